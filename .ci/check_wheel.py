@@ -11,7 +11,9 @@ wanted = {
     path.relative_to(ROOT).as_posix()
     for package in ("fmus", "gfor_fmu", "orchestrator")
     for path in (ROOT / package).rglob("*")
-    if path.is_file() and "__pycache__" not in path.parts and path.suffix != ".png"  # pictures of pages
+    if path.is_file()
+    and "__pycache__" not in path.parts
+    and path.suffix != ".png"  # pictures of pages
 }
 missing = sorted(wanted - held)
 if missing:
@@ -19,4 +21,6 @@ if missing:
 prebuilt = [name for name in held if "/prebuilt/" in name]
 if len(prebuilt) < 3:
     sys.exit(f"{wheel} brings no prebuilt libraries")
-print(f"{wheel}: {len(held)} files, {Path(wheel).stat().st_size / 1e6:.1f} MB, {len(prebuilt)} prebuilt libraries")
+print(
+    f"{wheel}: {len(held)} files, {Path(wheel).stat().st_size / 1e6:.1f} MB, {len(prebuilt)} prebuilt libraries"
+)

@@ -57,7 +57,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         files.append(File.generated(config, site, content=text))
         files.append(File.generated(config, site.replace(".md", ".ipynb"), abs_src_path=str(path)))
         for picture, content in pictures.items():
-            files.append(File.generated(config, f"{posixpath.dirname(site)}/{picture}", content=content))
+            files.append(
+                File.generated(config, f"{posixpath.dirname(site)}/{picture}", content=content)
+            )
     return files
 
 
@@ -132,8 +134,13 @@ def _command(name: str, words: str) -> str:
             shown += f" {value}"
         text = (action.help or "").replace("%%", "%").replace("|", "\\|").replace("<", "&lt;")
         rows.append(f"| `{shown.replace('|', '/')}` | {text} |")
-    usage = "\n".join(line[len("usage: ") :] for line in parser.format_usage().rstrip().splitlines())
-    return f"## `gfor {name}`\n\n{words[0].upper()}{words[1:]}.\n\n```text\n{usage}\n```\n\n" + "\n".join(rows)
+    usage = "\n".join(
+        line[len("usage: ") :] for line in parser.format_usage().rstrip().splitlines()
+    )
+    return (
+        f"## `gfor {name}`\n\n{words[0].upper()}{words[1:]}.\n\n```text\n{usage}\n```\n\n"
+        + "\n".join(rows)
+    )
 
 
 def studies() -> str:
@@ -151,8 +158,13 @@ def studies() -> str:
         )  # an added study has none
         for name in sorted({*rooms(), "design_over_points"})
     ]
-    of_scenario = [(f"Scenario.{name}", getattr(Scenario, name)) for name in ("modes", "run", "sensitivities", "steps")]
-    return "\n\n".join(_method(name, function) for name, function in (*of_case, *of_scenario, ("certify", certify)))
+    of_scenario = [
+        (f"Scenario.{name}", getattr(Scenario, name))
+        for name in ("modes", "run", "sensitivities", "steps")
+    ]
+    return "\n\n".join(
+        _method(name, function) for name, function in (*of_case, *of_scenario, ("certify", certify))
+    )
 
 
 def _method(name: str, function: Callable[..., object]) -> str:
@@ -164,7 +176,10 @@ def _method(name: str, function: Callable[..., object]) -> str:
             shown.append(f"```python\n{text.strip()}\n```")
             continue
         pairs = re.findall(r"^(\S+)\n((?:    .*\n?)+)", text, re.MULTILINE)
-        rows = [f"| `{one}` | {' '.join(words.split()).replace('|', chr(92) + '|')} |" for one, words in pairs]
+        rows = [
+            f"| `{one}` | {' '.join(words.split()).replace('|', chr(92) + '|')} |"
+            for one, words in pairs
+        ]
         shown.append("\n".join([f"| {head} | |", "|---|---|", *rows]))
     return "\n\n".join(shown)
 

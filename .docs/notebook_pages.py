@@ -39,10 +39,16 @@ def as_markdown(path: Path) -> tuple[str, dict[str, bytes]]:
     notebook = nbformat.read(path, as_version=4)
     heading = path.stem
     for cell in notebook.cells:
-        found = re.findall(r"^#+ +(.*)", cell.source, re.MULTILINE) if cell.cell_type == "markdown" else []
+        found = (
+            re.findall(r"^#+ +(.*)", cell.source, re.MULTILINE)
+            if cell.cell_type == "markdown"
+            else []
+        )
         heading = found[-1] if found else heading
         cell.metadata["heading"] = heading
-    exporter = MarkdownExporter(extra_loaders=[DictLoader({"page.md.j2": TEMPLATE})], template_file="page.md.j2")
+    exporter = MarkdownExporter(
+        extra_loaders=[DictLoader({"page.md.j2": TEMPLATE})], template_file="page.md.j2"
+    )
     for written in (fences, text_block, table_block):
         exporter.register_filter(written.__name__, written)
     names = {"unique_key": path.stem, "output_files_dir": f"{path.stem}_files"}

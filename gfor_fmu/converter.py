@@ -41,7 +41,9 @@ class Converter:
 
 def grid_forming_converter() -> Model:
     """Average EMT-type model of a droop-controlled grid-forming converter, stiff DC side (the paper's Fig. 1)."""
-    title = "Grid-forming converter with P-f and Q-V droop, POD-P and POD-Q (EMT-type average model)"
+    title = (
+        "Grid-forming converter with P-f and Q-V droop, POD-P and POD-Q (EMT-type average model)"
+    )
     m = ModelBuilder("gfor", title, kind="converter", usual=FORMING)
     port = device_port(m, S_n=S_N, P_0=P_0)
     converter = declare_converter(m, port)
@@ -63,10 +65,14 @@ def declare_converter(m: ModelBuilder, port: DevicePort, measured: Expr | None =
     m.close(Q, s.im)
     filter_equations(m, electrical, port, v_c, droop.theta, control.omega)
     current = electrical.i_g.value.rotated(droop.theta)
-    return Converter(current, control, electrical.u.magnitude(), electrical.i_s.value.magnitude(), limited.share)
+    return Converter(
+        current, control, electrical.u.magnitude(), electrical.i_s.value.magnitude(), limited.share
+    )
 
 
-def outer_control(m: ModelBuilder, droop: Droop, omega_b: Expr, measured: Expr | None = None) -> OuterControl:
+def outer_control(
+    m: ModelBuilder, droop: Droop, omega_b: Expr, measured: Expr | None = None
+) -> OuterControl:
     """Both POD controllers around the droops, and the angle that follows.
 
     Parameters
@@ -95,11 +101,26 @@ def declare_converter_outputs(m: ModelBuilder, converter: Converter) -> None:
     """Declare the control's signals and the magnitudes inside."""
     control = converter.control
     m.output("omega", control.omega, "pu", "Frequency imposed by the converter", base="f_n")
-    m.output("delta_p_pod", control.delta_p, "pu", "Supplementary active-power reference of POD-P", base="S_n")
-    m.output("delta_q_pod", control.delta_q, "pu", "Supplementary reactive-power reference of POD-Q", base="S_n")
+    m.output(
+        "delta_p_pod",
+        control.delta_p,
+        "pu",
+        "Supplementary active-power reference of POD-P",
+        base="S_n",
+    )
+    m.output(
+        "delta_q_pod",
+        control.delta_q,
+        "pu",
+        "Supplementary reactive-power reference of POD-Q",
+        base="S_n",
+    )
     m.output("u", converter.u, "pu", "Voltage magnitude at the filter capacitor", base="S_n")
     m.output("i_s", converter.i_s, "pu", "Current magnitude in the converter", base="S_n")
     if converter.current_demand is not None:
         m.output(
-            "current_demand", converter.current_demand, "1", "Demanded current in parts of its limit; above 1 it acts"
+            "current_demand",
+            converter.current_demand,
+            "1",
+            "Demanded current in parts of its limit; above 1 it acts",
         )

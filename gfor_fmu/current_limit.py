@@ -13,9 +13,12 @@ from fmus.toolchain.symbols import Expr, cos, fabs, fmax, if_else, logic_and, lo
 
 PAPER = "Mateu-Barriendos et al. 2024, appendix, current saturation"
 
-BOX, CIRCULAR, THRESHOLD_IMPEDANCE, SATURATION_INFORMED = range(4)  # values of ``current_limit.kind``
-_NEWTON = 8  # Newton's steps for the current behind a threshold impedance: to rounding for demands up to 100 pu
-_SMALLEST = 1e-12  # least value under a root; it keeps derivatives finite where the limit does not act
+# values of ``current_limit.kind``
+BOX, CIRCULAR, THRESHOLD_IMPEDANCE, SATURATION_INFORMED = range(4)
+# Newton's steps for the current behind a threshold impedance: to rounding for demands up to 100 pu
+_NEWTON = 8
+# least value under a root; it keeps derivatives finite where the limit does not act
+_SMALLEST = 1e-12
 
 
 @dataclass(frozen=True)
@@ -80,10 +83,16 @@ class LimitedCurrent:
     share: Expr
 
 
-def declare_box_limits(m: ModelBuilder, start: SteadyState, kind: Expr | float = float(BOX)) -> BoxLimits:
+def declare_box_limits(
+    m: ModelBuilder, start: SteadyState, kind: Expr | float = float(BOX)
+) -> BoxLimits:
     """Declare the limits of i_q,ref and i_d,ref; a dispatch beyond them is refused if that kind of limit acts."""
-    i_q_max = m.parameter("i_q_max", 1.1, "pu", "Limit of i_q,ref", base="S_n", minimum=0.1, source=PAPER)
-    i_d_max = m.parameter("i_d_max", 1.1, "pu", "Limit of i_d,ref", base="S_n", minimum=0.1, source=PAPER)
+    i_q_max = m.parameter(
+        "i_q_max", 1.1, "pu", "Limit of i_q,ref", base="S_n", minimum=0.1, source=PAPER
+    )
+    i_d_max = m.parameter(
+        "i_d_max", 1.1, "pu", "Limit of i_d,ref", base="S_n", minimum=0.1, source=PAPER
+    )
     acts = Expr(kind) < BOX + 0.5
     m.require(
         if_else(acts, i_q_max - fabs(start.i_s.re), 1),
@@ -100,24 +109,47 @@ def declare_current_limit(m: ModelBuilder, start: SteadyState) -> CurrentLimit:
     """Declare the limit; a dispatch that it would change is refused."""
     with m.scope("current_limit"):
         kind = m.parameter(
-            "kind", BOX, "1", "0: box in q and d; 1: circular; 2: threshold virtual impedance; 3: saturation-informed",
-            minimum=0, maximum=3, type="Integer", source=PAPER,
-        )  # fmt: skip
-        I_max = m.parameter(
-            "I_max", 1.1, "pu", "Largest current of kinds 1 to 3", base="S_n", minimum=0.1, source=PAPER
+            "kind",
+            BOX,
+            "1",
+            "0: box in q and d; 1: circular; 2: threshold virtual impedance; 3: saturation-informed",
+            minimum=0,
+            maximum=3,
+            type="Integer",
+            source=PAPER,
         )
-        threshold = m.parameter("threshold", 1.0, "pu", "Current from which kind 2 acts", base="S_n", minimum=0.05)
+        I_max = m.parameter(
+            "I_max",
+            1.1,
+            "pu",
+            "Largest current of kinds 1 to 3",
+            base="S_n",
+            minimum=0.1,
+            source=PAPER,
+        )
+        threshold = m.parameter(
+            "threshold", 1.0, "pu", "Current from which kind 2 acts", base="S_n", minimum=0.05
+        )
         angle = m.parameter(
-            "angle", 0.7854, "rad", "Angle of the impedance that kinds 1 and 3 act like; 0: the demand's angle is kept",
-            minimum=0, maximum=1.5708,
-        )  # fmt: skip
+            "angle",
+            0.7854,
+            "rad",
+            "Angle of the impedance that kinds 1 and 3 act like; 0: the demand's angle is kept",
+            minimum=0,
+            maximum=1.5708,
+        )
         X_R = m.parameter("X_R", 5.0, "1", "X/R of the impedance of kind 2", minimum=0, maximum=100)
         slope = m.calculated(
-            "slope", start.u.re / (I_max * fmax(I_max - threshold, 1e-6) * sqrt(1 + X_R**2)), "pu",
-            "Resistance of kind 2 for 1 pu beyond the threshold: a short circuit at the capacitor gives I_max", "S_n",
-        )  # fmt: skip
+            "slope",
+            start.u.re / (I_max * fmax(I_max - threshold, 1e-6) * sqrt(1 + X_R**2)),
+            "pu",
+            "Resistance of kind 2 for 1 pu beyond the threshold: a short circuit at the capacitor gives I_max",
+            "S_n",
+        )
     with m.scope("voltage_control"):
-        limit = CurrentLimit(kind, declare_box_limits(m, start, kind), I_max, threshold, angle, X_R, slope)
+        limit = CurrentLimit(
+            kind, declare_box_limits(m, start, kind), I_max, threshold, angle, X_R, slope
+        )
     m.require(
         if_else(limit.is_kind(THRESHOLD_IMPEDANCE), I_max - threshold, 1),
         "current_limit.threshold must be below current_limit.I_max",
@@ -155,13 +187,18 @@ def limited_current(limit: CurrentLimit, demanded: Phasor, k_p: Expr) -> Limited
     clamped = demanded.clamped(limit.box.i_q_max, limit.box.i_d_max)
     of_box = fmax(fabs(demanded.re) / limit.box.i_q_max, fabs(demanded.im) / limit.box.i_d_max)
     return LimitedCurrent(
-        demanded, _where(box, clamped, passed), missing, _where(limit.is_kind(SATURATION_INFORMED), missing, ZERO),
+        demanded,
+        _where(box, clamped, passed),
+        missing,
+        _where(limit.is_kind(SATURATION_INFORMED), missing, ZERO),
         if_else(box, of_box, size / free),
-    )  # fmt: skip
+    )
 
 
 def _where(condition: Expr, then: Phasor, otherwise: Phasor) -> Phasor:
-    return Phasor(if_else(condition, then.re, otherwise.re), if_else(condition, then.im, otherwise.im))
+    return Phasor(
+        if_else(condition, then.re, otherwise.re), if_else(condition, then.im, otherwise.im)
+    )
 
 
 def _circular_drop(limit: CurrentLimit, size: Expr) -> Phasor:

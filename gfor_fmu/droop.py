@@ -27,19 +27,41 @@ class Droop:
 def declare_droop(m: ModelBuilder, start: SteadyState, measured: Phasor) -> Droop:
     """Declare both droops with their measuring lags; ``measured`` is P + jQ at the filter capacitor."""
     with m.scope("droop"):
-        R_f = m.parameter("R_f", 0.05, "pu", "P-f droop", base="S_n", minimum=0, tunable=True, source=APPENDIX)
-        R_V = m.parameter("R_V", 0.067, "pu", "Q-V droop", base="S_n", minimum=0, tunable=True, source=APPENDIX)
-        tau_P = m.parameter("tau_P", 0.1, "s", "Lag of the P measurement", minimum=1e-3, source=APPENDIX)
-        tau_Q = m.parameter("tau_Q", 0.1, "s", "Lag of the Q measurement", minimum=1e-3, source=APPENDIX)
-        delta_P = m.parameter("delta_P_ref", 0, "pu", "Change of the P reference", base="S_n", tunable=True)
-        delta_Q = m.parameter("delta_Q_ref", 0, "pu", "Change of the Q reference", base="S_n", tunable=True)
-        delta_U = m.parameter("delta_U_ref", 0, "pu", "Change of the voltage reference", base="S_n", tunable=True)
-        P_0 = m.calculated("P_ref", start.s.re, "pu", "Active-power reference of the operating point", base="S_n")
-        Q_0 = m.calculated("Q_ref", start.s.im, "pu", "Reactive-power reference of the operating point", base="S_n")
-        U_0 = m.calculated("U_ref", start.u.re, "pu", "Voltage reference of the operating point", base="S_n")
+        R_f = m.parameter(
+            "R_f", 0.05, "pu", "P-f droop", base="S_n", minimum=0, tunable=True, source=APPENDIX
+        )
+        R_V = m.parameter(
+            "R_V", 0.067, "pu", "Q-V droop", base="S_n", minimum=0, tunable=True, source=APPENDIX
+        )
+        tau_P = m.parameter(
+            "tau_P", 0.1, "s", "Lag of the P measurement", minimum=1e-3, source=APPENDIX
+        )
+        tau_Q = m.parameter(
+            "tau_Q", 0.1, "s", "Lag of the Q measurement", minimum=1e-3, source=APPENDIX
+        )
+        delta_P = m.parameter(
+            "delta_P_ref", 0, "pu", "Change of the P reference", base="S_n", tunable=True
+        )
+        delta_Q = m.parameter(
+            "delta_Q_ref", 0, "pu", "Change of the Q reference", base="S_n", tunable=True
+        )
+        delta_U = m.parameter(
+            "delta_U_ref", 0, "pu", "Change of the voltage reference", base="S_n", tunable=True
+        )
+        P_0 = m.calculated(
+            "P_ref", start.s.re, "pu", "Active-power reference of the operating point", base="S_n"
+        )
+        Q_0 = m.calculated(
+            "Q_ref", start.s.im, "pu", "Reactive-power reference of the operating point", base="S_n"
+        )
+        U_0 = m.calculated(
+            "U_ref", start.u.re, "pu", "Voltage reference of the operating point", base="S_n"
+        )
         p_f = m.state("P_f", P_0, "pu", "Measured active power", base="S_n")
         q_f = m.state("Q_f", Q_0, "pu", "Measured reactive power", base="S_n")
-        theta = m.state("theta", start.theta, "rad", "Angle of the converter's frame in the network frame")
+        theta = m.state(
+            "theta", start.theta, "rad", "Angle of the converter's frame in the network frame"
+        )
         m.derivative(p_f, (measured.re - p_f) / tau_P)
         m.derivative(q_f, (measured.im - q_f) / tau_Q)
     return Droop(R_f, R_V, P_0 + delta_P, Q_0 + delta_Q, U_0 + delta_U, p_f, q_f, theta)

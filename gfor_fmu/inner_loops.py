@@ -5,7 +5,13 @@ from fmus.converter_parts.filter import APPENDIX, MeasuredFilter
 from fmus.toolchain.frames import Phasor, QdState, qd_state
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, fabs, if_else, logic_and
-from gfor_fmu.current_limit import BOX, CurrentLimit, LimitedCurrent, declare_current_limit, limited_current
+from gfor_fmu.current_limit import (
+    BOX,
+    CurrentLimit,
+    LimitedCurrent,
+    declare_current_limit,
+    limited_current,
+)
 
 
 def inner_loops(
@@ -29,13 +35,22 @@ def inner_loops(
     start = f.initial
     u_lagged, i_g_lagged = _feed_forwards(m, f)
     with m.scope("voltage_control"):
-        tau = m.parameter("tau", 0.05, "s", "Response time of the AC-voltage loop", minimum=1e-3, source=APPENDIX)
-        xi = m.parameter("xi", 0.707, "1", "Damping ratio of the AC-voltage loop", minimum=0.1, source=APPENDIX)
+        tau = m.parameter(
+            "tau", 0.05, "s", "Response time of the AC-voltage loop", minimum=1e-3, source=APPENDIX
+        )
+        xi = m.parameter(
+            "xi", 0.707, "1", "Damping ratio of the AC-voltage loop", minimum=0.1, source=APPENDIX
+        )
         C_c = f.B_c / omega_b
         omega_n = 4 / (tau * xi)
         k_p = 2 * xi * omega_n * C_c * 100  # the factor 100 is the paper's
         k_i = omega_n**2 * C_c
-        x = qd_state(m, "x", start.i_s - Phasor(0, f.B_c) * start.u - start.i_g, "Integrator of the voltage loop")
+        x = qd_state(
+            m,
+            "x",
+            start.i_s - Phasor(0, f.B_c) * start.u - start.i_g,
+            "Integrator of the voltage loop",
+        )
         error = u_ref - f.u
         demanded = k_p * error + x.value + Phasor(0, w * f.B_c) * f.u + i_g_lagged
     limit = declare_current_limit(m, start)
@@ -47,8 +62,13 @@ def inner_loops(
 def _feed_forwards(m: ModelBuilder, f: MeasuredFilter) -> tuple[Phasor, Phasor]:
     """Lagged capacitor voltage, and lagged grid current."""
     with m.scope("feed_forward"):
-        tau = m.parameter("tau", 1e-4, "s", "Lag of both feed-forwards", minimum=1e-5, source=APPENDIX)
-        m.require(2.5 * tau - m.internal_step, "internal_step must be shorter than 2.5 times feed_forward.tau")
+        tau = m.parameter(
+            "tau", 1e-4, "s", "Lag of both feed-forwards", minimum=1e-5, source=APPENDIX
+        )
+        m.require(
+            2.5 * tau - m.internal_step,
+            "internal_step must be shorter than 2.5 times feed_forward.tau",
+        )
         u = qd_state(m, "u", f.initial.u, "Lagged capacitor voltage")
         i_g = qd_state(m, "i_g", f.initial.i_g, "Lagged grid current")
         u.set_derivative(m, (f.u - u.value) / tau)
@@ -57,11 +77,18 @@ def _feed_forwards(m: ModelBuilder, f: MeasuredFilter) -> tuple[Phasor, Phasor]:
 
 
 def _integrate_what_is_left(
-    m: ModelBuilder, x: QdState, limit: CurrentLimit, found: LimitedCurrent, k_i: Expr, error: Phasor
+    m: ModelBuilder,
+    x: QdState,
+    limit: CurrentLimit,
+    found: LimitedCurrent,
+    k_i: Expr,
+    error: Phasor,
 ) -> None:
     """Anti-windup. In the paper's box each component stands still while it is clamped; behind the other limits the
     voltage that they take away is no error."""
     box, left = limit.is_kind(BOX), error - found.missing
     q_stops = logic_and(box, fabs(found.demanded.re) >= limit.box.i_q_max)
     d_stops = logic_and(box, fabs(found.demanded.im) >= limit.box.i_d_max)
-    x.set_derivative(m, Phasor(if_else(q_stops, 0, k_i * left.re), if_else(d_stops, 0, k_i * left.im)))
+    x.set_derivative(
+        m, Phasor(if_else(q_stops, 0, k_i * left.re), if_else(d_stops, 0, k_i * left.im))
+    )

@@ -37,7 +37,9 @@ def grid_forming_converter_phasor() -> Model:
     emf = source_emf(m, u, electrical.initial.u, droop.theta, port.omega_b * (control.omega - 1))
     declare_phasor_outputs(m, port, emf, impedance)
     i_s = i_g + _capacitor_current(electrical, u)
-    declare_converter_outputs(m, Converter(i_g.rotated(droop.theta), control, u.magnitude(), i_s.magnitude()))
+    declare_converter_outputs(
+        m, Converter(i_g.rotated(droop.theta), control, u.magnitude(), i_s.magnitude())
+    )
     text = "Current in parts of its limit; above 1 the current limit, which is not represented, would act"
     m.output("current_limit", _of_limit(m, electrical, i_s), "1", text)
     return m.build()

@@ -18,7 +18,9 @@ N_S_MAX = 3  # most lead/lag stages a controller can be given
 SOURCE = "Mateu-Barriendos et al. 2024, table of POD parameters"
 
 
-def pod(m: ModelBuilder, name: str, delta_omega: Expr, *, sign: int, T_S1: float, T_S2: float) -> Expr:
+def pod(
+    m: ModelBuilder, name: str, delta_omega: Expr, *, sign: int, T_S1: float, T_S2: float
+) -> Expr:
     """Declare one controller and return its supplementary reference [pu, S_n].
 
     Parameters
@@ -35,17 +37,59 @@ def pod(m: ModelBuilder, name: str, delta_omega: Expr, *, sign: int, T_S1: float
         Default lead and lag time constants [s].
     """
     with m.scope(name):
-        enabled = m.switch("enabled", False, "Adds the controller's output to the droop", tunable=True)
-        T_W = m.parameter("T_W", 5.0, "s", "Washout", minimum=0.01, tunable=True, source=SOURCE)
-        T_f = m.parameter("T_f", 0.1, "s", "Low-pass filter", minimum=1e-3, tunable=True, source=SOURCE)
-        T_1 = m.parameter("T_S1", T_S1, "s", "Lead time constant of each stage", minimum=0, tunable=True, source=SOURCE)
-        T_2 = m.parameter("T_S2", T_S2, "s", "Lag time constant of each stage", minimum=0, tunable=True, source=SOURCE)
-        N_S = m.parameter(
-            "N_S", 2, "1", "Number of lead/lag stages", minimum=0, maximum=N_S_MAX, type="Integer", source=SOURCE
+        enabled = m.switch(
+            "enabled", False, "Adds the controller's output to the droop", tunable=True
         )
-        K = m.parameter("K", 200.0, "pu", "Gain", base="S_n", minimum=0, maximum=1e5, tunable=True, source=SOURCE)
-        bound = m.parameter("limit", 0.2, "pu", "Output limit", base="S_n", minimum=0, tunable=True, source=SOURCE)
-        m.require(if_else(logic_and(T_2 <= 0, T_1 > 0), -1, 1), f"{name}.T_S2 = 0 needs {name}.T_S1 = 0 as well")
+        T_W = m.parameter("T_W", 5.0, "s", "Washout", minimum=0.01, tunable=True, source=SOURCE)
+        T_f = m.parameter(
+            "T_f", 0.1, "s", "Low-pass filter", minimum=1e-3, tunable=True, source=SOURCE
+        )
+        T_1 = m.parameter(
+            "T_S1",
+            T_S1,
+            "s",
+            "Lead time constant of each stage",
+            minimum=0,
+            tunable=True,
+            source=SOURCE,
+        )
+        T_2 = m.parameter(
+            "T_S2",
+            T_S2,
+            "s",
+            "Lag time constant of each stage",
+            minimum=0,
+            tunable=True,
+            source=SOURCE,
+        )
+        N_S = m.parameter(
+            "N_S",
+            2,
+            "1",
+            "Number of lead/lag stages",
+            minimum=0,
+            maximum=N_S_MAX,
+            type="Integer",
+            source=SOURCE,
+        )
+        K = m.parameter(
+            "K",
+            200.0,
+            "pu",
+            "Gain",
+            base="S_n",
+            minimum=0,
+            maximum=1e5,
+            tunable=True,
+            source=SOURCE,
+        )
+        bound = m.parameter(
+            "limit", 0.2, "pu", "Output limit", base="S_n", minimum=0, tunable=True, source=SOURCE
+        )
+        m.require(
+            if_else(logic_and(T_2 <= 0, T_1 > 0), -1, 1),
+            f"{name}.T_S2 = 0 needs {name}.T_S1 = 0 as well",
+        )
         m.require(
             if_else(T_2 <= 0, 1, T_2 - m.internal_step / 2),
             f"{name}.T_S2 must be 0 or longer than half of internal_step",

@@ -9,10 +9,14 @@ from gfor_fmu.usual import FORMING
 
 def grid_forming_converter_pod_input() -> Model:
     """`grid_forming_converter`, but POD-P and POD-Q act on the frequency at the input ``omega_pod``."""
-    title = "Grid-forming converter with P-f and Q-V droop; POD-P and POD-Q act on an input (EMT type)"
+    title = (
+        "Grid-forming converter with P-f and Q-V droop; POD-P and POD-Q act on an input (EMT type)"
+    )
     m = ModelBuilder("gfor_pod_input", title, kind="converter", usual=FORMING)
     port = device_port(m, S_n=S_N, P_0=P_0)
-    measured = m.input("omega_pod", "pu", "Frequency that the POD controllers act on", base="f_n", start=1.0)
+    measured = m.input(
+        "omega_pod", "pu", "Frequency that the POD controllers act on", base="f_n", start=1.0
+    )
     converter = declare_converter(m, port, measured)
     declare_port_outputs(m, port, converter.current)
     declare_converter_outputs(m, converter)

@@ -26,21 +26,32 @@ def grid_forming_converter_abc() -> Model:
     rating = declare_rating(m, S_N)
     V_n = m.declare(replace(port_variables.V_N, start=V_N))
     angle_0 = m.parameter(
-        "angle_0", 0.0, "rad", "Angle of the network frame at the start; phase a is v·cos(angle_0 + theta_0) there"
+        "angle_0",
+        0.0,
+        "rad",
+        "Angle of the network frame at the start; phase a is v·cos(angle_0 + theta_0) there",
     )
     # Of phase quantities: 1 pu is the amplitude of the rated phase voltage, and the current that gives S_n with it.
     volt, ampere = V_n * 1e3 * sqrt(2 / 3), rating / V_n * 1e3 * sqrt(2 / 3)
     peak = V_N * 1e3 * (2 / 3) ** 0.5
     v_a = m.input("v_a", "V", "Instantaneous voltage of phase a to neutral at the bus", start=peak)
-    v_b = m.input("v_b", "V", "Instantaneous voltage of phase b to neutral at the bus", start=-peak / 2)
-    v_c = m.input("v_c", "V", "Instantaneous voltage of phase c to neutral at the bus", start=-peak / 2)
-    angle = m.state("frame.angle", angle_0, "rad", "Angle of the network frame, φ_0 + ω_b·t", stepwise=True)
+    v_b = m.input(
+        "v_b", "V", "Instantaneous voltage of phase b to neutral at the bus", start=-peak / 2
+    )
+    v_c = m.input(
+        "v_c", "V", "Instantaneous voltage of phase c to neutral at the bus", start=-peak / 2
+    )
+    angle = m.state(
+        "frame.angle", angle_0, "rad", "Angle of the network frame, φ_0 + ω_b·t", stepwise=True
+    )
 
     port = port_at(m, of_phases((v_a, v_b, v_c), angle) / volt, P_0, ampere)
     m.derivative(angle, port.omega_b)
     converter = declare_converter(m, port)
 
-    for name, current in zip("abc", phases(converter.current * port.current_scale, angle), strict=True):
+    for name, current in zip(
+        "abc", phases(converter.current * port.current_scale, angle), strict=True
+    ):
         m.output(f"i_{name}", current, "A", f"Instantaneous current of phase {name} into the bus")
     s = power(port.v, converter.current) * rating
     m.output("p", s.re, "MW", "Active power into the bus")

@@ -17,7 +17,10 @@ from types import ModuleType
 
 _STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
 _HOMES = {
-    name: home for home, name in re.findall(r"^from orchestrator\.(\S+) import \S+ as (\S+)$", _STUB, re.MULTILINE)
+    name: home
+    for home, name in re.findall(
+        r"^from orchestrator\.(\S+) import \S+ as (\S+)$", _STUB, re.MULTILINE
+    )
 }
 """Name → module of this package that defines it, as ``__init__.pyi`` has them."""
 
@@ -26,7 +29,9 @@ __all__ = [*_HOMES]  # noqa: PLE0604 - names all the same
 
 def __getattr__(name: str) -> object:
     if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has: {', '.join(_HOMES)}")
+        raise AttributeError(
+            f"module {__name__!r} has no attribute {name!r}; it has: {', '.join(_HOMES)}"
+        )
     value: object = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
     globals()[name] = value
     return value
@@ -46,7 +51,9 @@ class _Package(ModuleType):
 
     def __call__(self, *_: object, **__: object) -> None:
         name = self.__name__.rpartition(".")[2]
-        method = f"gfor.load('two_area').{name}(…), or " if hasattr(__getattr__("Case"), name) else ""
+        method = (
+            f"gfor.load('two_area').{name}(…), or " if hasattr(__getattr__("Case"), name) else ""
+        )
         raise AttributeError(
             f"{name} is no function: use {method}`gfor {name}` at the terminal; functions: {', '.join(_HOMES)}"
         )

@@ -16,7 +16,12 @@ def rooms() -> dict[str, str]:
 
 def words_of(room: str) -> str:
     """What a room says of itself, for a list of commands."""
-    text = (import_module(f"{__package__}.{room}").__doc__ or "").strip().partition("\n")[0].rstrip(".")
+    text = (
+        (import_module(f"{__package__}.{room}").__doc__ or "")
+        .strip()
+        .partition("\n")[0]
+        .rstrip(".")
+    )
     return text[:1].lower() + text[1:]
 
 

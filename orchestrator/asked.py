@@ -18,7 +18,9 @@ Request = TypeVar("Request")
 Names = str | Sequence[str]  # one name, or several
 
 _ASKED = "asked"
-_FOR_COMMANDS = re.compile(r" \((default: [^ ;()]+(; with [^()]*)?|repeatable|[\d.:]+)\)|repeatable; (?=default)")
+_FOR_COMMANDS = re.compile(
+    r" \((default: [^ ;()]+(; with [^()]*)?|repeatable|[\d.:]+)\)|repeatable; (?=default)"
+)
 _SHOWN = 60  # characters of an overlong path that an error shows
 _LARGEST = 10**308  # of a whole number that a floating-point number can hold
 
@@ -28,7 +30,8 @@ class FieldKind:
     metavar: str
     # from an option's text, or a `ValueError` that says what is wrong with it; None for a switch
     read: Callable[[str], Any] | None
-    check: Callable[[Any, str], Any]  # from what a caller gives, and the keyword for the `InputError`
+    # from what a caller gives, and the keyword for the `InputError`
+    check: Callable[[Any, str], Any]
     several: bool = False  # whether the option is repeatable, and gives a tuple
     joined: bool = False  # whether these are one text with commas
     unit: str = ""  # that Python gives it in
@@ -52,24 +55,36 @@ class Asked:
     def meaning(self) -> str:
         """What the field means to Python, whose signature shows the default."""
         text = self.python or _FOR_COMMANDS.sub("", self.help).replace("%%", "%")
-        return text[:1].upper() + text[1:] + (f" [{self.kind.unit}]" if self.kind.unit else "") + "."
+        return (
+            text[:1].upper() + text[1:] + (f" [{self.kind.unit}]" if self.kind.unit else "") + "."
+        )
 
     @property
     def shown_default(self) -> Any:
         """The default in the unit in which Python gives the field."""
         return (
-            self.default if self.kind.times == 1 or self.default is None else round(self.kind.times * self.default, 9)
+            self.default
+            if self.kind.times == 1 or self.default is None
+            else round(self.kind.times * self.default, 9)
         )
 
 
 def asked(
-    kind: FieldKind, default: Any, text: str, metavar: str = "", *, option: str | None = "", python: str = ""
+    kind: FieldKind,
+    default: Any,
+    text: str,
+    metavar: str = "",
+    *,
+    option: str | None = "",
+    python: str = "",
 ) -> Any:
     """A field of a request, whose name is its keyword.
 
     ``text``: help of the option, and what the field means; ``python``: where Python needs other words.
     ``option``: where it is not spelt as the field is; None for a field that only Python has."""
-    return field(default=default, metadata={_ASKED: (kind, text, metavar or kind.metavar, option, python)})
+    return field(
+        default=default, metadata={_ASKED: (kind, text, metavar or kind.metavar, option, python)}
+    )
 
 
 def asked_of(request: type) -> dict[str, Asked]:
@@ -98,14 +113,20 @@ def checked(request: type, wanted: Mapping[str, Any]) -> dict[str, Any]:
 def require_known(wanted: Iterable[str], known: Iterable[str], who: str) -> None:
     """Refuse keywords that a study does not have; ``who`` is such as ``a design``."""
     if unknown := [name for name in wanted if name not in known]:
-        raise InputError(f"{who} cannot be asked for {', '.join(map(repr, unknown))}, but for {', '.join(known)}")
+        raise InputError(
+            f"{who} cannot be asked for {', '.join(map(repr, unknown))}, but for {', '.join(known)}"
+        )
 
 
 def plain_value(value: Any) -> Value:
     """A value, as Python's own number where it is one of NumPy."""
-    own: Value = value.item() if hasattr(value, "item") and getattr(value, "size", 1) == 1 else value
+    own: Value = (
+        value.item() if hasattr(value, "item") and getattr(value, "size", 1) == 1 else value
+    )
     if isinstance(own, int) and abs(own) > _LARGEST:
-        raise InputError("a whole number beyond 1e308 was given as a value; give a number that a float can hold")
+        raise InputError(
+            "a whole number beyond 1e308 was given as a value; give a number that a float can hold"
+        )
     return own
 
 
@@ -118,10 +139,14 @@ def number_in(given: Any, unit: str, argument: str, rule: str) -> float:
     except ValueError as error:
         raise InputError(f"{argument}: {error}") from error
     except OverflowError as error:
-        raise InputError(f"{argument} is a number beyond 1e308; give {rule.removeprefix('give ')}") from error
+        raise InputError(
+            f"{argument} is a number beyond 1e308; give {rule.removeprefix('give ')}"
+        ) from error
 
 
-def number_between(given: Any, unit: str, argument: str, least: float, most: float, rule: str) -> float:
+def number_between(
+    given: Any, unit: str, argument: str, least: float, most: float, rule: str
+) -> float:
     number = number_in(given, unit, argument, rule)
     if not least <= number <= most:
         raise InputError(f"{argument} = {given!r}; it must be {rule}")
@@ -155,7 +180,9 @@ def names(given: Names, argument: str) -> tuple[str, ...]:
     return listed
 
 
-def text_or_none(given: Any, argument: str, rule: str = "give one name, or leave it out") -> str | None:
+def text_or_none(
+    given: Any, argument: str, rule: str = "give one name, or leave it out"
+) -> str | None:
     if given is not None and (not isinstance(given, str) or not given):
         raise InputError(f"{argument} = {given!r}; {rule}")
     return given
@@ -175,7 +202,9 @@ def _check_length(path: Path, argument: str) -> None:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         shown = str(path) if len(str(path)) <= _SHOWN else f"{str(path)[:_SHOWN]}…"
-        raise InputError(f"{argument} = {shown!r} is no path that a file can have: {reason}") from error
+        raise InputError(
+            f"{argument} = {shown!r} is no path that a file can have: {reason}"
+        ) from error
 
 
 def read_range(text: str) -> tuple[float, float]:
@@ -183,7 +212,9 @@ def read_range(text: str) -> tuple[float, float]:
     low, colon, high = text.partition(":")
     limits = as_number(low), as_number(high)
     if not colon or not 0 <= limits[0] < limits[1]:
-        raise ValueError(f"{text!r} is not a range; write LO:HI in Hz with 0 ≤ LO < HI, such as 0.1:2")
+        raise ValueError(
+            f"{text!r} is not a range; write LO:HI in Hz with 0 ≤ LO < HI, such as 0.1:2"
+        )
     return limits
 
 
@@ -224,15 +255,23 @@ def percent(given: Any, argument: str, most: float = 90) -> float:
     """A damping [%] as a ratio; a number below 1 looks like a ratio and is refused."""
     own: Any = plain_value(given)
     if not _is_number(own) or not 1 <= own <= most:
-        ratio = f": write {100 * own:g} for a damping ratio of {own:g}" if _is_number(own) and 0 < own < 1 else ""
-        raise InputError(f"{argument} = {given!r}; it is in percent between 1 and {most:g}, such as 20{ratio}")
+        ratio = (
+            f": write {100 * own:g} for a damping ratio of {own:g}"
+            if _is_number(own) and 0 < own < 1
+            else ""
+        )
+        raise InputError(
+            f"{argument} = {given!r}; it is in percent between 1 and {most:g}, such as 20{ratio}"
+        )
     return float(own) / 100
 
 
 def share(given: Any, argument: str) -> float:
     own: Any = plain_value(given)
     if not _is_number(own) or not 0 < own <= 0.5:
-        raise InputError(f"{argument} = {given!r}; it must be a share above 0, and at most 0.5: 0.05 is 5 %")
+        raise InputError(
+            f"{argument} = {given!r}; it must be a share above 0, and at most 0.5: 0.05 is 5 %"
+        )
     return float(own)
 
 
@@ -243,7 +282,9 @@ def read_positive(text: str) -> float:
     return number
 
 
-def positive(given: Any, argument: str, rule: str = "give a number above 0, or leave it out") -> float:
+def positive(
+    given: Any, argument: str, rule: str = "give a number above 0, or leave it out"
+) -> float:
     own: Any = plain_value(given)
     if not _is_number(own) or not 0 < own < 1e300:
         raise InputError(f"{argument} = {given!r}; {rule}")
@@ -276,7 +317,9 @@ def read_bounds(text: str) -> tuple[float, float]:
     low, _, high = text.partition(":")
     limits = as_number(low), as_number(high)
     if not _are_bounds(*limits):
-        raise ValueError(f"{text!r} are no bounds; write MIN:MAX in pu with 0 ≤ MIN ≤ MAX, such as 200:400")
+        raise ValueError(
+            f"{text!r} are no bounds; write MIN:MAX in pu with 0 ≤ MIN ≤ MAX, such as 200:400"
+        )
     return limits
 
 
@@ -312,13 +355,20 @@ DAMPING = FieldKind("PERCENT", read_percent, percent, unit="%", times=100)
 SHARE = FieldKind("PERCENT", read_part("a share in percent up to 50, such as 5", 1e-9, 50), share)
 POSITIVE = FieldKind("X", read_positive, positive)
 GAIN = FieldKind(
-    "DK", read_positive, partial(positive, rule="give a gain above 0 in pu, such as 50.0, or leave it out")
+    "DK",
+    read_positive,
+    partial(positive, rule="give a gain above 0 in pu, such as 50.0, or leave it out"),
 )
-FILE = FieldKind("FILE", Path, lambda given, argument: None if given is None else path(given, argument))
+FILE = FieldKind(
+    "FILE", Path, lambda given, argument: None if given is None else path(given, argument)
+)
 OUTAGES = FieldKind(
-    "WHICH", str, lambda given, argument: None if given is None else ",".join(names(given, argument)),
-    several=True, joined=True,
-)  # fmt: skip
+    "WHICH",
+    str,
+    lambda given, argument: None if given is None else ",".join(names(given, argument)),
+    several=True,
+    joined=True,
+)
 GAIN_BOUNDS = FieldKind("MIN:MAX", read_bounds, bounds)
 STAGES = FieldKind("N_S", read_whole(0, 10), partial(whole_number, least=0, most=10))
 RANKED = FieldKind("N", read_whole(0, 1000), partial(whole_number, least=0, most=1000))

@@ -22,7 +22,11 @@ def few(texts: Iterable[str], most: int, between: str = ", ") -> str:
 
 def counted(number: int, what: str) -> str:
     """``3 points``."""
-    return f"{number} {what}" if number == 1 else f"{number} {what}{'es' if what.endswith('s') else 's'}"
+    return (
+        f"{number} {what}"
+        if number == 1
+        else f"{number} {what}{'es' if what.endswith('s') else 's'}"
+    )
 
 
 class ErrorKind(StrEnum):
@@ -50,9 +54,15 @@ class ErrorKind(StrEnum):
 
 
 _LASTING = {
-    ErrorKind.VALUES, ErrorKind.UNITS, ErrorKind.ISLANDING, ErrorKind.POWER_FLOW, ErrorKind.START,
-    ErrorKind.STEADY_STATE, ErrorKind.HIDDEN_STATES, ErrorKind.ANALYSIS,
-}  # fmt: skip
+    ErrorKind.VALUES,
+    ErrorKind.UNITS,
+    ErrorKind.ISLANDING,
+    ErrorKind.POWER_FLOW,
+    ErrorKind.START,
+    ErrorKind.STEADY_STATE,
+    ErrorKind.HIDDEN_STATES,
+    ErrorKind.ANALYSIS,
+}
 
 
 class CosimError(Exception):
@@ -79,7 +89,8 @@ class CosimError(Exception):
         return make, (type(self), *self.args), self.__dict__
 
     def __str__(self) -> str:
-        return spelled(Exception.__str__(self))  # not that of another base, such as KeyError, which quotes
+        # not that of another base, such as KeyError, which quotes
+        return spelled(Exception.__str__(self))
 
 
 class InputError(CosimError):
@@ -125,7 +136,8 @@ class Problem:
         return spelled(f"{self.place}: {self.text}" if self.place else self.text)
 
 
-MOST_PROBLEMS = 200  # so many mistakes of one case are listed; looking for more would take long and help nobody
+# so many mistakes of one case are listed; looking for more would take long and help nobody
+MOST_PROBLEMS = 200
 
 TOO_MANY = Problem("", "there are more problems than are listed; mend these first")
 
@@ -165,12 +177,26 @@ class ComponentError(CosimError):
     kind = ErrorKind.FMU
 
     def __init__(
-        self, component: str, call: str, status: str, log: str, time: float | None = None, kind: ErrorKind | None = None
+        self,
+        component: str,
+        call: str,
+        status: str,
+        log: str,
+        time: float | None = None,
+        kind: ErrorKind | None = None,
     ) -> None:
-        self.component, self.call, self.status, self.log, self.time = component, call, status, log, time
+        self.component, self.call, self.status, self.log, self.time = (
+            component,
+            call,
+            status,
+            log,
+            time,
+        )
         when = "" if time is None else f" at t = {time:.6g} s"
         said = log or "the FMU logged no text"
-        super().__init__(f"component {component!r}{when}: {call} returned {status}: {said}", kind=kind)
+        super().__init__(
+            f"component {component!r}{when}: {call} returned {status}: {said}", kind=kind
+        )
 
 
 class NotFiniteError(ComponentError):
@@ -178,7 +204,9 @@ class NotFiniteError(ComponentError):
 
     kind = ErrorKind.NOT_FINITE
 
-    def __init__(self, component: str, variable: str, value: float | None, time: float | None) -> None:
+    def __init__(
+        self, component: str, variable: str, value: float | None, time: float | None
+    ) -> None:
         self.variable, self.value = variable, value
         seen = "" if value is None else f" ({value})"
         said = f"{variable} is no finite number{seen}"
@@ -196,7 +224,13 @@ class EndedError(CosimError):
     [s]."""
 
     def __init__(self, component: str, status: str, log: str, time: float, ended_at: float) -> None:
-        self.component, self.status, self.log, self.time, self.ended_at = component, status, log, time, ended_at
+        self.component, self.status, self.log, self.time, self.ended_at = (
+            component,
+            status,
+            log,
+            time,
+            ended_at,
+        )
         said = f" (it says: {log})" if log else ""
         super().__init__(
             f"component {component!r}: it ended its simulation at t = {ended_at:.6g} s by itself, which is no error"
@@ -209,7 +243,9 @@ class NotTakenUpError(CosimError):
 
     def __init__(self, component: str, reason: str) -> None:
         self.component, self.reason = component, reason
-        super().__init__(f"component {component!r} does not go on from its state in a checkpoint: {reason}")
+        super().__init__(
+            f"component {component!r} does not go on from its state in a checkpoint: {reason}"
+        )
 
 
 class RunInterruptedError(CosimError):

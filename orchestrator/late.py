@@ -26,7 +26,9 @@ if TYPE_CHECKING:
     import xarray as xr
     from scipy import optimize, signal
 else:
-    pd, xr, optimize, signal = (Late(name) for name in ("pandas", "xarray", "scipy.optimize", "scipy.signal"))
+    pd, xr, optimize, signal = (
+        Late(name) for name in ("pandas", "xarray", "scipy.optimize", "scipy.signal")
+    )
 
 
 def import_xarray_alone() -> None:

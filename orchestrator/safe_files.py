@@ -10,7 +10,8 @@ from pathlib import Path
 from orchestrator.errors import InputError, ResultsError
 
 inputs: set[Path] = set()  # real paths of the files that the command in force reads
-PARTIAL = ".part-"  # begins the names of files that are not finished, and stands in those of folders that are not
+# begins the names of files that are not finished, and stands in those of folders that are not
+PARTIAL = ".part-"
 
 
 def file_hash(path: Path | None) -> str | None:
@@ -18,7 +19,9 @@ def file_hash(path: Path | None) -> str | None:
     return None if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def made_folder(given: str | Path, label: str = "", what: str = "results cannot be written there") -> Path:
+def made_folder(
+    given: str | Path, label: str = "", what: str = "results cannot be written there"
+) -> Path:
     """A folder, made where it is missing, before anything is computed for it."""
     if not isinstance(given, str | Path) or not given:
         raise InputError(f"{label or 'folder'} = {given!r}; give the path of a folder")
@@ -33,7 +36,9 @@ def made_folder(given: str | Path, label: str = "", what: str = "results cannot 
 
 def spare_input(path: Path) -> None:
     if inputs and path.resolve() in inputs:
-        raise InputError(f"{path}: the command reads this file and would write over it; name another one to write")
+        raise InputError(
+            f"{path}: the command reads this file and would write over it; name another one to write"
+        )
 
 
 @contextmanager

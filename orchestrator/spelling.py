@@ -5,17 +5,46 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 _KEYWORDS = {
-    "set": "values", "range": "frequencies", "min-damping": "least_damping", "rank": "ranked", "place": "places",
-    "out": "folder", "checkpoint": "checkpoints", "resume": "checkpoints", "parameter": "parameters", "text": "texts",
-    "try": "steps", "federate": "federates", "engine helics": "federates",
-}  # fmt: skip
+    "set": "values",
+    "range": "frequencies",
+    "min-damping": "least_damping",
+    "rank": "ranked",
+    "place": "places",
+    "out": "folder",
+    "checkpoint": "checkpoints",
+    "resume": "checkpoints",
+    "parameter": "parameters",
+    "text": "texts",
+    "try": "steps",
+    "federate": "federates",
+    "engine helics": "federates",
+}
 """Of options that are not spelt as their keywords."""
 
-_CALLS = ("run", "modes", "linearize", "steps", "sweep", "sensitivities", "interactions", "site", "screen", "compare",
-          "source", "identify", "design", "nyquist", "build", "check", "info")  # fmt: skip
+_CALLS = (
+    "run",
+    "modes",
+    "linearize",
+    "steps",
+    "sweep",
+    "sensitivities",
+    "interactions",
+    "site",
+    "screen",
+    "compare",
+    "source",
+    "identify",
+    "design",
+    "nyquist",
+    "build",
+    "check",
+    "info",
+)
 """Commands that Python has as functions of the same name."""
 
-_KEPT = re.compile(r"[^\s'\"]*given[/\\][0-9a-f]{16}[/\\](case|binding|points)\.(?:toml|csv)(?:, line (\d+))?")
+_KEPT = re.compile(
+    r"[^\s'\"]*given[/\\][0-9a-f]{16}[/\\](case|binding|points)\.(?:toml|csv)(?:, line (\d+))?"
+)
 _COMMAND_ONLY = {"json", "with-linear-model"}
 _QUOTED = re.compile(r"`[^`]*`|(?<![\w-])--(engine helics|[a-z][a-z-]*)")
 _commanded = list[None]()  # one for each that asks for options
@@ -38,7 +67,9 @@ def keyword(option: str) -> str:
 def spelled(text: str) -> str:
     """A text that names options as ``--out``, for who reads it; commands of other programs stay. What was given as
     tables is named as it was given, and not by the file that keeps it."""
-    text = _KEPT.sub(lambda m: m[1] + (f", row {int(m[2]) - 1}" if (m[2] or "1") != "1" else ""), text)
+    text = _KEPT.sub(
+        lambda m: m[1] + (f", row {int(m[2]) - 1}" if (m[2] or "1") != "1" else ""), text
+    )
     return text if _commanded or "--" not in text else _QUOTED.sub(_in_python, text)
 
 
@@ -53,6 +84,9 @@ def _in_python(found: re.Match[str]) -> str:
         return found[0]
     given = [option.partition(" ") for option in options]
     if words[1] in _CALLS and not any(name in _COMMAND_ONLY for name, _, _ in given):
-        values = [f"{keyword(name)}={value!r}" if value else f"{keyword(name)}=True" for name, _, value in given]
+        values = [
+            f"{keyword(name)}={value!r}" if value else f"{keyword(name)}=True"
+            for name, _, value in given
+        ]
         return f"`{words[1]}({', '.join(values)})`"
     return f"`{command}` with {', '.join(f'{keyword(name)} {value}'.strip() for name, _, value in given)}"

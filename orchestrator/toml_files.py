@@ -18,7 +18,9 @@ class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", populate_by_name=True)
 
 
-def read_toml(path: Path, subject: str, remedy: str, option: str = "") -> tuple[str, dict[str, Any]]:
+def read_toml(
+    path: Path, subject: str, remedy: str, option: str = ""
+) -> tuple[str, dict[str, Any]]:
     """Read a TOML file; its text, and what the text says.
 
     Raises an `InputError` if there is no such file, it cannot be read, it is larger than `MOST_BYTES`, or it is not
@@ -33,7 +35,9 @@ def read_toml(path: Path, subject: str, remedy: str, option: str = "") -> tuple[
         text = path.read_text(encoding="utf-8")
         return text, parsed(text)
     except OSError as error:
-        raise InputError(f"{source}: {subject} cannot be read: {error.strerror}; {remedy}") from error
+        raise InputError(
+            f"{source}: {subject} cannot be read: {error.strerror}; {remedy}"
+        ) from error
     except tomllib.TOMLDecodeError as error:
         last = f"at the end of line {len(text.rstrip().splitlines())}, the last one"
         said = str(error).replace("at end of document", last)
@@ -44,9 +48,13 @@ def read_toml(path: Path, subject: str, remedy: str, option: str = "") -> tuple[
     except UnicodeDecodeError as error:
         raise InputError(f"{source}: it is not a TOML file: {error}") from error
     except ValueError as error:  # of `parsed`, or Python's own, which converts at most 4,300 digits
-        raise InputError(f"{source}: a whole number in it has too many digits to be read; shorten it") from error
+        raise InputError(
+            f"{source}: a whole number in it has too many digits to be read; shorten it"
+        ) from error
     except RecursionError as error:
-        raise InputError(f"{source}: its brackets nest too deeply to be read; {subject} nests at most five") from error
+        raise InputError(
+            f"{source}: its brackets nest too deeply to be read; {subject} nests at most five"
+        ) from error
 
 
 def parsed(text: str) -> dict[str, Any]:
@@ -61,7 +69,9 @@ def _check_whole_numbers(value: Any) -> None:
         for inner in value.values() if isinstance(value, dict) else value:
             _check_whole_numbers(inner)
     elif isinstance(value, int) and abs(value) > sys.float_info.max:
-        raise ValueError(f"a whole number has {value.bit_length()} bits; it must be one that a computation takes")
+        raise ValueError(
+            f"a whole number has {value.bit_length()} bits; it must be one that a computation takes"
+        )
 
 
 def fault_of(detail: Any) -> str:
@@ -78,4 +88,8 @@ def fault_of(detail: Any) -> str:
         case "list_type" | "tuple_type":
             return "it must be a list; write it in square brackets"
         case _:
-            return str(detail["msg"]).removeprefix("Value error, ").replace("Input should be", "it must be")
+            return (
+                str(detail["msg"])
+                .removeprefix("Value error, ")
+                .replace("Input should be", "it must be")
+            )

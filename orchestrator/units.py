@@ -5,18 +5,24 @@ from functools import cache
 from threading import Lock
 from typing import Any
 
-_QUANTITY = re.compile(r"\s*(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)\s*(?P<unit>[^\d\s,.][^\s,]*)?\s*")
+_QUANTITY = re.compile(
+    r"\s*(?P<number>[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)\s*(?P<unit>[^\d\s,.][^\s,]*)?\s*"
+)
 _POWERS = {"W", "VA", "var"}
 _ANGLES = ("radian", "degree", "arcminute", "arcsecond", "grade", "mil", "turn", "revolution")
 _TURNS = ("turn", "revolution")
 
 USUAL: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
-    "Hz": {"Hz": 1.0, "mHz": 1e-3, "kHz": 1e3, "MHz": 1e6}, "MW": {"MW": 1.0, "W": 1e-6, "kW": 1e-3, "GW": 1e3},
+    "Hz": {"Hz": 1.0, "mHz": 1e-3, "kHz": 1e3, "MHz": 1e6},
+    "MW": {"MW": 1.0, "W": 1e-6, "kW": 1e-3, "GW": 1e3},
     "MVA": {"MVA": 1.0, "VA": 1e-6, "kVA": 1e-3, "GVA": 1e3},
-    "Mvar": {"Mvar": 1.0, "var": 1e-6, "kvar": 1e-3, "Gvar": 1e3}, "kV": {"kV": 1.0, "V": 1e-3}, "rad": {"rad": 1.0},
-    "deg": {"deg": 1.0}, "pu": {"pu": 1.0},
-}  # fmt: skip
+    "Mvar": {"Mvar": 1.0, "var": 1e-6, "kvar": 1e-3, "Gvar": 1e3},
+    "kV": {"kV": 1.0, "V": 1e-3},
+    "rad": {"rad": 1.0},
+    "deg": {"deg": 1.0},
+    "pu": {"pu": 1.0},
+}
 """Declared unit → factor of the units that it is usually given in. They are pint's own factors, to the last bit: a case
 that is written in them is read without pint, which takes half a second to import.
 """
@@ -66,14 +72,17 @@ def to_unit(value: float | int | str, unit: str) -> float:
         return float(value)
     parts = _QUANTITY.fullmatch(value)
     if parts is None:
-        raise ValueError(f"{value!r} is not a number with a unit; write it like '0.9 GW', with a decimal point")
+        raise ValueError(
+            f"{value!r} is not a number with a unit; write it like '0.9 GW', with a decimal point"
+        )
     number, given = float(parts["number"]), parts["unit"]
     if not given:
         return number
     needed = "a plain number" if unit in ("", "1") else unit
     declared = "dimensionless" if unit in ("", "1") else unit
     if {_kind(given), _kind(unit)} & _POWERS and _kind(given) != _kind(unit):
-        raise ValueError(f"{value!r} is in {given}, but {needed} is needed")  # one dimension, three quantities
+        # one dimension, three quantities
+        raise ValueError(f"{value!r} is in {given}, but {needed} is needed")
     factor = USUAL.get(declared, {}).get(given)
     if factor is None:
         try:
@@ -95,14 +104,18 @@ def pint_factor(given: str, declared: str) -> float:
 
 def _kind(unit: str) -> str:
     """``MW`` → ``W``: a unit of power without its prefix."""
-    return next((power for power in sorted(_POWERS, key=len, reverse=True) if unit.endswith(power)), unit)
+    return next(
+        (power for power in sorted(_POWERS, key=len, reverse=True) if unit.endswith(power)), unit
+    )
 
 
 def _counts_alike(given: str, needed: str) -> bool:
     """Whether two units of one dimension both count cycles, both count angles, or neither; pint takes a cycle and a
     radian for 1 both, and would lose the 2π between them."""
     one, other = (_registry().Quantity(1, unit) for unit in (given, needed))
-    (cycles, angles, turns), (cycles_needed, angles_needed, turns_needed) = map(_counted, (one, other))
+    (cycles, angles, turns), (cycles_needed, angles_needed, turns_needed) = map(
+        _counted, (one, other)
+    )
     turned = (turns and not angles_needed) or (turns_needed and not angles)
     return cycles == cycles_needed and not turned
 
@@ -111,7 +124,9 @@ def _counted(quantity: Any) -> tuple[float, bool, bool]:
     """Power of the hertz in a unit, and whether it has angles, and whole turns."""
     powers = {str(name): float(power) for name, power in quantity.unit_items()}
     cycles = sum(power for name, power in powers.items() if name.endswith("hertz"))
-    angles, turns = (any(part in name for name in powers for part in parts) for parts in (_ANGLES, _TURNS))
+    angles, turns = (
+        any(part in name for name in powers for part in parts) for parts in (_ANGLES, _TURNS)
+    )
     return cycles, angles, turns
 
 
@@ -122,8 +137,16 @@ def base_exponents(unit: str) -> tuple[float, dict[str, int]] | None:
     --------
     ``kV`` is (1000.0, {"kg": 1, "m": 2, "s": -3, "A": -1}).
     """
-    names = {"kilogram": "kg", "meter": "m", "second": "s", "ampere": "A", "kelvin": "K", "mole": "mol",
-             "candela": "cd", "radian": "rad"}  # fmt: skip
+    names = {
+        "kilogram": "kg",
+        "meter": "m",
+        "second": "s",
+        "ampere": "A",
+        "kelvin": "K",
+        "mole": "mol",
+        "candela": "cd",
+        "radian": "rad",
+    }
     try:
         quantity = _registry().Quantity(1, unit).to_base_units()
     except Exception:  # pint lets its parser's errors through; an unknown unit is nothing to check

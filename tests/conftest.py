@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
-if "PYTEST_XDIST_WORKER" in os.environ:  # before NumPy: threads of BLAS in every worker would wait for each other
+if (
+    "PYTEST_XDIST_WORKER" in os.environ
+):  # before NumPy: threads of BLAS in every worker would wait for each other
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from fmus.toolchain.catalogue import build_model
@@ -61,7 +63,9 @@ def spelt(request):
 @pytest.fixture(scope="session")
 def fmu_path():
     """Name of a catalogue model → its built .fmu, Python-backed or native."""
-    return cache(lambda name, native=False: cached((NativeFmu if native else PythonFmu)(build_model(name))))
+    return cache(
+        lambda name, native=False: cached((NativeFmu if native else PythonFmu)(build_model(name)))
+    )
 
 
 @pytest.fixture

@@ -43,7 +43,9 @@ FLOORS = (
 )
 """Lowest first; those on one floor do not know each other."""
 
-ADDED = FLOORS.index(("orchestrator.certification", "orchestrator.coordinated_design", "orchestrator.siting"))
+ADDED = FLOORS.index(
+    ("orchestrator.certification", "orchestrator.coordinated_design", "orchestrator.siting")
+)
 """The floor of a study that is added in a room of its own, with a module ``command``."""
 
 PLAIN_DATA = {"fmus.grid.names", "fmus.toolchain.port_variables", "fmus.toolchain.variables"}
@@ -79,7 +81,9 @@ def imports():
     graph = {}
     for name, tree in modules().items():
         targets = imported_names(tree)
-        graph[name] = {t if t in modules() else t.rpartition(".")[0] for t in targets if within(t, *PACKAGES)} - {name}
+        graph[name] = {
+            t if t in modules() else t.rpartition(".")[0] for t in targets if within(t, *PACKAGES)
+        } - {name}
         unknown = graph[name] - set(modules())
         assert not unknown, f"{name} imports {unknown}, which does not exist"
     return graph
@@ -102,9 +106,15 @@ def part(name):
 
 def breaches(allowed):
     """Imports, as text, for which ``allowed(importer, imported)`` does not hold."""
-    edges = [(importer, imported) for importer, targets in imports().items() for imported in targets]
+    edges = [
+        (importer, imported) for importer, targets in imports().items() for imported in targets
+    ]
     assert len(edges) > 50
-    return [f"{importer} imports {imported}" for importer, imported in sorted(edges) if not allowed(importer, imported)]
+    return [
+        f"{importer} imports {imported}"
+        for importer, imported in sorted(edges)
+        if not allowed(importer, imported)
+    ]
 
 
 def test_the_imports_are_read():
@@ -123,7 +133,9 @@ def test_every_room_of_the_orchestrator_is_on_a_floor_or_is_a_study():
 
 
 def test_the_toolchain_knows_no_model():
-    assert not breaches(lambda a, b: within(b, "fmus.toolchain") if within(a, "fmus.toolchain") else True)
+    assert not breaches(
+        lambda a, b: within(b, "fmus.toolchain") if within(a, "fmus.toolchain") else True
+    )
 
 
 def test_models_know_neither_the_converter_nor_the_orchestrator():
@@ -174,11 +186,15 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
         if a in borrowers:
             return b == "fmus.toolchain.compiler"
         if a in ("orchestrator.fmi.vendor_files", "orchestrator.fmi.dll_reading"):
-            return within(b, "fmus.vendor_dll", "fmus.toolchain.cache", "fmus.toolchain.archive") or b == "fmus"
+            return (
+                within(b, "fmus.vendor_dll", "fmus.toolchain.cache", "fmus.toolchain.archive")
+                or b == "fmus"
+            )
         if a == "orchestrator.fmi.wine_program":
             return b in ("fmus.toolchain.compiler", "fmus.vendor_dll.memory")
         if a in ("orchestrator.fmi.instance", "orchestrator.ssp.archive"):
-            return b == "fmus.toolchain.cache"  # what was built or unpacked here, and is intact, is trusted
+            # what was built or unpacked here, and is intact, is trusted
+            return b == "fmus.toolchain.cache"
         return within(a, *importers) and not within(b, "gfor_fmu")
 
     assert not breaches(allowed)
@@ -190,9 +206,22 @@ def test_plain_data_are_read_without_symbols(name):
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-FOR_TYPES = {"api.case", "api.results", "cases.case", "cases.definition", "cases.given",
-             "cases.values", "coupling.system", "cli.terminal", "coupling.observers", "oscillations.view",
-             "report.plot_style", "report.tables", "results.recording", "results.storage"}  # fmt: skip
+FOR_TYPES = {
+    "api.case",
+    "api.results",
+    "cases.case",
+    "cases.definition",
+    "cases.given",
+    "cases.values",
+    "coupling.system",
+    "cli.terminal",
+    "coupling.observers",
+    "oscillations.view",
+    "report.plot_style",
+    "report.tables",
+    "results.recording",
+    "results.storage",
+}
 """Imported by `signal compare`, `gfor verify` and `load`, which start without what computes; `imports` counts these
 arrows."""
 
@@ -205,9 +234,12 @@ def test_only_libraries_that_come_late_are_imported_for_type_checkers_alone():
         for node in ast.walk(tree)
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
     ]
-    assert {name for name, _ in blocks} == {n for n, tree in modules().items() if "TYPE_CHECKING" in _code_of(tree)}
+    assert {name for name, _ in blocks} == {
+        n for n, tree in modules().items() if "TYPE_CHECKING" in _code_of(tree)
+    }
     hiding = [
-        (name, imported_names(node) - {"pandas", "scipy.optimize", "scipy.signal", "xarray"}) for name, node in blocks
+        (name, imported_names(node) - {"pandas", "scipy.optimize", "scipy.signal", "xarray"})
+        for name, node in blocks
     ]
     assert {name.removeprefix("orchestrator.") for name, names in hiding if names} == FOR_TYPES
 
@@ -217,15 +249,27 @@ def _code_of(tree):
     return " ".join(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
 
 
-POINTS = ("sweep.point", "screening.point", "coordinated_design.point", "interactions.point", "certification.point",
-          "certification.codes.bench_point", "certification.codes.change_point")  # fmt: skip
+POINTS = (
+    "sweep.point",
+    "screening.point",
+    "coordinated_design.point",
+    "interactions.point",
+    "certification.point",
+    "certification.codes.bench_point",
+    "certification.codes.change_point",
+)
 """What computes a point that is kept."""
 
 
 def test_every_kept_point_is_known_here():
     """Whoever computes points has the kind of their task in a module ``…point``, whose code names their files."""
-    kinds = {name for name, tree in modules().items() for node in tree.body if isinstance(node, ast.ClassDef)
-             if {ast.unparse(base) for base in node.bases} & {"Task", "BenchTask"}}  # fmt: skip
+    kinds = {
+        name
+        for name, tree in modules().items()
+        for node in tree.body
+        if isinstance(node, ast.ClassDef)
+        if {ast.unparse(base) for base in node.bases} & {"Task", "BenchTask"}
+    }
     assert kinds == {f"orchestrator.{name}" for name in POINTS}
 
 
@@ -267,7 +311,10 @@ def test_there_is_no_cycle():
         ("pythonfmu", {f"fmus.toolchain.{name}" for name in ("python_fmu", "slave", "wrapper")}),
         (
             "fmpy",
-            {f"orchestrator.fmi.{name}" for name in ("binary", "description", "loaded", "messages", "validation")},
+            {
+                f"orchestrator.fmi.{name}"
+                for name in ("binary", "description", "loaded", "messages", "validation")
+            },
         ),
         ("pandapower", {"orchestrator.cases.network_sources"}),
         ("matpowercaseframes", {"orchestrator.cases.network_sources"}),
@@ -277,7 +324,11 @@ def test_there_is_no_cycle():
     ],
 )
 def test_a_library_is_used_in_one_place(library, users):
-    found = {name for name, tree in modules().items() if any(within(n, library) for n in imported_names(tree))}
+    found = {
+        name
+        for name, tree in modules().items()
+        if any(within(n, library) for n in imported_names(tree))
+    }
     assert found == users
 
 
@@ -302,14 +353,22 @@ ON_THE_FACE = {
 COMPUTING = {
     *("acceptance.runner.check_fmu", "pod_design.design.design_pod", "study.comparison.compare"),
     *("study.comparison.strongest_modes", "study.linear.linear_model", "study.modes.compute_modes"),
-    *("screening.study.run_screening", "study.run.run_scenario", "sweep.sweep.plan_sweep", "sweep.sweep.run_sweep"),
+    *(
+        "screening.study.run_screening",
+        "study.run.run_scenario",
+        "sweep.sweep.plan_sweep",
+        "sweep.sweep.run_sweep",
+    ),
 }
 """Functions that the face wraps: a command that called one itself would hold a copy of the face's logic."""
 
 
 @pytest.mark.parametrize("command", sorted(ON_THE_FACE))
 def test_a_command_is_written_on_the_face(command):
-    names = {name.removeprefix("orchestrator.") for name in imported_names(modules()[f"orchestrator.cli.{command}"])}
+    names = {
+        name.removeprefix("orchestrator.")
+        for name in imported_names(modules()[f"orchestrator.cli.{command}"])
+    }
     assert names >= ON_THE_FACE[command]
     assert not names & COMPUTING
 
@@ -344,12 +403,17 @@ def test_errors_are_raised_by_a_name_of_their_own():
         for node in ast.walk(tree):
             if isinstance(node, ast.Raise) and node.exc is not None:
                 raised = node.exc.func if isinstance(node.exc, ast.Call) else node.exc
-                assert ast.unparse(raised) not in ("Exception", "BaseException"), f"{name}, line {node.lineno}"
+                assert ast.unparse(raised) not in ("Exception", "BaseException"), (
+                    f"{name}, line {node.lineno}"
+                )
 
 
 def test_no_error_is_caught_without_saying_which():
     handlers = [
-        (name, n) for name, tree in modules().items() for n in ast.walk(tree) if isinstance(n, ast.ExceptHandler)
+        (name, n)
+        for name, tree in modules().items()
+        for n in ast.walk(tree)
+        if isinstance(n, ast.ExceptHandler)
     ]
     assert len(handlers) > 10
     for name, node in handlers:
@@ -357,7 +421,9 @@ def test_no_error_is_caught_without_saying_which():
 
 
 TEXT = {".py", ".toml", ".md", ".json", ".csv", ".c", ".yml", ".yaml", ".txt", ".cfg"}
-OF_A_MACHINE = re.compile(r"(?<![\w./-])(?:/(?:home|root|Users|work|tmp|opt|mnt|var)/\w|[A-Z]:\\\w)")
+OF_A_MACHINE = re.compile(
+    r"(?<![\w./-])(?:/(?:home|root|Users|work|tmp|opt|mnt|var)/\w|[A-Z]:\\\w)"
+)
 
 
 def text_files():
@@ -380,12 +446,16 @@ def test_no_file_holds_a_path_of_some_machine():
     assert not found
 
 
-@pytest.mark.parametrize("text", ["x = '" + "/home" + "/me/file'", '"' + "C:" + '\\temp"', "see " + "/tmp" + "/a"])
+@pytest.mark.parametrize(
+    "text", ["x = '" + "/home" + "/me/file'", '"' + "C:" + '\\temp"', "see " + "/tmp" + "/a"]
+)
 def test_a_path_of_some_machine_is_recognised(text):
     assert OF_A_MACHINE.search(text)
 
 
-@pytest.mark.parametrize("text", ["fmus/toolchain", "https://example.org/home/x", "results/tmp/x", "1/s", "a/work/b"])
+@pytest.mark.parametrize(
+    "text", ["fmus/toolchain", "https://example.org/home/x", "results/tmp/x", "1/s", "a/work/b"]
+)
 def test_what_only_looks_like_one(text):
     assert not OF_A_MACHINE.search(text)
 
@@ -395,7 +465,13 @@ def test_a_class_name_has_one_meaning():
     homes = {}
     for name, tree in modules().items():
         for node in tree.body:
-            if within(name, "orchestrator") and isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+            if (
+                within(name, "orchestrator")
+                and isinstance(node, ast.ClassDef)
+                and not node.name.startswith("_")
+            ):
                 homes.setdefault(node.name, []).append(name)
     twice = {name: modules for name, modules in homes.items() if len(modules) > 1}
-    assert {name: m for name, m in twice.items() if not any(within(x, "orchestrator.api") for x in m)} == {}
+    assert {
+        name: m for name, m in twice.items() if not any(within(x, "orchestrator.api") for x in m)
+    } == {}

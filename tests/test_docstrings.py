@@ -21,7 +21,8 @@ FILLER = re.compile(
 
 LITTLE_WORDS = frozenset(
     re.findall(
-        r"\w+", "a all an and are as at by for from has in is it its of on one or that the their this to was what with"
+        r"\w+",
+        "a all an and are as at by for from has in is it its of on one or that the their this to was what with",
     )
 )
 
@@ -32,7 +33,9 @@ MANY = 4
 def public_functions(node, prefix=""):
     """Public functions of a module, and public methods of its public classes, each with its dotted name."""
     for inner in node.body:
-        if not isinstance(inner, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) or inner.name.startswith("_"):
+        if not isinstance(
+            inner, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+        ) or inner.name.startswith("_"):
             continue
         if isinstance(inner, ast.ClassDef):
             yield from public_functions(inner, f"{prefix}{inner.name}.")
@@ -49,7 +52,9 @@ def arguments(function):
 
 def explained(docstring):
     """Names in the section `Parameters`; several of a kind share a line."""
-    section = re.search(r"^Parameters\n-+\n(.*?)(?=\n\n\w+\n-+\n|\Z)", docstring, re.MULTILINE | re.DOTALL)
+    section = re.search(
+        r"^Parameters\n-+\n(.*?)(?=\n\n\w+\n-+\n|\Z)", docstring, re.MULTILINE | re.DOTALL
+    )
     lines = section[1].splitlines() if section else []
     heads = [line for line in lines if line and not line.startswith(" ")]
     return [name.strip().lstrip("*") for head in heads for name in head.split(",")]
@@ -59,7 +64,9 @@ def found():
     for package in PLACES:
         for path in sorted((ROOT / package).rglob("*.py")):
             place = path.relative_to(ROOT).as_posix()
-            for name, function in public_functions(ast.parse(path.read_text(encoding="utf-8"), place)):
+            for name, function in public_functions(
+                ast.parse(path.read_text(encoding="utf-8"), place)
+            ):
                 if len(arguments(function)) >= MANY:
                     yield pytest.param(function, id=f"{place}:{name}")
 
@@ -77,20 +84,32 @@ def test_docstring_explains_every_argument(function):
 def documented(node):
     """Functions and classes inside of a module that have more to them than a docstring, with its text."""
     for inner in ast.walk(node):
-        if isinstance(inner, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and len(inner.body) > 1:
+        if (
+            isinstance(inner, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
+            and len(inner.body) > 1
+        ):
             text = ast.get_docstring(inner)
-            if text and not (isinstance(inner.body[1], ast.Expr) and isinstance(inner.body[1].value, ast.Constant)):
+            if text and not (
+                isinstance(inner.body[1], ast.Expr)
+                and isinstance(inner.body[1].value, ast.Constant)
+            ):
                 yield inner, text
 
 
 def words(text):
-    return {word.lower().rstrip("s") for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+", text)}
+    return {
+        word.lower().rstrip("s") for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+", text)
+    }
 
 
 def says_nothing(node, text):
     """Whether a docstring is a filler, or has no word that the name and the arguments do not have."""
-    named = words(node.name) | (set() if isinstance(node, ast.ClassDef) else words(" ".join(arguments(node))))
-    return bool(FILLER.fullmatch(text)) or not (words(text) - named - {word.rstrip("s") for word in LITTLE_WORDS})
+    named = words(node.name) | (
+        set() if isinstance(node, ast.ClassDef) else words(" ".join(arguments(node)))
+    )
+    return bool(FILLER.fullmatch(text)) or not (
+        words(text) - named - {word.rstrip("s") for word in LITTLE_WORDS}
+    )
 
 
 def inside():

@@ -38,7 +38,11 @@ def test_the_list_names_tests_of_files_that_are_there_each_once():
     seconds = read_list()
     assert len(lines) == len(seconds)
     assert min(seconds.values()) >= LONGEST
-    missing = {test.partition("::")[0] for test in seconds if not (LIST.parents[1] / test.partition("::")[0]).exists()}
+    missing = {
+        test.partition("::")[0]
+        for test in seconds
+        if not (LIST.parents[1] / test.partition("::")[0]).exists()
+    }
     assert not missing, "python -m tests.benchmarks.durations writes the list anew"
 
 
@@ -57,5 +61,8 @@ def test_what_runs_by_night_is_there_and_is_none_of_the_papers_tables():
     root = NIGHTLY.parents[1]
     for line in NIGHTLY.read_text(encoding="utf-8").splitlines():
         file, _, name = line.partition("::")
-        assert f"def {name.partition('[')[0]}(" in (root / file).read_text(encoding="utf-8") or not name, line
+        assert (
+            f"def {name.partition('[')[0]}(" in (root / file).read_text(encoding="utf-8")
+            or not name
+        ), line
         assert "papers" not in name

@@ -7,8 +7,25 @@ import pytest
 from orchestrator.errors import CosimError
 from tests.benchmarks.reader_fuzz import Defect, fuzzed, kinds
 
-KINDS = ("case", "case with files", "lines", "case of a planner", "parameters", "raw 33", "raw 35", "dyr", "cfg", "dat",
-         "binary cfg", "binary dat", "ssd", "description", "binding", "points", "device")  # fmt: skip
+KINDS = (
+    "case",
+    "case with files",
+    "lines",
+    "case of a planner",
+    "parameters",
+    "raw 33",
+    "raw 35",
+    "dyr",
+    "cfg",
+    "dat",
+    "binary cfg",
+    "binary dat",
+    "ssd",
+    "description",
+    "binding",
+    "points",
+    "device",
+)
 LONG, HUGE = "x" * 5000, "9" * 400
 
 
@@ -52,14 +69,24 @@ def test_the_program_tells_a_defect_with_its_place(of_kind, tmp_path):
         ("case of a planner", 'raw = "grid.raw"', f'raw = "{LONG}"', "File name too long"),
         ("case of a planner", 'dyr = "grid.dyr"', f'dyr = "{LONG}"', "File name too long"),
         ("case with files", 'fmu = "theirs.fmu"', f'fmu = "{LONG}.fmu"', "File name too long"),
-        ("lines", "l2,b,c,0.001,0.01,0.1", "l2,b", "line 3: from = 'b', to = ''; name the bus at each end"),
+        (
+            "lines",
+            "l2,b,c,0.001,0.01,0.1",
+            "l2,b",
+            "line 3: from = 'b', to = ''; name the bus at each end",
+        ),
         ("raw 35", "1.0,0,0,0,0", "1e308,0,0,0,0", "WINDV is '1e308'; it must be a number"),
         ("ssd", 'source="resources/integrator.fmu"', 'source="//[x"', "is not a URI"),
         ("ssd", "<gfor:CaseTables>", "<gfor:CaseTables>solver = 3\n", "gives solver as 3"),
         ("ssd", "<gfor:CaseTables>", "<gfor:CaseTables>[title]\n", "gives title as"),
         ("ssd", "modes = []", f"modes = {'[' * 2000}", "cannot be read"),
         ("ssd", "modes = []", f"modes = {HUGE}", "a whole number has"),
-        ("ssd", '<ssv:Real value="-20.0"/>', f'<ssv:Integer value="{HUGE}"/>', "is not a value of type Integer"),
+        (
+            "ssd",
+            '<ssv:Real value="-20.0"/>',
+            f'<ssv:Integer value="{HUGE}"/>',
+            "is not a value of type Integer",
+        ),
     ],
 )
 def test_what_changed_files_have_found_is_one_error(kind, old, new, said, of_kind, tmp_path):

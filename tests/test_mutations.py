@@ -31,9 +31,13 @@ def test_the_list_is_as_long_as_it_should_be_and_names_each_mistake_once():
 def test_every_mistake_can_still_be_made():
     """Where this fails the code has moved on: give the entry the text of today, or take it out."""
     gone = [
-        m.name for m in MUTATIONS if m.old == m.new or m.applied((ROOT / m.file).read_text(encoding="utf-8")) is None
+        m.name
+        for m in MUTATIONS
+        if m.old == m.new or m.applied((ROOT / m.file).read_text(encoding="utf-8")) is None
     ]
-    tests = {test.partition("::")[0] for m in MUTATIONS for test in m.tests if test.startswith("tests/")}
+    tests = {
+        test.partition("::")[0] for m in MUTATIONS for test in m.tests if test.startswith("tests/")
+    }
     assert not gone
     assert not [test for test in tests if not (ROOT / test).exists()]
 
@@ -82,10 +86,18 @@ def test_verdicts_and_the_users_tree(tmp_path):
     }
     nothing = mutation("selects nothing", "2 * x", "3 * x", "-k", "no_such_test")
     found = {}
-    run_all([*cases.values(), nothing], root, 2, 100.0, lambda m, outcome: found.update({m.name: outcome}))
+    run_all(
+        [*cases.values(), nothing],
+        root,
+        2,
+        100.0,
+        lambda m, outcome: found.update({m.name: outcome}),
+    )
     for_ever = mutation("for ever", "sleep(0)", "sleep(100)", "-k", "slow")
     run_all([for_ever], root, 1, 4.0, lambda m, outcome: found.update({m.name: outcome}))
-    assert {m.name: found[m.name].verdict for m in cases.values()} == {m.name: v for v, m in cases.items()}
+    assert {m.name: found[m.name].verdict for m in cases.values()} == {
+        m.name: v for v, m in cases.items()
+    }
     assert found["selects nothing"].verdict == UNCLEAR
     assert found["for ever"].verdict == TOO_SLOW
     assert found["noticed"].by == "test_it.py::test_double"
@@ -93,8 +105,12 @@ def test_verdicts_and_the_users_tree(tmp_path):
 
 
 def test_the_page_counts_what_was_run():
-    outcomes = {MUTATIONS[0].name: Outcome(CAUGHT, 1.0, "tests/a.py::test_b"), MUTATIONS[1].name: Outcome(SURVIVED)}
+    outcomes = {
+        MUTATIONS[0].name: Outcome(CAUGHT, 1.0, "tests/a.py::test_b"),
+        MUTATIONS[1].name: Outcome(SURVIVED),
+    }
     text = page(MUTATIONS, outcomes)
     assert "**1 of 2 caught**" in text
     assert f"{len(MUTATIONS) - 2} of the list were not run" in text
-    assert text.index(f"| {MUTATIONS[1].name} |") < text.index(f"| {MUTATIONS[0].name} |")  # what survived stands first
+    # what survived stands first
+    assert text.index(f"| {MUTATIONS[1].name} |") < text.index(f"| {MUTATIONS[0].name} |")

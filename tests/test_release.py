@@ -37,7 +37,9 @@ def test_gfor_tells_its_version_without_a_heavy_library():
         "heavy = {'numpy', 'scipy', 'xarray', 'rich', 'fmpy', 'pint'} & set(sys.modules)\n"
         "assert not heavy, heavy"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, cwd=ROOT)
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False, cwd=ROOT
+    )
     assert done.returncode == 0, done.stderr
     assert re.fullmatch(r"gfor-cosim \d+\.\d+\.\d+\n", done.stdout)
 
@@ -45,7 +47,9 @@ def test_gfor_tells_its_version_without_a_heavy_library():
 def test_the_changelog_counts_what_there_is():
     assert f"{len(CHECKS) + len(FILE_CHECKS)} acceptance tests" in CHANGELOG
     assert f"{NUMBERS[len(MASTERS)]} configurations" in CHANGELOG
-    mutations = tomllib.loads((ROOT / "tests/benchmarks/mutations.toml").read_text(encoding="utf-8"))["mutation"]
+    mutations = tomllib.loads(
+        (ROOT / "tests/benchmarks/mutations.toml").read_text(encoding="utf-8")
+    )["mutation"]
     assert f"{len(mutations)} plausible mistakes" in CHANGELOG
 
 
@@ -54,7 +58,9 @@ def test_the_changelog_names_commands_models_and_cases_that_exist():
     named = {OLD.get(one, one).split()[0] for one in re.findall(r"`gfor ([a-z][\w-]*)", text)}
     assert named <= {name.split()[0] for name in COMMANDS}
     everywhere = {OLD.get(one, one) for one in re.findall(r"`gfor ([a-z][\w-]*)", CHANGELOG)}
-    assert set(COMMANDS) - {"fmu info"} <= everywhere | set(re.findall(r"`gfor ([a-z]+ [a-z]+)", CHANGELOG))
+    assert set(COMMANDS) - {"fmu info"} <= everywhere | set(
+        re.findall(r"`gfor ([a-z]+ [a-z]+)", CHANGELOG)
+    )
     assert {"gfor", "gfor_abc", "gfor_phasor", "infinite_bus"} <= set(model_names())
     for case in (path.parent.name for path in BUILT_IN.glob("*/case.toml")):
         assert f"`{case}`" in CHANGELOG
@@ -66,8 +72,14 @@ def test_nothing_lies_at_the_top_that_has_no_place_there():
     """
     files = {"CHANGELOG.md", "CITATION.cff", "LICENSE", "README.md", "pyproject.toml"}
     folders = {"fmus/", "gfor_fmu/", "orchestrator/", "tests/"}
-    done = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
-    tops = {"".join(name.partition("/")[:2]) for name in done.stdout.splitlines() if not name.startswith(".")}
+    done = subprocess.run(
+        ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    tops = {
+        "".join(name.partition("/")[:2])
+        for name in done.stdout.splitlines()
+        if not name.startswith(".")
+    }
     assert tops <= files | folders
 
 

@@ -42,10 +42,18 @@ def session(tmp_path):
     """Run some tests with a list; returns the exit code and what is printed."""
 
     def run(allowed, *arguments, ci="true", tests=TESTS):
-        for name, text in (("test_it.py", tests), ("conftest.py", CONFTEST), ("allowed.txt", allowed)):
+        for name, text in (
+            ("test_it.py", tests),
+            ("conftest.py", CONFTEST),
+            ("allowed.txt", allowed),
+        ):
             (tmp_path / name).write_text(text, encoding="utf-8")
         (tmp_path / "pytest.ini").write_text("[pytest]\n", encoding="utf-8")
-        environment = os.environ | {"CI": ci, "PYTHONPATH": str(ROOT), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+        environment = os.environ | {
+            "CI": ci,
+            "PYTHONPATH": str(ROOT),
+            "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
+        }
         for name in ("PYTEST_ADDOPTS", "PYTEST_XDIST_WORKER"):
             environment.pop(name, None)
         done = subprocess.run(
@@ -93,5 +101,7 @@ def test_what_the_list_names_exists():
 def test_a_line_that_is_none_is_said(tmp_path):
     path = tmp_path / "allowed.txt"
     path.write_text("tests/test_x.py::test_y\n", encoding="utf-8")
-    with pytest.raises(pytest.UsageError, match=r"allowed\.txt:1: .* is not of the form FILE::TEST \| REASON"):
+    with pytest.raises(
+        pytest.UsageError, match=r"allowed\.txt:1: .* is not of the form FILE::TEST \| REASON"
+    ):
         read_list(path)

@@ -9,18 +9,26 @@ from orchestrator.toml_files import Table, fault_of, read_toml
 
 def test_a_file_comes_as_text_and_as_tables(tmp_path):
     (tmp_path / "a.toml").write_text("[a]\nK = 2.0 # Ω\n", encoding="utf-8")
-    assert read_toml(tmp_path / "a.toml", "the file", "") == ("[a]\nK = 2.0 # Ω\n", {"a": {"K": 2.0}})
+    assert read_toml(tmp_path / "a.toml", "the file", "") == (
+        "[a]\nK = 2.0 # Ω\n",
+        {"a": {"K": 2.0}},
+    )
 
 
 @pytest.mark.parametrize(
-    ("option", "source"), [("", "{path}: "), ("--details", "--details {path}: ")], ids=["no option", "an option"]
+    ("option", "source"),
+    [("", "{path}: "), ("--details", "--details {path}: ")],
+    ids=["no option", "an option"],
 )
 @pytest.mark.parametrize(
     ("content", "words"),
     [
         (None, "the file cannot be read: No such file or directory; print one"),
         (b"[a", "it is not a TOML file: Expected ']' at the end of a table declaration"),
-        (b"a = 1\nb =\n\n", "it is not a TOML file: Invalid value (at line 2, column 4); write NAME = VALUE"),
+        (
+            b"a = 1\nb =\n\n",
+            "it is not a TOML file: Invalid value (at line 2, column 4); write NAME = VALUE",
+        ),
         (
             b"a = 1\nb = ",
             "it is not a TOML file: Invalid value (at the end of line 2, the last one); write NAME = VALUE",

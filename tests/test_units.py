@@ -111,7 +111,9 @@ def test_cycles_and_angles_are_not_taken_for_one_another(value, unit):
     assert str(caught.value).startswith(repr(value))
 
 
-@pytest.mark.parametrize(("given", "declared"), [(g, d) for d, factors in USUAL.items() for g in factors])
+@pytest.mark.parametrize(
+    ("given", "declared"), [(g, d) for d, factors in USUAL.items() for g in factors]
+)
 def test_factors_of_usual_units_are_those_of_pint_to_the_last_bit(given, declared):
     assert USUAL[declared][given] == pint_factor(given, declared)
     assert _counts_alike(given, declared)

@@ -26,10 +26,17 @@ def data_sheet(part: ControlPart, sample_time: float) -> str:
     values = {p.name: p.start for p in model.parameters}
     page = Path(__file__).with_name("sheet.txt").read_text(encoding="utf-8")
     return page.format(
-        name=model.name, title=model.title, circuit=_circuit(part, values), bases=_bases(values),
-        sample_time=sample_time, lead=part.lead, lead_time=values[part.lead], inputs=_signals(model.inputs),
-        outputs=_signals(model.outputs), parameters=_parameters(part),
-    )  # fmt: skip
+        name=model.name,
+        title=model.title,
+        circuit=_circuit(part, values),
+        bases=_bases(values),
+        sample_time=sample_time,
+        lead=part.lead,
+        lead_time=values[part.lead],
+        inputs=_signals(model.inputs),
+        outputs=_signals(model.outputs),
+        parameters=_parameters(part),
+    )
 
 
 def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -70,11 +77,16 @@ def _parameters(part: ControlPart) -> str:
 
     rows = [
         [
-            f"`{c_name(p.name)}`", f"{p.start:.10g}", p.unit, bound(p.minimum), bound(p.maximum),
-            "any time" if p.tunable else "before the start", p.text,
+            f"`{c_name(p.name)}`",
+            f"{p.start:.10g}",
+            p.unit,
+            bound(p.minimum),
+            bound(p.maximum),
+            "any time" if p.tunable else "before the start",
+            p.text,
         ]
         for p in part.model.parameters
-    ]  # fmt: skip
+    ]
     return _table(("Name", "Default", "Unit", "Least", "Most", "May change", "Meaning"), rows)
 
 
@@ -121,7 +133,9 @@ def with_values(part: ControlPart, values: Mapping[str, float], sample_time: flo
     model = part.model
     known = {p.name: p for p in model.parameters}
     if unknown := [name for name in values if name not in known]:
-        raise ControlDllError(f"there is no parameter {unknown[0]!r}; there are: {', '.join(known)}")
+        raise ControlDllError(
+            f"there is no parameter {unknown[0]!r}; there are: {', '.join(known)}"
+        )
     given = {part.lead: sample_time / 2} | dict(values)
     for name, value in given.items():
         _check(known[name], value)
@@ -147,9 +161,13 @@ def _check(p: Parameter, value: float) -> None:
 
 
 def write_dll(
-    part: ControlPart, folder: Path, platforms: tuple[str, ...] = tuple(DLL_TARGETS), sample_time: float = SAMPLE_TIME,
-    values: Mapping[str, float] | None = None, report: Callable[[str], None] = lambda text: None,
-) -> WrittenDll:  # fmt: skip
+    part: ControlPart,
+    folder: Path,
+    platforms: tuple[str, ...] = tuple(DLL_TARGETS),
+    sample_time: float = SAMPLE_TIME,
+    values: Mapping[str, float] | None = None,
+    report: Callable[[str], None] = lambda text: None,
+) -> WrittenDll:
     """Write the libraries, each into the folder of its platform, and the data sheet beside these folders.
 
     ``part``: As `control_part_of` gives it.
@@ -159,7 +177,9 @@ def write_dll(
     ``values``: Other defaults of the DLL's parameters, by name.
     ``report``: Called with a sentence before each part of the work."""
     if unknown := [name for name in platforms if name not in DLL_TARGETS]:
-        raise ControlDllError(f"there is no platform {unknown[0]!r}; choose from: {', '.join(DLL_TARGETS)}")
+        raise ControlDllError(
+            f"there is no platform {unknown[0]!r}; choose from: {', '.join(DLL_TARGETS)}"
+        )
     if not _SHORTEST <= sample_time <= _LONGEST:
         raise ControlDllError(
             f"a sample time of {sample_time:g} s; it must be from {_SHORTEST:g} to {_LONGEST:g} s, within which the "
@@ -170,13 +190,18 @@ def write_dll(
     report(f"{name}: writing the C code of its control part")
     code = dll_source(chosen.model, sample_time)
     for number, platform in enumerate(platforms, 1):
-        report(f"{name}: compiling for {platform} ({number} of {len(platforms)}); minutes where it was never compiled")
+        report(
+            f"{name}: compiling for {platform} ({number} of {len(platforms)}); minutes where it was never compiled"
+        )
         target, ending = DLL_TARGETS[platform]
         built[platform] = (f"{name}{ending}", compile_for(code, target, ending).read_bytes())
     libraries = {platform: folder / platform / file for platform, (file, _) in built.items()}
     sheet = folder / f"{name}.md"
-    _write_all(folder, {path: built[platform][1] for platform, path in libraries.items()}
-               | {sheet: data_sheet(chosen, sample_time).encode()})  # fmt: skip
+    _write_all(
+        folder,
+        {path: built[platform][1] for platform, path in libraries.items()}
+        | {sheet: data_sheet(chosen, sample_time).encode()},
+    )
     return WrittenDll(libraries, sheet)
 
 

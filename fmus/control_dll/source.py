@@ -9,7 +9,8 @@ from fmus.toolchain.model import Model
 from fmus.toolchain.variables import Input, Output, Parameter
 
 _C = Path(__file__).with_name("c")
-_UNBOUNDED = 1e30  # bound of a parameter without one: the interface has no word for "none", and a host may print it
+# bound of a parameter without one: the interface has no word for "none", and a host may print it
+_UNBOUNDED = 1e30
 
 
 def dll_source(model: Model, sample_time: float) -> str:
@@ -39,8 +40,12 @@ def _declarations(model: Model, sample_time: float) -> str:
     for group in (parameters, model.inputs, model.outputs):
         names = [c_name(variable.name) for variable in group]
         if twice := [name for name in names if names.count(name) > 1]:
-            raise ValueError(f"model {model.name}: two variables would be called {twice[0]!r} in the DLL")
-    members = "".join(f" {'double' if p.type == 'Real' else 'int32_t'} {c_name(p.name)};" for p in parameters)
+            raise ValueError(
+                f"model {model.name}: two variables would be called {twice[0]!r} in the DLL"
+            )
+    members = "".join(
+        f" {'double' if p.type == 'Real' else 'int32_t'} {c_name(p.name)};" for p in parameters
+    )
     rows = {
         "AT": ("size_t", [f"offsetof(struct parameters, {c_name(p.name)})" for p in parameters]),
         "WHOLE": ("char", [str(int(p.type != "Real")) for p in parameters]),
@@ -48,14 +53,21 @@ def _declarations(model: Model, sample_time: float) -> str:
         "LEAST": ("double", [c_number(_bounds(p)[0]) for p in parameters]),
         "MOST": ("double", [c_number(_bounds(p)[1]) for p in parameters]),
     }
-    numbers = [f"static const {kind} {name}[] = {{{', '.join(row)}}};" for name, (kind, row) in rows.items()]
+    numbers = [
+        f"static const {kind} {name}[] = {{{', '.join(row)}}};"
+        for name, (kind, row) in rows.items()
+    ]
     lines = [
         f"enum {{ NR = {len(model.requirement_texts)}, INTERNAL_STEP = {model.value_references['internal_step']} }};",
-        f"static const double SAMPLE_TIME = {sample_time!r};", f"struct parameters {{{members} }};", *numbers,
-        *_texts(model), _table("dll_signal", "INPUTS", [_signal(v) for v in model.inputs]),
+        f"static const double SAMPLE_TIME = {sample_time!r};",
+        f"struct parameters {{{members} }};",
+        *numbers,
+        *_texts(model),
+        _table("dll_signal", "INPUTS", [_signal(v) for v in model.inputs]),
         _table("dll_signal", "OUTPUTS", [_signal(v) for v in model.outputs]),
-        _table("dll_parameter", "PARAMETERS", [_parameter(p) for p in parameters]), _info(model, sample_time),
-    ]  # fmt: skip
+        _table("dll_parameter", "PARAMETERS", [_parameter(p) for p in parameters]),
+        _info(model, sample_time),
+    ]
     return "\n".join(lines)
 
 
@@ -67,7 +79,8 @@ def _texts(model: Model) -> list[str]:
         return f"static const char *const {kind}[] = {{{', '.join(c_string(f'{name}: {t}') for t in texts) or '0'}}};"
 
     bounds = [
-        f"parameter {c_name(p.name)} must be from {_bounds(p)[0]:g} to {_bounds(p)[1]:g}" for p in model.parameters
+        f"parameter {c_name(p.name)} must be from {_bounds(p)[0]:g} to {_bounds(p)[1]:g}"
+        for p in model.parameters
     ]
     free = ", ".join(c_name(p.name) for p in model.parameters if p.tunable)
     single = {
@@ -79,9 +92,18 @@ def _texts(model: Model) -> list[str]:
     return [
         row("OUT_OF_BOUNDS", bounds),
         row("RULE", [f"parameters cannot be used: {rule}" for rule in model.requirement_texts]),
-        row("INPUT_NOT_FINITE", [f"input {c_name(v.name)} is not a finite number" for v in model.inputs]),
-        row("STATE_NOT_FINITE", [f"state {v.name} is no longer finite: the solution diverges" for v in model.states]),
-        *(f"static const char {key}[] = {c_string(f'{name}: {text}')};" for key, text in single.items()),
+        row(
+            "INPUT_NOT_FINITE",
+            [f"input {c_name(v.name)} is not a finite number" for v in model.inputs],
+        ),
+        row(
+            "STATE_NOT_FINITE",
+            [f"state {v.name} is no longer finite: the solution diverges" for v in model.states],
+        ),
+        *(
+            f"static const char {key}[] = {c_string(f'{name}: {text}')};"
+            for key, text in single.items()
+        ),
         f"static const char TITLE[] = {c_string(f'{name}, gfor-cosim {_version()}: {model.title}')};",
     ]
 
@@ -93,7 +115,10 @@ def _version() -> str:
 def _bounds(p: Parameter) -> tuple[float, float]:
     if p.type == "Boolean":
         return 0.0, 1.0
-    return (-_UNBOUNDED if p.minimum is None else p.minimum, _UNBOUNDED if p.maximum is None else p.maximum)
+    return (
+        -_UNBOUNDED if p.minimum is None else p.minimum,
+        _UNBOUNDED if p.maximum is None else p.maximum,
+    )
 
 
 def _table(kind: str, name: str, rows: list[str]) -> str:
@@ -111,7 +136,10 @@ def _parameter(p: Parameter) -> str:
     if p.type == "Real":
         kind, values = "REAL64", [f"{{.real64 = {c_number(v)}}}" for v in numbers]
     else:
-        kind, values = "INT32", [f"{{.int32 = {max(-(2**31), min(2**31 - 1, int(v)))}}}" for v in numbers]
+        kind, values = (
+            "INT32",
+            [f"{{.int32 = {max(-(2**31), min(2**31 - 1, int(v)))}}}" for v in numbers],
+        )
     return f"{{{texts}, {kind}, {int(not p.tunable)}, {', '.join(values)}}}"
 
 

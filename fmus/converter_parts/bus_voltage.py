@@ -11,7 +11,8 @@ from fmus.toolchain.phasor_port import MasterStep
 from fmus.toolchain.port import DevicePort
 from fmus.toolchain.symbols import Expr, exp, fmax
 
-SHORT = 1e-3  # communication step in parts of the lags below which their delays are those of none: 2e-7 from τ
+# communication step in parts of the lags below which their delays are those of none: 2e-7 from τ
+SHORT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -42,20 +43,31 @@ class ExtrapolatedVoltage:
             m.derivative(Expr(behind.im), (ahead.im - behind.im) / self.tau)
 
 
-def extrapolated_voltage(m: ModelBuilder, port: DevicePort, master: MasterStep) -> ExtrapolatedVoltage:
+def extrapolated_voltage(
+    m: ModelBuilder, port: DevicePort, master: MasterStep
+) -> ExtrapolatedVoltage:
     """Declare both lags.
 
     A step H holds the voltage of its middle. At its end the first lag is late by D = (H/2)·coth(H/2τ) and the second by
     (H²/4τ)/sinh²(H/2τ) more; both are τ where H is short."""
     with m.scope("bus_voltage"):
         shortest = m.parameter(
-            "tau", 0.002, "s", "Time constant of both lags of the bus voltage; at least communication_step",
+            "tau",
+            0.002,
+            "s",
+            "Time constant of both lags of the bus voltage; at least communication_step",
             minimum=1e-3,
-        )  # fmt: skip
+        )
         once, twice = (
             Phasor(
                 *(
-                    m.state(f"{name}_{part}", initial, "pu", f"Bus voltage through {text}, {part} part", base="bus")
+                    m.state(
+                        f"{name}_{part}",
+                        initial,
+                        "pu",
+                        f"Bus voltage through {text}, {part} part",
+                        base="bus",
+                    )
                     for part, initial in (("re", port.v_0.re), ("im", port.v_0.im))
                 )
             )
@@ -65,4 +77,6 @@ def extrapolated_voltage(m: ModelBuilder, port: DevicePort, master: MasterStep) 
     ratio = fmax(master.size / tau, SHORT)
     growth = exp(ratio)
     more = tau * ratio**2 / (growth - 2 + 1 / growth)
-    return ExtrapolatedVoltage(once, twice, tau, tau * ratio / 2 * (growth + 1) / (growth - 1), more)
+    return ExtrapolatedVoltage(
+        once, twice, tau, tau * ratio / 2 * (growth + 1) / (growth - 1), more
+    )

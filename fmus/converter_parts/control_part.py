@@ -7,7 +7,8 @@ from typing import Literal
 
 from fmus.toolchain.model import Model
 
-GROUP = "gfor_cosim.controls"  # entry points: name of a converter → a function that returns its `ControlPart`
+# entry points: name of a converter → a function that returns its `ControlPart`
+GROUP = "gfor_cosim.controls"
 
 
 @dataclass(frozen=True)

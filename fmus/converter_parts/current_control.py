@@ -18,10 +18,17 @@ def current_control(
     voltage across the capacitor branch [pu, S_n]."""
     start = f.initial
     with m.scope("current_control"):
-        tau = m.parameter("tau", 0.001, "s", "Time constant of the current loop", minimum=2e-4, source=APPENDIX)
+        tau = m.parameter(
+            "tau", 0.001, "s", "Time constant of the current loop", minimum=2e-4, source=APPENDIX
+        )
         L_c = f.X_c / omega_b
         i_s = f.i_s.value
-        x = qd_state(m, "x", start.v_c - Phasor(0, f.X_c) * start.i_s - start.u, "Integrator of the current loop")
+        x = qd_state(
+            m,
+            "x",
+            start.v_c - Phasor(0, f.X_c) * start.i_s - start.u,
+            "Integrator of the current loop",
+        )
         error = i_ref - i_s
         x.set_derivative(m, f.R_c / tau * error)
         return L_c / tau * error + x.value + Phasor(0, w * f.X_c) * i_s + u_lagged

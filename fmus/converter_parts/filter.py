@@ -59,16 +59,26 @@ class Filter(MeasuredFilter):
 def declare_filter_data(m: ModelBuilder, port: OperatingPoint) -> FilterData:
     """Declare parameters alone; the power flow gives the operating point."""
     with m.scope("filter"):
-        R_c = m.parameter("R_c", 0.005, "pu", "Inductor resistance", base="S_n", minimum=0.0, source=APPENDIX)
-        X_c = m.parameter("X_c", 0.15, "pu", "Inductor reactance", base="S_n", minimum=0.01, source=APPENDIX)
-        B_c = m.parameter("B_c", 0.15, "pu", "Capacitor susceptance", base="S_n", minimum=0.01, source=APPENDIX)
+        R_c = m.parameter(
+            "R_c", 0.005, "pu", "Inductor resistance", base="S_n", minimum=0.0, source=APPENDIX
+        )
+        X_c = m.parameter(
+            "X_c", 0.15, "pu", "Inductor reactance", base="S_n", minimum=0.01, source=APPENDIX
+        )
+        B_c = m.parameter(
+            "B_c", 0.15, "pu", "Capacitor susceptance", base="S_n", minimum=0.01, source=APPENDIX
+        )
     with m.scope("transformer"):
         R_t = m.parameter("R_t", 0.002, "pu", "Resistance", base="S_n", minimum=0.0, source=STAMP)
-        X_t = m.parameter("X_t", 0.15, "pu", "Reactance", base="S_n", minimum=0.01, source="paper, case study 1")
+        X_t = m.parameter(
+            "X_t", 0.15, "pu", "Reactance", base="S_n", minimum=0.01, source="paper, case study 1"
+        )
 
     # In series with the capacitor, 1/(3·10·ω_b·C_c) as the paper has it: the factor 3·10 is dimensionless.
     R_cap = 1 / (30 * B_c)
-    return FilterData(R_c, X_c, B_c, R_t, X_t, R_cap, _steady_state(port, R_c, X_c, B_c, R_t, X_t, R_cap))
+    return FilterData(
+        R_c, X_c, B_c, R_t, X_t, R_cap, _steady_state(port, R_c, X_c, B_c, R_t, X_t, R_cap)
+    )
 
 
 def declare_filter(m: ModelBuilder, port: DevicePort) -> Filter:
@@ -83,11 +93,23 @@ def declare_filter(m: ModelBuilder, port: DevicePort) -> Filter:
         i_g = qd_state(m, "i_g", start.i_g, "Current into the grid")
     u = u_c.value + data.R_cap * (i_s.value - i_g.value)
     return Filter(
-        data.R_c, data.X_c, data.B_c, data.R_t, data.X_t, data.R_cap, start, i_s=i_s, u_c=u_c, i_g=i_g, u=u
-    )  # fmt: skip
+        data.R_c,
+        data.X_c,
+        data.B_c,
+        data.R_t,
+        data.X_t,
+        data.R_cap,
+        start,
+        i_s=i_s,
+        u_c=u_c,
+        i_g=i_g,
+        u=u,
+    )
 
 
-def filter_equations(m: ModelBuilder, f: Filter, port: DevicePort, v_c: Phasor, theta: Expr, w: Expr) -> None:
+def filter_equations(
+    m: ModelBuilder, f: Filter, port: DevicePort, v_c: Phasor, theta: Expr, w: Expr
+) -> None:
     """Voltage over each inductor and current into the capacitor.
 
     ``port``: the port, which gives the bus voltage and the breaker's position; ``v_c``: the converter's own voltage, in

@@ -4,4 +4,5 @@ from fmus.toolchain.port_variables import TRANSFORMER
 from fmus.toolchain.variables import usual_beside
 
 CONVERTER = TRANSFORMER | usual_beside(__file__)
-FOLLOWING = CONVERTER | usual_beside(__file__, "following.toml")  # of converters that follow the grid by a PLL
+# of converters that follow the grid by a PLL
+FOLLOWING = CONVERTER | usual_beside(__file__, "following.toml")

@@ -16,7 +16,9 @@ S_SC = 20000.0  # default short-circuit power [MVA]
 def external_grid() -> Model:
     """Source and impedance in the network frame, EMT type."""
     m = ModelBuilder(
-        "external_grid", "External grid: a voltage source behind its short-circuit impedance (EMT type)", kind="network"
+        "external_grid",
+        "External grid: a voltage source behind its short-circuit impedance (EMT type)",
+        kind="network",
     )
     port, Z, e = _declare(m)
     i = Phasor(
@@ -33,7 +35,9 @@ def external_grid() -> Model:
 def external_grid_phasor() -> Model:
     """The same without network transients."""
     m = phasor_builder(
-        "external_grid_phasor", "External grid: a voltage source behind its impedance (phasor type)", kind="network"
+        "external_grid_phasor",
+        "External grid: a voltage source behind its impedance (phasor type)",
+        kind="network",
     )
     port, Z, e = _declare(m)
     declare_phasor_outputs(m, port, SourceEmf(behind=e, ahead=e), Z)
@@ -52,6 +56,8 @@ def _declare(m: ModelBuilder) -> tuple[DevicePort, Phasor, Phasor]:
     with m.scope("source"):
         e = Phasor(
             m.calculated("E_re", start.re, "pu", "Voltage of the source, real part", base="bus"),
-            m.calculated("E_im", start.im, "pu", "Voltage of the source, imaginary part", base="bus"),
+            m.calculated(
+                "E_im", start.im, "pu", "Voltage of the source, imaginary part", base="bus"
+            ),
         )
     return port, Z, e

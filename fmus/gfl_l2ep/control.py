@@ -53,7 +53,9 @@ def declare_transformer(m: ModelBuilder, port: DevicePort) -> Transformer:
         return Transformer(R, X, ratio, start, qd_state(m, "i", inside, "Current of the converter"))
 
 
-def transformer_equation(m: ModelBuilder, t: Transformer, port: DevicePort, v_c: Phasor, u: Phasor, w: Expr) -> None:
+def transformer_equation(
+    m: ModelBuilder, t: Transformer, port: DevicePort, v_c: Phasor, u: Phasor, w: Expr
+) -> None:
     """(X/ω_b)·di/dt = v_c − u − (R + j·w·X)·i; behind an open breaker the current fades.
 
     ``port``: the port, which gives the breaker's position; ``v_c``, ``u``: voltage of the converter, and of the bus
@@ -63,7 +65,8 @@ def transformer_equation(m: ModelBuilder, t: Transformer, port: DevicePort, v_c:
     t.i.set_derivative(m, port.through_breaker(closed, i * (-1 / BREAKER_TIME)))
 
 
-MEMORY = 1e-3  # time constant [s] of the state that remembers; it passes the middle 0.7 ms after a threshold
+# time constant [s] of the state that remembers; it passes the middle 0.7 ms after a threshold
+MEMORY = 1e-3
 
 
 def running(m: ModelBuilder, v: Expr) -> Expr:
@@ -72,9 +75,17 @@ def running(m: ModelBuilder, v: Expr) -> Expr:
     ``v``: magnitude of the bus voltage [pu]."""
     with m.scope("pll"), m.scope("freezing"):
         low = m.parameter(
-            "V_low", 0.4, "pu", "Voltage below which the PLL stands; 0: never", base="bus", minimum=0.0, source=COLIB
+            "V_low",
+            0.4,
+            "pu",
+            "Voltage below which the PLL stands; 0: never",
+            base="bus",
+            minimum=0.0,
+            source=COLIB,
         )
-        high = m.parameter("V_high", 0.5, "pu", "Voltage above which it runs again", base="bus", source=COLIB)
+        high = m.parameter(
+            "V_high", 0.5, "pu", "Voltage above which it runs again", base="bus", source=COLIB
+        )
         m.require(high - low, "pll.freezing.V_high must be above pll.freezing.V_low")
         awake = m.state("awake", 1.0, "1", "Memory of the thresholds: the PLL runs above 0.5")
         runs = if_else(awake > 0.5, 1.0, 0.0)
@@ -100,31 +111,46 @@ def declare_limits(m: ModelBuilder, start: Start, reactive: Expr) -> Limits:
     ``start``: the operating point. It leaves sqrt(I_max² − i_q0²) for the reactive current of the voltage control;
     ``reactive``: reactive current in the converter [pu, S_n]."""
     with m.scope("current_limit"):
-        I_max = m.parameter("I_max", 1.0, "pu", "Largest current", base="S_n", minimum=0.1, source=COLIB)
-        T = m.parameter("tau", 0.002, "s", "Lag of the active current's limit", minimum=1e-3, source=COLIB)
+        I_max = m.parameter(
+            "I_max", 1.0, "pu", "Largest current", base="S_n", minimum=0.1, source=COLIB
+        )
+        T = m.parameter(
+            "tau", 0.002, "s", "Lag of the active current's limit", minimum=1e-3, source=COLIB
+        )
         recovery = m.parameter(
-            "recovery", 0.5, "pu/s", "Fastest recovery of the active current's limit", base="S_n", minimum=0.01,
+            "recovery",
+            0.5,
+            "pu/s",
+            "Fastest recovery of the active current's limit",
+            base="S_n",
+            minimum=0.01,
             source=COLIB,
-        )  # fmt: skip
+        )
         m.require(
             I_max - start.i.magnitude(),
             "the power flow asks for more current than current_limit.I_max: lower P_0 or Q_0, or raise S_n",
         )
-        most = m.state("I_active", _rest(I_max, start.i.im), "pu", "Largest active current", base="S_n")
+        most = m.state(
+            "I_active", _rest(I_max, start.i.im), "pu", "Largest active current", base="S_n"
+        )
         m.derivative(most, fmin((_rest(I_max, reactive) - most) / T, recovery))
     return Limits(I_max, clamp(most, 0, I_max), _rest(I_max, start.i.re))
 
 
 def limited(limits: Limits, active: Expr, reactive: Expr) -> Phasor:
     """The current that is allowed [pu, S_n]."""
-    return Phasor(clamp(active, -limits.active, limits.active), clamp(reactive, -limits.I_max, limits.I_max))
+    return Phasor(
+        clamp(active, -limits.active, limits.active), clamp(reactive, -limits.I_max, limits.I_max)
+    )
 
 
 def _rest(most: Expr, other: Scalar) -> Expr:
     return sqrt(fmax(most**2 - other**2, SMALLEST * most**2))
 
 
-LOOP = LoopDefaults(f_0=7.957747154594767, xi=1.0, source=f"{COLIB}: 5/(2π·0.1 s), from its gains 10/T and 25/T²")
+LOOP = LoopDefaults(
+    f_0=7.957747154594767, xi=1.0, source=f"{COLIB}: 5/(2π·0.1 s), from its gains 10/T and 25/T²"
+)
 MODES = f"{COLIB}, mode 0; 0.1667 and 50 in mode 1"
 
 
@@ -152,7 +178,14 @@ def following_converter(m: ModelBuilder, port: DevicePort, v: Phasor) -> Followi
     inside = u + Phasor(t.R, t.X) * i
     limits = declare_limits(m, t.start, Expr(i.im))
     with m.scope("measurement"):
-        tau = m.parameter("tau", 0.0033, "s", "Lag of the measurements of P, Q and u_c", minimum=1e-3, source=COLIB)
+        tau = m.parameter(
+            "tau",
+            0.0033,
+            "s",
+            "Lag of the measurements of P, Q and u_c",
+            minimum=1e-3,
+            source=COLIB,
+        )
     s = power(u, i)
     active = _active_power(m, port, t, limits, Expr(s.re), tau)
     seen = _Seen(Expr(s.im), inside.magnitude(), v.magnitude())
@@ -164,15 +197,29 @@ def following_converter(m: ModelBuilder, port: DevicePort, v: Phasor) -> Followi
     return Following(frame, i / t.ratio, inside.magnitude(), i.magnitude(), asked)
 
 
-def _active_power(m: ModelBuilder, port: DevicePort, t: Transformer, limits: Limits, P: Expr, tau: Expr) -> Expr:
+def _active_power(
+    m: ModelBuilder, port: DevicePort, t: Transformer, limits: Limits, P: Expr, tau: Expr
+) -> Expr:
     """Active current that the PI controller asks for [pu, S_n]."""
     with m.scope("active_power"):
         K_p = m.parameter(
-            "K_p", 0.0333, "pu", "Proportional gain", base="S_n", minimum=0.0, source=f"{COLIB}: K_i·measurement.tau"
+            "K_p",
+            0.0333,
+            "pu",
+            "Proportional gain",
+            base="S_n",
+            minimum=0.0,
+            source=f"{COLIB}: K_i·measurement.tau",
         )
-        K_i = m.parameter("K_i", 10.0, "pu/s", "Integral gain", base="S_n", minimum=0.01, source=COLIB)
-        change = m.parameter("delta_P_ref", 0, "pu", "Change of the P reference", base="S_n", tunable=True)
-        P_ref = m.calculated("P_ref", t.start.s.re, "pu", "Reference of the operating point", base="S_n")
+        K_i = m.parameter(
+            "K_i", 10.0, "pu/s", "Integral gain", base="S_n", minimum=0.01, source=COLIB
+        )
+        change = m.parameter(
+            "delta_P_ref", 0, "pu", "Change of the P reference", base="S_n", tunable=True
+        )
+        P_ref = m.calculated(
+            "P_ref", t.start.s.re, "pu", "Reference of the operating point", base="S_n"
+        )
         error = P_ref + change - low_pass(m, "P_f", P, tau, t.start.s.re)
         x = m.state("x", t.start.i.re, "pu", "Integrator, active current", base="S_n")
         _integrate(m, port, x, K_i * error, limits.active)
@@ -188,18 +235,35 @@ class _Seen:
     v: Expr
 
 
-def _reactive_power(m: ModelBuilder, port: DevicePort, t: Transformer, limits: Limits, seen: _Seen, tau: Expr) -> Expr:
+def _reactive_power(
+    m: ModelBuilder, port: DevicePort, t: Transformer, limits: Limits, seen: _Seen, tau: Expr
+) -> Expr:
     """Reactive current that is asked for [pu, S_n]: a PI controller, and what a low voltage adds."""
     with m.scope("reactive_power"):
         mode = m.parameter(
-            "mode", 0, "1", "0: reactive power at the bus; 1: voltage of the converter", minimum=0, maximum=1,
+            "mode",
+            0,
+            "1",
+            "0: reactive power at the bus; 1: voltage of the converter",
+            minimum=0,
+            maximum=1,
             type="Integer",
-        )  # fmt: skip
-        K_p = m.parameter("K_p", 0.0333, "pu", "Proportional gain", base="S_n", minimum=0.0, source=MODES)
-        K_i = m.parameter("K_i", 10.0, "pu/s", "Integral gain", base="S_n", minimum=0.01, source=MODES)
-        Q_ref = m.calculated("Q_ref", t.start.s.im, "pu", "Reference of the operating point", base="S_n")
-        U_ref = m.calculated("U_ref", t.start.v_c.magnitude(), "pu", "Reference of the operating point", base="S_n")
-        change = m.parameter("delta_ref", 0, "pu", "Change of the reference", base="S_n", tunable=True)
+        )
+        K_p = m.parameter(
+            "K_p", 0.0333, "pu", "Proportional gain", base="S_n", minimum=0.0, source=MODES
+        )
+        K_i = m.parameter(
+            "K_i", 10.0, "pu/s", "Integral gain", base="S_n", minimum=0.01, source=MODES
+        )
+        Q_ref = m.calculated(
+            "Q_ref", t.start.s.im, "pu", "Reference of the operating point", base="S_n"
+        )
+        U_ref = m.calculated(
+            "U_ref", t.start.v_c.magnitude(), "pu", "Reference of the operating point", base="S_n"
+        )
+        change = m.parameter(
+            "delta_ref", 0, "pu", "Change of the reference", base="S_n", tunable=True
+        )
         by_q = mode < 0.5
         controlled = if_else(by_q, seen.Q, seen.u_c)
         start = if_else(by_q, Q_ref, U_ref)
@@ -208,16 +272,33 @@ def _reactive_power(m: ModelBuilder, port: DevicePort, t: Transformer, limits: L
         error = if_else(seen.v < low, 0, slow - start - change)
         x = m.state("x", t.start.i.im, "pu", "Integrator, reactive current", base="S_n")
         _integrate(m, port, x, K_i * error, limits.reactive)
-        asked = clamp(K_p * error + clamp(x, -limits.reactive, limits.reactive), -limits.reactive, limits.reactive)
+        asked = clamp(
+            K_p * error + clamp(x, -limits.reactive, limits.reactive),
+            -limits.reactive,
+            limits.reactive,
+        )
         return asked - limits.I_max * clamp((high - seen.v) / (high - low), 0, 1)
 
 
 def _support(m: ModelBuilder) -> tuple[Expr, Expr]:
     """Bus voltages [pu] at which the support begins, and at which all current is reactive."""
     with m.scope("support"):
-        high = m.parameter("V_1", 0.95, "pu", "Voltage below which reactive current is added", base="bus", source=COLIB)
-        low = m.parameter("V_2", 0.5, "pu", "Voltage below which all of it is, and integration stands", base="bus",
-                          source=COLIB)  # fmt: skip
+        high = m.parameter(
+            "V_1",
+            0.95,
+            "pu",
+            "Voltage below which reactive current is added",
+            base="bus",
+            source=COLIB,
+        )
+        low = m.parameter(
+            "V_2",
+            0.5,
+            "pu",
+            "Voltage below which all of it is, and integration stands",
+            base="bus",
+            source=COLIB,
+        )
         m.require(high - low, "support.V_1 must be above support.V_2")
         return high, low
 
@@ -225,14 +306,22 @@ def _support(m: ModelBuilder) -> tuple[Expr, Expr]:
 def _integrate(m: ModelBuilder, port: DevicePort, x: Expr, rate: Expr, most: Expr) -> None:
     """The integrator stands still at its limit; behind an open breaker it returns to 0."""
     outward = logic_or(logic_and(x > most, rate > 0), logic_and(x < -most, rate < 0))
-    m.derivative(x, if_else(outward, 0, rate) * port.connected - x / BREAKER_TIME * (1 - port.connected))
+    m.derivative(
+        x, if_else(outward, 0, rate) * port.connected - x / BREAKER_TIME * (1 - port.connected)
+    )
 
 
-def _current_control(m: ModelBuilder, port: DevicePort, t: Transformer, u: Phasor, w: Expr, i_ref: Phasor) -> Phasor:
+def _current_control(
+    m: ModelBuilder, port: DevicePort, t: Transformer, u: Phasor, w: Expr, i_ref: Phasor
+) -> Phasor:
     """Voltage of the converter [pu, S_n]: PI controller, decoupling, and the voltage along the frame fed forward."""
     with m.scope("current_control"):
-        K_p = m.parameter("K_p", 0.4584, "pu", "Proportional gain", base="S_n", minimum=0.01, source=COLIB)
-        K_i = m.parameter("K_i", 6.0, "pu/s", "Integral gain", base="S_n", minimum=0.0, source=COLIB)
+        K_p = m.parameter(
+            "K_p", 0.4584, "pu", "Proportional gain", base="S_n", minimum=0.01, source=COLIB
+        )
+        K_i = m.parameter(
+            "K_i", 6.0, "pu/s", "Integral gain", base="S_n", minimum=0.0, source=COLIB
+        )
         x = qd_state(m, "x", t.start.i * t.R, "Integrator of the current loop")
         error = i_ref - t.i.value
         x.set_derivative(m, port.through_breaker(error * K_i, x.value * (-1 / BREAKER_TIME)))

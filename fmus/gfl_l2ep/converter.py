@@ -6,11 +6,18 @@ from fmus.gfl_l2ep.control import Following, following_converter
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.phasor_port import SourceEmf, declare_master_step, declare_phasor_outputs, motion, phasor_builder
+from fmus.toolchain.phasor_port import (
+    SourceEmf,
+    declare_master_step,
+    declare_phasor_outputs,
+    motion,
+    phasor_builder,
+)
 from fmus.toolchain.port import declare_port_outputs, device_port
 from fmus.toolchain.symbols import Expr
 
-S_N, P_0 = 2400.0, 0.83  # default rating [MVA] and dispatch [pu]: those of a wind park of the benchmark
+# default rating [MVA] and dispatch [pu]: those of a wind park of the benchmark
+S_N, P_0 = 2400.0, 0.83
 
 BEHIND = Phasor(0.1, 10.0)
 """Impedance [pu, S_n] behind which the phasor variant gives its current: the larger, the less does the error of the
@@ -54,6 +61,17 @@ def gfl_l2ep_phasor() -> Model:
 
 def _declare_signals(m: ModelBuilder, found: Following) -> None:
     m.output("omega", found.frame.w, "pu", "Frequency that the PLL sees", base="f_n")
-    m.output("u_c", found.u_c, "pu", "Voltage magnitude behind the transformer, which mode 1 holds", base="S_n")
+    m.output(
+        "u_c",
+        found.u_c,
+        "pu",
+        "Voltage magnitude behind the transformer, which mode 1 holds",
+        base="S_n",
+    )
     m.output("i", found.i, "pu", "Current magnitude in the converter", base="S_n")
-    m.output("current_demand", found.demand, "1", "Current that the outer control asks for, in parts of the limit")
+    m.output(
+        "current_demand",
+        found.demand,
+        "1",
+        "Current that the outer control asks for, in parts of the limit",
+    )

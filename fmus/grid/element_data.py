@@ -44,12 +44,15 @@ class Zip:
     p: float = 0.0
 
 
-LAWS = {"impedance": Zip(z=1.0), "current": Zip(i=1.0), "power": Zip(p=1.0)}  # laws of one share only, by name
+# laws of one share only, by name
+LAWS = {"impedance": Zip(z=1.0), "current": Zip(i=1.0), "power": Zip(p=1.0)}
 
 IMPEDANCE = LAWS["impedance"]
 
-LOW_VOLTAGE = 0.7  # default of the voltage [pu] below which a load with a share of constant power is an impedance
-LEAST_LOW_VOLTAGE = 0.3  # least of that voltage [pu]: a constant power draws more than three times its current there
+# default of the voltage [pu] below which a load with a share of constant power is an impedance
+LOW_VOLTAGE = 0.7
+# least of that voltage [pu]: a constant power draws more than three times its current there
+LEAST_LOW_VOLTAGE = 0.3
 
 
 @dataclass(frozen=True, slots=True)

@@ -73,7 +73,9 @@ class LineValues:
 def declare_bus(m: ModelBuilder, name: str) -> Bus:
     """Declare the power flow's voltage of a bus."""
     with m.scope(name):
-        magnitude = m.parameter("v_0", 1.0, "pu", "Power flow: voltage magnitude", base="bus", minimum=0.1, maximum=2.0)
+        magnitude = m.parameter(
+            "v_0", 1.0, "pu", "Power flow: voltage magnitude", base="bus", minimum=0.1, maximum=2.0
+        )
         angle = m.parameter("theta_0", 0.0, "rad", "Power flow: voltage angle")
     return Bus(polar(magnitude, angle), ZERO, Expr(0), Expr(0))
 
@@ -83,9 +85,13 @@ def declare_port(m: ModelBuilder, port: Port, buses: dict[str, Bus]) -> Phasor:
     with m.scope(port.name):
         current = Phasor(
             m.input("i_re", "pu", "Current injected by the device, real part", base=SYSTEM_BASE),
-            m.input("i_im", "pu", "Current injected by the device, imaginary part", base=SYSTEM_BASE),
+            m.input(
+                "i_im", "pu", "Current injected by the device, imaginary part", base=SYSTEM_BASE
+            ),
         )
-        connected = m.switch("connected", True, "The device's breaker at the bus is closed", tunable=True)
+        connected = m.switch(
+            "connected", True, "The device's breaker at the bus is closed", tunable=True
+        )
     fed = current * connected
     buses[port.bus].injected += fed
     return fed
@@ -94,7 +100,14 @@ def declare_port(m: ModelBuilder, port: Port, buses: dict[str, Bus]) -> Phasor:
 def declare_injection(m: ModelBuilder, name: str, buses: dict[str, Bus]) -> None:
     """Declare a current into a bus beside those of its devices, as `injection_names` calls its parts."""
     parts = [
-        m.parameter(part, 0.0, "pu", "Current injected besides, network frame", base=SYSTEM_BASE, tunable=True)
+        m.parameter(
+            part,
+            0.0,
+            "pu",
+            "Current injected besides, network frame",
+            base=SYSTEM_BASE,
+            tunable=True,
+        )
         for part in injection_names(name)
     ]
     buses[name].injected += Phasor(parts[0], parts[1])
@@ -103,31 +116,49 @@ def declare_injection(m: ModelBuilder, name: str, buses: dict[str, Bus]) -> None
 def declare_line_values(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> LineValues:
     """Declare the parameters of a π section and add its charging to both buses."""
 
-    def parameter(name: str, value: float, unit: str, text: str, minimum: float | None, maximum: float | None) -> Expr:
+    def parameter(
+        name: str, value: float, unit: str, text: str, minimum: float | None, maximum: float | None
+    ) -> Expr:
         base = SYSTEM_BASE if unit == "pu" and name != "tap" else "bus" if unit == "pu" else ""
         return m.parameter(
-            line.variable(name), value, unit, f"{text} of line {line.name}", base=base, minimum=minimum,
-            maximum=maximum, tunable=name != "B",
-        )  # fmt: skip
+            line.variable(name),
+            value,
+            unit,
+            f"{text} of line {line.name}",
+            base=base,
+            minimum=minimum,
+            maximum=maximum,
+            tunable=name != "B",
+        )
 
     start, end = buses[line.from_bus], buses[line.to_bus]
     least, most = (-100, -SMALLEST_REACTANCE) if line.X < 0 else (SMALLEST_REACTANCE, 100)
     X = parameter("X", line.X, "pu", "Reactance", least, most)
     R = parameter("R", line.R, "pu", "Resistance", *((None, 0) if line.R < 0 else (0, None)))
-    connected = m.switch(line.variable("connected"), True, f"Line {line.name} is closed at both ends", tunable=True)
+    connected = m.switch(
+        line.variable("connected"), True, f"Line {line.name} is closed at both ends", tunable=True
+    )
     ratio, turns = None, Expr(1)
     if line.has_ratio:
         turns = parameter("tap", line.tap, "1", "Magnitude of the ratio at the from side", 0.1, 10)
-        ratio = polar(turns, parameter("shift", line.shift, "rad", "Phase shift at the from side", None, None))
+        ratio = polar(
+            turns, parameter("shift", line.shift, "rad", "Phase shift at the from side", None, None)
+        )
     if line.B:
-        B = parameter("B", line.B, "pu", "Charging", 1e-9, None) * (OPEN_CHARGING + (1 - OPEN_CHARGING) * connected)
+        B = parameter("B", line.B, "pu", "Charging", 1e-9, None) * (
+            OPEN_CHARGING + (1 - OPEN_CHARGING) * connected
+        )
         start.B += B / 2 / turns**2
         end.B += B / 2
     X_C = None
     if line.X_C:
         text = f"Reactance of the series capacitor of line {line.name}"
-        X_C = m.parameter(line.variable("X_C"), line.X_C, "pu", text, base=SYSTEM_BASE, minimum=1e-6, maximum=100)
-        m.require(X - X_C, f"line {line.name}: X must exceed X_C, the reactance of its series capacitor")
+        X_C = m.parameter(
+            line.variable("X_C"), line.X_C, "pu", text, base=SYSTEM_BASE, minimum=1e-6, maximum=100
+        )
+        m.require(
+            X - X_C, f"line {line.name}: X must exceed X_C, the reactance of its series capacitor"
+        )
     return LineValues(R, X, ratio, connected, X_C)
 
 
@@ -147,8 +178,16 @@ def declare_line(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> Branch:
     start.injected -= drawn
     end.injected += current
     return Branch(
-        current, drawn, values.R, values.X, line.from_bus, line.to_bus, values.ratio, values.connected, capacitor
-    )  # fmt: skip
+        current,
+        drawn,
+        values.R,
+        values.X,
+        line.from_bus,
+        line.to_bus,
+        values.ratio,
+        values.connected,
+        capacitor,
+    )
 
 
 def inductor_state(m: ModelBuilder, bus: Bus, name: str, X: Expr, scale: Scalar) -> list[Branch]:
@@ -166,7 +205,12 @@ def inductor_state(m: ModelBuilder, bus: Bus, name: str, X: Expr, scale: Scalar)
 
 
 def declare_load(
-    m: ModelBuilder, load: Load, buses: dict[str, Bus], *, alone: bool, inductor: Inductor = inductor_state
+    m: ModelBuilder,
+    load: Load,
+    buses: dict[str, Bus],
+    *,
+    alone: bool,
+    inductor: Inductor = inductor_state,
 ) -> DeclaredLoad:
     """Declare a load, and put the part of it that is a constant impedance to its bus.
 
@@ -179,9 +223,17 @@ def declare_load(
     if alone:
         text = "Load step: factor on G and 1/X; not 0, because nothing else determines the voltage of this bus"
     with m.scope(load.name):
-        scale = m.parameter("scale", 1.0, "1", text, minimum=1e-6 if alone else 0, maximum=100, tunable=True)
-        P = m.parameter("P", load.p_mw, "MW", "Active power at the power flow's voltage",
-                        minimum=None if load.p_mw < 0 else 0, maximum=0 if load.p_mw < 0 else None)  # fmt: skip
+        scale = m.parameter(
+            "scale", 1.0, "1", text, minimum=1e-6 if alone else 0, maximum=100, tunable=True
+        )
+        P = m.parameter(
+            "P",
+            load.p_mw,
+            "MW",
+            "Active power at the power flow's voltage",
+            minimum=None if load.p_mw < 0 else 0,
+            maximum=0 if load.p_mw < 0 else None,
+        )
         G = P / SYSTEM_BASE_MVA / v_squared
         if load.conductance_mw or not load.p_mw:
             bus.G += scale * G
@@ -190,9 +242,13 @@ def declare_load(
             return DeclaredLoad(G, 0.0, own_G, scale, [])
         inductive = load.q_mvar > 0
         Q = m.parameter(
-            "Q", load.q_mvar, "Mvar", "Reactive power at the power flow's voltage",
-            minimum=1e-6 if inductive else None, maximum=None if inductive else -1e-6,
-        )  # fmt: skip
+            "Q",
+            load.q_mvar,
+            "Mvar",
+            "Reactive power at the power flow's voltage",
+            minimum=1e-6 if inductive else None,
+            maximum=None if inductive else -1e-6,
+        )
         B = -Q / SYSTEM_BASE_MVA / v_squared
         if not load.susceptance_mvar:
             return DeclaredLoad(G, B, own_G, scale, [])
@@ -213,7 +269,9 @@ def declare_shunt(
     bus = buses[shunt.bus]
     with m.scope(shunt.name):
         text = "The shunt is connected"
-        connected: Scalar = m.switch("connected", True, text, tunable=True) if shunt.switched else 1.0
+        connected: Scalar = (
+            m.switch("connected", True, text, tunable=True) if shunt.switched else 1.0
+        )
         if shunt.g_mw:
             G = m.parameter("G", shunt.g_mw, "MW", "Active power drawn at 1 pu") / SYSTEM_BASE_MVA
             bus.G += G * connected if shunt.switched else G
@@ -221,9 +279,13 @@ def declare_shunt(
             return []
         capacitive = shunt.b_mvar > 0
         B = m.parameter(
-            "B", shunt.b_mvar, "Mvar", "Reactive power generated at 1 pu",
-            minimum=1e-6 if capacitive else None, maximum=None if capacitive else -1e-6,
-        )  # fmt: skip
+            "B",
+            shunt.b_mvar,
+            "Mvar",
+            "Reactive power generated at 1 pu",
+            minimum=1e-6 if capacitive else None,
+            maximum=None if capacitive else -1e-6,
+        )
         if capacitive:
             rest = OPEN_CHARGING + (1 - OPEN_CHARGING) * connected
             bus.B += B / SYSTEM_BASE_MVA * rest if shunt.switched else B / SYSTEM_BASE_MVA
@@ -236,7 +298,9 @@ def add_stray(m: ModelBuilder, network: Network, buses: dict[str, Bus]) -> None:
     capacitance."""
     if floating := [bus for name, bus in buses.items() if network.needs_stray(name)]:
         text = "Capacitance to earth of every bus that has none of its own"
-        stray = m.parameter("stray_B", network.stray_B, "pu", text, base=SYSTEM_BASE, minimum=1e-9, maximum=100)
+        stray = m.parameter(
+            "stray_B", network.stray_B, "pu", text, base=SYSTEM_BASE, minimum=1e-9, maximum=100
+        )
         for bus in floating:
             bus.B += stray
 
@@ -252,7 +316,9 @@ def declare_network_outputs(
     for name, bus in buses.items():
         with m.scope(name):
             m.output("v_re", bus.v.re, "pu", "Bus voltage, real part, network frame", base="bus")
-            m.output("v_im", bus.v.im, "pu", "Bus voltage, imaginary part, network frame", base="bus")
+            m.output(
+                "v_im", bus.v.im, "pu", "Bus voltage, imaginary part, network frame", base="bus"
+            )
             m.output("v", bus.v.magnitude(), "pu", "Bus voltage magnitude", base="bus")
     for line, current in zip(network.lines, drawn, strict=True):
         texts = "Active power entering the line", "Reactive power entering the line"
@@ -294,7 +360,9 @@ def _capacitor_equation(m: ModelBuilder, branch: Branch, omega_b: Expr) -> None:
     phasor_derivative(m, v, rate)
 
 
-def declare_power(m: ModelBuilder, name: str, v: Phasor, current: Phasor, active: str, reactive: str) -> None:
+def declare_power(
+    m: ModelBuilder, name: str, v: Phasor, current: Phasor, active: str, reactive: str
+) -> None:
     """Declare ``<name>.p`` and ``<name>.q`` of a current at a voltage.
 
     ``name``: scope of both outputs; ``v``: voltage [pu]; ``current``: in the same frame [pu, 100 MVA]; ``active``,

@@ -33,17 +33,43 @@ def fault_admittance(m: ModelBuilder, bus: str) -> Phasor:
 def declare_fault_outputs(m: ModelBuilder, bus: str, current: Phasor) -> None:
     """Declare the current of a fault as outputs."""
     with m.scope(f"{bus}.fault"):
-        m.output("i_re", current.re, "pu", "Current into the fault, real part, network frame", base=SYSTEM_BASE)
-        m.output("i_im", current.im, "pu", "Current into the fault, imaginary part, network frame", base=SYSTEM_BASE)
+        m.output(
+            "i_re",
+            current.re,
+            "pu",
+            "Current into the fault, real part, network frame",
+            base=SYSTEM_BASE,
+        )
+        m.output(
+            "i_im",
+            current.im,
+            "pu",
+            "Current into the fault, imaginary part, network frame",
+            base=SYSTEM_BASE,
+        )
 
 
 def _declare_values(m: ModelBuilder, bus: str) -> tuple[Expr, Expr, Expr]:
     with m.scope(f"{bus}.fault"):
         return (
-            m.parameter("R", 0.0, "pu", f"Resistance of a fault at {bus}", base=SYSTEM_BASE, minimum=0, tunable=True),
             m.parameter(
-                "X", SMALLEST_REACTANCE, "pu", f"Reactance of a fault at {bus}", base=SYSTEM_BASE,
-                minimum=SMALLEST_REACTANCE, maximum=100, tunable=True,
+                "R",
+                0.0,
+                "pu",
+                f"Resistance of a fault at {bus}",
+                base=SYSTEM_BASE,
+                minimum=0,
+                tunable=True,
+            ),
+            m.parameter(
+                "X",
+                SMALLEST_REACTANCE,
+                "pu",
+                f"Reactance of a fault at {bus}",
+                base=SYSTEM_BASE,
+                minimum=SMALLEST_REACTANCE,
+                maximum=100,
+                tunable=True,
             ),
             m.switch("on", False, f"There is a fault at {bus}", tunable=True),
-        )  # fmt: skip
+        )

@@ -9,7 +9,11 @@ from fmus.grid import elements
 from fmus.grid.fault import declare_fault, declare_fault_outputs
 from fmus.grid.load_laws import FollowingLoad, declare_following_load, following_load_equations
 from fmus.grid.network import Network
-from fmus.grid.three_winding import declare_transformer, declare_winding_powers, transformer_equations
+from fmus.grid.three_winding import (
+    declare_transformer,
+    declare_winding_powers,
+    transformer_equations,
+)
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
@@ -18,7 +22,9 @@ from fmus.toolchain.symbols import Expr
 
 def grid(network: Network) -> Model:
     """Build the model of a network; parameters are named after its elements (``X_<line>``, ``<load>.P``)."""
-    m = ModelBuilder(network.name, f"EMT network {network.name} in the frame turning at ω_b", kind="network")
+    m = ModelBuilder(
+        network.name, f"EMT network {network.name} in the frame turning at ω_b", kind="network"
+    )
     f_n = m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
     omega_b = 2 * pi * f_n
     buses = {bus: elements.declare_bus(m, bus) for bus in network.buses}
@@ -59,12 +65,15 @@ def grid(network: Network) -> Model:
     return m.build(integrator="sdirk" if stiff else "runge_kutta")
 
 
-def _bus_voltage(m: ModelBuilder, name: str, bus: elements.Bus, omega_b: Expr, network: Network) -> None:
+def _bus_voltage(
+    m: ModelBuilder, name: str, bus: elements.Bus, omega_b: Expr, network: Network
+) -> None:
     """(B/ω_b)·dv/dt = Σ i − (G + jB)·v, or v = Σ i / G where there is no capacitance."""
     dynamic = network.has_capacitance(name)
     if network.loads_decide(name):
         m.require(
-            bus.B if dynamic else bus.G, f"the voltage of {name} hangs on its loads; leave one of them switched on"
+            bus.B if dynamic else bus.G,
+            f"the voltage of {name} hangs on its loads; leave one of them switched on",
         )
     if not dynamic:
         bus.v = bus.injected / bus.G

@@ -27,19 +27,22 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port_variables import SYSTEM_BASE
 from fmus.toolchain.symbols import Expr, Scalar, fmax
 
-RECOVERY_TIME = 1e-3  # default of τ [s]: far above electromechanical modes, well below the communication rate
+# default of τ [s]: far above electromechanical modes, well below the communication rate
+RECOVERY_TIME = 1e-3
 
 POWER_RECOVERY_TIME = 2e-3
 """The same with a share of constant power, whose negative resistance feeds resonances of the network below 1/τ: in
 ieee39 with such loads alone, 0.5 ms leaves one at 151 Hz growing, 1 ms none."""
 
-SHORTEST_RECOVERY = 5e-4  # least τ [s]: the law is taken at the stages of an implicit step of up to 0.2 ms
+# least τ [s]: the law is taken at the stages of an implicit step of up to 0.2 ms
+SHORTEST_RECOVERY = 5e-4
 
 PHASOR_RECOVERY_TIME, SHORTEST_PHASOR_RECOVERY = 1e-2, 4e-3
 """The same for phasor networks, whose explicit steps are up to 2 ms long."""
 
 LONGEST_RECOVERY = 1.0  # largest τ [s]
-FREQUENCY_TIME = 0.02  # default time constant [s] of the frequency that a load feels: one period at 50 Hz
+# default time constant [s] of the frequency that a load feels: one period at 50 Hz
+FREQUENCY_TIME = 0.02
 
 
 @dataclass(frozen=True)
@@ -64,9 +67,14 @@ class FollowingLoad:
 
 
 def declare_following_load(
-    m: ModelBuilder, load: Load, declared: DeclaredLoad, buses: dict[str, Bus], omega_b: Scalar | None, *,
+    m: ModelBuilder,
+    load: Load,
+    declared: DeclaredLoad,
+    buses: dict[str, Bus],
+    omega_b: Scalar | None,
+    *,
     phasors: bool = False,
-) -> FollowingLoad:  # fmt: skip
+) -> FollowingLoad:
     """Make a declared load follow its laws.
 
     ``load``: the load's bus, name and laws; ``declared``: the same load as a constant impedance, as `declare_load`
@@ -85,26 +93,39 @@ def declare_following_load(
         )
     with m.scope(load.name):
         tau = m.parameter(
-            "tau", load.tau or _recovery_time(load, phasors), "s",
+            "tau",
+            load.tau or _recovery_time(load, phasors),
+            "s",
             f"Time after which the load is {law}; before, {before}",
-            minimum=shortest, maximum=LONGEST_RECOVERY,
-        )  # fmt: skip
+            minimum=shortest,
+            maximum=LONGEST_RECOVERY,
+        )
         v_min = None
         if load.low_voltage:
             text = "Voltage below which the load is an impedance"
             v_min = m.parameter(
-                "v_min", load.low_voltage, "pu", text, base="bus", minimum=LEAST_LOW_VOLTAGE, maximum=1.0
+                "v_min",
+                load.low_voltage,
+                "pu",
+                text,
+                base="bus",
+                minimum=LEAST_LOW_VOLTAGE,
+                maximum=1.0,
             )
             rule = f"{load.name}: its voltage in the power flow must exceed v_min, where the load becomes an impedance"
             m.require(bus.v_0.magnitude() - v_min, f"{rule}; lower {load.name}.v_min")
         start = _missing(load, declared, bus.v_0)
         text = "Correction of the load's current at scale 1"
         correction = phasor_state(m, "c", start, text, SYSTEM_BASE)
-        held = phasor_state(m, "d", start, f"{text}, behind its lag", SYSTEM_BASE) if phasors else None
+        held = (
+            phasor_state(m, "d", start, f"{text}, behind its lag", SYSTEM_BASE) if phasors else None
+        )
         delayed = _delayed_voltage(m, bus) if load.k_pf or load.k_qf else None
     followed = correction if held is None else correction * 3.0 - held * 2.0
     bus.injected -= followed * declared.scale
-    return FollowingLoad(load, bus, declared, correction, held, followed, tau, v_min, delayed, omega_b)
+    return FollowingLoad(
+        load, bus, declared, correction, held, followed, tau, v_min, delayed, omega_b
+    )
 
 
 def following_load_equations(m: ModelBuilder, load: FollowingLoad) -> None:
@@ -114,14 +135,22 @@ def following_load_equations(m: ModelBuilder, load: FollowingLoad) -> None:
     implicit = load.correction * (-1 / load.tau)
     phasor_derivative(m, load.correction, rate, implicit)
     if load.held is not None:
-        phasor_derivative(m, load.held, (load.correction - load.held) * (2 / load.tau), load.held * (-2 / load.tau))
+        phasor_derivative(
+            m,
+            load.held,
+            (load.correction - load.held) * (2 / load.tau),
+            load.held * (-2 / load.tau),
+        )
     if load.delayed is not None:
         delayed, lag = load.delayed
         moved = (v - delayed) * (1 / lag)
         phasor_derivative(m, delayed, moved)
     own = v * declared.G
     if load.data.reactive_follows:
-        own = v * Phasor(declared.G, declared.B_0 if load.data.susceptance_mvar and not declared.branches else 0.0)
+        own = v * Phasor(
+            declared.G,
+            declared.B_0 if load.data.susceptance_mvar and not declared.branches else 0.0,
+        )
         for branch in declared.branches:
             own += branch.current
     drawn = power(v, (own + load.followed) * declared.scale)
@@ -141,9 +170,14 @@ def _wanted(m: ModelBuilder, load: FollowingLoad) -> Phasor:
     G: Scalar = 0.0
     B: Scalar = 0.0
     if data.active_follows:
-        G = load.load.G_0 * (_of_law(data.active, ratio, data.k_pf, deviation) - (1 if data.conductance_mw else 0))
+        G = load.load.G_0 * (
+            _of_law(data.active, ratio, data.k_pf, deviation) - (1 if data.conductance_mw else 0)
+        )
     if data.reactive_follows:
-        B = load.load.B_0 * (_of_law(data.reactive, ratio, data.k_qf, deviation) - (1 if data.susceptance_mvar else 0))
+        B = load.load.B_0 * (
+            _of_law(data.reactive, ratio, data.k_qf, deviation)
+            - (1 if data.susceptance_mvar else 0)
+        )
     return v * G if not data.reactive_follows else v * Phasor(G, B)
 
 
@@ -173,7 +207,12 @@ def _recovery_time(load: Load, phasors: bool) -> float:
 
 def _delayed_voltage(m: ModelBuilder, bus: Bus) -> tuple[Phasor, Expr]:
     lag = m.parameter(
-        "T_f", FREQUENCY_TIME, "s", "Time constant of the frequency that the load feels", minimum=5e-3, maximum=10.0
+        "T_f",
+        FREQUENCY_TIME,
+        "s",
+        "Time constant of the frequency that the load feels",
+        minimum=5e-3,
+        maximum=10.0,
     )
     text = "Bus voltage behind the lag of the frequency"
     return phasor_state(m, "z", bus.v_0, text, "bus"), lag

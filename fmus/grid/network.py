@@ -7,9 +7,28 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
-from fmus.grid.element_data import LEAST_LOW_VOLTAGE, SMALLEST_REACTANCE, Line, Load, Port, Shunt, ThreeWinding, Zip
+from fmus.grid.element_data import (
+    LEAST_LOW_VOLTAGE,
+    SMALLEST_REACTANCE,
+    Line,
+    Load,
+    Port,
+    Shunt,
+    ThreeWinding,
+    Zip,
+)
 
-__all__ = ["OPEN_CHARGING", "SMALLEST_REACTANCE", "Line", "Load", "Network", "Port", "Shunt", "ThreeWinding", "Zip"]
+__all__ = [
+    "OPEN_CHARGING",
+    "SMALLEST_REACTANCE",
+    "Line",
+    "Load",
+    "Network",
+    "Port",
+    "Shunt",
+    "ThreeWinding",
+    "Zip",
+]
 
 OPEN_CHARGING = 1e-3
 """Part of an open line's charging that stays connected. A bus that only this line supports then keeps a defined
@@ -50,7 +69,12 @@ class Network:
     injections: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        problems = [*self._unknown_buses(), *self._repeated_names(), *self._bad_elements(), *self._floating_buses()]
+        problems = [
+            *self._unknown_buses(),
+            *self._repeated_names(),
+            *self._bad_elements(),
+            *self._floating_buses(),
+        ]
         problems += self._bad_loads()
         if problems:
             raise ValueError(f"network {self.name!r}: " + "; ".join(problems))
@@ -58,7 +82,11 @@ class Network:
     def has_capacitance(self, bus: str) -> bool:
         """Whether the bus voltage is a state, because of line charging, a capacitive load or shunt, or stray
         capacitance."""
-        return self._has_fixed_capacitance(bus) or bool(self._capacitive_loads(bus)) or self.needs_stray(bus)
+        return (
+            self._has_fixed_capacitance(bus)
+            or bool(self._capacitive_loads(bus))
+            or self.needs_stray(bus)
+        )
 
     def floats(self, bus: str) -> bool:
         """Whether the bus has neither capacitance nor a load or shunt that conducts."""
@@ -118,7 +146,9 @@ class Network:
         for line in self.lines:
             for bus in {line.from_bus, line.to_bus} - known:
                 yield f"line {line.name!r} ends at bus {bus!r}, which does not exist{self._near(bus)}"
-        attached = [("load", x.name, x.bus) for x in self.loads] + [("shunt", x.name, x.bus) for x in self.shunts]
+        attached = [("load", x.name, x.bus) for x in self.loads] + [
+            ("shunt", x.name, x.bus) for x in self.shunts
+        ]
         attached += [("port", x.name, x.bus) for x in self.ports]
         attached += [("transformer", x.name, bus) for x in self.transformers for bus in x.buses]
         attached += [("fault", bus, bus) for bus in self.faults]
@@ -130,7 +160,11 @@ class Network:
     def _near(self, bus: str) -> str:
         """A hint at buses of nearly this name, such as another case of letters or the same number."""
         number = re.sub(r"\D", "", bus)
-        alike = [x for x in self.buses if x.lower() == bus.lower() or (number and re.sub(r"\D", "", x) == number)]
+        alike = [
+            x
+            for x in self.buses
+            if x.lower() == bus.lower() or (number and re.sub(r"\D", "", x) == number)
+        ]
         close = alike or difflib.get_close_matches(bus, self.buses, 3)
         return f"; did you mean {' or '.join(map(repr, close[:3]))}?" if close else ""
 
@@ -139,7 +173,8 @@ class Network:
         names += [*(x.name for x in self.shunts), *(x.name for x in self.ports)]
         names += [x.name for x in self.transformers]
         yield from (
-            f"the name {name!r} is used twice" for name in sorted(n for n, k in Counter(names).items() if k > 1)
+            f"the name {name!r} is used twice"
+            for name in sorted(n for n, k in Counter(names).items() if k > 1)
         )
 
     def _bad_lines(self) -> Iterable[str]:

@@ -29,11 +29,15 @@ voltage is 0 and not 0/0."""
 
 def phasor_grid(network: Network) -> Model:
     """Build the model of a network; parameters are named after its elements, as in `grid`."""
-    m = phasor_builder(network.name, f"Phasor network {network.name} at rated frequency", kind="network")
+    m = phasor_builder(
+        network.name, f"Phasor network {network.name} at rated frequency", kind="network"
+    )
     following: list[FollowingLoad] = []
     omega_b: Expr | None = None
     if any(load.follows and (load.k_pf or load.k_qf) for load in network.loads):
-        omega_b = 2 * pi * m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
+        omega_b = (
+            2 * pi * m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
+        )
     buses = {bus: elements.declare_bus(m, bus) for bus in network.buses}
     Y: Admittances = {bus: {} for bus in buses}
     sources = [_declare_source(m, port, buses, Y) for port in network.ports]
@@ -41,7 +45,9 @@ def phasor_grid(network: Network) -> Model:
     for load in network.loads:
         declared = elements.declare_load(m, load, buses, alone=False, inductor=_susceptance)
         if load.follows:
-            following.append(declare_following_load(m, load, declared, buses, omega_b, phasors=True))
+            following.append(
+                declare_following_load(m, load, declared, buses, omega_b, phasors=True)
+            )
     for shunt in network.shunts:
         elements.declare_shunt(m, shunt, buses, inductor=_susceptance)
     elements.add_stray(m, network, buses)
@@ -49,7 +55,9 @@ def phasor_grid(network: Network) -> Model:
         elements.declare_injection(m, name, buses)
     for name, bus in buses.items():
         least = LEAST_CONDUCTANCE if network.floats(name) else 0.0
-        add_admittance(Y, name, name, Phasor(bus.G + least, bus.B) if least else Phasor(bus.G, bus.B))
+        add_admittance(
+            Y, name, name, Phasor(bus.G + least, bus.B) if least else Phasor(bus.G, bus.B)
+        )
     faults = {bus: fault_admittance(m, bus) for bus in network.faults}
     for name, y in faults.items():
         add_admittance(Y, name, name, y)
@@ -74,7 +82,11 @@ def phasor_grid(network: Network) -> Model:
 def _settle(m: ModelBuilder, buses: dict[str, elements.Bus], Y: Admittances) -> None:
     """Give every bus its voltage, for which the kernel solves."""
     place = {name: k for k, name in enumerate(Y)}
-    matrix = {(place[name], place[other]): (y.re, y.im) for name, row in Y.items() for other, y in row.items()}
+    matrix = {
+        (place[name], place[other]): (y.re, y.im)
+        for name, row in Y.items()
+        for other, y in row.items()
+    }
     voltages = m.nodes(matrix, [(bus.injected.re, bus.injected.im) for bus in buses.values()])
     for bus, (re, im) in zip(buses.values(), voltages, strict=True):
         bus.v = Phasor(re, im)
@@ -91,7 +103,9 @@ def _declare_source(
         )
         y = Phasor(
             m.input("y_re", "pu", "Admittance between emf and bus, real part", base=SYSTEM_BASE),
-            m.input("y_im", "pu", "Admittance between emf and bus, imaginary part", base=SYSTEM_BASE),
+            m.input(
+                "y_im", "pu", "Admittance between emf and bus, imaginary part", base=SYSTEM_BASE
+            ),
         )
         y *= m.switch("connected", True, "The device's breaker at the bus is closed", tunable=True)
     buses[port.bus].injected += e * y
@@ -99,7 +113,9 @@ def _declare_source(
     return e, y
 
 
-def _susceptance(m: ModelBuilder, bus: elements.Bus, name: str, X: Expr, scale: Scalar) -> list[elements.Branch]:
+def _susceptance(
+    m: ModelBuilder, bus: elements.Bus, name: str, X: Expr, scale: Scalar
+) -> list[elements.Branch]:
     """An inductor between a bus and earth, as an admittance."""
     bus.B -= scale / X
     return []

@@ -37,15 +37,32 @@ def declare_windings(m: ModelBuilder, data: ThreeWinding) -> Windings:
     with m.scope(data.name):
         for k in range(3):
             n, text = k + 1, f"of winding {k + 1} in the star"
-            X = m.parameter(f"X_{n}", data.X[k], "pu", f"Reactance {text}", base=SYSTEM_BASE, minimum=-100, maximum=100)
-            R = m.parameter(f"R_{n}", data.R[k], "pu", f"Resistance {text}", base=SYSTEM_BASE, minimum=-100)
+            X = m.parameter(
+                f"X_{n}",
+                data.X[k],
+                "pu",
+                f"Reactance {text}",
+                base=SYSTEM_BASE,
+                minimum=-100,
+                maximum=100,
+            )
+            R = m.parameter(
+                f"R_{n}", data.R[k], "pu", f"Resistance {text}", base=SYSTEM_BASE, minimum=-100
+            )
             Z.append(Phasor(R, X))
             turns = _ONE
             if data.has_ratio(k):
-                tap = m.parameter(f"tap_{n}", data.tap[k], "1", f"Ratio at winding {n}", minimum=0.1, maximum=10)
-                turns = polar(tap, m.parameter(f"shift_{n}", data.shift[k], "rad", f"Phase shift at winding {n}"))
+                tap = m.parameter(
+                    f"tap_{n}", data.tap[k], "1", f"Ratio at winding {n}", minimum=0.1, maximum=10
+                )
+                turns = polar(
+                    tap,
+                    m.parameter(f"shift_{n}", data.shift[k], "rad", f"Phase shift at winding {n}"),
+                )
             ratio.append(turns)
-        connected = m.switch("connected", True, "The transformer is closed at all windings", tunable=True)
+        connected = m.switch(
+            "connected", True, "The transformer is closed at all windings", tunable=True
+        )
     a, b, c = (Expr(z.im) for z in Z)
     rule = f"transformer {data.name}: the reactances of any two windings, and of all three, must be those of inductors"
     m.require(a + c, rule)
@@ -61,8 +78,17 @@ def declare_transformer(m: ModelBuilder, data: ThreeWinding, buses: dict[str, Bu
     with m.scope(data.name):
         for k in (0, 1):
             parts = [
-                m.state(f"i_{part}_{k + 1}", value, "pu", f"Current of winding {k + 1}, {which} part", SYSTEM_BASE)
-                for part, which, value in (("re", "real", start[k].re), ("im", "imaginary", start[k].im))
+                m.state(
+                    f"i_{part}_{k + 1}",
+                    value,
+                    "pu",
+                    f"Current of winding {k + 1}, {which} part",
+                    SYSTEM_BASE,
+                )
+                for part, which, value in (
+                    ("re", "real", start[k].re),
+                    ("im", "imaginary", start[k].im),
+                )
             ]
             found.append(Phasor(parts[0], parts[1]))
     currents = (found[0], found[1], -(found[0] + found[1]))
@@ -71,7 +97,9 @@ def declare_transformer(m: ModelBuilder, data: ThreeWinding, buses: dict[str, Bu
     return Windings(data, windings.Z, windings.ratio, windings.connected, currents)
 
 
-def transformer_equations(m: ModelBuilder, windings: Windings, buses: dict[str, Bus], omega_b: Expr) -> None:
+def transformer_equations(
+    m: ModelBuilder, windings: Windings, buses: dict[str, Bus], omega_b: Expr
+) -> None:
     """Give both currents their rates; where the transformer is open they fade, as a line's current does.
 
     ``windings``: the declared transformer, with its currents; ``buses``: by name; they give the voltages; ``omega_b``:

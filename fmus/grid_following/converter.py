@@ -14,7 +14,8 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort, declare_port_outputs, device_port
 from fmus.toolchain.symbols import Expr
 
-S_N, P_0 = 1500.0, 0.9  # default rating [MVA] and dispatch [pu]: the two-area system's converter, whose place it takes
+# default rating [MVA] and dispatch [pu]: the two-area system's converter, whose place it takes
+S_N, P_0 = 1500.0, 0.9
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,9 @@ class Signals:
 
 def grid_following_converter() -> Model:
     """Average EMT-type model of a grid-following converter with a stiff DC side."""
-    title = "Grid-following converter with PLL, current control and P, Q or voltage control (EMT type)"
+    title = (
+        "Grid-following converter with PLL, current control and P, Q or voltage control (EMT type)"
+    )
     m = ModelBuilder("gfl", title, kind="converter", usual=FOLLOWING)
     port = device_port(m, S_n=S_N, P_0=P_0)
     f = declare_filter(m, port)
@@ -59,11 +62,23 @@ def declare_signals(m: ModelBuilder, signals: Signals) -> None:
 def _declare_measurement(m: ModelBuilder, f: Filter) -> tuple[QdState, Expr]:
     """Declare the voltage that PLL and feed-forward see, and its lag [s]."""
     with m.scope("feed_forward"):
-        tau = m.parameter("tau", 1e-4, "s", "Lag of the voltage of PLL and feed-forward", minimum=1e-5, source=APPENDIX)
-        m.require(2.5 * tau - m.internal_step, "internal_step must be shorter than 2.5 times feed_forward.tau")
+        tau = m.parameter(
+            "tau",
+            1e-4,
+            "s",
+            "Lag of the voltage of PLL and feed-forward",
+            minimum=1e-5,
+            source=APPENDIX,
+        )
+        m.require(
+            2.5 * tau - m.internal_step,
+            "internal_step must be shorter than 2.5 times feed_forward.tau",
+        )
         return qd_state(m, "u", f.initial.u, "Measured capacitor voltage"), tau
 
 
 def _standby(f: Filter, port: DevicePort, frame: Frame, bus: Phasor) -> Phasor:
     """Current behind an open breaker: what the capacitor takes, and what brings its voltage to that of the bus."""
-    return Phasor(0, frame.w * f.B_c) * f.u_c.value + (bus - f.u) * (f.B_c / port.omega_b / TRACKING_TIME)
+    return Phasor(0, frame.w * f.B_c) * f.u_c.value + (bus - f.u) * (
+        f.B_c / port.omega_b / TRACKING_TIME
+    )

@@ -8,7 +8,8 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, sqrt
 
 SOURCE = "Mateu-Barriendos et al. 2024, appendix: 1.1 pu, there for each component"
-SMALLEST = 1e-6  # part of the limit always left to the current without priority: no root of 0 is to be derived
+# part of the limit always left to the current without priority: no root of 0 is to be derived
+SMALLEST = 1e-6
 
 
 @dataclass(frozen=True)
@@ -31,11 +32,18 @@ def limited_current(m: ModelBuilder, start: SteadyState, demanded: Phasor) -> Li
     ``start``: operating point of the filter; ``demanded``: reference of the converter's current, its own frame: real
     part active, imaginary part reactive [pu, S_n]."""
     with m.scope("current_limit"):
-        most = m.parameter("I_max", 1.1, "pu", "Largest current", base="S_n", minimum=0.1, source=SOURCE)
+        most = m.parameter(
+            "I_max", 1.1, "pu", "Largest current", base="S_n", minimum=0.1, source=SOURCE
+        )
         priority = m.parameter(
-            "priority", 0, "1", "0: both parts shrink alike; 1: active current first; 2: reactive current first",
-            minimum=0, maximum=2, type="Integer",
-        )  # fmt: skip
+            "priority",
+            0,
+            "1",
+            "0: both parts shrink alike; 1: active current first; 2: reactive current first",
+            minimum=0,
+            maximum=2,
+            type="Integer",
+        )
     m.require(
         most - start.i_s.magnitude(),
         "the power flow asks for more current than current_limit.I_max: lower P_0 or Q_0, or raise S_n",

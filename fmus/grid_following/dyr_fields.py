@@ -16,12 +16,16 @@ MODEL = "gfl_phasor"
 CONVERTER = "REGCA1"
 FIELDS: dict[str, tuple[str, ...]] = {
     record: tuple(fields.split())
-    for record, fields in tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")).items()
+    for record, fields in tomllib.loads(
+        Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+    ).items()
 }
 """Fields behind the identifier of the machine, in the file's order, by PSS/E's name of the record."""
 
 PLANT = "REPCA1"  # the plant's controller, of which nothing can be taken over
-X_S = 0.5  # reactance [pu, S_n] by which `gfl_phasor` states its voltage control; any gives the same integrator
+# reactance [pu, S_n] by which `gfl_phasor` states its voltage control; any gives the same
+# integrator
+X_S = 0.5
 
 _FLAGS = {"PFFLAG", "VFLAG", "QFLAG", "PFLAG", "PQFLAG"}
 _SHORTEST, _SHORTEST_CURRENT, _LEAST_LIMIT, _LEAST_REACTANCE = 5e-3, 1e-3, 0.1, 0.01
@@ -39,7 +43,9 @@ def approximation(records: Mapping[str, Mapping[str, float]]) -> tuple[dict[str,
     electrical = next((name for name in records if name != CONVERTER), None)
     if electrical is None or CONVERTER not in records:
         missing = CONVERTER if electrical else "REECA1 or REECB1"
-        raise ValueError(f"{electrical or CONVERTER} is there, and {missing} is not; together they are the converter")
+        raise ValueError(
+            f"{electrical or CONVERTER} is there, and {missing} is not; together they are the converter"
+        )
     converter, control = records[CONVERTER], records[electrical]
     _check_modes(electrical, control)
     texts: list[str] = []
@@ -64,15 +70,21 @@ def approximation(records: Mapping[str, Mapping[str, float]]) -> tuple[dict[str,
     if control["QFLAG"]:
         used.add("Kvi")
         values["reactive_power.X_s"] = X_S
-        values["reactive_power.tau"] = at_least(_SHORTEST, 1 / (control["Kvi"] * X_S), f"1/({X_S:g}·Kvi)")
+        values["reactive_power.tau"] = at_least(
+            _SHORTEST, 1 / (control["Kvi"] * X_S), f"1/({X_S:g}·Kvi)"
+        )
     else:
         used.add("Tiq")
         values["reactive_power.tau"] = at_least(_SHORTEST, slow + control["Tiq"], "Trv + Tg + Tiq")
         if control["PFFLAG"]:
             texts.append("PFFLAG = 1: the reactive power is held, and not the power factor")
-    texts.append("a PLL of its own (pll.f_0), which REGCA1 does not have: there the current follows the angle at once")
+    texts.append(
+        "a PLL of its own (pll.f_0), which REGCA1 does not have: there the current follows the angle at once"
+    )
     for name, given in records.items():
-        texts.append(f"not taken over from {name}: {', '.join(field for field in given if field not in used)}")
+        texts.append(
+            f"not taken over from {name}: {', '.join(field for field in given if field not in used)}"
+        )
     return values, texts
 
 
@@ -81,8 +93,14 @@ def _check_modes(name: str, control: Mapping[str, float]) -> None:
         if control[flag] not in (0.0, 1.0):
             raise ValueError(f"{name} has {flag} = {control[flag]:g}; it is 0 or 1")
     if control.get("PFLAG"):
-        raise ValueError(f"{name} has PFLAG = 1, power by the speed of a turbine, which the model does not have")
+        raise ValueError(
+            f"{name} has PFLAG = 1, power by the speed of a turbine, which the model does not have"
+        )
     if control["QFLAG"] and control["VFLAG"]:
-        raise ValueError(f"{name} has QFLAG = 1 and VFLAG = 1, a voltage control within one of Q; the model has one")
+        raise ValueError(
+            f"{name} has QFLAG = 1 and VFLAG = 1, a voltage control within one of Q; the model has one"
+        )
     if control["QFLAG"] and not control["Kvi"] > 0:
-        raise ValueError(f"{name} has QFLAG = 1 and Kvi = {control['Kvi']:g}; a voltage control needs its integrator")
+        raise ValueError(
+            f"{name} has QFLAG = 1 and Kvi = {control['Kvi']:g}; a voltage control needs its integrator"
+        )

@@ -15,7 +15,8 @@ from fmus.toolchain.port import DevicePort
 from fmus.toolchain.symbols import Expr, Scalar, if_else
 
 CHOSEN = "chosen here: about six times slower than the PLL"
-TRACKING_TIME = 0.01  # time constant [s] with which control and capacitor follow the bus behind an open breaker
+# time constant [s] with which control and capacitor follow the bus behind an open breaker
+TRACKING_TIME = 0.01
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,14 @@ def outer_control(
     an open breaker, its own frame [pu, S_n]."""
     start = f.initial
     with m.scope("measurement"):
-        tau = m.parameter("tau", 0.01, "s", "Lag of the measurements of P, Q and u", minimum=1e-3, source="chosen here")
+        tau = m.parameter(
+            "tau",
+            0.01,
+            "s",
+            "Lag of the measurements of P, Q and u",
+            minimum=1e-3,
+            source="chosen here",
+        )
         P_f = low_pass(m, "P_f", Expr(measured.s.re), tau, start.s.re)
         Q_f = low_pass(m, "Q_f", Expr(measured.s.im), tau, start.s.im)
         U_f = low_pass(m, "U_f", measured.u, tau, start.u.re)
@@ -51,7 +59,8 @@ def outer_control(
     limited = limited_current(m, start, demanded)
     tracked = (standby - demanded) / TRACKING_TIME
     moving = Phasor(
-        _unless_outward(K_P * active, limited.excess.re), -_unless_outward(K_Q * reactive, -limited.excess.im)
+        _unless_outward(K_P * active, limited.excess.re),
+        -_unless_outward(K_Q * reactive, -limited.excess.im),
     )
     rate = port.through_breaker(moving, tracked)
     m.derivative(x_P, rate.re)
@@ -63,34 +72,66 @@ def _active_error(m: ModelBuilder, P_0: Scalar, P_f: Expr, w: Expr) -> tuple[Exp
     """Error of the active power [pu] with the droop's part, and the integral gain [1/s]."""
     with m.scope("active_power"):
         tau = m.parameter("tau", 0.1, "s", "Response time", minimum=5e-3, source=CHOSEN)
-        change = m.parameter("delta_P_ref", 0, "pu", "Change of the P reference", base="S_n", tunable=True)
-        P_ref = m.calculated("P_ref", P_0, "pu", "Active-power reference of the operating point", base="S_n")
+        change = m.parameter(
+            "delta_P_ref", 0, "pu", "Change of the P reference", base="S_n", tunable=True
+        )
+        P_ref = m.calculated(
+            "P_ref", P_0, "pu", "Active-power reference of the operating point", base="S_n"
+        )
     with m.scope("frequency_droop"):
-        enabled = m.switch("enabled", False, "Active power answers the frequency that the PLL sees", tunable=True)
-        R_f = m.parameter("R_f", 0.05, "pu", "P-f droop", base="S_n", minimum=1e-3, tunable=True, source=APPENDIX)
-        lag = m.parameter("tau", 0.05, "s", "Lag of the measured frequency", minimum=1e-3, source="chosen here")
+        enabled = m.switch(
+            "enabled", False, "Active power answers the frequency that the PLL sees", tunable=True
+        )
+        R_f = m.parameter(
+            "R_f", 0.05, "pu", "P-f droop", base="S_n", minimum=1e-3, tunable=True, source=APPENDIX
+        )
+        lag = m.parameter(
+            "tau", 0.05, "s", "Lag of the measured frequency", minimum=1e-3, source="chosen here"
+        )
         w_f = m.state("w_f", 1, "pu", "Measured frequency", base="f_n")
         m.derivative(w_f, (w - w_f) / lag)
     return P_ref + change + enabled * (1 - w_f) / R_f - P_f, 1 / tau
 
 
-def _reactive_error(m: ModelBuilder, Q_0: Scalar, U_0: Scalar, Q_f: Expr, U_f: Expr) -> tuple[Expr, Expr]:
+def _reactive_error(
+    m: ModelBuilder, Q_0: Scalar, U_0: Scalar, Q_f: Expr, U_f: Expr
+) -> tuple[Expr, Expr]:
     """Error of what the mode controls [pu, as reactive power], and the integral gain [1/s]."""
     with m.scope("reactive_power"):
         mode = m.parameter(
-            "mode", 0, "1", "0: reactive power; 1: voltage; 2: reactive power with Q-V droop",
-            minimum=0, maximum=2, type="Integer",
-        )  # fmt: skip
+            "mode",
+            0,
+            "1",
+            "0: reactive power; 1: voltage; 2: reactive power with Q-V droop",
+            minimum=0,
+            maximum=2,
+            type="Integer",
+        )
         tau = m.parameter("tau", 0.1, "s", "Response time", minimum=5e-3, source=CHOSEN)
-        R_V = m.parameter("R_V", 0.067, "pu", "Q-V droop", base="S_n", minimum=1e-3, source=APPENDIX)
+        R_V = m.parameter(
+            "R_V", 0.067, "pu", "Q-V droop", base="S_n", minimum=1e-3, source=APPENDIX
+        )
         X_s = m.parameter(
-            "X_s", 0.5, "pu", "Reactance to a stiff voltage for which modes 1 and 2 respond within tau", base="S_n",
-            minimum=0.01, source="chosen here: a short-circuit ratio near 3, and the step-up transformer",
-        )  # fmt: skip
-        change_Q = m.parameter("delta_Q_ref", 0, "pu", "Change of the Q reference", base="S_n", tunable=True)
-        change_U = m.parameter("delta_U_ref", 0, "pu", "Change of the voltage reference", base="S_n", tunable=True)
-        Q_ref = m.calculated("Q_ref", Q_0, "pu", "Reactive-power reference of the operating point", base="S_n")
-        U_ref = m.calculated("U_ref", U_0, "pu", "Voltage reference of the operating point", base="S_n")
+            "X_s",
+            0.5,
+            "pu",
+            "Reactance to a stiff voltage for which modes 1 and 2 respond within tau",
+            base="S_n",
+            minimum=0.01,
+            source="chosen here: a short-circuit ratio near 3, and the step-up transformer",
+        )
+        change_Q = m.parameter(
+            "delta_Q_ref", 0, "pu", "Change of the Q reference", base="S_n", tunable=True
+        )
+        change_U = m.parameter(
+            "delta_U_ref", 0, "pu", "Change of the voltage reference", base="S_n", tunable=True
+        )
+        Q_ref = m.calculated(
+            "Q_ref", Q_0, "pu", "Reactive-power reference of the operating point", base="S_n"
+        )
+        U_ref = m.calculated(
+            "U_ref", U_0, "pu", "Voltage reference of the operating point", base="S_n"
+        )
     of_q, of_u = Q_ref + change_Q - Q_f, U_ref + change_U - U_f
     droop = (of_q + of_u / R_V) / (1 + X_s / R_V)
     return if_else(mode < 0.5, of_q, if_else(mode < 1.5, of_u / X_s, droop)), 1 / tau

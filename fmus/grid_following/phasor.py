@@ -12,7 +12,13 @@ from fmus.grid_following.outer_control import Measured, outer_control
 from fmus.grid_following.pll import phase_locked_loop
 from fmus.toolchain.frames import Phasor, power, qd_state
 from fmus.toolchain.model import Model
-from fmus.toolchain.phasor_port import SourceEmf, declare_master_step, declare_phasor_outputs, motion, phasor_builder
+from fmus.toolchain.phasor_port import (
+    SourceEmf,
+    declare_master_step,
+    declare_phasor_outputs,
+    motion,
+    phasor_builder,
+)
 from fmus.toolchain.port import device_port
 from fmus.toolchain.symbols import Expr
 
@@ -35,12 +41,16 @@ def grid_following_converter_phasor() -> Model:
     measured = Measured(power(u, into_grid), u.magnitude(), frame.w)
     limited, i_ref = outer_control(m, f, port, measured, _capacitor(f) * u)
     with m.scope("current_control"):
-        tau = m.parameter("tau", 0.001, "s", "Time constant of the current loop", minimum=1e-3, source=APPENDIX)
+        tau = m.parameter(
+            "tau", 0.001, "s", "Time constant of the current loop", minimum=1e-3, source=APPENDIX
+        )
         i_s.set_derivative(m, (i_ref - i_s.value) / tau)
         moving = motion(m, "slow", i_s.value, f.initial.i_s, "Current of the converter")
 
     def emf(time: Expr) -> Phasor:
-        i_then = (i_s.value + moving * time).rotated(frame.theta + port.omega_b * (frame.w - 1) * time)
+        i_then = (i_s.value + moving * time).rotated(
+            frame.theta + port.omega_b * (frame.w - 1) * time
+        )
         return _capacitor_voltage(f, seen.after(time), i_then)
 
     source = SourceEmf(behind=emf(-master.size / 2), ahead=emf(master.to_next))

@@ -28,9 +28,13 @@ class LoopDefaults:
 
 
 def phase_locked_loop(
-    m: ModelBuilder, angle_0: Scalar, omega_b: Expr, measured: Phasor, defaults: LoopDefaults = LoopDefaults(),
+    m: ModelBuilder,
+    angle_0: Scalar,
+    omega_b: Expr,
+    measured: Phasor,
+    defaults: LoopDefaults = LoopDefaults(),
     running: Expr | None = None,
-) -> Frame:  # fmt: skip
+) -> Frame:
     """Declare the loop: w = 1 + k_p·u_⊥ + x, dx/dt = k_i·u_⊥, dθ/dt = ω_b·(w − 1), with u_⊥ = −u_d.
 
     For a voltage of 1 pu the angle follows as (2ξω_0·s + ω_0²)/(s² + 2ξω_0·s + ω_0²).
@@ -41,14 +45,28 @@ def phase_locked_loop(
     seen = measured.im if running is None else measured.im * running
     with m.scope("pll"):
         f_0 = m.parameter(
-            "f_0", defaults.f_0, "Hz", "Natural frequency at 1 pu", minimum=0.1, maximum=200, source=defaults.source
+            "f_0",
+            defaults.f_0,
+            "Hz",
+            "Natural frequency at 1 pu",
+            minimum=0.1,
+            maximum=200,
+            source=defaults.source,
         )
         xi = m.parameter(
-            "xi", defaults.xi, "1", "Damping ratio at 1 pu", minimum=0.05, maximum=5, source=defaults.source
+            "xi",
+            defaults.xi,
+            "1",
+            "Damping ratio at 1 pu",
+            minimum=0.05,
+            maximum=5,
+            source=defaults.source,
         )
         omega_0 = 2 * pi * f_0
         x = m.state("x", 0, "pu", "Integrator, deviation of the frequency", base="f_n")
-        theta = m.state("theta", angle_0, "rad", "Angle of the converter's frame in the network frame")
+        theta = m.state(
+            "theta", angle_0, "rad", "Angle of the converter's frame in the network frame"
+        )
         w = 1 + 2 * xi * omega_0 / omega_b * seen + x
         m.derivative(x, omega_0**2 / omega_b * seen)
         turning = omega_b * (w - 1)

@@ -6,7 +6,14 @@ because a running clock is a state that never stands still."""
 
 from math import pi
 
-from fmus.toolchain.frames import Phasor, current_of_power, phasor_derivative, phasor_state, polar, power
+from fmus.toolchain.frames import (
+    Phasor,
+    current_of_power,
+    phasor_derivative,
+    phasor_state,
+    polar,
+    power,
+)
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port_variables import SYSTEM_BASE, SYSTEM_BASE_MVA
@@ -23,7 +30,9 @@ A Runge-Kutta step that ends at that time sees it in its last stage, with a sixt
 def infinite_bus() -> Model:
     """Source, bus and load of a single-machine system, in the network frame, per unit on 100 MVA."""
     m = ModelBuilder(
-        "infinite_bus", "Infinite bus behind an impedance, with a load, a voltage dip and a load step", kind="network"
+        "infinite_bus",
+        "Infinite bus behind an impedance, with a load, a voltage dip and a load step",
+        kind="network",
     )
     f_n = m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
     omega_b = 2 * pi * f_n
@@ -32,8 +41,12 @@ def infinite_bus() -> Model:
         m.input("i_re", "pu", "Current injected by the device, real part", base=SYSTEM_BASE),
         m.input("i_im", "pu", "Current injected by the device, imaginary part", base=SYSTEM_BASE),
     )
-    R = m.parameter("R", 0.002, "pu", "Resistance between source and bus", base=SYSTEM_BASE, minimum=0)
-    X = m.parameter("X", 0.02, "pu", "Reactance between source and bus", base=SYSTEM_BASE, minimum=1e-4)
+    R = m.parameter(
+        "R", 0.002, "pu", "Resistance between source and bus", base=SYSTEM_BASE, minimum=0
+    )
+    X = m.parameter(
+        "X", 0.02, "pu", "Reactance between source and bus", base=SYSTEM_BASE, minimum=1e-4
+    )
     B = m.parameter("B", 0.5, "pu", "Capacitance at the bus", base=SYSTEM_BASE, minimum=1e-3)
     clock = _clock(m)
     G_0, G = _load(m, v_0, clock)
@@ -57,7 +70,15 @@ def infinite_bus() -> Model:
 
 def _operating_point(m: ModelBuilder) -> tuple[Phasor, Phasor]:
     """Voltage at the bus and current of the device."""
-    v_0 = m.parameter("v_0", 1.0, "pu", "Start: voltage magnitude at the bus", base="bus", minimum=0.1, maximum=2.0)
+    v_0 = m.parameter(
+        "v_0",
+        1.0,
+        "pu",
+        "Start: voltage magnitude at the bus",
+        base="bus",
+        minimum=0.1,
+        maximum=2.0,
+    )
     theta_0 = m.parameter("theta_0", 0.0, "rad", "Start: voltage angle at the bus")
     P_0 = m.parameter("P_0", 13.5, "pu", "Start: active power of the device", base=SYSTEM_BASE)
     Q_0 = m.parameter("Q_0", 0.0, "pu", "Start: reactive power of the device", base=SYSTEM_BASE)
@@ -68,7 +89,9 @@ def _operating_point(m: ModelBuilder) -> tuple[Phasor, Phasor]:
 def _clock(m: ModelBuilder) -> Expr:
     """Time since the start [s], or always 0 if the clock is not enabled."""
     with m.scope("clock"):
-        runs = m.switch("runs", False, "What has a time happens at it; without the clock nothing does")
+        runs = m.switch(
+            "runs", False, "What has a time happens at it; without the clock nothing does"
+        )
         t = m.state("t", 0.0, "s", "Time since the start")
         m.derivative(t, runs)
     return t
@@ -82,9 +105,15 @@ def _load(m: ModelBuilder, v_0: Phasor, t: Expr) -> tuple[Expr, Expr]:
     """Conductance at the start and now."""
     with m.scope("load"):
         P = m.parameter("P", 400.0, "MW", "Active power at the start's voltage", minimum=0)
-        scale = m.parameter("scale", 1.0, "1", "Load step: factor on the conductance", minimum=0, tunable=True)
-        at = m.parameter("step_time", 1.0, "s", "When the load steps by itself, if the clock runs", minimum=0)
-        step = m.parameter("step", 0.0, "1", "By how much it then steps, as a part of it", minimum=-1)
+        scale = m.parameter(
+            "scale", 1.0, "1", "Load step: factor on the conductance", minimum=0, tunable=True
+        )
+        at = m.parameter(
+            "step_time", 1.0, "s", "When the load steps by itself, if the clock runs", minimum=0
+        )
+        step = m.parameter(
+            "step", 0.0, "1", "By how much it then steps, as a part of it", minimum=-1
+        )
     G_0 = P / SYSTEM_BASE_MVA / (v_0.re**2 + v_0.im**2)
     return G_0, G_0 * (scale + step * _reached(t, at))
 
@@ -92,16 +121,37 @@ def _load(m: ModelBuilder, v_0: Phasor, t: Expr) -> tuple[Expr, Expr]:
 def _source(m: ModelBuilder, start: Phasor, t: Expr, omega_b: Expr) -> Phasor:
     """The source's voltage, with its own frequency, and reduced in a dip."""
     with m.scope("source"):
-        E = m.calculated("E", start.magnitude(), "pu", "Voltage magnitude of the source", base="bus")
+        E = m.calculated(
+            "E", start.magnitude(), "pu", "Voltage magnitude of the source", base="bus"
+        )
         theta = m.state("theta", start.angle(), "rad", "Voltage angle of the source")
-        deviation = m.parameter("delta_omega", 0.0, "pu", "Frequency deviation", base="f_n", minimum=-0.2, maximum=0.2,
-                                tunable=True)  # fmt: skip
+        deviation = m.parameter(
+            "delta_omega",
+            0.0,
+            "pu",
+            "Frequency deviation",
+            base="f_n",
+            minimum=-0.2,
+            maximum=0.2,
+            tunable=True,
+        )
     with m.scope("dip"):
-        depth = m.parameter("depth", 0.0, "1", "Part of the source's voltage that is missing", minimum=0, maximum=1,
-                            tunable=True)  # fmt: skip
-        start_time = m.parameter("start", 1.0, "s", "When a dip begins by itself, if the clock runs", minimum=0)
+        depth = m.parameter(
+            "depth",
+            0.0,
+            "1",
+            "Part of the source's voltage that is missing",
+            minimum=0,
+            maximum=1,
+            tunable=True,
+        )
+        start_time = m.parameter(
+            "start", 1.0, "s", "When a dip begins by itself, if the clock runs", minimum=0
+        )
         duration = m.parameter("duration", 0.15, "s", "How long it lasts", minimum=0)
-        own_depth = m.parameter("timed_depth", 0.0, "1", "Part that is then missing", minimum=0, maximum=1)
+        own_depth = m.parameter(
+            "timed_depth", 0.0, "1", "Part that is then missing", minimum=0, maximum=1
+        )
     m.derivative(theta, omega_b * deviation)
     dipped = _reached(t, start_time) * (1 - _reached(t, start_time + duration))
     return polar(E * (1 - depth) * (1 - own_depth * dipped), theta)

@@ -12,13 +12,22 @@ from fmus.converter_parts.bus_voltage import extrapolated_voltage
 from fmus.toolchain.frames import ZERO, Phasor, phasor_derivative
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.phasor_port import SourceEmf, declare_master_step, declare_phasor_outputs, phasor_builder
+from fmus.toolchain.phasor_port import (
+    SourceEmf,
+    declare_master_step,
+    declare_phasor_outputs,
+    phasor_builder,
+)
 from fmus.toolchain.port import BREAKER_TIME, DevicePort, declare_port_outputs, device_port
 from fmus.toolchain.symbols import Expr, fmax
 
-S_N, P_0 = 1500.0, 0.9  # default rating [MVA] and dispatch [pu]: those of `gfor` and `gfl`, whose place it takes
-F_0 = 10.0  # default of ω_0/2π [Hz]: above electromechanical modes, which the current follows, below networks' own
-LEAST_VOLTAGE = 0.05  # voltage [pu] below which the current shrinks with it: at zero it has no angle to turn with
+# default rating [MVA] and dispatch [pu]: those of `gfor` and `gfl`, whose place it takes
+S_N, P_0 = 1500.0, 0.9
+# default of ω_0/2π [Hz]: above electromechanical modes, which the current follows, below networks'
+# own
+F_0 = 10.0
+# voltage [pu] below which the current shrinks with it: at zero it has no angle to turn with
+LEAST_VOLTAGE = 0.05
 
 
 @dataclass(frozen=True)
@@ -45,7 +54,9 @@ class Following:
 def static_generation() -> Model:
     """The device, EMT type."""
     m = ModelBuilder(
-        "static_generation", "Static generation: a constant current at a constant power factor (EMT type)", kind="load"
+        "static_generation",
+        "Static generation: a constant current at a constant power factor (EMT type)",
+        kind="load",
     )
     port = device_port(m, S_n=S_N, P_0=P_0)
     following = _declare_current(m, port)
@@ -59,7 +70,14 @@ def static_generation_phasor() -> Model:
     title = "Static generation: a constant current at a constant power factor (phasor type)"
     m = phasor_builder("static_generation_phasor", title, kind="load")
     port = device_port(m, S_n=S_N, P_0=P_0)
-    X = m.parameter("X", 0.5, "pu", "Reactance of the port, across which the current is fed", base="S_n", minimum=0.01)
+    X = m.parameter(
+        "X",
+        0.5,
+        "pu",
+        "Reactance of the port, across which the current is fed",
+        base="S_n",
+        minimum=0.01,
+    )
     R = m.parameter("R", 0.0, "pu", "Resistance of the port", base="S_n", minimum=0.0)
     Z = Phasor(R, X)
     master = declare_master_step(m)
@@ -72,13 +90,21 @@ def static_generation_phasor() -> Model:
     def emf(time: Expr) -> Phasor:
         return seen.after(time) + Z * (following.current + moving * time)
 
-    declare_phasor_outputs(m, port, SourceEmf(behind=emf(-master.size / 2), ahead=emf(master.to_next)), Z)
+    declare_phasor_outputs(
+        m, port, SourceEmf(behind=emf(-master.size / 2), ahead=emf(master.to_next)), Z
+    )
     return m.build()
 
 
 def _declare_current(m: ModelBuilder, port: DevicePort) -> Following:
-    f_0 = m.parameter("f_0", F_0, "Hz", "Natural frequency with which the current follows the voltage's angle",
-                      minimum=0.1, maximum=50.0)  # fmt: skip
+    f_0 = m.parameter(
+        "f_0",
+        F_0,
+        "Hz",
+        "Natural frequency with which the current follows the voltage's angle",
+        minimum=0.1,
+        maximum=50.0,
+    )
     current, turning = (
         Phasor(
             m.state(f"{name}_x", start.re, "pu", f"{text}, real part", base="S_n"),

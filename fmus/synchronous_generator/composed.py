@@ -19,7 +19,10 @@ S_N, P_0 = 100.0, 0.8  # defaults of rating [MVA] and power [pu]
 
 
 def synchronous_generator(
-    machine: str = "genrou", exciter: str = "manual", governor: str = "constant_torque", stabilizer: str = NONE
+    machine: str = "genrou",
+    exciter: str = "manual",
+    governor: str = "constant_torque",
+    stabilizer: str = NONE,
 ) -> Model:
     """Generator of these parts with stator transients.
 
@@ -48,7 +51,10 @@ def synchronous_generator(
 
 
 def synchronous_generator_phasor(
-    machine: str = "genrou", exciter: str = "manual", governor: str = "constant_torque", stabilizer: str = NONE
+    machine: str = "genrou",
+    exciter: str = "manual",
+    governor: str = "constant_torque",
+    stabilizer: str = NONE,
 ) -> Model:
     """Generator of these parts without stator transients, an emf behind an impedance.
 
@@ -63,12 +69,16 @@ def synchronous_generator_phasor(
         If there is no such part, or the parts do not fit each other.
     """
     parts = chosen_parts(machine, exciter, governor, stabilizer)
-    m = phasor_builder(parts.model_name("phasor"), parts.title("phasor type"), kind="machine", usual=MACHINE)
+    m = phasor_builder(
+        parts.model_name("phasor"), parts.title("phasor type"), kind="machine", usual=MACHINE
+    )
     S_n = declare_rating(m, S_N)
     port = device_port_of(m, S_n, P_0)
     g = parts.machine(m, port, S_n, lambda m, name, start, text: m.algebraic(name))
     with m.scope("machine"):
-        with_speed = m.switch("speed_in_emf", not g.at_rated_speed, "Emf is w·e''; else e'', as of rated speed")
+        with_speed = m.switch(
+            "speed_in_emf", not g.at_rated_speed, "Emf is w·e''; else e'', as of rated speed"
+        )
     g = replace(g, emf_speed=if_else(with_speed, g.w, 1))
     made = phasor_with_controls(m, port, g, parts.exciter, parts.governor, parts.stabilizer)
     return replace(made, of_parts=True)

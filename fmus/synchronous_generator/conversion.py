@@ -53,7 +53,9 @@ def exact(a: AxisData, omega_b: Expr) -> RotorBranches:
     X_m and of both branches; its partial fractions are the branches: s/(ω_b·R + s·X) each."""
     X_m = a.X - a.X_l
     # The time constant of a missing fast branch has no meaning, and must not be taken for that of the slow branch.
-    T20 = if_else(a.X1 - a.X2 <= _NOTHING * a.X, fmin(a.T20, 0.1 * a.T10 * (a.X1 - a.X_l) / X_m), a.T20)
+    T20 = if_else(
+        a.X1 - a.X2 <= _NOTHING * a.X, fmin(a.T20, 0.1 * a.T10 * (a.X1 - a.X_l) / X_m), a.T20
+    )
     T1, T2 = a.T10 * a.X1 / a.X, T20 * a.X2 / a.X1
     # X(s) − X_l = (X_m + n1·s + n2·s²) / ((1 + s·T'_0)(1 + s·T''_0))
     n1 = a.X * (T1 + T2) - a.X_l * (a.T10 + T20)

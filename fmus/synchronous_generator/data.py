@@ -53,4 +53,6 @@ def _data(name: str) -> dict[str, Any]:
 
 
 SG1, SG2, IEEE118 = (MachineData(**_data(name)) for name in ("SG1", "SG2", "IEEE118"))
-IEEEG1_NTS631, IEEEG1_STAMP = (GovernorData(**_data(name)) for name in ("IEEEG1_NTS631", "IEEEG1_STAMP"))
+IEEEG1_NTS631, IEEEG1_STAMP = (
+    GovernorData(**_data(name)) for name in ("IEEEG1_NTS631", "IEEEG1_STAMP")
+)

@@ -13,13 +13,22 @@ MACHINE = TRANSFORMER | usual_beside(__file__)
 
 
 def per_unit(
-    m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None, *, base: str, source: str
+    m: ModelBuilder,
+    name: str,
+    value: float,
+    text: str,
+    minimum: float | None = None,
+    *,
+    base: str,
+    source: str,
 ) -> Expr:
     """Declare a gain or limit per unit of a base."""
     return m.parameter(name, value, "pu", text, base=base, minimum=minimum, source=source)
 
 
-def time_constant(m: ModelBuilder, name: str, value: float, text: str, minimum: float = 0.0, *, source: str) -> Expr:
+def time_constant(
+    m: ModelBuilder, name: str, value: float, text: str, minimum: float = 0.0, *, source: str
+) -> Expr:
     """Declare a time constant [s]; where it may be 0, 0 leaves its block out."""
     T = m.parameter(name, value, "s", text, minimum=minimum, source=source)
     if minimum == 0:
@@ -33,7 +42,10 @@ def require_between(
 ) -> None:
     """Refuse an operating point at or beyond a limit of a signal, whose steady state is ``value``."""
     for margin, name, side in ((value - low, names[0], "below"), (high - value, names[1], "above")):
-        m.require(margin, f"{name}: the operating point of the power flow lies at or {side} this limit, {rule}")
+        m.require(
+            margin,
+            f"{name}: the operating point of the power flow lies at or {side} this limit, {rule}",
+        )
 
 
 def saturated_part(x: Expr, one: tuple[Scalar, Scalar], other: tuple[Scalar, Scalar]) -> Expr:
@@ -49,17 +61,24 @@ def saturated_part(x: Expr, one: tuple[Scalar, Scalar], other: tuple[Scalar, Sca
     return B * fmax(x - A, 0) ** 2
 
 
-def require_rising(m: ModelBuilder, one: tuple[Scalar, Scalar], other: tuple[Scalar, Scalar], text: str) -> None:
+def require_rising(
+    m: ModelBuilder, one: tuple[Scalar, Scalar], other: tuple[Scalar, Scalar], text: str
+) -> None:
     """Refuse points between which S(x)·x does not rise.
 
     ``text``: names the points."""
     first, last = _ordered(one, other)
     none = logic_and(first[1] <= 0, last[1] <= 0)
     rises = logic_and(last[0] - first[0] > 1e-6, last[0] * last[1] - first[0] * first[1] > 1e-9)
-    m.require(if_else(logic_or(none, rises), 1, -1), f"{text}: saturation must rise; give 0 at both for none")
+    m.require(
+        if_else(logic_or(none, rises), 1, -1),
+        f"{text}: saturation must rise; give 0 at both for none",
+    )
 
 
-def _ordered(one: tuple[Scalar, Scalar], other: tuple[Scalar, Scalar]) -> tuple[tuple[Expr, Expr], ...]:
+def _ordered(
+    one: tuple[Scalar, Scalar], other: tuple[Scalar, Scalar]
+) -> tuple[tuple[Expr, Expr], ...]:
     """The points by rising x. Without saturation any two serve."""
     swapped = Expr(one[0]) > Expr(other[0])
     none = logic_and(Expr(one[1]) <= 0, Expr(other[1]) <= 0)

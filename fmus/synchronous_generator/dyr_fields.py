@@ -54,7 +54,13 @@ _WORD = re.compile(
 )
 """A field as the table has it."""
 
-_SCOPES = {"machine": "machine.", "exciter": "exciter.", "governor": "governor.", "stabilizer": "pss.", "converter": ""}
+_SCOPES = {
+    "machine": "machine.",
+    "exciter": "exciter.",
+    "governor": "governor.",
+    "stabilizer": "pss.",
+    "converter": "",
+}
 
 
 def _record(table: Mapping[str, Any]) -> DyrRecord:
@@ -63,13 +69,19 @@ def _record(table: Mapping[str, Any]) -> DyrRecord:
         found = _WORD.fullmatch(word)
         assert found is not None, word
         sets, negated = (
-            tuple(f"{scope}{p}" for p in (found[group] or "").split("+") if p) for group in ("sets", "negated")
+            tuple(f"{scope}{p}" for p in (found[group] or "").split("+") if p)
+            for group in ("sets", "negated")
         )
         only = tuple(map(float, found["only"].split("|"))) if found["only"] else ()
         times, same = found["times"] or "", found["same"] or ""
         marks = found["not_zero"] != "", found["switch"] != ""
         fields.append(DyrField(found["name"], sets, negated, times, only, same, *marks))
-    return DyrRecord(table["kind"], table["part"], tuple(fields), tuple(f"{scope}{p}" for p in table.get("lacks", ())))
+    return DyrRecord(
+        table["kind"],
+        table["part"],
+        tuple(fields),
+        tuple(f"{scope}{p}" for p in table.get("lacks", ())),
+    )
 
 
 def records_beside(module: str) -> dict[str, DyrRecord]:

@@ -13,7 +13,15 @@ from fmus.synchronous_generator.machine import (
 )
 from fmus.synchronous_generator.stabilization.norm631 import pss2a
 from fmus.synchronous_generator.turbines.without_limits import ieeeg1
-from fmus.synchronous_generator.variants import AC4A, ST1, ST4B, Governor, Stabilizer, Variant, declare_machine_outputs
+from fmus.synchronous_generator.variants import (
+    AC4A,
+    ST1,
+    ST4B,
+    Governor,
+    Stabilizer,
+    Variant,
+    declare_machine_outputs,
+)
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort, declare_port_outputs, device_port
@@ -49,11 +57,18 @@ def _generator(variant: Variant, stabilizer: str = "") -> Model:
 
 
 def with_controls(
-    m: ModelBuilder, port: DevicePort, g: Machine, exciter: Exciter, governor: Governor, stabilizer: Stabilizer | None
+    m: ModelBuilder,
+    port: DevicePort,
+    g: Machine,
+    exciter: Exciter,
+    governor: Governor,
+    stabilizer: Stabilizer | None,
 ) -> Model:
     """A machine with stator transients and its controls."""
     v_s = 0.0 if stabilizer is None else stabilizer(m, g.w - 1, *terminal_power(g, port))
-    E_fd, v_t = exciter(m, Regulated(g.start, lambda E: terminal_voltage(g, port, E), g.field_current, v_s))
+    E_fd, v_t = exciter(
+        m, Regulated(g.start, lambda E: terminal_voltage(g, port, E), g.field_current, v_s)
+    )
     P_m = governor(m, g.w, g.start.T_e)
     machine_equations(m, g, port, E_fd, P_m)
     declare_port_outputs(m, port, g.current.rotated(g.delta))

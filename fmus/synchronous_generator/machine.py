@@ -85,14 +85,30 @@ def declare_machine(
 ) -> Machine:
     """Declare the machine's parameters and states; the power flow gives the operating point."""
     with m.scope("transformer"):
-        R_t = m.parameter("R_t", data.R_t, "pu", "Resistance", base="S_n", minimum=0, source=data.source)
-        X_t = m.parameter("X_t", data.X_t, "pu", "Reactance", base="S_n", minimum=0, source=data.source)
+        R_t = m.parameter(
+            "R_t", data.R_t, "pu", "Resistance", base="S_n", minimum=0, source=data.source
+        )
+        X_t = m.parameter(
+            "X_t", data.X_t, "pu", "Reactance", base="S_n", minimum=0, source=data.source
+        )
     with m.scope("machine"):
-        R_s = m.parameter("R_s", 0.0025, "pu", "Stator resistance", base="S_n", minimum=0, source=STAMP)
+        R_s = m.parameter(
+            "R_s", 0.0025, "pu", "Stator resistance", base="S_n", minimum=0, source=STAMP
+        )
         H = m.parameter("H", data.H, "s", "Inertia constant", minimum=0.01, source=data.source)
-        D = m.parameter("D", 0.0, "pu", "Damping torque per speed deviation", base="S_n", minimum=0, source=STAMP)
+        D = m.parameter(
+            "D",
+            0.0,
+            "pu",
+            "Damping torque per speed deviation",
+            base="S_n",
+            minimum=0,
+            source=STAMP,
+        )
         d_data, q_data = _axis_parameters(m, data)
-        use_exact = m.switch("exact_conversion", False, "Standard data to circuit: exact, not classical")
+        use_exact = m.switch(
+            "exact_conversion", False, "Standard data to circuit: exact, not classical"
+        )
         saturation = _saturation_factor(m, port, data, R_s, R_t, X_t, d_data.X_l)
         start, d, q, delta_0 = _operating_point(
             m, port, R_s, R_t, X_t, d_data, q_data, use_exact, saturation, stator_flux
@@ -127,7 +143,11 @@ def terminal_voltage(g: Machine, port: DevicePort, E_fd: Expr) -> Expr:
     psi_q, psi_d, d_rotor, q_rotor = _flux_rates(g, port, E_fd)
     rate = Phasor(g.q.current_rate(psi_q, q_rotor), -g.d.current_rate(psi_d, d_rotor))
     drop = Phasor(g.R_t, g.w * g.X_t) * g.current + rate * (g.X_t / port.omega_b)
-    opened = Phasor(psi_q, -psi_d) / port.omega_b - g.current * g.R + Phasor(g.w * g.d.psi, g.w * g.q.psi)
+    opened = (
+        Phasor(psi_q, -psi_d) / port.omega_b
+        - g.current * g.R
+        + Phasor(g.w * g.d.psi, g.w * g.q.psi)
+    )
     return (port.through_breaker(port.v.rotated(-g.delta), opened) + drop).magnitude()
 
 
@@ -143,14 +163,19 @@ def terminal_power(g: Machine, port: DevicePort) -> tuple[Expr, Expr]:
 RotorRates = tuple[Expr, ...]  # rates of the fluxes of one axis' rotor windings
 
 
-def _flux_rates(g: Machine, port: DevicePort, E_fd: Expr) -> tuple[Expr, Expr, RotorRates, RotorRates]:
+def _flux_rates(
+    g: Machine, port: DevicePort, E_fd: Expr
+) -> tuple[Expr, Expr, RotorRates, RotorRates]:
     """Rates of ψ_q, ψ_d and of the rotor's fluxes, d and q axis.
 
     Behind an open breaker the stator's flux follows the rotor's such that the current fades like that of every open
     breaker. The voltage at the breaker then follows from the stator's equation."""
     d_rotor, q_rotor = _rotor_flux_rates(g, port, E_fd)
     v = port.v.rotated(-g.delta)
-    closed = Phasor(v.re + g.R * g.q.i - g.w * g.d.psi, -v.im + g.R * g.d.i + g.w * g.q.psi) * port.omega_b
+    closed = (
+        Phasor(v.re + g.R * g.q.i - g.w * g.d.psi, -v.im + g.R * g.d.i + g.w * g.q.psi)
+        * port.omega_b
+    )
     opened = Phasor(g.q.open_rate(q_rotor), g.d.open_rate(d_rotor))
     psi = port.through_breaker(closed, opened)  # a pair of q and d here, not a complex number
     return Expr(psi.re), Expr(psi.im), d_rotor, q_rotor
@@ -159,7 +184,9 @@ def _flux_rates(g: Machine, port: DevicePort, E_fd: Expr) -> tuple[Expr, Expr, R
 def _rotor_flux_rates(g: Machine, port: DevicePort, E_fd: Expr) -> tuple[RotorRates, RotorRates]:
     """Rates of the rotor's fluxes, d and q axis; the first winding of the d axis is the field."""
     d_rotor, q_rotor = (
-        tuple(-port.omega_b * winding.R * axis.current(k) for k, winding in enumerate(axis.windings))
+        tuple(
+            -port.omega_b * winding.R * axis.current(k) for k, winding in enumerate(axis.windings)
+        )
         for axis in (g.d, g.q)
     )
     if d_rotor:
@@ -170,7 +197,9 @@ def _rotor_flux_rates(g: Machine, port: DevicePort, E_fd: Expr) -> tuple[RotorRa
 
 def _axis_parameters(m: ModelBuilder, data: MachineData) -> tuple[AxisData, AxisData]:
     def reactance(name: str, value: float, text: str) -> Expr:
-        return m.parameter(name, value, "pu", text, base="S_n", minimum=0.001, maximum=20, source=data.source)
+        return m.parameter(
+            name, value, "pu", text, base="S_n", minimum=0.001, maximum=20, source=data.source
+        )
 
     def time(name: str, value: float, text: str) -> Expr:
         return m.parameter(name, value, "s", text, minimum=1e-3, source=data.source)
@@ -201,9 +230,18 @@ def _saturation_factor(
     m: ModelBuilder, port: DevicePort, data: MachineData, R_s: Expr, R_t: Expr, X_t: Expr, X_l: Expr
 ) -> Expr:
     """1 + s(ψ) at the air-gap flux of the operating point, s(ψ) = s(1.0)·ψⁿ through s(1.2); 1 where switched off."""
-    on = m.switch("saturation", False, "Divide the magnetising reactances by 1 + s at the operating point")
+    on = m.switch(
+        "saturation", False, "Divide the magnetising reactances by 1 + s at the operating point"
+    )
     s_10, s_12 = (
-        m.parameter(name, s, "1", f"Saturation s({x}) of the open-circuit curve", minimum=1e-6, source=data.source)
+        m.parameter(
+            name,
+            s,
+            "1",
+            f"Saturation s({x}) of the open-circuit curve",
+            minimum=1e-6,
+            source=data.source,
+        )
         for name, s, x in (("s_10", data.s_10, "1.0"), ("s_12", data.s_12, "1.2"))
     )
     psi = (port.v_0 + Phasor(R_s + R_t, X_t + X_l) * port.i_0).magnitude()
@@ -212,19 +250,33 @@ def _saturation_factor(
 
 
 def _operating_point(
-    m: ModelBuilder, port: DevicePort, R_s: Expr, R_t: Expr, X_t: Expr, d_data: AxisData, q_data: AxisData,
-    use_exact: Expr, saturation: Expr, stator_flux: FluxDeclaration,
-) -> tuple[Start, Axis, Axis, Expr]:  # fmt: skip
+    m: ModelBuilder,
+    port: DevicePort,
+    R_s: Expr,
+    R_t: Expr,
+    X_t: Expr,
+    d_data: AxisData,
+    q_data: AxisData,
+    use_exact: Expr,
+    saturation: Expr,
+    stator_flux: FluxDeclaration,
+) -> tuple[Start, Axis, Axis, Expr]:
     """Circuit of both axes, rotor angle and every flux of the steady state."""
     reactances = {}
     for axis, data in {"d": d_data, "q": q_data}.items():
         X_m = m.calculated(
-            f"X_m{axis}", (data.X - data.X_l) / saturation, "pu", f"Magnetising reactance, {axis} axis", "S_n"
+            f"X_m{axis}",
+            (data.X - data.X_l) / saturation,
+            "pu",
+            f"Magnetising reactance, {axis} axis",
+            "S_n",
         )
         b = convert(data, port.omega_b, use_exact)
         branches = RotorBranches(
             *(
-                m.calculated(f"{axis}_{name}", value, "pu", f"Rotor branch of the {axis} axis: {name}", "S_n")
+                m.calculated(
+                    f"{axis}_{name}", value, "pu", f"Rotor branch of the {axis} axis: {name}", "S_n"
+                )
                 for name, value in {"X_1": b.X_1, "R_1": b.R_1, "X_2": b.X_2, "R_2": b.R_2}.items()
             )
         )
@@ -233,9 +285,12 @@ def _operating_point(
             f"machine: no circuit fits the {axis}-axis data; check X, X', X'' and the time constants",
         )
         X_sub = m.calculated(
-            f"X_m{axis}2", 1 / (1 / X_m + 1 / branches.X_1 + 1 / branches.X_2), "pu", f"Subtransient X''_{axis} − X_l",
+            f"X_m{axis}2",
+            1 / (1 / X_m + 1 / branches.X_1 + 1 / branches.X_2),
+            "pu",
+            f"Subtransient X''_{axis} − X_l",
             "S_n",
-        )  # fmt: skip
+        )
         reactances[axis] = X_m, branches, X_sub, X_sub + data.X_l + X_t
 
     v_t = port.v_0 + Phasor(R_t, X_t) * port.i_0
@@ -256,7 +311,13 @@ def _operating_point(
         windings = tuple(Winding(X, R, flux_state(m, *flux)) for (X, R), flux in branches)
         return Axis(X_m, windings, stator, X_sub, X_between)
 
-    d = axis_of("d", psi_d, ("psi_f", psi_f, "Field flux"), ("psi_1d", airgap_d, "Damper flux, d axis"))
-    q = axis_of("q", psi_q, ("psi_1q", airgap_q, "First damper flux, q axis"),
-                ("psi_2q", airgap_q, "Second damper flux, q axis"))  # fmt: skip
+    d = axis_of(
+        "d", psi_d, ("psi_f", psi_f, "Field flux"), ("psi_1d", airgap_d, "Damper flux, d axis")
+    )
+    q = axis_of(
+        "q",
+        psi_q,
+        ("psi_1q", airgap_q, "First damper flux, q axis"),
+        ("psi_2q", airgap_q, "Second damper flux, q axis"),
+    )
     return Start(v_t.magnitude(), E_fd, psi_d * i_q - psi_q * i_d, v, i), d, q, delta_0

@@ -11,7 +11,12 @@ from fmus.synchronous_generator.excitation.static import sexs, st1a, st4b
 from fmus.synchronous_generator.excitation.without_regulator import external, manual
 from fmus.synchronous_generator.machine import FluxDeclaration, Machine
 from fmus.synchronous_generator.machines.classical import classical
-from fmus.synchronous_generator.machines.standard import genrou, genrou_rated_speed, gensal, two_axis
+from fmus.synchronous_generator.machines.standard import (
+    genrou,
+    genrou_rated_speed,
+    gensal,
+    two_axis,
+)
 from fmus.synchronous_generator.stabilization.standard import pss1a, pss2a, pss2b
 from fmus.synchronous_generator.turbines.governors import (
     constant_power,
@@ -34,19 +39,37 @@ as states, or as signals that a model without stator transients closes."""
 NONE = "none"  # the stabiliser of a generator that has none
 
 MACHINES: dict[str, MachinePart] = {
-    "classical": classical, "two_axis": two_axis, "gensal": gensal, "genrou": genrou,
+    "classical": classical,
+    "two_axis": two_axis,
+    "gensal": gensal,
+    "genrou": genrou,
     "genrou_rated_speed": genrou_rated_speed,
-}  # fmt: skip
+}
 EXCITERS: dict[str, Exciter] = {
-    "manual": manual, "sexs": sexs, "ieeet1": ieeet1, "dc1a": dc1a, "ac1a": ac1a, "ac4a": ac4a, "st1a": st1a,
-    "st4b": st4b, "external": external,
-}  # fmt: skip
+    "manual": manual,
+    "sexs": sexs,
+    "ieeet1": ieeet1,
+    "dc1a": dc1a,
+    "ac1a": ac1a,
+    "ac4a": ac4a,
+    "st1a": st1a,
+    "st4b": st4b,
+    "external": external,
+}
 GOVERNORS: dict[str, Governor] = {
-    "constant_power": read_either_way(constant_power), "constant_torque": constant_torque,
-    "tgov1": read_either_way(tgov1), "hygov": read_either_way(hygov), "gast": read_either_way(gast),
+    "constant_power": read_either_way(constant_power),
+    "constant_torque": constant_torque,
+    "tgov1": read_either_way(tgov1),
+    "hygov": read_either_way(hygov),
+    "gast": read_either_way(gast),
     "ieeeg1": read_either_way(ieeeg1),
-}  # fmt: skip
-STABILIZERS: dict[str, Stabilizer | None] = {NONE: None, "pss1a": pss1a, "pss2a": pss2a, "pss2b": pss2b}
+}
+STABILIZERS: dict[str, Stabilizer | None] = {
+    NONE: None,
+    "pss1a": pss1a,
+    "pss2a": pss2a,
+    "pss2b": pss2b,
+}
 
 
 @dataclass(frozen=True)
@@ -65,7 +88,9 @@ class Parts:
 
     def title(self, kind: str) -> str:
         """The model's title; ``kind`` says how its stator is modelled."""
-        return f"Synchronous generator of {', '.join(self.names)} and a step-up transformer ({kind})"
+        return (
+            f"Synchronous generator of {', '.join(self.names)} and a step-up transformer ({kind})"
+        )
 
 
 def chosen_parts(machine: str, exciter: str, governor: str, stabilizer: str) -> Parts:

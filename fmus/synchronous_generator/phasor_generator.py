@@ -15,9 +15,22 @@ from functools import partial
 
 from fmus.synchronous_generator.declarations import MACHINE
 from fmus.synchronous_generator.excitation.common import Exciter, Regulated
-from fmus.synchronous_generator.machine import Machine, declare_machine, rotor_equations, terminal_power
+from fmus.synchronous_generator.machine import (
+    Machine,
+    declare_machine,
+    rotor_equations,
+    terminal_power,
+)
 from fmus.synchronous_generator.turbines.without_limits import ieeeg1
-from fmus.synchronous_generator.variants import AC4A, ST1, ST4B, Governor, Stabilizer, Variant, declare_machine_outputs
+from fmus.synchronous_generator.variants import (
+    AC4A,
+    ST1,
+    ST4B,
+    Governor,
+    Stabilizer,
+    Variant,
+    declare_machine_outputs,
+)
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
@@ -41,14 +54,23 @@ def synchronous_generator_st4b_phasor() -> Model:
 
 
 def _generator(variant: Variant) -> Model:
-    m = phasor_builder(variant.model_name("phasor"), variant.title("phasor type"), kind="machine", usual=MACHINE)
+    m = phasor_builder(
+        variant.model_name("phasor"), variant.title("phasor type"), kind="machine", usual=MACHINE
+    )
     port = device_port(m, variant.data.S_n, variant.data.P_0)
-    g = declare_machine(m, port, variant.data, stator_flux=lambda m, name, start, text: m.algebraic(name))
+    g = declare_machine(
+        m, port, variant.data, stator_flux=lambda m, name, start, text: m.algebraic(name)
+    )
     return with_controls(m, port, g, variant.exciter, partial(ieeeg1, data=variant.governor), None)
 
 
 def with_controls(
-    m: ModelBuilder, port: DevicePort, g: Machine, exciter: Exciter, governor: Governor, stabilizer: Stabilizer | None
+    m: ModelBuilder,
+    port: DevicePort,
+    g: Machine,
+    exciter: Exciter,
+    governor: Governor,
+    stabilizer: Stabilizer | None,
 ) -> Model:
     """A machine without stator transients, its stator's fluxes as open signals, and its controls."""
     emf = Phasor(g.d.emf, g.q.emf) * (g.w if g.emf_speed is None else g.emf_speed)
@@ -70,7 +92,9 @@ def declare_phasor_port(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phas
     ``emf``: behind the subtransient reactance, rotor frame [pu]."""
     impedance = Phasor(g.R, g.d.X_between)
     start = g.start.v + impedance * g.start.i
-    source = source_emf(m, emf - _saliency(m, g) if g.salient else emf, start, g.delta, port.omega_b * (g.w - 1))
+    source = source_emf(
+        m, emf - _saliency(m, g) if g.salient else emf, start, g.delta, port.omega_b * (g.w - 1)
+    )
     declare_phasor_outputs(m, port, source, impedance)
 
 
@@ -92,9 +116,14 @@ def _saliency(m: ModelBuilder, g: Machine) -> Phasor:
     """j·(X''_q − X''_d)·i_q with i_q through a lag, rotor frame."""
     with m.scope("machine"):
         T = m.parameter(
-            "T_saliency", 0.005, "s", "Lag of i_q in the emf's part for X''_q − X''_d; no effect where they are equal",
+            "T_saliency",
+            0.005,
+            "s",
+            "Lag of i_q in the emf's part for X''_q − X''_d; no effect where they are equal",
             minimum=1e-3,
-        )  # fmt: skip
-        lagged = m.state("i_q_lagged", g.start.i.re, "pu", "Stator current through a lag, q axis", base="S_n")
+        )
+        lagged = m.state(
+            "i_q_lagged", g.start.i.re, "pu", "Stator current through a lag, q axis", base="S_n"
+        )
     m.derivative(lagged, (g.q.i - lagged) / T)
     return Phasor(0.0, (g.q.X_between - g.d.X_between) * lagged)

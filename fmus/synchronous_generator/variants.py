@@ -3,14 +3,23 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fmus.synchronous_generator.data import IEEE118, IEEEG1_NTS631, IEEEG1_STAMP, SG1, SG2, GovernorData, MachineData
+from fmus.synchronous_generator.data import (
+    IEEE118,
+    IEEEG1_NTS631,
+    IEEEG1_STAMP,
+    SG1,
+    SG2,
+    GovernorData,
+    MachineData,
+)
 from fmus.synchronous_generator.excitation.common import Exciter
 from fmus.synchronous_generator.excitation.without_ceilings import ac4a, st1, st4b
 from fmus.synchronous_generator.machine import Machine
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr
 
-Governor = Callable[[ModelBuilder, Expr, Expr], Expr]  # mechanical power [pu, S_n] from speed and that at the start
+# mechanical power [pu, S_n] from speed and that at the start
+Governor = Callable[[ModelBuilder, Expr, Expr], Expr]
 
 Stabilizer = Callable[[ModelBuilder, Expr, Expr, Expr], Expr]
 """Signal [pu] from w − 1, electrical power and the power of the operating point."""
@@ -47,7 +56,9 @@ ST4B = Variant("st4b", st4b, SG1, IEEEG1_NTS631)
 """SG1 of the two-area case, and with PSS2A SG1 of the grid code's two-area system."""
 
 
-def declare_machine_outputs(m: ModelBuilder, machine: Machine, v_t: Expr, E_fd: Expr, P_m: Expr) -> None:
+def declare_machine_outputs(
+    m: ModelBuilder, machine: Machine, v_t: Expr, E_fd: Expr, P_m: Expr
+) -> None:
     """Declare what a generator shows beside its port.
 
     ``machine``: gives speed, angle and torque; ``v_t``: voltage magnitude at the terminal [pu, S_n]; ``E_fd``: field

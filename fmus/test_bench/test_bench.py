@@ -5,7 +5,14 @@ machine asks for; without one its inputs stay 0."""
 
 from math import pi
 
-from fmus.toolchain.frames import Phasor, current_of_power, phasor_derivative, phasor_state, polar, power
+from fmus.toolchain.frames import (
+    Phasor,
+    current_of_power,
+    phasor_derivative,
+    phasor_state,
+    polar,
+    power,
+)
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import BREAKER_TIME
@@ -21,10 +28,18 @@ def test_bench() -> Model:
     omega_b = 2 * pi * f_n
     v_0, i_0 = _operating_point(m)
     plant, duplicate = _injected(m)
-    X_0 = m.parameter("X_0", 0.1, "pu", "Start: reactance of the source", base=SYSTEM_BASE, minimum=1e-4)
-    R_0 = m.parameter("R_0", 0.01, "pu", "Start: resistance of the source", base=SYSTEM_BASE, minimum=0)
-    X = X_0 * m.parameter("X_factor", 1.0, "1", "Factor on the reactance", minimum=1e-3, maximum=1e3, tunable=True)
-    R = R_0 * m.parameter("R_factor", 1.0, "1", "Factor on the resistance", minimum=0, maximum=1e3, tunable=True)
+    X_0 = m.parameter(
+        "X_0", 0.1, "pu", "Start: reactance of the source", base=SYSTEM_BASE, minimum=1e-4
+    )
+    R_0 = m.parameter(
+        "R_0", 0.01, "pu", "Start: resistance of the source", base=SYSTEM_BASE, minimum=0
+    )
+    X = X_0 * m.parameter(
+        "X_factor", 1.0, "1", "Factor on the reactance", minimum=1e-3, maximum=1e3, tunable=True
+    )
+    R = R_0 * m.parameter(
+        "R_factor", 1.0, "1", "Factor on the resistance", minimum=0, maximum=1e3, tunable=True
+    )
     B = m.parameter("B", 0.05, "pu", "Capacitance at the bus", base=SYSTEM_BASE, minimum=1e-3)
     G, B_load = _load(m, v_0)
     fault = _fault(m)
@@ -35,7 +50,9 @@ def test_bench() -> Model:
     line = phasor_state(m, "line.i", line_0, "Current from the source", SYSTEM_BASE)
     load = phasor_state(m, "load.i", load_0, "Current of the load's inductor", SYSTEM_BASE)
     v = phasor_state(m, "bus.v", v_0, "Bus voltage, network frame", "bus")
-    passive = (-v - Phasor(R, X) * line) * (omega_b / X * closed) - line * ((1 - closed) / BREAKER_TIME)
+    passive = (-v - Phasor(R, X) * line) * (omega_b / X * closed) - line * (
+        (1 - closed) / BREAKER_TIME
+    )
     phasor_derivative(m, line, passive + source * (omega_b / X * closed), passive)
     phasor_derivative(m, load, v * (omega_b * B_load) - load.times_j() * omega_b)
     currents = line + plant + duplicate - load - Phasor(G + fault, B) * v
@@ -52,7 +69,15 @@ def test_bench() -> Model:
 
 def _operating_point(m: ModelBuilder) -> tuple[Phasor, Phasor]:
     """Voltage at the bus and current of both plants."""
-    v_0 = m.parameter("v_0", 1.0, "pu", "Start: voltage magnitude at the bus", base="bus", minimum=0.1, maximum=2.0)
+    v_0 = m.parameter(
+        "v_0",
+        1.0,
+        "pu",
+        "Start: voltage magnitude at the bus",
+        base="bus",
+        minimum=0.1,
+        maximum=2.0,
+    )
     P_0 = m.parameter("P_0", 0.5, "pu", "Start: active power of the plants", base=SYSTEM_BASE)
     Q_0 = m.parameter("Q_0", 0.0, "pu", "Start: reactive power of the plants", base=SYSTEM_BASE)
     voltage = polar(v_0, 0.0)
@@ -85,21 +110,46 @@ def _load(m: ModelBuilder, v_0: Phasor) -> tuple[Expr, Expr]:
 def _fault(m: ModelBuilder) -> Expr:
     """Conductance of a balanced fault at the bus."""
     with m.scope("fault"):
-        return m.parameter("G", 0.0, "pu", "Conductance of a fault of all three phases at the bus", base=SYSTEM_BASE,
-                           minimum=0, maximum=1e4, tunable=True)  # fmt: skip
+        return m.parameter(
+            "G",
+            0.0,
+            "pu",
+            "Conductance of a fault of all three phases at the bus",
+            base=SYSTEM_BASE,
+            minimum=0,
+            maximum=1e4,
+            tunable=True,
+        )
 
 
 def _source(m: ModelBuilder, start: Phasor, omega_b: Expr) -> tuple[Phasor, Expr]:
     """The source's voltage, and whether its breaker is closed."""
     with m.scope("source"):
-        E = m.calculated("E", start.magnitude(), "pu", "Voltage magnitude of the source", base="bus")
-        factor = m.parameter("factor", 1.0, "1", "Factor on the voltage", minimum=0, maximum=2, tunable=True)
-        jump = m.parameter("jump", 0.0, "rad", "Angle by which the voltage has jumped", tunable=True)
-        rise = m.parameter("rise", 0.0, "1", "Rate of the frequency, per unit of f_n and second", minimum=-1,
-                           maximum=1, tunable=True)  # fmt: skip
+        E = m.calculated(
+            "E", start.magnitude(), "pu", "Voltage magnitude of the source", base="bus"
+        )
+        factor = m.parameter(
+            "factor", 1.0, "1", "Factor on the voltage", minimum=0, maximum=2, tunable=True
+        )
+        jump = m.parameter(
+            "jump", 0.0, "rad", "Angle by which the voltage has jumped", tunable=True
+        )
+        rise = m.parameter(
+            "rise",
+            0.0,
+            "1",
+            "Rate of the frequency, per unit of f_n and second",
+            minimum=-1,
+            maximum=1,
+            tunable=True,
+        )
         closed = m.switch("connected", True, "The breaker of the source is closed", tunable=True)
-        theta = m.state("theta", start.angle(), "rad", "Voltage angle of the source without the jumps")
-        deviation = m.state("delta_omega", 0.0, "pu", "Frequency deviation of the source", base="f_n")
+        theta = m.state(
+            "theta", start.angle(), "rad", "Voltage angle of the source without the jumps"
+        )
+        deviation = m.state(
+            "delta_omega", 0.0, "pu", "Frequency deviation of the source", base="f_n"
+        )
     m.derivative(theta, omega_b * deviation)
     m.derivative(deviation, rise)
     return polar(E * factor, theta + jump), closed

@@ -9,7 +9,8 @@ and is seen by nobody."""
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and, logic_or
 
-BYPASS_TIME = 0.01  # time constant [s] with which the unused state of a left-out block follows its input
+# time constant [s] with which the unused state of a left-out block follows its input
+BYPASS_TIME = 0.01
 
 RETURN_TIME = 2e-3
 """Time constant [s] with which a state returns to the limit that a step of integration carried it over: as long as the
@@ -34,7 +35,9 @@ def low_pass(m: ModelBuilder, name: str, u: Expr, T: Scalar, initial: Scalar = 0
     return x
 
 
-def low_pass_or_nothing(m: ModelBuilder, name: str, u: Expr, T: Scalar, initial: Scalar = 0.0) -> Expr:
+def low_pass_or_nothing(
+    m: ModelBuilder, name: str, u: Expr, T: Scalar, initial: Scalar = 0.0
+) -> Expr:
     """1/(1 + s·T); passed through where T = 0.
 
     ``T``: time constant [s], 0 or more."""
@@ -44,7 +47,9 @@ def low_pass_or_nothing(m: ModelBuilder, name: str, u: Expr, T: Scalar, initial:
     return if_else(left_out, u, x)
 
 
-def washout_or_nothing(m: ModelBuilder, name: str, u: Expr, T_W: Expr, initial: Scalar = 0.0) -> Expr:
+def washout_or_nothing(
+    m: ModelBuilder, name: str, u: Expr, T_W: Expr, initial: Scalar = 0.0
+) -> Expr:
     """s·T_W/(1 + s·T_W); passed through where T_W = 0, and then ``initial`` must be 0 or be taken off later.
 
     ``T_W``: time constant [s], 0 or more."""
@@ -52,7 +57,9 @@ def washout_or_nothing(m: ModelBuilder, name: str, u: Expr, T_W: Expr, initial: 
     return if_else(left_out, u, washout(m, name, u, if_else(left_out, BYPASS_TIME, T_W), initial))
 
 
-def lead_lag(m: ModelBuilder, name: str, u: Expr, T_lead: Scalar, T_lag: Scalar, initial: Scalar = 0.0) -> Expr:
+def lead_lag(
+    m: ModelBuilder, name: str, u: Expr, T_lead: Scalar, T_lag: Scalar, initial: Scalar = 0.0
+) -> Expr:
     """(1 + s·T_lead)/(1 + s·T_lag); passed through where T_lag = 0.
 
     ``T_lead``, ``T_lag``: time constants [s], 0 or more."""
@@ -63,7 +70,9 @@ def lead_lag(m: ModelBuilder, name: str, u: Expr, T_lead: Scalar, T_lag: Scalar,
     return if_else(left_out, u, x + (T_lead / T) * (u - x))
 
 
-def proportional_integral(m: ModelBuilder, name: str, error: Expr, K_P: Scalar, K_I: Scalar, initial: Scalar) -> Expr:
+def proportional_integral(
+    m: ModelBuilder, name: str, error: Expr, K_P: Scalar, K_I: Scalar, initial: Scalar
+) -> Expr:
     """K_P + K_I/s.
 
     ``error``: what goes in; 0 in steady state; ``K_P``: proportional gain; ``K_I``: integral gain [1/s, times the unit
@@ -92,7 +101,9 @@ def limited_low_pass(
     return close_limited_low_pass(m, x, u, T, low, high)
 
 
-def close_limited_low_pass(m: ModelBuilder, x: Expr, u: Expr, T: Scalar, low: Scalar, high: Scalar) -> Expr:
+def close_limited_low_pass(
+    m: ModelBuilder, x: Expr, u: Expr, T: Scalar, low: Scalar, high: Scalar
+) -> Expr:
     """`limited_low_pass` with a state that is declared already, for what the input is fed back from."""
     left_out = _is_zero(T)
     rate = (u - x) / if_else(left_out, BYPASS_TIME, T)
@@ -101,7 +112,14 @@ def close_limited_low_pass(m: ModelBuilder, x: Expr, u: Expr, T: Scalar, low: Sc
 
 
 def limited_proportional_integral(
-    m: ModelBuilder, name: str, error: Expr, K_P: Scalar, K_I: Scalar, low: Scalar, high: Scalar, initial: Scalar
+    m: ModelBuilder,
+    name: str,
+    error: Expr,
+    K_P: Scalar,
+    K_I: Scalar,
+    low: Scalar,
+    high: Scalar,
+    initial: Scalar,
 ) -> Expr:
     """K_P + K_I/s, the output limited; the integrator stops while the output is at a limit (IEEE 421.5, annex E).
 

@@ -9,7 +9,9 @@ def identity_source(guid: str, digest: str) -> str:
 
 def c_string(text: str) -> str:
     """A C string literal; octal escapes, because a hexadecimal one would swallow digits after it."""
-    plain = "".join(chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in text.encode())
+    plain = "".join(
+        chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in text.encode()
+    )
     return f'"{plain}"'
 
 

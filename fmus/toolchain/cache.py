@@ -47,7 +47,11 @@ def intact(path: Path) -> bool:
         mark = (seen.st_ino, seen.st_size, seen.st_mtime_ns)
         if _checked.get(path) == mark:
             return True
-        kept = _hash_file(path).read_text(encoding="ascii").strip() if _hash_file(path).exists() else "missing"
+        kept = (
+            _hash_file(path).read_text(encoding="ascii").strip()
+            if _hash_file(path).exists()
+            else "missing"
+        )
         found = hashlib.sha256(path.read_bytes()).hexdigest()
     except (FileNotFoundError, NotADirectoryError):
         return False
@@ -55,7 +59,11 @@ def intact(path: Path) -> bool:
         _LOG.warning("cache: %s cannot be read (%s); it is built again", path, error)
         return False
     if found != kept:
-        why = "has no SHA-256 beside it" if kept == "missing" else "differs from the SHA-256 kept beside it"
+        why = (
+            "has no SHA-256 beside it"
+            if kept == "missing"
+            else "differs from the SHA-256 kept beside it"
+        )
         _LOG.warning("cache: %s %s, so it may be damaged or altered; it is built again", path, why)
         return False
     _checked[path] = mark

@@ -27,7 +27,8 @@ ENDINGS = {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib"}  # of a shar
 
 FLAGS = (
     *("-O2", "-shared", "-fPIC", "-fvisibility=hidden", "-fno-sanitize=undefined", "-g0", "-s"),
-    "-ffp-contract=off",  # nor fast-math: a compiled kernel and its Python fallback agree to rounding
+    # nor fast-math: a compiled kernel and its Python fallback agree to rounding
+    "-ffp-contract=off",
     # LLVM 22 was seen to unroll a loop in one run and not in the next, and is known to vectorise so
     # (llvm/llvm-project#200833): an FMU would not be the same file on each machine. It costs a grid's step 4 %.
     *("-fno-unroll-loops", "-fno-vectorize"),
@@ -63,13 +64,19 @@ def compile_library(source: str, platform: str) -> Path:
     ``source``: One translation unit.
     ``platform``: A key of `TARGETS`."""
     if platform not in TARGETS:
-        raise ValueError(f"the compiler has no target for platform {platform!r}; choose from {', '.join(TARGETS)}")
+        raise ValueError(
+            f"the compiler has no target for platform {platform!r}; choose from {', '.join(TARGETS)}"
+        )
     targets, ending = TARGETS[platform], ENDINGS[platform]
     if len(targets) == 1:
         return compile_for(source, targets[0], ending)
     thin = [compile_for(source, target, ending) for target in targets]
     library = thin[0].with_name(f"{thin[0].stem}_universal{ending}")
-    return library if intact(library) else keep(library, universal_binary([path.read_bytes() for path in thin]))
+    return (
+        library
+        if intact(library)
+        else keep(library, universal_binary([path.read_bytes() for path in thin]))
+    )
 
 
 def compile_here(*files: Path) -> Path:
@@ -99,7 +106,9 @@ def prebuild(*files: Path) -> None:
 
 def _prebuilt(source: str, platform: str) -> Path:
     """Path of a source's library in the package, if the package contains one. Another source gives another name."""
-    key = hashlib.sha256("\0".join([source, platform, *FLAGS, *_MAC_FLAGS]).encode()).hexdigest()[:32]
+    key = hashlib.sha256("\0".join([source, platform, *FLAGS, *_MAC_FLAGS]).encode()).hexdigest()[
+        :32
+    ]
     return _PREBUILT / f"{key}{ENDINGS[platform]}"
 
 
@@ -130,7 +139,9 @@ def compile_for(source: str, target: str, ending: str, libraries: Sequence[str] 
     flags = [*FLAGS, *_MAC_FLAGS] if target.endswith("macos") else [*FLAGS]
     if ending == ".exe":
         flags.remove("-shared")
-    key = hashlib.sha256("\0".join([source, target, *recipe(), *libraries]).encode()).hexdigest()[:32]
+    key = hashlib.sha256("\0".join([source, target, *recipe(), *libraries]).encode()).hexdigest()[
+        :32
+    ]
     library = cache_directory("libraries") / f"{key}{ending}"
     if intact(library):
         return library
@@ -140,17 +151,28 @@ def compile_for(source: str, target: str, ending: str, libraries: Sequence[str] 
         c_file, built = folder / "source.c", folder / f"library{ending}"
         c_file.write_text(source, encoding="utf-8")
         compiler = [sys.executable, "-m", "ziglang", "cc", "-target", target]
-        command = [*compiler, *flags, str(c_file), "-o", str(built), "-lm", *(f"-l{name}" for name in libraries)]
+        command = [
+            *compiler,
+            *flags,
+            str(c_file),
+            "-o",
+            str(built),
+            "-lm",
+            *(f"-l{name}" for name in libraries),
+        ]
         result = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
         if result.returncode:
-            raise RuntimeError(f"the C compiler (ziglang) failed for {target}:\n{result.stderr.strip()}")
+            raise RuntimeError(
+                f"the C compiler (ziglang) failed for {target}:\n{result.stderr.strip()}"
+            )
         return keep(library, built.read_bytes())
     finally:
         remove(folder)
 
 
 _MAGIC = 0xCAFEBABE
-_ALIGNMENT = 14  # alignment of each library in the file, as a power of two: the page size of the newer processors
+# alignment of each library in the file, as a power of two: the page size of the newer processors
+_ALIGNMENT = 14
 _THIN = b"\xcf\xfa\xed\xfe"
 
 

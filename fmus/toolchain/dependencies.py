@@ -41,10 +41,17 @@ def structure(model: Model) -> Structure:
 
     Where there would be more than `MOST` dependencies nothing is listed, which means in both versions of FMI that there
     may be any."""
-    sizes = (len(group) for group in (model.parameters, model.calculated, model.inputs, model.states))
+    sizes = (
+        len(group) for group in (model.parameters, model.calculated, model.inputs, model.states)
+    )
     first_calculated, first_input, first_state, first_output = accumulate(sizes)
-    p, c, u, x = (partial(_mark, first) for first in (0, first_calculated, first_input, first_state))
-    inputs, states = (1 << first_state) - (1 << first_input), (1 << first_output) - (1 << first_state)
+    p, c, u, x = (
+        partial(_mark, first) for first in (0, first_calculated, first_input, first_state)
+    )
+    inputs, states = (
+        (1 << first_state) - (1 << first_input),
+        (1 << first_output) - (1 << first_state),
+    )
     c_p, x_p = model.initialise.dependence(p)
 
     def of(function: Function, first: int) -> tuple[tuple[Unknown, ...], tuple[Unknown, ...]]:
@@ -57,12 +64,19 @@ def structure(model: Model) -> Structure:
             running = _unknowns(first, [known & (inputs | states) for known in by])
             if _count(by, (1 << first_calculated) - 1) <= MOST:
                 at_start = x_p.__getitem__, u, p, c_p.__getitem__
-                start = _unknowns(first, function.dependence(*at_start, *_voltages(model, *at_start))[0])
+                start = _unknowns(
+                    first, function.dependence(*at_start, *_voltages(model, *at_start))[0]
+                )
         return running, start
 
     outputs, first_outputs = of(model.outputs_function, first_output)
     derivatives, first_derivatives = of(model.derivatives, first_output + len(model.outputs))
-    initial = (*_unknowns(first_calculated, c_p), *_unknowns(first_state, x_p), *first_outputs, *first_derivatives)
+    initial = (
+        *_unknowns(first_calculated, c_p),
+        *_unknowns(first_state, x_p),
+        *first_outputs,
+        *first_derivatives,
+    )
     return Structure(outputs, derivatives, initial)
 
 
@@ -72,7 +86,9 @@ def _voltages(model: Model, *marks: Callable[[int], int]) -> list[Callable[[int]
         return []
     (matrix,), (currents,) = nodal.values.dependence(*marks[1:]), nodal.currents.dependence(*marks)
     n, entries = len(nodal.plan.order), nodal.plan.entries
-    _, island = connected_components(coo_array((np.ones(len(entries)), np.array(entries).T), shape=(n, n)), False)
+    _, island = connected_components(
+        coo_array((np.ones(len(entries)), np.array(entries).T), shape=(n, n)), False
+    )
     found = [0] * n
     for bus, mark in enumerate(currents):
         found[island[bus % n]] |= mark

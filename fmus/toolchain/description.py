@@ -8,14 +8,24 @@ from xml.etree.ElementTree import Element, SubElement
 from fmus.toolchain import description_common as common
 from fmus.toolchain.model import Model
 
-_GROUPS = {"Output": "Outputs", "ContinuousStateDerivative": "Derivatives", "InitialUnknown": "InitialUnknowns"}
+_GROUPS = {
+    "Output": "Outputs",
+    "ContinuousStateDerivative": "Derivatives",
+    "InitialUnknown": "InitialUnknowns",
+}
 """FMI 2.0's name of the list of each kind of unknown."""
 
 
 def model_description(
-    model: Model, guid: str, identifier: str, tool: str, *, native: bool = False, listed: bool = True,
+    model: Model,
+    guid: str,
+    identifier: str,
+    tool: str,
+    *,
+    native: bool = False,
+    listed: bool = True,
     source_file: str = "",
-) -> bytes:  # fmt: skip
+) -> bytes:
     """Return the file's text.
 
     ``guid``, ``identifier``: As in the standard; the identifier also names the binaries.
@@ -26,16 +36,23 @@ def model_description(
     root = common.root_element(model, "2.0", {"guid": guid}, tool)
     root.set("numberOfEventIndicators", "0")
     kind = SubElement(
-        root, "CoSimulation", modelIdentifier=identifier, needsExecutionTool="false" if native else "true",
-        canHandleVariableCommunicationStepSize="true", canNotUseMemoryManagementFunctions="true",
-        canGetAndSetFMUstate="true", canSerializeFMUstate="true",
+        root,
+        "CoSimulation",
+        modelIdentifier=identifier,
+        needsExecutionTool="false" if native else "true",
+        canHandleVariableCommunicationStepSize="true",
+        canNotUseMemoryManagementFunctions="true",
+        canGetAndSetFMUstate="true",
+        canSerializeFMUstate="true",
         providesDirectionalDerivative="true" if native else "false",
-    )  # fmt: skip
+    )
     if source_file:
         SubElement(SubElement(kind, "SourceFiles"), "File", name=source_file)
     common.write_definitions(root, model, "fmi2")
     annotations = SubElement(root, "VendorAnnotations")
-    SubElement(SubElement(annotations, "Tool", name=common.TOOL), "ContinuousStates", settable="true")
+    SubElement(
+        SubElement(annotations, "Tool", name=common.TOOL), "ContinuousStates", settable="true"
+    )
     # a Tool has one element
     SubElement(annotations, "Tool", name=common.COMPONENT).append(common.component_element(model))
     _variables(root, model)
@@ -69,5 +86,9 @@ def _structure(root: Element, model: Model, *, listed: bool) -> None:
         if group or kind == "InitialUnknown":
             parent = SubElement(element, _GROUPS[kind])
             for unknown in group:
-                given = {} if unknown.known is None else {"dependencies": " ".join(map(_index, unknown.known))}
+                given = (
+                    {}
+                    if unknown.known is None
+                    else {"dependencies": " ".join(map(_index, unknown.known))}
+                )
                 SubElement(parent, "Unknown", {"index": _index(unknown.reference), **given})

@@ -8,7 +8,15 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from fmus.toolchain.dependencies import Unknown, structure, unlisted
 from fmus.toolchain.model import Model
-from fmus.toolchain.variables import UNITS, CalculatedParameter, Input, Output, Parameter, State, Variable
+from fmus.toolchain.variables import (
+    UNITS,
+    CalculatedParameter,
+    Input,
+    Output,
+    Parameter,
+    State,
+    Variable,
+)
 
 TOOL = "gfor-cosim"
 COMPONENT = f"{TOOL}.Component"  # names of our annotations
@@ -20,11 +28,13 @@ _CALCULATED = {"causality": "local", "variability": "continuous", "initial": "ca
 class DescribedVariable:
     """A variable as both versions declare it."""
 
-    reference: int  # value reference; FMI 2.0's index is greater by one, as the file lists variables in this order
+    # value reference; FMI 2.0's index is greater by one, as the file lists variables in this order
+    reference: int
     attributes: Mapping[str, str]  # name, value reference, text, causality, variability and initial
     kind: str  # name of the type in FMI 2.0
     own: Mapping[str, str]  # attributes of the type: start, bounds and unit
-    derivative_of: int | None = None  # value reference of the state whose time derivative it is; None for all others
+    # value reference of the state whose time derivative it is; None for all others
+    derivative_of: int | None = None
 
 
 def root_element(model: Model, version: str, identity: Mapping[str, str], tool: str) -> Element:
@@ -33,9 +43,13 @@ def root_element(model: Model, version: str, identity: Mapping[str, str], tool: 
     ``identity``: The attribute that tells one FMU from another.
     ``tool``: Name and version for ``generationTool``. No date is written: equal contents give equal files."""
     attributes = {
-        "fmiVersion": version, "modelName": model.name, **identity, "description": model.title, "generationTool": tool,
+        "fmiVersion": version,
+        "modelName": model.name,
+        **identity,
+        "description": model.title,
+        "generationTool": tool,
         "variableNamingConvention": "structured",
-    }  # fmt: skip
+    }
     return Element("fmiModelDescription", attributes)
 
 
@@ -50,20 +64,29 @@ def described_variables(model: Model) -> Iterator[DescribedVariable]:
     """All variables in the order of their value references; the states' time derivatives come last."""
     for reference, variable in enumerate(model.variables):
         attributes, kind, own = _attributes_of(variable)
-        yield DescribedVariable(reference, _named(variable.name, reference, variable.text) | attributes, kind, own)
+        yield DescribedVariable(
+            reference, _named(variable.name, reference, variable.text) | attributes, kind, own
+        )
     for state in model.states:
         name = f"der({state.name})"
         reference = model.value_references[name]
         yield DescribedVariable(
-            reference, _named(name, reference, f"Time derivative of {state.name}") | _CALCULATED, "Real",
-            {"unit": _derivative_unit(state)}, model.value_references[state.name],
-        )  # fmt: skip
+            reference,
+            _named(name, reference, f"Time derivative of {state.name}") | _CALCULATED,
+            "Real",
+            {"unit": _derivative_unit(state)},
+            model.value_references[state.name],
+        )
 
 
 def unknowns(model: Model, *, listed: bool = True) -> dict[str, tuple[Unknown, ...]]:
     """Outputs, derivatives and initial unknowns with what each depends on, by the names of FMI 3.0."""
     known = structure(model) if listed else unlisted(model)
-    return {"Output": known.outputs, "ContinuousStateDerivative": known.derivatives, "InitialUnknown": known.initial}
+    return {
+        "Output": known.outputs,
+        "ContinuousStateDerivative": known.derivatives,
+        "InitialUnknown": known.initial,
+    }
 
 
 def component_element(model: Model) -> Element:
@@ -71,8 +94,16 @@ def component_element(model: Model) -> Element:
     element = Element("Component", {"kind": model.kind} if model.kind else {})
     for parameter in model.parameters:
         if (usual := parameter.usual) is not None:
-            bounds = {"name": parameter.name, "low": repr(float(usual.low)), "high": repr(float(usual.high))}
-            SubElement(element, "Usual", bounds | ({"orZero": "true"} if usual.or_zero else {}) | {"why": usual.why})
+            bounds = {
+                "name": parameter.name,
+                "low": repr(float(usual.low)),
+                "high": repr(float(usual.high)),
+            }
+            SubElement(
+                element,
+                "Usual",
+                bounds | ({"orZero": "true"} if usual.or_zero else {}) | {"why": usual.why},
+            )
     return element
 
 
@@ -102,7 +133,9 @@ def write_log_categories(root: Element, prefix: str) -> None:
 def _write_units(root: Element, model: Model) -> None:
     """Every unit in use; only real variables have one."""
     without = {parameter.name for parameter in model.parameters if parameter.type != "Real"}
-    used = {v.unit for v in model.variables if v.name not in without} | {_derivative_unit(s) for s in model.states}
+    used = {v.unit for v in model.variables if v.name not in without} | {
+        _derivative_unit(s) for s in model.states
+    }
     definitions = SubElement(root, "UnitDefinitions")
     for unit in sorted(used):
         element = SubElement(definitions, "Unit", name=unit)
@@ -121,13 +154,21 @@ def _attributes_of(variable: Variable) -> tuple[dict[str, str], str, dict[str, s
             }
             return attributes, kind, _parameter_type(variable)
         case CalculatedParameter():
-            attributes = {"causality": "calculatedParameter", "variability": "fixed", "initial": "calculated"}
+            attributes = {
+                "causality": "calculatedParameter",
+                "variability": "fixed",
+                "initial": "calculated",
+            }
             return attributes, "Real", {"unit": variable.unit}
         case Input():
             attributes = {"causality": "input", "variability": "continuous"}
             return attributes, "Real", {"unit": variable.unit, "start": repr(float(variable.start))}
         case Output():
-            attributes = {"causality": "output", "variability": "continuous", "initial": "calculated"}
+            attributes = {
+                "causality": "output",
+                "variability": "continuous",
+                "initial": "calculated",
+            }
             return attributes, "Real", {"unit": variable.unit}
         case _:
             return _CALCULATED, "Real", {"unit": variable.unit}

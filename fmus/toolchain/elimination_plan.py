@@ -32,7 +32,11 @@ def plan_pattern(n: int, rows: Sequence[int], columns: Sequence[int]) -> Plan:
 def _order(n: int, rows: np.ndarray, columns: np.ndarray) -> list[int]:
     """Minimum-degree order, from SuperLU on a dominant matrix of that pattern."""
     values = np.where(rows == columns, 10.0 * n, 1.0)
-    factors = splu(csc_matrix((values, (rows, columns)), shape=(n, n)), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0)
+    factors = splu(
+        csc_matrix((values, (rows, columns)), shape=(n, n)),
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0,
+    )
     return [int(k) for k in np.argsort(factors.perm_c)]
 
 
@@ -75,10 +79,14 @@ def plan_elimination(model: Model) -> Elimination:
     (rates,) = (model.implicit or model.derivatives).of(x, u, p, c)
     A = jacobian(rates, x)
     if depends_on(list(A.values()), [*x, *u]):
-        raise ValueError(f"model {model.name} is not linear in its states; the implicit integrator needs that")
+        raise ValueError(
+            f"model {model.name} is not linear in its states; the implicit integrator needs that"
+        )
     gh = symbol("gh")
     matrix = {(i, i): Expr(1) for i in range(n)}
     for place, element in A.items():
         matrix[place] = matrix.get(place, Expr(0)) - gh * element
     plan = plan_pattern(n, *zip(*matrix, strict=True))
-    return Elimination(plan, Function("iteration", [p, c, [gh]], [[matrix[place] for place in plan.entries]]))
+    return Elimination(
+        plan, Function("iteration", [p, c, [gh]], [[matrix[place] for place in plan.entries]])
+    )

@@ -29,9 +29,11 @@ class Recipe(Protocol):
 
 
 def export(
-    recipe: Recipe, destination: Path, platforms: tuple[str, ...] | None = None,
+    recipe: Recipe,
+    destination: Path,
+    platforms: tuple[str, ...] | None = None,
     extra: Mapping[str, bytes] | None = None,
-) -> Path:  # fmt: skip
+) -> Path:
     """Write ``<model name>.fmu`` into a folder, which is created where missing.
 
     ``platforms``: FMI 2.0 names of those to compile for; by default all of them for a native FMU, and this machine's
@@ -39,7 +41,9 @@ def export(
     holds code for both kinds of Mac. ``extra``: further members of the archive, by path. Errors are those of
     `compile_library`."""
     chosen = recipe.default_platforms() if platforms is None else platforms
-    return write_archive(destination / f"{recipe.model.name}.fmu", recipe.contents(chosen) | dict(extra or {}))
+    return write_archive(
+        destination / f"{recipe.model.name}.fmu", recipe.contents(chosen) | dict(extra or {})
+    )
 
 
 def kept_at(recipe: Recipe) -> Path:

@@ -5,9 +5,14 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 
 EXTRAS = {
-    "ziglang": "build", "matpowercaseframes": "networks", "pandapower": "networks",
-    "pypowsybl": "cgmes", "skrf": "black-box", "distributed": "cluster", "helics": "federation",
-}  # fmt: skip
+    "ziglang": "build",
+    "matpowercaseframes": "networks",
+    "pandapower": "networks",
+    "pypowsybl": "cgmes",
+    "skrf": "black-box",
+    "distributed": "cluster",
+    "helics": "federation",
+}
 """Name of a library in an import → extra of this distribution that installs it."""
 
 

@@ -29,7 +29,9 @@ class Phasor:
 
     def __mul__(self, other: Phasor | Scalar) -> Phasor:
         if isinstance(other, Phasor):
-            return Phasor(self.re * other.re - self.im * other.im, self.re * other.im + self.im * other.re)
+            return Phasor(
+                self.re * other.re - self.im * other.im, self.re * other.im + self.im * other.re
+            )
         return Phasor(self.re * other, self.im * other)
 
     __rmul__ = __mul__
@@ -58,7 +60,9 @@ class Phasor:
         return self * polar(1.0, angle)
 
     def clamped(self, limit_re: Scalar, limit_im: Scalar) -> Phasor:
-        return Phasor(fmin(fmax(self.re, -limit_re), limit_re), fmin(fmax(self.im, -limit_im), limit_im))
+        return Phasor(
+            fmin(fmax(self.re, -limit_re), limit_re), fmin(fmax(self.im, -limit_im), limit_im)
+        )
 
 
 Phases = tuple[Scalar, Scalar, Scalar]  # instantaneous values of phases a, b and c
@@ -132,7 +136,9 @@ def phasor_state(m: ModelBuilder, name: str, initial: Phasor, text: str, base: s
     )
 
 
-def phasor_derivative(m: ModelBuilder, state: Phasor, rate: Phasor, implicit: Phasor | None = None) -> None:
+def phasor_derivative(
+    m: ModelBuilder, state: Phasor, rate: Phasor, implicit: Phasor | None = None
+) -> None:
     """Give a rate; ``implicit`` is its part that is linear in the states, where that is not all of it."""
     m.derivative(Expr(state.re), rate.re, None if implicit is None else implicit.re)
     m.derivative(Expr(state.im), rate.im, None if implicit is None else implicit.im)

@@ -52,9 +52,12 @@ def c_source(model: Model, further: Mapping[str, Function] | None = None) -> str
     ``further``: Functions by name whose code is wanted beside the kernel's own."""
     functions = kernel_functions(model)
     sizes = {
-        "NP": len(model.parameters), "NC": len(model.calculated), "NU": len(model.inputs), "NX": len(model.states),
+        "NP": len(model.parameters),
+        "NC": len(model.calculated),
+        "NU": len(model.inputs),
+        "NX": len(model.states),
         "NY": len(model.outputs),
-    }  # fmt: skip
+    }
     tables = ""
     if model.integrator == "sdirk":
         elimination = plan_elimination(model)
@@ -65,17 +68,25 @@ def c_source(model: Model, further: Mapping[str, Function] | None = None) -> str
         held = [index for index, state in enumerate(model.states) if state.stepwise]
         sizes["NS"] = len(held)
         tables = f"static const int STEPWISE[] = {{{', '.join(map(str, held or [-1]))}}};"
-    code = [c_function(function, f"{name}_code") for name, function in {**functions, **(further or {})}.items()]
-    enumeration = "enum { " + ", ".join(f"{name} = {value}" for name, value in sizes.items()) + " };\n"
+    code = [
+        c_function(function, f"{name}_code")
+        for name, function in {**functions, **(further or {})}.items()
+    ]
+    enumeration = (
+        "enum { " + ", ".join(f"{name} = {value}" for name, value in sizes.items()) + " };\n"
+    )
     parts = ["#include <math.h>", *code, enumeration, tables]
-    parts += [(_C / name).read_text(encoding="utf-8") for name in ("kernel.c", f"{model.integrator}.c")]
+    parts += [
+        (_C / name).read_text(encoding="utf-8") for name in ("kernel.c", f"{model.integrator}.c")
+    ]
     kept = "IMPLICIT_SIZE" if model.integrator == "sdirk" else "0"
     return "\n".join([*parts, f"KERNEL int workspace_size(void) {{ return {kept}; }}", ""])
 
 
 def _tables(lists: Mapping[str, list[int]]) -> str:
     return "\n".join(
-        f"static const int {name}[] = {{{', '.join(map(str, values))}}};" for name, values in lists.items()
+        f"static const int {name}[] = {{{', '.join(map(str, values))}}};"
+        for name, values in lists.items()
     )
 
 
@@ -110,7 +121,9 @@ def derivative_functions(model: Model) -> dict[str, Function]:
 def _direction(name: str, known: list[list[Expr]], follows: list[list[Expr]]) -> Function:
     directions = [symbols("d", len(vector)) for vector in known]
     point, along = list(chain(*known)), list(chain(*directions))
-    return Function(name, [*known, *directions], [jtimes(values, point, along) for values in follows])
+    return Function(
+        name, [*known, *directions], [jtimes(values, point, along) for values in follows]
+    )
 
 
 def _adjoint(name: str, known: list[list[Expr]], follows: list[list[Expr]]) -> Function:

@@ -6,7 +6,15 @@ from typing import Literal
 
 from fmus.toolchain.plan import Plan
 from fmus.toolchain.symbols import Function
-from fmus.toolchain.variables import CalculatedParameter, Input, Kind, Output, Parameter, State, Variable
+from fmus.toolchain.variables import (
+    CalculatedParameter,
+    Input,
+    Kind,
+    Output,
+    Parameter,
+    State,
+    Variable,
+)
 
 Integrator = Literal["runge_kutta", "sdirk"]
 

@@ -8,7 +8,15 @@ from dataclasses import replace
 
 from fmus.toolchain.model import Integrator, Model
 from fmus.toolchain.nodes import Complex, Nodes
-from fmus.toolchain.symbols import Expr, Function, Scalar, depends_on, substitute, symbol, symbols_in
+from fmus.toolchain.symbols import (
+    Expr,
+    Function,
+    Scalar,
+    depends_on,
+    substitute,
+    symbol,
+    symbols_in,
+)
 from fmus.toolchain.variables import (
     UNITS,
     CalculatedParameter,
@@ -31,9 +39,15 @@ class ModelBuilder:
     for electromagnetic transients. ``usual``: ranges of parameters by their full name."""
 
     def __init__(
-        self, name: str, title: str, internal_step: float = 1e-4, longest_step: float = 2e-4, *, kind: Kind = "",
+        self,
+        name: str,
+        title: str,
+        internal_step: float = 1e-4,
+        longest_step: float = 2e-4,
+        *,
+        kind: Kind = "",
         usual: Mapping[str, Usual] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.name, self.title, self.kind, self._usual = name, title, kind, usual or {}
         self._prefix: list[str] = []
         self._declared: dict[str, tuple[Variable, Expr]] = {}
@@ -45,10 +59,13 @@ class ModelBuilder:
         self._algebraic: list[tuple[Expr, Expr]] = []
         self._nodes: Nodes | None = None
         self.internal_step = self.parameter(
-            "internal_step", internal_step, "s",
+            "internal_step",
+            internal_step,
+            "s",
             "Longest internal Runge-Kutta step; a communication step is cut into equal parts no longer than this",
-            minimum=1e-6, maximum=longest_step,
-        )  # fmt: skip
+            minimum=1e-6,
+            maximum=longest_step,
+        )
 
     @contextmanager
     def scope(self, name: str) -> Iterator[None]:
@@ -80,9 +97,19 @@ class ModelBuilder:
         self.output(variable.name, value, variable.unit, variable.description, variable.base)
 
     def parameter(
-        self, name: str, start: float, unit: str, description: str, *, base: str = "", minimum: float | None = None,
-        maximum: float | None = None, tunable: bool = False, type: VariableType = "Real", source: str = "",
-    ) -> Expr:  # fmt: skip
+        self,
+        name: str,
+        start: float,
+        unit: str,
+        description: str,
+        *,
+        base: str = "",
+        minimum: float | None = None,
+        maximum: float | None = None,
+        tunable: bool = False,
+        type: VariableType = "Real",
+        source: str = "",
+    ) -> Expr:
         """Declare a parameter.
 
         ``name``: without the scope; ``base``: what 1 pu is, such as ``"S_n"``; required where the unit is ``pu``;
@@ -90,14 +117,27 @@ class ModelBuilder:
         communication point, not only before initialisation; ``type``: in the equations an Integer or a Boolean is a
         number as well; ``source``: source of the default value; empty if it is not given."""
         return self._declare(
-            Parameter(self._full(name), unit, description, base, float(start), minimum, maximum, tunable, type, source)
+            Parameter(
+                self._full(name),
+                unit,
+                description,
+                base,
+                float(start),
+                minimum,
+                maximum,
+                tunable,
+                type,
+                source,
+            )
         )
 
     def switch(self, name: str, start: bool, description: str, *, tunable: bool = False) -> Expr:
         """Declare a Boolean parameter; in the equations it is 0 or 1."""
         return self.parameter(name, float(start), "1", description, tunable=tunable, type="Boolean")
 
-    def calculated(self, name: str, value: Scalar, unit: str, description: str, base: str = "") -> Expr:
+    def calculated(
+        self, name: str, value: Scalar, unit: str, description: str, base: str = ""
+    ) -> Expr:
         """Declare a quantity computed at initialisation from fixed parameters.
 
         ``value``: an expression of fixed parameters."""
@@ -105,14 +145,23 @@ class ModelBuilder:
         self._expressions[full] = Expr(value)
         return self._declare(CalculatedParameter(full, unit, description, base))
 
-    def input(self, name: str, unit: str, description: str, *, base: str = "", start: float = 0.0) -> Expr:
+    def input(
+        self, name: str, unit: str, description: str, *, base: str = "", start: float = 0.0
+    ) -> Expr:
         """Declare an input.
 
         ``start``: its value until it is set."""
         return self._declare(Input(self._full(name), unit, description, base, start))
 
     def state(
-        self, name: str, initial: Scalar, unit: str, description: str, base: str = "", *, stepwise: bool = False
+        self,
+        name: str,
+        initial: Scalar,
+        unit: str,
+        description: str,
+        base: str = "",
+        *,
+        stepwise: bool = False,
     ) -> Expr:
         """Declare a continuous state.
 
@@ -121,7 +170,9 @@ class ModelBuilder:
         rate × step size at its end."""
         full = self._full(name)
         if f"{unit}/s" not in UNITS:
-            raise ValueError(f"state {full!r} is in {unit!r}; add its rate {unit + '/s'!r} to UNITS as well")
+            raise ValueError(
+                f"state {full!r} is in {unit!r}; add its rate {unit + '/s'!r} to UNITS as well"
+            )
         self._expressions[full] = Expr(initial)
         return self._declare(State(full, unit, description, base, stepwise))
 
@@ -133,7 +184,9 @@ class ModelBuilder:
         must be slow against it."""
         declared = self._declared.get(state.name())
         if declared is None or not isinstance(declared[0], State):
-            raise ValueError(f"model {self.name}: {state.name()!r} is no declared state and can have no derivative")
+            raise ValueError(
+                f"model {self.name}: {state.name()!r} is no declared state and can have no derivative"
+            )
         if state.name() in self._derivatives:
             raise ValueError(f"model {self.name}: state {state.name()!r} has two derivatives")
         self._derivatives[state.name()] = Expr(rate)
@@ -157,7 +210,9 @@ class ModelBuilder:
         """Give the value of an `algebraic` signal; a `ValueError` if it depends on the signal itself."""
         value = Expr(value)
         if depends_on([value], [signal]):
-            raise ValueError(f"model {self.name}: signal {signal.name()!r} depends directly on itself")
+            raise ValueError(
+                f"model {self.name}: signal {signal.name()!r} depends directly on itself"
+            )
         self._algebraic.append((signal, value))
 
     def nodes(
@@ -185,10 +240,16 @@ class ModelBuilder:
         self._check_origins(p)
         if missing := [s.name for s, _ in kinds[State] if s.name not in self._derivatives]:
             raise ValueError(f"model {self.name}: no derivative is given for {', '.join(missing)}")
-        if integrator == "sdirk" and any(isinstance(v, State) and v.stepwise for v, _ in kinds[State]):
-            raise ValueError(f"model {self.name}: the implicit integrator knows no stepwise states; take runge_kutta")
+        if integrator == "sdirk" and any(
+            isinstance(v, State) and v.stepwise for v, _ in kinds[State]
+        ):
+            raise ValueError(
+                f"model {self.name}: the implicit integrator knows no stepwise states; take runge_kutta"
+            )
         if integrator == "sdirk" and self._nodes is not None:
-            raise ValueError(f"model {self.name}: the implicit integrator solves no nodal equations; take runge_kutta")
+            raise ValueError(
+                f"model {self.name}: the implicit integrator solves no nodal equations; take runge_kutta"
+            )
 
         def collect(entries: list[tuple[Variable, Expr]], values: dict[str, Expr]) -> list[Expr]:
             found = [values[variable.name] for variable, _ in entries]
@@ -217,8 +278,12 @@ class ModelBuilder:
             states=tuple(v for v, _ in kinds[State]),  # type: ignore[misc]
             outputs=tuple(v for v, _ in kinds[Output]),  # type: ignore[misc]
             initialise=Function("initialise", [p], [c_value, x_value]),
-            derivatives=Function("derivatives", arguments, [collect(kinds[State], self._derivatives)]),
-            outputs_function=Function("outputs", arguments, [collect(kinds[Output], self._expressions)]),
+            derivatives=Function(
+                "derivatives", arguments, [collect(kinds[State], self._derivatives)]
+            ),
+            outputs_function=Function(
+                "outputs", arguments, [collect(kinds[Output], self._expressions)]
+            ),
             requirements=Function("requirements", [p, c], [r_value]),
             requirement_texts=tuple(text for _, text in self._requirements),
             integrator=integrator,
@@ -247,7 +312,9 @@ class ModelBuilder:
         Raises a `ValueError` if one was never closed, or several depend on one another in a circle."""
         closed = [symbol.name() for symbol, _ in self._algebraic]
         if never := [symbol.name() for symbol in self._opened if symbol.name() not in closed]:
-            raise ValueError(f"model {self.name}: signal {', '.join(never)} is used but never closed")
+            raise ValueError(
+                f"model {self.name}: signal {', '.join(never)} is used but never closed"
+            )
         waiting = list(self._algebraic)
         ordered: list[tuple[Expr, Expr]] = []
         for _ in range(len(waiting)):
@@ -260,7 +327,9 @@ class ModelBuilder:
                     waiting = [entry for entry in waiting if entry[0].name() != signal.name()]
         if waiting:
             names = ", ".join(symbol.name() for symbol, _ in waiting)
-            raise ValueError(f"model {self.name}: signals {names} depend on one another in a circle")
+            raise ValueError(
+                f"model {self.name}: signals {names} depend on one another in a circle"
+            )
         return ordered
 
     def _check_origins(self, p: list[Expr]) -> None:
@@ -270,7 +339,9 @@ class ModelBuilder:
         }
         for variable, _ in self._declared.values():
             if isinstance(variable, CalculatedParameter | State):
-                others = {s.name() for s in symbols_in([self._expressions[variable.name]])} - allowed
+                others = {
+                    s.name() for s in symbols_in([self._expressions[variable.name]])
+                } - allowed
                 if others:
                     raise ValueError(
                         f"model {self.name}: {variable.name!r} must follow from parameters at initialisation, "

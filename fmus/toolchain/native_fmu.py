@@ -17,7 +17,14 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from fmus.toolchain import description_common as common
 from fmus.toolchain.archive import digest_of, guid_of
 from fmus.toolchain.c_text import c_number, c_string, identity_source
-from fmus.toolchain.compiler import ENDINGS, TARGETS, compile_library, joined_source, library_of, recipe
+from fmus.toolchain.compiler import (
+    ENDINGS,
+    TARGETS,
+    compile_library,
+    joined_source,
+    library_of,
+    recipe,
+)
 from fmus.toolchain.description import model_description, with_guid
 from fmus.toolchain.exporter import this_machine
 from fmus.toolchain.extras import installed_version
@@ -25,7 +32,8 @@ from fmus.toolchain.kernel import c_source, derivative_functions
 from fmus.toolchain.model import FmiVersion, Model
 from fmus.toolchain.tape import VERSION, tape_of
 
-_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}  # FMI 2.0's name of a type → FMI 3.0's
+# FMI 2.0's name of a type → FMI 3.0's
+_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
 
 
 def model_description_3(model: Model, token: str, identifier: str, tool: str) -> bytes:
@@ -35,16 +43,23 @@ def model_description_3(model: Model, token: str, identifier: str, tool: str) ->
     ``tool``: Name and version for ``generationTool``."""
     root = common.root_element(model, "3.0", {"instantiationToken": token}, tool)
     SubElement(
-        root, "CoSimulation", modelIdentifier=identifier, canHandleVariableCommunicationStepSize="true",
-        canGetAndSetFMUState="true", canSerializeFMUState="true", providesDirectionalDerivatives="true",
+        root,
+        "CoSimulation",
+        modelIdentifier=identifier,
+        canHandleVariableCommunicationStepSize="true",
+        canGetAndSetFMUState="true",
+        canSerializeFMUState="true",
+        providesDirectionalDerivatives="true",
         providesAdjointDerivatives="true",
-    )  # fmt: skip
+    )
     common.write_definitions(root, model, "fmi3")
     _variables(root, model)
     _structure(root, model)
     annotations = SubElement(root, "Annotations")
     SubElement(annotations, "Annotation", type=f"{common.TOOL}.ContinuousStates").text = "settable"
-    SubElement(annotations, "Annotation", type=common.COMPONENT).append(common.component_element(model))
+    SubElement(annotations, "Annotation", type=common.COMPONENT).append(
+        common.component_element(model)
+    )
     return common.text_of(root)
 
 
@@ -52,7 +67,9 @@ def build_description(identifier: str, source_file: str) -> bytes:
     """The text of sources/buildDescription.xml: how a tool compiles the FMU."""
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
-    SubElement(SubElement(configuration, "SourceFileSet", language="C11"), "SourceFile", name=source_file)
+    SubElement(
+        SubElement(configuration, "SourceFileSet", language="C11"), "SourceFile", name=source_file
+    )
     return common.text_of(root)
 
 
@@ -61,18 +78,28 @@ def _variables(root: Element, model: Model) -> None:
     for variable in common.described_variables(model):
         state = variable.derivative_of
         more = {} if state is None else {"derivative": str(state)}
-        SubElement(variables, _TYPES[variable.kind], {**variable.attributes, **variable.own, **more})
+        SubElement(
+            variables, _TYPES[variable.kind], {**variable.attributes, **variable.own, **more}
+        )
     SubElement(
-        variables, "Float64", name="time", valueReference=str(len(model.value_references)), description="Time",
-        causality="independent", variability="continuous", unit="s",
-    )  # fmt: skip
+        variables,
+        "Float64",
+        name="time",
+        valueReference=str(len(model.value_references)),
+        description="Time",
+        causality="independent",
+        variability="continuous",
+        unit="s",
+    )
 
 
 def _structure(root: Element, model: Model) -> None:
     element = SubElement(root, "ModelStructure")
     for kind, group in common.unknowns(model).items():
         for unknown in group:
-            given = {} if unknown.known is None else {"dependencies": " ".join(map(str, unknown.known))}
+            given = (
+                {} if unknown.known is None else {"dependencies": " ".join(map(str, unknown.known))}
+            )
             SubElement(element, kind, {"valueReference": str(unknown.reference), **given})
 
 
@@ -91,11 +118,21 @@ def terminals_and_icons(model: Model) -> bytes:
     """Return the file's text, for a model that has a port."""
     root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
     terminal = SubElement(
-        SubElement(root, "Terminals"), "Terminal", name="bus", matchingRule="bus", terminalKind=KIND,
+        SubElement(root, "Terminals"),
+        "Terminal",
+        name="bus",
+        matchingRule="bus",
+        terminalKind=KIND,
         description=f"Electrical port of {model.name} in the network frame: bus voltage and injected current",
-    )  # fmt: skip
+    )
     for name, kind in _MEMBERS.items():
-        SubElement(terminal, "TerminalMemberVariable", variableName=name, memberName=name, variableKind=kind)
+        SubElement(
+            terminal,
+            "TerminalMemberVariable",
+            variableName=name,
+            memberName=name,
+            variableKind=kind,
+        )
     indent(root)
     text: str = tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
@@ -122,24 +159,39 @@ LIBRARIES = {version: (_C / "native.c", _C / f"fmi{version[0]}.c") for version i
 
 def model_data(model: Model, tape: bytes, digest: str) -> bytes:
     """A model as ``c/model.c`` reads it; ``digest``: [hex] of all that its FMU is made from."""
-    texts = [text.encode() for text in (guid_of(digest), *model.value_references, *model.requirement_texts)]
+    texts = [
+        text.encode()
+        for text in (guid_of(digest), *model.value_references, *model.requirement_texts)
+    ]
     text = b"\0".join([*texts, b""])
     text += bytes(-len(text) % 8)
     start, parameters = _start(model), model.parameters
-    counts = len(model.value_references), len(model.requirement_texts), len(start), len(parameters), len(text)
-    parts = [struct.pack("<7I", *counts, max(map(len, texts)), model.value_references["internal_step"])]
+    counts = (
+        len(model.value_references),
+        len(model.requirement_texts),
+        len(start),
+        len(parameters),
+        len(text),
+    )
+    parts = [
+        struct.pack("<7I", *counts, max(map(len, texts)), model.value_references["internal_step"])
+    ]
     parts += [bytes.fromhex(digest)[:16], array("d", start).tobytes()]
     for p in parameters:
         bounds = -inf if p.minimum is None else p.minimum, inf if p.maximum is None else p.maximum
         parts.append(struct.pack("<2d2i", *bounds, [*_TYPES].index(p.type), p.tunable))
     content = b"".join([*parts, text, tape])
-    return struct.pack("<8s3I", b"gformodl", VERSION, 20 + len(content), zlib.crc32(content)) + content
+    return (
+        struct.pack("<8s3I", b"gformodl", VERSION, 20 + len(content), zlib.crc32(content)) + content
+    )
 
 
 def _model_source(data: bytes) -> str:
     """A model's data as text of C, for a source that has it within."""
     numbers = ", ".join(map(hex, array("I", data)))
-    return f"#include <stdint.h>\nstatic const uint32_t MODEL[] = {{{numbers}}};\n#define MODEL MODEL"
+    return (
+        f"#include <stdint.h>\nstatic const uint32_t MODEL[] = {{{numbers}}};\n#define MODEL MODEL"
+    )
 
 
 def _start(model: Model) -> list[float]:
@@ -184,7 +236,9 @@ class NativeFmu:
         self._source_file = f"{model.name}.c" if sources else ""
         compiled = model.kind != "network" and installed_version("ziglang")
         self._tape = b"" if compiled else tape_of(model)
-        self._code = native_source(model, version) if compiled else joined_source(*LIBRARIES[version])
+        self._code = (
+            native_source(model, version) if compiled else joined_source(*LIBRARIES[version])
+        )
         self._icons = terminals_and_icons(model) if version == "3.0" and has_port(model) else None
         icons = [self._icons.decode()] if self._icons else []
         self._text = self._description("").decode()
@@ -195,11 +249,17 @@ class NativeFmu:
         tool = f"gfor-cosim {version_of('gfor-cosim')}"
         if self._version == "3.0":
             return model_description_3(self.model, guid, self.model.name, tool)
-        return model_description(self.model, guid, self.model.name, tool, native=True, source_file=self._source_file)
+        return model_description(
+            self.model, guid, self.model.name, tool, native=True, source_file=self._source_file
+        )
 
     def description(self) -> bytes:
         """The text of modelDescription.xml, for which nothing is compiled."""
-        return with_guid(self._text, guid_of(self.digest), "guid" if self._version == "2.0" else "instantiationToken")
+        return with_guid(
+            self._text,
+            guid_of(self.digest),
+            "guid" if self._version == "2.0" else "instantiationToken",
+        )
 
     def default_platforms(self) -> tuple[str, ...]:
         return tuple(TARGETS)
@@ -208,7 +268,9 @@ class NativeFmu:
         """That of this machine; without compiled code there is no native FMU."""
         if host := this_machine():
             return host
-        raise RuntimeError("native FMUs cannot be compiled for this machine; use the Python-backed ones")
+        raise RuntimeError(
+            "native FMUs cannot be compiled for this machine; use the Python-backed ones"
+        )
 
     def contents(self, platforms: tuple[str, ...]) -> dict[str, bytes]:
         """The archive's members, with a binary for each platform [FMI 2.0 names]."""
@@ -224,10 +286,18 @@ class NativeFmu:
         if self._source_file:
             members[f"sources/{self._source_file}"] = code.encode()
             if self._version == "3.0":
-                members["sources/buildDescription.xml"] = build_description(self.model.name, self._source_file)
+                members["sources/buildDescription.xml"] = build_description(
+                    self.model.name, self._source_file
+                )
         for platform in platforms:
-            library = compile_library(code, platform) if code else library_of(platform, *LIBRARIES[self._version])
+            library = (
+                compile_library(code, platform)
+                if code
+                else library_of(platform, *LIBRARIES[self._version])
+            )
             targets = TARGETS[platform] if self._version == "3.0" else ()
             for folder in [_FOLDERS_3[target] for target in targets] or [platform]:
-                members[f"binaries/{folder}/{self.model.name}{ENDINGS[platform]}"] = library.read_bytes()
+                members[f"binaries/{folder}/{self.model.name}{ENDINGS[platform]}"] = (
+                    library.read_bytes()
+                )
         return members

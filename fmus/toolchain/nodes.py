@@ -9,7 +9,8 @@ from fmus.toolchain.model import NodalEquations
 from fmus.toolchain.symbols import Expr, Function, Scalar, Vector, symbols, symbols_in
 
 Complex = tuple[Scalar, Scalar]  # real and imaginary part
-LARGEST_REST = 1e-6  # part of its terms that a row of Y·v = i may leave over; with more, no voltage is finite
+# part of its terms that a row of Y·v = i may leave over; with more, no voltage is finite
+LARGEST_REST = 1e-6
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,9 @@ class Nodes:
         ordered = [self.elements[place] for place in plan.entries]
         values = Function("nodal_values", [u, p, c], [_parts(ordered)])
         number = {symbol: k for k, symbol in enumerate(u)}
-        given = sorted(number[symbol] for symbol in symbols_in(values.outputs[0]) if symbol in number)
+        given = sorted(
+            number[symbol] for symbol in symbols_in(values.outputs[0]) if symbol in number
+        )
         currents = Function("nodal_currents", [x, u, p, c], [_parts(self.currents)])
         return NodalEquations(plan, values, currents, tuple(given))
 

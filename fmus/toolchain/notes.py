@@ -37,7 +37,9 @@ def noted(entry: EntryPoint, asked: str, find: Callable[[], Any]) -> Any:
         return json.loads(path.read_bytes())
     found = find()
     with suppress(CacheError):  # as slow as before, but right
-        if _code_now() == _code_loaded():  # else the code may have been changed between its import and now
+        if (
+            _code_now() == _code_loaded()
+        ):  # else the code may have been changed between its import and now
             keep(path, json.dumps(found).encode())
     return found
 
@@ -53,9 +55,16 @@ def note_of(entry: EntryPoint, asked: str) -> Path | None:
     if entry.module.partition(".")[0] not in _OWN:
         return None
     parts = [
-        entry.value, asked, _code_loaded(), *machine(), *(f"{name} {installed_version(name)}" for name in _LIBRARIES),
-    ]  # fmt: skip
-    return cache_directory("notes") / f"{hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]}.json"
+        entry.value,
+        asked,
+        _code_loaded(),
+        *machine(),
+        *(f"{name} {installed_version(name)}" for name in _LIBRARIES),
+    ]
+    return (
+        cache_directory("notes")
+        / f"{hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]}.json"
+    )
 
 
 def machine() -> tuple[str, ...]:
@@ -65,7 +74,12 @@ def machine() -> tuple[str, ...]:
 def code_files() -> dict[str, Path]:
     """Files of the models and of the toolchain, C included, by their names from the package on, sorted."""
     specs = [find_spec(name) for name in _OWN]
-    roots = [Path(place) for spec in specs if spec is not None for place in spec.submodule_search_locations or ()]
+    roots = [
+        Path(place)
+        for spec in specs
+        if spec is not None
+        for place in spec.submodule_search_locations or ()
+    ]
     files = [(root, file) for root in roots for file in root.rglob("*") if file.suffix in _ENDINGS]
     return dict(sorted((file.relative_to(root.parent).as_posix(), file) for root, file in files))
 

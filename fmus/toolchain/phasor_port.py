@@ -17,7 +17,8 @@ INTERNAL_STEP, LONGEST_STEP = 1e-3, 2e-3
 """Internal step [s], default and maximum: parameters allow time constants of 1 ms, and Runge-Kutta of order 4 needs
 steps below 2.78 of them."""
 
-DERIVATIVE_LAG = 5e-3  # lag [s] of the derivative that carries an emf half a communication step ahead
+# lag [s] of the derivative that carries an emf half a communication step ahead
+DERIVATIVE_LAG = 5e-3
 
 
 def phasor_builder(name: str, title: str, **what: Any) -> ModelBuilder:
@@ -49,15 +50,24 @@ class MasterStep:
 def declare_master_step(m: ModelBuilder) -> MasterStep:
     """Declare the master's step and delay as parameters."""
     step = m.parameter(
-        "communication_step", 0.0, "s",
+        "communication_step",
+        0.0,
+        "s",
         "Communication step of the master: emf and admittance are given for the middle of the step to come; 0: for now",
-        minimum=0.0, maximum=0.1, tunable=True,
-    )  # fmt: skip
+        minimum=0.0,
+        maximum=0.1,
+        tunable=True,
+    )
     late = m.parameter(
-        "steps_late", 0, "1",
+        "steps_late",
+        0,
+        "1",
         "Steps by which the bus voltage comes late: 0 where the master steps devices and then the grid; Jacobi: 1",
-        minimum=0, maximum=2, tunable=True, type="Integer",
-    )  # fmt: skip
+        minimum=0,
+        maximum=2,
+        tunable=True,
+        type="Integer",
+    )
     return MasterStep(step, late)
 
 
@@ -68,7 +78,9 @@ def motion(m: ModelBuilder, name: str, value: Phasor, start: Phasor, text: str) 
     ``value``, ``start``: In the device's frame [pu], a function of states; and its value at the operating point."""
     moving = []
     for part, now, initial in (("q", value.re, start.re), ("d", -value.im, -start.im)):
-        slow = m.state(f"{name}_{part}", initial, "pu", f"{text} through a lag, {part} component", base="S_n")
+        slow = m.state(
+            f"{name}_{part}", initial, "pu", f"{text} through a lag, {part} component", base="S_n"
+        )
         moving.append((now - slow) / DERIVATIVE_LAG)
         m.derivative(slow, moving[-1])
     return Phasor(moving[0], -moving[1])
@@ -94,7 +106,9 @@ def source_emf(m: ModelBuilder, emf: Phasor, start: Phasor, angle: Expr, rate: E
     return SourceEmf(behind=moved(-master.size / 2), ahead=moved(master.to_next))
 
 
-def declare_phasor_outputs(m: ModelBuilder, port: DevicePort, emf: SourceEmf, impedance: Phasor) -> None:
+def declare_phasor_outputs(
+    m: ModelBuilder, port: DevicePort, emf: SourceEmf, impedance: Phasor
+) -> None:
     """Declare the port's outputs: current and powers as every device has them, emf and admittance.
 
     Current and powers are read after a step, with the voltage that was held in the step, and therefore hold for its
@@ -107,8 +121,28 @@ def declare_phasor_outputs(m: ModelBuilder, port: DevicePort, emf: SourceEmf, im
         X = m.calculated("X", impedance.im, "pu", "Reactance between emf and bus", base="S_n")
     y = Phasor(1.0, 0.0) / Phasor(R, X) * port.connected
     declare_port_outputs(m, port, (emf.behind - port.v) * y)
-    m.output("e_re", emf.ahead.re, "pu", "Emf behind the impedance, real part, network frame", base="bus")
-    m.output("e_im", emf.ahead.im, "pu", "Emf behind the impedance, imaginary part, network frame", base="bus")
+    m.output(
+        "e_re", emf.ahead.re, "pu", "Emf behind the impedance, real part, network frame", base="bus"
+    )
+    m.output(
+        "e_im",
+        emf.ahead.im,
+        "pu",
+        "Emf behind the impedance, imaginary part, network frame",
+        base="bus",
+    )
     y *= port.current_scale
-    m.output("y_re", y.re, "pu", "Admittance between emf and bus, real part; 0 while open", base=SYSTEM_BASE)
-    m.output("y_im", y.im, "pu", "Admittance between emf and bus, imaginary part; 0 while open", base=SYSTEM_BASE)
+    m.output(
+        "y_re",
+        y.re,
+        "pu",
+        "Admittance between emf and bus, real part; 0 while open",
+        base=SYSTEM_BASE,
+    )
+    m.output(
+        "y_im",
+        y.im,
+        "pu",
+        "Admittance between emf and bus, imaginary part; 0 while open",
+        base=SYSTEM_BASE,
+    )

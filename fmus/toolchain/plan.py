@@ -27,6 +27,10 @@ class Plan:
 
     def tables(self) -> dict[str, list[int]]:
         return {
-            "PERM": self.order, "ROW": self.row, "COL": self.column, "DIAG": self.diagonal, "MROW": self.matrix_row,
+            "PERM": self.order,
+            "ROW": self.row,
+            "COL": self.column,
+            "DIAG": self.diagonal,
+            "MROW": self.matrix_row,
             "MCOL": self.matrix_column,
-        }  # fmt: skip
+        }

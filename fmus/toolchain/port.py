@@ -73,7 +73,10 @@ def declare_operating_point(m: ModelBuilder, P_0: float) -> OperatingPoint:
     """Declare the rated frequency and the power-flow start values; ``P_0`` is the default active power [pu, S_n]."""
     f_n = m.declare(port_variables.F_N)
     v_0, theta_0 = m.declare(port_variables.V_0), m.declare(port_variables.THETA_0)
-    p_0, q_0 = m.declare(replace(port_variables.P_0, start=float(P_0))), m.declare(port_variables.Q_0)
+    p_0, q_0 = (
+        m.declare(replace(port_variables.P_0, start=float(P_0))),
+        m.declare(port_variables.Q_0),
+    )
     bus = polar(v_0, theta_0)
     return OperatingPoint(bus, current_of_power(p_0, q_0, bus), 2 * pi * f_n)
 

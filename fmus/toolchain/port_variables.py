@@ -5,7 +5,8 @@ imports no symbols."""
 
 from fmus.toolchain.variables import Input, Output, Parameter, Usual
 
-SYSTEM_BASE_MVA = 100.0  # base power of every network: of its powers, currents and admittances in pu
+# base power of every network: of its powers, currents and admittances in pu
+SYSTEM_BASE_MVA = 100.0
 
 SYSTEM_BASE = f"{SYSTEM_BASE_MVA:g} MVA"
 
@@ -17,29 +18,52 @@ P = Output("p", "pu", "Active power into the bus", base="S_n")
 Q = Output("q", "pu", "Reactive power into the bus", base="S_n")
 
 S_N = Parameter(
-    "S_n", "MVA", "Rated apparent power, the device's base", minimum=1e-3,
+    "S_n",
+    "MVA",
+    "Rated apparent power, the device's base",
+    minimum=1e-3,
     usual=Usual(0.05, 20_000, "from a distribution converter to a whole area"),
-)  # fmt: skip
+)
 """Each device has its own start value; the same holds for `P_0`."""
 
-P_0 = Parameter("P_0", "pu", "Power flow: active power into the bus", base="S_n", minimum=-2.0, maximum=2.0)
-Q_0 = Parameter("Q_0", "pu", "Power flow: reactive power into the bus", base="S_n", minimum=-2.0, maximum=2.0)
+P_0 = Parameter(
+    "P_0", "pu", "Power flow: active power into the bus", base="S_n", minimum=-2.0, maximum=2.0
+)
+Q_0 = Parameter(
+    "Q_0", "pu", "Power flow: reactive power into the bus", base="S_n", minimum=-2.0, maximum=2.0
+)
 V_0 = Parameter(
-    "v_0", "pu", "Power flow: voltage magnitude at the bus", base="bus", start=1.0, minimum=0.1, maximum=2.0,
+    "v_0",
+    "pu",
+    "Power flow: voltage magnitude at the bus",
+    base="bus",
+    start=1.0,
+    minimum=0.1,
+    maximum=2.0,
     usual=Usual(0.8, 1.2, "operation within 20 % of the rated voltage"),
-)  # fmt: skip
+)
 THETA_0 = Parameter("theta_0", "rad", "Power flow: voltage angle at the bus")
 
 F_N = Parameter(
-    "f_n", "Hz", "Rated frequency", start=50.0, minimum=1.0, maximum=400.0,
+    "f_n",
+    "Hz",
+    "Rated frequency",
+    start=50.0,
+    minimum=1.0,
+    maximum=400.0,
     usual=Usual(45, 65, "grids have 50 or 60 Hz"),
-)  # fmt: skip
+)
 V_N = Parameter(
-    "V_n", "kV", "Rated voltage at the bus, line to line, rms", minimum=1e-3,
+    "V_n",
+    "kV",
+    "Rated voltage at the bus, line to line, rms",
+    minimum=1e-3,
     usual=Usual(0.1, 1500, "from low voltage to 1500 kV"),
-)  # fmt: skip
+)
 
-S_BASE = Parameter("S_base", "MVA", "Base power of the network", start=SYSTEM_BASE_MVA, minimum=1e-3)
+S_BASE = Parameter(
+    "S_base", "MVA", "Base power of the network", start=SYSTEM_BASE_MVA, minimum=1e-3
+)
 """Parameter of our devices. Coupled devices must leave it at its start value, because networks are in pu of that
 base."""
 

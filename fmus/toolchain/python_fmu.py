@@ -50,11 +50,20 @@ class PythonFmu:
         self._python = _TAPE_KERNEL.read_text(encoding="utf-8")
         self._slave = _SLAVE.read_text(encoding="utf-8")
         self._tool = f"gfor-cosim {version('gfor-cosim')} with PythonFMU {version('pythonfmu')}"
-        self._description = description = model_description(model, "", model.name, self._tool).decode()
+        self._description = description = model_description(
+            model, "", model.name, self._tool
+        ).decode()
         exporter = "".join(file.read_text(encoding="utf-8") for file in (Path(__file__), _WRAPPER))
         data = json.dumps(_slave_data(model))
         self.digest = digest_of(
-            self._tape.hex(), code, self._python, self._slave, description, data, exporter, *recipe()
+            self._tape.hex(),
+            code,
+            self._python,
+            self._slave,
+            description,
+            data,
+            exporter,
+            *recipe(),
         )
 
     def default_platforms(self) -> tuple[str, ...]:
@@ -81,14 +90,19 @@ class PythonFmu:
             f"resources/{kernel_module}.py": self._python.encode(),
             "resources/tape.bin": self._tape,
             "resources/model.json": json.dumps(
-                _slave_data(model) | {"hash": self.digest, "kernel_module": kernel_module}, ensure_ascii=False
+                _slave_data(model) | {"hash": self.digest, "kernel_module": kernel_module},
+                ensure_ascii=False,
             ).encode(),
         }
         for platform in platforms:
             name, library = (
-                ("kernel", compile_library(self._c, platform)) if self._c else ("tape", library_of(platform, *LIBRARY))
+                ("kernel", compile_library(self._c, platform))
+                if self._c
+                else ("tape", library_of(platform, *LIBRARY))
             )
-            contents[f"resources/kernel/{platform}/{name}{ENDINGS[platform]}"] = library.read_bytes()
+            contents[f"resources/kernel/{platform}/{name}{ENDINGS[platform]}"] = (
+                library.read_bytes()
+            )
         package = Path(pythonfmu.__file__).parent
         for file in sorted(package.glob("*.py")):
             contents[f"resources/pythonfmu/{file.name}"] = file.read_bytes()
@@ -105,11 +119,14 @@ def _slave_data(model: Model) -> dict[str, object]:
         "name": model.name,
         "names": list(model.value_references),
         "counts": {
-            "parameters": len(model.parameters), "calculated": len(model.calculated), "inputs": len(model.inputs),
-            "states": len(model.states), "outputs": len(model.outputs),
+            "parameters": len(model.parameters),
+            "calculated": len(model.calculated),
+            "inputs": len(model.inputs),
+            "states": len(model.states),
+            "outputs": len(model.outputs),
         },
         "parameters": [[p.type, p.minimum, p.maximum, p.tunable] for p in model.parameters],
         "start": start,
         "requirements": list(model.requirement_texts),
         "internal_step": model.value_references["internal_step"],
-    }  # fmt: skip
+    }

@@ -14,7 +14,10 @@ def remove_tree(folder: Path) -> None:
 
     No path is longer than one name, and nothing recurses: each folder below is moved to the top before it is emptied.
     A symbolic link is removed, and never followed."""
-    if not ({os.open, os.rename, os.rmdir, os.unlink} <= os.supports_dir_fd and os.scandir in os.supports_fd):
+    if not (
+        {os.open, os.rename, os.rmdir, os.unlink} <= os.supports_dir_fd
+        and os.scandir in os.supports_fd
+    ):
         with contextlib.suppress(OSError, RecursionError, ValueError):
             rmtree(folder, ignore_errors=True)
         return
@@ -53,7 +56,8 @@ def _emptied(directory: int, top: int) -> list[str]:
             name = entry.name
             if directory != top:
                 name = os.urandom(12).hex()
-                os.close(_opened(entry.name, directory))  # a folder that may not be written to cannot be moved
+                # a folder that may not be written to cannot be moved
+                os.close(_opened(entry.name, directory))
                 os.rename(entry.name, name, src_dir_fd=directory, dst_dir_fd=top)
             folders.append(name)
     return folders

@@ -24,7 +24,8 @@ from pythonfmu.enums import Fmi2Status
 
 INSTANTIATED, INITIALISING, STEPPING, TERMINATED = range(4)
 MOST_PARTS = 1_000_000  # internal steps in one communication step
-LOGGING = ctypes.sizeof(ctypes.c_void_p)  # where the wrapper's logger, a C++ object, says whether it logs
+# where the wrapper's logger, a C++ object, says whether it logs
+LOGGING = ctypes.sizeof(ctypes.c_void_p)
 PLATFORMS = {
     ("linux", "x86_64"): ("linux64", ".so"),
     ("win32", "amd64"): ("win64", ".dll"),
@@ -35,9 +36,21 @@ POINTER = ctypes.c_void_p
 DAMAGED = "resources/tape.bin is damaged ({}); build or copy the FMU again"
 
 
-PYTHON = ("PyLong_AsVoidPtr", "PyList_Size", "PyList_GetItem", "PyList_New", "PyList_SetItem", "PyLong_AsLong",
-          "PyFloat_AsDouble", "PyFloat_FromDouble", "PyBool_FromLong", "PyErr_Occurred", "PyErr_Clear",
-          "PyObject_CallMethod", "Py_IncRef")  # fmt: skip
+PYTHON = (
+    "PyLong_AsVoidPtr",
+    "PyList_Size",
+    "PyList_GetItem",
+    "PyList_New",
+    "PyList_SetItem",
+    "PyLong_AsLong",
+    "PyFloat_AsDouble",
+    "PyFloat_FromDouble",
+    "PyBool_FromLong",
+    "PyErr_Occurred",
+    "PyErr_Clear",
+    "PyObject_CallMethod",
+    "Py_IncRef",
+)
 """Functions of Python that ``c/slave.c`` calls, in its order."""
 
 
@@ -47,7 +60,10 @@ class Now(ctypes.Structure):
     _fields_ = [
         ("size", ctypes.c_double),  # that the next step may have without a further look, or none
         ("part", ctypes.c_double),
-        *((name, ctypes.c_int32) for name in ("parts", "stale", "first_input", "first_state", "first_derivative")),
+        *(
+            (name, ctypes.c_int32)
+            for name in ("parts", "stale", "first_input", "first_state", "first_derivative")
+        ),
         *((name, POINTER) for name in ("variables", "workspace", "advance", "slave")),
     ]
 
@@ -63,7 +79,8 @@ class Slave(Fmi2Slave):
             self._load(Path(kwargs["resources"]))
             self._logger = kwargs.get("logger")
             if kwargs["resources"] in sys.path:
-                sys.path.remove(kwargs["resources"])  # the wrapper puts it there for each instance; all is imported
+                # the wrapper puts it there for each instance; all is imported
+                sys.path.remove(kwargs["resources"])
         except Exception as error:
             raise RuntimeError(f"{self.instance_name}: {error}") from error
 
@@ -101,7 +118,10 @@ class Slave(Fmi2Slave):
                 try:
                     kernel = ctypes.PyDLL(str(library))
                 except OSError as error:
-                    self.log(f"compiled kernel not usable ({error}); evaluating in Python", Fmi2Status.warning)
+                    self.log(
+                        f"compiled kernel not usable ({error}); evaluating in Python",
+                        Fmi2Status.warning,
+                    )
                 else:
                     use(kernel, resources)
                     return
@@ -110,7 +130,8 @@ class Slave(Fmi2Slave):
             self._kernel = evaluated.Kernel(content, len(self._names))
         except ValueError as error:
             raise ValueError(DAMAGED.format(error)) from error
-        advance, z = self._kernel.advance, self._z  # an instance that held itself would stay in memory
+        # an instance that held itself would stay in memory
+        advance, z = self._kernel.advance, self._z
         self._advance = lambda h, n: functools.partial(advance, z, h, n, None)
         self._arguments, self._margins_address = (self._z,), self._margins
 
@@ -141,16 +162,25 @@ class Slave(Fmi2Slave):
         make = ctypes.PYFUNCTYPE(ctypes.py_object, POINTER, ctypes.py_object, POINTER)
         made = make(("PyCFunction_NewEx", ctypes.pythonapi))
         for place, name in enumerate(("do_step", "get_real", "set_real")):
-            own = made(first + place * 4 * ctypes.sizeof(POINTER), ctypes.addressof(self._now), None)
+            own = made(
+                first + place * 4 * ctypes.sizeof(POINTER), ctypes.addressof(self._now), None
+            )
             setattr(self, name, own)
 
     def _use(self, kernel, workspace):
         # The cheapest call is one of objects without a prototype, then one of addresses as integers.
         self._kernel, self._workspace, advance = kernel, workspace, kernel["advance"]
         z, own = POINTER(ctypes.addressof(self._z)), POINTER(ctypes.addressof(workspace))
-        self._advance = lambda h, n: functools.partial(advance, z, ctypes.c_double(h), ctypes.c_int(n), own)
+        self._advance = lambda h, n: functools.partial(
+            advance, z, ctypes.c_double(h), ctypes.c_int(n), own
+        )
         self._arguments = (ctypes.addressof(self._z), ctypes.addressof(workspace))
-        for function in (kernel.initialise, kernel.outputs, kernel.derivatives, kernel.requirements):
+        for function in (
+            kernel.initialise,
+            kernel.outputs,
+            kernel.derivatives,
+            kernel.requirements,
+        ):
             function.argtypes, function.restype = [POINTER] * 2, None
         kernel.requirements.argtypes = [POINTER] * 3
         self._margins_address = ctypes.addressof(self._margins)
@@ -176,7 +206,11 @@ class Slave(Fmi2Slave):
         """Report why a step is discarded, once to a master that takes no log, which would never learn it."""
         if not reported:
             self._report(text)
-        if self._logger and not ctypes.c_bool.from_address(self._logger + LOGGING).value and sys.stderr:
+        if (
+            self._logger
+            and not ctypes.c_bool.from_address(self._logger + LOGGING).value
+            and sys.stderr
+        ):
             self._logger = None
             print(f"{self.instance_name}: fmi2DoStep: {text}", file=sys.stderr, flush=True)
         return False
@@ -194,7 +228,9 @@ class Slave(Fmi2Slave):
             self._refresh()
             self._check_requirements()
             if worst := [n for n, v in zip(self._names, self._z) if not math.isfinite(v)]:
-                self._fail(f"initialisation gives no finite value for {', '.join(worst[:5])}; check the parameters")
+                self._fail(
+                    f"initialisation gives no finite value for {', '.join(worst[:5])}; check the parameters"
+                )
         except Exception as error:
             self._fail(f"initialisation failed: {error!r}")
         self._parameters_changed = False
@@ -208,7 +244,10 @@ class Slave(Fmi2Slave):
             self._now.stale = False
             return not status or self._stop(status, current_time)
         except Exception as error:
-            self._failure, self._now.size = f"step from {current_time} s failed: {error!r}", math.nan
+            self._failure, self._now.size = (
+                f"step from {current_time} s failed: {error!r}",
+                math.nan,
+            )
         return self._discard(self._failure)
 
     def _stop(self, status, time):
@@ -221,7 +260,9 @@ class Slave(Fmi2Slave):
         if self._failure is not None:
             return self._discard(self._failure)
         if self._phase != STEPPING:
-            return self._discard("fmi2DoStep is allowed only between initialisation and fmi2Terminate")
+            return self._discard(
+                "fmi2DoStep is allowed only between initialisation and fmi2Terminate"
+            )
         longest = MOST_PARTS * self._z[self._internal_step]
         if not 0.0 < step_size <= longest:
             return self._discard(
@@ -252,7 +293,8 @@ class Slave(Fmi2Slave):
             self._kernel.initialise(*self._arguments)
             self._parameters_changed = False
         elif self._phase == STEPPING and self._parameters_changed:
-            self._check_requirements()  # before partners see what follows from values that cannot be used
+            # before partners see what follows from values that cannot be used
+            self._check_requirements()
             self._parameters_changed = False
         self._kernel.outputs(*self._arguments)
         self._now.stale = False
@@ -263,7 +305,9 @@ class Slave(Fmi2Slave):
                 self._refresh()
             if vrs and max(vrs) >= self._first_derivative:
                 self._kernel.derivatives(*self._arguments)
-            if vrs and min(vrs) < 0:  # references above 2**31 arrive so, and Python would count from the end
+            if (
+                vrs and min(vrs) < 0
+            ):  # references above 2**31 arrive so, and Python would count from the end
                 raise IndexError("there is no such value reference")
             z = self._z
             return [z[reference] for reference in vrs]
@@ -282,7 +326,8 @@ class Slave(Fmi2Slave):
         except Exception as error:
             self._fail(f"setting value references {list(vrs)} failed: {error!r}")
 
-    _step, _get_real, _set_real = do_step, get_real, set_real  # for what the functions in C leave to them
+    # for what the functions in C leave to them
+    _step, _get_real, _set_real = do_step, get_real, set_real
 
     def get_integer(self, vrs):
         return self._get_discrete(vrs, "Integer", int)
@@ -326,7 +371,9 @@ class Slave(Fmi2Slave):
             self._set_parameter(reference, value, kind)
         elif self._first_state <= reference < self._first_output and kind == "Real":
             if self._phase != STEPPING:
-                self._fail(f"state {self._names[reference]} can be set only after initialisation, which computes it")
+                self._fail(
+                    f"state {self._names[reference]} can be set only after initialisation, which computes it"
+                )
             self._z[reference] = value
         elif 0 <= reference < len(self._names):
             self._fail(f"{self._names[reference]} is computed by the FMU and cannot be set")
@@ -339,7 +386,9 @@ class Slave(Fmi2Slave):
         if kind != declared:
             self._fail(f"parameter {name} is of type {declared}, not {kind}")
         elif self._phase >= STEPPING and not tunable:
-            self._fail(f"parameter {name} is fixed; it can be set only before the end of initialisation")
+            self._fail(
+                f"parameter {name} is fixed; it can be set only before the end of initialisation"
+            )
         elif not math.isfinite(value):
             self._fail(f"parameter {name} = {value}; it must be a finite number")
         elif minimum is not None and value < minimum:

@@ -24,9 +24,38 @@ from fmus.toolchain.symbols.operations import UNARY
 
 CODES = {
     # operation -> code of a tape, as `c/tape.c` and `tape_kernel.py` know it
-    **{Op.ADD: 0, Op.SUB: 1, Op.MUL: 2, Op.DIV: 3, Op.POW: 4, Op.CONSTPOW: 4, Op.ATAN2: 5, Op.COPYSIGN: 6},
-    **{Op.FMIN: 7, Op.FMAX: 8, Op.LT: 9, Op.LE: 10, Op.EQ: 11, Op.NE: 12, Op.AND: 13, Op.OR: 14, Op.IF_ELSE_ZERO: 15},
-    **{Op.NEG: 16, Op.INV: 17, Op.SQ: 18, Op.TWICE: 19, Op.SQRT: 20, Op.SIN: 21, Op.COS: 22, Op.TAN: 23, Op.EXP: 24},
+    **{
+        Op.ADD: 0,
+        Op.SUB: 1,
+        Op.MUL: 2,
+        Op.DIV: 3,
+        Op.POW: 4,
+        Op.CONSTPOW: 4,
+        Op.ATAN2: 5,
+        Op.COPYSIGN: 6,
+    },
+    **{
+        Op.FMIN: 7,
+        Op.FMAX: 8,
+        Op.LT: 9,
+        Op.LE: 10,
+        Op.EQ: 11,
+        Op.NE: 12,
+        Op.AND: 13,
+        Op.OR: 14,
+        Op.IF_ELSE_ZERO: 15,
+    },
+    **{
+        Op.NEG: 16,
+        Op.INV: 17,
+        Op.SQ: 18,
+        Op.TWICE: 19,
+        Op.SQRT: 20,
+        Op.SIN: 21,
+        Op.COS: 22,
+        Op.TAN: 23,
+        Op.EXP: 24,
+    },
     **{Op.LOG: 25, Op.FABS: 26, Op.FLOOR: 27, Op.NOT: 28},
 }
 ADD, SUB, MUL = (CODES[operation] for operation in (Op.ADD, Op.SUB, Op.MUL))
@@ -96,7 +125,8 @@ def runs_of(operations: dict[int, Operation]) -> list[tuple[int, list[int]]]:
 
 MAGIC, VERSION = b"gfortape", 1
 
-LIBRARY = tuple(Path(__file__).with_name("c") / name for name in ("tape.c", "slave.c"))  # executes tapes for a slave
+# executes tapes for a slave
+LIBRARY = tuple(Path(__file__).with_name("c") / name for name in ("tape.c", "slave.c"))
 
 
 def tape_of(model: Model) -> bytes:
@@ -120,7 +150,9 @@ def tape_of(model: Model) -> bytes:
         "matrix": values.read(solved.values, "matrix", "upc" if nodal else "pcg") if solved else [],
     }
     rows = {name: values.behind(results, values.fixed) for name, results in often.items()}
-    taken = {value for row in rows.values() for operation in row.values() for value in operation[1:]}
+    taken = {
+        value for row in rows.values() for operation in row.values() for value in operation[1:]
+    }
     kept = taken.union(*often.values()) & values.fixed
     rows |= {name: values.behind(results) for name, results in seldom.items()}
 
@@ -130,8 +162,22 @@ def tape_of(model: Model) -> bytes:
         lists.add(rows[name], (often | seldom)[name])
     held = [index for index, state in enumerate(model.states) if state.stepwise]
     given = list(nodal.given) if nodal else []
-    head = [*sizes.values(), len(model.outputs), int(elimination is not None), len(held), len(given), buses]
-    head += [len(plan.order), len(plan.matrix_column), len(plan.column), len(values.numbers), fixed, lists.slots]
+    head = [
+        *sizes.values(),
+        len(model.outputs),
+        int(elimination is not None),
+        len(held),
+        len(given),
+        buses,
+    ]
+    head += [
+        len(plan.order),
+        len(plan.matrix_column),
+        len(plan.column),
+        len(values.numbers),
+        fixed,
+        lists.slots,
+    ]
     head += lists.lengths
     body = [struct.pack("<d", LARGEST_REST), array("i", head).tobytes(), *values.numbers]
     body += [array("i", numbers).tobytes() for numbers in (held, given, *plan.tables().values())]
@@ -165,7 +211,9 @@ class _Values:
                 taken = (value[node.a],) if node.op in UNARY else (value[node.a], value[node.b])
                 value[node] = self._operation((CODES[node.op], *taken))
             elif node.op != Op.SYMBOL:
-                raise ValueError(f"{name}: operation {node.op} has no code of a tape yet; add it to `CODES`")
+                raise ValueError(
+                    f"{name}: operation {node.op} has no code of a tape yet; add it to `CODES`"
+                )
         return [value[result] for vector in function.outputs for result in vector]
 
     def _number(self, bits: bytes) -> int:
@@ -183,7 +231,9 @@ class _Values:
                 self.fixed.add(found)
         return found
 
-    def behind(self, results: Iterable[int], known: set[int] | frozenset[int] = frozenset()) -> dict[int, Operation]:
+    def behind(
+        self, results: Iterable[int], known: set[int] | frozenset[int] = frozenset()
+    ) -> dict[int, Operation]:
         """The operations that some values need, in order, by the value that each gives; without those already known."""
         needed, waiting = dict[int, Operation](), list(results)
         while waiting:
@@ -198,7 +248,10 @@ class _Lists:
     """Runs, results and operands of sections, as numbers of slots."""
 
     def __init__(self, values: _Values) -> None:
-        self._slot = {value: slot for slot, value in enumerate([*range(values.arguments), *values.numbers.values()])}
+        self._slot = {
+            value: slot
+            for slot, value in enumerate([*range(values.arguments), *values.numbers.values()])
+        }
         self._first = self.slots = len(self._slot)
         self.lengths: list[int] = []
         self.lists: list[array[int]] = []

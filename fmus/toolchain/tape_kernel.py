@@ -13,8 +13,23 @@ from math import copysign, fabs, inf, isfinite, isnan, nan
 VERSION = 1
 G = 0.29289321881345254
 FIXED, INITIALISE, REQUIREMENTS, OUTPUTS, DERIVATIVES, MATRIX, CURRENTS = SECTIONS = range(7)
-SIZES = ("np", "nc", "nu", "nx", "ny", "implicit", "held", "given", "buses", "rank", "nm", "nlu", "numbers", "fixed",
-         "slots")  # fmt: skip
+SIZES = (
+    "np",
+    "nc",
+    "nu",
+    "nx",
+    "ny",
+    "implicit",
+    "held",
+    "given",
+    "buses",
+    "rank",
+    "nm",
+    "nlu",
+    "numbers",
+    "fixed",
+    "slots",
+)
 
 # Arithmetic as in C: what is undefined becomes inf or nan and is found by its name after the step.
 
@@ -44,19 +59,38 @@ def as_in_c(function, overflow):
 
 
 NAMES = {
-    "divide": divide, "power": power, "sqrt": as_in_c(math.sqrt, lambda a: nan),
-    "log": as_in_c(math.log, lambda a: -inf if a == 0.0 else nan), "exp": as_in_c(math.exp, lambda a: inf),
+    "divide": divide,
+    "power": power,
+    "sqrt": as_in_c(math.sqrt, lambda a: nan),
+    "log": as_in_c(math.log, lambda a: -inf if a == 0.0 else nan),
+    "exp": as_in_c(math.exp, lambda a: inf),
     **{f.__name__: as_in_c(f, lambda a: nan) for f in (math.sin, math.cos, math.tan)},
     **{f.__name__: f for f in (math.atan2, math.copysign, math.fabs, math.floor)},
-}  # fmt: skip
+}
 FORMS = (
-    *("{0} + {1}", "{0} - {1}", "{0} * {1}", "divide({0}, {1})", "power({0}, {1})", "atan2({0}, {1})"),
+    *(
+        "{0} + {1}",
+        "{0} - {1}",
+        "{0} * {1}",
+        "divide({0}, {1})",
+        "power({0}, {1})",
+        "atan2({0}, {1})",
+    ),
     *("copysign({0}, {1})", "min({0}, {1})", "max({0}, {1})"),
-    *(f"1.0 if {{0}} {compared} {{1}} else 0.0" for compared in ("<", "<=", "==", "!=", "and", "or")),
+    *(
+        f"1.0 if {{0}} {compared} {{1}} else 0.0"
+        for compared in ("<", "<=", "==", "!=", "and", "or")
+    ),
     *("{1} if {0} else 0.0", "-{0}", "divide(1.0, {0})", "{0} * {0}", "2.0 * {0}"),
     *(f"{name}({{0}})" for name in ("sqrt", "sin", "cos", "tan", "exp", "log", "fabs", "floor")),
     "0.0 if {0} else 1.0",
-    *("{0} * {1} + {2}", "{0} * {1} - {2}", "{2} - {0} * {1}", "{0} * {1} + {2} * {3}", "{0} * {1} - {2} * {3}"),
+    *(
+        "{0} * {1} + {2}",
+        "{0} * {1} - {2}",
+        "{2} - {0} * {1}",
+        "{0} * {1} + {2} * {3}",
+        "{0} * {1} - {2} * {3}",
+    ),
 )
 """By code of an operation."""
 TAKES = [sum(f"{{{k}}}" in form for k in range(4)) for form in FORMS]
@@ -81,14 +115,20 @@ class Tape:
         lengths = self._take("i", 3 * len(SECTIONS))
         self.values = self._take("d", self.numbers)
         self.stepwise, self.given_at = self._take("i", self.held), self._take("i", self.given)
-        self.perm, self.row, self.col = (self._take("i", n) for n in (self.rank, self.rank + 1, self.nlu))
-        self.diag, self.mrow, self.mcol = (self._take("i", n) for n in (self.rank, self.rank + 1, self.nm))
+        self.perm, self.row, self.col = (
+            self._take("i", n) for n in (self.rank, self.rank + 1, self.nlu)
+        )
+        self.diag, self.mrow, self.mcol = (
+            self._take("i", n) for n in (self.rank, self.rank + 1, self.nm)
+        )
         first = self.np + self.nc + self.nu + self.nx + 2 * self.buses + 1 + self.numbers
         self.section = []
         for which in SECTIONS:
             runs, results, operands = lengths[3 * which : 3 * which + 3]
             lists = self._take("i", 2 * runs), self._take("i", results), self._take("i", operands)
-            self.section.append(_function(first if which == FIXED else first + self.fixed, which == FIXED, *lists))
+            self.section.append(
+                _function(first if which == FIXED else first + self.fixed, which == FIXED, *lists)
+            )
 
     def _take(self, kind, count):
         taken = array(kind)
@@ -110,7 +150,9 @@ def _function(first, keeps_all, runs, results, operands):
     named = range(first, place) if keeps_all else results
     head = ["def section(slots):", *(f"    w{slot} = slots[{slot}]" for slot in given)]
     scope = dict(NAMES)
-    exec("\n".join([*head, *lines, f"    return [{', '.join(f'w{slot}' for slot in named)}]"]), scope)
+    exec(
+        "\n".join([*head, *lines, f"    return [{', '.join(f'w{slot}' for slot in named)}]"]), scope
+    )
     return scope["section"]
 
 
@@ -158,7 +200,9 @@ class Kernel:
         z[self._y : self._dx] = self._at_states(OUTPUTS, z, z[self._x : self._y])
 
     def derivatives(self, z):
-        z[self._dx : self._dx + self._tape.nx] = self._at_states(DERIVATIVES, z, z[self._x : self._y])
+        z[self._dx : self._dx + self._tape.nx] = self._at_states(
+            DERIVATIVES, z, z[self._x : self._y]
+        )
 
     def requirements(self, z, margins):
         found = self._tape.section[REQUIREMENTS](self._slots(z, z[self._x : self._y]))
@@ -166,7 +210,9 @@ class Kernel:
 
     def advance(self, z, h, n, workspace=None):
         x = z[self._x : self._y]
-        z[self._x : self._y] = x = self._implicitly(z, x, h, n) if self._tape.implicit else self._explicitly(z, x, h, n)
+        z[self._x : self._y] = x = (
+            self._implicitly(z, x, h, n) if self._tape.implicit else self._explicitly(z, x, h, n)
+        )
         for index, value in enumerate(x):
             if not isfinite(value):
                 return index + 1
@@ -197,10 +243,15 @@ class Kernel:
         key = struct.pack(f"{self._u + 1}d", h, *z[: self._u])
         if key != self._key:
             elements = self._tape.section[MATRIX](self._slots(z, x, G * h))
-            self._factors, self._key = self._factorise(elements, 0.0, lambda pivot: divide(1.0, pivot)), key
+            self._factors, self._key = (
+                self._factorise(elements, 0.0, lambda pivot: divide(1.0, pivot)),
+                key,
+            )
         for _ in range(n):
             k1 = self._solve(self._at_states(DERIVATIVES, z, x))
-            k2 = self._solve(self._at_states(DERIVATIVES, z, [a + (1 - G) * h * k for a, k in zip(x, k1)]))
+            k2 = self._solve(
+                self._at_states(DERIVATIVES, z, [a + (1 - G) * h * k for a, k in zip(x, k1)])
+            )
             x = [a + h * ((1 - G) * b + G * c) for a, b, c in zip(x, k1, k2)]
         return x
 
@@ -223,7 +274,9 @@ class Kernel:
 
     def _solve(self, b):
         found = [0.0] * self._tape.rank
-        for place, value in zip(self._tape.perm, self._through_factors([b[place] for place in self._tape.perm])):
+        for place, value in zip(
+            self._tape.perm, self._through_factors([b[place] for place in self._tape.perm])
+        ):
             found[place] = value
         return found
 
@@ -257,10 +310,14 @@ class Kernel:
         self._factors = self._factorise(elements, 0j, lambda pivot: 1 / pivot if pivot else unknown)
         b = [complex(math.cos(place), math.sin(place)) for place in t.perm]
         s = self._through_factors(b)
-        for i in range(t.rank):  # a trial solution leaves hardly anything over, or no voltage is finite
+        for i in range(
+            t.rank
+        ):  # a trial solution leaves hardly anything over, or no voltage is finite
             terms = [elements[q] * s[t.mcol[q]] for q in range(t.mrow[i], t.mrow[i + 1])] + [-b[i]]
             rest = sum(terms)
-            if fabs(rest.real) + fabs(rest.imag) > t.largest_rest * sum(fabs(a.real) + fabs(a.imag) for a in terms):
+            if fabs(rest.real) + fabs(rest.imag) > t.largest_rest * sum(
+                fabs(a.real) + fabs(a.imag) for a in terms
+            ):
                 self._factors = self._factors[0], [unknown] * t.rank
 
 

@@ -21,7 +21,8 @@ except ImportError:  # Windows
 _LOCKED, _NEW = "gfor_locked_", "gfor_new_"
 """Beginnings of the names of folders that have their lock, and of those that get it within microseconds."""
 _YOUNG = 60.0  # age below which a new folder may not have its lock yet [s]
-_ABANDONED = 7 * 86_400.0  # age at which a folder counts as left behind where there are no locks [s]
+# age at which a folder counts as left behind where there are no locks [s]
+_ABANDONED = 7 * 86_400.0
 _UNFINISHED = 3600.0
 """Age of a file that is still being written at which nobody writes it any more [s]; it takes seconds."""
 

@@ -13,7 +13,9 @@ VariableType = Literal["Real", "Integer", "Boolean"]
 Kind = Literal["converter", "machine", "network", "load", ""]
 """A component's role in a power system; empty for none of these, such as a controller alone."""
 
-UNITS: dict[str, dict[str, float]] = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
+UNITS: dict[str, dict[str, float]] = tomllib.loads(
+    Path(__file__).with_name("units.toml").read_text(encoding="utf-8")
+)
 """Unit → exponents of SI base units, with the factor to them."""
 
 
@@ -36,8 +38,11 @@ class Usual:
 def usual_beside(module: str, file: str = "usual.toml") -> dict[str, Usual]:
     """Usual ranges by parameter, of a file beside a module."""
     tables = tomllib.loads(Path(module).with_name(file).read_text(encoding="utf-8"))["usual"]
-    return {name: Usual(low, high, table["why"], table.get("or_zero", False))
-            for table in tables for name, (low, high) in table["ranges"].items()}  # fmt: skip
+    return {
+        name: Usual(low, high, table["why"], table.get("or_zero", False))
+        for table in tables
+        for name, (low, high) in table["ranges"].items()
+    }
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +66,9 @@ class Variable:
                 f"use one of {', '.join(sorted(UNITS))} or add it to UNITS"
             )
         if self.unit == "pu" and not self.base:
-            raise ValueError(f"variable {self.name!r} is in pu and names no base; add base='S_n' or '100 MVA'")
+            raise ValueError(
+                f"variable {self.name!r} is in pu and names no base; add base='S_n' or '100 MVA'"
+            )
 
     @property
     def text(self) -> str:

@@ -41,7 +41,9 @@ def wrapper_binaries() -> dict[Path, bytes]:
     Raises `SetupError` if pythonfmu is not there as a whole, as while it is being installed: an FMU without them would
     be kept and could run nowhere."""
     root = Path(pythonfmu.__file__).parent / "resources" / "binaries"
-    found = {file.relative_to(root): _mended(file.read_bytes()) for file in sorted(root.rglob("*.*"))}
+    found = {
+        file.relative_to(root): _mended(file.read_bytes()) for file in sorted(root.rglob("*.*"))
+    }
     if not found:
         raise SetupError(
             f"pythonfmu: there are no binaries in {root}; install it again: pip install --force-reinstall pythonfmu"
@@ -67,14 +69,23 @@ def _release_once(binary: bytes) -> bytes:
 def _read_any_folder(binary: bytes) -> bytes:
     """With `_RESOURCES_PATH` in the room behind its machine code, for which masters' fmi2Instantiate is taken."""
     found, segments = _exported(binary, b"fmi2Instantiate"), _segments(binary)
-    code = next((n for n, segment in enumerate(segments) if segment[0] == _TO_LOAD and segment[1] & _EXECUTABLE), None)
+    code = next(
+        (
+            n
+            for n, segment in enumerate(segments)
+            if segment[0] == _TO_LOAD and segment[1] & _EXECUTABLE
+        ),
+        None,
+    )
     if found is None or code is None or binary.count(_ESCAPED_BLANK) != 1:
         return binary
     symbol, at = found
     _, _, start, address, size, place = segments[code]
     free = size + -size % 16
     end = start + free + len(_RESOURCES_PATH)
-    if end > min(segment[2] for segment in segments if segment[2] > start) or any(binary[start + size : end]):
+    if end > min(segment[2] for segment in segments if segment[2] > start) or any(
+        binary[start + size : end]
+    ):
         return binary
     here = address + free + len(_RESOURCES_PATH) - 4
     added = _RESOURCES_PATH[:-4] + struct.pack("<i", at - start + address - here)
@@ -101,7 +112,9 @@ def _exported(binary: bytes, function: bytes) -> tuple[int, int] | None:
     (table,) = struct.unpack_from("<Q", binary, 40)
     size, count = struct.unpack_from("<HH", binary, 58)
     # of every section: type, address, offset, size, link, size of an entry
-    sections = [struct.unpack_from("<4xI8xQQQI12xQ", binary, table + size * n) for n in range(count)]
+    sections = [
+        struct.unpack_from("<4xI8xQQQI12xQ", binary, table + size * n) for n in range(count)
+    ]
     for kind, _, start, length, link, entry in sections:
         if kind != _DYNAMIC_SYMBOLS:
             continue

@@ -28,7 +28,9 @@ class ForeignAnswerError(ValueError):
 def read_plain_file(path: Path, most: int = _MOST_BYTES) -> bytes:
     """The content of a file that foreign code may have put there."""
     try:
-        number = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
+        number = os.open(
+            path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+        )
     except OSError as error:
         raise ForeignAnswerError(f"it cannot be opened: {error.strerror}") from error
     found = os.fstat(number)
@@ -110,21 +112,42 @@ def _taken(value: Any, form: Any, where: str) -> Any:
         if not isinstance(value, list) or (isinstance(form, tuple) and len(value) != len(form)):
             raise ForeignAnswerError(f"{where} is no list of its length")
         forms = form if isinstance(form, tuple) else form * len(value)
-        return [_taken(inner, kind, f"{where}[{n}]") for n, (inner, kind) in enumerate(zip(value, forms, strict=True))]
+        return [
+            _taken(inner, kind, f"{where}[{n}]")
+            for n, (inner, kind) in enumerate(zip(value, forms, strict=True))
+        ]
     checked: Callable[[Any, str], Any] = form
     return checked(value, where)
 
 
 TEXTS = (
-    *("ModelName", "ModelVersion", "ModelDescription", "GeneralInformation", "ModelCreated", "ModelCreator"),
-    *("ModelLastModifiedDate", "ModelLastModifiedBy", "ModelModifiedComment", "ModelModifiedHistory"),
+    *(
+        "ModelName",
+        "ModelVersion",
+        "ModelDescription",
+        "GeneralInformation",
+        "ModelCreated",
+        "ModelCreator",
+    ),
+    *(
+        "ModelLastModifiedDate",
+        "ModelLastModifiedBy",
+        "ModelModifiedComment",
+        "ModelModifiedHistory",
+    ),
 )
 """Names of the texts that every DLL has."""
 
 _SIGNAL = {"name": _name, "description": _text, "unit": _text, "data_type": _whole, "width": _whole}
 _PARAMETER = {
     **{"name": _name, "group": _text, "description": _text, "unit": _text},
-    **{"data_type": _whole, "fixed": _flag, "default": _default, "minimum": _bound, "maximum": _bound},
+    **{
+        "data_type": _whole,
+        "fixed": _flag,
+        "default": _default,
+        "minimum": _bound,
+        "maximum": _bound,
+    },
 }
 _ANSWER = {
     "interface": {

@@ -14,7 +14,8 @@ from fmus.toolchain.temporary import own_folder, remove
 from fmus.vendor_dll.answer_file import ForeignAnswerError, read_answer, read_plain_file
 
 BEFORE_IT_STARTS = 300.0  # for Python, and Wine, to start, until the DLL's own code runs [s]
-_OWN_DOING = 0.5  # processor time, as a part of the time it had, from which a DLL counts as one that never comes back
+# processor time, as a part of the time it had, from which a DLL counts as one that never comes back
+_OWN_DOING = 0.5
 _START = tuple(f"Model_{call} runs" for call in ("FirstCall", "CheckParameters", "Initialize"))
 _FROM_OUTSIDE = (*("SIGKILL", "SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT"), *("SIGXCPU", "SIGSTOP"))
 """Signals by which others end a process: the system that lacks memory, a person."""
@@ -23,7 +24,8 @@ _FROM_OUTSIDE = (*("SIGKILL", "SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT"), *("SIGX
 @dataclass(frozen=True)
 class Answer:
     found: dict[str, Any] = field(default_factory=dict)  # its answer; empty where it gave none
-    end: str = ""  # how it ended where it gave none, in words that follow "the process that reads it"
+    # how it ended where it gave none, in words that follow "the process that reads it"
+    end: str = ""
     why: str = ""
     passing: bool = False  # the reason lies in this machine, so that another call may find more
     in_its_start: bool = False  # the DLL's own code ended it before the first sample
@@ -43,10 +45,14 @@ def ask(path: Path, reader: str, longest: float, *more: str) -> Answer:
         # Not sys.path: Python-backed FMUs lengthen it, and Linux takes no variable of more than 128 KiB.
         search = filter(None, [str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH")])
         process = subprocess.Popen(
-            [sys.executable, "-m", reader, str(path), str(answer), *more], cwd=folder, stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(search)}, start_new_session=True,
-        )  # fmt: skip
+            [sys.executable, "-m", reader, str(path), str(answer), *more],
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(search)},
+            start_new_session=True,
+        )
         note = note_beside(answer)
         try:
             in_time = _wait(process, note, longest)
@@ -74,7 +80,9 @@ def _doing(note: Path) -> str:
     if not os.path.lexists(note):
         return ""
     try:
-        return "".join(filter(str.isprintable, read_plain_file(note, 1000).decode("utf-8", "replace"))).strip()
+        return "".join(
+            filter(str.isprintable, read_plain_file(note, 1000).decode("utf-8", "replace"))
+        ).strip()
     except ForeignAnswerError:
         return "its code runs"
 
@@ -140,7 +148,9 @@ def _ended(doing: str, code: int) -> Answer:
     end = f"ends with {name}" + (f" while {doing}" if doing else "")
     if name in _FROM_OUTSIDE:
         return Answer(
-            end=end, why="something else ended it, such as the system for want of memory; try again", passing=True
+            end=end,
+            why="something else ended it, such as the system for want of memory; try again",
+            passing=True,
         )
     if not doing:
         why = "it fails before the DLL is loaded"

@@ -9,7 +9,13 @@ from typing import Literal
 from fmus.toolchain.frames import Phasor, of_phases, phases, power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.port import BREAKER_TIME, DevicePort, declare_port_outputs, declare_rating, device_port_of
+from fmus.toolchain.port import (
+    BREAKER_TIME,
+    DevicePort,
+    declare_port_outputs,
+    declare_rating,
+    device_port_of,
+)
 from fmus.toolchain.symbols import Expr, fmax, fmin, sqrt
 
 FilterKind = Literal["L", "LC", "LCL"]
@@ -18,7 +24,8 @@ BridgeKind = Literal["modulation", "voltage"]
 ANGLE = "frame.angle"
 """State that the host sets anew at each sample: it follows from the time, so it is none of the device's states."""
 
-BRIDGE = ("bridge.a", "bridge.b", "bridge.c")  # inputs that the controller gives: modulation indices, or phase voltages
+# inputs that the controller gives: modulation indices, or phase voltages
+BRIDGE = ("bridge.a", "bridge.b", "bridge.c")
 TRIMS = ("trim.P", "trim.Q", "trim.V")  # inputs that the host sets while it looks for the start
 REFERENCES = ("P_ref", "Q_ref", "V_ref")
 MEASURED = tuple(f"{name}_{phase}" for name in ("u", "v", "i_s", "i_g") for phase in "abc")
@@ -53,8 +60,12 @@ def converter_circuit(name: str, filter_kind: FilterKind, bridge: BridgeKind) ->
     m = ModelBuilder(name, "Converter circuit around a vendor's controller", internal_step=1e-5)
     rating = declare_rating(m, S_N)
     port = device_port_of(m, rating, P_0)
-    V_n = m.parameter("V_n", V_N, "kV", "Rated voltage at the filter, line to line, rms", minimum=1e-3)
-    volt = m.calculated("base.voltage", V_n * sqrt(2 / 3), "kV", "Amplitude of the rated phase voltage")
+    V_n = m.parameter(
+        "V_n", V_N, "kV", "Rated voltage at the filter, line to line, rms", minimum=1e-3
+    )
+    volt = m.calculated(
+        "base.voltage", V_n * sqrt(2 / 3), "kV", "Amplitude of the rated phase voltage"
+    )
     m.calculated("base.current", rating / V_n * sqrt(2 / 3), "kA", "Amplitude of the rated current")
     branches = _declare_branches(m, filter_kind)
     angle = m.state(ANGLE, 0.0, "rad", "Angle of the network frame")
@@ -79,8 +90,12 @@ def _declare_branches(m: ModelBuilder, kind: FilterKind) -> _Branches:
         z_s = branch(0.005, 0.15, "the inductor at the bridge")
         B_c = R_d = None
         if kind != "L":
-            B_c = m.parameter("B", 0.05, "pu", "Susceptance of the capacitor", base="S_n", minimum=1e-3)
-            R_d = m.parameter("R_d", 0.1, "pu", "Resistance in series with the capacitor", base="S_n", minimum=0.0)
+            B_c = m.parameter(
+                "B", 0.05, "pu", "Susceptance of the capacitor", base="S_n", minimum=1e-3
+            )
+            R_d = m.parameter(
+                "R_d", 0.1, "pu", "Resistance in series with the capacitor", base="S_n", minimum=0.0
+            )
     with m.scope("transformer"):
         z_g = branch(0.005, 0.1, "the transformer")
     if kind == "LCL":
@@ -92,7 +107,9 @@ def _declare_branches(m: ModelBuilder, kind: FilterKind) -> _Branches:
 def _bridge_voltage(m: ModelBuilder, kind: BridgeKind, volt: Expr, angle: Expr) -> Phasor:
     """The averaged bridge [pu]: half the DC voltage times the modulation, which cannot exceed its limit."""
     V_dc = m.parameter("V_dc", 1.2, "kV", "DC voltage, held by a stiff source", minimum=1e-3)
-    largest = m.parameter("m_max", 1.15, "1", "Limit of the modulation; 1.15 with a third harmonic", minimum=0.1)
+    largest = m.parameter(
+        "m_max", 1.15, "1", "Limit of the modulation; 1.15 with a third harmonic", minimum=0.1
+    )
     unit, text = ("1", "Modulation") if kind == "modulation" else ("kV", "Voltage demanded")
     given = [m.input(name, unit, f"{text} of phase {name[-1]}") for name in BRIDGE]
     half = V_dc / 2
@@ -101,12 +118,18 @@ def _bridge_voltage(m: ModelBuilder, kind: BridgeKind, volt: Expr, angle: Expr) 
     return of_phases((a, b, c), angle)
 
 
-def _equations(m: ModelBuilder, port: DevicePort, z: _Branches, e: Phasor) -> tuple[Phasor, Phasor, Phasor]:
+def _equations(
+    m: ModelBuilder, port: DevicePort, z: _Branches, e: Phasor
+) -> tuple[Phasor, Phasor, Phasor]:
     """Declare states and their rates; return bridge current, filter voltage and current into the grid."""
 
     def complex_state(name: str, initial: Phasor, text: str) -> tuple[Phasor, tuple[Expr, Expr]]:
-        re = m.state(f"{name}_re", initial.re, "pu", f"{text}, real part, network frame", base="S_n")
-        im = m.state(f"{name}_im", initial.im, "pu", f"{text}, imaginary part, network frame", base="S_n")
+        re = m.state(
+            f"{name}_re", initial.re, "pu", f"{text}, real part, network frame", base="S_n"
+        )
+        im = m.state(
+            f"{name}_im", initial.im, "pu", f"{text}, imaginary part, network frame", base="S_n"
+        )
         return Phasor(re, im), (re, im)
 
     def rate(state: tuple[Expr, Expr], value: Phasor) -> None:
@@ -116,29 +139,46 @@ def _equations(m: ModelBuilder, port: DevicePort, z: _Branches, e: Phasor) -> tu
     u_0 = port.v_0 + z.z_g * port.i_0
     fading = -1 / BREAKER_TIME
     if z.B_c is None or z.R_d is None:
-        i, state = complex_state("filter.i", port.i_0, "Current of the bridge, which goes into the grid")
+        i, state = complex_state(
+            "filter.i", port.i_0, "Current of the bridge, which goes into the grid"
+        )
         both = z.z_s + z.z_g
         closed = (e - port.v - both * i) * (port.omega_b / both.im)
         moving = port.through_breaker(closed, i * fading)
         rate(state, moving)
         return i, port.v + z.z_g * i + moving * (z.z_g.im / port.omega_b), i
     u_c0 = z.capacitor_voltage(u_0)
-    i_s, state_s = complex_state("filter.i_s", port.i_0 + Phasor(0, z.B_c) * u_c0, "Current of the inductor")
+    i_s, state_s = complex_state(
+        "filter.i_s", port.i_0 + Phasor(0, z.B_c) * u_c0, "Current of the inductor"
+    )
     u_c, state_c = complex_state("filter.u_c", u_c0, "Voltage of the capacitor")
     i_g, state_g = complex_state("transformer.i_g", port.i_0, "Current into the grid")
     u = u_c + z.R_d * (i_s - i_g)
     rate(state_s, (e - u - z.z_s * i_s) * (port.omega_b / z.z_s.im))
     rate(state_c, (i_s - i_g - Phasor(0, z.B_c) * u_c) * (port.omega_b / z.B_c))
-    rate(state_g, port.through_breaker((u - port.v - z.z_g * i_g) * (port.omega_b / z.z_g.im), i_g * fading))
+    rate(
+        state_g,
+        port.through_breaker((u - port.v - z.z_g * i_g) * (port.omega_b / z.z_g.im), i_g * fading),
+    )
     return i_s, u, i_g
 
 
 def _measurements(m: ModelBuilder, quantities: dict[str, Phasor], angle: Expr) -> None:
-    texts = {"u": "Voltage at the filter", "v": "Voltage at the bus", "i_s": "Current of the bridge",
-             "i_g": "Current into the grid"}  # fmt: skip
+    texts = {
+        "u": "Voltage at the filter",
+        "v": "Voltage at the bus",
+        "i_s": "Current of the bridge",
+        "i_g": "Current into the grid",
+    }
     for name, value in quantities.items():
         for phase, instant in zip("abc", phases(value, angle), strict=True):
-            m.output(f"{name}_{phase}", instant, "pu", f"{texts[name]}, phase {phase}", base="amplitude at S_n, V_n")
+            m.output(
+                f"{name}_{phase}",
+                instant,
+                "pu",
+                f"{texts[name]}, phase {phase}",
+                base="amplitude at S_n, V_n",
+            )
 
 
 def _references(m: ModelBuilder, port: DevicePort, z: _Branches, s: Phasor, u: Phasor) -> None:
@@ -146,11 +186,37 @@ def _references(m: ModelBuilder, port: DevicePort, z: _Branches, s: Phasor, u: P
     u_0 = port.v_0 + z.z_g * port.i_0
     s_0 = power(u_0, port.i_0)
     texts = {"P": "active power", "Q": "reactive power", "V": "voltage magnitude"}
-    for letter, value, at_start in (("P", s.re, s_0.re), ("Q", s.im, s_0.im), ("V", u.magnitude(), u_0.magnitude())):
+    for letter, value, at_start in (
+        ("P", s.re, s_0.re),
+        ("Q", s.im, s_0.im),
+        ("V", u.magnitude(), u_0.magnitude()),
+    ):
         text = texts[letter]
-        first = m.calculated(f"{letter}_ref_0", at_start, "pu", f"Power flow: {text} at the filter", base="S_n")
-        trim = m.input(f"trim.{letter}", "pu", f"What the start adds to the reference of {text}", base="S_n")
-        added = m.parameter(f"d{letter}_ref", 0.0, "pu", f"Added to the reference of {text}", base="S_n", tunable=True)
-        m.output(f"{letter}_ref", first + trim + added, "pu", f"Reference of {text} at the filter", base="S_n")
-        m.output({"P": "p_u", "Q": "q_u", "V": "u"}[letter], value, "pu", f"{text.capitalize()} at the filter",
-                 base="S_n")  # fmt: skip
+        first = m.calculated(
+            f"{letter}_ref_0", at_start, "pu", f"Power flow: {text} at the filter", base="S_n"
+        )
+        trim = m.input(
+            f"trim.{letter}", "pu", f"What the start adds to the reference of {text}", base="S_n"
+        )
+        added = m.parameter(
+            f"d{letter}_ref",
+            0.0,
+            "pu",
+            f"Added to the reference of {text}",
+            base="S_n",
+            tunable=True,
+        )
+        m.output(
+            f"{letter}_ref",
+            first + trim + added,
+            "pu",
+            f"Reference of {text} at the filter",
+            base="S_n",
+        )
+        m.output(
+            {"P": "p_u", "Q": "q_u", "V": "u"}[letter],
+            value,
+            "pu",
+            f"{text.capitalize()} at the filter",
+            base="S_n",
+        )

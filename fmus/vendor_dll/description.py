@@ -14,25 +14,40 @@ _LONGEST_WHY = 500
 
 
 def dll_description(
-    interface: DllInterface, trial: Trial, variables: tuple[source.HostVariable, ...], guid: str, identifier: str,
-    tool: str, circuit: Model | None = None,
-) -> bytes:  # fmt: skip
+    interface: DllInterface,
+    trial: Trial,
+    variables: tuple[source.HostVariable, ...],
+    guid: str,
+    identifier: str,
+    tool: str,
+    circuit: Model | None = None,
+) -> bytes:
     """The file's text.
 
     States are declared as our extension of FMI, which has no discrete states in co-simulation: ``DiscreteStates`` names
     the variables that the next sample depends on and that a master may set."""
     attributes = {
-        "fmiVersion": "2.0", "modelName": interface.texts["ModelName"] or identifier, "guid": guid,
-        "description": interface.texts["ModelDescription"], "author": interface.texts["ModelCreator"],
-        "version": interface.texts["ModelVersion"], "generationTool": tool, "numberOfEventIndicators": "0",
-    }  # fmt: skip
-    root = Element("fmiModelDescription", {name: value for name, value in attributes.items() if value})
+        "fmiVersion": "2.0",
+        "modelName": interface.texts["ModelName"] or identifier,
+        "guid": guid,
+        "description": interface.texts["ModelDescription"],
+        "author": interface.texts["ModelCreator"],
+        "version": interface.texts["ModelVersion"],
+        "generationTool": tool,
+        "numberOfEventIndicators": "0",
+    }
+    root = Element(
+        "fmiModelDescription", {name: value for name, value in attributes.items() if value}
+    )
     SubElement(
-        root, "CoSimulation", modelIdentifier=identifier, canHandleVariableCommunicationStepSize="true",
+        root,
+        "CoSimulation",
+        modelIdentifier=identifier,
+        canHandleVariableCommunicationStepSize="true",
         canNotUseMemoryManagementFunctions="true",
         canGetAndSetFMUstate="true" if trial.state in ("arrays", "library") else "false",
         canSerializeFMUstate="true" if trial.state == "arrays" else "false",
-    )  # fmt: skip
+    )
     if units := sorted({v.unit for v in variables if v.unit and v.kind == "Real"}):
         definitions = SubElement(root, "UnitDefinitions")
         for unit in units:
@@ -59,7 +74,9 @@ def dll_description(
     if known := _dependencies(variables, circuit):
         parent = SubElement(structure_element, "Outputs")
         for index, follows in known.items():
-            SubElement(parent, "Unknown", index=str(index), dependencies=" ".join(map(str, follows)))
+            SubElement(
+                parent, "Unknown", index=str(index), dependencies=" ".join(map(str, follows))
+            )
         initial = SubElement(structure_element, "InitialUnknowns")
         for index in known:
             SubElement(initial, "Unknown", index=str(index))
@@ -71,10 +88,14 @@ def _plain(words: str) -> str:
     return "".join(c if c.isprintable() else " " for c in words)[:_LONGEST_WHY]
 
 
-def _dependencies(variables: tuple[source.HostVariable, ...], circuit: Model | None) -> dict[int, list[int]]:
+def _dependencies(
+    variables: tuple[source.HostVariable, ...], circuit: Model | None
+) -> dict[int, list[int]]:
     """Index of each output → indices of the inputs it follows at once; the DLL's are held since the last sample."""
     known: dict[int, list[int]] = {
-        place: [] for place, v in enumerate(variables, start=1) if v.role == source.OUTPUT and not v.local
+        place: []
+        for place, v in enumerate(variables, start=1)
+        if v.role == source.OUTPUT and not v.local
     }
     if circuit is None:
         return known
@@ -85,7 +106,9 @@ def _dependencies(variables: tuple[source.HostVariable, ...], circuit: Model | N
             continue
         follows = [names[k] for k in unknown.known or () if isinstance(circuit.variables[k], Input)]
         known[index[names[unknown.reference]]] = [
-            index[name] for name in follows if variables[index[name] - 1].role == source.CIRCUIT_INPUT
+            index[name]
+            for name in follows
+            if variables[index[name] - 1].role == source.CIRCUIT_INPUT
         ]
     return known
 
@@ -100,8 +123,13 @@ def _write(listed: Element, reference: int, variable: source.HostVariable) -> No
         case r if r in (source.PARAMETER, source.CIRCUIT_PARAMETER):
             assert variable.parameter is not None
             of = {"causality": "parameter", "variability": "fixed" if variable.fixed else "tunable"}
-            whole = DATA_TYPES[variable.data_type].kind == "Integer" and isinstance(variable.parameter, DllParameter)
-            for name, bound in (("min", variable.parameter.minimum), ("max", variable.parameter.maximum)):
+            whole = DATA_TYPES[variable.data_type].kind == "Integer" and isinstance(
+                variable.parameter, DllParameter
+            )
+            for name, bound in (
+                ("min", variable.parameter.minimum),
+                ("max", variable.parameter.maximum),
+            ):
                 if bound is not None:
                     own[name] = str(int(bound)) if whole else repr(float(bound))
             own["start"] = start
@@ -114,7 +142,9 @@ def _write(listed: Element, reference: int, variable: source.HostVariable) -> No
         case r if r in (source.INPUT, source.CIRCUIT_INPUT):
             of = {"causality": "input", "variability": "continuous" if real else "discrete"}
             own["start"] = start
-        case r if not variable.local and (r == source.OUTPUT or isinstance(variable.declared, Output)):
+        case r if not variable.local and (
+            r == source.OUTPUT or isinstance(variable.declared, Output)
+        ):
             of = {"causality": "output", "variability": "continuous" if real else "discrete"}
         case _:
             of = {"causality": "local", "variability": "discrete"}

@@ -10,16 +10,38 @@ from pathlib import Path
 from typing import Any, cast, get_args
 
 from fmus.toolchain.model import Model
-from fmus.vendor_dll.circuit import BASES, MEASURED, REFERENCES, BridgeKind, FilterKind, converter_circuit
+from fmus.vendor_dll.circuit import (
+    BASES,
+    MEASURED,
+    REFERENCES,
+    BridgeKind,
+    FilterKind,
+    converter_circuit,
+)
 from fmus.vendor_dll.interface import DATA_TYPES, DllInterface, DllParameter, Place, layout
 
-_KEYS = {"dll", "filter", "delay", "unit", "circuit", "inputs", "bridge", "start", "parameters", "texts"}
+_KEYS = {
+    "dll",
+    "filter",
+    "delay",
+    "unit",
+    "circuit",
+    "inputs",
+    "bridge",
+    "start",
+    "parameters",
+    "texts",
+}
 _PARTS = {
     # unit -> how many of it are in one kV, kA or MVA
     "voltage": {"V": 1e3, "kV": 1.0, "MV": 1e-3},
     "current": {"A": 1e3, "kA": 1.0},
-    "power": {p + unit: factor for p, factor in (("", 1e6), ("k", 1e3), ("M", 1.0)) for unit in ("W", "VA", "var")},
-}  # fmt: skip
+    "power": {
+        p + unit: factor
+        for p, factor in (("", 1e6), ("k", 1e3), ("M", 1.0))
+        for unit in ("W", "VA", "var")
+    },
+}
 _MEASURED_KIND = (
     dict.fromkeys(MEASURED[:6], "voltage")
     | dict.fromkeys(MEASURED[6:], "current")
@@ -27,7 +49,8 @@ _MEASURED_KIND = (
 )
 """Signals that can be given in the DLL's own unit."""
 
-_PER_UNIT = ("V_ref", "u", "i_s")  # in per unit alone: whether a unit would mean a peak or an rms value, nothing says
+# in per unit alone: whether a unit would mean a peak or an rms value, nothing says
+_PER_UNIT = ("V_ref", "u", "i_s")
 
 _WORDS_FOR_PER_UNIT = ("pu", "p.u.", "p.u", "PU")
 
@@ -58,8 +81,10 @@ class Device:
     # values of the DLL's parameters, instead of its defaults.
     parameters: Mapping[str, float] = field(default_factory=dict)
     texts: Mapping[str, str] = field(default_factory=dict)
-    circuit: Mapping[str, float] = field(default_factory=dict)  # default values of the circuit's parameters
-    delay: bool = False  # whether a signal of the bridge is applied one sample after it was computed
+    # default values of the circuit's parameters
+    circuit: Mapping[str, float] = field(default_factory=dict)
+    # whether a signal of the bridge is applied one sample after it was computed
+    delay: bool = False
     trims: tuple[str, ...] = ("P", "Q")  # which references are trimmed at the start: of P, Q, V
     # longest_start, first_trim, trim_time: how long the start may take, when trimming begins, and its time constant
     # [s].
@@ -73,11 +98,16 @@ class Device:
         known = {p.name: p for p in made.parameters if p.type == "Real"}
         for key, value in self.circuit.items():
             if key not in known:
-                raise DeviceFileError(f"[circuit] {key}: the circuit has no such parameter; it has: {', '.join(known)}")
+                raise DeviceFileError(
+                    f"[circuit] {key}: the circuit has no such parameter; it has: {', '.join(known)}"
+                )
             low, high = known[key].minimum, known[key].maximum
             if (low is not None and value < low) or (high is not None and value > high):
                 raise DeviceFileError(f"[circuit] {key} = {value}; allowed is {low} to {high}")
-        changed = [replace(p, start=self.circuit[p.name]) if p.name in self.circuit else p for p in made.parameters]
+        changed = [
+            replace(p, start=self.circuit[p.name]) if p.name in self.circuit else p
+            for p in made.parameters
+        ]
         return replace(made, parameters=tuple(changed))
 
 
@@ -92,9 +122,13 @@ def read_device_file(path: Path) -> tuple[Path, dict[str, Any]]:
     except (ValueError, RecursionError) as error:
         raise DeviceFileError(f"{path}: it is not TOML: {error}") from error
     if unknown := sorted(table.keys() - _KEYS):
-        raise DeviceFileError(f"{path}: {unknown[0]!r} is no key here; there are: {', '.join(sorted(_KEYS))}")
+        raise DeviceFileError(
+            f"{path}: {unknown[0]!r} is no key here; there are: {', '.join(sorted(_KEYS))}"
+        )
     if not isinstance(table.get("dll"), str):
-        raise DeviceFileError(f"{path}: 'dll' is missing: the path of the vendor's file, such as dll = \"vendor.so\"")
+        raise DeviceFileError(
+            f"{path}: 'dll' is missing: the path of the vendor's file, such as dll = \"vendor.so\""
+        )
     return path.parent / table["dll"], table
 
 
@@ -118,7 +152,9 @@ class _Reader:
         if not part:
             return {}
         if part.keys() != {"S_n", "V_n"}:
-            raise ValueError("[unit] needs S_n [MVA] and V_n [kV] of the one unit that the DLL controls")
+            raise ValueError(
+                "[unit] needs S_n [MVA] and V_n [kV] of the one unit that the DLL controls"
+            )
         S_n, V_n = (_finite(part[name], f"[unit] {name}") for name in ("S_n", "V_n"))
         if S_n <= 0 or V_n <= 0:
             raise ValueError(f"[unit] S_n = {S_n}, V_n = {V_n}; both must be above 0")
@@ -128,18 +164,30 @@ class _Reader:
     def device(self, dll: Path) -> Device:
         kind = self._table.get("filter", "LC")
         if kind not in get_args(FilterKind):
-            raise ValueError(f"filter = {kind!r}; it must be one of: {', '.join(get_args(FilterKind))}")
+            raise ValueError(
+                f"filter = {kind!r}; it must be one of: {', '.join(get_args(FilterKind))}"
+            )
         delay = self._table.get("delay", 0)
         if delay not in (0, 1) or isinstance(delay, bool):
-            raise ValueError(f"delay = {delay!r}; it must be 0 or 1 samples between a computation and its effect")
+            raise ValueError(
+                f"delay = {delay!r}; it must be 0 or 1 samples between a computation and its effect"
+            )
         measured, constants = self._inputs()
         bridge, driven = self._bridge()
         known = {p.name: p for p in self._interface.parameters}
         return Device(
-            dll, kind, bridge, tuple(measured), tuple(driven), constants, self._parameters(known), self._texts(known),
-            self._circuit(), bool(delay),
+            dll,
+            kind,
+            bridge,
+            tuple(measured),
+            tuple(driven),
+            constants,
+            self._parameters(known),
+            self._texts(known),
+            self._circuit(),
+            bool(delay),
             **self._start(measured),
-        )  # fmt: skip
+        )
 
     def _circuit(self) -> dict[str, float]:
         found = {}
@@ -156,7 +204,11 @@ class _Reader:
         return part
 
     def _inputs(self) -> tuple[list[Route], dict[str, float]]:
-        places = {place.name: place for place in layout(self._interface.inputs).places if place.type.kind != "String"}
+        places = {
+            place.name: place
+            for place in layout(self._interface.inputs).places
+            if place.type.kind != "String"
+        }
         measured, constants = [], {}
         for name, given in self._part("inputs").items():
             where = f"[inputs] {name}"
@@ -166,7 +218,11 @@ class _Reader:
                 constants[name] = _finite(given, where)
                 continue
             entry = {"from": given} if isinstance(given, str) else given
-            if not isinstance(entry, dict) or entry.keys() - {"from", "unit", "sign"} or "from" not in entry:
+            if (
+                not isinstance(entry, dict)
+                or entry.keys() - {"from", "unit", "sign"}
+                or "from" not in entry
+            ):
                 raise ValueError(
                     f'{where}: give a number, a quantity of the circuit, or {{ from = "u_a", unit = "kV" }}'
                 )
@@ -181,7 +237,10 @@ class _Reader:
         quantity, row = entry["from"], place.row
         if quantity == "V_dc":
             return Route(
-                place, quantity, None, _factor(where, "voltage", entry.get("unit", row.unit)) * _sign(where, entry)
+                place,
+                quantity,
+                None,
+                _factor(where, "voltage", entry.get("unit", row.unit)) * _sign(where, entry),
             )
         if quantity not in (*_MEASURED_KIND, *_PER_UNIT):
             known = ", ".join((*_MEASURED_KIND, *_PER_UNIT, "V_dc"))
@@ -203,17 +262,31 @@ class _Reader:
         part = self._part("bridge")
         kinds = [kind for kind in get_args(BridgeKind) if kind in part]
         if len(kinds) != 1 or part.keys() - {"unit", *get_args(BridgeKind)}:
-            raise ValueError('[bridge]: give one of modulation = ["m_a", "m_b", "m_c"] and voltage = [...], and a unit')
+            raise ValueError(
+                '[bridge]: give one of modulation = ["m_a", "m_b", "m_c"] and voltage = [...], and a unit'
+            )
         (kind,) = kinds
         names = part[kind]
-        if not isinstance(names, list) or [type(name) for name in names] != [str] * 3 or len({*names}) != 3:
-            raise ValueError(f"[bridge] {kind}: three different outputs of the DLL are needed, for phases a, b and c")
-        places = {place.name: place for place in layout(self._interface.outputs).places if place.type.kind != "String"}
+        if (
+            not isinstance(names, list)
+            or [type(name) for name in names] != [str] * 3
+            or len({*names}) != 3
+        ):
+            raise ValueError(
+                f"[bridge] {kind}: three different outputs of the DLL are needed, for phases a, b and c"
+            )
+        places = {
+            place.name: place
+            for place in layout(self._interface.outputs).places
+            if place.type.kind != "String"
+        }
         routes = []
         for letter, name in zip("abc", names, strict=True):
             where = f"[bridge] {name}"
             if name not in places:
-                raise ValueError(f"{where}: the DLL has no such output; it has: {', '.join(places)}")
+                raise ValueError(
+                    f"{where}: the DLL has no such output; it has: {', '.join(places)}"
+                )
             base, factor, unit = None, 1.0, part.get("unit", places[name].row.unit)
             if kind == "voltage" and unit in _WORDS_FOR_PER_UNIT:
                 base = BASES["voltage"]
@@ -227,36 +300,60 @@ class _Reader:
         for name, value in self._part("parameters").items():
             where = f"[parameters] {name}"
             if name not in known or DATA_TYPES[known[name].data_type].kind == "String":
-                raise ValueError(f"{where}: the DLL has no such parameter that is a number; it has: {', '.join(known)}")
+                raise ValueError(
+                    f"{where}: the DLL has no such parameter that is a number; it has: {', '.join(known)}"
+                )
             row = known[name]
             values[name] = _finite(value, where)
             low, high = row.minimum, row.maximum
-            if (low is not None and values[name] < low) or (high is not None and values[name] > high):
+            if (low is not None and values[name] < low) or (
+                high is not None and values[name] > high
+            ):
                 raise ValueError(f"{where} = {value}; the DLL allows {low} to {high}")
         return values
 
     def _texts(self, known: Mapping[str, DllParameter]) -> dict[str, str]:
         texts = self._part("texts")
         for name, value in texts.items():
-            if name not in known or DATA_TYPES[known[name].data_type].kind != "String" or not isinstance(value, str):
-                raise ValueError(f"[texts] {name}: the DLL has no such parameter that is text, or the value is no text")
+            if (
+                name not in known
+                or DATA_TYPES[known[name].data_type].kind != "String"
+                or not isinstance(value, str)
+            ):
+                raise ValueError(
+                    f"[texts] {name}: the DLL has no such parameter that is text, or the value is no text"
+                )
         return dict(texts)
 
     def _start(self, measured: list[Route]) -> dict[str, Any]:
         part = dict(self._part("start"))
-        times = {"longest": "longest_start", "trim_after": "first_trim", "trim_time": "trim_time",
-                 "voltage_per_q": "voltage_per_q"}  # fmt: skip
+        times = {
+            "longest": "longest_start",
+            "trim_after": "first_trim",
+            "trim_time": "trim_time",
+            "voltage_per_q": "voltage_per_q",
+        }
         if unknown := sorted(part.keys() - {"trims", *times}):
             raise ValueError(f"[start] {unknown[0]}: there are: trims, {', '.join(times)}")
         given = {route.quantity for route in measured}
         usual = [letter for letter in ("P", "Q") if f"{letter}_ref" in given]
         trims = part.pop("trims", usual if "Q" in usual or "V_ref" not in given else [*usual, "V"])
-        if not isinstance(trims, list) or set(map(str, trims)) - {"P", "Q", "V"} or {"Q", "V"} <= set(trims):
-            raise ValueError(f'[start] trims = {trims!r}; it must be a list of "P" and one of "Q" and "V"')
+        if (
+            not isinstance(trims, list)
+            or set(map(str, trims)) - {"P", "Q", "V"}
+            or {"Q", "V"} <= set(trims)
+        ):
+            raise ValueError(
+                f'[start] trims = {trims!r}; it must be a list of "P" and one of "Q" and "V"'
+            )
         if idle := [letter for letter in trims if f"{letter}_ref" not in given]:
-            raise ValueError(f"[start] trims: {idle[0]}_ref goes to no input of the DLL; the references are: "
-                             f"{', '.join(REFERENCES)}")  # fmt: skip
-        found: dict[str, Any] = {times[key]: _seconds(value, f"[start] {key}") for key, value in part.items()}
+            raise ValueError(
+                f"[start] trims: {idle[0]}_ref goes to no input of the DLL; the references are: "
+                f"{', '.join(REFERENCES)}"
+            )
+        found: dict[str, Any] = {
+            times[key]: _seconds(value, f"[start] {key}") for key, value in part.items()
+        }
         return found | {"trims": tuple(trims)}
 
 
@@ -269,7 +366,11 @@ def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any
 
 
 def _finite(value: object, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= sys.float_info.max:
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int | float)
+        or not abs(value) <= sys.float_info.max
+    ):
         raise ValueError(f"{where} = {value!r}; it must be a finite number")
     return float(value)
 

@@ -52,7 +52,9 @@ class VendorDll:
     @property
     def identifier(self) -> str:
         """Name of the FMU: the model's own, as a name in C."""
-        name = re.sub(r"\W+", "_", self.interface.texts["ModelName"] or self.path.stem, flags=re.ASCII).strip("_")
+        name = re.sub(
+            r"\W+", "_", self.interface.texts["ModelName"] or self.path.stem, flags=re.ASCII
+        ).strip("_")
         return name if name[:1].isalpha() else f"dll_{name}"
 
 
@@ -60,22 +62,35 @@ READER = "fmus.vendor_dll.reading"  # module whose process reads a DLL
 
 
 def read_dll(
-    path: Path | str, reader: str = READER, also: Sequence[str] = (), texts: Mapping[str, str] | None = None,
+    path: Path | str,
+    reader: str = READER,
+    also: Sequence[str] = (),
+    texts: Mapping[str, str] | None = None,
     folder: Path = Path(),
-) -> VendorDll:  # fmt: skip
+) -> VendorDll:
     """Read a DLL in a process of its own, and try how it keeps its state."""
     path = Path(path).absolute()
     platform = platform_of(path, also)
-    given, files = {name: value for name, value in (texts or {}).items() if isinstance(value, str)}, dict[str, Path]()
+    given, files = (
+        {name: value for name, value in (texts or {}).items() if isinstance(value, str)},
+        dict[str, Path](),
+    )
     while True:
-        asked = ask(path, reader, _LONGEST, json.dumps(given | {name: str(file) for name, file in files.items()}))
+        asked = ask(
+            path,
+            reader,
+            _LONGEST,
+            json.dumps(given | {name: str(file) for name, file in files.items()}),
+        )
         answer = asked.found
         if not answer:
             again = ask(path, reader, _LONGEST)
             if not again.found:
                 raise DllError(f"{path.name}: the process that reads it {again.end}: {again.why}")
             why = f"with inputs that move, the process that ran it {asked.end}: {asked.why}"
-            answer = again.found | {"trial": Trial("not tried", why=why, passing=asked.passing).as_json()}
+            answer = again.found | {
+                "trial": Trial("not tried", why=why, passing=asked.passing).as_json()
+            }
         if "error" in answer:
             raise DllError(f"{path.name}: {answer['error']}")
         interface = DllInterface.from_json(answer["interface"])
@@ -88,7 +103,9 @@ def read_dll(
         files = named  # known from what it declares; now it is run with them
     if asked.in_its_start and (unseen := hidden(interface, given, files)):
         raise DllError(f"{path.name}: the process that runs it {asked.end}; {unseen}")
-    return VendorDll(path, interface, Trial.from_json(answer["trial"]), platform, files, tuple(looked.values()))
+    return VendorDll(
+        path, interface, Trial.from_json(answer["trial"]), platform, files, tuple(looked.values())
+    )
 
 
 def platform_of(path: Path, also: Sequence[str] = ()) -> str:
@@ -127,7 +144,10 @@ def _is_32_bit(path: Path) -> bool:
 
 
 def dll_fmu(
-    dll: VendorDll, destination: Path, texts: Mapping[str, str] | None = None, device: Device | None = None
+    dll: VendorDll,
+    destination: Path,
+    texts: Mapping[str, str] | None = None,
+    device: Device | None = None,
 ) -> Path:
     """Write the FMU of a DLL into a folder; it holds the DLL itself."""
     return write_archive(destination / f"{dll.identifier}.fmu", dll_members(dll, texts, device))
@@ -156,10 +176,20 @@ def dll_members(
     def described(guid: str) -> bytes:
         return dll_description(interface, dll.trial, variables, guid, dll.identifier, tool, circuit)
 
-    digest = digest_of(code, described("").decode(), hashlib.sha256(content).hexdigest(), *recipe(),
-                       *(hashlib.sha256(held).hexdigest() for held in files.values()))  # fmt: skip
+    digest = digest_of(
+        code,
+        described("").decode(),
+        hashlib.sha256(content).hexdigest(),
+        *recipe(),
+        *(hashlib.sha256(held).hexdigest() for held in files.values()),
+    )
     guid, (target, *_) = guid_of(digest), TARGETS[dll.platform]
-    host = compile_for(identity_source(guid, digest) + code, target, ENDINGS[dll.platform], _LIBRARIES[dll.platform])
+    host = compile_for(
+        identity_source(guid, digest) + code,
+        target,
+        ENDINGS[dll.platform],
+        _LIBRARIES[dll.platform],
+    )
     return {
         "modelDescription.xml": described(guid),
         f"binaries/{dll.platform}/{dll.identifier}{ENDINGS[dll.platform]}": host.read_bytes(),
@@ -177,7 +207,9 @@ def _check_texts(dll: VendorDll, given: Mapping[str, str]) -> None:
     words = {p.name for p in dll.interface.parameters if DATA_TYPES[p.data_type].kind == "String"}
     if unknown := sorted(given.keys() - words):
         has = ", ".join(sorted(words)) or "none"
-        raise DllError(f"{dll.path.name}: {unknown[0]!r} is no parameter that is text; there are: {has}")
+        raise DllError(
+            f"{dll.path.name}: {unknown[0]!r} is no parameter that is text; there are: {has}"
+        )
 
 
 def _check_names(dll: VendorDll, names: Sequence[str]) -> None:
@@ -196,7 +228,9 @@ def _values(interface: DllInterface, texts: Mapping[str, str]) -> dict[str, str]
     return {p.name: texts.get(p.name, str(p.default)) for p in words}
 
 
-def places(interface: DllInterface, texts: Mapping[str, str], library: Path, folder: Path) -> dict[str, Path]:
+def places(
+    interface: DllInterface, texts: Mapping[str, str], library: Path, folder: Path
+) -> dict[str, Path]:
     """Where files would lie that text parameters name.
 
     ``texts``: Values that somebody gave, absolute or from ``folder`` on.
@@ -212,7 +246,11 @@ def places(interface: DllInterface, texts: Mapping[str, str], library: Path, fol
 
 def hidden(interface: DllInterface, texts: Mapping[str, str], files: Mapping[str, Path]) -> str:
     """Which text parameters name files that the DLL does not see, and the remedy; empty where there are none."""
-    named = {n: v for n, v in _values(interface, texts).items() if n not in files and _LOOKS_LIKE_A_FILE.fullmatch(v)}
+    named = {
+        n: v
+        for n, v in _values(interface, texts).items()
+        if n not in files and _LOOKS_LIKE_A_FILE.fullmatch(v)
+    }
     said = ", ".join(f"{name} = {value!r}" for name, value in named.items())
     return said and (
         f"it sees no files but those that its text parameters name, and of {said} there is none: put it beside the "

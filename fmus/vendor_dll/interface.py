@@ -32,10 +32,19 @@ DATA_TYPES = {
 }
 """By the number that the interface gives each."""
 
-CALLS = ("FirstCall", "CheckParameters", "Initialize", "Outputs", "Iterate", "Terminate", "PrintInfo")
+CALLS = (
+    "FirstCall",
+    "CheckParameters",
+    "Initialize",
+    "Outputs",
+    "Iterate",
+    "Terminate",
+    "PrintInfo",
+)
 """Functions beside ``Model_GetInfo``, without their prefix ``Model_``."""
 
-CONTROLLER = "controller."  # before the names of the DLL's variables, where a circuit lies around it
+# before the names of the DLL's variables, where a circuit lies around it
+CONTROLLER = "controller."
 _SHORTEST = 1e-9  # A shorter sample time is none [s]
 _VERSIONS = (0, 1, 2)
 """First numbers of the interface's version that are known: 1 is that of both editions of its API; some write 2 for the
@@ -74,7 +83,8 @@ class DllParameter:
 
 @dataclass(frozen=True)
 class DllInterface:
-    texts: dict[str, str]  # ``ModelName``, ``ModelVersion`` and the eight others, by the interface's names
+    # ``ModelName``, ``ModelVersion`` and the eight others, by the interface's names
+    texts: dict[str, str]
     interface_version: tuple[int, ...]  # four numbers
     sample_time: float  # ``FixedStepBaseSampleTime`` [s]; not positive means: that of the host
     mode: int  # ``EMT_RMS_Mode``: 1 is EMT, 2 RMS, 3 both; others say nothing
@@ -89,23 +99,31 @@ class DllInterface:
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> "DllInterface":
-        signals = {name: tuple(Signal(**row) for row in data[name]) for name in ("inputs", "outputs")}
+        signals = {
+            name: tuple(Signal(**row) for row in data[name]) for name in ("inputs", "outputs")
+        }
         rows = {"parameters": tuple(DllParameter(**row) for row in data["parameters"])}
         plain = {name: tuple(data[name]) for name in ("interface_version", "states", "calls")}
         return cls(**data | signals | rows | plain)
 
     def with_defaults(self, values: Mapping[str, Number | str]) -> "DllInterface":
-        rows = tuple(replace(row, default=values.get(row.name, row.default)) for row in self.parameters)
+        rows = tuple(
+            replace(row, default=values.get(row.name, row.default)) for row in self.parameters
+        )
         return replace(self, parameters=rows)
 
     def faults(self) -> list[str]:
         """Declarations that no host can run, in words; empty for a sound DLL."""
         found = [
-            f"it has no function Model_{call}, which every host calls" for call in NEEDED if call not in self.calls
+            f"it has no function Model_{call}, which every host calls"
+            for call in NEEDED
+            if call not in self.calls
         ]
         if self.interface_version[0] not in _VERSIONS:
             told = ".".join(map(str, self.interface_version))
-            found.append(f"it was written for version {told} of the interface, whose structures are not known here")
+            found.append(
+                f"it was written for version {told} of the interface, whose structures are not known here"
+            )
         if not self.outputs:
             found.append("it declares no outputs, or its structure is of another layout")
         groups: tuple[tuple[str, Sequence[Signal | DllParameter]], ...] = (
@@ -120,19 +138,31 @@ class DllInterface:
                 if not row.name:
                     found.append(f"{kind} {place} has no name")
                 elif names.index(row.name) != place - 1:
-                    found.append(f"{where} has the name of {kind} {names.index(row.name) + 1}; each needs its own")
+                    found.append(
+                        f"{where} has the name of {kind} {names.index(row.name) + 1}; each needs its own"
+                    )
                 if row.data_type not in DATA_TYPES:
-                    found.append(f"{where} has data type {row.data_type}; the interface knows 1 to 10")
+                    found.append(
+                        f"{where} has data type {row.data_type}; the interface knows 1 to 10"
+                    )
                 if isinstance(row, Signal) and not 1 <= row.width <= 100_000:
-                    found.append(f"{where} has width {row.width}; it must be at least 1 (and 100,000 at most)")
+                    found.append(
+                        f"{where} has width {row.width}; it must be at least 1 (and 100,000 at most)"
+                    )
                 if isinstance(row, DllParameter) and (row.minimum or 0) > (row.maximum or 0):
-                    found.append(f"{where} has the bounds {row.minimum} to {row.maximum}, between which nothing is")
+                    found.append(
+                        f"{where} has the bounds {row.minimum} to {row.maximum}, between which nothing is"
+                    )
                 if not row.name.isprintable():
                     found.append(f"{where} has a name that cannot be written")
         if not math.isfinite(self.sample_time) or 0 < self.sample_time < _SHORTEST:
-            found.append(f"its sample time is {self.sample_time:g} s; at least {_SHORTEST:g} s, or none, can be run")
+            found.append(
+                f"its sample time is {self.sample_time:g} s; at least {_SHORTEST:g} s, or none, can be run"
+            )
         if any(count < 0 for count in self.states):
-            found.append(f"its numbers of integer, float and double states are {self.states}; none may be negative")
+            found.append(
+                f"its numbers of integer, float and double states are {self.states}; none may be negative"
+            )
         return found
 
 
@@ -140,7 +170,9 @@ class DllInterface:
 class Place:
     """One value in a structure of the host."""
 
-    name: str  # of the signal or parameter, with its place in the array in brackets, from 1, where there is one
+    # of the signal or parameter, with its place in the array in brackets, from 1, where there is
+    # one
+    name: str
     row: Signal | DllParameter
     offset: int  # from the structure's start [bytes]
 

@@ -91,12 +91,20 @@ class _Segment(c.Structure):
     _fields_ = (
         ("type", c.c_uint32),
         ("flags", c.c_uint32),
-        *((name, c.c_uint64) for name in ("offset", "address", "physical", "in_file", "size", "align")),
+        *(
+            (name, c.c_uint64)
+            for name in ("offset", "address", "physical", "in_file", "size", "align")
+        ),
     )
 
 
 class _Loaded(c.Structure):
-    _fields_ = (("base", c.c_uint64), ("name", c.c_char_p), ("segments", c.POINTER(_Segment)), ("count", c.c_uint16))
+    _fields_ = (
+        ("base", c.c_uint64),
+        ("name", c.c_char_p),
+        ("segments", c.POINTER(_Segment)),
+        ("count", c.c_uint16),
+    )
 
 
 def _writable(path: Path) -> Iterator[Region]:

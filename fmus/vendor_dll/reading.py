@@ -26,7 +26,12 @@ _Row = TypeVar("_Row", bound=c.Structure)
 class _Value(c.Union):
     _fields_ = (
         *(("char", c.c_int8), ("c_string", c.c_void_p), ("int8", c.c_int8), ("uint8", c.c_uint8)),
-        *(("int16", c.c_int16), ("uint16", c.c_uint16), ("int32", c.c_int32), ("uint32", c.c_uint32)),
+        *(
+            ("int16", c.c_int16),
+            ("uint16", c.c_uint16),
+            ("int32", c.c_int32),
+            ("uint32", c.c_uint32),
+        ),
         *(("real32", c.c_float), ("real64", c.c_double)),
     )
 
@@ -50,12 +55,15 @@ class _Parameter(c.Structure):
 
 class _ModelInfo(c.Structure):
     _fields_ = (
-        ("interface_version", c.c_uint8 * 4), *((name, c.c_void_p) for name in TEXTS), ("sample_time", c.c_double),
-        ("mode", c.c_uint8), *(("n_inputs", c.c_int32), ("inputs", c.c_void_p)),
+        ("interface_version", c.c_uint8 * 4),
+        *((name, c.c_void_p) for name in TEXTS),
+        ("sample_time", c.c_double),
+        ("mode", c.c_uint8),
+        *(("n_inputs", c.c_int32), ("inputs", c.c_void_p)),
         *(("n_outputs", c.c_int32), ("outputs", c.c_void_p)),
         *(("n_parameters", c.c_int32), ("parameters", c.c_void_p)),
         *((name, c.c_int32) for name in ("int_states", "float_states", "double_states")),
-    )  # fmt: skip
+    )
 
 
 def read_interface(library: Library) -> DllInterface:
@@ -68,12 +76,17 @@ def read_interface(library: Library) -> DllInterface:
     def text(address: int | None) -> str:
         found = library.text(address)
         if len(found) > MOST_TEXT:
-            raise ValueError(f"it declares a text of {len(found)} bytes; at most {MOST_TEXT} are read")
+            raise ValueError(
+                f"it declares a text of {len(found)} bytes; at most {MOST_TEXT} are read"
+            )
         return found.decode("utf-8", "replace").strip()
 
     def rows(kind: type[_Row], address: int | None, count: int) -> list[_Row]:
         size = c.sizeof(kind)
-        return [kind.from_buffer_copy(library.read((address or 0) + k * size, size)) for k in range(count)]
+        return [
+            kind.from_buffer_copy(library.read((address or 0) + k * size, size))
+            for k in range(count)
+        ]
 
     info = _ModelInfo.from_buffer_copy(library.read(found, c.sizeof(_ModelInfo)))
     for name in ("n_inputs", "n_outputs", "n_parameters"):
@@ -88,7 +101,9 @@ def read_interface(library: Library) -> DllInterface:
         mode=info.mode,
         inputs=tuple(_signal(row, text) for row in rows(_Signal, info.inputs, info.n_inputs)),
         outputs=tuple(_signal(row, text) for row in rows(_Signal, info.outputs, info.n_outputs)),
-        parameters=tuple(_parameter(row, text) for row in rows(_Parameter, info.parameters, info.n_parameters)),
+        parameters=tuple(
+            _parameter(row, text) for row in rows(_Parameter, info.parameters, info.n_parameters)
+        ),
         states=(info.int_states, info.float_states, info.double_states),
         calls=tuple(name for name in CALLS if library.has(f"Model_{name}")),
     )
@@ -110,16 +125,24 @@ def _parameter(row: _Parameter, text: _Text) -> DllParameter:
     if bounds == (0, 0):  # the author wrote none
         bounds = (None, None)
     return DllParameter(
-        text(row.name), text(row.group), text(row.description), text(row.unit), row.data_type, bool(row.fixed),
-        (text(row.default.c_string) if kind else "") if words else bound(row.default) or 0, *bounds,
-    )  # fmt: skip
+        text(row.name),
+        text(row.group),
+        text(row.description),
+        text(row.unit),
+        row.data_type,
+        bool(row.fixed),
+        (text(row.default.c_string) if kind else "") if words else bound(row.default) or 0,
+        *bounds,
+    )
 
 
 def read(library: Library, texts: Mapping[str, str] | None) -> dict[str, Any]:
     """A DLL's declarations and, where texts are given, how it keeps its state with them [JSON]."""
     interface = read_interface(library)
     trial = (
-        Trial("not tried") if texts is None or interface.faults() else tried(library, interface.with_defaults(texts))
+        Trial("not tried")
+        if texts is None or interface.faults()
+        else tried(library, interface.with_defaults(texts))
     )
     return {"interface": interface.as_json(), "trial": trial.as_json()}
 
@@ -137,7 +160,9 @@ def _noting(path: Path) -> Note:
     return note
 
 
-def answer_for(load: Callable[[Note], Library], answer: Path, texts: Mapping[str, str] | None) -> None:
+def answer_for(
+    load: Callable[[Note], Library], answer: Path, texts: Mapping[str, str] | None
+) -> None:
     """Write what `read` finds into a file, or the error."""
     found: dict[str, Any]
     try:
@@ -154,4 +179,6 @@ def texts_in(words: Sequence[str]) -> dict[str, str] | None:
 
 
 if __name__ == "__main__":
-    answer_for(lambda note: LocalLibrary(Path(sys.argv[1]), note), Path(sys.argv[2]), texts_in(sys.argv))
+    answer_for(
+        lambda note: LocalLibrary(Path(sys.argv[1]), note), Path(sys.argv[2]), texts_in(sys.argv)
+    )

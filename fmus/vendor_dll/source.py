@@ -10,17 +10,41 @@ from fmus.toolchain.model import Model
 from fmus.toolchain.variables import Input, Parameter, State, Variable
 from fmus.vendor_dll.circuit import ANGLE, BRIDGE, MEASURED, TRIMS
 from fmus.vendor_dll.device import Device, Route
-from fmus.vendor_dll.interface import CONTROLLER, DATA_TYPES, DllInterface, DllParameter, Place, Signal, layout
+from fmus.vendor_dll.interface import (
+    CONTROLLER,
+    DATA_TYPES,
+    DllInterface,
+    DllParameter,
+    Place,
+    Signal,
+    layout,
+)
 from fmus.vendor_dll.state_trial import Trial
 
-_KERNEL = {"initialise": "circuit_initialise", "outputs": "circuit_outputs", "derivatives": "circuit_derivatives",
-           "requirements": "circuit_requirements", "advance": "circuit_advance_parts",
-           "workspace_size": "circuit_workspace"}  # fmt: skip
+_KERNEL = {
+    "initialise": "circuit_initialise",
+    "outputs": "circuit_outputs",
+    "derivatives": "circuit_derivatives",
+    "requirements": "circuit_requirements",
+    "advance": "circuit_advance_parts",
+    "workspace_size": "circuit_workspace",
+}
 _PLACES = {
-    "AT_ANGLE": ANGLE, "AT_INTERNAL_STEP": "internal_step", "AT_FREQUENCY": "f_n", "AT_V_RE": "v_re", "AT_V_IM": "v_im",
-    "AT_V_0": "v_0", "AT_THETA_0": "theta_0", "AT_P_0": "P_0", "AT_Q_0": "Q_0", "AT_P": "p", "AT_Q": "q",
-    "AT_TRIM_P": "trim.P", "AT_TRIM_Q": "trim.Q", "AT_TRIM_V": "trim.V",
-}  # fmt: skip
+    "AT_ANGLE": ANGLE,
+    "AT_INTERNAL_STEP": "internal_step",
+    "AT_FREQUENCY": "f_n",
+    "AT_V_RE": "v_re",
+    "AT_V_IM": "v_im",
+    "AT_V_0": "v_0",
+    "AT_THETA_0": "theta_0",
+    "AT_P_0": "P_0",
+    "AT_Q_0": "Q_0",
+    "AT_P": "p",
+    "AT_Q": "q",
+    "AT_TRIM_P": "trim.P",
+    "AT_TRIM_Q": "trim.Q",
+    "AT_TRIM_V": "trim.V",
+}
 
 
 def kernel_source(model: Model) -> str:
@@ -69,14 +93,46 @@ _HEADERS = "#define _GNU_SOURCE\n" + "".join(
     f"#include <{name}.h>\n" for name in ("math", "stdarg", "stdint", "stdio", "stdlib", "string")
 )
 
-PARAMETER, INITIAL, INPUT, OUTPUT, HELD, INT_STATE, FLOAT_STATE, DOUBLE_STATE, MEMORY_STATE, SAMPLES = range(10)
-CIRCUIT_PARAMETER, CIRCUIT_INPUT, CIRCUIT_STATE, CIRCUIT_VALUE, HELD_INPUT, CONSTANT_INPUT = range(10, 16)
+(
+    PARAMETER,
+    INITIAL,
+    INPUT,
+    OUTPUT,
+    HELD,
+    INT_STATE,
+    FLOAT_STATE,
+    DOUBLE_STATE,
+    MEMORY_STATE,
+    SAMPLES,
+) = range(10)
+CIRCUIT_PARAMETER, CIRCUIT_INPUT, CIRCUIT_STATE, CIRCUIT_VALUE, HELD_INPUT, CONSTANT_INPUT = range(
+    10, 16
+)
 """A variable's role for the host. Those up to `INITIAL` are set before the start."""
 
-_ROLES = ("PARAMETER", "INITIAL", "INPUT", "OUTPUT", "HELD", "INT_STATE", "FLOAT_STATE", "DOUBLE_STATE",
-          "MEMORY_STATE", "SAMPLES", "CIRCUIT_PARAMETER", "CIRCUIT_INPUT", "CIRCUIT_STATE",
-          "CIRCUIT_VALUE", "HELD_INPUT", "CONSTANT_INPUT")  # fmt: skip
-_STATES = {INT_STATE: ("IntStates", 6, 4), FLOAT_STATE: ("FloatStates", 8, 4), DOUBLE_STATE: ("DoubleStates", 9, 8)}
+_ROLES = (
+    "PARAMETER",
+    "INITIAL",
+    "INPUT",
+    "OUTPUT",
+    "HELD",
+    "INT_STATE",
+    "FLOAT_STATE",
+    "DOUBLE_STATE",
+    "MEMORY_STATE",
+    "SAMPLES",
+    "CIRCUIT_PARAMETER",
+    "CIRCUIT_INPUT",
+    "CIRCUIT_STATE",
+    "CIRCUIT_VALUE",
+    "HELD_INPUT",
+    "CONSTANT_INPUT",
+)
+_STATES = {
+    INT_STATE: ("IntStates", 6, 4),
+    FLOAT_STATE: ("FloatStates", 8, 4),
+    DOUBLE_STATE: ("DoubleStates", 9, 8),
+}
 
 
 @dataclass(frozen=True)
@@ -108,7 +164,9 @@ class HostVariable:
         return not p.tunable if isinstance(p, Parameter) else p is None or p.fixed
 
 
-def device_variables(interface: DllInterface, trial: Trial, device: Device, circuit: Model) -> tuple[HostVariable, ...]:
+def device_variables(
+    interface: DllInterface, trial: Trial, device: Device, circuit: Model
+) -> tuple[HostVariable, ...]:
     """All variables of a controller with a circuit around it: what the circuit gives the controller is no input."""
     measured = {route.place.name for route in device.measured}
     driven = {route.place.name for route in device.driven}
@@ -138,7 +196,9 @@ def _of_circuit(circuit: Model) -> list[HostVariable]:
             role = CIRCUIT_STATE
         parameter = v if isinstance(v, Parameter) else None
         hidden = v.name in MEASURED
-        found.append(HostVariable(v.name, role, kind, 9, place, start, v.unit, v.text, parameter, v, hidden))
+        found.append(
+            HostVariable(v.name, role, kind, 9, place, start, v.unit, v.text, parameter, v, hidden)
+        )
     return found
 
 
@@ -149,10 +209,14 @@ def host_variables(interface: DllInterface, trial: Trial) -> tuple[HostVariable,
     for place in _numbers(interface.parameters):
         assert isinstance(place.row, DllParameter)
         name = place.name if place.name not in taken else f"parameter.{place.name}"
-        found.append(_variable(place, name, PARAMETER, start=float(place.row.default), parameter=place.row))
+        found.append(
+            _variable(place, name, PARAMETER, start=float(place.row.default), parameter=place.row)
+        )
     outputs = _numbers(interface.outputs)
     for place in outputs:
-        text = f"Value of {place.name} before the first sample, from which the DLL initialises itself"
+        text = (
+            f"Value of {place.name} before the first sample, from which the DLL initialises itself"
+        )
         found.append(_variable(place, f"initial.{place.name}", INITIAL, text=text))
     inputs = {row.name for row in interface.inputs}
     found += [_variable(place, place.name, INPUT) for place in _numbers(interface.inputs)]
@@ -167,12 +231,26 @@ def host_variables(interface: DllInterface, trial: Trial) -> tuple[HostVariable,
         array, data_type, size = _STATES[role]
         kind = DATA_TYPES[data_type].kind
         found += [
-            HostVariable(f"{array}[{k + 1}]", role, kind, data_type, k * size, text=f"Element {k} of the DLL's {array}")
+            HostVariable(
+                f"{array}[{k + 1}]",
+                role,
+                kind,
+                data_type,
+                k * size,
+                text=f"Element {k} of the DLL's {array}",
+            )
             for k in range(count)
         ]
     for data_type, places in ((9, trial.doubles), (8, trial.floats)):
         found += [
-            HostVariable(f"memory[{at:#x}]", MEMORY_STATE, "Real", data_type, at, text="In the DLL's own memory")
+            HostVariable(
+                f"memory[{at:#x}]",
+                MEMORY_STATE,
+                "Real",
+                data_type,
+                at,
+                text="In the DLL's own memory",
+            )
             for at in places
         ]
     found.append(HostVariable("samples", SAMPLES, "Integer", 6, 0, text="Samples so far"))
@@ -184,24 +262,40 @@ def _numbers(rows: Sequence[DllParameter] | Sequence[Signal]) -> list[Place]:
 
 
 def _variable(
-    place: Place, name: str, role: int, *, start: float = 0.0, text: str = "", parameter: DllParameter | None = None
+    place: Place,
+    name: str,
+    role: int,
+    *,
+    start: float = 0.0,
+    text: str = "",
+    parameter: DllParameter | None = None,
 ) -> HostVariable:
     row = place.row
     text = text or row.description
-    return HostVariable(name, role, place.type.kind, row.data_type, place.offset, start, row.unit, text, parameter)
+    return HostVariable(
+        name, role, place.type.kind, row.data_type, place.offset, start, row.unit, text, parameter
+    )
 
 
 def host_source(
-    interface: DllInterface, trial: Trial, texts: Mapping[str, str], carried: Mapping[str, str], vendor_file: str,
-    variables: Sequence[HostVariable], around: tuple[Device, Model] | None = None,
-) -> str:  # fmt: skip
+    interface: DllInterface,
+    trial: Trial,
+    texts: Mapping[str, str],
+    carried: Mapping[str, str],
+    vendor_file: str,
+    variables: Sequence[HostVariable],
+    around: tuple[Device, Model] | None = None,
+) -> str:
     """The source without its identity."""
     code = [(_C / name).read_text(encoding="utf-8") for name in ("library.c", "host.c")]
     functions = (_TOOLCHAIN / "fmi2.c").read_text(encoding="utf-8")
     export = (_TOOLCHAIN / "fmi.h").read_text(encoding="utf-8").split("typedef")[0]
     tables = _tables(interface, trial, {**texts, **carried}, carried, vendor_file, variables)
     if around is None:
-        before, after = "enum { CIRCUIT_SIZE = 0 };", (_C / "no_circuit.c").read_text(encoding="utf-8")
+        before, after = (
+            "enum { CIRCUIT_SIZE = 0 };",
+            (_C / "no_circuit.c").read_text(encoding="utf-8"),
+        )
     else:
         device, circuit = around
         before, after = kernel_source(circuit), circuit_source(circuit, device)
@@ -209,9 +303,13 @@ def host_source(
 
 
 def _tables(
-    interface: DllInterface, trial: Trial, texts: Mapping[str, str], carried: Mapping[str, str], vendor_file: str,
+    interface: DllInterface,
+    trial: Trial,
+    texts: Mapping[str, str],
+    carried: Mapping[str, str],
+    vendor_file: str,
     variables: Sequence[HostVariable],
-) -> list[str]:  # fmt: skip
+) -> list[str]:
     regions = trial.regions
     sizes = {
         name: layout(rows).size
@@ -222,9 +320,16 @@ def _tables(
         )
     }
     words = [place for place in layout(interface.parameters).places if place.type.kind == "String"]
-    text_inputs = [place for place in layout(interface.inputs).places if place.type.kind == "String"]
+    text_inputs = [
+        place for place in layout(interface.inputs).places if place.type.kind == "String"
+    ]
     numbers = sizes | dict(zip(("INTS", "FLOATS", "DOUBLES"), interface.states, strict=True))
-    numbers |= {"NV": len(variables), "TEXTS": len(words), "TEXT_INPUTS": len(text_inputs), "REGIONS": len(regions)}
+    numbers |= {
+        "NV": len(variables),
+        "TEXTS": len(words),
+        "TEXT_INPUTS": len(text_inputs),
+        "REGIONS": len(regions),
+    }
     numbers |= {"OWN_STATE": int(trial.state == "library")}
     numbers |= {"MEMORY": sum(size for _, size in regions), "MODE": 2 if interface.mode == 2 else 1}
     values = [
@@ -234,7 +339,11 @@ def _tables(
         f"{int(v.parameter is not None and not v.fixed)}}}"
         for v in variables
     ]
-    given = [texts.get(place.name, str(place.row.default)) for place in words if isinstance(place.row, DllParameter)]
+    given = [
+        texts.get(place.name, str(place.row.default))
+        for place in words
+        if isinstance(place.row, DllParameter)
+    ]
     return [
         "enum { " + ", ".join(f"{name} = {value}" for name, value in numbers.items()) + " };",
         "enum kind { REAL, INTEGER, BOOLEAN };",

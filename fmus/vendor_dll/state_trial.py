@@ -14,8 +14,10 @@ from fmus.vendor_dll.interface import DllInterface, DllParameter, Layout, Signal
 from fmus.vendor_dll.memory import Library, Region
 
 _SAMPLES = 200  # in each of the runs
-_LARGEST = (1.5, 0.6)  # of the inputs' waves; the second where the DLL refuses the first with an error
-_MODEST = (1e-12, 1e12)  # A word is taken for a number where its magnitude is zero or between these at all times
+# of the inputs' waves; the second where the DLL refuses the first with an error
+_LARGEST = (1.5, 0.6)
+# A word is taken for a number where its magnitude is zero or between these at all times
+_MODEST = (1e-12, 1e12)
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,9 @@ class Trial:
     def from_json(cls, data: dict[str, Any]) -> "Trial":
         places = {name: tuple(data[name]) for name in ("doubles", "floats")}
         regions = tuple((start, size) for start, size in data["regions"])
-        return cls(data["state"], **places, regions=regions, why=data["why"], passing=data["passing"])
+        return cls(
+            data["state"], **places, regions=regions, why=data["why"], passing=data["passing"]
+        )
 
 
 class _Instance(c.Structure):
@@ -58,14 +62,18 @@ class _Host:
 
     def __init__(self, library: Library, interface: DllInterface, largest: float) -> None:
         self._library, self._interface, self._largest = library, interface, largest
-        self._layouts = [layout(rows) for rows in (interface.inputs, interface.outputs, interface.parameters)]
+        self._layouts = [
+            layout(rows) for rows in (interface.inputs, interface.outputs, interface.parameters)
+        ]
         self._sizes = [found.size for found in self._layouts] + [
             n * size for n, size in zip(interface.states, (4, 4, 8), strict=True)
         ]
         self._sizes = [size + 64 for size in self._sizes]
         self._at = [library.allocate(size) for size in self._sizes]
         at = self._at
-        self._instance = _Instance(*at[:3], 0.0, 2 if interface.mode == 2 else 1, None, None, *at[3:])
+        self._instance = _Instance(
+            *at[:3], 0.0, 2 if interface.mode == 2 else 1, None, None, *at[3:]
+        )
         self._instance_at = library.allocate(c.sizeof(_Instance))
         self._inputs = bytearray(self._sizes[0])
         self._set_defaults(interface.parameters, self._layouts[2])
@@ -91,7 +99,9 @@ class _Host:
         library = self._library
         library.write(self._instance_at, bytes(self._instance))
         if c.c_int32(library.call(f"Model_{name}", self._instance_at)).value == 2:
-            said = _Instance.from_buffer_copy(library.read(self._instance_at, c.sizeof(_Instance))).error
+            said = _Instance.from_buffer_copy(
+                library.read(self._instance_at, c.sizeof(_Instance))
+            ).error
             words = (library.text(said) or b"(no message)").decode("utf-8", "replace").strip()
             raise ValueError(f"Model_{name} ends with an error: {words}")
 
@@ -102,7 +112,12 @@ class _Host:
         for sample in range(first, first + _SAMPLES):
             for k, place in enumerate(self._layouts[0].places):
                 if place.type.kind != "String":
-                    _pack(self._inputs, place.row, place.offset, self._input(sample, k, place.type.kind))
+                    _pack(
+                        self._inputs,
+                        place.row,
+                        place.offset,
+                        self._input(sample, k, place.type.kind),
+                    )
             self._library.write(self._at[0], bytes(self._inputs))
             self._instance.time = sample * step
             self._call("Outputs")
@@ -117,7 +132,9 @@ class _Host:
         return self._largest * wave if sample % _SAMPLES < _SAMPLES // 2 else 1.0 + 0.2 * wave
 
     def arrays(self) -> list[bytes]:
-        return [self._library.read(at, size) for at, size in zip(self._at, self._sizes, strict=True)]
+        return [
+            self._library.read(at, size) for at, size in zip(self._at, self._sizes, strict=True)
+        ]
 
     def restore(self, arrays: list[bytes]) -> None:
         for at, kept in zip(self._at, arrays, strict=True):
@@ -152,7 +169,9 @@ def _tried(host: _Host, library: Library) -> Trial:
     host.restore(arrays)
     _put_back(library, regions, memory)
     if host.run(_SAMPLES) != first:
-        return Trial("hidden", why="a run from the same arrays and the same memory of the library differs")
+        return Trial(
+            "hidden", why="a run from the same arrays and the same memory of the library differs"
+        )
     return Trial("library", *_numbers(regions, moving), regions=places)
 
 
@@ -171,7 +190,9 @@ def _put_back(library: Library, regions: Sequence[Region], memory: list[bytes]) 
         library.write(start, kept)
 
 
-def _numbers(regions: Sequence[Region], moving: Sequence[list[bytes]]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+def _numbers(
+    regions: Sequence[Region], moving: Sequence[list[bytes]]
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Places of doubles and of floats that differ between two times, as numbers look."""
     doubles, floats = [], []
     for k, (base, start, size) in enumerate(regions):
@@ -188,7 +209,8 @@ def _numbers(regions: Sequence[Region], moving: Sequence[list[bytes]]) -> tuple[
             floats += [
                 place + 4 * half
                 for half in (0, 1)
-                if halves[0][half] != halves[1][half] and all(_modest(pair[half]) for pair in halves)
+                if halves[0][half] != halves[1][half]
+                and all(_modest(pair[half]) for pair in halves)
             ]
     return tuple(doubles), tuple(floats)
 

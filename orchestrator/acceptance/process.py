@@ -58,7 +58,11 @@ class FmuProcess:
         port = asdict(description.port) if isinstance(description, BoundDescription) else None
         request = {"fmu": str(fmu), "port": port, "directory": str(directory)}
         self._process = ConfinedProcess(
-            "orchestrator.acceptance.worker", request, [fmu, directory], limits, windows=runs_under_wine(description)
+            "orchestrator.acceptance.worker",
+            request,
+            [fmu, directory],
+            limits,
+            windows=runs_under_wine(description),
         )
         try:
             self.box = self._process.box
@@ -71,7 +75,9 @@ class FmuProcess:
 
     def _begin(self) -> None:
         try:
-            self.protections = self.typed(answers.protections, self.talk("the beginning of its process", -1, "begin"))
+            self.protections = self.typed(
+                answers.protections, self.talk("the beginning of its process", -1, "begin")
+            )
         except ProcessEndedError as error:  # the FMU is not loaded yet
             raise InputError(f"the FMU's process did not start: {error.how}") from error
         self._patience = self.limits.seconds
@@ -93,9 +99,15 @@ class FmuProcess:
             raise self._tampered(f"{error}") from error
 
     def run(
-        self, instance: int, into: NDArray[np.uint32], rows: Numbers, out: NDArray[np.uint32],
-        steps: int = 0, time: float = 0.0, step_size: float = 0.0,
-    ) -> tuple[int, int, int, Numbers]:  # fmt: skip
+        self,
+        instance: int,
+        into: NDArray[np.uint32],
+        rows: Numbers,
+        out: NDArray[np.uint32],
+        steps: int = 0,
+        time: float = 0.0,
+        step_size: float = 0.0,
+    ) -> tuple[int, int, int, Numbers]:
         """Set inputs, step and read, as often as asked.
 
         ``into``, ``out``: Value references that are set before a step, and read after it.
@@ -109,7 +121,9 @@ class FmuProcess:
         if self._ended is not None:
             raise self._ended
         if max(len(into), len(out)) > MOST:
-            raise InputError(f"{max(len(into), len(out))} variables cannot be exchanged at once; {MOST} can")
+            raise InputError(
+                f"{max(len(into), len(out))} variables cannot be exchanged at once; {MOST} can"
+            )
         head, asked = self.box.head, self.box.run
         length, values = max(1, steps), np.empty((max(1, steps), len(out)))
         chunk = max(1, ROOM // max(1, len(into) + len(out)))
@@ -156,7 +170,12 @@ class FmuProcess:
 
     def _answer(self, kind: int, call: str) -> int:
         self._number += 1
-        box, wait, begin, steps = self.box, self._library.mailbox_wait, monotonic(), self.box.head.steps
+        box, wait, begin, steps = (
+            self.box,
+            self._library.mailbox_wait,
+            monotonic(),
+            self.box.head.steps,
+        )
         self._library.mailbox_post(box.address, kind, self._number)
         while not (answered := wait(box.address, self._number, _LOOK)):
             now = monotonic()
@@ -166,7 +185,9 @@ class FmuProcess:
                 raise self._died(call)
             if box.head.steps != steps:
                 steps, begin = box.head.steps, now
-            if now - begin > self._patience and now - begin > (allowed := self._patience * crowded()):
+            if now - begin > self._patience and now - begin > (
+                allowed := self._patience * crowded()
+            ):
                 raise self._given_up(f"no answer within {allowed:.3g} s in {self._where(call)}")
             if now > self.deadline:
                 raise self._given_up(f"it takes too long, last in {self._where(call)}")
@@ -176,11 +197,15 @@ class FmuProcess:
 
     def _where(self, call: str) -> str:
         call = call or _STAGES.get(self.box.run.stage, "fmi2DoStep")
-        time = self.time + (max(0, self.box.run.done) * self.box.head.step if call == "fmi2DoStep" else 0.0)
+        time = self.time + (
+            max(0, self.box.run.done) * self.box.head.step if call == "fmi2DoStep" else 0.0
+        )
         return f"{call}, at t = {time:.6g} s"
 
     def _tampered(self, seen: str) -> ProcessEndedError:
-        return self._end(ProcessFault.TAMPERING, f"it wrote into the memory between the processes: {seen}")
+        return self._end(
+            ProcessFault.TAMPERING, f"it wrote into the memory between the processes: {seen}"
+        )
 
     def _given_up(self, how: str) -> ProcessEndedError:
         return self._end(ProcessFault.HANG, how)
@@ -188,7 +213,9 @@ class FmuProcess:
     def _died(self, call: str) -> ProcessEndedError:
         fault, how = self._process.fault()
         said = "" if fault is ProcessFault.OUTPUT else self._process.last_words()
-        return self._end(fault, f"{how} in {self._where(call)}{f'; it wrote: {said}' if said else ''}")
+        return self._end(
+            fault, f"{how} in {self._where(call)}{f'; it wrote: {said}' if said else ''}"
+        )
 
     def _end(self, fault: ProcessFault, how: str) -> ProcessEndedError:
         self._process.end()
@@ -226,7 +253,15 @@ class HostedComponent(RemoteCalls):
     def _typed(self, form: Callable[..., Form], answer: Any, *wanted: Any) -> Form:
         return self._process.typed(form, answer, *wanted)
 
-    def run(self, into: RealBatch, rows: Numbers, out: RealBatch, steps: int, time: float, step_size: float) -> Numbers:
+    def run(
+        self,
+        into: RealBatch,
+        rows: Numbers,
+        out: RealBatch,
+        steps: int,
+        time: float,
+        step_size: float,
+    ) -> Numbers:
         """Step several times; rows of inputs before each, what was read after each.
 
         ``into`` and ``out``: variables that are set before a step, and read after it.
@@ -256,7 +291,10 @@ class HostedComponent(RemoteCalls):
 
     def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NoReturn:
         raise ComponentError(
-            self.name, "fmi2GetDirectionalDerivative", "nothing", "the acceptance tests ask no FMU for derivatives"
+            self.name,
+            "fmi2GetDirectionalDerivative",
+            "nothing",
+            "the acceptance tests ask no FMU for derivatives",
         )
 
     def free_state(self, state: Any) -> None:

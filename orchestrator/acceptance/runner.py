@@ -63,7 +63,9 @@ class AcceptanceReport:
     @property
     def not_supported(self) -> list[str]:
         """Names of what this program or machine lacks for this FMU, each once."""
-        return list(dict.fromkeys(r.fault for r in self.results if r.verdict is base.Verdict.NOT_SUPPORTED))
+        return list(
+            dict.fromkeys(r.fault for r in self.results if r.verdict is base.Verdict.NOT_SUPPORTED)
+        )
 
     @property
     def not_judged(self) -> list[str]:
@@ -83,7 +85,9 @@ class AcceptanceReport:
     def sentence(self) -> str:
         """The verdict; the frequency that it is made for is told where this shows."""
         if self.trusted:
-            return f"no check failed; not judged: {', and '.join(self.not_judged)}".removesuffix("; not judged: ")
+            return f"no check failed; not judged: {', and '.join(self.not_judged)}".removesuffix(
+                "; not judged: "
+            )
         if not self.failures:
             return f"not supported here: {', '.join(self.not_supported)}; that says nothing about the FMU"
         if self.binding_fails and self.binding is not None:
@@ -94,13 +98,19 @@ class AcceptanceReport:
 
     def as_dict(self) -> dict[str, Any]:
         return {
-            "tool": f"gfor-cosim {version('gfor-cosim')}", "fmu": str(self.fmu),
+            "tool": f"gfor-cosim {version('gfor-cosim')}",
+            "fmu": str(self.fmu),
             "binding": None if self.binding is None else str(self.binding),
-            "sha256": {"fmu": file_hash(self.fmu), "binding": file_hash(self.binding)}, "trusted": self.trusted,
-            "faults": self.faults, "not_supported": self.not_supported, "not_limited": missing(self.protections),
-            "protections": [asdict(protection) for protection in self.protections], "used_as": self.used_as,
-            "seed": self.seed, "checks": [{"question": question_of(r.check), **r.as_dict()} for r in self.results],
-        }  # fmt: skip
+            "sha256": {"fmu": file_hash(self.fmu), "binding": file_hash(self.binding)},
+            "trusted": self.trusted,
+            "faults": self.faults,
+            "not_supported": self.not_supported,
+            "not_limited": missing(self.protections),
+            "protections": [asdict(protection) for protection in self.protections],
+            "used_as": self.used_as,
+            "seed": self.seed,
+            "checks": [{"question": question_of(r.check), **r.as_dict()} for r in self.results],
+        }
 
 
 FILE_CHECKS = {
@@ -114,9 +124,14 @@ def question_of(name: str) -> str:
 
 
 def check_fmu(
-    fmu: Path, binding: Path | None = None, limits: Limits | None = None, only: tuple[str, ...] = (),
-    run_for: float = RUN_FOR, use: Use | None = None, seed: int | None = None,
-) -> AcceptanceReport:  # fmt: skip
+    fmu: Path,
+    binding: Path | None = None,
+    limits: Limits | None = None,
+    only: tuple[str, ...] = (),
+    run_for: float = RUN_FOR,
+    use: Use | None = None,
+    seed: int | None = None,
+) -> AcceptanceReport:
     """Run the acceptance tests.
 
     ``limits``: what the FMU may take; the usual limits where None.
@@ -131,7 +146,9 @@ def check_fmu(
         known = ", ".join([*FILE_CHECKS, *CHECKS])
         raise InputError(f"there is no check {', '.join(map(repr, unknown))}; there are: {known}")
     if "binding" in only and binding is None:
-        raise InputError("the check 'binding' needs a binding; give one with --binding (`gfor fmu bind` drafts one)")
+        raise InputError(
+            "the check 'binding' needs a binding; give one with --binding (`gfor fmu bind` drafts one)"
+        )
     if fmu.is_dir():
         raise InputError(f"{fmu}: it is a folder; give the path of an .fmu")
     if not fmu.is_file():
@@ -156,7 +173,9 @@ def check_fmu(
         wanted = [name for name in only if name in CHECKS] if only else list(CHECKS)
         if binding is not None and bound is None:
             # Without its port the FMU is asked in vain; what is wrong stands in a file that the user can mend at once.
-            report.results += [base.not_applicable(name, "because the binding does not fit") for name in wanted]
+            report.results += [
+                base.not_applicable(name, "because the binding does not fit") for name in wanted
+            ]
             return report
         if not wanted:
             return report
@@ -185,24 +204,33 @@ def _unpacked(fmu: Path) -> base.CheckResult:
     )
 
 
-def _bound(report: AcceptanceReport, described: FmuDescription, binding: Path) -> BoundDescription | None:
+def _bound(
+    report: AcceptanceReport, described: FmuDescription, binding: Path
+) -> BoundDescription | None:
     """The FMU behind its binding; None, with a failure in the report, where that does not fit."""
     try:
         bound = bind(described, binding)
     except BindingError as error:
         differ = any(p.kind is ErrorKind.UNITS for p in error.problems)
         says = "; ".join(map(str, error.problems))
-        result = base.failed("binding", "wrong units" if differ else "binding does not fit", f"{binding.name}: {says}")
+        result = base.failed(
+            "binding",
+            "wrong units" if differ else "binding does not fit",
+            f"{binding.name}: {says}",
+        )
         remedy = (
-            "give the unit that the FMU declares, or have modelDescription.xml corrected" if differ else result.remedy
+            "give the unit that the FMU declares, or have modelDescription.xml corrected"
+            if differ
+            else result.remedy
         )
         report.results.append(replace(result, remedy=remedy, whose=base.Whose.BINDING))
         return None
     unlike = [f"the binding has {text}" for text in bound.unlike_delivered().values()]
     report.results.append(
-        base.remarked("binding", "; ".join(unlike), "give [rating] that of one unit as delivered") if unlike
+        base.remarked("binding", "; ".join(unlike), "give [rating] that of one unit as delivered")
+        if unlike
         else base.passed("binding", "all variables are there, with the units that it says")
-    )  # fmt: skip
+    )
     return bound
 
 
@@ -233,7 +261,9 @@ class _Runner:
             self._deadline = monotonic() + _PATIENCE * crowded() * self._limits.seconds
             result = self._answer(CHECKS[name])
             if cause := likely_cause(self._subject.description, result.fault):
-                result = replace(result, evidence=f"{result.evidence}; {cause}", whose=base.Whose.BINDING)
+                result = replace(
+                    result, evidence=f"{result.evidence}; {cause}", whose=base.Whose.BINDING
+                )
             results.append(self._with_whom(result))
             self._asked.append(name)
             if name == "runs" and (because := self._too_bad(result)):
@@ -263,19 +293,24 @@ class _Runner:
         """The check's result; an FMU that refuses what every FMU must be able to do is at fault."""
         faulty = [r.check for r in self._report.results if r.fault]
         asked_of_the_file = ORDER.index(check.name) <= ORDER.index("loads")
-        missing = [name for name in ("loads", *check.needs) if name in faulty and not asked_of_the_file]
+        missing = [
+            name for name in ("loads", *check.needs) if name in faulty and not asked_of_the_file
+        ]
         if missing == ["loads"] and self._report.not_supported:
             return base.not_applicable(check.name, "because the FMU cannot run here")
         if missing:
             return base.not_applicable(
-                check.name, f"because it failed in {missing[0]!r}, without which this has no meaning"
+                check.name,
+                f"because it failed in {missing[0]!r}, without which this has no meaning",
             )
         self._subject.doing = ""
         try:
             return check.run(self._subject)
         except ProcessEndedError as error:
             doing = self._subject.doing
-            return base.failed(check.name, error.fault, f"{doing}: {error.how}" if doing else error.how)
+            return base.failed(
+                check.name, error.fault, f"{doing}: {error.how}" if doing else error.how
+            )
         except EndedError as error:
             return _ended(check.name, self._subject, error)
         except UnsupportedFmuError as error:
@@ -286,7 +321,9 @@ class _Runner:
             raise
         except CosimError as error:
             return base.failed(check.name, "refused call", str(error))
-        except Exception as error:  # a check that fails by itself must not hide the others, nor count as passed
+        except (
+            Exception
+        ) as error:  # a check that fails by itself must not hide the others, nor count as passed
             where = traceback.extract_tb(error.__traceback__)[-1]
             says = f"the check failed by itself: {error!r} in {Path(where.filename).name}, line {where.lineno}"
             return base.failed(check.name, "no verdict", says)
@@ -301,9 +338,13 @@ def _ended(name: str, subject: Subject, error: EndedError) -> base.CheckResult:
     if subject.ends is None or error.ended_at < subject.ends * (1 - 1e-9):
         says = f"it ended its simulation by itself at t = {error.ended_at:.6g} s"
         return base.remarked(
-            name, f"{says}, earlier than otherwise", "no error, but this could not be checked; ask why it ends"
+            name,
+            f"{says}, earlier than otherwise",
+            "no error, but this could not be checked; ask why it ends",
         )
-    return base.not_applicable(name, f"because it takes longer than the FMU runs, which is {error.ended_at:.6g} s")
+    return base.not_applicable(
+        name, f"because it takes longer than the FMU runs, which is {error.ended_at:.6g} s"
+    )
 
 
 _REFUSED = {

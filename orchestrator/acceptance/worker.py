@@ -19,7 +19,18 @@ from orchestrator.fmi.loaded import LoadedComponent
 from orchestrator.fmi.mailbox import DIED, Served
 from orchestrator.fmi.port import BoundDescription, PortMap, without_binding
 
-_MALLINFO2 = ["arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks", "fsmblks", "uordblks", "fordblks", "keepcost"]
+_MALLINFO2 = [
+    "arena",
+    "ordblks",
+    "smblks",
+    "hblks",
+    "hblkhd",
+    "usmblks",
+    "fsmblks",
+    "uordblks",
+    "fordblks",
+    "keepcost",
+]
 
 
 class _MallocInfo(ctypes.Structure):
@@ -82,11 +93,15 @@ class Host(Worker):
         return self._instances[self._asked]
 
     def do_open(self, name: str) -> int:
-        component = open_component(name, self._description, Path(self._request["directory"]), isolated=False)
+        component = open_component(
+            name, self._description, Path(self._request["directory"]), isolated=False
+        )
         number = next(n for n in range(_MOST) if n not in self._instances)
         self._instances[number] = component
         functions = (component.set_real, component.get_real, component.do_step)
-        self._table[number] = Served(component.pointer, *(ctypes.cast(f, ctypes.c_void_p).value for f in functions))
+        self._table[number] = Served(
+            component.pointer, *(ctypes.cast(f, ctypes.c_void_p).value for f in functions)
+        )
         return number
 
     def do_absent_functions(self) -> list[list[str]]:

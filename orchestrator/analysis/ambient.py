@@ -14,13 +14,15 @@ from orchestrator.arrays import Complex, Numbers
 from orchestrator.errors import AnalysisError
 
 _RATE = 4.0  # samples used per period of the highest frequency
-_LAGS = 1.5  # rows of the covariance's matrix [s]; longer ones take noise for modes in a record of a minute
+# rows of the covariance's matrix [s]; longer ones take noise for modes in a record of a minute
+_LAGS = 1.5
 _PARTS = 10  # of the record, each left out once
 _ORDERS = range(4, 13, 2)
 _NEAR = 0.1  # distance of two eigenvalues, in sizes, up to which they are one mode
 _OFTEN = 0.6  # part of the orders in which a mode has to be
 _LARGEST_DAMPING = 30.0
-_VAGUE = 0.15  # half-width of the frequency's interval, as a part of it, beyond which a mode is none
+# half-width of the frequency's interval, as a part of it, beyond which a mode is none
+_VAGUE = 0.15
 _SHORTEST_PERIODS = 12  # of the lowest frequency that is looked for
 _STUDENT = 2.262  # standard errors to the end of a 95 % interval from so many parts
 
@@ -45,15 +47,30 @@ def ambient_modes(times: Numbers, values: Numbers, highest_hz: float = 2.5) -> l
     parts = _covariances(y, 2 * rows)
     whole = parts.mean(axis=0)
     basis = _Basis(whole, rows)
-    found = {order: [m for m in basis.modes(order, interval) if lowest <= m[0].imag / (2 * np.pi) <= highest_hz
-                     and damping_percent(m[0]) < _LARGEST_DAMPING] for order in _ORDERS}  # fmt: skip
+    found = {
+        order: [
+            m
+            for m in basis.modes(order, interval)
+            if lowest <= m[0].imag / (2 * np.pi) <= highest_hz
+            and damping_percent(m[0]) < _LARGEST_DAMPING
+        ]
+        for order in _ORDERS
+    }
     steady = _steady({order: [value for value, _, _ in modes] for order, modes in found.items()})
-    others = [_Basis((whole * len(parts) - part) / (len(parts) - 1), rows) for part in parts] if steady else []
+    others = (
+        [_Basis((whole * len(parts) - part) / (len(parts) - 1), rows) for part in parts]
+        if steady
+        else []
+    )
     modes = []
     for order, value in steady:
-        again = np.array([_nearest([v for v, _, _ in one.modes(order, interval)], value) for one in others])
+        again = np.array(
+            [_nearest([v for v, _, _ in one.modes(order, interval)], value) for one in others]
+        )
         frequency, damping = again.imag / (2 * np.pi), np.array([damping_percent(v) for v in again])
-        spread = [float(_STUDENT * np.sqrt((len(again) - 1) * np.var(x))) for x in (frequency, damping)]
+        spread = [
+            float(_STUDENT * np.sqrt((len(again) - 1) * np.var(x))) for x in (frequency, damping)
+        ]
         if spread[0] > _VAGUE * value.imag / (2 * np.pi):
             continue
         _, share, shape = next(m for m in found[order] if m[0] == value)
@@ -66,10 +83,14 @@ def _prepared(times: Numbers, values: Numbers, highest_hz: float) -> tuple[float
     steps = np.diff(times)
     step = float(np.median(steps)) if len(steps) else 0.0
     if not step or np.abs(steps - step).max() > 0.1 * step:
-        raise AnalysisError("ambient modes need even samples without gaps; give a part of the record that has them")
+        raise AnalysisError(
+            "ambient modes need even samples without gaps; give a part of the record that has them"
+        )
     if step > 1 / (_RATE * highest_hz) * 1.01:
-        raise AnalysisError(f"a sample every {step:g} s shows no modes up to {highest_hz:g} Hz; "
-                            f"it takes {_RATE * highest_hz:g} samples a second")  # fmt: skip
+        raise AnalysisError(
+            f"a sample every {step:g} s shows no modes up to {highest_hz:g} Hz; "
+            f"it takes {_RATE * highest_hz:g} samples a second"
+        )
     thin = max(1, int(1 / (_RATE * highest_hz * step) + 1e-6))
     x = np.linspace(-1, 1, len(values))
     line = np.column_stack([np.ones(len(values)), x, x**2])
@@ -82,9 +103,15 @@ def _prepared(times: Numbers, values: Numbers, highest_hz: float) -> tuple[float
             y = np.apply_along_axis(np.convolve, 0, y, weights, "valid")[::thin]
     fewest = 20 * max(_ORDERS)
     if len(y) < fewest or (y.std(axis=0) <= 1e-9 * np.abs(values).max(axis=0)).any():
-        what = "a signal is constant" if len(y) >= fewest else f"{len(values) * step:.3g} s are too short"
+        what = (
+            "a signal is constant"
+            if len(y) >= fewest
+            else f"{len(values) * step:.3g} s are too short"
+        )
         least = 1.2 * fewest / (_RATE * highest_hz)
-        raise AnalysisError(f"{what}: no ambient modes can be identified; take {least:.0f} s or more of what moves")
+        raise AnalysisError(
+            f"{what}: no ambient modes can be identified; take {least:.0f} s or more of what moves"
+        )
     return step * thin, np.asarray(y / y.std(axis=0))
 
 
@@ -92,9 +119,12 @@ def _covariances(y: Numbers, lags: int) -> Numbers:
     """Of signals some lags apart, shape (parts, lags, m, m), each from one part of the record."""
     n = len(y) - lags
     edges = np.linspace(0, n, _PARTS + 1).astype(int)
-    return np.array([
-        [y[a + lag : b + lag].T @ y[a:b] / (b - a) for lag in range(1, lags)] for a, b in pairwise(edges)
-    ])  # fmt: skip
+    return np.array(
+        [
+            [y[a + lag : b + lag].T @ y[a:b] / (b - a) for lag in range(1, lags)]
+            for a, b in pairwise(edges)
+        ]
+    )
 
 
 class _Basis:
@@ -112,11 +142,17 @@ class _Basis:
         A = np.linalg.pinv(observed[: -self.width]) @ observed[self.width :]
         multipliers, right = np.linalg.eig(A)
         seen = observed[: self.width] @ right
-        driven = np.linalg.solve(right, (np.sqrt(self.s[:order])[:, None] * self.vh[:order])[:, : self.width])
+        driven = np.linalg.solve(
+            right, (np.sqrt(self.s[:order])[:, None] * self.vh[:order])[:, : self.width]
+        )
         sizes = np.abs(np.einsum("ik,ki->k", seen, driven))
         values = np.log(multipliers.astype(complex) + 1e-300) / interval
         return [
-            (complex(values[k]), float(2 * sizes[k] / sizes.sum()), seen[:, k] / seen[np.abs(seen[:, k]).argmax(), k])
+            (
+                complex(values[k]),
+                float(2 * sizes[k] / sizes.sum()),
+                seen[:, k] / seen[np.abs(seen[:, k]).argmax(), k],
+            )
             for k in np.flatnonzero(values.imag > 0)
         ]
 
@@ -127,10 +163,16 @@ def _steady(found: dict[int, list[complex]]) -> list[tuple[int, complex]]:
     kept = []
     for first in [v for order in sorted(left, reverse=True) for v in found[order]]:
         nearest = {order: _nearest(values, first) for order, values in left.items()}
-        group = {k: v for k, v in nearest.items() if v is not None and abs(v - first) < _NEAR * abs(first)}
+        group = {
+            k: v
+            for k, v in nearest.items()
+            if v is not None and abs(v - first) < _NEAR * abs(first)
+        }
         if len(group) < _OFTEN * len(left):
             continue
-        middle = complex(np.median([v.real for v in group.values()]), np.median([v.imag for v in group.values()]))
+        middle = complex(
+            np.median([v.real for v in group.values()]), np.median([v.imag for v in group.values()])
+        )
         order = min(group, key=lambda k: abs(group[k] - middle))
         kept.append((order, group[order]))
         for k, value in group.items():

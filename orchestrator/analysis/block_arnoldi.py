@@ -12,17 +12,21 @@ from scipy.linalg.blas import zgemm
 
 from orchestrator.arrays import Matrix, Vector
 
-WIDTH = 16  # vectors at once; an eigenvalue as often there as that may be there more often than it was found
+# vectors at once; an eigenvalue as often there as that may be there more often than it was found
+WIDTH = 16
 MOST = 640  # largest number of vectors; 48,000 states take 0.5 GB for them
-TOLERANCE = 1e-7  # of ν: what the rest may be of what is found; left and right vectors together give ν to its square
+# of ν: what the rest may be of what is found; left and right vectors together give ν to its square
+TOLERANCE = 1e-7
 
 ROUGH, _BEYOND = 1e-2, 8
 """What lies beyond a limit is known where so many values there, the largest, have settled to this part of themselves or
 to half their distance from the limit."""
 
-_GROWTH = 1.25  # values are looked at where the vectors are more by this factor; there are many operations in it
+# values are looked at where the vectors are more by this factor; there are many operations in it
+_GROWTH = 1.25
 _DEPENDENT = 1e-12  # A direction that is smaller than this part of the largest one is none
-_AGAIN = 1e-2  # where what is new of the vectors is less than this part of them, it is made orthogonal twice
+# where what is new of the vectors is less than this part of them, it is made orthogonal twice
+_AGAIN = 1e-2
 _EQUAL = 1e-6  # values of ν that differ by less than this part are one
 
 
@@ -60,7 +64,9 @@ class BlockArnoldi:
 
     def vectors(self, places: Sequence[int]) -> Vector:
         """Eigenvectors of some of the values, shape (n, number of places)."""
-        found: Vector = self._basis[:, : len(self._coordinates)] @ self._coordinates[:, list(places)]
+        found: Vector = (
+            self._basis[:, : len(self._coordinates)] @ self._coordinates[:, list(places)]
+        )
         return found
 
     def knows_all_beyond(self, size: float, wanted: Callable[[int], bool]) -> bool:
@@ -68,10 +74,15 @@ class BlockArnoldi:
         larger = int((np.abs(self.values) >= size).sum())
         beyond = slice(larger, larger + _BEYOND)
         allowed = np.maximum(ROUGH, (size / np.abs(self.values[beyond]) - 1) / 2)
-        if len(allowed) < min(_BEYOND, self._size - larger) or (self.accuracy[beyond] > allowed).any():
+        if (
+            len(allowed) < min(_BEYOND, self._size - larger)
+            or (self.accuracy[beyond] > allowed).any()
+        ):
             return False
         near = self.accuracy[:larger]
-        return bool((near <= ROUGH).all()) and not any(map(wanted, np.flatnonzero(near > TOLERANCE).tolist()))
+        return bool((near <= ROUGH).all()) and not any(
+            map(wanted, np.flatnonzero(near > TOLERANCE).tolist())
+        )
 
     def is_complete(self, larger: int) -> bool:
         """Whether none of the largest values is there so often that there may be more of it."""
@@ -88,7 +99,9 @@ class BlockArnoldi:
         directions, sizes = np.linalg.qr(rest)
         dependent = np.abs(np.diag(sizes)) <= _DEPENDENT * before.max()
         if dependent.any():
-            directions[:, dependent] = self._random.standard_normal((self._size, int(dependent.sum())))
+            directions[:, dependent] = self._random.standard_normal(
+                (self._size, int(dependent.sum()))
+            )
             sizes[dependent] = 0.0
         if dependent.any() or np.linalg.svd(sizes, compute_uv=False).min() < _AGAIN * before.max():
             again = zgemm(1.0, known, directions, trans_a=2)

@@ -47,11 +47,19 @@ class Blocks:
     ``declared``: By component and output: the inputs that its FMU says it depends on directly."""
 
     def __init__(
-        self, master: Master, step_size: float | None = None, inputs: Sequence[str] = (), outputs: Sequence[str] = (),
-        *, derivatives: bool = False, without_step: bool = False, directional: bool = False,
-        known: Mapping[str, ComponentLinearization] | None = None, schedule: Schedule | None = None,
+        self,
+        master: Master,
+        step_size: float | None = None,
+        inputs: Sequence[str] = (),
+        outputs: Sequence[str] = (),
+        *,
+        derivatives: bool = False,
+        without_step: bool = False,
+        directional: bool = False,
+        known: Mapping[str, ComponentLinearization] | None = None,
+        schedule: Schedule | None = None,
         once: bool = False,
-    ) -> None:  # fmt: skip
+    ) -> None:
         known = known or {}
         schedule = schedule or master.schedule
         self._step_aware = [name for name in master.components if knows_step(master, name)]
@@ -66,7 +74,10 @@ class Blocks:
                 f"{schedule.name!r} does in {self.parts} parts; take gauss-seidel or jacobi"
             )
         self.inputs, self.outputs = tuple(inputs), tuple(outputs)
-        self._driven, self._observed = _by_component(master, self.inputs), _by_component(master, self.outputs)
+        self._driven, self._observed = (
+            _by_component(master, self.inputs),
+            _by_component(master, self.outputs),
+        )
         _check_driven(master, self._driven)
         self.period = steps_of_period(master, self.step_size, known)
         self.sampled = tuple(name for name in repeating(master) if name not in set(known))
@@ -75,12 +86,18 @@ class Blocks:
         first_external = len(master.output_names)
         self.sources = {
             name: np.concatenate(
-                [exchange.sources, [first_external + self.inputs.index(f"{name}.{v}") for v in self._driven[name]]]
+                [
+                    exchange.sources,
+                    [first_external + self.inputs.index(f"{name}.{v}") for v in self._driven[name]],
+                ]
             ).astype(np.int64)
             for name, exchange in master.exchanges.items()
         }
         self.declared = {
-            name: {output: master.components[name].description.feedthrough(output) for output in e.outputs.names}
+            name: {
+                output: master.components[name].description.feedthrough(output)
+                for output in e.outputs.names
+            }
             for name, e in master.exchanges.items()
         }
         self.schedule = master.schedule
@@ -106,12 +123,21 @@ class Blocks:
         self, master: Master, name: str, others: Mapping[str, ComponentLinearization]
     ) -> ComponentLinearization:
         """One component, without the inputs that nothing moves where others are as they are."""
-        self._idle[name] = _idle_inputs(master, name, others) if _has_many_inputs(master, name) else frozenset()
+        self._idle[name] = (
+            _idle_inputs(master, name, others) if _has_many_inputs(master, name) else frozenset()
+        )
         return linearize_within(
-            master, name, self.step_size / self.parts, self._driven[name], self._observed[name],
-            derivatives=self._derivatives, without_step=self._untold, directional=self.directional,
-            idle=self._idle[name], once=self._once,
-        )  # fmt: skip
+            master,
+            name,
+            self.step_size / self.parts,
+            self._driven[name],
+            self._observed[name],
+            derivatives=self._derivatives,
+            without_step=self._untold,
+            directional=self.directional,
+            idle=self._idle[name],
+            once=self._once,
+        )
 
     def _anew(self, master: Master, names: Iterable[str]) -> dict[str, ComponentLinearization]:
         """All components, some of them linearised again, and with them those whose idle inputs move now."""
@@ -141,7 +167,11 @@ class Blocks:
                 f"components {', '.join(self._step_aware)} know the communication step; linearise them with "
                 f"without_step={not told} for a {'step map' if told else 'continuous model'}"
             )
-        if schedule is not None and schedule.is_second_order and schedule.parts(self.step_size) != self.parts:
+        if (
+            schedule is not None
+            and schedule.is_second_order
+            and schedule.parts(self.step_size) != self.parts
+        ):
             raise ValueError(
                 f"components were linearised for {self.parts} parts of a step, and schedule {schedule.name!r} has "
                 f"{schedule.parts(self.step_size)}"
@@ -150,7 +180,11 @@ class Blocks:
     def over_step(self, name: str) -> LineMap:
         """The map of a component over the whole step, with inputs that follow straight lines."""
         c = self.components[name]
-        return LineMap(c.A, c.B, np.zeros_like(c.B)) if self.parts == 1 else over_parts(c.A, c.B, self.parts)
+        return (
+            LineMap(c.A, c.B, np.zeros_like(c.B))
+            if self.parts == 1
+            else over_parts(c.A, c.B, self.parts)
+        )
 
     @property
     def serves_continuous(self) -> bool:
@@ -188,17 +222,32 @@ class Blocks:
 
 
 def linearize_within(
-    master: Master, name: str, step_size: float, inputs: Sequence[str] = (), observed: Sequence[str] = (), *,
-    derivatives: bool = False, without_step: bool = False, directional: bool = False, idle: Collection[str] = (),
+    master: Master,
+    name: str,
+    step_size: float,
+    inputs: Sequence[str] = (),
+    observed: Sequence[str] = (),
+    *,
+    derivatives: bool = False,
+    without_step: bool = False,
+    directional: bool = False,
+    idle: Collection[str] = (),
     once: bool = False,
-) -> ComponentLinearization:  # fmt: skip
+) -> ComponentLinearization:
     """Linearise one component of a running system, which is given the step [s] meanwhile if it knows the step."""
     exchange, time = master.exchanges[name], master.time
     with other_step(master, name, 0.0 if without_step else step_size):
         if directional:
             return linearize_by_derivatives(exchange, time, step_size, inputs, observed)
         return linearize_component(
-            exchange, time, step_size, inputs, observed, derivatives=derivatives, idle=idle, once=once
+            exchange,
+            time,
+            step_size,
+            inputs,
+            observed,
+            derivatives=derivatives,
+            idle=idle,
+            once=once,
         )
 
 
@@ -206,7 +255,9 @@ def _has_many_inputs(master: Master, name: str) -> bool:
     return len(master.exchanges[name].inputs.names) >= MANY_INPUTS
 
 
-def _idle_inputs(master: Master, name: str, found: Mapping[str, ComponentLinearization]) -> frozenset[str]:
+def _idle_inputs(
+    master: Master, name: str, found: Mapping[str, ComponentLinearization]
+) -> frozenset[str]:
     """Inputs of a component whose sources answer nothing at all, to the last bit."""
     feeds = {str(c.target): c.source for c in master.system.connections}
     still = {
@@ -216,17 +267,30 @@ def _idle_inputs(master: Master, name: str, found: Mapping[str, ComponentLineari
         if not (C.any() or D.any())
     }
     inputs = master.exchanges[name].inputs.names
-    return frozenset(variable for variable in inputs if str(feeds.get(f"{name}.{variable}")) in still)
+    return frozenset(
+        variable for variable in inputs if str(feeds.get(f"{name}.{variable}")) in still
+    )
 
 
 def _by_component(master: Master, names: Sequence[str]) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {name: [] for name in master.components}
     for full in names:
         component, _, variable = full.partition(".")
-        if component not in found or variable not in master.components[component].description.variables:
-            known = [f"{name}.{own}" for name, one in master.components.items() for own in one.description.variables]
+        if (
+            component not in found
+            or variable not in master.components[component].description.variables
+        ):
+            known = [
+                f"{name}.{own}"
+                for name, one in master.components.items()
+                for own in one.description.variables
+            ]
             near = difflib.get_close_matches(full, known, 3)
-            hint = f"did you mean {' or '.join(near)}?" if near else "`gfor fmu info` lists the variables of an FMU"
+            hint = (
+                f"did you mean {' or '.join(near)}?"
+                if near
+                else "`gfor fmu info` lists the variables of an FMU"
+            )
             raise InputError(f"linear model: there is no variable {full!r}; {hint}")
         found[component].append(variable)
     return found
@@ -239,8 +303,12 @@ def _check_driven(master: Master, driven: Mapping[str, Sequence[str]]) -> None:
         for variable in variables:
             info = master.components[name].description.variables[variable]
             if f"{name}.{variable}" in fed:
-                raise InputError(f"linear model: {name}.{variable} is fed by {fed[f'{name}.{variable}']}")
-            if info.type != "Real" or not (info.causality == "input" or info.variability == "tunable"):
+                raise InputError(
+                    f"linear model: {name}.{variable} is fed by {fed[f'{name}.{variable}']}"
+                )
+            if info.type != "Real" or not (
+                info.causality == "input" or info.variability == "tunable"
+            ):
                 raise InputError(
                     f"linear model: {name}.{variable} is a {info.variability} {info.causality} of type {info.type}; "
                     "an input must be a Real tunable parameter or an open Real input"

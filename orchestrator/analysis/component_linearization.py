@@ -51,8 +51,10 @@ class ComponentLinearization:
     # or they were not requested
     A_c: Matrix | None
     B_c: Matrix | None
-    disagreement: float  # largest difference of an element of A, B, C or D between the two perturbation sizes
-    source: str = PERTURBED  # origin of the model: ``perturbed``, ``directional``, ``packed`` or ``identified``
+    # largest difference of an element of A, B, C or D between the two perturbation sizes
+    disagreement: float
+    # origin of the model: ``perturbed``, ``directional``, ``packed`` or ``identified``
+    source: str = PERTURBED
     # The same matrices, computed in other ways, which should hardly differ: with the other perturbation size, and with
     # a perturbation to one side only. Where some columns have a smaller size, also with twice the usual size. Empty for
     # a model that was not perturbed.
@@ -65,9 +67,16 @@ class ComponentLinearization:
 
 
 def linearize_component(
-    exchange: Exchange, time: float, step_size: float, inputs: Sequence[str] = (), observed: Sequence[str] = (), *,
-    derivatives: bool = False, idle: Collection[str] = (), once: bool = False,
-) -> ComponentLinearization:  # fmt: skip
+    exchange: Exchange,
+    time: float,
+    step_size: float,
+    inputs: Sequence[str] = (),
+    observed: Sequence[str] = (),
+    *,
+    derivatives: bool = False,
+    idle: Collection[str] = (),
+    once: bool = False,
+) -> ComponentLinearization:
     """Perturb one component around its present state, and restore that state.
 
     Where its states cannot be set, the linear model inside its FMU is taken, if that is of this operating point.
@@ -75,7 +84,8 @@ def linearize_component(
     ``derivatives``: also difference the FMU's own derivatives, if it declares them; it costs a third more.
     ``idle``: connected inputs that nothing moves: they are not perturbed, and their columns of B and D are 0."""
     component = exchange.component
-    StateAccess(component)  # refuses a component that can neither be perturbed nor has a model inside
+    # refuses a component that can neither be perturbed nor has a model inside
+    StateAccess(component)
     if (inside := embedded_model(component)) is not None:
         return _from_inside(exchange, inside, time, step_size, inputs, observed)
     names = component.description.states
@@ -84,7 +94,11 @@ def linearize_component(
     entries = (*exchange.inputs.names, *inputs)
     exits = (*exchange.outputs.names, *observed)
     moved = [k for k, name in enumerate(entries) if name not in idle]
-    found = perturb(PerturbedStep(component, [entries[k] for k in moved], exits, time, step_size), rates, once=once)
+    found = perturb(
+        PerturbedStep(component, [entries[k] for k in moved], exits, time, step_size),
+        rates,
+        once=once,
+    )
 
     def by_input(answers: Matrix) -> Matrix:
         if len(moved) == len(entries):
@@ -109,7 +123,9 @@ def linearize_component(
         D_o=by_input(small.outputs[p:]),
         A_c=small.slopes[:, :n] if len(rates) == n and derivatives else None,
         B_c=by_input(small.slopes) if len(rates) == n and derivatives else None,
-        disagreement=max(float(np.abs(a - b).max(initial=0.0)) for a, b in zip(one, other, strict=True)),
+        disagreement=max(
+            float(np.abs(a - b).max(initial=0.0)) for a, b in zip(one, other, strict=True)
+        ),
         variants=(
             other,
             step_map(small.after_up, small.outputs_up),
@@ -121,7 +137,11 @@ def linearize_component(
 
 
 def linearize_by_derivatives(
-    exchange: Exchange, time: float, step_size: float, inputs: Sequence[str] = (), observed: Sequence[str] = ()
+    exchange: Exchange,
+    time: float,
+    step_size: float,
+    inputs: Sequence[str] = (),
+    observed: Sequence[str] = (),
 ) -> ComponentLinearization:
     """The component's linear model from the FMU's own directional derivatives, without a perturbation and without a
     step.
@@ -146,19 +166,27 @@ def linearize_by_derivatives(
         check_derivatives(component, whole, (*rates, *exits), (*states, *entries))
     else:
         model = ContinuousModel(states, rates, entries, exits, *blocks)
-        check_response(component, model, "what its FMU gives as directional derivatives", time, step_size)
+        check_response(
+            component, model, "what its FMU gives as directional derivatives", time, step_size
+        )
     return _over_step(exchange, step_size, DIRECTIONAL, states, entries, observed, *blocks)
 
 
 def _from_inside(
-    exchange: Exchange, model: EmbeddedModel, time: float, step_size: float, inputs: Sequence[str],
+    exchange: Exchange,
+    model: EmbeddedModel,
+    time: float,
+    step_size: float,
+    inputs: Sequence[str],
     observed: Sequence[str],
-) -> ComponentLinearization:  # fmt: skip
+) -> ComponentLinearization:
     """The model inside an FMU, compared with the FMU and taken over one communication step with its inputs held."""
     component = exchange.component
     check_operating_point(component, model)
     entries, exits = (*exchange.inputs.names, *inputs), (*exchange.outputs.names, *observed)
-    if missing := [v for v in entries if v not in model.inputs] + [v for v in exits if v not in model.outputs]:
+    if missing := [v for v in entries if v not in model.inputs] + [
+        v for v in exits if v not in model.outputs
+    ]:
         raise AnalysisError(
             f"component {component.name!r}: the linear model inside its FMU has no {', '.join(map(repr, missing))}; it "
             f"has the inputs {', '.join(model.inputs)} and the outputs {', '.join(model.outputs)}"
@@ -173,24 +201,47 @@ def _from_inside(
 
 
 def _over_step(
-    exchange: Exchange, step_size: float, source: str, states: tuple[str, ...], entries: tuple[str, ...],
-    observed: Sequence[str], A_c: Matrix, B_c: Matrix, C: Matrix, D: Matrix,
-) -> ComponentLinearization:  # fmt: skip
+    exchange: Exchange,
+    step_size: float,
+    source: str,
+    states: tuple[str, ...],
+    entries: tuple[str, ...],
+    observed: Sequence[str],
+    A_c: Matrix,
+    B_c: Matrix,
+    C: Matrix,
+    D: Matrix,
+) -> ComponentLinearization:
     """A continuous model, and its exact map over a communication step with the inputs held."""
     p = len(exchange.outputs.names)
     A, B = over_held_inputs(A_c, B_c, step_size)
     return ComponentLinearization(
-        exchange.component.name, states, entries, exchange.outputs.names, A=A, B=B, C=C[:p], D=D[:p],
-        observed=tuple(observed), C_o=C[p:], D_o=D[p:], A_c=A_c, B_c=B_c, disagreement=0.0, source=source,
-    )  # fmt: skip
+        exchange.component.name,
+        states,
+        entries,
+        exchange.outputs.names,
+        A=A,
+        B=B,
+        C=C[:p],
+        D=D[:p],
+        observed=tuple(observed),
+        C_o=C[p:],
+        D_o=D[p:],
+        A_c=A_c,
+        B_c=B_c,
+        disagreement=0.0,
+        source=source,
+    )
 
 
 SIZES = (1e-5, 2e-5)
 """Two sizes of central differences, relative to max(1, |value|). The difference between both results shows their
 accuracy."""
 
-AGREES = 1e-4  # largest relative difference of an element from its central one: a hundredth of a point of damping
-_NEARBY = (1e-7, 1e-9, 1e-11)  # smaller sizes, which are tried if a limit lies within the first ones
+# largest relative difference of an element from its central one: a hundredth of a point of damping
+AGREES = 1e-4
+# smaller sizes, which are tried if a limit lies within the first ones
+_NEARBY = (1e-7, 1e-9, 1e-11)
 _BENT, _FITS = 0.1, 0.01
 """A difference quotient that changes by more than the first part depends on the size. A quotient that differs by less
 than the second part confirms the derivative."""
@@ -200,10 +251,16 @@ _ROUNDING = 1e-8
 size of the difference."""
 
 
-def check_derivatives(component: Component, given: Matrix, unknowns: Sequence[str], knowns: Sequence[str]) -> None:
+def check_derivatives(
+    component: Component, given: Matrix, unknowns: Sequence[str], knowns: Sequence[str]
+) -> None:
     """Compare partial derivatives that an FMU gives with differences of its variables, and put the FMU back."""
     one, two = _central_differences(component, unknowns, knowns)
-    allowed = AGREES * np.abs(one) + 3 * np.abs(one - two) + _ROUNDING * np.abs(one).max(axis=1, initial=0.0)[:, None]
+    allowed = (
+        AGREES * np.abs(one)
+        + 3 * np.abs(one - two)
+        + _ROUNDING * np.abs(one).max(axis=1, initial=0.0)[:, None]
+    )
     differs = np.abs(given - one)
     wrong = ~(differs <= allowed)
     if wrong.any():
@@ -221,9 +278,13 @@ def check_derivatives(component: Component, given: Matrix, unknowns: Sequence[st
 
 
 def _right_nearby(
-    component: Component, given: Matrix, far: Matrix, unknowns: Sequence[str], knowns: Sequence[str],
+    component: Component,
+    given: Matrix,
+    far: Matrix,
+    unknowns: Sequence[str],
+    knowns: Sequence[str],
     doubted: NDArray[np.bool_],
-) -> NDArray[np.bool_]:  # fmt: skip
+) -> NDArray[np.bool_]:
     """The doubted elements that are right for smaller changes; the larger change has run into a limit.
 
     Only an element whose difference quotient depends on the size is looked at again: a wrong derivative of something
@@ -240,10 +301,16 @@ def _right_nearby(
 
 
 def _central_differences(
-    component: Component, unknowns: Sequence[str], knowns: Sequence[str], sizes: Sequence[float] = SIZES
+    component: Component,
+    unknowns: Sequence[str],
+    knowns: Sequence[str],
+    sizes: Sequence[float] = SIZES,
 ) -> list[Matrix]:
     before = RealBatch(component, knowns).read().copy()
-    perturbed, follows = [RealBatch(component, [name]) for name in knowns], RealBatch(component, unknowns)
+    perturbed, follows = (
+        [RealBatch(component, [name]) for name in knowns],
+        RealBatch(component, unknowns),
+    )
     found = [np.zeros((len(unknowns), len(knowns))) for _ in sizes]
     saved = component.save_state()
     try:

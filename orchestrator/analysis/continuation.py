@@ -48,10 +48,14 @@ class Eigenpair:
     def within(self, places: Sequence[int]) -> "Eigenpair":
         """The part of the mode that is in some of the states, scaled anew; like no other where that is little."""
         left, right = self.left[places], self.right[places]
-        return _pair(self.eigenvalue, left if abs(np.vdot(right, left)) > _LITTLE else 0 * left, right)
+        return _pair(
+            self.eigenvalue, left if abs(np.vdot(right, left)) > _LITTLE else 0 * left, right
+        )
 
 
-def eigenpairs(model: LinearModel, lowest_hz: float, highest_hz: float) -> tuple[list[Eigenpair], Vector]:
+def eigenpairs(
+    model: LinearModel, lowest_hz: float, highest_hz: float
+) -> tuple[list[Eigenpair], Vector]:
     """The eigenpairs of a frequency range [Hz], one of each conjugate pair, and all eigenvalues [rad/s]."""
     lambdas, left, right = eigenvectors(model)
     chosen = in_range(lambdas, lowest_hz, highest_hz)
@@ -84,9 +88,13 @@ is a system that has to be started.
 
 
 def follow_along(
-    start: Eigenpair, model_at: Callable[[float], LinearModel], begin: float, end: float, strides: Strides = USUAL,
+    start: Eigenpair,
+    model_at: Callable[[float], LinearModel],
+    begin: float,
+    end: float,
+    strides: Strides = USUAL,
     common: Sequence[str] = (),
-) -> Eigenpair:  # fmt: skip
+) -> Eigenpair:
     """Follow a mode along a path from ``begin`` to ``end``, in strides short enough to recognise it.
 
     ``common``: states by which modes are recognised, where not all models have the same; the start's vectors hold these
@@ -98,7 +106,9 @@ def follow_along(
         model = model_at(there)
         states = [model.names.index(name) for name in common]
         found = _recognise(
-            pair, [p.within(states) if states else p for p in pairs_near(model, pair.eigenvalue)], strides
+            pair,
+            [p.within(states) if states else p for p in pairs_near(model, pair.eigenvalue)],
+            strides,
         )
         if found is not None:
             here, pair, stride = there, found, 2 * stride
@@ -129,15 +139,20 @@ def between(one: LinearModel, other: LinearModel) -> Callable[[float], LinearMod
 
 
 def pair_of(mode: Mode, names: Sequence[str]) -> Eigenpair:
-    return _pair(mode.eigenvalue, *(np.array([v[name] for name in names]) for v in (mode.left, mode.shape)))
+    return _pair(
+        mode.eigenvalue, *(np.array([v[name] for name in names]) for v in (mode.left, mode.shape))
+    )
 
 
-def _recognise(pair: Eigenpair, candidates: Sequence[Eigenpair], strides: Strides) -> Eigenpair | None:
+def _recognise(
+    pair: Eigenpair, candidates: Sequence[Eigenpair], strides: Strides
+) -> Eigenpair | None:
     alike = [pair.similarity(candidate) for candidate in candidates]
     order = np.argsort(alike)[::-1]
     if not len(order) or not alike[order[0]] >= strides.same:
         return None
-    beside = max([alike[k] for k in order[1:]] + [alike[order[0]] - 1])  # above 1 it is half of a double eigenvalue
+    # above 1 it is half of a double eigenvalue
+    beside = max([alike[k] for k in order[1:]] + [alike[order[0]] - 1])
     return candidates[order[0]] if beside <= strides.rival else None
 
 

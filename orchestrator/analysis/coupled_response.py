@@ -42,7 +42,8 @@ _SECONDS, _WALL, _LEAST, _SHORT = 5.0, 8.0, 0.1, 1.0
 """Longest simulated time for which a response is followed [s], longest computing time for it [s], least simulated time
 [s], and the simulated time below which the verdict states how short it was [s]."""
 
-_SAMPLE, _WINDOWS = 5e-3, 10  # between compared points [s], and windows in which errors are relative to the response
+# between compared points [s], and windows in which errors are relative to the response
+_SAMPLE, _WINDOWS = 5e-3, 10
 _DENSE = 500  # up to this number of states, a power of the step map costs less than single steps
 _STANDS, _MOVES = 1e-10, 1e-7
 """A state stands still if its elements of the step map differ from those of a constant by less than the first figure,
@@ -56,7 +57,8 @@ class Disagreement:
     error: float  # relative to the response's size at that time
     seconds: float  # how long the response was followed [s]
     size: float  # of the disturbance, one of `SIZES`
-    smooth: bool = True  # whether the disagreement at the size before is that of a curve, and of no edge
+    # whether the disagreement at the size before is that of a curve, and of no edge
+    smooth: bool = True
 
 
 def foreign_components(master: Master) -> list[str]:
@@ -68,7 +70,9 @@ def foreign_components(master: Master) -> list[str]:
     return found
 
 
-def confirmed(master: Master, blocks: Blocks, model: LinearModel, stability: Stability) -> Stability:
+def confirmed(
+    master: Master, blocks: Blocks, model: LinearModel, stability: Stability
+) -> Stability:
     """The verdict on a system, or "not known" if the linear model calls it stable and the response of a foreign FMU
     differs."""
     if not stability.stable:
@@ -91,7 +95,10 @@ def _standstill(blocks: Blocks, foreign: Sequence[str]) -> str:
         c = blocks.components[name]
         rows = np.abs(np.hstack([c.A - np.eye(len(c.A)), c.B])).max(axis=1, initial=0.0) <= _STANDS
         if c.A_c is not None and c.B_c is not None:
-            rows &= np.abs(np.hstack([c.A_c, c.B_c])).max(axis=1, initial=0.0) * blocks.step_size > _MOVES
+            rows &= (
+                np.abs(np.hstack([c.A_c, c.B_c])).max(axis=1, initial=0.0) * blocks.step_size
+                > _MOVES
+            )
         elif not rows.all():
             continue
         if rows.any():
@@ -110,9 +117,16 @@ def _departure(master: Master, model: LinearModel, foreign: Sequence[str]) -> tu
     try:
         found = worst_disagreement(master, model)
     except ComponentError as error:
-        return f"after a small disturbance the FMUs cannot be run to confirm the linear model: {error}", ""
+        return (
+            f"after a small disturbance the FMUs cannot be run to confirm the linear model: {error}",
+            "",
+        )
     of = found.state.partition(".")[0]
-    whose = f"component {of!r}" if of in foreign else f"the system with the foreign FMU of {', '.join(foreign)}"
+    whose = (
+        f"component {of!r}"
+        if of in foreign
+        else f"the system with the foreign FMU of {', '.join(foreign)}"
+    )
     if not found.error > LARGEST_ERROR:
         if found.size == SIZES[-1] and not found.smooth:
             return (
@@ -143,11 +157,18 @@ def worst_disagreement(master: Master, model: LinearModel) -> Disagreement:
     """Disturb all states, run the FMUs, and compare with z⁺ = A·z; the smallest disagreement of all `SIZES`."""
     state = CoupledState(master)
     x_0 = state.read()
-    settable = np.concatenate([
-        np.full(len(c.description.states), c.description.states_are_settable) for c in master.components.values()
-    ])  # fmt: skip
+    settable = np.concatenate(
+        [
+            np.full(len(c.description.states), c.description.states_are_settable)
+            for c in master.components.values()
+        ]
+    )
     # Random signs excite every mode. They are the same in every call.
-    shape = np.random.default_rng(1).choice([-1.0, 1.0], len(x_0)) * np.maximum(1.0, np.abs(x_0)) * settable
+    shape = (
+        np.random.default_rng(1).choice([-1.0, 1.0], len(x_0))
+        * np.maximum(1.0, np.abs(x_0))
+        * settable
+    )
     every = model.period * max(1, round(_SAMPLE / (model.period * master.clock.step_size)))
 
     def departure(size: float, times: int | None = None) -> _Departure:
@@ -166,18 +187,30 @@ def worst_disagreement(master: Master, model: LinearModel) -> Disagreement:
     smooth = True
     if best.size == SIZES[-1] and error <= LARGEST_ERROR:
         larger, smaller = tried[:2]
-        if len(larger.difference) < len(smaller.difference):  # the computing time ended it, and not the model
+        if len(larger.difference) < len(
+            smaller.difference
+        ):  # the computing time ended it, and not the model
             larger = departure(larger.size, len(smaller.difference))
         smooth = _is_curvature(larger, smaller)
     return Disagreement(
-        model.names[i], float(k + 1) * interval, error, len(best.relative) * interval, best.size, smooth
+        model.names[i],
+        float(k + 1) * interval,
+        error,
+        len(best.relative) * interval,
+        best.size,
+        smooth,
     )
 
 
 def _response(
-    master: Master, state: CoupledState, model: LinearModel, x_0: Matrix, disturbance: Matrix, every: int,
+    master: Master,
+    state: CoupledState,
+    model: LinearModel,
+    x_0: Matrix,
+    disturbance: Matrix,
+    every: int,
     times: int | None,
-) -> tuple[Matrix, Matrix]:  # fmt: skip
+) -> tuple[Matrix, Matrix]:
     """Odd part of the response to a disturbance up and down, shape (times, states), and the z that it begins with."""
     up, z_up = _run(master, state, model, x_0 + disturbance, every, times)
     down, z_down = _run(master, state, model, x_0 - disturbance, every, len(up))
@@ -185,11 +218,20 @@ def _response(
 
 
 def _run(
-    master: Master, state: CoupledState, model: LinearModel, x: Matrix, every: int, times: int | None
+    master: Master,
+    state: CoupledState,
+    model: LinearModel,
+    x: Matrix,
+    every: int,
+    times: int | None,
 ) -> tuple[Matrix, Matrix]:
     """States from x on at regular numbers of steps, until the wanted number of times or the computing time is reached;
     and z at the start."""
-    held = [master.output_names.index(name.removesuffix(HELD)) for name in model.names if name.endswith(HELD)]
+    held = [
+        master.output_names.index(name.removesuffix(HELD))
+        for name in model.names
+        if name.endswith(HELD)
+    ]
     interval = every * master.clock.step_size
     rows: list[Matrix] = []
     with state.put_back():

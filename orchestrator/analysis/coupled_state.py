@@ -16,7 +16,9 @@ class CoupledState:
 
     def __init__(self, master: Master) -> None:
         self._master = master
-        self._access = {name: StateAccess(component) for name, component in master.components.items()}
+        self._access = {
+            name: StateAccess(component) for name, component in master.components.items()
+        }
 
     def read(self) -> Matrix:
         return np.concatenate([access.read() for access in self._access.values()])
@@ -61,7 +63,11 @@ class CoupledState:
 
     def _save(self) -> tuple[dict[str, Any], Matrix, int]:
         master = self._master
-        return {n: c.save_state() for n, c in master.components.items()}, master.y.copy(), master.index
+        return (
+            {n: c.save_state() for n, c in master.components.items()},
+            master.y.copy(),
+            master.index,
+        )
 
     def _restore(self, saved: dict[str, Any], y: Matrix, index: int) -> None:
         master = self._master

@@ -18,10 +18,13 @@ from orchestrator.coupling.master import Master
 from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.instance import open_component
 
-_STEPS = 20  # communication steps of a response: what grows as below does not ask for what came before them
-_GROWS = 1.1  # factor in a communication step: what grows less is left to the run, where it can be seen growing
+# communication steps of a response: what grows as below does not ask for what came before them
+_STEPS = 20
+# factor in a communication step: what grows less is left to the run, where it can be seen growing
+_GROWS = 1.1
 _MOVED = 1e-3  # by how much an input is moved, of 1 or of its value
-_TURNS, _LATE = 300, 100  # steps of the linear model, and those at the end over which growth is measured
+# steps of the linear model, and those at the end over which growth is measured
+_TURNS, _LATE = 300, 100
 
 
 def coupling_growth(master: Master, boxes: Sequence[str]) -> list[str]:
@@ -31,7 +34,9 @@ def coupling_growth(master: Master, boxes: Sequence[str]) -> list[str]:
     growth = _growth(compose(blocks, master.schedule))
     if not growth > _GROWS:
         return []
-    guilty = [name for name in boxes if not _without(blocks, master, known, name) > _GROWS] or list(boxes)
+    guilty = [name for name in boxes if not _without(blocks, master, known, name) > _GROWS] or list(
+        boxes
+    )
     micro = master.clock.step_size * 1e6
     return [
         f"component {name!r}: {_gain_in_words(known[name])}, and the network answers at the next step: at {micro:g} µs "
@@ -47,7 +52,11 @@ def _responding(master: Master, name: str) -> ComponentLinearization:
 
     Its states are past inputs."""
     exchange = master.exchanges[name]
-    rest, m, p = exchange.inputs.values.copy(), len(exchange.inputs.names), len(exchange.outputs.names)
+    rest, m, p = (
+        exchange.inputs.values.copy(),
+        len(exchange.inputs.names),
+        len(exchange.outputs.names),
+    )
     before = _run(master, name, rest)
     responses = np.zeros((_STEPS, p, m))
     for j in range(m):
@@ -63,13 +72,30 @@ def _responding(master: Master, name: str) -> ComponentLinearization:
     none = np.zeros((0, n)), np.zeros((0, m))
     inputs, outputs = tuple(exchange.inputs.names), tuple(exchange.outputs.names)
     return ComponentLinearization(
-        name, states, inputs, outputs, A, B, C, np.zeros((p, m)), (), *none, None, None, 0.0, IDENTIFIED
+        name,
+        states,
+        inputs,
+        outputs,
+        A,
+        B,
+        C,
+        np.zeros((p, m)),
+        (),
+        *none,
+        None,
+        None,
+        0.0,
+        IDENTIFIED,
     )
 
 
 def _run(master: Master, name: str, inputs: Numbers) -> Numbers:
     """Coupled outputs of a new instance after each step with inputs held, shape (steps, p)."""
-    plan, exchange, h = master.system.components[name], master.exchanges[name], master.clock.step_size
+    plan, exchange, h = (
+        master.system.components[name],
+        master.exchanges[name],
+        master.clock.step_size,
+    )
     with ExitStack() as release:
         component = open_component(name, plan.description, isolated=plan.isolated)
         release.enter_context(component)
@@ -91,7 +117,9 @@ def _run(master: Master, name: str, inputs: Numbers) -> Numbers:
     return np.array(rows)
 
 
-def _without(blocks: Blocks, master: Master, known: Mapping[str, ComponentLinearization], name: str) -> float:
+def _without(
+    blocks: Blocks, master: Master, known: Mapping[str, ComponentLinearization], name: str
+) -> float:
     box = known[name]
     kept, blocks.components[name] = blocks.components[name], _deaf(box)
     try:
@@ -102,9 +130,22 @@ def _without(blocks: Blocks, master: Master, known: Mapping[str, ComponentLinear
 
 def _deaf(box: ComponentLinearization) -> ComponentLinearization:
     return ComponentLinearization(
-        box.name, box.states, box.inputs, box.outputs, box.A, box.B, 0 * box.C, box.D, (), box.C_o, box.D_o, None, None,
-        0.0, IDENTIFIED,
-    )  # fmt: skip
+        box.name,
+        box.states,
+        box.inputs,
+        box.outputs,
+        box.A,
+        box.B,
+        0 * box.C,
+        box.D,
+        (),
+        box.C_o,
+        box.D_o,
+        None,
+        None,
+        0.0,
+        IDENTIFIED,
+    )
 
 
 def _growth(model: LinearModel) -> float:

@@ -21,7 +21,8 @@ from orchestrator.arrays import Vector
 from orchestrator.errors import AnalysisError
 
 DENSE = 200  # up to this number of states, the full spectrum is cheaper
-_STRETCH = 1.35  # ratio of the ends of the stretches of the range: the region is a wedge, so discs grow upwards
+# ratio of the ends of the stretches of the range: the region is a wedge, so discs grow upwards
+_STRETCH = 1.35
 
 _SHORT_STRETCH = 1.15
 """The same where a model has a hub: a factorisation is worth few vectors there, and short stretches keep the crowd of
@@ -35,7 +36,8 @@ _KEPT = 100
 """Least number of vectors that Arnoldi's method keeps. With 50 it begins anew more often, and solves a fifth more
 equations (299 buses, 0.1 to 2 Hz)."""
 
-_KEPT_FOR_ONE = 30  # the same where only the eigenvalue nearest to the point is looked for, mostly next to it
+# the same where only the eigenvalue nearest to the point is looked for, mostly next to it
+_KEPT_FOR_ONE = 30
 
 _TOLERANCE = 1e-9
 """Of Arnoldi's method, relative. The last digits of eigenvalues at the rim, which crowd, cost most of its equations;
@@ -54,7 +56,8 @@ _BESIDE = 1e-7
 6e-7 rad/s, on it by 1.5e-3. The point moves then."""
 
 _SMALLEST = 1e-4  # smallest size of a cell of the region, relative to its distance from 0
-_UNSTABLE_MARGIN = 0.1  # how far into instability the region reaches: to this negative damping ratio
+# how far into instability the region reaches: to this negative damping ratio
+_UNSTABLE_MARGIN = 0.1
 
 
 def find_critical_modes(
@@ -78,21 +81,29 @@ def find_critical_modes(
         found = spectra.find_modes(model, lowest_hz, highest_hz)
     else:
         beyond = 1 + _SMALLEST  # a cell does not own its upper edges
-        found = _search(model, 2 * np.pi * lowest_hz, 2 * np.pi * highest_hz * beyond, damping * beyond)
+        found = _search(
+            model, 2 * np.pi * lowest_hz, 2 * np.pi * highest_hz * beyond, damping * beyond
+        )
     wanted = (m for m in found if lowest_hz <= m.frequency_hz <= highest_hz)
-    return spectra.least_damped_first(m for m in wanted if -_UNSTABLE_MARGIN <= m.damping_ratio <= damping)
+    return spectra.least_damped_first(
+        m for m in wanted if -_UNSTABLE_MARGIN <= m.damping_ratio <= damping
+    )
 
 
 def nearest_eigenvalue(model: LinearModel, wanted: complex) -> complex:
     """The eigenvalue λ [rad/s] nearest to a given one, from the sparse equations alone."""
     if len(model.names) <= DENSE:
-        values, _ = spectra.to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
+        values, _ = spectra.to_continuous(
+            np.linalg.eigvals(model.A).astype(complex), model.step_size
+        )
         return complex(values[np.argmin(np.abs(values - wanted))])
     values = Search(model, wanted).nearest(2, _KEPT_FOR_ONE)
     return complex(values[np.argmin(np.abs(values - wanted))])
 
 
-def nearest_pairs(model: LinearModel, wanted: complex, count: int) -> list[tuple[complex, Vector, Vector]]:
+def nearest_pairs(
+    model: LinearModel, wanted: complex, count: int
+) -> list[tuple[complex, Vector, Vector]]:
     """The eigenvalues λ [rad/s] nearest to a given one, each with its left and right eigenvector."""
     search = Search(model, wanted)
     search.nearest(count)
@@ -126,7 +137,10 @@ class _Cell:
 
     def holds(self, value: complex) -> bool:
         """Whether a point lies in the cell, which includes its lower edges but not the upper ones."""
-        return self.low <= value.imag < self.high and self.least <= spectra.damping_ratio(value) < self.most
+        return (
+            self.low <= value.imag < self.high
+            and self.least <= spectra.damping_ratio(value) < self.most
+        )
 
     def halves(self) -> tuple["_Cell", "_Cell"]:
         """Cut across the longer side."""
@@ -137,11 +151,15 @@ class _Cell:
         return replace(self, most=between), replace(self, least=between)
 
 
-def _search(model: LinearModel, lowest: float, highest: float, damping: float) -> list[spectra.Mode]:
+def _search(
+    model: LinearModel, lowest: float, highest: float, damping: float
+) -> list[spectra.Mode]:
     """Cover the region with discs. If a disc is too small, find more eigenvalues around its point, or cut the cell."""
     modes: list[spectra.Mode] = []
     stretch = _SHORT_STRETCH if model.is_searched_in_blocks else _STRETCH
-    edges = np.geomspace(lowest, highest, 1 + int(np.ceil(np.log(highest / lowest) / np.log(stretch)))).tolist()
+    edges = np.geomspace(
+        lowest, highest, 1 + int(np.ceil(np.log(highest / lowest) / np.log(stretch)))
+    ).tolist()
     waiting = [_Cell(low, high, -_UNSTABLE_MARGIN, damping) for low, high in pairwise(edges)]
     while waiting:
         cell = waiting.pop()
@@ -162,7 +180,11 @@ def _searched(model: LinearModel, cell: _Cell) -> "tuple[Search, NDArray[np.comp
     for moved in (0.0, 0.02, 0.05):
         search = Search(model, cell.centre + moved * cell.radius)
         values = search.reaching((1 + moved) * cell.radius, cell.holds)
-        if values is None or not len(values) or np.abs(values - search.centre).min() > _BESIDE * abs(search.centre):
+        if (
+            values is None
+            or not len(values)
+            or np.abs(values - search.centre).min() > _BESIDE * abs(search.centre)
+        ):
             break
     return search, values
 
@@ -209,7 +231,10 @@ class Search:
         return None
 
     def modes(self, chosen: Sequence[int]) -> list[spectra.Mode]:
-        return [spectra.make_mode(value, left, right, self._model.names) for value, left, right in self.pairs(chosen)]
+        return [
+            spectra.make_mode(value, left, right, self._model.names)
+            for value, left, right in self.pairs(chosen)
+        ]
 
     def pairs(self, chosen: Sequence[int]) -> list[tuple[complex, Vector, Vector]]:
         """Eigenvalue, left and right eigenvector of some of the eigenvalues of the last search."""
@@ -220,7 +245,11 @@ class Search:
         nu, left = self._arnoldi(self._solver.solve_adjoint, len(self._values))
         partners = self._to_lambda(nu.conj())
         return [
-            (complex(self._values[k]), left[:, np.argmin(np.abs(partners - self._values[k]))], self._right[:, k])
+            (
+                complex(self._values[k]),
+                left[:, np.argmin(np.abs(partners - self._values[k]))],
+                self._right[:, k],
+            )
             for k in chosen
         ]
 
@@ -240,7 +269,9 @@ class Search:
         self._values = self._to_lambda(blocks.values[:count])
         return self._values if blocks.is_complete(count) else None
 
-    def _pairs_of_blocks(self, blocks: BlockArnoldi, chosen: list[int]) -> list[tuple[complex, Vector, Vector]]:
+    def _pairs_of_blocks(
+        self, blocks: BlockArnoldi, chosen: list[int]
+    ) -> list[tuple[complex, Vector, Vector]]:
         """The same, from the space of both sides' vectors: its eigenvalues have the square of their accuracy."""
         from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - half a second to import
 
@@ -251,12 +282,18 @@ class Search:
         with one_thread():
             left, right = adjoint.vectors(_partners(adjoint, wanted) or ()), blocks.vectors(chosen)
             moved = self._solver.solve(right)
-            nu, of_left, of_right = scipy.linalg.eig(left.conj().T @ moved, left.conj().T @ right, left=True)
+            nu, of_left, of_right = scipy.linalg.eig(
+                left.conj().T @ moved, left.conj().T @ right, left=True
+            )
             left, right, moved = left @ of_left, right @ of_right, moved @ of_right
         order = linear_sum_assignment(np.abs(wanted[:, None] - nu[None, :]))[1]
-        rest = np.linalg.norm(moved - right * nu, axis=0) / (np.abs(nu) * np.linalg.norm(right, axis=0))
+        rest = np.linalg.norm(moved - right * nu, axis=0) / (
+            np.abs(nu) * np.linalg.norm(right, axis=0)
+        )
         moves = np.abs(nu[order] - wanted) / np.abs(wanted)
-        if not (np.concatenate([rest, moves]) <= _SAME).all():  # nor is it where one is not a number
+        if not (
+            np.concatenate([rest, moves]) <= _SAME
+        ).all():  # nor is it where one is not a number
             raise self._not_converging
         values = self._to_lambda(nu)
         return [(complex(values[k]), left[:, k], right[:, k]) for k in order.tolist()]
@@ -277,14 +314,22 @@ class Search:
             f"the search for modes around {self.centre:.3g} rad/s does not converge; compute the full spectrum"
         )
 
-    def _arnoldi(self, solve: Callable[[Vector], Vector], count: int, kept: int = _KEPT) -> tuple[Vector, Vector]:
+    def _arnoldi(
+        self, solve: Callable[[Vector], Vector], count: int, kept: int = _KEPT
+    ) -> tuple[Vector, Vector]:
         n = len(self._model.names)
-        start = np.random.default_rng(0).standard_normal(n).astype(complex)  # the same search gives the same answer
+        # the same search gives the same answer
+        start = np.random.default_rng(0).standard_normal(n).astype(complex)
         inverse = spla.LinearOperator((n, n), matvec=solve, dtype=complex)
         try:
             with one_thread():
-                nu, vectors = spla.eigs(inverse, k=count, ncv=min(n, max(kept, 2 * count + 10)), v0=start,
-                                      tol=_TOLERANCE)  # fmt: skip
+                nu, vectors = spla.eigs(
+                    inverse,
+                    k=count,
+                    ncv=min(n, max(kept, 2 * count + 10)),
+                    v0=start,
+                    tol=_TOLERANCE,
+                )
         except spla.ArpackNoConvergence as error:
             raise self._not_converging from error
         return nu, vectors
@@ -306,6 +351,8 @@ def _partners(blocks: BlockArnoldi, wanted: NDArray[np.complex128]) -> list[int]
     settled = np.flatnonzero(blocks.accuracy <= TOLERANCE)
     if len(settled) < len(wanted):
         return None
-    apart = np.abs(wanted[:, None] - blocks.values[settled].conj()[None, :]) / np.abs(wanted)[:, None]
+    apart = (
+        np.abs(wanted[:, None] - blocks.values[settled].conj()[None, :]) / np.abs(wanted)[:, None]
+    )
     rows, columns = linear_sum_assignment(np.minimum(apart, 1.0))
     return settled[columns].tolist() if bool((apart[rows, columns] <= _SAME).all()) else None

@@ -25,7 +25,8 @@ _FLAT = (-1 / 24, 13 / 12, -1 / 24)
 """Weights of three values that follow one another: they undo the loss of fast signals in values that are held over a
 step, up to the fourth power of the frequency."""
 
-LARGEST_ERROR = 1e-3  # a mode for which a delay's approximation is off by more than this part is not the step map's
+# a mode for which a delay's approximation is off by more than this part is not the step map's
+LARGEST_ERROR = 1e-3
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,10 @@ class DelayLine:
 
 def links_of(master: Master) -> dict[Endpoint, WireLink]:
     """The connections of a system that matter to its linear model, by their target."""
-    links = {target: WireLink(plan.name, plan.delay, plan.is_cut) for target, plan in master.system.wires.items()}
+    links = {
+        target: WireLink(plan.name, plan.delay, plan.is_cut)
+        for target, plan in master.system.wires.items()
+    }
     return {target: link for target, link in links.items() if link.delay or link.is_cut}
 
 
@@ -70,7 +74,9 @@ def delay_line(delay: float, step_size: float) -> DelayLine:
     weights = np.zeros(n + 2)  # of u, and of the places of the register
     weights[whole] += 1.0 - part
     weights[whole + 1] += part
-    return DelayLine(A, B, weights[None, 1 : n + 1], float(weights[0]), weights[None, :n].copy(), np.ones(n))
+    return DelayLine(
+        A, B, weights[None, 1 : n + 1], float(weights[0]), weights[None, :n].copy(), np.ones(n)
+    )
 
 
 def _long(delay: float, step_size: float) -> DelayLine:
@@ -83,7 +89,9 @@ def _long(delay: float, step_size: float) -> DelayLine:
         A_c, B_c, C_c = transport(delay - shorter)
         A_d, B_d = over_held_inputs(A_c, B_c, step_size)
         still = np.eye(len(A_d)) - A_d
-        arrives = step_size * (1 + (C_c @ np.linalg.solve(still, np.linalg.solve(still, B_d)))[0, 0])
+        arrives = step_size * (
+            1 + (C_c @ np.linalg.solve(still, np.linalg.solve(still, B_d)))[0, 0]
+        )
         shorter += float(arrives) - delay
     q = len(A_d)
     line, last = slice(2, q + 2), q + 2
@@ -145,12 +153,16 @@ def too_long(links: Iterable[WireLink], top_hz: float, step_size: float | None) 
     ]
 
 
-def doubtful_delays(links: Iterable[WireLink], eigenvalues: Iterable[complex], step_size: float | None) -> list[str]:
+def doubtful_delays(
+    links: Iterable[WireLink], eigenvalues: Iterable[complex], step_size: float | None
+) -> list[str]:
     """Delays that the linear model does not have right at one of the eigenvalues [rad/s], in words."""
     said = []
     values = list(eigenvalues)
     for link in links:
-        errors = [representation_error(link, value, step_size) for value in values] if link.delay else []
+        errors = (
+            [representation_error(link, value, step_size) for value in values] if link.delay else []
+        )
         if errors and not max(errors) <= LARGEST_ERROR:
             value = values[int(np.argmax(errors))]
             size = f"wrong by {100 * max(errors):.2g} %" if max(errors) < 1 else "altogether wrong"
@@ -161,7 +173,9 @@ def doubtful_delays(links: Iterable[WireLink], eigenvalues: Iterable[complex], s
     return said
 
 
-def values_on_the_way(master: Master, names: tuple[str, ...], links: Mapping[Endpoint, WireLink]) -> Vector:
+def values_on_the_way(
+    master: Master, names: tuple[str, ...], links: Mapping[Endpoint, WireLink]
+) -> Vector:
     """The states of all delay lines among the names while everything that is carried is constant."""
     found = []
     for target, link in links.items():
@@ -185,8 +199,12 @@ def warnings_of(master: Master) -> tuple[str, ...]:
                     f"connection {plan.name} has {imperfection}: the modes are those of the system without {kind}"
                 )
             if isinstance(imperfection, DropOut):
-                said.append(f"connection {plan.name} is {imperfection}: it is cut in the linear model")
+                said.append(
+                    f"connection {plan.name} is {imperfection}: it is cut in the linear model"
+                )
         if plan.later:
             faults = ", ".join(map(str, plan.later))
-            said.append(f"connection {plan.name} has faults later ({faults}): the modes are those before them")
+            said.append(
+                f"connection {plan.name} has faults later ({faults}): the modes are those before them"
+            )
     return tuple(said)

@@ -10,7 +10,14 @@ import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.arrays import Numbers
-from orchestrator.binding.misfits import Misfit, at_rest, likely_cause, of_current, of_frequency, of_power
+from orchestrator.binding.misfits import (
+    Misfit,
+    at_rest,
+    likely_cause,
+    of_current,
+    of_frequency,
+    of_power,
+)
 from orchestrator.coupling.master import Master
 from orchestrator.errors import CosimError
 from orchestrator.fmi.component import Component
@@ -18,7 +25,8 @@ from orchestrator.fmi.instance import open_component
 from orchestrator.fmi.port import BoundDescription
 
 _HOLDS = 0.2  # time [s] for which a device is held alone before its omega is read
-_AT = 0.01  # distance of the voltage from v_0 up to which the power is to be what the power flow asks for [pu]
+# distance of the voltage from v_0 up to which the power is to be what the power flow asks for [pu]
+_AT = 0.01
 
 
 def misfits_of(master: Master) -> dict[str, list[Misfit]]:
@@ -26,7 +34,9 @@ def misfits_of(master: Master) -> dict[str, list[Misfit]]:
     found = {}
     for name in master.components:
         try:
-            found[name] = [_with_cause(misfit, master.components[name]) for misfit in _of(master, name)]
+            found[name] = [
+                _with_cause(misfit, master.components[name]) for misfit in _of(master, name)
+            ]
         except CosimError:
             continue
     return {name: misfits for name, misfits in found.items() if misfits}
@@ -43,7 +53,11 @@ def _with_cause(misfit: Misfit, component: Component) -> Misfit:
 
 def _omega_alone(master: Master, name: str) -> tuple[float, bool]:
     """Its omega at rest in a second instance at an ideal bus, as in `gfor fmu check`, and whether it has settled."""
-    plan, inputs, h = master.system.components[name], master.exchanges[name].inputs.names, master.clock.step_size
+    plan, inputs, h = (
+        master.system.components[name],
+        master.exchanges[name].inputs.names,
+        master.clock.step_size,
+    )
     with closing(open_component(name, plan.description, isolated=plan.isolated)) as alone:
         alone.setup(0.0, None)
         alone.set(plan.parameters)
@@ -74,7 +88,10 @@ def _of(master: Master, name: str) -> Iterator[Misfit]:
                 yield misfit
     inputs = master.exchanges[name].inputs
     given = dict(zip(inputs.names, inputs.values.tolist(), strict=True))
-    start, outputs = component.values(["S_n", "P_0", "Q_0", "v_0", "theta_0"]), component.get(["i_re", "i_im"])
+    start, outputs = (
+        component.values(["S_n", "P_0", "Q_0", "v_0", "theta_0"]),
+        component.get(["i_re", "i_im"]),
+    )
     current = complex(outputs["i_re"], outputs["i_im"]) * SYSTEM_BASE_MVA / start["S_n"]
     v = complex(given.get("v_re", 0.0), given.get("v_im", 0.0))
     if described.port.start.get("P_0") and abs(v - rect(start["v_0"], start["theta_0"])) < _AT:

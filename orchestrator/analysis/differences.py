@@ -40,14 +40,20 @@ class PerturbedStep:
     def names(self) -> tuple[str, ...]:
         return (*self.states, *self.inputs)
 
-    def differences(self, varied: Sequence[int], size: float, rates: Sequence[str] = ()) -> Differences:
+    def differences(
+        self, varied: Sequence[int], size: float, rates: Sequence[str] = ()
+    ) -> Differences:
         """Central differences, one column for each perturbed state or input; the component is put back.
 
         ``size``: of the perturbation, relative to max(1, |value|); ``rates`` are read before the step."""
         component, names = self.component, self.names
         z_0 = RealBatch(component, names).read().copy()
-        after, outputs, slopes = (RealBatch(component, group) for group in (self.states, self.exits, rates))
-        columns = tuple(np.zeros((len(varied), len(batch.names))) for batch in (after, outputs, slopes))
+        after, outputs, slopes = (
+            RealBatch(component, group) for group in (self.states, self.exits, rates)
+        )
+        columns = tuple(
+            np.zeros((len(varied), len(batch.names))) for batch in (after, outputs, slopes)
+        )
         upwards = tuple(np.zeros_like(column) for column in columns[:2])
         saved = component.save_state()
         try:
@@ -71,7 +77,9 @@ class PerturbedStep:
                         upwards[1][k] = sign * (outputs.values - outputs_0)
                     component.restore_state(saved)
                 if len(signs) == 1:
-                    for column, at_rest in zip(columns, (after_0, outputs_0, slopes_0), strict=True):
+                    for column, at_rest in zip(
+                        columns, (after_0, outputs_0, slopes_0), strict=True
+                    ):
                         column[k] -= signs[0] * at_rest
                 for column in columns:
                     column[k] /= len(signs) * step

@@ -16,7 +16,13 @@ from numpy.typing import NDArray
 from orchestrator.analysis.apart import standing_apart
 from orchestrator.analysis.coupled_response import confirmed
 from orchestrator.analysis.critical_modes import DENSE, nearest_eigenvalue
-from orchestrator.analysis.delays import LARGEST_ERROR, doubtful_delays, representation_error, too_long, warnings_of
+from orchestrator.analysis.delays import (
+    LARGEST_ERROR,
+    doubtful_delays,
+    representation_error,
+    too_long,
+    warnings_of,
+)
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearity import Doubt, doubts
 from orchestrator.analysis.linearization import Blocks, compose
@@ -42,10 +48,28 @@ SLOW_HZ = 5.0
 warning."""
 
 _SLOWEST_HZ = 0.01
-_GROWTH = 1.0  # the coupling is unstable if the step map grows faster than the continuous system by more [1/s]
-_COMPARED = 6  # modes of a large system that are compared, least damped first: each costs a factorisation
+# the coupling is unstable if the step map grows faster than the continuous system by more [1/s]
+_GROWTH = 1.0
+# modes of a large system that are compared, least damped first: each costs a factorisation
+_COMPARED = 6
 
-_ADVISED = (5e-2, 2e-2, 1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6)
+_ADVISED = (
+    5e-2,
+    2e-2,
+    1e-2,
+    5e-3,
+    2e-3,
+    1e-3,
+    5e-4,
+    2e-4,
+    1e-4,
+    5e-5,
+    2e-5,
+    1e-5,
+    5e-6,
+    2e-6,
+    1e-6,
+)
 """Steps [s] that are tried to advise a shorter one, longest first, and the largest number of tried steps."""
 _TRIALS = 9
 
@@ -70,9 +94,13 @@ class Pair:
 
 
 def check_resolution(
-    master: Master, model: LinearModel, system: LinearModel | None, modes: Sequence[Mode],
-    frequency_range: tuple[float, float], stability: Stability,
-) -> tuple[str, ...]:  # fmt: skip
+    master: Master,
+    model: LinearModel,
+    system: LinearModel | None,
+    modes: Sequence[Mode],
+    frequency_range: tuple[float, float],
+    stability: Stability,
+) -> tuple[str, ...]:
     """Warn of an unstable coupling, and compare the modes of a step map with those of the continuous system.
 
     The warnings name a step that is short enough; it is computed, not estimated. Without a continuous model nothing is
@@ -147,7 +175,10 @@ def _is_slow(pair: Pair) -> bool:
 
 
 def _pairs(
-    model: LinearModel, system: LinearModel, modes: Sequence[Mode], frequency_range: tuple[float, float]
+    model: LinearModel,
+    system: LinearModel,
+    modes: Sequence[Mode],
+    frequency_range: tuple[float, float],
 ) -> list[Pair]:
     """The oscillations of the step map, each paired with the nearest one of the continuous system; in a small system
     also the reverse pairs.
@@ -160,7 +191,9 @@ def _pairs(
         return [Pair(value, nearest(value)) for value in seen[:_COMPARED]]
     of_step = _nearest(model)
     exact = [complex(value) for value in eigenvalues(system) if _swings(value, low, high)]
-    return [Pair(value, nearest(value)) for value in seen] + [Pair(of_step(value), value) for value in exact]
+    return [Pair(value, nearest(value)) for value in seen] + [
+        Pair(of_step(value), value) for value in exact
+    ]
 
 
 def _swings(value: complex, low: float, high: float) -> bool:
@@ -186,7 +219,10 @@ def _short_step(master: Master, system: LinearModel, pairs: Sequence[Pair]) -> f
         except CosimError:  # an FMU may refuse a step; others are left to try
             continue
         nearest = _nearest(model)
-        if all(Pair(nearest(value), value).error <= MOVED for value in exact) and _growth(model) <= limit:
+        if (
+            all(Pair(nearest(value), value).error <= MOVED for value in exact)
+            and _growth(model) <= limit
+        ):
             return step
     return None
 
@@ -199,7 +235,9 @@ def _growth(model: LinearModel) -> float:
     step = spla.LinearOperator((n, n), matvec=model.apply, dtype=float)
     start = np.random.default_rng(0).standard_normal(n)
     try:
-        largest = spla.eigs(step, k=2, ncv=20, maxiter=50, tol=1e-6, v0=start, return_eigenvectors=False)
+        largest = spla.eigs(
+            step, k=2, ncv=20, maxiter=50, tol=1e-6, v0=start, return_eigenvectors=False
+        )
     except spla.ArpackNoConvergence:
         return 0.0
     return float(np.log(np.abs(largest).max()) / model.step_size)
@@ -212,10 +250,17 @@ class Examination:
 
 
 def examine(
-    master: Master, blocks: Blocks, model: LinearModel, system: LinearModel | None, *, spectrum: Spectrum | None = None,
-    of_system: Spectrum | None = None, modes: Sequence[Mode] | None = None, shown: Sequence[Mode] | None = None,
+    master: Master,
+    blocks: Blocks,
+    model: LinearModel,
+    system: LinearModel | None,
+    *,
+    spectrum: Spectrum | None = None,
+    of_system: Spectrum | None = None,
+    modes: Sequence[Mode] | None = None,
+    shown: Sequence[Mode] | None = None,
     frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
-) -> Examination:  # fmt: skip
+) -> Examination:
     """Judge a step map, and look for what would make the verdict wrong; say what it leaves out of the connections.
 
     ``spectrum`` and ``of_system``: all eigenvalues of both models, where they are known already.
@@ -224,12 +269,21 @@ def examine(
     ``shown``: modes that must not depend on the communication step; by default the same."""
     if spectrum is None:
         small = len(model.names) <= WHOLE
-        spectrum = find_spectrum(model, *frequency_range) if small and modes is None else whole_spectrum(model)
+        spectrum = (
+            find_spectrum(model, *frequency_range)
+            if small and modes is None
+            else whole_spectrum(model)
+        )
     if modes is None:
         modes = [] if spectrum is None else [mode for mode in spectrum.modes if mode.is_oscillation]
-    elif any(component.doubtful for component in blocks.components.values()) and len(model.names) <= WHOLE:
+    elif (
+        any(component.doubtful for component in blocks.components.values())
+        and len(model.names) <= WHOLE
+    ):
         modes = [*modes, *(mode for mode in find_spectrum(model).modes if mode.is_oscillation)]
-    rightmost = [spectrum.rightmost] if spectrum is not None and spectrum.rightmost is not None else []
+    rightmost = (
+        [spectrum.rightmost] if spectrum is not None and spectrum.rightmost is not None else []
+    )
     stability = confirmed(master, blocks, model, judge(model, spectrum, system, of_system))
     if model.period > 1:
         told = (
@@ -237,7 +291,9 @@ def examine(
             f"({model.period * master.clock.step_size:g} s): the modes are those of the map over this period"
         )
         apart = standing_apart(master, model, stability.zeros)
-        return Examination(stability, (told, *verdict_warnings(stability), *apart, *warnings_of(master)))
+        return Examination(
+            stability, (told, *verdict_warnings(stability), *apart, *warnings_of(master))
+        )
     found = doubts(blocks, master.schedule, model, [*modes, *rightmost])
     shown = modes if shown is None else shown
     eigenvalues = [mode.eigenvalue for mode in [*shown, *rightmost]]
@@ -269,7 +325,12 @@ def _has_delays(blocks: Blocks, model: LinearModel, modes: Sequence[Mode]) -> bo
 
 
 def _turning(
-    blocks: Blocks, master: Master, model: LinearModel, stability: Stability, found: list[Doubt], rightmost: list[Mode]
+    blocks: Blocks,
+    master: Master,
+    model: LinearModel,
+    stability: Stability,
+    found: list[Doubt],
+    rightmost: list[Mode],
 ) -> list[Doubt]:
     """Doubts that leave the verdict open. If a mode grows, only doubts about this mode count."""
     turning = [doubt for doubt in found if doubt.turns]

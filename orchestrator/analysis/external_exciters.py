@@ -27,9 +27,13 @@ def _outside(master: Master) -> Iterator[_Outside]:
         machine, exciter = connection.target.component, connection.source.component
         component = master.components[machine]
         wanted = (_NEEDED, _HELD, _VOLTAGE)
-        if connection.target.variable == _FIELD and component.description.variables.keys() >= set(wanted):
+        if connection.target.variable == _FIELD and component.description.variables.keys() >= set(
+            wanted
+        ):
             found = component.values([_NEEDED, _HELD])
-            yield _Outside(machine, exciter, connection.source.variable, found[_NEEDED], found[_HELD])
+            yield _Outside(
+                machine, exciter, connection.source.variable, found[_NEEDED], found[_HELD]
+            )
 
 
 def start_warnings(master: Master) -> tuple[str, ...]:
@@ -40,7 +44,11 @@ def start_warnings(master: Master) -> tuple[str, ...]:
         if abs(given - one.field) > _APART:
             start = f"initial.{one.output}"
             known = start in master.components[one.exciter].description.variables
-            where = f"{start} = {one.field:.8g}" if known else f"the start of its output, {one.field:.8g},"
+            where = (
+                f"{start} = {one.field:.8g}"
+                if known
+                else f"the start of its output, {one.field:.8g},"
+            )
             said.append(
                 f"{one.exciter}: it starts with {one.output} = {given:.6g}, and {one.machine} needs {one.field:.8g} pu "
                 f"({_NEEDED}): a run begins with a swing; write {where} into the parameters of {one.exciter}"

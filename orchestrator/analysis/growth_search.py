@@ -17,10 +17,12 @@ from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.modes import Mode, make_mode
 from orchestrator.errors import AnalysisError
 
-SLOWEST = 2 * np.pi * 1e-3  # least eigenvalue looked for [rad/s]: smaller grow by less than 0.01 a second
+# least eigenvalue looked for [rad/s]: smaller grow by less than 0.01 a second
+SLOWEST = 2 * np.pi * 1e-3
 FASTEST = 2 * np.pi * 1e5  # largest eigenvalue of a continuous model that is looked for [rad/s]
 _RING = 1.6  # ratio of the radii of a ring
-_AT_A_TIME = (20, 80)  # numbers of eigenvalues to find around one point: the first number and the largest one
+# numbers of eigenvalues to find around one point: the first number and the largest one
+_AT_A_TIME = (20, 80)
 _STANDS_OUT = 1.1  # multipliers of a step map beyond this size are found as the largest ones
 _THINNEST = 1e-3  # smallest size of a sector, relative to its radius
 
@@ -107,13 +109,20 @@ def _standing_out(model: LinearModel, step_size: float) -> list[Mode]:
     start = np.random.default_rng(0).standard_normal(n)
     count = _AT_A_TIME[0]
     try:
-        mu = spla.eigs(step, k=count, ncv=3 * count, maxiter=30, tol=1e-6, v0=start, return_eigenvectors=False)
+        mu = spla.eigs(
+            step, k=count, ncv=3 * count, maxiter=30, tol=1e-6, v0=start, return_eigenvectors=False
+        )
     except spla.ArpackNoConvergence as error:
         mu = error.eigenvalues  # the largest multipliers converge first
     mu = mu[(np.abs(mu) > _STANDS_OUT) & (mu.imag >= 0)]
     if len(mu) == count:
-        raise AnalysisError(f"more than {count} modes grow by a tenth in each communication step; take a shorter one")
-    pairs = [nearest_pairs(model, complex(np.log(value.astype(complex)) / step_size), 1)[0] for value in mu]
+        raise AnalysisError(
+            f"more than {count} modes grow by a tenth in each communication step; take a shorter one"
+        )
+    pairs = [
+        nearest_pairs(model, complex(np.log(value.astype(complex)) / step_size), 1)[0]
+        for value in mu
+    ]
     return [make_mode(*pair, model.names) for pair in pairs]
 
 

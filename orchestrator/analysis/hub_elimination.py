@@ -21,7 +21,9 @@ from numpy.typing import NDArray
 from orchestrator.arrays import Matrix, Vector
 
 BUSY = 100  # an equation with more unknowns than this belongs to the hub
-LEAST_HUB = 200  # models with a smaller hub keep the sparse factorisation of the whole, and with it their last digits
+# models with a smaller hub keep the sparse factorisation of the whole, and with it their last
+# digits
+LEAST_HUB = 200
 _ACCURATE = 1e-9
 """Largest part of a right side that a solution may leave over. Otherwise σ is too close to an eigenvalue of a block,
 and the whole is factorised instead."""
@@ -114,7 +116,9 @@ class HubEquations:
         trial = np.random.default_rng(1).standard_normal(self.states).astype(schur.dtype)
         return factors if factors.left_over(trial) <= _ACCURATE else None
 
-    def _through_blocks(self, blocks: spla.SuperLU, Q: sp.csc_array, kind: np.dtype) -> sp.csc_array:
+    def _through_blocks(
+        self, blocks: spla.SuperLU, Q: sp.csc_array, kind: np.dtype
+    ) -> sp.csc_array:
         """P⁻¹·Q, solved for all columns of one colour at once."""
         colour, owner = self.colours
         _, block = self.blocks
@@ -184,7 +188,9 @@ def _times(real: Matrix | sp.csr_array, vector: Vector) -> Vector:
     return np.ascontiguousarray(product).view(complex).reshape(real.shape[0], *vector.shape[1:])
 
 
-def hub_equations(F: sp.csr_array, G: sp.csr_array, H: sp.csr_array, K: sp.csr_array) -> HubEquations | None:
+def hub_equations(
+    F: sp.csr_array, G: sp.csr_array, H: sp.csr_array, K: sp.csr_array
+) -> HubEquations | None:
     """The equations with their hub; None where there is no hub worth setting apart."""
     n = F.shape[0]
     taken = _taken(G, K)

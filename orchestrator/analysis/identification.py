@@ -14,8 +14,10 @@ from orchestrator.errors import AnalysisError
 
 TOLERANCE = 1e-6  # singular values below this fraction of the largest are taken for noise
 _MIN_SAMPLES, _MAX_SAMPLES = 20, 1200
-_DROPPED = 1e-3  # rows of the triangle below this part of the tolerance change modes by its square, and most are
-_ALIASED = 1e-6  # part of a signal's power that is too fast for the samples used, from which on they are averages
+# rows of the triangle below this part of the tolerance change modes by its square, and most are
+_DROPPED = 1e-3
+# part of a signal's power that is too fast for the samples used, from which on they are averages
+_ALIASED = 1e-6
 _LARGEST_EXPONENT = 300.0
 """Largest exponent of e within the window. A larger exponent is not a signal, and its square exceeds the range of
 numbers."""
@@ -27,13 +29,18 @@ class IdentifiedMode(OfEigenvalue):
 
     eigenvalue: complex
     amplitude: float
-    doubts: tuple[str, ...] = ()  # why it may be no mode of the system, where that was asked; see `mode_doubts`
+    # why it may be no mode of the system, where that was asked; see `mode_doubts`
+    doubts: tuple[str, ...] = ()
 
 
 def identify_modes(
-    times: NDArray[np.float64], signal: NDArray[np.float64], *, tolerance: float = TOLERANCE, max_order: int = 24,
+    times: NDArray[np.float64],
+    signal: NDArray[np.float64],
+    *,
+    tolerance: float = TOLERANCE,
+    max_order: int = 24,
     highest_hz: float = 10.0,
-) -> list[IdentifiedMode]:  # fmt: skip
+) -> list[IdentifiedMode]:
     """Write a signal as a sum of damped exponentials.
 
     ``times`` and ``signal``: shape (n,); equally spaced samples of a free response, [s] and any unit.
@@ -45,8 +52,12 @@ def identify_modes(
     y = signal[::thin] if len(weights) == 1 else np.convolve(signal, weights, mode="valid")[::thin]
     lags = np.arange(len(weights)) * used.recorded
     if len(y) < _MIN_SAMPLES or np.ptp(y) == 0:
-        what = "a constant signal" if len(y) >= _MIN_SAMPLES else f"a signal of {len(signal)} samples"
-        raise AnalysisError(f"no mode can be identified in {what}; record a longer response to an event")
+        what = (
+            "a constant signal" if len(y) >= _MIN_SAMPLES else f"a signal of {len(signal)} samples"
+        )
+        raise AnalysisError(
+            f"no mode can be identified in {what}; record a longer response to an event"
+        )
     pencil = len(y) // 3
     hankel = np.lib.stride_tricks.sliding_window_view(y, pencil + 1)
     triangle, columns = scipy.linalg.qr(np.linalg.qr(hankel, mode="r"), mode="r", pivoting=True)
@@ -57,7 +68,9 @@ def identify_modes(
     basis = right[:order].T
     multipliers = np.linalg.eigvals(np.linalg.pinv(basis[:-1]) @ basis[1:])
     if len(y) * np.log(np.abs(multipliers).max(initial=1.0)) > _LARGEST_EXPONENT:
-        raise AnalysisError("no mode can be identified: the signal seems to grow beyond all bounds within the window")
+        raise AnalysisError(
+            "no mode can be identified: the signal seems to grow beyond all bounds within the window"
+        )
     vandermonde = multipliers[None, :] ** np.arange(len(y))[:, None]
     residues = np.linalg.lstsq(vandermonde, y.astype(complex), rcond=None)[0]
     found = [
@@ -65,7 +78,10 @@ def identify_modes(
         for mu, r in zip(multipliers, residues, strict=True)
         if mu.imag >= 0 and abs(mu) > 1e-6
     ]
-    modes = [IdentifiedMode(x, float(size / abs((weights * np.exp(x * lags)).sum()))) for x, size in found]
+    modes = [
+        IdentifiedMode(x, float(size / abs((weights * np.exp(x * lags)).sum())))
+        for x, size in found
+    ]
     return sorted(modes, key=lambda m: -m.amplitude)
 
 
@@ -89,7 +105,8 @@ class Sampling:
     recorded: float  # time between two samples of the record [s]
     thin: int  # every so many of them are used
     number: int
-    finest: float  # time between two samples from which on they are thinned, however short the record [s]
+    # time between two samples from which on they are thinned, however short the record [s]
+    finest: float
 
     @property
     def interval(self) -> float:
@@ -113,7 +130,11 @@ class Sampling:
 def sampling(times: NDArray[np.float64], highest_hz: float = 10.0) -> Sampling:
     step = float(times[1] - times[0]) if len(times) > 1 else 0.0
     finest = 1 / (10 * highest_hz)
-    thin = max(1, round(1 / (10 * highest_hz * step)), -(-len(times) // _MAX_SAMPLES)) if step > 0 else 1
+    thin = (
+        max(1, round(1 / (10 * highest_hz * step)), -(-len(times) // _MAX_SAMPLES))
+        if step > 0
+        else 1
+    )
     return Sampling(step, thin, len(times), finest)
 
 

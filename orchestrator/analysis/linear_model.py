@@ -19,7 +19,8 @@ from orchestrator.arrays import Matrix, Vector
 
 HELD = " (held)"
 DELAYED = " (delayed"  # in the name of a state that stands for what is on its way over a connection
-LEAST_IN_BLOCKS = 4_000  # with fewer states, one vector at a time, which keeps the last digits of modes
+# with fewer states, one vector at a time, which keeps the last digits of modes
+LEAST_IN_BLOCKS = 4_000
 
 PERTURBED, DIRECTIONAL, PACKED, IDENTIFIED = "perturbed", "directional", "packed", "identified"
 """Origins of a component's linear model: perturbation of its running FMU, directional derivatives of the FMU, a model
@@ -32,7 +33,8 @@ class ShiftedSolver:
 
     solve: Callable[[Vector], Vector]
     solve_adjoint: Callable[[Vector], Vector]
-    takes_many: bool = False  # whether both take many vectors as columns, and take hardly longer for them than for one
+    # whether both take many vectors as columns, and take hardly longer for them than for one
+    takes_many: bool = False
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,8 @@ class LinearModel:
     # ``component.state`` for states, ``component.output (held)`` for what the exchange remembers and ``a.out -> b.in
     # (delayed k)`` for what is on its way over a connection; length n
     names: tuple[str, ...]
-    step_size: float | None  # communication step [s]; None for a continuous model, whose A is in 1/s
+    # communication step [s]; None for a continuous model, whose A is in 1/s
+    step_size: float | None
     # largest difference between the two perturbation sizes, in elements of the components' matrices
     disagreement: float
     sources: Mapping[str, str] = field(default_factory=dict)
@@ -55,7 +58,9 @@ class LinearModel:
     period: int = 1
 
     @classmethod
-    def from_matrix(cls, A: Matrix, names: tuple[str, ...], step_size: float | None, disagreement: float = 0.0) -> Self:
+    def from_matrix(
+        cls, A: Matrix, names: tuple[str, ...], step_size: float | None, disagreement: float = 0.0
+    ) -> Self:
         """The model of one matrix, without outputs that travel between components."""
         n = len(A)
         G, H, K = (sp.csr_array(shape) for shape in ((n, 0), (0, n), (0, 0)))
@@ -70,7 +75,9 @@ class LinearModel:
     def apply(self, z: Vector) -> Vector:
         """A·z, computed without forming A; z may be complex, of shape (n,) or (n, k)."""
         w = self.H @ z
-        settled = self.settle(w.real) + 1j * self.settle(w.imag) if np.iscomplexobj(w) else self.settle(w)
+        settled = (
+            self.settle(w.real) + 1j * self.settle(w.imag) if np.iscomplexobj(w) else self.settle(w)
+        )
         result: Vector = self.F @ z + self.G @ settled
         return result
 
@@ -101,7 +108,9 @@ class LinearModel:
         if len(kept) == len(self.names):
             return self
         F = self.F[kept][:, kept]
-        return replace(self, F=F, G=self.G[kept], H=self.H[:, kept], names=tuple(self.names[k] for k in kept))
+        return replace(
+            self, F=F, G=self.G[kept], H=self.H[:, kept], names=tuple(self.names[k] for k in kept)
+        )
 
     @cached_property
     def settle(self) -> Callable[[Any], Any]:
@@ -133,11 +142,15 @@ class LinearModel:
         factors_of_hub = self._hub.at(sigma) if self._hub else None
         if factors_of_hub:
             return ShiftedSolver(
-                factors_of_hub.solve, factors_of_hub.solve_adjoint, takes_many=self.is_searched_in_blocks
+                factors_of_hub.solve,
+                factors_of_hub.solve_adjoint,
+                takes_many=self.is_searched_in_blocks,
             )
         n, m = self.G.shape
         identity_n, identity_m = sp.eye_array(n), sp.eye_array(m)
-        whole = sp.block_array([[self.F - sigma * identity_n, self.G], [self.H, self.K - identity_m]], format="csc")
+        whole = sp.block_array(
+            [[self.F - sigma * identity_n, self.G], [self.H, self.K - identity_m]], format="csc"
+        )
         factors = spla.splu(whole)
         kind = whole.dtype
 
@@ -157,7 +170,9 @@ class Equations:
 
     def __init__(self, n: int, m: int) -> None:
         self._shapes = {"F": (n, n), "G": (n, m), "H": (m, n), "K": (m, m)}
-        self._parts: dict[str, list[tuple[Indices, Indices, Matrix]]] = {name: [] for name in self._shapes}
+        self._parts: dict[str, list[tuple[Indices, Indices, Matrix]]] = {
+            name: [] for name in self._shapes
+        }
 
     def next_state(self, rows: slice, states: slice, A: Matrix, w: Indices, B: Matrix) -> None:
         """Add z⁺[rows] = A·z[states] + B·w[w]."""
@@ -175,11 +190,17 @@ class Equations:
         self._parts[name].append((rows[i], columns[k], block[i, k]))
 
     def model(
-        self, names: Iterable[str], step_size: float | None, disagreement: float, sources: Mapping[str, str]
+        self,
+        names: Iterable[str],
+        step_size: float | None,
+        disagreement: float,
+        sources: Mapping[str, str],
     ) -> LinearModel:
         F, G, H, K = (self._matrix(name) for name in self._shapes)
         return LinearModel(F, G, H, K, tuple(names), step_size, disagreement, sources)
 
     def _matrix(self, name: str) -> sp.csr_array:
-        rows, columns, values = (np.concatenate(part) for part in zip(*self._parts[name], strict=True))
+        rows, columns, values = (
+            np.concatenate(part) for part in zip(*self._parts[name], strict=True)
+        )
         return sp.coo_array((values, (rows, columns)), shape=self._shapes[name]).tocsr()

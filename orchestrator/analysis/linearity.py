@@ -22,8 +22,11 @@ LARGEST_SHIFT = 1e-3
 """Shift of a mode from which a doubt is reported, as a part of |λ|: a tenth of a point of damping. In smooth systems,
 up to the IEEE 118-bus system, the shift is at most 1.5e-4."""
 
-_SLOWEST = 0.5  # the shift of a mode slower than this [rad/s] is divided by this figure instead of |λ|
-_DENSE = 1000  # most states of a model whose slowest eigenvalues are told apart from the free angle by a Schur form
+# the shift of a mode slower than this [rad/s] is divided by this figure instead of |λ|
+_SLOWEST = 0.5
+# most states of a model whose slowest eigenvalues are told apart from the free angle by a Schur
+# form
+_DENSE = 1000
 
 _WHY = (
     "a perturbation of twice the size has another effect per unit: look for noise in it, a coarse tolerance of its "
@@ -63,7 +66,9 @@ class Doubt:
         )
 
 
-def doubts(blocks: Blocks, schedule: Schedule, model: LinearModel, modes: Sequence[Mode]) -> list[Doubt]:
+def doubts(
+    blocks: Blocks, schedule: Schedule, model: LinearModel, modes: Sequence[Mode]
+) -> list[Doubt]:
     """Components whose perturbation leaves the modes in doubt; empty for a smooth system."""
     found = []
     for kind, why in enumerate(_WHY):
@@ -81,14 +86,21 @@ def doubts(blocks: Blocks, schedule: Schedule, model: LinearModel, modes: Sequen
         guilty = [name for name, shifts in each.items() if shifts.max() > LARGEST_SHIFT] or [most]
         for name in guilty:
             narrow = blocks.components[name].narrow
-            text = why.format(narrow=", ".join(f"{name}.{what} by {size:g}" for what, size in narrow.items()))
+            text = why.format(
+                narrow=", ".join(f"{name}.{what} by {size:g}" for what, size in narrow.items())
+            )
             worst = int(each[name].argmax())
             found.append(Doubt(name, modes[worst], float(each[name][worst]), text, turns))
     return found
 
 
 def _shifts(
-    blocks: Blocks, schedule: Schedule, model: LinearModel, modes: Sequence[Mode], names: Sequence[str], kind: int
+    blocks: Blocks,
+    schedule: Schedule,
+    model: LinearModel,
+    modes: Sequence[Mode],
+    names: Sequence[str],
+    kind: int,
 ) -> Vector:
     """Relative shift of every mode if some components are replaced by one of their variants."""
     other = copy.copy(blocks)
@@ -113,7 +125,9 @@ def _may_turn(modes: Sequence[Mode], shifts: Vector) -> bool:
 
 
 def _shift(model: LinearModel, varied: LinearModel, mode: Mode) -> float:
-    left, right = (np.array([vector[name] for name in model.names]) for vector in (mode.left, mode.shape))
+    left, right = (
+        np.array([vector[name] for name in model.names]) for vector in (mode.left, mode.shape)
+    )
     shift = eigenvalue_shift(model, varied, mode.eigenvalue, left, right)
     return abs(shift) / max(abs(mode.eigenvalue), _SLOWEST)
 

@@ -16,10 +16,20 @@ from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.errors import AnalysisError
 
-__all__ = ["Blocks", "compose", "continuous", "continuous_model", "linearize", "linearize_within", "where_given"]
+__all__ = [
+    "Blocks",
+    "compose",
+    "continuous",
+    "continuous_model",
+    "linearize",
+    "linearize_within",
+    "where_given",
+]
 
 
-def linearize(master: Master, step_size: float | None = None, schedule: Schedule | None = None) -> LinearModel:
+def linearize(
+    master: Master, step_size: float | None = None, schedule: Schedule | None = None
+) -> LinearModel:
     return compose(Blocks(master, step_size), schedule or master.schedule)
 
 
@@ -40,12 +50,14 @@ def compose(blocks: Blocks, schedule: Schedule, *, within_period: bool = False) 
     memory = [i for name in held for i in range(len(blocks.output_names))[blocks.window[name]]]
     n, p = len(names), len(blocks.output_names)
     links = len(blocks.links)
-    arrived, arriving = 2 * p + np.arange(links), 2 * p + links + np.arange(links)  # in the step before, and in this
+    # in the step before, and in this
+    arrived, arriving = 2 * p + np.arange(links), 2 * p + links + np.arange(links)
     external = 2 * p + 2 * links + np.arange(len(blocks.inputs))
     lines = _delay_lines(blocks, n + len(memory), blocks.step_size)
     total = n + len(memory) + sum(len(line.A) for line, _ in lines.values())
     equations = Equations(total, 2 * p + 2 * links + len(external))
-    newest = np.concatenate([np.arange(p), external])  # where in w the newest value of every output stands
+    # where in w the newest value of every output stands
+    newest = np.concatenate([np.arange(p), external])
     check_feedthrough(blocks, [name for name in blocks.components if name not in held])
     for k, (line, where) in lines.items():
         equations.output(arrived[k : k + 1], where, line.C_before, newest[:0], np.zeros((1, 0)))
@@ -54,14 +66,18 @@ def compose(blocks: Blocks, schedule: Schedule, *, within_period: bool = False) 
             entries = blocks.entries(name, newest, arrived)
             equations.output(newest[blocks.window[name]], windows[name], c.C, entries, c.D)
     for k, i in enumerate(memory):
-        equations.output(newest[i : i + 1], slice(n + k, n + k + 1), np.eye(1), newest[:0], np.zeros((1, 0)))
+        equations.output(
+            newest[i : i + 1], slice(n + k, n + k + 1), np.eye(1), newest[:0], np.zeros((1, 0))
+        )
     for group in schedule.groups:
         inputs = {name: blocks.entries(name, newest, arriving) for name in group}
         for name in group:
             for place, k in blocks.linked(name).items():
                 if k in lines:
                     (line, where), sent = lines[k], newest[blocks.sources[name][place : place + 1]]
-                    equations.output(arriving[k : k + 1], where, line.C, sent, np.full((1, 1), line.d))
+                    equations.output(
+                        arriving[k : k + 1], where, line.C, sent, np.full((1, 1), line.d)
+                    )
                     equations.next_state(where, where, line.A, sent, line.B)
         for name in group:
             c, x, u = blocks.components[name], windows[name], inputs[name]
@@ -70,17 +86,29 @@ def compose(blocks: Blocks, schedule: Schedule, *, within_period: bool = False) 
             newest[blocks.window[name]] = p + np.arange(p)[blocks.window[name]]
             equations.output(newest[blocks.window[name]], x, c.C @ A, u, c.C @ B + c.D)
     for k, i in enumerate(memory):
-        equations.next_state(slice(n + k, n + k + 1), slice(0, 0), np.zeros((1, 0)), newest[i : i + 1], np.eye(1))
-    all_names = (*names, *(f"{blocks.output_names[i]}{HELD}" for i in memory), *_line_names(blocks, lines))
+        equations.next_state(
+            slice(n + k, n + k + 1), slice(0, 0), np.zeros((1, 0)), newest[i : i + 1], np.eye(1)
+        )
+    all_names = (
+        *names,
+        *(f"{blocks.output_names[i]}{HELD}" for i in memory),
+        *_line_names(blocks, lines),
+    )
     return equations.model(all_names, blocks.step_size, blocks.disagreement, blocks.how)
 
 
-def _delay_lines(blocks: Blocks, first: int, step_size: float | None) -> dict[int, tuple[DelayLine, slice]]:
+def _delay_lines(
+    blocks: Blocks, first: int, step_size: float | None
+) -> dict[int, tuple[DelayLine, slice]]:
     """By the number of their link: delays, and where their states stand, from ``first`` on."""
     lines = {}
     for k, link in enumerate(blocks.links.values()):
         if not link.is_cut:
-            line = continuous_line(link.delay) if step_size is None else delay_line(link.delay, step_size)
+            line = (
+                continuous_line(link.delay)
+                if step_size is None
+                else delay_line(link.delay, step_size)
+            )
             lines[k] = line, slice(first, first + len(line.A))
             first += len(line.A)
     return lines
@@ -88,7 +116,11 @@ def _delay_lines(blocks: Blocks, first: int, step_size: float | None) -> dict[in
 
 def _line_names(blocks: Blocks, lines: Mapping[int, tuple[DelayLine, slice]]) -> list[str]:
     links = list(blocks.links.values())
-    return [f"{links[k].name}{DELAYED} {i + 1})" for k, (line, _) in lines.items() for i in range(len(line.A))]
+    return [
+        f"{links[k].name}{DELAYED} {i + 1})"
+        for k, (line, _) in lines.items()
+        for i in range(len(line.A))
+    ]
 
 
 def continuous(blocks: Blocks) -> LinearModel:
@@ -116,7 +148,9 @@ def continuous(blocks: Blocks) -> LinearModel:
                 (line, where), sent = lines[k], newest[blocks.sources[name][place : place + 1]]
                 equations.output(arriving[k : k + 1], where, line.C, sent, np.zeros((1, 1)))
                 equations.next_state(where, where, line.A, sent, line.B)
-    return equations.model([*names, *_line_names(blocks, lines)], None, blocks.disagreement, blocks.how)
+    return equations.model(
+        [*names, *_line_names(blocks, lines)], None, blocks.disagreement, blocks.how
+    )
 
 
 def continuous_model(master: Master, blocks: Blocks | None = None) -> LinearModel | None:
@@ -139,9 +173,17 @@ def where_given(make: Callable[[], LinearModel]) -> LinearModel | None:
 def _held_outputs(blocks: Blocks, schedule: Schedule) -> list[str]:
     """Components whose outputs at the end of a step still depend on inputs from its beginning."""
     renewed: set[str] = set()
-    owner = {i: name for name in blocks.components for i in range(len(blocks.output_names))[blocks.window[name]]}
+    owner = {
+        i: name
+        for name in blocks.components
+        for i in range(len(blocks.output_names))[blocks.window[name]]
+    }
     for group in schedule.groups:
-        fresh = [name for name in group if all(owner[i] in renewed for i in feedthrough_sources(blocks, name))]
+        fresh = [
+            name
+            for name in group
+            if all(owner[i] in renewed for i in feedthrough_sources(blocks, name))
+        ]
         renewed.update(fresh)
     return [name for name in blocks.components if name not in renewed]
 
@@ -171,25 +213,36 @@ def line_model(blocks: Blocks, schedule: Schedule) -> LinearModel:
     def entries(name: str, first: Indices) -> Indices:
         """Where a component's inputs stand in w; ``first`` has that of each output."""
         sources = blocks.sources[name]
-        return np.where(sources < p, first[np.minimum(sources, p - 1)], first_external + sources - p)
+        return np.where(
+            sources < p, first[np.minimum(sources, p - 1)], first_external + sources - p
+        )
 
     for name, c in blocks.components.items():
         equations.output(every[blocks.window[name]], windows[name], c.C, entries(name, every), c.D)
     for k, i in enumerate(guessed):
         place, nothing = slice(n + k, n + k + 1), np.zeros((1, 0))
-        equations.output(2 * p + every[i : i + 1], place, -np.eye(1), every[i : i + 1], np.full((1, 1), 2.0))
+        equations.output(
+            2 * p + every[i : i + 1], place, -np.eye(1), every[i : i + 1], np.full((1, 1), 2.0)
+        )
         equations.next_state(place, slice(0, 0), nothing, every[i : i + 1], np.eye(1))
     newest = every + (p if schedule.coupling == "newton" else 2 * p)
     for group in schedule.groups:
         ends = {name: entries(name, newest) for name in group}
         for name in group:
-            c, x, begin, end = blocks.components[name], windows[name], entries(name, every), ends[name]
+            c, x, begin, end = (
+                blocks.components[name],
+                windows[name],
+                entries(name, every),
+                ends[name],
+            )
             A, B, E = blocks.over_step(name)
             equations.next_state(x, x, A, begin, B / 2 - E)
             equations.next_state(x, slice(0, 0), np.zeros((len(A), 0)), end, B / 2 + E)
             rows = p + every[blocks.window[name]]
             equations.output(rows, x, c.C @ A, begin, c.C @ (B / 2 - E))
-            equations.output(rows, slice(0, 0), np.zeros((len(rows), 0)), end, c.C @ (B / 2 + E) + c.D)
+            equations.output(
+                rows, slice(0, 0), np.zeros((len(rows), 0)), end, c.C @ (B / 2 + E) + c.D
+            )
             newest[blocks.window[name]] = rows
     all_names = (*names, *(f"{blocks.output_names[i]}{HELD}" for i in guessed))
     return equations.model(all_names, blocks.step_size, blocks.disagreement, blocks.how)
@@ -212,7 +265,9 @@ def _check_declared(blocks: Blocks) -> None:
     for name, c in blocks.components.items():
         connected = blocks.sources[name] < len(blocks.output_names)
         for row, output in enumerate(c.outputs):
-            undeclared = np.array([given not in blocks.declared[name][output] for given in c.inputs], dtype=bool)
+            undeclared = np.array(
+                [given not in blocks.declared[name][output] for given in c.inputs], dtype=bool
+            )
             for column in np.flatnonzero(undeclared & connected & (c.D[row] != 0)).tolist():
                 raise AnalysisError(
                     f"component {name!r}: its FMU declares that {output} does not depend on {c.inputs[column]} "
@@ -225,7 +280,9 @@ def check_feedthrough(blocks: Blocks, names: list[str]) -> None:
     """No output of the named components may depend on itself within one instant."""
     waiting = list(names)
     while waiting:
-        pending = {i for name in waiting for i in range(len(blocks.output_names))[blocks.window[name]]}
+        pending = {
+            i for name in waiting for i in range(len(blocks.output_names))[blocks.window[name]]
+        }
         ready = [name for name in waiting if not pending & feedthrough_sources(blocks, name)]
         if not ready:
             raise AnalysisError(

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from orchestrator.analysis.identification import IdentifiedMode
 
-SAME = 0.015  # distance, as a part of |λ|, within which a half shows the same mode where there is no noise
+# distance, as a part of |λ|, within which a half shows the same mode where there is no noise
+SAME = 0.015
 SENSIBLE = 0.3  # distance, as a part of |λ|, beyond which a mode is another one
-_CERTAIN = 5.0  # standard deviations of an eigenvalue within which a half shows the same mode in noise
+# standard deviations of an eigenvalue within which a half shows the same mode in noise
+_CERTAIN = 5.0
 _FEWEST_PERIODS = 2.0
 _WHITE = 0.3  # largest correlation of noise with itself one to three samples later
 _LEFT = 0.01  # part of a mode's amplitude below which next to nothing of it is left
@@ -69,7 +71,9 @@ def near(modes: Sequence[IdentifiedMode] | None, mode: IdentifiedMode) -> Identi
     return best if best is not None and _distance(best, mode) <= SENSIBLE else None
 
 
-def part_of(times: NDArray[np.float64], signal: NDArray[np.float64], modes: Sequence[IdentifiedMode]) -> WindowPart:
+def part_of(
+    times: NDArray[np.float64], signal: NDArray[np.float64], modes: Sequence[IdentifiedMode]
+) -> WindowPart:
     """What the modes of a part of a signal leave of it."""
     thin = -(-len(times) // _MOST_SAMPLES)
     t, y = times[::thin] - times[0], signal[::thin]
@@ -82,7 +86,11 @@ def part_of(times: NDArray[np.float64], signal: NDArray[np.float64], modes: Sequ
     matrix = np.column_stack(columns)
     left = y - matrix @ np.linalg.lstsq(matrix, y, rcond=None)[0]
     power = float(left @ left) or 1.0
-    white = all(abs(float(left[:-lag] @ left[lag:])) < _WHITE * power for lag in (1, 2, 3) if len(left) > lag)
+    white = all(
+        abs(float(left[:-lag] @ left[lag:])) < _WHITE * power
+        for lag in (1, 2, 3)
+        if len(left) > lag
+    )
     return WindowPart(modes, length, len(t), float(np.sqrt(np.mean(left**2))), white)
 
 
@@ -91,29 +99,43 @@ def _distance(one: IdentifiedMode, other: IdentifiedMode) -> float:
 
 
 FEWEST_PERIODS = 2.0  # A mode with fewer periods in the window may be a part of a trend
-LARGEST_DAMPING = 40.0  # with a higher damping [%] less than a fifteenth of an amplitude is left after one period
+# with a higher damping [%] less than a fifteenth of an amplitude is left after one period
+LARGEST_DAMPING = 40.0
 LEAST_ENERGY = 1e-3  # least part of the energy of all oscillations in the window
-AGREE = 0.05  # largest distance, as a part of |λ|, to the same mode in another identification of the same signal
-STEEP = 10.0  # A straight line that changes by this many times the strongest oscillation may hide smaller ones
-TOLD_APART = 0.75  # Two modes d Hz apart need 0.75/d s: with 3 % of noise the damping is right to 0.8 points then
+# largest distance, as a part of |λ|, to the same mode in another identification of the same signal
+AGREE = 0.05
+# A straight line that changes by this many times the strongest oscillation may hide smaller ones
+STEEP = 10.0
+# Two modes d Hz apart need 0.75/d s: with 3 % of noise the damping is right to 0.8 points then
+TOLD_APART = 0.75
 SHORTER, COARSER = 0.1, 30.0
 """The other identification leaves out this part of the window at its beginning, and takes singular values for noise
 that are this factor larger, so that its order is lower where noise made modes."""
 
 
 def with_doubts(
-    modes: Sequence[IdentifiedMode], length: float, others: Sequence[IdentifiedMode] | None,
-    halves: Sequence[WindowPart] = (), noise_like: bool = False,
-) -> list[IdentifiedMode]:  # fmt: skip
+    modes: Sequence[IdentifiedMode],
+    length: float,
+    others: Sequence[IdentifiedMode] | None,
+    halves: Sequence[WindowPart] = (),
+    noise_like: bool = False,
+) -> list[IdentifiedMode]:
     """The modes, each with its doubts; real poles have none, as they do not swing.
 
     ``length``: of the window [s].
     ``others``: modes of the same signal by another order and window; None where that shows none.
     ``noise_like``: whether the modes leave nothing of the signal but noise."""
     energies = [_energy(mode, length) for mode in modes]
-    total = sum(energy for mode, energy in zip(modes, energies, strict=True) if _swings(mode, length))
+    total = sum(
+        energy for mode, energy in zip(modes, energies, strict=True) if _swings(mode, length)
+    )
     return [
-        replace(mode, doubts=tuple(_doubts(mode, length, energy / total if total else 1.0, others, halves, noise_like)))
+        replace(
+            mode,
+            doubts=tuple(
+                _doubts(mode, length, energy / total if total else 1.0, others, halves, noise_like)
+            ),
+        )
         if mode.frequency_hz > 0
         else mode
         for mode, energy in zip(modes, energies, strict=True)
@@ -127,7 +149,9 @@ def is_trend(mode: IdentifiedMode, length: float) -> bool:
     return abs(mode.eigenvalue) * length < 1
 
 
-def worth_showing(modes: Sequence[IdentifiedMode], length: float, weakest: float) -> list[IdentifiedMode]:
+def worth_showing(
+    modes: Sequence[IdentifiedMode], length: float, weakest: float
+) -> list[IdentifiedMode]:
     """The modes without those that are too small.
 
     A straight line comes out as exponentials of huge amplitudes that cancel, so that oscillations are compared with the
@@ -136,7 +160,11 @@ def worth_showing(modes: Sequence[IdentifiedMode], length: float, weakest: float
     ``length``: of the window [s]."""
     largest = max((mode.amplitude for mode in modes), default=0.0)
     swing = max((mode.amplitude for mode in modes if _swings(mode, length)), default=largest)
-    return [mode for mode in modes if mode.amplitude >= weakest * (swing if mode.frequency_hz > 0 else largest)]
+    return [
+        mode
+        for mode in modes
+        if mode.amplitude >= weakest * (swing if mode.frequency_hz > 0 else largest)
+    ]
 
 
 def _swings(mode: IdentifiedMode, length: float) -> bool:
@@ -144,15 +172,21 @@ def _swings(mode: IdentifiedMode, length: float) -> bool:
 
 
 def _doubts(
-    mode: IdentifiedMode, length: float, share: float, others: Sequence[IdentifiedMode] | None,
-    halves: Sequence[WindowPart], noise_like: bool,
-) -> list[str]:  # fmt: skip
+    mode: IdentifiedMode,
+    length: float,
+    share: float,
+    others: Sequence[IdentifiedMode] | None,
+    halves: Sequence[WindowPart],
+    noise_like: bool,
+) -> list[str]:
     found = []
     periods = mode.frequency_hz * length
     if periods < FEWEST_PERIODS:
         found.append(f"the window has {_fewer(periods)} periods of it")
     if mode.damping_percent > LARGEST_DAMPING:
-        found.append(f"its damping of {mode.damping_percent:.0f} % leaves next to nothing after a period")
+        found.append(
+            f"its damping of {mode.damping_percent:.0f} % leaves next to nothing after a period"
+        )
     if share < LEAST_ENERGY:
         found.append(f"it has {100 * share:.1g} % of the energy of all oscillations")
     shown = [half.shows(mode) for half in halves]
@@ -187,7 +221,9 @@ def _energy(mode: IdentifiedMode, length: float) -> float:
 def short_window(modes: Sequence[IdentifiedMode], start: float, stop: float) -> str:
     """A sentence on a window that is too short for the strongest oscillation; else empty."""
     length = stop - start
-    strongest = next((mode for mode in modes if mode.frequency_hz > 0 and not is_trend(mode, length)), None)
+    strongest = next(
+        (mode for mode in modes if mode.frequency_hz > 0 and not is_trend(mode, length)), None
+    )
     if strongest is None or strongest.frequency_hz * length >= FEWEST_PERIODS:
         return ""
     return (
@@ -228,7 +264,11 @@ def over_a_trend(modes: Sequence[IdentifiedMode], length: float, line: float) ->
     trends = any(is_trend(mode, length) for mode in modes)
     if not trends or abs(line) <= STEEP * swing:
         return ""
-    beside = f"{abs(line) / swing:.0f} times its strongest oscillation" if swing else "and no oscillation was found"
+    beside = (
+        f"{abs(line) / swing:.0f} times its strongest oscillation"
+        if swing
+        else "and no oscillation was found"
+    )
     return (
         f"The signal drifts by {line:.3g} along a straight line, {beside}: smaller modes may be hidden below this "
         "trend. Give a shorter window, or take a signal without the trend, such as a difference of two."

@@ -13,10 +13,15 @@ LEAST_ANGLE = 45.0
 180 degrees where its damping is high."""
 
 LEAST_SHARE = 0.02  # A group whose participation is below this part of the other's rests in a mode
-LEAST_COMMON = 0.5  # A group in which less than this part of the participation is a common motion swings within itself
-CLEAR = 0.8  # A name is in doubt if another mode reaches this part of the measure of the mode that it would go to
-CONTESTED = 0.5  # from this part on it is worth asking which of both the mode was, before something was changed
-NO_RESONANCE = 1 / np.sqrt(2)  # from this damping ratio on a mode amplifies nothing, and is no rival of one that does
+# A group in which less than this part of the participation is a common motion swings within itself
+LEAST_COMMON = 0.5
+# A name is in doubt if another mode reaches this part of the measure of the mode that it would go
+# to
+CLEAR = 0.8
+# from this part on it is worth asking which of both the mode was, before something was changed
+CONTESTED = 0.5
+# from this damping ratio on a mode amplifies nothing, and is no rival of one that does
+NO_RESONANCE = 1 / np.sqrt(2)
 
 LEFT_OVER = 0.5
 """A name takes a mode that is not its best one, because that has another name, only from this part of the best one's
@@ -29,7 +34,8 @@ Measure = Callable[[Mode], float]  # how well a mode fits to a name, from 0 to 1
 @dataclass(frozen=True)
 class Naming:
     named: Mapping[str, Mode]
-    reasons: Mapping[str, str] = field(default_factory=dict)  # why a name that fits some mode is borne by none, by name
+    # why a name that fits some mode is borne by none, by name
+    reasons: Mapping[str, str] = field(default_factory=dict)
     # names for which another mode fits at least `CONTESTED` as well as the one that fits best
     contested: tuple[str, ...] = ()
     # the best mode of each name with the sum of all measures in view, doubts or not; and what its name measures
@@ -56,7 +62,11 @@ def opposition(mode: Mode, side: Sequence[str], other: Sequence[str]) -> float:
     if smaller <= LEAST_SHARE * larger:
         return 0.0
     cosine = (one * two.conjugate()).real / (smaller * larger)
-    return 0.0 if cosine > np.cos(np.radians(LEAST_ANGLE)) else float(np.sqrt(smaller * larger) * (1 - cosine) / 2)
+    return (
+        0.0
+        if cosine > np.cos(np.radians(LEAST_ANGLE))
+        else float(np.sqrt(smaller * larger) * (1 - cosine) / 2)
+    )
 
 
 def _common_motion(mode: Mode, factors: Mapping[str, float], group: Sequence[str]) -> complex:
@@ -72,7 +82,9 @@ def name_modes(modes: Sequence[Mode], measures: Mapping[str, Measure]) -> Naming
     A name stays free where no mode fits, where two fit about equally, or where the only mode that fits well has another
     name."""
     names = list(measures)
-    fit = np.array([[measures[name](mode) for mode in modes] for name in names]).reshape(len(names), len(modes))
+    fit = np.array([[measures[name](mode) for mode in modes] for name in names]).reshape(
+        len(names), len(modes)
+    )
     column = _assigned(fit)
     named, reasons, contested, fits = {}, {}, [], {}
     for row, name in enumerate(names):
@@ -85,7 +97,8 @@ def name_modes(modes: Sequence[Mode], measures: Mapping[str, Measure]) -> Naming
             reasons[name] = _taken(name, modes[best], names[owner])
             continue
         fits[name] = (modes[k], measures[name])
-        resonant = modes[k].damping_ratio < NO_RESONANCE  # such a one is not taken for one without resonance
+        # such a one is not taken for one without resonance
+        resonant = modes[k].damping_ratio < NO_RESONANCE
         alike = [not resonant or mode.damping_ratio < NO_RESONANCE for mode in modes]
         free = [j for j in range(len(modes)) if j != k and j not in column.values() and alike[j]]
         rival = max(free, key=lambda j: fit[row, j], default=None)
@@ -109,12 +122,19 @@ def _assigned(fit: np.ndarray) -> dict[int, int]:
     if len(fit) <= _TRIED:
         # In a largest sum no row needs more columns than its own best ones, as others take fewer than there are rows.
         best = np.argsort(-fit, axis=1, kind="stable")[:, : len(fit)].tolist()
-        ways = (way for way in product(*([*columns, None] for columns in best)) if _is_one_to_one(way))
-        way = max(ways, key=lambda way: sum(fit[row, k] for row, k in enumerate(way) if k is not None))
+        ways = (
+            way for way in product(*([*columns, None] for columns in best)) if _is_one_to_one(way)
+        )
+        way = max(
+            ways, key=lambda way: sum(fit[row, k] for row, k in enumerate(way) if k is not None)
+        )
         return {row: k for row, k in enumerate(way) if k is not None}
     from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - it takes long, and most cases have few names
 
-    return {int(row): int(column) for row, column in zip(*linear_sum_assignment(fit, maximize=True), strict=True)}
+    return {
+        int(row): int(column)
+        for row, column in zip(*linear_sum_assignment(fit, maximize=True), strict=True)
+    }
 
 
 def _is_one_to_one(columns: Sequence[int | None]) -> bool:

@@ -23,10 +23,13 @@ from orchestrator.arrays import Vector
 from orchestrator.errors import AnalysisError
 
 _ROUNDS = 8
-_SETTLED = 1e-8  # the eigenvalues have settled where a round moves none of them by more than this part
-_REST = 1e-4  # what A·r may differ from λ·r by, as a part of λ and r. The eigenvalue has the square of it.
+# the eigenvalues have settled where a round moves none of them by more than this part
+_SETTLED = 1e-8
+# what A·r may differ from λ·r by, as a part of λ and r. The eigenvalue has the square of it.
+_REST = 1e-4
 _SPREAD = 1.1  # eigenvalues whose sizes differ by up to this factor share a point
-_BESIDE = 1e-3  # by this part the point lies beside its eigenvalues' middle: on one nothing could be solved
+# by this part the point lies beside its eigenvalues' middle: on one nothing could be solved
+_BESIDE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,11 @@ class RefinedModes:
 
 
 def refine(
-    model: LinearModel, equations: ShiftedEquations, values: NDArray[np.complex128], left: Vector, right: Vector
+    model: LinearModel,
+    equations: ShiftedEquations,
+    values: NDArray[np.complex128],
+    left: Vector,
+    right: Vector,
 ) -> RefinedModes:
     """Modes of a continuous model, from values and vectors that are nearly so."""
     settled = False
@@ -79,7 +86,9 @@ def _groups(values: NDArray[np.complex128]) -> list[NDArray[np.int64]]:
     return [np.array(group, dtype=np.int64) for group in groups]
 
 
-def _in_order_of(before: NDArray[np.complex128], found: NDArray[np.complex128]) -> NDArray[np.int64]:
+def _in_order_of(
+    before: NDArray[np.complex128], found: NDArray[np.complex128]
+) -> NDArray[np.int64]:
     """Places of what was found, each next to what it was before."""
     from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - half a second to import
 
@@ -114,7 +123,9 @@ def missed(
     ``damping``: damping ratio below which nothing may be missed, down to −0.3. What is found is rough."""
     norms = np.einsum("ij,ij->j", known.left.conj(), known.right)
     left = (known.left / norms.conj()).conj().T
-    edges = np.geomspace(lowest, highest, 1 + int(np.ceil(np.log(highest / lowest) / np.log(_STRETCH)))).tolist()
+    edges = np.geomspace(
+        lowest, highest, 1 + int(np.ceil(np.log(highest / lowest) / np.log(_STRETCH)))
+    ).tolist()
     slopes = [-ratio / np.sqrt(1 - ratio**2) for ratio in (-_GROWTH, damping)]
     found: list[complex] = []
     for low, high in pairwise(edges):
@@ -127,7 +138,9 @@ def missed(
     return found
 
 
-def _unknown(equations: ShiftedEquations, left: Vector, right: Vector, centre: complex, radius: float) -> list[complex]:
+def _unknown(
+    equations: ShiftedEquations, left: Vector, right: Vector, centre: complex, radius: float
+) -> list[complex]:
     """All unknown eigenvalues nearer to a point than a radius, and some farther ones."""
     factors, n = equations.at(centre), right.shape[0]
 
@@ -137,13 +150,20 @@ def _unknown(equations: ShiftedEquations, left: Vector, right: Vector, centre: c
         found: Vector = (rest - right @ (left @ rest))[:, 0]
         return found
 
-    start = np.random.default_rng(0).standard_normal((n,)).astype(complex)  # the same search gives the same answer
+    # the same search gives the same answer
+    start = np.random.default_rng(0).standard_normal((n,)).astype(complex)
     inverse = spla.LinearOperator((n, n), matvec=solve, dtype=complex)
     count, most = _AT_A_TIME
     while count <= min(most, n - 2):
         try:
-            nu = spla.eigs(inverse, k=count, ncv=min(n, max(24, 3 * count)), v0=start, tol=_ROUGH,
-                               return_eigenvectors=False)  # fmt: skip
+            nu = spla.eigs(
+                inverse,
+                k=count,
+                ncv=min(n, max(24, 3 * count)),
+                v0=start,
+                tol=_ROUGH,
+                return_eigenvectors=False,
+            )
         except spla.ArpackNoConvergence as error:
             raise AnalysisError(
                 f"the search for modes around {centre:.3g} rad/s does not converge; compute the full spectrum"
@@ -152,4 +172,6 @@ def _unknown(equations: ShiftedEquations, left: Vector, right: Vector, centre: c
         if np.abs(values - centre).max() > radius:
             return [complex(value) for value in values]
         count *= 2
-    raise AnalysisError(f"more than {most} modes lie at {centre:.4g} rad/s; compute the full spectrum instead")
+    raise AnalysisError(
+        f"more than {most} modes lie at {centre:.4g} rad/s; compute the full spectrum instead"
+    )

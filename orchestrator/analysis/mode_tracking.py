@@ -15,9 +15,13 @@ from orchestrator.analysis.modes import Mode
 from orchestrator.arrays import Complex, Vector
 
 THRESHOLD = 0.5  # least similarity with which two modes count as the same mode
-_MARGIN = 0.3  # A mode is left unmatched if the similarities of its two best candidates differ by less than this
-_DISTANCE_WEIGHT = 0.1  # of the relative distance between eigenvalues; the similarity, from 0 to 1, has 1
-_EDGE = 1.1  # A mode whose frequency is within this factor of an end of the range may leave or enter the range there
+# A mode is left unmatched if the similarities of its two best candidates differ by less than this
+_MARGIN = 0.3
+# of the relative distance between eigenvalues; the similarity, from 0 to 1, has 1
+_DISTANCE_WEIGHT = 0.1
+# A mode whose frequency is within this factor of an end of the range may leave or enter the range
+# there
+_EDGE = 1.1
 
 At = TypeVar("At", bound=Hashable)
 
@@ -64,13 +68,15 @@ def similarities(a: ModeSet, b: ModeSet) -> NDArray[np.float64]:
     in both: each identification has states of its own."""
     place_in_b = {name: k for k, name in enumerate(b.names)}
     both = [
-        (k, place_in_b[name]) for k, name in enumerate(a.names) if name in place_in_b and ".identified." not in name
+        (k, place_in_b[name])
+        for k, name in enumerate(a.names)
+        if name in place_in_b and ".identified." not in name
     ]
     of_a, of_b = [k for k, _ in both], [k for _, k in both]
     norm_a, norm_b = (np.einsum("ij,ij->i", s.left.conj(), s.right) for s in (a, b))
-    product = similarity(a.left[:, of_a], a.right[:, of_a], b.left[:, of_b], b.right[:, of_b]) / np.abs(
-        np.outer(norm_a, norm_b)
-    )
+    product = similarity(
+        a.left[:, of_a], a.right[:, of_a], b.left[:, of_b], b.right[:, of_b]
+    ) / np.abs(np.outer(norm_a, norm_b))
     # The product exceeds 1 only near a double eigenvalue, where eigenvectors say little; its inverse is used then.
     return np.asarray(np.where(product > 1, 1 / np.maximum(product, 1.0), product), dtype=float)
 
@@ -86,8 +92,12 @@ def match(a: ModeSet, b: ModeSet, threshold: float = THRESHOLD) -> list[Link]:
 
     alike = similarities(a, b)
     sizes = np.abs(a.eigenvalues)[:, None] + np.abs(b.eigenvalues)[None, :]
-    distance = np.abs(a.eigenvalues[:, None] - b.eigenvalues[None, :]) / np.where(sizes > 0, sizes, 1.0)
-    cost = np.where(alike >= threshold, 1 - alike + _DISTANCE_WEIGHT * distance, 1 + 2 * _DISTANCE_WEIGHT)
+    distance = np.abs(a.eigenvalues[:, None] - b.eigenvalues[None, :]) / np.where(
+        sizes > 0, sizes, 1.0
+    )
+    cost = np.where(
+        alike >= threshold, 1 - alike + _DISTANCE_WEIGHT * distance, 1 + 2 * _DISTANCE_WEIGHT
+    )
     links = []
     for i, k in zip(*linear_sum_assignment(cost), strict=True):
         rivals = [*np.delete(alike[i], k), *np.delete(alike[:, k], i)]
@@ -101,7 +111,9 @@ def near_an_end(frequency: float, frequency_range: tuple[float, float]) -> bool:
     return not frequency_range[0] * _EDGE < frequency < frequency_range[1] / _EDGE
 
 
-def is_ambiguous(a: ModeSet, b: ModeSet, frequency_range: tuple[float, float], threshold: float = THRESHOLD) -> bool:
+def is_ambiguous(
+    a: ModeSet, b: ModeSet, frequency_range: tuple[float, float], threshold: float = THRESHOLD
+) -> bool:
     """Whether a mode of one point has no partner in the other without being near an end of the range [Hz]."""
     links = match(a, b, threshold)
     paired = ({link.source for link in links}, {link.target for link in links})
@@ -114,7 +126,8 @@ def is_ambiguous(a: ModeSet, b: ModeSet, frequency_range: tuple[float, float], t
 
 @dataclass
 class Followed(Generic[At]):
-    trajectory: dict[At, list[int]] = field(default_factory=dict)  # numbers of the trajectories of a point's modes
+    # numbers of the trajectories of a point's modes
+    trajectory: dict[At, list[int]] = field(default_factory=dict)
     # similarity of each mode to its predecessor; NaN where a trajectory begins
     similarity: dict[At, list[float]] = field(default_factory=dict)
     # the predecessor's point; None where a trajectory begins
@@ -122,7 +135,9 @@ class Followed(Generic[At]):
 
 
 def number_trajectories(
-    points: Mapping[At, ModeSet], route: Iterable[tuple[At, Sequence[At]]], threshold: float = THRESHOLD
+    points: Mapping[At, ModeSet],
+    route: Iterable[tuple[At, Sequence[At]]],
+    threshold: float = THRESHOLD,
 ) -> Followed[At]:
     result: Followed[At] = Followed()
     count = 0
@@ -132,7 +147,9 @@ def number_trajectories(
         for origin in origins:
             for link in match(points[origin], modes, threshold):
                 number = result.trajectory[origin][link.source]
-                if link.target not in numbers and all(number != taken for taken, _, _ in numbers.values()):
+                if link.target not in numbers and all(
+                    number != taken for taken, _, _ in numbers.values()
+                ):
                     numbers[link.target] = (number, link.similarity, origin)
         for i in range(len(modes.eigenvalues)):
             if i not in numbers:
@@ -145,7 +162,9 @@ def number_trajectories(
     return result
 
 
-def similarity(left_a: Vector, right_a: Vector, left_b: Vector, right_b: Vector) -> NDArray[np.float64]:
+def similarity(
+    left_a: Vector, right_a: Vector, left_b: Vector, right_b: Vector
+) -> NDArray[np.float64]:
     """|l_aᴴ·r_b|·|l_bᴴ·r_a| of every mode a with every mode b, shape (m_a, m_b)."""
     forth = left_a.conj() @ right_b.T
     back = (left_b.conj() @ right_a.T).T

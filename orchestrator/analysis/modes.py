@@ -24,9 +24,13 @@ guarded."""
 HIGHEST_SWING_HZ = 5.0
 """Frequency [Hz] up to which electromechanical modes outside of a range are named: small machines beside large ones."""
 
-_DEAD = 1e-9  # A multiplier of the step map smaller than this decays within one step and is not a mode
-ALL_VECTORS = 400  # up to this number of states, all eigenvectors are computed: they take no time that anyone notices
-_REAL = 1e-2  # a pair with an imaginary part below this share of the real one is a double real pole split by rounding
+# A multiplier of the step map smaller than this decays within one step and is not a mode
+_DEAD = 1e-9
+# up to this number of states, all eigenvectors are computed: they take no time that anyone notices
+ALL_VECTORS = 400
+# a pair with an imaginary part below this share of the real one is a double real pole split by
+# rounding
+_REAL = 1e-2
 
 
 def damping_ratio(eigenvalue: complex) -> float:
@@ -67,8 +71,10 @@ class Mode(OfEigenvalue):
     """One eigenvalue λ [rad/s] with its participation factors and its shape."""
 
     eigenvalue: complex
-    participation: tuple[tuple[str, float], ...]  # factor of every state, largest first; the factors of a mode sum to 1
-    shape: dict[str, complex]  # right eigenvector by state name, scaled so that its largest element is 1
+    # factor of every state, largest first; the factors of a mode sum to 1
+    participation: tuple[tuple[str, float], ...]
+    # right eigenvector by state name, scaled so that its largest element is 1
+    shape: dict[str, complex]
     # left eigenvector l by state name, scaled so that lᴴ·shape is 1: it recognises the mode elsewhere
     left: dict[str, complex] = field(default_factory=dict)
 
@@ -144,14 +150,18 @@ def in_range(values: NDArray[np.complex128], lowest_hz: float, highest_hz: float
 
 
 def find_modes(
-    model: LinearModel, lowest_hz: float = ELECTROMECHANICAL_HZ[0], highest_hz: float = ELECTROMECHANICAL_HZ[1]
+    model: LinearModel,
+    lowest_hz: float = ELECTROMECHANICAL_HZ[0],
+    highest_hz: float = ELECTROMECHANICAL_HZ[1],
 ) -> list[Mode]:
     """Modes with a frequency in a range; see `find_spectrum`."""
     return find_spectrum(model, lowest_hz, highest_hz).modes
 
 
 def find_spectrum(
-    model: LinearModel, lowest_hz: float = ELECTROMECHANICAL_HZ[0], highest_hz: float = ELECTROMECHANICAL_HZ[1]
+    model: LinearModel,
+    lowest_hz: float = ELECTROMECHANICAL_HZ[0],
+    highest_hz: float = ELECTROMECHANICAL_HZ[1],
 ) -> Spectrum:
     """Every eigenvalue, and the modes with a frequency in a range, one of each conjugate pair.
 
@@ -161,7 +171,9 @@ def find_spectrum(
     chosen, k = in_range(lambdas, lowest_hz, highest_hz), index_of_rightmost(lambdas)
     wanted = chosen if k is None else [*chosen, k]
     left, right = vectors(wanted)
-    modes = [make_mode(lambdas[i], left[:, j], right[:, j], model.names) for j, i in enumerate(wanted)]
+    modes = [
+        make_mode(lambdas[i], left[:, j], right[:, j], model.names) for j, i in enumerate(wanted)
+    ]
     rightmost = None if k is None else modes.pop()
     return Spectrum(lambdas, least_damped_first(modes), rightmost)
 
@@ -207,7 +219,10 @@ def to_continuous(
 
 
 def make_mode(
-    value: complex, left: NDArray[np.complex128], right: NDArray[np.complex128], names: tuple[str, ...]
+    value: complex,
+    left: NDArray[np.complex128],
+    right: NDArray[np.complex128],
+    names: tuple[str, ...],
 ) -> Mode:
     """A mode from its eigenvalue λ [rad/s] and the eigenvectors of A and Aᴴ, each of shape (n,).
 

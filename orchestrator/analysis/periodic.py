@@ -22,9 +22,11 @@ from orchestrator.coupling.schedule import Schedule, gauss_seidel
 from orchestrator.errors import AnalysisError
 
 _SIZE = 1e-6  # of a perturbation, relative to the state's scale
-_LOOKS = 40  # at a perturbed system in a period: modes up to 20 times the period's frequency are told
+# at a perturbed system in a period: modes up to 20 times the period's frequency are told
+_LOOKS = 40
 _ALIVE = 1e-4  # multipliers over a period below this belong to what decays within it
-_REAL = 1e-6  # largest imaginary part of the map that is put together from its modes again, relative to the map
+# largest imaginary part of the map that is put together from its modes again, relative to the map
+_REAL = 1e-6
 _MOVING, _SAME = 1e-4, 1e-9
 """A state that changes by more than the first in a period may count; then a period from the changed value must be the
 same, to the second, in all states."""
@@ -39,9 +41,11 @@ Mask = NDArray[np.bool_]
 class PeriodicPoint:
     """A state that repeats after a period."""
 
-    names: tuple[str, ...]  # of all states; outputs that are held over a step follow those of the components
+    # of all states; outputs that are held over a step follow those of the components
+    names: tuple[str, ...]
     x: Matrix  # values of all states, shape (n,)
-    change: Matrix  # of all states over a period, relative to their scale, 0 for those that count, shape (n,)
+    # of all states over a period, relative to their scale, 0 for those that count, shape (n,)
+    change: Matrix
     first: float  # the largest one at the start
     iterations: int  # of Newton's method
     # whether a state grows by the same in each period without any effect, such as a clock, or an angle by whole turns,
@@ -139,7 +143,8 @@ def _per_step(maps: NDArray[np.float64], steps: int) -> Matrix:
     values, left, right = scipy.linalg.eig(maps[-1], left=True, right=True)
     alive = np.abs(values) > _ALIVE
     values, left, right = values[alive], left[:, alive], right[:, alive]
-    left = left @ np.linalg.inv(left.conj().T @ right).conj().T  # so that leftᴴ·right is the identity
+    # so that leftᴴ·right is the identity
+    left = left @ np.linalg.inv(left.conj().T @ right).conj().T
     exponents = np.log(values.astype(complex))
     exponents = exponents + 2j * np.pi * _turns(right, left, exponents, maps)
     made = (right * np.exp(exponents / steps)) @ left.conj().T
@@ -159,13 +164,15 @@ def _turns(right: Complex, left: Complex, exponents: Complex, maps: NDArray[np.f
     looks = len(maps)
     shares = np.arange(looks) / looks
     motions = (
-        np.stack([right, *(A @ right for A in maps[:-1])]) * np.exp(-np.multiply.outer(shares, exponents))[:, None, :]
+        np.stack([right, *(A @ right for A in maps[:-1])])
+        * np.exp(-np.multiply.outer(shares, exponents))[:, None, :]
     )
     content = np.einsum("kim,im->km", np.abs(np.fft.fft(motions, axis=0)), np.abs(left))
     turns = content.argmax(axis=0)
     turns = np.where(turns > looks // 2, turns - looks, turns)
     swinging = np.abs(exponents.imag) > _REAL
-    turns = np.where(swinging, turns, 0)  # a real multiplier of a real system has no partner to turn the other way
+    # a real multiplier of a real system has no partner to turn the other way
+    turns = np.where(swinging, turns, 0)
     for k in np.flatnonzero(exponents.imag > _REAL):  # rounding must not tell conjugate modes apart
         partner = int(np.argmin(np.abs(exponents - exponents[k].conjugate())))
         turns[partner] = -turns[k]
@@ -203,7 +210,10 @@ def _without_counts(period: _Period, x: Matrix) -> tuple[Matrix, Mask]:
         moved = x.copy()
         moved[k] += change[k]
         counting[k] = bool(
-            (np.abs(period.change(moved) - change) <= _SAME * np.maximum(period.scale, np.abs(moved))).all()
+            (
+                np.abs(period.change(moved) - change)
+                <= _SAME * np.maximum(period.scale, np.abs(moved))
+            ).all()
         )
     return np.where(counting, 0.0, change / period.scale), counting
 

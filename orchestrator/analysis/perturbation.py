@@ -64,7 +64,9 @@ def perturb(step: PerturbedStep, rates: Sequence[str], *, once: bool = False) ->
         else:
             for kept, new in zip(found, pair, strict=True):
                 _take_over(kept, new, columns, ~apart, one_sided)
-            narrow |= {names[k]: size for k, disagree in zip(columns, apart, strict=True) if not disagree}
+            narrow |= {
+                names[k]: size for k, disagree in zip(columns, apart, strict=True) if not disagree
+            }
         columns = [k for k, disagree in zip(columns, apart, strict=True) if disagree]
         if not columns:
             break
@@ -74,9 +76,12 @@ def perturb(step: PerturbedStep, rates: Sequence[str], *, once: bool = False) ->
 
 
 def _take_over(
-    kept: Differences, new: Differences, columns: Sequence[int], agreeing: NDArray[np.bool_],
+    kept: Differences,
+    new: Differences,
+    columns: Sequence[int],
+    agreeing: NDArray[np.bool_],
     one_sided: NDArray[np.bool_],
-) -> None:  # fmt: skip
+) -> None:
     for part in Differences._fields:
         taken = [k for k in range(len(columns)) if agreeing[k]]
         if part.endswith("_up"):
@@ -86,7 +91,9 @@ def _take_over(
             whole[:, [columns[k] for k in taken]] = again[:, taken]
 
 
-def _apart(one: tuple[Matrix, Matrix], other: tuple[Matrix, Matrix], share: float, *floors: float) -> NDArray[np.bool_]:
+def _apart(
+    one: tuple[Matrix, Matrix], other: tuple[Matrix, Matrix], share: float, *floors: float
+) -> NDArray[np.bool_]:
     """Columns in which two answers, each the states' change and d(y), differ by more than a share of what is there."""
     far = [
         (np.abs(a - b) > share * (np.abs(a) + floor)).any(axis=0)

@@ -19,7 +19,8 @@ from orchestrator.arrays import Matrix, Vector
 
 _ROUTINES = {"dgebal": 5, "dgehrd": 6, "dorghr": 6, "dhseqr": 7, "dtrevc": 8, "dgebak": 6}
 """How many arguments of each routine are integers of 32 bits, or logical values."""
-_SIZES = (1e-120, 1e120)  # matrices whose largest element lies outside are scaled by LAPACK's driver, and left to it
+# matrices whose largest element lies outside are scaled by LAPACK's driver, and left to it
+_SIZES = (1e-120, 1e120)
 
 
 class RealSchur:
@@ -47,7 +48,8 @@ class RealSchur:
         if not len(places):
             empty = np.zeros((len(self.values), 0), dtype=complex)
             return empty, empty
-        first = places - (self.values.imag[places] < 0)  # a pair stands in two columns, for its upper half
+        # a pair stands in two columns, for its upper half
+        first = places - (self.values.imag[places] < 0)
         wanted = np.zeros(len(self.values), dtype=np.int32)
         wanted[first] = 1
         paired = self.values.imag != 0
@@ -69,7 +71,9 @@ class RealSchur:
         call.with_room(n, "dgehrd", n, self._low, self._high, T, n, tau)
         self._Q = Q = T.copy(order="F")
         call.with_room(n, "dorghr", n, self._low, self._high, Q, n, tau)
-        call.with_room(n, "dhseqr", b"S", b"V", n, self._low, self._high, T, n, real, imaginary, Q, n)
+        call.with_room(
+            n, "dhseqr", b"S", b"V", n, self._low, self._high, T, n, real, imaginary, Q, n
+        )
         self.values = real + 1j * imaginary
         return call.succeeded
 
@@ -78,7 +82,22 @@ class RealSchur:
         n = len(self.values)
         left, right = (np.zeros((n, room), order="F") for _ in range(2))
         found, call = ctypes.c_int(), _Call()
-        call("dtrevc", b"B", b"S", wanted.copy(), n, self._T, n, left, n, right, n, room, found, np.zeros(3 * n))
+        call(
+            "dtrevc",
+            b"B",
+            b"S",
+            wanted.copy(),
+            n,
+            self._T,
+            n,
+            left,
+            n,
+            right,
+            n,
+            room,
+            found,
+            np.zeros(3 * n),
+        )
         whole = []
         for side, vectors in ((b"L", left), (b"R", right)):
             turned = np.asfortranarray(self._Q @ vectors)
@@ -99,7 +118,10 @@ def lapack() -> dict[str, Any] | None:
     except (ImportError, AttributeError, KeyError):
         return None
     python = ctypes.pythonapi
-    python.PyCapsule_GetName.restype, python.PyCapsule_GetName.argtypes = ctypes.c_char_p, [ctypes.py_object]
+    python.PyCapsule_GetName.restype, python.PyCapsule_GetName.argtypes = (
+        ctypes.c_char_p,
+        [ctypes.py_object],
+    )
     python.PyCapsule_GetPointer.restype = ctypes.c_void_p
     python.PyCapsule_GetPointer.argtypes = [ctypes.py_object, ctypes.c_char_p]
     routines = {}

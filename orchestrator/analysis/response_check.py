@@ -45,7 +45,8 @@ MOST_STEPS = 1000  # largest number of communication steps in one response
 _HOLDS = (1, 1, 2, 3, 5, 8, 13, 21, 34, 55, 89, 144)
 """Numbers of communication steps for which an input is held, in turn. They excite fast parts and slow ones."""
 
-_ROUNDING = 1e-11  # relative error of what an FMU computes, before it is divided by the size of a step
+# relative error of what an FMU computes, before it is divided by the size of a step
+_ROUNDING = 1e-11
 
 
 @dataclass(frozen=True)
@@ -111,7 +112,9 @@ _AGREED: WeakKeyDictionary[Component, set[bytes]] = WeakKeyDictionary()
 """Checks that have passed already: a study linearises the same instance at the same operating point many times."""
 
 
-def check_response(component: Component, model: ContinuousModel, what: str, time: float, step_size: float) -> None:
+def check_response(
+    component: Component, model: ContinuousModel, what: str, time: float, step_size: float
+) -> None:
     """Compare a linear model with its FMU, and restore the FMU's state.
 
     ``what``: what the model is, for the error: ``the linear model inside its FMU``."""
@@ -131,11 +134,18 @@ def check_response(component: Component, model: ContinuousModel, what: str, time
 def _digest(model: ContinuousModel, values: Matrix, step_size: float) -> bytes:
     text = repr((model.signals, model.inputs, step_size)).encode()
     matrices = (model.A, model.B, model.C, model.D, values)
-    return hashlib.sha256(text + b"".join(np.ascontiguousarray(m).tobytes() for m in matrices)).digest()
+    return hashlib.sha256(
+        text + b"".join(np.ascontiguousarray(m).tobytes() for m in matrices)
+    ).digest()
 
 
 def _measure(
-    component: Component, model: ContinuousModel, plan: _Plan, at_rest: Matrix, time: float, step_size: float
+    component: Component,
+    model: ContinuousModel,
+    plan: _Plan,
+    at_rest: Matrix,
+    time: float,
+    step_size: float,
 ) -> _Response:
     """The response to the first of `SIZES` whose half gives half the response."""
     bench = _Courses(component, model, plan, at_rest, time, step_size)
@@ -178,7 +188,9 @@ class _Courses:
     def course(self, size: float) -> Matrix:
         """All signals at the end of each hold, shape (k, signals)."""
         component = self.component
-        inputs, signals = (RealBatch(component, names) for names in (self.model.inputs, self.model.signals))
+        inputs, signals = (
+            RealBatch(component, names) for names in (self.model.inputs, self.model.signals)
+        )
         rows = np.empty((len(self.plan.holds), len(signals.names)))
         done = 0
         saved = component.save_state()
@@ -224,7 +236,8 @@ class _Comparison:
         follow = range(n, course.shape[1])
         self._refuse(follow, self._by_equations(), EQUATIONS, "computed from the FMU's own states")
         shown = [*range(n), *range(2 * n, course.shape[1])]
-        with np.errstate(over="ignore", invalid="ignore"):  # a wrong model may grow beyond the range of numbers
+        # a wrong model may grow beyond the range of numbers
+        with np.errstate(over="ignore", invalid="ignore"):
             by_itself = self._by_itself()[:, shown]
         self._refuse(shown, by_itself, COURSE, "computed from the inputs alone")
 

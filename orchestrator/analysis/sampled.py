@@ -39,7 +39,9 @@ def steps_of_times(times: Iterable[Fraction], step_size: float) -> int:
         return 1
     common = step
     for time in known:
-        common = Fraction(lcm(common.numerator, time.numerator), gcd(common.denominator, time.denominator))
+        common = Fraction(
+            lcm(common.numerator, time.numerator), gcd(common.denominator, time.denominator)
+        )
     return int(common / step)
 
 
@@ -48,7 +50,10 @@ def steps_of_period(master: Master, step_size: float, without: Iterable[str] = (
     times = {name: t for name, t in repeating(master).items() if name not in set(without)}
     steps = steps_of_times((time for found in times.values() for time in found), step_size)
     if steps > 1 and steps * step_size > LONGEST * (1 + 1e-9):
-        told = "; ".join(f"{name}: {', '.join(f'{float(t):.6g} s' for t in found)}" for name, found in times.items())
+        told = "; ".join(
+            f"{name}: {', '.join(f'{float(t):.6g} s' for t in found)}"
+            for name, found in times.items()
+        )
         raise AnalysisError(
             f"sampled components and the communication step of {step_size:g} s repeat together after "
             f"{steps * step_size:.4g} s only, more than {LONGEST:g} s ({told}); take a step that divides these times, "

@@ -40,9 +40,12 @@ class Factors:
 class ShiftedEquations:
     def __init__(self, model: LinearModel) -> None:
         n, m = model.G.shape
-        parts = sp.block_array([[model.F, model.G], [model.H, model.K - sp.eye_array(m)]], format="coo")
+        parts = sp.block_array(
+            [[model.F, model.G], [model.H, model.K - sp.eye_array(m)]], format="coo"
+        )
         rows, columns = (np.concatenate([place, np.arange(n)]) for place in parts.coords)
-        values = np.concatenate([parts.data, np.zeros(n)])  # a diagonal element that is 0 needs its place, too
+        # a diagonal element that is 0 needs its place, too
+        values = np.concatenate([parts.data, np.zeros(n)])
         whole = sp.coo_array((values, (rows, columns)), shape=(n + m, n + m)).tocsc()
         column_of = np.repeat(np.arange(n + m), np.diff(whole.indptr))
         self._diagonal = np.flatnonzero((whole.indices == column_of) & (column_of < n))
@@ -54,7 +57,9 @@ class ShiftedEquations:
         try:
             return Factors(spla.splu(shifted, options={"Equil": False}), self._n)
         except RuntimeError as error:
-            raise AnalysisError(f"{sigma:.6g} is an eigenvalue itself; look from a point beside it") from error
+            raise AnalysisError(
+                f"{sigma:.6g} is an eigenvalue itself; look from a point beside it"
+            ) from error
 
 
 def _odd(permutation: NDArray[np.int32]) -> bool:
@@ -65,7 +70,8 @@ def _odd(permutation: NDArray[np.int32]) -> bool:
     return bool((n - count) % 2)
 
 
-GROWING = 2e-3  # eigenvalues to the right of this count as growing [1/s]: what is closer to 0 may be the free angle
+# eigenvalues to the right of this count as growing [1/s]: what is closer to 0 may be the free angle
+GROWING = 2e-3
 
 _STEP = 0.7
 """Largest change of the logarithm between two points, and from one half of the way to the other. An angle alone could
@@ -102,7 +108,9 @@ def count_growing(equations: ShiftedEquations, alone: Sequence[complex] | Vector
             if max(abs(first), abs(second), abs(second - first)) <= _STEP:
                 turn += (first + second).imag
             elif depth == _HALVINGS:
-                raise AnalysisError(f"an eigenvalue lies at {a:.6g} rad/s, on the line where growth begins")
+                raise AnalysisError(
+                    f"an eigenvalue lies at {a:.6g} rad/s, on the line where growth begins"
+                )
             else:
                 waiting += [(middle, f, b, f_b, depth + 1), (a, f_a, middle, f, depth + 1)]
     return int((poles.real > GROWING).sum()) - round(turn / np.pi)

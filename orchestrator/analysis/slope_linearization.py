@@ -9,7 +9,10 @@ from contextlib import contextmanager
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.analysis.component_linearization import ComponentLinearization, linearize_component
+from orchestrator.analysis.component_linearization import (
+    ComponentLinearization,
+    linearize_component,
+)
 from orchestrator.arrays import Matrix
 from orchestrator.coupling.turns import Exchange
 from orchestrator.fmi.component import Component, RealBatch
@@ -18,7 +21,9 @@ _SIZE = 1e-5  # of a perturbation, relative to max(1, |value|)
 _EVEN, _FLOOR = 0.1, 1e-2
 """An element's answers up and down may differ by this part of it, and of this rate [1/s]: beyond, a limit is near."""
 
-_OF_ROW = 1e-3  # part of an answer's largest slope that counts as this rate: |v| is curved, and a gain makes it large
+# part of an answer's largest slope that counts as this rate: |v| is curved, and a gain makes it
+# large
+_OF_ROW = 1e-3
 _MANY = 100  # from this number of states and inputs on, variables are perturbed together
 _HOLDS, _ROUNDING = 1e-3, 1e-9
 """A perturbation in all directions at once may differ by the first part of its answer from the sum of the single
@@ -32,9 +37,13 @@ def gives_slopes(exchange: Exchange) -> bool:
 
 
 def linearize_slopes(
-    exchange: Exchange, time: float, step_size: float, inputs: Sequence[str] = (), observed: Sequence[str] = (),
+    exchange: Exchange,
+    time: float,
+    step_size: float,
+    inputs: Sequence[str] = (),
+    observed: Sequence[str] = (),
     like: ComponentLinearization | None = None,
-) -> ComponentLinearization:  # fmt: skip
+) -> ComponentLinearization:
     """ẋ = A_c·x + B_c·u and y = C·x + D·u of one component; it has no step map.
 
     ``like``: the same FMU at another operating point. Variables that had no common effect there are perturbed together;
@@ -45,7 +54,11 @@ def linearize_slopes(
     entries, exits = (*exchange.inputs.names, *inputs), (*exchange.outputs.names, *observed)
     n, p = len(states), len(exchange.outputs.names)
     point = _Point(component, (*states, *entries), (*rates, *exits))
-    pattern = None if like is None or len(point.names) < _MANY else _pattern(like, point.names, _answers(states, exits))
+    pattern = (
+        None
+        if like is None or len(point.names) < _MANY
+        else _pattern(like, point.names, _answers(states, exits))
+    )
     found = None if pattern is None else point.together(pattern)
     up, down = found or point.one_by_one()
     whole = (up + down) / 2
@@ -54,11 +67,21 @@ def linearize_slopes(
         return linearize_component(exchange, time, step_size, inputs, observed, derivatives=True)
     none = np.zeros((0, 0))
     return ComponentLinearization(
-        component.name, states, entries, exchange.outputs.names,
-        A=none, B=none, C=whole[n : n + p, :n], D=whole[n : n + p, n:],
-        observed=tuple(observed), C_o=whole[n + p :, :n], D_o=whole[n + p :, n:],
-        A_c=whole[:n, :n], B_c=whole[:n, n:], disagreement=0.0,
-    )  # fmt: skip
+        component.name,
+        states,
+        entries,
+        exchange.outputs.names,
+        A=none,
+        B=none,
+        C=whole[n : n + p, :n],
+        D=whole[n : n + p, n:],
+        observed=tuple(observed),
+        C_o=whole[n + p :, :n],
+        D_o=whole[n + p :, n:],
+        A_c=whole[:n, :n],
+        B_c=whole[:n, n:],
+        disagreement=0.0,
+    )
 
 
 class _Point:
@@ -77,7 +100,11 @@ class _Point:
             at_rest = self._answers.read().copy()
             up, down = (np.empty((len(at_rest), len(self.names))) for _ in range(2))
             for k, name in enumerate(self.names):
-                value, step, perturbed = self._values[k], self._steps[k], RealBatch(self._component, [name])
+                value, step, perturbed = (
+                    self._values[k],
+                    self._steps[k],
+                    RealBatch(self._component, [name]),
+                )
                 for sign, found in ((+1.0, up), (-1.0, down)):
                     perturbed.values[0] = value + sign * step
                     perturbed.write()
@@ -99,7 +126,11 @@ class _Point:
             turns = np.random.default_rng(0).choice([-1.0, 1.0], len(self.names)) * self._steps
             change = (self._answer_at(turns) - self._answer_at(-turns)) / 2
         expected = (up + down) / 2 @ turns
-        size = np.abs((up + down) / 2) @ np.abs(turns) + np.abs(at_rest) * _ROUNDING + _ROUNDING * _SIZE
+        size = (
+            np.abs((up + down) / 2) @ np.abs(turns)
+            + np.abs(at_rest) * _ROUNDING
+            + _ROUNDING * _SIZE
+        )
         return (up, down) if bool((np.abs(change - expected) <= _HOLDS * size).all()) else None
 
     def _answer(self, sign: float, group: NDArray[np.int64]) -> Matrix:
@@ -140,11 +171,15 @@ def _answers(states: Sequence[str], exits: Sequence[str]) -> tuple[str, ...]:
     return (*(f"der({name})" for name in states), *exits)
 
 
-def _pattern(like: ComponentLinearization, entries: Sequence[str], exits: Sequence[str]) -> NDArray[np.bool_] | None:
+def _pattern(
+    like: ComponentLinearization, entries: Sequence[str], exits: Sequence[str]
+) -> NDArray[np.bool_] | None:
     """Which answer depends on which variable, both by name; None where the model lacks one of them."""
     assert like.A_c is not None
     assert like.B_c is not None
-    row, column = ({name: k for k, name in enumerate(names)} for names in (_exits(like), _entries(like)))
+    row, column = (
+        {name: k for k, name in enumerate(names)} for names in (_exits(like), _entries(like))
+    )
     if not (set(exits) <= set(row) and set(entries) <= set(column)):
         return None
     blocks = (like.A_c, like.B_c), (like.C, like.D), (like.C_o, like.D_o)

@@ -28,8 +28,11 @@ from orchestrator.analysis.modes import (
 )
 from orchestrator.errors import few
 
-WHOLE = 4000  # up to so many states, all eigenvalues are computed; in larger systems growing ones are searched for
-_GROWING = 1e-6  # A real part above this [1/s], and above 1e-8 of the eigenvalue's size, is growth and not rounding
+# up to so many states, all eigenvalues are computed; in larger systems growing ones are searched
+# for
+WHOLE = 4000
+# A real part above this [1/s], and above 1e-8 of the eigenvalue's size, is growth and not rounding
+_GROWING = 1e-6
 
 SLOW = 0.05
 """Eigenvalues of a step map up to this size [rad/s] are judged by the continuous model if there is one. No usual step
@@ -40,7 +43,8 @@ _COUPLING_FACTOR, _COUPLING_RATE = 2.0, 1.0
 """The coupling is the cause of growth if the step map's growth rate exceeds the continuous system's rate times the
 first figure plus the second [1/s]."""
 
-_DENSE_VECTORS = 200  # up to this number of states, all eigenvectors cost less than a search for one
+# up to this number of states, all eigenvectors cost less than a search for one
+_DENSE_VECTORS = 200
 _STATES_NAMED = 3
 _SWINGS_SHOWN = 3
 
@@ -70,7 +74,10 @@ class Hidden:
         text += f"; the least damped of them: {self._hertz:.4g} Hz, {self._percent:.2f} %"
         if not self.electromechanical:
             return text
-        shown = [f"{z.imag / (2 * np.pi):.4g} Hz, {damping_percent(z):.2f} %" for z in self.electromechanical]
+        shown = [
+            f"{z.imag / (2 * np.pi):.4g} Hz, {damping_percent(z):.2f} %"
+            for z in self.electromechanical
+        ]
         highest = max(z.imag for z in self.electromechanical) / (2 * np.pi)
         wide = f"{min(low, self._lowest_swing):.2g}:{max(high, np.ceil(10 * highest) / 10):g}"
         text += f"; electromechanical: {few(shown, _SWINGS_SHOWN, '; ')}"
@@ -110,7 +117,9 @@ class Stability:
     # the mode of the largest real part: of the step map, or of the continuous system if only this one grows
     mode: Mode | None = None
     growing: int = 0  # number of growing modes of the same model; a conjugate pair counts once
-    zeros: int = 0  # eigenvalues taken for zero (`orchestrator.analysis.modes.ZERO`), clocks left out: the free angle
+    # eigenvalues taken for zero (`orchestrator.analysis.modes.ZERO`), clocks left out: the free
+    # angle
+    zeros: int = 0
     eigenvalues: int = 0
     cause: Cause | None = None  # the cause of growth; None if no mode grows
     # largest real part [1/s] of the continuous system; None where a component gives no derivatives
@@ -141,7 +150,9 @@ class Stability:
         if self.mode is None or self.stable is None:
             return self.reason or "there is no eigenvalue but zeros"
         value = self.mode.eigenvalue
-        states = ", ".join(f"{name} {factor:.2f}" for name, factor in self.mode.participation[:_STATES_NAMED])
+        states = ", ".join(
+            f"{name} {factor:.2f}" for name, factor in self.mode.participation[:_STATES_NAMED]
+        )
         where = f"{value.real:+.4g} 1/s ({place(value, self.step_size)}; {states})"
         tail = f"; {self.reason}" if self.reason else ""
         if self.zeros > 1:
@@ -161,13 +172,20 @@ class Stability:
     def as_json(self) -> dict[str, Any]:
         mode = self.mode
         return {
-            "stable": self.stable, "largest_growth_rate": self.largest_growth_rate,
+            "stable": self.stable,
+            "largest_growth_rate": self.largest_growth_rate,
             "frequency_hz": None if mode is None else mode.frequency_hz,
-            "participation": [] if mode is None else [{"state": s, "factor": f} for s, f in mode.participation[:6]],
-            "growing_modes": self.growing, "zero_eigenvalues": self.zeros, "eigenvalues": self.eigenvalues,
+            "participation": []
+            if mode is None
+            else [{"state": s, "factor": f} for s, f in mode.participation[:6]],
+            "growing_modes": self.growing,
+            "zero_eigenvalues": self.zeros,
+            "eigenvalues": self.eigenvalues,
             "cause": None if self.cause is None else str(self.cause),
-            "continuous_growth_rate": self.continuous_growth_rate, "reason": self.reason, "sentence": self.sentence(),
-        }  # fmt: skip
+            "continuous_growth_rate": self.continuous_growth_rate,
+            "reason": self.reason,
+            "sentence": self.sentence(),
+        }
 
 
 def zeros_in_words(zeros: int) -> str:
@@ -194,14 +212,18 @@ def whole_spectrum(model: LinearModel) -> Spectrum | None:
     k = index_of_rightmost(values)
     if k is None:
         return Spectrum(values, [], None)
-    value, left, right = min(nearest_pairs(model, values[k], 2), key=lambda pair: abs(pair[0] - values[k]))
+    value, left, right = min(
+        nearest_pairs(model, values[k], 2), key=lambda pair: abs(pair[0] - values[k])
+    )
     return Spectrum(values, [], make_mode(value, left, right, model.names))
 
 
 def grows(values: NDArray[np.complex128]) -> NDArray[np.bool_]:
     """Mask of the eigenvalues [rad/s] that grow, one of each pair, zeros left out."""
     size = np.abs(values)
-    mask: NDArray[np.bool_] = (values.real > np.maximum(_GROWING, 1e-8 * size)) & (size > ZERO) & (values.imag >= 0)
+    mask: NDArray[np.bool_] = (
+        (values.real > np.maximum(_GROWING, 1e-8 * size)) & (size > ZERO) & (values.imag >= 0)
+    )
     return mask
 
 
@@ -243,12 +265,18 @@ def judge(
     rate = continuous.largest_growth_rate
     if own.stable is False and continuous.stable is not None and _only_slow(spectrum, own):
         slow = f"slow eigenvalues, up to {SLOW:g} rad/s, are those without a communication step"
-        return replace(continuous, step_size=own.step_size, continuous_growth_rate=rate, reason=slow)
+        return replace(
+            continuous, step_size=own.step_size, continuous_growth_rate=rate, reason=slow
+        )
     if own.stable is False:
         return replace(own, cause=_cause(own, rate), continuous_growth_rate=rate)
     if continuous.stable is False:
         text = f"the communication step of {model.step_size:g} s hides it: the step map has no growing mode"
-        return replace(continuous, continuous_growth_rate=rate, reason="; ".join(t for t in (own.reason, text) if t))
+        return replace(
+            continuous,
+            continuous_growth_rate=rate,
+            reason="; ".join(t for t in (own.reason, text) if t),
+        )
     return replace(own, continuous_growth_rate=rate)
 
 
@@ -274,12 +302,26 @@ def _look_at(model: LinearModel, spectrum: Spectrum | None) -> Stability:
         mode = search.modes[0] if search.modes else None
         n = len(model.names)
         return Stability(
-            not search.modes, mode, len(search.modes), 0, n, Cause.SYSTEM if mode else None, None, model.step_size,
+            not search.modes,
+            mode,
+            len(search.modes),
+            0,
+            n,
+            Cause.SYSTEM if mode else None,
+            None,
+            model.step_size,
             f"too large for all {n} eigenvalues: the right half-plane was searched, {search.not_searched}",
-        )  # fmt: skip
+        )
     growing = int(grows(spectrum.eigenvalues).sum())
     zeros = int((np.abs(spectrum.eigenvalues) <= ZERO).sum()) - model.clocks
     cause = Cause.SYSTEM if growing and model.step_size is None else None
     return Stability(
-        growing == 0, spectrum.rightmost, growing, zeros, len(spectrum.eigenvalues), cause, None, model.step_size
+        growing == 0,
+        spectrum.rightmost,
+        growing,
+        zeros,
+        len(spectrum.eigenvalues),
+        cause,
+        None,
+        model.step_size,
     )

@@ -9,13 +9,16 @@ from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.linear_model import EmbeddedModel, read_embedded_model
 from orchestrator.fmi.port import BoundDescription
 
-_TOLERANCE = 1e-6  # largest difference of a variable from the model's operating point, relative to max(1, |value|)
+# largest difference of a variable from the model's operating point, relative to max(1, |value|)
+_TOLERANCE = 1e-6
 
 
 def embedded_model(component: Component) -> EmbeddedModel | None:
     """The model inside a component's FMU; None if the component can be perturbed, or its FMU has no model inside."""
     description = component.description
-    if description.states_are_settable or isinstance(description, BoundDescription):  # it has the FMU's own names
+    if description.states_are_settable or isinstance(
+        description, BoundDescription
+    ):  # it has the FMU's own names
         return None
     return read_embedded_model(description.path)
 
@@ -24,13 +27,19 @@ def check_operating_point(component: Component, model: EmbeddedModel) -> None:
     """Compare a running FMU with the operating point and the parameters of the model inside it."""
     where = f"component {component.name!r}: the linear model inside its FMU"
     if tuple(model.states) != component.description.states:
-        raise AnalysisError(f"{where} has other states than the FMU; build the FMU again with its model")
+        raise AnalysisError(
+            f"{where} has other states than the FMU; build the FMU again with its model"
+        )
     variables = component.description.variables
     expected = {**model.states, **model.inputs, **model.outputs, **_parameters(component, model)}
     if unknown := [name for name in expected if name not in variables]:
-        raise AnalysisError(f"{where} speaks of {unknown[0]!r}, which the FMU does not have; build both together")
+        raise AnalysisError(
+            f"{where} speaks of {unknown[0]!r}, which the FMU does not have; build both together"
+        )
     found = component.values(expected)
-    far = {name: abs(found[name] - value) / max(1.0, abs(value)) for name, value in expected.items()}
+    far = {
+        name: abs(found[name] - value) / max(1.0, abs(value)) for name, value in expected.items()
+    }
     worst = max(far, key=lambda name: far[name], default=None)
     if worst is not None and not far[worst] <= _TOLERANCE:
         raise AnalysisError(

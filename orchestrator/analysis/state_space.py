@@ -30,7 +30,8 @@ class StateSpace:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     step_size: float | None  # communication step [s]; None for a continuous model, ẋ for x⁺
-    sources: Mapping[str, str] = field(default_factory=dict)  # how the linear model of every component was found
+    # how the linear model of every component was found
+    sources: Mapping[str, str] = field(default_factory=dict)
 
     def step_response(self, change: Matrix, times: Matrix) -> Matrix:
         """Deviations of the outputs, shape (k, p), after a step of the inputs at t = 0.
@@ -38,10 +39,14 @@ class StateSpace:
         ``times``: [s], not before 0 and in equal distances; of a step map, multiples of its step."""
         u, times = (np.atleast_1d(np.asarray(one, dtype=float)) for one in (change, times))
         if u.shape != (len(self.inputs),):
-            raise InputError(f"change = {change!r}; give one number for each input: {', '.join(self.inputs)}")
+            raise InputError(
+                f"change = {change!r}; give one number for each input: {', '.join(self.inputs)}"
+            )
         distances = np.diff(times) if len(times) > 1 else np.zeros(1)
         if times.ndim != 1 or not times.size or times[0] < -1e-9 or np.ptp(distances) > 1e-9:
-            raise InputError("times: give one or more, from 0 on and in equal distances, such as np.arange(0, 5, 0.01)")
+            raise InputError(
+                "times: give one or more, from 0 on and in equal distances, such as np.arange(0, 5, 0.01)"
+            )
         A, B = self._over(distances[0])
         x, rows = self._over(times[0])[1] @ u, []
         for _ in times:
@@ -68,7 +73,9 @@ def read_linear_model(path: Path) -> StateSpace:
     """The continuous linear model that an FMU carries; names are those of its variables."""
     model = read_embedded_model(path)
     if model is None:
-        raise InputError(f"{path}: there is no linear model inside; `gfor fmu build --with-linear-model` packs one")
+        raise InputError(
+            f"{path}: there is no linear model inside; `gfor fmu build --with-linear-model` packs one"
+        )
     names = (tuple(model.states), tuple(model.inputs), tuple(model.outputs))
     return StateSpace(model.A, model.B, model.C, model.D, *names, step_size=None)
 
@@ -84,7 +91,8 @@ def state_space(blocks: Blocks, schedule: Schedule | None) -> StateSpace:
     by_state, by_input = model.settle(model.H.toarray()), model.settle(drive)
     p = len(blocks.output_names)
     newest = np.concatenate([np.arange(p), external])
-    arriving = (2 * p if schedule else p) + np.arange(len(blocks.links))  # of a step map, what arrived before
+    # of a step map, what arrived before
+    arriving = (2 * p if schedule else p) + np.arange(len(blocks.links))
     C, D = np.zeros((len(blocks.outputs), n)), np.zeros((len(blocks.outputs), len(blocks.inputs)))
     windows = blocks.state_windows()
     for name, c in blocks.components.items():

@@ -19,16 +19,19 @@ from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import gauss_seidel
 from orchestrator.errors import AnalysisError, ErrorKind
 
-_SHIFT = 1e-7  # far above the rounding in a computed eigenvalue 1, and far below 1 − |μ| of the slowest mode
+# far above the rounding in a computed eigenvalue 1, and far below 1 − |μ| of the slowest mode
+_SHIFT = 1e-7
 _SHORT = 1e-4  # for steps shorter than this [s], the accepted change is a rate per second
 
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    residual: float  # largest change of any state over one communication step [the state's unit, mostly pu]
+    # largest change of any state over one communication step [the state's unit, mostly pu]
+    residual: float
     drift: float  # largest rate of change of any state [the state's unit per second]
     initial_residual: float  # residual at the power flow's operating point, before any correction
-    iterations: int  # number of Newton iterations; 0 if the power flow's point is a steady state already
+    # number of Newton iterations; 0 if the power flow's point is a steady state already
+    iterations: int
     states: dict[str, float]  # values of the states by ``component.state``
 
 
@@ -47,7 +50,8 @@ def find_operating_point(
     x = state.read()
     change = state.step_from(x) - x
     first = residual = _largest(change)
-    iterations, once = 0, True  # one size of perturbation, unless its direction is worth little: a limit is close
+    # one size of perturbation, unless its direction is worth little: a limit is close
+    iterations, once = 0, True
     while residual > accept and iterations < max_iterations:
         candidate = x + _newton_correction(master, len(x), change, once=once)
         state.write(candidate)
@@ -62,7 +66,8 @@ def find_operating_point(
         x, change, residual = candidate, new_change, _largest(new_change)
         iterations += 1
     names = [f"{name}.{s}" for name, c in master.components.items() for s in c.description.states]
-    tolerance *= min(1.0, master.clock.step_size / _SHORT)  # the same drift is accepted however short the step is
+    # the same drift is accepted however short the step is
+    tolerance *= min(1.0, master.clock.step_size / _SHORT)
     if not residual <= tolerance:
         worst = ", ".join(f"{names[i]} ({change[i]:+.3g})" for i in np.argsort(-np.abs(change))[:3])
         changes = f"{_newton_in_words(iterations)} a communication step changes {worst}, more than {tolerance:g}"
@@ -72,25 +77,39 @@ def find_operating_point(
                 f"([[events]] with a time); {changes}",
                 kind=ErrorKind.STEADY_STATE,
             )
-        raise AnalysisError(f"no steady state found: {changes}; {what_to_check(master)}", kind=ErrorKind.STEADY_STATE)
+        raise AnalysisError(
+            f"no steady state found: {changes}; {what_to_check(master)}",
+            kind=ErrorKind.STEADY_STATE,
+        )
     values = dict(zip(names, x.tolist(), strict=True))
     return OperatingPoint(residual, residual / master.clock.step_size, first, iterations, values)
 
 
-def _periodic_point(master: Master, steps: int, tolerance: float, accept: float, most: int) -> OperatingPoint:
+def _periodic_point(
+    master: Master, steps: int, tolerance: float, accept: float, most: int
+) -> OperatingPoint:
     """The same with sampled controllers: all must repeat after a period, and the limits are those of all its steps."""
     found = find_periodic_point(master, accept * steps, most)
     period = steps * master.clock.step_size
     tolerance *= steps * min(1.0, master.clock.step_size / _SHORT)
     if not found.residual <= tolerance:
-        worst = ", ".join(f"{found.names[i]} ({found.change[i]:+.3g})" for i in np.argsort(-np.abs(found.change))[:3])
+        worst = ", ".join(
+            f"{found.names[i]} ({found.change[i]:+.3g})"
+            for i in np.argsort(-np.abs(found.change))[:3]
+        )
         raise AnalysisError(
             f"no steady state found: {_newton_in_words(found.iterations)} a period of {period:g} s, after which "
             f"sampled controllers repeat, changes {worst}, more than {tolerance:g}; {what_to_check(master)}",
             kind=ErrorKind.STEADY_STATE,
         )
-    values = {name: x for name, x in zip(found.names, found.x.tolist(), strict=True) if not name.endswith(HELD)}
-    return OperatingPoint(found.residual, found.residual / period, found.first, found.iterations, values)
+    values = {
+        name: x
+        for name, x in zip(found.names, found.x.tolist(), strict=True)
+        if not name.endswith(HELD)
+    }
+    return OperatingPoint(
+        found.residual, found.residual / period, found.first, found.iterations, values
+    )
 
 
 def what_to_check(master: Master) -> str:

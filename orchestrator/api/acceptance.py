@@ -52,8 +52,13 @@ class Acceptance:
         """One row a check: its question, verdict, evidence and remedy."""
         import pandas as pd  # noqa: PLC0415 - see `DataFrame`
 
-        rows = {r.check: (str(r.verdict), question_of(r.check), r.evidence, r.remedy) for r in self.report.results}
-        return pd.DataFrame.from_dict(rows, orient="index", columns=["verdict", "question", "evidence", "remedy"])
+        rows = {
+            r.check: (str(r.verdict), question_of(r.check), r.evidence, r.remedy)
+            for r in self.report.results
+        }
+        return pd.DataFrame.from_dict(
+            rows, orient="index", columns=["verdict", "question", "evidence", "remedy"]
+        )
 
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor fmu check --json`` prints, as JSON's types."""
@@ -80,11 +85,19 @@ class Acceptance:
 
 
 def check(
-    path: str | Path, binding: str | Path | None = None, *, step: Time | None = None, only: Names = (),
-    case: str | Path | Case | None = None, component: str | None = None, scenario: str | None = None,
-    seed: int | None = None, frequency: float | None = None, time_limit: Time | None = None,
+    path: str | Path,
+    binding: str | Path | None = None,
+    *,
+    step: Time | None = None,
+    only: Names = (),
+    case: str | Path | Case | None = None,
+    component: str | None = None,
+    scenario: str | None = None,
+    seed: int | None = None,
+    frequency: float | None = None,
+    time_limit: Time | None = None,
     memory_limit: float | str | None = None,
-) -> Acceptance:  # fmt: skip
+) -> Acceptance:
     """Run the acceptance tests of an FMU: can it be trusted in a co-simulation?
 
     Parameters
@@ -139,7 +152,9 @@ def check(
     for argument, given in (("component", component), ("scenario", scenario)):
         text_or_none(given, argument, "give one name, or leave it out")
     if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int) or seed < 0):
-        raise InputError(f"seed = {seed!r} is no whole number of at least 0; give one such as the report states")
+        raise InputError(
+            f"seed = {seed!r} is no whole number of at least 0; give one such as the report states"
+        )
     if case is not None:
         place = case.file.path if isinstance(case, Case) else path_of(case, "case")
         use, of_case = use_in_case(str(place), component, file, step_size, scenario)
@@ -150,7 +165,9 @@ def check(
     fmu = as_fmu(file)
     if frequency is not None:
         if "f_n" not in read_description(fmu).variables:
-            raise InputError(f"frequency = {frequency}: {file.name} has no parameter f_n; a binding's [rating] has one")
+            raise InputError(
+                f"frequency = {frequency}: {file.name} has no parameter f_n; a binding's [rating] has one"
+            )
         use = replace(use, values={**use.values, "f_n": float(frequency)})
     return Acceptance(check_fmu(fmu, bound_by, limits, names(only, "only"), use=use, seed=seed))
 

@@ -52,14 +52,23 @@ class Admittance:
 
     def __repr__(self) -> str:
         content = self.as_json()
-        return f"<Admittance of {content['lines']} lines, model of order {content['model']['order']}>"
+        return (
+            f"<Admittance of {content['lines']} lines, model of order {content['model']['order']}>"
+        )
 
 
 def admittance(
-    fmu: str | Path, *, binding: str | Path | None = None, values: Mapping[str, Any] | None = None, step: Time = 1e-4,
-    method: str = "multisine", amplitude: float | None = None, frequencies: tuple[float, float] = (0.05, 1000.0),
-    use_state: bool = True, report: Callable[[str], None] = lambda text: None,
-) -> Admittance:  # fmt: skip
+    fmu: str | Path,
+    *,
+    binding: str | Path | None = None,
+    values: Mapping[str, Any] | None = None,
+    step: Time = 1e-4,
+    method: str = "multisine",
+    amplitude: float | None = None,
+    frequencies: tuple[float, float] = (0.05, 1000.0),
+    use_state: bool = True,
+    report: Callable[[str], None] = lambda text: None,
+) -> Admittance:
     """Measure a device's admittance at an ideal bus, and fit a model to it.
 
     Parameters
@@ -104,10 +113,17 @@ def admittance(
         raise InputError(f"method = {method!r}; choose from {', '.join(METHODS)}")
     low, high = frequency_range(frequencies)
     if not low:
-        raise InputError(f"frequencies = {frequencies!r}; the lowest must be above 0 Hz, such as 0.05")
+        raise InputError(
+            f"frequencies = {frequencies!r}; the lowest must be above 0 Hz, such as 0.05"
+        )
     require_fitting()
     description = bound_fmu(path_of(fmu, "fmu"), binding_path(binding))
-    bench = bench_at(description, plain(values), in_seconds(step, "step") or 1e-4, restore=None if use_state else False)
+    bench = bench_at(
+        description,
+        plain(values),
+        in_seconds(step, "step") or 1e-4,
+        restore=None if use_state else False,
+    )
     excited = Excitation(method, low, high)
     excited = excited if amplitude is None else replace(excited, amplitude=amplitude)
     rated = float(bench.parameters.get("f_n", start_of(description, "f_n"))) or 50.0

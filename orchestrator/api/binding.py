@@ -33,7 +33,10 @@ def bind(fmu: str | Path, out: str | Path | None = None) -> str:
     >>> "[voltage]" in draft, "[current]" in draft
     (True, True)
     """
-    description, place = read_description(path_of(fmu, "fmu")), None if out is None else path_of(out, "out", "path")
+    description, place = (
+        read_description(path_of(fmu, "fmu")),
+        None if out is None else path_of(out, "out", "path"),
+    )
     text = draft_binding(description, None if place is None else place.parent)
     if place is not None:
         try:

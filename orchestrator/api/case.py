@@ -74,13 +74,20 @@ def load(case: str | Path | Mapping[str, Any], *, trust_fmus: bool = False) -> "
     """
     trusted = flag(trust_fmus, "trust_fmus")
     if isinstance(case, Mapping):
-        return Case(load_case(kept({"directory": str(Path.cwd()), **case}, "case.toml", "case"), trust_fmus=trusted))
+        return Case(
+            load_case(
+                kept({"directory": str(Path.cwd()), **case}, "case.toml", "case"),
+                trust_fmus=trusted,
+            )
+        )
     if isinstance(case, str) and "\n" in case:
         has_one = re.search(r"(?m)^directory\s*=", case)
         head = "" if has_one else f"{FROM_TEXT}directory = {json.dumps(str(Path.cwd()))}\n"
         return Case(load_case(keep(head + case, "case.toml"), trust_fmus=trusted))
     if not isinstance(case, str | Path) or not str(case):
-        raise InputError(f"case = {case!r}; give a built-in case's name ({', '.join(names_of_cases())}) or a path")
+        raise InputError(
+            f"case = {case!r}; give a built-in case's name ({', '.join(names_of_cases())}) or a path"
+        )
     path_of(case, "case")
     return Case(load_case(case, trust_fmus=trusted))
 
@@ -149,7 +156,8 @@ class Case:
         (('load_step',), 3.0)
         """
         return load(
-            {"directory": str(self.file.directory)} | _joined(tomllib.loads(self.file.text), tables),
+            {"directory": str(self.file.directory)}
+            | _joined(tomllib.loads(self.file.text), tables),
             trust_fmus=self.file.trust_fmus,
         )
 
@@ -163,16 +171,28 @@ class Case:
         design = studies.design
         design_over_points = studies.design_over_points
     else:
-        scenario, choose, sweep, screen, site, interactions, design, design_over_points = (_Late() for _ in range(8))
+        scenario, choose, sweep, screen, site, interactions, design, design_over_points = (
+            _Late() for _ in range(8)
+        )
 
     if not TYPE_CHECKING:  # a study that was added; a line as those above shows it to type checkers
 
         def __getattr__(self, name: str) -> Any:
             room = rooms().get(name)
             if room is None or name.startswith("_"):
-                scenario = None if name.startswith("_") else import_module("orchestrator.api.scenario").Scenario
-                of = f"; it belongs to a scenario: case.scenario(…).{name}" if hasattr(scenario, name) else ""
-                raise NoSuchAttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{of}")
+                scenario = (
+                    None
+                    if name.startswith("_")
+                    else import_module("orchestrator.api.scenario").Scenario
+                )
+                of = (
+                    f"; it belongs to a scenario: case.scenario(…).{name}"
+                    if hasattr(scenario, name)
+                    else ""
+                )
+                raise NoSuchAttributeError(
+                    f"{type(self).__name__!r} object has no attribute {name!r}{of}"
+                )
             from orchestrator.api.studies import of_study  # noqa: PLC0415 - as `_Late`
 
             return MethodType(of_study(name, study_in(room)), self)

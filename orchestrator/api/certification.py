@@ -58,8 +58,13 @@ def _certified(request: CertifyRequest) -> IssuedCertificate:
         check_target(file, target)
     place = made_folder(Path(request.folder or usual_folder(file.stem, request.code)), "folder")
     spare_another(place, request.code, issue.request.fmu, issue.request.binding)
-    with held(place), shown_progress(f"Certificate, {request.code}", shown=request.progress) as report:
-        with closing(choose_executor(request.workers, None, [issue.parts.task.__module__])) as executor:
+    with (
+        held(place),
+        shown_progress(f"Certificate, {request.code}", shown=request.progress) as report,
+    ):
+        with closing(
+            choose_executor(request.workers, None, [issue.parts.task.__module__])
+        ) as executor:
             found = issue.compute(executor, place, report)
         asked = issue.request
         found.acceptance = run_checks(asked.fmu, asked.binding, place) if request.check else None
@@ -73,7 +78,11 @@ certify = function("certify", "certification", CertifyRequest, _certified)
 
 
 def verify(
-    certificate: str | Path, anew: Iterable[float | str] | None = None, *, every: bool = False, workers: int | None = 1
+    certificate: str | Path,
+    anew: Iterable[float | str] | None = None,
+    *,
+    every: bool = False,
+    workers: int | None = 1,
 ) -> Verification:
     """Whether a certificate still holds: hashes, its judgement made again, and points or rows computed anew.
 
@@ -113,7 +122,9 @@ def verify(
     found, wanted = Verification(), None if anew is None else tuple(anew)
     with laid_out(path_of(certificate, "certificate")) as places:
         for place in places:
-            one = verified(place, wanted, lambda imports: choose_executor(workers, None, imports), every=every)
+            one = verified(
+                place, wanted, lambda imports: choose_executor(workers, None, imports), every=every
+            )
             prefix = f"{place.name}: " if len(places) > 1 else ""
             found.faults += [prefix + text for text in one.faults]
             found.agreed += [prefix + text for text in one.agreed]

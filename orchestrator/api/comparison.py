@@ -24,7 +24,10 @@ RINGS_FROM = 2.0
 
 
 def compare(
-    a: Run | xr.Dataset | str | Path, b: Run | xr.Dataset | str | Path, signals: Names = (), start: Time | None = None
+    a: Run | xr.Dataset | str | Path,
+    b: Run | xr.Dataset | str | Path,
+    signals: Names = (),
+    start: Time | None = None,
 ) -> RunComparison:
     """Compare two runs: how far signals differ, and what each rings with.
 
@@ -55,10 +58,14 @@ def compare(
     _warn_of_different_ends(first, second, labels)
     _warn_of_other_files(first, second, labels)
     begin = RINGS_FROM if start is None else moment(start, "start")
-    ends = [(label, float(run["time"][-1])) for run, label in zip((first, second), labels, strict=True)]
+    ends = [
+        (label, float(run["time"][-1])) for run, label in zip((first, second), labels, strict=True)
+    ]
     short = [(label, end) for label, end in ends if end <= begin]
     if short and start is not None:
-        raise InputError(f"start = {start!r}: {short[0][0]} ends at t = {short[0][1]:g} s; give an earlier start")
+        raise InputError(
+            f"start = {start!r}: {short[0][0]} ends at t = {short[0][1]:g} s; give an earlier start"
+        )
     remarks = [
         f"{label} ends at t = {end:g} s: its oscillations, which are read from t = {begin:g} s on, are not shown; give "
         "an earlier start."
@@ -69,24 +76,38 @@ def compare(
         raise InputError(f"{labels[0]} and {labels[1]} have no signal in common")
     times = common_times(first["time"].values, second["time"].values, labels)
     with side_by_side() as pool:
-        each = pool.map if in_memory(first) and in_memory(second) else map  # a file is read by one thread at a time
-        signals_compared = list(each(lambda one: compare_signal(first, second, one, begin, labels), chosen))
+        # a file is read by one thread at a time
+        each = pool.map if in_memory(first) and in_memory(second) else map
+        signals_compared = list(
+            each(lambda one: compare_signal(first, second, one, begin, labels), chosen)
+        )
     remarks += [
         f"? {label}: {c.expression} at {doubt_text(mode)}."
         for c in signals_compared
         for label, mode in zip(labels, c.modes, strict=True)
         if mode is not None and mode.doubts
     ]
-    return RunComparison(labels, signals_compared, [*([times.remark] if times.remark else []), *remarks])
+    return RunComparison(
+        labels, signals_compared, [*([times.remark] if times.remark else []), *remarks]
+    )
 
 
 def _warn_of_other_files(first: xr.Dataset, second: xr.Dataset, labels: tuple[str, str]) -> None:
-    if (cases := [run.attrs.get("case_file") for run in (first, second)])[0] != cases[1] and None not in cases:
-        told = [f"{label} of {run.attrs['case']}" for label, run in zip(labels, (first, second), strict=True)]
-        text = f"the runs are of two case files ({', '.join(told)}): what differs may be the networks"
+    if (cases := [run.attrs.get("case_file") for run in (first, second)])[0] != cases[
+        1
+    ] and None not in cases:
+        told = [
+            f"{label} of {run.attrs['case']}"
+            for label, run in zip(labels, (first, second), strict=True)
+        ]
+        text = (
+            f"the runs are of two case files ({', '.join(told)}): what differs may be the networks"
+        )
         warnings.warn(text, ResultsWarning, stacklevel=3)
     one, two = (json.loads(run.attrs.get("inputs", "{}")) for run in (first, second))
-    if other := [name for name in one if one[name] != two.get(name, one[name]) and not name.endswith(".fmu")]:
+    if other := [
+        name for name in one if one[name] != two.get(name, one[name]) and not name.endswith(".fmu")
+    ]:
         text = f"{labels[0]} and {labels[1]} are of files that differ: {few(other, 3)}"
         warnings.warn(text, ResultsWarning, stacklevel=3)
 
@@ -96,7 +117,10 @@ def _warn_of_different_ends(first: xr.Dataset, second: xr.Dataset, labels: tuple
     times = [run["time"].values for run in (first, second)]
     if min(map(len, times)) < 2:
         return
-    (end_a, end_b), interval = (float(t[-1]) for t in times), max(float(t[-1] - t[-2]) for t in times)
+    (end_a, end_b), interval = (
+        (float(t[-1]) for t in times),
+        max(float(t[-1] - t[-2]) for t in times),
+    )
     if abs(end_a - end_b) > interval * (1 + 1e-6):
         text = (
             f"{labels[0]} ends at t = {end_a:.6g} s, and {labels[1]} at t = {end_b:.6g} s: differences are those until "

@@ -14,9 +14,12 @@ from orchestrator.study.comparison import recorded
 
 
 def export_comtrade(
-    run: Run | xr.Dataset | str | Path, signals: Names = (), path: str | Path | None = None, form: str = "BINARY32",
+    run: Run | xr.Dataset | str | Path,
+    signals: Names = (),
+    path: str | Path | None = None,
+    form: str = "BINARY32",
     frequency: float | None = None,
-) -> tuple[Path, Path]:  # fmt: skip
+) -> tuple[Path, Path]:
     """Write signals of a run as a COMTRADE recording, which tools for relays and fault records read.
 
     Parameters
@@ -61,7 +64,9 @@ def export_comtrade(
         folder = Path(run) if Path(run).is_dir() else Path(run).parent
         path = folder / "trajectory.cfg"
     rated = _rated_frequency(dataset) if frequency is None else frequency
-    return write_comtrade(xr.Dataset(curves, attrs=dataset.attrs), list(curves), Path(path), form, rated)
+    return write_comtrade(
+        xr.Dataset(curves, attrs=dataset.attrs), list(curves), Path(path), form, rated
+    )
 
 
 def _rated_frequency(dataset: xr.Dataset) -> float:
@@ -75,5 +80,7 @@ def _curve(dataset: xr.Dataset, expression: str, label: str) -> xr.DataArray:
     """A signal with its unit, which a difference takes from its first part."""
     curve = recorded(dataset, expression, label)
     first = expression.split(" - ", maxsplit=1)[0].strip()
-    unit = curve.attrs.get("units") or (dataset[first].attrs.get("units", "") if first in dataset else "")
+    unit = curve.attrs.get("units") or (
+        dataset[first].attrs.get("units", "") if first in dataset else ""
+    )
     return curve.assign_attrs(units=unit)

@@ -36,7 +36,9 @@ class BuiltDll(NamedTuple):
     told: tuple[str, ...]
 
 
-def build_from_dll(dll: str | Path, folder: str | Path = ".", *, texts: Mapping[str, str] | None = None) -> BuiltDll:
+def build_from_dll(
+    dll: str | Path, folder: str | Path = ".", *, texts: Mapping[str, str] | None = None
+) -> BuiltDll:
     """Make an FMU of a vendor's controller, which was delivered as IEEE/CIGRE DLL.
 
     Parameters
@@ -67,24 +69,38 @@ def build_from_dll(dll: str | Path, folder: str | Path = ".", *, texts: Mapping[
         of_device = (table or {}).get("texts")
         given = {**(of_device if isinstance(of_device, dict) else {}), **(texts or {})}
         place = Path(dll).parent if table else Path()
-        read = read_dll(library, READER, also, given, place) if also else read_dll(library, texts=given, folder=place)
+        read = (
+            read_dll(library, READER, also, given, place)
+            if also
+            else read_dll(library, texts=given, folder=place)
+        )
         device = None if table is None else device_of(Path(dll), table, read.interface)
         path = dll_fmu(read, Path(folder), texts, device)
     except (DllError, DeviceFileError) as error:
         raise InputError(str(error)) from error
     interface, trial = read.interface, read.trial
     counts = ", ".join(
-        f"{n} {kind}" for n, kind in zip(interface.states, ("integer", "float", "double"), strict=True) if n
+        f"{n} {kind}"
+        for n, kind in zip(interface.states, ("integer", "float", "double"), strict=True)
+        if n
     )
-    rate = f"a sample every {interface.sample_time:g} s" if interface.sample_time > 0 else "a sample in every step"
-    about = f"{interface.texts['ModelName']} {interface.texts['ModelVersion']}".strip() or read.path.name
+    rate = (
+        f"a sample every {interface.sample_time:g} s"
+        if interface.sample_time > 0
+        else "a sample in every step"
+    )
+    about = (
+        f"{interface.texts['ModelName']} {interface.texts['ModelVersion']}".strip()
+        or read.path.name
+    )
     why = f" ({trial.why})" if trial.why else ""
     moving = len(trial.doubles) + len(trial.floats)
     return BuiltDll(
         path,
         (
             f"{about}: {rate}; declared states: {counts or 'none'}",
-            f"state: {KEPT_IN[trial.state]}{why}" + (f"; {moving} numbers there move" if moving else ""),
+            f"state: {KEPT_IN[trial.state]}{why}"
+            + (f"; {moving} numbers there move" if moving else ""),
         ),
     )
 
@@ -105,9 +121,14 @@ class ExportedDll(NamedTuple):
 
 
 def export_dll(
-    name: str, folder: str | Path = ".", *, platforms: Sequence[str] | None = None, sample_time: float = 2e-5,
-    values: Mapping[str, float] | None = None, report: Callable[[str], None] = lambda text: None,
-) -> ExportedDll:  # fmt: skip
+    name: str,
+    folder: str | Path = ".",
+    *,
+    platforms: Sequence[str] | None = None,
+    sample_time: float = 2e-5,
+    values: Mapping[str, float] | None = None,
+    report: Callable[[str], None] = lambda text: None,
+) -> ExportedDll:
     """Write the control part of a converter as IEEE/CIGRE DLL, for EMT programs.
 
     Parameters
@@ -138,7 +159,9 @@ def export_dll(
     place = path_of(folder, "folder", "folder")
     chosen = tuple(export.DLL_TARGETS) if platforms is None else names(platforms, "platforms")
     try:
-        written = export.write_dll(export.control_part_of(name), place, chosen, sample_time, values, report)
+        written = export.write_dll(
+            export.control_part_of(name), place, chosen, sample_time, values, report
+        )
     except export.ControlDllError as error:
         raise InputError(str(error)) from error
     return ExportedDll(written.libraries, written.sheet)

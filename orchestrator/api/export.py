@@ -18,9 +18,12 @@ from orchestrator.ssp.writing import ssp_members
 KINDS = ("linear", "ssp", "comtrade", "dll")
 
 _TABLES: dict[str, Any] = {
-    "source": True, "analysis": True, "plots": True, "reference": True,
+    "source": True,
+    "analysis": True,
+    "plots": True,
+    "reference": True,
     "solver": {"record_interval", "record", "record_filter"},
-}  # fmt: skip
+}
 """Tables of a case file that go into our annotation as they are, as SSP has no place for them."""
 
 
@@ -61,10 +64,16 @@ def export(what: Any, kind: str, out: str | Path | None = None, **how: Any) -> l
         written = export_dll(what, Path() if out is None else out, **how)
         return [*written.libraries.values(), written.sheet]
     if not isinstance(what, Scenario):
-        raise InputError(f"what = {what!r}; give a scenario, such as load('two_area').scenario('gfor')")
+        raise InputError(
+            f"what = {what!r}; give a scenario, such as load('two_area').scenario('gfor')"
+        )
     place = path_of("." if out is None else out, "out", "path")
     if kind == "ssp":
-        target = place if place.suffix.lower() == ".ssp" else place / f"{what.prepared.case.name}_{what.name}.ssp"
+        target = (
+            place
+            if place.suffix.lower() == ".ssp"
+            else place / f"{what.prepared.case.name}_{what.name}.ssp"
+        )
         write_ssp(what.prepared, target)
         return [target]
     from orchestrator.study.linear_model_files import save_linear_model  # noqa: PLC0415 - only here
@@ -72,7 +81,9 @@ def export(what: Any, kind: str, out: str | Path | None = None, **how: Any) -> l
     model = what.linearize(**how)
     made_folder(place, "out")
     with staged(place, new_run_id()) as staging:
-        files = save_linear_model(model, model.operating_point, model.stability, what.prepared, staging)
+        files = save_linear_model(
+            model, model.operating_point, model.stability, what.prepared, staging
+        )
     return [place / file.name for file in files]
 
 
@@ -83,9 +94,18 @@ def write_ssp(prepared: PreparedScenario, target: Path) -> None:
         mode="json", by_alias=True, exclude_none=True, exclude_unset=True, include=_TABLES
     )
     filled = {name: table for name, table in tables.items() if table}
-    study = study_of(prepared.name, prepared.title, prepared.step_size, prepared.schedule, prepared.events, filled)
+    study = study_of(
+        prepared.name,
+        prepared.title,
+        prepared.step_size,
+        prepared.schedule,
+        prepared.events,
+        filled,
+    )
     members = ssp_members(case.name, case.table.title, prepared.system, prepared.stop_time, study)
     try:
         write_archive(target, members)
     except OSError as error:
-        raise InputError(f"--out {target}: it cannot be written: {error.strerror}; choose another place") from error
+        raise InputError(
+            f"--out {target}: it cannot be written: {error.strerror}; choose another place"
+        ) from error

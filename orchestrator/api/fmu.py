@@ -32,7 +32,9 @@ class Fmu(Closing):
         Where it stands [s].
     """
 
-    def __init__(self, description: FmuDescription, values: Mapping[str, Any], stop: float | None) -> None:
+    def __init__(
+        self, description: FmuDescription, values: Mapping[str, Any], stop: float | None
+    ) -> None:
         self.description = description
         self.time = 0.0
         start = self._converted(values)
@@ -97,7 +99,9 @@ class Fmu(Closing):
         component = self._open()
         seconds = in_seconds(step_size, "step_size")
         if seconds is None:
-            raise InputError("step_size = None; give a communication step above 0 s, such as 1e-4 or '100 us'")
+            raise InputError(
+                "step_size = None; give a communication step above 0 s, such as 1e-4 or '100 us'"
+            )
         component.step(self.time, seconds)
         self.time += seconds
 
@@ -122,12 +126,16 @@ class Fmu(Closing):
 
     def _variable(self, name: str) -> VariableInfo:
         if not isinstance(name, str) or name not in self.description.variables:
-            raise InputError(f"{self.description.model_name}: there is no variable {name!r}; table() lists them")
+            raise InputError(
+                f"{self.description.model_name}: there is no variable {name!r}; table() lists them"
+            )
         return self.description.variables[name]
 
     def _converted(self, values: Mapping[str, Any]) -> dict[str, float | bool]:
         try:
-            return {name: convert(self._variable(name), value) for name, value in plain(values).items()}
+            return {
+                name: convert(self._variable(name), value) for name, value in plain(values).items()
+            }
         except ValueError as error:
             raise InputError(f"{self.description.model_name}: {error}") from error
 
@@ -140,14 +148,19 @@ class Fmu(Closing):
 
     def _repr_html_(self) -> str:
         return page(
-            f"{self.description.model_name}: {self.description.title}", [f"t = {self.time:.6g} s"], self.table()
+            f"{self.description.model_name}: {self.description.title}",
+            [f"t = {self.time:.6g} s"],
+            self.table(),
         )
 
 
 def open_fmu(
-    path: str | Path, values: Mapping[str, Any] | None = None, *, binding: str | Path | None = None,
+    path: str | Path,
+    values: Mapping[str, Any] | None = None,
+    *,
+    binding: str | Path | None = None,
     stop: Time | None = None,
-) -> Fmu:  # fmt: skip
+) -> Fmu:
     """Open and initialise an FMU; use it in a ``with`` block. Foreign ones run in a process of their own.
 
     Parameters
@@ -178,7 +191,11 @@ def open_fmu(
     ...     print(f"{fmu.get('v'):.1f} pu after {fmu.time:.1f} s")
     0.8 pu after 0.1 s
     """
-    return Fmu(bound_fmu(path_of(path, "path"), binding_path(binding)), values or {}, in_seconds(stop, "stop"))
+    return Fmu(
+        bound_fmu(path_of(path, "path"), binding_path(binding)),
+        values or {},
+        in_seconds(stop, "stop"),
+    )
 
 
 class FmuInfo:
@@ -202,14 +219,30 @@ class FmuInfo:
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor fmu info --json`` prints, as JSON's types."""
         d = self.description
-        keys = ("name", "type", "causality", "variability", "unit", "start", "minimum", "maximum", "description")
+        keys = (
+            "name",
+            "type",
+            "causality",
+            "variability",
+            "unit",
+            "start",
+            "minimum",
+            "maximum",
+            "description",
+        )
         return {
-            "model_name": d.model_name, "title": d.title, "guid": d.guid, "generation_tool": d.generation_tool,
-            "fmi_version": d.fmi_version, "platforms": list(d.platforms), "continuous_states": list(d.states),
-            "states_are_settable": d.states_are_settable, "can_save_state": d.can_save_state,
+            "model_name": d.model_name,
+            "title": d.title,
+            "guid": d.guid,
+            "generation_tool": d.generation_tool,
+            "fmi_version": d.fmi_version,
+            "platforms": list(d.platforms),
+            "continuous_states": list(d.states),
+            "states_are_settable": d.states_are_settable,
+            "can_save_state": d.can_save_state,
             "has_linear_model": self.linear_model is not None,
             "variables": [{key: getattr(v, key) for key in keys} for v in d.variables.values()],
-        }  # fmt: skip
+        }
 
     def __repr__(self) -> str:
         d = self.description
@@ -246,8 +279,26 @@ def info(path: str | Path) -> FmuInfo:
 def _variables(description: FmuDescription) -> pd.DataFrame:
     """The variables that an FMU declares, one row for each."""
     rows = {
-        v.name: (v.causality, v.variability, v.type, v.unit, v.start, v.minimum, v.maximum, v.description)
+        v.name: (
+            v.causality,
+            v.variability,
+            v.type,
+            v.unit,
+            v.start,
+            v.minimum,
+            v.maximum,
+            v.description,
+        )
         for v in description.variables.values()
     }
-    columns = ["causality", "variability", "type", "unit", "start", "minimum", "maximum", "description"]
+    columns = [
+        "causality",
+        "variability",
+        "type",
+        "unit",
+        "start",
+        "minimum",
+        "maximum",
+        "description",
+    ]
     return pd.DataFrame.from_dict(rows, orient="index", columns=columns)

@@ -17,7 +17,12 @@ from orchestrator.errors import AnalysisError, InputError
 from orchestrator.oscillations.verdict import forced_frequencies
 from orchestrator.results.recorded import warn_of_early_end
 from orchestrator.study.ambient import AmbientModes, AmbientWindow
-from orchestrator.study.comparison import open_trajectory, recorded, require_numbers, strongest_modes
+from orchestrator.study.comparison import (
+    open_trajectory,
+    recorded,
+    require_numbers,
+    strongest_modes,
+)
 from orchestrator.study.signal_modes import SignalModes
 
 _ONE_SIGNAL = "give one signal, 'a.b' or the difference 'a.b - c.d' of two"
@@ -67,9 +72,15 @@ def identify(
 
 
 def ambient(
-    run: Run | xr.Dataset | str | Path, signals: str | Sequence[str], start: Time = 0.0, stop: Time | None = None, *,
-    window: Time | None = None, level: float = 3.0, highest_hz: float = 2.5,
-) -> AmbientModes:  # fmt: skip
+    run: Run | xr.Dataset | str | Path,
+    signals: str | Sequence[str],
+    start: Time = 0.0,
+    stop: Time | None = None,
+    *,
+    window: Time | None = None,
+    level: float = 3.0,
+    highest_hz: float = 2.5,
+) -> AmbientModes:
     """Find the modes in signals that noise shakes, by covariance-driven stochastic subspace identification.
 
     Parameters
@@ -105,7 +116,9 @@ def ambient(
         require_numbers(curve, name, label)
     times, values = curves[0]["time"].values, np.column_stack([curve.values for curve in curves])
     if not 0 < length <= end - begin + 1e-9:
-        raise InputError(f"window = {window!r}: the record is used from {begin:g} to {end:g} s; give a shorter window")
+        raise InputError(
+            f"window = {window!r}: the record is used from {begin:g} to {end:g} s; give a shorter window"
+        )
     found = []
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     for k in range(int(2 * (end - begin - length + step) / length + 1e-6) + 1):
@@ -115,7 +128,10 @@ def ambient(
             modes = ambient_modes(times[part], values[part], highest_hz)
             steady = forced_frequencies(times[part], names, values[part]) if modes else []
             near = 2 / length
-            told = [replace(m, forced=any(abs(m.frequency_hz - f) < near for f in steady)) for m in modes]
+            told = [
+                replace(m, forced=any(abs(m.frequency_hz - f) < near for f in steady))
+                for m in modes
+            ]
             found.append(AmbientWindow(first, first + length, told))
         except AnalysisError as error:
             found.append(AmbientWindow(first, first + length, (), str(error)))
@@ -137,9 +153,13 @@ def opened(run: Run | xr.Dataset | str | Path, otherwise: str) -> tuple[xr.Datas
     else:
         dataset = run.dataset if isinstance(run, Run) else run
         if not isinstance(dataset, xr.Dataset):
-            raise InputError(f"{otherwise} = {run!r}; give a run, its dataset, or the folder of a scenario's results")
+            raise InputError(
+                f"{otherwise} = {run!r}; give a run, its dataset, or the folder of a scenario's results"
+            )
         label = str(dataset.attrs.get("scenario", otherwise))
     if not dataset.sizes.get("time"):
-        raise InputError(f"{label}: nothing was recorded over the time; give a run that came beyond its start")
+        raise InputError(
+            f"{label}: nothing was recorded over the time; give a run that came beyond its start"
+        )
     warn_of_early_end(dataset, label)
     return dataset, label

@@ -78,9 +78,13 @@ class LinearSystem(StateSpace):
         try:
             control = import_module("control")
         except ImportError as error:
-            raise InputError("the package control is missing; install it with `pip install control`") from error
+            raise InputError(
+                "the package control is missing; install it with `pip install control`"
+            ) from error
         kinds = ("states", "inputs", "outputs")
-        names = {kind: [re.sub(r"\W+", "_", name) for name in getattr(self, kind)] for kind in kinds}
+        names = {
+            kind: [re.sub(r"\W+", "_", name) for name in getattr(self, kind)] for kind in kinds
+        }
         return control.ss(self.A, self.B, self.C, self.D, self.step_size or 0, **names)
 
     def __repr__(self) -> str:

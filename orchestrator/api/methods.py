@@ -45,7 +45,11 @@ def _made(request: Any, before: list[Parameter], call: Callable[..., Any], who: 
 
 
 def _named(made: Any, name: str, module: str) -> Any:
-    made.__name__, made.__qualname__, made.__module__ = name.rpartition(".")[2], name, f"orchestrator.api.{module}"
+    made.__name__, made.__qualname__, made.__module__ = (
+        name.rpartition(".")[2],
+        name,
+        f"orchestrator.api.{module}",
+    )
     return made
 
 

@@ -35,7 +35,9 @@ def catalogue_model(name: str, parts: Mapping[str, str] | None = None) -> Model:
             f"model {name!r} is built from the [network] table of a case file, by `gfor run` or `gfor modes`"
         )
     if not isinstance(parts, Mapping | None):
-        raise InputError(f"parts = {parts!r}; give models by part, such as {{'machine': 'genrou', 'exciter': 'sexs'}}")
+        raise InputError(
+            f"parts = {parts!r}; give models by part, such as {{'machine': 'genrou', 'exciter': 'sexs'}}"
+        )
     chosen, known = dict(parts or {}), parts_of(name)
     if unknown := [part for part in chosen if part not in known]:
         has = f"it is made of {', '.join(known)}" if known else "'synchronous_generator' has some"
@@ -47,10 +49,17 @@ def catalogue_model(name: str, parts: Mapping[str, str] | None = None) -> Model:
 
 
 def build(
-    model: str | Model, folder: str | Path = ".", *, native: bool = False, fmi: FmiVersion = "2.0",
-    platforms: Sequence[str] | None = None, extra: Mapping[str, bytes] | None = None,
-    parts: Mapping[str, str] | None = None, reference: bool = False, sources: bool = False,
-) -> Path:  # fmt: skip
+    model: str | Model,
+    folder: str | Path = ".",
+    *,
+    native: bool = False,
+    fmi: FmiVersion = "2.0",
+    platforms: Sequence[str] | None = None,
+    extra: Mapping[str, bytes] | None = None,
+    parts: Mapping[str, str] | None = None,
+    reference: bool = False,
+    sources: bool = False,
+) -> Path:
     """Build the FMU of a model; returns its path.
 
     Parameters
@@ -89,16 +98,22 @@ def build(
     'infinite_bus.fmu'
     """
     if not isinstance(model, str | Model):
-        raise InputError(f"model = {model!r}; give the name of a model of the catalogue, or a model of your own")
+        raise InputError(
+            f"model = {model!r}; give the name of a model of the catalogue, or a model of your own"
+        )
     flag(native, "native")
     if fmi not in ("2.0", "3.0"):
         raise InputError(f"fmi = {fmi!r}; choose from '2.0' and '3.0'")
     if fmi != "2.0" and not native:
-        raise InputError("FMI 3.0 is for native FMUs: pythonfmu's wrapper speaks FMI 2.0; build a native one")
+        raise InputError(
+            "FMI 3.0 is for native FMUs: pythonfmu's wrapper speaks FMI 2.0; build a native one"
+        )
     flag(reference, "reference")
     flag(sources, "sources")
     if sources and not native:
-        raise InputError("only native FMUs are made of C source that a tool can compile; build a native one")
+        raise InputError(
+            "only native FMUs are made of C source that a tool can compile; build a native one"
+        )
     from fmus.toolchain.compiler import TARGETS  # noqa: PLC0415 - as above
     from fmus.toolchain.exporter import export  # noqa: PLC0415 - needs the extra `build`
     from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - as above
@@ -132,23 +147,31 @@ def with_reference(path: Path) -> Path:
 def _platforms(given: Sequence[str], known: Collection[str]) -> tuple[str, ...]:
     listed = names(given, "platforms")
     if wrong := [name for name in listed if name not in known]:
-        raise InputError(f"platforms: there is no platform {wrong[0]!r}; choose from {', '.join(sorted(known))}")
+        raise InputError(
+            f"platforms: there is no platform {wrong[0]!r}; choose from {', '.join(sorted(known))}"
+        )
     return listed
 
 
 def _members(extra: Mapping[str, bytes] | None) -> dict[str, bytes]:
     """Members of the archive, none of which leads out of the folder or replaces a part of the FMU."""
     if extra is not None and not isinstance(extra, Mapping):
-        raise InputError(f"extra = {extra!r}; give bytes by path, such as {{'extra/notes.txt': b'...'}}")
+        raise InputError(
+            f"extra = {extra!r}; give bytes by path, such as {{'extra/notes.txt': b'...'}}"
+        )
     for name, content in (extra or {}).items():
         parts = name.split("/") if isinstance(name, str) else []
-        outside = len(parts) < 2 or parts[0] != "extra" or any(part in ("", ".", "..") for part in parts)
+        outside = (
+            len(parts) < 2 or parts[0] != "extra" or any(part in ("", ".", "..") for part in parts)
+        )
         if outside or any(letter in name for letter in "\\:\0"):
             raise InputError(
                 f"extra: {name!r} is not a path in the FMU's folder extra/; write it with /, such as 'extra/notes.txt'"
             )
         if not isinstance(content, bytes):
-            raise InputError(f"extra: the content of {name!r} is of type {type(content).__name__}; give bytes")
+            raise InputError(
+                f"extra: the content of {name!r} is of type {type(content).__name__}; give bytes"
+            )
     return dict(extra or {})
 
 
@@ -159,7 +182,11 @@ def _folder(given: str | Path) -> Path:
         place.mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"folder = {str(place)!r}: an FMU cannot be written there: {reason}") from error
+        raise InputError(
+            f"folder = {str(place)!r}: an FMU cannot be written there: {reason}"
+        ) from error
     if not os.access(place, os.W_OK):
-        raise InputError(f"folder = {str(place)!r}: an FMU cannot be written there: it is closed to you")
+        raise InputError(
+            f"folder = {str(place)!r}: an FMU cannot be written there: it is closed to you"
+        )
     return place

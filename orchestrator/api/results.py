@@ -84,16 +84,23 @@ class Modes:
             {
                 **eigenvalue_json(mode.eigenvalue, mode.damping_percent),
                 "name": self.result.name_of(mode) or "",
-                "states": ", ".join(f"{state} {factor:.2f}" for state, factor in mode.participation[:_STATES]),
+                "states": ", ".join(
+                    f"{state} {factor:.2f}" for state, factor in mode.participation[:_STATES]
+                ),
             }
             for mode in self.result.modes
         ]
         columns = ["real", "imag", "frequency_hz", "damping_percent", "name", "states"]
-        return pd.DataFrame(rows, columns=columns, index=pd.RangeIndex(1, len(rows) + 1, name="mode"))
+        return pd.DataFrame(
+            rows, columns=columns, index=pd.RangeIndex(1, len(rows) + 1, name="mode")
+        )
 
     def participation(self) -> pd.DataFrame:
         """Participation of every state (row) in every mode (column, as in `table`)."""
-        columns = {number: dict(mode.participation) for number, mode in enumerate(self.result.modes, start=1)}
+        columns = {
+            number: dict(mode.participation)
+            for number, mode in enumerate(self.result.modes, start=1)
+        }
         table = pd.DataFrame(columns, index=list(self.result.model.names))
         return table.rename_axis(index="state", columns="mode")
 
@@ -107,10 +114,11 @@ class Modes:
                 "eigenvalue": ("mode", [mode.eigenvalue for mode in self], {"units": "rad/s"}),
                 "frequency": ("mode", [mode.frequency_hz for mode in self], {"units": "Hz"}),
                 "damping": ("mode", [mode.damping_percent for mode in self], {"units": "%"}),
-                "participation": (of_both, share.to_numpy().T), "shape": (of_both, np.reshape(shape, share.T.shape)),
+                "participation": (of_both, share.to_numpy().T),
+                "shape": (of_both, np.reshape(shape, share.T.shape)),
             },
             {"mode": table.index, "name": ("mode", table["name"].to_numpy()), "state": share.index},
-        )  # fmt: skip
+        )
 
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor modes --json`` prints of this scenario, as JSON's types."""
@@ -182,7 +190,11 @@ class Modes:
     def _repr_html_(self) -> str:
         r = self.result
         outside = [] if r.hidden is None else [r.hidden.sentence()]
-        lines = [self.stability.sentence(), *outside, *(f"warning: {text}" for text in self.warnings)]
+        lines = [
+            self.stability.sentence(),
+            *outside,
+            *(f"warning: {text}" for text in self.warnings),
+        ]
         return page(f"Modes of {r.prepared.case.name}: {r.prepared.title}", lines, self.table())
 
 
@@ -203,7 +215,9 @@ class NamedModes(dict[str, Mode]):
         if name in r.unnamed:
             raise NoSuchModeError(f"{where}: {r.unnamed[name]}")
         names = ", ".join(map(repr, self)) or "none"
-        raise NoSuchModeError(f"{where} has no mode named {name!r} in the range; its named modes: {names}")
+        raise NoSuchModeError(
+            f"{where} has no mode named {name!r} in the range; its named modes: {names}"
+        )
 
 
 class Run:
@@ -304,7 +318,11 @@ class Run:
         from orchestrator.study import beside  # noqa: PLC0415 - as below
         from orchestrator.study.files import save_run, save_study  # noqa: PLC0415 - plots: a second to import
 
-        place, run_id, name = made_folder(folder, "folder"), new_run_id(), self.result.modes.prepared.name
+        place, run_id, name = (
+            made_folder(folder, "folder"),
+            new_run_id(),
+            self.result.modes.prepared.name,
+        )
         scenario = ScenarioFolder(place, name, run_id)
         save_netcdf(self.result.dataset, scenario.path / TRAJECTORY)
         save_run(self.result, scenario, csv=False)
@@ -330,7 +348,10 @@ class Run:
         from orchestrator.study.mode_plots import draw_signal  # noqa: PLC0415 - a second to import
 
         expression = self._first_plotted() if signal is None else signal
-        unit = self.signal(expression).attrs.get("units") or self.dataset[expression.split(" - ")[0].strip()].units
+        unit = (
+            self.signal(expression).attrs.get("units")
+            or self.dataset[expression.split(" - ")[0].strip()].units
+        )
         axes = axes_or_new(ax, 7.2, 3.2)
         draw_signal(axes, [self.result], expression, first=curves_on(axes))
         axes.set_xlabel("Time [s]")
@@ -342,7 +363,9 @@ class Run:
         for plot in self.result.modes.prepared.case.table.plots:
             for panel in plot.panels:
                 return str(panel.signal)
-        raise InputError(f"the case plots no signal; name one of: {', '.join(map(str, self.dataset.data_vars))}")
+        raise InputError(
+            f"the case plots no signal; name one of: {', '.join(map(str, self.dataset.data_vars))}"
+        )
 
     def __repr__(self) -> str:
         prepared, times = self.result.modes.prepared, self.dataset["time"].values
@@ -355,4 +378,8 @@ class Run:
         lines += [f"ended early: {self.failure}"] if self.failure else []
         lines += [f"found: {finding.message}" for finding in self.findings]
         prepared = self.result.modes.prepared
-        return page(f"Run of {prepared.case.name}: {prepared.title}", lines, rest=str(self.dataset._repr_html_()))
+        return page(
+            f"Run of {prepared.case.name}: {prepared.title}",
+            lines,
+            rest=str(self.dataset._repr_html_()),
+        )

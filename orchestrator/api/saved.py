@@ -24,7 +24,11 @@ class Saved(Mapping[str, Any]):
         self.folder = folder
 
     def __iter__(self) -> Iterator[str]:
-        found = (file for file in sorted(self.folder.rglob("*.*")) if file.suffix in (".nc", ".csv", ".json"))
+        found = (
+            file
+            for file in sorted(self.folder.rglob("*.*"))
+            if file.suffix in (".nc", ".csv", ".json")
+        )
         return (file.relative_to(self.folder).as_posix() for file in found if file.name != MANIFEST)
 
     def __len__(self) -> int:
@@ -68,5 +72,7 @@ def open(folder: str | Path) -> Saved:
     """
     place = path_of(folder, "folder", "folder")
     if not place.is_dir() or not len(saved := Saved(place)):
-        raise InputError(f"folder = {str(place)!r}: there are no results; give a folder that a study wrote")
+        raise InputError(
+            f"folder = {str(place)!r}: there are no results; give a folder that a study wrote"
+        )
     return saved

@@ -74,26 +74,37 @@ def _run(scenario: Scenario, request: RunRequest) -> Run:
 
     prepared, recording = scenario._until(cast("float | None", request.stop)), request.recording
     if request.checkpoints is not None and request.federates is not None:
-        raise InputError("a run with federates keeps no checkpoints; leave out federates or checkpoints")
+        raise InputError(
+            "a run with federates keeps no checkpoints; leave out federates or checkpoints"
+        )
     with ExitStack() as stack:
         kept = request.checkpoints if isinstance(request.checkpoints, Checkpoints) else None
         if request.checkpoints is not None and kept is None:
             folder = path_of(request.checkpoints, "checkpoints", "folder")
             stack.enter_context(held(folder))
-            kept = _checkpoints(prepared, folder, cast("float | None", request.checkpoint_every) or EVERY)
+            kept = _checkpoints(
+                prepared, folder, cast("float | None", request.checkpoint_every) or EVERY
+            )
         if recording is None and recorded_size(prepared, csv=False) > IN_MEMORY:
             recording = temporary_recording(prepared) if kept is None else kept.recording(prepared)
         with shown_progress(scenario.title, shown=request.progress) as report:
             bars = [Progress(report)] if request.progress else []
             result = run_scenario(
-                prepared, observers=[*bars, *request.observers], linear=request.linear, recording=recording,
-                checkpoints=kept, federates=request.federates, threads=request.threads,
+                prepared,
+                observers=[*bars, *request.observers],
+                linear=request.linear,
+                recording=recording,
+                checkpoints=kept,
+                federates=request.federates,
+                threads=request.threads,
                 boxes=_boxes("modes_with_boxes", request.black_box),
-            )  # fmt: skip
+            )
         if kept is not None and kept is not request.checkpoints and result.failure is None:
             kept.clear()
     if result.failure is not None:
-        warnings.warn(f"scenario {scenario.name!r}: {result.failure}", RunEndedWarning, stacklevel=3)
+        warnings.warn(
+            f"scenario {scenario.name!r}: {result.failure}", RunEndedWarning, stacklevel=3
+        )
     return Run(result)
 
 
@@ -175,14 +186,19 @@ class Scenario:
         """
         rows = [
             {
-                "parameter": f"{name}.{info.name}", "value": plan.value(info.name), "unit": info.unit or "1",
-                "type": info.type, "variability": info.variability, "minimum": info.minimum, "maximum": info.maximum,
+                "parameter": f"{name}.{info.name}",
+                "value": plan.value(info.name),
+                "unit": info.unit or "1",
+                "type": info.type,
+                "variability": info.variability,
+                "minimum": info.minimum,
+                "maximum": info.maximum,
                 "description": info.description,
             }
             for name, plan in self.prepared.system.components.items()
             for info in plan.description.variables.values()
             if info.causality == "parameter"
-        ]  # fmt: skip
+        ]
         return pd.DataFrame(rows, dtype=object).set_index("parameter")
 
     @property
@@ -222,7 +238,9 @@ class Scenario:
 
     def again(self, changed: Mapping[str, float]) -> PreparedScenario:
         """The scenario with other values by ``component.variable``, prepared anew from the case."""
-        (prepared,) = self._file.prepare([self.name], dict(changed), self._asked.step_size, None, self._asked.layers)
+        (prepared,) = self._file.prepare(
+            [self.name], dict(changed), self._asked.step_size, None, self._asked.layers
+        )
         return prepared
 
     def _until(self, stop_time: float | None) -> PreparedScenario:
@@ -241,7 +259,9 @@ class Scenario:
 
     steps = method("Scenario.steps", StepsRequest, steps_of)
 
-    def strengths(self, converter_current: float = 0.0, rating: float | str | None = None) -> list[BusStrength]:
+    def strengths(
+        self, converter_current: float = 0.0, rating: float | str | None = None
+    ) -> list[BusStrength]:
         """Short-circuit power of every bus, with the short-circuit ratio of the converters there.
 
         Parameters
@@ -270,7 +290,12 @@ class Scenario:
         return ShortCircuit.of(self.prepared).strengths(current, rated)
 
     def linearize(
-        self, inputs: Names = (), outputs: Names = (), *, continuous: bool = False, black_box: bool = False
+        self,
+        inputs: Names = (),
+        outputs: Names = (),
+        *,
+        continuous: bool = False,
+        black_box: bool = False,
     ) -> LinearSystem:
         """The linear model A, B, C, D around the steady state, with names and the verdict on it.
 
@@ -305,10 +330,17 @@ class Scenario:
         if continuous and black_box:
             raise InputError("black_box identifies a step map; leave out continuous, or black_box")
         model, point, examined = linear_model(
-            self.prepared, inputs, outputs, as_continuous=continuous, boxes=_boxes("linear_with_boxes", black_box)
+            self.prepared,
+            inputs,
+            outputs,
+            as_continuous=continuous,
+            boxes=_boxes("linear_with_boxes", black_box),
         )
         return LinearSystem(
-            **vars(model), operating_point=point, stability=examined.stability, warnings=examined.warnings
+            **vars(model),
+            operating_point=point,
+            stability=examined.stability,
+            warnings=examined.warnings,
         )
 
     def __repr__(self) -> str:
@@ -327,10 +359,20 @@ def _boxes(name: str, wanted: bool) -> Any:
 
 def _differences(one: PreparedScenario, other: PreparedScenario) -> list[str]:
     """Values and FMUs, by name, in which two preparations of a scenario differ."""
-    names = [name for name in {**one.values, **other.values} if one.values.get(name) != other.values.get(name)]
-    fmus = [{n: plan.description for n, plan in ready.system.components.items()} for ready in (one, other)]
+    names = [
+        name
+        for name in {**one.values, **other.values}
+        if one.values.get(name) != other.values.get(name)
+    ]
+    fmus = [
+        {n: plan.description for n, plan in ready.system.components.items()}
+        for ready in (one, other)
+    ]
     made, found = ({n: (fmu.path, fmu.guid) for n, fmu in of.items()} for of in fmus)
-    return [*names, *(f"the FMU of {name}" for name in {**made, **found} if made.get(name) != found.get(name))]
+    return [
+        *names,
+        *(f"the FMU of {name}" for name in {**made, **found} if made.get(name) != found.get(name)),
+    ]
 
 
 def _checkpoints(prepared: PreparedScenario, folder: Path, every: float) -> Checkpoints:
@@ -338,14 +380,20 @@ def _checkpoints(prepared: PreparedScenario, folder: Path, every: float) -> Chec
         warnings.warn(text, CheckpointWarning, stacklevel=5)
 
     for name, reason in not_kept(prepared).items():
-        say(f"scenario {prepared.name!r} cannot be resumed within its run, because of component {name!r}: {reason}")
+        say(
+            f"scenario {prepared.name!r} cannot be resumed within its run, because of component {name!r}: {reason}"
+        )
     return Checkpoints(prepared, folder, every, resume=True, say=say)
 
 
-def choose(file: CaseFile, names: Names, asked: Preparing, stop: float | None = None) -> list[Scenario]:
+def choose(
+    file: CaseFile, names: Names, asked: Preparing, stop: float | None = None
+) -> list[Scenario]:
     """As `Case.choose`, of a case file, with scenarios prepared as ``asked`` says; runs end at ``stop`` [s]."""
     file = replace(file, sharing=cast("SharingRule | None", asked.sharing))
-    prepared = file.prepare(names_given(names, "names"), asked.overrides, asked.step_size, stop, asked.files)
+    prepared = file.prepare(
+        names_given(names, "names"), asked.overrides, asked.step_size, stop, asked.files
+    )
     return [Scenario(asked.scheduled(one), file, asked) for one in prepared]
 
 

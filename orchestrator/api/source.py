@@ -19,9 +19,11 @@ if TYPE_CHECKING:
 
 
 def source(
-    run: Run | xr.Dataset | str | Path, start: Time | None = None, stop: Time | None = None,
+    run: Run | xr.Dataset | str | Path,
+    start: Time | None = None,
+    stop: Time | None = None,
     scenario: Scenario | None = None,
-) -> Sources:  # fmt: skip
+) -> Sources:
     """Find the oscillations of a record, whether they are forced, and which place feeds them.
 
     Parameters
@@ -54,7 +56,9 @@ def source(
     elif isinstance(scenario, Scenario):
         prepared = scenario.prepared
     else:
-        raise InputError(f"scenario = {scenario!r}; give a scenario, as Case.scenario makes it, or leave it out")
+        raise InputError(
+            f"scenario = {scenario!r}; give a scenario, as Case.scenario makes it, or leave it out"
+        )
     return sources_of(dataset, label, start, stop, prepared)
 
 

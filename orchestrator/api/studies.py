@@ -34,8 +34,12 @@ def _scenario(case: Any, request: ScenarioRequest) -> Scenario:
     known, name = ", ".join(case.scenarios), request.name
     text_or_none(name, "name", f"give the name of one scenario: {known}")
     if name is None and len(case.scenarios) != 1:
-        raise InputError(f"{case.name}: the case has {len(case.scenarios)} scenarios; choose one of: {known}")
-    file = with_events(case.file, names_given(request.force, "force"), names_given(request.fault, "fault"))
+        raise InputError(
+            f"{case.name}: the case has {len(case.scenarios)} scenarios; choose one of: {known}"
+        )
+    file = with_events(
+        case.file, names_given(request.force, "force"), names_given(request.fault, "fault")
+    )
     (chosen,) = chosen_of(file, [name] if name else [], request)
     question([chosen.prepared], above=1)
     return chosen
@@ -56,7 +60,9 @@ def _designed(file: CaseFile, request: DesignRequest) -> ControllerDesign:
 
 def of_study(name: str, study: Study[Asks, Shown]) -> Callable[Concatenate[Any, Asks], Shown]:
     """The method of a study."""
-    return method(f"Case.{name}", study.request, lambda case, request: _computed(study, case.file, request))
+    return method(
+        f"Case.{name}", study.request, lambda case, request: _computed(study, case.file, request)
+    )
 
 
 def _computed(study: Study[..., Shown], file: CaseFile, request: Any) -> Shown:
@@ -70,7 +76,10 @@ def _computed(study: Study[..., Shown], file: CaseFile, request: Any) -> Shown:
     question(study.prepared(planned), above=2)
     kept = None if request.folder is None else _folder(request.folder)
     title = study.counted.capitalize()
-    with shown_progress(title, shown=request.progress) as report, nullcontext() if kept is None else held(kept):
+    with (
+        shown_progress(title, shown=request.progress) as report,
+        nullcontext() if kept is None else held(kept),
+    ):
         return cast("Shown", study.compute(planned, executor, kept, report))
 
 

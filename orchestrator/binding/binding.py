@@ -15,12 +15,27 @@ from orchestrator.binding.scales import PER_UNIT, Bases, UnitsDifferError, amoun
 from orchestrator.binding.tables import BindingTable, PhasorTable, SignalTable, StartTable
 from orchestrator.errors import BindingError, ErrorKind, Problem
 from orchestrator.fmi.description import FmuDescription, VariableInfo, read_description
-from orchestrator.fmi.port import START, BoundDescription, Form, Matrix2, PhasorMap, PortMap, SignalMap, StartMap
+from orchestrator.fmi.port import (
+    START,
+    BoundDescription,
+    Form,
+    Matrix2,
+    PhasorMap,
+    PortMap,
+    SignalMap,
+    StartMap,
+)
 from orchestrator.toml_files import fault_of, read_toml
 from orchestrator.units import to_unit
 
-_FORMS = {"rectangular": Form.RECTANGULAR, "dq": Form.RECTANGULAR, "qd": Form.RECTANGULAR, "polar": Form.POLAR,
-          "abc": Form.ABC, "power": Form.POWER}  # fmt: skip
+_FORMS = {
+    "rectangular": Form.RECTANGULAR,
+    "dq": Form.RECTANGULAR,
+    "qd": Form.RECTANGULAR,
+    "polar": Form.POLAR,
+    "abc": Form.ABC,
+    "power": Form.POWER,
+}
 _FREQUENCY = ("omega", "frequency")
 _SWITCH = ".enabled"  # end of our names of Boolean variables, such as ``pod_p.enabled``
 
@@ -50,7 +65,9 @@ def read_table(path: Path) -> BindingTable:
 
 
 def _problem(detail: Any) -> Problem:
-    place = ".".join(str(part) for part in detail["loc"] if part not in ("StartTable", "list[StartTable]"))
+    place = ".".join(
+        str(part) for part in detail["loc"] if part not in ("StartTable", "list[StartTable]")
+    )
     return Problem(place, fault_of(detail))
 
 
@@ -71,10 +88,23 @@ class _Reader:
         if bases is not None:
             own_rating = "S_n" in table.start
             voltage, current = self._voltage(bases), self._current(bases, own_rating)
-            start, signals, settings = self._start(bases, own_rating), self._signals(bases), self._settings()
+            start, signals, settings = (
+                self._start(bases, own_rating),
+                self._signals(bases),
+                self._settings(),
+            )
             if voltage is not None and current is not None:
-                port = PortMap(bases.rating, bases.frequency, voltage, current, start, signals, settings,
-                               self._current_limit(), bases.voltage)  # fmt: skip
+                port = PortMap(
+                    bases.rating,
+                    bases.frequency,
+                    voltage,
+                    current,
+                    start,
+                    signals,
+                    settings,
+                    self._current_limit(),
+                    bases.voltage,
+                )
                 self._check_once(port)
         if self._problems or port is None:
             raise BindingError(self._source, self._problems)
@@ -91,9 +121,13 @@ class _Reader:
     def _variable(self, name: str, *causalities: str, kind: str = "Real") -> VariableInfo:
         info = self._fmu.variables.get(name)
         if info is None:
-            raise ValueError(f"the FMU has no variable {name!r}; `gfor fmu info {self._fmu.path.name}` lists them")
+            raise ValueError(
+                f"the FMU has no variable {name!r}; `gfor fmu info {self._fmu.path.name}` lists them"
+            )
         if causalities and info.causality not in causalities:
-            raise ValueError(f"{name} is of causality {info.causality}; {' or '.join(causalities)} is needed here")
+            raise ValueError(
+                f"{name} is of causality {info.causality}; {' or '.join(causalities)} is needed here"
+            )
         if info.type != kind:
             raise ValueError(f"{name} is of type {info.type}; {kind} is needed here")
         return info
@@ -109,14 +143,22 @@ class _Reader:
     def _current_limit(self) -> float | None:
         declared = self._table.rating.I_max
         with self._at("rating"):
-            limit = None if declared is None else to_unit(str(declared).removesuffix("pu").strip(), "1")
+            limit = (
+                None if declared is None else to_unit(str(declared).removesuffix("pu").strip(), "1")
+            )
             if limit is not None and not 0 < limit < 100:
-                raise ValueError(f"I_max = {declared}; it must be above 0 and below 100, in pu of the rated current")
+                raise ValueError(
+                    f"I_max = {declared}; it must be above 0 and below 100, in pu of the rated current"
+                )
             return limit
         return None
 
     def _phasor(
-        self, place: str, table: PhasorTable, causality: str, scale: Callable[[str, VariableInfo], float]
+        self,
+        place: str,
+        table: PhasorTable,
+        causality: str,
+        scale: Callable[[str, VariableInfo], float],
     ) -> tuple[Form, Matrix2, float]:
         """Form, matrix from our frame [pu, rating] to the FMU's axes, and angle factor."""
         form = _FORMS[table.form]
@@ -134,14 +176,21 @@ class _Reader:
         if len(signs) != needed:
             raise ValueError(f"'signs' needs {needed} values, one for each variable")
         if form in (Form.POLAR, Form.ABC) and any(s != 1 for s in signs):
-            raise ValueError("'signs' are for rectangular axes and powers; turn a frame with 'frame_angle'")
+            raise ValueError(
+                "'signs' are for rectangular axes and powers; turn a frame with 'frame_angle'"
+            )
         if table.form == "qd":
             signs[1] = -signs[1]  # f = f_q − j·f_d
         angle = radians(to_unit(table.frame_angle, "deg"))
         if form is Form.POWER and angle:
             raise ValueError("powers have no frame; remove 'frame_angle'")
         k, (s0, s1) = scales[0], signs[:2]
-        matrix = (s0 * k * cos(angle), s0 * -k * sin(angle), s1 * k * sin(angle), s1 * k * cos(angle))
+        matrix = (
+            s0 * k * cos(angle),
+            s0 * -k * sin(angle),
+            s1 * k * sin(angle),
+            s1 * k * cos(angle),
+        )
         return form, matrix, self._angle_factor(form, table, infos)
 
     @staticmethod
@@ -157,7 +206,9 @@ class _Reader:
         table, found = self._table.voltage, None
         with self._at("voltage"):
             if table.form == "power":
-                raise ValueError("form 'power' is for [current]; a voltage is rectangular, dq, qd, polar or abc")
+                raise ValueError(
+                    "form 'power' is for [current]; a voltage is rectangular, dq, qd, polar or abc"
+                )
             if table.direction != "into the grid":
                 raise ValueError("'direction' is for [current]; remove it")
 
@@ -182,7 +233,11 @@ class _Reader:
             # On the 100 MVA base of the network, for one unit of the rating as delivered.
             factor = direction * bases.rating / SYSTEM_BASE_MVA
             # Signs of powers act on P and Q, before the current is taken from them.
-            matrix = self._power_matrix(to_fmu, factor) if form is Form.POWER else _inverse(to_fmu, factor)
+            matrix = (
+                self._power_matrix(to_fmu, factor)
+                if form is Form.POWER
+                else _inverse(to_fmu, factor)
+            )
             per_unit = unit_of(self._variable(table.variables[0]), table.unit) == PER_UNIT
             per_rating = not own_rating or (per_unit and table.base in (None, "S_n"))
             found = PhasorMap(form, tuple(table.variables), matrix, angle_factor, per_rating)
@@ -202,7 +257,9 @@ class _Reader:
             for table in tables if isinstance(tables, list) else [tables]:
                 with self._at(f"start.{name}"):
                     if name not in START:
-                        raise ValueError(f"there is no start value of that name; choose from {', '.join(START)}")
+                        raise ValueError(
+                            f"there is no start value of that name; choose from {', '.join(START)}"
+                        )
                     maps.append(self._start_map(name, table, bases, own_rating))
             found[name] = tuple(maps)
         return found
@@ -215,7 +272,9 @@ class _Reader:
             factor = 1.0 if unit == PER_UNIT else to_unit("1 rad", unit)
             return StartMap(info.name, table.sign * factor, table.sign * factor * offset)
         if name == "S_n":
-            return StartMap(info.name, bases.power_unit(unit, table.base or "1 MVA", info.name) / bases.rating)
+            return StartMap(
+                info.name, bases.power_unit(unit, table.base or "1 MVA", info.name) / bases.rating
+            )
         if name == "v_0":
             return StartMap(info.name, bases.voltage_unit(unit, table.base, table.value, info.name))
         absolute = unit != PER_UNIT or table.base not in (None, "S_n")
@@ -234,13 +293,20 @@ class _Reader:
             return self._switch(table)
         info = self._variable(table.variable)
         if name in _FREQUENCY:
-            return SignalMap(info.name, 1 / bases.frequency_unit(unit_of(info, table.unit), info.name), 0.0, PER_UNIT)
+            return SignalMap(
+                info.name,
+                1 / bases.frequency_unit(unit_of(info, table.unit), info.name),
+                0.0,
+                PER_UNIT,
+            )
         return SignalMap(info.name, 1.0, 0.0, unit_of(info, table.unit))
 
     def _switch(self, table: SignalTable) -> SignalMap:
         info = self._variable(table.variable, "parameter", "input", kind="Boolean")
         if table.unit is not None or table.base is not None:
-            raise ValueError(f"{info.name} is a Boolean, which has no unit and no base; remove them")
+            raise ValueError(
+                f"{info.name} is a Boolean, which has no unit and no base; remove them"
+            )
         return SignalMap(info.name, 1.0, 0.0, "")
 
     def _settings(self) -> dict[str, float | bool]:
@@ -250,7 +316,9 @@ class _Reader:
                 with self._at(f"{group}.{name}"):
                     info = self._fmu.variables.get(name)
                     if info is None or info.causality != causality or info.type == "String":
-                        raise ValueError(f"the FMU has no {causality} of that name that takes a number")
+                        raise ValueError(
+                            f"the FMU has no {causality} of that name that takes a number"
+                        )
                     found[name] = value if isinstance(value, bool) else to_unit(value, info.unit)
         return found
 
@@ -259,9 +327,13 @@ class _Reader:
         used = [*port.voltage.variables, *port.current.variables, *port.settings]
         used += [m.variable for maps in port.start.values() for m in maps]
         if twice := sorted({name for name in used if used.count(name) > 1}):
-            self._problems.append(Problem("", f"{', '.join(twice)}: bound more than once; a variable has one meaning"))
+            self._problems.append(
+                Problem("", f"{', '.join(twice)}: bound more than once; a variable has one meaning")
+            )
         if not all(math.isfinite(x) for x in (*port.voltage.matrix, *port.current.matrix)):
-            self._problems.append(Problem("rating", "rating and bases give no finite factors; check their units"))
+            self._problems.append(
+                Problem("rating", "rating and bases give no finite factors; check their units")
+            )
 
 
 def _phase(table: PhasorTable) -> str | None:

@@ -10,14 +10,19 @@ from orchestrator.binding.tables import REQUIRED
 from orchestrator.fmi.description import FmuDescription, VariableInfo
 from orchestrator.fmi.port import START
 
-_VOLTAGE = re.compile(r"^(v|u|volt|voltage|vbus|vt|vpcc|vg|ug|upcc)(?![a-z])|volt|spannung", re.IGNORECASE)
+_VOLTAGE = re.compile(
+    r"^(v|u|volt|voltage|vbus|vt|vpcc|vg|ug|upcc)(?![a-z])|volt|spannung", re.IGNORECASE
+)
 _CURRENT = re.compile(r"^(i|cur|current|iinj|ig|it|ipcc|inj)(?![a-z])|current|strom", re.IGNORECASE)
 _POWER = re.compile(r"^(p|q)(?![a-z])|power|leistung", re.IGNORECASE)
 
 _PARTS = {
     "rectangular": (r"re|real|r|x", r"im|imag|imaginary|i|y"),
     "dq": (r"d", r"q"),
-    "polar": (r"mag|magnitude|abs|amp|amplitude|m|rms|mod|modulus", r"ang|angle|arg|phase|phi|theta|deg|a"),
+    "polar": (
+        r"mag|magnitude|abs|amp|amplitude|m|rms|mod|modulus",
+        r"ang|angle|arg|phase|phi|theta|deg|a",
+    ),
     "abc": (r"a|1|u|l1|r", r"b|2|v|l2|s", r"c|3|w|l3|t"),
     "power": (r"p|active", r"q|reactive"),
 }
@@ -72,7 +77,9 @@ def draft_binding(fmu: FmuDescription, beside: Path | None = None) -> str:
         "",
         *_phasor("current", current, fmu.outputs),
         "",
-        *_starts({name: info for name, info in starts.items() if info is None or info.name not in taken}),
+        *_starts(
+            {name: info for name, info in starts.items() if info is None or info.name not in taken}
+        ),
         *_signals(fmu, taken),
     ]
     return "\n".join(lines) + "\n"
@@ -95,19 +102,31 @@ def _relative(path: Path, beside: Path) -> str:
 
 
 def _find(
-    fmu: FmuDescription, causality: str, names: re.Pattern[str], units: Sequence[str], forms: Sequence[str]
+    fmu: FmuDescription,
+    causality: str,
+    names: re.Pattern[str],
+    units: Sequence[str],
+    forms: Sequence[str],
 ) -> Guess | None:
     """Two or three variables whose names differ only in their last part."""
     candidates = [
         v
         for v in fmu.variables.values()
-        if v.causality == causality and v.type == "Real" and (names.search(_last(v.name)) or names.search(v.description)
-                                                             or hints.likely_unit(v) in units)
-    ]  # fmt: skip
+        if v.causality == causality
+        and v.type == "Real"
+        and (
+            names.search(_last(v.name))
+            or names.search(v.description)
+            or hints.likely_unit(v) in units
+        )
+    ]
     best: tuple[int, Guess] | None = None
     for form in forms:
         for found in _matches(candidates, _PARTS[form], loose=form == "power"):
-            score = sum(1 + 2 * bool(names.search(_last(v.name))) + (hints.likely_unit(v) in units) for v in found)
+            score = sum(
+                1 + 2 * bool(names.search(_last(v.name))) + (hints.likely_unit(v) in units)
+                for v in found
+            )
             if best is None or score > best[0]:
                 best = score, Guess(form, found)
     return None if best is None else best[1]
@@ -121,7 +140,8 @@ def _matches(
         if stem is None:
             continue
         others = [
-            next((v for v in candidates if v is not first and _stem(v.name, part) == stem), None) for part in parts[1:]
+            next((v for v in candidates if v is not first and _stem(v.name, part) == stem), None)
+            for part in parts[1:]
         ]
         if all(others) and (stem or loose):
             yield (first, *[v for v in others if v is not None])
@@ -145,7 +165,11 @@ def _start(fmu: FmuDescription, name: str, taken: Sequence[str]) -> VariableInfo
         if exact or close:
             return (exact or close)[0]
     text = hints.START_TEXTS.get(name)
-    told = [v for v in known if v.causality == "parameter" and text is not None and text.search(v.description)]
+    told = [
+        v
+        for v in known
+        if v.causality == "parameter" and text is not None and text.search(v.description)
+    ]
     return told[0] if told else None
 
 
@@ -155,18 +179,28 @@ def _rating(S_n: VariableInfo | None, fmu: FmuDescription, *ports: Guess | None)
         unit = S_n.unit if S_n.unit in ("MVA", "kVA", "VA", "GVA") else "MVA"
         lines.append(f'S_n = "{S_n.start_number:g} {unit}"  # GUESS: start value of {S_n.name}')
     else:
-        lines.append(f'S_n = "{REQUIRED}: rated apparent power of the FMU as delivered, such as 3.5 MVA"')
+        lines.append(
+            f'S_n = "{REQUIRED}: rated apparent power of the FMU as delivered, such as 3.5 MVA"'
+        )
     lines.append(_rated_voltage(fmu, ports))
     f_n = fmu.variables.get("f_n")
-    lines.append(f'f_n = "{50 if f_n is None or f_n.start is None else f_n.start_number:g} Hz"  # GUESS')
+    lines.append(
+        f'f_n = "{50 if f_n is None or f_n.start is None else f_n.start_number:g} Hz"  # GUESS'
+    )
     return lines
 
 
 def _rated_voltage(fmu: FmuDescription, ports: Iterable[Guess | None]) -> str:
     """V_n from a parameter of that name. Without such a parameter the user must fill it in if the port is in volts or
     amperes."""
-    known = [v for v in fmu.variables.values() if v.causality == "parameter" and v.type == "Real" and v.start]
-    if named := next((v for v in known if v.unit in hints.VOLTS and _RATED_VOLTAGE.search(_last(v.name))), None):
+    known = [
+        v
+        for v in fmu.variables.values()
+        if v.causality == "parameter" and v.type == "Real" and v.start
+    ]
+    if named := next(
+        (v for v in known if v.unit in hints.VOLTS and _RATED_VOLTAGE.search(_last(v.name))), None
+    ):
         return f'V_n = "{named.start_number:g} {named.unit}"  # GUESS: start value of {_comment(named.name)}'
     units = {hints.likely_unit(v) for guess in ports if guess is not None for v in guess.variables}
     if units & {*hints.VOLTS, *hints.AMPERES}:
@@ -179,16 +213,32 @@ def _phasor(table: str, guess: Guess | None, names: Sequence[str]) -> list[str]:
     listed = ", ".join(names[:20]) + (", …" if len(names) > 20 else "")
     if guess is None:
         forms = "rectangular, dq, qd, polar or abc" + (", or power" if table == "current" else "")
-        lines += [f'form = "{REQUIRED}: {forms}"', f'variables = ["{REQUIRED}: one or more of: {_comment(listed)}"]']
+        lines += [
+            f'form = "{REQUIRED}: {forms}"',
+            f'variables = ["{REQUIRED}: one or more of: {_comment(listed)}"]',
+        ]
     else:
-        lines.append(f'form = "{guess.form}"  # GUESS; qd is f = f_q − j·f_d, dq is f = f_d + j·f_q')
-        lines.append(f"variables = [{', '.join(_quoted(v.name) for v in guess.variables)}]  # GUESS")
-        lines += [f"# {v.name} [{v.unit or 'no unit'}]: {_comment(v.description)}" for v in guess.variables]
+        lines.append(
+            f'form = "{guess.form}"  # GUESS; qd is f = f_q − j·f_d, dq is f = f_d + j·f_q'
+        )
+        lines.append(
+            f"variables = [{', '.join(_quoted(v.name) for v in guess.variables)}]  # GUESS"
+        )
+        lines += [
+            f"# {v.name} [{v.unit or 'no unit'}]: {_comment(v.description)}"
+            for v in guess.variables
+        ]
     lines += _units(table, guess)
     if table == "current":
         drawn = guess is not None and any(map(hints.is_drawn, guess.variables))
-        way, other = ("into the converter", "into the grid") if drawn else ("into the grid", "into the converter")
-        lines.append(f'direction = "{way}"  # GUESS{": from the description" * drawn}; or "{other}"')
+        way, other = (
+            ("into the converter", "into the grid")
+            if drawn
+            else ("into the grid", "into the converter")
+        )
+        lines.append(
+            f'direction = "{way}"  # GUESS{": from the description" * drawn}; or "{other}"'
+        )
     lines.append("# frame_angle = \"-90 deg\"  # by which the FMU's frame leads the network's")
     return lines
 
@@ -196,19 +246,28 @@ def _phasor(table: str, guess: Guess | None, names: Sequence[str]) -> list[str]:
 def _units(table: str, guess: Guess | None) -> list[str]:
     if guess is None:
         kinds = "line-to-line rms, phase rms or phase peak" if table == "voltage" else "rms or peak"
-        asked = [f'unit = "{REQUIRED}: pu, V, kV, A, kA, MW…"', f'# value = "…"  # of what is in V or A: {kinds}']
-        return [*asked, 'base = "S_n"  # GUESS; or such as "100 MVA"'] if table == "current" else asked
+        asked = [
+            f'unit = "{REQUIRED}: pu, V, kV, A, kA, MW…"',
+            f'# value = "…"  # of what is in V or A: {kinds}',
+        ]
+        return (
+            [*asked, 'base = "S_n"  # GUESS; or such as "100 MVA"'] if table == "current" else asked
+        )
     first = hints.likely_unit(guess.variables[0])
     lines = _unit(guess.variables[0], "pu, V, kV, A, kA, MW…")
     if first in (*hints.VOLTS, *hints.AMPERES) and guess.form != "abc":
         lines += _value(guess.variables, first)
     elif not first and guess.form != "abc":
-        lines.append('# value = "…"  # of what is in V: line-to-line rms, phase rms or phase peak; in A: rms or peak')
+        lines.append(
+            '# value = "…"  # of what is in V: line-to-line rms, phase rms or phase peak; in A: rms or peak'
+        )
     if table == "current" and first in ("pu", "p.u.", ""):
         text = _comment(" ".join(v.description for v in guess.variables))
         base = re.search(r"(\d+(?:\.\d+)?)\s*([kMG]?VA)\b", text)
         known = (
-            f'"{base[1]} {base[2]}"  # GUESS: from the description' if base else '"S_n"  # GUESS; or such as "100 MVA"'
+            f'"{base[1]} {base[2]}"  # GUESS: from the description'
+            if base
+            else '"S_n"  # GUESS; or such as "100 MVA"'
         )
         lines.append(f"base = {known}")
     if guess.form == "polar" and guess.variables[1].unit not in ("rad", "deg"):
@@ -220,7 +279,11 @@ def _unit(info: VariableInfo, such_as: str) -> list[str]:
     if not hints.undeclared(info):
         return []
     unit = hints.likely_unit(info)
-    return [f'unit = "{unit}"  # GUESS: from the description' if unit else f'unit = "{REQUIRED}: {such_as}"']
+    return [
+        f'unit = "{unit}"  # GUESS: from the description'
+        if unit
+        else f'unit = "{REQUIRED}: {such_as}"'
+    ]
 
 
 def _value(variables: Sequence[VariableInfo], unit: str) -> list[str]:
@@ -233,12 +296,19 @@ def _value(variables: Sequence[VariableInfo], unit: str) -> list[str]:
 
 
 def _starts(starts: dict[str, VariableInfo | None]) -> list[str]:
-    lines = ["# Where the power flow's start values go; without them the FMU starts where it wants to."]
+    lines = [
+        "# Where the power flow's start values go; without them the FMU starts where it wants to."
+    ]
     for name, info in starts.items():
         if info is None:
-            lines.append(f'# [start.{name}]\n# variable = "…"  # nothing was found that looks like it')
+            lines.append(
+                f'# [start.{name}]\n# variable = "…"  # nothing was found that looks like it'
+            )
             continue
-        lines += [f"[start.{name}]", f"variable = {_quoted(info.name)}  # GUESS: {_comment(info.description)}"]
+        lines += [
+            f"[start.{name}]",
+            f"variable = {_quoted(info.name)}  # GUESS: {_comment(info.description)}",
+        ]
         lines += _unit(info, "the FMU declares none")
         if name == "v_0" and hints.likely_unit(info) in hints.VOLTS:
             lines += _value([info], hints.likely_unit(info))
@@ -248,7 +318,14 @@ def _starts(starts: dict[str, VariableInfo | None]) -> list[str]:
 
 
 def _signals(fmu: FmuDescription, taken: Iterable[str]) -> list[str]:
-    found = next((n for n in fmu.outputs if re.fullmatch(r"(omega|w|speed|freq\w*|f)", _last(n), re.IGNORECASE)), None)
+    found = next(
+        (
+            n
+            for n in fmu.outputs
+            if re.fullmatch(r"(omega|w|speed|freq\w*|f)", _last(n), re.IGNORECASE)
+        ),
+        None,
+    )
     if found is None or found in taken:
         return []
     return [

@@ -10,13 +10,22 @@ _KNOWN = {*VOLTS, *AMPERES, *WATTS, "pu", "p.u.", "deg", "rad", "Hz", "rad/s"}
 _BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]+?)\s*[\])]")
 
 START_TEXTS = {
-    "P_0": re.compile(r"\bactive power\b.*(start|init)|(start|init)\w* active power", re.IGNORECASE),
-    "Q_0": re.compile(r"reactive power\b.*(start|init)|(start|init)\w* reactive power", re.IGNORECASE),
-    "v_0": re.compile(r"^(?!.*(angle|phase of)).*(voltage.*(start|init)|(start|init)\w* voltage)", re.IGNORECASE),
+    "P_0": re.compile(
+        r"\bactive power\b.*(start|init)|(start|init)\w* active power", re.IGNORECASE
+    ),
+    "Q_0": re.compile(
+        r"reactive power\b.*(start|init)|(start|init)\w* reactive power", re.IGNORECASE
+    ),
+    "v_0": re.compile(
+        r"^(?!.*(angle|phase of)).*(voltage.*(start|init)|(start|init)\w* voltage)", re.IGNORECASE
+    ),
     "theta_0": re.compile(r"angle.*(start|init)|(start|init)\w* (voltage )?angle", re.IGNORECASE),
 }
 
-_DRAWN = re.compile(r"\b(consum|drawn|draws|absorb|taken|demand)|into the (converter|device|load|unit)", re.IGNORECASE)
+_DRAWN = re.compile(
+    r"\b(consum|drawn|draws|absorb|taken|demand)|into the (converter|device|load|unit)",
+    re.IGNORECASE,
+)
 
 
 def undeclared(info: VariableInfo) -> bool:
@@ -27,7 +36,9 @@ def likely_unit(info: VariableInfo) -> str:
     """The declared unit, or else one that stands in brackets in the description; "" where neither is known."""
     if not undeclared(info):
         return info.unit
-    return next((text for text in reversed(_BRACKETS.findall(info.description)) if text in _KNOWN), "")
+    return next(
+        (text for text in reversed(_BRACKETS.findall(info.description)) if text in _KNOWN), ""
+    )
 
 
 def is_drawn(info: VariableInfo) -> bool:

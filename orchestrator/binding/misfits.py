@@ -14,7 +14,8 @@ from orchestrator.arrays import Numbers
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.port import BoundDescription
 
-BALANCE = 0.02  # deviation of the power from what was asked up to which signs and bases are right; losses are below
+# deviation of the power from what was asked up to which signs and bases are right; losses are below
+BALANCE = 0.02
 
 NO_LIMIT = 3.3
 """Current [pu, S_n] over the last cycle of a disturbance that no converter with a current limit gives.
@@ -23,13 +24,24 @@ Semiconductors carry 1.0 to 1.5 times the rated current, 2 where they are overra
 axis, gives up to 1.7 at the grid's side of its filter. More must be declared (`I_max` of the binding), but of machines.
 """
 
-FREQUENCY_APART = 0.02  # deviation of omega at rest from 1 above which a device is made for another frequency
+# deviation of omega at rest from 1 above which a device is made for another frequency
+FREQUENCY_APART = 0.02
 _HIGHEST = 400.0  # rated frequency of a device [Hz]
 SLIGHT = 1e-3  # the same below which nothing is said
-_HELD = 5  # how often a device is held again whose omega still moves, as a meter's does that begins elsewhere, or at 1
+# how often a device is held again whose omega still moves, as a meter's does that begins elsewhere,
+# or at 1
+_HELD = 5
 
-REMEDIES: dict[str, str] = tomllib.loads(Path(__file__).with_name("remedies.toml").read_text(encoding="utf-8"))
-_OF_RATING = ("wrong base", "power not as asked", "above its current limit", "no current limit", "no steady state")
+REMEDIES: dict[str, str] = tomllib.loads(
+    Path(__file__).with_name("remedies.toml").read_text(encoding="utf-8")
+)
+_OF_RATING = (
+    "wrong base",
+    "power not as asked",
+    "above its current limit",
+    "no current limit",
+    "no steady state",
+)
 
 
 @dataclass(frozen=True)
@@ -58,7 +70,11 @@ def at_rest(hold: Callable[[], Numbers]) -> tuple[float, bool]:
 
 def likely_cause(described: FmuDescription, fault: str) -> str:
     """What of the binding's ratings brings a fault; "" where nothing does."""
-    return described.likely_cause() if fault in _OF_RATING and isinstance(described, BoundDescription) else ""
+    return (
+        described.likely_cause()
+        if fault in _OF_RATING and isinstance(described, BoundDescription)
+        else ""
+    )
 
 
 def omega_seen(omega: float) -> str:
@@ -98,7 +114,9 @@ def of_current(size: float, limit: float | None) -> Misfit | None:
     """By its current at rest, and the largest one that is declared [pu, S_n]."""
     if limit is None or size <= limit * (1 + BALANCE):
         return None
-    return Misfit("above its current limit", f"at rest {size:.3g} pu of its rating; {limit:g} pu is declared")
+    return Misfit(
+        "above its current limit", f"at rest {size:.3g} pu of its rating; {limit:g} pu is declared"
+    )
 
 
 def of_dip(size: float, limit: float, begin: float) -> Misfit:
@@ -121,11 +139,22 @@ def diagnosis(of: str, a: complex, b: complex, c: complex, rest: float) -> tuple
     if min(abs(a), abs(b)) > BALANCE:
         return "wrong axes", f"{fit}, so its axes are scaled or signed differently"
     if abs(b) > abs(a):
-        return "wrong sign", f"{'the reactive power' if of == 'S' else 'one axis of the current'} is reversed: {fit}"
+        return (
+            "wrong sign",
+            f"{'the reactive power' if of == 'S' else 'one axis of the current'} is reversed: {fit}",
+        )
     turn = phase(a) * 180 / pi
     if abs(abs(a) - 1) > BALANCE:
-        return "wrong base", f"the power is {abs(a):.4g} times what is asked{known_ratio(abs(a))}" + (
-            ", with the opposite sign" if abs(turn) > 178 else f", turned by {turn:.0f}°" if abs(turn) > 2 else ""
+        return (
+            "wrong base",
+            f"the power is {abs(a):.4g} times what is asked{known_ratio(abs(a))}"
+            + (
+                ", with the opposite sign"
+                if abs(turn) > 178
+                else f", turned by {turn:.0f}°"
+                if abs(turn) > 2
+                else ""
+            ),
         )
     if abs(turn) > 178:
         return "wrong sign", "the power has the opposite sign"
@@ -137,9 +166,12 @@ def diagnosis(of: str, a: complex, b: complex, c: complex, rest: float) -> tuple
 def known_ratio(ratio: float) -> str:
     """What a factor between powers stands for; "" where it is none of the usual ones."""
     names = {
-        sqrt(3): "√3: phase for line-to-line", sqrt(2): "√2: peak for rms", 1.5: "3/2: of peak phase quantities",
-        3.0: "3: three phases for one", 1000.0: "1000: kilo",
-    }  # fmt: skip
+        sqrt(3): "√3: phase for line-to-line",
+        sqrt(2): "√2: peak for rms",
+        1.5: "3/2: of peak phase quantities",
+        3.0: "3: three phases for one",
+        1000.0: "1000: kilo",
+    }
     for value, text in names.items():
         for name, seen in ((text, value), (f"1/({text})", 1 / value)):
             if abs(ratio / seen - 1) < 0.01:

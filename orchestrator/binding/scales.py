@@ -7,7 +7,12 @@ from orchestrator.units import to_unit
 
 PER_UNIT = "pu"
 _NO_UNIT = {"", "1", "-", "pu", "p.u.", "p.u", "PU", "per unit", "per_unit"}
-_VALUES = {"line-to-line rms": 1.0, "line-to-line peak": sqrt(2), "phase rms": 1 / sqrt(3), "phase peak": sqrt(2 / 3)}
+_VALUES = {
+    "line-to-line rms": 1.0,
+    "line-to-line peak": sqrt(2),
+    "phase rms": 1 / sqrt(3),
+    "phase peak": sqrt(2 / 3),
+}
 
 
 class UnitsDifferError(ValueError):
@@ -19,12 +24,16 @@ def unit_of(info: VariableInfo, given: str | None) -> str:
     declared = info.unit
     if given is None:
         if declared in ("", "1", "-"):
-            raise ValueError(f'the FMU declares no unit for {info.name}; add the key \'unit\', such as "pu" or "kV"')
+            raise ValueError(
+                f'the FMU declares no unit for {info.name}; add the key \'unit\', such as "pu" or "kV"'
+            )
         return PER_UNIT if declared in _NO_UNIT else declared
     given = PER_UNIT if given in _NO_UNIT else given
     if declared in ("", "1", "-"):
         return given
-    if (given == PER_UNIT) != (declared in _NO_UNIT) or (given != PER_UNIT and factor(declared, given, info.name) != 1):
+    if (given == PER_UNIT) != (declared in _NO_UNIT) or (
+        given != PER_UNIT and factor(declared, given, info.name) != 1
+    ):
         raise UnitsDifferError(
             f"unit = {given!r}, but the FMU declares {info.name} in {declared!r}; give the declared one, "
             "or have the FMU's modelDescription.xml corrected"
@@ -58,7 +67,9 @@ class Bases:
 
     def _v_n(self, why: str) -> float:
         if self.voltage is None:
-            raise ValueError(f'{why} needs the rated voltage; add V_n under [rating], such as "230 kV"')
+            raise ValueError(
+                f'{why} needs the rated voltage; add V_n under [rating], such as "230 kV"'
+            )
         return self.voltage
 
     def voltage_unit(self, unit: str, base: str | None, value: str | None, name: str) -> float:
@@ -71,7 +82,9 @@ class Bases:
                 return 1.0
             return self._v_n("a base of its own") / amount(base or "", "kV", f"{name}: base")
         if value not in _VALUES:
-            raise ValueError(f"{name}: a voltage in {unit} needs the key 'value', one of: {', '.join(_VALUES)}")
+            raise ValueError(
+                f"{name}: a voltage in {unit} needs the key 'value', one of: {', '.join(_VALUES)}"
+            )
         return self._v_n(f"a voltage in {unit}") * _VALUES[value] * factor("kV", unit, name)
 
     def current_unit(self, unit: str, base: str | None, value: str | None, name: str) -> float:
@@ -83,7 +96,9 @@ class Bases:
             return self.rating / self._power_base(base, name)
         peak = {"rms": 1.0, "phase rms": 1.0, "peak": sqrt(2), "phase peak": sqrt(2)}
         if value not in peak:
-            raise ValueError(f"{name}: a current in {unit} needs the key 'value', one of: rms, peak")
+            raise ValueError(
+                f"{name}: a current in {unit} needs the key 'value', one of: rms, peak"
+            )
         kiloampere = self.rating / (sqrt(3) * self._v_n(f"a current in {unit}"))
         return kiloampere * peak[value] * factor("kA", unit, name)
 
@@ -93,7 +108,9 @@ class Bases:
         for mega in ("MW", "Mvar", "MVA"):
             if unit.endswith(mega.lstrip("M")):
                 return self.rating * factor(mega, unit, name)
-        raise ValueError(f"{name}: {unit!r} is not a unit of power; use pu, W, var or VA with their prefixes")
+        raise ValueError(
+            f"{name}: {unit!r} is not a unit of power; use pu, W, var or VA with their prefixes"
+        )
 
     def frequency_unit(self, unit: str, name: str) -> float:
         if unit == PER_UNIT:

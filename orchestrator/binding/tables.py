@@ -6,7 +6,8 @@ from pydantic import Field, field_validator, model_validator
 
 from orchestrator.toml_files import Table
 
-REQUIRED = "REQUIRED"  # what `gfor fmu bind` writes for an unknown value; a binding that still has it is refused
+# what `gfor fmu bind` writes for an unknown value; a binding that still has it is refused
+REQUIRED = "REQUIRED"
 
 
 class DraftedTable(Table):
@@ -17,7 +18,9 @@ class DraftedTable(Table):
     def _nothing_left_to_fill_in(cls, values: Any) -> Any:
         given = values.items() if isinstance(values, dict) else ()
         if left := [k for k, v in given if isinstance(v, str) and v.startswith(REQUIRED)]:
-            raise ValueError(f"still to be filled in: {', '.join(left)}; the comments in the draft say what is meant")
+            raise ValueError(
+                f"still to be filled in: {', '.join(left)}; the comments in the draft say what is meant"
+            )
         return values
 
 
@@ -46,7 +49,10 @@ class QuantityTable(DraftedTable):
 class PhasorTable(QuantityTable):
     form: Literal["rectangular", "dq", "qd", "polar", "abc", "power"]
     variables: list[str]
-    value: Literal["line-to-line rms", "line-to-line peak", "phase rms", "phase peak", "rms", "peak"] | None = None
+    value: (
+        Literal["line-to-line rms", "line-to-line peak", "phase rms", "phase peak", "rms", "peak"]
+        | None
+    ) = None
     angle_unit: Literal["rad", "deg"] | None = None
     frame_angle: str | float = 0.0
     signs: list[Literal[1, -1]] | None = None

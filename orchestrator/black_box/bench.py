@@ -24,7 +24,8 @@ from orchestrator.fmi.interrupts import calls
 
 _SOURCE = Path(__file__).with_name("drive.c")
 _CALLS = {1: "fmi2SetReal", 2: "fmi2DoStep", 3: "fmi2GetReal"}
-_STRETCH = 20000  # steps in one call of the C library; an interrupt from the keyboard takes effect between two
+# steps in one call of the C library; an interrupt from the keyboard takes effect between two
+_STRETCH = 20000
 
 STILL = 1e-9
 """Largest change of an output over a second [pu] at which the device counts as being in steady state; of its mean over
@@ -110,7 +111,9 @@ class Runs:
         bench = self._bench
         found = np.zeros((len(bench.outputs), len(bench.inputs)))
         self._rewind()
-        inputs, outputs = (RealBatch(self._running, names) for names in (bench.inputs, bench.outputs))
+        inputs, outputs = (
+            RealBatch(self._running, names) for names in (bench.inputs, bench.outputs)
+        )
         for k in range(len(bench.inputs)):
             for sign in (1.0, -1.0):
                 inputs.values[:] = bench.rest
@@ -131,7 +134,9 @@ class Runs:
 
     def _start(self) -> None:
         bench = self._bench
-        component = self._component = open_component("box", bench.description, isolated=bench.isolated)
+        component = self._component = open_component(
+            "box", bench.description, isolated=bench.isolated
+        )
         component.setup(0.0, None)
         component.set(bench.parameters)
         component.enter_initialization_mode()
@@ -172,7 +177,9 @@ class Runs:
         whole = len(outputs) // period  # periods
         if period == 1 or whole < 2:
             return outputs
-        return np.asarray(outputs[len(outputs) - whole * period :].reshape(whole, period, -1).mean(axis=1))
+        return np.asarray(
+            outputs[len(outputs) - whole * period :].reshape(whole, period, -1).mean(axis=1)
+        )
 
     def _hold(self, count: int) -> Numbers:
         return self._drive(np.tile(self._bench.rest, (count, 1)))
@@ -187,20 +194,36 @@ class Runs:
 
     def _stretch(self, inputs: Numbers, outputs: Numbers) -> None:
         component, bench = self._running, self._bench
-        into, out = RealBatch(component, bench.inputs, inputs[0]), RealBatch(component, bench.outputs, outputs[0])
+        into, out = (
+            RealBatch(component, bench.inputs, inputs[0]),
+            RealBatch(component, bench.outputs, outputs[0]),
+        )
         failed = (ctypes.c_int64 * 2)()
         with calls:
             status = _library().drive(
                 component.pointer,
-                *(ctypes.cast(f, ctypes.c_void_p) for f in (component.set_real, component.get_real, component.do_step)),
-                into.arguments[1], len(bench.inputs), out.arguments[1], len(bench.outputs),
-                inputs.ctypes.data, outputs.ctypes.data, self._index, len(inputs), bench.step_size, failed,
-            )  # fmt: skip
+                *(
+                    ctypes.cast(f, ctypes.c_void_p)
+                    for f in (component.set_real, component.get_real, component.do_step)
+                ),
+                into.arguments[1],
+                len(bench.inputs),
+                out.arguments[1],
+                len(bench.outputs),
+                inputs.ctypes.data,
+                outputs.ctypes.data,
+                self._index,
+                len(inputs),
+                bench.step_size,
+                failed,
+            )
         if status:
             component.check(status, _CALLS[failed[1]], (self._index + failed[0]) * bench.step_size)
         self._index += len(inputs)
         if not np.isfinite(outputs).all():
-            raise AnalysisError(f"{bench.description.path.name}: its current is no longer a finite number")
+            raise AnalysisError(
+                f"{bench.description.path.name}: its current is no longer a finite number"
+            )
 
 
 @cache
@@ -212,7 +235,19 @@ def _library() -> Any:
         raise InputError(f"the test bench is compiled, and {error}") from error
     address, integer = ctypes.c_void_p, ctypes.c_int64
     library.drive.argtypes = [
-        address, address, address, address, address, integer, address, integer, address, address, integer, integer,
-        ctypes.c_double, address,
-    ]  # fmt: skip
+        address,
+        address,
+        address,
+        address,
+        address,
+        integer,
+        address,
+        integer,
+        address,
+        address,
+        integer,
+        integer,
+        ctypes.c_double,
+        address,
+    ]
     return library

@@ -30,7 +30,8 @@ from orchestrator.fmi.component import Component
 from orchestrator.study.modes import ModesResult, modes_from, modes_of, running
 
 STEADY = 1e-6  # largest difference of the box's current [pu] at the ideal bus from the power flow's
-STILL = 1e-9  # largest change of a known component's state in a step; the same limit holds without black box
+# largest change of a known component's state in a step; the same limit holds without black box
+STILL = 1e-9
 
 
 @dataclass(frozen=True)
@@ -42,11 +43,15 @@ class BoxedSystem:
     # the larger of two changes: of a known component's state in one communication step, and of the box's current from
     # its start to its rest at the ideal bus
     residual: float
-    warnings: tuple[str, ...] = ()  # reasons in the other components for doubts about the modes from 0.1 to 2 Hz
-    misfits: tuple[str, ...] = ()  # what does not fit between devices and their bindings; among the warnings too
+    # reasons in the other components for doubts about the modes from 0.1 to 2 Hz
+    warnings: tuple[str, ...] = ()
+    # what does not fit between devices and their bindings; among the warnings too
+    misfits: tuple[str, ...] = ()
 
     def modes(
-        self, lowest_hz: float = ELECTROMECHANICAL_HZ[0], highest_hz: float = ELECTROMECHANICAL_HZ[1]
+        self,
+        lowest_hz: float = ELECTROMECHANICAL_HZ[0],
+        highest_hz: float = ELECTROMECHANICAL_HZ[1],
     ) -> list[Mode]:
         return find_spectrum(self.model, lowest_hz, highest_hz).modes
 
@@ -66,41 +71,64 @@ def component_participation(mode: Mode, component: str) -> float:
 
 
 def linearize_with_box(
-    master: Master, component: str, excitation: Excitation | None = None, *, restore: bool | None = None,
+    master: Master,
+    component: str,
+    excitation: Excitation | None = None,
+    *,
+    restore: bool | None = None,
     report: Callable[[str], None] | None = None,
-) -> BoxedSystem:  # fmt: skip
+) -> BoxedSystem:
     """Identify one component and linearise the coupled system around where the master is.
 
     ``master``: at the power flow's operating point; nothing is stepped, so an unstable system serves as well.
     ``restore``: whether the bench saves and restores the box's state; None if it does so whenever the FMU can."""
     if component not in master.components:
-        raise InputError(f"there is no component {component!r}; there are: {', '.join(master.components)}")
+        raise InputError(
+            f"there is no component {component!r}; there are: {', '.join(master.components)}"
+        )
     require_fitting()
     misfits = sentences(misfits_of(master))
     residual = _check_still(master, [component])
-    response, moved = _respond(master, component, excitation or Excitation(), restore=restore, report=report)
+    response, moved = _respond(
+        master, component, excitation or Excitation(), restore=restore, report=report
+    )
     identified = fit(response)
     blocks = Blocks(master, known={component: _as_component(component, identified)})
     model = compose(blocks, master.schedule)
     doubtful = doubts(blocks, master.schedule, model, find_spectrum(model).modes)
-    return BoxedSystem(component, response, identified, model, max(moved, residual), (*misfits, *map(str, doubtful)),
-                       misfits)  # fmt: skip
+    return BoxedSystem(
+        component,
+        response,
+        identified,
+        model,
+        max(moved, residual),
+        (*misfits, *map(str, doubtful)),
+        misfits,
+    )
 
 
 def modes_with_boxes(
-    prepared: PreparedScenario, master: Master, frequency_range: tuple[float, float], critical: float | None = None,
-    excitation: Excitation | None = None, report: Callable[[str], None] | None = None,
-) -> ModesResult:  # fmt: skip
+    prepared: PreparedScenario,
+    master: Master,
+    frequency_range: tuple[float, float],
+    critical: float | None = None,
+    excitation: Excitation | None = None,
+    report: Callable[[str], None] | None = None,
+) -> ModesResult:
     """Modes as `modes_of` finds them; components that hide their states are identified first.
 
     ``prepared`` and ``master`` and ``frequency_range`` and ``critical``: as `modes_of`; to identify anything, the
     master must be at rest at the power flow's operating point."""
     if not any(map(is_black_box, master.components.values())):
         return modes_of(prepared, master, frequency_range, critical)
-    return _with_boxes(prepared, master, frequency_range, critical, excitation or Excitation(), report)[0]
+    return _with_boxes(
+        prepared, master, frequency_range, critical, excitation or Excitation(), report
+    )[0]
 
 
-def coupled_with_boxes(prepared: PreparedScenario, frequency_range: tuple[float, float]) -> ModesResult:
+def coupled_with_boxes(
+    prepared: PreparedScenario, frequency_range: tuple[float, float]
+) -> ModesResult:
     """The same of a scenario that does not run yet."""
     with running(prepared) as master:
         return modes_with_boxes(prepared, master, frequency_range)
@@ -110,16 +138,23 @@ def linear_with_boxes(
     prepared: PreparedScenario, master: Master, inputs: Sequence[str], outputs: Sequence[str]
 ) -> tuple[StateSpace, OperatingPoint, Examination]:
     """The step map from inputs to outputs, with the verdict on it."""
-    found, blocks = _with_boxes(prepared, master, ELECTROMECHANICAL_HZ, None, Excitation(), None, inputs, outputs)
+    found, blocks = _with_boxes(
+        prepared, master, ELECTROMECHANICAL_HZ, None, Excitation(), None, inputs, outputs
+    )
     space = state_space(blocks, master.schedule)
     return space, found.operating_point, Examination(found.stability, found.warnings)
 
 
 def _with_boxes(
-    prepared: PreparedScenario, master: Master, frequency_range: tuple[float, float], critical: float | None,
-    excitation: Excitation, report: Callable[[str], None] | None, inputs: Sequence[str] = (),
+    prepared: PreparedScenario,
+    master: Master,
+    frequency_range: tuple[float, float],
+    critical: float | None,
+    excitation: Excitation,
+    report: Callable[[str], None] | None,
+    inputs: Sequence[str] = (),
     outputs: Sequence[str] = (),
-) -> tuple[ModesResult, Blocks]:  # fmt: skip
+) -> tuple[ModesResult, Blocks]:
     boxes = [name for name, component in master.components.items() if is_black_box(component)]
     require_fitting()
     most = 0.0
@@ -135,20 +170,32 @@ def _with_boxes(
 
     blocks = Blocks(master, inputs=inputs, outputs=outputs, known=identified(master))
     point = OperatingPoint(most, most / master.clock.step_size, most, 0, {})
-    return modes_from(prepared, master, point, blocks, frequency_range, critical, identified), blocks
+    return modes_from(
+        prepared, master, point, blocks, frequency_range, critical, identified
+    ), blocks
 
 
 def _respond(
-    master: Master, name: str, excitation: Excitation, *, restore: bool | None = None,
+    master: Master,
+    name: str,
+    excitation: Excitation,
+    *,
+    restore: bool | None = None,
     report: Callable[[str], None] | None = None,
-) -> tuple[FrequencyResponse, float]:  # fmt: skip
+) -> tuple[FrequencyResponse, float]:
     """Measure one component at an ideal bus. Also return the difference of its current from the power flow's."""
     exchange, plan = master.exchanges[name], master.system.components[name]
     bench = Bench(
-        plan.description, plan.parameters, rest=master.arriving(name), inputs=exchange.inputs.names,
-        outputs=exchange.outputs.names, held=plan.inputs, step_size=master.clock.step_size, restore=restore,
+        plan.description,
+        plan.parameters,
+        rest=master.arriving(name),
+        inputs=exchange.inputs.names,
+        outputs=exchange.outputs.names,
+        held=plan.inputs,
+        step_size=master.clock.step_size,
+        restore=restore,
         isolated=plan.isolated,
-    )  # fmt: skip
+    )
     response = measure(bench, excitation, report)
     moved = float(np.abs(response.operating_point - exchange.outputs.values).max())
     if not moved <= STEADY:
@@ -200,6 +247,18 @@ def _as_component(name: str, model: IdentifiedModel) -> ComponentLinearization:
     n = len(model.A)
     none = np.zeros((0, n)), np.zeros((0, len(model.inputs)))
     return ComponentLinearization(
-        name, tuple(f"identified.{k + 1}" for k in range(n)), model.inputs, model.outputs, model.A, model.B, model.C,
-        model.D, (), *none, None, None, model.error, IDENTIFIED,
-    )  # fmt: skip
+        name,
+        tuple(f"identified.{k + 1}" for k in range(n)),
+        model.inputs,
+        model.outputs,
+        model.A,
+        model.B,
+        model.C,
+        model.D,
+        (),
+        *none,
+        None,
+        None,
+        model.error,
+        IDENTIFIED,
+    )

@@ -21,8 +21,10 @@ def save_identification(
     names = ("admittance.csv", "identified_model.mat", "identification.json", "admittance.png")
     table, matrices, summary, picture = (folder / name for name in names)
     save_table(_rows(response, passive), table)
-    lists = {key: np.array(list(values), dtype=object).reshape(-1, 1) for key, values in
-             (("inputs", model.inputs), ("outputs", model.outputs))}  # fmt: skip
+    lists = {
+        key: np.array(list(values), dtype=object).reshape(-1, 1)
+        for key, values in (("inputs", model.inputs), ("outputs", model.outputs))
+    }
     content = {"A": model.A, "B": model.B, "C": model.C, "D": model.D, "step_size": model.step_size}
     save_matrices(content | lists, matrices)
     save_json(identification_json(response, model, passive), summary)
@@ -30,19 +32,32 @@ def save_identification(
     return [table, matrices, summary, picture]
 
 
-def identification_json(response: FrequencyResponse, model: IdentifiedModel, passive: Passivity) -> dict[str, Any]:
+def identification_json(
+    response: FrequencyResponse, model: IdentifiedModel, passive: Passivity
+) -> dict[str, Any]:
     slowest_first = sorted(model.poles.tolist(), key=abs)
     return {
-        "method": response.method, "linearised": IDENTIFIED, "step_size_s": response.step_size,
-        "simulated_s": response.seconds, "lines": len(response.frequencies),
+        "method": response.method,
+        "linearised": IDENTIFIED,
+        "step_size_s": response.step_size,
+        "simulated_s": response.seconds,
+        "lines": len(response.frequencies),
         "range_hz": [float(response.frequencies[0]), float(response.frequencies[-1])],
-        "operating_point": dict(zip(response.outputs, response.operating_point.tolist(), strict=True)),
-        "feedthrough": response.feedthrough.tolist(), "largest_relative_bound": response.largest_bound,
-        "model": {"order": len(model.A), "error": model.error,
-                  "poles": [{"real": p.real, "imag": p.imag} for p in slowest_first if p.imag >= 0]},
-        "passivity": {"least_relative_index": float(passive.relative.min()),
-                      "active_hz": [list(pair) for pair in passive.ranges()]},
-    }  # fmt: skip
+        "operating_point": dict(
+            zip(response.outputs, response.operating_point.tolist(), strict=True)
+        ),
+        "feedthrough": response.feedthrough.tolist(),
+        "largest_relative_bound": response.largest_bound,
+        "model": {
+            "order": len(model.A),
+            "error": model.error,
+            "poles": [{"real": p.real, "imag": p.imag} for p in slowest_first if p.imag >= 0],
+        },
+        "passivity": {
+            "least_relative_index": float(passive.relative.min()),
+            "active_hz": [list(pair) for pair in passive.ranges()],
+        },
+    }
 
 
 def _rows(response: FrequencyResponse, passive: Passivity) -> list[dict[str, float]]:
@@ -55,12 +70,17 @@ def _rows(response: FrequencyResponse, passive: Passivity) -> list[dict[str, flo
                 value = -response.values[k, i, j]
                 row[f"re {y}/{u}"], row[f"im {y}/{u}"] = float(value.real), float(value.imag)
                 row[f"bound {y}/{u}"] = float(response.bounds[k, i, j])
-        row["passivity index"], row["relative passivity index"] = float(passive.index[k]), float(passive.relative[k])
+        row["passivity index"], row["relative passivity index"] = (
+            float(passive.index[k]),
+            float(passive.relative[k]),
+        )
         rows.append(row)
     return rows
 
 
-def _plot(response: FrequencyResponse, model: IdentifiedModel, passive: Passivity, path: Path) -> None:
+def _plot(
+    response: FrequencyResponse, model: IdentifiedModel, passive: Passivity, path: Path
+) -> None:
     fine = np.geomspace(response.frequencies[0], response.frequencies[-1], 1500)
     z = np.exp(2j * np.pi * fine * response.step_size)
     fitted = model.response(z) + model.D / z[:, None, None]
@@ -71,10 +91,19 @@ def _plot(response: FrequencyResponse, model: IdentifiedModel, passive: Passivit
         for k, (i, j) in enumerate(pairs):
             label = f"−{response.outputs[i]}/{response.inputs[j]}"
             value = -response.values[:, i, j]
-            size.errorbar(response.frequencies, np.abs(value), response.bounds[:, i, j], fmt=".", ms=3.5,
-                          color=colour(k), label=label)  # fmt: skip
+            size.errorbar(
+                response.frequencies,
+                np.abs(value),
+                response.bounds[:, i, j],
+                fmt=".",
+                ms=3.5,
+                color=colour(k),
+                label=label,
+            )
             size.plot(fine, np.abs(fitted[:, i, j]), color=colour(k), linewidth=0.9)
-            phase.plot(response.frequencies, np.rad2deg(np.angle(value)), ".", ms=3.5, color=colour(k))
+            phase.plot(
+                response.frequencies, np.rad2deg(np.angle(value)), ".", ms=3.5, color=colour(k)
+            )
             phase.plot(fine, np.rad2deg(np.angle(-fitted[:, i, j])), color=colour(k), linewidth=0.9)
         size.set(xscale="log", yscale="log", ylabel="Admittance [pu, 100 MVA]")
         size.set_title("Measured (points, with bounds) and fitted (lines)", loc="left")

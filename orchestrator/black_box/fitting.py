@@ -18,7 +18,8 @@ from orchestrator.errors import AnalysisError
 ORDERS = ((2, 2), (2, 4), (3, 5), (4, 6), (4, 8), (5, 9), (6, 10), (8, 14))
 """Numbers of real poles and of complex pairs that are tried, in turn."""
 
-_WANTED = 1e-5  # relative error of a fit with which no larger one is tried; the measurement's bound where more
+# relative error of a fit with which no larger one is tried; the measurement's bound where more
+_WANTED = 1e-5
 
 _MOST_ITERATIONS = 30
 """Largest number of iterations of the pole relocation. A fit that has not converged by then has more poles than the
@@ -45,7 +46,8 @@ class IdentifiedModel:
     step_size: float
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    error: float  # largest difference from the measured response at any frequency, relative to it (2-norms)
+    # largest difference from the measured response at any frequency, relative to it (2-norms)
+    error: float
 
     @property
     def poles(self) -> Complex:
@@ -56,7 +58,9 @@ class IdentifiedModel:
         """C·(z − A)⁻¹·B, shape (f, p, m)."""
         values, vectors = np.linalg.eig(self.A)
         left, right = self.C @ vectors, np.linalg.solve(vectors, self.B)
-        return np.asarray(np.einsum("pk,fk,km->fpm", left, 1 / (z[:, None] - values[None, :]), right))
+        return np.asarray(
+            np.einsum("pk,fk,km->fpm", left, 1 / (z[:, None] - values[None, :]), right)
+        )
 
 
 def fit(response: FrequencyResponse, largest_error: float = 0.01) -> IdentifiedModel:
@@ -72,7 +76,11 @@ def fit(response: FrequencyResponse, largest_error: float = 0.01) -> IdentifiedM
         if best is not None and best.error <= wanted:
             break
     if best is None or best.error > largest_error:
-        why = "none is stable" if best is None else f"the best has an error above {largest_error:g}: {best.error:.2g}"
+        why = (
+            "none is stable"
+            if best is None
+            else f"the best has an error above {largest_error:g}: {best.error:.2g}"
+        )
         raise AnalysisError(
             f"no rational model fits the measured response: {why}; measure more lines, "
             "or take a smaller amplitude if the bounds are wide"
@@ -99,7 +107,9 @@ def _fit_with(response: FrequencyResponse, real: int, pairs: int) -> IdentifiedM
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
-            fitting.vector_fit(real, pairs, "log", "s", fit_constant=True, fit_proportional=False, enforce_dc=False)
+            fitting.vector_fit(
+                real, pairs, "log", "s", fit_constant=True, fit_proportional=False, enforce_dc=False
+            )
     except (np.linalg.LinAlgError, ValueError):
         return None
     residues = np.asarray(fitting.residues).reshape(ports, ports, -1)[:p, :m]
@@ -110,13 +120,19 @@ def _fit_with(response: FrequencyResponse, real: int, pairs: int) -> IdentifiedM
     A, B, C, _, _ = cont2discrete((*blocks, constant), H, method="bilinear")
     if not len(A) or not np.isfinite(A).all() or np.abs(np.linalg.eigvals(A)).max() >= 1:
         return None
-    model = IdentifiedModel(A, B, C, response.feedthrough, H, response.inputs, response.outputs, np.nan)
+    model = IdentifiedModel(
+        A, B, C, response.feedthrough, H, response.inputs, response.outputs, np.nan
+    )
     difference = np.linalg.norm(model.response(response.z) - data, ord=2, axis=(1, 2))
     error = float((difference / np.linalg.norm(response.values, ord=2, axis=(1, 2))).max())
-    return IdentifiedModel(A, B, C, response.feedthrough, H, response.inputs, response.outputs, error)
+    return IdentifiedModel(
+        A, B, C, response.feedthrough, H, response.inputs, response.outputs, error
+    )
 
 
-def _realisation(poles: Complex, residues: Complex, largest: float) -> tuple[Matrix, Matrix, Matrix]:
+def _realisation(
+    poles: Complex, residues: Complex, largest: float
+) -> tuple[Matrix, Matrix, Matrix]:
     """Real A, B, C with Σ R/(w − p); complex poles stand for their conjugates as well."""
     parts: list[tuple[Matrix, Matrix, Matrix]] = []
     for k, pole in enumerate(poles.tolist()):
@@ -129,7 +145,9 @@ def _realisation(poles: Complex, residues: Complex, largest: float) -> tuple[Mat
                 parts.append((np.array([[pole.real]]), b.real[None, :], c.real[:, None]))
             else:
                 a = np.array([[pole.real, pole.imag], [-pole.imag, pole.real]])
-                parts.append((a, np.array([2 * b.real, -2 * b.imag]), np.stack([c.real, c.imag], axis=1)))
+                parts.append(
+                    (a, np.array([2 * b.real, -2 * b.imag]), np.stack([c.real, c.imag], axis=1))
+                )
     n = sum(len(a) for a, _, _ in parts)
     A = np.zeros((n, n))
     first = 0
@@ -138,7 +156,11 @@ def _realisation(poles: Complex, residues: Complex, largest: float) -> tuple[Mat
         first += len(a)
     if not parts:
         return A, np.zeros((0, residues.shape[1])), np.zeros((residues.shape[0], 0))
-    return A, np.concatenate([b for _, b, _ in parts]), np.concatenate([c for _, _, c in parts], axis=1)
+    return (
+        A,
+        np.concatenate([b for _, b, _ in parts]),
+        np.concatenate([c for _, _, c in parts], axis=1),
+    )
 
 
 def bands_of(f: Numbers, inside: Vector) -> list[tuple[float, float]]:

@@ -22,7 +22,8 @@ def odd_lines(lowest_hz: float, highest_hz: float, count: int) -> NDArray[np.int
     """About ``count`` odd multiples of the lowest frequency up to the highest, spread over its logarithm.
 
     Even multiples stay silent, so that a quadratic part of the device does not reach the excited ones."""
-    last = int((highest_hz / lowest_hz * (1 + 1e-9) - 1) // 2)  # the largest odd multiple is 2·last + 1
+    # the largest odd multiple is 2·last + 1
+    last = int((highest_hz / lowest_hz * (1 + 1e-9) - 1) // 2)
     wanted = (np.geomspace(1.0, 2 * last + 1, count) - 1) / 2
     return np.asarray(2 * np.unique(np.round(wanted).astype(np.int64)) + 1)
 
@@ -41,7 +42,9 @@ def multisine(lines: NDArray[np.int64], period: int, amplitude: float) -> Number
 def line_response(u: Numbers, y: Numbers, lines: NDArray[np.int64]) -> Complex:
     """M at the excited lines from whole periods, shape (f, p)."""
     delay = np.exp(-2j * np.pi * lines / len(u))  # y[k] is read one step after u[k] begins
-    return np.asarray(np.fft.rfft(y, axis=0)[lines] / np.fft.rfft(u)[lines][:, None] * delay[:, None])
+    return np.asarray(
+        np.fft.rfft(y, axis=0)[lines] / np.fft.rfft(u)[lines][:, None] * delay[:, None]
+    )
 
 
 def pulse_response(m: Numbers, frequencies: Numbers, step_size: float) -> Complex:
@@ -57,7 +60,8 @@ def pulse_response(m: Numbers, frequencies: Numbers, step_size: float) -> Comple
 
 METHODS = ("multisine", "pulse")
 _MOST_SECONDS = 400.0  # time after which a response must have settled [s]
-_APART = 10.0  # shortest time between two compared periods [s]: short ones in direct succession look alike
+# shortest time between two compared periods [s]: short ones in direct succession look alike
+_APART = 10.0
 
 _AWAY = 0.1
 """Every excitation has a mean of zero or ends at zero, and the response must do the same. A device whose response keeps
@@ -73,7 +77,8 @@ class Excitation:
     lowest_hz: float = 0.05
     highest_hz: float = 1000.0
     lines: int = 120
-    amplitude: float = 1e-3  # Largest deviation of an input [its unit]. Every measurement is repeated with half of it.
+    # Largest deviation of an input [its unit]. Every measurement is repeated with half of it.
+    amplitude: float = 1e-3
     # two successive periods, or the rest of a pulse response, may still differ by this part of the largest response
     settled: float = 1e-5
 
@@ -123,7 +128,9 @@ class FrequencyResponse:
         return np.asarray(self.values * (x / (1 - np.exp(-x)))[:, None, None])
 
 
-def measure(bench: Bench, excitation: Excitation, report: Callable[[str], None] | None = None) -> FrequencyResponse:
+def measure(
+    bench: Bench, excitation: Excitation, report: Callable[[str], None] | None = None
+) -> FrequencyResponse:
     lines = odd_lines(excitation.lowest_hz, excitation.highest_hz, excitation.lines)
     frequencies = lines * excitation.lowest_hz
     if frequencies[-1] * bench.step_size >= 0.5:
@@ -205,7 +212,9 @@ def _by_pulses(
         turn = np.exp(-2j * np.pi * frequencies * part * bench.step_size)[:, None]
         for number, y in enumerate(runs.respond(parts)):
             largest = max(largest, float(np.abs(y).max()))
-            added = pulse_response(y, frequencies, bench.step_size) * turn**number / (sign * amplitude)
+            added = (
+                pulse_response(y, frequencies, bench.step_size) * turn**number / (sign * amplitude)
+            )
             total += added
             if np.abs(added).max() <= e.settled * np.abs(total).max():
                 break

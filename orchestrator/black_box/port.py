@@ -18,7 +18,9 @@ def values_for(description: FmuDescription, given: Mapping[str, Any]) -> dict[st
     for name, value in given.items():
         info = description.variables.get(name)
         if info is None:
-            raise InputError(f"--set {name}: {description.path.name} has no such variable; `gfor fmu info` lists them")
+            raise InputError(
+                f"--set {name}: {description.path.name} has no such variable; `gfor fmu info` lists them"
+            )
         try:
             values[name] = convert(info, value)
             check_system_base(description, name, values[name])
@@ -29,10 +31,14 @@ def values_for(description: FmuDescription, given: Mapping[str, Any]) -> dict[st
 
 def start_of(description: FmuDescription, name: str) -> float:
     info = description.variables.get(name)
-    return info.start_number if info is not None and info.start is not None else float(name == "v_0")
+    return (
+        info.start_number if info is not None and info.start is not None else float(name == "v_0")
+    )
 
 
-def bench_at(description: FmuDescription, given: Mapping[str, Any], step: float, restore: bool | None = None) -> Bench:
+def bench_at(
+    description: FmuDescription, given: Mapping[str, Any], step: float, restore: bool | None = None
+) -> Bench:
     """A device at an ideal bus of its own start. Refuses an FMU without the voltages and currents of our port."""
     values = values_for(description, given)
     v, angle = (float(values.get(name, start_of(description, name))) for name in ("v_0", "theta_0"))

@@ -24,7 +24,11 @@ def _fitting(areas: Mapping[str, Sequence[str]], system: System) -> dict[str, li
     for wire in system.connections:
         homes[wire.target.component].add(wire.source.variable.rpartition(".")[0])
     found = {
-        name: [area for area, patterns in areas.items() if any(fnmatch.filter(known_as, x) for x in patterns)]
+        name: [
+            area
+            for area, patterns in areas.items()
+            if any(fnmatch.filter(known_as, x) for x in patterns)
+        ]
         for name, known_as in homes.items()
     }
     return {name: fitting for name, fitting in found.items() if fitting}

@@ -22,10 +22,15 @@ EMF, TORQUE = "machine.speed_in_emf", "governor.output_is_torque"
 @dataclass(frozen=True)
 class Convention:
     speed_in_emf: bool  # the emf is w times the subtransient flux
-    output_is_torque: bool  # the governor's output is the torque; else the power, and the torque is output/w
+    # the governor's output is the torque; else the power, and the torque is output/w
+    output_is_torque: bool
 
 
-LIKE = {"exact": Convention(True, False), "psse": Convention(False, False), "andes": Convention(False, True)}
+LIKE = {
+    "exact": Convention(True, False),
+    "psse": Convention(False, False),
+    "andes": Convention(False, True),
+}
 LIKE["powerfactory"] = LIKE["psse"]
 
 
@@ -54,11 +59,14 @@ def _chosen(table: ConventionsTable) -> Convention:
     usual = LIKE[table.like]
     return Convention(
         usual.speed_in_emf if table.speed_in_emf is None else table.speed_in_emf,
-        usual.output_is_torque if table.governor_gives is None else table.governor_gives == "torque",
+        usual.output_is_torque
+        if table.governor_gives is None
+        else table.governor_gives == "torque",
     )
 
 
-_THOUSANDS = (1e-6, 1e-3, 1e3, 1e6)  # between a value and another one of the same digits, in another unit
+# between a value and another one of the same digits, in another unit
+_THOUSANDS = (1e-6, 1e-3, 1e3, 1e6)
 
 
 def assign_values(draft: Draft) -> None:
@@ -67,12 +75,15 @@ def assign_values(draft: Draft) -> None:
     for name, table in draft.tables.items():
         for group in ("parameters", "inputs"):
             flat = flatten(getattr(table, group))
-            for key in given_twice(flat) if name not in draft.origins else ():  # a unit's row overrides what is common
+            for key in (
+                given_twice(flat) if name not in draft.origins else ()
+            ):  # a unit's row overrides what is common
                 draft.note(draft.place_of_value(name, group, key.split(".")), f"{key}: {TWICE}")
             for path, value in flat:
                 _assign(draft, name, ".".join(path), value, draft.place_of_value(name, group, path))
     for layer in draft.given.layers:
-        chosen = [(choice.pattern, choice.place) for choice in layer.natives]  # made when the components were added
+        # made when the components were added
+        chosen = [(choice.pattern, choice.place) for choice in layer.natives]
         chosen += [(choice.pattern, choice.place) for choice in layer.parts]
         for pattern, place in chosen:
             _check_component(draft, pattern, place)
@@ -80,7 +91,9 @@ def assign_values(draft: Draft) -> None:
             _assign_key(draft, key, value, layer.place(key))
 
 
-def convert_value(draft: Draft, info: VariableInfo, value: Value, where: str) -> float | bool | None:
+def convert_value(
+    draft: Draft, info: VariableInfo, value: Value, where: str
+) -> float | bool | None:
     """The value in the variable's unit and type; None, with a note of the problem, if it does not fit."""
     try:
         return convert(info, value)
@@ -115,11 +128,17 @@ def _assign_key(draft: Draft, key: str, value: Value, where: str) -> None:
     if pattern not in draft.tables and all(name in draft.system.components for name in fitting):
         if fitting == meant and fitting and not having:
             settable = {v for name in fitting for v in _settable(draft, name)}
-            hint = close_names(variable, settable, f"{', '.join(fitting[:5])} are what fits the pattern")
-            draft.note(where, f"no component that fits {pattern!r} has a variable {variable!r}; {hint}")
+            hint = close_names(
+                variable, settable, f"{', '.join(fitting[:5])} are what fits the pattern"
+            )
+            draft.note(
+                where, f"no component that fits {pattern!r} has a variable {variable!r}; {hint}"
+            )
         fitting = having
     if variable == "S_n" and key in draft.given.from_outside:
-        draft.found.ratings |= {name: draft.system.components[name].number(variable) for name in having}
+        draft.found.ratings |= {
+            name: draft.system.components[name].number(variable) for name in having
+        }
     for name in fitting:
         for each in _meant(draft, name, variable) or [variable]:
             _assign(draft, name, each, value, where)
@@ -130,14 +149,23 @@ def _switch(draft: Draft, key: str, value: Value) -> str:
     """How an element is switched that a key means by another word, or without its grid; "" for any other key."""
     owner, _, word = key.rpartition(".")
     item, grid = owner.rpartition(".")[2], draft.grid or ""
-    homes = (key.partition(".")[::2], (item, "connected"), (grid, f"{item}.connected"), (grid, f"{item}.scale"))
+    homes = (
+        key.partition(".")[::2],
+        (item, "connected"),
+        (grid, f"{item}.connected"),
+        (grid, f"{item}.scale"),
+    )
     fitting = {name: fnmatch.filter(draft.system.components, name) for name, _ in homes}
-    found = [(name, what) for name, what in homes if any(_has(draft, one, what) for one in fitting[name])]
+    found = [
+        (name, what) for name, what in homes if any(_has(draft, one, what) for one in fitting[name])
+    ]
     if word not in SERVICE or not found or found[0] == homes[0]:
         return ""
     (name, variable), state = found[0], STATES.get(str(value).lower())
     if state is None:
-        return f"{word} = {value!r}; it must be true or false; {item} is switched by {name}.{variable}"
+        return (
+            f"{word} = {value!r}; it must be true or false; {item} is switched by {name}.{variable}"
+        )
     on = state != (word in ("out", "off"))
     text = str(int(on)) if variable.endswith("scale") else str(on).lower()
     return f"{item} is switched {'on' if on else 'off'} by {name}.{variable}={text}; write that"
@@ -145,7 +173,9 @@ def _switch(draft: Draft, key: str, value: Value) -> str:
 
 def _has(draft: Draft, name: str, variable: str) -> bool:
     plan = draft.system.components.get(name)
-    return plan is not None and (variable in plan.description.variables or bool(_meant(draft, name, variable)))
+    return plan is not None and (
+        variable in plan.description.variables or bool(_meant(draft, name, variable))
+    )
 
 
 def _meant(draft: Draft, name: str, variable: str) -> list[str]:
@@ -164,7 +194,9 @@ def _check_component(draft: Draft, pattern: str, where: str) -> None:
     if not fnmatch.filter(draft.known, pattern):
         some = ", ".join([*draft.given.case.components, *draft.origins][:12])
         own = {name: plan.description.variables for name, plan in draft.system.components.items()}
-        hint = f"; the network's are {draft.grid}.…" if pattern == "network" else whose(pattern, own)
+        hint = (
+            f"; the network's are {draft.grid}.…" if pattern == "network" else whose(pattern, own)
+        )
         draft.note(where, f"there is no component {pattern!r}; the case has: {some}{hint}")
 
 
@@ -176,11 +208,16 @@ def _assign(draft: Draft, name: str, variable: str, value: Value, where: str) ->
     if info is None:
         if draft.is_repeated(name, variable):
             return
-        hint = close_names(variable, _settable(draft, name), f"`gfor fmu info {plan.description.path}` lists them")
+        hint = close_names(
+            variable, _settable(draft, name), f"`gfor fmu info {plan.description.path}` lists them"
+        )
         draft.note(where, f"component {name!r} has no variable {variable!r}; {hint}")
         return
     if info.causality not in ("parameter", "input"):
-        draft.note(where, f"{variable} is of causality {info.causality}; only parameters and inputs can be set")
+        draft.note(
+            where,
+            f"{variable} is of causality {info.causality}; only parameters and inputs can be set",
+        )
         return
     converted = convert_value(draft, info, value, where)
     if converted is None:
@@ -191,7 +228,11 @@ def _assign(draft: Draft, name: str, variable: str, value: Value, where: str) ->
         draft.note(where, f"component {name!r}: {error}")
     else:
         target: dict[str, Any] = plan.inputs if info.causality == "input" else plan.parameters
-        before = plan.number(variable) if isinstance(value, str) and isinstance(converted, float) else 0.0
+        before = (
+            plan.number(variable)
+            if isinstance(value, str) and isinstance(converted, float)
+            else 0.0
+        )
         if before and round(converted / before, 9) in _THOUSANDS:
             text = f"{value} is {converted / before:g} times what it is in the files; is the unit meant?"
             draft.found.thousandfold[f"{name}.{variable}"] = text

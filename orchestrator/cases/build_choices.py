@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 from orchestrator.cases.schema import Value
 
-ALPHA = "units.alpha"  # key of the share that all converters have; ``units.alpha.<label>`` is that of one unit
+# key of the share that all converters have; ``units.alpha.<label>`` is that of one unit
+ALPHA = "units.alpha"
 MODELS = "models"  # key of the kind of all models, EMT or phasor; see `model_kinds`
 _NATIVE = "native"
 
@@ -53,7 +54,9 @@ class PartChoice:
     @property
     def name(self) -> str:
         if not isinstance(self.given, str):
-            raise ValueError(f"{self.part} = {self.given!r}; it must be the name of a part, in quotes")
+            raise ValueError(
+                f"{self.part} = {self.given!r}; it must be the name of a part, in quotes"
+            )
         return self.given
 
 

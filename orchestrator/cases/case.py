@@ -38,7 +38,8 @@ if TYPE_CHECKING:
     from orchestrator.ssp import reading
 else:  # what prepares a scenario: FMUs and the power flow, which reading a file does without
     event_tables, idle_values, mentions, prepare, sharing = (
-        Late(f"orchestrator.cases.{name}") for name in ("event_tables", "idle_values", "mentions", "prepare", "sharing")
+        Late(f"orchestrator.cases.{name}")
+        for name in ("event_tables", "idle_values", "mentions", "prepare", "sharing")
     )
     reading = Late("orchestrator.ssp.reading")
 
@@ -54,7 +55,9 @@ _SOURCES = {
 """Files of other programs by their suffix: what each is, and where a case names it."""
 
 _STEP = "give a communication step with its unit, such as '100 us' with EMT models or '5 ms' with phasor models"
-_TIMES = {"step_size": _STEP, "micro_step": _STEP} | dict.fromkeys(("stop_time", "record_interval", "time"), "")
+_TIMES = {"step_size": _STEP, "micro_step": _STEP} | dict.fromkeys(
+    ("stop_time", "record_interval", "time"), ""
+)
 """Keys of times [s], with the remedy."""
 
 _SHARES = {"alpha": "it is a part of the unit's rating: 30 % is 0.3"}
@@ -79,10 +82,14 @@ def _uncollected() -> Iterator[None]:
 class Case(CaseDefinition):
     @_uncollected()
     def prepare(
-        self, scenarios: Sequence[str] = (), overrides: Mapping[str, Value] | None = None,
-        step_size: float | None = None, stop_time: float | None = None, parameters: Sequence[ParameterFile] = (),
+        self,
+        scenarios: Sequence[str] = (),
+        overrides: Mapping[str, Value] | None = None,
+        step_size: float | None = None,
+        stop_time: float | None = None,
+        parameters: Sequence[ParameterFile] = (),
         dispatch: Dispatch | None = None,
-    ) -> list[PreparedScenario]:  # fmt: skip
+    ) -> list[PreparedScenario]:
         """Check everything and make the chosen scenarios, or all, ready to run.
 
         ``parameters``: Their values have priority over the scenario's, and ``overrides`` have priority over theirs.
@@ -92,7 +99,9 @@ class Case(CaseDefinition):
         problems = list(self.problems)
         unknown = [name for name in scenarios if name not in self.scenarios]
         has = f"the case has: {', '.join(self.scenarios)}"
-        problems += [Problem("--scenario", f"there is no scenario {name!r}; {has}") for name in unknown]
+        problems += [
+            Problem("--scenario", f"there is no scenario {name!r}; {has}") for name in unknown
+        ]
         doubles = [name for name, count in Counter(scenarios).items() if count > 1]
         twice = "is chosen more than once; name it once"
         problems += [Problem("--scenario", f"the scenario {name!r} {twice}") for name in doubles]
@@ -101,7 +110,11 @@ class Case(CaseDefinition):
         prepared, questions, named = [], [], mentions.Named()
         for name in scenarios or self.scenarios:
             preparer = self._preparer(name, overrides, parameters)
-            lost, shared = self._switched_off(name, overrides or {}, parameters) if dispatch is None else ((), dispatch)
+            lost, shared = (
+                self._switched_off(name, overrides or {}, parameters)
+                if dispatch is None
+                else ((), dispatch)
+            )
             preparer.draft.dispatch = shared
             prepared.append(_told(preparer.prepare(step_size, stop_time), lost, shared))
             named.add(preparer.draft)
@@ -109,49 +122,97 @@ class Case(CaseDefinition):
             questions += [q for q in preparer.draft.found.questions if q not in questions]
         if not problems and self.numbered and mentions.unmatched(self.table, named, self.place):
             problems += self._mentions
-        problems += [] if problems else self._switched_on([p for p in prepared if p], parameters, overrides or {})
+        problems += (
+            []
+            if problems
+            else self._switched_on([p for p in prepared if p], parameters, overrides or {})
+        )
         if problems:  # unusual data may be the reason of the failure
             kind = problems[0].kind  # a question besides is of no kind of its own
             asked = [Problem(q.place, f"questioned besides: {q.text}", kind) for q in questions]
             raise CaseError(str(self.path), [*problems, *asked])
         if scenarios and self.numbered:
             others = event_tables.other_scenarios(preparer.draft, scenarios)
-            prepared[-1] = prepared[-1] and replace(prepared[-1], questions=(*prepared[-1].questions, *others))
+            prepared[-1] = prepared[-1] and replace(
+                prepared[-1], questions=(*prepared[-1].questions, *others)
+            )
         beside = partial(self._beside, overrides, step_size, parameters)
         ready = [p for p in prepared if p is not None]
         idle = idle_values.idle_everywhere([p.idle for p in ready])
         given = [file.values for file in parameters if not file.text] + [overrides or {}]
         changed = [*self.events_given, *(file.path.name for file in parameters if file.text)]
         changed += [f"{key} = {value}" for values in given for key, value in values.items()]
-        return [replace(p, beside=beside, questions=(*p.questions, *idle), changed=few(changed, _NAMED)) for p in ready]
+        return [
+            replace(p, beside=beside, questions=(*p.questions, *idle), changed=few(changed, _NAMED))
+            for p in ready
+        ]
 
     def _switched_on(
-        self, ready: Sequence[PreparedScenario], parameters: Sequence[ParameterFile], overrides: Mapping[str, Value]
+        self,
+        ready: Sequence[PreparedScenario],
+        parameters: Sequence[ParameterFile],
+        overrides: Mapping[str, Value],
     ) -> list[Problem]:
         """Controllers that a file switches on where the scenario has it off: in one of several scenarios, or beside
         another one that is on there, which no value says."""
-        found, said = [], [key for values in (overrides, *(file.values for file in parameters)) for key in values]
+        found, said = (
+            [],
+            [
+                key
+                for values in (overrides, *(file.values for file in parameters))
+                for key in values
+            ],
+        )
         for file in parameters:
-            for key in (key for key, value in file.values.items() if value is True and key.endswith(".enabled")):
+            for key in (
+                key
+                for key, value in file.values.items()
+                if value is True and key.endswith(".enabled")
+            ):
                 pattern, _, variable = key.partition(".")
                 systems = [p.system for p in ready if file.text]
-                others = [x for system in systems for x in idle_values.others_on(system, pattern, variable, said)]
-                each = [(p.name, self.components_of(p.name).items()) for p in ready if others or len(ready) > 1]
-                on = {s: p.value(variable) for s, plans in each for name, p in plans if fnmatchcase(name, pattern)}
+                others = [
+                    x
+                    for system in systems
+                    for x in idle_values.others_on(system, pattern, variable, said)
+                ]
+                each = [
+                    (p.name, self.components_of(p.name).items())
+                    for p in ready
+                    if others or len(ready) > 1
+                ]
+                on = {
+                    s: p.value(variable)
+                    for s, plans in each
+                    for name, p in plans
+                    if fnmatchcase(name, pattern)
+                }
                 if off := [scenario for scenario, is_on in on.items() if not is_on]:
                     text = f"too, where it is off: choose one scenario of {', '.join(on)}"
                     if len(on) == 1:
                         remedy = f"choose another scenario, or set {others[0]} = true too where both are meant"
                         text = f"beside {others[0]}, where it is off: {remedy}"
-                    found.append(Problem(file.place(key), f"it would switch this on in {', '.join(off)} {text}"))
+                    found.append(
+                        Problem(
+                            file.place(key), f"it would switch this on in {', '.join(off)} {text}"
+                        )
+                    )
         return found
 
     def _beside(
-        self, overrides: Mapping[str, Value] | None, step_size: float | None, parameters: Sequence[ParameterFile],
-        name: str, plain: bool, further: Mapping[str, Value] | None = None, stop_time: float | None = None,
-    ) -> PreparedScenario | None:  # fmt: skip
+        self,
+        overrides: Mapping[str, Value] | None,
+        step_size: float | None,
+        parameters: Sequence[ParameterFile],
+        name: str,
+        plain: bool,
+        further: Mapping[str, Value] | None = None,
+        stop_time: float | None = None,
+    ) -> PreparedScenario | None:
         if not plain:
-            return self.prepare([name], {**(overrides or {}), **(further or {})}, step_size, stop_time, parameters)[0]
+            return self.prepare(
+                [name], {**(overrides or {}), **(further or {})}, step_size, stop_time, parameters
+            )[0]
         return self.prepare([name], None, step_size)[0] if overrides or parameters else None
 
     def _switched_off(
@@ -159,7 +220,11 @@ class Case(CaseDefinition):
     ) -> tuple[Collection[str], Dispatch | None]:
         """Units that values take out of service, and how others share their power; none where powers are given too."""
         table = self.table.power_flow
-        on = {key: value for key, value in overrides.items() if value or not key.endswith(".connected")}
+        on = {
+            key: value
+            for key, value in overrides.items()
+            if value or not key.endswith(".connected")
+        }
         given = any(key.endswith(".P_0") for key in overrides)
         if table is None or given or len(on) == len(overrides):
             return (), None
@@ -170,14 +235,24 @@ class Case(CaseDefinition):
         off = [key for key in overrides if key not in on]
         heads = ("", f"{table.grid}.")
         fed_by = [unit for unit, power in powers.items() if power]
-        lost = [u for u in fed_by if any(fnmatchcase(f"{h}{u}.connected", key) for key in off for h in heads)]
+        lost = [
+            u
+            for u in fed_by
+            if any(fnmatchcase(f"{h}{u}.connected", key) for key in off for h in heads)
+        ]
         if not lost:
             return (), None
         drawn, loads = 0.0, [x.name for x in before.network.loads] if before.network else []
-        of_loads = {k for k in on if any(fnmatchcase(f"{table.grid}.{x}", k.rpartition(".")[0]) for x in loads)}
+        of_loads = {
+            k
+            for k in on
+            if any(fnmatchcase(f"{table.grid}.{x}", k.rpartition(".")[0]) for x in loads)
+        }
         kept = {key: value for key, value in on.items() if key not in of_loads}
         if of_loads and (intact := self._preparer(name, kept, parameters).prepare(None, None)):
-            before_mw, now_mw = (sharing.load_of(loads, x[table.grid]) for x in (intact.system.components, plans))
+            before_mw, now_mw = (
+                sharing.load_of(loads, x[table.grid]) for x in (intact.system.components, plans)
+            )
             drawn = before_mw - now_mw
             powers = intact.power_flow.powers if intact.power_flow else powers
         fed = sum(powers[unit].real * plans[unit].number("S_n") for unit in lost)
@@ -203,13 +278,21 @@ class Case(CaseDefinition):
         return problems
 
     def components_of(
-        self, scenario: str, overrides: Mapping[str, Value] | None = None, parameters: Sequence[ParameterFile] = ()
+        self,
+        scenario: str,
+        overrides: Mapping[str, Value] | None = None,
+        parameters: Sequence[ParameterFile] = (),
     ) -> dict[str, ComponentPlan]:
         """Components of one scenario with their values; much cheaper than to prepare it."""
-        return {name: plan for name, (_, plan) in self.placed(scenario, overrides, parameters).items()}
+        return {
+            name: plan for name, (_, plan) in self.placed(scenario, overrides, parameters).items()
+        }
 
     def placed(
-        self, scenario: str, overrides: Mapping[str, Value] | None = None, parameters: Sequence[ParameterFile] = ()
+        self,
+        scenario: str,
+        overrides: Mapping[str, Value] | None = None,
+        parameters: Sequence[ParameterFile] = (),
     ) -> dict[str, tuple[ComponentTable, ComponentPlan]]:
         preparer = self._of_kind(overrides, parameters)._preparer(scenario, overrides, parameters)
         components = preparer.assemble().components
@@ -217,7 +300,9 @@ class Case(CaseDefinition):
             raise CaseError(str(self.path), problems)
         return {name: (preparer.draft.tables[name], plan) for name, plan in components.items()}
 
-    def _of_kind(self, overrides: Mapping[str, Value] | None, parameters: Sequence[ParameterFile]) -> Case:
+    def _of_kind(
+        self, overrides: Mapping[str, Value] | None, parameters: Sequence[ParameterFile]
+    ) -> Case:
         """The case with the kind of models that is wanted; itself where that is the file's own."""
         kind = kind_wanted(overrides, parameters)
         if kind is None or kind == self.table.models:
@@ -243,8 +328,13 @@ def _told(
     if not any(abs(dispatch.powers[unit].real) > _FED for unit in lost):
         return prepared
     plans = prepared.system.components
-    drawn = sum(dispatch.powers[unit].real * plans[unit].number("S_n") for unit in lost) - dispatch.change
-    shared = sharing.in_words(dispatch, prepared.power_flow.powers, plans, lost, sharing.lost_load(drawn))
+    drawn = (
+        sum(dispatch.powers[unit].real * plans[unit].number("S_n") for unit in lost)
+        - dispatch.change
+    )
+    shared = sharing.in_words(
+        dispatch, prepared.power_flow.powers, plans, lost, sharing.lost_load(drawn)
+    )
     text = f"{shared}, by {dispatch.rule}; the rules are {', '.join(sharing.SharingRule)}"
     return replace(prepared, questions=(*prepared.questions, Problem("[power_flow] sharing", text)))
 
@@ -282,7 +372,9 @@ def case_of_text(text: str, raw: dict[str, Any], path: Path, *, trust_fmus: bool
     """The case of a text that is, or is to be, in a file; ``raw`` is what TOML makes of it."""
     table, problems = _validate(raw, text, path)
     table = table if table.models is None or problems else of_kind(table, table.models)
-    return _case(table, text, path, problems, path.parent / (table.directory or ""), trust_fmus=trust_fmus)
+    return _case(
+        table, text, path, problems, path.parent / (table.directory or ""), trust_fmus=trust_fmus
+    )
 
 
 def _from_ssp(path: Path, trust_fmus: bool) -> Case:
@@ -294,9 +386,15 @@ def _from_ssp(path: Path, trust_fmus: bool) -> Case:
 
 
 def _case(
-    table: CaseTable, text: str, path: Path, problems: Sequence[Problem], directory: Path, *, numbered: bool = True,
+    table: CaseTable,
+    text: str,
+    path: Path,
+    problems: Sequence[Problem],
+    directory: Path,
+    *,
+    numbered: bool = True,
     trust_fmus: bool,
-) -> Case:  # fmt: skip
+) -> Case:
     """The case, with what its scenarios' parameter files say now and paths that outlast a change of the folder."""
     files: dict[str, ParameterFile | str] = {}
     for name in (name for scenario in table.scenarios.values() for name in scenario.parameters):
@@ -305,34 +403,52 @@ def _case(
         except InputError as error:
             files[name] = str(error)
     home = path.absolute().parent
-    return Case(table, text, path, tuple(problems), directory.absolute(), numbered, trust_fmus, home, files)
+    return Case(
+        table, text, path, tuple(problems), directory.absolute(), numbered, trust_fmus, home, files
+    )
 
 
 def _validate(raw: dict[str, Any], text: str, path: Path) -> tuple[CaseTable, list[Problem]]:
     """Validate the tables: note each wrong entry, remove it, and continue with the rest."""
-    problems = [Problem(place_in(text, where), f"{where[-1]}: {TWICE}") for where in _join_names(raw)]
+    problems = [
+        Problem(place_in(text, where), f"{where[-1]}: {TWICE}") for where in _join_names(raw)
+    ]
     for _ in range(_SCHEMA_PASSES):
         try:
             table = CaseTable.model_validate(raw)
-            if not text:  # an SSP is one scenario of a case, and keeps what the case says of the others
+            if (
+                not text
+            ):  # an SSP is one scenario of a case, and keeps what the case says of the others
                 return table, problems
             return table, problems or contradictions(table, lambda *where: place_in(text, where))
         except ValidationError as error:
             removed, details = False, error.errors()
             if len(details) > MOST_PROBLEMS:
-                first = [(_location(raw, detail["loc"]), detail) for detail in details[:MOST_PROBLEMS]]
-                shown = [Problem(place_in(text, where), _schema_message(detail, where)) for where, detail in first]
+                first = [
+                    (_location(raw, detail["loc"]), detail) for detail in details[:MOST_PROBLEMS]
+                ]
+                shown = [
+                    Problem(place_in(text, where), _schema_message(detail, where))
+                    for where, detail in first
+                ]
                 raise CaseError(str(path), [*shown, TOO_MANY]) from None
             located = [(_location(raw, detail["loc"]), detail) for detail in details]
             seen = [place for place, _ in located]
             for k, (location, detail) in enumerate(located):
-                if location in seen[:k] or any(x[: len(location)] == location for x in seen if x != location):
-                    continue  # one of several forms that do not fit; what is said of the nearest one is enough
+                if location in seen[:k] or any(
+                    x[: len(location)] == location for x in seen if x != location
+                ):
+                    # one of several forms that do not fit; what is said of the nearest one is
+                    # enough
+                    continue
                 known = any(p.place == place_in(text, location) for p in problems)
-                if not (known and detail["type"] == "missing"):  # missing because it was wrong and removed
+                if not (
+                    known and detail["type"] == "missing"
+                ):  # missing because it was wrong and removed
                     problem = Problem(place_in(text, location), _schema_message(detail, location))
                     problems += [] if problem in problems else [problem]
-                removed |= _take_out(raw, _location(raw, detail["loc"]), detail["type"])  # others may be gone
+                # others may be gone
+                removed |= _take_out(raw, _location(raw, detail["loc"]), detail["type"])
             if not removed:
                 break
     raise CaseError(str(path), problems)
@@ -343,7 +459,9 @@ def _join_names(raw: dict[str, Any]) -> list[tuple[str, ...]]:
     names that are given both ways."""
     scenarios, twice = raw.get("scenarios"), list[tuple[str, ...]]()
     named = scenarios.items() if isinstance(scenarios, dict) else ()
-    tables: list[tuple[tuple[str, ...], Any]] = [(("scenarios", name, "set"), table) for name, table in named]
+    tables: list[tuple[tuple[str, ...], Any]] = [
+        (("scenarios", name, "set"), table) for name, table in named
+    ]
     tables.append((("reference", "when"), raw.get("reference")))
     for place, table in tables:
         key = place[-1]
@@ -364,7 +482,11 @@ def _location(raw: Any, location: Sequence[str | int]) -> tuple[str | int, ...]:
         if inside:
             path.append(part)
             raw = raw[part]
-        elif part == location[-1] and isinstance(raw, dict) and part not in ("float", "str", "bool", "[key]"):
+        elif (
+            part == location[-1]
+            and isinstance(raw, dict)
+            and part not in ("float", "str", "bool", "[key]")
+        ):
             path.append(part)
     return tuple(path)
 
@@ -410,7 +532,11 @@ def _schema_message(detail: Any, location: Sequence[str | int]) -> str:
         case _:
             seen = detail.get("input")
             in_seconds = key in _TIMES and type(seen) in (int, float)
-            shown = f" (value seen: {seen!r}{' s' if in_seconds else ''})" if not isinstance(seen, dict | list) else ""
+            shown = (
+                f" (value seen: {seen!r}{' s' if in_seconds else ''})"
+                if not isinstance(seen, dict | list)
+                else ""
+            )
             said = fault_of(detail) + (" s" if in_seconds else "") + shown
             remedy = (_TIMES | _SHARES).get(key, "")
             return f"{said}; {remedy}" if remedy else said

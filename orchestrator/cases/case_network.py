@@ -8,7 +8,12 @@ from fmus.toolchain.catalogue import model_names, needs_arguments, network_of
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.names import close_names
 from orchestrator.cases.network_data import network_data
-from orchestrator.cases.schema import BusFaultTable, ComponentTable, ShuntReconnectionTable, ShuntTripTable
+from orchestrator.cases.schema import (
+    BusFaultTable,
+    ComponentTable,
+    ShuntReconnectionTable,
+    ShuntTripTable,
+)
 from orchestrator.errors import InputError
 
 Tables = Mapping[str, ComponentTable]
@@ -23,7 +28,9 @@ def read_network(draft: Draft) -> None:
     table = draft.given.case.network
     if table is None:
         return
-    given = [key for key in ("matpower", "pandapower", "raw", "cgmes") if getattr(table, key) is not None]
+    given = [
+        key for key in ("matpower", "pandapower", "raw", "cgmes") if getattr(table, key) is not None
+    ]
     if len(given) > 1:
         names = " or ".join(map(repr, given))
         draft.note_network(draft.given.place("network"), f"give either {names}, not both")
@@ -40,12 +47,18 @@ def read_network(draft: Draft) -> None:
 def check_network_is_used(draft: Draft, everything: Tables) -> None:
     """Refuse a network that nothing is built from; its frequency alone would still set that of every component."""
     tables = everything.values()
-    unknown = [table.model for table in tables if table.model is not None and table.model not in model_names()]
+    unknown = [
+        table.model
+        for table in tables
+        if table.model is not None and table.model not in model_names()
+    ]
     if draft.given.case.network is None or draft.given.case.units is not None or unknown:
         return
     if not any(takes_network(table) for table in tables):
         remedy = "give the grid the model 'grid' or 'phasor_grid', or remove the table"
-        draft.note(draft.given.place("network"), f"no component is built from this network; {remedy}")
+        draft.note(
+            draft.given.place("network"), f"no component is built from this network; {remedy}"
+        )
 
 
 def find_network(draft: Draft, everything: Tables) -> None:
@@ -55,8 +68,12 @@ def find_network(draft: Draft, everything: Tables) -> None:
         return
     grid = draft.tables.get(draft.grid)
     if grid is None:
-        hint = close_names(draft.grid, draft.tables, f"the case has: {', '.join([*draft.tables][:12])}")
-        draft.note_network(draft.given.place("power_flow", "grid"), f"there is no component {draft.grid!r}; {hint}")
+        hint = close_names(
+            draft.grid, draft.tables, f"the case has: {', '.join([*draft.tables][:12])}"
+        )
+        draft.note_network(
+            draft.given.place("power_flow", "grid"), f"there is no component {draft.grid!r}; {hint}"
+        )
     elif takes_network(grid):
         draft.network = _from_table(draft, grid, everything)
     elif grid.model in model_names():
@@ -71,7 +88,9 @@ def _with_ports(draft: Draft, grid: ComponentTable) -> Network | None:
     if network is None:
         return None
     known = {port.name for port in network.ports}
-    if further := [Port(n, t.bus) for n, t in draft.tables.items() if t.bus in network.buses and n not in known]:
+    if further := [
+        Port(n, t.bus) for n, t in draft.tables.items() if t.bus in network.buses and n not in known
+    ]:
         network = replace(network, ports=(*network.ports, *further))
     return _with_switches(network, draft)
 
@@ -81,9 +100,14 @@ def _check_buses_have_a_grid(draft: Draft) -> None:
     for name, table in draft.tables.items():
         if table.bus is not None:
             place = "units" if name in draft.origins else "components"
-            where = draft.given.place(place) if place == "units" else draft.given.place(place, name, "bus")
+            where = (
+                draft.given.place(place)
+                if place == "units"
+                else draft.given.place(place, name, "bus")
+            )
             draft.note_network(
-                where, "a bus needs a [power_flow] table whose grid is a model with a network; or use [[connections]]"
+                where,
+                "a bus needs a [power_flow] table whose grid is a model with a network; or use [[connections]]",
             )
             return
 
@@ -107,9 +131,17 @@ def _from_table(draft: Draft, grid: ComponentTable, everything: Tables) -> Netwo
     name = f"{draft.given.case.name}_grid"
     try:
         network = Network(
-            name, data.buses, data.lines, data.loads, ports, data.shunts, data.stray_B, (), data.transformers,
+            name,
+            data.buses,
+            data.lines,
+            data.loads,
+            ports,
+            data.shunts,
+            data.stray_B,
+            (),
+            data.transformers,
             phasors=grid.model == "phasor_grid",
-        )  # fmt: skip
+        )
         return _with_switches(network, draft)
     except ValueError as error:
         draft.note_network(draft.given.place("network"), str(error))
@@ -122,10 +154,19 @@ def _with_switches(network: Network, draft: Draft) -> Network:
     Unknown names are the events' matter."""
     case = draft.given.case
     network = replace(network, injections=network.buses) if draft.given.injections else network
-    tables = [*case.events, *(event for scenario in case.scenarios.values() for event in scenario.events or ())]
+    tables = [
+        *case.events,
+        *(event for scenario in case.scenarios.values() for event in scenario.events or ()),
+    ]
     faults = {table.bus for table in tables if isinstance(table, BusFaultTable)}
-    switched = {table.shunt for table in tables if isinstance(table, ShuntTripTable | ShuntReconnectionTable)}
+    switched = {
+        table.shunt
+        for table in tables
+        if isinstance(table, ShuntTripTable | ShuntReconnectionTable)
+    }
     if not (faults or switched):
         return network
     shunts = tuple(replace(shunt, switched=shunt.name in switched) for shunt in network.shunts)
-    return replace(network, faults=tuple(bus for bus in network.buses if bus in faults), shunts=shunts)
+    return replace(
+        network, faults=tuple(bus for bus in network.buses if bus in faults), shunts=shunts
+    )

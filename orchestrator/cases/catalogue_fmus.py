@@ -9,7 +9,12 @@ from typing import Any
 from fmus.grid.network import Network
 from fmus.toolchain.catalogue import build_model, entry_of
 from fmus.toolchain.notes import known, noted
-from orchestrator.fmi.description import FmuDescription, parse_description, platforms_of, read_description
+from orchestrator.fmi.description import (
+    FmuDescription,
+    parse_description,
+    platforms_of,
+    read_description,
+)
 
 _TO_COME = "not-built"  # identity of an FMU that is not there
 _IDENTITY, _START = re.compile(r'(guid|generationTool)="([^"]*)"'), "<InitialUnknowns"
@@ -32,7 +37,10 @@ class PlannedFmu:
 
 @cache
 def plan_fmu(
-    model: str, network: Network | None = None, native: bool = False, parts: tuple[tuple[str, str], ...] = ()
+    model: str,
+    network: Network | None = None,
+    native: bool = False,
+    parts: tuple[tuple[str, str], ...] = (),
 ) -> PlannedFmu:
     """FMU of a catalogue's model, described and not yet built."""
     from fmus.toolchain.cache import cache_directory, intact  # noqa: PLC0415 - needs the extra `build`
@@ -40,26 +48,36 @@ def plan_fmu(
     place = known(entry_of(model), _asked(model, network, native, parts))
     if place is not None and intact(path := cache_directory("fmus").joinpath(*place)):
         return PlannedFmu(model, network, native, parts, read_description(path), is_there=True)
-    name, text = noted(entry_of(model), f"sketch of {_asked(model, network, native, parts)}", partial(
-        _sketch, model, network, native, parts
-    ))  # fmt: skip
+    name, text = noted(
+        entry_of(model),
+        f"sketch of {_asked(model, network, native, parts)}",
+        partial(_sketch, model, network, native, parts),
+    )
     path = cache_directory("fmus") / _TO_COME / f"{name}.fmu"
-    return PlannedFmu(model, network, native, parts, parse_description(path, text.encode()), is_there=False)
+    return PlannedFmu(
+        model, network, native, parts, parse_description(path, text.encode()), is_there=False
+    )
 
 
-def _sketch(model: str, network: Network | None, native: bool, parts: tuple[tuple[str, str], ...]) -> tuple[str, str]:
+def _sketch(
+    model: str, network: Network | None, native: bool, parts: tuple[tuple[str, str], ...]
+) -> tuple[str, str]:
     """Name of an FMU that is not there, and its description without dependencies, which take long."""
     from fmus.toolchain.description import model_description  # noqa: PLC0415 - imports what writes equations
 
     sketch = build_model(model, **_arguments(network, parts))
     while len(_described) >= 8:  # of cases that failed
         _described.pop(next(iter(_described)))
-    text = model_description(sketch, _TO_COME, sketch.name, "", native=native, listed=False).decode()
+    text = model_description(
+        sketch, _TO_COME, sketch.name, "", native=native, listed=False
+    ).decode()
     _described[_asked(model, network, native, parts)] = sketch, text
     return sketch.name, text
 
 
-def _asked(model: str, network: Network | None, native: bool, parts: tuple[tuple[str, str], ...]) -> str:
+def _asked(
+    model: str, network: Network | None, native: bool, parts: tuple[tuple[str, str], ...]
+) -> str:
     return f"fmu {model} {native} {parts!r} {network!r}"
 
 
@@ -73,7 +91,11 @@ def _recipe(planned: PlannedFmu) -> Any:
     from fmus.toolchain.python_fmu import PythonFmu  # noqa: PLC0415 - as above
 
     kept = _described.get(_asked(planned.model, planned.network, planned.native, planned.parts))
-    made = kept[0] if kept else build_model(planned.model, **_arguments(planned.network, planned.parts))
+    made = (
+        kept[0]
+        if kept
+        else build_model(planned.model, **_arguments(planned.network, planned.parts))
+    )
     return (NativeFmu if planned.native else PythonFmu)(made)
 
 
@@ -100,13 +122,28 @@ def build_fmu(planned: PlannedFmu) -> FmuDescription:
     asked = _asked(planned.model, planned.network, planned.native, planned.parts)
     noted(entry_of(planned.model), asked, find)
     recipe = recipes[0] if recipes else _recipe(planned)
-    path, told, (_, text) = cached(recipe), recipe.description().decode(), _described.pop(asked, (None, ""))
-    if _IDENTITY.sub("", told, 2).partition(_START)[0] != _IDENTITY.sub("", text, 2).partition(_START)[0]:
+    path, told, (_, text) = (
+        cached(recipe),
+        recipe.description().decode(),
+        _described.pop(asked, (None, "")),
+    )
+    if (
+        _IDENTITY.sub("", told, 2).partition(_START)[0]
+        != _IDENTITY.sub("", text, 2).partition(_START)[0]
+    ):
         return read_description(path)
     (_, guid), (_, tool) = _IDENTITY.findall(told, 0, 4096)
-    return replace(planned.description, path=path, guid=guid, generation_tool=tool, platforms=platforms_of(path))
+    return replace(
+        planned.description,
+        path=path,
+        guid=guid,
+        generation_tool=tool,
+        platforms=platforms_of(path),
+    )
 
 
-def catalogue_fmu(model: str, network: Network | None = None, native: bool = False) -> FmuDescription:
+def catalogue_fmu(
+    model: str, network: Network | None = None, native: bool = False
+) -> FmuDescription:
     """FMU of a catalogue's model, built once on each machine."""
     return build_fmu(plan_fmu(model, network, native))

@@ -2,8 +2,10 @@
 
 from orchestrator.cases.schema import ComponentTable
 
-NO_STATES = ("{0} is known by its scan alone, which has no states: it cannot be run and has no modes; `gfor fmu "
-             "nyquist {1}` judges it, and for all else give the vendor's 'fmu' or 'dll'")  # fmt: skip
+NO_STATES = (
+    "{0} is known by its scan alone, which has no states: it cannot be run and has no modes; `gfor fmu "
+    "nyquist {1}` judges it, and for all else give the vendor's 'fmu' or 'dll'"
+)
 
 
 def contradiction(table: ComponentTable) -> str:

@@ -15,9 +15,12 @@ Locate = Callable[..., str]
 
 def contradictions(case: CaseTable, place: Locate) -> list[Problem]:
     return [
-        *_modes(case, place), *_references(case, place), *_plots(case, place), *_buses(case, place),
+        *_modes(case, place),
+        *_references(case, place),
+        *_plots(case, place),
+        *_buses(case, place),
         *_units(case, place),
-    ]  # fmt: skip
+    ]
 
 
 def _modes(case: CaseTable, place: Locate) -> Iterator[Problem]:
@@ -28,9 +31,15 @@ def _modes(case: CaseTable, place: Locate) -> Iterator[Problem]:
             text = f"mode {mode.name!r} has {given} of 'states' and 'against'; give one of them, which tells its shape"
             yield Problem(where, text)
         if mode.against is not None and not all(mode.against):
-            yield Problem(where, f"mode {mode.name!r}: a side of 'against' is empty; name the states on both sides")
+            yield Problem(
+                where,
+                f"mode {mode.name!r}: a side of 'against' is empty; name the states on both sides",
+            )
     for name, k in _again([mode.name for mode in case.analysis.modes]):
-        yield Problem(place("analysis", "modes", k), f"two modes are called {name!r}; give each a name of its own")
+        yield Problem(
+            place("analysis", "modes", k),
+            f"two modes are called {name!r}; give each a name of its own",
+        )
 
 
 def _references(case: CaseTable, place: Locate) -> Iterator[Problem]:
@@ -42,10 +51,15 @@ def _references(case: CaseTable, place: Locate) -> Iterator[Problem]:
         where = place("reference", "modes", scenario)
         if scenario not in scenarios:
             hint = close_names(scenario, scenarios, f"the case has: {', '.join(scenarios)}")
-            yield Problem(where, f"there is no scenario {scenario!r} that the figures could stand beside; {hint}")
+            yield Problem(
+                where,
+                f"there is no scenario {scenario!r} that the figures could stand beside; {hint}",
+            )
         for name in figures:
             if name not in modes:
-                known = f"[analysis] has: {', '.join(modes)}" if modes else "[analysis] names no mode"
+                known = (
+                    f"[analysis] has: {', '.join(modes)}" if modes else "[analysis] names no mode"
+                )
                 hint = close_names(name, modes, known)
                 text = f"there is no mode {name!r} that the figures could stand beside; {hint}"
                 yield Problem(place("reference", "modes", scenario, name), text)
@@ -85,11 +99,20 @@ def _again(names: Iterable[str]) -> Iterator[tuple[str, int]]:
 
 def _stand_ins(case: CaseTable, place: Locate) -> Iterator[Problem]:
     """Devices and what stands for them without dynamics in other scenarios, where their powers differ."""
-    fed = {name: power for name, table in case.components.items() if (power := _power(table)) is not None}
+    fed = {
+        name: power
+        for name, table in case.components.items()
+        if (power := _power(table)) is not None
+    }
     for name, other in permutations(fed, 2):
         device, still = case.components[name], case.components[other]
         apart = all({name, other} & set(scenario.remove) for scenario in case.scenarios.values())
-        if (still.model or "").startswith(STAND_IN) and device.bus == still.bus and apart and fed[name] != fed[other]:
+        if (
+            (still.model or "").startswith(STAND_IN)
+            and device.bus == still.bus
+            and apart
+            and fed[name] != fed[other]
+        ):
             text = f"{name} feeds {fed[name]:.4g} MW, and {other}, which stands for it, {fed[other]:.4g} MW"
             yield Problem(place("components", other), f"{text}: give both the same S_n and P_0")
 

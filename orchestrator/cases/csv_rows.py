@@ -15,7 +15,9 @@ def seen_from_here(path: Path) -> Path:
     try:
         path.exists()  # false where there is none; it fails where nobody could tell
     except OSError as error:
-        raise InputError(f"{str(path)[:200]}: it cannot be looked for: {error.strerror}; give another path") from error
+        raise InputError(
+            f"{str(path)[:200]}: it cannot be looked for: {error.strerror}; give another path"
+        ) from error
     return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
 
 
@@ -31,7 +33,11 @@ def rows_of(path: Path, columns: Sequence[str]) -> list[Row]:
     semicolons or tabs, the file is not text in UTF-8, or it has more than `MOST_ROWS` rows."""
     path = seen_from_here(path)
     if not path.is_file():
-        wanted = f"it should hold the columns {', '.join(columns)}" if columns else "give the path of a .csv"
+        wanted = (
+            f"it should hold the columns {', '.join(columns)}"
+            if columns
+            else "give the path of a .csv"
+        )
         raise InputError(f"{path}: there is no such file; {wanted}")
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:  # spreadsheets write the mark
@@ -39,12 +45,21 @@ def rows_of(path: Path, columns: Sequence[str]) -> list[Row]:
             names = reader.fieldnames or ()
             _check_names(path, names)
             if missing := [c for c in columns if c not in names]:
-                raise InputError(f"{path}: column {', '.join(missing)} is missing; it should hold {', '.join(columns)}")
-            rows = [row | {PLACE: f"{path}, line {n}"} for n, row in enumerate(islice(reader, MOST_ROWS + 1), start=2)]
+                raise InputError(
+                    f"{path}: column {', '.join(missing)} is missing; it should hold {', '.join(columns)}"
+                )
+            rows = [
+                row | {PLACE: f"{path}, line {n}"}
+                for n, row in enumerate(islice(reader, MOST_ROWS + 1), start=2)
+            ]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path}: it cannot be read as a table: {error}; save it as CSV in UTF-8") from error
+        raise InputError(
+            f"{path}: it cannot be read as a table: {error}; save it as CSV in UTF-8"
+        ) from error
     if len(rows) > MOST_ROWS:
-        raise InputError(f"{path}: it has more than {MOST_ROWS} rows, which is the most that a table may have")
+        raise InputError(
+            f"{path}: it has more than {MOST_ROWS} rows, which is the most that a table may have"
+        )
     return rows
 
 
@@ -58,7 +73,9 @@ def _check_names(path: Path, names: Sequence[str]) -> None:
             )
     for k, name in enumerate(names):
         if name and name in names[:k]:
-            raise InputError(f"{path}, line 1: the column {name!r} stands twice; leave one of them out")
+            raise InputError(
+                f"{path}, line 1: the column {name!r} stands twice; leave one of them out"
+            )
 
 
 def place_of(row: Row) -> str:

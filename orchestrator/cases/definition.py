@@ -26,8 +26,10 @@ class CaseDefinition:
     text: str
     path: Path
     problems: tuple[Problem, ...]
-    directory: Path  # folder to which paths in the tables are relative; it holds wherever the program works later
-    numbered: bool = True  # whether ``text`` is the user's own file, whose line numbers help in errors
+    # folder to which paths in the tables are relative; it holds wherever the program works later
+    directory: Path
+    # whether ``text`` is the user's own file, whose line numbers help in errors
+    numbered: bool = True
     # whether the user said that its FMUs may run in gfor's own process, where the file wants that.
     trust_fmus: bool = False
     # folder of the file itself; that of an SSP is another one than ``directory``.
@@ -40,14 +42,19 @@ class CaseDefinition:
     # how units share what given values take out of service, such as ``sg5.connected = false``; as the file says where
     # None.
     sharing: SharingRule | None = None
-    scans: bool = False  # whether a component may be a scan: only for what needs neither its states nor a run
+    # whether a component may be a scan: only for what needs neither its states nor a run
+    scans: bool = False
     events_given: tuple[str, ...] = ()  # in words, by the caller, in the place of the file's
-    injections: bool = False  # whether the grid takes a current besides at every bus; see `Network.injections`
+    # whether the grid takes a current besides at every bus; see `Network.injections`
+    injections: bool = False
 
     @property
     def content(self) -> bytes:
         """``text`` with the line ends of its file, as long as that says the same."""
-        there, text = self.path.read_bytes() if self.path.is_file() else b"", self.text.encode("utf-8")
+        there, text = (
+            self.path.read_bytes() if self.path.is_file() else b"",
+            self.text.encode("utf-8"),
+        )
         return there if there.replace(b"\r\n", b"\n") == text else text
 
     @property

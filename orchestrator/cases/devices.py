@@ -38,12 +38,17 @@ def devices_of(
     names = _names(named)
     own = _bindings(names, bindings)
     values: dict[str, dict[str, Value]] = {name: {} for name in names}
-    for_one = [(whose, name, value) for text, value in settings for whose, name in [_whose(text, names)]]
+    for_one = [
+        (whose, name, value) for text, value in settings for whose, name in [_whose(text, names)]
+    ]
     for whose, name, value in sorted(for_one, key=lambda entry: entry[0] is not None):
         for device in names if whose is None else [whose]:
             values[device].pop(name, None)
             values[device][name] = value
-    return [Device(name, path, own.get(name), values[name]) for name, (_, path) in zip(names, named, strict=True)]
+    return [
+        Device(name, path, own.get(name), values[name])
+        for name, (_, path) in zip(names, named, strict=True)
+    ]
 
 
 def _split(text: str) -> tuple[str | None, Path]:
@@ -52,7 +57,9 @@ def _split(text: str) -> tuple[str | None, Path]:
     if not sign or Path(text).exists() or "/" in name or "\\" in name:
         return None, Path(text)
     if not _NAME.fullmatch(name):
-        rule = "since its folder gets that name; take letters, digits and ._+- with no point in front"
+        rule = (
+            "since its folder gets that name; take letters, digits and ._+- with no point in front"
+        )
         raise InputError(f"{text}: a device cannot be called {name!r}, {rule}")
     if not rest:
         raise InputError(f"{text}: the file of {name} is missing; write {name}=FILE.fmu")
@@ -73,7 +80,11 @@ def _names(named: Sequence[tuple[str | None, Path]]) -> list[str]:
                 break
     if twice := _doubles(found):
         name = twice[0]
-        files = [path for other, (_, path) in zip(found, named, strict=True) if other.casefold() == name.casefold()]
+        files = [
+            path
+            for other, (_, path) in zip(found, named, strict=True)
+            if other.casefold() == name.casefold()
+        ]
         remedy = " ".join(f"{name}_{number}={path}" for number, path in enumerate(files, 1))
         raise InputError(
             f"{', '.join(map(str, files))}: {len(files)} devices are called {name!r}, so that they would share one "
@@ -106,7 +117,9 @@ def _bindings(names: Sequence[str], given: Sequence[str]) -> dict[str, Path]:
             form = f"with several devices write NAME=FILE.toml, with NAME one of {', '.join(names)}"
             raise InputError(f"--binding {text}: it does not say whose it is; {form}")
         if name in found:
-            raise InputError(f"--binding {text}: {name} has {found[name]} already; a device has one binding")
+            raise InputError(
+                f"--binding {text}: {name} has {found[name]} already; a device has one binding"
+            )
         found[name] = path
     return found
 
@@ -114,5 +127,7 @@ def _bindings(names: Sequence[str], given: Sequence[str]) -> dict[str, Path]:
 def _whose(text: str, names: Sequence[str]) -> tuple[str | None, str]:
     name, sign, rest = text.partition(":")
     if sign and len(names) > 1 and name not in names:
-        raise InputError(f"--set {text}: there is no device {name!r}; the devices are {', '.join(names)}")
+        raise InputError(
+            f"--set {text}: there is no device {name!r}; the devices are {', '.join(names)}"
+        )
     return (name, rest) if sign and name in names else (None, text)

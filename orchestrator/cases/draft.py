@@ -58,14 +58,16 @@ class Findings:
     questions: list[Problem] = field(default_factory=list)
     # what is asked about values, by ``component.variable``, of the digits that the files have, in another unit.
     thousandfold: dict[str, str] = field(default_factory=dict)
-    ratings: dict[str, float] = field(default_factory=dict)  # S_n of components before one from outside [MVA]
+    # S_n of components before one from outside [MVA]
+    ratings: dict[str, float] = field(default_factory=dict)
     # components of other scenarios to which a layer gives values, by ``component.variable``, with the place.
     absent: dict[str, str] = field(default_factory=dict)
     not_reached: list[float] = field(default_factory=list)
     # components whose form the network cannot take, each with its model; what follows from that is not noted.
     misfits: dict[str, str] = field(default_factory=dict)
     network_failed: bool = False
-    missed: set[tuple[str, str]] = field(default_factory=set)  # variables of units of a kind that none of them has
+    # variables of units of a kind that none of them has
+    missed: set[tuple[str, str]] = field(default_factory=set)
 
 
 @dataclass
@@ -81,13 +83,15 @@ class Draft:
     known: set[str] = field(default_factory=set)
     tables: dict[str, ComponentTable] = field(default_factory=dict)
     system: System = field(default_factory=System)
-    places: dict[str, str] = field(default_factory=dict)  # place of the last assignment of each ``component.variable``
+    # place of the last assignment of each ``component.variable``
+    places: dict[str, str] = field(default_factory=dict)
     origins: dict[str, UnitOrigin] = field(default_factory=dict)
     # least and most reactive power of the units at a bus together [Mvar], by bus.
     reactive_limits: dict[str, tuple[float, float]] = field(default_factory=dict)
     # least and most active power of a unit in sharing [MW], by component.
     active_limits: dict[str, tuple[float, float]] = field(default_factory=dict)
-    dispatch: Dispatch | None = None  # what the units fed before an outage that they share; None without one
+    # what the units fed before an outage that they share; None without one
+    dispatch: Dispatch | None = None
 
     def note(self, place: str, text: str, kind: ErrorKind = ErrorKind.VALUES) -> None:
         problem = Problem(place, text, kind)

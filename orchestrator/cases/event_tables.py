@@ -19,7 +19,8 @@ from orchestrator.coupling.system import ComponentPlan, Endpoint
 from orchestrator.errors import InputError, Problem
 
 _POWERS = ("P_ref", "Pref")
-_FASTEST = 0.05  # product of the frequency of a forcing and the communication step up to which it is followed
+# product of the frequency of a forcing and the communication step up to which it is followed
+_FASTEST = 0.05
 _LONG_FAULT = 10.0  # duration of a fault [s] above which one without a unit is questioned
 
 
@@ -42,10 +43,16 @@ def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Eve
             asked = (*_endless(table, stop), *_elsewhere(table, draft.network))
             draft.found.questions += [Problem(where, text) for text in asked]
         for event in _all_events_of(draft, table, clock, stop, where):
-            checked = event if isinstance(event, coupled.Fault) else _checked(draft, event, fed, where)
+            checked = (
+                event if isinstance(event, coupled.Fault) else _checked(draft, event, fed, where)
+            )
             if checked is not None and _is_point(draft, clock, event.time, "the event", where):
                 events.append((checked, where))
-    where = "--stop" if stop != draft.given.case.solver.stop_time else draft.given.place("solver", "stop_time")
+    where = (
+        "--stop"
+        if stop != draft.given.case.solver.stop_time
+        else draft.given.place("solver", "stop_time")
+    )
     _is_point(draft, clock, stop, "the stop", where)
     question_islands(draft, [(event, where) for event, where in events if event.time < stop])
     return tuple(event for event in note_conflicts(draft, events, clock) if event.time < stop)
@@ -60,11 +67,14 @@ def other_scenarios(draft: Draft, wanted: Collection[str]) -> Iterator[Problem]:
             where = draft.given.place("scenarios", name, "events", index)
             if table.time >= draft.given.case.solver.stop_time:
                 _note_late(other, table.time, draft.given.case.solver.stop_time, where)
-            if isinstance(table, schema.GridEventBase) and not isinstance(table, schema.UnitSwitchingTable):
+            if isinstance(table, schema.GridEventBase) and not isinstance(
+                table, schema.UnitSwitchingTable
+            ):
                 for event in _events_of(other, table, where):
                     _checked(other, event, {}, where)
         yield from (
-            Problem(p.place, f"scenario {name!r}, which was not asked for: {p.text}") for p in other.found.problems
+            Problem(p.place, f"scenario {name!r}, which was not asked for: {p.text}")
+            for p in other.found.problems
         )
 
 
@@ -91,7 +101,11 @@ def _endless(table: schema.EventTable, stop: float) -> Iterator[str]:
     """Questions about what ends only after the run, or lasts so long that its unit is in doubt."""
     if isinstance(table, schema.BusFaultTable) and table.duration is not None:
         seen = f"duration = {table.duration:g} s"
-        slip = f"; if {table.duration:g} ms is meant, write '{table.duration:g} ms'" if table.has_bare_duration else ""
+        slip = (
+            f"; if {table.duration:g} ms is meant, write '{table.duration:g} ms'"
+            if table.has_bare_duration
+            else ""
+        )
         if table.time + table.duration > stop:
             yield f"{seen}: the fault is not cleared before the run stops at {stop:g} s{slip}"
         elif table.has_bare_duration and table.duration > _LONG_FAULT:
@@ -102,14 +116,22 @@ def _endless(table: schema.EventTable, stop: float) -> Iterator[str]:
 
 
 def _elsewhere(table: schema.EventTable, network: Network | None) -> Iterator[str]:
-    if isinstance(table, schema.BusFaultTable) and table.cleared_by is not None and network is not None:
-        ends = {line.name: (line.from_bus, line.to_bus) for line in network.lines}.get(table.cleared_by, ())
+    if (
+        isinstance(table, schema.BusFaultTable)
+        and table.cleared_by is not None
+        and network is not None
+    ):
+        ends = {line.name: (line.from_bus, line.to_bus) for line in network.lines}.get(
+            table.cleared_by, ()
+        )
         if ends and table.bus not in ends:
             text = f"{table.cleared_by} opens for a fault at {table.bus}, but it joins {' and '.join(ends)}"
             yield f"{text}: the fault goes away though nothing that leads to it opens; is another line meant?"
 
 
-def _all_events_of(draft: Draft, table: schema.EventTable, clock: Clock, stop: float, where: str) -> list[Event]:
+def _all_events_of(
+    draft: Draft, table: schema.EventTable, clock: Clock, stop: float, where: str
+) -> list[Event]:
     if isinstance(table, schema.WireEventTable):
         return wire_events(draft, table, clock, stop, where)
     if isinstance(table, schema.ComponentFaultTable):
@@ -126,11 +148,16 @@ def _events_of(draft: Draft, table: schema.SettingEventTable, where: str) -> lis
     elif table.component is None and draft.found.network_failed:
         return []
     elif table.component is None and draft.grid is None:
-        draft.note(where, "the key 'component' is missing; name the grid here, or in a [power_flow] table")
+        draft.note(
+            where, "the key 'component' is missing; name the grid here, or in a [power_flow] table"
+        )
         return []
     else:
         component = table.component or draft.grid or ""
-    concerned = {component, table.unit if isinstance(table, schema.UnitSwitchingTable) else component}
+    concerned = {
+        component,
+        table.unit if isinstance(table, schema.UnitSwitchingTable) else component,
+    }
     if concerned & set(draft.given.scenario.remove):
         return []
     if isinstance(table, schema.UnitSwitchingTable):
@@ -138,7 +165,9 @@ def _events_of(draft: Draft, table: schema.SettingEventTable, where: str) -> lis
     return _grid_or_reference_events(table, component)
 
 
-def forcing_events(draft: Draft, table: schema.ForcingTable, clock: Clock, stop: float, where: str) -> list[Event]:
+def forcing_events(
+    draft: Draft, table: schema.ForcingTable, clock: Clock, stop: float, where: str
+) -> list[Event]:
     plan = draft.system.components.get(table.component)
     if plan is None:
         if table.component in draft.given.scenario.remove:
@@ -150,24 +179,45 @@ def forcing_events(draft: Draft, table: schema.ForcingTable, clock: Clock, stop:
             known = close_names(table.component, names, f"the case has: {', '.join(draft.tables)}")
             draft.note(where, f"there is no component {table.component!r}; {known}")
         return []
-    tunable = {_reference_of(v): v for v, info in plan.description.variables.items()
-               if info.variability == "tunable" and v.rpartition(".")[2].startswith("delta_")}  # fmt: skip
+    tunable = {
+        _reference_of(v): v
+        for v, info in plan.description.variables.items()
+        if info.variability == "tunable" and v.rpartition(".")[2].startswith("delta_")
+    }
     wanted = table.reference or next((r for r in tunable if r.rpartition(".")[2] in _POWERS), None)
     if wanted not in tunable:
-        what = f"has no reference {wanted!r}" if wanted else "has no reference of its power; name another one"
+        what = (
+            f"has no reference {wanted!r}"
+            if wanted
+            else "has no reference of its power; name another one"
+        )
         draft.note(where, f"{table.component!r} {what}; it has: {', '.join(tunable) or 'none'}")
         return []
     if table.frequency * clock.step_size > _FASTEST:
-        draft.note(where, f"frequency = {table.frequency:g} Hz: a step of {clock.step_size:g} s does not show it; give "
-                   f"at most {_FASTEST / clock.step_size:g} Hz, or a shorter step")  # fmt: skip
+        draft.note(
+            where,
+            f"frequency = {table.frequency:g} Hz: a step of {clock.step_size:g} s does not show it; give "
+            f"at most {_FASTEST / clock.step_size:g} Hz, or a shorter step",
+        )
         return []
     end = stop if table.end is None else table.end
     if end <= table.time or not _is_point(draft, clock, end, "the end of the event", where):
         if end <= table.time < stop:
-            draft.note(where, f"end = {end:g} s is not after time = {table.time:g} s; give a later end")
+            draft.note(
+                where, f"end = {end:g} s is not after time = {table.time:g} s; give a later end"
+            )
         return []
-    return [coupled.Forcing(table.time, table.component, tunable[wanted], table.frequency, table.amplitude, table.shape,
-                    table.end)]  # fmt: skip
+    return [
+        coupled.Forcing(
+            table.time,
+            table.component,
+            tunable[wanted],
+            table.frequency,
+            table.amplitude,
+            table.shape,
+            table.end,
+        )
+    ]
 
 
 def _reference_of(variable: str) -> str:
@@ -183,7 +233,11 @@ def _unit_switching(draft: Draft, table: schema.UnitSwitchingTable, grid: str) -
     has_breaker = plan is not None and "connected" in plan.description.variables
     return [
         coupled.UnitSwitching(
-            table.time, grid, table.unit, isinstance(table, schema.UnitReconnectionTable), has_breaker
+            table.time,
+            grid,
+            table.unit,
+            isinstance(table, schema.UnitReconnectionTable),
+            has_breaker,
         )
     ]
 
@@ -229,13 +283,17 @@ def _fault(table: schema.BusFaultTable, grid: str) -> list[Event]:
     return events
 
 
-def _checked(draft: Draft, event: Event, fed: Mapping[Endpoint, Endpoint], where: str) -> Event | None:
+def _checked(
+    draft: Draft, event: Event, fed: Mapping[Endpoint, Endpoint], where: str
+) -> Event | None:
     """The event with its values in the variables' units; None if something is wrong with it."""
     before = len(draft.found.problems)
     for component, settings in event.changes().items():
         plan = draft.system.components.get(component)
         if plan is None:
-            if component not in draft.tables and not (draft.found.network_failed and component == draft.grid):
+            if component not in draft.tables and not (
+                draft.found.network_failed and component == draft.grid
+            ):
                 names = ", ".join(draft.tables)
                 draft.note(where, f"there is no component {component!r}; the case has: {names}")
             return None
@@ -244,11 +302,17 @@ def _checked(draft: Draft, event: Event, fed: Mapping[Endpoint, Endpoint], where
             if info is None:
                 draft.note(where, _unknown(event, component, variable, plan))
             elif source := fed.get(Endpoint(component, variable)):
-                draft.note(where, f"{component}.{variable} is fed by {source}; change that one's source")
+                draft.note(
+                    where, f"{component}.{variable} is fed by {source}; change that one's source"
+                )
             elif info.causality != "input" and info.variability != "tunable":
                 kind = f"{component}.{variable} is a {info.variability} {info.causality}"
                 draft.note(where, f"{kind}; only tunable parameters and open inputs can change")
-            elif isinstance(event, coupled.LoadSwitching) and info.minimum is not None and event.scale < info.minimum:
+            elif (
+                isinstance(event, coupled.LoadSwitching)
+                and info.minimum is not None
+                and event.scale < info.minimum
+            ):
                 why = "because nothing else determines the voltage of its bus"
                 remedy = "give a line there some charging B, or take load_change"
                 draft.note(where, f"load {event.load!r} cannot be switched off, {why}; {remedy}")

@@ -6,13 +6,15 @@ from orchestrator.cases.load_models import in_words
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import counted
 
-SOURCES = ("raw", "matpower", "pandapower", "cgmes")  # keys of ``[network]`` that name another program's data
+# keys of ``[network]`` that name another program's data
+SOURCES = ("raw", "matpower", "pandapower", "cgmes")
 
 
 @dataclass(frozen=True)
 class Facts:
     sources: tuple[str, ...]  # files, as the case names them
-    phasors: bool  # whether devices give the network an emf behind an admittance; else the models are EMT ones
+    # whether devices give the network an emf behind an admittance; else the models are EMT ones
+    phasors: bool
     frequency_hz: float | None  # rated; None where no component has one
     # buses, machines, converters: how many; units out of service do not count
     buses: int
@@ -21,19 +23,27 @@ class Facts:
     governed: bool  # whether a machine has a governor
     load_mw: float  # active power of all loads, without what feeds in [MW]
     load_model: str
-    slack: tuple[tuple[str, float, float], ...]  # units at the slack bus, with their power [MW] and their rating [MVA]
+    # units at the slack bus, with their power [MW] and their rating [MVA]
+    slack: tuple[tuple[str, float, float], ...]
     voltages_pu: tuple[float, float]  # least and largest magnitude
 
     def sentence(self) -> str:
-        units = [counted(n, what) for n, what in ((self.machines, "machine"), (self.converters, "converter")) if n]
+        units = [
+            counted(n, what)
+            for n, what in ((self.machines, "machine"), (self.converters, "converter"))
+            if n
+        ]
         slack = ", ".join(f"{n} at {p:.4g} MW ({100 * p / S_n:.0f} %)" for n, p, S_n in self.slack)
         parts = [
             "phasor models" if self.phasors else "EMT models",
-            *([f"{self.frequency_hz:g} Hz"] if self.frequency_hz else []), counted(self.buses, "bus"), *units,
+            *([f"{self.frequency_hz:g} Hz"] if self.frequency_hz else []),
+            counted(self.buses, "bus"),
+            *units,
             *(["no governor"] if self.machines and not self.governed else []),
-            f"{self.load_mw:.5g} MW of load ({self.load_model})", *([f"slack {slack}"] if slack else []),
+            f"{self.load_mw:.5g} MW of load ({self.load_model})",
+            *([f"slack {slack}"] if slack else []),
             "voltages {:.3g} to {:.3g} pu".format(*self.voltages_pu),
-        ]  # fmt: skip
+        ]
         return f"{', '.join(self.sources)}: {', '.join(parts)}"
 
 
@@ -53,16 +63,26 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
     at_slack = [name for name in feeding if units[name] == units.get(wanted, wanted)]
     machines = [n for n in feeding if plans[n].kind == "machine"]
     magnitudes = [abs(flow.voltages[bus]) for bus in network.buses]
-    loads = [(x, grid.number(f"{x.name}.scale") * grid.number(f"{x.name}.P")) for x in network.loads]
+    loads = [
+        (x, grid.number(f"{x.name}.scale") * grid.number(f"{x.name}.P")) for x in network.loads
+    ]
     dyr = [table.units.dyr] if table.units is not None and table.units.dyr is not None else []
     return Facts(
-        (*sources, *dyr), any(name.endswith(".y_re") for name in grid.description.inputs), rated_frequency(prepared),
-        len(network.buses), len(machines), len(feeding) - len(machines),
+        (*sources, *dyr),
+        any(name.endswith(".y_re") for name in grid.description.inputs),
+        rated_frequency(prepared),
+        len(network.buses),
+        len(machines),
+        len(feeding) - len(machines),
         any(v.startswith("governor.T_") for n in machines for v in plans[n].description.variables),
-        sum(p for _, p in loads if p > 0), in_words([load for load, p in loads if p > 0]),
-        tuple((n, flow.powers[n].real * plans[n].number("S_n"), plans[n].number("S_n")) for n in at_slack),
+        sum(p for _, p in loads if p > 0),
+        in_words([load for load, p in loads if p > 0]),
+        tuple(
+            (n, flow.powers[n].real * plans[n].number("S_n"), plans[n].number("S_n"))
+            for n in at_slack
+        ),
         (min(magnitudes), max(magnitudes)),
-    )  # fmt: skip
+    )
 
 
 def rated_frequency(prepared: PreparedScenario) -> float | None:

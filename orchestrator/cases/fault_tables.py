@@ -5,7 +5,11 @@ from itertools import pairwise
 
 from orchestrator.cases import schema
 from orchestrator.cases.draft import Draft
-from orchestrator.cases.imperfection_tables import connections_meant, imperfection_of, note_long_delay
+from orchestrator.cases.imperfection_tables import (
+    connections_meant,
+    imperfection_of,
+    note_long_delay,
+)
 from orchestrator.coupling import events as coupled
 from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.events import Event
@@ -17,7 +21,9 @@ from orchestrator.fmi.instance import is_isolated
 _BREAKER = "connected"
 
 
-def wire_events(draft: Draft, table: schema.WireEventTable, clock: Clock, stop: float, where: str) -> list[Event]:
+def wire_events(
+    draft: Draft, table: schema.WireEventTable, clock: Clock, stop: float, where: str
+) -> list[Event]:
     """What an imperfection that begins at a time, and may end, does to every connection that is meant."""
     end = table.end
     if end is not None:
@@ -50,7 +56,9 @@ def component_events(draft: Draft, table: schema.ComponentFaultTable, where: str
     plan = draft.system.components.get(name)
     if plan is None:
         if name not in draft.known:
-            draft.note(where, f"there is no component {name!r}; the case has: {', '.join(draft.tables)}")
+            draft.note(
+                where, f"there is no component {name!r}; the case has: {', '.join(draft.tables)}"
+            )
         return []
     if isinstance(table, schema.ComponentTripTable):
         return _trip(draft, table, where)
@@ -61,7 +69,10 @@ def component_events(draft: Draft, table: schema.ComponentFaultTable, where: str
             return []
         return [coupled.Silence(table.time, name)]
     if not any(c.source.component == name for c in draft.system.connections):
-        draft.note(where, f"component {name!r} feeds nothing, so that nobody would notice what its outputs are")
+        draft.note(
+            where,
+            f"component {name!r} feeds nothing, so that nobody would notice what its outputs are",
+        )
         return []
     return [coupled.NotANumber(table.time, name)]
 
@@ -85,13 +96,18 @@ def _trip(draft: Draft, table: schema.ComponentTripTable, where: str) -> list[Ev
     name, components = table.component, draft.system.components
     own = _BREAKER in components[name].description.variables
     port = f"{name}.{_BREAKER}"
-    if grid := next((other for other, plan in components.items() if port in plan.description.variables), None):
+    if grid := next(
+        (other for other, plan in components.items() if port in plan.description.variables), None
+    ):
         return [coupled.UnitSwitching(table.time, grid, name, connected=False, has_breaker=own)]
     if own:
         return [coupled.ParameterChange(table.time, name, _BREAKER, False)]
     given = [c for c in draft.system.connections if c.source.component == name]
     if not given:
-        draft.note(where, f"component {name!r} has no breaker and feeds nothing, so that its trip would change nothing")
+        draft.note(
+            where,
+            f"component {name!r} has no breaker and feeds nothing, so that its trip would change nothing",
+        )
     for connection in given:
         draft.system.foresee(connection, DropOut(0.0))
     return [coupled.WireFault(table.time, c.target.component, c, DropOut(0.0)) for c in given]
@@ -128,16 +144,22 @@ def _set_by(event: Event) -> Iterator[str]:
 
 def _replaced_ends(draft: Draft, events: Sequence[tuple[Event, str]]) -> set[int]:
     """Ends at which another imperfection of the kind begins; one that begins before the other's end is noted."""
-    by_kind: dict[tuple[str, str], list[tuple[coupled.WireFault, coupled.WireRecovery | None, str]]] = {}
+    by_kind: dict[
+        tuple[str, str], list[tuple[coupled.WireFault, coupled.WireRecovery | None, str]]
+    ] = {}
     for k, (event, where) in enumerate(events):
         if isinstance(event, coupled.WireFault):
             after = events[k + 1][0] if k + 1 < len(events) else None
             mine = isinstance(after, coupled.WireRecovery) and after.connection == event.connection
             end = after if mine and isinstance(after, coupled.WireRecovery) else None
-            by_kind.setdefault((str(event.connection), _kind(event)), []).append((event, end, where))
+            by_kind.setdefault((str(event.connection), _kind(event)), []).append(
+                (event, end, where)
+            )
     obsolete = set()
     for (connection, kind), faults in by_kind.items():
-        for (one, end, where), (other, _, elsewhere) in pairwise(sorted(faults, key=lambda f: f[0].time)):
+        for (one, end, where), (other, _, elsewhere) in pairwise(
+            sorted(faults, key=lambda f: f[0].time)
+        ):
             if end is not None and end.time == other.time:
                 obsolete.add(id(end))
             elif one.time < other.time and (end is None or end.time > other.time):

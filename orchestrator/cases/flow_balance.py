@@ -65,7 +65,10 @@ class FlowShunt:
 
 
 def nodal_powers(
-    voltages: Mapping[str, complex], lines: Sequence[FlowLine], loads: Sequence[FlowLoad], shunts: Sequence[FlowShunt]
+    voltages: Mapping[str, complex],
+    lines: Sequence[FlowLine],
+    loads: Sequence[FlowLoad],
+    shunts: Sequence[FlowShunt],
 ) -> dict[str, complex]:
     """P + jQ [pu, 100 MVA] that units must feed into every bus to give these voltages."""
     needed = dict.fromkeys(voltages, 0j)
@@ -92,7 +95,11 @@ def check_connected(buses: Sequence[str], lines: Sequence[FlowLine], slack_bus: 
         waiting += found
         reached |= found
     if islands := [bus for bus in buses if bus not in reached]:
-        opened = [line.name for line in lines if not line.closed and {line.from_bus, line.to_bus} & set(islands)]
+        opened = [
+            line.name
+            for line in lines
+            if not line.closed and {line.from_bus, line.to_bus} & set(islands)
+        ]
         remedy = f"close {', '.join(opened[:5])}, " if opened else ""
         raise InputError(
             f"power flow: no way leads to the slack bus {slack_bus!r} from: {', '.join(map(repr, islands[:10]))}; "
@@ -123,7 +130,9 @@ def legs_of(transformer: ThreeWinding, *, closed: bool = True) -> list[FlowLine]
         is_closed = closed or k == 0
         if _is_split(transformer, k):
             inner = f"{transformer.name}.inner_{k + 1}"
-            legs.append(FlowLine(f"{name}_ratio", bus, inner, 0.0, _PART, 0.0, closed=is_closed, **ratio))
+            legs.append(
+                FlowLine(f"{name}_ratio", bus, inner, 0.0, _PART, 0.0, closed=is_closed, **ratio)
+            )
             legs.append(FlowLine(name, inner, star, R, X - _PART, 0.0))
         else:
             legs.append(FlowLine(name, bus, star, R, X, 0.0, closed=is_closed, **ratio))

@@ -25,7 +25,8 @@ class FlowEquations:
     rows: NDArray[np.int64]
     columns: NDArray[np.int64]
     admittances: NDArray[np.complex128]
-    fed: NDArray[np.complex128]  # P + jQ that is fed into every bus [pu]: what units feed, less the loads
+    # P + jQ that is fed into every bus [pu]: what units feed, less the loads
+    fed: NDArray[np.complex128]
     slack: int  # the bus with a given voltage and angle zero
     held: NDArray[np.bool_]  # whether a bus has a voltage of given magnitude
     magnitudes: NDArray[np.float64]  # the given magnitudes [pu]; 1 elsewhere
@@ -33,9 +34,15 @@ class FlowEquations:
 
     @classmethod
     def of(
-        cls, buses: Sequence[str], lines: Sequence[FlowLine], loads: Sequence[FlowLoad], shunts: Sequence[FlowShunt],
-        active: Mapping[str, float], held: Mapping[str, float], slack_bus: str,
-    ) -> "FlowEquations":  # fmt: skip
+        cls,
+        buses: Sequence[str],
+        lines: Sequence[FlowLine],
+        loads: Sequence[FlowLoad],
+        shunts: Sequence[FlowShunt],
+        active: Mapping[str, float],
+        held: Mapping[str, float],
+        slack_bus: str,
+    ) -> "FlowEquations":
         """The equations of a network.
 
         ``active``: active power that units feed, by bus [pu, 100 MVA].
@@ -51,8 +58,11 @@ class FlowEquations:
                 y = 1 / complex(line.R, line.X)
                 turn = complex(math.cos(line.shift), math.sin(line.shift))
                 triplets += [
-                    (i, i, y / line.tap**2), (j, j, y), (i, j, -y * turn / line.tap), (j, i, -y / turn / line.tap),
-                ]  # fmt: skip
+                    (i, i, y / line.tap**2),
+                    (j, j, y),
+                    (i, j, -y * turn / line.tap),
+                    (j, i, -y / turn / line.tap),
+                ]
         triplets += [(position[s.bus], position[s.bus], complex(s.g, s.b)) for s in shunts]
         fed = np.zeros(len(buses), dtype=complex)
         for load in loads:
@@ -60,11 +70,16 @@ class FlowEquations:
         for bus, power in active.items():
             fed[position[bus]] += power
         return cls(
-            tuple(buses), np.array([t[0] for t in triplets], dtype=np.int64),
-            np.array([t[1] for t in triplets], dtype=np.int64), np.array([t[2] for t in triplets], dtype=np.complex128),
-            fed, position[slack_bus], np.array([bus in held for bus in buses]),
-            np.array([held.get(bus, 1.0) for bus in buses]), tuple(lines),
-        )  # fmt: skip
+            tuple(buses),
+            np.array([t[0] for t in triplets], dtype=np.int64),
+            np.array([t[1] for t in triplets], dtype=np.int64),
+            np.array([t[2] for t in triplets], dtype=np.complex128),
+            fed,
+            position[slack_bus],
+            np.array([bus in held for bus in buses]),
+            np.array([held.get(bus, 1.0) for bus in buses]),
+            tuple(lines),
+        )
 
     @cached_property
     def angle_buses(self) -> NDArray[np.int64]:
@@ -77,7 +92,9 @@ class FlowEquations:
 
     @cached_property
     def matrix(self) -> csr_array:
-        return coo_array((self.admittances, (self.rows, self.columns)), shape=(len(self.buses),) * 2).tocsr()
+        return coo_array(
+            (self.admittances, (self.rows, self.columns)), shape=(len(self.buses),) * 2
+        ).tocsr()
 
     def powers(self, voltages: np.ndarray) -> np.ndarray:
         """P + jQ that flows from every bus into the network [pu], in the precision of the voltages."""
@@ -99,13 +116,21 @@ class FlowEquations:
     def jacobian(self, voltages: NDArray[np.complex128]) -> csc_array:
         """Derivatives of the mismatch by the unknown angles [rad] and by the unknown magnitudes [pu]."""
         matrix, unit = self.matrix, voltages / np.abs(voltages)
-        current, v, direction = diags_array(matrix @ voltages), diags_array(voltages), diags_array(unit)
+        current, v, direction = (
+            diags_array(matrix @ voltages),
+            diags_array(voltages),
+            diags_array(unit),
+        )
         by_angle = 1j * (v @ (current - matrix @ v).conj())
         by_magnitude = v @ (matrix @ direction).conj() + current.conj() @ direction
         a, m = by_angle.tocsr(), by_magnitude.tocsr()
         p, q = self.angle_buses, self.free_buses
         return vstack(
-            [hstack([a[p][:, p].real, m[p][:, q].real]), hstack([a[q][:, p].imag, m[q][:, q].imag])], format="csc"
+            [
+                hstack([a[p][:, p].real, m[p][:, q].real]),
+                hstack([a[q][:, p].imag, m[q][:, q].imag]),
+            ],
+            format="csc",
         )
 
     def dc_angles(self) -> NDArray[np.float64]:
@@ -120,7 +145,9 @@ class FlowEquations:
         np.add.at(power, i, turned)
         np.add.at(power, j, -turned)
         where = np.concatenate([i, j, i, j]), np.concatenate([i, j, j, i])
-        matrix = coo_array((np.concatenate([b, b, -b, -b]), where), shape=(len(self.buses),) * 2).tocsc()
+        matrix = coo_array(
+            (np.concatenate([b, b, -b, -b]), where), shape=(len(self.buses),) * 2
+        ).tocsc()
         angles, known = np.zeros(len(self.buses)), self.angle_buses
         if len(known):
             angles[known] = spsolve(matrix[known][:, known], power[known])

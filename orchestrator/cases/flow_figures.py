@@ -19,11 +19,17 @@ def power_flow_json(prepared: PreparedScenario) -> dict[str, Any] | None:
         into, out = (complex(SYSTEM_BASE_MVA * power) for power in ends)
         branches.append(
             {
-                "name": line.name, "from_bus": line.from_bus, "to_bus": line.to_bus, "closed": line.closed,
-                "p_from_mw": into.real, "q_from_mvar": into.imag, "p_to_mw": out.real, "q_to_mvar": out.imag,
+                "name": line.name,
+                "from_bus": line.from_bus,
+                "to_bus": line.to_bus,
+                "closed": line.closed,
+                "p_from_mw": into.real,
+                "q_from_mvar": into.imag,
+                "p_to_mw": out.real,
+                "q_to_mvar": out.imag,
                 "losses_mw": into.real + out.real,
             }
-        )  # fmt: skip
+        )
     places = {port.name: port.bus for port in prepared.network.ports} if prepared.network else {}
     machines: list[dict[str, Any]] = []
     for name, power in flow.powers.items():
@@ -31,17 +37,23 @@ def power_flow_json(prepared: PreparedScenario) -> dict[str, Any] | None:
         rating = plan.number("S_n")
         machines.append(
             {
-                "name": name, "bus": places[name], "rating_mva": rating, "p_mw": power.real * rating,
-                "q_mvar": power.imag * rating, "loading_percent": 100 * abs(power),
+                "name": name,
+                "bus": places[name],
+                "rating_mva": rating,
+                "p_mw": power.real * rating,
+                "q_mvar": power.imag * rating,
+                "loading_percent": 100 * abs(power),
             }
-        )  # fmt: skip
+        )
     total = sum(machine["p_mw"] for machine in machines)
     slack = [machine for machine in machines if machine["bus"] == flow.slack]
     fed = sum(machine["p_mw"] for machine in slack)
     return {
         "residual_pu": flow.residual,
         "slack": {
-            "bus": flow.slack, "units": [machine["name"] for machine in slack], "p_mw": fed,
+            "bus": flow.slack,
+            "units": [machine["name"] for machine in slack],
+            "p_mw": fed,
             "share_percent": 100 * fed / total if total else None,
         },
         "generation_mw": total,
@@ -52,4 +64,4 @@ def power_flow_json(prepared: PreparedScenario) -> dict[str, Any] | None:
         ],
         "branches": branches,
         "machines": machines,
-    }  # fmt: skip
+    }

@@ -22,7 +22,8 @@ _RETURNS = 2  # so many times a bus may get its voltage back; then it stays at i
 @dataclass(frozen=True, slots=True)
 class Excess:
     bus: str
-    q: float  # reactive power that holding the voltage takes [pu, 100 MVA]; the limit itself where it is kept
+    # reactive power that holding the voltage takes [pu, 100 MVA]; the limit itself where it is kept
+    q: float
     limit: float  # the limit [pu, 100 MVA]
     # wanted, voltage: magnitude that the units would hold, and the one that it has [pu]
     wanted: float
@@ -46,11 +47,15 @@ def exceeded(equations: FlowEquations, voltages: np.ndarray, limits: Limits) -> 
             limit = most if q[k] > most + _TOUCHED else least if q[k] < least - _TOUCHED else None
             if limit is not None:
                 magnitude = float(abs(voltages[k]))
-                found.append(Excess(bus, float(q[k]), limit, float(equations.magnitudes[k]), magnitude))
+                found.append(
+                    Excess(bus, float(q[k]), limit, float(equations.magnitudes[k]), magnitude)
+                )
     return found
 
 
-def solve_with_limits(equations: FlowEquations, limits: Limits) -> tuple[FlowEquations, NewtonResult, list[Excess]]:
+def solve_with_limits(
+    equations: FlowEquations, limits: Limits
+) -> tuple[FlowEquations, NewtonResult, list[Excess]]:
     """Solve, and let every bus that exceeds a limit feed that limit instead of holding its voltage; the slack bus
     holds its own whatever it takes.
 
@@ -62,11 +67,21 @@ def solve_with_limits(equations: FlowEquations, limits: Limits) -> tuple[FlowEqu
     for _ in range(_ROUNDS):
         if not result.converged:
             return current, result, []
-        new = [e for e in exceeded(current, result.voltages, limits) if position[e.bus] != equations.slack]
+        new = [
+            e
+            for e in exceeded(current, result.voltages, limits)
+            if position[e.bus] != equations.slack
+        ]
         back = [
             bus
             for bus, limit in at_limit.items()
-            if _can_hold(bus, limit, limits, abs(result.voltages[position[bus]]), equations.magnitudes[position[bus]])
+            if _can_hold(
+                bus,
+                limit,
+                limits,
+                abs(result.voltages[position[bus]]),
+                equations.magnitudes[position[bus]],
+            )
             and returns[bus] < _RETURNS
         ]
         if not new and not back:
@@ -89,7 +104,9 @@ def _can_hold(bus: str, limit: float, limits: Limits, magnitude: float, wanted: 
     return least < most and (magnitude > wanted if limit == most else magnitude < wanted)
 
 
-def _with_fixed(equations: FlowEquations, at_limit: Mapping[str, float], position: Mapping[str, int]) -> FlowEquations:
+def _with_fixed(
+    equations: FlowEquations, at_limit: Mapping[str, float], position: Mapping[str, int]
+) -> FlowEquations:
     held, fed = equations.held.copy(), equations.fed.copy()
     for bus, limit in at_limit.items():
         held[position[bus]] = False
@@ -97,10 +114,14 @@ def _with_fixed(equations: FlowEquations, at_limit: Mapping[str, float], positio
     return replace(equations, held=held, fed=fed)
 
 
-def _at_limits(equations: FlowEquations, result: NewtonResult, at_limit: Mapping[str, float]) -> list[Excess]:
+def _at_limits(
+    equations: FlowEquations, result: NewtonResult, at_limit: Mapping[str, float]
+) -> list[Excess]:
     found = []
     for k, bus in enumerate(equations.buses):
         if bus in at_limit:
             voltage = float(abs(result.voltages[k]))
-            found.append(Excess(bus, at_limit[bus], at_limit[bus], float(equations.magnitudes[k]), voltage))
+            found.append(
+                Excess(bus, at_limit[bus], at_limit[bus], float(equations.magnitudes[k]), voltage)
+            )
     return found

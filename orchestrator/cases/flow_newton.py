@@ -28,7 +28,8 @@ _LEAST_VOLTAGE = 0.01  # magnitude [pu] below which no step goes
 @dataclass(frozen=True)
 class NewtonResult:
     voltages: NDArray[np.complex128]  # complex bus voltages [pu]
-    converged: bool  # whether the mismatch is below `CONVERGED`, and no voltage below `LOWEST_VOLTAGE`
+    # whether the mismatch is below `CONVERGED`, and no voltage below `LOWEST_VOLTAGE`
+    converged: bool
     # largest mismatch [pu, 100 MVA] before the first and after each iteration, and its bus
     history: tuple[tuple[float, str], ...]
 
@@ -89,7 +90,11 @@ def _newton(equations: FlowEquations, start: NDArray[np.complex128]) -> NewtonRe
         for _ in range(_HALVINGS):
             trial = _moved(equations, angle, magnitude, length * step)
             left = equations.mismatch(_voltages(*trial))
-            if np.isfinite(left).all() and trial[1].min() > _LEAST_VOLTAGE and np.linalg.norm(left) < norm:
+            if (
+                np.isfinite(left).all()
+                and trial[1].min() > _LEAST_VOLTAGE
+                and np.linalg.norm(left) < norm
+            ):
                 break
             length /= 2
         else:
@@ -103,7 +108,10 @@ def _newton(equations: FlowEquations, start: NDArray[np.complex128]) -> NewtonRe
 
 
 def _polished(
-    equations: FlowEquations, angle: np.ndarray, magnitude: np.ndarray, history: list[tuple[float, str]]
+    equations: FlowEquations,
+    angle: np.ndarray,
+    magnitude: np.ndarray,
+    history: list[tuple[float, str]],
 ) -> NewtonResult:
     """The solution as exact as it gets."""
     angle, magnitude = angle.astype(np.longdouble), magnitude.astype(np.longdouble)

@@ -13,7 +13,9 @@ _HELD = "holds its bus there, whatever reactive power that takes; give v_0, or g
 def flow_unit(name: str, bus: str, plan: ComponentPlan, *, connected: bool) -> FlowUnit:
     """A unit as the power flow sees it: one whose ``Q_0`` is set feeds that, any other holds its ``v_0``."""
     Q_0 = plan.number("Q_0") if "Q_0" in plan.parameters else None
-    return FlowUnit(name, bus, plan.number("S_n"), plan.number("P_0"), plan.number("v_0"), connected, Q_0)
+    return FlowUnit(
+        name, bus, plan.number("S_n"), plan.number("P_0"), plan.number("v_0"), connected, Q_0
+    )
 
 
 def note_contradictions(draft: Draft, units: Mapping[str, str]) -> None:
@@ -22,7 +24,10 @@ def note_contradictions(draft: Draft, units: Mapping[str, str]) -> None:
         given = draft.system.components[name].parameters
         if "theta_0" in given:
             place = _place(draft, name, "theta_0")
-            draft.note(place, f"{name}: theta_0 cannot be set, because the power flow computes it; remove it")
+            draft.note(
+                place,
+                f"{name}: theta_0 cannot be set, because the power flow computes it; remove it",
+            )
         if {"Q_0", "v_0"} <= {*given}:
             if name in draft.origins:
                 remedy = "remove Q_0, because the units' table gives v_0"
@@ -45,11 +50,14 @@ def undecided_units(draft: Draft, units: Mapping[str, str], slack: str) -> Itera
         follows = any(variable.startswith("pll.") for variable in plan.description.parameters)
         if not follows or bus == slack or {"v_0", "Q_0"} & {*plan.parameters}:
             continue
-        if any("v_0" in draft.system.components[other].parameters for other, at in units.items() if at == bus):
+        if any(
+            "v_0" in draft.system.components[other].parameters
+            for other, at in units.items()
+            if at == bus
+        ):
             continue
-        text = (
-            f"neither v_0 nor Q_0 is given: its default, v_0 = {plan.number('v_0'):g} {unit_of(plan, 'v_0')}, {_HELD}"
-        )
+        default = f"v_0 = {plan.number('v_0'):g} {unit_of(plan, 'v_0')}"
+        text = f"neither v_0 nor Q_0 is given: its default, {default}, {_HELD}"
         yield UnusualValue(f"{name}.v_0", place_of(draft, name, "v_0"), text)
 
 

@@ -12,15 +12,25 @@ from orchestrator.units import to_unit
 
 _BEGIN = 1.0  # time at which an event in words begins unless it says another [s]
 _FORMS = {
-    "force": (ForcingTable, "forcing", re.compile(
-        r"(?P<component>[^\s.]+)(\.(?P<reference>\S+))?\s+(?P<frequency>\S+\s*[mk]?Hz)\s+(?P<amplitude>\S+?\s*(%|pu))"
-        r"(\s+(?P<shape>sine|square))?(\s+from\s+(?P<time>\S+\s*[mu]?s))?"
-    ), "'UNIT FREQUENCY AMPLITUDE', such as 'sg35 0.8 Hz 2 %'; a reference ('sg35.exciter.V_ref'), a shape ('square')"),
-    "fault": (BusFaultTable, "bus_fault", re.compile(
-        r"(bus )?(?P<bus>[^\s,]+)\s*,\s*(?P<duration>[^\s,]+\s*[mu]?s)(\s*,\s*opens\s+(?P<cleared_by>[^\s,]+))?"
-        r"(\s*,?\s*from\s+(?P<time>\S+\s*[mu]?s))?"
-    ), "'BUS, DURATION', such as 'bus_9, 150 ms'; the line that clears it ('opens line_7_9')"),
-}  # fmt: skip
+    "force": (
+        ForcingTable,
+        "forcing",
+        re.compile(
+            r"(?P<component>[^\s.]+)(\.(?P<reference>\S+))?\s+(?P<frequency>\S+\s*[mk]?Hz)\s+(?P<amplitude>\S+?\s*(%|pu))"
+            r"(\s+(?P<shape>sine|square))?(\s+from\s+(?P<time>\S+\s*[mu]?s))?"
+        ),
+        "'UNIT FREQUENCY AMPLITUDE', such as 'sg35 0.8 Hz 2 %'; a reference ('sg35.exciter.V_ref'), a shape ('square')",
+    ),
+    "fault": (
+        BusFaultTable,
+        "bus_fault",
+        re.compile(
+            r"(bus )?(?P<bus>[^\s,]+)\s*,\s*(?P<duration>[^\s,]+\s*[mu]?s)(\s*,\s*opens\s+(?P<cleared_by>[^\s,]+))?"
+            r"(\s*,?\s*from\s+(?P<time>\S+\s*[mu]?s))?"
+        ),
+        "'BUS, DURATION', such as 'bus_9, 150 ms'; the line that clears it ('opens line_7_9')",
+    ),
+}
 """Option → what it asks for, its form, and that in words."""
 
 
@@ -28,10 +38,20 @@ def with_events(case: Case, forcings: Sequence[str], faults: Sequence[str]) -> C
     """The case with these in the place of all its events; see `event_of`."""
     if not (forcings or faults):
         return case
-    events = [*(event_of("force", text) for text in forcings), *(event_of("fault", text) for text in faults)]
-    scenarios = {name: table.model_copy(update={"events": None}) for name, table in case.table.scenarios.items()}
+    events = [
+        *(event_of("force", text) for text in forcings),
+        *(event_of("fault", text) for text in faults),
+    ]
+    scenarios = {
+        name: table.model_copy(update={"events": None})
+        for name, table in case.table.scenarios.items()
+    }
     table: CaseTable = case.table.model_copy(update={"events": events, "scenarios": scenarios})
-    said = [f'{option} "{text}"' for option, texts in (("force", forcings), ("fault", faults)) for text in texts]
+    said = [
+        f'{option} "{text}"'
+        for option, texts in (("force", forcings), ("fault", faults))
+        for text in texts
+    ]
     return replace(case, table=table, events_given=tuple(said))
 
 
@@ -40,7 +60,9 @@ def event_of(option: str, text: str) -> ForcingTable | BusFaultTable:
     kind, name, form, how = _FORMS[option]
     parts = form.fullmatch(" ".join(text.split()))
     if parts is None:
-        raise InputError(f"--{option} {text!r}: it is not of the form {how} and a begin ('from 2 s') may be added")
+        raise InputError(
+            f"--{option} {text!r}: it is not of the form {how} and a begin ('from 2 s') may be added"
+        )
     given = {key: word for key, word in parts.groupdict().items() if word is not None}
     try:
         time = to_unit(given.pop("time", _BEGIN), "s")
@@ -48,5 +70,9 @@ def event_of(option: str, text: str) -> ForcingTable | BusFaultTable:
         table: ForcingTable | BusFaultTable = kind(type=name, time=time, **given)
         return table.asked_as(f"--{option} {text!r}")
     except ValueError as error:  # pydantic's and ours
-        reasons = [str(e["msg"]) for e in error.errors()] if hasattr(error, "errors") else [str(error)]
-        raise InputError(f"--{option} {text!r}: {'; '.join(reasons).removeprefix('Value error, ')}") from error
+        reasons = (
+            [str(e["msg"]) for e in error.errors()] if hasattr(error, "errors") else [str(error)]
+        )
+        raise InputError(
+            f"--{option} {text!r}: {'; '.join(reasons).removeprefix('Value error, ')}"
+        ) from error

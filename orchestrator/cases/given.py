@@ -34,15 +34,25 @@ def plain(values: Mapping[str, Any] | None, argument: str = "values") -> dict[st
     from orchestrator.cases.values import flatten, given_twice  # noqa: PLC0415 - a record needs no case
 
     if not isinstance(values, Mapping):
-        raise InputError(f"{argument} = {values!r}; give values by name, such as {{'grid.X_L': 0.3}}")
+        raise InputError(
+            f"{argument} = {values!r}; give values by name, such as {{'grid.X_L': 0.3}}"
+        )
     if wrong := [key for key in _keys(values) if not isinstance(key, str)]:
-        raise InputError(f"{argument}: {wrong[0]!r} is not a name; give values by name, such as {{'grid.X_L': 0.3}}")
+        raise InputError(
+            f"{argument}: {wrong[0]!r} is not a name; give values by name, such as {{'grid.X_L': 0.3}}"
+        )
     flat = flatten(values)
     if twice := given_twice(flat):
         raise InputError(f"{argument}: {twice[0]!r} is given twice, flat and nested; give it once")
     found = {".".join(path): plain_value(value) for path, value in flat}
-    if several := [name for name, value in found.items() if hasattr(value, "__len__") and not isinstance(value, str)]:
-        raise InputError(f"{argument}: {several[0]} is given several values; give one, or vary it with case.sweep(…)")
+    if several := [
+        name
+        for name, value in found.items()
+        if hasattr(value, "__len__") and not isinstance(value, str)
+    ]:
+        raise InputError(
+            f"{argument}: {several[0]} is given several values; give one, or vary it with case.sweep(…)"
+        )
     return found
 
 
@@ -58,7 +68,9 @@ def check_case_name(name: str, argument: str) -> None:
     from orchestrator.cases.build_choices import ALPHA, MODELS  # noqa: PLC0415 - a record needs no case
 
     if not _CASE_VALUE.fullmatch(name) and name not in (ALPHA, MODELS):
-        raise InputError(f"{argument}: {name!r} is not of the form component.variable, such as 'grid.X_L'")
+        raise InputError(
+            f"{argument}: {name!r} is not of the form component.variable, such as 'grid.X_L'"
+        )
 
 
 def _keys(values: Mapping[Any, Any]) -> Iterable[Any]:
@@ -84,17 +96,24 @@ def kept(given: Any, name: str, argument: str) -> Path:
         try:
             text = tomli_w.dumps(given)
         except (TypeError, ValueError, AttributeError) as error:
-            raise InputError(f"{argument}: {error}; give what TOML has: tables, lists, numbers and text") from error
+            raise InputError(
+                f"{argument}: {error}; give what TOML has: tables, lists, numbers and text"
+            ) from error
         return keep(FROM_TABLES + text, name)
     if isinstance(given, Mapping) and all(isinstance(row, Mapping) for row in given.values()):
-        table = pd.DataFrame([*given.values()], index=[*given])  # a row without values is the case as it is
+        # a row without values is the case as it is
+        table = pd.DataFrame([*given.values()], index=[*given])
     else:
         table = given if hasattr(given, "to_csv") else pd.DataFrame.from_dict(given, orient="index")
     if not hasattr(table, "columns"):
-        raise InputError(f"{argument}: a {type(given).__name__} has no columns; give a DataFrame, a row each")
+        raise InputError(
+            f"{argument}: a {type(given).__name__} has no columns; give a DataFrame, a row each"
+        )
     if table is given and (gaps := [str(name) for name in table if table[name].isna().any()]):
-        warnings.warn(f"question: {argument}: {', '.join(gaps)}: the case's value is taken at NaN; is it meant?",
-                      stacklevel=2)  # fmt: skip
+        warnings.warn(
+            f"question: {argument}: {', '.join(gaps)}: the case's value is taken at NaN; is it meant?",
+            stacklevel=2,
+        )
     named = {"time", "name"} & set(table.columns)
     return keep(table.to_csv(index=not named, index_label=None if named else "name"), name)
 
@@ -114,12 +133,16 @@ def in_seconds(time: Time | None, argument: str) -> float | None:
     """A time [s]; None for None."""
     if time is None:
         return None
-    return number_between(time, "s", argument, 5e-324, 1e308, "a time above 0 and finite, such as 5.0 or '200 us'")
+    return number_between(
+        time, "s", argument, 5e-324, 1e308, "a time above 0 and finite, such as 5.0 or '200 us'"
+    )
 
 
 def moment(time: Any, argument: str) -> float:
     """A time on the axis of a run [s], which begins at 0."""
-    return number_between(time, "s", argument, 0.0, 1e308, "a time of 0 or later and finite, such as 2.0 or '500 ms'")
+    return number_between(
+        time, "s", argument, 0.0, 1e308, "a time of 0 or later and finite, such as 2.0 or '500 ms'"
+    )
 
 
 def part_of_record(times: Numbers, start: Any, stop: Any, label: str) -> tuple[float, float]:
@@ -127,10 +150,14 @@ def part_of_record(times: Numbers, start: Any, stop: Any, label: str) -> tuple[f
     first, last = float(times[0]), float(times[-1])
     begin = first if start is None else moment(start, "start")
     if begin >= last:
-        raise InputError(f"start = {start!r}: the record of {label} ends at t = {last:g} s; give an earlier start")
+        raise InputError(
+            f"start = {start!r}: the record of {label} ends at t = {last:g} s; give an earlier start"
+        )
     end = last if stop is None else moment(stop, "stop")
     if end <= max(begin, first):
-        raise InputError(f"stop = {stop!r}: it must come after start = {start or first!r}; give a later stop")
+        raise InputError(
+            f"stop = {stop!r}: it must come after start = {start or first!r}; give a later stop"
+        )
     return begin, end
 
 
@@ -139,7 +166,9 @@ def in_megabytes(given: Any, argument: str, least: float) -> float:
     rule = "an amount of memory in MB, such as 4096, or '4 GB'"
     number = number_in(given, "MB", argument, rule)
     if not number < float("inf") or not number > 0:
-        raise InputError(f"{argument} = {given!r}; it must be above 0 MB and finite, such as 4096 or '4 GB'")
+        raise InputError(
+            f"{argument} = {given!r}; it must be above 0 MB and finite, such as 4096 or '4 GB'"
+        )
     if number < least:
         raise InputError(
             f"{argument} = {given!r} is {number:g} MB, too little to load any FMU; give at least {least:g} MB, such as "
@@ -151,5 +180,7 @@ def in_megabytes(given: Any, argument: str, least: float) -> float:
 def parameter_files(paths: Paths) -> list[ParameterFile]:
     from orchestrator.cases.parameter_files import read_parameter_file  # noqa: PLC0415 - a record needs no case
 
-    listed = [paths] if isinstance(paths, str | Path) or not isinstance(paths, Iterable) else list(paths)
+    listed = (
+        [paths] if isinstance(paths, str | Path) or not isinstance(paths, Iterable) else list(paths)
+    )
     return [read_parameter_file(path(one, "parameters")) for one in listed]

@@ -11,7 +11,8 @@ from orchestrator.errors import Problem, few
 
 _SHOWN = 3
 
-DAMPING_CONTROLLERS = ("pod_p", "pod_q")  # parts of converters that act by a gain ``K`` and have no effect at rest
+# parts of converters that act by a gain ``K`` and have no effect at rest
+DAMPING_CONTROLLERS = ("pod_p", "pod_q")
 
 Idle = Mapping[str, Problem | None]
 """By ``component.variable``, all values that somebody gave; with a question where one cannot act."""
@@ -27,16 +28,23 @@ def why_idle(system: System, name: str, variable: str, moved: Collection[str] = 
     parts = variable.split(".")
     for part in (".".join(parts[:depth]) for depth in range(1, len(parts))):
         for key in (f"{part}.enabled", *([f"{part}.K"] if part in DAMPING_CONTROLLERS else [])):
-            known = key != variable and key in plan.description.variables and f"{name}.{key}" not in moved
+            known = (
+                key != variable
+                and key in plan.description.variables
+                and f"{name}.{key}" not in moved
+            )
             if known and plan.number(key) == 0:
                 return f"{name}.{key} is {str(plan.value(key)).lower()}"
     return ""
 
 
 def idle_values(
-    system: System, keys: frozenset[str], places: Mapping[str, str], events: Sequence[Event],
+    system: System,
+    keys: frozenset[str],
+    places: Mapping[str, str],
+    events: Sequence[Event],
     absent: Mapping[str, str] = MappingProxyType({}),
-) -> Idle:  # fmt: skip
+) -> Idle:
     """What keys with patterns set, and where that cannot act; a switch that is given too, or moves later, is meant.
 
     ``absent``: places of values that components of other scenarios were given."""
@@ -46,7 +54,9 @@ def idle_values(
         for name in fnmatch.filter(system.components, pattern)
         if variable in system.components[name].description.variables
     ]
-    moved = {f"{who}.{key}" for event in events for who, new in event.changes().items() for key in new}
+    moved = {
+        f"{who}.{key}" for event in events for who, new in event.changes().items() for key in new
+    }
     moved |= {f"{name}.{variable}" for name, variable in given}
     found: dict[str, Problem | None] = {}
     for name, of_one in groupby(sorted(absent.keys() & keys), lambda key: key.partition(".")[0]):
@@ -64,14 +74,21 @@ def others_on(system: System, pattern: str, variable: str, said: Sequence[str]) 
     switches = {f"{controller}.enabled" for controller in DAMPING_CONTROLLERS}
     on = [
         f"{name}.{switch}"
-        for name, plan in system.components.items() if variable in switches and fnmatch.fnmatchcase(name, pattern)
-        for switch in sorted((switches - {variable}) & plan.description.variables.keys()) if plan.value(switch)
-    ]  # fmt: skip
+        for name, plan in system.components.items()
+        if variable in switches and fnmatch.fnmatchcase(name, pattern)
+        for switch in sorted((switches - {variable}) & plan.description.variables.keys())
+        if plan.value(switch)
+    ]
     return [other for other in on if not any(fnmatch.fnmatchcase(other, key) for key in said)]
 
 
 def idle_everywhere(scenarios: Sequence[Idle]) -> list[Problem]:
     """The questions about values that act in none of some scenarios."""
     acting = {name for idle in scenarios for name, question in idle.items() if question is None}
-    asked = (question for idle in scenarios for name, question in idle.items() if question and name not in acting)
+    asked = (
+        question
+        for idle in scenarios
+        for name, question in idle.items()
+        if question and name not in acting
+    )
     return list(dict.fromkeys(asked))

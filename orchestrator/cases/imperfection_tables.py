@@ -12,7 +12,14 @@ from orchestrator.cases.draft import Draft
 from orchestrator.cases.names import close_names
 from orchestrator.cases.values import convert
 from orchestrator.coupling.clock import Clock
-from orchestrator.coupling.imperfections import Bias, Delay, DropOut, Imperfection, Noise, Quantisation
+from orchestrator.coupling.imperfections import (
+    Bias,
+    Delay,
+    DropOut,
+    Imperfection,
+    Noise,
+    Quantisation,
+)
 from orchestrator.coupling.system import Connection, System
 from orchestrator.coupling.wire_bank import whole_steps
 from orchestrator.errors import InputError, Problem
@@ -22,7 +29,14 @@ from orchestrator.toml_files import fault_of
 KEY = "imperfections"
 """Values of the command line and of a scenario reach an imperfection as ``imperfections.NAME.KEY``."""
 
-_NUMBERS = {"delay": "s", "bandwidth": "Hz", "value": None, "deviation": None, "step": None, "substitute": None}
+_NUMBERS = {
+    "delay": "s",
+    "bandwidth": "Hz",
+    "value": None,
+    "deviation": None,
+    "step": None,
+    "substitute": None,
+}
 """Keys that hold a number, with their unit; None for that of the signal."""
 
 
@@ -33,7 +47,10 @@ def sets_imperfection(key: str) -> bool:
 def disturb_connections(draft: Draft, clock: Clock, stop: float) -> dict[str, float | bool]:
     """Give the connections what the case and the scenario say of them; the numbers that were given, by key."""
     given: dict[str, float | bool] = {}
-    tables = {name: (table, draft.given.place(KEY, name)) for name, table in draft.given.case.imperfections.items()}
+    tables = {
+        name: (table, draft.given.place(KEY, name))
+        for name, table in draft.given.case.imperfections.items()
+    }
     for name, table in draft.given.scenario.imperfections.items():
         tables[name] = table, draft.given.place("scenarios", draft.given.name, KEY, name)
     for name, (table, where) in _overridden(draft, tables).items():
@@ -57,7 +74,9 @@ def note_long_delay(draft: Draft, delay: float, stop: float, where: str) -> None
     """A delay after which nothing arrives before the run ends: a mistake, or worth a word if the run was cut short."""
     if delay < stop:
         return
-    text = f"delay = {delay:g} s, but the run ends at {stop:g} s: nothing that is sent in it arrives"
+    text = (
+        f"delay = {delay:g} s, but the run ends at {stop:g} s: nothing that is sent in it arrives"
+    )
     if stop == draft.given.case.solver.stop_time:
         draft.note(where, f"{text}; give a shorter delay, or the run a later solver.stop_time")
     else:
@@ -75,7 +94,9 @@ def _overridden(
                 continue
             _, name, field = (*key.split(".", 2), "", "")[:3]
             if name not in found:
-                hint = close_names(name, found, f"there are: {', '.join(found)}" if found else "the case has none")
+                hint = close_names(
+                    name, found, f"there are: {', '.join(found)}" if found else "the case has none"
+                )
                 draft.note(layer.place(key), f"there is no imperfection {name!r}; {hint}")
                 continue
             content = found[name][0].model_dump(exclude_unset=True) | {field: value}
@@ -95,7 +116,11 @@ def imperfection_of(
         found = _converted(table, info)
         if isinstance(found, Delay):
             whole_steps(found.seconds, clock.step_size, str(connection))
-        if isinstance(found, Noise) and found.bandwidth is not None and found.bandwidth >= 0.5 / clock.step_size:
+        if (
+            isinstance(found, Noise)
+            and found.bandwidth is not None
+            and found.bandwidth >= 0.5 / clock.step_size
+        ):
             raise ValueError(
                 f"bandwidth = {found.bandwidth:g} Hz; it must be below {0.5 / clock.step_size:g} Hz, the most that a "
                 f"communication step of {clock.step_size:g} s shows; leave it out for white noise"
@@ -111,13 +136,17 @@ def _converted(table: schema.ImperfectionTable, info: VariableInfo) -> Imperfect
         case schema.BiasTable():
             return Bias(_number(info, "value", table.value))
         case schema.NoiseTable():
-            return Noise(_not_negative(info, "deviation", table.deviation), table.seed, table.bandwidth)
+            return Noise(
+                _not_negative(info, "deviation", table.deviation), table.seed, table.bandwidth
+            )
         case schema.FreezeTable():
             return DropOut()
         case schema.DropOutTable():
             if table.substitute == "hold":
                 return DropOut()
-            return DropOut(0.0 if table.substitute == "zero" else _number(info, "substitute", table.substitute))
+            return DropOut(
+                0.0 if table.substitute == "zero" else _number(info, "substitute", table.substitute)
+            )
         case schema.DelayTable():
             return Delay(table.delay)
         case schema.QuantisationTable():
@@ -143,7 +172,9 @@ def signal_info(system: System, connection: Connection) -> VariableInfo:
 def is_none(imperfection: Imperfection) -> bool:
     """Whether it changes nothing: a delay, bias, deviation or step of 0."""
     match imperfection:
-        case Bias(value=size) | Noise(deviation=size) | Quantisation(step=size) | Delay(seconds=size):
+        case (
+            Bias(value=size) | Noise(deviation=size) | Quantisation(step=size) | Delay(seconds=size)
+        ):
             return size == 0
         case _:
             return False
@@ -153,13 +184,19 @@ def connections_meant(draft: Draft, text: str, where: str) -> list[Connection]:
     """The connections that ``a.out -> b.in`` or a pattern names; those that a scenario removes are none."""
     ends = [part.strip() for part in text.split("->")]
     if len(ends) != 2 or not all("." in end for end in ends):
-        draft.note(where, f"connection = {text!r}; write it as 'component.output -> component.input'")
+        draft.note(
+            where, f"connection = {text!r}; write it as 'component.output -> component.input'"
+        )
         return []
     found = list(matching(draft.system.connections, ends))
     absent = draft.known - set(draft.system.components)
     if not found and not any(fnmatch.filter(absent, end.partition(".")[0]) for end in ends):
         names = [str(c) for c in draft.system.connections]
-        hint = close_names(text, names, f"there are {len(names)}, such as {names[0]}" if names else "there are none")
+        hint = close_names(
+            text,
+            names,
+            f"there are {len(names)}, such as {names[0]}" if names else "there are none",
+        )
         draft.note(where, f"there is no connection {text!r}; {hint}")
     return found
 
@@ -188,14 +225,20 @@ def _numbers(name: str, imperfection: Imperfection) -> dict[str, float | bool]:
             values = {"delay": imperfection.seconds}
         case DropOut():
             values = {"substitute": imperfection.substitute}
-    return {f"{KEY}.{name}.{key}": float(value) for key, value in values.items() if value is not None}
+    return {
+        f"{KEY}.{name}.{key}": float(value) for key, value in values.items() if value is not None
+    }
 
 
-def number_info(system: System, tables: Mapping[str, schema.ImperfectionTable], key: str) -> VariableInfo:
+def number_info(
+    system: System, tables: Mapping[str, schema.ImperfectionTable], key: str
+) -> VariableInfo:
     """The number that ``imperfections.NAME.KEY`` reaches, as a variable with its unit."""
     _, name, field = (*key.split(".", 2), "", "")[:3]
     if name not in tables:
-        hint = close_names(name, tables, f"there are: {', '.join(tables)}" if tables else "the case has none")
+        hint = close_names(
+            name, tables, f"there are: {', '.join(tables)}" if tables else "the case has none"
+        )
         raise InputError(f"{key}: there is no imperfection {name!r}; {hint}")
     table = tables[name]
     numbers = [n for n in _NUMBERS if n in type(table).model_fields]

@@ -21,9 +21,13 @@ def question_islands(draft: Draft, events: Sequence[tuple[Event, str]]) -> None:
     if draft.network is None or draft.found.network_failed or plan is None or draft.grid is None:
         return
     values = {name: plan.value(name) for name in plan.description.parameters}
-    units = {port.name: port.bus for port in draft.network.ports if port.name in draft.system.components}
+    units = {
+        port.name: port.bus for port in draft.network.ports if port.name in draft.system.components
+    }
     asked = {frozenset(part) for part in _without_unit(draft.network, units, values)}
-    for time, group in groupby(sorted(events, key=lambda pair: pair[0].time), key=lambda pair: pair[0].time):
+    for time, group in groupby(
+        sorted(events, key=lambda pair: pair[0].time), key=lambda pair: pair[0].time
+    ):
         where, switched = "", False
         for event, place in group:
             where = where or place
@@ -45,19 +49,29 @@ def question_islands(draft: Draft, events: Sequence[tuple[Event, str]]) -> None:
                 )
 
 
-def _without_unit(network: Network, units: Mapping[str, str], values: Mapping[str, object]) -> list[list[str]]:
+def _without_unit(
+    network: Network, units: Mapping[str, str], values: Mapping[str, object]
+) -> list[list[str]]:
     row = {bus: k for k, bus in enumerate(network.buses)}
-    ends = [(line.from_bus, line.to_bus) for line in network.lines if values.get(line.variable("connected"), True)]
+    ends = [
+        (line.from_bus, line.to_bus)
+        for line in network.lines
+        if values.get(line.variable("connected"), True)
+    ]
     for winding in network.transformers:
         if values.get(f"{winding.name}.connected", True):
             ends += [(winding.buses[0], bus) for bus in winding.buses[1:]]
     starts, stops = ([row[end[k]] for end in ends] for k in (0, 1))
     links = coo_array((np.ones(len(ends)), (starts, stops)), shape=(len(row), len(row)))
     _, part_of = connected_components(links, directed=False)
-    fed = {part_of[row[bus]] for unit, bus in units.items() if values.get(f"{unit}.connected", True)}
+    fed = {
+        part_of[row[bus]] for unit, bus in units.items() if values.get(f"{unit}.connected", True)
+    }
     drawn = {
         part_of[row[load.bus]]
         for load in network.loads
         if (load.p_mw or load.q_mvar) and values.get(f"{load.name}.scale", 1.0)
     }
-    return [[bus for bus in network.buses if part_of[row[bus]] == part] for part in sorted(drawn - fed)]
+    return [
+        [bus for bus in network.buses if part_of[row[bus]] == part] for part in sorted(drawn - fed)
+    ]

@@ -52,12 +52,18 @@ def kept_tables(name: str, content: bytes, make: Callable[[], SourceTables]) -> 
     if not versions["pandapower"]:
         return make()
     parts = [name, hashlib.sha256(content).hexdigest(), versions, sys.platform, sys.version, _CODE]
-    path = cache_directory("networks") / f"{hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]}.json"
+    path = (
+        cache_directory("networks")
+        / f"{hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]}.json"
+    )
     if intact(path):
         return _from_json(json.loads(path.read_bytes()))
     tables = make()
     with suppress(CacheError):  # as slow as before, but right
-        if not tables.load_parts and "".join(file.read_text(encoding="utf-8") for file in _FILES) == _CODE:
+        if (
+            not tables.load_parts
+            and "".join(file.read_text(encoding="utf-8") for file in _FILES) == _CODE
+        ):
             keep(path, json.dumps(_as_json(tables)).encode())
     return tables
 
@@ -82,11 +88,20 @@ def _as_json(tables: SourceTables) -> dict[str, Any]:
 
 
 def _from_json(kept: Mapping[str, Any]) -> SourceTables:
-    arrays = {name: np.array(values, dtype=float).reshape(shape) for name, (shape, values) in kept["arrays"].items()}
+    arrays = {
+        name: np.array(values, dtype=float).reshape(shape)
+        for name, (shape, values) in kept["arrays"].items()
+    }
     to_earth = np.empty(arrays["real"].shape, dtype=np.complex128)
     to_earth.real, to_earth.imag = arrays["real"], arrays["imag"]
     labels = {int(number): str(label) for number, label in kept["labels"]}
     return SourceTables(
-        kept["name"], kept["base_mva"], arrays["bus"], arrays["branch"], arrays["gen"], to_earth, labels,
+        kept["name"],
+        kept["base_mva"],
+        arrays["bus"],
+        arrays["branch"],
+        arrays["gen"],
+        to_earth,
+        labels,
         kept["frequency"],
-    )  # fmt: skip
+    )

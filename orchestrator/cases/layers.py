@@ -27,7 +27,9 @@ def joined_values(layers: Sequence[ParameterFile]) -> dict[str, Value]:
     return {key: value for layer in layers for key, value in layer.values.items()}
 
 
-def value_layers(draft: Draft, parameters: Sequence[ParameterFile], overrides: Mapping[str, Value]) -> list[Layer]:
+def value_layers(
+    draft: Draft, parameters: Sequence[ParameterFile], overrides: Mapping[str, Value]
+) -> list[Layer]:
     """All layers, weakest first: files of the scenario, the scenario, files of the command line, values of the command
     line."""
     has_units = draft.given.case.units is not None
@@ -42,7 +44,10 @@ def value_layers(draft: Draft, parameters: Sequence[ParameterFile], overrides: M
             draft.note(draft.given.place("scenarios", draft.given.name, "parameters", index), file)
         else:
             add(file.values, file.place)
-    add(draft.given.scenario.set, lambda key: draft.given.place("scenarios", draft.given.name, "set", key))
+    add(
+        draft.given.scenario.set,
+        lambda key: draft.given.place("scenarios", draft.given.name, "set", key),
+    )
     for file in parameters:
         add(file.values, file.place)
     add(overrides, lambda key: f"{COMMAND_LINE} {key}")

@@ -9,7 +9,8 @@ from orchestrator.cases.schema import LoadLaw, LoadModelTable, NetworkTable
 from orchestrator.errors import InputError, Problem
 
 _NAMES = {zip_: name for name, zip_ in LAWS.items()}
-_LARGEST_SHARE = 100.0  # of a part by the whole: above, the parts cancel, and the whole is none to take shares of
+# of a part by the whole: above, the parts cancel, and the whole is none to take shares of
+_LARGEST_SHARE = 100.0
 
 _OPEN = (
     "the load model is open: the file's loads (constant powers in its power flow) are taken as constant impedances, as "
@@ -35,11 +36,19 @@ def in_words(loads: list[Load]) -> str:
     if len(active) > 1 or len(reactive) > 1:
         return "several models"
     (p,), q = active or {LAWS["impedance"]}, next(iter(reactive), None)
-    return f"constant {_named(p)}" if q in (None, p) else f"P constant {_named(p)}, Q constant {_named(q)}"
+    return (
+        f"constant {_named(p)}"
+        if q in (None, p)
+        else f"P constant {_named(p)}, Q constant {_named(q)}"
+    )
 
 
 def _named(law: Zip | None) -> str:
-    return "power" if law is None else _NAMES.get(law, f"{law.z:.3g} impedance, {law.i:.3g} current, {law.p:.3g} power")
+    return (
+        "power"
+        if law is None
+        else _NAMES.get(law, f"{law.z:.3g} impedance, {law.i:.3g} current, {law.p:.3g} power")
+    )
 
 
 def open_question(table: NetworkTable | None, loads: Sequence[Load], place: str) -> list[Problem]:
@@ -47,7 +56,10 @@ def open_question(table: NetworkTable | None, loads: Sequence[Load], place: str)
 
 
 def with_laws(
-    load: Load, table: NetworkTable, own: LoadModelTable | None = None, parts: tuple[complex, complex] = (0j, 0j)
+    load: Load,
+    table: NetworkTable,
+    own: LoadModelTable | None = None,
+    parts: tuple[complex, complex] = (0j, 0j),
 ) -> Load:
     """The load with its laws.
 
@@ -56,23 +68,31 @@ def with_laws(
     ``own``: the load's own keys, which decide first.
     ``parts``: what of the load is a constant impedance and a constant current [MW, Mvar]; the keys are for the rest."""
     feeds = load.p_mw < 0
-    models = [m for m in (own, table.generation_model if feeds else table.load_model) if m is not None]
+    models = [
+        m for m in (own, table.generation_model if feeds else table.load_model) if m is not None
+    ]
     usual: LoadLaw = "current" if feeds else "impedance"
     return replace(
         load,
         active=_mixed(
-            load, "P", _law(next((m.active for m in models if m.active is not None), usual)), load.p_mw,
+            load,
+            "P",
+            _law(next((m.active for m in models if m.active is not None), usual)),
+            load.p_mw,
             (parts[0].real, parts[1].real),
         ),
         reactive=_mixed(
-            load, "Q", _law(next((m.reactive for m in models if m.reactive is not None), usual)), load.q_mvar,
+            load,
+            "Q",
+            _law(next((m.reactive for m in models if m.reactive is not None), usual)),
+            load.q_mvar,
             (parts[0].imag, parts[1].imag),
         ),
         k_pf=next((m.k_pf for m in models if m.k_pf is not None), 0.0),
         k_qf=next((m.k_qf for m in models if m.k_qf is not None), 0.0),
         v_min=next((m.v_min for m in models if m.v_min is not None), None),
         tau=next((m.tau for m in models if m.tau is not None), None),
-    )  # fmt: skip
+    )
 
 
 def _law(law: LoadLaw) -> Zip:

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 _HEADER = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(#.*)?$")
-_KEY = re.compile(r"^\s*((?:[A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*')(?:\s*\.\s*(?:[A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*'))*)\s*=")
+_KEY = re.compile(
+    r"^\s*((?:[A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*')(?:\s*\.\s*(?:[A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*'))*)\s*="
+)
 _PART = re.compile(r"(\"(?:[^\"\\]|\\.)*\")|'([^']*)'|([A-Za-z0-9_-]+)")
 
 FROM_TABLES = "# From tables of a program: none of these lines is anybody's\n"
@@ -41,7 +43,9 @@ def _lines(text: str) -> dict[tuple[str, ...], int]:
 
 
 def _parts(key: str) -> tuple[str, ...]:
-    return tuple(_unquoted(quoted) or literal or bare for quoted, literal, bare in _PART.findall(key))
+    return tuple(
+        _unquoted(quoted) or literal or bare for quoted, literal, bare in _PART.findall(key)
+    )
 
 
 def _unquoted(text: str) -> str:

@@ -20,7 +20,8 @@ class Named:
     # and their names are not checked.
     foreign: set[str] = field(default_factory=set)
     outputs: set[str] = field(default_factory=set)
-    homes: set[str] = field(default_factory=set)  # names that an area may contain: components and buses
+    # names that an area may contain: components and buses
+    homes: set[str] = field(default_factory=set)
 
     def add(self, draft: Draft) -> None:
         for name, plan in draft.system.components.items():
@@ -55,8 +56,13 @@ def _states(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
     for where, patterns in groups:
         for pattern in patterns:
             if not fnmatch.filter(named.states, pattern) and not _of_foreign(named, pattern):
-                hint = close_names(pattern, sorted(named.states), "`gfor modes --json` lists the states")
-                yield Problem(where, f"{pattern!r}: no scenario has a state component.state of that name; {hint}")
+                hint = close_names(
+                    pattern, sorted(named.states), "`gfor modes --json` lists the states"
+                )
+                yield Problem(
+                    where,
+                    f"{pattern!r}: no scenario has a state component.state of that name; {hint}",
+                )
 
 
 def _of_foreign(named: Named, pattern: str) -> bool:
@@ -67,22 +73,38 @@ def _areas(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
     for area, patterns in case.analysis.areas.items():
         for pattern in patterns:
             if not fnmatch.filter(named.homes, pattern):
-                hint = close_names(pattern, sorted(named.homes), "name components, or the buses that feed them")
+                hint = close_names(
+                    pattern, sorted(named.homes), "name components, or the buses that feed them"
+                )
                 yield Problem(
-                    place("analysis", "areas", area), f"{pattern!r}: no scenario has such a component or bus; {hint}"
+                    place("analysis", "areas", area),
+                    f"{pattern!r}: no scenario has such a component or bus; {hint}",
                 )
 
 
 def _records(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
     for pattern in case.solver.record:
-        if pattern != "*" and not fnmatch.filter(named.outputs, pattern) and not _of_foreign(named, pattern):
-            hint = close_names(pattern, sorted(named.outputs), "`gfor fmu info` lists the outputs of an FMU")
-            yield Problem(place("solver", "record"), f"{pattern!r}: no scenario has such an output to record; {hint}")
+        if (
+            pattern != "*"
+            and not fnmatch.filter(named.outputs, pattern)
+            and not _of_foreign(named, pattern)
+        ):
+            hint = close_names(
+                pattern, sorted(named.outputs), "`gfor fmu info` lists the outputs of an FMU"
+            )
+            yield Problem(
+                place("solver", "record"),
+                f"{pattern!r}: no scenario has such an output to record; {hint}",
+            )
 
 
 def shown_signals(case: CaseTable, place: Locate) -> list[tuple[str, str]]:
     """Signals of the ring-down and of plots, each with its place."""
-    entries = [(place("analysis", "ring_down"), case.analysis.ring_down.signal)] if case.analysis.ring_down else []
+    entries = (
+        [(place("analysis", "ring_down"), case.analysis.ring_down.signal)]
+        if case.analysis.ring_down
+        else []
+    )
     return entries + [
         (place("plots", k, "panels", n, "signal"), signal)
         for k, plot in enumerate(case.plots)
@@ -106,5 +128,7 @@ def _signal(where: str, expression: str, named: Named) -> Iterator[Problem]:
         component = name.partition(".")[0]
         if name not in named.outputs and component not in named.foreign:
             own = sorted(output for output in named.outputs if output.startswith(f"{component}."))
-            hint = close_names(name, own or sorted(named.outputs), "`gfor fmu info` lists the outputs of an FMU")
+            hint = close_names(
+                name, own or sorted(named.outputs), "`gfor fmu info` lists the outputs of an FMU"
+            )
             yield Problem(where, f"no scenario has an output {name!r}; {hint}")

@@ -15,7 +15,9 @@ _GRIDS = {"grid": "phasor_grid", "two_area_grid": "two_area_phasor_grid"}
 _SUFFIX = "_phasor"
 
 
-def kind_wanted(overrides: Mapping[str, Value] | None, parameters: Sequence[ParameterFile]) -> str | None:
+def kind_wanted(
+    overrides: Mapping[str, Value] | None, parameters: Sequence[ParameterFile]
+) -> str | None:
     """The kind that the command line or a parameter file chooses; None where they leave it to the case."""
     layers = [file.values for file in parameters] + [dict(overrides or {})]
     given = [layer[MODELS] for layer in layers if MODELS in layer]
@@ -55,7 +57,9 @@ def twin(model: str, kind: str) -> str:
 
     known = model_names()
     if model in known and wanted not in known:
-        raise InputError(f"models = {kind!r}: the model {model!r} has no counterpart {wanted!r} in the catalogue")
+        raise InputError(
+            f"models = {kind!r}: the model {model!r} has no counterpart {wanted!r} in the catalogue"
+        )
     return wanted
 
 
@@ -63,7 +67,9 @@ def _renamed(plot: PlotTable) -> PlotTable:
     return plot.model_copy(
         update={
             "panels": [
-                p.model_copy(update={"signal": _other(p.signal), "also": [_other(s) for s in p.also]})
+                p.model_copy(
+                    update={"signal": _other(p.signal), "also": [_other(s) for s in p.also]}
+                )
                 for p in plot.panels
             ]
         }

@@ -7,7 +7,9 @@ from collections.abc import Iterable, Mapping
 
 from orchestrator.errors import InputError
 
-LONGEST = 200  # bytes of a name that becomes a file's, in UTF-8: file systems take 255, and something is added to it
+# bytes of a name that becomes a file's, in UTF-8: file systems take 255, and something is added to
+# it
+LONGEST = 200
 TWINS = {"current_limit": "current_demand", "current_demand": "current_limit"}
 """Outputs of one meaning in EMT and phasor models."""
 
@@ -22,7 +24,9 @@ _FORBIDDEN = re.compile(r'[\x00-\x1f\x7f/\\:*?"<>|]')
 
 def file_name(name: str) -> str:
     """A name that can be that of a file or a folder on every system, and lead to no other place."""
-    rule = "it becomes the name of a file or folder: use letters, digits, _ and -, at most 200 bytes"
+    rule = (
+        "it becomes the name of a file or folder: use letters, digits, _ and -, at most 200 bytes"
+    )
     if not name.strip():
         raise ValueError(f"this name is empty; {rule}")
     if len(name.encode("utf-8", "surrogatepass")) > LONGEST:
@@ -30,7 +34,9 @@ def file_name(name: str) -> str:
     if found := _FORBIDDEN.search(name):
         raise ValueError(f"the name {name!r} holds the character {found.group()!r}; {rule}")
     if name[0] in ".-=+@ " or name[-1] in ". ":
-        raise ValueError(f"the name {name!r} begins or ends with a character that misleads programs; {rule}")
+        raise ValueError(
+            f"the name {name!r} begins or ends with a character that misleads programs; {rule}"
+        )
     if any("\ud800" <= letter <= "\udfff" for letter in name):
         raise ValueError(f"the name {name!r} holds half a character; {rule}")
     if _RESERVED.fullmatch(name):
@@ -51,7 +57,9 @@ def close_names(wanted: str, known: Iterable[str], otherwise: str = "") -> str:
     close = [name for name in names if _parts(name) == _parts(wanted)]
     close = close or [name for name in names if name.endswith(f".{wanted}")][:3]
     number = re.fullmatch(r"\D*(\d+)", wanted)  # as of a bus, which may be written in another way
-    close = close or [name for name in names if number and re.fullmatch(rf"\D*{number[1]}", name)][:3]
+    close = (
+        close or [name for name in names if number and re.fullmatch(rf"\D*{number[1]}", name)][:3]
+    )
     close = close or difflib.get_close_matches(wanted, names, n=3, cutoff=0.5)
     return f"did you mean {' or '.join(close)}?" if close else otherwise
 
@@ -62,7 +70,9 @@ def _parts(name: str) -> list[str]:
 
 def whose(part: str, variables: Mapping[str, Iterable[str]]) -> str:
     """A hint at the component whose variables have this part, as a grid's have a line's name; "" where none has it."""
-    homes = [name for name, own in variables.items() if any(one.startswith(f"{part}.") for one in own)]
+    homes = [
+        name for name, own in variables.items() if any(one.startswith(f"{part}.") for one in own)
+    ]
     return f"; it is of {homes[0]!r}: write {homes[0]}.{part}.…" if homes else ""
 
 

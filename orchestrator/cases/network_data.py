@@ -12,7 +12,14 @@ from fmus.grid.network import Line, Load, Shunt, ThreeWinding
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.arrays import Matrix
 from orchestrator.cases.cgmes.network import read_cgmes
-from orchestrator.cases.csv_rows import Row, number, optional_number, place_of, rows_of, seen_from_here
+from orchestrator.cases.csv_rows import (
+    Row,
+    number,
+    optional_number,
+    place_of,
+    rows_of,
+    seen_from_here,
+)
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt, inner_buses, legs_of
 from orchestrator.cases.flow_equations import FlowEquations
 from orchestrator.cases.load_models import with_laws
@@ -42,11 +49,13 @@ class NetworkData:
     lines: tuple[Line, ...]
     loads: tuple[Load, ...]
     shunts: tuple[Shunt, ...]
-    generation: dict[str, Generation] = field(default_factory=dict)  # power and voltage of the units at each bus
+    # power and voltage of the units at each bus
+    generation: dict[str, Generation] = field(default_factory=dict)
     slack: str | None = None  # reference bus of the source
     frequency: float | None = None  # rated frequency [Hz]; None leaves every model's own
     stray_B: float = 0.0
-    places: dict[str, str] = field(default_factory=dict)  # file and line of the lines that a file holds, by name
+    # file and line of the lines that a file holds, by name
+    places: dict[str, str] = field(default_factory=dict)
     transformers: tuple[ThreeWinding, ...] = ()
     changes: tuple[Problem, ...] = ()
     # machines, idle_machines: machines in service, one by one, where the source is of PSS/E; bus and identifier of
@@ -66,11 +75,16 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
     something that the grid model does not have."""
     found = _source(table, directory)
     source = found.network
-    lines = [Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B, t.tap, t.shift, t.X_C) for n, t in table.lines.items()]
+    lines = [
+        Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B, t.tap, t.shift, t.X_C)
+        for n, t in table.lines.items()
+    ]
     loads = [with_laws(Load(n, t.bus, t.p, t.q), table, t) for n, t in table.loads.items()]
     shunts = [Shunt(n, t.bus, t.g, t.b) for n, t in table.shunts.items()]
     transformers = [
-        ThreeWinding(n, t.buses, _star(t.X_12, t.X_13, t.X_23), _star(t.R_12, t.R_13, t.R_23), t.tap, t.shift)
+        ThreeWinding(
+            n, t.buses, _star(t.X_12, t.X_13, t.X_23), _star(t.R_12, t.R_13, t.R_23), t.tap, t.shift
+        )
         for n, t in table.three_winding_transformers.items()
     ]
     in_file = _lines_of_file(directory / table.lines_file) if table.lines_file is not None else []
@@ -85,13 +99,29 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
         ends = [bus for line in lines for bus in (line.from_bus, line.to_bus)]
         buses = dict.fromkeys([*ends, *(bus for x in transformers for bus in x.buses)])
     return NetworkData(
-        tuple(buses), (*source.lines, *lines),
-        (*(with_laws(x, table, parts=source.load_parts.get(x.name, (0j, 0j))) for x in source.loads), *loads),
-        (*source.shunts, *shunts), source.generation, source.slack,
-        table.frequency if table.frequency is not None else source.frequency, table.stray_B,
-        {line.name: place for line, place in in_file}, (*source.transformers, *transformers), found.changes,
-        found.machines, found.idle, source.feeding, source.capacitors, found.misfit,
-    )  # fmt: skip
+        tuple(buses),
+        (*source.lines, *lines),
+        (
+            *(
+                with_laws(x, table, parts=source.load_parts.get(x.name, (0j, 0j)))
+                for x in source.loads
+            ),
+            *loads,
+        ),
+        (*source.shunts, *shunts),
+        source.generation,
+        source.slack,
+        table.frequency if table.frequency is not None else source.frequency,
+        table.stray_B,
+        {line.name: place for line, place in in_file},
+        (*source.transformers, *transformers),
+        found.changes,
+        found.machines,
+        found.idle,
+        source.feeding,
+        source.capacitors,
+        found.misfit,
+    )
 
 
 def _star(one_two: float, one_three: float, two_three: float) -> tuple[float, float, float]:
@@ -110,11 +140,15 @@ def _source(table: NetworkTable, directory: Path) -> _Source:
     if table.raw is not None:
         return _from_raw(directory / table.raw, table)
     if table.keep_load_parts:
-        raise InputError("keep_load_parts is for networks of PSS/E; remove the key, or give the file as 'raw'")
+        raise InputError(
+            "keep_load_parts is for networks of PSS/E; remove the key, or give the file as 'raw'"
+        )
     if table.cgmes is not None:
         return _from_cgmes(directory / table.cgmes, table)
     if table.leave_out:
-        raise InputError("leave_out is for networks of PSS/E and CGMES; remove the key, or give 'raw' or 'cgmes'")
+        raise InputError(
+            "leave_out is for networks of PSS/E and CGMES; remove the key, or give 'raw' or 'cgmes'"
+        )
     if table.matpower is not None:
         path = seen_from_here(directory / table.matpower)
         tables = read_matpower(path)
@@ -148,8 +182,12 @@ def _from_raw(path: Path, table: NetworkTable) -> _Source:
     for machine in raw.machines:
         bus = bus_name(raw.tables.labels[machine.bus])
         ratings[bus] = ratings.get(bus, 0.0) + machine.rating_mva
-    generation = {bus: replace(g, rating_mva=ratings[bus]) for bus, g in imported.generation.items()}
-    return _Source(replace(imported, generation=generation), tuple(changes), raw.machines, raw.idle, misfit)
+    generation = {
+        bus: replace(g, rating_mva=ratings[bus]) for bus, g in imported.generation.items()
+    }
+    return _Source(
+        replace(imported, generation=generation), tuple(changes), raw.machines, raw.idle, misfit
+    )
 
 
 def _from_cgmes(path: Path, table: NetworkTable) -> _Source:
@@ -157,8 +195,12 @@ def _from_cgmes(path: Path, table: NetworkTable) -> _Source:
     model = read_cgmes(seen_from_here(path), table.leave_out)
     imported = import_network(model.tables)
     ratings = {bus_of(label): rating for label, rating in model.ratings.items()}
-    generation = {bus: replace(g, rating_mva=ratings.get(bus, g.rating_mva)) for bus, g in imported.generation.items()}
-    slack = imported.slack or max(generation, key=lambda bus: generation[bus].p_mw)  # balances SV's losses
+    generation = {
+        bus: replace(g, rating_mva=ratings.get(bus, g.rating_mva))
+        for bus, g in imported.generation.items()
+    }
+    # balances SV's losses
+    slack = imported.slack or max(generation, key=lambda bus: generation[bus].p_mw)
     misfit = misfit_of(replace(imported, slack=slack), model.tables.bus, model.tables.labels)
     return _Source(replace(imported, generation=generation), model.changes, misfit=misfit)
 
@@ -168,13 +210,17 @@ def _lines_of_file(path: Path) -> list[tuple[Line, str]]:
     ohms = "X_ohm" in next(iter(rows_of(path, ("from", "to"))), ())
     for row in rows_of(path, ("from", "to", *(_IN_OHMS if ohms else ("R", "X", "B")))):
         if not (row["from"] and row["to"]):
-            raise InputError(f"{place_of(row)}: from = {row['from']!r}, to = {row['to']!r}; name the bus at each end")
+            raise InputError(
+                f"{place_of(row)}: from = {row['from']!r}, to = {row['to']!r}; name the bus at each end"
+            )
         circuit = (row.get("circuit") or "").strip()
         if circuit and not (circuit.isascii() and circuit.isalnum()):
             raise InputError(
                 f"{place_of(row)}: circuit = {circuit!r}; it becomes part of a name: use letters and digits"
             )
-        name = "_".join(["line", row["from"], row["to"], *([circuit] if circuit not in ("", "1") else [])])
+        name = "_".join(
+            ["line", row["from"], row["to"], *([circuit] if circuit not in ("", "1") else [])]
+        )
         ends = bus_name(row["from"]), bus_name(row["to"])
         tap, shift = optional_number(row, "tap") or 1.0, optional_number(row, "shift") or 0.0
         X, R, B = _impedance(row)
@@ -191,7 +237,9 @@ def _impedance(row: Row) -> list[float]:
         return [number(row, key) for key in ("X", "R", "B")]
     kv, R, X, B = (number(row, key) for key in _IN_OHMS)
     if kv <= 0:
-        raise InputError(f"{place_of(row)}: kv = {kv:g}; ohms need the line's rated voltage, above 0")
+        raise InputError(
+            f"{place_of(row)}: kv = {kv:g}; ohms need the line's rated voltage, above 0"
+        )
     z = kv**2 / SYSTEM_BASE_MVA
     return [X / z, R / z, B * 1e-6 * z]
 
@@ -207,23 +255,36 @@ NOT_SOLVED = (
 )
 
 
-def misfit_of(network: ImportedNetwork, bus: Matrix, labels: Mapping[int, str], unsolved: str = "") -> str:
+def misfit_of(
+    network: ImportedNetwork, bus: Matrix, labels: Mapping[int, str], unsolved: str = ""
+) -> str:
     """What does not fit; "" where all does, and ``unsolved`` where the file has no solution.
 
     ``bus``: MATPOWER's table with the voltages [pu, degrees]; ``labels``: names of its buses by number."""
-    stated = {bus_of(labels[int(r[0])]): cmath.rect(r[_VM], np.radians(r[_VA])) for r in bus if r[_VM] > 0}
+    stated = {
+        bus_of(labels[int(r[0])]): cmath.rect(r[_VM], np.radians(r[_VA])) for r in bus if r[_VM] > 0
+    }
     if network.slack not in stated or not bus[:, _VA].any():
         return "" if bus[:, _VA].any() else unsolved
     places = [place for place in network.buses if place in stated]
-    stars = [place for place in network.buses if place not in stated]  # of transformers with an open winding
+    # of transformers with an open winding
+    stars = [place for place in network.buses if place not in stated]
     buses = [*places, *stars, *(inner for x in network.transformers for inner in inner_buses(x))]
-    lines = [FlowLine(x.name, x.from_bus, x.to_bus, x.R, x.X, x.B, x.tap, x.shift) for x in network.lines]
+    lines = [
+        FlowLine(x.name, x.from_bus, x.to_bus, x.R, x.X, x.B, x.tap, x.shift) for x in network.lines
+    ]
     equations = FlowEquations.of(
-        buses, [*lines, *(leg for x in network.transformers for leg in legs_of(x))],
+        buses,
+        [*lines, *(leg for x in network.transformers for leg in legs_of(x))],
         [FlowLoad(x.bus, x.p_mw, x.q_mvar) for x in network.loads],
-        [FlowShunt(x.bus, x.g_mw / SYSTEM_BASE_MVA, x.b_mvar / SYSTEM_BASE_MVA) for x in network.shunts],
-        {place: g.p_mw / SYSTEM_BASE_MVA for place, g in network.generation.items()}, {}, network.slack,
-    )  # fmt: skip
+        [
+            FlowShunt(x.bus, x.g_mw / SYSTEM_BASE_MVA, x.b_mvar / SYSTEM_BASE_MVA)
+            for x in network.shunts
+        ],
+        {place: g.p_mw / SYSTEM_BASE_MVA for place, g in network.generation.items()},
+        {},
+        network.slack,
+    )
     known, matrix = len(places), equations.matrix
     voltages = np.array([*(stated[place] for place in places), *[1 + 0j] * (len(buses) - known)])
     if known < len(buses):
@@ -242,7 +303,9 @@ def misfit_of(network: ImportedNetwork, bus: Matrix, labels: Mapping[int, str], 
 
 
 def _sentence(left: Mapping[str, complex], buses: int) -> str:
-    shown = [f"{p.real:+.4g} MW {p.imag:+.4g} Mvar at {place}" for place, p in [*left.items()][:_SHOWN]]
+    shown = [
+        f"{p.real:+.4g} MW {p.imag:+.4g} Mvar at {place}" for place, p in [*left.items()][:_SHOWN]
+    ]
     more = f" and less at {len(left) - _SHOWN} more" if len(left) > _SHOWN else ""
     if len(left) == 1:
         likely = "its load, its shunt, its unit's power or a branch to a bus with a unit"
@@ -258,4 +321,6 @@ def _sentence(left: Mapping[str, complex], buses: int) -> str:
 
 def _rounding(values: np.ndarray) -> float:
     """Half of the last digit to which numbers are given."""
-    return next(0.5 * 10.0**-d for d in range(16) if d == 15 or not (np.round(values, d) - values).any())
+    return next(
+        0.5 * 10.0**-d for d in range(16) if d == 15 or not (np.round(values, d) - values).any()
+    )

@@ -72,7 +72,9 @@ def import_network(source: SourceTables, *, joined: bool = True) -> ImportedNetw
     lines, to_earth = _lines(source, labels)
     at_bus = _generators(source, labels)
     loads = _loads(source, rows, at_bus if joined else {})
-    earthed = {n for n, y in to_earth.items() if abs(y) > _NEGLIGIBLE} | {n for n, r in rows.items() if any(r[4:6])}
+    earthed = {n for n, y in to_earth.items() if abs(y) > _NEGLIGIBLE} | {
+        n for n, r in rows.items() if any(r[4:6])
+    }
     kept = {load.bus for load in loads} | {bus_of(labels[n]) for n in (*at_bus, *earthed)}
     lines, merged = without_negative_reactances(lines, kept)
     lines, transformers, stars = without_star_points(lines, kept)
@@ -84,19 +86,29 @@ def import_network(source: SourceTables, *, joined: bool = True) -> ImportedNetw
         for n, y in ((n, y * source.base_mva) for n, y in to_earth.items())
         if abs(y) > _NEGLIGIBLE
     ]
-    problems = [f"bus {s.name.removeprefix('shunt_')} has the negative conductance {s.g_mw:g} MW to earth"
-                for s in shunts if s.g_mw < 0]  # fmt: skip
+    problems = [
+        f"bus {s.name.removeprefix('shunt_')} has the negative conductance {s.g_mw:g} MW to earth"
+        for s in shunts
+        if s.g_mw < 0
+    ]
     if problems:
-        raise InputError(f"{source.name}: {few(problems, 5, '; ')}; the grid model has no such element")
+        raise InputError(
+            f"{source.name}: {few(problems, 5, '; ')}; the grid model has no such element"
+        )
     reference = [n for n, row in rows.items() if int(row[1]) == _REFERENCE]
     return ImportedNetwork(
-        tuple(bus for label in labels.values() if (bus := bus_of(label)) not in merged), tuple(lines), tuple(loads),
-        tuple(shunts), {bus_of(labels[n]): _generation(labels[n], members) for n, members in at_bus.items()},
-        bus_of(labels[reference[0]]) if reference else None, source.frequency, tuple(transformers),
+        tuple(bus for label in labels.values() if (bus := bus_of(label)) not in merged),
+        tuple(lines),
+        tuple(loads),
+        tuple(shunts),
+        {bus_of(labels[n]): _generation(labels[n], members) for n, members in at_bus.items()},
+        bus_of(labels[reference[0]]) if reference else None,
+        source.frequency,
+        tuple(transformers),
         {f"load_{labels[n]}": parts for n, parts in source.load_parts.items() if n in labels},
         {bus_of(labels[n]): float(row[2]) for n, row in rows.items() if row[2] < -_NEGLIGIBLE},
         {bus_of(labels[n]): float(row[5]) for n, row in rows.items() if row[5] > _NEGLIGIBLE},
-    )  # fmt: skip
+    )
 
 
 def bus_of(label: str) -> str:
@@ -125,11 +137,16 @@ def _lines(source: SourceTables, labels: dict[int, str]) -> tuple[list[Line], di
             to_earth[bus] = to_earth.get(bus, 0j) + complex(rest)
         lines.append(
             Line(
-                name if seen[name] == 1 else f"{name}_{seen[name]}", bus_of(labels[start]), bus_of(labels[end]),
-                X=float(row[3]) * scale, R=float(row[2]) * scale, B=float(b) / scale, tap=tap,
+                name if seen[name] == 1 else f"{name}_{seen[name]}",
+                bus_of(labels[start]),
+                bus_of(labels[end]),
+                X=float(row[3]) * scale,
+                R=float(row[2]) * scale,
+                B=float(b) / scale,
+                tap=tap,
                 shift=math.radians(float(row[9])),
             )
-        )  # fmt: skip
+        )
     return lines, to_earth
 
 
@@ -140,7 +157,10 @@ def _generators(source: SourceTables, labels: dict[int, str]) -> dict[int, list[
             p, most = float(row[1]), float(row[8])
             reactive = max(abs(float(row[3])), abs(float(row[4])))
             needed = max(abs(p), most) or (reactive if reactive < _NO_LIMIT else 0.0)
-            least, largest = (q if abs(q) < _NO_LIMIT else math.copysign(math.inf, q) for q in map(float, row[[4, 3]]))
+            least, largest = (
+                q if abs(q) < _NO_LIMIT else math.copysign(math.inf, q)
+                for q in map(float, row[[4, 3]])
+            )
             if least == largest == 0:  # not known, as in pandapower's tables
                 least, largest = -math.inf, math.inf
             member = _Member(p, float(row[5]), needed / _POWER_FACTOR, least, largest)
@@ -148,7 +168,9 @@ def _generators(source: SourceTables, labels: dict[int, str]) -> dict[int, list[
     return at_bus
 
 
-def _loads(source: SourceTables, rows: dict[int, Matrix], at_bus: dict[int, list[_Member]]) -> list[Load]:
+def _loads(
+    source: SourceTables, rows: dict[int, Matrix], at_bus: dict[int, list[_Member]]
+) -> list[Load]:
     """Loads; a negative one is static generation. At a generator's bus it is added to the generators there, unless it
     has parts that follow the voltage."""
     loads = []
@@ -180,7 +202,11 @@ def without_negative_reactances(lines: list[Line], kept: set[str]) -> tuple[list
     for line in [line for line in lines if line.X < SMALLEST_REACTANCE]:
         for bus in (line.from_bus, line.to_bus):
             others = [x for x in lines if bus in (x.from_bus, x.to_bus) and x is not line]
-            if joined := _joined(line, others[0], bus) if len(others) == 1 and bus not in kept else None:
+            if (
+                joined := _joined(line, others[0], bus)
+                if len(others) == 1 and bus not in kept
+                else None
+            ):
                 lines = [joined if x is others[0] else x for x in lines if x is not line]
                 merged.add(bus)
                 break
@@ -202,14 +228,30 @@ def _joined(line: Line, other: Line, bus: str) -> Line | None:
 
 def _joined_legs(line: Line, other: Line) -> Line | None:
     """Two legs of a transformer, each with its ratio at its outer end: what is behind both ratios, behind one."""
-    if line.B or other.B or other.X + line.X < SMALLEST_REACTANCE or line.from_bus == other.from_bus:
+    if (
+        line.B
+        or other.B
+        or other.X + line.X < SMALLEST_REACTANCE
+        or line.from_bus == other.from_bus
+    ):
         return None
     square = line.tap**2
     X, R = (other.X + line.X) * square, (other.R + line.R) * square
-    return Line(other.name, other.from_bus, line.from_bus, X, R, 0.0, other.tap / line.tap, other.shift - line.shift)
+    return Line(
+        other.name,
+        other.from_bus,
+        line.from_bus,
+        X,
+        R,
+        0.0,
+        other.tap / line.tap,
+        other.shift - line.shift,
+    )
 
 
-def without_star_points(lines: list[Line], kept: set[str]) -> tuple[list[Line], list[ThreeWinding], set[str]]:
+def without_star_points(
+    lines: list[Line], kept: set[str]
+) -> tuple[list[Line], list[ThreeWinding], set[str]]:
     """The lines without those of negative reactance at star points, the transformers in their place, and the buses that
     are no more."""
     transformers, gone = [], set[str]()
@@ -230,15 +272,20 @@ def _transformer(star: str, legs: list[Line]) -> ThreeWinding | None:
     if len(legs) != 3 or any(leg.B for leg in legs):
         return None
     ends = [(leg.to_bus if leg.from_bus == star else leg.from_bus) for leg in legs]
-    turned = [leg.from_bus == star for leg in legs]  # the ratio is at the star: taken to the other side
+    # the ratio is at the star: taken to the other side
+    turned = [leg.from_bus == star for leg in legs]
     square = [leg.tap**2 if inner else 1.0 for leg, inner in zip(legs, turned, strict=True)]
     found = ThreeWinding(
         f"transformer_{star.removeprefix('bus_')}",
         (ends[0], ends[1], ends[2]),
         _three([leg.X * n for leg, n in zip(legs, square, strict=True)]),
         _three([leg.R * n for leg, n in zip(legs, square, strict=True)]),
-        _three([1 / leg.tap if inner else leg.tap for leg, inner in zip(legs, turned, strict=True)]),
-        _three([-leg.shift if inner else leg.shift for leg, inner in zip(legs, turned, strict=True)]),
+        _three(
+            [1 / leg.tap if inner else leg.tap for leg, inner in zip(legs, turned, strict=True)]
+        ),
+        _three(
+            [-leg.shift if inner else leg.shift for leg, inner in zip(legs, turned, strict=True)]
+        ),
     )
     return found if found.is_passive and len(set(ends)) == 3 else None
 

@@ -26,30 +26,45 @@ _COLUMNS = {"bus": 9, "branch": 11, "gen": 10}
 
 def read_matpower(path: Path) -> SourceTables:
     if not path.is_file():
-        raise InputError(f"{path}: there is no such file; give the path of a MATPOWER case (.m or .mat)")
+        raise InputError(
+            f"{path}: there is no such file; give the path of a MATPOWER case (.m or .mat)"
+        )
     if path.suffix not in (".m", ".mat"):
-        raise InputError(f"{path}: a MATPOWER case ends in .m or .mat, and this file in {path.suffix!r}")
+        raise InputError(
+            f"{path}: a MATPOWER case ends in .m or .mat, and this file in {path.suffix!r}"
+        )
     if path.suffix == ".m":
         require(f"reading the MATPOWER case {path.name}", "matpowercaseframes")
     try:
         tables = _m_file(path) if path.suffix == ".m" else _mat_file(path)
     except Exception as error:  # both libraries let all kinds of errors through
-        raise InputError(f"{path}: it cannot be read as a MATPOWER case: {error or type(error).__name__}") from error
+        raise InputError(
+            f"{path}: it cannot be read as a MATPOWER case: {error or type(error).__name__}"
+        ) from error
     if missing := [name for name in ("baseMVA", *_COLUMNS) if tables.get(name) is None]:
-        raise InputError(f"{path}: it is not a MATPOWER case, because mpc.{', mpc.'.join(missing)} is missing")
+        raise InputError(
+            f"{path}: it is not a MATPOWER case, because mpc.{', mpc.'.join(missing)} is missing"
+        )
     for name, columns in _COLUMNS.items():
         if (
             tables[name].ndim != 2
             or tables[name].shape[1] < columns
             or not np.isfinite(tables[name][:, :columns]).all()
         ):
-            raise InputError(f"{path}: mpc.{name} must be a table of numbers with {columns} columns or more")
+            raise InputError(
+                f"{path}: mpc.{name} must be a table of numbers with {columns} columns or more"
+            )
     branch = tables["branch"]
     numbers = tables["bus"][:, 0].astype(int)
     return SourceTables(
-        path.name, float(tables["baseMVA"]), tables["bus"], branch, tables["gen"],
-        np.repeat(0.5j * branch[:, [4]], 2, axis=1), {int(n): str(n) for n in numbers},
-    )  # fmt: skip
+        path.name,
+        float(tables["baseMVA"]),
+        tables["bus"],
+        branch,
+        tables["gen"],
+        np.repeat(0.5j * branch[:, [4]], 2, axis=1),
+        {int(n): str(n) for n in numbers},
+    )
 
 
 def read_pandapower(name: str, directory: Path) -> SourceTables:
@@ -62,7 +77,9 @@ def read_pandapower(name: str, directory: Path) -> SourceTables:
 def _solved_pandapower(name: str, path: Path, changed: int) -> SourceTables:
     """The tables of a network; ``changed`` keeps a file's newer contents apart. Every scenario of a case asks."""
     content = path.read_bytes() if changed else b""
-    return tables_beside(path) or kept_tables(name, content, lambda: _made_by_pandapower(name, path))
+    return tables_beside(path) or kept_tables(
+        name, content, lambda: _made_by_pandapower(name, path)
+    )
 
 
 def _made_by_pandapower(name: str, path: Path) -> SourceTables:
@@ -74,9 +91,17 @@ def _made_by_pandapower(name: str, path: Path) -> SourceTables:
         warnings.simplefilter("ignore")
         net = _pandapower_file(pp, path) if name.endswith(".json") else _pandapower_named(name)
         try:
-            pp.runpp(net, calculate_voltage_angles=True, numba=False, init="auto", voltage_depend_loads=False)
+            pp.runpp(
+                net,
+                calculate_voltage_angles=True,
+                numba=False,
+                init="auto",
+                voltage_depend_loads=False,
+            )
         except Exception as error:  # pandapower's checks raise whatever fits
-            raise InputError(f"pandapower network {name!r}: its power flow has no solution: {error}") from error
+            raise InputError(
+                f"pandapower network {name!r}: its power flow has no solution: {error}"
+            ) from error
     return _pandapower_tables(name, net)
 
 
@@ -85,7 +110,9 @@ def _m_file(path: Path) -> dict[str, Any]:
 
     frames = CaseFrames(str(path))
     found = {name: getattr(frames, name, None) for name in ("baseMVA", *_COLUMNS)}
-    return {n: t if n == "baseMVA" or t is None else t.to_numpy(dtype=float) for n, t in found.items()}
+    return {
+        n: t if n == "baseMVA" or t is None else t.to_numpy(dtype=float) for n, t in found.items()
+    }
 
 
 def _mat_file(path: Path) -> dict[str, Any]:
@@ -94,7 +121,9 @@ def _mat_file(path: Path) -> dict[str, Any]:
     mpc = loadmat(str(path), squeeze_me=False, struct_as_record=True).get("mpc")
     if mpc is None:
         return {}
-    found = {name: mpc[0, 0][name] for name in ("baseMVA", *_COLUMNS) if name in (mpc.dtype.names or ())}
+    found = {
+        name: mpc[0, 0][name] for name in ("baseMVA", *_COLUMNS) if name in (mpc.dtype.names or ())
+    }
     return {n: t.item() if n == "baseMVA" else np.asarray(t, dtype=float) for n, t in found.items()}
 
 
@@ -103,26 +132,36 @@ def _pandapower_named(name: str) -> Any:
 
     known = [n for n in dir(networks) if not n.startswith("_") and callable(getattr(networks, n))]
     if name not in known:
-        hint = close_names(name, known, "give one of pandapower.networks, or the path of a .json file")
+        hint = close_names(
+            name, known, "give one of pandapower.networks, or the path of a .json file"
+        )
         raise InputError(f"there is no pandapower network {name!r}; {hint}")
     try:
         net = getattr(networks, name)()
     except TypeError as error:
-        raise InputError(f"pandapower.networks.{name} needs arguments; save it with pandapower.to_json") from error
+        raise InputError(
+            f"pandapower.networks.{name} needs arguments; save it with pandapower.to_json"
+        ) from error
     if not hasattr(net, "bus"):
-        raise InputError(f"pandapower.networks.{name} is no network; save one with pandapower.to_json")
+        raise InputError(
+            f"pandapower.networks.{name} is no network; save one with pandapower.to_json"
+        )
     return net
 
 
 def _pandapower_file(pp: Any, path: Path) -> Any:
     if not path.is_file():
-        raise InputError(f"{path}: there is no such file; save a network with pandapower.to_json(net, {path.name!r})")
+        raise InputError(
+            f"{path}: there is no such file; save a network with pandapower.to_json(net, {path.name!r})"
+        )
     try:
         net = pp.from_json(str(path))
         if not hasattr(net, "bus"):
             raise ValueError("it holds no network")
     except Exception as error:  # whatever the decoder raises
-        raise InputError(f"{path}: it is no network saved with pandapower.to_json: {error}") from error
+        raise InputError(
+            f"{path}: it is no network saved with pandapower.to_json: {error}"
+        ) from error
     return net
 
 
@@ -155,12 +194,24 @@ def _pandapower_tables(name: str, net: Any) -> SourceTables:
 
 def _labels(net: Any, numbers: dict[Any, int], count: int) -> dict[int, str]:
     """The buses' names where each has one of its own (``Bus 7``: 7), else their indices; inner buses have neither."""
-    named = {index: re.sub(r"\W+", "_", str(name)).strip("_") for index, name in net.bus.name.items()}
-    short = {index: re.sub(r"^bus_*(?=\w)", "", name, flags=re.IGNORECASE) for index, name in named.items()}
+    named = {
+        index: re.sub(r"\W+", "_", str(name)).strip("_") for index, name in net.bus.name.items()
+    }
+    short = {
+        index: re.sub(r"^bus_*(?=\w)", "", name, flags=re.IGNORECASE)
+        for index, name in named.items()
+    }
     named = short if len(set(short.values())) == len(set(named.values())) else named
-    if len(set(named.values())) < len(named) or not all(named.values()) or net.bus.name.isna().any():
+    if (
+        len(set(named.values())) < len(named)
+        or not all(named.values())
+        or net.bus.name.isna().any()
+    ):
         named = {index: str(index) for index in net.bus.index}
     labels: dict[int, str] = {}
-    for index, number in numbers.items():  # several for one where a closed switch joins them: the first counts
+    for (
+        index,
+        number,
+    ) in numbers.items():  # several for one where a closed switch joins them: the first counts
         labels.setdefault(int(number), named[index])
     return {number: labels.get(number, f"inner_{number}") for number in range(count)}

@@ -31,7 +31,13 @@ _TABLES = {
 }
 """What a table of a plain network is → the columns that tell it."""
 
-_FILES = {".raw": "raw", ".m": "matpower", ".mat": "matpower", ".json": "pandapower", ".zip": "cgmes"}
+_FILES = {
+    ".raw": "raw",
+    ".m": "matpower",
+    ".mat": "matpower",
+    ".json": "pandapower",
+    ".zip": "cgmes",
+}
 _TEMPLATE = Path(__file__).with_suffix(".txt").read_text(encoding="utf-8")
 _EMT_STEP = 1e-4
 _MOST_CURVES = 12
@@ -112,10 +118,14 @@ def read_converter(text: str) -> WantedConverter:
         raise InputError(f"--converter {text!r}: the {' and the '.join(lacks)} is missing; {how}")
     rating, power = to_unit(found["MVA"], "MVA"), to_unit(found["MW"], "MW")
     if not 0 < rating < math.inf or not abs(power) <= rating:
-        raise InputError(f"--converter {text!r}: {power:g} MW with a rating of {rating:g} MVA; {how}")
+        raise InputError(
+            f"--converter {text!r}: {power:g} MW with a rating of {rating:g} MVA; {how}"
+        )
     if 0 < abs(power) < 0.01 * rating:
-        raise InputError(f"--converter {text!r}: {power:g} MW is {100 * power / rating:.2g} % of its rating; is "
-                         f"{1000 * power:g} MW meant? A converter that only holds the voltage has 0 MW")  # fmt: skip
+        raise InputError(
+            f"--converter {text!r}: {power:g} MW is {100 * power / rating:.2g} % of its rating; is "
+            f"{1000 * power:g} MW meant? A converter that only holds the voltage has 0 MW"
+        )
     return WantedConverter(found["bus"], rating, power, found.get("less"), replaces)
 
 
@@ -124,14 +134,22 @@ def write_case(wanted: WantedCase) -> NewCase:
 
     Raises `InputError` if a file, a bus or a machine cannot be used; as a case of these files would be refused."""
     sources = sources_of(wanted.files)
-    device = None if wanted.device is None else _described(wanted.device, wanted.binding, is_dll=wanted.is_dll)
+    device = (
+        None
+        if wanted.device is None
+        else _described(wanted.device, wanted.binding, is_dll=wanted.is_dll)
+    )
     if "units" in sources:  # tables say neither
         rows = rows_of(sources["units"], ("rating_mva",))
         machines = {bus_name(row["bus"]): number(row, "rating_mva") for row in rows}
         largest = max(machines, key=machines.__getitem__)
-        wanted = replace(wanted, slack=wanted.slack or largest, frequency=wanted.frequency or "50 Hz")
+        wanted = replace(
+            wanted, slack=wanted.slack or largest, frequency=wanted.frequency or "50 Hz"
+        )
     base = _prepared(_Text(wanted, sources).text, wanted, ["base"])[0]
-    place = None if wanted.converter is None else _placed(wanted.converter, base, _called(wanted.files))
+    place = (
+        None if wanted.converter is None else _placed(wanted.converter, base, _called(wanted.files))
+    )
     draft = _Text(wanted, sources, base, place, _switched(device))
     scenarios = _prepared(draft.text, wanted, [])
     questions = dict.fromkeys(q for prepared in scenarios for q in prepared.questions)
@@ -145,18 +163,29 @@ def _switched(device: FmuDescription | None) -> dict[str, bool]:
     if device is None:
         return {"p": False, "q": False}
     found = {x: device.variables.get(f"pod_{x}.enabled") for x in "pq"}
-    return {x: str(v.start).lower() in ("true", "1", "1.0") for x, v in found.items() if v is not None}
+    return {
+        x: str(v.start).lower() in ("true", "1", "1.0") for x, v in found.items() if v is not None
+    }
 
 
 def _described(path: Path, binding: Path | None, *, is_dll: bool) -> FmuDescription:
     """A device that has the port of a case, perhaps by a binding."""
     found = bound_fmu(path, binding)
-    other = [v.name for v in (V_RE, V_IM, I_RE, I_IM)
-             if v.name not in found.variables or found.variables[v.name].unit not in (None, "", "pu")]  # fmt: skip
+    other = [
+        v.name
+        for v in (V_RE, V_IM, I_RE, I_IM)
+        if v.name not in found.variables or found.variables[v.name].unit not in (None, "", "pu")
+    ]
     if other:
         way = "say which of its variables it is with --binding; `gfor fmu bind` drafts one"
-        way = "lay a circuit around the DLL in a device's file, and give that to --dll" if is_dll else way
-        raise InputError(f"{path}: it has no port of voltage and current in pu ({', '.join(other)}); {way}")
+        way = (
+            "lay a circuit around the DLL in a device's file, and give that to --dll"
+            if is_dll
+            else way
+        )
+        raise InputError(
+            f"{path}: it has no port of voltage and current in pu ({', '.join(other)}); {way}"
+        )
     return found
 
 
@@ -172,22 +201,38 @@ def sources_of(files: Sequence[Path]) -> dict[str, Path]:
         suffix = path.suffix.lower()
         known = ", ".join([*_FILES, ".dyr", ".csv"])
         if not path.is_dir() and suffix not in (*_FILES, ".dyr", ".csv"):
-            raise InputError(f"{path}: no network that is read; give a file {known}, or the folder of a CGMES model")
+            raise InputError(
+                f"{path}: no network that is read; give a file {known}, or the folder of a CGMES model"
+            )
         if not path.exists():
             near = close_names(path.name, [p.name for p in path.absolute().parent.glob("*")])
             raise InputError(f"{path}: there is no such file{f'; {near}' if near else ''}")
-        key = "cgmes" if path.is_dir() else "dyr" if suffix == ".dyr" else _FILES.get(suffix) or _table_of(path)
+        key = (
+            "cgmes"
+            if path.is_dir()
+            else "dyr"
+            if suffix == ".dyr"
+            else _FILES.get(suffix) or _table_of(path)
+        )
         others = [k for k in found if "dyr" not in (k, key) and not {k, key} <= {*_TABLES}]
         if key in found or others:
-            raise InputError(f"{path} and {found.get(key) or found[others[0]]}: a case has one of them; give one")
+            raise InputError(
+                f"{path} and {found.get(key) or found[others[0]]}: a case has one of them; give one"
+            )
         found[key] = path
     if not [key for key in found if key != "dyr"]:
         raise InputError("no network is given; name its file, such as own.raw, and with it own.dyr")
-    if {*found} & {*_TABLES} and (lacks := [key for key in ("lines_file", "units") if key not in found]):
+    if {*found} & {*_TABLES} and (
+        lacks := [key for key in ("lines_file", "units") if key not in found]
+    ):
         wanted = " and ".join(f"one with the columns {', '.join(_TABLES[key])}" for key in lacks)
-        raise InputError(f"{', '.join(map(str, found.values()))}: of the tables of a network, {wanted} is missing")
+        raise InputError(
+            f"{', '.join(map(str, found.values()))}: of the tables of a network, {wanted} is missing"
+        )
     if "dyr" in found and "raw" not in found:
-        raise InputError(f"{found['dyr']}: dynamics data of PSS/E need the network's RAW file; give both")
+        raise InputError(
+            f"{found['dyr']}: dynamics data of PSS/E need the network's RAW file; give both"
+        )
     return found
 
 
@@ -196,7 +241,9 @@ def _table_of(path: Path) -> str:
     key = next((key for key, wanted in _TABLES.items() if columns >= {*wanted}), None)
     if key is None:
         kinds = "; ".join(", ".join(wanted) for wanted in _TABLES.values())
-        raise InputError(f"{path}: no table of a network: none has its columns in line 1, or it has no row ({kinds})")
+        raise InputError(
+            f"{path}: no table of a network: none has its columns in line 1, or it has no row ({kinds})"
+        )
     return key
 
 
@@ -226,17 +273,28 @@ def _called(files: Sequence[Path]) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     raw = [path for path in files if path.suffix.lower() == ".raw"]
     for record in (record for path in raw for record in read_records(path).of("bus")):
-        found.setdefault(record.text(1, "").strip(), []).append(bus_name(str(record.whole(0, "the bus' number"))))
+        found.setdefault(record.text(1, "").strip(), []).append(
+            bus_name(str(record.whole(0, "the bus' number")))
+        )
     return found
 
 
-def _placed(wanted: WantedConverter, base: PreparedScenario, called: Mapping[str, Sequence[str]]) -> _Place:
+def _placed(
+    wanted: WantedConverter, base: PreparedScenario, called: Mapping[str, Sequence[str]]
+) -> _Place:
     network, flow = base.network, base.power_flow
     if network is None or flow is None:
         raise InputError("the network has no power flow")
-    names = {wanted.bus, bus_name(wanted.bus), f"bus_{wanted.bus}", *called.get(wanted.bus, ())} & set(network.buses)
+    names = {
+        wanted.bus,
+        bus_name(wanted.bus),
+        f"bus_{wanted.bus}",
+        *called.get(wanted.bus, ()),
+    } & set(network.buses)
     if len(names) != 1:
-        hint = close_names(bus_name(wanted.bus), [*network.buses, *called], f"there are: {few(network.buses, 8)}")
+        hint = close_names(
+            bus_name(wanted.bus), [*network.buses, *called], f"there are: {few(network.buses, 8)}"
+        )
         raise InputError(f"--converter: the network has no bus {wanted.bus!r}; {hint}")
     (bus,) = names
     plans = base.system.components
@@ -245,21 +303,32 @@ def _placed(wanted: WantedConverter, base: PreparedScenario, called: Mapping[str
     found = _Place(wanted, bus, round(abs(flow.voltages[bus]), 5), ", ".join(at_slack))
     if wanted.less is None:
         return found
-    if len(there := [unit for unit, place in units.items() if place in called.get(wanted.less, ())]) == 1:
+    if (
+        len(
+            there := [unit for unit, place in units.items() if place in called.get(wanted.less, ())]
+        )
+        == 1
+    ):
         wanted = replace(wanted, less=there[0])
     if wanted.less not in units:
         known = f"the network's units: {', '.join(units)}"
-        raise InputError(f"--converter: there is no unit {wanted.less!r} to feed less; "
-                         f"{close_names(str(wanted.less), units, known)}")  # fmt: skip
+        raise InputError(
+            f"--converter: there is no unit {wanted.less!r} to feed less; "
+            f"{close_names(str(wanted.less), units, known)}"
+        )
     rating = plans[wanted.less].number("S_n")
     power = flow.powers[wanted.less].real * rating
     if wanted.replaces:
         if wanted.less in at_slack:
-            raise InputError(f"--converter: instead of {wanted.less}: it is at the slack; replace another, or write "
-                             "another slack into the files")  # fmt: skip
+            raise InputError(
+                f"--converter: instead of {wanted.less}: it is at the slack; replace another, or write "
+                "another slack into the files"
+            )
         return replace(found, less=wanted.less, before_mw=power, rating_mva=rating)
     if wanted.less not in at_slack and abs(wanted.p_mw - power) < 1e-6:
-        raise InputError(f"--converter: {wanted.less} would feed nothing; write 'instead of {wanted.less}'")
+        raise InputError(
+            f"--converter: {wanted.less} would feed nothing; write 'instead of {wanted.less}'"
+        )
     if wanted.p_mw > power + 1e-6:
         most = f"give the converter at most {power:.5g} MW, or leave the rest to the slack without 'less'"
         raise InputError(
@@ -274,14 +343,20 @@ class _Text:
     """The text of a case, without and with what the network's first power flow says."""
 
     def __init__(
-        self, wanted: WantedCase, sources: dict[str, Path], base: PreparedScenario | None = None,
-        place: _Place | None = None, pods: Mapping[str, bool] = MappingProxyType({}),
-    ) -> None:  # fmt: skip
+        self,
+        wanted: WantedCase,
+        sources: dict[str, Path],
+        base: PreparedScenario | None = None,
+        place: _Place | None = None,
+        pods: Mapping[str, bool] = MappingProxyType({}),
+    ) -> None:
         self._pods = pods
         self._wanted, self._sources, self._base, self._place = wanted, sources, base, place
         self._stray, self._stray_why = _stray_capacitance(base) if base else (0.05, "")
         self._network = base.network if base else None
-        largest = max(self._network.loads if self._network else (), key=lambda load: load.p_mw, default=None)
+        largest = max(
+            self._network.loads if self._network else (), key=lambda load: load.p_mw, default=None
+        )
         buses = self._network.buses if self._network else ("",)
         self._fault_bus = place.bus if place else largest.bus if largest else buses[0]
 
@@ -296,16 +371,26 @@ class _Text:
                 dispatch = f"{p.less} feeds {w.p_mw:g} MW less ({p.before_mw:.5g} before), with its rating and inertia"
             ours = "ours, with the POD gains of the paper's system (`gfor design` finds others)"
             what = ours if device is None else device.name
-            lines.append(f"converter: {what}; at {p.bus} it holds the {p.v_pu:g} pu of the base; {dispatch}")
+            lines.append(
+                f"converter: {what}; at {p.bus} it holds the {p.v_pu:g} pu of the base; {dispatch}"
+            )
         if "dyr" not in self._sources:
-            lines.append("machines: no dynamics data, so all are a steam turbine's with exciter ST1: typical data")
+            lines.append(
+                "machines: no dynamics data, so all are a steam turbine's with exciter ST1: typical data"
+            )
         elif self._wanted.kind == "phasor":
             lines.append(f"machines: {_EMF}")
         if "units" in self._sources:
-            lines[-1] += f"; slack {self._wanted.slack}, {self._wanted.frequency} (--slack, --frequency)"
+            lines[-1] += (
+                f"; slack {self._wanted.slack}, {self._wanted.frequency} (--slack, --frequency)"
+            )
         asked = "impedance until [network] load_model says otherwise; `gfor modes` tells what power would change"
-        lines.append(f"loads: constant {asked if not self._tables() else 'power; [network] load_model changes it'}")
-        lines.append(f"models: {self._wanted.kind}; stray_B of EMT models: {self._stray:g} pu{self._stray_why}")
+        lines.append(
+            f"loads: constant {asked if not self._tables() else 'power; [network] load_model changes it'}"
+        )
+        lines.append(
+            f"models: {self._wanted.kind}; stray_B of EMT models: {self._stray:g} pu{self._stray_why}"
+        )
         lines.append(f"fault: three-phase at {self._fault_bus}, 100 ms, nothing trips")
         more = f"{questions} question{'s' * (questions != 1)} about the data: comments at their lines in the file"
         return [*lines, more] if questions else lines
@@ -313,7 +398,11 @@ class _Text:
     def _path(self, path: Path) -> str:
         """As the file names it: relative where that is possible, with slashes everywhere."""
         try:
-            return _quoted(Path(os.path.relpath(path.absolute(), self._wanted.out.absolute().parent)).as_posix())
+            return _quoted(
+                Path(
+                    os.path.relpath(path.absolute(), self._wanted.out.absolute().parent)
+                ).as_posix()
+            )
         except ValueError:  # on another drive
             return _quoted(path.absolute().as_posix())
 
@@ -323,8 +412,10 @@ class _Text:
         key = next(key for key in self._sources if key not in ("dyr", "units"))
         kind, other = w.kind, "phasor" if w.kind == "emt" else "emt"
         steps = {"emt": "100 us", "phasor": "2 ms"}
-        stray = {"emt": f"stray_B = {self._stray:g}             # pu on 100 MVA{self._stray_why}\n",
-                 "phasor": "stray_B = 0                 # no bus needs any\n"}  # fmt: skip
+        stray = {
+            "emt": f"stray_B = {self._stray:g}             # pu on 100 MVA{self._stray_why}\n",
+            "phasor": "stray_B = 0                 # no bus needs any\n",
+        }
         both = f'models = "{kind}"           # the same with the others: --set models={other}\n'
         rest = f"\n[{other}]                       # what --set models={other} takes instead\n"
         rest += f'step_size = "{steps[other]}"\n'
@@ -332,32 +423,50 @@ class _Text:
         own = f"    # {_EMF}" if kind == "phasor" else ""
         dyr = "generator_parameters = { transformer.X_t = 0.0, transformer.R_t = 0.0 }    # the network has it"
         dyr = f"dyr = {self._path(self._sources['dyr'])}{own}" if "dyr" in self._sources else dyr
-        dyr = f"file = {self._path(self._sources['units'])}\n{dyr}" if "units" in self._sources else dyr
-        lines = self._network is not None and any(x.name.startswith("line_") for x in self._network.lines)
+        dyr = (
+            f"file = {self._path(self._sources['units'])}\n{dyr}"
+            if "units" in self._sources
+            else dyr
+        )
+        lines = self._network is not None and any(
+            x.name.startswith("line_") for x in self._network.lines
+        )
         return _TEMPLATE.format(
             command=w.command,
             name=_quoted(re.sub(r"[^0-9A-Za-z_]+", "_", w.out.stem).strip("_") or "case"),
-            title=_quoted(self._sources[key].name + (f" with a converter at {place.bus}" if place else "")),
+            title=_quoted(
+                self._sources[key].name + (f" with a converter at {place.bus}" if place else "")
+            ),
             source=_quoted(", ".join(path.name for path in self._sources.values())),
             models=both if w.device is None else "",
             step=steps[kind],
             record=', "grid.line_*.p"' * lines + ', "gfor.*"' * (place is not None),
             other=rest + stray[other] if w.device is None else "",
-            slack=(f"\nslack = {_quoted(w.slack)}" if w.slack else "") + "\nreactive_limits = true" * w.reactive_limits,
+            slack=(f"\nslack = {_quoted(w.slack)}" if w.slack else "")
+            + "\nreactive_limits = true" * w.reactive_limits,
             grid="grid" if kind == "emt" else "phasor_grid",
-            network=self._tables() or f"{key} = {self._path(self._sources[key])}" + kept * (key == "raw"),
+            network=self._tables()
+            or f"{key} = {self._path(self._sources[key])}" + kept * (key == "raw"),
             loads="" if self._tables() else "# ",
-            more=(f"frequency = {_quoted(w.frequency)}\n" if w.frequency else "") + stray["emt"] * (kind == "emt")
+            more=(f"frequency = {_quoted(w.frequency)}\n" if w.frequency else "")
+            + stray["emt"] * (kind == "emt")
             + (f"leave_out = {_listed(w.leave_out)}\n" if w.leave_out else ""),
-            units=dyr + (f"\ndyr_leave_out = {_listed(w.dyr_leave_out)}" if w.dyr_leave_out else ""),
+            units=dyr
+            + (f"\ndyr_leave_out = {_listed(w.dyr_leave_out)}" if w.dyr_leave_out else ""),
             generator="" if "dyr" in self._sources else "_st1",
             suffix="" if kind == "emt" else "_phasor",
             converter=self._converter(),
-            scenarios="\n".join("\n".join([*block, ""]) for block in [*self._scenarios(), *self._plots()]),
-        )  # fmt: skip
+            scenarios="\n".join(
+                "\n".join([*block, ""]) for block in [*self._scenarios(), *self._plots()]
+            ),
+        )
 
     def _tables(self) -> str:
-        tables = [f"{k} = {self._path(self._sources[k])}" for k in ("lines_file", "loads_file") if k in self._sources]
+        tables = [
+            f"{k} = {self._path(self._sources[k])}"
+            for k in ("lines_file", "loads_file")
+            if k in self._sources
+        ]
         if "buses" in self._sources:
             buses = [bus_name(row["bus"]) for row in rows_of(self._sources["buses"], ("bus",))]
             tables.append(f"buses = {_listed(buses)}")
@@ -373,10 +482,14 @@ class _Text:
             what += f"\nbinding = {self._path(w.binding)}" if w.binding else ""
         power = f"P_0 = {place.p_mw / place.rating_mva:.6g}"
         values = f'S_n = "{place.rating_mva:g} MVA", {power}, v_0 = {self._place.v_pu:g}'
-        without = values + "".join(f", pod_{x}.enabled = false" for x, starts in self._pods.items() if starts)
+        without = values + "".join(
+            f", pod_{x}.enabled = false" for x, starts in self._pods.items() if starts
+        )
         still = f'model = "static_generation{"" if w.kind == "emt" else "_phasor"}"'
-        parts = ((_CONVERTER, what, without, f"P_0 in parts of S_n: {place.p_mw:g} MW"),
-                 (_INJECTION, still, values, "the same power without dynamics, in [scenarios.dispatch]"))  # fmt: skip
+        parts = (
+            (_CONVERTER, what, without, f"P_0 in parts of S_n: {place.p_mw:g} MW"),
+            (_INJECTION, still, values, "the same power without dynamics, in [scenarios.dispatch]"),
+        )
         return "".join(
             f'\n[components.{name}]\n{kind}\nbus = "{self._place.bus}"\nparameters = {{ {given} }}    # {why}\n'
             for name, kind, given, why in parts
@@ -390,18 +503,35 @@ class _Text:
         if self._place is not None:
             found.append(self._scenario("dispatch", "Dispatch without the device", beside=""))
             found.append(self._scenario("converter", "Converter"))
-            found += [self._scenario(f"pod_{x}", f"POD-{x.upper()}", f"gfor.pod_{x}.enabled") for x in self._pods]
+            found += [
+                self._scenario(f"pod_{x}", f"POD-{x.upper()}", f"gfor.pod_{x}.enabled")
+                for x in self._pods
+            ]
         fault = f'type = "bus_fault", time = "1 s", bus = "{self._fault_bus}", duration = "100 ms"'
-        lines = sorted(self._network.lines, key=lambda x: (x.has_ratio, self._fault_bus not in (x.from_bus, x.to_bus)))
-        opening = f'    # cleared_by = "{lines[0].name}" would open that line with it' if lines else ""
+        lines = sorted(
+            self._network.lines,
+            key=lambda x: (x.has_ratio, self._fault_bus not in (x.from_bus, x.to_bus)),
+        )
+        opening = (
+            f'    # cleared_by = "{lines[0].name}" would open that line with it' if lines else ""
+        )
         events = f"events = [{{ {fault} }}]{opening}"
-        return [*found, [*self._scenario("fault", f"Fault of 100 ms at {self._fault_bus}", beside=""), events]]
+        return [
+            *found,
+            [*self._scenario("fault", f"Fault of 100 ms at {self._fault_bus}", beside=""), events],
+        ]
 
-    def _scenario(self, name: str, title: str, enabled: str = "", beside: str = "dispatch") -> list[str]:
+    def _scenario(
+        self, name: str, title: str, enabled: str = "", beside: str = "dispatch"
+    ) -> list[str]:
         p = self._place
         values = [f'"{key}" = {value}' for key, value in p.changed.items()] if p else []
         values += [f'"{enabled}" = true'] if enabled else []
-        less = f"    # {p.less}: {p.before_mw - p.wanted.p_mw:.5g} for {p.before_mw:.5g} MW" if p and p.changed else ""
+        less = (
+            f"    # {p.less}: {p.before_mw - p.wanted.p_mw:.5g} for {p.before_mw:.5g} MW"
+            if p and p.changed
+            else ""
+        )
         gone = [_CONVERTER if name == "dispatch" else _INJECTION] if p else []
         gone += [p.less] if p and p.less and p.wanted.replaces else []
         settings = [f"remove = {_listed(gone)}"] if gone else []
@@ -414,14 +544,23 @@ class _Text:
         if self._base is None or self._network is None:
             return []
         plans = self._base.system.components
-        speeds = [f"{name}.omega" for name, plan in plans.items() if "omega" in plan.description.outputs]
+        speeds = [
+            f"{name}.omega" for name, plan in plans.items() if "omega" in plan.description.outputs
+        ]
         with_units = {port.bus for port in self._network.ports}
-        buses = [self._fault_bus, *(x for x in self._network.buses if x not in {*with_units, self._fault_bus})]
+        buses = [
+            self._fault_bus,
+            *(x for x in self._network.buses if x not in {*with_units, self._fault_bus}),
+        ]
         found = [_plot("speeds", [(speeds, "Speed [pu]")])] if speeds else []
         found.append(_plot("voltages", [([f"grid.{bus}.v" for bus in buses], "v [pu]")]))
         if self._place is not None:
             current = f"gfor.{'current_demand' if self._wanted.kind == 'emt' else 'current_limit'}"
-            panels = [(["gfor.p"], "p [pu]"), (["gfor.q"], "q [pu]"), ([current], "Current / limit")]
+            panels = [
+                (["gfor.p"], "p [pu]"),
+                (["gfor.q"], "q [pu]"),
+                ([current], "Current / limit"),
+            ]
             found.append(_plot("converter", panels[: 3 if self._wanted.device is None else 2]))
         return found
 
@@ -458,7 +597,9 @@ def _stray_capacitance(base: PreparedScenario) -> tuple[float, str]:
         return 0.0, ", as every bus of a unit has a capacitance of its own"
     name = max(needed, key=needed.__getitem__)
     digits = 10 ** (math.floor(math.log10(needed[name])) - 1)
-    return math.ceil(needed[name] / digits) * digits, f", (ω_b·H)²/X'' of {name} at a bus without capacitance"
+    return math.ceil(
+        needed[name] / digits
+    ) * digits, f", (ω_b·H)²/X'' of {name} at a bus without capacitance"
 
 
 def _quoted(text: str) -> str:
@@ -472,9 +613,18 @@ def _commented(text: str, questions: Sequence[Problem], sources: dict[str, Path]
     for question in questions:
         place = _line_of(question, lines, sources)
         where = "" if question.place.startswith("line ") else f"{question.place}: "
-        above.setdefault(place, []).extend(textwrap.wrap(f"question: {where}{question.text}", 116, initial_indent="# ",
-                                                         subsequent_indent="#   ", break_long_words=False))  # fmt: skip
-    return "\n".join(part for k, line in enumerate(lines) for part in [*above.get(k, []), line]) + "\n"
+        above.setdefault(place, []).extend(
+            textwrap.wrap(
+                f"question: {where}{question.text}",
+                116,
+                initial_indent="# ",
+                subsequent_indent="#   ",
+                break_long_words=False,
+            )
+        )
+    return (
+        "\n".join(part for k, line in enumerate(lines) for part in [*above.get(k, []), line]) + "\n"
+    )
 
 
 def _line_of(question: Problem, lines: Sequence[str], sources: dict[str, Path]) -> int:

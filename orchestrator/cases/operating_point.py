@@ -29,7 +29,9 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
         none = f"no bus of {raw} is the reference (IDE = 3), and " if raw is not None else ""
         text = f"{none}the key 'slack' is missing; name a unit or a bus with one that feeds what is left"
         one = next(iter(units.values()), "bus_1")
-        draft.note(draft.given.place("power_flow"), f'{text}, such as slack = "{one}" (`gfor new --slack`)')
+        draft.note(
+            draft.given.place("power_flow"), f'{text}, such as slack = "{one}" (`gfor new --slack`)'
+        )
         return None
     slack = units.get(wanted, wanted)
     if slack not in units.values():
@@ -44,20 +46,30 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
     if draft.dispatch is not None:
         slack = _reference(draft, units, slack, table.grid)
     undecided = list(undecided_units(draft, units, slack))
-    returning = {event.unit for event in draft.given.events if isinstance(event, UnitReconnectionTable)}
+    returning = {
+        event.unit for event in draft.given.events if isinstance(event, UnitReconnectionTable)
+    }
     try:
         flow = start_from_power_flow(
-            draft.system, draft.network, table.grid, units, slack, _reactive_limits(draft),
-            keep_limits=table.reactive_limits is True, returning=returning, dispatch=draft.dispatch,
+            draft.system,
+            draft.network,
+            table.grid,
+            units,
+            slack,
+            _reactive_limits(draft),
+            keep_limits=table.reactive_limits is True,
+            returning=returning,
+            dispatch=draft.dispatch,
             active=draft.active_limits,
-        )  # fmt: skip
+        )
     except InputError as error:
         kind = ErrorKind.VALUES if error.kind is ErrorKind.INPUT else error.kind
         draft.note(draft.given.place("power_flow"), f"scenario {draft.given.name!r}: {error}", kind)
         return None
     question(draft, undecided)
     draft.found.questions += [*_limit_questions(draft, flow), *_voltage_questions(draft, flow)]
-    draft.found.questions += _leftover(draft, flow) if slack == intact else []  # else what it fed before is shared
+    # else what it fed before is shared
+    draft.found.questions += _leftover(draft, flow) if slack == intact else []
     return flow
 
 
@@ -72,17 +84,21 @@ def _leftover(draft: Draft, flow: PowerFlow) -> Iterator[Problem]:
         least, most = draft.active_limits.get(name, (-math.inf, math.inf))
         if not least - close <= fed_mw <= most + close:
             text = f"{name} is the slack and feeds {fed_mw:.4g} MW, beyond its limits, {least:g} to {most:g} MW"
-            yield Problem(draft.places.get(f"{name}.P_0", ""), f"{text}; let other units feed more or less")
+            yield Problem(
+                draft.places.get(f"{name}.P_0", ""), f"{text}; let other units feed more or less"
+            )
 
 
 def _reference(draft: Draft, units: Mapping[str, str], slack: str, grid: str) -> str:
     """The slack bus, or, where an outage takes all its units, the bus of the largest unit that holds a voltage."""
     plans = draft.system.components
     left = [
-        name for name in units
-        if is_connected(plans[grid], f"{name}.connected") and is_connected(plans[name], "connected")
+        name
+        for name in units
+        if is_connected(plans[grid], f"{name}.connected")
+        and is_connected(plans[name], "connected")
         and "Q_0" not in plans[name].parameters
-    ]  # fmt: skip
+    ]
     if not left or slack in (units[name] for name in left):
         return slack
     return units[max(left, key=lambda name: plans[name].number("S_n"))]
@@ -91,7 +107,9 @@ def _reference(draft: Draft, units: Mapping[str, str], slack: str, grid: str) ->
 def _voltage_questions(draft: Draft, flow: PowerFlow) -> list[Problem]:
     """Ask about voltages with which no network is run."""
     low, high = _USUAL_VOLTAGES
-    unusual = [f"{bus!r} {abs(v):.3f} pu" for bus, v in flow.voltages.items() if not low <= abs(v) <= high]
+    unusual = [
+        f"{bus!r} {abs(v):.3f} pu" for bus, v in flow.voltages.items() if not low <= abs(v) <= high
+    ]
     if not unusual:
         return []
     return [
@@ -106,7 +124,9 @@ def _voltage_questions(draft: Draft, flow: PowerFlow) -> list[Problem]:
 def _reactive_limits(draft: Draft) -> dict[str, tuple[float, float]]:
     """Limits of the source's generators, which the units' file overrides [Mvar]."""
     generation = draft.data.generation if draft.data else {}
-    return {bus: (g.q_min_mvar, g.q_max_mvar) for bus, g in generation.items()} | draft.reactive_limits
+    return {
+        bus: (g.q_min_mvar, g.q_max_mvar) for bus, g in generation.items()
+    } | draft.reactive_limits
 
 
 def _limit_questions(draft: Draft, flow: PowerFlow) -> list[Problem]:

@@ -18,7 +18,8 @@ _EXAMPLE = '[set]\n"gfor.pod_p.K" = 200.0'
 class ParameterFile:
     path: Path
     text: str
-    values: dict[str, Value]  # by ``component.variable``; the component may be a pattern such as ``gfor*``
+    # by ``component.variable``; the component may be a pattern such as ``gfor*``
+    values: dict[str, Value]
 
     def place(self, key: str) -> str:
         return _place(self.path, self.text, key)
@@ -37,7 +38,9 @@ def read_parameter_file(path: Path) -> ParameterFile:
             f"this one has at its top: {', '.join(raw) or 'nothing'}"
         )
     unknown = "this key is unknown; a parameter file has the table [set] and no other"
-    problems = [Problem(_named(path, line_of(text, (key,)), key), unknown) for key in raw if key != _TABLE]
+    problems = [
+        Problem(_named(path, line_of(text, (key,)), key), unknown) for key in raw if key != _TABLE
+    ]
     problems += [Problem(_place(path, text, key), TWICE) for key in given_twice(flatten(table))]
     values: dict[str, Value] = {}
     for parts, value in flatten(table):
@@ -57,14 +60,23 @@ def read_parameter_file(path: Path) -> ParameterFile:
 
 def parameter_file_text(values: Mapping[str, Value], comments: Sequence[str]) -> str:
     lines = [f"# {line}".rstrip() for comment in comments for line in comment.splitlines()]
-    lines += ["", f"[{_TABLE}]", *(f'"{key}" = {_toml(value)}' for key, value in values.items()), ""]
+    lines += [
+        "",
+        f"[{_TABLE}]",
+        *(f'"{key}" = {_toml(value)}' for key, value in values.items()),
+        "",
+    ]
     return "\n".join(lines)
 
 
 def _toml(value: Value) -> str:
     if isinstance(value, bool):
         return str(value).lower()
-    return repr(value) if not isinstance(value, str) else '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    return (
+        repr(value)
+        if not isinstance(value, str)
+        else '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    )
 
 
 def _place(path: Path, text: str, key: str) -> str:

@@ -40,9 +40,13 @@ class Rule:
 
 
 _FIELD = "what a winding screens, it takes from the reactance; a machine without a field winding is not modelled"
-_SCREENS = "a winding that reacts can only lower the reactance; equal says that there is no such winding"
+_SCREENS = (
+    "a winding that reacts can only lower the reactance; equal says that there is no such winding"
+)
 _LEAKAGE = "the leakage reactance is what no rotor winding can screen"
-_SLOWER = "the transient is by definition the slower one; check the units and whether the two are swapped"
+_SLOWER = (
+    "the transient is by definition the slower one; check the units and whether the two are swapped"
+)
 
 _LIMITS = "the lower limit exceeds the upper one, or equals it; are the two swapped?"
 LIMITS = (
@@ -53,27 +57,44 @@ LIMITS = (
 """Limits of a machine's controls, the upper one first."""
 
 RULES = (
-    Rule("machine.X_d", "machine.X_d1", _FIELD), Rule("machine.X_d1", "machine.X_d2", _SCREENS, may_be_equal=True),
-    Rule("machine.X_d2", "machine.X_l", _LEAKAGE), Rule("machine.X_q", "machine.X_q1", _SCREENS, may_be_equal=True),
-    Rule("machine.X_q1", "machine.X_q2", _SCREENS, may_be_equal=True), Rule("machine.X_q2", "machine.X_l", _LEAKAGE),
-    Rule("machine.T_d10", "machine.T_d20", _SLOWER), Rule("machine.T_q10", "machine.T_q20", _SLOWER),
-    Rule("machine.s_12", "machine.s_10", "saturation rises with the flux; are the two swapped?", may_be_equal=True),
+    Rule("machine.X_d", "machine.X_d1", _FIELD),
+    Rule("machine.X_d1", "machine.X_d2", _SCREENS, may_be_equal=True),
+    Rule("machine.X_d2", "machine.X_l", _LEAKAGE),
+    Rule("machine.X_q", "machine.X_q1", _SCREENS, may_be_equal=True),
+    Rule("machine.X_q1", "machine.X_q2", _SCREENS, may_be_equal=True),
+    Rule("machine.X_q2", "machine.X_l", _LEAKAGE),
+    Rule("machine.T_d10", "machine.T_d20", _SLOWER),
+    Rule("machine.T_q10", "machine.T_q20", _SLOWER),
+    Rule(
+        "machine.s_12",
+        "machine.s_10",
+        "saturation rises with the flux; are the two swapped?",
+        may_be_equal=True,
+    ),
     *(Rule(upper, lower, _LIMITS) for upper, lower in LIMITS),
-)  # fmt: skip
+)
 """Rules of the machines' data. The FMUs refuse the same data in any tool; here the error names the line, before any FMU
 is started."""
 
-RESISTANCES = (("transformer.R_t", "transformer.X_t"), ("filter.R_c", "filter.X_c"), ("machine.X_d1", "machine.X_q1"),
-               ("machine.X_q", "machine.X_d"))  # fmt: skip
+RESISTANCES = (
+    ("transformer.R_t", "transformer.X_t"),
+    ("filter.R_c", "filter.X_c"),
+    ("machine.X_d1", "machine.X_q1"),
+    ("machine.X_q", "machine.X_d"),
+)
 """Resistances and reactances, each with a larger one that it should not exceed."""
 
 
-_FULL = 1.05  # apparent power [pu of the rating] above which a converter's operating point is questioned
+# apparent power [pu of the rating] above which a converter's operating point is questioned
+_FULL = 1.05
 _LONG = 0.01  # step of phasor models [s] above which it is questioned
 _OF_PARTS = ("machine", "exciter", "governor", "pss")
 """Begins of a generator's variables; another scenario may choose a part that has one which this one's has not."""
 
-_LEADS = (("exciter.K", "exciter.T_A", "exciter.T_B"), ("governor.D_t", "governor.T_2", "governor.T_3"))
+_LEADS = (
+    ("exciter.K", "exciter.T_A", "exciter.T_B"),
+    ("governor.D_t", "governor.T_2", "governor.T_3"),
+)
 """Of SEXS and of TGOV1: a parameter that only they have, their lead and their lag."""
 
 _SHOWN = 3  # largest number of components that a question names; the others are counted
@@ -86,16 +107,24 @@ def check_plausibility(draft: Draft) -> None:
     _check_frequencies(draft)
     _check_meant(draft)
     doubts = list(_doubts(draft))
-    ranges = {doubt.name for doubt in doubts}  # one question about a value is enough, and a range says more
+    # one question about a value is enough, and a range says more
+    ranges = {doubt.name for doubt in doubts}
     draft.found.questions += _long_step(draft)
-    thousands = [(name, text) for name, text in draft.found.thousandfold.items() if name not in ranges]
-    question(draft, [*doubts, *(UnusualValue(name, draft.places[name], text) for name, text in thousands)])
+    thousands = [
+        (name, text) for name, text in draft.found.thousandfold.items() if name not in ranges
+    ]
+    question(
+        draft,
+        [*doubts, *(UnusualValue(name, draft.places[name], text) for name, text in thousands)],
+    )
 
 
 def question(draft: Draft, doubts: Iterable[UnusualValue]) -> None:
     """Add questions to the draft's, without those that the case answers; equal ones become one."""
     meant = draft.given.case.meant
-    draft.found.questions += _merged([d for d in doubts if not any(fnmatch.fnmatchcase(d.name, m) for m in meant)])
+    draft.found.questions += _merged(
+        [d for d in doubts if not any(fnmatch.fnmatchcase(d.name, m) for m in meant)]
+    )
 
 
 def _check_meant(draft: Draft) -> None:
@@ -104,8 +133,13 @@ def _check_meant(draft: Draft) -> None:
         component, _, variable = pattern.partition(".")
         if draft.given.whole and not fnmatch.filter(draft.known, component):
             hint = close_names(component, sorted(draft.known), "name it as [components] does")
-            draft.note(draft.given.place("meant"), f"{pattern!r}: there is no component {component!r}; {hint}")
-        plans = [p for name, p in draft.system.components.items() if fnmatch.fnmatchcase(name, component)]
+            draft.note(
+                draft.given.place("meant"),
+                f"{pattern!r}: there is no component {component!r}; {hint}",
+            )
+        plans = [
+            p for name, p in draft.system.components.items() if fnmatch.fnmatchcase(name, component)
+        ]
         elsewhere = variable in (*PARTS, SOLVED) or variable.partition(".")[0] in _OF_PARTS
         here = (v for p in plans for v in p.description.variables)
         if plans and not elsewhere and not any(fnmatch.fnmatchcase(v, variable) for v in here):
@@ -118,17 +152,31 @@ def _doubts(draft: Draft) -> Iterator[UnusualValue]:
         for variable in plan.description.parameters:
             wanted, value = plan.description.variables[variable].usual, value_of(plan, variable)
             if wanted is not None and value is not None:
-                yield from outside(draft, name, variable, value, wanted, scale=_to_rating(plan, variable))
+                yield from outside(
+                    draft, name, variable, value, wanted, scale=_to_rating(plan, variable)
+                )
         for own, of_lead, of_lag in _LEADS:
             lead, lag = value_of(plan, of_lead), value_of(plan, of_lag)
-            if plan.kind == "machine" and lead and lag and lead > 2 * lag and value_of(plan, own) is not None:
+            if (
+                plan.kind == "machine"
+                and lead
+                and lag
+                and lead > 2 * lag
+                and value_of(plan, own) is not None
+            ):
                 text = f"{of_lead} = {lead:g} s, the lead, exceeds {of_lag} = {lag:g} s, the lag; are the two swapped?"
-                yield UnusualValue(f"{name}.{of_lead}", place_of(draft, name, of_lead, of_lag), text)
+                yield UnusualValue(
+                    f"{name}.{of_lead}", place_of(draft, name, of_lead, of_lag), text
+                )
         for resistance, reactance in RESISTANCES:
             R, X = value_of(plan, resistance), value_of(plan, reactance)
             if R is not None and X is not None and R > 1.05 * X > 0:
-                text = f"{resistance} = {R:g} pu exceeds {reactance} = {X:g} pu; are the two swapped?"
-                yield UnusualValue(f"{name}.{resistance}", place_of(draft, name, resistance, reactance), text)
+                text = (
+                    f"{resistance} = {R:g} pu exceeds {reactance} = {X:g} pu; are the two swapped?"
+                )
+                yield UnusualValue(
+                    f"{name}.{resistance}", place_of(draft, name, resistance, reactance), text
+                )
     yield from _small_units(draft)
     yield from network_doubts(draft)
     yield from source_doubts(draft)
@@ -138,9 +186,17 @@ def _doubts(draft: Draft) -> Iterator[UnusualValue]:
 def _long_step(draft: Draft) -> Iterator[Problem]:
     """Ask about a step of the file after which phasor models exchange too late for their modes."""
     solver, grid = draft.given.case.solver, draft.tables.get(draft.grid or "")
-    if grid and "phasor" in (grid.model or "") and solver.step_size > _LONG and solver.schedule not in SECOND_ORDER:
+    if (
+        grid
+        and "phasor" in (grid.model or "")
+        and solver.step_size > _LONG
+        and solver.schedule not in SECOND_ORDER
+    ):
         text = f"{1e3 * solver.step_size:g} ms are long for phasor models and move modes: 1 to 5 ms are usual; is it"
-        yield Problem(draft.given.place("solver", "step_size"), f"{text} meant? `gfor steps` says what a step costs")
+        yield Problem(
+            draft.given.place("solver", "step_size"),
+            f"{text} meant? `gfor steps` says what a step costs",
+        )
 
 
 def _ratings(draft: Draft) -> Iterator[UnusualValue]:
@@ -151,14 +207,17 @@ def _ratings(draft: Draft) -> Iterator[UnusualValue]:
             continue
         for rated, said in found.unlike_delivered().items():
             text = f"the binding has {said}: is the binding's rating that of one unit as delivered?"
-            yield UnusualValue(f"{name}.{rated}", draft.given.place("components", name, "binding"), text)
+            yield UnusualValue(
+                f"{name}.{rated}", draft.given.place("components", name, "binding"), text
+            )
 
 
 def question_loading(draft: Draft, flow: PowerFlow | None) -> None:
     """Ask about units whose operating point exceeds their rating, of machines in active power, and about powers that
     another rating moves. The operating point is the power flow's if there is one."""
     question(draft, _rescaled(draft, flow))
-    asked = {question.place for question in draft.found.questions}  # one question about a rating is enough
+    # one question about a rating is enough
+    asked = {question.place for question in draft.found.questions}
     question(draft, (d for d in _overloaded(draft) if d.place not in asked))
 
 
@@ -168,14 +227,27 @@ def _rescaled(draft: Draft, flow: PowerFlow | None) -> Iterator[UnusualValue]:
     for name, before in draft.found.ratings.items():
         plan = draft.system.components[name]
         P, S_n = value_of(plan, "P_0"), value_of(plan, "S_n")
-        if flow is None or name not in flow.powers or name in flow.balancing or not P or not S_n or S_n == before:
+        if (
+            flow is None
+            or name not in flow.powers
+            or name in flow.balancing
+            or not P
+            or not S_n
+            or S_n == before
+        ):
             continue
-        if unit_of(plan, "P_0") == "pu" and not any(fnmatch.fnmatchcase(f"{name}.P_0", key) for key in said):
+        if unit_of(plan, "P_0") == "pu" and not any(
+            fnmatch.fnmatchcase(f"{name}.P_0", key) for key in said
+        ):
             text = (
                 f"S_n = {S_n:g} MVA where the file has {before:g} MVA moves its power from {P * before:.4g} to "
                 f"{P * S_n:.4g} MW, which {flow.slack}, the slack, takes up: P_0 = {P:.4g} is in parts of S_n"
             )
-            text += f", and {name}.P_0={P * before / S_n:.4g} keeps the power" if abs(P * before) <= S_n else ""
+            text += (
+                f", and {name}.P_0={P * before / S_n:.4g} keeps the power"
+                if abs(P * before) <= S_n
+                else ""
+            )
             yield UnusualValue(f"{name}.S_n", place_of(draft, name, "S_n"), text)
 
 
@@ -184,10 +256,17 @@ def overloads(plans: Mapping[str, ComponentPlan], meant: Iterable[str]) -> dict[
     found = {}
     for name, plan in plans.items():
         P, Q, S_n = (value_of(plan, v) for v in ("P_0", "Q_0", "S_n"))
-        if P is None or Q is None or S_n is None or any(unit_of(plan, v) != "pu" for v in ("P_0", "Q_0")):
+        if (
+            P is None
+            or Q is None
+            or S_n is None
+            or any(unit_of(plan, v) != "pu" for v in ("P_0", "Q_0"))
+        ):
             continue
         apparent = abs(P) if plan.kind == "machine" else math.hypot(P, Q)
-        if apparent > _FULL and not any(fnmatch.fnmatchcase(f"{name}.S_n", pattern) for pattern in meant):
+        if apparent > _FULL and not any(
+            fnmatch.fnmatchcase(f"{name}.S_n", pattern) for pattern in meant
+        ):
             found[name] = apparent
     return found
 
@@ -232,8 +311,12 @@ def _check_rule(draft: Draft, name: str, plan: ComponentPlan, rule: Rule) -> Non
 
 def _check_frequencies(draft: Draft) -> None:
     """Check that coupled components have one rated frequency: frames of two frequencies turn against each other."""
-    fs = {n: p.description.port.f_n if isinstance(p.description, BoundDescription) else value_of(p, "f_n")
-          for n, p in draft.system.components.items()}  # fmt: skip
+    fs = {
+        n: p.description.port.f_n
+        if isinstance(p.description, BoundDescription)
+        else value_of(p, "f_n")
+        for n, p in draft.system.components.items()
+    }
     rated = {name: f for name, f in fs.items() if f is not None}
     for group in _coupled(draft):
         known = {name: f for name, f in rated.items() if name in group}
@@ -243,7 +326,9 @@ def _check_frequencies(draft: Draft) -> None:
         common = known[grid] if grid else max(set(known.values()), key=list(known.values()).count)
         reference = grid or next(name for name, f in known.items() if f == common)
         for name, f in known.items():
-            if f != common and not any(p.place == _frequency_place(draft, name) for p in draft.found.problems):
+            if f != common and not any(
+                p.place == _frequency_place(draft, name) for p in draft.found.problems
+            ):
                 draft.note(
                     _frequency_place(draft, name),
                     f"{name} is rated at {f:g} Hz and {reference} at {common:g} Hz; what is coupled has one rated "
@@ -261,8 +346,13 @@ def _frequency_place(draft: Draft, name: str) -> str:
 def _coupled(draft: Draft) -> list[set[str]]:
     """Components that are connected, directly or through others."""
     groups = [{name} for name in draft.system.components]
-    wires = (frozenset((c.source.component, c.target.component)) for c in reversed(draft.system.connections))
-    for ends in reversed(dict.fromkeys(wires)):  # the last wire between two decides where their group stands
+    wires = (
+        frozenset((c.source.component, c.target.component))
+        for c in reversed(draft.system.connections)
+    )
+    for ends in reversed(
+        dict.fromkeys(wires)
+    ):  # the last wire between two decides where their group stands
         touched = [group for group in groups if group & ends]
         groups = [group for group in groups if not group & ends] + [set().union(*touched)]
     return groups
@@ -272,13 +362,20 @@ def _small_units(draft: Draft) -> Iterator[UnusualValue]:
     """Ask about units in the power flow with a rating too small to affect the network."""
     ports = {p.name: p.bus for p in draft.network.ports} if draft.network else {}
     plans = {name: plan for name, plan in draft.system.components.items() if name in ports}
-    ratings = {name: S_n for name, plan in plans.items() if (S_n := value_of(plan, "S_n")) is not None}
+    ratings = {
+        name: S_n for name, plan in plans.items() if (S_n := value_of(plan, "S_n")) is not None
+    }
     if not ratings:
         return
     largest = max(ratings, key=lambda name: ratings[name])
     for name, S_n in ratings.items():
-        shared = [n for n in draft.origins if n in ratings and ports[n] == ports[name]] if name in draft.origins else []
-        whole = sum(ratings[n] for n in shared) if shared else S_n  # the share of a unit may be arbitrarily small
+        shared = (
+            [n for n in draft.origins if n in ratings and ports[n] == ports[name]]
+            if name in draft.origins
+            else []
+        )
+        # the share of a unit may be arbitrarily small
+        whole = sum(ratings[n] for n in shared) if shared else S_n
         if whole < SMALLEST_SHARE * ratings[largest]:
             text = f"S_n = {S_n:g} MVA beside {largest}'s {ratings[largest]:g} MVA; is it in MVA?"
             yield UnusualValue(f"{name}.S_n", place_of(draft, name, "S_n"), text)

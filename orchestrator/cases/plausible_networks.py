@@ -8,7 +8,14 @@ from statistics import median
 
 from fmus.grid.network import Line, Network, ThreeWinding
 from orchestrator.cases.draft import Draft
-from orchestrator.cases.plausible_ranges import COMPENSATION, LINE_B, LINE_RATIO, LINE_X, MOST_R_OVER_X, STRAY_B
+from orchestrator.cases.plausible_ranges import (
+    COMPENSATION,
+    LINE_B,
+    LINE_RATIO,
+    LINE_X,
+    MOST_R_OVER_X,
+    STRAY_B,
+)
 from orchestrator.cases.plausible_values import UnusualValue, outside, place_of_source, value_of
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import few
@@ -30,22 +37,30 @@ def network_doubts(draft: Draft) -> Iterator[UnusualValue]:
     for transformer in draft.network.transformers:
         yield from _transformer(draft, draft.grid, grid, transformer)
     if (stray := value_of(grid, "stray_B")) is not None:
-        yield from outside(draft, draft.grid, "stray_B", stray, STRAY_B, draft.given.place("network", "stray_B"))
+        yield from outside(
+            draft, draft.grid, "stray_B", stray, STRAY_B, draft.given.place("network", "stray_B")
+        )
 
 
 def _equivalents(draft: Draft, name: str, network: Network) -> Iterator[UnusualValue]:
     """Name the branches of a network of phasors that only a reduction can have made."""
     for quantity, what in (("R", "resistance"), ("X", "reactance")):
         if found := [line for line in network.lines if getattr(line, quantity) < 0]:
-            shown = few((f"{line.name!r} ({getattr(line, quantity):g} pu)" for line in found), _SHOWN)
+            shown = few(
+                (f"{line.name!r} ({getattr(line, quantity):g} pu)" for line in found), _SHOWN
+            )
             text = (
                 f"{len(found)} of {len(network.lines)} branches have a negative {what}: {shown}; as equivalents "
                 "of a reduced network they are taken as admittances, which hold at rated frequency alone"
             )
-            yield UnusualValue(f"{name}.{found[0].variable(quantity)}", draft.given.place("network"), text)
+            yield UnusualValue(
+                f"{name}.{found[0].variable(quantity)}", draft.given.place("network"), text
+            )
 
 
-def _unlike_others(draft: Draft, name: str, grid: ComponentPlan, network: Network) -> Iterator[UnusualValue]:
+def _unlike_others(
+    draft: Draft, name: str, grid: ComponentPlan, network: Network
+) -> Iterator[UnusualValue]:
     """Lines whose X/R and X/B both are far from those of the middle line, by about the same: of a higher voltage the
     first is larger and the second smaller, of a cable the second is smaller by far."""
     found = {}
@@ -62,10 +77,14 @@ def _unlike_others(draft: Draft, name: str, grid: ComponentPlan, network: Networ
                 f"{variable} = {X:g} pu: its X/R is {times[0]:.3g} times and its X/B {times[1]:.3g} times that of the "
                 f"middle line; has X a digit too {'many' if times[0] > 1 else 'few'}?"
             )
-            yield UnusualValue(f"{name}.{variable}", _place(draft, "lines", line.name, "X", variable), text)
+            yield UnusualValue(
+                f"{name}.{variable}", _place(draft, "lines", line.name, "X", variable), text
+            )
 
 
-def _unlike_twins(draft: Draft, name: str, grid: ComponentPlan, network: Network) -> Iterator[UnusualValue]:
+def _unlike_twins(
+    draft: Draft, name: str, grid: ComponentPlan, network: Network
+) -> Iterator[UnusualValue]:
     """Parallel circuits of which one of R, X and B is far from the other's, and the two others are alike."""
     circuits: dict[frozenset[str], list[tuple[Line, dict[str, float]]]] = {}
     for line in network.lines:
@@ -74,10 +93,17 @@ def _unlike_twins(draft: Draft, name: str, grid: ComponentPlan, network: Network
     for parallel in circuits.values():
         for (one, own), (other, its) in combinations(parallel, 2):
             odd = [q for q in "RXB" if abs(own[q] - its[q]) > 0.25 * max(abs(own[q]), abs(its[q]))]
-            if len(odd) == 1 and max(sizes := [abs(own[odd[0]]), abs(its[odd[0]])]) > _TWINS * min(sizes):
-                variable, its_twins = other.variable(odd[0]), f"the parallel {one.name} has {own[odd[0]]:g} pu"
+            if len(odd) == 1 and max(sizes := [abs(own[odd[0]]), abs(its[odd[0]])]) > _TWINS * min(
+                sizes
+            ):
+                variable, its_twins = (
+                    other.variable(odd[0]),
+                    f"the parallel {one.name} has {own[odd[0]]:g} pu",
+                )
                 text = f"{variable} = {its[odd[0]]:g} pu, and {its_twins}, with like other data"
-                yield UnusualValue(f"{name}.{variable}", _place(draft, "lines", other.name, odd[0], variable), text)
+                yield UnusualValue(
+                    f"{name}.{variable}", _place(draft, "lines", other.name, odd[0], variable), text
+                )
 
 
 def _line(draft: Draft, name: str, grid: ComponentPlan, line: Line) -> Iterator[UnusualValue]:
@@ -100,7 +126,9 @@ def _line(draft: Draft, name: str, grid: ComponentPlan, line: Line) -> Iterator[
         yield UnusualValue(f"{name}.{variables['X_C']}", place["X_C"], text)
 
 
-def _transformer(draft: Draft, name: str, grid: ComponentPlan, transformer: ThreeWinding) -> Iterator[UnusualValue]:
+def _transformer(
+    draft: Draft, name: str, grid: ComponentPlan, transformer: ThreeWinding
+) -> Iterator[UnusualValue]:
     """Impedances between any two windings, ratios and shifts; one winding alone may have a negative reactance."""
 
     def value(quantity: str, winding: int) -> float:
@@ -125,13 +153,17 @@ def _transformer(draft: Draft, name: str, grid: ComponentPlan, transformer: Thre
             yield from _shift(name, shift, value("shift", k), place("shift", k))
 
 
-def _shift(component: str, variable: str, shift: float | None, place: str) -> Iterator[UnusualValue]:
+def _shift(
+    component: str, variable: str, shift: float | None, place: str
+) -> Iterator[UnusualValue]:
     if shift is not None and abs(shift) > math.pi:
         text = f"{variable} = {shift:g} rad is more than half a turn; if it is in degrees, write '{shift:g} deg'"
         yield UnusualValue(f"{component}.{variable}", place, text)
 
 
-def _swapped(component: str, resistance: str, reactance: str, R: float, X: float, place: str) -> Iterator[UnusualValue]:
+def _swapped(
+    component: str, resistance: str, reactance: str, R: float, X: float, place: str
+) -> Iterator[UnusualValue]:
     if R > MOST_R_OVER_X * X > 0:
         text = f"{resistance} = {R:g} pu is {R / X:.3g} times {reactance} = {X:g} pu; are the two swapped?"
         yield UnusualValue(f"{component}.{resistance}", place, text)
@@ -145,4 +177,7 @@ def _place(draft: Draft, kind: str, element: str, key: str, *variables: str) -> 
     if table is not None and element in getattr(table, kind):
         return draft.given.place("network", kind, element, key)
     in_file = draft.data.places.get(element) if draft.data else None
-    return in_file or f"{place_of_source(draft)}, {'line' if kind == 'lines' else 'transformer'} {element!r}"
+    return (
+        in_file
+        or f"{place_of_source(draft)}, {'line' if kind == 'lines' else 'transformer'} {element!r}"
+    )

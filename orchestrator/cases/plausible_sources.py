@@ -3,14 +3,22 @@
 from collections.abc import Iterator, Mapping
 
 from orchestrator.cases.draft import Draft
-from orchestrator.cases.plausible_values import UnusualValue, place_of, place_of_source, unit_of, value_of
+from orchestrator.cases.plausible_values import (
+    UnusualValue,
+    place_of,
+    place_of_source,
+    unit_of,
+    value_of,
+)
 from orchestrator.coupling.system import ComponentPlan
 
 SOLVED = "solved"  # of the grid, in ``meant``: the source's voltages are a flat start on purpose
-_STEP_UP = (0.03, 0.35)  # usual reactances of step-up transformers on the machine's rating [pu], widened
+# usual reactances of step-up transformers on the machine's rating [pu], widened
+_STEP_UP = (0.03, 0.35)
 _PARTS = {"machine": "machine", "exciter": "exciter", "governor": "governor", "pss": "stabilizer"}
 _SHOWN = 3  # machines beyond which one is compared with the others
-_LITTLE, _SAME = 0.05, 0.05  # loading that is questioned [pu], and part by which two powers may differ
+# loading that is questioned [pu], and part by which two powers may differ
+_LITTLE, _SAME = 0.05, 0.05
 _ALIKE, _UNLIKE = 2.0, 5.0  # factors within which machines are alike, and from which one is not
 _FAR = 20.0
 """A capacitor or a load that is smaller than the next one by this factor is questioned where 100 times as much is
@@ -33,8 +41,14 @@ def source_doubts(draft: Draft) -> Iterator[UnusualValue]:
         yield UnusualValue(f"{draft.grid}.{SOLVED}", where, draft.data.misfit)
     yield from _negative_loads(draft, draft.grid, where)
     yield from _hundredths(draft.grid, "shunt", "Mvar", draft.data.capacitors, where)
-    loads = {x.name[5:]: value_of(grid, f"{x.name}.P") for x in draft.network.loads if x.name.startswith("load_")}
-    yield from _hundredths(draft.grid, "load", "MW", {name: p for name, p in loads.items() if p and p > 0}, where)
+    loads = {
+        x.name[5:]: value_of(grid, f"{x.name}.P")
+        for x in draft.network.loads
+        if x.name.startswith("load_")
+    }
+    yield from _hundredths(
+        draft.grid, "load", "MW", {name: p for name, p in loads.items() if p and p > 0}, where
+    )
     yield from _step_up(draft, draft.grid, grid, where)
     yield from _saturation(draft)
     yield from _own_converters(draft)
@@ -50,7 +64,9 @@ def _negative_loads(draft: Draft, grid: str, where: str) -> Iterator[UnusualValu
         yield UnusualValue(f"{grid}.load_{bus.removeprefix('bus_')}.P", where, text)
 
 
-def _hundredths(grid: str, what: str, unit: str, found: Mapping[str, float], where: str) -> Iterator[UnusualValue]:
+def _hundredths(
+    grid: str, what: str, unit: str, found: Mapping[str, float], where: str
+) -> Iterator[UnusualValue]:
     for bus, b in found.items():
         others = [other for name, other in found.items() if name != bus]
         if others and b < min(others) / _FAR and 0.2 * min(others) < 100 * b < 5 * max(others):
@@ -59,7 +75,9 @@ def _hundredths(grid: str, what: str, unit: str, found: Mapping[str, float], whe
                 f"the {what} at bus_{number} has {b:g} {unit}, where the others have {min(others):g} to "
                 f"{max(others):g} {unit}: is {100 * b:g} {unit} meant?"
             )
-            yield UnusualValue(f"{grid}.{what}_{number}.{'B' if what == 'shunt' else 'P'}", where, text)
+            yield UnusualValue(
+                f"{grid}.{what}_{number}.{'B' if what == 'shunt' else 'P'}", where, text
+            )
 
 
 def _step_up(draft: Draft, name: str, grid: ComponentPlan, where: str) -> Iterator[UnusualValue]:
@@ -85,10 +103,13 @@ def _step_up(draft: Draft, name: str, grid: ComponentPlan, where: str) -> Iterat
         variable = branches[0].variable("X")
         X = value_of(grid, variable)
         own = 0.0 if X is None else X * rating / 100  # on the machines' rating [pu]
-        if X is not None and ((low_side := own < low <= own * rating / 100 <= high) or (
-            own > high and (low <= X <= high or own > _FAR * low)
-        )):  # fmt: skip
-            meant = f"if {X:g} pu is on the machine's base, it is {100 * X / rating:.4g} pu on 100 MVA"
+        if X is not None and (
+            (low_side := own < low <= own * rating / 100 <= high)
+            or (own > high and (low <= X <= high or own > _FAR * low))
+        ):
+            meant = (
+                f"if {X:g} pu is on the machine's base, it is {100 * X / rating:.4g} pu on 100 MVA"
+            )
             if low_side:
                 meant = f"if {own:.3g} pu is on 100 MVA, CZ = 1 says so"
             elif not low <= X <= high and own < 100 * low:
@@ -148,7 +169,10 @@ def _own_converters(draft: Draft) -> Iterator[UnusualValue]:
     units feed less than in the file. Values from outside are tried on purpose."""
     if draft.network is None or draft.data is None or not draft.data.generation:
         return
-    own, left = {}, {bus: g.p_mw for bus, g in draft.data.generation.items() if bus != draft.data.slack}
+    own, left = (
+        {},
+        {bus: g.p_mw for bus, g in draft.data.generation.items() if bus != draft.data.slack},
+    )
     for port in draft.network.ports:
         plan = draft.system.components.get(port.name)
         P, S_n = (value_of(plan, v) if plan else None for v in ("P_0", "S_n"))
@@ -157,15 +181,28 @@ def _own_converters(draft: Draft) -> Iterator[UnusualValue]:
         if port.name in draft.origins:
             left[port.bus] = left.get(port.bus, 0.0) - P * S_n * (port.bus in left)
         elif (
-            plan.kind == "converter" and "P_0" in plan.parameters and f"{port.name}.P_0" not in draft.given.from_outside
+            plan.kind == "converter"
+            and "P_0" in plan.parameters
+            and f"{port.name}.P_0" not in draft.given.from_outside
         ):
             own[port.name] = P * S_n
             place = place_of(draft, port.name, "P_0")
             if P < 0 or 0 < P < _LITTLE:
-                said = f"draws {-P * S_n:g} MW" if P < 0 else f"feeds {P * S_n:g} MW with S_n = {S_n:g} MVA"
-                yield UnusualValue(f"{port.name}.P_0", place, f"P_0 = {P:g} pu: it {said}; is it so?")
+                said = (
+                    f"draws {-P * S_n:g} MW"
+                    if P < 0
+                    else f"feeds {P * S_n:g} MW with S_n = {S_n:g} MVA"
+                )
+                yield UnusualValue(
+                    f"{port.name}.P_0", place, f"P_0 = {P:g} pu: it {said}; is it so?"
+                )
     less, fed = sum(left.values()), sum(own.values())
-    if own and not draft.given.from_outside and abs(less) > _SAME * abs(fed) and abs(fed - less) > _SAME * abs(fed):
+    if (
+        own
+        and not draft.given.from_outside
+        and abs(less) > _SAME * abs(fed)
+        and abs(fed - less) > _SAME * abs(fed)
+    ):
         text = (
             f"with P_0 and S_n the case's converters feed {fed:.4g} MW, and the file's units {less:.4g} MW less than "
             "in the file; the slack takes the difference: is one of them wrong?"

@@ -7,7 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt, check_connected, nodal_powers
+from orchestrator.cases.flow_balance import (
+    FlowLine,
+    FlowLoad,
+    FlowShunt,
+    check_connected,
+    nodal_powers,
+)
 from orchestrator.cases.flow_equations import FlowEquations
 from orchestrator.cases.flow_limits import Excess, Limits, exceeded, solve_with_limits
 from orchestrator.cases.flow_newton import CONVERGED, NewtonResult, grow, solve
@@ -42,18 +48,27 @@ class PowerFlow:
     voltages: dict[str, complex]  # complex bus voltages [pu]
     powers: dict[str, complex]  # P + jQ of every unit on its own rating [pu, S_n]
     residual: float  # largest power mismatch of a bus [pu, 100 MVA], recomputed from the voltages
-    at_limits: tuple[Excess, ...] = ()  # buses that feed a limit of reactive power instead of holding their voltage
+    # buses that feed a limit of reactive power instead of holding their voltage
+    at_limits: tuple[Excess, ...] = ()
     # buses that hold their voltage beyond a limit, because the limits are not kept or the bus is the slack
     beyond_limits: tuple[Excess, ...] = ()
-    lines: tuple[FlowLine, ...] = ()  # what it was solved with; a transformer of three windings is three of them
+    # what it was solved with; a transformer of three windings is three of them
+    lines: tuple[FlowLine, ...] = ()
     slack: str = ""  # bus that feeds what is left
     balancing: tuple[str, ...] = ()  # units there that do, whatever their P_0
 
 
 def solve_power_flow(
-    buses: Sequence[str], lines: Sequence[FlowLine], loads: Sequence[FlowLoad], units: Sequence[FlowUnit],
-    slack_bus: str, shunts: Sequence[FlowShunt] = (), limits: Limits | None = None, *, keep_limits: bool = False,
-) -> PowerFlow:  # fmt: skip
+    buses: Sequence[str],
+    lines: Sequence[FlowLine],
+    loads: Sequence[FlowLoad],
+    units: Sequence[FlowUnit],
+    slack_bus: str,
+    shunts: Sequence[FlowShunt] = (),
+    limits: Limits | None = None,
+    *,
+    keep_limits: bool = False,
+) -> PowerFlow:
     """Solve the power flow.
 
     Units at one bus hold its voltage together. They share its reactive power in proportion to their ratings; at the
@@ -81,9 +96,15 @@ def solve_power_flow(
             f"{slack_bus!r}, so nothing feeds what is left; choose another slack in [power_flow]"
         )
     check_connected(buses, lines, slack_bus)
-    active = {bus: sum(u.P_0 * u.S_n for u in members) / SYSTEM_BASE_MVA for bus, members in at_bus.items()}
+    active = {
+        bus: sum(u.P_0 * u.S_n for u in members) / SYSTEM_BASE_MVA
+        for bus, members in at_bus.items()
+    }
     held = {bus: members[0].v_0 for bus, members in at_bus.items()}
-    drawn = [*loads, *(FlowLoad(b, *(-SYSTEM_BASE_MVA * x for x in (s.real, s.imag))) for b, s in fixed.items())]
+    drawn = [
+        *loads,
+        *(FlowLoad(b, *(-SYSTEM_BASE_MVA * x for x in (s.real, s.imag))) for b, s in fixed.items()),
+    ]
     equations = FlowEquations.of(buses, lines, drawn, shunts, active, held, slack_bus)
     known = _left(limits or {}, fixed)
     if keep_limits:
@@ -96,7 +117,9 @@ def solve_power_flow(
             fewer = [replace(s, b=share * s.b) if s.stray else s for s in shunts]
             return FlowEquations.of(buses, lines, drawn, fewer, active, held, slack_bus)
 
-        raise PowerFlowError(explain(equations, result, with_stray if any(s.stray for s in shunts) else None))
+        raise PowerFlowError(
+            explain(equations, result, with_stray if any(s.stray for s in shunts) else None)
+        )
     voltages = dict(zip(equations.buses, map(complex, result.voltages), strict=True))
     flow = _shares(voltages, nodal_powers(voltages, lines, drawn, shunts), at_bus, slack_bus)
     if not flow.residual <= _TOLERANCE:
@@ -104,11 +127,25 @@ def solve_power_flow(
             f"power flow: the solution leaves {flow.residual:.3g} pu of 100 MVA unbalanced, more than {_TOLERANCE:g}; "
             "check for very small reactances"
         )
-    powers = flow.powers | {u.name: complex(u.P_0, u.Q_0) for u in units if u.connected and u.Q_0 is not None}
+    powers = flow.powers | {
+        u.name: complex(u.P_0, u.Q_0) for u in units if u.connected and u.Q_0 is not None
+    }
     powers |= {unit.name: 0j for unit in units if not unit.connected}
-    beyond = (*exceeded(final, result.voltages, known), *_fed_beyond(fixed, at_bus, limits or {}, voltages))
+    beyond = (
+        *exceeded(final, result.voltages, known),
+        *_fed_beyond(fixed, at_bus, limits or {}, voltages),
+    )
     left = tuple(u.name for u in at_bus[slack_bus])
-    return PowerFlow(flow.voltages, powers, flow.residual, tuple(at_limits), beyond, tuple(lines), slack_bus, left)
+    return PowerFlow(
+        flow.voltages,
+        powers,
+        flow.residual,
+        tuple(at_limits),
+        beyond,
+        tuple(lines),
+        slack_bus,
+        left,
+    )
 
 
 def _left(limits: Limits, fixed: Mapping[str, complex]) -> Limits:
@@ -118,14 +155,19 @@ def _left(limits: Limits, fixed: Mapping[str, complex]) -> Limits:
 
 
 def _fed_beyond(
-    fixed: Mapping[str, complex], held: Mapping[str, object], limits: Limits, voltages: Mapping[str, complex]
+    fixed: Mapping[str, complex],
+    held: Mapping[str, object],
+    limits: Limits,
+    voltages: Mapping[str, complex],
 ) -> list[Excess]:
     """Buses of given reactive power that exceeds their limits."""
     found = []
     for bus in (bus for bus in fixed if bus in limits and bus not in held):
         q, (least, most) = fixed[bus].imag, limits[bus]
         if not least <= q <= most:
-            found.append(Excess(bus, q, most if q > most else least, abs(voltages[bus]), abs(voltages[bus])))
+            found.append(
+                Excess(bus, q, most if q > most else least, abs(voltages[bus]), abs(voltages[bus]))
+            )
     return found
 
 
@@ -144,7 +186,11 @@ def _shares(
             residual = max(residual, abs(power))
             continue
         rating = sum(u.S_n for u in members)
-        fed = power.real if bus == slack_bus else sum(u.P_0 * u.S_n for u in members) / SYSTEM_BASE_MVA
+        fed = (
+            power.real
+            if bus == slack_bus
+            else sum(u.P_0 * u.S_n for u in members) / SYSTEM_BASE_MVA
+        )
         residual = max(residual, abs(power.real - fed))
         q = power.imag * SYSTEM_BASE_MVA / rating
         for unit in members:
@@ -158,7 +204,11 @@ _SHOWN = 6  # iterations whose mismatch is told
 _LITTLE = 0.01  # part of all powers below which they are likely of another unit
 
 
-def explain(equations: FlowEquations, failed: NewtonResult, with_stray: Callable[[float], FlowEquations] | None) -> str:
+def explain(
+    equations: FlowEquations,
+    failed: NewtonResult,
+    with_stray: Callable[[float], FlowEquations] | None,
+) -> str:
     mismatch, bus = failed.history[-1]
     told = [f"{size * SYSTEM_BASE_MVA:.3g}" for size, _ in failed.history]
     left_out = [] if len(told) <= _SHOWN else ["…"]
@@ -206,7 +256,10 @@ def widest_angle(equations: FlowEquations) -> str:
     across = [angles[position[x.from_bus]] - angles[position[x.to_bus]] - x.shift for x in closed]
     worst = int(np.argmax(np.abs(across)))
     line, angle = closed[worst], across[worst]
-    ends = (f"{bus!r} ({math.degrees(angles[position[bus]]):.1f} deg)" for bus in (line.from_bus, line.to_bus))
+    ends = (
+        f"{bus!r} ({math.degrees(angles[position[bus]]):.1f} deg)"
+        for bus in (line.from_bus, line.to_bus)
+    )
     carried = abs(angle) / abs(line.X * line.tap) * SYSTEM_BASE_MVA
     return (
         f"In the DC solution the largest angle, {abs(math.degrees(angle)):.1f} deg, is across {line.name!r} between "

@@ -12,7 +12,12 @@ from orchestrator.cases import component_forms
 from orchestrator.cases.areas import in_two_areas
 from orchestrator.cases.assignment import EMF, TORQUE, assign_values
 from orchestrator.cases.build_choices import MODELS, PARTS, STAND_IN
-from orchestrator.cases.case_network import check_network_is_used, find_network, read_network, takes_network
+from orchestrator.cases.case_network import (
+    check_network_is_used,
+    find_network,
+    read_network,
+    takes_network,
+)
 from orchestrator.cases.catalogue_fmus import PlannedFmu, build_fmu, plan_fmu
 from orchestrator.cases.contradictions import doubts
 from orchestrator.cases.definition import CaseDefinition
@@ -28,7 +33,13 @@ from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.plausibility import check_plausibility, question_loading
 from orchestrator.cases.power_flow import PowerFlow
 from orchestrator.cases.references import references_of
-from orchestrator.cases.run_plan import check_length, checked_schedule, clock_of, record_every, recorded
+from orchestrator.cases.run_plan import (
+    check_length,
+    checked_schedule,
+    clock_of,
+    record_every,
+    recorded,
+)
 from orchestrator.cases.scheduling import schedule_in, told_again
 from orchestrator.cases.schema import ComponentTable, ReferenceModeTable, Value
 from orchestrator.cases.unit_tables import unit_components
@@ -58,18 +69,24 @@ class PreparedScenario:
     # the power flow that gives the components' start values; None if the case has no network.
     power_flow: PowerFlow | None
     values: dict[str, float | bool]  # every value that was set, by ``component.variable``
-    questions: tuple[Problem, ...] = ()  # data that are most unusual, each with its place: see `plausibility`
-    record_filtered: bool = False  # whether the recorded signals go through a low-pass filter before
-    about_rows: tuple[Problem, ...] = ()  # questions about the interval of the recording, which only a run asks
+    # data that are most unusual, each with its place: see `plausibility`
+    questions: tuple[Problem, ...] = ()
+    # whether the recorded signals go through a low-pass filter before
+    record_filtered: bool = False
+    # questions about the interval of the recording, which only a run asks
+    about_rows: tuple[Problem, ...] = ()
     # published modes of the scenario by name, where the conditions of ``[reference]`` hold.
     references: Mapping[str, ReferenceModeTable] = field(default_factory=dict)
     places: Mapping[str, str] = field(default_factory=dict)  # file and line of every component
     told: frozenset[str] = frozenset()  # components that are told the communication step
-    network: Network | None = None  # behind the grid component of the power flow; None if there is none
+    # behind the grid component of the power flow; None if there is none
+    network: Network | None = None
     source_slack: str | None = None  # reference bus of the network's source
     # prepares another scenario of the case with the same values, or with those of its file alone where that is asked
     # for; None where nothing but the file gave values.
-    beside: "Callable[..., PreparedScenario | None] | None" = field(default=None, repr=False, compare=False)
+    beside: "Callable[..., PreparedScenario | None] | None" = field(
+        default=None, repr=False, compare=False
+    )
     # what the scenario, parameter files and the command line give, as it is written; a later source goes first.
     given: Mapping[str, Value] = field(default_factory=dict, repr=False)
     # what came from outside of the file, and where that cannot act; see `idle_everywhere`.
@@ -92,16 +109,28 @@ class PreparedScenario:
     @property
     def about(self) -> dict[str, Any]:
         """What the JSON of every study says of its scenario."""
-        return {"case": self.case.name, "scenario": self.name, "subject": self.subject, "models": self.models,
-                "basis": self.basis, "questions": [*map(str, self.questions)]}  # fmt: skip
+        return {
+            "case": self.case.name,
+            "scenario": self.name,
+            "subject": self.subject,
+            "models": self.models,
+            "basis": self.basis,
+            "questions": [*map(str, self.questions)],
+        }
 
     @property
     def basis(self) -> dict[str, Any]:
         """What results have to have in common to be compared: network, model of its loads, and each machine's model."""
         table = self.case.table.network
-        file = table and (table.raw or table.matpower or table.pandapower or table.cgmes or table.lines_file)
+        file = table and (
+            table.raw or table.matpower or table.pandapower or table.cgmes or table.lines_file
+        )
         loads = [load for load in (self.network.loads if self.network else ()) if load.p_mw > 0]
-        machines = {name: _machine(plan) for name, plan in self.system.components.items() if plan.kind == "machine"}
+        machines = {
+            name: _machine(plan)
+            for name, plan in self.system.components.items()
+            if plan.kind == "machine"
+        }
         network = Path(file).name if file else self.case.name
         return {"network": network, "loads": in_words(loads) if loads else "", "machines": machines}
 
@@ -114,7 +143,9 @@ class PreparedScenario:
         schedule = schedule_in(self.case, self.name, self.system, name)
         step = 0.0 if schedule.is_second_order else self.step_size
         values = self.values | {f"{component}.{STEP_PARAMETER}": step for component in self.told}
-        return replace(self, schedule=schedule, system=told_again(self.system, self.told, step), values=values)
+        return replace(
+            self, schedule=schedule, system=told_again(self.system, self.told, step), values=values
+        )
 
     def with_tolerance(self, tolerance: float) -> "PreparedScenario":
         """The same scenario with steps as long as a tolerance allows; under ``newton`` unless it is ``midpoint``."""
@@ -133,22 +164,39 @@ def _machine(plan: ComponentPlan) -> str:
 
 class Preparer:
     def __init__(
-        self, case: CaseDefinition, name: str, overrides: dict[str, Value], parameters: Sequence[ParameterFile] = ()
+        self,
+        case: CaseDefinition,
+        name: str,
+        overrides: dict[str, Value],
+        parameters: Sequence[ParameterFile] = (),
     ) -> None:
         scenario = case.scenarios[name]
         self._case = case
         self._planned: dict[str, PlannedFmu] = {}
         outside = frozenset(overrides).union(*(file.values for file in parameters)) - {MODELS}
         given = DraftInput(
-            str(case.path), case.table, name, scenario, case.directory, case.place, case.parameter_files, case.numbered,
-            case.injections, frozenset(case.exchanged), outside,
-        )  # fmt: skip
+            str(case.path),
+            case.table,
+            name,
+            scenario,
+            case.directory,
+            case.place,
+            case.parameter_files,
+            case.numbered,
+            case.injections,
+            frozenset(case.exchanged),
+            outside,
+        )
         self.draft = draft = Draft(given)
         given.layers = value_layers(draft, parameters, overrides)
         read_network(draft)
         self._everything = dict(case.table.components) | unit_components(draft)
         draft.known |= set(self._everything)
-        draft.tables = {n: case.exchanged.get(n, t) for n, t in self._everything.items() if n not in scenario.remove}
+        draft.tables = {
+            n: case.exchanged.get(n, t)
+            for n, t in self._everything.items()
+            if n not in scenario.remove
+        }
 
     @property
     def problems(self) -> list[Problem]:
@@ -194,20 +242,44 @@ class Preparer:
         every, about_rows = record_every(draft, clock, stop)
         record, left_out = recorded(draft)
         loads = draft.network.loads if draft.network else ()
-        draft.found.questions += open_question(draft.given.case.network, loads, draft.given.place("network"))
-        draft.found.questions += [*doubts(draft.given.case, draft.given.place), *self._area_questions()]
+        draft.found.questions += open_question(
+            draft.given.case.network, loads, draft.given.place("network")
+        )
+        draft.found.questions += [
+            *doubts(draft.given.case, draft.given.place),
+            *self._area_questions(),
+        ]
         plans = draft.system.components
         return PreparedScenario(
-            self._case, draft.given.name, draft.given.scenario.title or draft.given.name, draft.system, schedule,
-            clock.step_size, stop, record, every, events, flow,
-            {f"{n}.{v}": x for n, p in plans.items() for v, x in p.parameters.items()} | imperfections,
-            questions=tuple(draft.found.questions), about_rows=(*about_rows, *left_out), references=references,
-            record_filtered=draft.given.case.solver.record_filter == "low-pass", told=told, network=draft.network,
+            self._case,
+            draft.given.name,
+            draft.given.scenario.title or draft.given.name,
+            draft.system,
+            schedule,
+            clock.step_size,
+            stop,
+            record,
+            every,
+            events,
+            flow,
+            {f"{n}.{v}": x for n, p in plans.items() for v, x in p.parameters.items()}
+            | imperfections,
+            questions=tuple(draft.found.questions),
+            about_rows=(*about_rows, *left_out),
+            references=references,
+            record_filtered=draft.given.case.solver.record_filter == "low-pass",
+            told=told,
+            network=draft.network,
             places={name: draft.place_of_component(name) for name in plans},
-            not_reached=tuple(sorted(draft.found.not_reached)), source_slack=draft.data.slack if draft.data else None,
-            idle=idle_values(draft.system, draft.given.from_outside, draft.places, events, draft.found.absent),
-            given={key: value for layer in draft.given.layers for key, value in layer.given.items()},
-        )  # fmt: skip
+            not_reached=tuple(sorted(draft.found.not_reached)),
+            source_slack=draft.data.slack if draft.data else None,
+            idle=idle_values(
+                draft.system, draft.given.from_outside, draft.places, events, draft.found.absent
+            ),
+            given={
+                key: value for layer in draft.given.layers for key, value in layer.given.items()
+            },
+        )
 
     def _add_component(self, name: str, table: ComponentTable) -> None:
         where = self.draft.given.place("components", name)
@@ -220,7 +292,9 @@ class Preparer:
             text = component_forms.NO_STATES.format(name, self.draft.given.source)
             self.draft.note(self.draft.given.place("components", name, "scan"), text)
         try:
-            description = self._description(name, table, self._is_native(name, table), self._parts(name, table))
+            description = self._description(
+                name, table, self._is_native(name, table), self._parts(name, table)
+            )
             self._check_trust(name, table)
             self.draft.system.add(name, description, isolated=table.isolated)
         except (InputError, ValueError) as error:  # ValueError: the model does not fit the network
@@ -231,17 +305,26 @@ class Preparer:
     def _note_model(self, name: str, model: str, text: str) -> None:
         """A model that is not there, once for all units that are to be of it."""
         hint = close_names(model, model_names())
-        text = f"there is no model {model!r}; {hint}" if hint and model not in model_names() else text
+        text = (
+            f"there is no model {model!r}; {hint}" if hint and model not in model_names() else text
+        )
         origin = self.draft.origins.get(name)
         if origin is None:
             self.draft.note(self.draft.given.place("components", name, "model"), text)
         else:
-            self.draft.note_network(self.draft.given.place("units", origin.common.removesuffix("_parameters")), text)
+            self.draft.note_network(
+                self.draft.given.place("units", origin.common.removesuffix("_parameters")), text
+            )
 
     def _is_native(self, name: str, table: ComponentTable) -> bool:
         """The kind of FMU that a component of the catalogue gets; the strongest layer decides."""
         native = table.native
-        for choice in (choice for layer in self.draft.given.layers for choice in layer.natives if choice.fits(name)):
+        for choice in (
+            choice
+            for layer in self.draft.given.layers
+            for choice in layer.natives
+            if choice.fits(name)
+        ):
             try:
                 native = choice.native
             except ValueError as error:
@@ -262,7 +345,11 @@ class Preparer:
 
     def _parts(self, name: str, table: ComponentTable) -> tuple[tuple[str, str], ...]:
         """The parts of a component of the catalogue; the strongest layer decides on each."""
-        known = parts_of(table.model) if table.model in model_names() and not takes_network(table) else {}
+        known = (
+            parts_of(table.model)
+            if table.model in model_names() and not takes_network(table)
+            else {}
+        )
         chosen = {part: found for part in PARTS if (found := getattr(table, part)) is not None}
         choices = [choice for layer in self.draft.given.layers for choice in layer.parts]
         for choice in (c for c in choices if c.fits(name, has_part=c.part in known)):
@@ -271,7 +358,9 @@ class Preparer:
             except ValueError as error:
                 self.draft.note(choice.place, str(error))
         for part in (
-            part for part in chosen if part not in known and (table.model is None or table.model in model_names())
+            part
+            for part in chosen
+            if part not in known and (table.model is None or table.model in model_names())
         ):
             what = f"the model {table.model!r}" if table.model else "an FMU file"
             raise InputError(
@@ -290,16 +379,23 @@ class Preparer:
     ) -> FmuDescription:
         if table.file is not None:
             directory = self.draft.given.directory
-            return bound_fmu(directory / table.file, directory / table.binding if table.binding else None)
+            return bound_fmu(
+                directory / table.file, directory / table.binding if table.binding else None
+            )
         own = takes_network(table)
-        if not own and self.draft.network is not None and table is self.draft.tables.get(self.draft.grid or ""):
+        if (
+            not own
+            and self.draft.network is not None
+            and table is self.draft.tables.get(self.draft.grid or "")
+        ):
             # A model with a network of its own is built anew, with the faults and ports that this one has besides.
             own = self.draft.network != network_of(table.model or "")
         if own and self.draft.network is None:
             raise InputError(
                 f"the model {table.model!r} needs a [network] table and a [power_flow] table that names this component"
             )
-        model = STAND_IN if table.scan is not None else table.model or ""  # a scan's current keeps the operating point
+        # a scan's current keeps the operating point
+        model = STAND_IN if table.scan is not None else table.model or ""
         planned = plan_fmu(model, self.draft.network if own else None, native, parts)
         self._planned[name] = planned
         return planned.description
@@ -308,6 +404,9 @@ class Preparer:
         given, system = self.draft.given, self.draft.system
         counts = "{} is in {}; it counts to {}, the first"
         return [
-            Problem(given.place("analysis", "areas", found[1]), counts.format(name, " and ".join(found), found[0]))
+            Problem(
+                given.place("analysis", "areas", found[1]),
+                counts.format(name, " and ".join(found), found[0]),
+            )
             for name, found in in_two_areas(given.case.analysis.areas, system).items()
         ]

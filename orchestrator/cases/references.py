@@ -11,7 +11,9 @@ from orchestrator.cases.schema import ReferenceModeTable, Value
 from orchestrator.cases.values import convert
 
 
-def references_of(draft: Draft, imperfections: Mapping[str, float | bool]) -> dict[str, ReferenceModeTable]:
+def references_of(
+    draft: Draft, imperfections: Mapping[str, float | bool]
+) -> dict[str, ReferenceModeTable]:
     """The modes of ``[reference]`` for a scenario; none where a condition of ``when`` does not hold, or where the
     command line or one of its parameter files sets a value that is no condition.
 
@@ -21,16 +23,26 @@ def references_of(draft: Draft, imperfections: Mapping[str, float | bool]) -> di
     if table is None:
         return {}
     held = [_holds(draft, key, wanted, imperfections) for key, wanted in table.when.items()]
-    return table.modes.get(draft.given.name, {}) if all(held) and draft.given.from_outside <= set(table.when) else {}
+    return (
+        table.modes.get(draft.given.name, {})
+        if all(held) and draft.given.from_outside <= set(table.when)
+        else {}
+    )
 
 
-def _holds(draft: Draft, key: str, wanted: Value, imperfections: Mapping[str, float | bool]) -> bool:
+def _holds(
+    draft: Draft, key: str, wanted: Value, imperfections: Mapping[str, float | bool]
+) -> bool:
     place = draft.given.place("reference", "when", key)
     if sets_imperfection(key):
         return key in imperfections and _equal(imperfections[key], wanted)
     name, _, variable = key.partition(".")
     if name not in draft.known and draft.given.whole:
-        hint = close_names(name, sorted(draft.known), f"the case has: {', '.join([*draft.given.case.components][:12])}")
+        hint = close_names(
+            name,
+            sorted(draft.known),
+            f"the case has: {', '.join([*draft.given.case.components][:12])}",
+        )
         draft.note(place, f"there is no component {name!r}; {hint}")
         return False
     plan = draft.system.components.get(name)
@@ -39,7 +51,9 @@ def _holds(draft: Draft, key: str, wanted: Value, imperfections: Mapping[str, fl
     info = plan.description.variables.get(variable)
     if info is None:
         if draft.tables[name].file is None:
-            hint = close_names(variable, plan.description.parameters, "`gfor fmu info` lists the variables")
+            hint = close_names(
+                variable, plan.description.parameters, "`gfor fmu info` lists the variables"
+            )
             draft.note(place, f"component {name!r} has no variable {variable!r}; {hint}")
         return False  # the FMU of somebody else may lack what the catalogue's model has
     try:

@@ -44,7 +44,9 @@ def check_length(draft: Draft, clock: Clock | None, stop: float) -> None:
 def checked_schedule(draft: Draft) -> Schedule:
     schedule, solver = _chosen(draft), draft.given.case.solver
     if solver.tolerance is not None and not schedule.is_second_order:
-        text = f'a tolerance goes with schedule = "midpoint" or "newton", not with {solver.schedule!r}'
+        text = (
+            f'a tolerance goes with schedule = "midpoint" or "newton", not with {solver.schedule!r}'
+        )
         draft.note(draft.given.place("solver", "tolerance"), text)
     if draft.found.network_failed:
         return schedule
@@ -59,13 +61,17 @@ def _chosen(draft: Draft) -> Schedule:
     solver = draft.given.case.solver
     if solver.schedule == "jacobi":
         _check_unused_groups(draft, solver.groups or [])
-    return schedule_of(solver.schedule, solver, draft.grid, draft.system, draft.given.scenario.remove)
+    return schedule_of(
+        solver.schedule, solver, draft.grid, draft.system, draft.given.scenario.remove
+    )
 
 
 def _check_unused_groups(draft: Draft, groups: Sequence[Sequence[str]]) -> None:
     """With Jacobi's schedule the groups are kept for later and do nothing; wrong names are wrong all the same."""
     for name in (name for group in groups for name in group if name not in draft.known):
-        hint = close_names(name, sorted(draft.known), f"the case has: {', '.join(sorted(draft.known))}")
+        hint = close_names(
+            name, sorted(draft.known), f"the case has: {', '.join(sorted(draft.known))}"
+        )
         draft.note(draft.given.place("solver", "groups"), f"there is no component {name!r}; {hint}")
 
 
@@ -97,7 +103,12 @@ def recorded(draft: Draft) -> tuple[tuple[str, ...], list[Problem]]:
     """All Real outputs that fit one of the file's patterns, and questions of a run about what it leaves out."""
     questions: list[Problem] = []
     plans = {name: plan.description for name, plan in draft.system.components.items()}
-    outputs = [f"{n}.{v}" for n, fmu in plans.items() for v in fmu.outputs if fmu.variables[v].type == "Real"]
+    outputs = [
+        f"{n}.{v}"
+        for n, fmu in plans.items()
+        for v in fmu.outputs
+        if fmu.variables[v].type == "Real"
+    ]
     forced = any(isinstance(event, ForcingTable) for event in draft.given.events)
     patterns = [*draft.given.case.solver.record, *(NEEDED_FOR_SOURCES if forced else ())]
     wanted = {name for pattern in patterns for name in fnmatch.filter(outputs, pattern)}
@@ -105,7 +116,9 @@ def recorded(draft: Draft) -> tuple[tuple[str, ...], list[Problem]]:
         text = f"nothing is recorded in scenario {draft.given.name!r}: none of its outputs fits a pattern"
         questions.append(Problem(draft.given.place("solver", "record"), text))
     for place, expression in shown_signals(draft.given.case, draft.given.place):
-        if missing := [name for name in _variables(expression) if name in outputs and name not in wanted]:
+        if missing := [
+            name for name in _variables(expression) if name in outputs and name not in wanted
+        ]:
             text = f"{expression!r} is not shown, because solver.record leaves out {' and '.join(missing)}"
             questions.append(Problem(place, text))
     return tuple(name for name in outputs if name in wanted), questions

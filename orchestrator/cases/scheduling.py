@@ -13,7 +13,9 @@ from orchestrator.coupling.system import System
 Groups = tuple[tuple[str, ...], ...]
 
 
-def groups_of(solver: SolverTable, grid: str | None, names: Collection[str], removed: Collection[str]) -> Groups:
+def groups_of(
+    solver: SolverTable, grid: str | None, names: Collection[str], removed: Collection[str]
+) -> Groups:
     """The groups of the file. By default the devices step first and then the grid, or every component is a group of
     its own."""
     if solver.groups is not None:
@@ -25,7 +27,11 @@ def groups_of(solver: SolverTable, grid: str | None, names: Collection[str], rem
 
 
 def schedule_of(
-    name: ScheduleName, solver: SolverTable, grid: str | None, system: System, removed: Collection[str]
+    name: ScheduleName,
+    solver: SolverTable,
+    grid: str | None,
+    system: System,
+    removed: Collection[str],
 ) -> Schedule:
     """The schedule of a name for a scenario's components, with the case's tolerance where it takes one."""
     if name == "jacobi":
@@ -35,7 +41,9 @@ def schedule_of(
     return replace(found, tolerance=solver.tolerance) if found.is_second_order else found
 
 
-def schedule_in(case: CaseDefinition, scenario: str, system: System, name: ScheduleName) -> Schedule:
+def schedule_in(
+    case: CaseDefinition, scenario: str, system: System, name: ScheduleName
+) -> Schedule:
     flow = case.table.power_flow
     grid = None if flow is None else flow.grid
     return schedule_of(name, case.table.solver, grid, system, case.scenarios[scenario].remove)
@@ -45,7 +53,9 @@ def told_again(system: System, told: Collection[str], step_size: float) -> Syste
     """The system with another communication step [s] in the components that take one."""
     other = copy.copy(system)
     other.components = {
-        name: replace(plan, parameters=plan.parameters | {STEP_PARAMETER: step_size}) if name in told else plan
+        name: replace(plan, parameters=plan.parameters | {STEP_PARAMETER: step_size})
+        if name in told
+        else plan
         for name, plan in system.components.items()
     }
     return other

@@ -3,7 +3,14 @@
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, FiniteFloat, PrivateAttr, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    FiniteFloat,
+    PrivateAttr,
+    model_validator,
+)
 
 from orchestrator.cases.names import file_name
 from orchestrator.coupling.events import ForcingShape
@@ -253,7 +260,8 @@ class QuantisationTable(WireTable):
 
 
 ImperfectionTable = Annotated[
-    BiasTable | NoiseTable | FreezeTable | DropOutTable | DelayTable | QuantisationTable, Field(discriminator="type")
+    BiasTable | NoiseTable | FreezeTable | DropOutTable | DelayTable | QuantisationTable,
+    Field(discriminator="type"),
 ]
 
 
@@ -395,7 +403,9 @@ class BusFaultTable(GridEventBase):
     @model_validator(mode="after")
     def _has_an_end_to_clear(self) -> Self:
         if self.cleared_by is not None and self.duration is None:
-            raise ValueError("'cleared_by' needs 'duration': the time from the fault to the opening of the line")
+            raise ValueError(
+                "'cleared_by' needs 'duration': the time from the fault to the opening of the line"
+            )
         return self
 
 
@@ -461,14 +471,21 @@ SettingEventTable = (
 """Events that set variables."""
 
 WireEventTable = (
-    BiasEventTable | NoiseEventTable | FreezeEventTable | DropOutEventTable | DelayEventTable | QuantisationEventTable
+    BiasEventTable
+    | NoiseEventTable
+    | FreezeEventTable
+    | DropOutEventTable
+    | DelayEventTable
+    | QuantisationEventTable
 )
 """Faults of connections."""
 
-ComponentFaultTable = ComponentTripTable | NanOutputTable | TimeOutTable  # faults of whole components
+# faults of whole components
+ComponentFaultTable = ComponentTripTable | NanOutputTable | TimeOutTable
 
 EventTable = Annotated[
-    SettingEventTable | WireEventTable | ComponentFaultTable | ForcingTable, Field(discriminator="type")
+    SettingEventTable | WireEventTable | ComponentFaultTable | ForcingTable,
+    Field(discriminator="type"),
 ]
 
 

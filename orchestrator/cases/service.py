@@ -18,8 +18,14 @@ def in_service(prepared: PreparedScenario) -> PreparedScenario:
     scenario = prepared.case.scenarios[prepared.name]
     events = prepared.case.table.events if scenario.events is None else scenario.events
     back = {event.unit for event in events if isinstance(event, UnitReconnectionTable)}
-    units = [port.name for port in prepared.network.ports if port.name in plans and port.name not in back]
-    out = [n for n in units if not (is_connected(plans[n], "connected") and is_connected(grid, f"{n}.connected"))]
+    units = [
+        port.name for port in prepared.network.ports if port.name in plans and port.name not in back
+    ]
+    out = [
+        n
+        for n in units
+        if not (is_connected(plans[n], "connected") and is_connected(grid, f"{n}.connected"))
+    ]
     return without_units(prepared, out)
 
 
@@ -38,6 +44,10 @@ def without_units(prepared: PreparedScenario, gone: Sequence[str]) -> PreparedSc
             system.components[connection.target.component].inputs[connection.target.variable] = 0.0
         elif connection.target.component not in gone:
             system.connections.append(connection)
-    groups = tuple(tuple(name for name in group if name not in gone) for group in prepared.schedule.groups)
-    schedule: Schedule = replace(prepared.schedule, groups=tuple(group for group in groups if group))
+    groups = tuple(
+        tuple(name for name in group if name not in gone) for group in prepared.schedule.groups
+    )
+    schedule: Schedule = replace(
+        prepared.schedule, groups=tuple(group for group in groups if group)
+    )
     return replace(prepared, system=system, schedule=schedule)

@@ -12,7 +12,8 @@ from orchestrator.errors import ErrorKind, InputError
 _CLOSE = 1e-6  # power [MW] that may be left to the units at the slack bus beside their share
 
 _ROUNDS = 30
-_ROOM = 1e-3  # so much of its rating stays between a unit and its limit: at the limit itself no model starts
+# so much of its rating stays between a unit and its limit: at the limit itself no model starts
+_ROOM = 1e-3
 
 _LEAST_SHARE, _SHOWN = 0.01, 4  # shares below this [MW] are not told; so many are
 
@@ -48,15 +49,23 @@ class Reserve:
 
 
 def in_words(
-    dispatch: Dispatch, after: Mapping[str, complex], plans: Mapping[str, ComponentPlan], lost: Collection[str],
+    dispatch: Dispatch,
+    after: Mapping[str, complex],
+    plans: Mapping[str, ComponentPlan],
+    lost: Collection[str],
     also: Sequence[str] = (),
-) -> str:  # fmt: skip
+) -> str:
     """What the lost units fed, what else was lost, and who feeds it now, by the units' powers afterwards [pu, S_n]."""
     rating = {name: plans[name].number("S_n") for name in dispatch.powers if name in plans}
-    fed = [f"{name} is lost, which fed {dispatch.powers[name].real * rating[name]:.4g} MW" for name in sorted(lost)]
+    fed = [
+        f"{name} is lost, which fed {dispatch.powers[name].real * rating[name]:.4g} MW"
+        for name in sorted(lost)
+    ]
     more = {n: (after[n] - dispatch.powers[n]).real * rating[n] for n in rating if n not in lost}
     most = sorted(more, key=lambda name: -abs(more[name]))[:_SHOWN]
-    shared = ", ".join(f"{name} {more[name]:+.4g} MW" for name in most if abs(more[name]) >= _LEAST_SHARE)
+    shared = ", ".join(
+        f"{name} {more[name]:+.4g} MW" for name in most if abs(more[name]) >= _LEAST_SHARE
+    )
     return "; ".join([*fed, *also, *([f"shared: {shared}"] if shared else [])])
 
 
@@ -67,7 +76,11 @@ def load_of(loads: Collection[str], plan: ComponentPlan) -> float:
 
 def lost_load(drawn: float) -> list[str]:
     """What is told of load that values or an outage take away [MW]."""
-    return [f"{abs(drawn):.4g} MW of load {'lost' if drawn > 0 else 'more'}"] if abs(drawn) >= _LEAST_SHARE else []
+    return (
+        [f"{abs(drawn):.4g} MW of load {'lost' if drawn > 0 else 'more'}"]
+        if abs(drawn) >= _LEAST_SHARE
+        else []
+    )
 
 
 def _number(plan: ComponentPlan, name: str) -> float | None:
@@ -107,7 +120,12 @@ def power_limits(plan: ComponentPlan, reactive: float = 0.0) -> tuple[float, flo
 
     turbine("V_MIN", "V_MAX")
     turbine("P_MIN", "P_MAX", _fractions(plan))
-    turbine("G_MIN", "G_MAX", _number(plan, "governor.A_t") or 1.0, _number(plan, "governor.q_NL") or 0.0)
+    turbine(
+        "G_MIN",
+        "G_MAX",
+        _number(plan, "governor.A_t") or 1.0,
+        _number(plan, "governor.q_NL") or 0.0,
+    )
     turbine("", "A_T")
     v_0 = _number(plan, "v_0") or 1.0
     kind = _number(plan, "current_limit.kind")
@@ -139,23 +157,30 @@ def shares(reserves: Sequence[Reserve], change: float, *, bare: bool = False) ->
         if not stopped:
             return found | wanted
         for one in stopped:
-            found[one.name] = max(min(one.before, one.least), min(max(one.before, one.most), wanted[one.name]))
+            found[one.name] = max(
+                min(one.before, one.least), min(max(one.before, one.most), wanted[one.name])
+            )
             rest -= found[one.name] - one.before
         free = [one for one in free if one not in stopped]
     if abs(rest) <= _CLOSE:
         return found
     raise InputError(
-        _overload(reserves, change, f"{abs(rest):.4g} MW{', before the losses grow,' * bare}"), kind=ErrorKind.START
+        _overload(reserves, change, f"{abs(rest):.4g} MW{', before the losses grow,' * bare}"),
+        kind=ErrorKind.START,
     )
 
 
 def _overload(reserves: Sequence[Reserve], change: float, left: str) -> str:
     able = [one for one in reserves if one.gain > 0] or list(reserves)
     step = change / (sum(one.gain for one in able) or 1.0)
-    worst = max(able, key=lambda one: (one.before + step * one.gain) / one.most if one.most > 0 else 0.0)
+    worst = max(
+        able, key=lambda one: (one.before + step * one.gain) / one.most if one.most > 0 else 0.0
+    )
     need = worst.before + step * worst.gain
     if change > 0:
-        first = f"{worst.name} would need {100 * need / worst.most:.0f} % of its {worst.most:.4g} MW"
+        first = (
+            f"{worst.name} would need {100 * need / worst.most:.0f} % of its {worst.most:.4g} MW"
+        )
     else:
         first = f"{worst.name} would have to go down to {need:.4g} MW"
     return (
@@ -166,28 +191,42 @@ def _overload(reserves: Sequence[Reserve], change: float, left: str) -> str:
 
 
 def shared_flow(
-    solve: Callable[[Sequence[FlowUnit]], PowerFlow], units: Sequence[FlowUnit], plans: Mapping[str, ComponentPlan],
-    slack_bus: str, dispatch: Dispatch, active: Mapping[str, tuple[float, float]],
-) -> PowerFlow:  # fmt: skip
+    solve: Callable[[Sequence[FlowUnit]], PowerFlow],
+    units: Sequence[FlowUnit],
+    plans: Mapping[str, ComponentPlan],
+    slack_bus: str,
+    dispatch: Dispatch,
+    active: Mapping[str, tuple[float, float]],
+) -> PowerFlow:
     """The power flow in which the units share what the dispatch before lacks now, with the change of the losses."""
-    left = [replace(one, P_0=dispatch.powers[one.name].real) if one.connected else one for one in units]
+    left = [
+        replace(one, P_0=dispatch.powers[one.name].real) if one.connected else one for one in units
+    ]
     if dispatch.rule is SharingRule.SLACK:
         return solve(left)
     reserves = _reserves(left, plans, dispatch, active)
-    at_slack = {one.name for one in left if one.connected and one.bus == slack_bus and one.Q_0 is None}
+    at_slack = {
+        one.name for one in left if one.connected and one.bus == slack_bus and one.Q_0 is None
+    }
     rating = {one.name: one.S_n for one in left}
     change, before = dispatch.change, (0.0, 0.0)
     for k in range(_ROUNDS):
         found = shares(reserves, change, bare=not k)
         moved = {
-            one.name: replace(one, P_0=found[one.name] / one.S_n) for one in left if one.name in found and one.connected
+            one.name: replace(one, P_0=found[one.name] / one.S_n)
+            for one in left
+            if one.name in found and one.connected
         }
         flow = solve([moved.get(one.name, one) for one in left])
         missing = sum(flow.powers[name].real * rating[name] - found[name] for name in at_slack)
         if abs(missing) <= _CLOSE:
             return replace(flow, powers=_as_shared(flow, found, rating, at_slack))
         # Losses depend but little on the shares: what is missing falls by about what is shared more.
-        slope = (missing - before[1]) / (change - before[0]) if before[1] and change != before[0] else -1.0
+        slope = (
+            (missing - before[1]) / (change - before[0])
+            if before[1] and change != before[0]
+            else -1.0
+        )
         before, change = (change, missing), change - missing / (slope or -1.0)
     raise InputError(
         f'power flow: the shares of the units do not settle in {_ROUNDS} rounds; take sharing = "slack"',
@@ -208,9 +247,19 @@ def _reserves(
         gains = {one.name: 1.0 if one.Q_0 is None else 0.0 for one in left}
     found = []
     for one in left:
-        least, most = (x * one.S_n for x in power_limits(plans[one.name], dispatch.powers[one.name].imag))
+        least, most = (
+            x * one.S_n for x in power_limits(plans[one.name], dispatch.powers[one.name].imag)
+        )
         low, high = active.get(one.name, (-math.inf, math.inf))
-        found.append(Reserve(one.name, one.P_0 * one.S_n, gains[one.name] * one.S_n, max(least, low), min(most, high)))
+        found.append(
+            Reserve(
+                one.name,
+                one.P_0 * one.S_n,
+                gains[one.name] * one.S_n,
+                max(least, low),
+                min(most, high),
+            )
+        )
     return found
 
 
@@ -222,5 +271,8 @@ def _as_shared(
     What little is missing is theirs as well: without a governor nothing else would ever make up for it."""
     missing = sum(flow.powers[name].real * rating[name] - found[name] for name in at_slack)
     rest = missing / (sum(rating[name] for name in at_slack) or 1.0)
-    own = {name: complex(found[name] / rating[name] + rest, flow.powers[name].imag) for name in at_slack}
+    own = {
+        name: complex(found[name] / rating[name] + rest, flow.powers[name].imag)
+        for name in at_slack
+    }
     return flow.powers | own

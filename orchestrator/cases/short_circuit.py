@@ -71,7 +71,10 @@ class ShortCircuit:
         converters: dict[str, tuple[str, float]] = {}
         for port in (port for port in network.ports if port.name in plans):
             plan = plans[port.name]
-            if not (is_connected(plan, "connected") and is_connected(plans[prepared.grid], f"{port.name}.connected")):
+            if not (
+                is_connected(plan, "connected")
+                and is_connected(plans[prepared.grid], f"{port.name}.connected")
+            ):
                 continue
             z = source_impedance(plan)
             if z is None:
@@ -97,9 +100,15 @@ class ShortCircuit:
         for bus, k in at.items():
             here = [name for name, (place, _) in self.converters.items() if place == bus]
             own = sum(self.converters[name][1] for name in here) or None
-            fed = sum(abs(Z[k, at[place]]) * current * S_n for place, S_n in self.converters.values())
+            fed = sum(
+                abs(Z[k, at[place]]) * current * S_n for place, S_n in self.converters.values()
+            )
             power = (SYSTEM_BASE_MVA + fed) / abs(Z[k, k])
-            x_r = float(Z[k, k].imag / Z[k, k].real) if abs(Z[k, k].real) > 1e-9 * abs(Z[k, k]) else None
+            x_r = (
+                float(Z[k, k].imag / Z[k, k].real)
+                if abs(Z[k, k].real) > 1e-9 * abs(Z[k, k])
+                else None
+            )
             found.append(BusStrength(bus, float(power), x_r, tuple(here), rating_mva or own))
         return found
 
@@ -114,7 +123,10 @@ class ShortCircuit:
 
     def power_at(self, bus: str, factor: float = 1.0) -> float:
         """Short-circuit power of a bus [MVA] with the impedances of all branches that end there times a factor."""
-        lines = [replace(x, R=x.R * factor, X=x.X * factor) if bus in (x.from_bus, x.to_bus) else x for x in self.lines]
+        lines = [
+            replace(x, R=x.R * factor, X=x.X * factor) if bus in (x.from_bus, x.to_bus) else x
+            for x in self.lines
+        ]
         return replace(self, lines=tuple(lines)).strengths()[self.buses.index(bus)].s_sc_mva
 
     def factor_for(self, bus: str, power: float) -> float:
@@ -128,7 +140,9 @@ class ShortCircuit:
                 f"{bus}: a short-circuit power of {power:.5g} MVA cannot be had by the impedances of the branches "
                 f"there, which give {least:.4g} to {most:.4g} MVA"
             )
-        return math.exp(brentq(lambda x: math.log(self.power_at(bus, math.exp(x)) / power), *ends, xtol=1e-12))
+        return math.exp(
+            brentq(lambda x: math.log(self.power_at(bus, math.exp(x)) / power), *ends, xtol=1e-12)
+        )
 
     def known(self, bus: str) -> str:
         if bus in self.buses:
@@ -160,7 +174,9 @@ def source_impedance(plan: ComponentPlan) -> complex | None:
         data = plan.number("machine.S_data") if "machine.S_data" in known else 0.0
         on_data = SYSTEM_BASE_MVA / data if data else scale
         z = on_data * complex(_or_zero(plan, "machine.R_s"), plan.number(reactance))
-        return z + scale * complex(_or_zero(plan, "transformer.R_t"), _or_zero(plan, "transformer.X_t"))
+        return z + scale * complex(
+            _or_zero(plan, "transformer.R_t"), _or_zero(plan, "transformer.X_t")
+        )
     if scale and "R_X" in known and "source.E_re" in known:
         ratio = plan.number("R_X")
         return scale * complex(ratio, 1.0) / math.hypot(1.0, ratio)

@@ -19,6 +19,9 @@ class Changes:
     def listed(self) -> list[Problem]:
         """One row for each kind, complete: how many, what was done, and every line or name."""
         return [
-            Problem(f"{self._place}, {self._what}{'s' if len(items) > 1 else ''} {', '.join(map(str, items))}", text)
+            Problem(
+                f"{self._place}, {self._what}{'s' if len(items) > 1 else ''} {', '.join(map(str, items))}",
+                text,
+            )
             for text, items in self._items.items()
         ]

@@ -14,16 +14,25 @@ from orchestrator.cases.sharing import Dispatch, shared_flow
 from orchestrator.coupling.system import ComponentPlan, System
 from orchestrator.errors import ErrorKind, InputError
 
-_LEAST_POWER = ("governor.V_MIN", "governor.P_MIN")  # lower limits of the power of governors without losses
-_IDLE = -0.1  # such a limit of a unit that is out of service [pu]: not at its edge while it turns idle
+# lower limits of the power of governors without losses
+_LEAST_POWER = ("governor.V_MIN", "governor.P_MIN")
+# such a limit of a unit that is out of service [pu]: not at its edge while it turns idle
+_IDLE = -0.1
 
 
 def start_from_power_flow(
-    system: System, network: Network, grid: str, units: Mapping[str, str], slack: str,
-    limits: Mapping[str, tuple[float, float]] | None = None, *, keep_limits: bool = False,
-    returning: Collection[str] = (), dispatch: Dispatch | None = None,
+    system: System,
+    network: Network,
+    grid: str,
+    units: Mapping[str, str],
+    slack: str,
+    limits: Mapping[str, tuple[float, float]] | None = None,
+    *,
+    keep_limits: bool = False,
+    returning: Collection[str] = (),
+    dispatch: Dispatch | None = None,
     active: Mapping[str, tuple[float, float]] | None = None,
-) -> PowerFlow:  # fmt: skip
+) -> PowerFlow:
     """Solve the power flow and set the start values of the grid and of all units.
 
     Lines, loads and units have the values that are set in the system. Every override therefore moves the operating
@@ -33,25 +42,37 @@ def start_from_power_flow(
     disconnected, the limits shrink with the rating.
     ``returning``: units that an event connects; a limit of theirs must stay.
     ``active``: least and most active power of units that share [MW], beside their models' own limits."""
-    feeding = [_unit(name, bus, system.components[name], system.components[grid]) for name, bus in units.items()]
+    feeding = [
+        _unit(name, bus, system.components[name], system.components[grid])
+        for name, bus in units.items()
+    ]
 
     def solve(fed: Sequence[FlowUnit]) -> PowerFlow:
         return solve_power_flow(
             (*network.buses, *(bus for x in network.transformers for bus in inner_buses(x))),
             [*_lines(network, system.components[grid]), *_legs(network, system.components[grid])],
-            _loads(network, system.components[grid]), fed, slack, _shunts(network, system.components[grid]),
-            _limits(limits or {}, fed), keep_limits=keep_limits,
-        )  # fmt: skip
+            _loads(network, system.components[grid]),
+            fed,
+            slack,
+            _shunts(network, system.components[grid]),
+            _limits(limits or {}, fed),
+            keep_limits=keep_limits,
+        )
 
     if dispatch is None:
         flow = solve(feeding)
     else:
         flow = shared_flow(solve, feeding, system.components, slack, dispatch, active or {})
     for bus, voltage in ((bus, flow.voltages[bus]) for bus in network.buses):
-        system.components[grid].parameters |= {f"{bus}.v_0": abs(voltage), f"{bus}.theta_0": cmath.phase(voltage)}
+        system.components[grid].parameters |= {
+            f"{bus}.v_0": abs(voltage),
+            f"{bus}.theta_0": cmath.phase(voltage),
+        }
     for name, bus in units.items():
         _start_unit(name, system.components[name], flow.voltages[bus], flow.powers[name])
-    for name in (unit.name for unit in feeding if not unit.connected and unit.name not in returning):
+    for name in (
+        unit.name for unit in feeding if not unit.connected and unit.name not in returning
+    ):
         _let_idle(system.components[name])
     return flow
 
@@ -59,15 +80,19 @@ def start_from_power_flow(
 def _lines(network: Network, grid: ComponentPlan) -> list[FlowLine]:
     return [
         FlowLine(
-            line.name, line.from_bus, line.to_bus, R=grid.number(line.variable("R")),
-            X=grid.number(line.variable("X")) - (grid.number(line.variable("X_C")) if line.X_C else 0.0),
+            line.name,
+            line.from_bus,
+            line.to_bus,
+            R=grid.number(line.variable("R")),
+            X=grid.number(line.variable("X"))
+            - (grid.number(line.variable("X_C")) if line.X_C else 0.0),
             B=grid.number(line.variable("B")) if line.B else 0.0,
             tap=grid.number(line.variable("tap")) if line.has_ratio else 1.0,
             shift=grid.number(line.variable("shift")) if line.has_ratio else 0.0,
             closed=is_connected(grid, line.variable("connected")),
         )
         for line in network.lines
-    ]  # fmt: skip
+    ]
 
 
 def _legs(network: Network, grid: ComponentPlan) -> list[FlowLine]:
@@ -75,20 +100,28 @@ def _legs(network: Network, grid: ComponentPlan) -> list[FlowLine]:
     return [
         leg
         for transformer in network.transformers
-        for leg in legs_of(_as_set(transformer, grid), closed=is_connected(grid, f"{transformer.name}.connected"))
+        for leg in legs_of(
+            _as_set(transformer, grid), closed=is_connected(grid, f"{transformer.name}.connected")
+        )
     ]
 
 
 def _as_set(x: ThreeWinding, grid: ComponentPlan) -> ThreeWinding:
-    def values(quantity: str, given: tuple[float, float, float] | None = None) -> tuple[float, float, float]:
+    def values(
+        quantity: str, given: tuple[float, float, float] | None = None
+    ) -> tuple[float, float, float]:
         """Of the three windings; those of a ratio are parameters only where there is one."""
         one, two, three = (
-            grid.number(f"{x.name}.{quantity}_{k + 1}") if given is None or x.has_ratio(k) else given[k]
+            grid.number(f"{x.name}.{quantity}_{k + 1}")
+            if given is None or x.has_ratio(k)
+            else given[k]
             for k in range(3)
         )
         return one, two, three
 
-    return replace(x, X=values("X"), R=values("R"), tap=values("tap", x.tap), shift=values("shift", x.shift))
+    return replace(
+        x, X=values("X"), R=values("R"), tap=values("tap", x.tap), shift=values("shift", x.shift)
+    )
 
 
 def _loads(network: Network, grid: ComponentPlan) -> list[FlowLoad]:
@@ -96,7 +129,9 @@ def _loads(network: Network, grid: ComponentPlan) -> list[FlowLoad]:
         FlowLoad(
             load.bus,
             p_mw=grid.number(f"{load.name}.scale") * grid.number(f"{load.name}.P"),
-            q_mvar=grid.number(f"{load.name}.scale") * grid.number(f"{load.name}.Q") if load.q_mvar else 0.0,
+            q_mvar=grid.number(f"{load.name}.scale") * grid.number(f"{load.name}.Q")
+            if load.q_mvar
+            else 0.0,
         )
         for load in network.loads
     ]
@@ -153,12 +188,18 @@ def _let_idle(plan: ComponentPlan) -> None:
 
 
 def _start_unit(name: str, plan: ComponentPlan, voltage: complex, power: complex) -> None:
-    start = {"P_0": power.real, "Q_0": power.imag, "v_0": abs(voltage), "theta_0": cmath.phase(voltage)}
+    start = {
+        "P_0": power.real,
+        "Q_0": power.imag,
+        "v_0": abs(voltage),
+        "theta_0": cmath.phase(voltage),
+    }
     for variable in ("P_0", "Q_0"):
         most = plan.description.variables[variable].maximum
         if most is not None and abs(start[variable]) > most:
-            kept = ", or keep its limits ([power_flow] reactive_limits, gfor new --reactive-limits)" * (
-                variable == "Q_0"
+            kept = (
+                ", or keep its limits ([power_flow] reactive_limits, gfor new --reactive-limits)"
+                * (variable == "Q_0")
             )
             raise InputError(
                 f"{name} would have to feed {variable} = {start[variable]:.4g} pu of its rating, more than {most:g}; "

@@ -25,16 +25,20 @@ class UnitRow:
     v_pu: float
     alpha: float | None = None  # share of the converter, if the row gives it; otherwise None
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    place: str = ""  # file and line of the row; empty where the unit comes from the network's source
+    # file and line of the row; empty where the unit comes from the network's source
+    place: str = ""
     parts: Mapping[str, str] = field(default_factory=dict)
-    partial: bool = False  # whether a record of it was left out, for which the case says what stands there
+    # whether a record of it was left out, for which the case says what stands there
+    partial: bool = False
     q_min_mvar: float = -math.inf
     q_max_mvar: float = math.inf
     converter: str | None = None  # model of the converter that the whole unit is by its record
-    doubts: tuple[tuple[str, str, str], ...] = ()  # questions about the generator's data: parameter, place and text
+    # questions about the generator's data: parameter, place and text
+    doubts: tuple[tuple[str, str, str], ...] = ()
     # lines of records for which the converter's model stands, each with what it leaves out.
     replaced: tuple[tuple[int, str], ...] = ()
-    lines: Mapping[str, int] = field(default_factory=dict)  # lines of the records that give parameters, by parameter
+    # lines of the records that give parameters, by parameter
+    lines: Mapping[str, int] = field(default_factory=dict)
     p_min_mw: float = -math.inf
     p_max_mw: float = math.inf
 

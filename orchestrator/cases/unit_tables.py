@@ -9,14 +9,27 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.build_choices import PARTS
-from orchestrator.cases.csv_rows import PLACE, Row, optional_number, place_of, rows_of, seen_from_here
+from orchestrator.cases.csv_rows import (
+    PLACE,
+    Row,
+    optional_number,
+    place_of,
+    rows_of,
+    seen_from_here,
+)
 from orchestrator.cases.draft import Draft, UnitOrigin
 from orchestrator.cases.names import close_names
 from orchestrator.cases.network_data import bus_name
 from orchestrator.cases.network_import import Generation
 from orchestrator.cases.plausibility import question
 from orchestrator.cases.plausible_values import UnusualValue
-from orchestrator.cases.psse.dyr_units import completed, missing_records, rows_of_machines, with_choices, with_records
+from orchestrator.cases.psse.dyr_units import (
+    completed,
+    missing_records,
+    rows_of_machines,
+    with_choices,
+    with_records,
+)
 from orchestrator.cases.schema import ComponentTable, UnitsTable
 from orchestrator.cases.source_changes import Changes
 from orchestrator.cases.unit_row import UnitRow, checked
@@ -40,12 +53,18 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
         return {}
     generation = draft.data.generation if draft.data else {}
     try:
-        rows = unit_rows(table, draft.given.directory, generation) if table.dyr is None else _rows_of_dyr(draft, table)
+        rows = (
+            unit_rows(table, draft.given.directory, generation)
+            if table.dyr is None
+            else _rows_of_dyr(draft, table)
+        )
     except InputError as error:
         if draft.found.network_failed:
             return {}  # figures that the source would have given are missing
         key = next((key for key in ("dyr", "file") if getattr(table, key) is not None), None)
-        draft.note_network(draft.given.place("units", key) if key else draft.given.place("units"), str(error))
+        draft.note_network(
+            draft.given.place("units", key) if key else draft.given.place("units"), str(error)
+        )
         return {}
     draft.known |= {f"{kind}{row.label}" for row in rows for kind in UNIT_KINDS}
     draft.reactive_limits |= {row.bus: (row.q_min_mvar, row.q_max_mvar) for row in rows}
@@ -64,20 +83,30 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
         for row in rows:
             share = alphas[row.label] if kind == "gfor" else 1 - alphas[row.label]
             if share > 0:
-                own = {"S_n": share * row.rating_mva, "P_0": row.p_mw / row.rating_mva, "v_0": row.v_pu}
+                own = {
+                    "S_n": share * row.rating_mva,
+                    "P_0": row.p_mw / row.rating_mva,
+                    "v_0": row.v_pu,
+                }
                 values = {**common, **row.parameters.get(kind, {}), **own}
                 name = f"{kind}{row.label}"
                 parts: dict[str, Any] = {**_parts_of(table), **row.parts} if kind == "sg" else {}
                 if row.converter is not None:  # its record says all
                     values = {**row.parameters.get(kind, {}), **own}
-                components[name] = ComponentTable(model=row.converter or model, bus=row.bus, parameters=values, **parts)
+                components[name] = ComponentTable(
+                    model=row.converter or model, bus=row.bus, parameters=values, **parts
+                )
                 of_row = frozenset((*row.parameters.get(kind, {}), *own))
-                draft.origins[name] = UnitOrigin(row.place or draft.given.place("units"), of_row, key, row.lines)
+                draft.origins[name] = UnitOrigin(
+                    row.place or draft.given.place("units"), of_row, key, row.lines
+                )
                 draft.active_limits[name] = share * row.p_min_mw, share * row.p_max_mw
     return components
 
 
-def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Generation]) -> list[UnitRow]:
+def unit_rows(
+    table: UnitsTable, directory: Path, generation: Mapping[str, Generation]
+) -> list[UnitRow]:
     """The units of a units table. Figures that its file leaves out come from the network's source."""
     if table.file is None:
         if not generation:
@@ -87,18 +116,27 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
             )
         rows = [
             UnitRow(
-                g.label, bus, g.rating_mva, g.p_mw, g.v_pu, q_min_mvar=g.q_min_mvar, q_max_mvar=g.q_max_mvar
+                g.label,
+                bus,
+                g.rating_mva,
+                g.p_mw,
+                g.v_pu,
+                q_min_mvar=g.q_min_mvar,
+                q_max_mvar=g.q_max_mvar,
             )
             for bus, g in generation.items()
-        ]  # fmt: skip
+        ]
         return [checked(row, "the network's source") for row in rows]
     rows = []
     path = seen_from_here(directory / table.file)
     for entry in _known_rows(path):
         bus = bus_name(entry["bus"])
         name = _name_in(entry)
-        given = None if name else generation.get(bus)  # the source's figures are those of all units of the bus
-        figures = {column: _figure(entry, column, given) for column in ("rating_mva", "p_mw", "v_pu")}
+        # the source's figures are those of all units of the bus
+        given = None if name else generation.get(bus)
+        figures = {
+            column: _figure(entry, column, given) for column in ("rating_mva", "p_mw", "v_pu")
+        }
         if missing := [column for column, value in figures.items() if value is None]:
             raise InputError(
                 f"{place_of(entry)}: the unit at bus {entry['bus']} has no {', '.join(missing)}; add the column, or "
@@ -106,25 +144,42 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
             )
         alpha = optional_number(entry, "alpha")
         if alpha is not None and not 0 <= alpha <= 1:
-            raise InputError(f"{place_of(entry)}: alpha = {alpha:g}; it must be a number from 0 to 1")
+            raise InputError(
+                f"{place_of(entry)}: alpha = {alpha:g}; it must be a number from 0 to 1"
+            )
         own = {kind: _parameters(entry, kind) for kind in UNIT_KINDS}
         limits = {c: value for c in _LIMITS if (value := _figure(entry, c, given)) is not None}
         numbers = {**figures, **limits}
         parts = {part: text.strip() for part in PARTS if (text := entry.get(part) or "").strip()}
         label = f"{entry['bus']}_{name}" if name else entry["bus"]
-        unit = UnitRow(label, bus, **numbers, alpha=alpha, parameters=own, place=place_of(entry), parts=parts)  # type: ignore[arg-type]
+        unit = UnitRow(
+            label,
+            bus,
+            **numbers,  # type: ignore[arg-type]
+            alpha=alpha,
+            parameters=own,
+            place=place_of(entry),
+            parts=parts,
+        )
         rows.append(checked(unit, place_of(entry)))
     _require_names(rows, path)
     at_bus = {row.bus: [r for r in rows if r.bus == row.bus] for row in rows}
-    reach = {bus: (sum(u.q_min_mvar for u in us), sum(u.q_max_mvar for u in us)) for bus, us in at_bus.items()}
-    return [replace(row, q_min_mvar=reach[row.bus][0], q_max_mvar=reach[row.bus][1]) for row in rows]
+    reach = {
+        bus: (sum(u.q_min_mvar for u in us), sum(u.q_max_mvar for u in us))
+        for bus, us in at_bus.items()
+    }
+    return [
+        replace(row, q_min_mvar=reach[row.bus][0], q_max_mvar=reach[row.bus][1]) for row in rows
+    ]
 
 
 def _name_in(entry: Row) -> str:
     """The unit's name among those of its bus; empty without one."""
     name = (entry.get("unit") or "").strip()
     if name and not re.fullmatch(r"\w+", name, re.ASCII):
-        raise InputError(f"{place_of(entry)}: unit = {name!r}; it becomes part of a name: use letters, digits and _")
+        raise InputError(
+            f"{place_of(entry)}: unit = {name!r}; it becomes part of a name: use letters, digits and _"
+        )
     return name
 
 
@@ -148,7 +203,9 @@ def _known_rows(path: Path) -> list[Row]:
         if column not in (*known, *_REMARKS, PLACE) and not ("." in column and kind in UNIT_KINDS):
             similar = [] if "." in column else known
             hint = close_names(
-                column, similar, f"there are {', '.join(_COLUMNS)}, and sg.… and gfor.… with a parameter"
+                column,
+                similar,
+                f"there are {', '.join(_COLUMNS)}, and sg.… and gfor.… with a parameter",
             )
             raise InputError(f"{path}, line 1: nothing reads the column {column!r}; {hint}")
     return rows
@@ -159,24 +216,36 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
     if table.file is not None:
         raise InputError("'dyr' and 'file' both say what the units are; remove one of them")
     machines = draft.data.machines if draft.data else ()
-    if not machines and draft.given.case.network is not None and draft.given.case.network.raw is not None:
+    if (
+        not machines
+        and draft.given.case.network is not None
+        and draft.given.case.network.raw is not None
+    ):
         raise InputError(
             f"{draft.given.case.network.raw}: no generator is in service (STAT = 0), so 'dyr' is of no machine"
         )
     if not machines:
-        raise InputError("'dyr' is for the machines of a network of PSS/E; give it as 'raw' in [network]")
+        raise InputError(
+            "'dyr' is for the machines of a network of PSS/E; give it as 'raw' in [network]"
+        )
     path = seen_from_here(draft.given.directory / (table.dyr or ""))
     rows = rows_of_machines(machines, str(path))
     alphas = _alphas(draft, table, rows)
     replaced = [row.label for row in rows if alphas[row.label] == 1]
     idle = draft.data.idle_machines if draft.data else ()
-    rows = with_records(rows, machines, path, table.dyr_leave_out, replaced, idle, approximate=table.dyr_approximate)
+    rows = with_records(
+        rows, machines, path, table.dyr_leave_out, replaced, idle, approximate=table.dyr_approximate
+    )
     rows = with_choices(rows, replaced, _parts_of(table))
     machine_rows = [row for row in rows if row.label not in replaced]
     question(
         draft,
         [
-            *(UnusualValue(f"sg{row.label}.{v}", at, text) for row in machine_rows for v, at, text in row.doubts),
+            *(
+                UnusualValue(f"sg{row.label}.{v}", at, text)
+                for row in machine_rows
+                for v, at, text in row.doubts
+            ),
             *missing_records(machine_rows, str(path)),
         ],
     )

@@ -13,7 +13,11 @@ _START = {"P_0": 0.0, "Q_0": 0.0, "v_0": 1.0, "theta_0": 0.0}
 
 
 def use_in_case(
-    case: str, component: str | None, fmu: Path, step_size: float | None, scenario: str | None = None
+    case: str,
+    component: str | None,
+    fmu: Path,
+    step_size: float | None,
+    scenario: str | None = None,
 ) -> tuple[Use, Path | None]:
     """Step, operating point and values that a case gives an FMU, and the file of its binding."""
     loaded = load_case(case, trust_fmus=True)  # of which nothing runs here
@@ -43,7 +47,9 @@ def _point(plan: ComponentPlan, start: dict[str, float]) -> tuple[OperatingAt | 
             full[name] = start[name]
         else:
             declared = variables.get(name)
-            full[name] = default if declared is None or declared.start is None else declared.start_number
+            full[name] = (
+                default if declared is None or declared.start is None else declared.start_number
+            )
         words.append(f"{name} = {full[name]:.6g}{'' if name in start else ' (default)'}")
     return OperatingAt(full["v_0"], full["theta_0"], full["P_0"], full["Q_0"]), ", ".join(words)
 
@@ -58,7 +64,9 @@ def _scenario(case: Case, component: str, wanted: str | None) -> str:
             )
         return having[0]
     if wanted not in case.scenarios:
-        raise InputError(f"{case.path}: there is no scenario {wanted!r}; scenarios with {component!r}: {known}")
+        raise InputError(
+            f"{case.path}: there is no scenario {wanted!r}; scenarios with {component!r}: {known}"
+        )
     if wanted not in having:
         raise InputError(
             f"{case.path}: scenario {wanted!r} removes component {component!r}; scenarios that have it: {known}"
@@ -67,7 +75,9 @@ def _scenario(case: Case, component: str, wanted: str | None) -> str:
 
 
 def _component(case: Case, wanted: str | None, fmu: Path) -> str:
-    files = {n: case.directory / t.file for n, t in case.table.components.items() if t.file is not None}
+    files = {
+        n: case.directory / t.file for n, t in case.table.components.items() if t.file is not None
+    }
     known = ", ".join(files) or "none"
     if wanted is not None:
         if wanted not in case.table.components:

@@ -15,7 +15,8 @@ from orchestrator.units import to_unit
 if TYPE_CHECKING:
     from orchestrator.fmi.description import FmuDescription, VariableInfo
 
-_CHOICES = re.compile(r"\b0: .*\b1: ")  # in the description of a variable that chooses: what its numbers mean
+# in the description of a variable that chooses: what its numbers mean
+_CHOICES = re.compile(r"\b0: .*\b1: ")
 
 
 def convert(info: VariableInfo, value: Value) -> float | bool:
@@ -31,16 +32,22 @@ def convert(info: VariableInfo, value: Value) -> float | bool:
         number = to_unit(value, info.unit)
     except ValueError as error:
         if choices:
-            raise ValueError(f"{info.name} = {value!r}; it must be one of its numbers{choices}") from error
+            raise ValueError(
+                f"{info.name} = {value!r}; it must be one of its numbers{choices}"
+            ) from error
         raise ValueError(f"{info.name}: {error}") from error
     if not math.isfinite(number):
         raise ValueError(f"{info.name} = {number}; it must be a finite number")
     if info.type == "Integer" and number != int(number):
         raise ValueError(f"{info.name} = {number:g}; it must be a whole number{choices}")
     if info.minimum is not None and number < info.minimum:
-        raise ValueError(f"{info.name} = {number:g}{unit}; it must be at least {info.minimum:g}{unit}{choices}")
+        raise ValueError(
+            f"{info.name} = {number:g}{unit}; it must be at least {info.minimum:g}{unit}{choices}"
+        )
     if info.maximum is not None and number > info.maximum:
-        raise ValueError(f"{info.name} = {number:g}{unit}; it must be at most {info.maximum:g}{unit}{choices}")
+        raise ValueError(
+            f"{info.name} = {number:g}{unit}; it must be at most {info.maximum:g}{unit}{choices}"
+        )
     return number
 
 

@@ -12,7 +12,11 @@ def connect(draft: Draft) -> None:
         ends = {wire.source.partition(".")[0], wire.target.partition(".")[0]}
         if not ends & set(draft.given.scenario.remove):
             _try_connect(draft, wire.source, wire.target, draft.given.place("connections", index))
-    at_buses = [n for n, table in draft.tables.items() if table.bus is not None and n in draft.system.components]
+    at_buses = [
+        n
+        for n, table in draft.tables.items()
+        if table.bus is not None and n in draft.system.components
+    ]
     _check_forms(draft, at_buses)
     taken = _taken_by_port(draft)
     for name in at_buses:
@@ -32,7 +36,11 @@ def _taken_by_port(draft: Draft) -> dict[str, list[str]]:
 def _check_forms(draft: Draft, names: list[str]) -> None:
     """Refuse EMT models in a network of phasors, and question phasor models in a network of the other kind; once for
     each model, whatever the number of its components."""
-    if draft.found.network_failed or draft.network is None or draft.grid not in draft.system.components:
+    if (
+        draft.found.network_failed
+        or draft.network is None
+        or draft.grid not in draft.system.components
+    ):
         return
     taken = draft.system.components[draft.grid].description.inputs
     phasors: dict[str, list[str]] = {}
@@ -42,7 +50,9 @@ def _check_forms(draft: Draft, names: list[str]) -> None:
         if wanted - {*given}:
             draft.found.misfits[name] = draft.tables[name].model or draft.tables[name].file or ""
         elif not wanted and f"{name}.i_re" in taken and {*_PHASOR_PORT} <= {*given}:
-            phasors.setdefault(draft.tables[name].model or draft.tables[name].file or "", []).append(name)
+            phasors.setdefault(
+                draft.tables[name].model or draft.tables[name].file or "", []
+            ).append(name)
     for model in dict.fromkeys(draft.found.misfits.values()):
         others = [name for name, its in draft.found.misfits.items() if its == model]
         draft.note(
@@ -67,7 +77,9 @@ def _remedy(model: str) -> str:
     if model in model_names():
         return "it has no phasor form: take another model, or model = 'grid' for the network and EMT models for all"
     needed = f"an FMU needs the outputs {', '.join(_PHASOR_PORT)} for that"
-    return f"{needed}, or give the network the model 'grid', a case with `models` by --set models=emt"
+    return (
+        f"{needed}, or give the network the model 'grid', a case with `models` by --set models=emt"
+    )
 
 
 def _place_of_model(draft: Draft, name: str) -> str:
@@ -84,12 +96,22 @@ def check_inputs(draft: Draft) -> None:
             text = f"{wire.target} is given a constant, but {wire.source} feeds it; remove the one or the other"
             draft.note(draft.given.place("components", wire.target.component, "inputs"), text)
     for endpoint in draft.system.unconnected_inputs():
-        if draft.found.network_failed and (draft.tables[endpoint.component].bus or endpoint.component == draft.grid):
+        if draft.found.network_failed and (
+            draft.tables[endpoint.component].bus or endpoint.component == draft.grid
+        ):
             continue
-        if endpoint.component == draft.grid and endpoint.variable.rpartition(".")[0] in draft.found.misfits:
+        if (
+            endpoint.component == draft.grid
+            and endpoint.variable.rpartition(".")[0] in draft.found.misfits
+        ):
             continue
-        text = f"nothing feeds the input {endpoint}; connect it, or give it a constant under 'inputs'"
-        draft.note(draft.given.place("components", endpoint.component), f"scenario {draft.given.name!r}: {text}")
+        text = (
+            f"nothing feeds the input {endpoint}; connect it, or give it a constant under 'inputs'"
+        )
+        draft.note(
+            draft.given.place("components", endpoint.component),
+            f"scenario {draft.given.name!r}: {text}",
+        )
 
 
 def _connect_to_bus(draft: Draft, name: str, bus: str, taken: list[str]) -> None:
@@ -98,7 +120,8 @@ def _connect_to_bus(draft: Draft, name: str, bus: str, taken: list[str]) -> None
         return
     if draft.grid is None or draft.network is None:
         draft.note(
-            where, "a bus needs a [power_flow] table whose grid is a model with a network; or use [[connections]]"
+            where,
+            "a bus needs a [power_flow] table whose grid is a model with a network; or use [[connections]]",
         )
         return
     if not any(port.name == name and port.bus == bus for port in draft.network.ports):

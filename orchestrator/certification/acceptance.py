@@ -49,12 +49,19 @@ def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
     try:
         report = json.loads(path.read_text(encoding="utf-8"))
         hashes = report["sha256"]["fmu"], report["sha256"]["binding"]
-        said, found = bool(report["trusted"]), [(r["verdict"], r["fault"], r["check"]) for r in report["checks"]]
+        said, found = (
+            bool(report["trusted"]),
+            [(r["verdict"], r["fault"], r["check"]) for r in report["checks"]],
+        )
         tool = report["tool"]
     except OSError as error:
-        raise InputError(f"--check {path}: it cannot be read: {error.strerror}; {remedy}") from error
+        raise InputError(
+            f"--check {path}: it cannot be read: {error.strerror}; {remedy}"
+        ) from error
     except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"--check {path}: it is no report of `gfor fmu check --json`; {remedy}") from error
+        raise InputError(
+            f"--check {path}: it is no report of `gfor fmu check --json`; {remedy}"
+        ) from error
     if hashes != (file_hash(fmu), file_hash(binding)):
         raise InputError(f"--check {path}: it is of another FMU or binding than {fmu}; {remedy}")
     if tool != _tool():
@@ -68,7 +75,9 @@ def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
     if not faults and (left := [name for name in CHECKS if name not in there]):
         raise InputError(f"--check {path}: it does not hold {', '.join(left)}; {remedy}")
     if not faults and not any(verdict == "pass" for verdict, *_ in found):
-        raise InputError(f"--check {path}: none of its checks was passed, so that it says nothing of the FMU; {remedy}")
+        raise InputError(
+            f"--check {path}: none of its checks was passed, so that it says nothing of the FMU; {remedy}"
+        )
     return Acceptance(not faults, faults, report)
 
 

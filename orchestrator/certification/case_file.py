@@ -13,10 +13,12 @@ from orchestrator.certification.point import CONVERTER
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.safe_files import write_text
 
-BASE = BUILT_IN / "norm631" / "case.toml"  # with our converter, from which a certificate's case is made
+# with our converter, from which a certificate's case is made
+BASE = BUILT_IN / "norm631" / "case.toml"
 
 WITHOUT, WITH = "without", "with"
-FMU, BINDING, CASE = "converter.fmu", "vendor.toml", "case.toml"  # names of files in a certificate's folder
+# names of files in a certificate's folder
+FMU, BINDING, CASE = "converter.fmu", "vendor.toml", "case.toml"
 
 _HEAD = """\
 # Damping test of {fmu}{binding}, written by `gfor certify`.

@@ -20,7 +20,13 @@ from orchestrator.certification.judgement import watched
 from orchestrator.certification.margins import CriterionMargin
 from orchestrator.certification.point import CONVERTER
 from orchestrator.certification.request import REACTANCES, CertificationRequest, same_reactance
-from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES, incomplete_because, verdict_of
+from orchestrator.certification.verdict import (
+    FAILS,
+    INCOMPLETE,
+    PASSES,
+    incomplete_because,
+    verdict_of,
+)
 from orchestrator.errors import CaseError, Problem
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.values import as_text
@@ -32,15 +38,18 @@ class Certificate:
     description: FmuDescription
     code: GridCode[Any]
     f_n: float
-    verdicts: Sequence[Any]  # each with ``name``, ``judged``, ``accepted``, ``unknown``, and its ``margins()``
+    # each with ``name``, ``judged``, ``accepted``, ``unknown``, and its ``margins()``
+    verdicts: Sequence[Any]
     results: Mapping[Any, Any]  # what was computed: by row, or by scenario and line reactance
     case: Path  # the case file of the damping test, or of the first row
     # every value of the system with the converter at the first row, by ``component.variable``
     values: Mapping[str, float | bool] = field(default_factory=dict, kw_only=True)
-    damping: DampingTest | None = field(default=None, kw_only=True)  # what the damping test has beside
+    # what the damping test has beside
+    damping: DampingTest | None = field(default=None, kw_only=True)
     stored: int = field(default=0, kw_only=True)  # number of rows that an earlier start had kept
     details: Details = field(default_factory=Details, kw_only=True)
-    acceptance: Acceptance | None = field(default=None, kw_only=True)  # of the FMU; None where they were not run
+    # of the FMU; None where they were not run
+    acceptance: Acceptance | None = field(default=None, kw_only=True)
 
     @property
     def departures(self) -> tuple[str, ...]:
@@ -54,12 +63,16 @@ class Certificate:
     def missing(self) -> tuple[str, ...]:
         """Why a test that nothing fails is not passed, its departures included."""
         done = {v.name for v in self.verdicts if v.judged}
-        rows = tuple(f"row {r.name}" for r in self.code.rows if r.name not in done and not r.shown_only)
+        rows = tuple(
+            f"row {r.name}" for r in self.code.rows if r.name not in done and not r.shown_only
+        )
         return (*rows, *self.code.left_out, *self.departures)
 
     @property
     def verdict(self) -> str:
-        return verdict_of([bool(row.accepted) for row in self.verdicts if row.judged], len(self.missing))
+        return verdict_of(
+            [bool(row.accepted) for row in self.verdicts if row.judged], len(self.missing)
+        )
 
     @property
     def passed(self) -> bool:
@@ -90,7 +103,8 @@ def rows_in_words(c: Certificate) -> str:
         names = "; ".join(f"{v.name}: {', '.join(f.criterion for f in v.failed)}" for v in bad)
         return f"{subject} {FAILS} {title}: {rows} Not accepted: {names}."
     if c.verdict == INCOMPLETE:
-        untested = f"{len(c.missing)} parts of {title} were not tested."  # as issued ones say, also of one part
+        # as issued ones say, also of one part
+        untested = f"{len(c.missing)} parts of {title} were not tested."
         return f"The test is {INCOMPLETE}: {untested} {subject}: {rows}"
     return f"{subject} {PASSES} {title}: {rows}"
 
@@ -121,7 +135,11 @@ class DampingTest:
             text = f"{subject} fails the damping test at X_L = {places} pu. At {first.X_L:g} pu: "
             text += f"{'; '.join(first.faults)}."
             return f"{text} The test is incomplete as well: {reasons}." if reasons else text
-        where = "is accepted where it was judged" if any(v.judged for v in c.verdicts) else "was judged nowhere"
+        where = (
+            "is accepted where it was judged"
+            if any(v.judged for v in c.verdicts)
+            else "was judged nowhere"
+        )
         unknown = [v for v in c.verdicts if not v.judged]
         text = f"The damping test is incomplete: {reasons}. {subject} {where}"
         return f"{text}; at {unknown[0].X_L:g} pu, {unknown[0].unknown}." if unknown else f"{text}."
@@ -133,7 +151,9 @@ def missing_of(c: Certificate) -> tuple[float, ...]:
     return tuple(X for X in REACTANCES if not any(same_reactance(X, value) for value in done))
 
 
-_OWN = re.compile(rf'^(?:components\.{CONVERTER}\.parameters\.|--set {CONVERTER}\.)"?(?P<name>[^"]*)"?$')
+_OWN = re.compile(
+    rf'^(?:components\.{CONVERTER}\.parameters\.|--set {CONVERTER}\.)"?(?P<name>[^"]*)"?$'
+)
 """Place of a value of the converter, in a case file or among changes."""
 
 
@@ -165,9 +185,14 @@ def _refused(request: CertificationRequest, error: CaseError, trial: str, where:
             place = f"--set {value['name']}={_shown(request.values[value['name']])}"
         text = said(problem.text).replace(f"component {CONVERTER!r} has", "the FMU has")
         problems.append(Problem(place, text))
-    if request.binding is None and any(p.place.startswith(f"components.{CONVERTER}") for p in problems):
+    if request.binding is None and any(
+        p.place.startswith(f"components.{CONVERTER}") for p in problems
+    ):
         problems.append(
-            Problem("", f"if its port has other names, give --binding; `gfor fmu bind {request.fmu}` drafts one")
+            Problem(
+                "",
+                f"if its port has other names, give --binding; `gfor fmu bind {request.fmu}` drafts one",
+            )
         )
     return CaseError(f"{request.fmu}, {where}", tuple(dict.fromkeys(problems)))
 

@@ -24,7 +24,8 @@ rounding."""
 
 THIS = version("gfor-cosim")
 Content = Mapping[str, Any]
-Compared = Iterator[tuple[str, str]]  # faults, or otherwise sentences on what agrees, one of both empty
+# faults, or otherwise sentences on what agrees, one of both empty
+Compared = Iterator[tuple[str, str]]
 
 
 @dataclass
@@ -65,8 +66,11 @@ def said_of(difference: float, tolerance: float) -> str:
 
 WRITTEN_LAST = ("made", "files", "seal")
 
-WORDS = frozenset(("norm", "title", "clause", "source", "date", "readings"))  # another version has others
-TAKEN = frozenset(("tool", "environment", "details", "parameters", "file", "binding", "again", "reason"))
+# another version has others
+WORDS = frozenset(("norm", "title", "clause", "source", "date", "readings"))
+TAKEN = frozenset(
+    ("tool", "environment", "details", "parameters", "file", "binding", "again", "reason")
+)
 """Entries that cannot be had anew; beside those that are written last."""
 
 _SAME, _SAME_IN_SIGNAL = 1e-9, 1e-5
@@ -80,15 +84,26 @@ def faults_of(stated: Mapping[str, Any], again: Mapping[str, Any]) -> Iterator[s
     """Sentences on what is stated and does not come out; rows are compared by their names."""
     taken = TAKEN if of_one_program(stated, again) else TAKEN | WORDS
     rows = "points" if "points" in again else "rows"
-    whole = [{k: v for k, v in c.items() if k not in (rows, *WRITTEN_LAST)} for c in (stated, again)]
+    whole = [
+        {k: v for k, v in c.items() if k not in (rows, *WRITTEN_LAST)} for c in (stated, again)
+    ]
     for place, text in differences(whole[0], whole[1], taken):
         yield f"{place!r} {text}"
     named = [{_name(row): row for row in content[rows]} for content in (stated, again)]
     listed = [_name(row) for row in stated[rows]]
     compared = (
-        ("rows of the record that do not come out anew", [name for name in listed if name not in named[1]]),
-        ("rows that come out anew that the record has not", [name for name in named[1] if name not in named[0]]),
-        ("rows that the record has twice", [name for k, name in enumerate(listed) if name in listed[:k]]),
+        (
+            "rows of the record that do not come out anew",
+            [name for name in listed if name not in named[1]],
+        ),
+        (
+            "rows that come out anew that the record has not",
+            [name for name in named[1] if name not in named[0]],
+        ),
+        (
+            "rows that the record has twice",
+            [name for k, name in enumerate(listed) if name in listed[:k]],
+        ),
     )
     yield from (f"{what}: {', '.join(dict.fromkeys(names))}" for what, names in compared if names)
     for name in (name for name in named[0] if name in named[1]):
@@ -101,11 +116,15 @@ def _name(row: Mapping[str, Any]) -> str:
 
 
 def of_one_program(*records: Content) -> bool:
-    one, other = ([(r.get("environment") or {}).get(key) for key in ("gfor-cosim", "Commit")] for r in records)
+    one, other = (
+        [(r.get("environment") or {}).get(key) for key in ("gfor-cosim", "Commit")] for r in records
+    )
     return one == other and None not in one
 
 
-def differences(stated: Any, again: Any, taken: frozenset[str], tolerance: float = _SAME) -> Iterator[tuple[str, str]]:
+def differences(
+    stated: Any, again: Any, taken: frozenset[str], tolerance: float = _SAME
+) -> Iterator[tuple[str, str]]:
     if isinstance(stated, dict) and isinstance(again, dict):
         keys = [k for k in (*again, *stated) if not (k in taken and k in again)]
         pairs = {k: (stated.get(k, _NOTHING), again.get(k, _NOTHING)) for k in keys}
@@ -116,7 +135,9 @@ def differences(stated: Any, again: Any, taken: frozenset[str], tolerance: float
             yield "", f"is {_text(stated)}, and {_text(again)} comes out"
         return
     for key, pair in pairs.items():
-        for place, text in differences(*pair, taken, _SAME_IN_SIGNAL if key == "modal" else tolerance):
+        for place, text in differences(
+            *pair, taken, _SAME_IN_SIGNAL if key == "modal" else tolerance
+        ):
             yield f"{key}.{place}" if place else key, text
 
 

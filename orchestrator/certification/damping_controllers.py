@@ -26,8 +26,10 @@ class DampingControllers:
     source: str
     # values to be set for these controllers, by the FMU's variable.
     settings: Mapping[str, bool] = field(default_factory=dict)
-    declared: str = ""  # letters of the controllers, active or not, that only the applicant declares
-    unseen: str = ""  # letters of active controllers with a switch but without an output that shows their effect
+    # letters of the controllers, active or not, that only the applicant declares
+    declared: str = ""
+    # letters of active controllers with a switch but without an output that shows their effect
+    unseen: str = ""
     can_be_off: bool = False  # whether each active one has a switch that may be set
 
     def in_words(self) -> str:
@@ -37,13 +39,26 @@ class DampingControllers:
             return f"without POD{_AS_DECLARED if self.declared else ''}"
         groups: dict[str, list[str]] = {}
         for letter in active:
-            said = _AS_DECLARED if letter in self.declared else f" ({UNSEEN})" if letter in self.unseen else ""
+            said = (
+                _AS_DECLARED
+                if letter in self.declared
+                else f" ({UNSEEN})"
+                if letter in self.unseen
+                else ""
+            )
             groups.setdefault(said, []).append(f"POD-{letter.upper()}")
-        return "with " + " and ".join(f"{' and '.join(names)}{said}" for said, names in groups.items())
+        return "with " + " and ".join(
+            f"{' and '.join(names)}{said}" for said, names in groups.items()
+        )
 
 
-def damping_controllers(description: FmuDescription, request: CertificationRequest) -> DampingControllers:
-    known, settings = {letter: _state(description, request, letter) for letter in "pq"}, dict[str, bool]()
+def damping_controllers(
+    description: FmuDescription, request: CertificationRequest
+) -> DampingControllers:
+    known, settings = (
+        {letter: _state(description, request, letter) for letter in "pq"},
+        dict[str, bool](),
+    )
     hidden = "".join(letter for letter, value in known.items() if value is None)
     pod = request.pod
     if pod is None:
@@ -57,10 +72,16 @@ def damping_controllers(description: FmuDescription, request: CertificationReque
             if _is_switch(description.variables.get(name)):
                 settings[name] = on
         source = DECLARED if hidden == "pq" else SET
-        source += f", except POD-{hidden.upper()}: {DECLARED}" if len(hidden) == 1 and pod != "none" else ""
+        source += (
+            f", except POD-{hidden.upper()}: {DECLARED}"
+            if len(hidden) == 1 and pod != "none"
+            else ""
+        )
     active = pod.removeprefix("none")
     switched = [letter for letter in active if letter not in hidden]
-    unseen = "".join(letter for letter in switched if f"delta_{letter}_pod" not in description.variables)
+    unseen = "".join(
+        letter for letter in switched if f"delta_{letter}_pod" not in description.variables
+    )
     names = " and ".join(f"POD-{letter.upper()}" for letter in unseen)
     source += f"; {UNSEEN} ({names})" if unseen else ""
     can_be_off = all(_is_switch(description.variables.get(variable(letter))) for letter in active)
@@ -95,9 +116,16 @@ def _bound(description: FmuDescription, name: str) -> bool | None:
     return None
 
 
-def _refuse_contradiction(description: FmuDescription, request: CertificationRequest, name: str, on: bool) -> None:
-    said = {"--set": request.values.get(name), f"the binding {request.binding}": _bound(description, name)}
+def _refuse_contradiction(
+    description: FmuDescription, request: CertificationRequest, name: str, on: bool
+) -> None:
+    said = {
+        "--set": request.values.get(name),
+        f"the binding {request.binding}": _bound(description, name),
+    }
     for source, value in said.items():
         if value is not None and value is not on:
-            raise InputError(f"--pod {request.pod} needs {name} = {as_text(on)}, but {source} has {name} = "
-                             f"{as_text(value)}; leave one of them away, or make them agree")  # fmt: skip
+            raise InputError(
+                f"--pod {request.pod} needs {name} = {as_text(on)}, but {source} has {name} = "
+                f"{as_text(value)}; leave one of them away, or make them agree"
+            )

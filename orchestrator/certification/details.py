@@ -12,9 +12,13 @@ from orchestrator.toml_files import Table, read_toml
 TEMPLATE = Path(__file__).with_name("details_template.toml").read_text(encoding="utf-8")
 
 _LABELS = {
-    "number": "Certificate number", "applicant": "Applicant", "operator": "Network operator", "tester": "Tester",
-    "place": "Place", "date": "Date",
-}  # fmt: skip
+    "number": "Certificate number",
+    "applicant": "Applicant",
+    "operator": "Network operator",
+    "tester": "Tester",
+    "place": "Place",
+    "date": "Date",
+}
 
 
 class Details(Table):
@@ -41,7 +45,10 @@ def read_details(path: Path) -> Details:
     try:
         return Details.model_validate(raw)
     except ValidationError as error:
-        problems = [_problem(text, detail["loc"][0], detail["type"], detail.get("input")) for detail in error.errors()]
+        problems = [
+            _problem(text, detail["loc"][0], detail["type"], detail.get("input"))
+            for detail in error.errors()
+        ]
         raise CaseError(f"--details {path}", problems) from error
 
 
@@ -50,5 +57,9 @@ def _problem(text: str, key: int | str, kind: str, seen: object) -> Problem:
     place = f"line {line}, {key}" if line else str(key)
     if kind == "extra_forbidden":
         return Problem(place, f"this key is unknown; there are: {', '.join(_LABELS)}")
-    wanted = "a date as TOML has it, such as 2026-01-31 without quotes" if key == "date" else "a text in quotes"
+    wanted = (
+        "a date as TOML has it, such as 2026-01-31 without quotes"
+        if key == "date"
+        else "a text in quotes"
+    )
     return Problem(place, f"{seen!r} is given; write {wanted}")

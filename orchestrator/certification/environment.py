@@ -12,8 +12,13 @@ _ROOT = Path(__file__).parents[2]
 
 
 def environment() -> dict[str, str]:
-    known = {"gfor-cosim": version("gfor-cosim"), "Commit": commit(), "Operating system": platform.platform(),
-             "Processor": platform.machine(), "Python": platform.python_version()}  # fmt: skip
+    known = {
+        "gfor-cosim": version("gfor-cosim"),
+        "Commit": commit(),
+        "Operating system": platform.platform(),
+        "Processor": platform.machine(),
+        "Python": platform.python_version(),
+    }
     return known | versions_of(_LIBRARIES)
 
 
@@ -24,7 +29,11 @@ def commit() -> str:
     try:
         said = [
             subprocess.run(
-                ["git", "-C", str(_ROOT), *words], capture_output=True, text=True, timeout=20, check=True
+                ["git", "-C", str(_ROOT), *words],
+                capture_output=True,
+                text=True,
+                timeout=20,
+                check=True,
             ).stdout.strip()
             for words in (("rev-parse", "HEAD"), ("status", "--porcelain", "--untracked-files=no"))
         ]

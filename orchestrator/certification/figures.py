@@ -61,7 +61,11 @@ def _start(info: VariableInfo) -> Scalar | None:
 def _values(c: Certificate, description: FmuDescription) -> Iterator[tuple[str, Scalar, str]]:
     """The FMU's own name, the value and its origin, for every variable that is not left at its start value."""
     bound = description if isinstance(description, BoundDescription) else None
-    given = {name.partition(".")[2]: v for name, v in c.values.items() if name.startswith(f"{CONVERTER}.")}
+    given = {
+        name.partition(".")[2]: v
+        for name, v in c.values.items()
+        if name.startswith(f"{CONVERTER}.")
+    }
     if bound:
         for own, value in bound.port.settings.items():
             yield own, value, "the binding"
@@ -70,7 +74,11 @@ def _values(c: Certificate, description: FmuDescription) -> Iterator[tuple[str, 
             value = float(given.get(name, bound.variables[name].start_number))
             for m in maps:
                 scale = rating if m.per_rating else 1.0
-                yield m.variable, scale * m.factor * value + m.offset, f"{_by(c, name)}, {name} of the binding"
+                yield (
+                    m.variable,
+                    scale * m.factor * value + m.offset,
+                    f"{_by(c, name)}, {name} of the binding",
+                )
     for name, passed in given.items():
         target = bound.inner_names.get(name) if bound else name
         if target is not None and not (bound and name in START):
@@ -106,36 +114,70 @@ def fit_errors_of(c: Certificate) -> dict[str, float]:
 def damping_json(c: Certificate, test: DampingTest) -> dict[str, Any]:
     missing = missing_of(c)
     return {
-        "format": NORM, "norm": c.code.source, "tool": f"gfor-cosim {version('gfor-cosim')}", "verdict": c.verdict,
-        "passed": c.passed, "sentence": c.sentence(), "missing": list(missing),
-        "judged": f"{len(REACTANCES) - len(missing)} of {len(REACTANCES)}", "departures": list(c.request.departures),
-        "details": c.details.texts(), "fmu": {
-            "file": c.request.fmu.name, "model": c.description.model_name, "guid": c.description.guid,
-            **read_origin(c.description.path)},
-        "binding": c.request.binding.name if c.request.binding else None, "values": dict(c.request.values),
-        "study_values": dict(c.request.study_values), "black_box": c.request.black_box,
-        "pod": test.pod, "pod_source": test.controllers.source, "pod_values": dict(test.controllers.settings),
+        "format": NORM,
+        "norm": c.code.source,
+        "tool": f"gfor-cosim {version('gfor-cosim')}",
+        "verdict": c.verdict,
+        "passed": c.passed,
+        "sentence": c.sentence(),
+        "missing": list(missing),
+        "judged": f"{len(REACTANCES) - len(missing)} of {len(REACTANCES)}",
+        "departures": list(c.request.departures),
+        "details": c.details.texts(),
+        "fmu": {
+            "file": c.request.fmu.name,
+            "model": c.description.model_name,
+            "guid": c.description.guid,
+            **read_origin(c.description.path),
+        },
+        "binding": c.request.binding.name if c.request.binding else None,
+        "values": dict(c.request.values),
+        "study_values": dict(c.request.study_values),
+        "black_box": c.request.black_box,
+        "pod": test.pod,
+        "pod_source": test.controllers.source,
+        "pod_values": dict(test.controllers.settings),
         "parameters": [asdict(row) for row in parameter_rows(c)],
         "acceptance": None if c.acceptance is None else dict(c.acceptance.report),
-        "signal": test.signal, "event_time": test.event_time, "linearised": linearised_of(c),
-        "fit_errors": fit_errors_of(c), "environment": environment(), "points": [_point_json(c, v) for v in c.verdicts],
-    }  # fmt: skip
+        "signal": test.signal,
+        "event_time": test.event_time,
+        "linearised": linearised_of(c),
+        "fit_errors": fit_errors_of(c),
+        "environment": environment(),
+        "points": [_point_json(c, v) for v in c.verdicts],
+    }
 
 
 def _point_json(c: Certificate, v: PointVerdict) -> dict[str, Any]:
     points = {name: c.results[name, v.X_L] for name in (WITHOUT, WITH)}
     having, without = points[WITH], points[WITHOUT].modes
     return {
-        "X_L": v.X_L, "accepted": v.accepted, "judged": v.judged, "faults": list(v.faults), "unknown": v.unknown,
-        "modes": [mode_json(m) for m in v.modes], "modes_beside": [mode_json(m) for m in v.neighbours],
-        "modes_without": [] if without is None else [_figures(x) for x in without.eigenvalues.tolist()],
-        "lowered": [{"frequency_hz": m.frequency_hz, "from_percent": m.before_percent, "to_percent": m.damping_percent}
-                    for m in v.lowered],
+        "X_L": v.X_L,
+        "accepted": v.accepted,
+        "judged": v.judged,
+        "faults": list(v.faults),
+        "unknown": v.unknown,
+        "modes": [mode_json(m) for m in v.modes],
+        "modes_beside": [mode_json(m) for m in v.neighbours],
+        "modes_without": []
+        if without is None
+        else [_figures(x) for x in without.eigenvalues.tolist()],
+        "lowered": [
+            {
+                "frequency_hz": m.frequency_hz,
+                "from_percent": m.before_percent,
+                "to_percent": m.damping_percent,
+            }
+            for m in v.lowered
+        ],
         "growth": {name: number(p.growth) for name, p in points.items()},
         "stability": {name: p.stability for name, p in points.items()},
-        "residual": {name: number(p.residual) for name, p in points.items()}, "power": having.power,
-        "findings": {name: p.findings for name, p in points.items()}, "converter_model": {
-            "source": having.linearised.get(CONVERTER), "order": having.identified,
+        "residual": {name: number(p.residual) for name, p in points.items()},
+        "power": having.power,
+        "findings": {name: p.findings for name, p in points.items()},
+        "converter_model": {
+            "source": having.linearised.get(CONVERTER),
+            "order": having.identified,
             "fit_error": having.fit_errors.get(CONVERTER),
         },
         "warnings": {name: list(p.warnings) for name, p in points.items()},
@@ -143,7 +185,7 @@ def _point_json(c: Certificate, v: PointVerdict) -> dict[str, Any]:
         "time_without": None if v.base_time is None else time_json(v.base_time),
         "again": {n: commands(v.X_L, n, identified=having.identified is not None) for n in points},
         **({} if v.pod is None else {"pod": v.pod.as_json()}),
-    }  # fmt: skip
+    }
 
 
 def commands(X_L: float, scenario: str, *, identified: bool) -> dict[str, str]:
@@ -164,9 +206,13 @@ def number(value: float) -> float | None:
 def mode_json(m: ModeVerdict) -> dict[str, Any]:
     without = None if m.before is None else _figures(m.before)
     return _figures(m.eigenvalue) | {
-        "without": without, "likeness": m.similarity, "components": m.components, "accepted": m.accepted,
-        "reason": m.reason, **({"doubt": m.doubt} if m.doubt else {}),
-    }  # fmt: skip
+        "without": without,
+        "likeness": m.similarity,
+        "components": m.components,
+        "accepted": m.accepted,
+        "reason": m.reason,
+        **({"doubt": m.doubt} if m.doubt else {}),
+    }
 
 
 def _figures(value: complex) -> dict[str, float]:
@@ -176,22 +222,29 @@ def _figures(value: complex) -> dict[str, float]:
 def time_json(time: TimeVerdict) -> dict[str, Any]:
     modal = [_figures(m.eigenvalue) | {"amplitude": m.amplitude} for m in time.modal.modes]
     return {
-        "signal": time.signal, "accepted": time.accepted, "swings": _swings_json(time.swings),
+        "signal": time.signal,
+        "accepted": time.accepted,
+        "swings": _swings_json(time.swings),
         "swings_with_first_extremum": _swings_json(time.other_reading),
         "modal": {"accepted": time.modal.accepted, "reason": time.modal.reason, "modes": modal},
-    }  # fmt: skip
+    }
 
 
 def _swings_json(test: SwingTest) -> dict[str, Any]:
     return {
-        "accepted": test.accepted, "reason": test.reason, "ratio": test.ratio,
-        "dropped": asdict(test.dropped) if test.dropped else None, "swings": [_swing_json(s) for s in test.swings],
-    }  # fmt: skip
+        "accepted": test.accepted,
+        "reason": test.reason,
+        "ratio": test.ratio,
+        "dropped": asdict(test.dropped) if test.dropped else None,
+        "swings": [_swing_json(s) for s in test.swings],
+    }
 
 
 def _swing_json(s: RecordedSwing) -> dict[str, Any]:
     points = {"P": s.before, "M": s.minimum, "P_next": s.after}
-    return {"k": s.number, "line": s.line, "depth": s.depth} | {n: [p.time, p.value] for n, p in points.items()}
+    return {"k": s.number, "line": s.line, "depth": s.depth} | {
+        n: [p.time, p.value] for n, p in points.items()
+    }
 
 
 def damping_responses(c: Certificate, test: DampingTest) -> xr.Dataset:
@@ -209,6 +262,9 @@ def damping_responses(c: Certificate, test: DampingTest) -> xr.Dataset:
         unit = next(p.units[name] for p in c.results.values() if name in p.units)
         kept = values if name == test.signal else values.astype(np.float32)
         data[name] = (("scenario", "X_L", "time"), kept, {"units": unit})
-    coordinates = {"scenario": scenarios, "X_L": ("X_L", reactances, {"units": "pu"}),
-                   "time": ("time", whole.times, {"units": "s"})}  # fmt: skip
+    coordinates = {
+        "scenario": scenarios,
+        "X_L": ("X_L", reactances, {"units": "pu"}),
+        "time": ("time", whole.times, {"units": "s"}),
+    }
     return xr.Dataset(data, coords=coordinates, attrs={"source": "gfor certify"})

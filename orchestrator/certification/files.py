@@ -23,7 +23,12 @@ from orchestrator.results.staging import check_free
 from orchestrator.results.storage import save_netcdf
 from orchestrator.safe_files import file_hash, write_text
 
-HTML, JSON, RESPONSES, PDF = "certificate.html", "certificate.json", "responses.nc", "certificate.pdf"
+HTML, JSON, RESPONSES, PDF = (
+    "certificate.html",
+    "certificate.json",
+    "responses.nc",
+    "certificate.pdf",
+)
 
 
 def figures_of(c: Certificate) -> dict[str, Any]:
@@ -36,7 +41,9 @@ def save(c: Certificate, folder: Path, *, pdf: bool = False) -> list[Path]:
     save_netcdf(responses, folder / RESPONSES)
     content = {"made": made.isoformat(), **figures_of(c)}
     names = [FMU, *([BINDING] if c.request.binding else []), *case_files(content), RESPONSES]
-    hashes = {name: file_hash(folder / name) for name in [*names, *([KEPT] if c.acceptance else [])]}
+    hashes = {
+        name: file_hash(folder / name) for name in [*names, *([KEPT] if c.acceptance else [])]
+    }
     write_text(html, page(c, hashes | {f"{JSON}, its figures": figures_hash(content)}, made))
     printed = [print_pdf(html, folder / PDF)] if pdf else []
     content["files"] = hashes | {file.name: file_hash(file) for file in (html, *printed)}
@@ -51,14 +58,23 @@ def spare_another(folder: Path, code: str, fmu: Path, binding: Path | None) -> N
         there = record.get("code") or {record["format"]: NTS631}[NORM]
     except (OSError, ValueError, AttributeError, LookupError):
         if not holds_points_alone(folder / POINTS):  # no certificate was begun there
-            written = {FMU: fmu.read_bytes(), **({BINDING: binding.read_bytes()} if binding else {})}
+            written = {
+                FMU: fmu.read_bytes(),
+                **({BINDING: binding.read_bytes()} if binding else {}),
+            }
             cases = folder.glob(CASE if code == NTS631 else case_name("*"))
-            others = [path.name for path in cases if path.is_dir() or b"gfor certify" not in path.read_bytes()]
+            others = [
+                path.name
+                for path in cases
+                if path.is_dir() or b"gfor certify" not in path.read_bytes()
+            ]
             check_free(folder, dict.fromkeys([JSON, HTML, RESPONSES, *others]) | written)
         return
     if there != code:
-        raise InputError(f"{folder}: it holds a certificate by {there}, which one by {code} would replace; give "
-                         "another --out, or leave it out")  # fmt: skip
+        raise InputError(
+            f"{folder}: it holds a certificate by {there}, which one by {code} would replace; give "
+            "another --out, or leave it out"
+        )
 
 
 def write_sealed(content: Mapping[str, Any], path: Path) -> None:

@@ -116,18 +116,24 @@ def check_form(file: Path, content: Any) -> None:
     kind = content.get("format") if isinstance(content, dict) else None
     form = _FORMS.get(kind) if isinstance(kind, int | str) else None
     if form is None:
-        raise InputError(f"{file}: it is no certificate of format {NORM} or {CODE} (found: {kind}); older ones hold "
-                         "too little to be verified, make it anew with `gfor certify`")  # fmt: skip
+        raise InputError(
+            f"{file}: it is no certificate of format {NORM} or {CODE} (found: {kind}); older ones hold "
+            "too little to be verified, make it anew with `gfor certify`"
+        )
     try:
         json.dumps(content, ensure_ascii=False).encode()
         form.model_validate(content)
     except UnicodeEncodeError as error:
-        raise InputError(f"{file}: a text in it holds half a character, which is no Unicode; {remedy}") from error
+        raise InputError(
+            f"{file}: a text in it holds half a character, which is no Unicode; {remedy}"
+        ) from error
     except ValidationError as error:
         first, *others = error.errors(include_url=False)
         place = ".".join(str(part) for part in first["loc"])
         more = f" (and {len(others)} more)" if others else ""
-        raise InputError(f"{file}: {place} {_wrong(first['type'], first['input'])}{more}; {remedy}") from error
+        raise InputError(
+            f"{file}: {place} {_wrong(first['type'], first['input'])}{more}; {remedy}"
+        ) from error
 
 
 def _wrong(kind: str, seen: object) -> str:
@@ -139,4 +145,6 @@ def _wrong(kind: str, seen: object) -> str:
 
 
 def case_files(content: Mapping[str, Any]) -> list[str]:
-    return [CASE] if content["format"] == NORM else [case_name(row["row"]) for row in content["rows"]]
+    return (
+        [CASE] if content["format"] == NORM else [case_name(row["row"]) for row in content["rows"]]
+    )

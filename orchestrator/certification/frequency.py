@@ -14,4 +14,6 @@ def bus_frequency(times: Numbers, v_re: Numbers, v_im: Numbers, f_n: float) -> N
     last = len(times) - 1
     here = np.arange(len(times))
     before, after = np.maximum(here - half, 0), np.minimum(here + half, last)
-    return np.asarray(f_n + (angle[after] - angle[before]) / (times[after] - times[before]) / (2 * np.pi))
+    return np.asarray(
+        f_n + (angle[after] - angle[before]) / (times[after] - times[before]) / (2 * np.pi)
+    )

@@ -71,27 +71,46 @@ def _files(row: str, prepared: PreparedScenario) -> dict[str, bytes]:
     step = prepared.step_size
     first = min((event.time for event in prepared.events), default=0.0)
     steps = round(min(first + AFTER, prepared.stop_time) / step)
-    into = {str(c.target.variable): str(c.source) for c in prepared.system.connections
-            if c.target.component == CONVERTER}  # fmt: skip
-    outputs = list(dict.fromkeys(c.source.variable for c in prepared.system.connections
-                                 if c.source.component == CONVERTER))  # fmt: skip
+    into = {
+        str(c.target.variable): str(c.source)
+        for c in prepared.system.connections
+        if c.target.component == CONVERTER
+    }
+    outputs = list(
+        dict.fromkeys(
+            c.source.variable
+            for c in prepared.system.connections
+            if c.source.component == CONVERTER
+        )
+    )
     recorder = Recorder([*into.values(), *(f"{CONVERTER}.{name}" for name in outputs)], 1)
     with running(prepared) as master:
-        master.run(steps * step, [event for event in prepared.events if event.time < steps * step], [recorder])
+        master.run(
+            steps * step,
+            [event for event in prepared.events if event.time < steps * step],
+            [recorder],
+        )
     given, tested = recorder.values[:, : len(into)], recorder.values[1:, len(into) :]
     with running(prepared) as master:
         replay = _replay(master, list(into), given, outputs, step)
     size = np.ptp(tested, axis=0) + np.abs(tested).max(axis=0)
     if not np.all(np.abs(replay.coupled - tested) <= _REPEATED * size):
         worst = float(np.max(np.abs(replay.coupled - tested) / size))
-        raise CosimError(f"--into: row {row}: with the same inputs the FMU alone answers otherwise than in the test, "
-                         f"by {worst:.2g} of an output's size, so that nobody could repeat it; look at `gfor fmu "
-                         "check`")  # fmt: skip
+        raise CosimError(
+            f"--into: row {row}: with the same inputs the FMU alone answers otherwise than in the test, "
+            f"by {worst:.2g} of an output's size, so that nobody could repeat it; look at `gfor fmu "
+            "check`"
+        )
     description = _own(master.components[CONVERTER]).description
-    names = {"Parameters": f"{row}.parameters.ssv", "Stimuli": f"{row}.stimuli.csv",
-             "References": f"{row}.references.csv"}  # fmt: skip
+    names = {
+        "Parameters": f"{row}.parameters.ssv",
+        "Stimuli": f"{row}.stimuli.csv",
+        "References": f"{row}.references.csv",
+    }
     return {
-        f"{row}.exp": experiment(row, TEXTS["experiment"].format(row=row, after=AFTER), steps * step, step, names),
+        f"{row}.exp": experiment(
+            row, TEXTS["experiment"].format(row=row, after=AFTER), steps * step, step, names
+        ),
         names["Parameters"]: parameter_set(row, replay.parameters, description),
         names["Stimuli"]: as_csv(replay.stimuli),
         names["References"]: as_csv(replay.references),
@@ -102,7 +121,9 @@ def _own(component: Component) -> Component:
     return component.inner if isinstance(component, BoundComponent) else component
 
 
-def _replay(master: Master, inputs: Sequence[str], given: Numbers, outputs: Sequence[str], step: float) -> _Replay:
+def _replay(
+    master: Master, inputs: Sequence[str], given: Numbers, outputs: Sequence[str], step: float
+) -> _Replay:
     component = master.components[CONVERTER]
     own = _own(component)
     variables = own.description.variables.values()
@@ -139,12 +160,19 @@ def put_inside(folder: Path, fmu: Path, target: Path) -> Path:
     members |= {f"{own}/{name}": (folder / name).read_bytes() for name in names}
     members |= {f"{own}/{name}": data for name, data in experiments_of(folder, content).items()}
     members[_TESTED] = _signature(tested)
-    members[_MANIFEST] = manifest({f"../{name.removeprefix('extra/')}": (*_purpose(name), data)
-                                   for name, data in members.items() if name != _MANIFEST})  # fmt: skip
+    members[_MANIFEST] = manifest(
+        {
+            f"../{name.removeprefix('extra/')}": (*_purpose(name), data)
+            for name, data in members.items()
+            if name != _MANIFEST
+        }
+    )
     buffer = io.BytesIO(tested)
     with zipfile.ZipFile(buffer, "a", zipfile.ZIP_DEFLATED) as archive:
         for name, data in members.items():
-            archive.writestr(zipfile.ZipInfo(name, (2020, 1, 1, 0, 0, 0)), data, zipfile.ZIP_DEFLATED)
+            archive.writestr(
+                zipfile.ZipInfo(name, (2020, 1, 1, 0, 0, 0)), data, zipfile.ZIP_DEFLATED
+            )
     write_bytes(target, buffer.getvalue())
     return target
 
@@ -171,8 +199,10 @@ def taken_out(fmu: Path, into: Path) -> list[Path]:
     tested = _unpacked(fmu, into)
     folders = sorted(place for place in (into / FOLDER).glob("*") if place.is_dir())
     if tested is None or not folders:
-        raise InputError(f"{fmu}: there is no certificate in it; `gfor certify --into` writes one, and a certificate "
-                         "beside an FMU is verified by its folder")  # fmt: skip
+        raise InputError(
+            f"{fmu}: there is no certificate in it; `gfor certify --into` writes one, and a certificate "
+            "beside an FMU is verified by its folder"
+        )
     for folder in folders:
         write_bytes(folder / FMU, tested)
     return folders
@@ -193,11 +223,15 @@ def _unpacked(fmu: Path, into: Path) -> bytes | None:
 def _check_names(fmu: Path) -> None:
     names = names_in(fmu)
     if taken := [name for name in names if name.startswith(f"{FOLDER}/")]:
-        raise InputError(f"--into: {fmu} holds {taken[0]}; certify the FMU without certificates, and name this file "
-                         "as --into: the new certificate joins those in it")  # fmt: skip
+        raise InputError(
+            f"--into: {fmu} holds {taken[0]}; certify the FMU without certificates, and name this file "
+            "as --into: the new certificate joins those in it"
+        )
     if _MANIFEST in names:
-        raise InputError(f"--into: {fmu} has a manifest of LS-REF already ({_MANIFEST}), which a certificate cannot "
-                         "join; build it without reference results, or take them away")  # fmt: skip
+        raise InputError(
+            f"--into: {fmu} has a manifest of LS-REF already ({_MANIFEST}), which a certificate cannot "
+            "join; build it without reference results, or take them away"
+        )
 
 
 def _others(target: Path, tested: bytes) -> Mapping[str, bytes]:
@@ -207,19 +241,32 @@ def _others(target: Path, tested: bytes) -> Mapping[str, bytes]:
         try:
             same = _unpacked(target, place) == tested
         except FmuFileError as error:
-            raise InputError(f"--into: {target} exists and is no FMU: {error}; name another file") from error
+            raise InputError(
+                f"--into: {target} exists and is no FMU: {error}; name another file"
+            ) from error
         if not same:
-            raise InputError(f"--into: {target} exists and is not the FMU that was tested, with certificates; name "
-                             "another file")  # fmt: skip
-        files = {file.relative_to(place).as_posix(): file for file in sorted((place / FOLDER).rglob("*"))}
-        return {name: file.read_bytes() for name, file in files.items() if file.is_file() and name != _TESTED}
+            raise InputError(
+                f"--into: {target} exists and is not the FMU that was tested, with certificates; name "
+                "another file"
+            )
+        files = {
+            file.relative_to(place).as_posix(): file for file in sorted((place / FOLDER).rglob("*"))
+        }
+        return {
+            name: file.read_bytes()
+            for name, file in files.items()
+            if file.is_file() and name != _TESTED
+        }
 
 
 def _signature(tested: bytes) -> bytes:
     with zipfile.ZipFile(io.BytesIO(tested)) as archive:
         directory = archive.start_dir
-    said = {"sha256": hashlib.sha256(tested).hexdigest(), "members_end": directory,
-            "directory": b64encode(tested[directory:]).decode()}  # fmt: skip
+    said = {
+        "sha256": hashlib.sha256(tested).hexdigest(),
+        "members_end": directory,
+        "directory": b64encode(tested[directory:]).decode(),
+    }
     return (json.dumps(said, indent=1) + "\n").encode()
 
 

@@ -12,15 +12,24 @@ from orchestrator.certification import criteria
 from orchestrator.certification.margins import CriterionMargin
 from orchestrator.certification.point import CONVERTER, FREQUENCY, POWER, PointResult
 from orchestrator.certification.request import row_of
-from orchestrator.certification.swings import LARGEST_RATIO, SLOWEST_PERIOD, SwingTest, slow_part, swing_test
+from orchestrator.certification.swings import (
+    LARGEST_RATIO,
+    SLOWEST_PERIOD,
+    SwingTest,
+    slow_part,
+    swing_test,
+)
 from orchestrator.watch.finding import NOT_JUDGED, UNSTABLE
 from orchestrator.watch.limits import told_of
 
-SETTLING = 0.5  # time after the event [s] from which the signal counts as a free response and is decomposed into modes
+# time after the event [s] from which the signal counts as a free response and is decomposed into
+# modes
+SETTLING = 0.5
 RATED_POWER = 1350.0  # active power of the converter in the norm's study [MW]
 _SAME_POWER = 0.01  # largest relative difference of the power at the start
 _LEAST_MOVEMENT = 1e-6  # least movement of an active damping controller's output [pu]
-LOWERED = 2.0  # A mode gets a remark if the converter lowers its damping by more than this [percentage points]
+# A mode gets a remark if the converter lowers its damping by more than this [percentage points]
+LOWERED = 2.0
 
 
 @dataclass(frozen=True)
@@ -39,14 +48,22 @@ class TimeVerdict:
     @property
     def margin(self) -> float | None:
         """The better of the two ways, since either is enough; None where the better one has no figure."""
-        ratio, least = self.swings.ratio, min((m.damping_percent for m in self.modal.modes), default=None)
+        ratio, least = (
+            self.swings.ratio,
+            min((m.damping_percent for m in self.modal.modes), default=None),
+        )
         ways = [
             (self.swings.accepted, None if ratio is None else 1 - abs(ratio) / LARGEST_RATIO),
-            (self.modal.accepted, None if least is None else least / (100 * criteria.LEAST_DAMPING) - 1),
+            (
+                self.modal.accepted,
+                None if least is None else least / (100 * criteria.LEAST_DAMPING) - 1,
+            ),
         ]
         if any(accepted and margin is None for accepted, margin in ways):
             return None
-        return max((m for accepted, m in ways if m is not None and accepted == self.accepted), default=None)
+        return max(
+            (m for accepted, m in ways if m is not None and accepted == self.accepted), default=None
+        )
 
 
 @dataclass(frozen=True)
@@ -54,13 +71,15 @@ class PointVerdict:
     X_L: float
     modes: tuple[criteria.ModeVerdict, ...]
     time: TimeVerdict | None
-    base_time: TimeVerdict | None  # the time-domain criterion on the system without the converter, for comparison only
+    # the time-domain criterion on the system without the converter, for comparison only
+    base_time: TimeVerdict | None
     faults: tuple[str, ...]  # why the point is not accepted; empty where it is
     neighbours: tuple[criteria.ModeVerdict, ...] = ()
     unknown: str = ""  # why the point could not be judged at all; empty where it was
     # the least damped judged mode without the converter [rad/s]; None where there is none.
     base_critical: complex | None = None
-    pod: criteria.PodEffect | None = None  # what the active damping controllers change; None where none is
+    # what the active damping controllers change; None where none is
+    pod: criteria.PodEffect | None = None
 
     @property
     def name(self) -> str:
@@ -82,19 +101,28 @@ class PointVerdict:
     def lowered(self) -> tuple[criteria.ModeVerdict, ...]:
         """Modes, judged or listed, whose damping is more than two points lower than without the converter."""
         every = (*self.modes, *self.neighbours)
-        return tuple(m for m in every if (b := m.before_percent) is not None and b - m.damping_percent > LOWERED)
+        return tuple(
+            m
+            for m in every
+            if (b := m.before_percent) is not None and b - m.damping_percent > LOWERED
+        )
 
     def margins(self) -> list[CriterionMargin]:
         """Every mode that the norm asks 5 % of, the response, and whatever else the point is not accepted for."""
         place = f"X_L = {self.X_L:g} pu"
         found = [
-            CriterionMargin(place, f"damping at {m.frequency_hz:.3f} Hz", margin, m.accepted, m.reason)
+            CriterionMargin(
+                place, f"damping at {m.frequency_hz:.3f} Hz", margin, m.accepted, m.reason
+            )
             for m in self.modes
-            if (margin := damping_ratio(m.eigenvalue) / criteria.LEAST_DAMPING - 1) >= 0 or not m.accepted
+            if (margin := damping_ratio(m.eigenvalue) / criteria.LEAST_DAMPING - 1) >= 0
+            or not m.accepted
         ]  # a mode below 5 % that is accepted was below without the converter
         if self.time is not None:
             reasons = f"{self.time.swings.reason}; {self.time.modal.reason}"
-            found.append(CriterionMargin(place, "response", self.time.margin, self.time.accepted, reasons))
+            found.append(
+                CriterionMargin(place, "response", self.time.margin, self.time.accepted, reasons)
+            )
         if self.faults and all(margin.accepted for margin in found):
             found.append(CriterionMargin(place, "stable", None, False, "; ".join(self.faults)))
         return found
@@ -119,8 +147,13 @@ def watched(pod: str) -> str:
     return FREQUENCY if "p" in pod.removeprefix("none") else POWER
 
 
-def judge(having: PointResult, lacking: PointResult, pod: str, event_time: float,
-          known: Sequence[criteria.ModeVerdict] | None = None) -> PointVerdict:  # fmt: skip
+def judge(
+    having: PointResult,
+    lacking: PointResult,
+    pod: str,
+    event_time: float,
+    known: Sequence[criteria.ModeVerdict] | None = None,
+) -> PointVerdict:
     """All criteria at one reactance, from the system with and without the converter.
 
     ``known``: Which mode is which without the converter; None where the modes' shapes are to tell it."""
@@ -140,30 +173,45 @@ def judge(having: PointResult, lacking: PointResult, pod: str, event_time: float
         unknown = f"nothing shows that the system with the converter is stable: {having.stability['sentence']}"
     if having.modes is not None and lacking.modes is not None:
         matched = list(
-            criteria.matched_modes(having.modes, lacking.modes, having.components) if known is None else known
+            criteria.matched_modes(having.modes, lacking.modes, having.components)
+            if known is None
+            else known
         )
-        modes, beside = tuple(criteria.judged_modes(matched)), tuple(criteria.neighbouring_modes(matched))
+        modes, beside = (
+            tuple(criteria.judged_modes(matched)),
+            tuple(criteria.neighbouring_modes(matched)),
+        )
         faults += [f"{m.frequency_hz:.3f} Hz: {m.reason}" for m in modes if not m.accepted]
-        fault = criteria.stability_fault(having.growth, lacking.growth, having.stability, lacking.stability)
+        fault = criteria.stability_fault(
+            having.growth, lacking.growth, having.stability, lacking.stability
+        )
         faults += [fault] if fault else []
     if not having.failure and not modes:
-        faults.append("no mode from 0.1 to 1.5 Hz was found, so that the eigenvalue criterion judged nothing")
+        faults.append(
+            "no mode from 0.1 to 1.5 Hz was found, so that the eigenvalue criterion judged nothing"
+        )
     signal = watched(pod)
     time, base = (judge_response(point, signal, event_time) for point in (having, lacking))
     if time is not None and not time.accepted:
-        faults.append(f"response of {signal}: {time.swings.reason}; and by its modes: {time.modal.reason}")
+        faults.append(
+            f"response of {signal}: {time.swings.reason}; and by its modes: {time.modal.reason}"
+        )
     if time is None and not having.failure:
         faults.append(f"there is no response of {signal}")
-    return PointVerdict(having.X_L, modes, time, base, tuple(faults), beside, "" if faults else unknown, critical)
+    return PointVerdict(
+        having.X_L, modes, time, base, tuple(faults), beside, "" if faults else unknown, critical
+    )
 
 
 def _wrong(having: PointResult, pod: str, event_time: float) -> list[str]:
     wrong = []
     power = float("nan") if having.power is None else having.power
     if not abs(power - RATED_POWER) <= _SAME_POWER * RATED_POWER:
-        wrong.append(f"the converter feeds in {power:.4g} MW at the start and not {RATED_POWER:g} MW, so that it is "
-                     "not the norm's study; check whether it is connected, its rating, and what the binding makes of "
-                     "its current")  # fmt: skip
+        wrong.append(
+            f"the converter feeds in {power:.4g} MW at the start and not {RATED_POWER:g} MW, so that it is "
+            "not the norm's study; check whether it is connected, its rating, and what the binding makes of "
+            "its current"
+        )
     for name, values in having.signals.items():
         if not np.isfinite(values).all():
             at = having.times[int(np.argmax(~np.isfinite(values)))]
@@ -182,7 +230,11 @@ def _idle(having: PointResult, pod: str, letter: str) -> str | None:
     moved = float(np.ptp(values))
     moves, named = moved > _LEAST_MOVEMENT, letter in pod.removeprefix("none")
     if named and not moves:
-        little = f"moves by {moved:.2g} pu, less than {_LEAST_MOVEMENT:g} pu" if moved else f"stays at {values[0]:g}"
+        little = (
+            f"moves by {moved:.2g} pu, less than {_LEAST_MOVEMENT:g} pu"
+            if moved
+            else f"stays at {values[0]:g}"
+        )
         return f"POD-{letter.upper()} is said to be active, and {name} {little}: it does nothing"
     if moves and not named:
         return f"POD-{letter.upper()} is said to be off, and {name} moves: it is active"
@@ -208,17 +260,23 @@ A mode of 0.1 Hz with 5 % of damping, the slowest and least damped that the norm
 """
 
 
-def motion_faults(times: Numbers, signals: Mapping[str, Numbers], event_time: float,
-                  findings: Sequence[Mapping[str, Any]] = ()) -> Iterator[str]:  # fmt: skip
+def motion_faults(
+    times: Numbers,
+    signals: Mapping[str, Numbers],
+    event_time: float,
+    findings: Sequence[Mapping[str, Any]] = (),
+) -> Iterator[str]:
     """Loss of synchronism, or no rest: a converter that slips or never stops swinging is not accepted."""
     yield from (str(finding["message"]) for finding in findings if finding["kind"] in UNSTABLE)
     frequency = signals.get(FREQUENCY)
     if frequency is not None and len(times) > 1:
         far = np.abs(frequency - frequency[0]) > LARGEST_DEVIATION
         if far.any():
-            yield (f"{FREQUENCY} goes from {frequency.min():.4g} to {frequency.max():.4g} Hz, first more than "
-                   f"{LARGEST_DEVIATION:g} Hz from its start at t = {times[int(np.argmax(far))]:g} s: synchronism is "
-                   "lost")  # fmt: skip
+            yield (
+                f"{FREQUENCY} goes from {frequency.min():.4g} to {frequency.max():.4g} Hz, first more than "
+                f"{LARGEST_DEVIATION:g} Hz from its start at t = {times[int(np.argmax(far))]:g} s: synchronism is "
+                "lost"
+            )
     for name in (POWER, FREQUENCY):
         if name in signals and len(times) > 1:
             yield from _late_swing(times, name, signals[name], event_time)
@@ -226,7 +284,9 @@ def motion_faults(times: Numbers, signals: Mapping[str, Numbers], event_time: fl
 
 def not_judged(findings: Sequence[Mapping[str, Any]]) -> str:
     """What the watch could not judge of a run, in its words; empty where it judged all of it."""
-    return "; ".join(str(finding["message"]) for finding in findings if finding["kind"] == NOT_JUDGED)
+    return "; ".join(
+        str(finding["message"]) for finding in findings if finding["kind"] == NOT_JUDGED
+    )
 
 
 def _late_swing(times: Numbers, name: str, signal: Numbers, event_time: float) -> Iterator[str]:
@@ -238,6 +298,8 @@ def _late_swing(times: Numbers, name: str, signal: Numbers, event_time: float) -
     drift = np.polyval(np.polyfit(times[last] - begin, signal[last], 1), times[last] - begin)
     late, early = float(np.ptp(signal[last] - drift)), float(np.ptp(signal[first]))
     if late > LATE_SWING * early:
-        yield (f"{name} still swings by {late:.3g} from peak to peak from t = {begin:.3g} s to the end, and by "
-               f"{early:.3g} in the first {SLOWEST_PERIOD:g} s after the event: more than {LATE_SWING:g} of it, so "
-               "that it does not come to rest")  # fmt: skip
+        yield (
+            f"{name} still swings by {late:.3g} from peak to peak from t = {begin:.3g} s to the end, and by "
+            f"{early:.3g} in the first {SLOWEST_PERIOD:g} s after the event: more than {LATE_SWING:g} of it, so "
+            "that it does not come to rest"
+        )

@@ -22,7 +22,13 @@ from orchestrator.certification.compared import Content, Verification
 from orchestrator.certification.files import RESPONSES
 from orchestrator.certification.form import NORM
 from orchestrator.certification.point import CertificatePointTask, compute_point
-from orchestrator.certification.request import PODS, REACTANCES, STUDY, CertificationRequest, read_reactances
+from orchestrator.certification.request import (
+    PODS,
+    REACTANCES,
+    STUDY,
+    CertificationRequest,
+    read_reactances,
+)
 from orchestrator.certification.study import certify
 from orchestrator.errors import InputError
 from orchestrator.fmi.devices import as_device
@@ -42,20 +48,31 @@ class Parts:
     # the module that judges them again: ``rebuilt``, ``faults``, ``choose``, ``tasks`` and ``compare``
     again: Any
     compute: Callable[[Any], Any]
-    later: Callable[[Content], tuple[str, ...]] = lambda _: ()  # those that the version that issued a record had not
+    # those that the version that issued a record had not
+    later: Callable[[Content], tuple[str, ...]] = lambda _: ()
 
-    def chosen(self, folder: Path, content: Content, wanted: Sequence[Any], *, every: bool) -> list[Any]:
+    def chosen(
+        self, folder: Path, content: Content, wanted: Sequence[Any], *, every: bool
+    ) -> list[Any]:
         """Line reactances, or names of rows; ``wanted``: those that were asked for."""
         named = any(isinstance(one, str) for one in wanted)
         if wanted and named != (self is ROWS):
             kind = "a grid code" if self is ROWS else "a damping test"
             given = "--rows" if named else "--points"
-            raise InputError(f"{given}: {folder} is the certificate of {kind}, which has {self.one}s; give "
-                             f"{self.option}")  # fmt: skip
+            raise InputError(
+                f"{given}: {folder} is the certificate of {kind}, which has {self.one}s; give "
+                f"{self.option}"
+            )
         return list(self.again.choose(content, wanted, every=every))
 
-    def verify(self, folder: Path, content: Content, chosen: Sequence[Any], executor: Executor,
-               report: CountReport = nobody) -> Verification:  # fmt: skip
+    def verify(
+        self,
+        folder: Path,
+        content: Content,
+        chosen: Sequence[Any],
+        executor: Executor,
+        report: CountReport = nobody,
+    ) -> Verification:
         found = Verification()
         tasks = self.again.tasks(folder, content, chosen, found)
         with xr.open_dataset(folder / RESPONSES, engine="scipy") as data:
@@ -65,8 +82,12 @@ class Parts:
         return found
 
 
-POINTS = Parts("point", CertificatePointTask, "--points, with line reactances", points_again, compute_point)
-ROWS = Parts("row", BenchTask, "--rows, with their names", rows_again, compute_row, rows_again.later)
+POINTS = Parts(
+    "point", CertificatePointTask, "--points, with line reactances", points_again, compute_point
+)
+ROWS = Parts(
+    "row", BenchTask, "--rows, with their names", rows_again, compute_row, rows_again.later
+)
 
 
 def parts_of(content: Content) -> Parts:
@@ -79,7 +100,11 @@ def rebuilt(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Cer
     certificate: Certificate = parts_of(content).again.rebuilt(folder, content, responses)
     if content["acceptance"] is not None:
         report = json.loads((folder / KEPT).read_text(encoding="utf-8"))
-        faults = tuple(dict.fromkeys(check["fault"] for check in report["checks"] if check["verdict"] == "fail"))
+        faults = tuple(
+            dict.fromkeys(
+                check["fault"] for check in report["checks"] if check["verdict"] == "fail"
+            )
+        )
         certificate.acceptance = Acceptance(not faults, faults, {**report, "trusted": not faults})
     return certificate
 
@@ -115,43 +140,68 @@ class CertifyRequest:
     """
 
     fmu: str | Path = asked(FieldKind("", str, path), MISSING, "the converter", option=None)
-    code: str = asked(one_of(WITH_VERDICT), NTS631, f'``"{NTS631}"``, the damping test, or another that ``gfor certify '
-                      "--code`` names, with a verdict", option=None)  # fmt: skip
+    code: str = asked(
+        one_of(WITH_VERDICT),
+        NTS631,
+        f'``"{NTS631}"``, the damping test, or another that ``gfor certify '
+        "--code`` names, with a verdict",
+        option=None,
+    )
     _: KW_ONLY
     binding: str | Path | None = asked(
-        FieldKind("", str, lambda given, _: binding_path(given)), None, "file that says what the FMU's variables mean "
-        "at our port", option=None,
-    )  # fmt: skip
-    values: Mapping[str, Any] | None = asked(
-        FieldKind("", str, plain), None, 'of the converter, such as ``{"pod_p.K": 150}``; or of the damping test\'s '
-        "study, which makes it another test", option=None,
-    )  # fmt: skip
-    declared: Mapping[str, float] | None = asked(
-        FieldKind("", str, plain), None, "what the applicant declares, for codes that compare the converter with that",
+        FieldKind("", str, lambda given, _: binding_path(given)),
+        None,
+        "file that says what the FMU's variables mean at our port",
         option=None,
-    )  # fmt: skip
+    )
+    values: Mapping[str, Any] | None = asked(
+        FieldKind("", str, plain),
+        None,
+        'of the converter, such as ``{"pod_p.K": 150}``; or of the damping test\'s '
+        "study, which makes it another test",
+        option=None,
+    )
+    declared: Mapping[str, float] | None = asked(
+        FieldKind("", str, plain),
+        None,
+        "what the applicant declares, for codes that compare the converter with that",
+        option=None,
+    )
     pod: str | None = asked(
-        one_of(PODS), None, "of nts631: damping controllers that are to be active: set in the FMU where it has "
+        one_of(PODS),
+        None,
+        "of nts631: damping controllers that are to be active: set in the FMU where it has "
         "pod_p.enabled and pod_q.enabled, else declared by the applicant (default: as the FMU shows them)",
         f"{{{','.join(PODS)}}}",
         python=f"active damping controllers, one of {', '.join(PODS)}; as the FMU shows them by default",
-    )  # fmt: skip
+    )
     reactances: Sequence[float] | None = asked(
-        FieldKind("X,X,…", read_reactances, _reactances), None, "of nts631: line reactances X_L [pu] (default: "
+        FieldKind("X,X,…", read_reactances, _reactances),
+        None,
+        "of nts631: line reactances X_L [pu] (default: "
         "the norm's 13, 0.01 and 0.05 to 0.60; less is incomplete)",
         python="line reactances of the damping test [pu]; the norm's 13 by default, less is incomplete",
-    )  # fmt: skip
-    black_box: bool = asked(FLAG, False, "of nts631: do not use the converter's states for the modes")
+    )
+    black_box: bool = asked(
+        FLAG, False, "of nts631: do not use the converter's states for the modes"
+    )
     check: bool = asked(FLAG, True, "whether the acceptance tests of the FMU are run", option=None)
     folder: str | Path | None = asked(
-        FILE, None, "for the certificate; ``results/certify_<file>[_<code>]`` by default. Points that are there are "
-        "kept", option=None,
-    )  # fmt: skip
+        FILE,
+        None,
+        "for the certificate; ``results/certify_<file>[_<code>]`` by default. Points that are there are "
+        "kept",
+        option=None,
+    )
     into: str | Path | None = asked(
-        FILE, None, "write the FMU with its certificate in it, and with experiments that any tool can repeat; "
-        "certificates by other codes that OUT.fmu holds stay", "OUT.fmu", python="where the FMU is written with the "
+        FILE,
+        None,
+        "write the FMU with its certificate in it, and with experiments that any tool can repeat; "
+        "certificates by other codes that OUT.fmu holds stay",
+        "OUT.fmu",
+        python="where the FMU is written with the "
         "certificate in it, and with experiments that any tool can repeat",
-    )  # fmt: skip
+    )
     workers: int | None = asked(ANYTHING, 1, "processes; one for each core where None", option=None)
     progress: bool = asked(FLAG, False, "show a bar", option=None)
 
@@ -160,17 +210,30 @@ class CertifyRequest:
         binding = None if self.binding is None else Path(self.binding)
         fmu, values = Path(self.fmu), self.values or {}
         if self.code != NTS631:
-            code, bench = code_for(self.code, self.declared or {}), bench_request(fmu, binding, values)
-            return Issue(bench, ROWS, lambda work, folder, say: certify_code(bench, code, work, folder, report=say))
+            code, bench = (
+                code_for(self.code, self.declared or {}),
+                bench_request(fmu, binding, values),
+            )
+            return Issue(
+                bench,
+                ROWS,
+                lambda work, folder, say: certify_code(bench, code, work, folder, report=say),
+            )
         if self.declared:
-            raise InputError(f"--declare {next(iter(self.declared))}: the damping test takes no declared value; leave "
-                             f"it out, or choose --code {', '.join(BY_DECLARATION)}")  # fmt: skip
+            raise InputError(
+                f"--declare {next(iter(self.declared))}: the damping test takes no declared value; leave "
+                f"it out, or choose --code {', '.join(BY_DECLARATION)}"
+            )
         study = {name: value for name, value in values.items() if name.split(".")[0] in STUDY}
         own = {name: value for name, value in values.items() if name not in study}
         reactances = self.reactances or REACTANCES
-        norm = CertificationRequest(as_device(fmu, binding), binding, own, self.pod, reactances, study, self.black_box)
+        norm = CertificationRequest(
+            as_device(fmu, binding), binding, own, self.pod, reactances, study, self.black_box
+        )
         norm.check()
-        return Issue(norm, POINTS, lambda executor, folder, report: certify(norm, executor, folder, report))
+        return Issue(
+            norm, POINTS, lambda executor, folder, report: certify(norm, executor, folder, report)
+        )
 
 
 def usual_folder(name: str, code: str) -> Path:
@@ -184,7 +247,9 @@ class Issue:
     compute: Callable[[Executor, Path, CountReport], Certificate]
 
 
-def bench_request(fmu: Path, binding: Path | None, values: Mapping[str, Value]) -> CertificationRequest:
+def bench_request(
+    fmu: Path, binding: Path | None, values: Mapping[str, Value]
+) -> CertificationRequest:
     request = CertificationRequest(as_device(fmu, binding), binding, values)
     request.check()
     return request

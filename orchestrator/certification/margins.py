@@ -35,7 +35,9 @@ def margin_of(finding: RowFinding) -> str:
     return margin_text(finding.margin, finding.limit, finding.value, unit[1] if unit else "")
 
 
-def margin_text(margin: float | None, limit: float | None = None, value: float | None = None, unit: str = "") -> str:
+def margin_text(
+    margin: float | None, limit: float | None = None, value: float | None = None, unit: str = ""
+) -> str:
     """A margin in percent of its limit; a dash where there is none.
 
     Beyond `MOST` the limit is next to nothing, and the distance from it says more: in the quantity's own unit where

@@ -40,7 +40,8 @@ class MatrixCell:
     judged: int = 0
     missing: int = 0  # number of parts of the code that were not tested
     refused: bool = False
-    has_needs: bool = False  # whether what the failed criteria would take lies beside the certificate
+    # whether what the failed criteria would take lies beside the certificate
+    has_needs: bool = False
     # what a code without a verdict gives, in words; None of a code with one. Whatever it is, it decides nothing.
     figures: Sequence[str] | None = None
 
@@ -64,7 +65,11 @@ class MatrixCell:
         """As `gfor certify` of this device and code alone ends; 0 of figures without a verdict."""
         if self.figures is not None:
             return 0
-        return InputError.exit_code if self.failure is not None else exit_code(self.verdict, refused=self.refused)
+        return (
+            InputError.exit_code
+            if self.failure is not None
+            else exit_code(self.verdict, refused=self.refused)
+        )
 
 
 @dataclass(frozen=True)
@@ -85,10 +90,22 @@ class CertificateMatrix:
     def sentence(self) -> str:
         verdicts = [cell.verdict for cell in self.cells.values() if cell.figures is None]
         said = {PASSES: "passed", FAILS: "failed", INCOMPLETE: INCOMPLETE, NOT_TESTED: NOT_TESTED}
-        judged = ", ".join(f"{n} {word}" for key, word in said.items() if (n := verdicts.count(key)))
-        alone = list(dict.fromkeys(cell.code for cell in self.cells.values() if cell.figures is not None))
-        refused = [name for name in self.devices if any(self.cells[name, code].refused for code in self.codes)]
-        text = f"Of {counted(len(verdicts), 'certificate')}: {judged}." if verdicts else "No certificate was asked for."
+        judged = ", ".join(
+            f"{n} {word}" for key, word in said.items() if (n := verdicts.count(key))
+        )
+        alone = list(
+            dict.fromkeys(cell.code for cell in self.cells.values() if cell.figures is not None)
+        )
+        refused = [
+            name
+            for name in self.devices
+            if any(self.cells[name, code].refused for code in self.codes)
+        ]
+        text = (
+            f"Of {counted(len(verdicts), 'certificate')}: {judged}."
+            if verdicts
+            else "No certificate was asked for."
+        )
         if alone:
             text += f" Figures without a verdict: {', '.join(alone)}."
         if self.left_out:
@@ -96,7 +113,12 @@ class CertificateMatrix:
         return f"{text} Acceptance tests failed: {', '.join(refused)}." if refused else text
 
 
-WORST_FIRST = (exit_code(FAILS, refused=False), InputError.exit_code, exit_code(INCOMPLETE, refused=False), NOT_TRUSTED)
+WORST_FIRST = (
+    exit_code(FAILS, refused=False),
+    InputError.exit_code,
+    exit_code(INCOMPLETE, refused=False),
+    NOT_TRUSTED,
+)
 """Exit codes of cells, the one that counts most first."""
 
 
@@ -116,27 +138,47 @@ def save_matrix(matrix: CertificateMatrix, devices: Sequence[Device], folder: Pa
 
 def matrix_json(matrix: CertificateMatrix, devices: Sequence[Device]) -> dict[str, Any]:
     return {
-        "format": FORMAT, "sentence": matrix.sentence(), "exit_code": matrix.exit_code,
-        "devices": [{"name": d.name, "file": d.file.name, "binding": d.binding.name if d.binding else None,
-                     "values": dict(d.values)} for d in devices],
-        "codes": list(matrix.codes), "left_out": list(matrix.left_out),
+        "format": FORMAT,
+        "sentence": matrix.sentence(),
+        "exit_code": matrix.exit_code,
+        "devices": [
+            {
+                "name": d.name,
+                "file": d.file.name,
+                "binding": d.binding.name if d.binding else None,
+                "values": dict(d.values),
+            }
+            for d in devices
+        ],
+        "codes": list(matrix.codes),
+        "left_out": list(matrix.left_out),
         "cells": [_cell_json(cell) for cell in matrix.cells.values()],
         "environment": environment(),
-    }  # fmt: skip
+    }
 
 
 def _cell_json(cell: MatrixCell) -> dict[str, Any]:
     least = cell.narrowest
     return {
-        "device": cell.device, "code": cell.code, "verdict": cell.verdict, "exit_code": cell.exit_code,
-        "sentence": cell.sentence, "failure": None if cell.failure is None else str(cell.failure),
-        "judged": cell.judged, "missing": cell.missing,
-        "acceptance_failed": cell.refused, "narrowest": None if least is None else asdict(least),
+        "device": cell.device,
+        "code": cell.code,
+        "verdict": cell.verdict,
+        "exit_code": cell.exit_code,
+        "sentence": cell.sentence,
+        "failure": None if cell.failure is None else str(cell.failure),
+        "judged": cell.judged,
+        "missing": cell.missing,
+        "acceptance_failed": cell.refused,
+        "narrowest": None if least is None else asdict(least),
         "failed": [asdict(m) for m in cell.failed],
-        "certificate": None if cell.failure is not None or cell.figures is not None else f"{cell.folder}/{JSON}",
-        "figures": None if cell.figures is None or cell.failure is not None else f"{cell.folder}/{FIGURES_JSON}",
+        "certificate": None
+        if cell.failure is not None or cell.figures is not None
+        else f"{cell.folder}/{JSON}",
+        "figures": None
+        if cell.figures is None or cell.failure is not None
+        else f"{cell.folder}/{FIGURES_JSON}",
         "sensitivities": f"{cell.folder}/{NEEDS_JSON}" if cell.has_needs else None,
-    }  # fmt: skip
+    }
 
 
 def in_words(cell: MatrixCell) -> list[str]:
@@ -153,38 +195,74 @@ def in_words(cell: MatrixCell) -> list[str]:
 
 
 def matrix_page(matrix: CertificateMatrix, devices: Sequence[Device], made: datetime) -> str:
-    whole = [[escape(code.upper()), *(_cell_html(matrix.cells[name, code]) for name in matrix.devices)]
-             for code in matrix.codes]  # fmt: skip
+    whole = [
+        [escape(code.upper()), *(_cell_html(matrix.cells[name, code]) for name in matrix.devices)]
+        for code in matrix.codes
+    ]
     tried = [[escape(text) for text in _given(device)] for device in devices]
     bad = [
-        [escape(cell.device), escape(cell.code.upper()), escape(m.place), escape(m.criterion), escape(m.text),
-         margin_text(m.margin)]
-        for cell in matrix.cells.values() for m in cell.failed
-    ]  # fmt: skip
-    lost = [[escape(c.device), escape(c.code.upper()), escape(str(c.failure)).replace("\n", "<br>")]
-            for c in matrix.cells.values() if c.failure is not None]  # fmt: skip
+        [
+            escape(cell.device),
+            escape(cell.code.upper()),
+            escape(m.place),
+            escape(m.criterion),
+            escape(m.text),
+            margin_text(m.margin),
+        ]
+        for cell in matrix.cells.values()
+        for m in cell.failed
+    ]
+    lost = [
+        [escape(c.device), escape(c.code.upper()), escape(str(c.failure)).replace("\n", "<br>")]
+        for c in matrix.cells.values()
+        if c.failure is not None
+    ]
     columns = ["Device", "Code", "Where", "Criterion", "Found", "Margin"]
     width = 1 + len(matrix.devices)
     sections = [
-        ("Verdict and narrowest margin",
-         table("Codes and devices", ["", *matrix.devices], whole, left=width) + f"<p>{escape(READING)}</p>"),
-        ("What is not met", table("Criteria, least margin first", columns, bad, left=5) if bad else "<p>Nothing.</p>"),
-        *([("Not tested", table("Why", ["Device", "Code", "Reason"], lost, left=3))] if lost else []),
-        ("The devices", table("As they were given", ["Device", "File", "Binding", "Values set"], tried, left=4)),
-    ]  # fmt: skip
+        (
+            "Verdict and narrowest margin",
+            table("Codes and devices", ["", *matrix.devices], whole, left=width)
+            + f"<p>{escape(READING)}</p>",
+        ),
+        (
+            "What is not met",
+            table("Criteria, least margin first", columns, bad, left=5)
+            if bad
+            else "<p>Nothing.</p>",
+        ),
+        *(
+            [("Not tested", table("Why", ["Device", "Code", "Reason"], lost, left=3))]
+            if lost
+            else []
+        ),
+        (
+            "The devices",
+            table("As they were given", ["Device", "File", "Binding", "Values set"], tried, left=4),
+        ),
+    ]
     kind = "Grid codes for grid-forming converters"
-    return document("Codes and devices", kind, f"<p><b>{escape(matrix.sentence())}</b></p>", sections, made)
+    return document(
+        "Codes and devices", kind, f"<p><b>{escape(matrix.sentence())}</b></p>", sections, made
+    )
 
 
 def _given(device: Device) -> list[str]:
     values = ", ".join(f"{name} = {as_text(value)}" for name, value in device.values.items())
-    return [device.name, device.file.name, device.binding.name if device.binding else "none", values or "none"]
+    return [
+        device.name,
+        device.file.name,
+        device.binding.name if device.binding else "none",
+        values or "none",
+    ]
 
 
 def _cell_html(cell: MatrixCell) -> str:
     verdict, *rest = in_words(cell)
     if cell.figures is not None and cell.failure is None:
-        word = f'<a class="soft" href="{quote(f"{cell.folder}/{FIGURES_PNG}")}">{escape(verdict)}</a>'
+        word = (
+            f'<a class="soft" href="{quote(f"{cell.folder}/{FIGURES_PNG}")}">{escape(verdict)}</a>'
+        )
         return "<br>".join([word, *(escape(line) for line in rest)])
     passing = cell.exit_code == 0 and cell.failure is None
     style = "good" if passing else "bad" if verdict == FAILS or cell.failure is not None else "soft"

@@ -39,18 +39,22 @@ class PointResult(Kept):
     modes: ModeSet | None = None
     components: list[str] = field(default_factory=list)
     growth: float = float("nan")  # largest real part of any eigenvalue [1/s], zeros left out
-    stability: dict[str, Any] | None = None  # the verdict over the whole spectrum, as `Stability.as_json` has it
+    # the verdict over the whole spectrum, as `Stability.as_json` has it
+    stability: dict[str, Any] | None = None
     residual: float = float("nan")
-    identified: int | None = None  # order of the model in the converter's place; None where its own states are used
+    # order of the model in the converter's place; None where its own states are used
+    identified: int | None = None
     # by component: perturbed, directional, packed or identified; and how far a fit is from what was measured, relative
     linearised: dict[str, str] = field(default_factory=dict)
     fit_errors: dict[str, float] = field(default_factory=dict)
-    power: float | None = None  # of the converter at the start, from its current [MW]; None without the converter
+    # of the converter at the start, from its current [MW]; None without the converter
+    power: float | None = None
     times: Numbers = field(default_factory=lambda: np.empty(0))
     signals: dict[str, Numbers] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
-    findings: list[dict[str, Any]] = field(default_factory=list)  # of the watch on the run, as `Finding.as_json`
+    # of the watch on the run, as `Finding.as_json`
+    findings: list[dict[str, Any]] = field(default_factory=list)
     # eigenvalues with the damping controllers off [rad/s], None where none are or `off_failure` says why; and the
     # electromechanical mode's off and on, nan where no shape tells it
     off: Complex | None = None
@@ -70,7 +74,8 @@ class CertificatePointTask(Task):
     record = PointResult
     X_L: float
     black_box: bool = False
-    off: tuple[tuple[str, Value], ...] = ()  # values by ``component.variable`` that switch the damping controllers off
+    # values by ``component.variable`` that switch the damping controllers off
+    off: tuple[tuple[str, Value], ...] = ()
 
     def failed(self, failure: Failure) -> PointResult:
         return PointResult(self.X_L, self.scenario, failure=failure)
@@ -110,7 +115,9 @@ def _switch_off(case: Case, task: CertificatePointTask, result: PointResult) -> 
         result.off, result.swings[0] = other.modes.eigenvalues, other.swings[1]
 
 
-def _linearised(prepared: PreparedScenario, master: Master, result: PointResult, *, black_box: bool) -> None:
+def _linearised(
+    prepared: PreparedScenario, master: Master, result: PointResult, *, black_box: bool
+) -> None:
     converter = master.components.get(CONVERTER)
     if converter is not None and (black_box or is_black_box(converter)):
         boxed = linearize_with_box(master, CONVERTER)
@@ -127,7 +134,11 @@ def _linearised(prepared: PreparedScenario, master: Master, result: PointResult,
     result.modes = ModeSet.of(modes, model.names)
     result.linearised = dict(model.sources)
     result.components = [
-        ", ".join(f"{name} {100 * share:.0f} %" for name, share in mode.by_component.items() if share >= 0.01)
+        ", ".join(
+            f"{name} {100 * share:.0f} %"
+            for name, share in mode.by_component.items()
+            if share >= 0.01
+        )
         for mode in modes
     ]
     result.stability, growth = stability.as_json(), stability.largest_growth_rate
@@ -146,5 +157,9 @@ def _keep_signals(result: PointResult, recorder: Recorder, master: Master, f_n: 
     result.signals = recorded
     for name in recorded:
         component, _, variable = name.partition(".")
-        known = master.components[component].description.variables if component in master.components else {}
+        known = (
+            master.components[component].description.variables
+            if component in master.components
+            else {}
+        )
         result.units[name] = known[variable].unit if variable in known else "Hz"

@@ -11,7 +11,11 @@ from orchestrator.certification.codes.record import row_chapters
 from orchestrator.certification.environment import environment
 from orchestrator.certification.figures import commands, parameter_rows
 from orchestrator.certification.point import FREQUENCY
-from orchestrator.certification.report_criteria import damping_chapters, damping_findings, told_of_damping
+from orchestrator.certification.report_criteria import (
+    damping_chapters,
+    damping_findings,
+    told_of_damping,
+)
 from orchestrator.certification.texts import TEXTS
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES
 from orchestrator.fmi.archive import read_origin
@@ -25,7 +29,9 @@ Hashes = Mapping[str, str | None]
 
 
 def details(c: Certificate) -> str:
-    rows = [[label, escape(text).replace("\n", "<br>") or _LINE] for label, text in c.details.rows()]
+    rows = [
+        [label, escape(text).replace("\n", "<br>") or _LINE] for label, text in c.details.rows()
+    ]
     rows += [[f"Signature of the {who}", _LINE] for who in ("tester", "applicant")]
     return table("Filled in from the file of --details, or by hand", ["", ""], rows, left=2)
 
@@ -35,16 +41,28 @@ def converter(c: Certificate, hashes: Hashes) -> str:
     switched = {} if c.damping is None else c.damping.controllers.settings
     values = {**c.request.values, **switched, **c.request.study_values}
     given = {
-        "FMU": c.request.fmu.name, "Model": c.description.model_name, "Description": origin["description"],
-        "Author": origin["author"], "Version": origin["version"], "Made by": origin["generation_tool"],
-        "Made on": origin["generated"], "Copyright": origin["copyright"], "License": origin["license"],
-        "FMI": f"{origin['fmi_version']}, co-simulation", "Guid": c.description.guid, "SHA-256": hashes[FMU],
-        "Rating": _rating(c), "Voltage": _voltage(c),
+        "FMU": c.request.fmu.name,
+        "Model": c.description.model_name,
+        "Description": origin["description"],
+        "Author": origin["author"],
+        "Version": origin["version"],
+        "Made by": origin["generation_tool"],
+        "Made on": origin["generated"],
+        "Copyright": origin["copyright"],
+        "License": origin["license"],
+        "FMI": f"{origin['fmi_version']}, co-simulation",
+        "Guid": c.description.guid,
+        "SHA-256": hashes[FMU],
+        "Rating": _rating(c),
+        "Voltage": _voltage(c),
         "Binding": c.request.binding.name if c.request.binding else "none: the port is ours",
         "Values set": ", ".join(f"{k} = {as_text(v)}" for k, v in values.items()) or "none",
         **({} if c.damping is None else told_of_damping(c, c.damping)),
-    }  # fmt: skip
-    rows = [[escape(name), escape(str(value)) or '<span class="soft">not said</span>'] for name, value in given.items()]
+    }
+    rows = [
+        [escape(name), escape(str(value)) or '<span class="soft">not said</span>']
+        for name, value in given.items()
+    ]
     return table("The converter", ["", ""], rows, left=2)
 
 
@@ -60,17 +78,32 @@ def _voltage(c: Certificate) -> str:
     if c.request.binding is None:
         return "per unit of the bus; the FMU has no rated voltage"
     given = read_table(c.request.binding).rating.V_n
-    return f"{given} (V_n of the binding)" if given is not None else "per unit of the bus; the binding gives no V_n"
+    return (
+        f"{given} (V_n of the binding)"
+        if given is not None
+        else "per unit of the bus; the binding gives no V_n"
+    )
 
 
 def parameters(c: Certificate) -> str:
     rows = [
-        [escape(r.name), _text(r.start), f"<b>{_text(r.used)}</b>" if r.changed_by else _text(r.used),
-         escape(r.unit), escape(r.changed_by or "–"), escape(r.description)] for r in parameter_rows(c)
-    ]  # fmt: skip
+        [
+            escape(r.name),
+            _text(r.start),
+            f"<b>{_text(r.used)}</b>" if r.changed_by else _text(r.used),
+            escape(r.unit),
+            escape(r.changed_by or "–"),
+            escape(r.description),
+        ]
+        for r in parameter_rows(c)
+    ]
     columns = ["Parameter", "In the file", "Used", "Unit", "Changed by", "Description"]
     changed = sum(1 for r in parameter_rows(c) if r.changed_by)
-    return table(f"All {len(rows)} parameters by the FMU's own names, {changed} of them given a value", columns, rows)
+    return table(
+        f"All {len(rows)} parameters by the FMU's own names, {changed} of them given a value",
+        columns,
+        rows,
+    )
 
 
 def _text(value: Scalar | None) -> str:
@@ -91,26 +124,39 @@ def acceptance(c: Certificate) -> str:
         return "<p>They were not run (--no-check).</p>"
     marks = {"fail": "bad", "pass": "good"}
     rows = [
-        [escape(r["check"]), f'<span class="{marks.get(r["verdict"], "soft")}">{escape(r["verdict"])}</span>',
-         escape(f"{r['fault']}: {r['evidence']}" if r["fault"] else r["evidence"])] for r in c.acceptance.checks
-    ]  # fmt: skip
-    said = "No check failed." if c.acceptance.trusted else f"FAILED: {', '.join(c.acceptance.faults)}."
+        [
+            escape(r["check"]),
+            f'<span class="{marks.get(r["verdict"], "soft")}">{escape(r["verdict"])}</span>',
+            escape(f"{r['fault']}: {r['evidence']}" if r["fault"] else r["evidence"]),
+        ]
+        for r in c.acceptance.checks
+    ]
+    said = (
+        "No check failed." if c.acceptance.trusted else f"FAILED: {', '.join(c.acceptance.faults)}."
+    )
     style = "good" if c.acceptance.trusted else "bad"
     listed = table("gfor fmu check", ["Check", "Verdict", "What was seen"], rows, left=3)
     return f'<p class="{style}">{escape(said)}</p>{listed}'
 
 
 def provenance(c: Certificate, hashes: Hashes) -> str:
-    machine = table("Computed on", ["", ""], [[escape(k), escape(v)] for k, v in environment().items()], left=2)
-    files = table("SHA-256 of the files beside this page", ["File", "SHA-256"],
-                  [[escape(name), str(value)] for name, value in hashes.items()], left=2)  # fmt: skip
+    machine = table(
+        "Computed on", ["", ""], [[escape(k), escape(v)] for k, v in environment().items()], left=2
+    )
+    files = table(
+        "SHA-256 of the files beside this page",
+        ["File", "SHA-256"],
+        [[escape(name), str(value)] for name, value in hashes.items()],
+        left=2,
+    )
     first = c.verdicts[0]
     again, worst = {"response": f"gfor run {c.case.name} --out again"}, ""
     if c.damping is not None:
-        again = commands(first.X_L, WITH, identified=c.results[WITH, first.X_L].identified is not None)
-        worst = (
-            f"Steady states hold to {max(p.residual for p in c.results.values()):.1e} pu in one communication step. "
+        again = commands(
+            first.X_L, WITH, identified=c.results[WITH, first.X_L].identified is not None
         )
+        residual = max(p.residual for p in c.results.values())
+        worst = f"Steady states hold to {residual:.1e} pu in one communication step. "
     named = "".join(f"<li>{name}: <code>{escape(text)}</code></li>" for name, text in again.items())
     text = escape(c.case.read_text(encoding="utf-8"))
     return (
@@ -133,7 +179,10 @@ def page(c: Certificate, hashes: Hashes, made: datetime) -> str:
         ("Acceptance tests of the FMU", acceptance(c)),
         ("Parameters of the FMU", parameters(c)),
         ("Binding", binding(c, hashes)),
-        ("How the code was read", f"{listed(readings)}<p>{escape(c.code.source)}, {escape(c.code.date)}.</p>"),
+        (
+            "How the code was read",
+            f"{listed(readings)}<p>{escape(c.code.source)}, {escape(c.code.date)}.</p>",
+        ),
         ("Provenance", provenance(c, hashes)),
     ]
     return document(title(c), c.code.title, _findings(c), content, made)
@@ -155,11 +204,22 @@ def title(c: Certificate) -> str:
 def _findings(c: Certificate) -> str:
     good = c.passed and not c.refused
     items = [f'<b class="{"good" if good else "bad"}">{escape(c.sentence())}</b>']
-    checked = "not run" if c.acceptance is None else "no check failed" if c.acceptance.trusted else "FAILED"
+    checked = (
+        "not run"
+        if c.acceptance is None
+        else "no check failed"
+        if c.acceptance.trusted
+        else "FAILED"
+    )
     if c.acceptance is not None and c.refused:
-        items = [f'<b class="bad">ACCEPTANCE TESTS FAILED: {escape(", ".join(c.acceptance.faults))}</b>', *items]
+        items = [
+            f'<b class="bad">ACCEPTANCE TESTS FAILED: {escape(", ".join(c.acceptance.faults))}</b>',
+            *items,
+        ]
     items.append(f"Acceptance tests of the FMU (gfor fmu check): {checked}")
     items += [] if c.damping is None else damping_findings(c, c.damping)
-    warnings = dict.fromkeys(text for result in c.results.values() for text in getattr(result, "warnings", ()))
+    warnings = dict.fromkeys(
+        text for result in c.results.values() for text in getattr(result, "warnings", ())
+    )
     extra = "".join(f'<div class="warning">{escape(text)}</div>' for text in warnings)
     return f'<div class="findings"><ul>{"".join(f"<li>{item}</li>" for item in items)}</ul></div>{extra}'

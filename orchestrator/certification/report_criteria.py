@@ -18,7 +18,8 @@ from orchestrator.report.html.charts import ChartCurve, Mark, complex_plane, leg
 from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, number, table
 from orchestrator.report.linearised import exceptions_in_words
 
-_SHOWN = 30.0  # length of the drawn part of the response, from the event on [s]. The whole response is judged.
+# length of the drawn part of the response, from the event on [s]. The whole response is judged.
+_SHOWN = 30.0
 
 
 PODS = {"none": "none", "p": "POD-P", "q": "POD-Q", "pq": "POD-P and POD-Q"}
@@ -30,7 +31,10 @@ def damping_chapters(c: Certificate, test: DampingTest, figures: Figures) -> lis
         ("Dampings that the converter lowers", _lowered(c)),
         ("Stability at all frequencies", _stability(c)),
         ("Eigenvalue criterion", eigenvalues(c, figures)),
-        ("Time-domain criterion", "".join(part for v in c.verdicts for part in _response(c, v, test, figures))),
+        (
+            "Time-domain criterion",
+            "".join(part for v in c.verdicts for part in _response(c, v, test, figures)),
+        ),
         ("What the damping controllers change", pod_section(c.verdicts)),
     ]
 
@@ -66,12 +70,20 @@ def converter_model(points: Iterable[PointResult]) -> str:
     if boxes := [p for p in known if p.identified is not None]:
         orders = ", ".join(dict.fromkeys(str(p.identified) for p in boxes))
         error = max(p.fit_errors.get(CONVERTER, 0.0) for p in boxes)
-        return (f"Black box: a model identified at its port, of order {orders}; largest relative fitting error "
-                f"{error:.1e}")  # fmt: skip
+        return (
+            f"Black box: a model identified at its port, of order {orders}; largest relative fitting error "
+            f"{error:.1e}"
+        )
     if any(p.linearised.get(CONVERTER) == PACKED for p in known):
-        return ("The model packed in the FMU stands for the converter in the modes; it was compared with its own "
-                "response")  # fmt: skip
-    return "White box: the FMU's own states were perturbed" if known else "Modes of the converter are not known"
+        return (
+            "The model packed in the FMU stands for the converter in the modes; it was compared with its own "
+            "response"
+        )
+    return (
+        "White box: the FMU's own states were perturbed"
+        if known
+        else "Modes of the converter are not known"
+    )
 
 
 _MODE = ("λ [rad/s]", "f [Hz]", "Damping [%]")
@@ -89,7 +101,11 @@ def before(value: complex | None) -> str:
 
 
 def verdict(accepted: bool) -> str:
-    return '<span class="good">accepted</span>' if accepted else '<span class="bad">not accepted</span>'
+    return (
+        '<span class="good">accepted</span>'
+        if accepted
+        else '<span class="bad">not accepted</span>'
+    )
 
 
 def eigenvalues(c: Certificate, figures: Figures) -> str:
@@ -98,7 +114,9 @@ def eigenvalues(c: Certificate, figures: Figures) -> str:
         for (name, X_L), point in c.results.items():
             if name != scenario or point.modes is None:
                 continue
-            for value, words in zip(point.modes.eigenvalues.tolist(), point.components, strict=True):
+            for value, words in zip(
+                point.modes.eigenvalues.tolist(), point.components, strict=True
+            ):
                 hz = value.imag / (2 * np.pi)
                 if is_judged(hz) and value.real > -4:
                     text = f"{scenario} the converter, X_L = {X_L:g} pu\n"
@@ -108,14 +126,26 @@ def eigenvalues(c: Certificate, figures: Figures) -> str:
     picture, link = figures.add(
         names + complex_plane("Eigenvalue map", marks, highest_hz=1.5),
         "Modes from 0.1 to 1.5 Hz at all line reactances, with rays of equal damping. Left of the 5 % ray all is well.",
-    )  # fmt: skip
+    )
     parts = [f"<p>{link} shows the modes; the tables below hold them all.</p>{picture}"]
     for v in c.verdicts:
         rows = [
-            [*_mode(m.eigenvalue), f"{before(m.before)} {escape(m.doubt)}", f"{m.similarity:.2f}",
-             escape(m.components), verdict(m.accepted)] for m in v.modes
-        ]  # fmt: skip
-        columns = [*_MODE, "Same mode without the converter", "Likeness", "Who takes part", "Verdict"]
+            [
+                *_mode(m.eigenvalue),
+                f"{before(m.before)} {escape(m.doubt)}",
+                f"{m.similarity:.2f}",
+                escape(m.components),
+                verdict(m.accepted),
+            ]
+            for m in v.modes
+        ]
+        columns = [
+            *_MODE,
+            "Same mode without the converter",
+            "Likeness",
+            "Who takes part",
+            "Verdict",
+        ]
         summary = f"X_L = {v.X_L:g} pu: {len(rows)} modes from 0.1 to 1.5 Hz"
         modes = table(f"Modes at X_L = {v.X_L:g} pu", columns, rows)
         content = f"{modes}{_modes_beside(v)}{_base_modes(c, v)}"
@@ -142,7 +172,9 @@ def _base_modes(c: Certificate, v: PointVerdict) -> str:
     return table(caption, [*_MODE, "Who takes part"], rows) + note
 
 
-def _response(c: Certificate, v: PointVerdict, test: DampingTest, figures: Figures) -> Iterator[str]:
+def _response(
+    c: Certificate, v: PointVerdict, test: DampingTest, figures: Figures
+) -> Iterator[str]:
     yield f"<h3>X_L = {v.X_L:g} pu</h3>"
     if v.time is None:
         yield f'<p class="bad">{escape("; ".join(v.faults) or v.unknown)}</p>'
@@ -160,7 +192,9 @@ def _response(c: Certificate, v: PointVerdict, test: DampingTest, figures: Figur
     yield _modal_table(v.time)
 
 
-def response_curves(c: Certificate, v: PointVerdict, event_time: float) -> tuple[str, list[ChartCurve]]:
+def response_curves(
+    c: Certificate, v: PointVerdict, event_time: float
+) -> tuple[str, list[ChartCurve]]:
     """The response with the norm's construction, and what it is of."""
     time = v.time
     assert time is not None
@@ -170,30 +204,58 @@ def response_curves(c: Certificate, v: PointVerdict, event_time: float) -> tuple
         point = c.results[scenario, v.X_L]
         if time.signal in point.signals:
             shown = point.times <= event_time + _SHOWN
-            curves.append(ChartCurve(f"{scenario} the converter", colour(k), point.times[shown],
-                                point.signals[time.signal][shown], dashed=scenario == WITHOUT))  # fmt: skip
+            curves.append(
+                ChartCurve(
+                    f"{scenario} the converter",
+                    colour(k),
+                    point.times[shown],
+                    point.signals[time.signal][shown],
+                    dashed=scenario == WITHOUT,
+                )
+            )
     curves += _construction(time, event_time + _SHOWN)
-    return f"{'Frequency at bus 2' if time.signal == FREQUENCY else 'Active power of SG1'} [{unit}]", curves
+    return (
+        f"{'Frequency at bus 2' if time.signal == FREQUENCY else 'Active power of SG1'} [{unit}]",
+        curves,
+    )
 
 
 def _construction(time: TimeVerdict, last: float) -> Iterator[ChartCurve]:
     red = "#a11d1d"
     for s in time.swings.swings:
         if s.after.time <= last and s.number <= 6:
-            ends = np.array([s.before.time, s.after.time]), np.array([s.before.value, s.after.value])
+            ends = (
+                np.array([s.before.time, s.after.time]),
+                np.array([s.before.value, s.after.value]),
+            )
             yield ChartCurve(f"P{s.number}–P{s.number + 1}", red, *ends, dashed=True)
             moment = np.array([s.minimum.time, s.minimum.time + 1e-6])
-            yield ChartCurve(f"ΔP{s.number}M{s.number}", red, moment, np.array([s.minimum.value, s.line]))
+            yield ChartCurve(
+                f"ΔP{s.number}M{s.number}", red, moment, np.array([s.minimum.value, s.line])
+            )
 
 
 def _swing_table(time: TimeVerdict, unit: str) -> str:
     test = time.swings
     rows = []
     for s in test.swings[:8]:
-        row = [text for p in (s.before, s.minimum, s.after) for text in (f"{p.time:.3f}", f"{p.value:.6f}")]
+        row = [
+            text
+            for p in (s.before, s.minimum, s.after)
+            for text in (f"{p.time:.3f}", f"{p.value:.6f}")
+        ]
         rows.append([str(s.number), *row, f"{s.line:.6f}", f"{s.depth:.6f}"])
-    columns = ["k", "Pk at [s]", f"Pk [{unit}]", "Mk at [s]", f"Mk [{unit}]", "Pk+1 at [s]", f"Pk+1 [{unit}]",
-               "Line at Mk", "ΔPkMk"]  # fmt: skip
+    columns = [
+        "k",
+        "Pk at [s]",
+        f"Pk [{unit}]",
+        "Mk at [s]",
+        f"Mk [{unit}]",
+        "Pk+1 at [s]",
+        f"Pk+1 [{unit}]",
+        "Line at Mk",
+        "ΔPkMk",
+    ]
     note = ""
     if test.dropped:
         kind = "maximum" if test.dropped.is_maximum else "minimum"
@@ -215,14 +277,29 @@ def _overview(c: Certificate) -> str:
     for v in c.verdicts:
         worst = v.modes[0] if v.modes else None
         row = [f"{v.X_L:g}"]
-        row += [f"{worst.frequency_hz:.3f}", damping(worst.damping_percent)] if worst else ["–", "–"]
+        row += (
+            [f"{worst.frequency_hz:.3f}", damping(worst.damping_percent)] if worst else ["–", "–"]
+        )
         row += [before(worst.before) if worst else "–", *_time_cells(v.time), _said(c, v)]
         rows.append(row)
-    columns = ["X_L [pu]", "Least damped mode [Hz]", "Damping [%]", "Without the converter",
-               "ΔP1M1", "ΔP5M5", "Ratio", "Least damping in the signal [%]", "Verdict"]  # fmt: skip
+    columns = [
+        "X_L [pu]",
+        "Least damped mode [Hz]",
+        "Damping [%]",
+        "Without the converter",
+        "ΔP1M1",
+        "ΔP5M5",
+        "Ratio",
+        "Least damping in the signal [%]",
+        "Verdict",
+    ]
     reasons = [(v.X_L, "; ".join(v.faults) or v.unknown) for v in c.verdicts]
-    listed = "".join(f"<li>X_L = {X_L:g} pu: {escape(reason)}</li>" for X_L, reason in reasons if reason)
-    return table("All line reactances, with the converter", columns, rows) + (f"<ul>{listed}</ul>" if listed else "")
+    listed = "".join(
+        f"<li>X_L = {X_L:g} pu: {escape(reason)}</li>" for X_L, reason in reasons if reason
+    )
+    return table("All line reactances, with the converter", columns, rows) + (
+        f"<ul>{listed}</ul>" if listed else ""
+    )
 
 
 def _said(c: Certificate, v: PointVerdict) -> str:
@@ -234,21 +311,31 @@ def _time_cells(time: TimeVerdict | None) -> list[str]:
     if time is None:
         return ["–"] * 4
     swings, test = time.swings.swings, time.swings
-    depths = [f"{s.depth:.4g}" for s in (swings[0], swings[4])] if len(swings) >= 5 else [
-        f"{swings[0].depth:.4g}" if swings else "–", "died out" if test.accepted else "–"]  # fmt: skip
+    depths = (
+        [f"{s.depth:.4g}" for s in (swings[0], swings[4])]
+        if len(swings) >= 5
+        else [f"{swings[0].depth:.4g}" if swings else "–", "died out" if test.accepted else "–"]
+    )
     ratio = "–" if test.ratio is None else f"{test.ratio:.3f}"
     least = min((m.damping_percent for m in time.modal.modes), default=None)
-    return [*depths, ratio if test.accepted else f'<span class="bad">{ratio}</span>',
-            "–" if least is None else damping(least)]  # fmt: skip
+    return [
+        *depths,
+        ratio if test.accepted else f'<span class="bad">{ratio}</span>',
+        "–" if least is None else damping(least),
+    ]
 
 
 def _remark(c: Certificate) -> Iterator[str]:
     if lowered := [(m, v.X_L) for v in c.verdicts for m in v.lowered]:
         worst, X_L = min(lowered, key=lambda entry: entry[0].damping_percent)
         places = ", ".join(f"{X:g}" for X in dict.fromkeys(X for _, X in lowered))
-        change = f"from {number(worst.before_percent or 0.0, 2)} to {damping(worst.damping_percent)} %"
-        yield (f"<b>Remark: the converter lowers a damping by more than {LOWERED:g} points at X_L = {places} pu</b>; "
-               f"the lowest of them at {X_L:g} pu and {worst.frequency_hz:.3f} Hz, {change}")  # fmt: skip
+        change = (
+            f"from {number(worst.before_percent or 0.0, 2)} to {damping(worst.damping_percent)} %"
+        )
+        yield (
+            f"<b>Remark: the converter lowers a damping by more than {LOWERED:g} points at X_L = {places} pu</b>; "
+            f"the lowest of them at {X_L:g} pu and {worst.frequency_hz:.3f} Hz, {change}"
+        )
 
 
 def _where(bad: list[PointVerdict]) -> str:
@@ -257,7 +344,9 @@ def _where(bad: list[PointVerdict]) -> str:
 
 
 def _least_and_growth(c: Certificate) -> Iterator[str]:
-    if least := min((m for v in c.verdicts for m in v.modes), key=lambda m: m.damping_percent, default=None):
+    if least := min(
+        (m for v in c.verdicts for m in v.modes), key=lambda m: m.damping_percent, default=None
+    ):
         yield f"Least damping of all judged modes: {damping(least.damping_percent)} % at {least.frequency_hz:.3f} Hz"
     growing = [c.results[WITH, v.X_L] for v in c.verdicts]
     if growing and all(p.modes is not None for p in growing):
@@ -268,21 +357,36 @@ def _least_and_growth(c: Certificate) -> Iterator[str]:
 
 def _lowered(c: Certificate) -> str:
     rows = [
-        [f"{v.X_L:g}", f"{m.frequency_hz:.3f}", number(m.before_percent or 0.0, 2), damping(m.damping_percent),
-         number(m.damping_percent - (m.before_percent or 0.0), 2), escape(m.components)]
-        for v in c.verdicts for m in v.lowered
-    ]  # fmt: skip
+        [
+            f"{v.X_L:g}",
+            f"{m.frequency_hz:.3f}",
+            number(m.before_percent or 0.0, 2),
+            damping(m.damping_percent),
+            number(m.damping_percent - (m.before_percent or 0.0), 2),
+            escape(m.components),
+        ]
+        for v in c.verdicts
+        for m in v.lowered
+    ]
     columns = ["X_L [pu]", "f [Hz]", "from [%]", "to [%]", "by [points]", "Who takes part"]
-    caption = f"Modes whose damping is lower by more than {LOWERED:g} points than without the converter"
+    caption = (
+        f"Modes whose damping is lower by more than {LOWERED:g} points than without the converter"
+    )
     said = "The norm asks for 5 % only; what is here is for the reader to weigh."
     return f"{table(caption, columns, rows)}<p>{said}</p>" if rows else f"<p>{caption}: none.</p>"
 
 
 def _stability(c: Certificate) -> str:
     rows = [
-        [f"{v.X_L:g}", name, escape(p.stability["sentence"]) if p.stability else f"{p.growth:+.3g} 1/s"]
-        for v in c.verdicts for name in (WITHOUT, WITH) if (p := c.results[name, v.X_L]).modes is not None
-    ]  # fmt: skip
+        [
+            f"{v.X_L:g}",
+            name,
+            escape(p.stability["sentence"]) if p.stability else f"{p.growth:+.3g} 1/s",
+        ]
+        for v in c.verdicts
+        for name in (WITHOUT, WITH)
+        if (p := c.results[name, v.X_L]).modes is not None
+    ]
     caption = "The verdict over the whole spectrum, whatever the frequency"
     note = "<p>The free angle of the system has an eigenvalue of 0, which is left out.</p>"
     return table(caption, ["X_L [pu]", "The converter", "Verdict"], rows, left=3) + note

@@ -12,7 +12,8 @@ from orchestrator.errors import InputError
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.fmi.values import as_text
 
-REACTANCES = (0.01, *(round(0.05 * k, 2) for k in range(1, 13)))  # values of X_L in the norm [pu, 100 MVA]
+# values of X_L in the norm [pu, 100 MVA]
+REACTANCES = (0.01, *(round(0.05 * k, 2) for k in range(1, 13)))
 PODS = ("none", "p", "q", "pq")
 STUDY = ("sg1", "sg2", "grid")  # components of the study that are not the converter
 GIVEN = ("S_n", "S_base", "f_n", "P_0", "Q_0", "v_0", "theta_0", "connected")
@@ -37,17 +38,25 @@ class CertificationRequest:
         """Check that the files exist, and that no value is set which the norm itself varies."""
         for file in (self.fmu, *([self.binding] if self.binding else [])):
             if not file.is_file():
-                raise InputError(f"{file}: there is no such file; give the path of an .fmu, and with --binding of a "
-                                 ".toml")  # fmt: skip
+                raise InputError(
+                    f"{file}: there is no such file; give the path of an .fmu, and with --binding of a "
+                    ".toml"
+                )
             if not file.name.isascii() and file.name != file.name.encode(errors="replace").decode():
-                raise InputError(f"{str(file)!a}: its name is not UTF-8, so that no report can state it; rename it")
+                raise InputError(
+                    f"{str(file)!a}: its name is not UTF-8, so that no report can state it; rename it"
+                )
         if "grid.X_L" in self.study_values:
-            raise InputError("--set grid.X_L: the test varies it; choose its values with --reactances")
+            raise InputError(
+                "--set grid.X_L: the test varies it; choose its values with --reactances"
+            )
 
     @property
     def departures(self) -> tuple[str, ...]:
         changed = {f"converter.{name}": self.values[name] for name in GIVEN if name in self.values}
-        return tuple(f"{name} = {as_text(value)}" for name, value in {**self.study_values, **changed}.items())
+        return tuple(
+            f"{name} = {as_text(value)}" for name, value in {**self.study_values, **changed}.items()
+        )
 
 
 def rated_frequency(request: CertificationRequest, wanted: float) -> float:
@@ -64,7 +73,9 @@ def read_reactances(text: str) -> tuple[float, ...]:
     """Different reactances of a line [pu], separated by commas."""
     values = tuple(as_number(part) for part in text.split(","))
     if not all(1e-3 <= value <= 10 for value in values) or len(set(values)) < len(values):
-        raise ValueError(f"{text!r} are no reactances; write different numbers from 0.001 to 10, such as 0.1,0.3")
+        raise ValueError(
+            f"{text!r} are no reactances; write different numbers from 0.001 to 10, such as 0.1,0.3"
+        )
     return values
 
 

@@ -33,12 +33,16 @@ def certify(
         return {name: case.prepare([name], first)[0] for name in (WITHOUT, WITH)}
 
     if (own := rated_frequency(request, NTS.f_n)) != NTS.f_n:
-        others = ", ".join(f"--code {key}" for key, code in CODES.items() if code.f_n == own) or "none"
+        others = (
+            ", ".join(f"--code {key}" for key, code in CODES.items() if code.f_n == own) or "none"
+        )
         raise InputError(
             f"{request.fmu}: it is rated at {own:g} Hz, and NTS 631 is a code of {NTS.f_n:g} Hz; of {own:g} Hz are "
             f"{others}; f_n of the FMU and rating.f_n of a binding say what it is"
         )
-    with refusing(request, folder, "in the study's case that `gfor certify` makes from the request") as trial:
+    with refusing(
+        request, folder, "in the study's case that `gfor certify` makes from the request"
+    ) as trial:
         laid(trial)
     prepared = laid(folder)
     tasks = tasks_of(prepared, request, controllers)
@@ -46,24 +50,51 @@ def certify(
     found = work.all(compute_point, tasks)
     points = {(task.scenario, task.X_L): point for task, point in zip(tasks, found, strict=True)}
     event, having = prepared[WITH].events[0].time, prepared[WITH]
-    verdicts = [judge(points[WITH, X], points[WITHOUT, X], controllers.pod, event) for X in request.reactances]
+    verdicts = [
+        judge(points[WITH, X], points[WITHOUT, X], controllers.pod, event)
+        for X in request.reactances
+    ]
     verdicts = with_pod(verdicts, points, controllers, event)
     description = having.system.components[CONVERTER].description
     return Certificate(
-        request, description, NTS, NTS.f_n, verdicts, points, having.case.path, values=having.values,
-        damping=DampingTest(controllers, event), stored=work.stored,
-    )  # fmt: skip
+        request,
+        description,
+        NTS,
+        NTS.f_n,
+        verdicts,
+        points,
+        having.case.path,
+        values=having.values,
+        damping=DampingTest(controllers, event),
+        stored=work.stored,
+    )
 
 
 def tasks_of(
-    prepared: Mapping[str, PreparedScenario], request: CertificationRequest, controllers: DampingControllers
+    prepared: Mapping[str, PreparedScenario],
+    request: CertificationRequest,
+    controllers: DampingControllers,
 ) -> list[CertificatePointTask]:
-    own = {f"{CONVERTER}.{name}": value for name, value in {**request.values, **controllers.settings}.items()}
-    settings: dict[str, dict[str, Value]] = {WITHOUT: dict(request.study_values), WITH: {**request.study_values, **own}}
+    own = {
+        f"{CONVERTER}.{name}": value
+        for name, value in {**request.values, **controllers.settings}.items()
+    }
+    settings: dict[str, dict[str, Value]] = {
+        WITHOUT: dict(request.study_values),
+        WITH: {**request.study_values, **own},
+    }
     # The case file names the binding, if there is one. The binding's effect is part of the scenario's content.
     text = BASE.read_text(encoding="utf-8")
-    study = {k: StudyCase.of(prepared[k], text=text, overrides=sorted(v.items())) for k, v in settings.items()}
+    study = {
+        k: StudyCase.of(prepared[k], text=text, overrides=sorted(v.items()))
+        for k, v in settings.items()
+    }
     off = off_values(controllers.pod) if controllers.can_be_off else ()
-    return [task for X_L in request.reactances for task in (
-        CertificatePointTask(study[WITHOUT], X_L), CertificatePointTask(study[WITH], X_L, request.black_box, off)
-    )]  # fmt: skip
+    return [
+        task
+        for X_L in request.reactances
+        for task in (
+            CertificatePointTask(study[WITHOUT], X_L),
+            CertificatePointTask(study[WITH], X_L, request.black_box, off),
+        )
+    ]

@@ -13,14 +13,17 @@ from orchestrator.arrays import Numbers
 LARGEST_RATIO = 0.25  # ΔP5M5 over ΔP1M1 must be less than this
 JUDGED_SWING = 5
 
-RESOLUTION = 1e-3  # a turn of the signal counts if it moves back by more than this part of its range after the event
+# a turn of the signal counts if it moves back by more than this part of its range after the event
+RESOLUTION = 1e-3
 
 SLOWEST_PERIOD = 10.0
 """Longest period of a judged mode [s]. If the signal does not turn for this time, no judged mode is left above the
 resolution."""
 
 
-FASTEST = 5.0  # parts of a signal above this [Hz] are removed before it is judged: over three times the fastest mode
+# parts of a signal above this [Hz] are removed before it is judged: over three times the fastest
+# mode
+FASTEST = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +78,9 @@ def slow_part(times: Numbers, signal: Numbers) -> Numbers:
     return np.asarray(sosfiltfilt(sections, signal))
 
 
-def extrema(times: Numbers, signal: Numbers, start: float, resolution: float = RESOLUTION) -> list[Extremum]:
+def extrema(
+    times: Numbers, signal: Numbers, start: float, resolution: float = RESOLUTION
+) -> list[Extremum]:
     """Turning points after a time, maxima and minima in turn.
 
     ``resolution``: Smallest movement that counts, as a part of the range of the signal after the event."""
@@ -108,7 +113,9 @@ def swings_of(points: list[Extremum]) -> tuple[RecordedSwing, ...]:
     return tuple(RecordedSwing(k, *part) for k, part in enumerate(parts, start=1))
 
 
-def swing_test(times: Numbers, signal: Numbers, start: float, *, drop_first: bool = True) -> SwingTest:
+def swing_test(
+    times: Numbers, signal: Numbers, start: float, *, drop_first: bool = True
+) -> SwingTest:
     """Apply the criterion after an event [s], without the extremum to which the oscillation starts or with it."""
     if not np.isfinite(signal).all():
         return SwingTest(None, (), None, False, "the signal is not finite")
@@ -119,10 +126,14 @@ def swing_test(times: Numbers, signal: Numbers, start: float, *, drop_first: boo
         ratio = swings[JUDGED_SWING - 1].depth / swings[0].depth
         accepted = abs(ratio) < LARGEST_RATIO
         sign = "<" if accepted else "≥"
-        return SwingTest(dropped, swings, ratio, accepted, f"ΔP5M5/ΔP1M1 = {ratio:.3f} {sign} {LARGEST_RATIO}")
+        return SwingTest(
+            dropped, swings, ratio, accepted, f"ΔP5M5/ΔP1M1 = {ratio:.3f} {sign} {LARGEST_RATIO}"
+        )
     quiet = points[-1].time if points else start
     if times[-1] - quiet <= SLOWEST_PERIOD:
-        return SwingTest(dropped, swings, None, False, "the record ends before the fifth swing; make it longer")
+        return SwingTest(
+            dropped, swings, None, False, "the record ends before the fifth swing; make it longer"
+        )
     count = {0: "no swing", 1: "one swing"}.get(len(swings), f"{len(swings)} swings")
     reason = f"died out after {count}: from {quiet:.1f} s on no turn above {RESOLUTION:.1%} of the signal's range"
     return SwingTest(dropped, swings, 0.0, True, reason)

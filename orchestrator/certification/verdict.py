@@ -27,7 +27,9 @@ def incomplete_because(missing: Sequence[float], departures: Sequence[str]) -> s
     if missing:
         done = len(REACTANCES) - len(missing)
         places = ", ".join(f"{X:g}" for X in missing)
-        reasons.append(f"{done} of {len(REACTANCES)} line reactances of the norm were judged (missing: {places} pu)")
+        reasons.append(
+            f"{done} of {len(REACTANCES)} line reactances of the norm were judged (missing: {places} pu)"
+        )
     if departures:
         reasons.append(f"the study is not the norm's, it was changed by {', '.join(departures)}")
     return "; ".join(reasons)

@@ -10,8 +10,23 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.certification.case_file import BINDING, FMU
-from orchestrator.certification.compared import THIS, Content, Verification, faults_of, issued_by, of_one_program
-from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, figures_of, read_record, seal_of
+from orchestrator.certification.compared import (
+    THIS,
+    Content,
+    Verification,
+    faults_of,
+    issued_by,
+    of_one_program,
+)
+from orchestrator.certification.files import (
+    HTML,
+    JSON,
+    RESPONSES,
+    figures_hash,
+    figures_of,
+    read_record,
+    seal_of,
+)
 from orchestrator.certification.form import case_files, check_form
 from orchestrator.certification.kinds import Parts, parts_of, rebuilt
 from orchestrator.certification.verdict import INCOMPLETE, PASSES
@@ -28,10 +43,14 @@ def read_certificate(path: Path) -> tuple[Path, dict[str, Any]]:
     try:
         content = read_record(file)
     except OSError as error:
-        raise InputError(f"{file}: the certificate cannot be read: {error.strerror}; give the folder that `gfor "
-                         "certify` wrote") from error  # fmt: skip
+        raise InputError(
+            f"{file}: the certificate cannot be read: {error.strerror}; give the folder that `gfor "
+            "certify` wrote"
+        ) from error
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{file}: it is not JSON: {error}; give the certificate.json of `gfor certify`") from error
+        raise InputError(
+            f"{file}: it is not JSON: {error}; give the certificate.json of `gfor certify`"
+        ) from error
     check_form(file, content)
     return file.parent, content
 
@@ -39,17 +58,26 @@ def read_certificate(path: Path) -> tuple[Path, dict[str, Any]]:
 def verify_files(folder: Path, content: dict[str, Any]) -> Verification:
     found = Verification()
     if content.get("seal") != seal_of(content):
-        found.faults.append(f"{JSON}: its figures or words are not those that were written: its own hash differs")
+        found.faults.append(
+            f"{JSON}: its figures or words are not those that were written: its own hash differs"
+        )
     else:
         found.agreed.append(f"{JSON}: its own hash")
-    hashes, names = content["files"], [FMU, RESPONSES, HTML, *([BINDING] if content["binding"] else [])]
+    hashes, names = (
+        content["files"],
+        [FMU, RESPONSES, HTML, *([BINDING] if content["binding"] else [])],
+    )
     names += case_files(content)
     for name in dict.fromkeys([*names, *hashes]):
         _compare_file(folder, name, hashes.get(name), found)
     _compare_page(folder / HTML, content, found)
     faults = _judged_again(folder, content, found.agreed)
     found.faults += faults
-    found.agreed += [] if faults else ["every row and the verdict, judged again from the figures and the responses"]
+    found.agreed += (
+        []
+        if faults
+        else ["every row and the verdict, judged again from the figures and the responses"]
+    )
     return found
 
 
@@ -60,7 +88,9 @@ def _compare_page(page: Path, content: dict[str, Any], found: Verification) -> N
     if f">{escape(content['sentence'])}</b>" not in text:
         found.faults.append(f"{HTML}: it does not hold the verdict's sentence of {JSON}")
     if figures_hash(content) not in text:
-        found.faults.append(f"{HTML}: it was made of other figures than those of {JSON}: their hash is not on the page")
+        found.faults.append(
+            f"{HTML}: it was made of other figures than those of {JSON}: their hash is not on the page"
+        )
     else:
         found.agreed.append(f"{HTML}: the hash of the figures that it shows")
 
@@ -70,18 +100,35 @@ def _judged_again(folder: Path, content: dict[str, Any], said: list[str]) -> lis
         with xr.open_dataset(folder / RESPONSES, engine="scipy") as data:
             again = json.loads(json.dumps(figures_of(rebuilt(folder, content, data))))
             if not of_one_program(content, again):
-                said.append("figures and verdicts alone: another commit issued it, so title, source, readings and the "
-                            "rows' titles are not compared")  # fmt: skip
-            return [*faults_of(content, again), *parts_of(content).again.faults(folder, content, data)]
-    except (InputError, OSError, KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
+                said.append(
+                    "figures and verdicts alone: another commit issued it, so title, source, readings and the "
+                    "rows' titles are not compared"
+                )
+            return [
+                *faults_of(content, again),
+                *parts_of(content).again.faults(folder, content, data),
+            ]
+    except (
+        InputError,
+        OSError,
+        KeyError,
+        ValueError,
+        TypeError,
+        IndexError,
+        AttributeError,
+    ) as error:
         kind = "" if isinstance(error, InputError) else f"{type(error).__name__}: "
-        return [f"the certificate cannot be judged again from {FMU}, its case files and {RESPONSES}: {kind}{error}"]
+        return [
+            f"the certificate cannot be judged again from {FMU}, its case files and {RESPONSES}: {kind}{error}"
+        ]
 
 
 def _compare_file(folder: Path, name: str, wanted: str | None, found: Verification) -> None:
     path = folder / name
     if not path.is_file():
-        found.faults.append(f"{name}: there is no such file beside {JSON}; it was removed or renamed")
+        found.faults.append(
+            f"{name}: there is no such file beside {JSON}; it was removed or renamed"
+        )
     elif wanted is None:
         found.faults.append(f"{name}: {JSON} has no hash of it")
     elif file_hash(path) != wanted:
@@ -108,24 +155,39 @@ class Verified(Verification):
 
 
 def verified(
-    place: Path, wanted: Sequence[Any] | None, executor: Callable[[list[str]], Executor], report: CountReport = nobody,
-    *, every: bool = False,
-) -> Verified:  # fmt: skip
+    place: Path,
+    wanted: Sequence[Any] | None,
+    executor: Callable[[list[str]], Executor],
+    report: CountReport = nobody,
+    *,
+    every: bool = False,
+) -> Verified:
     """Verify the files of a certificate, and, if they hold, parts computed anew: by default those that count most.
 
     ``wanted``: no part where it is empty and ``every`` is not asked for; ``executor``: made of a worker's imports."""
     folder, content = read_certificate(place)
     parts = parts_of(content)
-    chosen = [] if wanted == () and not every else parts.chosen(folder, content, wanted or (), every=every)
+    chosen = (
+        []
+        if wanted == () and not every
+        else parts.chosen(folder, content, wanted or (), every=every)
+    )
     files = verify_files(folder, content)
     found = Verified(
-        faults=files.faults, agreed=files.agreed, content=content, parts=parts, chosen=chosen,
-        computed=chosen if files.holds else [], later=parts.later(content),
-    )  # fmt: skip
+        faults=files.faults,
+        agreed=files.agreed,
+        content=content,
+        parts=parts,
+        chosen=chosen,
+        computed=chosen if files.holds else [],
+        later=parts.later(content),
+    )
     if found.later:
-        found.agreed.append(f"issued by gfor-cosim {issued_by(content)}, whose table had not "
-                            f"{', '.join(found.later)}: this version, {THIS}, judges {len(found.later)} more; "
-                            "certify anew to have that judged")  # fmt: skip
+        found.agreed.append(
+            f"issued by gfor-cosim {issued_by(content)}, whose table had not "
+            f"{', '.join(found.later)}: this version, {THIS}, judges {len(found.later)} more; "
+            "certify anew to have that judged"
+        )
     if found.computed:
         with closing(executor([parts.task.__module__])) as workers:
             again = parts.verify(folder, content, chosen, workers, report)

@@ -39,17 +39,22 @@ GROUPS = {
 
 OLD = {
     **{name.partition(" ")[2]: name for name in COMMANDS if name.startswith(("fmu ", "signal "))},
-    **{f"export-{kind}": f"export {kind}" for kind in ("ssp", "comtrade", "dll")}, "linearize": "export linear",
-    "which-master": "master which", "federate": "master federate", "black-box": "modes --black-box",
-}  # fmt: skip
+    **{f"export-{kind}": f"export {kind}" for kind in ("ssp", "comtrade", "dll")},
+    "linearize": "export linear",
+    "which-master": "master which",
+    "federate": "master federate",
+    "black-box": "modes --black-box",
+}
 """Spellings before 0.3, which work until 1.0, with today's."""
 
-_MODULES = {new: old for old, new in OLD.items()}  # a command in a group has the module of its old name
+# a command in a group has the module of its old name
+_MODULES = {new: old for old, new in OLD.items()}
 
 _READERS = ("signal compare", "signal identify", "signal source", "verify")
 """Commands that read recordings, with xarray, and hand no array of theirs to dask or pint."""
 
-QUESTIONS = Path(__file__).with_name("questions.txt").read_text(encoding="utf-8")  # the page that ``gfor`` alone prints
+# the page that ``gfor`` alone prints
+QUESTIONS = Path(__file__).with_name("questions.txt").read_text(encoding="utf-8")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -73,7 +78,9 @@ def _run(words: Sequence[str]) -> int:
             raise
         calls.over = True
         print(ending(error), file=sys.stderr)
-        exec("")  # clears CPython's note of an interrupt inside exec(), as of dataclasses; it would end us by SIGINT
+        # clears CPython's note of an interrupt inside exec(), as of dataclasses; it would end us by
+        # SIGINT
+        exec("")
         code = INTERRUPTED
     return code
 
@@ -107,7 +114,10 @@ def _spelt_today(words: Sequence[str]) -> list[str]:
     today = OLD.get(words[place]) if words else None
     if today is None:
         return list(words)
-    print(f"note: gfor {words[place]} is now gfor {today}; the old spelling works until 1.0", file=sys.stderr)
+    print(
+        f"note: gfor {words[place]} is now gfor {today}; the old spelling works until 1.0",
+        file=sys.stderr,
+    )
     return [*words[:place], *today.split(), *words[place + 1 :]]
 
 
@@ -122,7 +132,11 @@ def _origin(words: Sequence[str], files: Mapping[str, Path]) -> dict[str, Any]:
     from orchestrator.results.manifest import inputs_behind  # noqa: PLC0415 - likewise
 
     hashes = {name: sha256_of(path) for name, path in files.items()}
-    for path in (word for before, word in pairwise(["", *words]) if before.removeprefix("--") not in origin.WRITTEN):
+    for path in (
+        word
+        for before, word in pairwise(["", *words])
+        if before.removeprefix("--") not in origin.WRITTEN
+    ):
         hashes |= {f"{path}/{name}": of for name, of in inputs_behind(Path(path)).items()}
     command = shlex.join(["gfor", *words])
     return {"command": command, "directory": str(Path.cwd()), "code": code_hash(), "inputs": hashes}
@@ -159,7 +173,9 @@ def _escaped(error: UnicodeError) -> tuple[str, int]:
     if not isinstance(error, UnicodeEncodeError):
         raise error
     units = error.object[error.start : error.end].encode("utf-16-be", "surrogatepass")
-    return "".join(f"\\u{units[k]:02x}{units[k + 1]:02x}" for k in range(0, len(units), 2)), error.end
+    return "".join(
+        f"\\u{units[k]:02x}{units[k + 1]:02x}" for k in range(0, len(units), 2)
+    ), error.end
 
 
 def _print_error(text: str) -> None:
@@ -190,7 +206,13 @@ class _Once(argparse._StoreAction):
 
     given = False
 
-    def __call__(self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option: str | None = None) -> None:
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: Any,
+        values: Any,
+        option: str | None = None,
+    ) -> None:
         if option and self.given:
             parser.error(f"argument {option}: it is given twice, and takes one value; give it once")
         self.given = True
@@ -230,7 +252,10 @@ def module_of(command: str) -> Any:
 
 def _parser(chosen: str | None) -> argparse.ArgumentParser:
     """The parser, with the arguments of the one command that was chosen: the others' imports would take seconds."""
-    parser = _Parser(prog="gfor", description="Co-simulation of grid-forming converters: run, linearise, build FMUs.")
+    parser = _Parser(
+        prog="gfor",
+        description="Co-simulation of grid-forming converters: run, linearise, build FMUs.",
+    )
     parser.set_defaults(command=lambda _: _print(QUESTIONS))
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     lists = {"": parser.add_subparsers(metavar="COMMAND", parser_class=_Command)}

@@ -35,13 +35,19 @@ def run(options: argparse.Namespace) -> int:
     console = make_console(stderr=options.json)
     if options.fmu.suffix.lower() in ENDINGS:
         if not options.form or options.points or options.scan:
-            raise InputError(f"{options.fmu}: a scan is no FMU that could be measured; give --form alone")
+            raise InputError(
+                f"{options.fmu}: a scan is no FMU that could be measured; give --form alone"
+            )
         rated = options.frequency or 50.0
         files = _save_form(read_scan(options.fmu, rated), options, rated, folder)
     elif options.scan and not options.voltage:
-        raise InputError("--scan: a scan is in siemens; give the rated voltage as well, as in --voltage '230 kV'")
+        raise InputError(
+            "--scan: a scan is in siemens; give the rated voltage as well, as in --voltage '230 kV'"
+        )
     elif options.points:
-        by_point(options, folder, lambda values, place: _row(_measured(options, values, place)[0]), {})
+        by_point(
+            options, folder, lambda values, place: _row(_measured(options, values, place)[0]), {}
+        )
         return 0
     else:
         found, files = _measured(options, {}, folder)
@@ -50,33 +56,54 @@ def run(options: argparse.Namespace) -> int:
             return 0
         active = ", ".join(f"{low:g}–{high:g} Hz" for low, high in found.passivity.ranges())
         console.print(_summary(found.as_json()))
-        console.print(f"Not passive: {active or 'nowhere in the measured range'}; least relative index "
-                      f"{found.passivity.relative.min():.3f}", highlight=False)  # fmt: skip
-    console.print(escape(f"Results in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True, highlight=False)
+        console.print(
+            f"Not passive: {active or 'nowhere in the measured range'}; least relative index "
+            f"{found.passivity.relative.min():.3f}",
+            highlight=False,
+        )
+    console.print(
+        escape(f"Results in {folder}: {', '.join(f.name for f in files)}"),
+        soft_wrap=True,
+        highlight=False,
+    )
     return 0
 
 
-def _measured(options: argparse.Namespace, values: dict[str, Any], folder: Path) -> tuple[Admittance, list[Path]]:
+def _measured(
+    options: argparse.Namespace, values: dict[str, Any], folder: Path
+) -> tuple[Admittance, list[Path]]:
     """Measure, and write all that is asked for; a scan beside its point's folder bears the point's name."""
     how = excitation_of(options)
     with said_stages() as report:
         found = admittance(
-            options.fmu, binding=options.binding, values=dict(options.set) | values, step=options.step,
-            method=how.method, amplitude=how.amplitude, frequencies=(how.lowest_hz, how.highest_hz),
-            use_state=not options.no_state, report=report,
-        )  # fmt: skip
+            options.fmu,
+            binding=options.binding,
+            values=dict(options.set) | values,
+            step=options.step,
+            method=how.method,
+            amplitude=how.amplitude,
+            frequencies=(how.lowest_hz, how.highest_hz),
+            use_state=not options.no_state,
+            report=report,
+        )
     files = found.save(folder)
     if options.scan or options.form:
         scan = as_scan(options.fmu.stem, found.response, found.rest, options.voltage or 1.0)
         scan = scan.in_siemens(options.voltage) if options.voltage else scan
         files += _save_form(scan, options, options.frequency or found.rated_hz, folder)
     if options.scan:
-        to = options.scan.with_stem(f"{options.scan.stem}_{folder.name}") if options.points else options.scan
+        to = (
+            options.scan.with_stem(f"{options.scan.stem}_{folder.name}")
+            if options.points
+            else options.scan
+        )
         write_imtb(scan, to) if to.suffix.lower() == ".csv" else write_ztool(scan, to)
     return found, files
 
 
-def _save_form(scan: Scan, options: argparse.Namespace, rated_hz: float, folder: Path) -> list[Path]:
+def _save_form(
+    scan: Scan, options: argparse.Namespace, rated_hz: float, folder: Path
+) -> list[Path]:
     path = folder / f"{options.form}.csv"
     if options.form:
         save_table(rows_in(scan, options.form, rated_hz), path)
@@ -86,14 +113,21 @@ def _save_form(scan: Scan, options: argparse.Namespace, rated_hz: float, folder:
 def _row(found: Admittance) -> dict[str, Any]:
     worst = min((p for p in found.model.poles.tolist() if p.imag >= 0 and p), key=damping_percent)
     bands = "; ".join(f"{low:g}–{high:g} Hz" for low, high in found.passivity.ranges())
-    return {"least_damped_pole_hz": worst.imag / (2 * math.pi), "damping_percent": damping_percent(worst),
-            "not_passive": bands, "least_index": float(found.passivity.relative.min()), "remark": ""}  # fmt: skip
+    return {
+        "least_damped_pole_hz": worst.imag / (2 * math.pi),
+        "damping_percent": damping_percent(worst),
+        "not_passive": bands,
+        "least_index": float(found.passivity.relative.min()),
+        "remark": "",
+    }
 
 
 def _summary(content: dict[str, Any]) -> Group:
-    heading = (f"Admittance by {content['method']}: {content['lines']} lines from {content['range_hz'][0]:g} to "
-             f"{content['range_hz'][1]:g} Hz, largest bound {content['largest_relative_bound']:.1e}; model of order "
-             f"{content['model']['order']}, error {content['model']['error']:.1e}")  # fmt: skip
+    heading = (
+        f"Admittance by {content['method']}: {content['lines']} lines from {content['range_hz'][0]:g} to "
+        f"{content['range_hz'][1]:g} Hz, largest bound {content['largest_relative_bound']:.1e}; model of order "
+        f"{content['model']['order']}, error {content['model']['error']:.1e}"
+    )
     rows = []
     for pole in content["model"]["poles"]:
         eigenvalue = complex(pole["real"], pole["imag"])

@@ -8,7 +8,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any, cast
 
-from orchestrator.asked import as_number, asked_of, read_percent, read_positive, read_range, read_whole
+from orchestrator.asked import (
+    as_number,
+    asked_of,
+    read_percent,
+    read_positive,
+    read_range,
+    read_whole,
+)
 from orchestrator.coupling.schedule import check_tolerance
 from orchestrator.errors import InputError
 from orchestrator.points.executor import Executor
@@ -22,14 +29,24 @@ def switch(parser: argparse._ActionsContainer, name: str, text: str) -> None:
 
 
 def option(
-    parser: argparse._ActionsContainer, name: str, metavar: str, text: str, *, read: Callable[[str], Any] = str,
+    parser: argparse._ActionsContainer,
+    name: str,
+    metavar: str,
+    text: str,
+    *,
+    read: Callable[[str], Any] = str,
     default: Any = None,
-) -> None:  # fmt: skip
+) -> None:
     parser.add_argument(name, metavar=metavar, help=text, type=read, default=default)
 
 
 def repeatable(
-    parser: argparse._ActionsContainer, name: str, metavar: str, text: str, *, read: Callable[[str], Any] = str
+    parser: argparse._ActionsContainer,
+    name: str,
+    metavar: str,
+    text: str,
+    *,
+    read: Callable[[str], Any] = str,
 ) -> None:
     parser.add_argument(name, metavar=metavar, help=text, type=read, action="append", default=[])
 
@@ -42,7 +59,9 @@ def add_options(parser: argparse._ActionsContainer, part: str, **given: Any) -> 
         if name == "epilog":
             cast("argparse.ArgumentParser", parser).epilog = str(table).format(**given)
             continue
-        how = {key: value for key, value in table.items() if key not in ("read", "several", "filled")}
+        how = {
+            key: value for key, value in table.items() if key not in ("read", "several", "filled")
+        }
         if table.get("filled"):
             how["help"] = how["help"].format(**given)
         for key in ("choices", "default"):
@@ -53,7 +72,13 @@ def add_options(parser: argparse._ActionsContainer, part: str, **given: Any) -> 
             how["type"] = quantity(unit) if unit else given.get(kind) or READERS[kind]
         if table.get("several"):
             how |= {"action": "append", "default": []}
-        plain = how.keys() & {"metavar", "type", "choices", "nargs", "action"} or not name.startswith("-")
+        plain = how.keys() & {
+            "metavar",
+            "type",
+            "choices",
+            "nargs",
+            "action",
+        } or not name.startswith("-")
         parser.add_argument(name, **how if plain else how | {"action": "store_true"})
 
 
@@ -75,12 +100,15 @@ def add_request_arguments(parser: argparse._ActionsContainer, request: type) -> 
     for name, one in asked_of(request).items():
         if one.option is None or one.option in parser._option_string_actions:
             continue
-        taken = any(action.dest == name for action in parser._actions)  # as ``--parameters`` beside ``--parameter``
+        # as ``--parameters`` beside ``--parameter``
+        taken = any(action.dest == name for action in parser._actions)
         how: dict[str, Any] = {"action": "append"} if one.kind.several else {}
         how["dest"] = f"{_ASKED}{name}" if taken else name
         options = [(one.option, one.metavar, one.help, one.kind.read), *one.kind.besides]
         for spelt, metavar, text, read in options:
-            of = how | ({"action": "store_true"} if read is None else {"metavar": metavar, "type": read})
+            of = how | (
+                {"action": "store_true"} if read is None else {"metavar": metavar, "type": read}
+            )
             parser.add_argument(spelt, help=text, **of)
 
 
@@ -100,7 +128,9 @@ def assignment(text: str) -> tuple[str, bool | float | str]:
     """``component.parameter=value`` of a case."""
     key, equals, given = text.partition("=")
     if not equals or ("." not in key and key.strip() != "models") or not given:
-        raise ValueError(f"{text!r} is not of the form component.parameter=value, such as grid.X_L=0.2")
+        raise ValueError(
+            f"{text!r} is not of the form component.parameter=value, such as grid.X_L=0.2"
+        )
     return key.strip(), read_value(given.strip())
 
 
@@ -148,10 +178,18 @@ def tolerance(text: str) -> float:
 
 
 READERS: dict[str, Callable[[str], Any]] = {
-    "path": Path, "seconds": seconds, "seconds_or_none": seconds_or_none, "setting": setting, "assignment": assignment,
-    "positive": read_positive, "percent": read_percent, "range": read_range,
-    "value": read_value, "int": int, "float": float,
-}  # fmt: skip
+    "path": Path,
+    "seconds": seconds,
+    "seconds_or_none": seconds_or_none,
+    "setting": setting,
+    "assignment": assignment,
+    "positive": read_positive,
+    "percent": read_percent,
+    "range": read_range,
+    "value": read_value,
+    "int": int,
+    "float": float,
+}
 """What makes a value of an option's text, by how ``options.toml`` calls it."""
 
 
@@ -161,7 +199,9 @@ def add_executor_arguments(parser: argparse._ActionsContainer) -> None:
 
 def choose_executor(options: argparse.Namespace, imports: Sequence[str]) -> Executor:
     if options.scheduler is not None and options.workers is not None:
-        raise InputError("--workers and --scheduler exclude each other; a Dask cluster brings its own workers")
+        raise InputError(
+            "--workers and --scheduler exclude each other; a Dask cluster brings its own workers"
+        )
     from orchestrator.points import study  # noqa: PLC0415 - imports the reading of cases
 
     return study.choose_executor(options.workers, options.scheduler, imports, options.tls)

@@ -19,11 +19,17 @@ def run(options: argparse.Namespace) -> int:
     description = read_description(options.file)
     out = options.out or Path(f"{options.file.stem}.toml")
     if out.exists() and not options.force:
-        raise InputError(f"{out}: the file is there already, perhaps filled in; choose another with --out, or --force")
+        raise InputError(
+            f"{out}: the file is there already, perhaps filled in; choose another with --out, or --force"
+        )
     text = bind(options.file, out)
-    marked = [line.strip() for line in text.splitlines() if REQUIRED in line and not line.startswith("#")]
+    marked = [
+        line.strip() for line in text.splitlines() if REQUIRED in line and not line.startswith("#")
+    ]
     if is_controller_alone(description):
-        print(f"{options.file}: {NO_BUS}; a binding makes a device of it only where its DLL is a whole converter")
+        print(
+            f"{options.file}: {NO_BUS}; a binding makes a device of it only where its DLL is a whole converter"
+        )
     print(f"{out}: confirm what is marked GUESS")
     for line in marked:
         print(f"  to be filled in: {line}")

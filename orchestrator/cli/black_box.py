@@ -9,7 +9,12 @@ from rich.table import Table
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode
 from orchestrator.analysis.stability import Stability, judge
-from orchestrator.black_box.coupled_modes import BoxedSystem, component_participation, is_black_box, linearize_with_box
+from orchestrator.black_box.coupled_modes import (
+    BoxedSystem,
+    component_participation,
+    is_black_box,
+    linearize_with_box,
+)
 from orchestrator.black_box.files import identification_json, save_identification
 from orchestrator.black_box.fitting import passivity
 from orchestrator.cli.case_arguments import excitation_of, prepare
@@ -26,7 +31,9 @@ def run(options: argparse.Namespace) -> int:
     """Modes of a case's scenarios with one component identified, beside those from its states where it shows them."""
     scenarios = prepare(options)
     console = make_console(stderr=options.json)
-    folder = made_folder(options.out or Path("results") / f"{scenarios[0].case.name}_black_box", "--out")
+    folder = made_folder(
+        options.out or Path("results") / f"{scenarios[0].case.name}_black_box", "--out"
+    )
     output, run_id = [], new_run_id()
     verdicts: dict[str, Stability] = {}
     for prepared in scenarios:
@@ -43,14 +50,18 @@ def run(options: argparse.Namespace) -> int:
             save_identification(system.response, system.identified, passive, staging)
         warn(prepared.name, system.warnings)
         if options.json:
-            output.append(_system_json(prepared.name, system, verdicts[prepared.title], passive, white))
+            output.append(
+                _system_json(prepared.name, system, verdicts[prepared.title], passive, white)
+            )
         else:
             print_stability(console, {prepared.title: verdicts[prepared.title]})
             console.print(_modes_table(prepared.title, system, white), "")
     if options.json:
         print_json(output)
     else:
-        console.print(escape(f"Admittances and models in {folder}"), soft_wrap=True, highlight=False)
+        console.print(
+            escape(f"Admittances and models in {folder}"), soft_wrap=True, highlight=False
+        )
     return exit_code(options, list(verdicts.values()))
 
 
@@ -65,7 +76,11 @@ def _modes_table(title: str, system: BoxedSystem, white: list[Mode]) -> Table:
         other = min(white, key=lambda m: abs(m.eigenvalue - mode.eigenvalue), default=None)
         if other is not None:
             share = component_participation(other, system.component)
-            row += [f"{other.frequency_hz:.4f}", f"{other.damping_percent:.3f}", f"{100 * share:.2f}"]
+            row += [
+                f"{other.frequency_hz:.4f}",
+                f"{other.damping_percent:.3f}",
+                f"{100 * share:.2f}",
+            ]
         table.add_row(*row)
     return table
 
@@ -75,11 +90,20 @@ def _system_json(
 ) -> dict[str, Any]:
     def figures(mode: Mode) -> dict[str, float]:
         participation = component_participation(mode, system.component)
-        return eigenvalue_json(mode.eigenvalue, mode.damping_percent) | {"participation": participation}
+        return eigenvalue_json(mode.eigenvalue, mode.damping_percent) | {
+            "participation": participation
+        }
 
-    return {"scenario": name, "component": system.component, "residual": system.residual,
-            "stable": stability.stable, "largest_growth_rate": stability.largest_growth_rate,
-            "stability": stability.as_json(),
-            "linearised": dict(system.model.sources), "warnings": list(system.warnings),
-            "identification": identification_json(system.response, system.identified, passive),
-            "modes": [figures(m) for m in system.modes()], "white_box_modes": [figures(m) for m in white]}  # fmt: skip
+    return {
+        "scenario": name,
+        "component": system.component,
+        "residual": system.residual,
+        "stable": stability.stable,
+        "largest_growth_rate": stability.largest_growth_rate,
+        "stability": stability.as_json(),
+        "linearised": dict(system.model.sources),
+        "warnings": list(system.warnings),
+        "identification": identification_json(system.response, system.identified, passive),
+        "modes": [figures(m) for m in system.modes()],
+        "white_box_modes": [figures(m) for m in white],
+    }

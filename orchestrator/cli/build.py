@@ -22,7 +22,8 @@ from orchestrator.study.linear_model_files import component_model
 
 Port = Literal["dq", "abc", "phasor"]
 
-ENDINGS: dict[Port, str] = {"dq": "", "abc": "_abc", "phasor": "_phasor"}  # of the names of models with a port
+# of the names of models with a port
+ENDINGS: dict[Port, str] = {"dq": "", "abc": "_abc", "phasor": "_phasor"}
 
 
 @dataclass(frozen=True)
@@ -46,14 +47,20 @@ class Tool:
 
 HOSTS = {
     name: Tool(**table | {"platforms": tuple(table["platforms"])})
-    for name, table in tomllib.loads(Path(__file__).with_name("build_hosts.toml").read_text(encoding="utf-8")).items()
+    for name, table in tomllib.loads(
+        Path(__file__).with_name("build_hosts.toml").read_text(encoding="utf-8")
+    ).items()
 }
 
 
 def with_port(name: str, port: Port, known: tuple[str, ...]) -> str:
     """The model with a port; the one that was asked for where it has another port by its name, or there is none."""
     found = name + ENDINGS[port]
-    return found if found in known and not name.endswith(tuple(filter(None, ENDINGS.values()))) else name
+    return (
+        found
+        if found in known and not name.endswith(tuple(filter(None, ENDINGS.values())))
+        else name
+    )
 
 
 _SUCH_AS = {"machine": "genrou", "exciter": "sexs", "governor": "tgov1", "stabilizer": "pss1a"}
@@ -68,7 +75,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser, "build", hosts=HOSTS, listed=", ".join(HOSTS), platforms=sorted(TARGETS))
     for part in PARTS:
         parser.add_argument(
-            f"--{part}", metavar="PART", help=f"{part} of synchronous_generator, such as {_SUCH_AS[part]}"
+            f"--{part}",
+            metavar="PART",
+            help=f"{part} of synchronous_generator, such as {_SUCH_AS[part]}",
         )
 
 
@@ -79,13 +88,17 @@ def run(options: argparse.Namespace) -> int:
         _take_from_table(options)
     options.fmi = options.fmi or "2.0"
     if options.fmi != "2.0" and not options.native:
-        raise InputError("--fmi 3.0 is for native FMUs: pythonfmu's wrapper speaks FMI 2.0; add --native")
+        raise InputError(
+            "--fmi 3.0 is for native FMUs: pythonfmu's wrapper speaks FMI 2.0; add --native"
+        )
     if options.sources and not options.native:
         raise InputError("--sources is for native FMUs, which are compiled from C; add --native")
     names = options.names or [name for name in model_names() if not needs_arguments(name)]
     parts = {part: name for part in PARTS if (name := getattr(options, part)) is not None}
     if parts and not options.names:
-        raise InputError(f"--{next(iter(parts))} is for one model: name it, such as synchronous_generator")
+        raise InputError(
+            f"--{next(iter(parts))} is for one model: name it, such as synchronous_generator"
+        )
     models = [catalogue_model(name, parts) for name in names]
     extra = extra_members(options, [model.name for model in models])
     kind = "native" if options.native else "Python-backed"
@@ -93,9 +106,15 @@ def run(options: argparse.Namespace) -> int:
         for number, model in enumerate(models, start=1):
             report(f"{model.name}: building, {kind} ({number} of {len(models)})")
             built = build(
-                model, options.dest, native=options.native, fmi=options.fmi, platforms=options.platform, extra=extra,
-                reference=options.reference, sources=options.sources,
-            )  # fmt: skip
+                model,
+                options.dest,
+                native=options.native,
+                fmi=options.fmi,
+                platforms=options.platform,
+                extra=extra,
+                reference=options.reference,
+                sources=options.sources,
+            )
             print(built)
     if not options.native and options.host is None:
         make_errors().print(_NEEDS, soft_wrap=True)
@@ -105,19 +124,30 @@ def run(options: argparse.Namespace) -> int:
 def _take_from_table(options: argparse.Namespace) -> None:
     given = {"--native": options.native, "--fmi": options.fmi, "--platform": options.platform}
     if said := [name for name, value in given.items() if value]:
-        raise InputError(f"--for {options.host} chooses that by itself: leave out {', '.join(said)}, or --for")
+        raise InputError(
+            f"--for {options.host} chooses that by itself: leave out {', '.join(said)}, or --for"
+        )
     host = HOSTS[options.host]
     options.native, options.fmi, options.platform = host.native, host.fmi, list(host.platforms)
     names = options.names or [name for name in model_names() if not needs_arguments(name)]
     options.names = list(dict.fromkeys(with_port(name, host.port, model_names()) for name in names))
     make_errors().print(
         f"for {options.host}: {host.kind}, FMI {host.fmi}, {', '.join(host.platforms)}; port: {host.port}. Why: "
-        f"{host.why} ({host.source})", soft_wrap=True, markup=False,
-    )  # fmt: skip
+        f"{host.why} ({host.source})",
+        soft_wrap=True,
+        markup=False,
+    )
 
 
 def _from_dll(options: argparse.Namespace) -> int:
-    if options.names or options.native or options.platform or options.reference or options.fmi == "3.0" or options.host:
+    if (
+        options.names
+        or options.native
+        or options.platform
+        or options.reference
+        or options.fmi == "3.0"
+        or options.host
+    ):
         raise InputError(
             "--from-dll takes the DLL's own name, its platform and FMI 2.0: leave out names, --native, --platform, "
             "--reference, --fmi and --for"
@@ -125,7 +155,9 @@ def _from_dll(options: argparse.Namespace) -> int:
     pairs = [entry.partition("=") for entry in options.text]
     if wrong := [name for name, sign, _ in pairs if not (name and sign)]:
         raise InputError(f"--text {wrong[0]}: give NAME=VALUE")
-    built = build_from_dll(options.from_dll, options.dest, texts={name: value for name, _, value in pairs})
+    built = build_from_dll(
+        options.from_dll, options.dest, texts={name: value for name, _, value in pairs}
+    )
     for line in built.told:
         print(line)
     print(built.path)
@@ -141,9 +173,13 @@ def extra_members(options: argparse.Namespace, models: list[str]) -> dict[str, b
             raise InputError(f"--scenario and --component say more of {OPTION}; add it")
         return {}
     if len(models) != 1:
-        raise InputError(f"{OPTION} needs one model to build, not {len(models)}; name it before the options")
+        raise InputError(
+            f"{OPTION} needs one model to build, not {len(models)}; name it before the options"
+        )
     case = load_case(options.linear_case)
-    scenario = _chosen("--scenario", "scenario", options.scenario, list(case.scenarios), f"the case {case.name!r}")
+    scenario = _chosen(
+        "--scenario", "scenario", options.scenario, list(case.scenarios), f"the case {case.name!r}"
+    )
     (prepared,) = case.prepare([scenario], {"*.native": True} if options.native else {})
     component = _component(options.component, models[0], prepared)
     return linear_model_members(component_model(prepared, component))
@@ -158,7 +194,13 @@ def _component(wanted: str | None, model: str, prepared: PreparedScenario) -> st
             f"{OPTION}: scenario {prepared.name!r} has no component of the model {model!r}; it has some of: "
             f"{', '.join(made)}"
         )
-    return _chosen("--component", f"component of the model {model!r}", wanted, known, f"scenario {prepared.name!r}")
+    return _chosen(
+        "--component",
+        f"component of the model {model!r}",
+        wanted,
+        known,
+        f"scenario {prepared.name!r}",
+    )
 
 
 def _chosen(option: str, what: str, wanted: str | None, known: list[str], where: str) -> str:
@@ -166,5 +208,7 @@ def _chosen(option: str, what: str, wanted: str | None, known: list[str], where:
         return known[0]
     if wanted not in known:
         asked = f"there is no {what} {wanted!r}" if wanted else f"there are several {what}s"
-        raise InputError(f"{OPTION}: {asked} in {where}; choose with {option} from: {', '.join(known)}")
+        raise InputError(
+            f"{OPTION}: {asked} in {where}; choose with {option} from: {', '.join(known)}"
+        )
     return wanted

@@ -42,12 +42,16 @@ def by_point(
         print_json(rows)
     else:
         shown = [tuple(_cell(value) for value in row.values()) for row in cells]
-        table = make_table("Operating points", *(column.replace("_", " ") for column in columns), rows=shown)
+        table = make_table(
+            "Operating points", *(column.replace("_", " ") for column in columns), rows=shown
+        )
         print_parts(make_console(), [table, escape(f"Results in {folder}")])
     with staged(folder, new_run_id()) as staging:
         save_table(cells, staging / TABLE)
     if lost == len(rows):
-        raise InputError(f"{options.points}: no point could be computed; the remark of each says why")
+        raise InputError(
+            f"{options.points}: no point could be computed; the remark of each says why"
+        )
     return rows
 
 

@@ -20,12 +20,20 @@ from orchestrator.study.request import ScenariosRequest
 
 
 def add_case_arguments(
-    parser: argparse.ArgumentParser, *, optional: bool = False, schedule: bool = False, several: bool = True
+    parser: argparse.ArgumentParser,
+    *,
+    optional: bool = False,
+    schedule: bool = False,
+    several: bool = True,
 ) -> None:
     """The case, which may be left out where ``optional``, ``several`` scenarios or one, what is changed; its schedule
     where asked for."""
-    parser.add_argument("case", metavar="CASE", nargs="?" if optional else None, help="a built-in case (two_area), or "
-                        "the path of a case file or an .ssp")  # fmt: skip
+    parser.add_argument(
+        "case",
+        metavar="CASE",
+        nargs="?" if optional else None,
+        help="a built-in case (two_area), or the path of a case file or an .ssp",
+    )
     text = f"only this scenario{' (repeatable)' if several else ''}"
     repeatable(parser, "--scenario", "NAME", text)
     add_options(parser, "case")
@@ -49,12 +57,20 @@ def chosen(options: argparse.Namespace) -> list[Scenario]:
     events = [getattr(options, name, ()) for name in ("force", "fault")]
     file, stop = with_events(case_of(options), *events), getattr(options, "stop", None)
     file = replace(file, scans=getattr(options, "scans", False))
-    asked: dict[str, Any] = {name: getattr(options, name, None) for name in ("schedule", "tolerance", "sharing")}
+    asked: dict[str, Any] = {
+        name: getattr(options, name, None) for name in ("schedule", "tolerance", "sharing")
+    }
     asked["sharing"] = SharingRule(asked["sharing"]) if asked["sharing"] else None
-    asked |= {"values": values_set(options), "step": options.step, "parameters": parameters(options)}
+    asked |= {
+        "values": values_set(options),
+        "step": options.step,
+        "parameters": parameters(options),
+    }
     request = ScenariosRequest(**asked)
     scenarios = choose(file, options.scenario, request, stop)
-    print_questions([scenario.prepared for scenario in scenarios], as_json=getattr(options, "json", True))
+    print_questions(
+        [scenario.prepared for scenario in scenarios], as_json=getattr(options, "json", True)
+    )
     return scenarios
 
 
@@ -71,12 +87,18 @@ def values_set(options: argparse.Namespace) -> dict[str, Value]:
 
 def asked_of_case(options: argparse.Namespace, request: type, study: str) -> dict[str, Any]:
     """The fields of a request from all options: its own, and those of the case."""
-    of_case = {"values": values_set(options), "step": options.step, "parameters": parameters(options)}
+    of_case = {
+        "values": values_set(options),
+        "step": options.step,
+        "parameters": parameters(options),
+    }
     if hasattr(request, "scenarios"):
         of_case["scenarios"] = tuple(options.scenario)
     elif len(options.scenario) > 1:
         given = " and ".join(options.scenario)
-        raise InputError(f"--scenario: gfor {study} is for one scenario, not for {given}; start it once for each")
+        raise InputError(
+            f"--scenario: gfor {study} is for one scenario, not for {given}; start it once for each"
+        )
     else:
         of_case["scenario"] = next(iter(options.scenario), None)
     return asked_by(options, request) | of_case
@@ -94,16 +116,24 @@ _DEFAULTS = Excitation()
 
 
 def add_excitation_arguments(parser: argparse.ArgumentParser) -> None:
-    add_options(parser, "excitation", methods=METHODS, multisine=_DEFAULTS.method, **{
-        name: getattr(_DEFAULTS, name) for name in ("amplitude", "lowest_hz", "highest_hz")
-    })  # fmt: skip
+    add_options(
+        parser,
+        "excitation",
+        methods=METHODS,
+        multisine=_DEFAULTS.method,
+        **{name: getattr(_DEFAULTS, name) for name in ("amplitude", "lowest_hz", "highest_hz")},
+    )
 
 
 def excitation_given(options: argparse.Namespace) -> list[str]:
     """Options of the excitation that are not left to their defaults."""
-    said = {"--method": options.method != _DEFAULTS.method, "--amplitude": options.amplitude != _DEFAULTS.amplitude,
-            "--from-hz": options.from_hz != _DEFAULTS.lowest_hz, "--to-hz": options.to_hz != _DEFAULTS.highest_hz,
-            "--no-state": options.no_state}  # fmt: skip
+    said = {
+        "--method": options.method != _DEFAULTS.method,
+        "--amplitude": options.amplitude != _DEFAULTS.amplitude,
+        "--from-hz": options.from_hz != _DEFAULTS.lowest_hz,
+        "--to-hz": options.to_hz != _DEFAULTS.highest_hz,
+        "--no-state": options.no_state,
+    }
     return [name for name, is_said in said.items() if is_said]
 
 

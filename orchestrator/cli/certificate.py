@@ -23,7 +23,12 @@ from orchestrator.certification.details import Details, read_details
 from orchestrator.certification.files import JSON, save, spare_another
 from orchestrator.certification.inside import check_target, put_inside
 from orchestrator.certification.judgement import PointVerdict
-from orchestrator.certification.kinds import WITH_VERDICT, CertifyRequest, bench_request, usual_folder
+from orchestrator.certification.kinds import (
+    WITH_VERDICT,
+    CertifyRequest,
+    bench_request,
+    usual_folder,
+)
 from orchestrator.certification.margins import margin_of, narrowest
 from orchestrator.certification.request import STUDY, rated_frequency
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, exit_code
@@ -31,7 +36,13 @@ from orchestrator.cli.arguments import asked_by, choose_executor
 from orchestrator.cli.certify_sensitivities import find_needs
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.study import Progressing
-from orchestrator.cli.terminal import make_console, make_errors, print_json, print_parts, said_stages
+from orchestrator.cli.terminal import (
+    make_console,
+    make_errors,
+    print_json,
+    print_parts,
+    said_stages,
+)
 from orchestrator.errors import InputError
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.report.tables import PlainTable, make_table, short
@@ -43,7 +54,9 @@ _LONGEST = 100  # of a remark in the first table [characters]
 
 
 def show(found: Certificate, files: Sequence[Path], folder: Path, console: Console) -> None:
-    colour = {INCOMPLETE: "yellow"}.get(found.verdict, "green" if found.passed and not found.refused else "red")
+    colour = {INCOMPLETE: "yellow"}.get(
+        found.verdict, "green" if found.passed and not found.refused else "red"
+    )
     said = found.sentence()
     if found.damping is None and found.departures:
         said += f" Not as the code has it: {', '.join(found.departures)}."
@@ -58,17 +71,36 @@ def show(found: Certificate, files: Sequence[Path], folder: Path, console: Conso
 
 
 def _verdicts(found: Certificate) -> PlainTable:
-    table = make_table(f"{found.code.title}: {found.description.model_name}", "Row", "Verdict", "Criteria met",
-                       "Least margin", "Remark", left=99)  # fmt: skip
+    table = make_table(
+        f"{found.code.title}: {found.description.model_name}",
+        "Row",
+        "Verdict",
+        "Criteria met",
+        "Least margin",
+        "Remark",
+        left=99,
+    )
     judged = [v for v in found.verdicts if v.judged]
     bad, unknown = [v for v in judged if not v.accepted], [v for v in found.verdicts if v.unknown]
-    counted = [f"{len(judged)} judged", f"{len(bad)} failed", f"{len(found.verdicts) - len(judged)} not judged"]
+    counted = [
+        f"{len(judged)} judged",
+        f"{len(bad)} failed",
+        f"{len(found.verdicts) - len(judged)} not judged",
+    ]
     colour = {FAILS: "red", INCOMPLETE: "yellow"}.get(found.verdict, "green")
     table.add_row("all", Text(found.verdict, style=f"bold {colour}"), "", "", ", ".join(counted))
     for v in found.verdicts:
         known = [f for f in v.findings if f.accepted is not None]
         least = narrowest(known)
-        word = NOT_JUDGED if v in unknown else NO_VERDICT if not v.judged else "fails" if v in bad else "accepted"
+        word = (
+            NOT_JUDGED
+            if v in unknown
+            else NO_VERDICT
+            if not v.judged
+            else "fails"
+            if v in bad
+            else "accepted"
+        )
         failed = "; ".join(f"{f.criterion}: {f.text}" for f in v.failed)
         remark = v.unknown or failed or (f"nearest: {least.criterion}" if least else "")
         margin = "–" if least is None else margin_of(least)
@@ -81,14 +113,18 @@ def _remarks(found: Certificate) -> list[str]:
     """Remarks on the device, its acceptance tests and parts not tested, each once."""
     said = _misfits(r.findings for r in found.results.values())
     if isinstance(found.description, BoundDescription):
-        said += [f"the binding has {text}" for text in found.description.unlike_delivered().values()]
+        said += [
+            f"the binding has {text}" for text in found.description.unlike_delivered().values()
+        ]
     if left := [part for part in found.missing if part not in found.departures]:
         said.append(f"Not tested: {'; '.join(left)}")
     return list(dict.fromkeys(said))
 
 
 def _misfits(findings: Iterable[Sequence[Mapping[str, Any]]]) -> list[str]:
-    return list(dict.fromkeys(str(f["message"]) for found in findings for f in found if f["kind"] == MISFIT))
+    return list(
+        dict.fromkeys(str(f["message"]) for found in findings for f in found if f["kind"] == MISFIT)
+    )
 
 
 def _criteria(found: Certificate) -> PlainTable:
@@ -101,11 +137,23 @@ def _criteria(found: Certificate) -> PlainTable:
 
 def _show_damping_test(found: Certificate, test: DampingTest, console: Console) -> None:
     print_parts(console, map(escape, _misfits(p.findings for p in found.results.values())))
-    table = make_table(f"Damping test, {test.signal} watched", "X_L [pu]", "least damped [Hz]", "ξ [%]",
-                       "the same without", "ΔP5M5/ΔP1M1", "in the signal: ξ [%]", "", left=0)  # fmt: skip
+    table = make_table(
+        f"Damping test, {test.signal} watched",
+        "X_L [pu]",
+        "least damped [Hz]",
+        "ξ [%]",
+        "the same without",
+        "ΔP5M5/ΔP1M1",
+        "in the signal: ξ [%]",
+        "",
+        left=0,
+    )
     for v in found.verdicts:
-        table.add_row(f"{v.X_L:g}", *_figures(v), "accepted" if v.accepted else
-                      Text("not accepted" if v.judged else NOT_JUDGED, "red"))  # fmt: skip
+        table.add_row(
+            f"{v.X_L:g}",
+            *_figures(v),
+            "accepted" if v.accepted else Text("not accepted" if v.judged else NOT_JUDGED, "red"),
+        )
     console.print(table, "")
     for v in found.verdicts:
         if said := v.of_base_critical():
@@ -116,9 +164,17 @@ def _show_damping_test(found: Certificate, test: DampingTest, console: Console) 
 
 def _figures(v: PointVerdict) -> Iterator[str]:
     worst = v.modes[0] if v.modes else None
-    yield from ("–", "–") if worst is None else (f"{worst.frequency_hz:.3f}", f"{worst.damping_percent:.2f}")
+    yield from (
+        ("–", "–")
+        if worst is None
+        else (f"{worst.frequency_hz:.3f}", f"{worst.damping_percent:.2f}")
+    )
     before = worst.before if worst else None
-    yield "–" if before is None else f"{before.imag / (2 * np.pi):.3f} Hz, {100 * damping_ratio(before):.2f} %"
+    yield (
+        "–"
+        if before is None
+        else f"{before.imag / (2 * np.pi):.3f} Hz, {100 * damping_ratio(before):.2f} %"
+    )
     ratio = v.time.swings.ratio if v.time else None
     seen = min((m.damping_percent for m in v.time.modal.modes), default=None) if v.time else None
     yield "–" if ratio is None else f"{ratio:.3f}"
@@ -134,7 +190,9 @@ def read_code(text: str) -> str:
     if text in (*_CODES, ALL):
         return text
     near = " or ".join(like(text, _CODES))
-    raise ValueError(f"{text!r} is no code; {f'did you mean {near}?' if near else f'give one of {LISTED}, or {ALL}'}")
+    raise ValueError(
+        f"{text!r} is no code; {f'did you mean {near}?' if near else f'give one of {LISTED}, or {ALL}'}"
+    )
 
 
 def codes_of(asked: str) -> tuple[str, ...]:
@@ -164,20 +222,35 @@ def run_one(options: argparse.Namespace, device: Device) -> int:
 
 
 def check_code_options(options: argparse.Namespace, devices: Sequence[Device]) -> None:
-    asked = {"--pod": options.pod, "--black-box": options.black_box, "--reactances": options.reactances}
+    asked = {
+        "--pod": options.pod,
+        "--black-box": options.black_box,
+        "--reactances": options.reactances,
+    }
     if other := [name for name, value in asked.items() if value]:
-        raise InputError(f"{', '.join(other)}: only --code {NTS631} has it; leave it out, and set a damping "
-                         "controller by --set")  # fmt: skip
-    if study := [name for device in devices for name in device.values if name.split(".")[0] in STUDY]:
-        raise InputError(f"--set {study[0]}: the test bench has no such component; give values of the converter only")
+        raise InputError(
+            f"{', '.join(other)}: only --code {NTS631} has it; leave it out, and set a damping "
+            "controller by --set"
+        )
+    if study := [
+        name for device in devices for name in device.values if name.split(".")[0] in STUDY
+    ]:
+        raise InputError(
+            f"--set {study[0]}: the test bench has no such component; give values of the converter only"
+        )
 
 
 def certified(
     options: argparse.Namespace, device: Device, key: str, folder: Path, console: Console
 ) -> tuple[Certificate, list[Path]]:
     """Compute a certificate with its acceptance tests, and write its files; points are kept as they come."""
-    given = {"fmu": device.file, "code": key, "binding": device.binding, "values": device.values,
-             "declared": dict(options.declare)}  # fmt: skip
+    given = {
+        "fmu": device.file,
+        "code": key,
+        "binding": device.binding,
+        "values": device.values,
+        "declared": dict(options.declare),
+    }
     issue = CertifyRequest(**asked_by(options, CertifyRequest) | given).issue()
     request = issue.request
     details = read_details(options.details) if options.details else Details()
@@ -188,12 +261,16 @@ def certified(
     with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):
         executor = choose_executor(options, [issue.parts.task.__module__])
         told = (f"{device.name}, {key}: computing", f"{issue.parts.one}s")
-        found = progress.compute(lambda report: issue.compute(executor, folder, report), executor, console, told)
+        found = progress.compute(
+            lambda report: issue.compute(executor, folder, report), executor, console, told
+        )
         if acceptance is not None:
             acceptance.keep(folder)
         elif not options.no_check:
             if not console.is_terminal:
-                make_errors().print("acceptance tests of the FMU: about a minute; --no-check leaves them out")
+                make_errors().print(
+                    "acceptance tests of the FMU: about a minute; --no-check leaves them out"
+                )
             with console.status("Acceptance tests of the FMU"):
                 acceptance = run_checks(request.fmu, request.binding, folder)
         found.details, found.acceptance = details, acceptance
@@ -203,7 +280,9 @@ def certified(
 def run_stiffness(options: argparse.Namespace, device: Device) -> int:
     asked = {"--pdf": options.pdf, "--details": options.details, "--check": options.check}
     if other := [name for name, value in asked.items() if value]:
-        raise InputError(f"{', '.join(other)}: --code {GB} gives figures and no certificate; leave it out")
+        raise InputError(
+            f"{', '.join(other)}: --code {GB} gives figures and no certificate; leave it out"
+        )
     checked((), dict(options.declare), GB)
     check_code_options(options, [device])
     folder = options.out or Path("results") / f"certify_{device.name}_{GB}"

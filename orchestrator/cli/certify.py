@@ -7,9 +7,20 @@ from orchestrator.certification.codes.all_codes import NTS631
 from orchestrator.certification.details import TEMPLATE
 from orchestrator.certification.kinds import CertifyRequest
 from orchestrator.cli.arguments import add_executor_arguments, add_options, add_request_arguments
-from orchestrator.cli.certificate import ALL, GB, LISTED, codes_of, read_code, run_one, run_stiffness
+from orchestrator.cli.certificate import (
+    ALL,
+    GB,
+    LISTED,
+    codes_of,
+    read_code,
+    run_one,
+    run_stiffness,
+)
 from orchestrator.cli.certify_matrix import run_matrix
-from orchestrator.cli.certify_sensitivities import add_sensitivity_arguments, check_sensitivity_options
+from orchestrator.cli.certify_sensitivities import (
+    add_sensitivity_arguments,
+    check_sensitivity_options,
+)
 from orchestrator.errors import INTERRUPTED, InputError
 
 
@@ -31,8 +42,10 @@ def run(options: argparse.Namespace) -> int:
     check_sensitivity_options(options, codes_of(options.code), NTS631)
     devices = devices_of(options.fmu, options.binding, options.set)
     if options.into and (len(devices) > 1 or options.code in (GB, ALL)):
-        raise InputError("--into: it takes one device's certificate by one code with a verdict; for another code "
-                         "repeat the command with the same --into")  # fmt: skip
+        raise InputError(
+            "--into: it takes one device's certificate by one code with a verdict; for another code "
+            "repeat the command with the same --into"
+        )
     if options.code == GB and len(devices) == 1:
         return run_stiffness(options, devices[0])
     several = len(devices) > 1 or options.code == ALL

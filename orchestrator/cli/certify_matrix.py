@@ -23,7 +23,15 @@ from orchestrator.certification.matrix import (
     matrix_json,
     save_matrix,
 )
-from orchestrator.cli.certificate import ALL, GB, certified, check_code_options, codes_of, measured_figures, show
+from orchestrator.cli.certificate import (
+    ALL,
+    GB,
+    certified,
+    check_code_options,
+    codes_of,
+    measured_figures,
+    show,
+)
 from orchestrator.cli.certify_sensitivities import find_needs
 from orchestrator.cli.terminal import make_console, make_errors, print_json
 from orchestrator.errors import InputError
@@ -45,8 +53,10 @@ def run_matrix(options: argparse.Namespace, devices: Sequence[Device]) -> int:
     if set(codes) - {NTS631}:
         check_code_options(options, devices)
     if several and options.check:
-        raise InputError(f"--check {options.check}: a report of `gfor fmu check` is of one FMU, and there are "
-                         f"{len(devices)}; leave it out to have the tests run, or give --no-check")  # fmt: skip
+        raise InputError(
+            f"--check {options.check}: a report of `gfor fmu check` is of one FMU, and there are "
+            f"{len(devices)}; leave it out to have the tests run, or give --no-check"
+        )
     folder = options.out or Path("results") / f"certify_{'matrix' if several else devices[0].name}"
     made_folder(folder, "--out")
     console = make_console(stderr=options.json)
@@ -55,14 +65,20 @@ def run_matrix(options: argparse.Namespace, devices: Sequence[Device]) -> int:
         for device in devices:
             own = argparse.Namespace(**vars(options))
             for key in codes:
-                own.declare = options.declare if options.code != ALL or key in BY_DECLARATION else []
+                own.declare = (
+                    options.declare if options.code != ALL or key in BY_DECLARATION else []
+                )
                 place = f"{device.name}/{key}" if several else key
-                cells[device.name, key] = _tested(own, device, key, folder, place, console, several=several)
+                cells[device.name, key] = _tested(
+                    own, device, key, folder, place, console, several=several
+                )
         matrix = CertificateMatrix(tuple(d.name for d in devices), codes, cells, left_out)
         _check_any(matrix)
         files = save_matrix(matrix, devices, folder)
     for lost in (cell for cell in cells.values() if cell.failure is not None):
-        make_errors().print(f"[yellow]not tested:[/] {escape(f'{lost.device}, {lost.code}: {lost.failure}')}")
+        make_errors().print(
+            f"[yellow]not tested:[/] {escape(f'{lost.device}, {lost.code}: {lost.failure}')}"
+        )
     if options.json:
         print_json(matrix_json(matrix, devices))
     else:
@@ -70,12 +86,22 @@ def run_matrix(options: argparse.Namespace, devices: Sequence[Device]) -> int:
         console.print(READING, soft_wrap=True, highlight=False)
         colour = "green" if matrix.exit_code == 0 else "red"
         console.print(f"[bold {colour}]{escape(matrix.sentence())}[/]", soft_wrap=True)
-        console.print(escape(f"Report in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True)
+        console.print(
+            escape(f"Report in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True
+        )
     return matrix.exit_code
 
 
-def _tested(options: argparse.Namespace, device: Device, key: str, folder: Path, place: str, console: Console, *,
-            several: bool) -> MatrixCell:  # fmt: skip
+def _tested(
+    options: argparse.Namespace,
+    device: Device,
+    key: str,
+    folder: Path,
+    place: str,
+    console: Console,
+    *,
+    several: bool,
+) -> MatrixCell:
     """One device under one code; what cannot be tested says why, and the others go on.
 
     The acceptance tests of a device are run for its first certificate; ``options`` of the device remember them."""
@@ -83,7 +109,8 @@ def _tested(options: argparse.Namespace, device: Device, key: str, folder: Path,
     with failure_kept(cell):
         own = folder / place
         if key == GB:
-            cell.verdict, cell.figures = FIGURES, ()  # it decides nothing, also where it cannot be measured
+            # it decides nothing, also where it cannot be measured
+            cell.verdict, cell.figures = FIGURES, ()
             figures, _ = measured_figures(device, own)
             cell.figures = [*stiffness_in_words(figures), figures["phase_jump"]["sentence"]]
         else:
@@ -98,12 +125,18 @@ def _tested(options: argparse.Namespace, device: Device, key: str, folder: Path,
     if cell.failure is not None and cell.figures is not None:
         cell.verdict = NOT_TESTED
     if cell.failure is None and cell.figures is None and several and not options.json:
-        console.print(escape(f"{device.name}, {key}: {cell.sentence}"), soft_wrap=True, highlight=False)
+        console.print(
+            escape(f"{device.name}, {key}: {cell.sentence}"), soft_wrap=True, highlight=False
+        )
     return cell
 
 
 def _take_needs(
-    options: argparse.Namespace, found: Certificate, cell: MatrixCell, folder: Path, console: Console
+    options: argparse.Namespace,
+    found: Certificate,
+    cell: MatrixCell,
+    folder: Path,
+    console: Console,
 ) -> None:
     """Find the needs of failed criteria; where that fails, the certificate stands."""
     if not options.json:
@@ -112,7 +145,9 @@ def _take_needs(
     with failure_kept(note):
         cell.has_needs = find_needs(options, found, folder, console) is not None
     if note.failure is not None:
-        make_errors().print(f"[yellow]no sensitivities:[/] {escape(f'{cell.device}, {cell.code}: {note.failure}')}")
+        make_errors().print(
+            f"[yellow]no sensitivities:[/] {escape(f'{cell.device}, {cell.code}: {note.failure}')}"
+        )
 
 
 def _check_any(matrix: CertificateMatrix) -> None:
@@ -129,7 +164,11 @@ def _check_any(matrix: CertificateMatrix) -> None:
 
 
 def matrix_table(matrix: CertificateMatrix) -> PlainTable:
-    table = make_table("Codes and devices: verdict, and narrowest margin", "", *matrix.devices, left=99)
+    table = make_table(
+        "Codes and devices: verdict, and narrowest margin", "", *matrix.devices, left=99
+    )
     for code in matrix.codes:
-        table.add_row(code, *("\n".join(in_words(matrix.cells[name, code])) for name in matrix.devices))
+        table.add_row(
+            code, *("\n".join(in_words(matrix.cells[name, code])) for name in matrix.devices)
+        )
     return table

@@ -12,7 +12,12 @@ from orchestrator.asked import read_part
 from orchestrator.certification.certificate import Certificate
 from orchestrator.certification.codes import needs_record
 from orchestrator.certification.codes.change_point import ChangeTask
-from orchestrator.certification.codes.what_it_takes import CHANGE, confirm_changes, plan_changes, run_changes
+from orchestrator.certification.codes.what_it_takes import (
+    CHANGE,
+    confirm_changes,
+    plan_changes,
+    run_changes,
+)
 from orchestrator.cli.arguments import add_options, choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.study import Progressing
@@ -28,11 +33,17 @@ def add_sensitivity_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def check_sensitivity_options(options: argparse.Namespace, codes: Sequence[str], norm: str) -> None:
-    others = {"--parameter": options.parameter, "--fixed": options.fixed, "--change": options.change,
-              "--confirm": options.confirm}  # fmt: skip
+    others = {
+        "--parameter": options.parameter,
+        "--fixed": options.fixed,
+        "--change": options.change,
+        "--confirm": options.confirm,
+    }
     if not options.sensitivities:
         if idle := [name for name, value in others.items() if value]:
-            raise InputError(f"{idle[0]}: it belongs to --sensitivities, which is not given; add it, or leave this out")
+            raise InputError(
+                f"{idle[0]}: it belongs to --sensitivities, which is not given; add it, or leave this out"
+            )
         return
     if set(codes) <= {norm}:
         raise InputError(
@@ -48,7 +59,9 @@ def find_needs(
     change = CHANGE if options.change is None else options.change
     plan = plan_changes(certificate, folder, options.parameter, fixed=options.fixed, change=change)
     if not plan.rows:
-        console.print("No row fails: there is nothing that a criterion would take.", highlight=False)
+        console.print(
+            "No row fails: there is nothing that a criterion would take.", highlight=False
+        )
         return None
     console.print(escape(needs_record.plan_text(plan)), soft_wrap=True, highlight=False)
     progress = Progressing(folder)
@@ -67,9 +80,13 @@ def find_needs(
             console.print(needs_record.needs_table(need))
             print_parts(console, map(escape, needs_record.remarks_of(need)))
             if options.confirm:
-                console.print(escape(needs_record.confirmed_text(need)), soft_wrap=True, highlight=False)
+                console.print(
+                    escape(needs_record.confirmed_text(need)), soft_wrap=True, highlight=False
+                )
             console.print("")
         if text := needs_record.left_out_text(plan):
             console.print(escape(f"Not changed: {text}"), soft_wrap=True, highlight=False)
-        console.print(escape(f"Report in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True)
+        console.print(
+            escape(f"Report in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True
+        )
     return needs_record.needs_json(plan, needs)

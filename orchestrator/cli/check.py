@@ -14,9 +14,12 @@ from orchestrator.cli.terminal import keep_json, print_json
 from orchestrator.fmi.protection import missing
 
 _COLOURS = {
-    Verdict.PASS: "green", Verdict.REMARK: "yellow", Verdict.FAIL: "bold red", Verdict.NOT_APPLICABLE: "dim",
+    Verdict.PASS: "green",
+    Verdict.REMARK: "yellow",
+    Verdict.FAIL: "bold red",
+    Verdict.NOT_APPLICABLE: "dim",
     Verdict.NOT_SUPPORTED: "bold yellow",
-}  # fmt: skip
+}
 NOT_SUPPORTED = 2  # exit code where nothing failed, but the FMU could not be run here
 
 
@@ -29,10 +32,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Check, print, and write what is asked for; 1 if a check failed, 2 if the FMU is not supported here."""
     found = check(
-        options.file, options.binding, step=options.step, only=options.only, case=options.case or None,
-        component=options.component, scenario=options.scenario, seed=options.seed, frequency=options.frequency,
-        time_limit=options.time_limit, memory_limit=options.memory_limit,
-    )  # fmt: skip
+        options.file,
+        options.binding,
+        step=options.step,
+        only=options.only,
+        case=options.case or None,
+        component=options.component,
+        scenario=options.scenario,
+        seed=options.seed,
+        frequency=options.frequency,
+        time_limit=options.time_limit,
+        memory_limit=options.memory_limit,
+    )
     if options.junit:
         found.save_junit(options.junit)
     keep_json(found.as_json(), options.out, "check")
@@ -47,7 +58,11 @@ def _each_once(results: list[CheckResult]) -> list[CheckResult]:
     """Join checks that were left out for the same reason in one line."""
     lines: list[CheckResult] = []
     for result in results:
-        if result.verdict is Verdict.NOT_APPLICABLE and lines and lines[-1].evidence == result.evidence:
+        if (
+            result.verdict is Verdict.NOT_APPLICABLE
+            and lines
+            and lines[-1].evidence == result.evidence
+        ):
             lines[-1] = replace(lines[-1], check=f"{lines[-1].check}, {result.check}")
         else:
             lines.append(result)
@@ -71,7 +86,9 @@ def _print(report: AcceptanceReport) -> None:
         if result.remedy and result.remedy not in advised:
             console.print(f"{'':<38}[dim]{escape(result.remedy)}[/]")
             advised.add(result.remedy)
-    console.print(f"\nDips, jumps and points were drawn at random; --seed {report.seed} draws the same ones again.")
+    console.print(
+        f"\nDips, jumps and points were drawn at random; --seed {report.seed} draws the same ones again."
+    )
     if report.protections:
         in_force = [protection.name for protection in report.protections if protection.in_force]
         console.print(f"In force around the FMU's process: {', '.join(in_force)}.")

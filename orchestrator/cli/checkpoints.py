@@ -19,7 +19,9 @@ from orchestrator.study.checkpoints import CASE, Checkpoints, not_kept
 
 
 class StudyCheckpoints:
-    def __init__(self, scenarios: Sequence[PreparedScenario], folder: Path, options: argparse.Namespace) -> None:
+    def __init__(
+        self, scenarios: Sequence[PreparedScenario], folder: Path, options: argparse.Namespace
+    ) -> None:
         self._results, self._folder, self._every = folder, folder / CHECKPOINTS, options.checkpoint
         self._of: dict[str, Checkpoints] = {}
         self.run, self._options = str(options.run), options
@@ -33,7 +35,11 @@ class StudyCheckpoints:
                 prepared, self._folder, self._every, resume=options.resume is not None, say=_say
             )
             if one.time is not None:
-                done = "it was done" if one.time >= prepared.stop_time else f"it goes on from t = {one.time:.6g} s"
+                done = (
+                    "it was done"
+                    if one.time >= prepared.stop_time
+                    else f"it goes on from t = {one.time:.6g} s"
+                )
                 _say(f"scenario {prepared.name!r}: {done}")
             elif options.resume is not None:
                 _say(f"scenario {prepared.name!r}: nothing of it was kept, so it begins at t = 0")
@@ -43,7 +49,9 @@ class StudyCheckpoints:
     def _begin(self, scenarios: Sequence[PreparedScenario], options: argparse.Namespace) -> None:
         """Forget an earlier run, and keep what is asked of this one."""
         if self._interrupted():
-            _say(f"{self._results} holds an interrupted run, which is given up: it would have gone on with --resume")
+            _say(
+                f"{self._results} holds an interrupted run, which is given up: it would have gone on with --resume"
+            )
         rmtree(self._folder, ignore_errors=True)
         if not self._every:
             return
@@ -55,12 +63,18 @@ class StudyCheckpoints:
         if any(path.suffix in (CHECKPOINT, PREVIOUS) for path in self._folder.glob("*")):
             return True
         run = asked_by(self._results)
-        return run is not None and any(path.name.endswith(f"{PARTIAL}{run}") for path in unfinished(self._results))
+        return run is not None and any(
+            path.name.endswith(f"{PARTIAL}{run}") for path in unfinished(self._results)
+        )
 
-    def of(self, name: str, recording: RecordingFolder, place: ScenarioFolder) -> Checkpoints | None:
+    def of(
+        self, name: str, recording: RecordingFolder, place: ScenarioFolder
+    ) -> Checkpoints | None:
         """Those of a scenario, which has what it recorded until then; None where none are wanted."""
         if found := self._of.get(name):
-            found.take_back(recording, [place.path / TRAJECTORY, place.place / TRAJECTORY], self.run)
+            found.take_back(
+                recording, [place.path / TRAJECTORY, place.place / TRAJECTORY], self.run
+            )
         return found
 
     def end(self, *, whole: bool, interrupted: bool = False) -> None:
@@ -73,12 +87,17 @@ class StudyCheckpoints:
             _say(text)
 
 
-def _name_those_not_kept(scenarios: Sequence[PreparedScenario], options: argparse.Namespace) -> None:
+def _name_those_not_kept(
+    scenarios: Sequence[PreparedScenario], options: argparse.Namespace
+) -> None:
     if not (options.checkpoint or options.require_checkpoint):
         return
     for prepared in scenarios:
         plans = prepared.system.components
-        found = [f"{n!r} ({plans[n].description.path.name}): {why}" for n, why in not_kept(prepared).items()]
+        found = [
+            f"{n!r} ({plans[n].description.path.name}): {why}"
+            for n, why in not_kept(prepared).items()
+        ]
         if found and options.require_checkpoint:
             raise InputError(
                 f"scenario {prepared.name!r} cannot be resumed within its run, because of component "

@@ -7,7 +7,14 @@ from rich.markup import escape
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.api.comparison import compare
 from orchestrator.cli.arguments import add_kept_argument, add_options
-from orchestrator.cli.terminal import keep_json, make_console, make_errors, print_json, print_parts, saying_warnings
+from orchestrator.cli.terminal import (
+    keep_json,
+    make_console,
+    make_errors,
+    print_json,
+    print_parts,
+    saying_warnings,
+)
 from orchestrator.report.tables import make_table
 
 
@@ -25,12 +32,28 @@ def run(options: argparse.Namespace) -> int:
         for text in found.remarks:
             make_errors().print(text, markup=False, soft_wrap=True, highlight=False)
         return 0
-    columns = ("Signal", "Deviation A", "Deviation B", "Largest difference", "at [s]", "RMS", "A rings", "B rings")
+    columns = (
+        "Signal",
+        "Deviation A",
+        "Deviation B",
+        "Largest difference",
+        "at [s]",
+        "RMS",
+        "A rings",
+        "B rings",
+    )
     rows = [
-        (f"{c.expression} [{c.unit}]", f"{c.deviations[0]:.4g}", f"{c.deviations[1]:.4g}", f"{c.largest:.4g}",
-         f"{c.at:.3f}", f"{c.rms:.4g}", *map(_mode_text, c.modes))
+        (
+            f"{c.expression} [{c.unit}]",
+            f"{c.deviations[0]:.4g}",
+            f"{c.deviations[1]:.4g}",
+            f"{c.largest:.4g}",
+            f"{c.at:.3f}",
+            f"{c.rms:.4g}",
+            *map(_mode_text, c.modes),
+        )
         for c in found
-    ]  # fmt: skip
+    ]
     table = make_table(f"A: {options.first}\nB: {options.second}", *columns, rows=rows)
     print_parts(make_console(), [table, *map(escape, found.remarks)])
     return 0

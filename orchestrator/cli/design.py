@@ -8,7 +8,12 @@ from shutil import rmtree
 from rich.markup import escape
 
 from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
-from orchestrator.cli.arguments import add_executor_arguments, add_options, add_request_arguments, option
+from orchestrator.cli.arguments import (
+    add_executor_arguments,
+    add_options,
+    add_request_arguments,
+    option,
+)
 from orchestrator.cli.case_arguments import add_case_arguments, asked_of_case, case_of
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.study import shown, working_in
@@ -26,9 +31,16 @@ from orchestrator.results.origin import as_typed
 
 
 def run_over_points(options: argparse.Namespace, path: Path) -> int:
-    several = {"controllers": tuple(options.controller), "components": tuple(options.component),
-               "modes": () if ALL in options.mode else tuple(options.mode)}  # fmt: skip
-    with working_in(options, "design", STUDY, path.with_suffix(".points"), **several) as (_, compute, folder):
+    several = {
+        "controllers": tuple(options.controller),
+        "components": tuple(options.component),
+        "modes": () if ALL in options.mode else tuple(options.mode),
+    }
+    with working_in(options, "design", STUDY, path.with_suffix(".points"), **several) as (
+        _,
+        compute,
+        folder,
+    ):
         design = compute()
         written = design.save(path, as_typed())
     files = ", ".join(one.name for one in written[1:])
@@ -38,13 +50,24 @@ def run_over_points(options: argparse.Namespace, path: Path) -> int:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, several=False)
-    parser.add_argument("--controller", action="append", required=True, choices=DAMPING_CONTROLLERS,
-                        help="the controller to design (with --points repeatable)")  # fmt: skip
+    parser.add_argument(
+        "--controller",
+        action="append",
+        required=True,
+        choices=DAMPING_CONTROLLERS,
+        help="the controller to design (with --points repeatable)",
+    )
     add_options(parser, "design")
     add_request_arguments(parser, DesignRequest)
     add_options(parser, "design 2")
     add_verdict_argument(parser)
-    option(parser, "--out", "FILE.toml", "parameter file (default: <case>_<controller>.toml, here)", read=Path)
+    option(
+        parser,
+        "--out",
+        "FILE.toml",
+        "parameter file (default: <case>_<controller>.toml, here)",
+        read=Path,
+    )
     over_points = parser.add_argument_group("over operating points")
     add_request_arguments(over_points, PointsDesignRequest)
     add_executor_arguments(over_points)
@@ -55,7 +78,8 @@ def run(options: argparse.Namespace) -> int:
         _check_over_points(options)
         out = options.out and _writable(options.out)
         return run_over_points(
-            options, out or Path(f"{case_of(options).name}_{'_'.join(options.controller)}_points.toml")
+            options,
+            out or Path(f"{case_of(options).name}_{'_'.join(options.controller)}_points.toml"),
         )
     _check_for_one_point(options)
     case, console = case_of(options), make_console(stderr=options.json)
@@ -81,31 +105,55 @@ def run(options: argparse.Namespace) -> int:
         return ends
     print_parts(console, first_screen(design))
     print_stability(
-        console, {"without the controller": design.stability_before, "with the final setting": design.stability}
+        console,
+        {
+            "without the controller": design.stability_before,
+            "with the final setting": design.stability,
+        },
     )
     print_parts(console, sheet(design))
     warned = "" if design.met else " (the requirement is not met)"
-    emt = "; EMT models may differ: add --set models=emt" if design.prepared.case.table.models == "phasor" else ""
-    console.print(escape(f"Parameter file {path}{warned}; use it with: gfor modes {options.case} --scenario "
-                  f"{design.target.scenario} --parameters {path}{emt}"), soft_wrap=True, highlight=False)  # fmt: skip
+    emt = (
+        "; EMT models may differ: add --set models=emt"
+        if design.prepared.case.table.models == "phasor"
+        else ""
+    )
+    console.print(
+        escape(
+            f"Parameter file {path}{warned}; use it with: gfor modes {options.case} --scenario "
+            f"{design.target.scenario} --parameters {path}{emt}"
+        ),
+        soft_wrap=True,
+        highlight=False,
+    )
     return ends
 
 
 def _check_for_one_point(options: argparse.Namespace) -> None:
     for name in ("controller", "component", "mode"):
         if (times := len(getattr(options, name))) > 1:
-            raise InputError(f"--{name} is given {times} times; only a design with --points takes several: give one")
+            raise InputError(
+                f"--{name} is given {times} times; only a design with --points takes several: give one"
+            )
     for name in ("outages", "workers", "scheduler", "tls"):
         if getattr(options, name) is not None:
-            raise InputError(f"--{name} belongs to a design over operating points: give --points FILE as well")
+            raise InputError(
+                f"--{name} belongs to a design over operating points: give --points FILE as well"
+            )
 
 
 def _check_over_points(options: argparse.Namespace) -> None:
-    given = {"--damping-increment": options.damping_increment is not None, "--refine": options.refine,
-             "--delta-gain": options.delta_gain is not None, "--no-margins": options.no_margins,
-             "--gain-from": options.gain_from != "non-compensated"}  # fmt: skip
+    given = {
+        "--damping-increment": options.damping_increment is not None,
+        "--refine": options.refine,
+        "--delta-gain": options.delta_gain is not None,
+        "--no-margins": options.no_margins,
+        "--gain-from": options.gain_from != "non-compensated",
+    }
     for name in (name for name, is_given in given.items() if is_given):
-        raise InputError(f"{name} belongs to a design for one operating point; with --points leave it out")
+        raise InputError(
+            f"{name} belongs to a design for one operating point; with --points leave it out"
+        )
 
 
 def _how_it_goes_on(folder: Path) -> str:
@@ -118,8 +166,14 @@ def _how_it_goes_on(folder: Path) -> str:
 
 
 def _request(options: argparse.Namespace) -> DesignRequest:
-    first = {name: next(iter(getattr(options, name)), None) for name in ("controller", "component", "mode")}
-    how = {"compensated_gain": options.gain_from == "compensated", "margins": not options.no_margins}
+    first = {
+        name: next(iter(getattr(options, name)), None)
+        for name in ("controller", "component", "mode")
+    }
+    how = {
+        "compensated_gain": options.gain_from == "compensated",
+        "margins": not options.no_margins,
+    }
     return DesignRequest(**asked_of_case(options, DesignRequest, "design") | first | how)
 
 
@@ -129,8 +183,14 @@ def _writable(out: Path) -> Path:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         existed = path.exists()
-        if existed and path.is_file() and "[set]" not in (path.read_text("utf-8", "replace") or "[set]"):
-            raise InputError(f"--out {path}: another file is there, not a parameter file; choose another place")
+        if (
+            existed
+            and path.is_file()
+            and "[set]" not in (path.read_text("utf-8", "replace") or "[set]")
+        ):
+            raise InputError(
+                f"--out {path}: another file is there, not a parameter file; choose another place"
+            )
         path.open("a", encoding="utf-8").close()
         if not existed:
             path.unlink()

@@ -28,13 +28,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     word, case, kind = opened(options.case, trust_fmus=options.trust_fmus)
     if "study" in kind and (options.set or options.range != ELECTROMECHANICAL_HZ or options.save):
-        raise InputError(f"{options.case}: a study has its own values and range, and is not saved as a page; --set, "
-                         "--range and --save go with a case")  # fmt: skip
+        raise InputError(
+            f"{options.case}: a study has its own values and range, and is not saved as a page; --set, "
+            "--range and --save go with a case"
+        )
     name = options.scenario or kind.get("scenario", case.scenarios[-1])
     if name not in case.scenarios:
-        raise InputError(f"--scenario: there is no scenario {name!r}; the case has: {', '.join(case.scenarios)}")
+        raise InputError(
+            f"--scenario: there is no scenario {name!r}; the case has: {', '.join(case.scenarios)}"
+        )
     values = kind.get("values", {}) | values_set(options)
-    beginning = {"case": case.name, "range": list(options.range)} | kind | {"scenario": name, "values": values}
+    beginning = (
+        {"case": case.name, "range": list(options.range)}
+        | kind
+        | {"scenario": name, "values": values}
+    )
     if options.beside is not None:
         with saying_warnings():
             open_trajectory(options.beside)  # what cannot be read is refused here
@@ -47,9 +55,14 @@ def run(options: argparse.Namespace) -> int:
         print(f"Written: {options.save}")
         return 0
     if options.vary:
-        raise InputError("--vary is for a page that is saved; give --save FILE.html as well, or drag the slider")
+        raise InputError(
+            "--vary is for a page that is saved; give --save FILE.html as well, or drag the slider"
+        )
     explorer = Explorer(word, beginning, port=options.port, trust_fmus=options.trust_fmus)
-    print(f"{explorer.address}  (ends by Ctrl-C, or a minute after its last page was closed)", flush=True)
+    print(
+        f"{explorer.address}  (ends by Ctrl-C, or a minute after its last page was closed)",
+        flush=True,
+    )
     if not options.no_browser:
         webbrowser.open(explorer.address)
     explorer.serve()

@@ -13,7 +13,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     with saying_warnings():
-        files = export_comtrade(options.run, options.signal or (), options.out, options.form, options.frequency)
+        files = export_comtrade(
+            options.run, options.signal or (), options.out, options.form, options.frequency
+        )
     for file in files:
         print(file)
     return 0

@@ -16,9 +16,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     with said_stages() as report:
         written = export_dll(
-            options.name, options.dest, platforms=options.platform, sample_time=options.sample_time,
-            values=dict(map(_value, options.set)), report=report,
-        )  # fmt: skip
+            options.name,
+            options.dest,
+            platforms=options.platform,
+            sample_time=options.sample_time,
+            values=dict(map(_value, options.set)),
+            report=report,
+        )
     for path in (*written.libraries.values(), written.sheet):
         print(path)
     return 0
@@ -28,5 +32,7 @@ def _value(entry: str) -> tuple[str, float]:
     name, _, text = entry.partition("=")
     value = read_value(text)
     if not name or isinstance(value, str):
-        raise InputError(f"--set {entry}: give NAME=VALUE with a number, true or false, such as pod_p.enabled=true")
+        raise InputError(
+            f"--set {entry}: give NAME=VALUE with a number, true or false, such as pod_p.enabled=true"
+        )
     return name, float(value)

@@ -24,7 +24,11 @@ def run(options: argparse.Namespace) -> int:
             f"--out {out}: an SSP holds one scenario, not {names}; choose with --scenario, or give a folder"
         )
     for prepared in scenarios:
-        target = out if out is not None and single else (out or Path()) / f"{prepared.case.name}_{prepared.name}.ssp"
+        target = (
+            out
+            if out is not None and single
+            else (out or Path()) / f"{prepared.case.name}_{prepared.name}.ssp"
+        )
         write_ssp(prepared, target)
         print(target)
     return 0

@@ -21,7 +21,9 @@ def run(options: argparse.Namespace) -> int:
     """Take part in one run; values come from there, the case says which FMU it is."""
     having = [p for p in prepare(options) if options.component in p.system.components]
     if not having:
-        raise InputError(f"--component {options.component}: no scenario of {options.case} has such a component")
+        raise InputError(
+            f"--component {options.component}: no scenario of {options.case} has such a component"
+        )
     description = having[0].system.components[options.component].description
     require_broker(options.broker)
     print(f"federate {options.component!r} at {options.broker}, until the run ends", flush=True)

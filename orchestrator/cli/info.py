@@ -38,7 +38,9 @@ def run(options: argparse.Namespace) -> int:
         highlight=False,
     )
     if missing := missing_binary(description):
-        console.print(f"[bold]It cannot run here[/bold]: {escape('; '.join(missing))}", highlight=False)
+        console.print(
+            f"[bold]It cannot run here[/bold]: {escape('; '.join(missing))}", highlight=False
+        )
     if description.kept_in:
         why = f" ({description.kept_why})" if description.kept_why else ""
         kept = KEPT_IN.get(description.kept_in, description.kept_in)
@@ -54,7 +56,11 @@ def _states(description: FmuDescription) -> str:
     """How many there are; those of a vendor's DLL are no continuous ones, and by what they are."""
     if not description.kept_in:
         return f"continuous states: {len(description.states)}"
-    of_circuit = [name for name in description.states if description.frequency and not name.startswith(CONTROLLER)]
+    of_circuit = [
+        name
+        for name in description.states
+        if description.frequency and not name.startswith(CONTROLLER)
+    ]
     own, circuit = [name.removeprefix(CONTROLLER) for name in description.states], len(of_circuit)
     held = sum(name.startswith("held.") for name in own)
     memory = sum(name.startswith("memory[") for name in own)
@@ -70,5 +76,11 @@ def _states(description: FmuDescription) -> str:
 
 def _in_words(model: EmbeddedModel) -> str:
     size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
-    origin = ", ".join(f"{key} {model.origin[key]}" for key in ("case", "scenario", "component") if key in model.origin)
-    return f"linear model inside: {size}" + (f", at the operating point of {origin}" if origin else "")
+    origin = ", ".join(
+        f"{key} {model.origin[key]}"
+        for key in ("case", "scenario", "component")
+        if key in model.origin
+    )
+    return f"linear model inside: {size}" + (
+        f", at the operating point of {origin}" if origin else ""
+    )

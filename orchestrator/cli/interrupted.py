@@ -21,7 +21,8 @@ def is_interrupt(error: BaseException | None) -> bool:
     """Whether it is Ctrl-C or SIGTERM, or came after one: a library in C may have made another error of it."""
     if calls.taken:
         return True
-    seen: set[int] = set()  # an error that was kept and is raised again may stand behind its own cause
+    # an error that was kept and is raised again may stand behind its own cause
+    seen: set[int] = set()
     while error is not None and id(error) not in seen:
         if isinstance(error, KeyboardInterrupt):
             return True

@@ -22,18 +22,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     scenarios = chosen(options)
-    folder = made_folder(options.out or Path("results") / f"{scenarios[0].prepared.case.name}_linear", "--out")
+    folder = made_folder(
+        options.out or Path("results") / f"{scenarios[0].prepared.case.name}_linear", "--out"
+    )
     verdicts: dict[str, Stability] = {}
     lines, run_id = [], new_run_id()
     for scenario in scenarios:
-        model = scenario.linearize(options.input or (), options.output or (), continuous=options.continuous)
+        model = scenario.linearize(
+            options.input or (), options.output or (), continuous=options.continuous
+        )
         verdicts[scenario.title] = model.stability
         warn(scenario.name, model.warnings)
         place = folder / scenario.name
         with staged(place, run_id) as staging:
-            saved = save_linear_model(model, model.operating_point, model.stability, scenario.prepared, staging)
+            saved = save_linear_model(
+                model, model.operating_point, model.stability, scenario.prepared, staging
+            )
         paths = [place / path.name for path in saved]
-        size = f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
+        size = (
+            f"{len(model.states)} states, {len(model.inputs)} inputs, {len(model.outputs)} outputs"
+        )
         kind = "continuous" if model.step_size is None else f"step map of {model.step_size:g} s"
         lines.append(f"{scenario.name}: {kind}, {size}: {', '.join(map(str, paths))}")
         if exceptions := exceptions_in_words(model.sources):

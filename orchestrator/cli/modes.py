@@ -11,8 +11,19 @@ from rich.markup import escape
 from orchestrator.api.scenario import Scenario, modes_of
 from orchestrator.cli import terminal
 from orchestrator.cli.arguments import add_options, add_request_arguments, asked_by
-from orchestrator.cli.case_arguments import add_case_arguments, add_excitation_arguments, chosen, excitation_given
-from orchestrator.cli.verdict import add_details_argument, add_verdict_argument, exit_code, print_answers, print_details
+from orchestrator.cli.case_arguments import (
+    add_case_arguments,
+    add_excitation_arguments,
+    chosen,
+    excitation_given,
+)
+from orchestrator.cli.verdict import (
+    add_details_argument,
+    add_verdict_argument,
+    exit_code,
+    print_answers,
+    print_details,
+)
 from orchestrator.errors import InputError
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
@@ -39,7 +50,9 @@ def run(options: argparse.Namespace) -> int:
     if options.component is not None:
         return _with_a_black_box(options)
     if excited := excitation_given(options):
-        raise InputError(f"{excited[0]} is for a black box of its own: give --black-box --component NAME as well")
+        raise InputError(
+            f"{excited[0]} is for a black box of its own: give --black-box --component NAME as well"
+        )
     scenarios = chosen(options)
     request = ModesRequest(**asked_by(options, ModesRequest))
     request.check()
@@ -52,9 +65,15 @@ def _with_a_black_box(options: argparse.Namespace) -> int:
     from orchestrator.cli import black_box  # noqa: PLC0415 - only here
 
     if not options.black_box:
-        raise InputError("--component names what is taken for a black box: give --black-box as well")
-    others = {"--critical": options.critical is not None, "--directional": options.directional,
-              "--range": options.frequencies is not None, "--details": options.details}  # fmt: skip
+        raise InputError(
+            "--component names what is taken for a black box: give --black-box as well"
+        )
+    others = {
+        "--critical": options.critical is not None,
+        "--directional": options.directional,
+        "--range": options.frequencies is not None,
+        "--details": options.details,
+    }
     if given := [name for name, is_given in others.items() if is_given]:
         raise InputError(
             f"{given[0]} does not go with --component, which shows all modes of one black box; leave it out"
@@ -63,15 +82,24 @@ def _with_a_black_box(options: argparse.Namespace) -> int:
 
 
 def _compute(
-    scenarios: Sequence[Scenario], request: ModesRequest, options: argparse.Namespace, folder: Path | None
+    scenarios: Sequence[Scenario],
+    request: ModesRequest,
+    options: argparse.Namespace,
+    folder: Path | None,
 ) -> int:
     if request.black_box:
         with terminal.said_stages() as report:
-            results = [modes_of(scenario, replace(request, report=report)) for scenario in scenarios]
+            results = [
+                modes_of(scenario, replace(request, report=report)) for scenario in scenarios
+            ]
     else:
         prepared = [scenario.prepared for scenario in scenarios]
-        results = compute_all_modes(prepared, request.frequencies, request.critical, directional=request.directional)
-    weights = [] if options.black_box else load_model_weights(scenarios, results, request.frequencies)
+        results = compute_all_modes(
+            prepared, request.frequencies, request.critical, directional=request.directional
+        )
+    weights = (
+        [] if options.black_box else load_model_weights(scenarios, results, request.frequencies)
+    )
     written, said = [], [*beside.told(results)]
     if folder:
         from orchestrator.study.files import write_modes  # noqa: PLC0415 - plots: a second to import
@@ -92,7 +120,9 @@ def _compute(
     if options.details:
         print_details(console, results)
     if not whole:
-        console.print("All modes of each scenario, and who swings in them: --details, or one --scenario")
+        console.print(
+            "All modes of each scenario, and who swings in them: --details, or one --scenario"
+        )
     if folder:
         console.print(escape(f"Modes in {folder}: {', '.join(written)}"), soft_wrap=True)
     return exit_code(options, [r.stability for r in results])

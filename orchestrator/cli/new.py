@@ -33,7 +33,9 @@ def run(options: argparse.Namespace) -> int:
     wanted = _wanted(options)
     sources_of(wanted.files)
     if wanted.out.exists() and not options.force:
-        raise InputError(f"{wanted.out}: the file is there already; choose another with --out, or --force")
+        raise InputError(
+            f"{wanted.out}: the file is there already; choose another with --out, or --force"
+        )
     made = write_case(wanted)
     try:
         write_text(wanted.out, made.text)
@@ -46,7 +48,9 @@ def run(options: argparse.Namespace) -> int:
     for prepared in made.scenarios:
         if prepared.name in ("base", "converter"):
             running(in_service(prepared)).close()  # what cannot start is told at once
-    console.print(escape(f"Next: gfor modes {wanted.out}{' --black-box' * made.black_box}"), highlight=False)
+    console.print(
+        escape(f"Next: gfor modes {wanted.out}{' --black-box' * made.black_box}"), highlight=False
+    )
     return 0
 
 
@@ -58,7 +62,9 @@ def _wanted(options: argparse.Namespace) -> WantedCase:
         )
     if options.binding is not None and options.fmu is None:
         raise InputError("--binding says what an FMU's variables mean; give it with --fmu")
-    for path in (path for path in (device, options.binding) if path is not None and not path.is_file()):
+    for path in (
+        path for path in (device, options.binding) if path is not None and not path.is_file()
+    ):
         raise InputError(f"{path}: there is no such file")
     if device is not None and options.models == "phasor":
         raise InputError(
@@ -68,17 +74,28 @@ def _wanted(options: argparse.Namespace) -> WantedCase:
     if out.suffix.lower() != ".toml":
         raise InputError(f"--out {out}: a case file ends in .toml")
     return WantedCase(
-        tuple(options.files), out, None if options.converter is None else read_converter(options.converter), device,
-        options.binding, options.dll is not None, options.models, options.frequency, options.slack,
-        tuple(options.leave_out), tuple(options.dyr_leave_out), options.reactive_limits,
+        tuple(options.files),
+        out,
+        None if options.converter is None else read_converter(options.converter),
+        device,
+        options.binding,
+        options.dll is not None,
+        options.models,
+        options.frequency,
+        options.slack,
+        tuple(options.leave_out),
+        tuple(options.dyr_leave_out),
+        options.reactive_limits,
         f"gfor {shlex.join(sys.argv[1:])}" if sys.argv[1:2] == ["new"] else "gfor new",
-    )  # fmt: skip
+    )
 
 
 def _ask(options: argparse.Namespace) -> None:
     """Ask for what is missing, a line each; an empty answer takes what stands in brackets."""
     if not sys.stdin.isatty():
-        raise InputError(f"no network is given, and there is no terminal to ask at; write it like\n  {_EXAMPLE}")
+        raise InputError(
+            f"no network is given, and there is no terminal to ask at; write it like\n  {_EXAMPLE}"
+        )
 
     def line(question: str) -> str:
         try:
@@ -86,13 +103,18 @@ def _ask(options: argparse.Namespace) -> None:
         except EOFError as error:
             raise InputError(f"the answers ended; all in one line it is\n  {_EXAMPLE}") from error
 
-    options.files = [Path(word) for word in shlex.split(line("Network file(s), such as own.raw own.dyr"))]
+    options.files = [
+        Path(word) for word in shlex.split(line("Network file(s), such as own.raw own.dyr"))
+    ]
     if not options.files:
         raise InputError(f"no network is given; all in one line it is\n  {_EXAMPLE}")
     sources_of(options.files)  # what is wrong is said before the next question
     if bus := line("Bus of a converter, such as 9 [no converter]"):
-        parts = [f"bus {bus.removeprefix('bus ')}", _with_unit(line("Its rating in MVA, such as 300"), "MVA"),
-                 _with_unit(line("Its power in MW, such as 200"), "MW")]  # fmt: skip
+        parts = [
+            f"bus {bus.removeprefix('bus ')}",
+            _with_unit(line("Its rating in MVA, such as 300"), "MVA"),
+            _with_unit(line("Its power in MW, such as 200"), "MW"),
+        ]
         less = line("Machine that feeds so much less, such as sg3 [the slack]")
         options.converter = ", ".join([*parts, *([f"less {less}"] if less else [])])
         read_converter(options.converter)

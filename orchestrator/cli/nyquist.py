@@ -27,20 +27,42 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     if (options.parameter or options.distance) and not options.retune:
-        raise InputError("--parameter and --distance belong to --retune, which is not given; add it, or leave them out")
+        raise InputError(
+            "--parameter and --distance belong to --retune, which is not given; add it, or leave them out"
+        )
     asked = Asked(
-        options.device, options.network, options.scenario, dict(options.set), trust_fmus=options.trust_fmus,
-        frequency=options.frequency, compensation=options.compensation, angle=options.angle, bus=options.bus,
-        components=tuple(options.component), kilovolt=options.voltage, generator=frozenset(options.generator),
-        per_unit=frozenset(options.per_unit), units_checked=options.units_checked, binding=options.binding,
-        scr=options.scr, x_r=options.x_r, rating_mva=options.rating, step_size=options.step,
+        options.device,
+        options.network,
+        options.scenario,
+        dict(options.set),
+        trust_fmus=options.trust_fmus,
+        frequency=options.frequency,
+        compensation=options.compensation,
+        angle=options.angle,
+        bus=options.bus,
+        components=tuple(options.component),
+        kilovolt=options.voltage,
+        generator=frozenset(options.generator),
+        per_unit=frozenset(options.per_unit),
+        units_checked=options.units_checked,
+        binding=options.binding,
+        scr=options.scr,
+        x_r=options.x_r,
+        rating_mva=options.rating,
+        step_size=options.step,
         excitation=Excitation(lowest_hz=options.from_hz, highest_hz=options.to_hz, lines=160),
-    )  # fmt: skip
-    folder = made_folder(options.out or Path("results") / f"nyquist_{Path(options.device).stem}", "--out")
+    )
+    folder = made_folder(
+        options.out or Path("results") / f"nyquist_{Path(options.device).stem}", "--out"
+    )
     if options.points:
         judged = lambda values, place: _row(_judged(options, asked.at(values), place))  # noqa: E731
         rows = by_point(options, folder, judged, {"verdict": "not known"})
-        return NOT_MET if options.fail_unstable and any(row["verdict"] != "stable" for row in rows) else 0
+        return (
+            NOT_MET
+            if options.fail_unstable and any(row["verdict"] != "stable" for row in rows)
+            else 0
+        )
     found = _judged(options, asked, folder)
     if options.json:
         print_json(found.as_json())
@@ -62,7 +84,9 @@ def _judged(options: argparse.Namespace, asked: Asked, folder: Path) -> Nyquist:
 
 def _row(found: Nyquist) -> dict[str, Any]:
     m, result = margins_json(found.result.margins), found.result
-    told = {key: (m[key] or {}).get("value") for key in ("distance", "gain", "phase_deg", "delay_s")}
+    told = {
+        key: (m[key] or {}).get("value") for key in ("distance", "gain", "phase_deg", "delay_s")
+    }
     at = {"at_hz": (m["distance"] or {}).get("frequency_hz")}
     ratios = {"scr": result.scr, "lost_below_scr": result.scr_limit}
     return {"verdict": found.verdict} | at | told | ratios | {"remark": "; ".join(found.reasons)}

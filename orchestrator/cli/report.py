@@ -13,7 +13,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     with saying_warnings():
-        page = write_report(options.folder, options.others, options.out, options.against, options.title,
-                            short=options.short)  # fmt: skip
+        page = write_report(
+            options.folder,
+            options.others,
+            options.out,
+            options.against,
+            options.title,
+            short=options.short,
+        )
     print(page)
     return 0

@@ -23,7 +23,13 @@ from orchestrator.cli.side_by_side import Outcome, Report, SideBySide, number_of
 from orchestrator.cli.verdict import add_details_argument, add_verdict_argument, exit_code
 from orchestrator.cores import number_of_cores
 from orchestrator.coupling.observers import Progress
-from orchestrator.errors import INTERRUPTED, CosimError, InputError, ResultsError, RunInterruptedError
+from orchestrator.errors import (
+    INTERRUPTED,
+    CosimError,
+    InputError,
+    ResultsError,
+    RunInterruptedError,
+)
 from orchestrator.federation.choice import Federates
 from orchestrator.fmi.interrupts import calls
 from orchestrator.interop.rules import MASTERS, MasterRules, master_rules
@@ -73,20 +79,31 @@ def run(options: argparse.Namespace) -> int:
         stack.enter_context(saying_how_it_goes_on(lambda: run_request.how_it_goes_on(options)))
         rules = _rules_of(options)
         scenarios = chosen(options)
-        terminal.ask(question for scenario in scenarios for question in scenario.prepared.about_rows)
+        terminal.ask(
+            question for scenario in scenarios for question in scenario.prepared.about_rows
+        )
         engine = federates.choice(options, len(scenarios))
         options.checkpoint = run_request.interval(options)
         name = scenarios[0].prepared.case.name
-        options.out = options.out or Path("results") / (f"{name}_like_{rules.name}" if rules else name)
+        options.out = options.out or Path("results") / (
+            f"{name}_like_{rules.name}" if rules else name
+        )
         folder = made_folder(options.out, "--out")
         if options.resume is None:
             stack.enter_context(held(folder))
         if rules is not None:
-            return _run_like([scenario.prepared for scenario in scenarios], rules, folder, options.order)
+            return _run_like(
+                [scenario.prepared for scenario in scenarios], rules, folder, options.order
+            )
         return _run_all(scenarios, folder, options, engine)
 
 
-def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Namespace, engine: Federates | None) -> int:
+def _run_all(
+    scenarios: Sequence[Scenario],
+    folder: Path,
+    options: argparse.Namespace,
+    engine: Federates | None,
+) -> int:
     """Run the scenarios; each is written as soon as it is done."""
     require_room([scenario.prepared for scenario in scenarios], folder, csv=options.csv)
     mend(folder)
@@ -97,9 +114,13 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
     if options.resume is None:
         _say_unfinished(folder)
     console = terminal.make_console(stderr=options.json)
-    kept = checkpoints.StudyCheckpoints([scenario.prepared for scenario in scenarios], folder, options)
+    kept = checkpoints.StudyCheckpoints(
+        [scenario.prepared for scenario in scenarios], folder, options
+    )
     run_id = kept.run
-    alone = engine is not None or not (options.workers or all(all_ours(one.prepared) for one in scenarios))
+    alone = engine is not None or not (
+        options.workers or all(all_ours(one.prepared) for one in scenarios)
+    )
     workers = 1 if alone else number_of_workers(options.workers, len(scenarios))
     if options.threads is None and workers > 1 and workers >= number_of_cores():
         options.threads = 1  # each core has its scenario
@@ -115,7 +136,8 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
                 place.discard()
             else:
                 save_run(result, place, csv=options.csv)
-                result.dataset = result.dataset if workers == 1 else xr.Dataset()  # it is read again from the disk
+                # it is read again from the disk
+                result.dataset = result.dataset if workers == 1 else xr.Dataset()
         except (CosimError, KeyboardInterrupt) as error:
             place.discard()
             return error
@@ -161,7 +183,10 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
 
 
 def _outcomes(
-    scenarios: Sequence[Scenario], work: Callable[[int, Report], Outcome], console: Console, workers: int
+    scenarios: Sequence[Scenario],
+    work: Callable[[int, Report], Outcome],
+    console: Console,
+    workers: int,
 ) -> Iterator[tuple[int, Outcome]]:
     """What came of all scenarios that were begun, in order, each with a bar meanwhile."""
     bar, tasks = progress_bar(console), dict[int, Any]()
@@ -194,25 +219,38 @@ def _say_unfinished(folder: Path) -> None:
 
 
 def _run_into(
-    place: ScenarioFolder, scenario: Scenario, bar: Progress, kept: checkpoints.StudyCheckpoints,
-    options: argparse.Namespace, engine: Federates | None,
-) -> RunResult:  # fmt: skip
+    place: ScenarioFolder,
+    scenario: Scenario,
+    bar: Progress,
+    kept: checkpoints.StudyCheckpoints,
+    options: argparse.Namespace,
+    engine: Federates | None,
+) -> RunResult:
     """Run a scenario; its recording grows in its folder."""
     recording = RecordingFolder(place.path / FOLDER, scenario.prepared, {"run": place.run})
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RunEndedWarning)  # it is said at the end
         return scenario.run(
-            linear=options.linear, observers=[bar], recording=recording,
-            checkpoints=kept.of(scenario.name, recording, place), federates=engine, threads=options.threads,
-        ).result  # fmt: skip
+            linear=options.linear,
+            observers=[bar],
+            recording=recording,
+            checkpoints=kept.of(scenario.name, recording, place),
+            federates=engine,
+            threads=options.threads,
+        ).result
 
 
 def _early_end(
-    stopped: Mapping[str, BaseException], scenarios: Sequence[Scenario], results: Sequence[RunResult]
+    stopped: Mapping[str, BaseException],
+    scenarios: Sequence[Scenario],
+    results: Sequence[RunResult],
 ) -> EarlyEnd:
     begun = {r.modes.prepared.name for r in results} | set(stopped)
     never = {scenario.name: scenario.title for scenario in scenarios if scenario.name not in begun}
-    kept = any(r.modes.prepared.name in stopped and not isinstance(r.failure, ResultsError) for r in results)
+    kept = any(
+        r.modes.prepared.name in stopped and not isinstance(r.failure, ResultsError)
+        for r in results
+    )
     places = ", ".join(scenario.title for scenario in scenarios if scenario.name in stopped)
     return EarlyEnd(places, any(map(_is_interrupt, stopped.values())), kept, never)
 
@@ -222,13 +260,19 @@ def _is_interrupt(error: BaseException) -> bool:
 
 
 def _save_together(
-    results: Sequence[RunResult], said: Sequence[str], folder: Path, run_id: str,
-    stopped: Mapping[str, BaseException], early_end: EarlyEnd | None,
-) -> list[Path]:  # fmt: skip
+    results: Sequence[RunResult],
+    said: Sequence[str],
+    folder: Path,
+    run_id: str,
+    stopped: Mapping[str, BaseException],
+    early_end: EarlyEnd | None,
+) -> list[Path]:
     whole = [r for r in results if not isinstance(r.failure, ResultsError)]
     names = [r.modes.prepared.name for r in whole]
     try:
-        with staged(folder, run_id, [name for name in names if (folder / name).is_dir()]) as staging:
+        with staged(
+            folder, run_id, [name for name in names if (folder / name).is_dir()]
+        ) as staging:
             return save_study(results, staging, said, early_end)
     except ResultsError:
         if not any(isinstance(error, ResultsError) for error in stopped.values()):
@@ -240,25 +284,37 @@ def _end(stopped: Mapping[str, BaseException], folder: Path) -> int:
     where, text = "", ""
     for scenario, error in stopped.items():
         if isinstance(error, ResultsError):
-            begun = [path.name for path in unfinished(folder) if path.name.startswith(scenario + PARTIAL)]
+            begun = [
+                path.name for path in unfinished(folder) if path.name.startswith(scenario + PARTIAL)
+            ]
             where += f" ({', '.join(begun)})" if begun else ""
         head = "" if _is_interrupt(error) else "[bold red]error:[/bold red] "
         text += f"{head}{escape(f'scenario {scenario!r}: {str(error) or calls.how}')}\n"
-    terminal.make_errors().print(f"{text}{escape(f'What was computed until then is in {folder}{where}')}")
+    terminal.make_errors().print(
+        f"{text}{escape(f'What was computed until then is in {folder}{where}')}"
+    )
     return INTERRUPTED if any(map(_is_interrupt, stopped.values())) else 1
 
 
 def _rules_of(options: argparse.Namespace) -> MasterRules | None:
     if options.order and not options.like:
-        raise InputError("--order goes with --like MASTER; our own order stands in the case, under [solver]")
+        raise InputError(
+            "--order goes with --like MASTER; our own order stands in the case, under [solver]"
+        )
     if options.like and (options.threads or options.workers):
-        raise InputError("--like steps as another master does, on one thread; leave out --threads, --workers or --like")
+        raise InputError(
+            "--like steps as another master does, on one thread; leave out --threads, --workers or --like"
+        )
     if options.like and options.tolerance is not None:
-        raise InputError("--like steps as another master does, in fixed steps; leave out --tolerance or --like")
+        raise InputError(
+            "--like steps as another master does, in fixed steps; leave out --tolerance or --like"
+        )
     return master_rules(options.like) if options.like else None
 
 
-def _run_like(scenarios: Sequence[PreparedScenario], rules: MasterRules, folder: Path, turns: str | None) -> int:
+def _run_like(
+    scenarios: Sequence[PreparedScenario], rules: MasterRules, folder: Path, turns: str | None
+) -> int:
     """Run scenarios as another master would; their trajectories are all that is written.
 
     ``turns`` are components with commas between them, in the order in which they step; the master's own where None."""
@@ -269,5 +325,7 @@ def _run_like(scenarios: Sequence[PreparedScenario], rules: MasterRules, folder:
         path = folder / prepared.name / "trajectory"
         with staged(folder / prepared.name, run_id) as staging:
             save_dataset(dataset, staging / "trajectory")
-        print(f"{prepared.name} like {rules.title}: {dataset.sizes['time']} rows in {path}.nc and .csv")
+        print(
+            f"{prepared.name} like {rules.title}: {dataset.sizes['time']} rows in {path}.nc and .csv"
+        )
     return 0

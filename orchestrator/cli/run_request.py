@@ -17,18 +17,32 @@ from orchestrator.study.checkpoints import EVERY
 
 _REQUEST = "request.json"
 _OF_THE_RUN: Mapping[str, Any] = {
-    "case": None, "scenario": [], "set": [], "parameters": [], "step": None, "schedule": None, "stop": None,
-    "tolerance": None, "sharing": None, "force": [], "fault": [], "linear": False, "csv": True,
-    "require_checkpoint": False, "checkpoint": None,
-}  # fmt: skip
+    "case": None,
+    "scenario": [],
+    "set": [],
+    "parameters": [],
+    "step": None,
+    "schedule": None,
+    "stop": None,
+    "tolerance": None,
+    "sharing": None,
+    "force": [],
+    "fault": [],
+    "linear": False,
+    "csv": True,
+    "require_checkpoint": False,
+    "checkpoint": None,
+}
 """Options as they are where nothing is said; a resumed run keeps those that it had."""
 
 _GIVEN_ANEW = "checkpoint"  # the one of them that may go with ``--resume``: no value depends on it
 
 _NOT_WITH_RESUME: Mapping[str, Any] = {
     **{name: unsaid for name, unsaid in _OF_THE_RUN.items() if name != _GIVEN_ANEW},
-    "out": None, "like": None, "order": None,
-}  # fmt: skip
+    "out": None,
+    "like": None,
+    "order": None,
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -62,7 +76,9 @@ def with_request(options: argparse.Namespace) -> argparse.Namespace:
         kept[_GIVEN_ANEW] = options.checkpoint
     kept["set"] = [(name, value) for name, value in kept["set"]]
     kept["parameters"] = [Path(path) for path in kept["parameters"]]
-    return argparse.Namespace(**{**vars(options), **kept, "out": options.resume, "given_anew": given_anew})
+    return argparse.Namespace(
+        **{**vars(options), **kept, "out": options.resume, "given_anew": given_anew}
+    )
 
 
 def interval(options: argparse.Namespace) -> float:
@@ -105,6 +121,8 @@ def asked_by(folder: Path) -> str | None:
 
 def keep_request(folder: Path, options: argparse.Namespace) -> None:
     content = {name: getattr(options, name) for name in _OF_THE_RUN} | {"run": options.run}
-    content["case"] = options.case if options.case in built_in_cases() else str(Path(options.case).resolve())
+    content["case"] = (
+        options.case if options.case in built_in_cases() else str(Path(options.case).resolve())
+    )
     content["parameters"] = [str(path.resolve()) for path in options.parameters]
     write_text(folder / CHECKPOINTS / _REQUEST, json.dumps(content, indent=1))

@@ -20,7 +20,10 @@ def on_one_thread(statistics: StepStatistics) -> str:
     by_reason: dict[str, list[str]] = {}
     for name, reason in statistics.one_thread.items():
         by_reason.setdefault(reason, []).append(name)
-    parts = [f"{', '.join(names[:4])}{' …' if len(names) > 4 else ''} ({why})" for why, names in by_reason.items()]
+    parts = [
+        f"{', '.join(names[:4])}{' …' if len(names) > 4 else ''} ({why})"
+        for why, names in by_reason.items()
+    ]
     hint = "; with --native several threads can" if PYTHON_BACKED in by_reason else ""
     return f"One thread steps {'; '.join(parts)}{hint}." if parts else ""
 
@@ -29,7 +32,11 @@ def on_adaptive_steps(prepared: PreparedScenario, counts: StepCounts) -> str:
     taken = f"{counts.accepted} steps" if counts.accepted else "no step"
     if counts.accepted:
         taken += f" of {1e3 * counts.shortest:.3g} to {1e3 * counts.longest:.3g} ms"
-    back = "1 pair of steps was" if counts.rejected == 1 else f"{counts.rejected or 'no'} pairs of steps were"
+    back = (
+        "1 pair of steps was"
+        if counts.rejected == 1
+        else f"{counts.rejected or 'no'} pairs of steps were"
+    )
     return (
         f"{prepared.title}: tolerance {prepared.schedule.tolerance:g}: {taken}; {back} taken back. The modes above are "
         "those of the fixed communication step."
@@ -37,7 +44,12 @@ def on_adaptive_steps(prepared: PreparedScenario, counts: StepCounts) -> str:
 
 
 def print_run(
-    console: Console, results: Sequence[RunResult], beside: Sequence[str], early_end: EarlyEnd | None, *, details: bool
+    console: Console,
+    results: Sequence[RunResult],
+    beside: Sequence[str],
+    early_end: EarlyEnd | None,
+    *,
+    details: bool,
 ) -> None:
     if early_end is not None:
         colour = "yellow" if early_end.interrupted else "red"
@@ -59,7 +71,9 @@ def print_run(
         if r.statistics and r.statistics.adaptive:
             words = on_adaptive_steps(r.modes.prepared, r.statistics.adaptive)
             console.print(escape(words), soft_wrap=True, highlight=False)
-    for words in dict.fromkeys(text for r in results if r.statistics and (text := on_one_thread(r.statistics))):
+    for words in dict.fromkeys(
+        text for r in results if r.statistics and (text := on_one_thread(r.statistics))
+    ):
         console.print(escape(words), soft_wrap=True)
     if details:
         print_details(console, modes)

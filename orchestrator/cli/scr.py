@@ -22,8 +22,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     convention, console = CONVENTION.format(options.converter_current), make_console()
-    found = {s: weakest_first(s.strengths(options.converter_current, options.rating)) for s in chosen(options)}
-    told = [{"name": s.name, "buses": [bus.as_json() for bus in buses]} for s, buses in found.items()]
+    found = {
+        s: weakest_first(s.strengths(options.converter_current, options.rating))
+        for s in chosen(options)
+    }
+    told = [
+        {"name": s.name, "buses": [bus.as_json() for bus in buses]} for s, buses in found.items()
+    ]
     about = next(iter(found)).prepared.about
     kept = {key: about[key] for key in ("case", "models", "basis", "questions")}
     content = kept | {"convention": convention, "scenarios": told}
@@ -35,9 +40,16 @@ def run(options: argparse.Namespace) -> int:
     for scenario, buses in found.items():
         alike.setdefault(json.dumps([bus.as_json() for bus in buses]), []).append(scenario.title)
     for rows, titles in alike.items():
-        table = make_table(", ".join(titles), "Bus", "S_sc [MVA]", "SCR", "of [MVA]", "X/R", "Converters")
+        table = make_table(
+            ", ".join(titles), "Bus", "S_sc [MVA]", "SCR", "of [MVA]", "X/R", "Converters"
+        )
         for x in json.loads(rows):
-            numbers = (x["s_sc_mva"], ".0f"), (x["scr"], ".2f"), (x["rating_mva"], ".5g"), (x["x_r"], ".1f")
+            numbers = (
+                (x["s_sc_mva"], ".0f"),
+                (x["scr"], ".2f"),
+                (x["rating_mva"], ".5g"),
+                (x["x_r"], ".1f"),
+            )
             figures = ["–" if value is None else f"{value:{form}}" for value, form in numbers]
             table.add_row(x["bus"], *figures, ", ".join(x["converters"]))
         console.print(table, "")

@@ -20,7 +20,13 @@ from orchestrator.screening.study import Shard
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_study_arguments("screen", STUDY, parser)
-    option(parser, "--shard", "I/N", "compute the part I of N only, and keep its points", read=Shard.parse)
+    option(
+        parser,
+        "--shard",
+        "I/N",
+        "compute the part I of N only, and keep its points",
+        read=Shard.parse,
+    )
     repeatable(parser, "--merge", "DIR", "take the points that a part kept there", read=Path)
 
 

@@ -23,7 +23,9 @@ from orchestrator.sensitivities.view import left_out, sensitivity_table
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
     add_request_arguments(parser, SensitivitiesRequest)
-    option(parser, "--out", "DIR", "write sensitivities.csv and sensitivities.json there", read=Path)
+    option(
+        parser, "--out", "DIR", "write sensitivities.csv and sensitivities.json there", read=Path
+    )
     add_json_argument(parser)
     add_verdict_argument(parser)
 
@@ -36,7 +38,9 @@ def run(options: argparse.Namespace) -> int:
         return _compute(scenarios, options, folder)
 
 
-def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder: Path | None) -> int:
+def _compute(
+    scenarios: Sequence[Scenario], options: argparse.Namespace, folder: Path | None
+) -> int:
     request, found = SensitivitiesRequest(**asked_by(options, SensitivitiesRequest)), []
     for scenario in scenarios:
         with shown_progress("Parameters", shown=not options.json) as report:
@@ -56,7 +60,9 @@ def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder:
             warn(one.result.modes.prepared.name, one.result.warnings)
             console.print(sensitivity_table(one.result), "")
             if missing := left_out(one.result):
-                console.print(f"{len(missing)} of {len(one.result.rows)} parameters have no derivative", "")
+                console.print(
+                    f"{len(missing)} of {len(one.result.rows)} parameters have no derivative", ""
+                )
         if written:
             console.print(escape(f"Written: {', '.join(map(str, written))}"), soft_wrap=True)
     failed = int(all(row.derivative is None for one in found for row in one.result.rows))

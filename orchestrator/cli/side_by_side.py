@@ -54,13 +54,16 @@ class SideBySide:
     def _make(self) -> None:
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
-        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGUSR1})
+        blocked = signal.pthread_sigmask(
+            signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGUSR1}
+        )
         try:
             for _ in range(self._number):
                 ours, theirs = Pipe()
                 parent = os.getpid()
                 with warnings.catch_warnings():
-                    warnings.simplefilter("ignore", DeprecationWarning)  # BLAS ends its threads before a copy is made
+                    # BLAS ends its threads before a copy is made
+                    warnings.simplefilter("ignore", DeprecationWarning)
                     process = os.fork()
                 if not process:
                     for other in (ours, *self._copies):
@@ -71,7 +74,9 @@ class SideBySide:
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
 
-    def outcomes(self, count: int, report: Callable[[int, int, int], None]) -> list[tuple[int, Outcome]]:
+    def outcomes(
+        self, count: int, report: Callable[[int, int, int], None]
+    ) -> list[tuple[int, Outcome]]:
         """What came of all that were begun, in order.
 
         After one that failed no other is begun. Ctrl-C and SIGTERM end all that are under way, at their next step.
@@ -87,7 +92,8 @@ class SideBySide:
                     while waiting and idle:
                         pipe = idle.pop(0)
                         under_way[pipe] = waiting.pop(0)
-                        with suppress(BrokenPipeError):  # a copy that died while it was idle is found below
+                        # a copy that died while it was idle is found below
+                        with suppress(BrokenPipeError):
                             pipe.send(under_way[pipe])
                 if not under_way:
                     break
@@ -108,7 +114,9 @@ class SideBySide:
                 told = True
                 waiting.clear()
                 for pipe in under_way:
-                    os.kill(self._copies[pipe], signal.SIGTERM if calls.terminated else signal.SIGUSR1)
+                    os.kill(
+                        self._copies[pipe], signal.SIGTERM if calls.terminated else signal.SIGUSR1
+                    )
         if told and not any(_was_interrupted(outcome) for outcome in done.values()):
             if len(done) == count:
                 raise KeyboardInterrupt  # it came when all was done but what concerns all scenarios
@@ -150,7 +158,10 @@ def _was_interrupted(outcome: Outcome) -> bool:
 
 
 def _serve(
-    parent: int, pipe: Connection, work: Callable[[int, Report], Outcome], mask: set[int | signal.Signals]
+    parent: int,
+    pipe: Connection,
+    work: Callable[[int, Report], Outcome],
+    mask: set[int | signal.Signals],
 ) -> None:
     """In a copy: do what is asked for until the pipe ends, or the original does; never return.
 

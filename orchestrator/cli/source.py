@@ -10,7 +10,14 @@ from orchestrator.api.case import load
 from orchestrator.api.scenario import UnusualDataWarning
 from orchestrator.api.source import contest_sources, source
 from orchestrator.cli.arguments import add_json_argument, add_kept_argument, add_options
-from orchestrator.cli.terminal import keep_json, make_console, print_json, print_parts, print_questions, saying_warnings
+from orchestrator.cli.terminal import (
+    keep_json,
+    make_console,
+    print_json,
+    print_parts,
+    print_questions,
+    saying_warnings,
+)
 from orchestrator.cli.verdict import add_details_argument
 from orchestrator.errors import InputError
 from orchestrator.oscillations.view import Sources, opinions_table, sources_table
@@ -44,7 +51,9 @@ def run(options: argparse.Namespace) -> int:
     keep_json(records, options.out, "source")
     if options.html:
         if options.contest:
-            raise InputError("--html: it is the page of one record; give RUN in the place of --contest")
+            raise InputError(
+                "--html: it is the page of one record; give RUN in the place of --contest"
+            )
         write_page(options.html, found[0].html())
     if options.json:
         print_json(records if options.contest else records[0])
@@ -55,13 +64,18 @@ def run(options: argparse.Namespace) -> int:
 
 def _print(found: list[Sources], *, details: bool) -> None:
     console = make_console()
-    print_parts(console, (escape(f"{one.label}: {remark}") for one in found for remark in one.remarks))
+    print_parts(
+        console, (escape(f"{one.label}: {remark}") for one in found for remark in one.remarks)
+    )
     console.print(sources_table(found))
     for one in found:
         for x in one:
             head = f"{one.label}, {x.found.frequency:.4g} Hz"
             said: list[RenderableType] = [escape(f"{head}: {x.reason}. Next: {x.advice}.")]
             if details:
-                text = ", ".join(f"{name} {value:.3g}" for name, value in list(x.found.amplitudes.items())[:_SHOWN])
+                text = ", ".join(
+                    f"{name} {value:.3g}"
+                    for name, value in list(x.found.amplitudes.items())[:_SHOWN]
+                )
                 said += [opinions_table(head, x), escape(f"Amplitudes, the clearest first: {text}")]
             print_parts(console, said)

@@ -36,28 +36,44 @@ def _print(choice: StepChoice) -> None:
     console = make_console()
     console.print(
         f"{choice.prepared.title}: critical modes without a communication step, least damped first: "
-        + "; ".join(f"{z.imag / (2 * np.pi):.4g} Hz, {damping_percent(z):.2f} %" for z in choice.critical)
+        + "; ".join(
+            f"{z.imag / (2 * np.pi):.4g} Hz, {damping_percent(z):.2f} %" for z in choice.critical
+        )
     )
-    table = make_table("Steps", "Schedule", "Step", "Δf [mHz]", "Δξ [points]", "Growth [1/s]", "Verdict")
+    table = make_table(
+        "Steps", "Schedule", "Step", "Δf [mHz]", "Δξ [points]", "Growth [1/s]", "Verdict"
+    )
     for trial in choice.trials:
         step = f"{1e6 * trial.step_size:g} µs"
         if trial.refused:
             table.add_row(trial.schedule, step, "–", "–", "–", "not possible")
             continue
-        hertz, points = (float(errors[np.argmax(np.abs(errors))]) for errors in (trial.hertz, trial.points))
+        hertz, points = (
+            float(errors[np.argmax(np.abs(errors))]) for errors in (trial.hertz, trial.points)
+        )
         growth = f"{trial.growth:+.3g}" if trial.growth else "none"
         table.add_row(
-            trial.schedule, step, f"{1e3 * hertz:+.3g}", f"{points:+.3g}", growth, _verdict(trial, choice.allowed)
+            trial.schedule,
+            step,
+            f"{1e3 * hertz:+.3g}",
+            f"{points:+.3g}",
+            growth,
+            _verdict(trial, choice.allowed),
         )
     console.print(table)
     if choice.left_out:
         steps = ", ".join(f"{1e6 * step:g} µs" for step in choice.left_out)
-        console.print(f"not tried, as an event or the end of the run does not fall on it: {steps}", style="yellow")
+        console.print(
+            f"not tried, as an event or the end of the run does not fall on it: {steps}",
+            style="yellow",
+        )
     for text in dict.fromkeys(f"{t.schedule}: {t.refused}" for t in choice.trials if t.refused):
         console.print(text, style="yellow")
     for text in dict.fromkeys(doubt for trial in choice.trials for doubt in trial.doubts):
         console.print(text, style="yellow")
-    console.print(f"Largest step within {choice.allowed.hertz:g} Hz and {choice.allowed.points:g} points of damping:")
+    console.print(
+        f"Largest step within {choice.allowed.hertz:g} Hz and {choice.allowed.points:g} points of damping:"
+    )
     for name in choice.schedules:
         best = choice.largest(name)
         said = "none of those tried" if best is None else f"{1e6 * best.step_size:g} µs"

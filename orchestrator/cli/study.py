@@ -15,7 +15,14 @@ from orchestrator.api.progress import shown_progress
 from orchestrator.cli import arguments
 from orchestrator.cli.case_arguments import add_case_arguments, asked_of_case, case_of
 from orchestrator.cli.interrupted import saying_how_it_goes_on
-from orchestrator.cli.terminal import make_console, make_errors, print_json, print_parts, print_questions, say
+from orchestrator.cli.terminal import (
+    make_console,
+    make_errors,
+    print_json,
+    print_parts,
+    print_questions,
+    say,
+)
 from orchestrator.cli.verdict import add_verdict_argument
 from orchestrator.points.executor import Executor
 from orchestrator.points.points import CountReport
@@ -27,7 +34,8 @@ from orchestrator.safe_files import made_folder
 
 Result = TypeVar("Result")
 
-EVERY = 10.0  # where there is no terminal to draw a bar on, a line says how far it is after so long [s]
+# where there is no terminal to draw a bar on, a line says how far it is after so long [s]
+EVERY = 10.0
 
 
 class _Lines:
@@ -49,9 +57,12 @@ class Progressing:
         self._folder, self._done, self._total = folder, 0, 0
 
     def compute(
-        self, study: Callable[[CountReport], Result], executor: Executor, console: Console,
+        self,
+        study: Callable[[CountReport], Result],
+        executor: Executor,
+        console: Console,
         told: tuple[str, str] | None = None,
-    ) -> Result:  # fmt: skip
+    ) -> Result:
         """Run the study, and close its executor; ``told`` is for lines on standard error where there is no terminal."""
         lines = _Lines(None if console.is_terminal or console.is_jupyter else told)
         with progress_bar(console) as bar:
@@ -79,7 +90,9 @@ AnyStudy = PointStudy[..., Any, Any, Any]
 Simple = StudyAtOnce[..., Any]
 
 
-def add_study_arguments(name: str, study: AnyStudy | Simple, parser: argparse.ArgumentParser) -> None:
+def add_study_arguments(
+    name: str, study: AnyStudy | Simple, parser: argparse.ArgumentParser
+) -> None:
     add_case_arguments(parser, several=study.of_several)
     arguments.add_request_arguments(parser, study.asks)
     if isinstance(study, PointStudy):
@@ -132,14 +145,14 @@ def working_in(
         def compute(*more: object) -> Any:
             others = any_kept(folder / POINTS)
             found = progress.compute(
-                lambda report: study.compute(planned, executor, folder, report, *more), executor,
+                lambda report: study.compute(planned, executor, folder, report, *more),
+                executor,
                 make_console(stderr=options.json),
-            )  # fmt: skip
+            )
             # parts are of one study; a design has its tables elsewhere
             if others and not any(more) and not getattr(found.result, "stored", True):
-                text = (
-                    f"{folder} holds another study, with no {study.counted[:-1]} of this one: its tables are replaced"
-                )
+                point = study.counted[:-1]
+                text = f"{folder} holds another study, with no {point} of this one: its tables are replaced"
                 say("warning", [f"{text}, and its points stay; give another --out to keep both"])
             return found
 
@@ -148,7 +161,12 @@ def working_in(
 
 
 def shown(
-    options: argparse.Namespace, study: AnyStudy, found: Any, folder: Path, written: Sequence[Path], end: str = ""
+    options: argparse.Namespace,
+    study: AnyStudy,
+    found: Any,
+    folder: Path,
+    written: Sequence[Path],
+    end: str = "",
 ) -> int:
     """Print what was found, by default with a line on its files at the end; returns the exit code."""
     result = found.result
@@ -162,9 +180,12 @@ def shown(
 
 
 def present(
-    options: argparse.Namespace, as_json: Callable[[], object], parts: Iterable[RenderableType],
-    remarks: Iterable[str] = (), end: str = "",
-) -> None:  # fmt: skip
+    options: argparse.Namespace,
+    as_json: Callable[[], object],
+    parts: Iterable[RenderableType],
+    remarks: Iterable[str] = (),
+    end: str = "",
+) -> None:
     """Print a study: JSON, or its parts and then its last line; remarks on standard error in either case."""
     console = make_console(stderr=options.json)
     if options.json:

@@ -59,7 +59,9 @@ def say(kind: str, texts: Iterable[str]) -> None:
         make_errors().print(f"[bold yellow]{kind}:[/bold yellow] {escape(text)}")
 
 
-def print_named_modes(console: Console, results: Sequence[ModesResult], *, shapes: bool = True) -> None:
+def print_named_modes(
+    console: Console, results: Sequence[ModesResult], *, shapes: bool = True
+) -> None:
     """The modes that a case names, beside somebody else's figures for them, and who swings in them."""
     from orchestrator.study import tables  # noqa: PLC0415 - imports all that a run needs
 
@@ -75,11 +77,17 @@ def print_named_modes(console: Console, results: Sequence[ModesResult], *, shape
 
 def print_sources(console: Console, results: Sequence[ModesResult]) -> None:
     """Which linear models do not come from perturbing the running FMUs; nothing where all do."""
-    said = {r.prepared.title: text for r in results if (text := exceptions_in_words(r.linearised, r.fit_errors))}
+    said = {
+        r.prepared.title: text
+        for r in results
+        if (text := exceptions_in_words(r.linearised, r.fit_errors))
+    }
     if len(set(said.values())) == 1 and len(said) == len(results):
         said = {"": next(iter(said.values()))}
     for title, text in said.items():
-        console.print(f"{title}: {text}" if title else text, soft_wrap=True, highlight=False, markup=False)
+        console.print(
+            f"{title}: {text}" if title else text, soft_wrap=True, highlight=False, markup=False
+        )
 
 
 def print_questions(scenarios: Sequence[PreparedScenario], *, as_json: bool) -> None:
@@ -110,7 +118,10 @@ def print_findings(results: Sequence[RunResult]) -> None:
     """Say on standard error what runs did wrong; a failure is said where the study ends."""
     for result in results:
         known = (str(result.failure), *result.modes.warnings)
-        name, found = result.modes.prepared.name, [f.message for f in result.findings if f.message not in known]
+        name, found = (
+            result.modes.prepared.name,
+            [f.message for f in result.findings if f.message not in known],
+        )
         say("found", (f"scenario {name!r}: {text}" for text in found))
 
 
@@ -131,7 +142,10 @@ def saying_warnings() -> Iterator[None]:
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always", ResultsWarning)
         yield
-    say("warning", dict.fromkeys(str(w.message) for w in found if issubclass(w.category, ResultsWarning)))
+    say(
+        "warning",
+        dict.fromkeys(str(w.message) for w in found if issubclass(w.category, ResultsWarning)),
+    )
     for other in found:
         if not issubclass(other.category, ResultsWarning):
             warnings.warn_explicit(other.message, other.category, other.filename, other.lineno)

@@ -17,7 +17,11 @@ from orchestrator.study.modes import ModesResult
 
 
 def add_verdict_argument(parser: argparse.ArgumentParser) -> None:
-    switch(parser, "--fail-unstable", "end with exit code 1 unless everything is known to be stable, at any frequency")
+    switch(
+        parser,
+        "--fail-unstable",
+        "end with exit code 1 unless everything is known to be stable, at any frequency",
+    )
 
 
 def print_stability(
@@ -31,7 +35,9 @@ def stability_lines(verdicts: Mapping[str, Stability], outside: Mapping[str, str
     lines = [_headline(verdicts)] if len(verdicts) != 1 else []
     for title, verdict in verdicts.items():
         head = "" if len(verdicts) == 1 else "  "
-        lines.append(head + VerdictSentence(verdict.stable, verdict.verdict, verdict.because()).markup(title))
+        lines.append(
+            head + VerdictSentence(verdict.stable, verdict.verdict, verdict.because()).markup(title)
+        )
         if outside.get(title):
             lines.append(f"{head}  {escape(outside[title])}")
     return lines
@@ -50,7 +56,10 @@ def add_details_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def print_answers(
-    console: Console, answers: Sequence[ScenarioAnswer], results: Sequence[ModesResult], beside: Sequence[str]
+    console: Console,
+    answers: Sequence[ScenarioAnswer],
+    results: Sequence[ModesResult],
+    beside: Sequence[str],
 ) -> None:
     ranges = [r.hidden.frequency_range for r in results if r.hidden is not None]
     console.print(answers_table(answers, ranges[0] if ranges else ELECTROMECHANICAL_HZ))

@@ -23,8 +23,12 @@ from orchestrator.report.progress import progress_bar
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser, "verify", INTERRUPTED=INTERRUPTED, DOES_NOT_HOLD=DOES_NOT_HOLD)
-    add_options(parser.add_mutually_exclusive_group(), "verify which", reactances=read_reactances,
-                rows=lambda text: tuple(text.split(",")))  # fmt: skip
+    add_options(
+        parser.add_mutually_exclusive_group(),
+        "verify which",
+        reactances=read_reactances,
+        rows=lambda text: tuple(text.split(",")),
+    )
     add_executor_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
 
@@ -35,7 +39,9 @@ def run(options: argparse.Namespace) -> int:
         found = [_verified(options, place) for place in places]
     if options.json:
         said = [one for one, _ in found]
-        print_json(said[0] if options.certificate.suffix.lower() != ".fmu" else {"certificates": said})
+        print_json(
+            said[0] if options.certificate.suffix.lower() != ".fmu" else {"certificates": said}
+        )
     codes = [code for _, code in found]
     return DOES_NOT_HOLD if DOES_NOT_HOLD in codes else next(filter(None, codes), 0)
 
@@ -45,20 +51,31 @@ def _verified(options: argparse.Namespace, place: Path) -> tuple[dict[str, Any],
     with progress_bar(console) as bar:
         task = bar.add_task("Points", total=None)
         found = verified(
-            place, () if options.files_only else options.points or options.rows,
+            place,
+            () if options.files_only else options.points or options.rows,
             lambda imports: choose_executor(options, imports),
-            lambda done, total: bar.update(task, completed=done, total=total), every=options.all,
-        )  # fmt: skip
+            lambda done, total: bar.update(task, completed=done, total=total),
+            every=options.all,
+        )
     content, norm = found.content, found.parts is POINTS
-    said = {"holds": found.holds, "verdict": content["verdict"], **({"points": content["judged"]} if norm else {}),
-            "passes": found.holds and found.verdict == PASSES, "faults": found.faults,
-            "agreed": found.agreed, "computed": found.computed, "later_rows": list(found.later)}  # fmt: skip
+    said = {
+        "holds": found.holds,
+        "verdict": content["verdict"],
+        **({"points": content["judged"]} if norm else {}),
+        "passes": found.holds and found.verdict == PASSES,
+        "faults": found.faults,
+        "agreed": found.agreed,
+        "computed": found.computed,
+        "later_rows": list(found.later),
+    }
     if not options.json:
         if place != options.certificate:
             console.print(escape(f"{content['title']}:"), highlight=False)
         _show(found, console, norm=norm)
     code = exit_code(found.verdict, refused=_refused(content)) if found.holds else DOES_NOT_HOLD
-    return said | ({"code": content.get("code", NTS631)} if place != options.certificate else {}), code
+    return said | (
+        {"code": content.get("code", NTS631)} if place != options.certificate else {}
+    ), code
 
 
 def _show(found: Verified, console: Console, *, norm: bool) -> None:
@@ -69,21 +86,31 @@ def _show(found: Verified, console: Console, *, norm: bool) -> None:
     console.print("")
     one, every = found.parts.one, found.content["points" if norm else "rows"]
     if found.chosen and not found.computed:
-        console.print(f"No {one} was computed anew: with other files that would say nothing of this certificate.")
+        console.print(
+            f"No {one} was computed anew: with other files that would say nothing of this certificate."
+        )
     if found.computed and norm:
-        console.print(f"Allowed are differences of {TOLERANCE:g} of an eigenvalue and of a signal's range "
-                      f"({TOLERANCE_IDENTIFIED:g} of an eigenvalue with an identified converter).")  # fmt: skip
+        console.print(
+            f"Allowed are differences of {TOLERANCE:g} of an eigenvalue and of a signal's range "
+            f"({TOLERANCE_IDENTIFIED:g} of an eigenvalue with an identified converter)."
+        )
     if 0 < len(found.computed) < len(every):
-        console.print(f"{len(found.computed)} of {len(every)} {one}s were computed anew; --all takes every one.")
+        console.print(
+            f"{len(found.computed)} of {len(every)} {one}s were computed anew; --all takes every one."
+        )
     if found.holds:
-        console.print("The certificate holds. That is no proof of who made it: hashes guard against accidents only.")
+        console.print(
+            "The certificate holds. That is no proof of who made it: hashes guard against accidents only."
+        )
         console.print(_verdict(found, norm=norm), soft_wrap=True, highlight=False)
     else:
         count = f"{len(found.faults)} disagreement{'' if len(found.faults) == 1 else 's'}"
         console.print(f"[bold red]The certificate does not hold: {count}.[/]")
         if (issued := issued_by(found.content)) not in ("", THIS):
-            console.print(f"gfor-cosim {issued} issued it, and this is {THIS}, whose tables may ask for something "
-                          "else.")  # fmt: skip
+            console.print(
+                f"gfor-cosim {issued} issued it, and this is {THIS}, whose tables may ask for something "
+                "else."
+            )
 
 
 def _refused(content: Mapping[str, Any]) -> bool:

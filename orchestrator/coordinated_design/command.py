@@ -7,7 +7,11 @@ from rich.markup import escape
 
 from orchestrator.coordinated_design import view, words
 from orchestrator.coordinated_design.point import PointsTask
-from orchestrator.coordinated_design.study import PointsDesignRequest, design_over_points, plan_points_design
+from orchestrator.coordinated_design.study import (
+    PointsDesignRequest,
+    design_over_points,
+    plan_points_design,
+)
 from orchestrator.coordinated_design.view import CoordinatedDesign
 from orchestrator.errors import NOT_MET
 from orchestrator.operating_points.item import Status
@@ -27,13 +31,21 @@ def _code(found: CoordinatedDesign, fail_unstable: bool) -> int:
     """1 where no point has modes, gfor-cosim itself failed somewhere, or instability fails it; `NOT_MET` where a
     damping that was asked for is not reached everywhere, or that is not known."""
     verdict = found.result.verdict
-    internal = any(Status.INTERNAL in (point.before.status, point.after.status) for point in verdict.points)
+    internal = any(
+        Status.INTERNAL in (point.before.status, point.after.status) for point in verdict.points
+    )
     if internal or not verdict.known or (fail_unstable and not verdict.stable):
         return 1
     return NOT_MET if verdict.wanted is not None and not verdict.met else 0
 
 
 STUDY = PointStudy(
-    request=PointsDesignRequest, plan=plan_points_design, run=design_over_points, shown=CoordinatedDesign,
-    task=PointsTask, parts=_parts, code=_code, remarks=lambda found: words.remarks(found.result.verdict),
-)  # fmt: skip
+    request=PointsDesignRequest,
+    plan=plan_points_design,
+    run=design_over_points,
+    shown=CoordinatedDesign,
+    task=PointsTask,
+    parts=_parts,
+    code=_code,
+    remarks=lambda found: words.remarks(found.result.verdict),
+)

@@ -10,7 +10,8 @@ from orchestrator.coordinated_design.open_loops import OpenLoops, Setting
 from orchestrator.coordinated_design.point import PointModes
 from orchestrator.errors import AnalysisError
 
-_OPEN = 1e-9  # part of the gains with which the loops are as good as open, and have all their states
+# part of the gains with which the loops are as good as open, and have all their states
+_OPEN = 1e-9
 
 
 def followed(loops: OpenLoops, setting: Setting, value: complex) -> complex:
@@ -27,7 +28,10 @@ def followed(loops: OpenLoops, setting: Setting, value: complex) -> complex:
 
 
 def with_followed_names(
-    names: Sequence[str], before: Sequence[PointModes], after: Sequence[PointModes], setting: Setting
+    names: Sequence[str],
+    before: Sequence[PointModes],
+    after: Sequence[PointModes],
+    setting: Setting,
 ) -> list[PointModes]:
     """The points with a setting, whose names are borne by the modes that bear them without it.
 
@@ -37,7 +41,10 @@ def with_followed_names(
         named = dict(other.named)
         for name in names if one.loops is not None and other.computed else ():
             named.pop(name, None)
-            if name in one.named and (place := _place(one, other, setting, one.named[name])) is not None:
+            if (
+                name in one.named
+                and (place := _place(one, other, setting, one.named[name])) is not None
+            ):
                 named[name] = place
         found.append(replace(other, named=named))
     return found
@@ -50,4 +57,8 @@ def _place(one: PointModes, other: PointModes, setting: Setting, start: int) -> 
     except AnalysisError:
         return None
     place = min(other.swinging, key=lambda k: abs(other.values[k] - value), default=None)
-    return place if place is not None and abs(other.values[place] - value) < UNMOVED * abs(value) else None
+    return (
+        place
+        if place is not None and abs(other.values[place] - value) < UNMOVED * abs(value)
+        else None
+    )

@@ -6,7 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, ZERO, Mode, damping_ratio, make_mode, oscillations
+from orchestrator.analysis.modes import (
+    ELECTROMECHANICAL_HZ,
+    ZERO,
+    Mode,
+    damping_ratio,
+    make_mode,
+    oscillations,
+)
 from orchestrator.analysis.stability import grows
 from orchestrator.arrays import Complex
 from orchestrator.coordinated_design.open_loops import LEAD, OpenLoops, PodPlace, Setting
@@ -14,7 +21,8 @@ from orchestrator.coordinated_design.open_loops import LEAD, OpenLoops, PodPlace
 BANDS_HZ = (*ELECTROMECHANICAL_HZ, 10.0, 100.0)
 """Between these frequencies [Hz] other modes are compared with those that were there before."""
 
-ALLOWED = 1e-3  # the least damping ratio of a band may become worse by this where it is below the bound already
+# the least damping ratio of a band may become worse by this where it is below the bound already
+ALLOWED = 1e-3
 UNMOVED = 0.02
 """Loops hardly move a mode that all of them together move by less than this part of its size, by their largest gains.
 It counts as others do; beside it a search raises the least damping of the rest."""
@@ -40,7 +48,8 @@ class Aim:
 class Watched:
     value: complex  # λ [rad/s]
     place: int  # its column among the eigenvectors
-    floor: float | None  # damping ratio that it may not fall below; None for a mode that the design damps
+    # damping ratio that it may not fall below; None for a mode that the design damps
+    floor: float | None
     hardly_moved: bool = False
 
     @property
@@ -68,7 +77,9 @@ def floors_of(values: Iterable[complex], least: float) -> dict[int, float]:
     return floors
 
 
-def split(values: Complex, targets: Iterable[int] | None, floors: Mapping[int, float]) -> list[Watched]:
+def split(
+    values: Complex, targets: Iterable[int] | None, floors: Mapping[int, float]
+) -> list[Watched]:
     """All oscillations of a spectrum, with what is asked of each.
 
     ``values``: all eigenvalues [rad/s].
@@ -95,7 +106,8 @@ class Worth:
     # by how much another mode is below its floor, or the system grows more than before [1/s]; at most 0 if neither
     breach: float
     point: int = 0  # number of the point with the least damping
-    rest: float = 1.0  # least damping ratio of those that the loops move more than hardly; at least ``worst``
+    # least damping ratio of those that the loops move more than hardly; at least ``worst``
+    rest: float = 1.0
 
     @property
     def allowed(self) -> bool:
@@ -105,11 +117,15 @@ class Worth:
 _ROUNDING = 1e-7
 
 
-def worth_of(watched: Sequence[Watched], growing: float, growing_before: float, point: int = 0) -> Worth:
+def worth_of(
+    watched: Sequence[Watched], growing: float, growing_before: float, point: int = 0
+) -> Worth:
     damped = [mode for mode in watched if mode.floor is None]
     worst = min((mode.damping for mode in damped), default=1.0)
     rest = min((mode.damping for mode in damped if not mode.hardly_moved), default=worst)
-    short = max((mode.floor - mode.damping for mode in watched if mode.floor is not None), default=-1.0)
+    short = max(
+        (mode.floor - mode.damping for mode in watched if mode.floor is not None), default=-1.0
+    )
     more = growing - max(growing_before, 0.0)
     return Worth(worst, max(short, more if more > _ROUNDING else -1.0), point, rest)
 
@@ -120,27 +136,37 @@ class RatedPoint:
     ``largest``: the largest gain of every loop that may be closed [pu]; None where all modes count, also those that no
     loop moves."""
 
-    def __init__(self, number: int, loops: OpenLoops, aim: Aim, largest: Mapping[PodPlace, float] | None) -> None:
+    def __init__(
+        self, number: int, loops: OpenLoops, aim: Aim, largest: Mapping[PodPlace, float] | None
+    ) -> None:
         self.number, self.loops, self._aim = number, loops, aim
         self._held: tuple[complex, ...] = ()
         self._hardly: tuple[complex, ...] = ()
         values, targets, left, right = self._spectrum({})
         self._before = growth(values)
         modes = split(values, targets, floors_of((), 0.0))
-        self._floors = floors_of((mode.value for mode in modes if mode.floor is not None), aim.least)
+        self._floors = floors_of(
+            (mode.value for mode in modes if mode.floor is not None), aim.least
+        )
         if largest is None:
             return
         gains = np.array([largest.get(place, 0.0) for place in loops.places])
         damped = [mode for mode in modes if mode.floor is None]
         reach = [np.abs(self._residues(mode.place, left, right)) @ gains for mode in damped]
-        parts = [(mode.value, size / abs(mode.value)) for mode, size in zip(damped, reach, strict=True)]
+        parts = [
+            (mode.value, size / abs(mode.value)) for mode, size in zip(damped, reach, strict=True)
+        ]
         self._held = tuple(value for value, part in parts if LEAD * part < _HELD)
-        self._hardly = tuple(value for value, part in parts if LEAD * part >= _HELD and part < UNMOVED)
+        self._hardly = tuple(
+            value for value, part in parts if LEAD * part >= _HELD and part < UNMOVED
+        )
 
     def _residues(self, place: int, left: Complex, right: Complex) -> Complex:
         """How far each loop moves an eigenvalue with all loops open [rad/s per pu]."""
         row, column = left[:, place].conj(), right[:, place]
-        return np.asarray((row @ self.loops.U) * (self.loops.V @ column) / (row @ column), dtype=complex)
+        return np.asarray(
+            (row @ self.loops.U) * (self.loops.V @ column) / (row @ column), dtype=complex
+        )
 
     def _split(self, values: Complex, targets: Iterable[int] | None) -> list[Watched]:
         """The modes; those that no loop moves are not damped but kept as they are."""
@@ -148,21 +174,33 @@ class RatedPoint:
         for value in (*self._held, *self._hardly):
             k = min(range(len(found)), key=lambda k: abs(found[k].value - value), default=None)
             if k is not None and abs(found[k].value - value) < UNMOVED * abs(value):
-                held = {"floor": damping_ratio(value) - ALLOWED} if value in self._held else {"hardly_moved": True}
+                held = (
+                    {"floor": damping_ratio(value) - ALLOWED}
+                    if value in self._held
+                    else {"hardly_moved": True}
+                )
                 found[k] = replace(found[k], **held)
         return found
 
     def _spectrum(self, setting: Setting) -> tuple[Complex, list[int] | None, Complex, Complex]:
         """Eigenvalues, places of the named modes, and left and right eigenvectors."""
         found = self.loops.solve(setting)
-        return found.values, self._named(found.values, found.left, found.right), found.left, found.right
+        return (
+            found.values,
+            self._named(found.values, found.left, found.right),
+            found.left,
+            found.right,
+        )
 
     def _named(self, values: Complex, left: Complex, right: Complex) -> list[int] | None:
         """Places of the named modes; None where one of the names is not borne here, so that all modes count."""
         if self._aim.naming is None:
             return None
-        names, own = self.loops.all_names(len(left)), values[: len(left)]  # without those that a reduction left out
-        places = [k for k in np.flatnonzero(oscillations(own)).tolist() if band_of(values[k]) == _SWINGING]
+        # without those that a reduction left out
+        names, own = self.loops.all_names(len(left)), values[: len(left)]
+        places = [
+            k for k in np.flatnonzero(oscillations(own)).tolist() if band_of(values[k]) == _SWINGING
+        ]
         modes = {}
         for k in places:
             sides = self.loops.whole(left[:, k], left=True), self.loops.whole(right[:, k])
@@ -183,10 +221,16 @@ class RatedPoint:
     def residues(self) -> dict[PodPlace, complex]:
         """How far each loop moves the least damped of the modes that any moves [rad/s per pu]; empty without one."""
         watched, left, right = self.watched({})
-        worst = min((mode for mode in watched if mode.floor is None), key=lambda mode: mode.damping, default=None)
+        worst = min(
+            (mode for mode in watched if mode.floor is None),
+            key=lambda mode: mode.damping,
+            default=None,
+        )
         if worst is None:
             return {}
-        return dict(zip(self.loops.places, self._residues(worst.place, left, right).tolist(), strict=True))
+        return dict(
+            zip(self.loops.places, self._residues(worst.place, left, right).tolist(), strict=True)
+        )
 
     def watched(self, setting: Setting) -> tuple[list[Watched], Complex, Complex]:
         """Its modes with a setting, with the left and the right eigenvectors of all."""

@@ -17,7 +17,12 @@ from orchestrator.points.store import PointStore
 
 
 def search_settings(
-    case: CaseDefinition, request: DesignRequest, target: Target, mode: str, loop: PodLoop, frequency: float
+    case: CaseDefinition,
+    request: DesignRequest,
+    target: Target,
+    mode: str,
+    loop: PodLoop,
+    frequency: float,
 ) -> list[tuple[str, PodSetting]]:
     """The best settings for one mode and, where none was named, for all modes from 0.1 to 2 Hz.
 
@@ -27,7 +32,10 @@ def search_settings(
     group = PodGroup(request.controller, target.components, target.key, target.stages)
     loops = measure(*loop.opened(), group.places)
     bounds = request.bounds(search=True)
-    space, largest = SettingSpace([group], bounds, frequency), dict.fromkeys(group.places, bounds[1])
+    space, largest = (
+        SettingSpace([group], bounds, frequency),
+        dict.fromkeys(group.places, bounds[1]),
+    )
     aims = {f"searched for {mode}": Aim((mode,), request.least_damping, partial(naming_of, case))}
     if request.mode is None:
         aims["searched for all modes"] = Aim((), request.least_damping)
@@ -40,7 +48,10 @@ def search_settings(
 
 
 def design_controller(
-    case: Case, request: DesignRequest, report: StageReport = lambda text: None, store: PointStore | None = None
+    case: Case,
+    request: DesignRequest,
+    report: StageReport = lambda text: None,
+    store: PointStore | None = None,
 ) -> ControllerDesign:
     """A design for one operating point; ``store`` keeps figures on the way."""
     return ControllerDesign(design_pod(case, request, report, store, search_settings))

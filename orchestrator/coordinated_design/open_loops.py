@@ -15,7 +15,8 @@ from orchestrator.pod_design.closed_loop import PodSetting
 from orchestrator.pod_design.lead_lag import LARGEST_STAGE_ANGLE, lead_lag_turning
 
 REDUCED = 300  # systems with more states are reduced to their slow modes
-_FASTEST = 2 * np.pi * 30  # faster modes than this [rad/s] answer as they do at rest, unless loops move them
+# faster modes than this [rad/s] answer as they do at rest, unless loops move them
+_FASTEST = 2 * np.pi * 30
 
 LEAD = lead_lag_turning(2 * LARGEST_STAGE_ANGLE, 1.0, 2).filtering_ratio ** -2
 """Two stages of a lead/lag that leads most pass fast signals with this gain."""
@@ -26,7 +27,8 @@ _GAIN, _MOVED, _SLOWEST = 400.0, 0.02, 0.3
 
 _TRUE = 1e-6  # A reduction whose modes are not those of the system to this part is not taken
 _SEEN = (0.05, 4.0)  # modes between these frequencies [Hz] are kept however little they move
-Setting = Mapping["PodPlace", PodSetting]  # the setting of each loop that is closed; the others stay open
+# the setting of each loop that is closed; the others stay open
+Setting = Mapping["PodPlace", PodSetting]
 
 
 @dataclass(frozen=True, order=True)
@@ -68,24 +70,40 @@ class OpenLoops:
     # right, left: from the states x to the n states, and back: shapes (n, r) and (r, n); None where both are the same
     right: Matrix | None = None
     left: Matrix | None = None
-    rest: Complex | None = None  # eigenvalues that the reduction left out [rad/s]: no loop moves them, or they are fast
+    # eigenvalues that the reduction left out [rad/s]: no loop moves them, or they are fast
+    rest: Complex | None = None
 
     @classmethod
     def of(
-        cls, A: Matrix, U: Matrix, V: Matrix, places: Sequence[PodPlace], names: Sequence[str], D: Matrix | None = None
+        cls,
+        A: Matrix,
+        U: Matrix,
+        V: Matrix,
+        places: Sequence[PodPlace],
+        names: Sequence[str],
+        D: Matrix | None = None,
     ) -> "OpenLoops":
         """The system of full matrices, reduced where it is large.
 
         ``A`` and ``U`` and ``V``: shapes (n, n), (n, m), (m, n).
         ``D``: shape (m, m); none where no loop's signal reaches another, or itself, without a state between."""
-        whole = cls(A, U, V, np.zeros((len(places), len(places))) if D is None else D, tuple(places), tuple(names))
+        whole = cls(
+            A,
+            U,
+            V,
+            np.zeros((len(places), len(places))) if D is None else D,
+            tuple(places),
+            tuple(names),
+        )
         return (_reduced(whole) if len(A) > REDUCED else None) or whole
 
     def closed(self, setting: Setting) -> Vector:
         """The matrix of the system with some loops closed.
 
         Returns shape (r + k, r + k): behind the states x stand those of the lead/lag stages, loop by loop."""
-        used = [k for k, place in enumerate(self.places) if place in setting and setting[place].gain]
+        used = [
+            k for k, place in enumerate(self.places) if place in setting and setting[place].gain
+        ]
         parts = [setting[self.places[k]] for k in used]
         stages = [part.filters.N_S if part.filters.T_S2 else 0 for part in parts]
         r, z = len(self.A), sum(stages)
@@ -159,7 +177,15 @@ def _reduced(whole: OpenLoops) -> OpenLoops | None:
     unseen = np.linalg.eigvals(A[np.ix_(~seen, ~seen)]).astype(complex)
     rest = np.concatenate([values[~kept], unseen])
     return OpenLoops(
-        matrix, from_all @ U, V @ to_all, whole.D + at_rest.real, whole.places, whole.names, to_all, from_all, rest
+        matrix,
+        from_all @ U,
+        V @ to_all,
+        whole.D + at_rest.real,
+        whole.places,
+        whole.names,
+        to_all,
+        from_all,
+        rest,
     )
 
 
@@ -183,6 +209,12 @@ def _real_form(values: Complex, rows: Complex, columns: Complex) -> tuple[Matrix
     real, upper = np.flatnonzero(values.imag == 0), np.flatnonzero(values.imag > 0)
     blocks = [np.array([[value]]) for value in values[real].real]
     blocks += [np.array([[z.real, z.imag], [-z.imag, z.real]]) for z in values[upper].tolist()]
-    there = [*columns[:, real].real.T, *(part for k in upper for part in (columns[:, k].real, columns[:, k].imag))]
-    back = [*rows[real].real, *(part for k in upper for part in (2 * rows[k].real, -2 * rows[k].imag))]
+    there = [
+        *columns[:, real].real.T,
+        *(part for k in upper for part in (columns[:, k].real, columns[:, k].imag)),
+    ]
+    back = [
+        *rows[real].real,
+        *(part for k in upper for part in (2 * rows[k].real, -2 * rows[k].imag)),
+    ]
     return scipy.linalg.block_diag(*blocks), np.array(there).T, np.array(back)

@@ -10,7 +10,13 @@ from orchestrator.analysis.apart import standing_apart
 from orchestrator.analysis.component_linearization import ComponentLinearization
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, ZERO, Mode, find_spectrum, index_of_rightmost
+from orchestrator.analysis.modes import (
+    ELECTROMECHANICAL_HZ,
+    ZERO,
+    Mode,
+    find_spectrum,
+    index_of_rightmost,
+)
 from orchestrator.analysis.slope_linearization import gives_slopes, linearize_slopes
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.arrays import Complex, Vector
@@ -28,10 +34,13 @@ from orchestrator.points.task import Kept, Task, computed
 from orchestrator.study.naming import named_modes
 
 UNIT_GAIN = 50.0  # gain with which a loop is measured [pu]; the signal stays far below its limit
-_RANK = 1e-6  # A loop has one signal: the second singular value of its effect is below this part of the first
+# A loop has one signal: the second singular value of its effect is below this part of the first
+_RANK = 1e-6
 
 
-def measure(master: Master, model: LinearModel, blocks: Blocks, places: Sequence[PodPlace]) -> OpenLoops:
+def measure(
+    master: Master, model: LinearModel, blocks: Blocks, places: Sequence[PodPlace]
+) -> OpenLoops:
     windows, known = blocks.state_windows(), blocks.components
     there = [place for place in places if place.component in known]
     p = len(blocks.output_names)
@@ -49,7 +58,9 @@ def measure(master: Master, model: LinearModel, blocks: Blocks, places: Sequence
     # What a loop gives to the outputs comes back by way of the network: ż = F·z + G·w + U·s, w = H·z + K·w + sent·s.
     travelled = model.settle(sent)
     through = model.settle(model.H.toarray())
-    return OpenLoops.of(model.A, U + model.G @ travelled, V + seen @ through, there, model.names, seen @ travelled)
+    return OpenLoops.of(
+        model.A, U + model.G @ travelled, V + seen @ through, there, model.names, seen @ travelled
+    )
 
 
 def _loop(master: Master, place: PodPlace, before: ComponentLinearization) -> tuple[Vector, Vector]:
@@ -58,20 +69,27 @@ def _loop(master: Master, place: PodPlace, before: ComponentLinearization) -> tu
     saved = component.save_state()
     try:
         component.set({f"{place.controller}.enabled": True, f"{place.controller}.K": UNIT_GAIN})
-        with other_step(master, place.component, 0.0):  # as the whole system is: without a communication step
+        # as the whole system is: without a communication step
+        with other_step(master, place.component, 0.0):
             with_it = linearize_slopes(exchange, master.time, master.clock.step_size)
     finally:
         component.restore_state(saved)
         component.free_state(saved)
         component.set({f"{place.controller}.enabled": False})
     if with_it.A_c is None or with_it.B_c is None or before.A_c is None or before.B_c is None:
-        raise AnalysisError(f"component {place.component!r} does not give its derivatives, so no loop can be measured")
+        raise AnalysisError(
+            f"component {place.component!r} does not give its derivatives, so no loop can be measured"
+        )
     m = len(with_it.inputs)
-    changes = [[with_it.A_c - before.A_c, with_it.B_c - before.B_c[:, :m]],
-               [with_it.C - before.C, with_it.D - before.D[:, :m]]]  # fmt: skip
+    changes = [
+        [with_it.A_c - before.A_c, with_it.B_c - before.B_c[:, :m]],
+        [with_it.C - before.C, with_it.D - before.D[:, :m]],
+    ]
     left, sizes, right = np.linalg.svd(np.block(changes) / UNIT_GAIN)
     if sizes[0] == 0:
-        raise AnalysisError(f"{place.name} does not act on its converter at all; nothing can be designed there")
+        raise AnalysisError(
+            f"{place.name} does not act on its converter at all; nothing can be designed there"
+        )
     if sizes[1] > _RANK * sizes[0]:
         raise AnalysisError(f"{place.name} acts on its converter in more ways than by one signal")
     return left[:, 0] * sizes[0], right[0]
@@ -90,11 +108,13 @@ class PointModes:
     # all eigenvalues [rad/s]; empty where nothing was computed
     values: Complex = field(default_factory=lambda: np.zeros(0, dtype=complex))
     swinging: tuple[int, ...] = ()  # places of the electromechanical modes, least damped first
-    named: dict[str, int] = field(default_factory=dict)  # the place of each mode that the case names
+    # the place of each mode that the case names
+    named: dict[str, int] = field(default_factory=dict)
     who: tuple[str, ...] = ()  # for each of ``swinging``: who takes part most
     rightmost: str = ""  # the same for the eigenvalue with the largest real part
     loops: OpenLoops | None = None  # the open loops; None where they were not asked for
-    clocks: int = 0  # number of states that are coupled with no other, each of which is a zero in ``values``
+    # number of states that are coupled with no other, each of which is a zero in ``values``
+    clocks: int = 0
     lasting: bool = True  # whether computing it again would give the same
 
     @property
@@ -139,28 +159,40 @@ def compute_points(task: PointsTask) -> PointsRecord:
 
 def _of_task(task: PointsTask, case: Case) -> PointsRecord:
     with PointBench() as bench:
-        preparation = ItemPreparation(case, task.study.scenario, task.study.layers, task.study.step_size)
+        preparation = ItemPreparation(
+            case, task.study.scenario, task.study.layers, task.study.step_size
+        )
         return PointsRecord(tuple(_points(task, case, preparation, bench)))
 
 
-def _points(task: PointsTask, case: Case, preparation: ItemPreparation, bench: PointBench) -> Iterator[PointModes]:
+def _points(
+    task: PointsTask, case: Case, preparation: ItemPreparation, bench: PointBench
+) -> Iterator[PointModes]:
     for item in task.items:
         warnings: tuple[str, ...] = ()
         try:
             prepared = preparation.prepared(item).scenario
             warnings = preparation.warnings(prepared)
             found = _at(case, bench, bench.master(prepared), task.places, warnings)
-        except Exception as error:  # an error that nobody expected must neither end the other points nor be hidden
+        except (
+            Exception
+        ) as error:  # an error that nobody expected must neither end the other points nor be hidden
             kind, text, lasting = failure(error, item)
             found = PointModes(kind, text, warnings, lasting=lasting)
         yield found
 
 
 def _at(
-    case: Case, bench: PointBench, master: Master, places: Sequence[PodPlace], warnings: tuple[str, ...]
+    case: Case,
+    bench: PointBench,
+    master: Master,
+    places: Sequence[PodPlace],
+    warnings: tuple[str, ...],
 ) -> PointModes:
     find_operating_point(master, accept=ACCEPT)
-    if silent := [name for name, exchange in master.exchanges.items() if not gives_slopes(exchange)]:
+    if silent := [
+        name for name, exchange in master.exchanges.items() if not gives_slopes(exchange)
+    ]:
         raise AnalysisError(
             f"components {', '.join(silent[:3])} do not give their derivatives; a design over operating points needs "
             "them of all FMUs"
@@ -168,27 +200,41 @@ def _at(
     linear = bench.linear_model()
     model, blocks, warnings = linear.model, linear.blocks, (*warnings, *linear.doubts)
     if len(model.names) > _MOST_STATES:
-        raise AnalysisError(f"the system has {len(model.names)} states; a design needs all eigenvalues, of at most "
-                            f"{_MOST_STATES}")  # fmt: skip
+        raise AnalysisError(
+            f"the system has {len(model.names)} states; a design needs all eigenvalues, of at most "
+            f"{_MOST_STATES}"
+        )
     loops = measure(master, model, blocks, places) if places else None
     found = _modes(case, model, loops, warnings, doubtful=bool(linear.doubts))
     return replace(found, warnings=(*warnings, *standing_apart(master, model, found.zeros)))
 
 
 def _modes(
-    case: Case, model: LinearModel, loops: OpenLoops | None, warnings: tuple[str, ...], *, doubtful: bool
+    case: Case,
+    model: LinearModel,
+    loops: OpenLoops | None,
+    warnings: tuple[str, ...],
+    *,
+    doubtful: bool,
 ) -> PointModes:
     spectrum = find_spectrum(model, *ELECTROMECHANICAL_HZ)
     modes = [mode for mode in spectrum.modes if mode.is_oscillation]
     place = {complex(value): k for k, value in enumerate(spectrum.eigenvalues.tolist())}
     named = named_modes(case, model, modes).named
     return PointModes(
-        Status.COMPUTED, warnings=warnings, doubtful=doubtful, values=spectrum.eigenvalues,
+        Status.COMPUTED,
+        warnings=warnings,
+        doubtful=doubtful,
+        values=spectrum.eigenvalues,
         swinging=tuple(place[mode.eigenvalue] for mode in modes),
-        named={name: place[mode.eigenvalue] for name, mode in named.items()}, who=tuple(_who(mode) for mode in modes),
-        rightmost="" if index_of_rightmost(spectrum.eigenvalues) is None else _who(spectrum.rightmost), loops=loops,
+        named={name: place[mode.eigenvalue] for name, mode in named.items()},
+        who=tuple(_who(mode) for mode in modes),
+        rightmost=""
+        if index_of_rightmost(spectrum.eigenvalues) is None
+        else _who(spectrum.rightmost),
+        loops=loops,
         clocks=model.clocks,
-    )  # fmt: skip
+    )
 
 
 def _who(mode: Mode | None) -> str:

@@ -19,11 +19,14 @@ from orchestrator.pod_design.closed_loop import PodSetting
 from orchestrator.pod_design.lead_lag import angle_deg, compensation_deg
 from orchestrator.sensitivities.sensitivities import damping_change
 
-_RADIUS, _SMALLEST, _LARGEST = 0.15, 2e-4, 0.4  # of where the sensitivities are trusted, as parts of the ranges
+# of where the sensitivities are trusted, as parts of the ranges
+_RADIUS, _SMALLEST, _LARGEST = 0.15, 2e-4, 0.4
 _STEPS = 60
 _PRICE = 10.0  # what a breach costs, in damping ratio
-_BESIDE = 1e-3  # weight of the least damping of those modes that are moved more than hardly, beside that of all
-_NEAR, _NEAR_FLOOR = 0.3, 0.1  # modes whose damping ratio is farther away than this are left out of a linear program
+# weight of the least damping of those modes that are moved more than hardly, beside that of all
+_BESIDE = 1e-3
+# modes whose damping ratio is farther away than this are left out of a linear program
+_NEAR, _NEAR_FLOOR = 0.3, 0.1
 _APART = 0.2
 _EDGE, _POLISHING = 0.1, 40
 _DIFFERENCE = 1e-6
@@ -32,8 +35,10 @@ _TURNS, _CENTRES, _GAINS = (-90.0, -45.0, 0.0, 45.0, 90.0), (0.7, 1.0, 1.8), (0.
 _STARTS, _STARTS_OF_SEVERAL = 4, 6
 _GRID, _LEAST_SHARE = (13, 6, 9), 0.025
 """Turns, centres and gains of an exhaustive grid, and its smallest gain as a part of the largest."""
-_MOST_CUBED = 4e6  # sum of the cubes of all points' numbers of states up to which a grid is computed
-_SPREAD, _MOST_SPREAD = 64, 256  # vectors that are spread over all ranges for each of several groups, and at most
+# sum of the cubes of all points' numbers of states up to which a grid is computed
+_MOST_CUBED = 4e6
+# vectors that are spread over all ranges for each of several groups, and at most
+_SPREAD, _MOST_SPREAD = 64, 256
 
 
 @dataclass(frozen=True)
@@ -70,11 +75,19 @@ class SettingSearch:
         scanned = sorted((self.tried(x) for x in self._coarse()), key=lambda one: -one.merit)
         chosen = self._alone() if several else []
         most = len(chosen) + (starts or (_STARTS_OF_SEVERAL if several else _STARTS))
-        for part, number in ((slice(None), most if several else most // 2), (slice(1), most)):  # then with other turns
+        for part, number in (
+            (slice(None), most if several else most // 2),
+            (slice(1), most),
+        ):  # then with other turns
             for one in scanned:
-                if len(chosen) < number and all(np.abs(one.x - other.x)[part].max() > _APART for other in chosen):
+                if len(chosen) < number and all(
+                    np.abs(one.x - other.x)[part].max() > _APART for other in chosen
+                ):
                     chosen.append(one)
-        found = max([scanned[0], *map(self.improved, chosen)], key=lambda one: (one.worth.allowed, one.merit))
+        found = max(
+            [scanned[0], *map(self.improved, chosen)],
+            key=lambda one: (one.worth.allowed, one.merit),
+        )
         return self.improved(self._polished(found)) if polish else found
 
     def over_grid(self, found: Tried) -> tuple[Tried, int]:
@@ -85,7 +98,9 @@ class SettingSearch:
         if len(self._space.groups) > 1 or cost > _MOST_CUBED:
             return found, 0
         low, high = self._space.lowest, self._space.highest
-        ends = [np.unique(np.linspace(low[k], high[k], number)) for k, number in enumerate(_GRID[:2])]
+        ends = [
+            np.unique(np.linspace(low[k], high[k], number)) for k, number in enumerate(_GRID[:2])
+        ]
         gains = np.unique(np.geomspace(max(low[2], _LEAST_SHARE * high[2]), high[2], _GRID[2]))
         grid = [self.tried(np.array(x)) for x in product(*ends, gains)]
         best = max(grid, key=lambda one: (one.worth.allowed, one.merit))
@@ -110,7 +125,8 @@ class SettingSearch:
         turns, count = self._wanted_turns(), len(self._space.groups)
         yield self._space.clipped(np.zeros(3 * count))
         for offset, centre, share in product(_TURNS, _CENTRES, _GAINS):
-            angles = [(turn + offset + 180.0) % 360.0 - 180.0 for turn in turns]  # of 200° and −160°, one can be had
+            # of 200° and −160°, one can be had
+            angles = [(turn + offset + 180.0) % 360.0 - 180.0 for turn in turns]
             x = self._space.vector(angles, [centre] * count, [0.0] * count)
             x[2::3] = share
             yield self._space.clipped(x)
@@ -125,8 +141,12 @@ class SettingSearch:
         sums = np.zeros(len(self._space.groups), dtype=complex)
         for point in self._points:
             shares = point.residues()
-            sums += [sum(shares.get(place, 0j) for place in group.places) for group in self._space.groups]
-        return [compensation_deg(angle_deg(complex(total))) if total else 0.0 for total in sums.tolist()]
+            sums += [
+                sum(shares.get(place, 0j) for place in group.places) for group in self._space.groups
+            ]
+        return [
+            compensation_deg(angle_deg(complex(total))) if total else 0.0 for total in sums.tolist()
+        ]
 
     def improved(self, start: Tried) -> Tried:
         here, radius, steps = start, _RADIUS, 0
@@ -134,7 +154,9 @@ class SettingSearch:
         while radius > _SMALLEST and steps < _STEPS:
             steps += 1
             change = program.change(radius)
-            there = None if change is None else self.tried(self._space.clipped(here.x + change), steps)
+            there = (
+                None if change is None else self.tried(self._space.clipped(here.x + change), steps)
+            )
             if there is not None and there.merit > here.merit + _WORTH:
                 here, radius = there, min(1.5 * radius, _LARGEST)
                 program = self._program(here.x)
@@ -145,7 +167,12 @@ class SettingSearch:
     def _polished(self, start: Tried) -> Tried:
         """A better vector nearby without sensitivities, which do not exist where two eigenvalues meet."""
         size = len(start.x)
-        simplex = np.vstack([start.x, start.x + np.diag(np.where(start.x > 0.5 * self._space.highest, -_EDGE, _EDGE))])
+        simplex = np.vstack(
+            [
+                start.x,
+                start.x + np.diag(np.where(start.x > 0.5 * self._space.highest, -_EDGE, _EDGE)),
+            ]
+        )
         best = start
 
         def cost(x: Numbers) -> float:
@@ -176,10 +203,14 @@ class SettingSearch:
             step = _DIFFERENCE if x[k] + _DIFFERENCE <= self._space.highest[k] else -_DIFFERENCE
             moved = x.copy()
             moved[k] += step
-            slopes.append((point.loops.closed(self._space.setting(moved, searching=True)) - base) / step)
+            slopes.append(
+                (point.loops.closed(self._space.setting(moved, searching=True)) - base) / step
+            )
         for mode in watched:
             least = worst if mode.hardly_moved else rest
-            near = mode.damping < (least + _NEAR if mode.floor is None else mode.floor + _NEAR_FLOOR)
+            near = mode.damping < (
+                least + _NEAR if mode.floor is None else mode.floor + _NEAR_FLOOR
+            )
             if near and mode.place < left.shape[1]:
                 row, column = left[:, mode.place].conj(), right[:, mode.place]
                 shifts = [complex(row @ slope @ column / (row @ column)) for slope in slopes]
@@ -207,7 +238,9 @@ class _Program:
     Behind the change stand the least damping ratio of all modes, that of the modes that are moved more than hardly, and
     the breach."""
 
-    def __init__(self, rows: Sequence[tuple[Watched, Numbers]], lowest: Numbers, highest: Numbers) -> None:
+    def __init__(
+        self, rows: Sequence[tuple[Watched, Numbers]], lowest: Numbers, highest: Numbers
+    ) -> None:
         self._lowest, self._highest = lowest, highest
         matrix, right = [], []
         for mode, slopes in rows:
@@ -220,14 +253,24 @@ class _Program:
             else:  # −slopes·d − s ≤ ζ − floor
                 matrix.append([*(-slopes), 0.0, 0.0, -1.0])
                 right.append(mode.damping - mode.floor)
-        self._matrix, self._right = np.array(matrix).reshape(len(right), len(lowest) + 3), np.array(right)
+        self._matrix, self._right = (
+            np.array(matrix).reshape(len(right), len(lowest) + 3),
+            np.array(right),
+        )
 
     def change(self, radius: float) -> Numbers | None:
-        limits = [(max(-radius, low), min(radius, high)) for low, high in zip(self._lowest, self._highest, strict=True)]
+        limits = [
+            (max(-radius, low), min(radius, high))
+            for low, high in zip(self._lowest, self._highest, strict=True)
+        ]
         cost = np.zeros(len(limits) + 3)
         cost[-3:] = _BESIDE - 1.0, -_BESIDE, _PRICE
         solved = optimize.linprog(
-            cost, self._matrix, self._right, bounds=[*limits, (None, 1.0), (None, 1.0), (0.0, None)], method="highs"
+            cost,
+            self._matrix,
+            self._right,
+            bounds=[*limits, (None, 1.0), (None, 1.0), (0.0, None)],
+            method="highs",
         )
         return None if solved.x is None else np.asarray(solved.x[: len(limits)])
 
@@ -238,18 +281,27 @@ class RankedConverter:
     # how far it moves the least damped mode of each point by 1 pu of gain, as long as the gain is small: the mean of
     # the residues' sizes over all points [rad/s per pu]
     shift: float
-    setting: PodSetting | None = None  # the best setting that a search finds for it alone; None where none was searched
+    # the best setting that a search finds for it alone; None where none was searched
+    setting: PodSetting | None = None
     # least damping ratio with that setting, of all points and all modes to be damped; None where it is not known
     worst: float | None = None
     stages: int = 0  # N_S of its lead/lag
 
 
 def ranked(
-    places: Sequence[PodPlace], stages: Mapping[PodPlace, int], points: Sequence[RatedPoint], largest: float,
-    frequency: float, most: int, known: tuple[PodPlace, PodSetting] | None = None,
-) -> tuple[RankedConverter, ...]:  # fmt: skip
+    places: Sequence[PodPlace],
+    stages: Mapping[PodPlace, int],
+    points: Sequence[RatedPoint],
+    largest: float,
+    frequency: float,
+    most: int,
+    known: tuple[PodPlace, PodSetting] | None = None,
+) -> tuple[RankedConverter, ...]:
     """The controllers by the size of their residues; for the first a controller alone is designed."""
-    shifts = ((float(np.mean([abs(p.residues().get(place, 0j)) for p in points])), place) for place in places)
+    shifts = (
+        (float(np.mean([abs(p.residues().get(place, 0j)) for p in points])), place)
+        for place in places
+    )
     by_shift = sorted(shifts, key=lambda one: (-one[0], one[1]))
     found = []
     for k, (shift, place) in enumerate(by_shift):
@@ -262,10 +314,14 @@ def ranked(
         group = PodGroup(place.controller, (place.component,), (place.component,), stages[place])
         space = SettingSpace([group], (0.0, largest), frequency)
         best = SettingSearch(space, points).best(starts=1, polish=False)
-        found.append(RankedConverter(place, shift, space.group_settings(best.x)[0], stages=stages[place]))
+        found.append(
+            RankedConverter(place, shift, space.group_settings(best.x)[0], stages=stages[place])
+        )
     return tuple(found)
 
 
 def best_first(found: Sequence[RankedConverter]) -> tuple[RankedConverter, ...]:
     """The converters in the order of their least damping, those without one by how far they move the modes."""
-    return tuple(sorted(found, key=lambda one: (one.worst is None, -(one.worst or 0.0), -one.shift)))
+    return tuple(
+        sorted(found, key=lambda one: (one.worst is None, -(one.worst or 0.0), -one.shift))
+    )

@@ -13,7 +13,9 @@ from orchestrator.pod_design.closed_loop import PodSetting
 from orchestrator.pod_design.lead_lag import LARGEST_STAGE_ANGLE, NO_COMPENSATION, lead_lag_turning
 
 CENTRES = (0.5, 4.0)  # range of the lead/lag's centre, as parts of the modes' frequency
-_OFF = 1e-9  # part of the largest gain that stands for a gain of 0 in a search, where a loop must keep its states
+# part of the largest gain that stands for a gain of 0 in a search, where a loop must keep its
+# states
+_OFF = 1e-9
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,9 @@ class PodGroup:
 class SettingSpace:
     """Vectors x with three numbers for each group: turn and gain as parts of their ranges, logarithm of the centre."""
 
-    def __init__(self, groups: Sequence[PodGroup], gain_bounds: tuple[float, float], frequency: float) -> None:
+    def __init__(
+        self, groups: Sequence[PodGroup], gain_bounds: tuple[float, float], frequency: float
+    ) -> None:
         self.groups, self.frequency = tuple(groups), frequency
         self._gain_bounds, self._largest = gain_bounds, gain_bounds[1]
         low, high = (math.log(centre) for centre in CENTRES)
@@ -51,7 +55,9 @@ class SettingSpace:
     def clipped(self, x: Numbers) -> Numbers:
         return np.clip(x, self.lowest, self.highest)
 
-    def vector(self, turns_deg: Sequence[float], centres: Sequence[float], gains: Sequence[float]) -> Numbers:
+    def vector(
+        self, turns_deg: Sequence[float], centres: Sequence[float], gains: Sequence[float]
+    ) -> Numbers:
         """The vector of angles of all stages together [°], centres as parts of ω, and gains [pu], by group."""
         x = np.zeros(3 * len(self.groups))
         for k, group in enumerate(self.groups):
@@ -71,4 +77,8 @@ class SettingSpace:
     def setting(self, x: Numbers, *, searching: bool = False) -> Setting:
         """The setting of each loop; arguments as for `group_settings`."""
         settings = self.group_settings(x, searching=searching)
-        return {place: one for group, one in zip(self.groups, settings, strict=True) for place in group.places}
+        return {
+            place: one
+            for group, one in zip(self.groups, settings, strict=True)
+            for place in group.places
+        }

@@ -18,20 +18,38 @@ from orchestrator.coordinated_design.following import with_followed_names
 from orchestrator.coordinated_design.objective import Aim, RatedPoint, worth_of_all
 from orchestrator.coordinated_design.open_loops import PodPlace
 from orchestrator.coordinated_design.point import PointModes, PointsTask, compute_points
-from orchestrator.coordinated_design.search import RankedConverter, SettingSearch, Tried, best_first, ranked
+from orchestrator.coordinated_design.search import (
+    RankedConverter,
+    SettingSearch,
+    Tried,
+    best_first,
+    ranked,
+)
 from orchestrator.coordinated_design.settings import PodGroup, SettingSpace
-from orchestrator.coordinated_design.verdict import MORE, JudgedPoint, PointsVerdict, judged, least_of
+from orchestrator.coordinated_design.verdict import (
+    MORE,
+    JudgedPoint,
+    PointsVerdict,
+    judged,
+    least_of,
+)
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.operating_points.plan import OperatingPoints, read_operating_points
 from orchestrator.pod_design.closed_loop import PodSetting, check_tunable
-from orchestrator.pod_design.target import check_range, find_target, require_controllers, with_controller
+from orchestrator.pod_design.target import (
+    check_range,
+    find_target,
+    require_controllers,
+    with_controller,
+)
 from orchestrator.points.points import Work, nobody
 from orchestrator.points.request import POINTS_FILE, OverCluster, of_scenario, of_values
 from orchestrator.points.task import StudyCase
 from orchestrator.study.naming import modes_named
 
 ALL = "all"  # stands for all electromechanical modes
-_SPARE = 1e-4  # damping ratio beyond the wanted one with which a search for the smallest gain is content
+# damping ratio beyond the wanted one with which a search for the smallest gain is content
+_SPARE = 1e-4
 TOGETHER = 4  # operating points with outages that are computed together
 
 
@@ -61,27 +79,43 @@ class PointsDesignRequest(OverCluster):
 
     points: Any = asked(POINTS_FILE, MISSING, "operating points: a CSV file, as gfor screen has it")
     controllers: Sequence[str] = asked(
-        NAMES, ("pod_p",), '``"pod_p"``, ``"pod_q"``, or both; each gets a setting of its own', option=None
+        NAMES,
+        ("pod_p",),
+        '``"pod_p"``, ``"pod_q"``, or both; each gets a setting of its own',
+        option=None,
     )
-    outages: Names | None = asked(OUTAGES, None, "n-1, lines, units, or names, each at every point (repeatable)")
+    outages: Names | None = asked(
+        OUTAGES, None, "n-1, lines, units, or names, each at every point (repeatable)"
+    )
     scenario: str | None = of_scenario("its name; by default the one without these controllers")
     values: Mapping[str, Any] | None = of_values()
     _: KW_ONLY
     components: Sequence[str] = asked(
         NAMES, (), "converters, or patterns, each with a setting of its own", option="--component"
     )
-    modes: Sequence[str] = asked(NAMES, (), "the case's modes to damp (default: all from 0.1 to 2 Hz)", option="--mode")
+    modes: Sequence[str] = asked(
+        NAMES, (), "the case's modes to damp (default: all from 0.1 to 2 Hz)", option="--mode"
+    )
     damping: float | None = asked(
-        DAMPING, None, "required damping, such as 20", python="wanted everywhere; the best that there is by default"
+        DAMPING,
+        None,
+        "required damping, such as 20",
+        python="wanted everywhere; the best that there is by default",
     )
     gain_bounds: tuple[float, float] = asked(GAIN_BOUNDS, (0.0, 400.0), "bounds of every gain [pu]")
     stages: int | None = asked(STAGES, None, "lead/lag stages (default: the components' own)")
     # no other mode may fall below this damping ratio, or, where it is below already, below what it has
     least_damping: float = asked(
-        DAMPING, 0.05, "damping below which no other mode may be pushed (default: 5)", option="--min-damping"
+        DAMPING,
+        0.05,
+        "damping below which no other mode may be pushed (default: 5)",
+        option="--min-damping",
     )
     ranked: int = asked(
-        RANKED, 3, "converters for which a controller alone is designed to rank them (default: 3)", option="--rank"
+        RANKED,
+        3,
+        "converters for which a controller alone is designed to rank them (default: 3)",
+        option="--rank",
     )
 
 
@@ -106,12 +140,18 @@ def plan_points_design(case: Case, request: PointsDesignRequest) -> PointsDesign
     known = [table.name for table in case.table.analysis.modes]
     for name in request.modes:
         if name not in known:
-            raise InputError(f"--mode: the case names no mode {name!r}; it names: {', '.join([*known, ALL])}")
+            raise InputError(
+                f"--mode: the case names no mode {name!r}; it names: {', '.join([*known, ALL])}"
+            )
     scenario = _scenario(case, request)
     candidates = _candidates(case, request, scenario, groups)
     off: dict[str, Value] = {}
     for place in candidates:
-        off |= {f"{place.name}.enabled": False, f"{place.name}.T_S1": 0.0, f"{place.name}.T_S2": 0.0}
+        off |= {
+            f"{place.name}.enabled": False,
+            f"{place.name}.T_S1": 0.0,
+            f"{place.name}.T_S2": 0.0,
+        }
     off |= {f"{place.name}.N_S": float(group.stages) for group in groups for place in group.places}
     read = read_operating_points(case, request, request.points, request.outages, scenario, off)
     plans = read.prepared.system.components
@@ -120,12 +160,24 @@ def plan_points_design(case: Case, request: PointsDesignRequest) -> PointsDesign
             check_range(plans, group.components, f"{group.controller}.K", bound, "--gain-bounds")
     for place in candidates:
         check_tunable(place.component, plans[place.component].description, place.controller)
-    if clash := {key for item in read.items for key in item.values} & {*off, *(f"{p.name}.K" for p in candidates)}:
-        raise InputError(f"{request.points}: the column for {min(clash)} sets what is to be designed; leave it out")
+    if clash := {key for item in read.items for key in item.values} & {
+        *off,
+        *(f"{p.name}.K" for p in candidates),
+    }:
+        raise InputError(
+            f"{request.points}: the column for {min(clash)} sets what is to be designed; leave it out"
+        )
     naming = partial(naming_of, case) if request.modes else None
     aim = Aim(tuple(request.modes), request.least_damping, naming)
-    return PointsDesignPlan(case=case, request=request, read=read, groups=groups, candidates=candidates, off=off,
-                            aim=aim)  # fmt: skip
+    return PointsDesignPlan(
+        case=case,
+        request=request,
+        read=read,
+        groups=groups,
+        candidates=candidates,
+        off=off,
+        aim=aim,
+    )
 
 
 def naming_of(case: CaseDefinition, names: Sequence[str], modes: list[Mode]) -> Mapping[str, Mode]:
@@ -138,9 +190,14 @@ def _groups(case: Case, request: PointsDesignRequest) -> tuple[PodGroup, ...]:
     for controller in dict.fromkeys(request.controllers):
         for pattern in request.components or (None,):
             target = find_target(
-                case, controller, scenario=request.scenario, pattern=pattern, stages=request.stages,
-                overrides=request.overrides, parameters=request.files,
-            )  # fmt: skip
+                case,
+                controller,
+                scenario=request.scenario,
+                pattern=pattern,
+                stages=request.stages,
+                overrides=request.overrides,
+                parameters=request.files,
+            )
             group = PodGroup(controller, target.components, target.key, target.stages)
             for other in found:
                 if shared := set(other.places) & set(group.places):
@@ -154,9 +211,14 @@ def _groups(case: Case, request: PointsDesignRequest) -> tuple[PodGroup, ...]:
 
 def _scenario(case: Case, request: PointsDesignRequest) -> str:
     target = find_target(
-        case, request.controllers[0], scenario=request.scenario, pattern=None, stages=0,
-        overrides=request.overrides, parameters=request.files,
-    )  # fmt: skip
+        case,
+        request.controllers[0],
+        scenario=request.scenario,
+        pattern=None,
+        stages=0,
+        overrides=request.overrides,
+        parameters=request.files,
+    )
     return target.scenario
 
 
@@ -168,7 +230,11 @@ def _candidates(
     plan = case.components_of(scenario, request.overrides, request.files)
     for controller in request.controllers if request.ranked else ():
         able = with_controller(plan, controller)
-        own += [PodPlace(name, controller) for name in able if not plan[name].value(f"{controller}.enabled")]
+        own += [
+            PodPlace(name, controller)
+            for name in able
+            if not plan[name].value(f"{controller}.enabled")
+        ]
     return tuple(dict.fromkeys(own))
 
 
@@ -177,10 +243,12 @@ class PointsDesign:
     plan: PointsDesignPlan
     frequency: float  # ω that the centres relate to [rad/s]
     settings: tuple[PodSetting, ...]
-    found: Tried  # the search's own figures, on the linear models; nothing of the verdict rests on them
+    # the search's own figures, on the linear models; nothing of the verdict rests on them
+    found: Tried
     # every operating point with every outage, without the controllers and with them, all modes computed anew
     points: tuple[JudgedPoint, ...]
-    ranking: tuple[RankedConverter, ...]  # converters by what a controller there alone would give, the best first
+    # converters by what a controller there alone would give, the best first
+    ranking: tuple[RankedConverter, ...]
     evaluations: int
     compared: int = 0  # number of settings of an exhaustive grid that were tried; 0 without one
     thin: float | None = None  # as `PointsVerdict` has it
@@ -188,22 +256,32 @@ class PointsDesign:
     @property
     def verdict(self) -> PointsVerdict:
         request = self.plan.request
-        return PointsVerdict(self.points, request.damping, request.gain_bounds[1], self.compared, self.thin)
+        return PointsVerdict(
+            self.points, request.damping, request.gain_bounds[1], self.compared, self.thin
+        )
 
 
 def design_over_points(
     plan: PointsDesignPlan, work: Work, stage: Callable[[str], None] = lambda text: None
 ) -> PointsDesign:
     stage("operating points without the controllers")
-    before = modes_at(plan, plan.off, plan.candidates, replace(work, report=lambda n, of: work.report(n, 2 * of)))
+    before = modes_at(
+        plan, plan.off, plan.candidates, replace(work, report=lambda n, of: work.report(n, 2 * of))
+    )
     usable = [k for k, point in enumerate(before) if point.loops is not None]
     if not usable:
-        raise AnalysisError(f"no operating point has modes, so nothing can be designed; the first: {before[0].text}")
+        raise AnalysisError(
+            f"no operating point has modes, so nothing can be designed; the first: {before[0].text}"
+        )
     frequency = _frequency([before[k] for k in usable])
     stage("search")
     largest = plan.request.gain_bounds[1]
     own = {place: largest for group in plan.groups for place in group.places}
-    rated = [RatedPoint(k, loops, plan.aim, own) for k in usable if (loops := before[k].loops) is not None]
+    rated = [
+        RatedPoint(k, loops, plan.aim, own)
+        for k in usable
+        if (loops := before[k].loops) is not None
+    ]
     space = SettingSpace(plan.groups, plan.request.gain_bounds, frequency)
     search = SettingSearch(space, rated)
     found = search.best()
@@ -226,42 +304,62 @@ def design_over_points(
     every = dict.fromkeys(plan.candidates, largest)
     alike = [RatedPoint(point.number, point.loops, plan.aim, every) for point in rated]
     places = [place for group in plan.groups for place in group.places]
-    designed = (places[0], settings[0]) if len(places) == 1 and not reached else None  # the least gain is not the best
-    alone = ranked(plan.candidates, _stages(plan), alike, largest, frequency, plan.request.ranked, designed)
+    # the least gain is not the best
+    designed = (places[0], settings[0]) if len(places) == 1 and not reached else None
+    alone = ranked(
+        plan.candidates, _stages(plan), alike, largest, frequency, plan.request.ranked, designed
+    )
     known = {designed[0]: after} if designed else {}
     quietly = replace(work, report=nobody)
-    ranking = best_first([_confirmed(plan, one, before, known.get(one.place), quietly) for one in alone])
-    predicted = {point.number: worth_of_all(point.loops, space.setting(found.x), plan.aim) for point in rated}
+    ranking = best_first(
+        [_confirmed(plan, one, before, known.get(one.place), quietly) for one in alone]
+    )
+    predicted = {
+        point.number: worth_of_all(point.loops, space.setting(found.x), plan.aim) for point in rated
+    }
     where = [plan.read.of(item) for item in plan.read.items]
     points = tuple(judged(where, before, after, plan.aim, predicted))
-    return PointsDesign(plan, frequency, settings, found, points, ranking, search.evaluations, compared, thin)
+    return PointsDesign(
+        plan, frequency, settings, found, points, ranking, search.evaluations, compared, thin
+    )
 
 
 def _confirmed(
-    plan: PointsDesignPlan, one: RankedConverter, before: Sequence[PointModes], known: Sequence[PointModes] | None,
+    plan: PointsDesignPlan,
+    one: RankedConverter,
+    before: Sequence[PointModes],
+    known: Sequence[PointModes] | None,
     work: Work,
-) -> RankedConverter:  # fmt: skip
+) -> RankedConverter:
     """A ranked converter with the least damping that its setting gives where all modes are computed anew."""
     if one.setting is None:
         return one
-    group = PodGroup(one.place.controller, (one.place.component,), (one.place.component,), one.stages)
+    group = PodGroup(
+        one.place.controller, (one.place.component,), (one.place.component,), one.stages
+    )
     values = {**plan.off, **values_of([group], [one.setting])}
     made = {one.place: one.setting}
-    points = known or with_followed_names(plan.aim.names, before, modes_at(plan, values, (), work), made)
+    points = known or with_followed_names(
+        plan.aim.names, before, modes_at(plan, values, (), work), made
+    )
     return replace(one, worst=least_of(points, plan.aim))
 
 
 def _stages(plan: PointsDesignPlan) -> dict[PodPlace, int]:
     own = {place: group.stages for group in plan.groups for place in group.places}
     plans = plan.prepared.system.components
-    return {place: own.get(place, int(plans[place.component].number(f"{place.controller}.N_S")))
-            for place in plan.candidates}  # fmt: skip
+    return {
+        place: own.get(place, int(plans[place.component].number(f"{place.controller}.N_S")))
+        for place in plan.candidates
+    }
 
 
 def _frequency(points: Sequence[PointModes]) -> float:
     found = [point.values[point.swinging[0]].imag for point in points if point.swinging]
     if not found:
-        raise AnalysisError("no operating point has a mode from 0.1 to 2 Hz, so there is nothing to damp")
+        raise AnalysisError(
+            "no operating point has a mode from 0.1 to 2 Hz, so there is nothing to damp"
+        )
     return float(np.mean(found))
 
 
@@ -277,7 +375,13 @@ def modes_at(
     plan: PointsDesignPlan, values: Mapping[str, Value], places: Sequence[PodPlace], work: Work
 ) -> list[PointModes]:
     """The modes of all operating points and outages with some values, from the power flow on."""
-    study = StudyCase.of(plan.prepared, (*plan.request.layers, OptionValues.of(values)), plan.request.step_size)
+    study = StudyCase.of(
+        plan.prepared, (*plan.request.layers, OptionValues.of(values)), plan.request.step_size
+    )
     parts = [plan.read.items[k : k + TOGETHER] for k in range(0, len(plan.read.items), TOGETHER)]
     tasks = [PointsTask(study, part, tuple(places)) for part in parts]
-    return [point for record in work.all(compute_points, tasks, list(map(len, parts))) for point in record.points]
+    return [
+        point
+        for record in work.all(compute_points, tasks, list(map(len, parts)))
+        for point in record.points
+    ]

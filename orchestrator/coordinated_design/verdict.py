@@ -6,13 +6,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.analysis.modes import damping_ratio
-from orchestrator.coordinated_design.objective import UNMOVED, Aim, Watched, Worth, floors_of, growth, split, worth_of
+from orchestrator.coordinated_design.objective import (
+    UNMOVED,
+    Aim,
+    Watched,
+    Worth,
+    floors_of,
+    growth,
+    split,
+    worth_of,
+)
 from orchestrator.coordinated_design.point import PointModes
 from orchestrator.operating_points.outages import Outage
 from orchestrator.operating_points.points_file import OperatingCase
 
 MORE = 1.2  # of all gains: a setting that is not good enough with them has no margin
-ASTRAY = 1e-3  # from this difference of damping ratios on, the search's models and the modes anew disagree
+# from this difference of damping ratios on, the search's models and the modes anew disagree
+ASTRAY = 1e-3
 
 
 @dataclass(frozen=True)
@@ -32,7 +42,9 @@ class PlacedMode:
 
     @property
     def words(self) -> str:
-        return f"{self.frequency_hz:.3f} Hz, {100 * self.damping_ratio:.2f} %" + (f" ({self.who})" if self.who else "")
+        return f"{self.frequency_hz:.3f} Hz, {100 * self.damping_ratio:.2f} %" + (
+            f" ({self.who})" if self.who else ""
+        )
 
 
 @dataclass(frozen=True)
@@ -46,8 +58,10 @@ class JudgedPoint:
     target: PlacedMode | None = None
     # the other mode that is farthest below its floor, or nearest to it; None where there is none
     other: PlacedMode | None = None
-    worth: Worth | None = None  # least damping and breach with the controllers; None where nothing is known
-    predicted: Worth | None = None  # the same worth from the search's linear models; None where they were not asked
+    # least damping and breach with the controllers; None where nothing is known
+    worth: Worth | None = None
+    # the same worth from the search's linear models; None where they were not asked
+    predicted: Worth | None = None
     # whether a name that is asked for is borne by no mode here, so that all electromechanical ones count
     unnamed: bool = False
 
@@ -74,7 +88,9 @@ class JudgedPoint:
     def unmoved(self) -> bool:
         """Whether the controllers move the mode by less than 0.2 points of damping: a tenth of what a search passes."""
         before, after = self.target_before, self.target
-        return bool(before and after and abs(after.value - before.value) < 0.1 * UNMOVED * abs(before.value))
+        return bool(
+            before and after and abs(after.value - before.value) < 0.1 * UNMOVED * abs(before.value)
+        )
 
     @property
     def why_not(self) -> str:
@@ -92,19 +108,28 @@ class JudgedPoint:
     @property
     def unforeseen(self) -> bool:
         """Whether a mode grows or falls below its floor, and the search's models did not show it."""
-        return bool(self.worth and self.predicted and not self.worth.allowed and self.predicted.allowed)
+        return bool(
+            self.worth and self.predicted and not self.worth.allowed and self.predicted.allowed
+        )
 
 
 def judged(
-    where: Sequence[tuple[OperatingCase, Outage]], before: Sequence[PointModes], after: Sequence[PointModes], aim: Aim,
+    where: Sequence[tuple[OperatingCase, Outage]],
+    before: Sequence[PointModes],
+    after: Sequence[PointModes],
+    aim: Aim,
     predicted: Mapping[int, Worth],
-) -> Iterator[JudgedPoint]:  # fmt: skip
+) -> Iterator[JudgedPoint]:
     for k, here in enumerate(where):
         yield _judged(here, before[k], after[k], aim, predicted.get(k))
 
 
 def _judged(
-    where: tuple[OperatingCase, Outage], before: PointModes, after: PointModes, aim: Aim, predicted: Worth | None
+    where: tuple[OperatingCase, Outage],
+    before: PointModes,
+    after: PointModes,
+    aim: Aim,
+    predicted: Worth | None,
 ) -> JudgedPoint:
     if not (before.computed and after.computed):
         return JudgedPoint(*where, before, after, predicted=predicted)
@@ -116,16 +141,26 @@ def _judged(
     worth = worth_of(second, growth(after.values), growth(before.values))
     unnamed = any(name not in point.named for point in (before, after) for name in aim.names)
     return JudgedPoint(
-        *where, before, after, _least(first, before), _least(second, after),
-        None if nearest is None else _placed(nearest, after), worth, predicted, unnamed,
-    )  # fmt: skip
+        *where,
+        before,
+        after,
+        _least(first, before),
+        _least(second, after),
+        None if nearest is None else _placed(nearest, after),
+        worth,
+        predicted,
+        unnamed,
+    )
 
 
 def least_of(points: Sequence[PointModes], aim: Aim) -> float | None:
     """Least damping ratio of all modes that a design damps at all points; None where a point has no modes or grows."""
     if not all(point.computed and growth(point.values) == 0 for point in points):
         return None
-    every = (_least(split(point.values, _targets(point, aim), floors_of((), 0.0)), point) for point in points)
+    every = (
+        _least(split(point.values, _targets(point, aim), floors_of((), 0.0)), point)
+        for point in points
+    )
     return min((mode.damping_ratio for mode in every if mode is not None), default=None)
 
 
@@ -137,7 +172,11 @@ def _targets(point: PointModes, aim: Aim) -> list[int] | None:
 
 
 def _least(watched: Sequence[Watched], point: PointModes) -> PlacedMode | None:
-    found = min((mode for mode in watched if mode.floor is None), key=lambda mode: mode.damping, default=None)
+    found = min(
+        (mode for mode in watched if mode.floor is None),
+        key=lambda mode: mode.damping,
+        default=None,
+    )
     return None if found is None else _placed(found, point)
 
 
@@ -155,15 +194,21 @@ class PointsVerdict:
     ``thin``: least damping ratio with `MORE` of the gains, where that is too much for it or other modes; else None."""
 
     def __init__(
-        self, points: Sequence[JudgedPoint], wanted: float | None, largest: float = 0.0, compared: int = 0,
+        self,
+        points: Sequence[JudgedPoint],
+        wanted: float | None,
+        largest: float = 0.0,
+        compared: int = 0,
         thin: float | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.points, self.wanted, self.largest = tuple(points), wanted, largest
         self.compared, self.thin = compared, thin
         self.known = [point for point in points if point.computed]
         self.failed = [point for point in points if not point.computed]
         self.unstable = [point for point in self.known if point.grows]
-        self.harmed = [point for point in self.known if point.worth is not None and not point.worth.allowed]
+        self.harmed = [
+            point for point in self.known if point.worth is not None and not point.worth.allowed
+        ]
         self.doubtful = [point for point in self.known if point.after.doubtful]
 
     @property
@@ -179,7 +224,10 @@ class PointsVerdict:
 
     @property
     def worst_before(self) -> float | None:
-        return min((_damping(point.target_before) for point in self.known if point.target_before), default=None)
+        return min(
+            (_damping(point.target_before) for point in self.known if point.target_before),
+            default=None,
+        )
 
     @property
     def stable(self) -> bool | None:
@@ -193,7 +241,9 @@ class PointsVerdict:
         """Whether the wanted damping is reached everywhere, or, where none is wanted, the least one is better than
         before; None where points have no modes or a limit is near, and no other point says no."""
         wanted, worst, before = self.wanted, self.worst, self.worst_before
-        enough = worst is None or (worst >= wanted if wanted is not None else before is None or worst > before)
+        enough = worst is None or (
+            worst >= wanted if wanted is not None else before is None or worst > before
+        )
         if self.unstable or self.harmed or not enough:
             return False
         return None if self.failed or self.doubtful else True

@@ -72,7 +72,9 @@ class CoordinatedDesign:
         ``command``: what the file names as its origin; by default the call in Python.
         """
         file = parameter_file_path(path)
-        said = command or f"gfor.load({self.result.plan.case.name!r}).design_over_points(…) in Python"
+        said = (
+            command or f"gfor.load({self.result.plan.case.name!r}).design_over_points(…) in Python"
+        )
         points, ranking = file.with_suffix(".csv"), file.with_name(f"{file.stem}_ranking.csv")
         write_text(file, parameter_file_text(self.parameters, provenance(self.result, said)))
         save_json(self.as_json() | {"made": made_now()}, file.with_suffix(".json"))
@@ -94,38 +96,56 @@ def as_json(design: PointsDesign) -> dict[str, Any]:
     limiting = verdict.limiting
     return {
         **plan.prepared.about,
-        "verdict": verdict_sentence(verdict), "met": verdict.met, "stable": verdict.stable,
-        "wanted_damping_ratio": request.damping, "modes": list(request.modes) or "all",
-        "least_damping_of_others": request.least_damping, "gain_bounds": list(request.gain_bounds),
+        "verdict": verdict_sentence(verdict),
+        "met": verdict.met,
+        "stable": verdict.stable,
+        "wanted_damping_ratio": request.damping,
+        "modes": list(request.modes) or "all",
+        "least_damping_of_others": request.least_damping,
+        "gain_bounds": list(request.gain_bounds),
         "worst_damping_ratio": {"before": verdict.worst_before, "after": verdict.worst},
         "thin_margin_damping_ratio": verdict.thin,
-        "limiting": None if limiting is None else _where(limiting) | {"mode": _mode(limiting.target)},
-        "points": len(plan.read.points), "outages": len(plan.read.outages) - 1, "items": len(verdict.points),
+        "limiting": None
+        if limiting is None
+        else _where(limiting) | {"mode": _mode(limiting.target)},
+        "points": len(plan.read.points),
+        "outages": len(plan.read.outages) - 1,
+        "items": len(verdict.points),
         "failed": [_where(point) | {"why": point.why_not} for point in verdict.failed],
         "unstable": [_where(point) for point in verdict.unstable],
         "harmed": [_where(point) | {"mode": _mode(point.other)} for point in verdict.harmed],
         "astray": [_where(point) | {"difference": point.astray} for point in verdict.astray],
-        "unforeseen": [_where(point) for point in verdict.unforeseen], "warnings": remarks(verdict),
+        "unforeseen": [_where(point) for point in verdict.unforeseen],
+        "warnings": remarks(verdict),
         "settings": [
             {
-                "controller": group.controller, "components": list(group.components), "K": setting.gain,
-                "T_S1": setting.filters.T_S1, "T_S2": setting.filters.T_S2, "N_S": group.stages,
+                "controller": group.controller,
+                "components": list(group.components),
+                "K": setting.gain,
+                "T_S1": setting.filters.T_S1,
+                "T_S2": setting.filters.T_S2,
+                "N_S": group.stages,
             }
             for group, setting in zip(plan.groups, design.settings, strict=True)
         ],
         "all": [
-            _where(point) | {
-                "stable": point.stable, "before": _mode(point.target_before), "after": _mode(point.target),
-                "allowed": None if point.worth is None else point.worth.allowed, "why": point.why_not,
+            _where(point)
+            | {
+                "stable": point.stable,
+                "before": _mode(point.target_before),
+                "after": _mode(point.target),
+                "allowed": None if point.worth is None else point.worth.allowed,
+                "why": point.why_not,
             }
             for point in verdict.points
         ],
         "ranking": [_ranked(one) for one in design.ranking],
         "search": {
-            "worst_damping_ratio": design.found.worth.worst, "evaluations": design.evaluations,
+            "worst_damping_ratio": design.found.worth.worst,
+            "evaluations": design.evaluations,
             "linear_programs": design.found.steps,
         },
-    }  # fmt: skip
+    }
 
 
 def _where(point: JudgedPoint) -> dict[str, Any]:
@@ -135,52 +155,95 @@ def _where(point: JudgedPoint) -> dict[str, Any]:
 def _mode(mode: PlacedMode | None) -> dict[str, Any] | None:
     if mode is None:
         return None
-    return {"real": mode.value.real, "imag": mode.value.imag, "damping_ratio": mode.damping_ratio, "who": mode.who}
+    return {
+        "real": mode.value.real,
+        "imag": mode.value.imag,
+        "damping_ratio": mode.damping_ratio,
+        "who": mode.who,
+    }
 
 
 def _ranked(one: RankedConverter) -> dict[str, Any]:
     setting = one.setting
     return {
-        "component": one.place.component, "controller": one.place.controller, "worst_damping_ratio": one.worst,
-        "K": None if setting is None else setting.gain, "T_S1": None if setting is None else setting.filters.T_S1,
-        "T_S2": None if setting is None else setting.filters.T_S2, "shift_rad_s_per_pu": one.shift,
-    }  # fmt: skip
+        "component": one.place.component,
+        "controller": one.place.controller,
+        "worst_damping_ratio": one.worst,
+        "K": None if setting is None else setting.gain,
+        "T_S1": None if setting is None else setting.filters.T_S1,
+        "T_S2": None if setting is None else setting.filters.T_S2,
+        "shift_rad_s_per_pu": one.shift,
+    }
 
 
 def settings_table(design: PointsDesign) -> PlainTable:
     columns = ("Controller", "K [pu]", "T_S1 [s]", "T_S2 [s]", "N_S", "Lead [°]", "of")
     placed = zip(design.plan.groups, design.settings, strict=True)
-    rows = [(group.name, *_setting(setting), str(len(group.components))) for group, setting in placed]
+    rows = [
+        (group.name, *_setting(setting), str(len(group.components))) for group, setting in placed
+    ]
     return make_table("Settings", *columns, rows=rows)
 
 
 def _setting(setting: PodSetting) -> list[str]:
     filters = setting.filters
     angle = filters.N_S * filters.stage_angle_deg if filters.T_S1 else 0.0
-    return [f"{setting.gain:.5g}", f"{filters.T_S1:.4f}", f"{filters.T_S2:.4f}", str(filters.N_S), f"{angle:+.1f}"]
+    return [
+        f"{setting.gain:.5g}",
+        f"{filters.T_S1:.4f}",
+        f"{filters.T_S2:.4f}",
+        str(filters.N_S),
+        f"{angle:+.1f}",
+    ]
 
 
 def points_table(verdict: PointsVerdict) -> ColumnTable[JudgedPoint]:
     """Each operating point with each outage; "" where there is no figure."""
 
     def of(mode: PlacedMode | None, figure: str) -> float | str:
-        return "" if mode is None else 100 * mode.damping_ratio if figure == "damping" else mode.frequency_hz
+        return (
+            ""
+            if mode is None
+            else 100 * mode.damping_ratio
+            if figure == "damping"
+            else mode.frequency_hz
+        )
 
-    return ColumnTable("Points and outages", (
-        Column("Point", lambda p: p.point.name, name="point"),
-        Column("Outage", lambda p: p.outage.name, name="outage"),
-        Column("", lambda p: p.point.hours, name="hours"),
-        Column("", lambda p: str((p.after if p.before.computed else p.before).status), name="status"),
-        Column("", lambda p: _lower(p.stable), name="stable"),
-        Column("before [%]", lambda p: of(p.target_before, "damping"), _two, "damping_before_percent"),
-        Column("", lambda p: of(p.target_before, "frequency"), name="frequency_before_hz"),
-        Column("with it [%]", lambda p: of(p.target, "damping"), _two, "damping_percent"),
-        Column("f [Hz]", lambda p: of(p.target, "frequency"), ".3f", "frequency_hz"),
-        Column("Who", lambda p: "" if p.target is None else p.target.who, name="who"),
-        Column("", lambda p: "" if p.worth is None else _lower(p.worth.allowed), name="allowed"),
-        Column("", lambda p: "; ".join(text for text in (p.why_not, *p.after.warnings) if text), name="why"),
-        Column("Stable", lambda p: {True: "yes", False: "NO", None: "not known"}[p.stable]),
-    ), verdict.points, left=2)  # fmt: skip
+    return ColumnTable(
+        "Points and outages",
+        (
+            Column("Point", lambda p: p.point.name, name="point"),
+            Column("Outage", lambda p: p.outage.name, name="outage"),
+            Column("", lambda p: p.point.hours, name="hours"),
+            Column(
+                "",
+                lambda p: str((p.after if p.before.computed else p.before).status),
+                name="status",
+            ),
+            Column("", lambda p: _lower(p.stable), name="stable"),
+            Column(
+                "before [%]",
+                lambda p: of(p.target_before, "damping"),
+                _two,
+                "damping_before_percent",
+            ),
+            Column("", lambda p: of(p.target_before, "frequency"), name="frequency_before_hz"),
+            Column("with it [%]", lambda p: of(p.target, "damping"), _two, "damping_percent"),
+            Column("f [Hz]", lambda p: of(p.target, "frequency"), ".3f", "frequency_hz"),
+            Column("Who", lambda p: "" if p.target is None else p.target.who, name="who"),
+            Column(
+                "", lambda p: "" if p.worth is None else _lower(p.worth.allowed), name="allowed"
+            ),
+            Column(
+                "",
+                lambda p: "; ".join(text for text in (p.why_not, *p.after.warnings) if text),
+                name="why",
+            ),
+            Column("Stable", lambda p: {True: "yes", False: "NO", None: "not known"}[p.stable]),
+        ),
+        verdict.points,
+        left=2,
+    )
 
 
 def _lower(value: bool | None) -> str:
@@ -193,7 +256,9 @@ def _two(figure: float | str) -> str:
 
 def least_damped_table(verdict: PointsVerdict) -> ColumnTable[JudgedPoint]:
     having = [(point, point.target) for point in verdict.known if point.target is not None]
-    ordered = [point for point, _ in sorted(having, key=lambda entry: entry[1].damping_ratio)][:_ROWS]
+    ordered = [point for point, _ in sorted(having, key=lambda entry: entry[1].damping_ratio)][
+        :_ROWS
+    ]
     title = f"The {len(ordered)} least damped of {len(verdict.points)} points and outages"
     return replace(points_table(verdict), title=title, rows=ordered)
 
@@ -213,16 +278,32 @@ def ranking_table(design: PointsDesign) -> ColumnTable[RankedConverter]:
         return "unstable or not known" if one.worst is None else f"{100 * one.worst:.2f}"
 
     title = "Converters by what a controller there alone gives: the least damping of all points, computed anew"
-    return ColumnTable(title, (
-        Column("Converter", lambda one: one.place.component, name="converter"),
-        Column("Controller", lambda one: one.place.controller, name="controller"),
-        Column("least damping [%]", lambda one: one, damping),
-        Column("", lambda one: "" if one.worst is None else 100 * one.worst, name="least_damping_percent"),
-        Column("K [pu]", setting("K"), shown(".4g"), "K"),
-        Column("T_S1 [s]", setting("T_S1"), shown(".4f"), "T_S1"),
-        Column("T_S2 [s]", setting("T_S2"), shown(".4f"), "T_S2"),
-        Column("shift by 1 pu [rad/s]", setting("shift_rad_s_per_pu"), shown(".3g"), "shift_rad_s_per_pu"),
-    ), design.ranking, 2, _ROWS, "the files")  # fmt: skip
+    return ColumnTable(
+        title,
+        (
+            Column("Converter", lambda one: one.place.component, name="converter"),
+            Column("Controller", lambda one: one.place.controller, name="controller"),
+            Column("least damping [%]", lambda one: one, damping),
+            Column(
+                "",
+                lambda one: "" if one.worst is None else 100 * one.worst,
+                name="least_damping_percent",
+            ),
+            Column("K [pu]", setting("K"), shown(".4g"), "K"),
+            Column("T_S1 [s]", setting("T_S1"), shown(".4f"), "T_S1"),
+            Column("T_S2 [s]", setting("T_S2"), shown(".4f"), "T_S2"),
+            Column(
+                "shift by 1 pu [rad/s]",
+                setting("shift_rad_s_per_pu"),
+                shown(".3g"),
+                "shift_rad_s_per_pu",
+            ),
+        ),
+        design.ranking,
+        2,
+        _ROWS,
+        "the files",
+    )
 
 
 def provenance(design: PointsDesign, command: str) -> list[str]:

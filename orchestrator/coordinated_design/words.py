@@ -26,21 +26,31 @@ def verdict_of(verdict: PointsVerdict) -> VerdictSentence:
     aim = "" if wanted is None else f"{100 * wanted:g} % at all {total} points and outages"
     if verdict.met:
         if wanted is not None:
-            return VerdictSentence(True, "REACHED", f"{aim}{tail}{_no_margin(verdict.thin, wanted)}")
+            return VerdictSentence(
+                True, "REACHED", f"{aim}{tail}{_no_margin(verdict.thin, wanted)}"
+            )
         return VerdictSentence(True, "better", f"at all {total} points and outages{tail}")
     reasons = _reasons(verdict)
     if verdict.met is None:
         return VerdictSentence(None, "not known", f"{', '.join(reasons)}{tail}")
     word = "NOT REACHED" if wanted is not None else "NO BETTER"
     short = wanted is not None and worst is not None and worst < wanted
-    beyond = f"; {_cannot_be_had(verdict, worst)}" if short and worst is not None and not verdict.astray else ""
+    beyond = (
+        f"; {_cannot_be_had(verdict, worst)}"
+        if short and worst is not None and not verdict.astray
+        else ""
+    )
     return VerdictSentence(False, word, f"{', '.join([aim] * bool(aim) + reasons)}{beyond}{tail}")
 
 
 def _no_margin(thin: float | None, wanted: float) -> str:
     if thin is None:
         return ""
-    why = f"{100 * thin:.2f} %" if thin < wanted else "another mode below its least damping, or growth,"
+    why = (
+        f"{100 * thin:.2f} %"
+        if thin < wanted
+        else "another mode below its least damping, or growth,"
+    )
     return f"; no margin: {why} with gains of × {MORE:g}"
 
 
@@ -64,9 +74,13 @@ def _reasons(verdict: PointsVerdict) -> list[str]:
     if verdict.harmed:
         worst = max(verdict.harmed, key=lambda point: point.worth.breach if point.worth else 0.0)
         mode = f": {worst.other.words}" if worst.other is not None and not worst.grows else ""
-        reasons.append(f"other modes are harmed at {len(verdict.harmed)} of {total}, most at {worst.where}{mode}")
+        reasons.append(
+            f"other modes are harmed at {len(verdict.harmed)} of {total}, most at {worst.where}{mode}"
+        )
     if verdict.failed:
-        counts = Counter(str((p.before if not p.before.computed else p.after).status) for p in verdict.failed)
+        counts = Counter(
+            str((p.before if not p.before.computed else p.after).status) for p in verdict.failed
+        )
         said = ", ".join(f"{number} {status}" for status, number in counts.items())
         reasons.append(f"{len(verdict.failed)} of {total} have no modes ({said})")
     if verdict.doubtful:
@@ -76,7 +90,11 @@ def _reasons(verdict: PointsVerdict) -> list[str]:
 
 def what_it_rests_on(design: PointsDesign) -> str:
     request, steps = design.plan.request, design.found.steps
-    modes = "all modes from 0.1 to 2 Hz" if not request.modes else "the modes " + ", ".join(request.modes)
+    modes = (
+        "all modes from 0.1 to 2 Hz"
+        if not request.modes
+        else "the modes " + ", ".join(request.modes)
+    )
     return (
         f"Damped: {modes}. No other mode may fall below {100 * request.least_damping:g} % or, where the least of its "
         f"band of frequencies is there already, below that less 0.1 points. Gains from {request.gain_bounds[0]:g} to "
@@ -91,7 +109,9 @@ def remarks(verdict: PointsVerdict) -> list[str]:
     if verdict.failed:
         texts.append(f"{len(verdict.failed)} of {total} have no modes:")
         texts += [f"  {point.where}: {point.why_not}" for point in verdict.failed[:_SHOWN]]
-        texts += [f"  … and {len(verdict.failed) - _SHOWN} more, in the files"] * (len(verdict.failed) > _SHOWN)
+        texts += [f"  … and {len(verdict.failed) - _SHOWN} more, in the files"] * (
+            len(verdict.failed) > _SHOWN
+        )
     if verdict.astray:
         worst = verdict.astray[0]
         assert worst.predicted is not None
@@ -108,11 +128,16 @@ def remarks(verdict: PointsVerdict) -> list[str]:
             "showed no harm to other modes, and there is; give a lower upper end of --gain-bounds, or fewer controllers"
         )
     if free := [point for point in verdict.known if point.after.zeros > 1]:
-        texts.append(f"at {len(free)} of {total}, first at {free[0].where}: {zeros_in_words(free[0].after.zeros)}")
+        texts.append(
+            f"at {len(free)} of {total}, first at {free[0].where}: {zeros_in_words(free[0].after.zeros)}"
+        )
     if unnamed := [point for point in verdict.known if point.unnamed]:
         texts.append(
             f"at {len(unnamed)} of {total}, first at {unnamed[0].where}: a name that is asked for is borne by no mode, "
             "or its mode meets another one while the gains grow, so all modes from 0.1 to 2 Hz count there"
         )
     kinds = kinds_of((point, point.after.warnings) for point in verdict.known)
-    return [*texts, *(f"at {len(x)} of {total}, first at {x[0].where}: {text}" for text, x in kinds[:_SHOWN])]
+    return [
+        *texts,
+        *(f"at {len(x)} of {total}, first at {x[0].where}: {text}" for text, x in kinds[:_SHOWN]),
+    ]

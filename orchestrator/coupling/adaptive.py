@@ -18,13 +18,15 @@ from orchestrator.coupling.tracks import Tracks
 from orchestrator.coupling.turns import Exchange, Loop
 from orchestrator.errors import ComponentError, CosimError, CouplingError, EndedError, InputError
 
-_ORDER = 2  # of schedules in which inputs follow straight lines: a pair's error falls with this power plus 1
+# of schedules in which inputs follow straight lines: a pair's error falls with this power plus 1
+_ORDER = 2
 _SAFETY = 0.5  # part of the tolerance that the next pair is aimed at
 _SHORTEST = 1 / 1024  # shortest step, as a part of the communication step
 _FIRST = 1 / 4  # first pair, and the first after an event, as a part of the communication step
 _MOST_HALVINGS = 4  # so often a pair is halved at once, at most
 _PROVEN_EVERY = 100  # pairs between two proofs that all components go back to their saved states
-_SAME = 1e-8  # of 1 or an output: what a step may differ by from the same, done again; ``newton`` agrees to 1e-10
+# of 1 or an output: what a step may differ by from the same, done again; ``newton`` agrees to 1e-10
+_SAME = 1e-8
 
 Values = NDArray[np.float64]
 
@@ -36,14 +38,21 @@ class AdaptiveLoop:
     Between them it has the length of that stretch, halved as often as is needed."""
 
     def __init__(
-        self, inner: Loop, groups: Sequence[Sequence[Exchange]], y: Values, tracks: Tracks, schedule: Schedule,
+        self,
+        inner: Loop,
+        groups: Sequence[Sequence[Exchange]],
+        y: Values,
+        tracks: Tracks,
+        schedule: Schedule,
         step_size: float,
-    ) -> None:  # fmt: skip
+    ) -> None:
         if schedule.tolerance is None:
             raise ValueError(f"schedule {schedule.name!r} has no tolerance")
         self._inner, self._y, self._tracks, self._tolerance = inner, y, tracks, schedule.tolerance
         self._turns = [exchange for group in groups for exchange in group]
-        if stuck := [t.component.name for t in self._turns if not t.component.description.can_save_state]:
+        if stuck := [
+            t.component.name for t in self._turns if not t.component.description.can_save_state
+        ]:
             raise InputError(
                 f"tolerance = {self._tolerance:g}: steps that are too long are taken back, and component "
                 f"{', '.join(map(repr, stuck))} declares no canGetAndSetFMUstate; leave the tolerance out, and find a "

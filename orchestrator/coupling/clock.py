@@ -14,7 +14,9 @@ class Clock:
 
     def __post_init__(self) -> None:
         if not (self.step_size > 0 and math.isfinite(self.step_size)):
-            raise InputError(f"communication step size {self.step_size!r} s: it must exceed 0 and be finite")
+            raise InputError(
+                f"communication step size {self.step_size!r} s: it must exceed 0 and be finite"
+            )
 
     def time(self, index: int) -> float:
         return index * self.step_size

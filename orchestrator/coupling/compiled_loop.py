@@ -52,15 +52,30 @@ class Team:
         try:
             for k in range(1, min(members, MOST_THREADS)):
                 arguments = self.address, k, since
-                threads.append(Thread(target=unlocked.team_work, args=arguments, name=f"gfor step {k}", daemon=True))
+                threads.append(
+                    Thread(
+                        target=unlocked.team_work,
+                        args=arguments,
+                        name=f"gfor step {k}",
+                        daemon=True,
+                    )
+                )
                 threads[-1].start()
         except RuntimeError as error:
             threads.pop()
-            _LOG.warning("%d threads were wanted, and the system starts %d: %s", members, 1 + len(threads), error)
+            _LOG.warning(
+                "%d threads were wanted, and the system starts %d: %s",
+                members,
+                1 + len(threads),
+                error,
+            )
         self.members = 1 + len(threads)
         unlock, lock = (
             ctypes.cast(function, ctypes.c_void_p)
-            for function in (ctypes.pythonapi.PyEval_SaveThread, ctypes.pythonapi.PyEval_RestoreThread)
+            for function in (
+                ctypes.pythonapi.PyEval_SaveThread,
+                ctypes.pythonapi.PyEval_RestoreThread,
+            )
         )
         library.team_form(self.address, self.members, unlock, lock)
         self.dismiss = finalize(self, _dismiss, library, self._memory, threads)
@@ -80,32 +95,50 @@ _LOOKED_AT = 20
 """Communication steps over which a call's time is averaged; the least average of several counts, because others use
 the processor as well."""
 
-_BALANCED_AT = (100, 1000, 10_000, 100_000)  # communication steps after which the calls are shared out anew
+# communication steps after which the calls are shared out anew
+_BALANCED_AT = (100, 1000, 10_000, 100_000)
 
 
 class _Call(ctypes.Structure):
     _fields_ = (
-        ("component", ctypes.c_void_p), ("set_real", ctypes.c_void_p), ("get_real", ctypes.c_void_p),
-        ("step", ctypes.c_void_p), ("input_references", ctypes.c_void_p), ("output_references", ctypes.c_void_p),
-        ("inputs", ctypes.c_void_p), ("outputs", ctypes.c_void_p), ("sources", ctypes.c_void_p),
-        ("n_inputs", ctypes.c_int64), ("n_outputs", ctypes.c_int64), ("fresh", ctypes.c_void_p),
-        ("spent", ctypes.c_double), ("tracks", ctypes.c_void_p), ("status", ctypes.c_int32), ("stage", ctypes.c_int32),
+        ("component", ctypes.c_void_p),
+        ("set_real", ctypes.c_void_p),
+        ("get_real", ctypes.c_void_p),
+        ("step", ctypes.c_void_p),
+        ("input_references", ctypes.c_void_p),
+        ("output_references", ctypes.c_void_p),
+        ("inputs", ctypes.c_void_p),
+        ("outputs", ctypes.c_void_p),
+        ("sources", ctypes.c_void_p),
+        ("n_inputs", ctypes.c_int64),
+        ("n_outputs", ctypes.c_int64),
+        ("fresh", ctypes.c_void_p),
+        ("spent", ctypes.c_double),
+        ("tracks", ctypes.c_void_p),
+        ("status", ctypes.c_int32),
+        ("stage", ctypes.c_int32),
         ("unused", ctypes.c_int64),
-    )  # fmt: skip
+    )
 
 
 class _Group(ctypes.Structure):
     _fields_ = (
-        ("first", ctypes.c_int64), ("last", ctypes.c_int64), ("own", ctypes.c_void_p), ("shared", ctypes.c_void_p),
-        ("begin", ctypes.c_void_p), ("n_own", ctypes.c_int64),
-    )  # fmt: skip
+        ("first", ctypes.c_int64),
+        ("last", ctypes.c_int64),
+        ("own", ctypes.c_void_p),
+        ("shared", ctypes.c_void_p),
+        ("begin", ctypes.c_void_p),
+        ("n_own", ctypes.c_int64),
+    )
 
 
 @cache
 def loop_library() -> Any | None:
     try:
         # PyDLL keeps Python's lock: Python-backed FMUs would only take it back at every call.
-        library = ctypes.PyDLL(str(compile_here(*(Path(__file__).with_name(name) for name in SOURCES))))
+        library = ctypes.PyDLL(
+            str(compile_here(*(Path(__file__).with_name(name) for name in SOURCES)))
+        )
     except (OSError, RuntimeError):
         return None
     address, integer = ctypes.c_void_p, ctypes.c_int64
@@ -132,15 +165,21 @@ class CompiledLoop:
     out. Who does a call changes no value. Without a number of ``threads``, as many step as make a step shortest."""
 
     def __init__(
-        self, library: Any, groups: Sequence[Sequence[Turn]], y: NDArray[np.float64], tracks: Tracks,
+        self,
+        library: Any,
+        groups: Sequence[Sequence[Turn]],
+        y: NDArray[np.float64],
+        tracks: Tracks,
         threads: int | None = 1,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._library, self._y, self._tracks = library, y, tracks
         self._exchanges = [exchange for group in groups for exchange in group]
         n = len(self._exchanges)
         self._memory = apart(n * ctypes.sizeof(_Call), np.uint8)
         self._calls = (_Call * n).from_buffer(self._memory.data)
-        self._spent = self._memory.view(np.float64)[_Call.spent.offset // 8 :: ctypes.sizeof(_Call) // 8]
+        self._spent = self._memory.view(np.float64)[
+            _Call.spent.offset // 8 :: ctypes.sizeof(_Call) // 8
+        ]
         self._groups = (_Group * len(groups))()
         self._members: list[range] = []
         self._failure = (ctypes.c_int64 * 3)()
@@ -160,7 +199,9 @@ class CompiledLoop:
         self._trial = Trial() if threads is None else None
         self._done = self._looked = self._together = 0
         self._costs, self._spent_then = np.full(n, np.inf), np.zeros(n)
-        shareable = threads != 1 and any(worth_sharing(group, self._bound) for group in self._members)
+        shareable = threads != 1 and any(
+            worth_sharing(group, self._bound) for group in self._members
+        )
         self._balance_at = list(_BALANCED_AT) if shareable else []
 
     def _fill(self, call: _Call, exchange: Turn) -> None:
@@ -183,10 +224,16 @@ class CompiledLoop:
                 part, team = self._next(count - self.completed)
                 begun = perf_counter()
                 status = self._library.advance(
-                    ctypes.addressof(self._calls), ctypes.addressof(self._groups), len(self._groups),
-                    None if team is None else team.address, self._y.ctypes.data, index + self.completed, part,
-                    step_size, ctypes.addressof(self._failure),
-                )  # fmt: skip
+                    ctypes.addressof(self._calls),
+                    ctypes.addressof(self._groups),
+                    len(self._groups),
+                    None if team is None else team.address,
+                    self._y.ctypes.data,
+                    index + self.completed,
+                    part,
+                    step_size,
+                    ctypes.addressof(self._failure),
+                )
                 self.completed = self._failure[0] - index if status else self.completed + part
                 if not status:
                     self._note(part, perf_counter() - begun, team)
@@ -203,7 +250,11 @@ class CompiledLoop:
     def _next(self, count: int) -> tuple[int, Team | None]:
         """How many communication steps are next, at most ``count``, and who does them; None is the caller alone."""
         if self._team is None:
-            return (min(count, _LOOKED_AT) if self._done < _BALANCED_AT[0] and self._balance_at else count), None
+            return (
+                min(count, _LOOKED_AT)
+                if self._done < _BALANCED_AT[0] and self._balance_at
+                else count
+            ), None
         if self._balance_at:
             count = min(count, self._balance_at[0] - self._done)
         if self._trial is None:
@@ -245,7 +296,11 @@ class CompiledLoop:
         found = shares(group, self._bound, self._costs, members)
         own, shared = (np.array(part, dtype=np.int64) for part in (found.own, sum(found.of, ())))
         begin = np.cumsum([0, *map(len, found.of)])
-        entry.own, entry.shared, entry.begin = own.ctypes.data, shared.ctypes.data, begin.ctypes.data
+        entry.own, entry.shared, entry.begin = (
+            own.ctypes.data,
+            shared.ctypes.data,
+            begin.ctypes.data,
+        )
         entry.n_own = len(own)
         self._kept += [own, shared, begin]
         for part in (found.own, *found.of):

@@ -23,8 +23,12 @@ from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.instance import open_component
 
 _INITIAL_PASSES = 20
-_JUMP = 1e-6  # of 1 or of an output: by how much it may change as initialisation ends, with the inputs as they were
-_SAME = 1e-6  # relative difference of a parameter from what was set, as of an FMU that computes in single precision
+# of 1 or of an output: by how much it may change as initialisation ends, with the inputs as they
+# were
+_JUMP = 1e-6
+# relative difference of a parameter from what was set, as of an FMU that computes in single
+# precision
+_SAME = 1e-6
 
 
 @dataclass(frozen=True)
@@ -46,9 +50,13 @@ class CoupledComponents(Closing):
     ``wires``: The connections that do more than carry a value."""
 
     def __init__(
-        self, system: System, schedule: Schedule, step_size: float, stop_time: float | None,
+        self,
+        system: System,
+        schedule: Schedule,
+        step_size: float,
+        stop_time: float | None,
         opener: Callable[[str, ComponentPlan, Path], Component],
-    ) -> None:  # fmt: skip
+    ) -> None:
         if open_inputs := [str(endpoint) for endpoint in system.unconnected_inputs()]:
             raise InputError(
                 f"inputs that nothing feeds: {', '.join(open_inputs)}; connect them or give them a constant value"
@@ -66,7 +74,9 @@ class CoupledComponents(Closing):
             self.close()
             raise
 
-    def _instantiate(self, stop_time: float | None, opener: Callable[[str, ComponentPlan, Path], Component]) -> None:
+    def _instantiate(
+        self, stop_time: float | None, opener: Callable[[str, ComponentPlan, Path], Component]
+    ) -> None:
         folders: dict[Path, Path] = {}
         for name, plan in self.system.components.items():
             path = plan.description.path
@@ -150,14 +160,18 @@ class CoupledComponents(Closing):
         before = self.y.copy()
         for name, exchange in self.exchanges.items():
             exchange.outputs.read()
-            if late := _jump(self.output_names[exchange.window], before[exchange.window], self.y[exchange.window]):
+            if late := _jump(
+                self.output_names[exchange.window], before[exchange.window], self.y[exchange.window]
+            ):
                 self.late_starts[name] = late
 
     def _take_start_values(self) -> None:
         """Let every output be what the inputs that it feeds start from."""
         starts: dict[Endpoint, tuple[float, Endpoint]] = {}
         for wire in self.system.connections:
-            info = self.system.components[wire.target.component].description.variables[wire.target.variable]
+            info = self.system.components[wire.target.component].description.variables[
+                wire.target.variable
+            ]
             value = info.start_number
             known, other = starts.setdefault(wire.source, (value, wire.target))
             if known != value:
@@ -204,10 +218,12 @@ def _check_taken(name: str, component: Component, plan: ComponentPlan) -> None:
     for parameter, given in plan.parameters.items():
         if not np.isclose(values[parameter], given, rtol=_SAME, atol=0.0):
             raise ComponentError(
-                name, "fmi2SetReal", "OK",
+                name,
+                "fmi2SetReal",
+                "OK",
                 f"the parameter {parameter} was set to {given:g} and reads {values[parameter]:g}, so the FMU did not "
                 "take it; leave it out of the case, or have its author export the FMU with that value",
-            )  # fmt: skip
+            )
 
 
 def _jump(names: Sequence[str], before: Numbers, after: Numbers) -> LateStart | None:

@@ -34,7 +34,11 @@ class Event:
         return {self.component: self.settings()}
 
     def __str__(self) -> str:
-        values = [f"{who}.{name} = {value:g}" for who, new in self.changes().items() for name, value in new.items()]
+        values = [
+            f"{who}.{name} = {value:g}"
+            for who, new in self.changes().items()
+            for name, value in new.items()
+        ]
         return f"t = {self.time:g} s: {', '.join(values)}"
 
 
@@ -117,7 +121,11 @@ class BusFault(Event):
         fault = f"{self.bus}.fault"
         if not self.on:
             return {f"{fault}.on": False}
-        return {f"{fault}.R": self.R, f"{fault}.X": max(self.X, SMALLEST_FAULT_REACTANCE), f"{fault}.on": True}
+        return {
+            f"{fault}.R": self.R,
+            f"{fault}.X": max(self.X, SMALLEST_FAULT_REACTANCE),
+            f"{fault}.on": True,
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,15 +225,19 @@ class Forcing(Fault):
         end = stop if self.end is None else min(self.end, stop)
         first, last = round(self.time / step_size), round(end / step_size)
         parts = 2 if self.shape == "square" else FORCING_POINTS
-        points = [first + round(k / (parts * self.frequency * step_size))
-                  for k in range(int((last - first) * step_size * parts * self.frequency) + 2)]  # fmt: skip
+        points = [
+            first + round(k / (parts * self.frequency * step_size))
+            for k in range(int((last - first) * step_size * parts * self.frequency) + 2)
+        ]
         for k, (point, following) in enumerate(pairwise(dict.fromkeys(points))):
             if point >= last:
                 break
             middle = (point + following - 2 * first) / 2 * step_size
             phase = 2 * pi * self.frequency * middle
             value = sin(phase) if self.shape == "sine" else (-1.0) ** k
-            yield ParameterChange(point * step_size, self.component, self.variable, self.amplitude * value)
+            yield ParameterChange(
+                point * step_size, self.component, self.variable, self.amplitude * value
+            )
         if last * step_size < stop:
             yield ParameterChange(last * step_size, self.component, self.variable, 0.0)
 

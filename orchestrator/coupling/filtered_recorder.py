@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from orchestrator.coupling.observers import ObservedRun
 from orchestrator.coupling.recorder import Recorder, RowSink
 
-PASS_BAND, STOP_BAND = 0.4, 0.5  # in parts of 1/interval: what is below passes, what is above is taken away
+# in parts of 1/interval: what is below passes, what is above is taken away
+PASS_BAND, STOP_BAND = 0.4, 0.5
 _HALF = 25  # the filter reaches so many intervals to both sides
 _BETA = 7.857  # of the Kaiser window: 80 dB
 
@@ -19,7 +20,8 @@ FILTER = (
 )
 """What a row is made by, in words."""
 
-_MOST_READ = 1024  # steps whose values are kept until they are added to the rows that they are part of
+# steps whose values are kept until they are added to the rows that they are part of
+_MOST_READ = 1024
 
 
 class FilteredRecorder(Recorder):
@@ -30,7 +32,9 @@ class FilteredRecorder(Recorder):
 
     ``keep``: each ``keep``-th row stays in memory."""
 
-    def __init__(self, names: Sequence[str], interval: int, *, sink: RowSink | None = None, keep: int = 1) -> None:
+    def __init__(
+        self, names: Sequence[str], interval: int, *, sink: RowSink | None = None, keep: int = 1
+    ) -> None:
         super().__init__(names, 1, sink=sink, keep=keep)
         self.interval = interval
         self._weights, self._sums_of_weights = np.empty(0), np.empty(0)
@@ -48,7 +52,11 @@ class FilteredRecorder(Recorder):
         self._half = _HALF * self.interval
         cutoff = (PASS_BAND + STOP_BAND) / self.interval  # in parts of half the sampling frequency
         count = 2 * self._half + 1
-        self._weights = firwin(count, cutoff, window=("kaiser", _BETA)) if self.interval > 1 else np.zeros(count)
+        self._weights = (
+            firwin(count, cutoff, window=("kaiser", _BETA))
+            if self.interval > 1
+            else np.zeros(count)
+        )
         if self.interval == 1:
             self._weights[self._half] = 1.0
         self._sums_of_weights = np.concatenate([[0.0], np.cumsum(self._weights)])
@@ -85,7 +93,9 @@ class FilteredRecorder(Recorder):
                 self._pending[number] = self._first_values * self._sums_of_weights[max(0, -begin)]
             low, high = max(first, begin), min(after, begin + len(self._weights))
             if low < high:
-                self._pending[number] += self._weights[low - begin : high - begin] @ values[low - first : high - first]
+                self._pending[number] += (
+                    self._weights[low - begin : high - begin] @ values[low - first : high - first]
+                )
         self._last_values = values[-1].copy()
         self._inputs_before, self._inputs = after, 0
         while self._next * self.interval + self._half < after:
@@ -102,7 +112,9 @@ class FilteredRecorder(Recorder):
         self._take_in()
         for number in sorted(self._pending_times):
             missing = number * self.interval + self._half + 1 - self._inputs_before
-            self._record(self._pending.pop(number) + self._last_values * self._sums_of_weights[missing])
+            self._record(
+                self._pending.pop(number) + self._last_values * self._sums_of_weights[missing]
+            )
         super().end(run)
 
     def position(self) -> dict[str, Any]:
@@ -111,15 +123,25 @@ class FilteredRecorder(Recorder):
         sums = np.array([self._pending[n] for n in numbers]).reshape(len(numbers), len(self.names))
         times = np.array([[n, t] for n, t in sorted(self._pending_times.items())]).reshape(-1, 2)
         return super().position() | {
-            "filter_numbers": np.array(numbers), "filter_sums": sums, "filter_times": times, "filter_next": self._next,
-            "filter_read": self._inputs_before, "filter_input": self._input[: self._inputs].copy(),
-            "filter_first": self._first_values.copy(), "filter_last": self._last_values.copy(),
-        }  # fmt: skip
+            "filter_numbers": np.array(numbers),
+            "filter_sums": sums,
+            "filter_times": times,
+            "filter_next": self._next,
+            "filter_read": self._inputs_before,
+            "filter_input": self._input[: self._inputs].copy(),
+            "filter_first": self._first_values.copy(),
+            "filter_last": self._last_values.copy(),
+        }
 
     def _restore(self, position: Mapping[str, Any]) -> None:
-        numbers, sums = np.asarray(position["filter_numbers"]).tolist(), np.asarray(position["filter_sums"])
+        numbers, sums = (
+            np.asarray(position["filter_numbers"]).tolist(),
+            np.asarray(position["filter_sums"]),
+        )
         self._pending = {int(n): row.copy() for n, row in zip(numbers, sums, strict=True)}
-        self._pending_times = {int(n): float(t) for n, t in np.asarray(position["filter_times"]).reshape(-1, 2)}
+        self._pending_times = {
+            int(n): float(t) for n, t in np.asarray(position["filter_times"]).reshape(-1, 2)
+        }
         self._next, self._inputs_before = int(position["filter_next"]), int(position["filter_read"])
         values = np.asarray(position["filter_input"])
         self._inputs = len(values)

@@ -66,7 +66,8 @@ class DropOut:
         return "frozen" if self.substitute is None else f"lost, replaced by {self.substitute:g}"
 
 
-Imperfection = Bias | Noise | Quantisation | Delay | DropOut  # what can be wrong with a connection; each at most once
+# what can be wrong with a connection; each at most once
+Imperfection = Bias | Noise | Quantisation | Delay | DropOut
 
 
 @dataclass
@@ -74,14 +75,17 @@ class WirePlan:
     """What one connection does, and may do later."""
 
     name: str  # ``a.out -> b.in``
-    permanent: dict[type[Imperfection], Imperfection] = field(default_factory=dict)  # from t = 0 on, by kind
+    # from t = 0 on, by kind
+    permanent: dict[type[Imperfection], Imperfection] = field(default_factory=dict)
     later: list[Imperfection] = field(default_factory=list)  # what events may bring
 
     def disturb(self, imperfection: Imperfection) -> None:
         """From t = 0 on."""
         present = self.permanent.get(type(imperfection))
         if present is not None:
-            raise InputError(f"connection {self.name} has {present} already, and gets {imperfection}; remove one")
+            raise InputError(
+                f"connection {self.name} has {present} already, and gets {imperfection}; remove one"
+            )
         self.permanent[type(imperfection)] = imperfection
 
     @property
@@ -101,4 +105,8 @@ class WirePlan:
 
 
 def described(plans: Mapping[Any, WirePlan]) -> list[str]:
-    return [f"{plan.name}: {imperfection}" for plan in plans.values() for imperfection in plan.permanent.values()]
+    return [
+        f"{plan.name}: {imperfection}"
+        for plan in plans.values()
+        for imperfection in plan.permanent.values()
+    ]

@@ -22,9 +22,12 @@ class Master(Stepper):
     same inputs. Its partners were initialised with the first value. All else is `ObservedRun`'s."""
 
     def run(
-        self, stop_time: float, events: Sequence[Event] = (), observers: Sequence[Observer] = (),
+        self,
+        stop_time: float,
+        events: Sequence[Event] = (),
+        observers: Sequence[Observer] = (),
         keeper: Keeper = NOT_KEPT,
-    ) -> StepStatistics:  # fmt: skip
+    ) -> StepStatistics:
         """Step until a time [s].
 
         An event happens at its communication point before the step that starts there, and the outputs of its components

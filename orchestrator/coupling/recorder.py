@@ -60,10 +60,13 @@ class MemoryRows:
 
 
 BLOCK_ROWS = 8192  # most rows of a block
-_BLOCK_BYTES = 8_000_000  # size of the largest block; the more is recorded, the fewer rows a block has
+# size of the largest block; the more is recorded, the fewer rows a block has
+_BLOCK_BYTES = 8_000_000
 _FEWEST_ROWS = 64
-PATIENCE = 5.0  # rows of a block that is not full wait for so long until they are handed to the sink [s]
-_SHARE = 0.01  # they wait longer where handing them over would take a larger part of the time than this
+# rows of a block that is not full wait for so long until they are handed to the sink [s]
+PATIENCE = 5.0
+# they wait longer where handing them over would take a larger part of the time than this
+_SHARE = 0.01
 
 
 class Recorder:
@@ -81,9 +84,14 @@ class Recorder:
     ``values``: Shape (n, number of names), in the order of ``names``; only what was reached before a failure."""
 
     def __init__(
-        self, names: Sequence[str], every: int, *, after_exchange: bool = False, sink: RowSink | None = None,
+        self,
+        names: Sequence[str],
+        every: int,
+        *,
+        after_exchange: bool = False,
+        sink: RowSink | None = None,
         keep: int = 1,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.names = tuple(names)
         self.every = every
         self.after_exchange = after_exchange
@@ -101,11 +109,15 @@ class Recorder:
 
     @property
     def times(self) -> NDArray[np.float64]:
-        return self._kept.joined(self._first, self._times[: self._filled], self._block[: self._filled])[0]
+        return self._kept.joined(
+            self._first, self._times[: self._filled], self._block[: self._filled]
+        )[0]
 
     @property
     def values(self) -> NDArray[np.float64]:
-        return self._kept.joined(self._first, self._times[: self._filled], self._block[: self._filled])[1]
+        return self._kept.joined(
+            self._first, self._times[: self._filled], self._block[: self._filled]
+        )[1]
 
     @property
     def rows(self) -> int:
@@ -115,11 +127,19 @@ class Recorder:
         by_component: dict[str, list[tuple[int, str]]] = {}
         for column, name in enumerate(self.names):
             component, _, variable = name.partition(".")
-            if component not in run.components or variable not in run.components[component].description.variables:
-                raise InputError(f"cannot record {name!r}: there is no such variable; `gfor fmu info` lists them")
+            if (
+                component not in run.components
+                or variable not in run.components[component].description.variables
+            ):
+                raise InputError(
+                    f"cannot record {name!r}: there is no such variable; `gfor fmu info` lists them"
+                )
             by_component.setdefault(component, []).append((column, variable))
         self._batches = [
-            (RealBatch(run.components[component], [v for _, v in entries]), np.array([c for c, _ in entries]))
+            (
+                RealBatch(run.components[component], [v for _, v in entries]),
+                np.array([c for c, _ in entries]),
+            )
             for component, entries in by_component.items()
         ]
         self._allocate((stop_index - run.index) // self.every + 2)
@@ -185,7 +205,11 @@ class Recorder:
         Beside ``rows`` and ``block`` (rows of a block) the communication step of the last row; without a sink also
         ``times`` and ``values``, which need ``keep`` = 1."""
         self._hand_over()
-        found: dict[str, Any] = {"rows": self.rows, "index": self._last_index, "block": len(self._times)}
+        found: dict[str, Any] = {
+            "rows": self.rows,
+            "index": self._last_index,
+            "block": len(self._times),
+        }
         if self._sink is None:
             found |= {"times": self.times.copy(), "values": self.values.copy()}
         return found

@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 
 from orchestrator.coupling.events import Event, NotANumber, Silence, WireFault, WireRecovery
 from orchestrator.coupling.observers import Observer
-from orchestrator.coupling.run_state import Keeper, Resumable, RunState, resume_observers, set_state, state_as_bytes
+from orchestrator.coupling.run_state import (
+    Keeper,
+    Resumable,
+    RunState,
+    resume_observers,
+    set_state,
+    state_as_bytes,
+)
 from orchestrator.coupling.statistics import StepStatistics
 from orchestrator.coupling.stepping import Stepper
 from orchestrator.errors import ComponentError, InputError, NotFiniteError, NotTakenUpError
@@ -32,11 +39,14 @@ def silence(component: Component) -> None:
             "give it 'isolated = true' to try a time-out"
         )
     if sys.platform == "win32":
-        raise InputError("a time-out cannot be tried on Windows, which stops no process; try it on Linux or macOS")
+        raise InputError(
+            "a time-out cannot be tried on Windows, which stops no process; try it on Linux or macOS"
+        )
     os.killpg(component.process_group, signal.SIGSTOP)
 
 
-_LONGEST_STRETCH = 1000  # communication steps done at a stretch, so that an interrupt from the keyboard is heard
+# communication steps done at a stretch, so that an interrupt from the keyboard is heard
+_LONGEST_STRETCH = 1000
 
 
 class Run:
@@ -55,7 +65,9 @@ class Run:
         def state(components: Mapping[str, bytes] | None = None) -> RunState:
             spent = np.array(stepper.seconds()) - before
             applied = self._applied == stepper.index
-            return state_of(stepper, self._observers, components, applied, perf_counter() - start, spent)
+            return state_of(
+                stepper, self._observers, components, applied, perf_counter() - start, spent
+            )
 
         begun: list[Observer] = []
         try:
@@ -70,7 +82,9 @@ class Run:
             raise
         except ComponentError as error:
             if error.time is None:
-                raise ComponentError(error.component, error.call, error.status, error.log, stepper.time) from error
+                raise ComponentError(
+                    error.component, error.call, error.status, error.log, stepper.time
+                ) from error
             raise
         finally:
             for observer in begun:
@@ -110,7 +124,13 @@ class Run:
             with calls:
                 done = stepper.index - first
                 stepper.advance(
-                    min([target - stepper.index, _LONGEST_STRETCH, *(o.every - done % o.every for o in observers)])
+                    min(
+                        [
+                            target - stepper.index,
+                            _LONGEST_STRETCH,
+                            *(o.every - done % o.every for o in observers),
+                        ]
+                    )
                 )
                 done = stepper.index - first
                 for observer in observers:
@@ -153,19 +173,33 @@ class Run:
 
 
 def state_of(
-    stepper: Stepper, observers: Iterable[Observer], components: Mapping[str, bytes] | None, applied: bool,
-    seconds: float, spent: NDArray[np.float64],
-) -> RunState:  # fmt: skip
+    stepper: Stepper,
+    observers: Iterable[Observer],
+    components: Mapping[str, bytes] | None,
+    applied: bool,
+    seconds: float,
+    spent: NDArray[np.float64],
+) -> RunState:
     """All that another process needs to go on from here."""
     if components is None:
-        components = {name: state_as_bytes(component) for name, component in stepper.components.items()}
+        components = {
+            name: state_as_bytes(component) for name, component in stepper.components.items()
+        }
     return RunState(
-        index=stepper.index, applied=applied, handed_over=stepper.handed_over, seconds=seconds, spent=spent,
-        y=stepper.y.copy(), tracks=stepper.tracks.saved(),
-        before=np.empty(0) if stepper.before is None else stepper.before.copy(), components=components,
-        observers=[observer.position() for observer in observers if isinstance(observer, Resumable)],
+        index=stepper.index,
+        applied=applied,
+        handed_over=stepper.handed_over,
+        seconds=seconds,
+        spent=spent,
+        y=stepper.y.copy(),
+        tracks=stepper.tracks.saved(),
+        before=np.empty(0) if stepper.before is None else stepper.before.copy(),
+        components=components,
+        observers=[
+            observer.position() for observer in observers if isinstance(observer, Resumable)
+        ],
         wires=stepper.wires.state(),
-    )  # fmt: skip
+    )
 
 
 def take_up(stepper: Stepper, kept: RunState) -> None:

@@ -38,7 +38,8 @@ class RunState:
     # y, tracks: the coupled outputs, and where they went since the last look
     y: NDArray[np.float64]
     tracks: NDArray[np.float64]
-    before: NDArray[np.float64]  # the outputs one step earlier, where inputs are extrapolated; else empty
+    # the outputs one step earlier, where inputs are extrapolated; else empty
+    before: NDArray[np.float64]
     components: Mapping[str, bytes]  # serialised state of each FMU; empty at the end of a run
     observers: Sequence[Position]  # position of each observer that is `Resumable`, in their order
     # of connections that do more than carry a value, group by group: delay lines, noise generators, settings, and what
@@ -48,12 +49,21 @@ class RunState:
     def arrays(self) -> dict[str, NDArray[Any]]:
         found: dict[str, NDArray[Any]] = {
             "place": np.array([self.index, self.applied, self.handed_over], dtype=np.int64),
-            "seconds": np.array([self.seconds, *self.spent]), "y": self.y, "tracks": self.tracks, "before": self.before,
-            "observers": np.array(len(self.observers)), "wires": np.array(len(self.wires)),
-        }  # fmt: skip
-        found |= {f"component {n}": np.frombuffer(state, dtype=np.uint8) for n, state in self.components.items()}
+            "seconds": np.array([self.seconds, *self.spent]),
+            "y": self.y,
+            "tracks": self.tracks,
+            "before": self.before,
+            "observers": np.array(len(self.observers)),
+            "wires": np.array(len(self.wires)),
+        }
+        found |= {
+            f"component {n}": np.frombuffer(state, dtype=np.uint8)
+            for n, state in self.components.items()
+        }
         for k, position in enumerate(self.observers):
-            found |= {f"observer {k} {name}": np.asarray(values) for name, values in position.items()}
+            found |= {
+                f"observer {k} {name}": np.asarray(values) for name, values in position.items()
+            }
         for k, bank in enumerate(self.wires):
             found |= {f"wires {k} {name}": values for name, values in bank.items()}
         return found
@@ -61,7 +71,11 @@ class RunState:
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> Self:
         def beginning(head: str) -> dict[str, NDArray[Any]]:
-            return {name.removeprefix(head): values for name, values in arrays.items() if name.startswith(head)}
+            return {
+                name.removeprefix(head): values
+                for name, values in arrays.items()
+                if name.startswith(head)
+            }
 
         index, applied, handed_over = arrays["place"].tolist()
         seconds, *spent = arrays["seconds"].tolist()
@@ -76,7 +90,10 @@ class RunState:
             before=arrays["before"],
             components={name: values.tobytes() for name, values in beginning("component ").items()},
             observers=[
-                {name: values if values.ndim else values.item() for name, values in beginning(f"observer {k} ").items()}
+                {
+                    name: values if values.ndim else values.item()
+                    for name, values in beginning(f"observer {k} ").items()
+                }
                 for k in range(int(arrays["observers"]))
             ],
             wires=[beginning(f"wires {k} ") for k in range(int(arrays["wires"]))],

@@ -16,7 +16,8 @@ ScheduleName = Literal["gauss-seidel", "jacobi", "midpoint", "newton"]
 
 SCHEDULES: tuple[ScheduleName, ...] = ("gauss-seidel", "jacobi", "midpoint", "newton")
 
-SECOND_ORDER: tuple[ScheduleName, ...] = ("midpoint", "newton")  # inputs follow straight lines in a step
+# inputs follow straight lines in a step
+SECOND_ORDER: tuple[ScheduleName, ...] = ("midpoint", "newton")
 
 FirstInputs = Literal["consistent", "once", "start", "zero"]
 """What connected inputs hold in the first step.
@@ -43,7 +44,9 @@ TOLERANCES = (1e-8, 0.1)  # smallest and largest tolerance of a step's error
 def check_tolerance(tolerance: float) -> None:
     least, most = TOLERANCES
     if isinstance(tolerance, bool) or not least <= tolerance <= most:
-        raise InputError(f"tolerance = {tolerance!r}: give a number from {least:g} to {most:g}, such as 1e-4")
+        raise InputError(
+            f"tolerance = {tolerance!r}: give a number from {least:g} to {most:g}, such as 1e-4"
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +78,10 @@ class Schedule:
     @property
     def is_plain(self) -> bool:
         """Whether nothing but the order of the components is special about the steps."""
-        return not (self.extrapolation or self.wire_by_wire or self.ticks_per_second) and self.coupling == "held"
+        return (
+            not (self.extrapolation or self.wire_by_wire or self.ticks_per_second)
+            and self.coupling == "held"
+        )
 
     @property
     def is_second_order(self) -> bool:
@@ -106,16 +112,25 @@ class Schedule:
                     "newton, in which no component is told the length of the step; take one of them"
                 )
         if self.wire_by_wire and (len(self.groups) > 1 or self.extrapolation):
-            raise InputError(f"schedule {self.name!r}: wire_by_wire needs a single group and no extrapolation")
+            raise InputError(
+                f"schedule {self.name!r}: wire_by_wire needs a single group and no extrapolation"
+            )
         if self.is_second_order and (
-            self.wire_by_wire or self.extrapolation or self.ticks_per_second or self.first_inputs != "consistent"
+            self.wire_by_wire
+            or self.extrapolation
+            or self.ticks_per_second
+            or self.first_inputs != "consistent"
         ):
             raise InputError(
                 f"schedule {self.name!r}: {self.coupling} needs consistent first inputs, and no extrapolation, "
                 "wire_by_wire or ticks beside it"
             )
-        if faults := [f"{what}: {', '.join(sorted(names))}" for what, names in wrong.items() if names]:
-            raise InputError(f"schedule {self.name!r}: {'; '.join(faults)}; list every component exactly once")
+        if faults := [
+            f"{what}: {', '.join(sorted(names))}" for what, names in wrong.items() if names
+        ]:
+            raise InputError(
+                f"schedule {self.name!r}: {'; '.join(faults)}; list every component exactly once"
+            )
 
 
 def jacobi(components: tuple[str, ...]) -> Schedule:
@@ -141,7 +156,9 @@ def newton(groups: tuple[tuple[str, ...], ...], micro_step: float | None = None)
     return Schedule("newton", groups, coupling="newton", micro_step=micro_step)
 
 
-def of_kind(name: ScheduleName, groups: tuple[tuple[str, ...], ...], micro_step: float | None = None) -> Schedule:
+def of_kind(
+    name: ScheduleName, groups: tuple[tuple[str, ...], ...], micro_step: float | None = None
+) -> Schedule:
     """The schedule of a name, with its groups; ``jacobi`` makes one of them all."""
     match name:
         case "jacobi":

@@ -24,8 +24,10 @@ from orchestrator.fmi.interrupts import calls
 
 _PASSES = 20  # most exchanges after a step until outputs that depend on inputs directly agree
 _REPETITIONS = 12  # most repetitions of a step under ``newton``
-_AGREED = 1e-10  # of 1 or of an output: by how much it may differ from what the step was made with, under ``newton``
-_SLOW = 0.1  # A repetition that leaves more than this part of the disagreement asks for new derivatives
+# of 1 or of an output: by how much it may differ from what the step was made with, under ``newton``
+_AGREED = 1e-10
+# A repetition that leaves more than this part of the disagreement asks for new derivatives
+_SLOW = 0.1
 _UNSETTLED = -2
 _NUDGE = 1e-6  # of 1 or of an input: change for the derivatives of a step
 
@@ -35,10 +37,14 @@ Values = NDArray[np.float64]
 class _LineLoop:
     threads = 1
 
-    def __init__(self, groups: Sequence[Sequence[Exchange]], y: Values, tracks: Tracks, schedule: Schedule) -> None:
+    def __init__(
+        self, groups: Sequence[Sequence[Exchange]], y: Values, tracks: Tracks, schedule: Schedule
+    ) -> None:
         self._groups, self._y, self._tracks, self._schedule = groups, y, tracks, schedule
         self._turns = [exchange for group in groups for exchange in group]
-        self._direct = {exchange.component.name: exchange.follows_directly for exchange in self._turns}
+        self._direct = {
+            exchange.component.name: exchange.follows_directly for exchange in self._turns
+        }
         self._spent = dict.fromkeys(self._direct, 0.0)
         self.before: Values | None = None
         self.completed = 0
@@ -59,7 +65,9 @@ class _LineLoop:
     def _step(self, index: int, step_size: float, start: Values, before: Values) -> None:
         raise NotImplementedError
 
-    def _walk(self, turn: Exchange, index: int, step_size: float, start: Values, end: Values) -> None:
+    def _walk(
+        self, turn: Exchange, index: int, step_size: float, start: Values, end: Values
+    ) -> None:
         """Let a component do its step with inputs that go from one value to another."""
         parts = self._schedule.parts(step_size)
         first = start[turn.delivered]
@@ -141,7 +149,12 @@ class CompiledMidpointLoop(CompiledLoop):
     """The same as `MidpointLoop` in C, to the last bit."""
 
     def __init__(
-        self, library: Any, groups: Sequence[Sequence[Exchange]], y: Values, tracks: Tracks, schedule: Schedule
+        self,
+        library: Any,
+        groups: Sequence[Sequence[Exchange]],
+        y: Values,
+        tracks: Tracks,
+        schedule: Schedule,
     ) -> None:
         super().__init__(library, groups, y, tracks)
         self._schedule = schedule
@@ -154,10 +167,20 @@ class CompiledMidpointLoop(CompiledLoop):
         self.before = np.array(self._y if self.before is None else self.before, dtype=float)
         with calls:
             status: int = self._library.advance_lines(
-                ctypes.addressof(self._calls), ctypes.addressof(self._groups), len(self._groups), self._y.ctypes.data,
-                self._direct.ctypes.data, self.before.ctypes.data, self._end.ctypes.data, len(self._y),
-                self._schedule.parts(step_size), index, count, step_size, ctypes.addressof(self._failure),
-            )  # fmt: skip
+                ctypes.addressof(self._calls),
+                ctypes.addressof(self._groups),
+                len(self._groups),
+                self._y.ctypes.data,
+                self._direct.ctypes.data,
+                self.before.ctypes.data,
+                self._end.ctypes.data,
+                len(self._y),
+                self._schedule.parts(step_size),
+                index,
+                count,
+                step_size,
+                ctypes.addressof(self._failure),
+            )
             self.completed = self._failure[0] - index if status else count
         self._judge(status, step_size)
 
@@ -176,9 +199,13 @@ class NewtonLoop(_LineLoop):
     The derivatives of the outputs by the lines' ends come from nudged steps of each component alone. Those of each
     step size are kept as long as the repetitions converge."""
 
-    def __init__(self, groups: Sequence[Sequence[Exchange]], y: Values, tracks: Tracks, schedule: Schedule) -> None:
+    def __init__(
+        self, groups: Sequence[Sequence[Exchange]], y: Values, tracks: Tracks, schedule: Schedule
+    ) -> None:
         super().__init__(groups, y, tracks, schedule)
-        if stuck := [t.component.name for t in self._turns if not t.component.description.can_save_state]:
+        if stuck := [
+            t.component.name for t in self._turns if not t.component.description.can_save_state
+        ]:
             raise InputError(
                 f"schedule 'newton' takes steps back and repeats them: component {', '.join(map(repr, stuck))} "
                 "declares no canGetAndSetFMUstate; take midpoint"
@@ -193,7 +220,9 @@ class NewtonLoop(_LineLoop):
             for turn, state in zip(self._turns, saved, strict=True):
                 turn.component.free_state(state)
 
-    def _repeat(self, index: int, step_size: float, start: Values, before: Values, saved: Sequence[Any]) -> None:
+    def _repeat(
+        self, index: int, step_size: float, start: Values, before: Values, saved: Sequence[Any]
+    ) -> None:
         end, last, renewed = 2 * start - before, np.inf, False
         for repetition in range(_REPETITIONS):
             if repetition:
@@ -225,7 +254,9 @@ class NewtonLoop(_LineLoop):
             with self._timed(turn):
                 turn.component.restore_state(state)
 
-    def _derivatives(self, index: int, step_size: float, start: Values, saved: Sequence[Any]) -> Any:
+    def _derivatives(
+        self, index: int, step_size: float, start: Values, saved: Sequence[Any]
+    ) -> Any:
         """A solver for (1 − J)·x = b, J being the outputs' derivatives by the ends of the lines; states are left as
         saved."""
         rows, columns, values = [], [], []

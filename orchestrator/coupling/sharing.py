@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-HANDOVER = 2e-6  # what a further thread costs in every step [s]: it is told to begin, and fetches what others wrote
+# what a further thread costs in every step [s]: it is told to begin, and fetches what others wrote
+HANDOVER = 2e-6
 
 
 @dataclass(frozen=True)
@@ -17,7 +18,9 @@ class Shares:
     seconds: float  # cost of the thread that has most to do [s]
 
 
-def shares(calls: Sequence[int], bound: NDArray[np.bool_], costs: NDArray[np.float64], threads: int) -> Shares:
+def shares(
+    calls: Sequence[int], bound: NDArray[np.bool_], costs: NDArray[np.float64], threads: int
+) -> Shares:
     """Share out the calls of a group, the costly ones first, each to who has least.
 
     ``bound``: of every call, whether the calling thread alone may do it.
@@ -39,8 +42,13 @@ def best_number(
     """The number of threads, from 1 to ``most``, by which a step should take the least time."""
 
     def seconds(threads: int) -> float:
-        found = (shares(group, bound, costs, threads if worth_sharing(group, bound) else 1) for group in groups)
-        return sum(one.seconds + (HANDOVER * (threads - 1) if len(one.of) > 1 else 0.0) for one in found)
+        found = (
+            shares(group, bound, costs, threads if worth_sharing(group, bound) else 1)
+            for group in groups
+        )
+        return sum(
+            one.seconds + (HANDOVER * (threads - 1) if len(one.of) > 1 else 0.0) for one in found
+        )
 
     return min(range(1, most + 1), key=seconds)
 
@@ -52,8 +60,10 @@ def worth_sharing(group: Sequence[int], bound: NDArray[np.bool_]) -> bool:
 
 
 _BLOCK = 50  # communication steps done one way before the other has its turn
-_BLOCKS = 8  # of a trial, half of them each way: other programs on the same cores disturb both alike
-_VALID = 5000  # communication steps for which a trial's outcome counts: the load of a machine changes
+# of a trial, half of them each way: other programs on the same cores disturb both alike
+_BLOCKS = 8
+# communication steps for which a trial's outcome counts: the load of a machine changes
+_VALID = 5000
 
 
 class Trial:

@@ -17,7 +17,8 @@ class ComponentStatistics:
 @dataclass(slots=True)
 class StepCounts:
     accepted: int = 0  # steps that count, in pairs of equal length
-    rejected: int = 0  # pairs that were taken back, because their error was too large or a component refused them
+    # pairs that were taken back, because their error was too large or a component refused them
+    rejected: int = 0
     # shortest, longest: of the steps that count [s]
     shortest: float = float("inf")
     longest: float = 0.0
@@ -36,7 +37,8 @@ class StepStatistics:
     components: tuple[ComponentStatistics, ...]
     simulated: float = 0.0  # time that was simulated [s]
     threads: int = 1
-    one_thread: Mapping[str, str] = field(default_factory=dict)  # by component, why only one thread may step it
+    # by component, why only one thread may step it
+    one_thread: Mapping[str, str] = field(default_factory=dict)
     adaptive: StepCounts | None = None
 
     @property

@@ -18,7 +18,11 @@ def tell_step(system: System, step_size: float) -> frozenset[str]:
     told = set()
     for name, plan in system.components.items():
         info = plan.description.variables.get(STEP_PARAMETER)
-        if info is not None and info.causality == "parameter" and STEP_PARAMETER not in plan.parameters:
+        if (
+            info is not None
+            and info.causality == "parameter"
+            and STEP_PARAMETER not in plan.parameters
+        ):
             plan.parameters[STEP_PARAMETER] = step_size
             told.add(name)
     return frozenset(told)
@@ -26,7 +30,9 @@ def tell_step(system: System, step_size: float) -> frozenset[str]:
 
 def shortest_internal_step(system: System) -> float | None:
     """The shortest step [s] of the components' own integrators; None where none says it."""
-    plans = [plan for plan in system.components.values() if INTERNAL_STEP in plan.description.variables]
+    plans = [
+        plan for plan in system.components.values() if INTERNAL_STEP in plan.description.variables
+    ]
     return min((plan.number(INTERNAL_STEP) for plan in plans), default=None)
 
 

@@ -30,11 +30,18 @@ class PythonLoop:
     threads = 1
 
     def __init__(
-        self, groups: Sequence[Sequence[Turn]], y: NDArray[np.float64], tracks: Tracks, schedule: Schedule,
+        self,
+        groups: Sequence[Sequence[Turn]],
+        y: NDArray[np.float64],
+        tracks: Tracks,
+        schedule: Schedule,
         hand_over: Callable[[], None] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._groups, self._y, self._tracks, self._hand_over = groups, y, tracks, hand_over
-        self._extrapolation, self._ticks_per_second = schedule.extrapolation, schedule.ticks_per_second
+        self._extrapolation, self._ticks_per_second = (
+            schedule.extrapolation,
+            schedule.ticks_per_second,
+        )
         self.before: NDArray[np.float64] | None = None
         self._spent = [[0.0] * len(group) for group in groups]
         self.completed = 0
@@ -56,14 +63,18 @@ class PythonLoop:
                 start = perf_counter()
                 component = exchange.component
                 if exchange.inputs.names and self._hand_over is None:
-                    component.check(component.set_real(*exchange.inputs.arguments), "fmi2SetReal", time)
+                    component.check(
+                        component.set_real(*exchange.inputs.arguments), "fmi2SetReal", time
+                    )
                 component.step(time, size)
                 spent[i] += perf_counter() - start
             for i, exchange in enumerate(group):
                 start = perf_counter()
                 if exchange.outputs.names:
                     component = exchange.component
-                    component.check(component.get_real(*exchange.outputs.arguments), "fmi2GetReal", time)
+                    component.check(
+                        component.get_real(*exchange.outputs.arguments), "fmi2GetReal", time
+                    )
                 known[exchange.window] = exchange.outputs.values
                 spent[i] += perf_counter() - start
                 bad = self._tracks.follow(exchange.window, exchange.outputs.values)
@@ -79,7 +90,9 @@ class PythonLoop:
 
     def _extrapolated(self) -> NDArray[np.float64]:
         """All outputs as they would go on rising; what has stepped since then is overwritten group by group."""
-        known = self._y + self._extrapolation * (self._y - (self._y if self.before is None else self.before))
+        known = self._y + self._extrapolation * (
+            self._y - (self._y if self.before is None else self.before)
+        )
         self.before = self._y.copy()
         return known
 
@@ -91,9 +104,13 @@ class PythonLoop:
 
 
 def make_loop(
-    groups: Sequence[Sequence[Turn]], y: NDArray[np.float64], tracks: Tracks, schedule: Schedule,
-    hand_over: Callable[[], None] | None = None, threads: int | None = 1,
-) -> Loop:  # fmt: skip
+    groups: Sequence[Sequence[Turn]],
+    y: NDArray[np.float64],
+    tracks: Tracks,
+    schedule: Schedule,
+    hand_over: Callable[[], None] | None = None,
+    threads: int | None = 1,
+) -> Loop:
     """The compiled loop where there is one and it can do what is asked, else the loop in Python."""
     library = compiled_loop.loop_library() if schedule.is_plain else None
     if library is None:
@@ -103,9 +120,14 @@ def make_loop(
 
 class Stepper(CoupledComponents):
     def __init__(
-        self, system: System, schedule: Schedule, step_size: float, stop_time: float | None = None,
-        opener: Callable[[str, ComponentPlan, Path], Component] = open_plan, threads: int | None = 1,
-    ) -> None:  # fmt: skip
+        self,
+        system: System,
+        schedule: Schedule,
+        step_size: float,
+        stop_time: float | None = None,
+        opener: Callable[[str, ComponentPlan, Path], Component] = open_plan,
+        threads: int | None = 1,
+    ) -> None:
         self.index = 0
         super().__init__(system, schedule, step_size, stop_time, opener)
         self._single = self._single_wires() if schedule.wire_by_wire else []
@@ -122,7 +144,9 @@ class Stepper(CoupledComponents):
                     self._lines, groups, self.y, self.tracks, schedule, step_size
                 )
         else:
-            self._loop = make_loop(self._turns(), self._values, self.tracks, schedule, hand_over, threads)
+            self._loop = make_loop(
+                self._turns(), self._values, self.tracks, schedule, hand_over, threads
+            )
         self._release.callback(self._loop.close)
 
     def _turns(self) -> list[list[Turn]]:
@@ -139,7 +163,9 @@ class Stepper(CoupledComponents):
         wires = []
         for wire in self.system.connections:
             source = RealBatch(self.components[wire.source.component], [wire.source.variable])
-            target = RealBatch(self.components[wire.target.component], [wire.target.variable], source.values)
+            target = RealBatch(
+                self.components[wire.target.component], [wire.target.variable], source.values
+            )
             wires.append((source, target))
         return wires
 
@@ -207,8 +233,14 @@ class Stepper(CoupledComponents):
         threads = self._loop.threads
         adaptive = None if self._adaptive is None else replace(self._adaptive.counts)
         return StepStatistics(
-            steps if adaptive is None else adaptive.accepted, seconds,
-            tuple(ComponentStatistics(n, steps, s, s / (threads * seconds)) for n, s in zip(names, spent, strict=True)),
-            self.clock.time(steps), threads,
-            {name: reason for name, c in self.components.items() if (reason := c.one_thread)}, adaptive,
-        )  # fmt: skip
+            steps if adaptive is None else adaptive.accepted,
+            seconds,
+            tuple(
+                ComponentStatistics(n, steps, s, s / (threads * seconds))
+                for n, s in zip(names, spent, strict=True)
+            ),
+            self.clock.time(steps),
+            threads,
+            {name: reason for name, c in self.components.items() if (reason := c.one_thread)},
+            adaptive,
+        )

@@ -44,7 +44,9 @@ class ComponentPlan:
     @property
     def has_port(self) -> bool:
         """Whether it takes the voltage of its bus and gives its current."""
-        return {"v_re", "v_im"} <= {*self.description.inputs} and {"i_re", "i_im"} <= {*self.description.outputs}
+        return {"v_re", "v_im"} <= {*self.description.inputs} and {"i_re", "i_im"} <= {
+            *self.description.outputs
+        }
 
     @property
     def kind(self) -> str:
@@ -55,7 +57,9 @@ class ComponentPlan:
         """The value of a parameter or an input, else its start value; None without both."""
         info = self.description.variables.get(name)
         if info is None:
-            raise InputError(f"{self.description.model_name} has no variable {name!r}; `gfor fmu info` lists them")
+            raise InputError(
+                f"{self.description.model_name} has no variable {name!r}; `gfor fmu info` lists them"
+            )
         return self.parameters.get(name, self.inputs.get(name, info.start))
 
     def number(self, name: str) -> float:
@@ -77,15 +81,24 @@ class System:
         self._feeding: dict[Endpoint, Endpoint] = {}
 
     def add(
-        self, name: str, description: FmuDescription, parameters: Mapping[str, float | bool] | None = None,
-        inputs: Mapping[str, float] | None = None, *, isolated: bool | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        name: str,
+        description: FmuDescription,
+        parameters: Mapping[str, float | bool] | None = None,
+        inputs: Mapping[str, float] | None = None,
+        *,
+        isolated: bool | None = None,
+    ) -> None:
         """Add a component; ``inputs``: constants for inputs that nothing feeds.
 
         ``isolated``: whether it runs in a process of its own; by default all but our own FMUs do."""
         if name in self.components:
-            raise InputError(f"component {name!r} is added twice; give each instance a name of its own")
-        self.components[name] = ComponentPlan(description, dict(parameters or {}), dict(inputs or {}), isolated)
+            raise InputError(
+                f"component {name!r} is added twice; give each instance a name of its own"
+            )
+        self.components[name] = ComponentPlan(
+            description, dict(parameters or {}), dict(inputs or {}), isolated
+        )
 
     def connect(self, source: str, target: str) -> None:
         """Connect an output to an input, both written ``component.variable``."""
@@ -93,18 +106,26 @@ class System:
         start, out = self._resolve(source, label)
         end, into = self._resolve(target, label)
         if out.causality != "output":
-            raise InputError(f"{label}: {source} is of causality {out.causality}; a connection starts at an output")
+            raise InputError(
+                f"{label}: {source} is of causality {out.causality}; a connection starts at an output"
+            )
         if into.causality != "input":
-            raise InputError(f"{label}: {target} is of causality {into.causality}; a connection ends at an input")
+            raise InputError(
+                f"{label}: {target} is of causality {into.causality}; a connection ends at an input"
+            )
         if out.type != "Real" or into.type != "Real":
             raise InputError(
                 f"{label}: {source} is {out.type} and {target} is {into.type}; only Real variables are coupled"
             )
         if out.unit and into.unit and out.unit != into.unit:
-            raise InputError(f"{label}: {source} is in {out.unit} and {target} in {into.unit}; units must be equal")
+            raise InputError(
+                f"{label}: {source} is in {out.unit} and {target} in {into.unit}; units must be equal"
+            )
         feeding = self._sources().get(end)
         if feeding is not None:
-            raise InputError(f"{label}: {target} is already fed by {feeding}; an input takes one connection")
+            raise InputError(
+                f"{label}: {target} is already fed by {feeding}; an input takes one connection"
+            )
         self.connections.append(Connection(start, end))
         self._feeding[end] = start
 
@@ -125,7 +146,9 @@ class System:
 
     def _wire(self, connection: Connection) -> WirePlan:
         if connection not in self.connections:
-            raise InputError(f"there is no connection {connection}; connect it before it is disturbed")
+            raise InputError(
+                f"there is no connection {connection}; connect it before it is disturbed"
+            )
         return self.wires.setdefault(connection.target, WirePlan(str(connection)))
 
     def _resolve(self, name: str, label: str) -> tuple[Endpoint, VariableInfo]:

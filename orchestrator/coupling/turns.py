@@ -20,7 +20,12 @@ class Exchange:
     connection makes of it (`orchestrator.coupling.wires`)."""
 
     def __init__(
-        self, component: Component, inputs: RealBatch, outputs: RealBatch, window: slice, sources: NDArray[np.int64]
+        self,
+        component: Component,
+        inputs: RealBatch,
+        outputs: RealBatch,
+        window: slice,
+        sources: NDArray[np.int64],
     ) -> None:
         self.component, self.inputs, self.outputs = component, inputs, outputs
         self.window, self.sources, self.delivered = window, sources, sources
@@ -29,7 +34,10 @@ class Exchange:
     def follows_directly(self) -> bool:
         """Whether an output depends on a connected input directly, or the FMU does not say."""
         fed = set(self.inputs.names)
-        return any(fed.intersection(self.component.description.feedthrough(name)) for name in self.outputs.names)
+        return any(
+            fed.intersection(self.component.description.feedthrough(name))
+            for name in self.outputs.names
+        )
 
 
 Turn = Exchange | WireBank
@@ -43,7 +51,8 @@ class Loop(Protocol):
         Raises a `NotFiniteError` if a step gives an output that is no finite number."""
 
     completed: int  # communication steps that the last call did
-    before: NDArray[np.float64] | None  # the outputs one step earlier, where inputs are extrapolated; else None
+    # the outputs one step earlier, where inputs are extrapolated; else None
+    before: NDArray[np.float64] | None
 
     def seconds(self) -> list[float]:
         """Time spent inside each component's FMI calls [s], in the order of the schedule."""
@@ -57,4 +66,6 @@ class Loop(Protocol):
 
 
 def not_finite(outputs: RealBatch | WireValues, index: int, time: float) -> NotFiniteError:
-    return NotFiniteError(outputs.component.name, outputs.names[index], float(outputs.values[index]), time)
+    return NotFiniteError(
+        outputs.component.name, outputs.names[index], float(outputs.values[index]), time
+    )

@@ -15,14 +15,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fmus.toolchain.compiler import compile_here
-from orchestrator.coupling.imperfections import Bias, Delay, DropOut, Imperfection, Noise, Quantisation, WirePlan
+from orchestrator.coupling.imperfections import (
+    Bias,
+    Delay,
+    DropOut,
+    Imperfection,
+    Noise,
+    Quantisation,
+    WirePlan,
+)
 from orchestrator.errors import InputError
 
 STRETCH = 1000  # communication steps for which the noise is made at once
 _PASS, _HOLD, _SUBSTITUTE = 0, 1, 2
 _REALS = ("bias", "deviation", "keep", "fresh", "quantum", "substitute", "coloured", "last")
 _INTEGERS = ("mode", "delay", "capacity", "head", "started")
-_WIRE = np.dtype([*((n, "f8") for n in _REALS), *((n, "i8") for n in _INTEGERS), ("ring", "u8"), ("white", "u8")])
+_WIRE = np.dtype(
+    [*((n, "f8") for n in _REALS), *((n, "i8") for n in _INTEGERS), ("ring", "u8"), ("white", "u8")]
+)
 _STATE = ("coloured", "last", "head", "started")
 _SETTING = ("bias", "deviation", "keep", "fresh", "quantum", "substitute", "mode", "delay")
 
@@ -37,9 +47,13 @@ _nothing = _GET_SET(lambda *_: 0)
 
 class _Bank(ctypes.Structure):
     _fields_ = (
-        ("wires", ctypes.c_void_p), ("inputs", ctypes.c_void_p), ("outputs", ctypes.c_void_p), ("n", ctypes.c_int64),
-        ("position", ctypes.c_int64), ("quiet", ctypes.c_int64),
-    )  # fmt: skip
+        ("wires", ctypes.c_void_p),
+        ("inputs", ctypes.c_void_p),
+        ("outputs", ctypes.c_void_p),
+        ("n", ctypes.c_int64),
+        ("position", ctypes.c_int64),
+        ("quiet", ctypes.c_int64),
+    )
 
 
 @cache
@@ -57,7 +71,9 @@ def _library() -> Any | None:
 class WireValues:
     """Values that a bank takes or gives, in the form of a `RealBatch`."""
 
-    def __init__(self, component: "WireBank", names: Sequence[str], values: NDArray[np.float64]) -> None:
+    def __init__(
+        self, component: "WireBank", names: Sequence[str], values: NDArray[np.float64]
+    ) -> None:
         self.component, self.names, self.values = component, tuple(names), values
         self.arguments = (component.pointer, 0, len(self.names), values.ctypes.data)
 
@@ -75,13 +91,24 @@ class WireBank:
     name, one_thread = "connections", "no FMU"
 
     def __init__(
-        self, plans: Sequence[WirePlan], step_size: float, sources: NDArray[np.int64], outputs: NDArray[np.float64],
+        self,
+        plans: Sequence[WirePlan],
+        step_size: float,
+        sources: NDArray[np.int64],
+        outputs: NDArray[np.float64],
         window: slice,
-    ) -> None:  # fmt: skip
-        self.plans, self._step_size, self.sources, self.window = tuple(plans), step_size, sources, window
+    ) -> None:
+        self.plans, self._step_size, self.sources, self.window = (
+            tuple(plans),
+            step_size,
+            sources,
+            window,
+        )
         n = len(plans)
         self._wires = np.zeros(n, dtype=_WIRE)
-        longest = [max((whole_steps(s, step_size, p.name) for s in p.delays), default=0) for p in plans]
+        longest = [
+            max((whole_steps(s, step_size, p.name) for s in p.delays), default=0) for p in plans
+        ]
         self._rings = [np.zeros(steps + 1 if steps else 0) for steps in longest]
         self._white = np.zeros((n, STRETCH))
         self._keys = [0] * n
@@ -89,12 +116,20 @@ class WireBank:
             _check_bandwidths(plan, step_size)
         for k, ring in enumerate(self._rings):
             self._wires[k]["capacity"] = len(ring)
-            self._wires[k]["ring"], self._wires[k]["white"] = ring.ctypes.data, self._white[k].ctypes.data
+            self._wires[k]["ring"], self._wires[k]["white"] = (
+                ring.ctypes.data,
+                self._white[k].ctypes.data,
+            )
         inputs = np.zeros(n)
-        self._bank = _Bank(self._wires.ctypes.data, inputs.ctypes.data, outputs.ctypes.data, n, 0, 0)
+        self._bank = _Bank(
+            self._wires.ctypes.data, inputs.ctypes.data, outputs.ctypes.data, n, 0, 0
+        )
         self.pointer = ctypes.addressof(self._bank)
         names = [plan.name for plan in plans]
-        self.inputs, self.outputs = WireValues(self, names, inputs), WireValues(self, names, outputs)
+        self.inputs, self.outputs = (
+            WireValues(self, names, inputs),
+            WireValues(self, names, outputs),
+        )
         library = _library()
         self.set_real = library.wires_set_real if library else _nothing
         self.get_real = library.wires_get_real if library else _nothing
@@ -122,14 +157,21 @@ class WireBank:
         """From now on a connection has this imperfection, in place of another of its kind."""
         plan = self.plans[k]
         if imperfection not in (*plan.later, *plan.permanent.values()):
-            raise InputError(f"connection {plan.name}: {imperfection} was not announced before the run")
+            raise InputError(
+                f"connection {plan.name}: {imperfection} was not announced before the run"
+            )
         self._begin(k, imperfection)
 
     def end(self, k: int, kind: type[Imperfection]) -> None:
         """From now on a connection is as its permanent settings have it."""
         wire = self._wires[k]
-        for field in {Bias: ("bias",), Noise: ("deviation",), Quantisation: ("quantum",), Delay: ("delay",),
-                      DropOut: ("mode",)}[kind]:  # fmt: skip
+        for field in {
+            Bias: ("bias",),
+            Noise: ("deviation",),
+            Quantisation: ("quantum",),
+            Delay: ("delay",),
+            DropOut: ("mode",),
+        }[kind]:
             wire[field] = 0
         if kind in self.plans[k].permanent:
             self._begin(k, self.plans[k].permanent[kind])
@@ -208,17 +250,27 @@ class WireBank:
 
     def state(self) -> dict[str, NDArray[np.float64]]:
         """All that the next step depends on beside the components, as arrays of numbers."""
-        table = np.array([[float(wire[name]) for name in (*_SETTING, *_STATE)] for wire in self._wires])
-        keys = np.array([[float((key >> (32 * part)) & 0xFFFFFFFF) for part in range(4)] for key in self._keys])
+        table = np.array(
+            [[float(wire[name]) for name in (*_SETTING, *_STATE)] for wire in self._wires]
+        )
+        keys = np.array(
+            [[float((key >> (32 * part)) & 0xFFFFFFFF) for part in range(4)] for key in self._keys]
+        )
         return {
-            "wires": table, "keys": keys, "rings": np.concatenate(self._rings), "delivered": self.outputs.values.copy(),
-        }  # fmt: skip
+            "wires": table,
+            "keys": keys,
+            "rings": np.concatenate(self._rings),
+            "delivered": self.outputs.values.copy(),
+        }
 
     def restore(self, state: dict[str, NDArray[np.float64]]) -> None:
         for wire, row in zip(self._wires, state["wires"], strict=True):
             for name, value in zip((*_SETTING, *_STATE), row.tolist(), strict=True):
                 wire[name] = value
-        self._keys = [sum(int(part) << (32 * p) for p, part in enumerate(row.tolist())) for row in state["keys"]]
+        self._keys = [
+            sum(int(part) << (32 * p) for p, part in enumerate(row.tolist()))
+            for row in state["keys"]
+        ]
         first = 0
         for ring in self._rings:
             ring[:] = state["rings"][first : first + len(ring)]
@@ -239,7 +291,11 @@ def whole_steps(seconds: float, step_size: float, where: str) -> int:
 
 def _check_bandwidths(plan: WirePlan, step_size: float) -> None:
     for noise in (*plan.permanent.values(), *plan.later):
-        if isinstance(noise, Noise) and noise.bandwidth is not None and noise.bandwidth >= 0.5 / step_size:
+        if (
+            isinstance(noise, Noise)
+            and noise.bandwidth is not None
+            and noise.bandwidth >= 0.5 / step_size
+        ):
             raise InputError(
                 f"connection {plan.name}: noise up to {noise.bandwidth:g} Hz does not fit a communication step of "
                 f"{step_size:g} s, which shows {0.5 / step_size:g} Hz at most; leave the bandwidth out for white noise"
@@ -253,7 +309,8 @@ def white(key: int, first: int, count: int) -> NDArray[np.float64]:
     """Values of standard deviation 1 for ``count`` communication steps from ``first`` on, shape (count,)."""
     blocks = range(first // _BLOCK, (first + count - 1) // _BLOCK + 1) if count else range(0)
     values = [
-        np.random.Generator(np.random.Philox(key=key, counter=[0, b, 0, 0])).standard_normal(_BLOCK) for b in blocks
+        np.random.Generator(np.random.Philox(key=key, counter=[0, b, 0, 0])).standard_normal(_BLOCK)
+        for b in blocks
     ]
     start = first % _BLOCK
     whole = np.concatenate(values) if values else np.zeros(0)

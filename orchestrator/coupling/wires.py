@@ -19,9 +19,13 @@ class Wires:
     ``values``: y, and behind it a place for what arrives over each of these connections."""
 
     def __init__(
-        self, system: System, schedule: Schedule, step_size: float, output_index: Mapping[Endpoint, int],
+        self,
+        system: System,
+        schedule: Schedule,
+        step_size: float,
+        output_index: Mapping[Endpoint, int],
         values: NDArray[np.float64],
-    ) -> None:  # fmt: skip
+    ) -> None:
         if system.wires and not schedule.is_plain:
             names = ", ".join(plan.name for plan in system.wires.values())
             raise InputError(

@@ -26,9 +26,13 @@ class Computing:
     """A worker process, begun when it is first needed, and again after it died or was ended."""
 
     def __init__(
-        self, case: str, *, trust_fmus: bool = False, longest: float = LONGEST,
+        self,
+        case: str,
+        *,
+        trust_fmus: bool = False,
+        longest: float = LONGEST,
         recorded: Mapping[str, str] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._given = {"case": case, "trust_fmus": trust_fmus, "recorded": recorded}
         self._longest = longest
         self._state = threading.Condition()
@@ -133,7 +137,9 @@ class Computing:
         how = f"signal {-code}" if code < 0 else f"exit code {code}"
         if self._why == "too long":
             return f"the computation took more than {self._longest:g} s and was ended; ask again with fewer values"
-        text = "an FMU may have died in it; nothing else is lost, and the next question starts it anew"
+        text = (
+            "an FMU may have died in it; nothing else is lost, and the next question starts it anew"
+        )
         return f"the process that computes ended by itself ({how}){detail}: {text}"
 
     def _running(self) -> "subprocess.Popen[str]":
@@ -145,9 +151,13 @@ class Computing:
             path = os.pathsep.join([_ROOT, *filter(None, [os.environ.get("PYTHONPATH")])])
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "orchestrator.explore.worker"],
-                stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, encoding="utf-8",
-                env={**os.environ, "PYTHONPATH": path}, start_new_session=True,
-            )  # fmt: skip
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+                encoding="utf-8",
+                env={**os.environ, "PYTHONPATH": path},
+                start_new_session=True,
+            )
             assert self._process.stdin is not None
             self._process.stdin.write(json.dumps(self._given) + "\n")
             self._process.stdin.flush()

@@ -19,10 +19,15 @@ EXPLORED = "explored"  # name of the scenario that a state of the page becomes
 
 
 def copied(
-    file: CaseFile, word: str, scenario: str, values: Mapping[str, Value], frequencies: tuple[float, float],
-    events: Sequence[Mapping[str, Any]] | None = None, places: Mapping[str, Sequence[float]] | None = None,
+    file: CaseFile,
+    word: str,
+    scenario: str,
+    values: Mapping[str, Value],
+    frequencies: tuple[float, float],
+    events: Sequence[Mapping[str, Any]] | None = None,
+    places: Mapping[str, Sequence[float]] | None = None,
     step: float | None = None,
-) -> dict[str, str]:  # fmt: skip
+) -> dict[str, str]:
     """``command``, ``toml`` and ``python``; ``word`` is the case as it was given.
 
     ``events``: instead of the scenario's; they do not move the modes, and a command has none. ``places``: of buses in
@@ -40,9 +45,13 @@ def copied(
         case += f".with_(scenarios={ {scenario: {'events': list(events)}}!r})"
     last = "" if step is None else f", step={step!r}"
     lines = [
-        "import orchestrator as gfor", "", f"scenario = {case}.scenario({scenario!r}, {dict(values)!r}{last})",
-        f"modes = scenario.modes(({low!r}, {high!r}))", "print(modes.stability.sentence())", "print(modes.table())",
-    ]  # fmt: skip
+        "import orchestrator as gfor",
+        "",
+        f"scenario = {case}.scenario({scenario!r}, {dict(values)!r}{last})",
+        f"modes = scenario.modes(({low!r}, {high!r}))",
+        "print(modes.stability.sentence())",
+        "print(modes.table())",
+    ]
     return {
         "command": shlex.join(words),
         "toml": ("" if step is None else f"# with --step '{step!r} s'\n")
@@ -61,9 +70,14 @@ def saved(file: CaseFile, added: Mapping[str, Any], folder: Path) -> Path:
     tables = _tables(file)
     if "name" not in tables:
         raise InputError(f"{file.path}: it is no TOML file, so that no scenario can be added")
-    scenarios, places = tables.setdefault("scenarios", {}), tables.get("diagram", {}).get("positions", {})
+    scenarios, places = (
+        tables.setdefault("scenarios", {}),
+        tables.get("diagram", {}).get("positions", {}),
+    )
     if EXPLORED in scenarios:
-        raise InputError(f"{file.path}: it has a scenario {EXPLORED!r} already; rename that one, then save again")
+        raise InputError(
+            f"{file.path}: it has a scenario {EXPLORED!r} already; rename that one, then save again"
+        )
     scenarios |= added["scenarios"]
     if "diagram" in added:
         tables["diagram"] = {"positions": places | added["diagram"]["positions"]}
@@ -73,14 +87,23 @@ def saved(file: CaseFile, added: Mapping[str, Any], folder: Path) -> Path:
 
 
 def explored(
-    file: CaseFile, scenario: str, values: Mapping[str, Value], places: Mapping[str, Sequence[float]] | None = None
+    file: CaseFile,
+    scenario: str,
+    values: Mapping[str, Value],
+    places: Mapping[str, Sequence[float]] | None = None,
 ) -> dict[str, Any]:
     """Tables for a case file: a scenario of the case with further values, and places of buses."""
     table = _as_written(file, scenario)
-    kept = {".".join(path): value for path, value in flatten(table.get("set", {})) if ".".join(path) not in values}
+    kept = {
+        ".".join(path): value
+        for path, value in flatten(table.get("set", {}))
+        if ".".join(path) not in values
+    }
     table["set"] = {**kept, **values}
     table["title"] = f"{table.get('title') or scenario}, explored"
-    diagram = {"diagram": {"positions": {bus: list(xy) for bus, xy in places.items()}}} if places else {}
+    diagram = (
+        {"diagram": {"positions": {bus: list(xy) for bus, xy in places.items()}}} if places else {}
+    )
     return {"scenarios": {EXPLORED: table}, **diagram}
 
 
@@ -89,10 +112,18 @@ def _tables(file: CaseFile) -> dict[str, Any]:
     try:
         return tomllib.loads(file.text)
     except tomllib.TOMLDecodeError:
-        return {"events": [event.model_dump(mode="json", exclude_unset=True) for event in file.table.events]}
+        return {
+            "events": [
+                event.model_dump(mode="json", exclude_unset=True) for event in file.table.events
+            ]
+        }
 
 
 def _as_written(file: CaseFile, scenario: str) -> dict[str, Any]:
     """A scenario's table; of an SSP what it comes to."""
     found = _tables(file).get("scenarios", {}).get(scenario)
-    return dict(found) if found is not None else file.scenarios[scenario].model_dump(mode="json", exclude_unset=True)
+    return (
+        dict(found)
+        if found is not None
+        else file.scenarios[scenario].model_dump(mode="json", exclude_unset=True)
+    )

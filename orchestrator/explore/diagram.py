@@ -26,17 +26,28 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
 
     lines: list[dict[str, Any]] = [
         {
-            "name": line.name, "from": line.from_bus, "to": line.to_bus, "kind": "branch" if line.has_ratio else "line",
-            "open": of_grid(line.variable("connected")), "length": of_grid(line.variable("X")),
-            "resistance": of_grid(line.variable("R")), "charging": of_grid(line.variable("B")),
+            "name": line.name,
+            "from": line.from_bus,
+            "to": line.to_bus,
+            "kind": "branch" if line.has_ratio else "line",
+            "open": of_grid(line.variable("connected")),
+            "length": of_grid(line.variable("X")),
+            "resistance": of_grid(line.variable("R")),
+            "charging": of_grid(line.variable("B")),
         }
         for line in network.lines
-    ]  # fmt: skip
+    ]
     lines += [
-        {"name": x.name, "from": x.buses[0], "to": bus, "kind": "branch", "open": of_grid(f"{x.name}.connected")}
+        {
+            "name": x.name,
+            "from": x.buses[0],
+            "to": bus,
+            "kind": "branch",
+            "open": of_grid(f"{x.name}.connected"),
+        }
         for x in network.transformers
         for bus in x.buses[1:]
-    ]  # fmt: skip
+    ]
     ends = [(line["from"], line["to"]) for line in lines]
     points = places(network.buses, ends)
     points += np.array([WIDTH, HEIGHT]) / 2 - (points.max(axis=0) + points.min(axis=0)) / 2
@@ -50,23 +61,31 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
     return {
         "width": WIDTH,
         "height": HEIGHT,
-        "buses": [{"name": bus, "x": x, "y": y} for bus, (x, y) in zip(network.buses, at, strict=True)],
+        "buses": [
+            {"name": bus, "x": x, "y": y} for bus, (x, y) in zip(network.buses, at, strict=True)
+        ],
         "lines": lines,
         "loads": [
             {
-                "name": load.name, "bus": load.bus, "scale": of_grid(f"{load.name}.scale"),
+                "name": load.name,
+                "bus": load.bus,
+                "scale": of_grid(f"{load.name}.scale"),
                 "p_mw": plan.number(power) if (power := f"{load.name}.P") in has else load.p_mw,
             }
             for load in network.loads
         ],
         "units": [
             {
-                "name": port.name, "bus": port.bus,
-                "machine": any(state.endswith("machine.omega") for state in units[port.name].description.states),
-                "out": f"{port.name}.connected" if "connected" in units[port.name].description.variables
+                "name": port.name,
+                "bus": port.bus,
+                "machine": any(
+                    state.endswith("machine.omega") for state in units[port.name].description.states
+                ),
+                "out": f"{port.name}.connected"
+                if "connected" in units[port.name].description.variables
                 else of_grid(f"{port.name}.connected"),
             }
             for port in network.ports
             if port.name in units
         ],
-    }  # fmt: skip
+    }

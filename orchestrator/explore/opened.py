@@ -41,12 +41,16 @@ def certified(file: Path) -> tuple[str, dict[str, Any]]:
             places = [(f"{cell['code']}: ", file.parent / cell["certificate"]) for cell in cells]
             devices = [str(cell["device"]) for cell in cells]
         except (OSError, ValueError, KeyError, TypeError) as error:
-            raise InputError(f"{file}: it cannot be read as a matrix of certificates: {error!r}; give one of the "
-                             "certificates in its folder, or make it anew") from error  # fmt: skip
+            raise InputError(
+                f"{file}: it cannot be read as a matrix of certificates: {error!r}; give one of the "
+                "certificates in its folder, or make it anew"
+            ) from error
     for k, (code, place) in enumerate(places):
         folder, content = read_certificate(place)
         if faults := verify_files(folder, content).faults:
-            raise InputError(f"{folder}: the certificate does not hold: {faults[0]}; `gfor verify` says all")
+            raise InputError(
+                f"{folder}: the certificate does not hold: {faults[0]}; `gfor verify` says all"
+            )
         with xr.open_dataset(folder / RESPONSES, engine="scipy") as data:
             certificate = rebuilt(folder, content, data)
         device = devices[k] if code else certificate.description.model_name
@@ -58,10 +62,14 @@ def certified(file: Path) -> tuple[str, dict[str, Any]]:
         raise InputError(f"{file}: no certificate is in it, as none of its devices could be tested")
     names = list(dict.fromkeys(device for row in whole.values() for device in row))
     return word, {
-        "title": "; ".join(said), "kind": "certificate", "range": ELECTROMECHANICAL_HZ, "followed": False,
-        "rows": [{"name": name} for name in whole], "columns": [{"name": name} for name in names],
+        "title": "; ".join(said),
+        "kind": "certificate",
+        "range": ELECTROMECHANICAL_HZ,
+        "followed": False,
+        "rows": [{"name": name} for name in whole],
+        "columns": [{"name": name} for name in names],
         "cells": [[row.get(name) for name in names] for row in whole.values()],
-    }  # fmt: skip
+    }
 
 
 def _rows(certificate: Certificate) -> Iterator[tuple[str, str, dict[str, Any]]]:
@@ -70,27 +78,46 @@ def _rows(certificate: Certificate) -> Iterator[tuple[str, str, dict[str, Any]]]
         pictures: list[tuple[str, list[ChartCurve], str]] = []
         if certificate.damping is None:
             name, bench, said = verdict.row.name, case_name(verdict.row.name), [verdict.row.title]
-            said += [f"{f.criterion}: {verdict.word(f)}, {f.text} (margin {margin_text(f.margin)})"
-                     for f in verdict.findings]  # fmt: skip
+            said += [
+                f"{f.criterion}: {verdict.word(f)}, {f.text} (margin {margin_text(f.margin)})"
+                for f in verdict.findings
+            ]
             drawn = pictures_of(verdict, certificate.results[name], certificate.f_n)
             pictures = [(label, curves, caption) for _, label, curves, caption in drawn]
         else:
             name, bench, said = f"X_L = {verdict.X_L:g} pu", CASE, list(verdict.faults)
-            said += [f"{m.criterion}: {m.text} (margin {margin_text(m.margin)})" for m in verdict.margins()]
+            said += [
+                f"{m.criterion}: {m.text} (margin {margin_text(m.margin)})"
+                for m in verdict.margins()
+            ]
             if verdict.time is not None:
                 event_time = certificate.damping.event_time
-                pictures = [(*response_curves(certificate, verdict, event_time), verdict.time.swings.reason)]
+                pictures = [
+                    (*response_curves(certificate, verdict, event_time), verdict.time.swings.reason)
+                ]
         said += [f"not judged: {verdict.unknown}"] if verdict.unknown else []
-        yield name, bench, {
-            "text": "\n".join(said), "stable": verdict.accepted if verdict.judged else None,
-            "pictures": [{"label": label, "caption": caption, "curves": list(map(_drawn, curves))}
-                         for label, curves, caption in pictures],
-        }  # fmt: skip
+        yield (
+            name,
+            bench,
+            {
+                "text": "\n".join(said),
+                "stable": verdict.accepted if verdict.judged else None,
+                "pictures": [
+                    {"label": label, "caption": caption, "curves": list(map(_drawn, curves))}
+                    for label, curves, caption in pictures
+                ],
+            },
+        )
 
 
 def _drawn(curve: ChartCurve) -> dict[str, Any]:
     x, y = thinned(curve.x, curve.y)
-    return {"text": curve.label, "colour": curve.colour, "dashed": curve.dashed, "data": [x.tolist(), y.tolist()]}
+    return {
+        "text": curve.label,
+        "colour": curve.colour,
+        "dashed": curve.dashed,
+        "data": [x.tolist(), y.tolist()],
+    }
 
 
 Opened = tuple[str, Case, dict[str, Any]]
@@ -105,7 +132,11 @@ def opened(given: str, *, trust_fmus: bool = False) -> Opened:
         return _of_run(scenario.parent, trust_fmus, scenario.name)
     if (path / SUMMARY).is_file():
         return _of_run(path, trust_fmus)
-    file = path if path.name in CERTIFICATES else next((path / n for n in CERTIFICATES if (path / n).is_file()), None)
+    file = (
+        path
+        if path.name in CERTIFICATES
+        else next((path / n for n in CERTIFICATES if (path / n).is_file()), None)
+    )
     if file is not None and not (path / CELLS).is_file():
         word, study = certified(file)
         return word, load(word, trust_fmus=trust_fmus), {"study": study}
@@ -116,7 +147,9 @@ def opened(given: str, *, trust_fmus: bool = False) -> Opened:
         kept = {key: study.get(key) for key in ("scenario", "step", "values", "range")}
         return study["case"], case, {"study": study, **kept}
     if is_comtrade(path) or path.suffix.lower() in SUFFIXES:
-        raise InputError(f"{given}: a recording is shown beside a simulation: gfor explore CASE --beside {given}")
+        raise InputError(
+            f"{given}: a recording is shown beside a simulation: gfor explore CASE --beside {given}"
+        )
     return given, load(given, trust_fmus=trust_fmus), {}
 
 
@@ -125,17 +158,23 @@ def _of_run(folder: Path, trust_fmus: bool, scenario: str = "") -> Opened:
     try:
         summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
         word, given = str(found_from(summary["case_file"], folder)), summary["given"]
-        recorded = {name: str(folder / name) for name in given if (folder / name / TRAJECTORY).is_file()}
+        recorded = {
+            name: str(folder / name) for name in given if (folder / name / TRAJECTORY).is_file()
+        }
         name = scenario or next(reversed(recorded))
         wanted, text = dict(given[name]), (folder / "case.toml").read_text(encoding="utf-8")
         (step,) = (one["step_size_s"] for one in summary["scenarios"] if one["name"] == name)
     except (OSError, ValueError, KeyError, TypeError, StopIteration) as error:
-        raise InputError(f"{folder / SUMMARY}: it does not tell which case was run, and how ({error!r}); run it again "
-                         "with `gfor run`, or give the case and --beside FOLDER/SCENARIO") from error  # fmt: skip
+        raise InputError(
+            f"{folder / SUMMARY}: it does not tell which case was run, and how ({error!r}); run it again "
+            "with `gfor run`, or give the case and --beside FOLDER/SCENARIO"
+        ) from error
     case = load(word, trust_fmus=trust_fmus)
     if text != case.file.text:
-        raise InputError(f"{word} is not as it was when {folder} was made; run it again, or give the case and --beside "
-                         f"{folder / name}")  # fmt: skip
+        raise InputError(
+            f"{word} is not as it was when {folder} was made; run it again, or give the case and --beside "
+            f"{folder / name}"
+        )
     own = case.scenario(name).prepared
     values = {key: value for key, value in wanted.items() if own.given.get(key) != value}
     beginning = {"scenario": name, "values": values, "recorded": recorded}

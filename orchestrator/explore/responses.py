@@ -33,7 +33,9 @@ Say = Callable[[dict[str, Any]], None]
 def plotted(scenario: Scenario) -> list[str]:
     """What the case plots, as far as the scenario records it: signals ``a.b`` or ``a.b - c.d``."""
     recorded = set(scenario.prepared.record)
-    listed = [str(panel.signal) for plot in scenario.prepared.case.table.plots for panel in plot.panels]
+    listed = [
+        str(panel.signal) for plot in scenario.prepared.case.table.plots for panel in plot.panels
+    ]
     return [one for one in dict.fromkeys(listed) if set(variables_of(one)) <= recorded]
 
 
@@ -50,7 +52,10 @@ def curves(dataset: xr.Dataset, names: Sequence[str]) -> dict[str, list[list[flo
     """By signal its times and values, thinned so that peaks stay."""
     times: Numbers = dataset["time"].values
     found = {name: seen for name in names if (seen := signal(dataset, name)) is not None}
-    return {name: [part.tolist() for part in thinned(times, seen.values)] for name, seen in found.items()}
+    return {
+        name: [part.tolist() for part in thinned(times, seen.values)]
+        for name, seen in found.items()
+    }
 
 
 class Streamed:
@@ -70,7 +75,9 @@ class Streamed:
 
     def observe(self, run: ObservedRun) -> None:
         ends = (name.partition(".") for name in self._needed)
-        self._rows.append([run.time, *(run.components[c].get([variable])[variable] for c, _, variable in ends)])
+        self._rows.append(
+            [run.time, *(run.components[c].get([variable])[variable] for c, _, variable in ends)]
+        )
         if time.monotonic() - self._said > _PAUSE:
             self._flush()
 
@@ -80,7 +87,10 @@ class Streamed:
     def _flush(self) -> None:
         if self._rows:
             columns = dict(zip(["time", *self._needed], np.array(self._rows).T, strict=True))
-            seen = {one: combined(one, [columns[name] for name in variables_of(one)]).tolist() for one in self._names}
+            seen = {
+                one: combined(one, [columns[name] for name in variables_of(one)]).tolist()
+                for one in self._names
+            }
             self._say({"time": columns["time"].tolist(), "signals": seen, "until": self._stop})
             self._rows = []
         self._said = time.monotonic()
@@ -101,29 +111,48 @@ def simulated(scenario: Scenario, wanted: Sequence[str], say: Say) -> dict[str, 
         "answer": run.summary()["answer"],
         "findings": [finding.message for finding in run.findings],
         "ended_early": None if run.failure is None else str(run.failure),
-        "ring_down": None if run.ring_down is None else {
-            "frequency_hz": run.ring_down.frequency_hz, "damping_percent": run.ring_down.damping_percent,
+        "ring_down": None
+        if run.ring_down is None
+        else {
+            "frequency_hz": run.ring_down.frequency_hz,
+            "damping_percent": run.ring_down.damping_percent,
         },
-    }  # fmt: skip
+    }
 
 
 def recorded(place: str, scenario: Scenario, wanted: Sequence[str]) -> dict[str, Any]:
     """What an earlier run or an instrument recorded: ``curves``, the ``names`` of all signals, and what ``differs``
     between a run and the scenario as it is now."""
     if not place:
-        raise InputError(f"nothing was recorded of scenario {scenario.name!r}; choose another one, or run it")
+        raise InputError(
+            f"nothing was recorded of scenario {scenario.name!r}; choose another one, or run it"
+        )
     prepared, dataset = scenario.prepared, open_trajectory(Path(place))
     names = [str(name) for name in dataset.data_vars]
-    found = [name for one in wanted for name in ([n for n in names if fnmatchcase(n, one)] or [one])]
+    found = [
+        name for one in wanted for name in ([n for n in names if fnmatchcase(n, one)] or [one])
+    ]
     drawn = curves(dataset, list(dict.fromkeys(found or plotted(scenario)))[:_MOST])
     told, differs = dataset.attrs, []
     if "values" in told:
         were, live = json.loads(told["values"]), prepared.values
-        differs = [f"{name} was {were.get(name, 'not set')}, is {live.get(name, 'not set')}"
-                   for name in {**were, **live} if not _equal(were.get(name), live.get(name))]  # fmt: skip
+        differs = [
+            f"{name} was {were.get(name, 'not set')}, is {live.get(name, 'not set')}"
+            for name in {**were, **live}
+            if not _equal(were.get(name), live.get(name))
+        ]
         now = {"events": "; ".join(map(str, prepared.events)), "step_size_s": prepared.step_size}
-        differs += [f"{key}: {told.get(key) or 'none'}" for key, value in now.items() if told.get(key) != value]
-    return {"curves": drawn or curves(dataset, names[:_FEW]), "names": names, "differs": differs, "of": place}
+        differs += [
+            f"{key}: {told.get(key) or 'none'}"
+            for key, value in now.items()
+            if told.get(key) != value
+        ]
+    return {
+        "curves": drawn or curves(dataset, names[:_FEW]),
+        "names": names,
+        "differs": differs,
+        "of": place,
+    }
 
 
 def _equal(one: Any, other: Any) -> bool:

@@ -17,7 +17,12 @@ _MOST = 400  # of the grid's points: the page holds all their modes
 
 
 def save_page(
-    path: Path, case: Case, desk: Desk, beginning: Mapping[str, Any], varied: Sequence[Vary], report: CountReport
+    path: Path,
+    case: Case,
+    desk: Desk,
+    beginning: Mapping[str, Any],
+    varied: Sequence[Vary],
+    report: CountReport,
 ) -> None:
     """Compute the modes over the grid, and write the page; a scenario's other values are those it begins with."""
     check_page(path)
@@ -39,12 +44,17 @@ def save_page(
     answers = []
     for done, point in enumerate(points):
         report(done + 1, len(points))
-        found = desk.answer({**asked, "ask": "modes", "values": {**values, **point}}, lambda part: None)
+        found = desk.answer(
+            {**asked, "ask": "modes", "values": {**values, **point}}, lambda part: None
+        )
         answers.append({"scenario": name, "values": point, "answer": found})
     opened = desk.answer({"ask": "open"}, lambda part: None)
     parameters = desk.answer({**asked, "ask": "parameters"}, lambda part: None)
     content = {
-        "beginning": beginning, "open": {**opened, "scenarios": {name: opened["scenarios"][name]}},
-        "parameters": {name: parameters}, "grid": grid, "answers": answers,
-    }  # fmt: skip
+        "beginning": beginning,
+        "open": {**opened, "scenarios": {name: opened["scenarios"][name]}},
+        "parameters": {name: parameters},
+        "grid": grid,
+        "answers": answers,
+    }
     write_text(path, whole_page(content))

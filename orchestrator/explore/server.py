@@ -27,11 +27,19 @@ class Explorer:
     ``beginning``: what the page begins with, as JSON's types."""
 
     def __init__(
-        self, case: str, beginning: Answer, *, port: int = 0, trust_fmus: bool = False, linger: float = LINGER
+        self,
+        case: str,
+        beginning: Answer,
+        *,
+        port: int = 0,
+        trust_fmus: bool = False,
+        linger: float = LINGER,
     ) -> None:
         self.beginning, self.token = beginning, secrets.token_urlsafe(24)
         kinds, recorded = ("modes", "slopes", "run"), beginning.get("recorded")
-        self.computing = {kind: Computing(case, trust_fmus=trust_fmus, recorded=recorded) for kind in kinds}
+        self.computing = {
+            kind: Computing(case, trust_fmus=trust_fmus, recorded=recorded) for kind in kinds
+        }
         self._linger = linger
         self._pages: dict[str, queue.SimpleQueue[Answer]] = {}
         self._last_seen = float("inf")  # nobody was there yet
@@ -48,7 +56,9 @@ class Explorer:
 
     def serve(self) -> None:
         """Answer until the last page was closed for a while, or an interrupt comes."""
-        threading.Thread(target=self._server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True).start()
+        threading.Thread(
+            target=self._server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True
+        ).start()
         try:
             while self._pages or time.monotonic() < self._last_seen + self._linger:
                 time.sleep(0.2)
@@ -86,7 +96,9 @@ class Explorer:
                 computing.cancel(page, question["number"])
             return {"answer": {}}
         computing = self.computing.get(str(question.get("ask")), self.computing["modes"])
-        return computing.ask(page, question, lambda part: self.tell(page, {"of": question.get("ask"), **part}))
+        return computing.ask(
+            page, question, lambda part: self.tell(page, {"of": question.get("ask"), **part})
+        )
 
 
 def _handler(explorer: Explorer) -> type[BaseHTTPRequestHandler]:
@@ -101,7 +113,9 @@ def _handler(explorer: Explorer) -> type[BaseHTTPRequestHandler]:
             if name == "events" and page:
                 self._events(page)
             elif name == "beginning":
-                self._send(HTTPStatus.OK, json.dumps(explorer.beginning).encode(), "application/json")
+                self._send(
+                    HTTPStatus.OK, json.dumps(explorer.beginning).encode(), "application/json"
+                )
             elif (file := name or PAGE) in FILES:
                 self._send(HTTPStatus.OK, content_of(file), FILES[file])
             else:

@@ -35,15 +35,19 @@ from orchestrator.spelling import as_options
 from orchestrator.study.modes import modes_of
 
 _CHANGE = 2e-3  # of the parameter, in parts of its value, or of 1 where that is 0
-_FAR = 0.05  # an eigenvalue that moves by more than this part of itself is no longer known to be the same
+# an eigenvalue that moves by more than this part of itself is no longer known to be the same
+_FAR = 0.05
 _WIDER = 1.5  # the range in which changed modes are looked for, beyond that which is shown
 
 
 def slopes(
-    scenario_with: Callable[[Mapping[str, Value]], Scenario], values: Mapping[str, Value], parameter: str,
-    frequencies: tuple[float, float], say: Callable[[dict[str, Any]], None],
+    scenario_with: Callable[[Mapping[str, Value]], Scenario],
+    values: Mapping[str, Value],
+    parameter: str,
+    frequencies: tuple[float, float],
+    say: Callable[[dict[str, Any]], None],
     computed: Callable[[Scenario, tuple[float, float]], Modes] = Scenario.modes,
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """``value``, ``eigenvalues`` there, and ``slopes``, each a list of [real, imag]; None where no slope is known.
 
     The operating point moves with the parameter, and the FMUs are started and linearised at both sides of its value."""
@@ -54,9 +58,14 @@ def slopes(
         raise InputError(f"there is no parameter {parameter!r} in scenario {here.name!r}")
     info, value = plan.description.variables[variable], plan.value(variable)
     if info.type != "Real" or isinstance(value, str | bool) or value is None:
-        raise InputError(f"{parameter} is of type {info.type}, by which nothing can be differentiated")
+        raise InputError(
+            f"{parameter} is of type {info.type}, by which nothing can be differentiated"
+        )
     change = _CHANGE * (abs(value) or 1.0)
-    least, most = (-np.inf if info.minimum is None else info.minimum, np.inf if info.maximum is None else info.maximum)
+    least, most = (
+        -np.inf if info.minimum is None else info.minimum,
+        np.inf if info.maximum is None else info.maximum,
+    )
     ends = [min(max(end, least), most) for end in (value - change, value + change)]
     say({"progress": "modes at the value itself"})
     base = eigenvalues(computed(here, frequencies))
@@ -92,17 +101,28 @@ def matched(base: Complex, other: Complex) -> Complex:
 Say = Callable[[dict[str, Any]], None]
 
 _FOLDER = Path("results") / "explore"
-_UNEXPECTED = (ArithmeticError, AttributeError, LookupError, MemoryError, RuntimeError, TypeError, ValueError)
+_UNEXPECTED = (
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    MemoryError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
 
 
 class Desk:
     """Answers the questions about one case, which it reads again where its file has changed."""
 
-    def __init__(self, word: str, trust_fmus: bool, recorded: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self, word: str, trust_fmus: bool, recorded: Mapping[str, str] | None = None
+    ) -> None:
         self._word, self._trust, self._recorded = word, trust_fmus, recorded or {}
         self._case: Case | None = None
         self._stamp: list[float] = []
-        self._prepared: tuple[str, ItemPreparation, dict[str, int]] | None = None  # with its points' numbers
+        # with its points' numbers
+        self._prepared: tuple[str, ItemPreparation, dict[str, int]] | None = None
         # the next question's FMUs are those of the last one, where they can be and their files have not changed
         self._bench, self._files = PointBench(), dict[Path, list[float]]()
 
@@ -127,13 +147,21 @@ class Desk:
         answers: dict[str, Callable[[], dict[str, Any]]] = {
             "parameters": lambda: _parameters(case, scenario(values)),
             "modes": lambda: self._modes(case, scenario(values), values, (low, high), question),
-            "slopes": lambda: slopes(scenario, values, str(question["parameter"]), (low, high), say, self._computed),
+            "slopes": lambda: slopes(
+                scenario, values, str(question["parameter"]), (low, high), say, self._computed
+            ),
             "response": lambda: linear(scenario(values), signals),
             "recorded": lambda: recorded(
                 self._recorded.get(name, self._recorded.get("", "")), scenario(values), signals
             ),
             "save": lambda: {
-                "file": str(saved(original.file, explored(case.file, name, values, question.get("places")), _FOLDER))
+                "file": str(
+                    saved(
+                        original.file,
+                        explored(case.file, name, values, question.get("places")),
+                        _FOLDER,
+                    )
+                )
             },
             "run": lambda: simulated(scenario(values), signals, lambda part: say({"part": part})),
         }
@@ -146,14 +174,18 @@ class Desk:
             self._stamp = _stamp(self._case.file.path)
         return self._case
 
-    def _values_of(self, case: Case, question: Mapping[str, Any], values: dict[str, Value]) -> dict[str, Value]:
+    def _values_of(
+        self, case: Case, question: Mapping[str, Any], values: dict[str, Value]
+    ) -> dict[str, Value]:
         """Values by which the case is at a cell of a study: at an operating point, with its outage."""
         own, lost = ([str(name) for name in question.get(key) or ()] for key in ("own", "lost"))
         if not own and not lost:
             return values
         rule, base, step = question.get("sharing"), question.get("base"), question.get("step")
         key = json.dumps([self._stamp, question["scenario"], rule, base, step])
-        if self._prepared is None or self._prepared[0] != key:  # the base case serves all cells of a study
+        if (
+            self._prepared is None or self._prepared[0] != key
+        ):  # the base case serves all cells of a study
             sharing = None if rule is None else SharingRule(rule)
             layers = [OptionValues.of(base)] if base else ()
             made = ItemPreparation(case.file, question["scenario"], layers, step, sharing=sharing)
@@ -165,7 +197,11 @@ class Desk:
 
     def _computed(self, scenario: Scenario, frequencies: tuple[float, float]) -> Modes:
         prepared = scenario.prepared
-        files = {path: _stamp(path) for plan in prepared.system.components.values() if (path := plan.description.path)}
+        files = {
+            path: _stamp(path)
+            for plan in prepared.system.components.values()
+            if (path := plan.description.path)
+        }
         if files != self._files:
             self._bench.close()
             self._files = files
@@ -176,9 +212,13 @@ class Desk:
             raise
 
     def _modes(
-        self, case: Case, scenario: Scenario, values: Mapping[str, Value], frequencies: tuple[float, float],
+        self,
+        case: Case,
+        scenario: Scenario,
+        values: Mapping[str, Value],
+        frequencies: tuple[float, float],
         question: Mapping[str, Any],
-    ) -> dict[str, Any]:  # fmt: skip
+    ) -> dict[str, Any]:
         """The JSON of ``gfor modes``, the verdict in its words, and what reproduces it."""
         modes, system = self._computed(scenario, frequencies), scenario.prepared.system
         hidden, parts = modes.result.hidden, [(key, *key.partition(".")) for key in values]
@@ -187,13 +227,23 @@ class Desk:
             "title": scenario.title,
             "verdict": modes.stability.sentence(),
             "outside": None if hidden is None else hidden.sentence(remedy=False),
-            "idle": {key: why_idle(system, one, name) for key, one, _, name in parts if one in system.components},
+            "idle": {
+                key: why_idle(system, one, name)
+                for key, one, _, name in parts
+                if one in system.components
+            },
             "swings": [modes.result.swing_of(mode) for mode in modes],
             "copied": copied(
-                case.file, self._word, scenario.name, values, frequencies, question.get("events"),
-                question.get("places"), question.get("step"),
+                case.file,
+                self._word,
+                scenario.name,
+                values,
+                frequencies,
+                question.get("events"),
+                question.get("places"),
+                question.get("step"),
             ),
-        }  # fmt: skip
+        }
 
 
 def _parameters(case: Case, scenario: Scenario) -> dict[str, Any]:
@@ -230,7 +280,12 @@ def main() -> None:
         except CosimError as error:
             say({"error": str(error), "kind": error.kind})
         except _UNEXPECTED as error:
-            say({"error": f"it failed in a way that nobody expected: {error!r}; the command may say more", "kind": ""})
+            say(
+                {
+                    "error": f"it failed in a way that nobody expected: {error!r}; the command may say more",
+                    "kind": "",
+                }
+            )
 
 
 if __name__ == "__main__":

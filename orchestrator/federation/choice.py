@@ -39,7 +39,9 @@ class Federates:
                 "--broker names a broker that runs, --broker-port has gfor start one; give only one of them"
             )
         if both := sorted(set(self.names) & set(self.external)):
-            raise InputError(f"{', '.join(both)}: a federate is either started by gfor or external; name it only once")
+            raise InputError(
+                f"{', '.join(both)}: a federate is either started by gfor or external; name it only once"
+            )
         if self.broker is not None:
             address_of(self.broker)
 
@@ -47,5 +49,7 @@ class Federates:
 def address_of(broker: str) -> tuple[str, int]:
     host, colon, port = broker.removeprefix("tcp://").partition(":")
     if not host or "/" in host or (colon and not (port.isdigit() and 0 < int(port) < 65536)):
-        raise InputError(f"broker {broker!r}: an address has the form tcp://host:port, such as tcp://10.0.0.5:23405")
+        raise InputError(
+            f"broker {broker!r}: an address has the form tcp://host:port, such as tcp://10.0.0.5:23405"
+        )
     return host, int(port) if colon else DEFAULT_PORT

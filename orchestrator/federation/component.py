@@ -39,9 +39,13 @@ class FederatedComponent(Derived):
     ``published``: outputs that the federate publishes, in this order."""
 
     def __init__(
-        self, part: Part, description: FmuDescription, inner: Component | None, exchanges: Exchanges,
+        self,
+        part: Part,
+        description: FmuDescription,
+        inner: Component | None,
+        exchanges: Exchanges,
         published: Sequence[str],
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.name, self.description, self.inner, self._part = part.name, description, inner, part
         self._exchanges, variables = exchanges, description.variables
         self._published = [variables[v].reference for v in published]
@@ -95,11 +99,15 @@ class FederatedComponent(Derived):
 
     def _current(self, references: Sequence[int]) -> Sequence[float]:
         if self._published and not self._known:
-            self._known = dict(zip(self._published, self._exchanges.outputs(self.name), strict=True))
+            self._known = dict(
+                zip(self._published, self._exchanges.outputs(self.name), strict=True)
+            )
         known = self._known
         if self.inner is None:
             if missing := [r for r in references if r not in known and r not in self._inputs]:
-                raise ComponentError(self.name, "reading", "nothing", f"reference {missing[0]} is not published")
+                raise ComponentError(
+                    self.name, "reading", "nothing", f"reference {missing[0]} is not published"
+                )
             return [known[r] if r in known else self._inputs[r] for r in references]
         if not self._changed and all(r in known for r in references):
             return [known[r] for r in references]
@@ -114,7 +122,9 @@ class FederatedComponent(Derived):
             self._touched = True
             return int(self.inner.do_step(self.inner.pointer, time, _size, _flag))
         variables = self.description.variables
-        self._exchanges.begin_step(self.name, time, [self._inputs[variables[v].reference] for v in self._part.inputs])
+        self._exchanges.begin_step(
+            self.name, time, [self._inputs[variables[v].reference] for v in self._part.inputs]
+        )
         self._known = {}
         self._changed.clear()
         return 0
@@ -122,14 +132,18 @@ class FederatedComponent(Derived):
     def check(self, status: int, call: str, time: float | None = None) -> None:
         error, self._error = self._error, None
         if isinstance(error, ComponentError) and error.time is None:
-            raise ComponentError(error.component, error.call, error.status, error.log, time) from None
+            raise ComponentError(
+                error.component, error.call, error.status, error.log, time
+            ) from None
         if error is not None:
             raise error
         if self.inner is not None and not self._remote:
             self.inner.check(status, call, time)
 
     def progress_of_step(self) -> tuple[bool, float | None]:
-        return (False, None) if self._remote or self.inner is None else self.inner.progress_of_step()
+        return (
+            (False, None) if self._remote or self.inner is None else self.inner.progress_of_step()
+        )
 
     @property
     def is_foreign(self) -> bool:
@@ -180,7 +194,11 @@ class FederatedComponent(Derived):
         return getattr(self.inner, call)(*arguments)
 
     def _refuse(self, call: str) -> NoReturn:
-        kind = "a foreign federate has no FMU here" if self.inner is None else "it runs in its federate"
+        kind = (
+            "a foreign federate has no FMU here"
+            if self.inner is None
+            else "it runs in its federate"
+        )
         raise ComponentError(self.name, call, "nothing", kind)
 
     def setup(self, start_time: float, stop_time: float | None) -> None:
@@ -209,7 +227,9 @@ class FederatedComponent(Derived):
             self._exchanges.command(self.name, "set", dict(values))
             self._known = {}
             self._changed.update(self._inputs)
-        elif other := [name for name, value in values.items() if self._part.start.get(name) != float(value)]:
+        elif other := [
+            name for name, value in values.items() if self._part.start.get(name) != float(value)
+        ]:
             raise InputError(
                 f"component {self.name!r} is a foreign federate, which takes no {other[0]!r} while it runs"
             )

@@ -29,7 +29,12 @@ class OwnFederate:
     """An FMU that steps when HELICS grants it time."""
 
     def __init__(self, name: str, description: FmuDescription, broker: str, to_join: float) -> None:
-        self.name, self._description, self._broker, self._to_join = name, description, broker, to_join
+        self.name, self._description, self._broker, self._to_join = (
+            name,
+            description,
+            broker,
+            to_join,
+        )
         self._lock, self._configured = threading.Lock(), threading.Event()
         self._ended = False
         self._setting: dict[str, Any] = {}
@@ -55,7 +60,9 @@ class OwnFederate:
             except helics.HelicsException as error:
                 if OVER in helics_calls.text_of(error):
                     return
-                raise ComponentError(self.name, "the federation", "an end", helics_calls.text_of(error)) from error
+                raise ComponentError(
+                    self.name, "the federation", "an end", helics_calls.text_of(error)
+                ) from error
             with suppress(helics.HelicsException):
                 helics.helicsFederateDisconnect(self._federate)
 
@@ -69,14 +76,19 @@ class OwnFederate:
         variables = self._description.variables
         outputs = [v for v in self._description.outputs if variables[v].type == "Real"]
         self._outputs = [
-            helics_calls.publication(self._federate, f"{self.name}.{v}", variables[v].unit) for v in outputs
+            helics_calls.publication(self._federate, f"{self.name}.{v}", variables[v].unit)
+            for v in outputs
         ]
         self._inputs = {
-            v: helics_calls.optional_subscription(self._federate, f"{self.name}.{v}", variables[v].unit)
+            v: helics_calls.optional_subscription(
+                self._federate, f"{self.name}.{v}", variables[v].unit
+            )
             for v in self._description.inputs
             if variables[v].type == "Real"
         }
-        self._fault = helics_calls.text_publication(self._federate, f"{self.name}/{helics_calls.FAULT_MARK}")
+        self._fault = helics_calls.text_publication(
+            self._federate, f"{self.name}/{helics_calls.FAULT_MARK}"
+        )
         helics_calls.text_publication(self._federate, f"{self.name}/{helics_calls.OURS_MARK}")
         self._read = RealBatch(self._fmu(), outputs)
 
@@ -116,7 +128,9 @@ class OwnFederate:
                 text = helics.helicsFederateWaitCommand(self._federate)
                 source = helics.helicsFederateGetCommandSource(self._federate)
                 if text.startswith("{"):
-                    helics.helicsFederateSendCommand(self._federate, source, json.dumps(self._answer(text)))
+                    helics.helicsFederateSendCommand(
+                        self._federate, source, json.dumps(self._answer(text))
+                    )
         except helics.HelicsException:
             return  # the federation is over, as the main thread hears
 
@@ -124,7 +138,10 @@ class OwnFederate:
         asked = json.loads(text)
         function: Callable[..., Any] | None = getattr(self, f"do_{asked['command']}", None)
         if function is None:
-            return {"number": asked["number"], "error": f"it does not know the command {asked['command']!r}"}
+            return {
+                "number": asked["number"],
+                "error": f"it does not know the command {asked['command']!r}",
+            }
         try:
             with self._lock:
                 return {"number": asked["number"], "result": function(*asked["arguments"])}
@@ -132,7 +149,11 @@ class OwnFederate:
             return {"number": asked["number"], "error": str(error)}
 
     def do_hello(self) -> dict[str, Any]:
-        return {"protocol": PROTOCOL, "version": version("gfor-cosim"), "guid": self._description.guid}
+        return {
+            "protocol": PROTOCOL,
+            "version": version("gfor-cosim"),
+            "guid": self._description.guid,
+        }
 
     def do_configure(self, setting: dict[str, Any]) -> None:
         self._setting = setting
@@ -172,7 +193,9 @@ class OwnFederate:
         n = len(references)
         where, numbers = (ctypes.c_uint * n)(*references), (ctypes.c_double * n)(*values)
         function = getattr(self._fmu(), command)
-        status = function(self._fmu().pointer, ctypes.addressof(where), n, ctypes.addressof(numbers))
+        status = function(
+            self._fmu().pointer, ctypes.addressof(where), n, ctypes.addressof(numbers)
+        )
         self._fmu().check(status, "fmi2SetReal" if command == "set_real" else "fmi2GetReal")
         return list(numbers)
 

@@ -85,19 +85,35 @@ class Federation(Closing):
         choice, own = self._choice, None
         if choice.broker is None:
             port = broker_port(choice.port)
-            own, broker = {"port": port, "everywhere": choice.port is not None}, f"tcp://127.0.0.1:{port}"
+            own, broker = (
+                {"port": port, "everywhere": choice.port is not None},
+                f"tcp://127.0.0.1:{port}",
+            )
         else:
             broker = choice.broker
             require_broker(broker)
         if waited := [part.name for part in self.layout.parts if part.external]:
-            where = f"port {choice.port} of this machine" if choice.port is not None else f"the broker {broker}"
-            self._announce(f"waiting {choice.to_join:g} s for the federates {', '.join(waited)} at {where}")
+            where = (
+                f"port {choice.port} of this machine"
+                if choice.port is not None
+                else f"the broker {broker}"
+            )
+            self._announce(
+                f"waiting {choice.to_join:g} s for the federates {', '.join(waited)} at {where}"
+            )
         with Door() as door:
             request = {
-                "port": door.port, "word": door.word, "broker": broker, "own_broker": own, "patience": choice.patience,
-                "to_join": choice.to_join, **asdict(self.layout),
-            }  # fmt: skip
-            self._spawn("the hub", "orchestrator.federation.hub", json.dumps(request).encode() + b"\n")
+                "port": door.port,
+                "word": door.word,
+                "broker": broker,
+                "own_broker": own,
+                "patience": choice.patience,
+                "to_join": choice.to_join,
+                **asdict(self.layout),
+            }
+            self._spawn(
+                "the hub", "orchestrator.federation.hub", json.dumps(request).encode() + b"\n"
+            )
             deadline = time.monotonic() + choice.to_join
             while self._hub is None:
                 with suppress(TimeoutError):
@@ -108,15 +124,22 @@ class Federation(Closing):
                 plan = self._plans[part.name]
                 compile_adapters(plan.description)
                 content = pickle.dumps((part.name, plan.description, broker, choice.to_join))
-                self._spawn(part.name, "orchestrator.federation.federate", f"{len(content)}\n".encode() + content)
+                self._spawn(
+                    part.name,
+                    "orchestrator.federation.federate",
+                    f"{len(content)}\n".encode() + content,
+                )
 
     def _spawn(self, name: str, module: str, request: bytes) -> None:
         assert self._folder is not None
         with self._output(name).open("wb") as output:
             process = subprocess.Popen(
                 [sys.executable, "-P", "-m", module],
-                stdin=subprocess.PIPE, stdout=output, stderr=output, start_new_session=True,
-            )  # fmt: skip
+                stdin=subprocess.PIPE,
+                stdout=output,
+                stderr=output,
+                start_new_session=True,
+            )
         self._processes[name] = process
         assert process.stdin is not None
         with suppress(BrokenPipeError):  # that it has ended is seen when it is waited for
@@ -125,18 +148,26 @@ class Federation(Closing):
 
     def _output(self, name: str) -> Path:
         assert self._folder is not None
-        return self._folder / f"{list(self._parts).index(name) if name in self._parts else 'hub'}.txt"
+        return (
+            self._folder / f"{list(self._parts).index(name) if name in self._parts else 'hub'}.txt"
+        )
 
     def _look(self, deadline: float) -> None:
         """Raise if a process has ended, or time is up."""
-        for name, process in sorted(self._processes.items(), key=lambda entry: entry[0] == "the hub"):
+        for name, process in sorted(
+            self._processes.items(), key=lambda entry: entry[0] == "the hub"
+        ):
             code = process.poll()
             if code is not None:
                 fault, how = fault_of_exit(code, Limits())
-                raise ComponentError(name, "its federate", fault, last_line(self._output(name)) or how)
+                raise ComponentError(
+                    name, "its federate", fault, last_line(self._output(name)) or how
+                )
         if time.monotonic() > deadline:
             patience = self._choice.patience
-            raise ComponentError("the hub", "HELICS", "no answer", f"within {patience:g} s; its processes were ended")
+            raise ComponentError(
+                "the hub", "HELICS", "no answer", f"within {patience:g} s; its processes were ended"
+            )
 
     def _receive(self, kind: bytes, seconds: float) -> bytes:
         assert self._hub is not None
@@ -153,11 +184,18 @@ class Federation(Closing):
                 continue
             except EOFError:
                 self._look(time.monotonic() + _LOOK)
-                raise ComponentError("the hub", "HELICS", "an end", "the hub has closed its connection") from None
+                raise ComponentError(
+                    "the hub", "HELICS", "an end", "the hub has closed its connection"
+                ) from None
             if answer == frames.FAULT:
                 fault = json.loads(content)
                 self._look_for_the_dead(fault["component"])
-                raise ComponentError(fault["component"] or "federation", "its federate", fault["status"], fault["text"])
+                raise ComponentError(
+                    fault["component"] or "federation",
+                    "its federate",
+                    fault["status"],
+                    fault["text"],
+                )
             assert answer == kind
             return content
 
@@ -171,7 +209,9 @@ class Federation(Closing):
                 answer, content = self._hub.receive(_LOOK)
                 fault = json.loads(content) if answer == frames.FAULT else {"status": "no value"}
                 if fault["status"] == "a fault":
-                    raise ComponentError(fault["component"], "its federate", fault["status"], fault["text"]) from None
+                    raise ComponentError(
+                        fault["component"], "its federate", fault["status"], fault["text"]
+                    ) from None
             raise
 
     def _look_for_the_dead(self, name: str) -> None:
@@ -246,9 +286,11 @@ class Federation(Closing):
                 f"guid {here['guid']}; install the same version on both machines, and give both the same case"
             )
         setting = {
-            "period": self.layout.period, "offset": self.layout.slots[part.slot].compute,
-            "step_size": self.prepared.step_size, "inputs": list(part.inputs),
-        }  # fmt: skip
+            "period": self.layout.period,
+            "offset": self.layout.slots[part.slot].compute,
+            "step_size": self.prepared.step_size,
+            "inputs": list(part.inputs),
+        }
         self.command(name, "configure", setting)
         self.command(name, "begin")
 
@@ -272,7 +314,8 @@ class Federation(Closing):
         record = tuple(
             signal
             for signal in self.prepared.record
-            if signal.partition(".")[2] in system.components[signal.partition(".")[0]].description.variables
+            if signal.partition(".")[2]
+            in system.components[signal.partition(".")[0]].description.variables
         )
         return replace(self.prepared, system=system, record=record)
 
@@ -285,14 +328,18 @@ class Federation(Closing):
             component = open_component(name, plan.description, directory, isolated=plan.isolated)
             if name not in self._parts:
                 return component
-            own = FederatedComponent(self._parts[name], plan.description, component, self, self._published[name])
+            own = FederatedComponent(
+                self._parts[name], plan.description, component, self, self._published[name]
+            )
         self._opened.append(own)
         return own
 
     def begin(self, master: Master) -> None:
         """Hand the initialised components over to their federates."""
         steps = round(self.prepared.stop_time / self.prepared.step_size)
-        self._announce(f"{steps} steps over HELICS; the expected time follows after the first second")
+        self._announce(
+            f"{steps} steps over HELICS; the expected time follows after the first second"
+        )
         for name in self._parts:
             component = master.components[name]
             assert isinstance(component, FederatedComponent)
@@ -307,7 +354,9 @@ class Federation(Closing):
         deadline = time.monotonic() + _TO_END
         if hub is None or self._under_way is not None:  # it is busy, and hears nothing
             deadline = time.monotonic()
-        for process in reversed(self._processes.values()):  # the hub, which lets the others go, last
+        for process in reversed(
+            self._processes.values()
+        ):  # the hub, which lets the others go, last
             with suppress(subprocess.TimeoutExpired):
                 process.wait(max(0.0, deadline - time.monotonic()))
             assert process.stdin is not None
@@ -333,8 +382,19 @@ def _all_but_the_grid(prepared: PreparedScenario) -> tuple[str, ...]:
 
 def _as_published(plan: ComponentPlan, part: Part, published: Sequence[str]) -> FmuDescription:
     kept = {*part.inputs, *published}
-    variables = {n: v for n, v in plan.description.variables.items() if n in kept or v.causality == "parameter"}
+    variables = {
+        n: v
+        for n, v in plan.description.variables.items()
+        if n in kept or v.causality == "parameter"
+    }
     return replace(
-        plan.description, variables=variables, states=(), rates=(), states_are_settable=False, can_save_state=False,
-        can_serialize_state=False, gives_directional_derivatives=False, generation_tool="a federate at HELICS",
-    )  # fmt: skip
+        plan.description,
+        variables=variables,
+        states=(),
+        rates=(),
+        states_are_settable=False,
+        can_save_state=False,
+        can_serialize_state=False,
+        gives_directional_derivatives=False,
+        generation_tool="a federate at HELICS",
+    )

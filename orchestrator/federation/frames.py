@@ -12,7 +12,8 @@ JOIN, COMMAND, FIRST, STEP, END, FAULT = b"J", b"C", b"1", b"S", b"E", b"F"
 """Kinds: wait for all federates; a command to one of them; outputs before the first step; a step; the end; an error."""
 
 
-_TO_SPEAK = 10.0  # for who has called to say the word [s]: the hub may wait for a processor meanwhile
+# for who has called to say the word [s]: the hub may wait for a processor meanwhile
+_TO_SPEAK = 10.0
 
 
 class Frames:

@@ -10,7 +10,8 @@ from typing import Any
 from fmus.toolchain.extras import require
 from orchestrator.federation.choice import address_of
 
-CORE = "zmq"  # HELICS's own default, and the only core of its packages that always works between machines
+# HELICS's own default, and the only core of its packages that always works between machines
+CORE = "zmq"
 _TRIES, _PAUSE = 2, 0.5  # before the last try to join a broker, and between two tries [s]
 FAULT_MARK, OURS_MARK = "fault", "gfor-cosim"
 """Texts that a federate publishes as ``component/fault`` and ``component/gfor-cosim``."""
@@ -47,7 +48,8 @@ def _joined(helics: ModuleType, name: str, broker: str, seconds: float) -> Any:
     helics.helicsFederateInfoSetCoreTypeFromString(info, CORE)
     wait = f"{max(1, round(1000 * seconds))}ms"
     helics.helicsFederateInfoSetCoreInitString(
-        info, f"--federates=1 --broker_address=tcp://{host}:{port} --timeout={wait} --loglevel=error"
+        info,
+        f"--federates=1 --broker_address=tcp://{host}:{port} --timeout={wait} --loglevel=error",
     )
     helics.helicsFederateInfoSetFlagOption(info, helics.HELICS_FLAG_UNINTERRUPTIBLE, True)
     return helics.helicsCreateValueFederate(name, info)
@@ -77,9 +79,13 @@ def optional_subscription(federate: Any, name: str, unit: str) -> Any:
 
 def publication(federate: Any, name: str, unit: str) -> Any:
     helics = library()
-    return helics.helicsFederateRegisterGlobalPublication(federate, name, helics.HELICS_DATA_TYPE_DOUBLE, unit)
+    return helics.helicsFederateRegisterGlobalPublication(
+        federate, name, helics.HELICS_DATA_TYPE_DOUBLE, unit
+    )
 
 
 def text_publication(federate: Any, name: str) -> Any:
     helics = library()
-    return helics.helicsFederateRegisterGlobalPublication(federate, name, helics.HELICS_DATA_TYPE_STRING, "")
+    return helics.helicsFederateRegisterGlobalPublication(
+        federate, name, helics.HELICS_DATA_TYPE_STRING, ""
+    )

@@ -55,7 +55,13 @@ class Hub:
         except _FederationError as error:
             self._fail(error.fault)
         except helics_calls.library().HelicsException as error:
-            self._fail({"component": "", "status": "an error of HELICS", "text": helics_calls.text_of(error)})
+            self._fail(
+                {
+                    "component": "",
+                    "status": "an error of HELICS",
+                    "text": helics_calls.text_of(error),
+                }
+            )
 
     def _answer(self, kind: bytes, content: bytes) -> None:
         match kind:
@@ -78,10 +84,14 @@ class Hub:
         if own is not None:
             others = "--ipv4" if own["everywhere"] else "--local_interface=tcp://127.0.0.1"
             self._broker = helics.helicsCreateBroker(
-                helics_calls.CORE, "", f"-f {len(self._parts) + 1} --port={own['port']} {others} --loglevel=error"
+                helics_calls.CORE,
+                "",
+                f"-f {len(self._parts) + 1} --port={own['port']} {others} --loglevel=error",
             )
             if not helics.helicsBrokerIsConnected(self._broker):
-                raise _FederationError("no broker", f"a broker cannot be started at port {own['port']}")
+                raise _FederationError(
+                    "no broker", f"a broker cannot be started at port {own['port']}"
+                )
         broker, seconds = self._request["broker"], self._request["to_join"]
         try:
             self._federate = helics_calls.join(OWN_NAME, broker, seconds)
@@ -98,35 +108,56 @@ class Hub:
         self._optional = set()
         for part in self._parts:
             name, units = part["name"], part["units"]
-            self._inputs[name] = [helics_calls.publication(federate, f"{name}.{v}", units[v]) for v in part["inputs"]]
+            self._inputs[name] = [
+                helics_calls.publication(federate, f"{name}.{v}", units[v]) for v in part["inputs"]
+            ]
             self._outputs[name] = {
-                v: helics_calls.optional_subscription(federate, f"{name}.{v}", units[v]) for v in part["outputs"]
+                v: helics_calls.optional_subscription(federate, f"{name}.{v}", units[v])
+                for v in part["outputs"]
             }
-            self._faults[name] = helics_calls.optional_subscription(federate, f"{name}/{helics_calls.FAULT_MARK}", "")
-            self._optional |= {f"{name}.{v}" for v in part["outputs"]} | {f"{name}/{helics_calls.FAULT_MARK}"}
+            self._faults[name] = helics_calls.optional_subscription(
+                federate, f"{name}/{helics_calls.FAULT_MARK}", ""
+            )
+            self._optional |= {f"{name}.{v}" for v in part["outputs"]} | {
+                f"{name}/{helics_calls.FAULT_MARK}"
+            }
             slot = self._request["slots"][part["slot"]]
             for variable, value in part["start"].items():
                 if variable not in part["inputs"]:
                     self._start.append(
-                        (helics_calls.publication(federate, f"{name}.{variable}", units[variable]), value)
+                        (
+                            helics_calls.publication(
+                                federate, f"{name}.{variable}", units[variable]
+                            ),
+                            value,
+                        )
                     )
             for mark, value in (("period", self._request["period"]), ("offset", slot["compute"])):
-                self._start.append((helics_calls.publication(federate, f"{name}/{mark}", "s"), value * 1e-9))
+                self._start.append(
+                    (helics_calls.publication(federate, f"{name}/{mark}", "s"), value * 1e-9)
+                )
 
     def _all_join(self) -> dict[str, Any]:
         helics, names = helics_calls.library(), [part["name"] for part in self._parts]
         deadline = time.monotonic() + self._request["to_join"]
         while missing := [
-            name for name in names if name not in set(helics_calls.ask(self._federate, "root", "federates") or ())
+            name
+            for name in names
+            if name not in set(helics_calls.ask(self._federate, "root", "federates") or ())
         ]:
             if time.monotonic() > deadline:
                 raise _FederationError(
-                    "nobody", f"no federate named {' or '.join(map(repr, missing))} joined the federation at "
+                    "nobody",
+                    f"no federate named {' or '.join(map(repr, missing))} joined the federation at "
                     f"{self._request['broker']} within {self._request['to_join']:g} s; its name at HELICS must be the "
-                    "component's", missing[0],
-                )  # fmt: skip
+                    "component's",
+                    missing[0],
+                )
             time.sleep(_LOOK)
-        self._waiting = (time.monotonic() + self._request["to_join"], "all federates to enter the initialisation")
+        self._waiting = (
+            time.monotonic() + self._request["to_join"],
+            "all federates to enter the initialisation",
+        )
         helics.helicsFederateEnterInitializingMode(self._federate)
         joined = {part["name"]: self._published(part) for part in self._parts}
         self._joined = joined
@@ -144,11 +175,17 @@ class Hub:
             wanted = f"{name}.{variable}"
             if wanted not in published:
                 near = get_close_matches(wanted, published, 1)
-                hint = f"; it publishes {near[0]!r}, is that meant?" if near else f"; it publishes {published}"
+                hint = (
+                    f"; it publishes {near[0]!r}, is that meant?"
+                    if near
+                    else f"; it publishes {published}"
+                )
                 raise _FederationError(
-                    "no such name", f"federate {name!r} has no global publication {wanted!r}, which other components "
-                    f"take{hint}", name,
-                )  # fmt: skip
+                    "no such name",
+                    f"federate {name!r} has no global publication {wanted!r}, which other components "
+                    f"take{hint}",
+                    name,
+                )
         outputs = [v for v in part["outputs"] if f"{name}.{v}" in published]
         self._outputs[name] = {v: self._outputs[name][v] for v in outputs}
         return {"ours": f"{name}/{helics_calls.OURS_MARK}" in published, "outputs": outputs}
@@ -157,13 +194,16 @@ class Hub:
         """A subscription that nobody feeds stays at 0 for ever."""
         found = helics_calls.ask(self._federate, "root", "unconnected_interfaces")
         unknown = set(found.get("unknown_publications", ())) if isinstance(found, dict) else set()
-        known = [f"{part['name']}.{v}" for part in self._parts for v in (*part["inputs"], *part["start"])]
+        known = [
+            f"{part['name']}.{v}" for part in self._parts for v in (*part["inputs"], *part["start"])
+        ]
         for name in sorted(unknown - self._optional):
             near = get_close_matches(name, known, 1)
             if near or name.partition(".")[0] in self._inputs:
                 hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
                 raise _FederationError(
-                    "no such name", f"somebody subscribes to {name!r}, which nobody publishes; {hint}"
+                    "no such name",
+                    f"somebody subscribes to {name!r}, which nobody publishes; {hint}",
                 )
 
     def _command(self, component: str, text: str) -> str:
@@ -178,12 +218,16 @@ class Hub:
             time.sleep(pause)
             pause = min(2 * pause, 5e-3)
         raise _FederationError(
-            "no answer", f"within {self._request['patience']:g} s; it hangs, or the way to it is broken", component
+            "no answer",
+            f"within {self._request['patience']:g} s; it hangs, or the way to it is broken",
+            component,
         )
 
     def _first(self, foreign: list[str]) -> bytes:
         self._request_time(FIRST_NS, None)
-        return json.dumps({p["name"]: self._values(p) for p in self._parts if p["name"] in foreign}).encode()
+        return json.dumps(
+            {p["name"]: self._values(p) for p in self._parts if p["name"] in foreign}
+        ).encode()
 
     def _values(self, part: dict[str, Any]) -> list[float]:
         helics, name = helics_calls.library(), part["name"]
@@ -191,17 +235,28 @@ class Hub:
             text := helics.helicsInputGetString(self._faults[name])
         ):
             raise _FederationError("a fault", text, name)
-        if silent := [v for v, handle in self._outputs[name].items() if not helics.helicsInputIsUpdated(handle)]:
-            there = name in set(helics_calls.ask(self._federate, "root", "federates") or ()) and helics_calls.ask(
-                self._federate, name, "state"
-            ) not in ("disconnected", "error", "finished", "finalize")
+        if silent := [
+            v
+            for v, handle in self._outputs[name].items()
+            if not helics.helicsInputIsUpdated(handle)
+        ]:
+            there = name in set(
+                helics_calls.ask(self._federate, "root", "federates") or ()
+            ) and helics_calls.ask(self._federate, name, "state") not in (
+                "disconnected",
+                "error",
+                "finished",
+                "finalize",
+            )
             why = (
                 "each output must be published at each of its times, changed or not; look at its period, its offset "
                 "and only_transmit_on_change"
                 if there
                 else "it has left the federation"
             )
-            raise _FederationError("no value", f"of {', '.join(f'{name}.{v}' for v in silent)}: {why}", name)
+            raise _FederationError(
+                "no value", f"of {', '.join(f'{name}.{v}' for v in silent)}: {why}", name
+            )
         return [helics.helicsInputGetDouble(handle) for handle in self._outputs[name].values()]
 
     def _step(self, content: bytes) -> bytes:
@@ -216,7 +271,9 @@ class Hub:
         offset = 16
         for part in parts:
             handles = self._inputs[part["name"]]
-            for handle, value in zip(handles, struct.unpack_from(f"<{len(handles)}d", content, offset), strict=True):
+            for handle, value in zip(
+                handles, struct.unpack_from(f"<{len(handles)}d", content, offset), strict=True
+            ):
                 helics.helicsPublicationPublishDouble(handle, value)
             offset += 8 * len(handles)
         self._request_time(begin + slot["read"], number)
@@ -226,10 +283,14 @@ class Hub:
     def _request_time(self, nanoseconds: int, slot: int | None) -> None:
         names = [p["name"] for p in self._parts if slot is None or p["slot"] == slot]
         self._waiting = (time.monotonic() + self._request["patience"], " ".join(names))
-        granted = helics_calls.library().helicsFederateRequestTime(self._federate, nanoseconds * 1e-9)
+        granted = helics_calls.library().helicsFederateRequestTime(
+            self._federate, nanoseconds * 1e-9
+        )
         self._waiting = None
         if round(granted * 1e9) != nanoseconds:
-            raise _FederationError("an end", "the broker or a federate ended the federation", names[0])
+            raise _FederationError(
+                "an end", "the broker or a federate ended the federation", names[0]
+            )
         self._now = nanoseconds
 
     def _watch(self) -> None:
@@ -247,15 +308,19 @@ class Hub:
         late = []
         for name in among:
             times = helics_calls.ask(self._federate, name, "current_time")
-            if not isinstance(times, dict) or times.get("requested_time", 0.0) * 1e9 <= self._now + 1:
+            if (
+                not isinstance(times, dict)
+                or times.get("requested_time", 0.0) * 1e9 <= self._now + 1
+            ):
                 late.append(name)
         who = late or among
         patience = self._request["patience"]
         return {
-            "component": who[0], "status": "no answer",
+            "component": who[0],
+            "status": "no answer",
             "text": f"{', '.join(who)} did not ask for its next time within {patience:g} s; it hangs, or the way to it "
             "is broken",
-        }  # fmt: skip
+        }
 
     def _fail(self, fault: dict[str, str]) -> NoReturn:
         with self._sending, suppress(OSError):
@@ -268,13 +333,16 @@ class Hub:
         helics = helics_calls.library()
         worker = threading.Thread(target=self._leave, args=(helics, reason), daemon=True)
         worker.start()
-        worker.join(3.0 if reason else 1.0 + 1e-3 * _TO_LEAVE)  # a call of HELICS may wait for somebody who is gone
+        # a call of HELICS may wait for somebody who is gone
+        worker.join(3.0 if reason else 1.0 + 1e-3 * _TO_LEAVE)
 
     def _leave(self, helics: ModuleType, reason: str) -> None:
         with suppress(helics.HelicsException):
             # A broker that ends before they leave may not reach them, or lets them wait for ever.
             for name, found in {} if reason else self._joined.items():
-                helics.helicsFederateSendCommand(self._federate, name, _END if found["ours"] else _END_OF_OTHERS)
+                helics.helicsFederateSendCommand(
+                    self._federate, name, _END if found["ours"] else _END_OF_OTHERS
+                )
             if self._federate is not None and reason:
                 helics.helicsFederateGlobalError(self._federate, 1, reason)
                 time.sleep(0.1)

@@ -42,7 +42,9 @@ class Layout:
     parts: tuple[Part, ...]
 
 
-def make_layout(prepared: PreparedScenario, names: Sequence[str], external: Sequence[str]) -> Layout:
+def make_layout(
+    prepared: PreparedScenario, names: Sequence[str], external: Sequence[str]
+) -> Layout:
     system, known = prepared.system, prepared.system.components
     for option, given in (("--federate", names), ("--external", external)):
         if wrong := [name for name in given if name not in known]:
@@ -73,11 +75,26 @@ def make_layout(prepared: PreparedScenario, names: Sequence[str], external: Sequ
             variables = plan.description.variables
             inputs = [c.target.variable for c in system.connections if c.target.component == name]
             outputs = [v for v in plan.description.outputs if variables[v].type == "Real"]
-            start = {v: float(x) for v, x in (plan.parameters | plan.inputs).items() if not isinstance(x, str)}
-            needed = dict.fromkeys(c.source.variable for c in system.connections if c.source.component == name)
+            start = {
+                v: float(x)
+                for v, x in (plan.parameters | plan.inputs).items()
+                if not isinstance(x, str)
+            }
+            needed = dict.fromkeys(
+                c.source.variable for c in system.connections if c.source.component == name
+            )
             units = {v: variables[v].unit for v in (*inputs, *outputs, *start)}
             parts.append(
-                Part(name, tuple(inputs), tuple(outputs), tuple(needed), start, units, slot, name in set(external))
+                Part(
+                    name,
+                    tuple(inputs),
+                    tuple(outputs),
+                    tuple(needed),
+                    start,
+                    units,
+                    slot,
+                    name in set(external),
+                )
             )
     return Layout(period, slots, tuple(parts))
 
@@ -101,7 +118,9 @@ def broker_port(wanted: int | None) -> int:
             port: int = server.getsockname()[1]
         if port < 65000 and _taken(port, "127.0.0.1") is None:
             return port
-    raise InputError("this machine has no two free ports one after the other for a broker; give one with --broker-port")
+    raise InputError(
+        "this machine has no two free ports one after the other for a broker; give one with --broker-port"
+    )
 
 
 def _taken(port: int, host: str) -> int | None:

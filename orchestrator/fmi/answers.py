@@ -98,7 +98,9 @@ def matrix(answer: Any, rows: int, columns: int) -> NDArray[np.float64]:
 def protections(answer: Any) -> tuple[Protection, ...]:
     """What keeps the process from the rest of the machine; asked for before the FMU is loaded."""
     try:
-        return tuple(Protection(str(name), bool(in_force), str(how)) for name, in_force, how in answer)
+        return tuple(
+            Protection(str(name), bool(in_force), str(how)) for name, in_force, how in answer
+        )
     except (TypeError, ValueError):
         raise _not("a list of protections", answer) from None
 

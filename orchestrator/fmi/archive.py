@@ -32,7 +32,8 @@ MOST_XML_ELEMENTS = 600_000
 """Of one document: an FMU of about 200,000 variables, three elements each. A network of 9,241 buses has 484,788."""
 
 FREE_BYTES = 64 * 1024**2
-MOST_RATIO = 100  # most unpacked over packed size beyond the first `FREE_BYTES`; binaries reach 10, zip bombs 1000
+# most unpacked over packed size beyond the first `FREE_BYTES`; binaries reach 10, zip bombs 1000
+MOST_RATIO = 100
 
 _OUTSIDE = (
     "an absolute path, or one with a drive or a backslash",
@@ -43,9 +44,24 @@ _OUTSIDE = (
 
 _CHUNK = 1 << 20
 _METHODS = {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}
-_DAMAGE = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, NotImplementedError, RuntimeError,
-           ValueError, OverflowError)  # fmt: skip
-_DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{n}" for port in ("COM", "LPT") for n in range(1, 10))}
+_DAMAGE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    struct.error,
+    EOFError,
+    NotImplementedError,
+    RuntimeError,
+    ValueError,
+    OverflowError,
+)
+_DEVICES = {
+    "CON",
+    "PRN",
+    "AUX",
+    "NUL",
+    *(f"{port}{n}" for port in ("COM", "LPT") for n in range(1, 10)),
+}
 _ON_WINDOWS = os.name == "nt"
 
 
@@ -100,7 +116,8 @@ def extract(path: Path, folder: Path | None = None) -> Path:
         target.mkdir(parents=True, exist_ok=True)
         try:
             left = MOST_BYTES
-            entries = {entry.filename: entry for entry in archive.infolist()}  # listed twice, with the same bytes: once
+            # listed twice, with the same bytes: once
+            entries = {entry.filename: entry for entry in archive.infolist()}
             for entry in entries.values():
                 left = _write(archive, entry, target, left, path)
         except BaseException:
@@ -125,7 +142,9 @@ def check_xml(path: Path, name: str, text: bytes) -> None:
         nonlocal depth, elements
         depth, elements = depth + 1, elements + 1
         if depth > MOST_XML_DEPTH:
-            raise HostileFmuError(f"{path}: {name} nests more than {MOST_XML_DEPTH} elements; FMI's nest 6")
+            raise HostileFmuError(
+                f"{path}: {name} nests more than {MOST_XML_DEPTH} elements; FMI's nest 6"
+            )
         if elements > MOST_XML_ELEMENTS:
             raise HostileFmuError(
                 f"{path}: {name} has more than {MOST_XML_ELEMENTS} elements, which would fill the memory; ask for an "
@@ -172,14 +191,18 @@ def _opened(path: Path, kind: str = "FMU") -> Iterator[zipfile.ZipFile]:
 def _check_entries(path: Path, archive: zipfile.ZipFile) -> None:
     entries = archive.infolist()
     if len(entries) > MOST_FILES:
-        raise HostileFmuError(f"{path}: the archive has {len(entries)} files; at most {MOST_FILES} are unpacked")
+        raise HostileFmuError(
+            f"{path}: the archive has {len(entries)} files; at most {MOST_FILES} are unpacked"
+        )
     _check_sizes(path, sum(e.file_size for e in entries), sum(e.compress_size for e in entries))
     seen: dict[str, zipfile.ZipInfo] = {}
     for entry in entries:
         fault = _fault_of(entry)
         key = unicodedata.normalize("NFC", entry.filename.rstrip("/")).casefold()
         if fault is None and key in seen and not _harmless_twin(archive, seen[key], entry):
-            differs = ", with other bytes" if seen[key].filename == entry.filename else " on some systems"
+            differs = (
+                ", with other bytes" if seen[key].filename == entry.filename else " on some systems"
+            )
             fault = f"the same file as {seen[key].filename!r}{differs}"
         if fault is not None:
             raise HostileFmuError(
@@ -197,7 +220,9 @@ def _check_entries(path: Path, archive: zipfile.ZipFile) -> None:
                 )
 
 
-def _harmless_twin(archive: zipfile.ZipFile, first: zipfile.ZipInfo, second: zipfile.ZipInfo) -> bool:
+def _harmless_twin(
+    archive: zipfile.ZipFile, first: zipfile.ZipInfo, second: zipfile.ZipInfo
+) -> bool:
     """Whether two entries of one place are the same folder, or one file with the same bytes, listed twice."""
     if first.is_dir() or second.is_dir():
         return first.is_dir() and second.is_dir()
@@ -213,7 +238,8 @@ def _harmless_twin(archive: zipfile.ZipFile, first: zipfile.ZipInfo, second: zip
 def _check_sizes(path: Path, unpacked: int, packed: int) -> None:
     if unpacked > MOST_BYTES:
         raise HostileFmuError(
-            f"{path}: the archive unpacks to {unpacked} bytes; at most {MOST_BYTES} are unpacked", "zip bomb"
+            f"{path}: the archive unpacks to {unpacked} bytes; at most {MOST_BYTES} are unpacked",
+            "zip bomb",
         )
     if unpacked > FREE_BYTES + MOST_RATIO * packed:
         raise HostileFmuError(
@@ -235,7 +261,9 @@ def _fault_of(entry: zipfile.ZipInfo) -> str | None:
         return _OUTSIDE[1]
     if any(part in ("", ".") for part in parts):
         return "a path with an empty part"
-    if _ON_WINDOWS and any(part.endswith((" ", ".")) or part.split(".")[0].upper() in _DEVICES for part in parts):
+    if _ON_WINDOWS and any(
+        part.endswith((" ", ".")) or part.split(".")[0].upper() in _DEVICES for part in parts
+    ):
         return "a name that Windows gives to something else"
     try:
         if any(len(part.encode()) > 255 for part in parts) or len(name.encode()) > 2000:
@@ -261,7 +289,9 @@ def _shown(name: str) -> str:
     return repr(name if len(name) <= 80 else name[:77] + "...")
 
 
-def _write(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, folder: Path, left: int, path: Path) -> int:
+def _write(
+    archive: zipfile.ZipFile, entry: zipfile.ZipInfo, folder: Path, left: int, path: Path
+) -> int:
     """Unpack one entry; returns how many bytes may still be written."""
     target = folder.joinpath(*entry.filename.removesuffix("/").split("/"))
     if entry.is_dir():
@@ -273,16 +303,23 @@ def _write(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, folder: Path, left:
             left -= len(chunk)
             if left < 0:
                 raise HostileFmuError(
-                    f"{path}: the archive unpacks to more than {MOST_BYTES} bytes; do not trust it", "zip bomb"
+                    f"{path}: the archive unpacks to more than {MOST_BYTES} bytes; do not trust it",
+                    "zip bomb",
                 )
             sink.write(chunk)
     return left
 
 
 _ORIGIN = {
-    "author": "author", "version": "version", "description": "description", "generation_tool": "generationTool",
-    "generated": "generationDateAndTime", "copyright": "copyright", "license": "license", "fmi_version": "fmiVersion",
-}  # fmt: skip
+    "author": "author",
+    "version": "version",
+    "description": "description",
+    "generation_tool": "generationTool",
+    "generated": "generationDateAndTime",
+    "copyright": "copyright",
+    "license": "license",
+    "fmi_version": "fmiVersion",
+}
 
 
 def read_origin(path: Path) -> dict[str, str]:

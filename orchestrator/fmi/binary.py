@@ -16,11 +16,21 @@ from orchestrator.fmi.fmi3 import FUNCTIONS as FUNCTIONS_OF_3
 from orchestrator.fmi.fmi3 import in_words_of_3, needed_functions
 from orchestrator.fmi.wine import PLATFORM
 
-_FUNCTIONS = tuple(name for name in dir(FMU2Slave) if name.startswith("fmi2"))  # those of co-simulation
+# those of co-simulation
+_FUNCTIONS = tuple(name for name in dir(FMU2Slave) if name.startswith("fmi2"))
 
-_ALWAYS = ("fmi2Instantiate", "fmi2FreeInstance", "fmi2SetupExperiment", "fmi2EnterInitializationMode",
-           "fmi2ExitInitializationMode", "fmi2Terminate", "fmi2Reset", "fmi2DoStep", "fmi2GetReal",
-           "fmi2SetReal")  # fmt: skip
+_ALWAYS = (
+    "fmi2Instantiate",
+    "fmi2FreeInstance",
+    "fmi2SetupExperiment",
+    "fmi2EnterInitializationMode",
+    "fmi2ExitInitializationMode",
+    "fmi2Terminate",
+    "fmi2Reset",
+    "fmi2DoStep",
+    "fmi2GetReal",
+    "fmi2SetReal",
+)
 
 _MISSING = (
     re.compile(r"^([^/:\s]+): cannot open shared object file"),
@@ -33,7 +43,9 @@ _UNDEFINED = re.compile(r"undefined symbol: (\w+)")
 def binary_path(description: FmuDescription, directory: Path) -> Path:
     newer, ending = description.fmi_version == "3.0", fmpy.sharedLibraryExtension
     if runs_under_wine(description):
-        library: Path = directory.resolve() / "binaries" / PLATFORM / f"{description.model_identifier}.dll"
+        library: Path = (
+            directory.resolve() / "binaries" / PLATFORM / f"{description.model_identifier}.dll"
+        )
         if library.is_file():
             return library
     folder = (directory / "binaries" / (fmpy.platform_tuple if newer else fmpy.platform)).resolve()
@@ -73,7 +85,9 @@ def _not_loaded(fmu: Path, library: Path, text: str) -> FmuFileError:
                     "linked with $ORIGIN in its path, ask its author"
                 )
             return UnsupportedFmuError(
-                f"{fmu}: it needs {name}, which this machine has not", "missing system library", "install it"
+                f"{fmu}: it needs {name}, which this machine has not",
+                "missing system library",
+                "install it",
             )
     if found := _NEWER.search(text):
         return UnsupportedFmuError(
@@ -85,18 +99,27 @@ def _not_loaded(fmu: Path, library: Path, text: str) -> FmuFileError:
         return FmuFileError(
             f"{fmu}: its binary calls {found.group(1)}, which is in none of the libraries that it names; ask its author"
         )
-    return FmuFileError(f"{fmu}: its binary cannot be loaded: {text}; ask its author for one that can")
+    return FmuFileError(
+        f"{fmu}: its binary cannot be loaded: {text}; ask its author for one that can"
+    )
 
 
-def absent_functions(description: FmuDescription, library: ctypes.CDLL) -> tuple[list[str], list[str]]:
+def absent_functions(
+    description: FmuDescription, library: ctypes.CDLL
+) -> tuple[list[str], list[str]]:
     """Functions that a binary lacks: those that it needs by what it declares, and the others of its version of FMI."""
     if description.fmi_version == "3.0":
-        every, needed = [f"fmi3{name}" for name in FUNCTIONS_OF_3], {f"fmi3{n}" for n in needed_functions(description)}
+        every, needed = (
+            [f"fmi3{name}" for name in FUNCTIONS_OF_3],
+            {f"fmi3{n}" for n in needed_functions(description)},
+        )
         every += [name for name in sorted(needed) if name not in every]
     else:
         every, needed = list(_FUNCTIONS), _needed(description)
     absent = [name for name in every if not hasattr(library, name)]
-    return [name for name in absent if name in needed], [name for name in absent if name not in needed]
+    return [name for name in absent if name in needed], [
+        name for name in absent if name not in needed
+    ]
 
 
 def _needed(description: FmuDescription) -> set[str]:
@@ -110,7 +133,9 @@ def _needed(description: FmuDescription) -> set[str]:
         needed |= {"fmi2GetFMUstate", "fmi2SetFMUstate", "fmi2FreeFMUstate"}
     if description.can_serialize_state:
         needed |= {"fmi2SerializedFMUstateSize", "fmi2SerializeFMUstate", "fmi2DeSerializeFMUstate"}
-    return needed | ({"fmi2GetDirectionalDerivative"} if description.gives_directional_derivatives else set())
+    return needed | (
+        {"fmi2GetDirectionalDerivative"} if description.gives_directional_derivatives else set()
+    )
 
 
 class _Absent:

@@ -40,11 +40,20 @@ class _Port(ctypes.Structure):
 
 class _Adapter(ctypes.Structure):
     _fields_ = (
-        ("component", ctypes.c_void_p), ("set_real", ctypes.c_void_p), ("get_real", ctypes.c_void_p),
-        ("step", ctypes.c_void_p), ("others", ctypes.c_void_p), ("n_others", ctypes.c_int64), ("voltage", _Port),
-        ("current", _Port), ("omega", ctypes.c_double), ("power_scale", ctypes.c_double), ("v", ctypes.c_double * 2),
-        ("time", ctypes.c_double), ("angle", ctypes.c_double),
-    )  # fmt: skip
+        ("component", ctypes.c_void_p),
+        ("set_real", ctypes.c_void_p),
+        ("get_real", ctypes.c_void_p),
+        ("step", ctypes.c_void_p),
+        ("others", ctypes.c_void_p),
+        ("n_others", ctypes.c_int64),
+        ("voltage", _Port),
+        ("current", _Port),
+        ("omega", ctypes.c_double),
+        ("power_scale", ctypes.c_double),
+        ("v", ctypes.c_double * 2),
+        ("time", ctypes.c_double),
+        ("angle", ctypes.c_double),
+    )
 
 
 @cache
@@ -60,7 +69,9 @@ class BoundComponent(Derived):
         self.name, self.description, self.inner = inner.name, description, inner
         self._port, self._inner_names = description.port, description.inner_names
         self._start: dict[str, float] = {
-            name: description.variables[name].start_number for name in START if name in description.variables
+            name: description.variables[name].start_number
+            for name in START
+            if name in description.variables
         }
         self._start_is_new = True
         self._adapter = _Adapter()
@@ -71,7 +82,9 @@ class BoundComponent(Derived):
         exchange = ctypes.PYFUNCTYPE(ctypes.c_int, address, address, size, address)
         self.set_real = exchange(("adapter_set_real", library))
         self.get_real = exchange(("adapter_get_real", library))
-        self.do_step = ctypes.PYFUNCTYPE(ctypes.c_int, address, real, real, flag)(("adapter_do_step", library))
+        self.do_step = ctypes.PYFUNCTYPE(ctypes.c_int, address, real, real, flag)(
+            ("adapter_do_step", library)
+        )
         try:
             self.set(self._port.settings, own=True)
         except BaseException:
@@ -122,7 +135,9 @@ class BoundComponent(Derived):
             if not (cause := self.description.likely_cause()):
                 raise
             said = f"{error.log}; {cause}"
-            raise ComponentError(error.component, error.call, error.status, said, error.time, error.kind) from error
+            raise ComponentError(
+                error.component, error.call, error.status, said, error.time, error.kind
+            ) from error
 
     def progress_of_step(self) -> tuple[bool, float | None]:
         return self.inner.progress_of_step()
@@ -155,9 +170,17 @@ class BoundComponent(Derived):
                 target = name if own else self._inner_names[name]
                 signal = None if own else self._port.signals.get(name)
                 scaled = signal is not None and self.description.variables[name].type == "Real"
-                self.inner.set({target: (value - signal.offset) / signal.factor if signal and scaled else value})
+                self.inner.set(
+                    {
+                        target: (value - signal.offset) / signal.factor
+                        if signal and scaled
+                        else value
+                    }
+                )
             else:
-                raise InputError(f"component {self.name!r} has no variable {name!r}; `gfor fmu info` lists them")
+                raise InputError(
+                    f"component {self.name!r} has no variable {name!r}; `gfor fmu info` lists them"
+                )
         self._scale()
 
     def read(self, batch: RealBatch) -> None:
@@ -185,10 +208,14 @@ class BoundComponent(Derived):
 
     def _write_port(self, name: str, value: float) -> None:
         if name not in ("v_re", "v_im"):
-            raise InputError(f"component {self.name!r}: {name} is computed by the FMU and cannot be set")
+            raise InputError(
+                f"component {self.name!r}: {name} is computed by the FMU and cannot be set"
+            )
         reference, number = ctypes.c_uint(PORT.index(name)), ctypes.c_double(value)
         with calls:
-            status = self.set_real(self.pointer, ctypes.addressof(reference), 1, ctypes.addressof(number))
+            status = self.set_real(
+                self.pointer, ctypes.addressof(reference), 1, ctypes.addressof(number)
+            )
         self.check(status, f"setting {name} = {value}")
 
     def _send_start(self) -> None:
@@ -204,7 +231,13 @@ class BoundComponent(Derived):
 
     def save_state(self) -> Any:
         adapter = self._adapter
-        own = (*adapter.v, adapter.time, adapter.angle, float(self._start_is_new), *self._start.values())
+        own = (
+            *adapter.v,
+            adapter.time,
+            adapter.angle,
+            float(self._start_is_new),
+            *self._start.values(),
+        )
         return self.inner.save_state(), own
 
     def restore_state(self, state: Any) -> None:

@@ -57,7 +57,9 @@ class BroughtModules:
                 builtins.__import__ = _import
 
     def holds(self, file: object) -> bool:
-        return isinstance(file, str) and (file == self.root or file.startswith((f"{self.root}/", f"{self.root}\\")))
+        return isinstance(file, str) and (
+            file == self.root or file.startswith((f"{self.root}/", f"{self.root}\\"))
+        )
 
     def offers(self, top: str) -> bool:
         """Whether the FMU brings this module, and not just a copy of the installed one."""
@@ -74,7 +76,11 @@ class BroughtModules:
         self._note_folders()
 
     def _note_folders(self) -> None:
-        new = [place for place in dict.fromkeys(sys.path) if self.holds(place) and place not in self._places]
+        new = [
+            place
+            for place in dict.fromkeys(sys.path)
+            if self.holds(place) and place not in self._places
+        ]
         if new or self._names is None:
             self._places += new
             offered = {name for place in self._places for name in _modules_in(place)}
@@ -85,10 +91,16 @@ class BroughtModules:
         """Whether the installed one serves: no process can load compiled modules twice, and equal ones need not be."""
         if top in sys.builtin_module_names:
             return True
-        files = [getattr(m, "__file__", None) or "" for n, m in sys.modules.items() if n.partition(".")[0] == top]
+        files = [
+            getattr(m, "__file__", None) or ""
+            for n, m in sys.modules.items()
+            if n.partition(".")[0] == top
+        ]
         if any(file.endswith(tuple(EXTENSION_SUFFIXES)) for file in files):
             return True
-        installed = [place for place in sys.path if not any(one.holds(place) for one in _living.values())]
+        installed = [
+            place for place in sys.path if not any(one.holds(place) for one in _living.values())
+        ]
         ours = PathFinder.find_spec(top, installed)
         brought = PathFinder.find_spec(top, self._places)
         if ours is None or brought is None or not (ours.origin and brought.origin):
@@ -105,12 +117,18 @@ class BroughtModules:
         if changed:
             self._swap(top)
         held = [place for place in sys.path if self.holds(place)]
-        sys.path[:] = (self._places if own else []) + [place for place in sys.path if not self.holds(place)]
+        sys.path[:] = (self._places if own else []) + [
+            place for place in sys.path if not self.holds(place)
+        ]
         try:
             yield
         finally:
             rest = [place for place in sys.path if not self.holds(place)]
-            held += [place for place in sys.path if self.holds(place) and place not in (*self._places, *held)]
+            held += [
+                place
+                for place in sys.path
+                if self.holds(place) and place not in (*self._places, *held)
+            ]
             sys.path[:] = held + rest if first else rest + held
             if changed:
                 self._swap(top)
@@ -158,9 +176,12 @@ def _equal(one: Path, other: Path) -> bool:
 
 
 def _imported(
-    name: str, globals: Mapping[str, Any] | None = None, locals: Mapping[str, Any] | None = None,
-    fromlist: Sequence[str] | None = (), level: int = 0,
-) -> ModuleType:  # fmt: skip
+    name: str,
+    globals: Mapping[str, Any] | None = None,
+    locals: Mapping[str, Any] | None = None,
+    fromlist: Sequence[str] | None = (),
+    level: int = 0,
+) -> ModuleType:
     """In the place of Python's ``__import__``, as long as an FMU with modules is loaded."""
     top = (str((globals or {}).get("__package__") or "") if level else name).partition(".")[0]
     with ExitStack() as views:
@@ -175,5 +196,8 @@ def _imported(
 
 def _by_its_binary(brought: BroughtModules, importer: Mapping[str, Any] | None) -> bool:
     """Whether the FMU's binary imports: it does so in the name of FMPy, which calls it."""
-    named = importer is None or str(importer.get("__name__")).partition(".")[0] in {"fmpy", "ctypes"}
+    named = importer is None or str(importer.get("__name__")).partition(".")[0] in {
+        "fmpy",
+        "ctypes",
+    }
     return named and _loading[-1:] == [brought]

@@ -30,7 +30,9 @@ class FmiClock:
 
 def clocks_of(root: ElementTree.Element) -> tuple[FmiClock, ...]:
     types = {t.get("name"): t for t in root.iterfind("TypeDefinitions/ClockType")}
-    return tuple(_clock(e, types.get(e.get("declaredType"))) for e in root.iterfind("ModelVariables/Clock"))
+    return tuple(
+        _clock(e, types.get(e.get("declaredType"))) for e in root.iterfind("ModelVariables/Clock")
+    )
 
 
 def _clock(element: ElementTree.Element, declared: ElementTree.Element | None) -> FmiClock:
@@ -42,13 +44,19 @@ def _clock(element: ElementTree.Element, declared: ElementTree.Element | None) -
         )
     interval = _seconds(said, "interval")
     clock = FmiClock(
-        name, int(said["valueReference"]), said.get("causality", "local"), variability,
-        interval if variability in ("constant", "fixed", "tunable") else None, _seconds(said, "shift") or 0.0,
-    )  # fmt: skip
+        name,
+        int(said["valueReference"]),
+        said.get("causality", "local"),
+        variability,
+        interval if variability in ("constant", "fixed", "tunable") else None,
+        _seconds(said, "shift") or 0.0,
+    )
     if variability == "constant" and interval is None:
         raise FmuFileError(f"clock {name!r} is constant and declares no interval")
     if (interval is not None and not 0 < interval < inf) or not 0 <= clock.shift < inf:
-        raise FmuFileError(f"clock {name!r} has an interval of {interval} s and a shift of {clock.shift} s")
+        raise FmuFileError(
+            f"clock {name!r} has an interval of {interval} s and a shift of {clock.shift} s"
+        )
     return clock
 
 
@@ -66,13 +74,18 @@ def special_variables(root: ElementTree.Element) -> dict[int, tuple[int, ...]]:
     asks = any(c.variability == "tunable" and c.interval is None for c in clocks_of(root))
     found: dict[int, tuple[int, ...]] = {}
     for element in root.iterfind("ModelVariables/*"):
-        causality, reference = element.get("causality", "local"), int(element.get("valueReference", "-1"))
+        causality, reference = (
+            element.get("causality", "local"),
+            int(element.get("valueReference", "-1")),
+        )
         usual = "continuous" if element.tag in _CONTINUOUS else "discrete"
         variability = element.get("variability", usual)
         if element.tag == "Clock":
             continue
         if element.get("clocks"):
             found[reference] = tuple(int(text) for text in element.get("clocks", "").split())
-        elif (causality == "input" and variability == "discrete") or (asks and variability == "tunable"):
+        elif (causality == "input" and variability == "discrete") or (
+            asks and variability == "tunable"
+        ):
             found[reference] = ()
     return found

@@ -60,7 +60,10 @@ class Component(Protocol):
     def __enter__(self) -> Self: ...
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None: ...
 
     def set(self, values: Mapping[str, float | bool]) -> None:
@@ -117,7 +120,9 @@ class RealBatch:
 
     ``values``: Array of shape (n,), the caller's to read or fill."""
 
-    def __init__(self, component: Component, names: Sequence[str], values: NDArray[np.float64] | None = None) -> None:
+    def __init__(
+        self, component: Component, names: Sequence[str], values: NDArray[np.float64] | None = None
+    ) -> None:
         variables = component.description.variables
         self.names = tuple(names)
         if unknown := [name for name in self.names if name not in variables]:
@@ -126,10 +131,15 @@ class RealBatch:
                 "them"
             )
         self.values = np.zeros(len(self.names)) if values is None else values
-        self._references = (ctypes.c_uint * len(self.names))(*[variables[n].reference for n in self.names])
+        self._references = (ctypes.c_uint * len(self.names))(
+            *[variables[n].reference for n in self.names]
+        )
         self.arguments = (
-            component.pointer, ctypes.addressof(self._references), len(self.names), self.values.ctypes.data,
-        )  # fmt: skip
+            component.pointer,
+            ctypes.addressof(self._references),
+            len(self.names),
+            self.values.ctypes.data,
+        )
         self.component = component
 
     def read(self) -> NDArray[np.float64]:

@@ -21,7 +21,8 @@ from orchestrator.fmi.messages import FLOODED
 from orchestrator.fmi.process_tree import MOST_FILES
 from orchestrator.fmi.protection import Protection
 
-_WINDOWS_FAULTS = 0x80000000  # on Windows, a process that dies of a fault ends with its status, at least this
+# on Windows, a process that dies of a fault ends with its status, at least this
+_WINDOWS_FAULTS = 0x80000000
 
 
 class ProcessFault(StrEnum):
@@ -52,9 +53,15 @@ def fault_of_exit(code: int, limits: Limits) -> tuple[ProcessFault, str]:
     if code < 0 and -code == getattr(signal, "SIGXCPU", None):
         return ProcessFault.CPU, f"more than {limits.cpu:g} s in one process"
     if code == TOO_MUCH_MEMORY:
-        return ProcessFault.MEMORY, f"its processes used more than {limits.memory} bytes together, and were ended"
+        return (
+            ProcessFault.MEMORY,
+            f"its processes used more than {limits.memory} bytes together, and were ended",
+        )
     if code == TOO_MANY_TASKS:
-        return ProcessFault.TASKS, f"more than {limits.tasks} processes and threads, which were ended"
+        return (
+            ProcessFault.TASKS,
+            f"more than {limits.tasks} processes and threads, which were ended",
+        )
     if code == TOO_MUCH_DISK:
         much = f"{limits.disk} bytes or {MOST_FILES} files and folders"
         return (
@@ -86,8 +93,21 @@ def last_line(output: Path) -> str:
     return " ".join(lines[-1:])[:300]
 
 
-_KEPT = ("PATH", "LANG", "LANGUAGE", "TZ", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "DYLD_FALLBACK_LIBRARY_PATH",
-         "SYSTEMROOT", "WINDIR", "COMSPEC", "PATHEXT", "NUMBER_OF_PROCESSORS", "PROCESSOR_ARCHITECTURE")  # fmt: skip
+_KEPT = (
+    "PATH",
+    "LANG",
+    "LANGUAGE",
+    "TZ",
+    "LD_LIBRARY_PATH",
+    "DYLD_LIBRARY_PATH",
+    "DYLD_FALLBACK_LIBRARY_PATH",
+    "SYSTEMROOT",
+    "WINDIR",
+    "COMSPEC",
+    "PATHEXT",
+    "NUMBER_OF_PROCESSORS",
+    "PROCESSOR_ARCHITECTURE",
+)
 _KEPT_BEGINNINGS = ("LC_", "OMP_", "OPENBLAS_", "MKL_", "KMP_", "PYTHON")
 _NOT_FOR_IT = ("PYTHONSTARTUP", "PYTHONINSPECT", "PYTHONBREAKPOINT")
 
@@ -112,7 +132,8 @@ def environment(of: Mapping[str, str] | None = None) -> dict[str, str]:
     }
 
 
-_PATIENCE = 5.0  # time in which a supervisor ends all that it watches over [s]; then it is ended itself
+# time in which a supervisor ends all that it watches over [s]; then it is ended itself
+_PATIENCE = 5.0
 
 
 class ConfinedProcess:
@@ -121,9 +142,14 @@ class ConfinedProcess:
     ``protections``: What keeps it from the rest of the machine; empty until the worker has told."""
 
     def __init__(
-        self, worker: str, request: Mapping[str, Any], readable: Sequence[Path], limits: Limits, *,
+        self,
+        worker: str,
+        request: Mapping[str, Any],
+        readable: Sequence[Path],
+        limits: Limits,
+        *,
         windows: bool = False,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._limits, self.protections = limits, tuple[Protection, ...]()
         if windows:
             wine.socket_bases()  # the closed process cannot make them
@@ -135,16 +161,26 @@ class ConfinedProcess:
             (self.folder / "work").mkdir()
             libraries = Path(mailbox_library()._name).parent
             told = {
-                **request, "worker": worker, "mailbox": memory, "folder": str(self.folder),
-                "readable": [str(path.resolve()) for path in (*readable, libraries)], "limits": asdict(limits),
-                "layers": list(LAYERS), "parent": os.getpid(), "windows": windows,
-            }  # fmt: skip
+                **request,
+                "worker": worker,
+                "mailbox": memory,
+                "folder": str(self.folder),
+                "readable": [str(path.resolve()) for path in (*readable, libraries)],
+                "limits": asdict(limits),
+                "layers": list(LAYERS),
+                "parent": os.getpid(),
+                "windows": windows,
+            }
             with (self.folder / "output").open("ab") as output:
                 self._process = subprocess.Popen(
                     [sys.executable, "-P", "-m", "orchestrator.fmi.supervisor", json.dumps(told)],
-                    stdin=subprocess.PIPE, stdout=output, stderr=output, start_new_session=True, env=environment(),
+                    stdin=subprocess.PIPE,
+                    stdout=output,
+                    stderr=output,
+                    start_new_session=True,
+                    env=environment(),
                     pass_fds=(memory,) if isinstance(memory, int) else (),
-                )  # fmt: skip
+                )
         except BaseException:
             remove(self.folder)
             raise

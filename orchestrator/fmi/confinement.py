@@ -50,7 +50,9 @@ def restrict(readable: Iterable[Path], writable: Sequence[Path]) -> None:
     """Bind this thread, and what it starts, for good."""
     version = landlock_version()
     everything = _rights(version)
-    asked = struct.pack("<QQQ", everything, _TCP if version >= 4 else 0, _SCOPES if version >= 6 else 0)
+    asked = struct.pack(
+        "<QQQ", everything, _TCP if version >= 4 else 0, _SCOPES if version >= 6 else 0
+    )
     asked = asked[: 8 if version < 4 else 16 if version < 6 else 24]
     ruleset = call(_CREATE_RULESET, asked, len(asked), 0)
     try:
@@ -74,23 +76,51 @@ def _grant(ruleset: int, path: Path, rights: int) -> None:
             os.close(opened)
 
 
-LAYERS = ("namespaces", "landlock", "seccomp")  # means that can be left out one by one: tests try each alone
+# means that can be left out one by one: tests try each alone
+LAYERS = ("namespaces", "landlock", "seccomp")
 
-_SYSTEM = ("/usr", "/lib", "/lib32", "/lib64", "/bin", "/sbin", "/opt", "/etc/ld.so.cache", "/etc/ld.so.conf",
-           "/etc/ld.so.conf.d", "/etc/alternatives", "/etc/localtime", "/etc/timezone", "/sys/devices/system",
-           "/nix/store", "/gnu/store",
-           "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom")  # fmt: skip
+_SYSTEM = (
+    "/usr",
+    "/lib",
+    "/lib32",
+    "/lib64",
+    "/bin",
+    "/sbin",
+    "/opt",
+    "/etc/ld.so.cache",
+    "/etc/ld.so.conf",
+    "/etc/ld.so.conf.d",
+    "/etc/alternatives",
+    "/etc/localtime",
+    "/etc/timezone",
+    "/sys/devices/system",
+    "/nix/store",
+    "/gnu/store",
+    "/dev/zero",
+    "/dev/full",
+    "/dev/random",
+    "/dev/urandom",
+)
 """What programs and libraries read; nothing of a user's."""
 
-_OF_THE_KERNEL = ("/proc/self", "/proc/cpuinfo", "/proc/meminfo", "/proc/stat", "/proc/filesystems", "/proc/sys/vm",
-                  "/proc/sys/kernel/osrelease")  # fmt: skip
+_OF_THE_KERNEL = (
+    "/proc/self",
+    "/proc/cpuinfo",
+    "/proc/meminfo",
+    "/proc/stat",
+    "/proc/filesystems",
+    "/proc/sys/vm",
+    "/proc/sys/kernel/osrelease",
+)
 
 
 @dataclass
 class Means:
-    namespaces: str = "not tried"  # empty where they are, else why not; likewise ``landlock`` and ``seccomp``
+    # empty where they are, else why not; likewise ``landlock`` and ``seccomp``
+    namespaces: str = "not tried"
     own_processes: bool = False  # whether /proc shows its own processes only
-    read_only: bool = False  # whether it sees every folder but its own read-only, with a limit on the size of its own
+    # whether it sees every folder but its own read-only, with a limit on the size of its own
+    read_only: bool = False
     version: int = 0
     landlock: str = "not tried"
     seccomp: str = "not tried"
@@ -98,7 +128,12 @@ class Means:
 
 
 def confine(
-    means: Means, layers: Sequence[str], work: Path, readable: Iterable[Path], *, windows: bool = False
+    means: Means,
+    layers: Sequence[str],
+    work: Path,
+    readable: Iterable[Path],
+    *,
+    windows: bool = False,
 ) -> None:
     """Close this process off; ``means`` is completed.
 
@@ -147,17 +182,28 @@ def _restrict(means: Means, work: Path, readable: Iterable[Path], more: Sequence
         raise OSError(0, "there is a second thread already")
     proc = ["/proc"] if means.own_processes else list(_OF_THE_KERNEL)
     own = [Path("/dev/shm")] if means.read_only else []
-    restrict([*map(Path, [*_SYSTEM, *proc]), *python_folders(), *readable], [work, Path(os.devnull), *own, *more])
+    restrict(
+        [*map(Path, [*_SYSTEM, *proc]), *python_folders(), *readable],
+        [work, Path(os.devnull), *own, *more],
+    )
 
 
 def python_folders() -> list[Path]:
     """Where Python and its packages are, the user's home folder itself and what is above it left out."""
     home = Path(os.environ.get("HOME") or "/").resolve()
-    named = [sys.prefix, sys.base_prefix, sys.exec_prefix, *sys.path, *os.environ.get("LD_LIBRARY_PATH", "").split(":")]
+    named = [
+        sys.prefix,
+        sys.base_prefix,
+        sys.exec_prefix,
+        *sys.path,
+        *os.environ.get("LD_LIBRARY_PATH", "").split(":"),
+    ]
     found = {Path(name).resolve() for name in named if name and os.path.isabs(name)}
     for package in ("orchestrator", "fmus"):  # installed for development, they may lie anywhere
         spec = find_spec(package)
-        found |= {Path(place).resolve() for place in (spec and spec.submodule_search_locations) or ()}
+        found |= {
+            Path(place).resolve() for place in (spec and spec.submodule_search_locations) or ()
+        }
     return sorted(path for path in found if path != home and path not in home.parents)
 
 
@@ -172,29 +218,53 @@ def protections(means: Means, lacking: Iterable[str]) -> tuple[protection.Protec
         return bool(used), " and ".join(used) if used else otherwise
 
     found = {
-        protection.END: first((spaces and means.supervised, "a process namespace"),
+        protection.END: first(
+            (spaces and means.supervised, "a process namespace"),
             (not spaces and means.supervised and linux, "a supervisor that adopts orphans"),
             (means.supervised and not linux, "a supervisor, for its process group only"),
-            otherwise="nobody watches over it"),
-        protection.PROCESSES: first((spaces, "a process namespace"), (means.version >= 6, "Landlock"),
+            otherwise="nobody watches over it",
+        ),
+        protection.PROCESSES: first(
+            (spaces, "a process namespace"),
+            (means.version >= 6, "Landlock"),
             (filtered and not spaces and means.version < 6, "a filter of system calls"),
-            otherwise=no_spaces),
-        protection.NETWORK: first((filtered, "a filter of system calls"), otherwise=(
-            f"sockets of a path only are left open; {means.seccomp}" if spaces else f"no filter: {means.seccomp}")),
-        protection.WRITING: first((not landlock, "Landlock"), (means.read_only, files), otherwise=no_landlock),
-        protection.ATTRIBUTES: first((means.read_only, files),
+            otherwise=no_spaces,
+        ),
+        protection.NETWORK: first(
+            (filtered, "a filter of system calls"),
+            otherwise=(
+                f"sockets of a path only are left open; {means.seccomp}"
+                if spaces
+                else f"no filter: {means.seccomp}"
+            ),
+        ),
+        protection.WRITING: first(
+            (not landlock, "Landlock"), (means.read_only, files), otherwise=no_landlock
+        ),
+        protection.ATTRIBUTES: first(
+            (means.read_only, files),
             (filtered and not means.read_only, "a filter of system calls"),
-            otherwise=no_spaces),
+            otherwise=no_spaces,
+        ),
         protection.READING: first((not landlock, "Landlock"), otherwise=no_landlock),
         protection.ENVIRONMENT: (True, "a new environment"),
-        protection.MEMORY: first((True, "a limit for each process"),
+        protection.MEMORY: first(
+            (True, "a limit for each process"),
             (linux and means.supervised, "a watch over their sum"),
-            otherwise=""),
-        protection.DISK: first((True, "a limit for each file"), (means.read_only, "a folder in memory of limited size"),
-            (linux and means.supervised and not means.read_only, "a watch over their sum"), otherwise=""),
-        protection.TASKS: first((spaces, "limits of its namespaces"), (linux and means.supervised, "a watch"),
-            otherwise="nothing on this system limits it"),
+            otherwise="",
+        ),
+        protection.DISK: first(
+            (True, "a limit for each file"),
+            (means.read_only, "a folder in memory of limited size"),
+            (linux and means.supervised and not means.read_only, "a watch over their sum"),
+            otherwise="",
+        ),
+        protection.TASKS: first(
+            (spaces, "limits of its namespaces"),
+            (linux and means.supervised, "a watch"),
+            otherwise="nothing on this system limits it",
+        ),
         protection.CPU: (True, "a limit for each process"),
-    }  # fmt: skip
+    }
     found |= dict.fromkeys(lacking, (False, "this system does not limit it"))
     return protection.in_order(protection.Protection(name, *said) for name, said in found.items())

@@ -46,14 +46,18 @@ _OURS = f"VendorAnnotations/Tool[@name='{TOOL}']"
 _RATED = {variable.name: variable for variable in RATED}
 _LONGEST_WHY = 200  # characters of a range's reason that are taken from a file
 _SCALARS = "ModelVariables/ScalarVariable"  # where FMI 2.0 has its variables
-_OTHER_KINDS = {"ModelExchange": "for Model Exchange", "ScheduledExecution": "for Scheduled Execution"}
+_OTHER_KINDS = {
+    "ModelExchange": "for Model Exchange",
+    "ScheduledExecution": "for Scheduled Execution",
+}
 
 
 @dataclass(frozen=True, slots=True)
 class VariableInfo:
     name: str
     reference: int
-    type: str  # by FMI 2.0, such as ``Real``; what that has no name for is ``Array``, ``Binary`` or ``Clock``
+    # by FMI 2.0, such as ``Real``; what that has no name for is ``Array``, ``Binary`` or ``Clock``
+    type: str
     causality: str
     variability: str
     unit: str
@@ -119,7 +123,9 @@ class FmuDescription:
     # where a DLL keeps its state: ``arrays``, ``library``, ``hidden`` or ``not tried``; empty where it is no DLL.
     kept_in: str = ""
     kept_why: str = ""  # why that was not tried, or is hidden, in words
-    kind: str = ""  # what it is in a power system, as in `fmus.toolchain.variables.Kind`; empty where it does not say
+    # what it is in a power system, as in `fmus.toolchain.variables.Kind`; empty where it does not
+    # say
+    kind: str = ""
 
     @cached_property
     def inputs(self) -> tuple[str, ...]:
@@ -204,11 +210,14 @@ def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> Fmu
     try:
         content = _only(_with_initial(text, root))
         for part in root.findall("ModelVariables") if version == "2.0" else ():
-            part.clear()  # which FMPy reads on its own: twice they would take most of a large network's memory
+            # which FMPy reads on its own: twice they would take most of a large network's memory
+            part.clear()
         description = fmpy.read_model_description(content, validate=False)
         exchange_only = description.coSimulation is None
         platforms = tuple(fmpy.supported_platforms(_only(text, names)))
-        described = None if exchange_only else _describe(path, description, root, platforms, version)
+        described = (
+            None if exchange_only else _describe(path, description, root, platforms, version)
+        )
     except FmuFileError:
         raise
     except Exception as error:  # fmpy raises whatever its parsers raise
@@ -239,7 +248,9 @@ def _only(text: bytes, names: Sequence[str] = ()) -> BytesIO:
 
 def _with_initial(text: bytes, root: ElementTree.Element) -> bytes:
     """Give ``initial`` to variables for which FMI 2.0 has no default, as some tools write them: FMPy refuses them."""
-    without = [place for place, variable in enumerate(root.iterfind(_SCALARS)) if _lacks_initial(variable)]
+    without = [
+        place for place, variable in enumerate(root.iterfind(_SCALARS)) if _lacks_initial(variable)
+    ]
     if not without:
         return text
     changed = ElementTree.fromstring(text)  # the file's own description stays as it is
@@ -250,46 +261,79 @@ def _with_initial(text: bytes, root: ElementTree.Element) -> bytes:
 
 
 def _lacks_initial(variable: ElementTree.Element) -> bool:
-    causality, variability = variable.get("causality", "local"), variable.get("variability", "continuous")
-    return "initial" not in variable.attrib and causality not in _CAUSALITIES.get(variability, (causality,))
+    causality, variability = (
+        variable.get("causality", "local"),
+        variable.get("variability", "continuous"),
+    )
+    return "initial" not in variable.attrib and causality not in _CAUSALITIES.get(
+        variability, (causality,)
+    )
 
 
 def _root(path: Path, text: bytes) -> ElementTree.Element:
     """The file parsed, once: in a large network that takes longer than all else."""
     try:
         return ElementTree.fromstring(text)
-    except (ElementTree.ParseError, LookupError, ValueError) as error:  # the last two of its encoding
-        raise FmuFileError(f"{path}: modelDescription.xml is not XML: {error}; export it again") from error
+    except (
+        ElementTree.ParseError,
+        LookupError,
+        ValueError,
+    ) as error:  # the last two of its encoding
+        raise FmuFileError(
+            f"{path}: modelDescription.xml is not XML: {error}; export it again"
+        ) from error
 
 
 def _describe(
-    path: Path, md: ModelDescription, root: ElementTree.Element, platforms: tuple[str, ...], version: str
+    path: Path,
+    md: ModelDescription,
+    root: ElementTree.Element,
+    platforms: tuple[str, ...],
+    version: str,
 ) -> FmuDescription:
     kind, usual = _component(root, version)
     variables = {v.name: _variable(path, v, usual) for v in md.modelVariables}
     _check_names(path, md)
     dependencies = {
-        unknown.variable.name: None if unknown.dependencies is None else tuple(d.name for d in unknown.dependencies)
+        unknown.variable.name: None
+        if unknown.dependencies is None
+        else tuple(d.name for d in unknown.dependencies)
         for unknown in md.outputs
     }
     discrete = _discrete_states(path, root, md)
     return FmuDescription(
-        path=path, guid=md.guid, model_name=md.modelName or "", title=md.description or "",
-        model_identifier=md.coSimulation.modelIdentifier, generation_tool=md.generationTool or "", variables=variables,
-        states=(*_states(path, md), *discrete), states_are_settable=_settable(root, version) or bool(discrete),
+        path=path,
+        guid=md.guid,
+        model_name=md.modelName or "",
+        title=md.description or "",
+        model_identifier=md.coSimulation.modelIdentifier,
+        generation_tool=md.generationTool or "",
+        variables=variables,
+        states=(*_states(path, md), *discrete),
+        states_are_settable=_settable(root, version) or bool(discrete),
         can_save_state=bool(md.coSimulation.canGetAndSetFMUstate),
-        gives_directional_derivatives=_gives_directional_derivatives(root), output_dependencies=dependencies,
-        platforms=platforms, can_serialize_state=bool(md.coSimulation.canSerializeFMUstate),
+        gives_directional_derivatives=_gives_directional_derivatives(root),
+        output_dependencies=dependencies,
+        platforms=platforms,
+        can_serialize_state=bool(md.coSimulation.canSerializeFMUstate),
         needs_tool=bool(md.coSimulation.needsExecutionTool),
         one_instance=bool(md.coSimulation.canBeInstantiatedOnlyOncePerProcess),
-        default_step_size=_positive(md.defaultExperiment.stepSize) if md.defaultExperiment else None,
-        units=_units(root), stop_time=_positive(md.defaultExperiment.stopTime) if md.defaultExperiment else None,
-        fmi_version=version, rates=tuple(unknown.variable.name for unknown in md.derivatives), kind=kind,
-        **_sampling(path, root, variables), **_events(root, version),
-    )  # fmt: skip
+        default_step_size=_positive(md.defaultExperiment.stepSize)
+        if md.defaultExperiment
+        else None,
+        units=_units(root),
+        stop_time=_positive(md.defaultExperiment.stopTime) if md.defaultExperiment else None,
+        fmi_version=version,
+        rates=tuple(unknown.variable.name for unknown in md.derivatives),
+        kind=kind,
+        **_sampling(path, root, variables),
+        **_events(root, version),
+    )
 
 
-def _sampling(path: Path, root: ElementTree.Element, variables: Mapping[str, VariableInfo]) -> dict[str, Any]:
+def _sampling(
+    path: Path, root: ElementTree.Element, variables: Mapping[str, VariableInfo]
+) -> dict[str, Any]:
     listed = root.find(f"{_OURS}/DiscreteStates")
     if listed is None:
         return {}
@@ -322,9 +366,13 @@ def _events(root: ElementTree.Element, version: str) -> dict[str, Any]:
     if version != "3.0" or interface is None:
         return {}
     says = {
-        name: interface.get(name) in ("true", "1") for name in ("hasEventMode", "canReturnEarlyAfterIntermediateUpdate")
+        name: interface.get(name) in ("true", "1")
+        for name in ("hasEventMode", "canReturnEarlyAfterIntermediateUpdate")
     }
-    found: dict[str, Any] = {"has_event_mode": says["hasEventMode"], "returns_early": any(says.values())}
+    found: dict[str, Any] = {
+        "has_event_mode": says["hasEventMode"],
+        "returns_early": any(says.values()),
+    }
     if says["hasEventMode"]:
         found |= {"clocks": clocks_of(root), "specials": special_variables(root)}
     return found
@@ -336,7 +384,9 @@ def _gives_directional_derivatives(root: ElementTree.Element) -> bool:
     return interface is not None and any(interface.get(name) in ("true", "1") for name in names)
 
 
-def _discrete_states(path: Path, root: ElementTree.Element, md: ModelDescription) -> tuple[str, ...]:
+def _discrete_states(
+    path: Path, root: ElementTree.Element, md: ModelDescription
+) -> tuple[str, ...]:
     """Names of the states of a sampled controller, which FMI for co-simulation has no list for: our annotation."""
     listed = root.find(f"{_OURS}/DiscreteStates")
     if listed is None or listed.get("settable") != "true":
@@ -368,10 +418,14 @@ def _check_names(path: Path, md: ModelDescription) -> None:
             "(dots, hyphens and a leading digit are taken as well)"
         )
     if not md.guid:
-        raise FmuFileError(f"{path}: modelDescription.xml has no guid, which the binary is told; export it again")
+        raise FmuFileError(
+            f"{path}: modelDescription.xml has no guid, which the binary is told; export it again"
+        )
     for v in md.modelVariables:
         if not v.name:
-            raise FmuFileError(f"{path}: modelDescription.xml has a variable without a name; export it again")
+            raise FmuFileError(
+                f"{path}: modelDescription.xml has a variable without a name; export it again"
+            )
         if not 0 <= int(v.valueReference) < 2**32:
             raise FmuFileError(
                 f"{path}: {v.name[:80]!r} has valueReference {str(v.valueReference)[:20]}; 0 to 2³²−1 is allowed"
@@ -408,12 +462,20 @@ def _variable(path: Path, v: Any, usual: Mapping[str, Usual]) -> VariableInfo:
     unit = v.unit or (v.declaredType.unit if v.declaredType is not None else None) or ""
     fmi_type = "Array" if v.dimensions else _TYPES_OF_3.get(v.type, v.type)
     return VariableInfo(
-        name=v.name, reference=v.valueReference, type=fmi_type, causality=v.causality or "local",
-        variability=v.variability or "continuous", unit=unit,
-        start=None if v.start is None else _start(path, v, fmi_type), minimum=None if v.min is None else float(v.min),
-        maximum=None if v.max is None else float(v.max), description=v.description or "", declared_type=v.type,
-        usual=usual.get(v.name) or (rated.usual if (rated := _RATED.get(v.name)) and rated.unit == unit else None),
-    )  # fmt: skip
+        name=v.name,
+        reference=v.valueReference,
+        type=fmi_type,
+        causality=v.causality or "local",
+        variability=v.variability or "continuous",
+        unit=unit,
+        start=None if v.start is None else _start(path, v, fmi_type),
+        minimum=None if v.min is None else float(v.min),
+        maximum=None if v.max is None else float(v.max),
+        description=v.description or "",
+        declared_type=v.type,
+        usual=usual.get(v.name)
+        or (rated.usual if (rated := _RATED.get(v.name)) and rated.unit == unit else None),
+    )
 
 
 def _start(path: Path, v: Any, fmi_type: str) -> Scalar:

@@ -15,7 +15,9 @@ from orchestrator.fmi.confinement import LAYERS, Means, confine
 
 def _files(texts: dict[str, str] | None) -> list[Path]:
     """Those that text parameters name, which it may read."""
-    return [path for path in map(Path, (texts or {}).values()) if path.is_absolute() and path.is_file()]
+    return [
+        path for path in map(Path, (texts or {}).values()) if path.is_absolute() and path.is_file()
+    ]
 
 
 def _read(library: Path, answer: Path, texts: dict[str, str] | None) -> None:
@@ -34,12 +36,17 @@ def _read_under_wine(library: Path, answer: Path, texts: dict[str, str] | None) 
         return
     if texts is not None:
         files = set(map(str, _files(texts)))
-        texts = {n: f"Z:{text}".replace("/", "\\") if text in files else text for n, text in texts.items()}
+        texts = {
+            n: f"Z:{text}".replace("/", "\\") if text in files else text
+            for n, text in texts.items()
+        }
     answer_for(lambda note: WineLibrary(library, note), answer, texts)
     wine.in_process[0].close()
 
 
 if __name__ == "__main__":
     given, found = Path(sys.argv[1]), Path(sys.argv[2])
-    read = _read_under_wine if sys.platform == "linux" and given.read_bytes()[:2] == b"MZ" else _read
+    read = (
+        _read_under_wine if sys.platform == "linux" and given.read_bytes()[:2] == b"MZ" else _read
+    )
     read(given, found, texts_in(sys.argv))

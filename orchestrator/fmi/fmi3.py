@@ -13,21 +13,57 @@ from orchestrator.fmi.clocks import MOST_CLOCKS, FmiClock
 from orchestrator.fmi.description import FmuDescription
 
 SOURCES = ("fmi3_instance.c", "fmi3_events.c", "fmi3_as_fmi2.c")  # compiled as one, in this order
-_KINDS = ("Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean")
+_KINDS = (
+    "Float64",
+    "Float32",
+    "Int8",
+    "UInt8",
+    "Int16",
+    "UInt16",
+    "Int32",
+    "UInt32",
+    "Int64",
+    "UInt64",
+    "Boolean",
+)
 _ALIKE = {"Enumeration": "Int64"}  # A type that goes through the functions of another
 
-FUNCTIONS = ("InstantiateCoSimulation", "FreeInstance", "SetDebugLogging", "EnterInitializationMode",
-             "ExitInitializationMode", "Terminate", "Reset", "DoStep", "GetFMUState", "SetFMUState", "FreeFMUState",
-             "SerializedFMUStateSize", "SerializeFMUState", "DeserializeFMUState", "GetDirectionalDerivative",
-             "EnterEventMode", "EnterStepMode", "UpdateDiscreteStates", "GetIntervalDecimal", "GetShiftDecimal",
-             "SetClock", "GetClock",
-             *(f"Get{kind}" for kind in _KINDS), *(f"Set{kind}" for kind in _KINDS))  # fmt: skip
+FUNCTIONS = (
+    "InstantiateCoSimulation",
+    "FreeInstance",
+    "SetDebugLogging",
+    "EnterInitializationMode",
+    "ExitInitializationMode",
+    "Terminate",
+    "Reset",
+    "DoStep",
+    "GetFMUState",
+    "SetFMUState",
+    "FreeFMUState",
+    "SerializedFMUStateSize",
+    "SerializeFMUState",
+    "DeserializeFMUState",
+    "GetDirectionalDerivative",
+    "EnterEventMode",
+    "EnterStepMode",
+    "UpdateDiscreteStates",
+    "GetIntervalDecimal",
+    "GetShiftDecimal",
+    "SetClock",
+    "GetClock",
+    *(f"Get{kind}" for kind in _KINDS),
+    *(f"Set{kind}" for kind in _KINDS),
+)
 """In the order of the adapter's table."""
 
 _NAMES = {
-    "fmi2Instantiate": "fmi3InstantiateCoSimulation", "fmi2": "fmi3", "GetReal": "GetFloat64", "SetReal": "SetFloat64",
-    "FMUstate": "FMUState", "DeSerialize": "Deserialize",
-}  # fmt: skip
+    "fmi2Instantiate": "fmi3InstantiateCoSimulation",
+    "fmi2": "fmi3",
+    "GetReal": "GetFloat64",
+    "SetReal": "SetFloat64",
+    "FMUstate": "FMUState",
+    "DeSerialize": "Deserialize",
+}
 """Parts of names in FMI 2.0, and what they are in FMI 3.0; replaced in this order."""
 
 _CLOCK_KINDS = ("periodic", "changing", "countdown", "output")
@@ -42,25 +78,40 @@ def in_words_of_3(call: str) -> str:
 
 class _Clock(ctypes.Structure):
     _fields_ = (
-        ("interval", ctypes.c_double), ("shift", ctypes.c_double), ("reference", ctypes.c_uint),
-        ("kind", ctypes.c_int32), ("asked", ctypes.c_int32), ("tunable", ctypes.c_int32),
-    )  # fmt: skip
+        ("interval", ctypes.c_double),
+        ("shift", ctypes.c_double),
+        ("reference", ctypes.c_uint),
+        ("kind", ctypes.c_int32),
+        ("asked", ctypes.c_int32),
+        ("tunable", ctypes.c_int32),
+    )
 
 
 class _Special(ctypes.Structure):
     _fields_ = (
-        ("clocks", ctypes.c_uint64), ("start", ctypes.c_double), ("reference", ctypes.c_uint), ("kind", ctypes.c_int32),
+        ("clocks", ctypes.c_uint64),
+        ("start", ctypes.c_double),
+        ("reference", ctypes.c_uint),
+        ("kind", ctypes.c_int32),
         ("role", ctypes.c_int32),
-    )  # fmt: skip
+    )
 
 
 class _Table(ctypes.Structure):
     _fields_ = (
-        ("functions", ctypes.c_void_p * len(FUNCTIONS)), ("resources", ctypes.c_char_p),
-        ("references", ctypes.c_void_p), ("kinds", ctypes.c_void_p), ("n", ctypes.c_size_t), ("narrow", ctypes.c_int64),
-        ("events", ctypes.c_int64), ("early", ctypes.c_int64), ("clocks", ctypes.c_void_p),
-        ("n_clocks", ctypes.c_size_t), ("specials", ctypes.c_void_p), ("n_specials", ctypes.c_size_t),
-    )  # fmt: skip
+        ("functions", ctypes.c_void_p * len(FUNCTIONS)),
+        ("resources", ctypes.c_char_p),
+        ("references", ctypes.c_void_p),
+        ("kinds", ctypes.c_void_p),
+        ("n", ctypes.c_size_t),
+        ("narrow", ctypes.c_int64),
+        ("events", ctypes.c_int64),
+        ("early", ctypes.c_int64),
+        ("clocks", ctypes.c_void_p),
+        ("n_clocks", ctypes.c_size_t),
+        ("specials", ctypes.c_void_p),
+        ("n_specials", ctypes.c_size_t),
+    )
 
 
 @cache
@@ -68,14 +119,27 @@ def adapter_path() -> Path:
     try:
         return compile_here(*(Path(__file__).with_name(name) for name in SOURCES))
     except (OSError, RuntimeError) as error:
-        raise FmuFileError(f"FMUs of FMI 3.0 run behind a compiled adapter: {error}; ask for FMI 2.0") from error
+        raise FmuFileError(
+            f"FMUs of FMI 3.0 run behind a compiled adapter: {error}; ask for FMI 2.0"
+        ) from error
 
 
 def needed_functions(description: FmuDescription) -> set[str]:
     """Functions without which an FMU of FMI 3.0 cannot be run, by what it declares; without ``fmi3``."""
-    needed = {"InstantiateCoSimulation", "FreeInstance", "EnterInitializationMode", "ExitInitializationMode",
-              "Terminate", "Reset", "DoStep", "GetFloat64", "SetFloat64"}  # fmt: skip
-    for kind in {_kind(v.declared_type) for v in description.variables.values() if v.type != "Array"} & set(_KINDS):
+    needed = {
+        "InstantiateCoSimulation",
+        "FreeInstance",
+        "EnterInitializationMode",
+        "ExitInitializationMode",
+        "Terminate",
+        "Reset",
+        "DoStep",
+        "GetFloat64",
+        "SetFloat64",
+    }
+    for kind in {
+        _kind(v.declared_type) for v in description.variables.values() if v.type != "Array"
+    } & set(_KINDS):
         needed |= {f"Get{kind}", f"Set{kind}"}
     if description.can_save_state:
         needed |= {"GetFMUState", "SetFMUState", "FreeFMUState"}
@@ -95,7 +159,11 @@ def needed_functions(description: FmuDescription) -> set[str]:
 
 def refuse_other_clocks(description: FmuDescription) -> None:
     """Raise where a clock ticks only with those of other FMUs, which this master does not connect."""
-    if others := [c.name for c in description.clocks if c.variability == "triggered" and c.causality == "input"]:
+    if others := [
+        c.name
+        for c in description.clocks
+        if c.variability == "triggered" and c.causality == "input"
+    ]:
         raise UnsupportedFmuError(
             f"{description.path}: its clock {others[0]!r} is triggered by another FMU's clock, and this master has "
             "clocks that tick by the time only",
@@ -133,8 +201,14 @@ class Fmi3Library:
         self._table = table = _Table()
         resources = (directory / "resources").resolve()
         table.resources = f"{resources}{os.sep}".encode() if resources.is_dir() else None
-        table.references, table.kinds = ctypes.addressof(self._references), ctypes.addressof(self._kinds)
-        table.n, table.narrow = len(known), any(kind == _KINDS.index("Float32") for _, kind in known)
+        table.references, table.kinds = (
+            ctypes.addressof(self._references),
+            ctypes.addressof(self._kinds),
+        )
+        table.n, table.narrow = (
+            len(known),
+            any(kind == _KINDS.index("Float32") for _, kind in known),
+        )
         table.events, table.early = description.has_event_mode, description.returns_early
         table.clocks, table.n_clocks = ctypes.addressof(self._clocks), len(description.clocks)
         table.specials, table.n_specials = ctypes.addressof(self._specials), len(specials)
@@ -147,11 +221,22 @@ class Fmi3Library:
 
 
 def _described(clock: FmiClock) -> _Clock:
-    kind = "periodic" if clock.periodic else "output" if clock.variability == "triggered" else clock.variability
+    kind = (
+        "periodic"
+        if clock.periodic
+        else "output"
+        if clock.variability == "triggered"
+        else clock.variability
+    )
     asked = kind != "output" and clock.interval is None
     interval = 0.0 if clock.interval is None else clock.interval
     return _Clock(
-        interval, clock.shift, clock.reference, _CLOCK_KINDS.index(kind), asked, clock.variability == "tunable"
+        interval,
+        clock.shift,
+        clock.reference,
+        _CLOCK_KINDS.index(kind),
+        asked,
+        clock.variability == "tunable",
     )
 
 

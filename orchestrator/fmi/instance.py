@@ -49,7 +49,11 @@ def is_isolated(description: FmuDescription, isolated: bool | None) -> bool:
 
 
 def open_component(
-    name: str, description: FmuDescription, directory: Path | None = None, *, isolated: bool | None = None
+    name: str,
+    description: FmuDescription,
+    directory: Path | None = None,
+    *,
+    isolated: bool | None = None,
 ) -> Component:
     """Instantiate an FMU; behind a `BoundDescription` it speaks our port.
 
@@ -57,7 +61,9 @@ def open_component(
     ``isolated``: whether it runs in a process of its own; by default all but our own FMUs do."""
     compile_adapters(description)
     if isinstance(description, BoundDescription):
-        return BoundComponent(open_component(name, description.inner, directory, isolated=isolated), description)
+        return BoundComponent(
+            open_component(name, description.inner, directory, isolated=isolated), description
+        )
     if is_isolated(description, isolated):
         return IsolatedComponent(name, description, directory)
     return LoadedComponent(name, description, directory, ours=is_ours(description.path))

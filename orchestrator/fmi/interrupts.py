@@ -21,11 +21,22 @@ from typing import Any
 _OURS = frozenset({"orchestrator", "fmus", "gfor_fmu"})
 
 _WAITS = frozenset(
-    {"asyncio", "concurrent", "multiprocessing", "queue", "selectors", "socket", "ssl", "subprocess", "threading"}
+    {
+        "asyncio",
+        "concurrent",
+        "multiprocessing",
+        "queue",
+        "selectors",
+        "socket",
+        "ssl",
+        "subprocess",
+        "threading",
+    }
 )
 """Modules in which Python code waits for others; there a signal is raised at once, as Python does."""
 
-_LONGEST = 3.0  # seconds that a signal waits for a library at most; afterwards it is raised wherever the program is
+# seconds that a signal waits for a library at most; afterwards it is raised wherever the program is
+_LONGEST = 3.0
 _LIBRARIES = ("site-packages", "dist-packages", os.path.dirname(os.__file__))
 
 

@@ -29,7 +29,11 @@ from orchestrator.fmi.remote_calls import Form, RemoteCalls
 
 class IsolatedComponent(RemoteCalls):
     def __init__(
-        self, name: str, description: FmuDescription, directory: Path | None = None, limits: Limits | None = None
+        self,
+        name: str,
+        description: FmuDescription,
+        directory: Path | None = None,
+        limits: Limits | None = None,
     ) -> None:
         self.name, self.description, self.limits = name, description, limits or Limits()
         self._process: ConfinedProcess | None = None
@@ -51,10 +55,19 @@ class IsolatedComponent(RemoteCalls):
 
     def _start(self, directory: Path) -> None:
         fmu = self.description.path.resolve()
-        request = {"fmu": str(fmu), "name": self.name, "guid": self.description.guid, "directory": str(directory)}
+        request = {
+            "fmu": str(fmu),
+            "name": self.name,
+            "guid": self.description.guid,
+            "directory": str(directory),
+        }
         worker = "orchestrator.fmi.isolation_worker"
         self._process = ConfinedProcess(
-            worker, request, [fmu, directory], self.limits, windows=runs_under_wine(self.description)
+            worker,
+            request,
+            [fmu, directory],
+            self.limits,
+            windows=runs_under_wine(self.description),
         )
         self._box = self._process.box
         self._box.client.patience = TO_BEGIN
@@ -72,7 +85,11 @@ class IsolatedComponent(RemoteCalls):
             return
         if status == NOT_A_NUMBER:
             bad = self._box.client.bad_reference
-            names = [n for n, v in self.description.variables.items() if v.reference == bad and v.type == "Real"]
+            names = [
+                n
+                for n, v in self.description.variables.items()
+                if v.reference == bad and v.type == "Real"
+            ]
             raise NotFiniteError(self.name, names[0] if names else "a variable", None, time)
         if status == INTERRUPTED:  # it is still at work on the question
             self._give_up("interrupted: its process was ended")
@@ -89,9 +106,13 @@ class IsolatedComponent(RemoteCalls):
         assert self._process is not None
         if status == HUNG:
             self._end_kind = ErrorKind.HANG
-            return self._give_up(f"hang: no answer within {self._box.client.patience:g} s; its process was ended")
+            return self._give_up(
+                f"hang: no answer within {self._box.client.patience:g} s; its process was ended"
+            )
         if status == TAMPERED:
-            return self._give_up("tampering: an answer that no call of FMI gives; its process was ended")
+            return self._give_up(
+                "tampering: an answer that no call of FMI gives; its process was ended"
+            )
         fault, how = self._process.fault()
         self._end = f"{fault}: {how}{' in one step' if how.endswith(' log messages') else ''}"
         return self._end
@@ -127,17 +148,22 @@ class IsolatedComponent(RemoteCalls):
 
     def _tampered(self, call: str, error: ValueError) -> ComponentError:
         why = self._give_up("tampering: its process was ended")
-        return ComponentError(self.name, call, why, f"it wrote into the memory between the processes: {error}")
+        return ComponentError(
+            self.name, call, why, f"it wrote into the memory between the processes: {error}"
+        )
 
     def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NDArray[np.float64]:
-        found = self._remote("fmi2GetDirectionalDerivative", "jacobian", list(unknowns), list(knowns))
+        found = self._remote(
+            "fmi2GetDirectionalDerivative", "jacobian", list(unknowns), list(knowns)
+        )
         return self._typed(matrix, found, len(unknowns), len(knowns))
 
     def close(self) -> None:
         process = self._process
         if process is not None and self._end is None and process.running:
             self._box.client.patience = min(self._box.client.patience, 5.0)
-            with suppress(ComponentError, InputError, ValueError):  # an FMU that failed may not end by itself
+            # an FMU that failed may not end by itself
+            with suppress(ComponentError, InputError, ValueError):
                 self._remote("fmi2Terminate", "close")
                 process.wait(5.0)
         self._end = self._end or "closed"

@@ -17,9 +17,17 @@ from orchestrator.fmi.loaded import LoadedComponent
 from orchestrator.fmi.mailbox import DIED, OK, Mailbox
 from orchestrator.fmi.messages import on_message
 
-_PASSED_ON = frozenset((
-    "setup", "enter_initialization_mode", "exit_initialization_mode", "progress_of_step", "reset", "set", "values",
-))  # fmt: skip
+_PASSED_ON = frozenset(
+    (
+        "setup",
+        "enter_initialization_mode",
+        "exit_initialization_mode",
+        "progress_of_step",
+        "reset",
+        "set",
+        "values",
+    )
+)
 """Commands that are methods of a component, whose answers are JSON's types."""
 
 
@@ -38,7 +46,11 @@ class Worker:
         means = Means(**request["means"])
         lacking = apply_limits(limits, folder / "work", own_users=not means.namespaces)
         self._protections = protections(means, lacking)
-        on_message(limits.messages, lambda: self._box.head.steps + self._box.head.request, self._box.write_log)
+        on_message(
+            limits.messages,
+            lambda: self._box.head.steps + self._box.head.request,
+            self._box.write_log,
+        )
         self._component: Component | None = None
         self._states: dict[int, Any] = {}
         self._next = itertools.count(1)
@@ -56,16 +68,24 @@ class Worker:
                     self._component.close()
                 box.write_text({})
                 box.library.mailbox_answer(box.address, OK)
-                os._exit(0)  # what an FMU registered for the end of the process is of no use to anyone
+                # what an FMU registered for the end of the process is of no use to anyone
+                os._exit(0)
             self._answer(command, arguments)
             component = self._component
             if component is not None:
                 functions = (component.set_real, component.get_real, component.do_step)
-                pointers = (component.pointer, *(ctypes.cast(f, ctypes.c_void_p) for f in functions))
+                pointers = (
+                    component.pointer,
+                    *(ctypes.cast(f, ctypes.c_void_p) for f in functions),
+                )
         os._exit(DIED)
 
     def _answer(self, command: str, arguments: list[Any]) -> None:
-        function = getattr(self._instance(), command) if command in _PASSED_ON else getattr(self, f"do_{command}")
+        function = (
+            getattr(self._instance(), command)
+            if command in _PASSED_ON
+            else getattr(self, f"do_{command}")
+        )
         try:
             answer = {"result": function(*arguments)}
         except ComponentError as error:
@@ -75,7 +95,13 @@ class Worker:
         except CosimError as error:
             answer = {"input_error": str(error)}
         except MemoryError:
-            answer = {"component_error": ["memory", "memory limit", "the FMU's process has no memory left"]}
+            answer = {
+                "component_error": [
+                    "memory",
+                    "memory limit",
+                    "the FMU's process has no memory left",
+                ]
+            }
         try:
             self._box.write_text(answer)
         except ValueError as error:

@@ -12,8 +12,10 @@ from pathlib import Path
 from orchestrator.fmi.protection import CPU, DISK, MEMORY, TASKS
 
 _OUR_TASKS = 3  # processes of ours around an FMU that count as its own
-TO_BEGIN = 60.0  # wall-clock time for a process to begin [s], before the FMU: a busy machine is not its fault
-LEAST_MEMORY = 32.0  # with less [MB] the worker itself cannot load an FMU and answer; another unit was meant
+# wall-clock time for a process to begin [s], before the FMU: a busy machine is not its fault
+TO_BEGIN = 60.0
+# with less [MB] the worker itself cannot load an FMU and answer; another unit was meant
+LEAST_MEMORY = 32.0
 
 TOO_MUCH_MEMORY, TOO_MANY_TASKS, TOO_MUCH_DISK = 93, 94, 95
 """Exit codes of a supervisor that ended an FMU's processes for what they took together."""
@@ -31,7 +33,8 @@ class Limits:
     # address space of one process beyond what it has before the FMU is loaded, and memory that all its processes
     # together have in use [bytes]
     memory: int = 4 * 1024**3
-    output: int = 16 * 1024**2  # largest file that it may write, its standard output included [bytes]
+    # largest file that it may write, its standard output included [bytes]
+    output: int = 16 * 1024**2
     messages: int = 20_000  # log messages in one call after which it counts as flooded
     disk: int = 256 * 1024**2  # all files in its folder together [bytes]
     tasks: int = 128  # processes and threads that it may have at the same time
@@ -50,7 +53,8 @@ def apply_limits(limits: Limits, folder: Path, *, own_users: bool) -> list[str]:
     import resource  # noqa: PLC0415 - not on Windows
 
     for excess in (signal.SIGXFSZ, signal.SIGXCPU):
-        signal.signal(excess, signal.SIG_DFL)  # Python ignores the first; an FMU that floods a file must end
+        # Python ignores the first; an FMU that floods a file must end
+        signal.signal(excess, signal.SIG_DFL)
     _lower(resource.RLIMIT_CORE, 0)
     lacking = []
     if own_users:
@@ -81,6 +85,9 @@ def _address_space() -> int | None:
     try:
         import resource  # noqa: PLC0415 - not on Windows
 
-        return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
+        return (
+            int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+            * resource.getpagesize()
+        )
     except OSError:
         return None

@@ -23,7 +23,8 @@ VERSION = "1.0.0"
 FOLDER = f"extra/{NAME}"
 
 _LS = "http://fmi-standard.org/fmi-ls-manifest"
-_MATLAB_HEADER = 116  # bytes of free text at the beginning of a MAT file, in which scipy writes the date
+# bytes of free text at the beginning of a MAT file, in which scipy writes the date
+_MATLAB_HEADER = 116
 
 register_namespace("fmi-ls", _LS)
 
@@ -74,8 +75,13 @@ def _read(content: dict[str, Any]) -> EmbeddedModel:
     variables = {kind: content[kind] for kind in ("states", "inputs", "outputs", "parameters")}
     n, m, p = (len(variables[kind]) for kind in ("states", "inputs", "outputs"))
     shapes = {"A": (n, n), "B": (n, m), "C": (p, n), "D": (p, m)}
-    matrices: Any = {key: np.array(content[key], dtype=np.float64).reshape(shape) for key, shape in shapes.items()}
-    values: Any = {kind: {v["name"]: v["value"] for v in entries} for kind, entries in variables.items()}
+    matrices: Any = {
+        key: np.array(content[key], dtype=np.float64).reshape(shape)
+        for key, shape in shapes.items()
+    }
+    values: Any = {
+        kind: {v["name"]: v["value"] for v in entries} for kind, entries in variables.items()
+    }
     units = {v["name"]: v["unit"] for entries in variables.values() for v in entries}
     return EmbeddedModel(**matrices, **values, units=units, origin=content["origin"])
 
@@ -97,14 +103,20 @@ def _manifest() -> bytes:
 
 def _json(model: EmbeddedModel) -> bytes:
     def entries(values: Mapping[str, float | bool]) -> list[dict[str, Any]]:
-        return [{"name": n, "unit": model.units.get(n, ""), "value": value} for n, value in values.items()]
+        return [
+            {"name": n, "unit": model.units.get(n, ""), "value": value}
+            for n, value in values.items()
+        ]
 
     content = {
         "version": VERSION,
         "equations": "der(x) = A*x + B*u, y = C*x + D*u; x, u, y are deviations from the values given here",
-        "origin": model.origin, "parameters": entries(model.parameters), "states": entries(model.states),
-        "inputs": entries(model.inputs), "outputs": entries(model.outputs),
-    }  # fmt: skip
+        "origin": model.origin,
+        "parameters": entries(model.parameters),
+        "states": entries(model.states),
+        "inputs": entries(model.inputs),
+        "outputs": entries(model.outputs),
+    }
     lines = [f" {json.dumps(key)}: {_lines(value)}" for key, value in content.items()]
     lines += [f' "{key}": {_lines(getattr(model, key).tolist())}' for key in "ABCD"]
     return ("{\n" + ",\n".join(lines) + "\n}\n").encode()
@@ -113,7 +125,9 @@ def _json(model: EmbeddedModel) -> bytes:
 def _lines(value: Any) -> str:
     """Compact, but with a line for every row of a matrix and every variable."""
     if isinstance(value, list):
-        return "[\n" + ",\n".join(f"  {json.dumps(row, ensure_ascii=False)}" for row in value) + "\n ]"
+        return (
+            "[\n" + ",\n".join(f"  {json.dumps(row, ensure_ascii=False)}" for row in value) + "\n ]"
+        )
     return json.dumps(value, ensure_ascii=False)
 
 
@@ -124,7 +138,9 @@ def _matlab(model: EmbeddedModel) -> bytes:
         values = getattr(model, kind)
         content[kind] = _column(list(values), object)
         content[f"{kind[:-1]}_values"] = _column([float(v) for v in values.values()], float)
-        content[f"{kind[:-1]}_units"] = _column([model.units.get(name, "") for name in values], object)
+        content[f"{kind[:-1]}_units"] = _column(
+            [model.units.get(name, "") for name in values], object
+        )
     from scipy.io import savemat  # noqa: PLC0415 - a tenth of a second that only this format needs
 
     file = io.BytesIO()

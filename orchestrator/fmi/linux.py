@@ -7,7 +7,13 @@ import sys
 from functools import cache
 from typing import Any
 
-NEW_USER, NEW_PROCESSES, NEW_NETWORK, NEW_MOUNTS, NEW_IPC = 0x10000000, 0x20000000, 0x40000000, 0x00020000, 0x08000000
+NEW_USER, NEW_PROCESSES, NEW_NETWORK, NEW_MOUNTS, NEW_IPC = (
+    0x10000000,
+    0x20000000,
+    0x40000000,
+    0x00020000,
+    0x08000000,
+)
 """Flags of ``unshare`` and ``clone``, one for each namespace."""
 
 _DIES_WITH_PARENT, _DROP_CAPABILITY, _NO_NEW_PRIVILEGES, _SUBREAPER = 1, 24, 38, 36
@@ -38,14 +44,20 @@ def _done(found: int) -> None:
 
 def on_known_machine() -> bool:
     """Whether this is Linux on a processor whose system calls are known here, with 64-bit Python."""
-    return sys.platform == "linux" and platform.machine() in ("x86_64", "aarch64") and sys.maxsize > 2**32
+    return (
+        sys.platform == "linux"
+        and platform.machine() in ("x86_64", "aarch64")
+        and sys.maxsize > 2**32
+    )
 
 
 def unshare(flags: int) -> None:
     _done(libc().unshare(flags))
 
 
-def mount(source: str | None, target: str, kind: str | None, flags: int = 0, data: str | None = None) -> None:
+def mount(
+    source: str | None, target: str, kind: str | None, flags: int = 0, data: str | None = None
+) -> None:
     texts = [None if text is None else os.fsencode(text) for text in (source, target, kind, data)]
     _done(libc().mount(texts[0], texts[1], texts[2], ctypes.c_ulong(flags), texts[3]))
 

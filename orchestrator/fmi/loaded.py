@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 from fmus.toolchain.removal import remove_tree
 from orchestrator.errors import ComponentError, FmuFileError, InputError, UnsupportedFmuError
 from orchestrator.fmi.archive import MODEL_DESCRIPTION, extract
-from orchestrator.fmi.binary import FMU2Tolerant, absent_functions, binary_path, in_words_of_2, load, unload
+from orchestrator.fmi.binary import (
+    FMU2Tolerant,
+    absent_functions,
+    binary_path,
+    in_words_of_2,
+    load,
+    unload,
+)
 from orchestrator.fmi.brought_modules import brought_by
 from orchestrator.fmi.component import Derived, RealBatch
 from orchestrator.fmi.description import FmuDescription, runs_under_wine
@@ -25,7 +32,8 @@ from orchestrator.fmi.refusal import FATAL, check_log, in_its_words, refusal
 from orchestrator.fmi.wine import NoWineError
 from orchestrator.fmi.wine_program import WineProgram, proxy_path
 
-PYTHON_BACKED = "Python-backed"  # why one thread alone steps an FMU: Python's lock lets one thread run at a time
+# why one thread alone steps an FMU: Python's lock lets one thread run at a time
+PYTHON_BACKED = "Python-backed"
 _LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3  # kinds of ``fmi2Get…Status``
 
 
@@ -35,7 +43,12 @@ class LoadedComponent(Derived):
     ``lost``: Whether it said ``fmi2Fatal``: no call is allowed any more."""
 
     def __init__(
-        self, name: str, description: FmuDescription, directory: Path | None = None, *, ours: bool = False
+        self,
+        name: str,
+        description: FmuDescription,
+        directory: Path | None = None,
+        *,
+        ours: bool = False,
     ) -> None:
         self.name, self._ours = name, ours
         self.description = description
@@ -58,9 +71,13 @@ class LoadedComponent(Derived):
         except Exception as error:  # fmpy raises a bare Exception here
             said = "; ".join(self._texts()) or str(error)
             self.close()
-            raise ComponentError(name, in_its_words(description, "fmi2Instantiate"), "no instance", said) from error
+            raise ComponentError(
+                name, in_its_words(description, "fmi2Instantiate"), "no instance", said
+            ) from error
         self.pointer = self._fmu.component
-        self.pointer = self.pointer.value if isinstance(self.pointer, ctypes.c_void_p) else self.pointer
+        self.pointer = (
+            self.pointer.value if isinstance(self.pointer, ctypes.c_void_p) else self.pointer
+        )
         self._bind_functions()
 
     def _loaded(self, directory: Path) -> Any:
@@ -79,10 +96,14 @@ class LoadedComponent(Derived):
         if newer:
             self._behind = Fmi3Library(self.description, directory, library)
         fmu = FMU2Tolerant(
-            in_words_of_2(set(spare)) if newer else set(spare), self._refuse_absent, guid=self.description.guid,
-            unzipDirectory=str(directory), modelIdentifier=self.description.model_identifier, instanceName=self.name,
+            in_words_of_2(set(spare)) if newer else set(spare),
+            self._refuse_absent,
+            guid=self.description.guid,
+            unzipDirectory=str(directory),
+            modelIdentifier=self.description.model_identifier,
+            instanceName=self.name,
             libraryPath=str(adapter_path()) if newer else None,
-        )  # fmt: skip
+        )
         if newer:
             self._behind.prepare(fmu.dll)
         else:
@@ -94,25 +115,38 @@ class LoadedComponent(Derived):
         try:
             self._wine = WineProgram(binary_path(self.description, directory))
         except (NoWineError, ValueError) as error:
-            raise FmuFileError(f"{self.description.path}: its binary for Windows: {error}") from error
+            raise FmuFileError(
+                f"{self.description.path}: its binary for Windows: {error}"
+            ) from error
         self._wine.attach()
         return FMU2Tolerant(
-            set(), self._refuse_absent, guid=self.description.guid, unzipDirectory=str(directory),
-            modelIdentifier=self.description.model_identifier, instanceName=self.name, libraryPath=str(proxy_path()),
-        )  # fmt: skip
+            set(),
+            self._refuse_absent,
+            guid=self.description.guid,
+            unzipDirectory=str(directory),
+            modelIdentifier=self.description.model_identifier,
+            instanceName=self.name,
+            libraryPath=str(proxy_path()),
+        )
 
     def _refuse_absent(self, call: str) -> None:
         call = in_its_words(self.description, call)
         raise ComponentError(
-            self.name, call, "nothing", "its binary has no such function, and its file declares no need"
+            self.name,
+            call,
+            "nothing",
+            "its binary has no such function, and its file declares no need",
         )
 
     def _compare_guid(self, directory: Path) -> None:
         """What was described and what was extracted must be the same FMU; not every binary checks that itself."""
         with (directory / MODEL_DESCRIPTION).open("rb") as file:
-            root = next(ElementTree.iterparse(file, events=("start",)))[1]  # the rest of it takes milliseconds
+            # the rest of it takes milliseconds
+            root = next(ElementTree.iterparse(file, events=("start",)))[1]
         if self.description.guid not in (root.get("guid") or root.get("instantiationToken") or ""):
-            raise InputError(f"the guid {self.description.guid} is not that of the FMU; read its description again")
+            raise InputError(
+                f"the guid {self.description.guid} is not that of the FMU; read its description again"
+            )
 
     def _bind_functions(self) -> None:
         """Function pointers with fixed prototypes: no per-call conversion, unlike fmpy's wrappers."""
@@ -121,7 +155,9 @@ class LoadedComponent(Derived):
         prototype = ctypes.CFUNCTYPE(ctypes.c_int, address, address, size, address)
         self.set_real = prototype(("fmi2SetReal", library))
         self.get_real = prototype(("fmi2GetReal", library))
-        self.do_step = ctypes.CFUNCTYPE(ctypes.c_int, address, real, real, flag)(("fmi2DoStep", library))
+        self.do_step = ctypes.CFUNCTYPE(ctypes.c_int, address, real, real, flag)(
+            ("fmi2DoStep", library)
+        )
 
     @property
     def one_thread(self) -> str | None:
@@ -164,7 +200,10 @@ class LoadedComponent(Derived):
         return result
 
     def setup(self, start_time: float, stop_time: float | None) -> None:
-        self._call("fmi2SetupExperiment", lambda: self._fmu.setupExperiment(startTime=start_time, stopTime=stop_time))
+        self._call(
+            "fmi2SetupExperiment",
+            lambda: self._fmu.setupExperiment(startTime=start_time, stopTime=stop_time),
+        )
 
     def enter_initialization_mode(self) -> None:
         self._call("fmi2EnterInitializationMode", self._fmu.enterInitializationMode)
@@ -199,7 +238,9 @@ class LoadedComponent(Derived):
         for name, value in values.items():
             variable = self.description.variables.get(name)
             if variable is None:
-                raise InputError(f"component {self.name!r} has no variable {name!r}; `gfor fmu info` lists them")
+                raise InputError(
+                    f"component {self.name!r} has no variable {name!r}; `gfor fmu info` lists them"
+                )
             setters = {
                 "Real": (self._fmu.setReal, float),
                 "Integer": (self._fmu.setInteger, int),
@@ -212,7 +253,9 @@ class LoadedComponent(Derived):
                 )
             setter, convert = setters[variable.type]
             if convert is int and value != int(value):
-                raise InputError(f"component {self.name!r}: {name} = {value:g}; it must be a whole number")
+                raise InputError(
+                    f"component {self.name!r}: {name} = {value:g}; it must be a whole number"
+                )
             self._call(f"setting {name} = {value}", setter, [variable.reference], [convert(value)])
 
     def read(self, batch: RealBatch) -> None:
@@ -232,7 +275,13 @@ class LoadedComponent(Derived):
         variables = self.description.variables
         rows = [variables[name].reference for name in unknowns]
         columns = [
-            self._call("fmi2GetDirectionalDerivative", self._fmu.getDirectionalDerivative, rows, [reference], [1.0])
+            self._call(
+                "fmi2GetDirectionalDerivative",
+                self._fmu.getDirectionalDerivative,
+                rows,
+                [reference],
+                [1.0],
+            )
             for reference in (variables[name].reference for name in knowns)
         ]
         return np.array(columns).reshape(len(knowns), len(unknowns)).T

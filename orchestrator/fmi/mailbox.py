@@ -20,41 +20,63 @@ MOST, ROOM = 16384, 1 << 18  # references of one question; numbers of a question
 SET, STEP, GET = 1, 2, 4
 TALK, RUN = 2, 3
 OK = 0
-DIED, HUNG, NOT_A_NUMBER, INTERRUPTED, TAMPERED = 64, 65, 66, 67, 68  # answers that no FMU gives; as in mailbox.c
+# answers that no FMU gives; as in mailbox.c
+DIED, HUNG, NOT_A_NUMBER, INTERRUPTED, TAMPERED = 64, 65, 66, 67, 68
 
 
 class Head(ctypes.Structure):
     _fields_ = (
-        ("request", ctypes.c_int32), ("reply", ctypes.c_int32), ("sleeping", ctypes.c_int32 * 2),
-        ("kind", ctypes.c_int32), ("what", ctypes.c_int32), ("status", ctypes.c_int32), ("steps", ctypes.c_int32),
-        ("time", ctypes.c_double), ("step", ctypes.c_double), ("n_set", ctypes.c_int64), ("n_get", ctypes.c_int64),
+        ("request", ctypes.c_int32),
+        ("reply", ctypes.c_int32),
+        ("sleeping", ctypes.c_int32 * 2),
+        ("kind", ctypes.c_int32),
+        ("what", ctypes.c_int32),
+        ("status", ctypes.c_int32),
+        ("steps", ctypes.c_int32),
+        ("time", ctypes.c_double),
+        ("step", ctypes.c_double),
+        ("n_set", ctypes.c_int64),
+        ("n_get", ctypes.c_int64),
         ("text_length", ctypes.c_int64),
-    )  # fmt: skip
+    )
 
 
 class Client(ctypes.Structure):
     """``struct client``: what the asking side knows for itself, out of the other one's reach."""
 
     _fields_ = (
-        ("box", ctypes.c_void_p), ("peer", ctypes.c_int64), ("patience", ctypes.c_double), ("n_set", ctypes.c_int64),
-        ("n_get", ctypes.c_int64), ("number", ctypes.c_int32), ("bad_reference", ctypes.c_uint32),
-        ("fresh", ctypes.c_uint32), ("get_references", ctypes.c_uint32 * MOST),
-    )  # fmt: skip
+        ("box", ctypes.c_void_p),
+        ("peer", ctypes.c_int64),
+        ("patience", ctypes.c_double),
+        ("n_set", ctypes.c_int64),
+        ("n_get", ctypes.c_int64),
+        ("number", ctypes.c_int32),
+        ("bad_reference", ctypes.c_uint32),
+        ("fresh", ctypes.c_uint32),
+        ("get_references", ctypes.c_uint32 * MOST),
+    )
 
 
 class MailboxRun(ctypes.Structure):
     """What one question for many steps says, behind the log in ``struct mailbox``."""
 
     _fields_ = (
-        ("instance", ctypes.c_int64), ("n_steps", ctypes.c_int64), ("n_rows", ctypes.c_int64), ("n_in", ctypes.c_int64),
-        ("n_out", ctypes.c_int64), ("done", ctypes.c_int64), ("stage", ctypes.c_int64),
-    )  # fmt: skip
+        ("instance", ctypes.c_int64),
+        ("n_steps", ctypes.c_int64),
+        ("n_rows", ctypes.c_int64),
+        ("n_in", ctypes.c_int64),
+        ("n_out", ctypes.c_int64),
+        ("done", ctypes.c_int64),
+        ("stage", ctypes.c_int64),
+    )
 
 
 class Served(ctypes.Structure):
     """``struct served``: an instance that a process of several serves."""
 
-    _fields_ = tuple((name, ctypes.c_void_p) for name in ("component", "set_real", "get_real", "step"))
+    _fields_ = tuple(
+        (name, ctypes.c_void_p) for name in ("component", "set_real", "get_real", "step")
+    )
 
 
 @cache
@@ -68,7 +90,9 @@ def mailbox_library() -> Any:
             "in the case and give --trust-fmus"
         ) from error
     address, size = ctypes.c_void_p, ctypes.c_size_t
-    library.mailbox_size.restype = library.mailbox_offset.restype = library.client_size.restype = size
+    library.mailbox_size.restype = library.mailbox_offset.restype = library.client_size.restype = (
+        size
+    )
     library.mailbox_talk.argtypes = [address]
     library.mailbox_serve.argtypes = [address, ctypes.c_int64, *[address] * 4]
     library.mailbox_host.argtypes = [address, ctypes.c_int64, address, ctypes.c_int64]
@@ -76,7 +100,9 @@ def mailbox_library() -> Any:
     library.mailbox_answer.restype = None
     library.mailbox_heed.argtypes = [address, address]
     library.mailbox_heed.restype = None
-    library.mailbox_heed(ctypes.cast(ctypes.pythonapi.PyErr_CheckSignals, address), calls.asked_address)
+    library.mailbox_heed(
+        ctypes.cast(ctypes.pythonapi.PyErr_CheckSignals, address), calls.asked_address
+    )
     return library
 
 
@@ -102,7 +128,9 @@ def shared_memory(folder: Path) -> int | str:
 
     memory = os.memfd_create("gfor_mailbox", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
     os.ftruncate(memory, size)
-    fcntl.fcntl(memory, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL)
+    fcntl.fcntl(
+        memory, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL
+    )
     return memory
 
 
@@ -118,7 +146,9 @@ class Mailbox:
         self.head = Head.from_buffer(self._memory)
         self.address = ctypes.addressof(self.head)
         self.client = Client(box=self.address)
-        self._text, self._log, run, *arrays = (self.library.mailbox_offset(which) for which in range(6))
+        self._text, self._log, run, *arrays = (
+            self.library.mailbox_offset(which) for which in range(6)
+        )
         self.run = MailboxRun.from_buffer(self._memory, run)
         self._arrays = arrays
 

@@ -29,7 +29,8 @@ def texts(messages: Iterable[tuple[int, str]], least: int = 0) -> list[str]:
     return list(dict.fromkeys(text for status, text in messages if status >= least))
 
 
-_guards: list[Callable[[Messages], None]] = []  # called for each message: none, or the one that `on_message` sets
+# called for each message: none, or the one that `on_message` sets
+_guards: list[Callable[[Messages], None]] = []
 
 
 def on_message(
@@ -53,7 +54,9 @@ _message_lists: WeakValueDictionary[int, Messages] = WeakValueDictionary()
 _next_environment = itertools.count(1)
 
 
-def _receive(environment: int | None, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
+def _receive(
+    environment: int | None, _instance: bytes, status: int, _category: bytes, message: bytes
+) -> None:
     messages = _message_lists.get(environment or 0)
     if messages is not None:
         messages.append((status, (message or b"").decode("utf-8", "replace")))

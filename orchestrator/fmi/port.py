@@ -84,22 +84,28 @@ class PortMap:
     start: Mapping[str, tuple[StartMap, ...]]
     signals: Mapping[str, SignalMap]
     settings: Mapping[str, float | bool]  # values of the FMU's own parameters and inputs
-    current_limit: float | None = None  # largest current that it gives, as somebody declares it [pu, rating]
-    V_n: float | None = None  # the voltage of one of them, line to line [kV]; None where nothing needs it
+    # largest current that it gives, as somebody declares it [pu, rating]
+    current_limit: float | None = None
+    # the voltage of one of them, line to line [kV]; None where nothing needs it
+    V_n: float | None = None
 
     @classmethod
     def of_dict(cls, values: Mapping[str, Any]) -> Self:
         """From what `dataclasses.asdict` made of one, perhaps through JSON."""
 
         def phasor(part: Mapping[str, Any]) -> PhasorMap:
-            return PhasorMap(**{**part, "form": Form(part["form"]), "variables": tuple(part["variables"])})
+            return PhasorMap(
+                **{**part, "form": Form(part["form"]), "variables": tuple(part["variables"])}
+            )
 
         return cls(
             **{
                 **values,
                 "voltage": phasor(values["voltage"]),
                 "current": phasor(values["current"]),
-                "start": {n: tuple(StartMap(**m) for m in maps) for n, maps in values["start"].items()},
+                "start": {
+                    n: tuple(StartMap(**m) for m in maps) for n, maps in values["start"].items()
+                },
                 "signals": {n: SignalMap(**m) for n, m in values["signals"].items()},
             }
         )
@@ -112,7 +118,9 @@ class PortMap:
     def taken(self) -> frozenset[str]:
         starts = {m.variable for maps in self.start.values() for m in maps}
         signals = {m.variable for m in self.signals.values()}
-        return frozenset({*self.voltage.variables, *self.current.variables, *starts, *signals, *self.settings})
+        return frozenset(
+            {*self.voltage.variables, *self.current.variables, *starts, *signals, *self.settings}
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,24 +139,43 @@ class BoundDescription(FmuDescription):
         for name in ("S_n", "v_0", "P_0"):
             for target in port.start.get(name, ()):
                 info = self.inner.variables[target.variable]
-                if isinstance(info.start, bool | str) or info.start in (None, 0, 1) or not target.factor:
+                if (
+                    isinstance(info.start, bool | str)
+                    or info.start in (None, 0, 1)
+                    or not target.factor
+                ):
                     continue
                 value = abs(float(info.start or 0) - target.offset) / abs(target.factor)
                 itself = f"{info.name} is {info.start:g} {info.unit or 'pu'} by itself, {value:.3g} times"
-                if name == "S_n" and info.name not in port.settings and abs(value / port.rating - 1) > _SAME:
-                    found["S_n"] = f"S_n = {port.rating:g} MVA, and the FMU's {info.name} is {value:g} MVA by itself"
+                if (
+                    name == "S_n"
+                    and info.name not in port.settings
+                    and abs(value / port.rating - 1) > _SAME
+                ):
+                    found["S_n"] = (
+                        f"S_n = {port.rating:g} MVA, and the FMU's {info.name} is {value:g} MVA by itself"
+                    )
                 V_n = None if info.unit in ("pu", "p.u.", "1", "") else port.V_n
                 most = _NEAR if V_n else _OTHER
                 if name == "v_0" and not 1 / most < value < most:
                     kV = f" ({V_n:g} kV, and {value * V_n:.3g} kV by itself)" if V_n else ""
-                    found.setdefault("V_n", f"another V_n than the FMU starts with: its {itself} what is bound{kV}")
+                    found.setdefault(
+                        "V_n",
+                        f"another V_n than the FMU starts with: its {itself} what is bound{kV}",
+                    )
                 if name == "P_0" and value > _OTHER:
-                    found.setdefault("S_n", f"S_n = {port.rating:g} MVA, and the FMU's {itself} as much")
+                    found.setdefault(
+                        "S_n", f"S_n = {port.rating:g} MVA, and the FMU's {itself} as much"
+                    )
         return found
 
     def _unlike_named(self) -> Iterator[tuple[str, str]]:
         """By the FMU's own parameters that are called as a rating is, and say something else."""
-        own = [v for v in self.inner.variables.values() if v.causality == "parameter" and v.type == "Real"]
+        own = [
+            v
+            for v in self.inner.variables.values()
+            if v.causality == "parameter" and v.type == "Real"
+        ]
         for name, unit, bound in (
             ("S_n", "MVA", self.port.rating),
             ("V_n", "kV", self.port.V_n),
@@ -159,7 +186,9 @@ class BoundDescription(FmuDescription):
             for info in (v for v in own if v.unit and v.start and v.name not in self.port.taken):
                 with suppress(ValueError):
                     value = (
-                        to_unit(f"{info.start_number} {info.unit}", unit) if _NAMED[name].search(info.name) else bound
+                        to_unit(f"{info.start_number} {info.unit}", unit)
+                        if _NAMED[name].search(info.name)
+                        else bound
                     )
                     if abs(value / bound - 1) > _SAME:
                         said = f"{name} = {bound:g} {unit}, and the FMU's {info.name} is {value:g} {unit} by itself"
@@ -168,14 +197,20 @@ class BoundDescription(FmuDescription):
     def likely_cause(self) -> str:
         """Ratings that do not fit, as the end of a sentence; "" without any."""
         unlike = self.unlike_delivered()
-        return f"likely cause: the binding has {'; and '.join(unlike.values())}: check [rating]" if unlike else ""
+        return (
+            f"likely cause: the binding has {'; and '.join(unlike.values())}: check [rating]"
+            if unlike
+            else ""
+        )
 
     @classmethod
     def of(cls, inner: FmuDescription, port: PortMap) -> Self:
         inner_names = {name: m.variable for name, m in port.signals.items()}
         for name in inner.variables:
             if name not in port.taken:
-                inner_names[f"native.{name}" if name in (*PORT, *START, *inner_names) else name] = name
+                inner_names[f"native.{name}" if name in (*PORT, *START, *inner_names) else name] = (
+                    name
+                )
         variables = _port_variables(port)
         for number, (name, own) in enumerate(inner_names.items()):
             variables[name] = _passed(inner, port, name, own, len(PORT) + number)
@@ -183,37 +218,61 @@ class BoundDescription(FmuDescription):
         renamed = {own: name for name, own in inner_names.items()}
         shared |= {
             "variables": variables,
-            "states": tuple(renamed.get(s, s) for s in inner.states) if set(inner.states) <= set(renamed) else (),
-            "rates": tuple(renamed.get(s, s) for s in inner.rates) if set(inner.rates) <= set(renamed) else (),
+            "states": tuple(renamed.get(s, s) for s in inner.states)
+            if set(inner.states) <= set(renamed)
+            else (),
+            "rates": tuple(renamed.get(s, s) for s in inner.rates)
+            if set(inner.rates) <= set(renamed)
+            else (),
             "output_dependencies": _dependencies(inner, port, renamed),
-            "gives_directional_derivatives": False,  # they are the FMU's own variables', not the port's
+            # they are the FMU's own variables', not the port's
+            "gives_directional_derivatives": False,
         }
         return cls(**shared, inner=inner, port=port, inner_names=inner_names)
 
 
-def _passed(inner: FmuDescription, port: PortMap, name: str, own: str, reference: int) -> VariableInfo:
+def _passed(
+    inner: FmuDescription, port: PortMap, name: str, own: str, reference: int
+) -> VariableInfo:
     info = inner.variables[own]
     signal = port.signals.get(name)
     if signal is None or info.type == "Boolean":
-        return replace(info, name=name, reference=reference if info.type == "Real" else info.reference)
-    return replace(info, name=name, reference=reference, causality="output", unit=signal.unit, start=None,
-                   minimum=None, maximum=None, usual=None)  # fmt: skip
+        return replace(
+            info, name=name, reference=reference if info.type == "Real" else info.reference
+        )
+    return replace(
+        info,
+        name=name,
+        reference=reference,
+        causality="output",
+        unit=signal.unit,
+        start=None,
+        minimum=None,
+        maximum=None,
+        usual=None,
+    )
 
 
 def _port_variables(port: PortMap) -> dict[str, VariableInfo]:
     found = [_info(v, "input", v.start) for v in INPUTS] + [_info(v, "output") for v in OUTPUTS]
     for v in START_VALUES:
-        found.append(_info(v, "parameter", port.rating if v is S_N else v.start, v.minimum, v.maximum))
+        found.append(
+            _info(v, "parameter", port.rating if v is S_N else v.start, v.minimum, v.maximum)
+        )
     return {info.name: info for info in found}
 
 
 def _info(
-    variable: Variable, causality: str, start: float | None = None, minimum: float | None = None,
+    variable: Variable,
+    causality: str,
+    start: float | None = None,
+    minimum: float | None = None,
     maximum: float | None = None,
-) -> VariableInfo:  # fmt: skip
+) -> VariableInfo:
     return VariableInfo(
         name=variable.name,
-        reference=PORT.index(variable.name) if variable.name in PORT else 2**32 - 1,  # start values are not read
+        # start values are not read
+        reference=PORT.index(variable.name) if variable.name in PORT else 2**32 - 1,
         type="Real",
         causality=causality,
         variability="fixed" if causality == "parameter" else "continuous",

@@ -58,7 +58,9 @@ def usage(processes: list[int], enough: int) -> Usage:
 def _resident(process: int) -> int:
     """Memory of a process, with all that it shares [bytes]; 0 once it has ended."""
     with contextlib.suppress(OSError, ValueError, IndexError):
-        for task in os.listdir(_PROC / str(process) / "task"):  # the first has none once it ended before the others
+        for task in os.listdir(
+            _PROC / str(process) / "task"
+        ):  # the first has none once it ended before the others
             text = (_PROC / str(process) / "task" / task / "statm").read_text(encoding="ascii")
             if pages := int(text.split()[1]):
                 return pages * os.sysconf("SC_PAGE_SIZE")
@@ -70,7 +72,9 @@ def _own_share(process: int) -> int:
 
     All that it shares counts where the process hides its share, as each process may."""
     with contextlib.suppress(OSError, ValueError):
-        for line in (_PROC / str(process) / "smaps_rollup").read_text(encoding="ascii").splitlines():
+        for line in (
+            (_PROC / str(process) / "smaps_rollup").read_text(encoding="ascii").splitlines()
+        ):
             if line.startswith("Pss:"):
                 return 1024 * int(line.split()[1])
     return _resident(process)

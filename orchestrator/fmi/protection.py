@@ -23,14 +23,28 @@ DISK = "disk"
 TASKS = "number of processes and threads"
 CPU = "CPU time"
 
-NAMES = (END, PROCESSES, NETWORK, WRITING, ATTRIBUTES, READING, ENVIRONMENT, MEMORY, DISK, TASKS, CPU)
+NAMES = (
+    END,
+    PROCESSES,
+    NETWORK,
+    WRITING,
+    ATTRIBUTES,
+    READING,
+    ENVIRONMENT,
+    MEMORY,
+    DISK,
+    TASKS,
+    CPU,
+)
 """In the order of the pages."""
 
 
 def in_order(protections: Iterable[Protection]) -> tuple[Protection, ...]:
     """One for each name; what nobody spoke of is not in force."""
     found = {protection.name: protection for protection in protections}
-    return tuple(found.get(name, Protection(name, False, "nothing on this system does it")) for name in NAMES)
+    return tuple(
+        found.get(name, Protection(name, False, "nothing on this system does it")) for name in NAMES
+    )
 
 
 def missing(protections: Iterable[Protection]) -> list[str]:

@@ -21,7 +21,9 @@ _SILENT = {
 Said = Callable[[int], list[str]]  # gives the distinct messages of at least a status, oldest first
 
 
-def refusal(component: Component, said_by: Said, status: int, call: str, time: float | None) -> CosimError:
+def refusal(
+    component: Component, said_by: Said, status: int, call: str, time: float | None
+) -> CosimError:
     """The error for a call whose status is neither OK nor Warning.
 
     ``call``: by its name in FMI 2.0; the error has the name in the FMU's own version."""
@@ -32,7 +34,9 @@ def refusal(component: Component, said_by: Said, status: int, call: str, time: f
         failed = bool(said_by(DISCARD))  # some say that they ended whenever a step failed
         ended, reached = component.progress_of_step()
         if ended and not failed:
-            return EndedError(component.name, name, said, time, time if reached is None else reached)
+            return EndedError(
+                component.name, name, said, time, time if reached is None else reached
+            )
         said = said or _partly(reached, time)
     said = said or f"it logs no text; {_SILENT.get(status, 'FMI knows no such status')}"
     return ComponentError(component.name, in_its_words(described, call), name, said, time)

@@ -43,7 +43,9 @@ class RemoteCalls(Derived, ABC):
         self._remote("fmi2ExitInitializationMode", "exit_initialization_mode")
 
     def progress_of_step(self) -> tuple[bool, float | None]:
-        return self._typed(answers.progress, self._remote("fmi2GetBooleanStatus", "progress_of_step"))
+        return self._typed(
+            answers.progress, self._remote("fmi2GetBooleanStatus", "progress_of_step")
+        )
 
     def reset(self) -> None:
         self._remote("fmi2Reset", "reset")
@@ -71,7 +73,12 @@ class RemoteCalls(Derived, ABC):
         self._remote("fmi2FreeFMUstate", "free_state", state)
 
     def serialize_state(self, state: Any) -> bytes:
-        return self._typed(answers.hexadecimal, self._remote("fmi2SerializeFMUstate", "serialize_state", state))
+        return self._typed(
+            answers.hexadecimal, self._remote("fmi2SerializeFMUstate", "serialize_state", state)
+        )
 
     def deserialize_state(self, content: bytes) -> Any:
-        return self._typed(answers.number, self._remote("fmi2DeSerializeFMUstate", "deserialize_state", content.hex()))
+        return self._typed(
+            answers.number,
+            self._remote("fmi2DeSerializeFMUstate", "deserialize_state", content.hex()),
+        )

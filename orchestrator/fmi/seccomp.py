@@ -20,7 +20,8 @@ _SET_FILTER, _ALL_THREADS = 1, 1
 _LOAD, _EQUAL, _ANY_BIT, _AND, _RETURN = 0x20, 0x15, 0x45, 0x54, 0x06
 _ALLOW, _ERROR = 0x7FFF0000, 0x00050000
 _NUMBER, _ARCHITECTURE = 0, 4
-_32_BIT_CALLS = 0x40000000  # numbers from here on are those of x32, a second way to every call on x86
+# numbers from here on are those of x32, a second way to every call on x86
+_32_BIT_CALLS = 0x40000000
 _DATAGRAM, _RAW = 2, 3
 _TYPE_OF_SOCKET = 0xF
 _NEW_NAMESPACES = 0x7E020000
@@ -49,30 +50,55 @@ def _low_word(argument: int) -> bytes:
 def _program(own_process: int | None, *, signals: bool, attributes: bool, ipc: bool) -> bytes:
     which = list(_ARCHITECTURES).index(platform.machine())
     steps = [
-        _step(_LOAD, _ARCHITECTURE), _step(_EQUAL, _ARCHITECTURES[platform.machine()], 1, 0), _refuse(),
-        _step(_LOAD, _NUMBER), _step(_ANY_BIT, _32_BIT_CALLS, 0, 1), _refuse(),
-    ]  # fmt: skip
+        _step(_LOAD, _ARCHITECTURE),
+        _step(_EQUAL, _ARCHITECTURES[platform.machine()], 1, 0),
+        _refuse(),
+        _step(_LOAD, _NUMBER),
+        _step(_ANY_BIT, _32_BIT_CALLS, 0, 1),
+        _refuse(),
+    ]
 
     def only(call_numbers: Sequence[int], *inner: bytes) -> None:
         """Steps for one call alone; they end with the number loaded again."""
         body = [*inner, _step(_LOAD, _NUMBER)]
         steps.extend([_step(_EQUAL, call_numbers[which], 0, len(body)), *body])
 
-    wanted = {"always": True, "memory": True, "attributes": attributes, "ipc": ipc, "signals": bool(own_process)}
-    for numbers in (numbers for group in wanted if wanted[group] for numbers in _CALLS[group].values()):
+    wanted = {
+        "always": True,
+        "memory": True,
+        "attributes": attributes,
+        "ipc": ipc,
+        "signals": bool(own_process),
+    }
+    for numbers in (
+        numbers for group in wanted if wanted[group] for numbers in _CALLS[group].values()
+    ):
         if (number := numbers[which]) >= 0:
             steps += [_step(_EQUAL, number, 0, 1), _refuse()]
-    steps += [_step(_EQUAL, _CLONE3[which], 0, 1), _refuse(errno.ENOSYS)]  # its flags lie where no filter can look
+    # its flags lie where no filter can look
+    steps += [_step(_EQUAL, _CLONE3[which], 0, 1), _refuse(errno.ENOSYS)]
     only(_PRCTL, _low_word(0), _step(_EQUAL, _SET_DUMPABLE, 0, 1), _refuse())
     only(_CLONE, _low_word(0), _step(_ANY_BIT, _NEW_NAMESPACES, 0, 1), _refuse())
-    only(_SOCKETPAIR, _low_word(1), _step(_AND, _TYPE_OF_SOCKET), _step(_EQUAL, _DATAGRAM, 1, 0),
-         _step(_EQUAL, _RAW, 0, 1), _refuse())  # fmt: skip
+    only(
+        _SOCKETPAIR,
+        _low_word(1),
+        _step(_AND, _TYPE_OF_SOCKET),
+        _step(_EQUAL, _DATAGRAM, 1, 0),
+        _step(_EQUAL, _RAW, 0, 1),
+        _refuse(),
+    )
     if own_process:
         for numbers in (_KILL, _TGKILL) if signals else ():
             only(numbers, _low_word(0), _step(_EQUAL, own_process, 1, 0), _refuse())
         for argument, group in enumerate(("of_a_process", "of_some_process")):
             for numbers in _CALLS[group].values():
-                only(numbers, _low_word(argument), _step(_EQUAL, own_process, 2, 0), _step(_EQUAL, 0, 1, 0), _refuse())
+                only(
+                    numbers,
+                    _low_word(argument),
+                    _step(_EQUAL, own_process, 2, 0),
+                    _step(_EQUAL, 0, 1, 0),
+                    _refuse(),
+                )
     return b"".join([*steps, _step(_RETURN, _ALLOW)])
 
 
@@ -85,7 +111,9 @@ def filter_calls(*, attributes: bool, ipc: bool, own_process: int | None, signal
     ``own_process``: number of the only process whose limits and priority it may change: its own; None where it sees no
     other.
     ``signals``: whether it may send signals to that process only: where they would reach others."""
-    program = _program(own_process, signals=signals and own_process is not None, attributes=attributes, ipc=ipc)
+    program = _program(
+        own_process, signals=signals and own_process is not None, attributes=attributes, ipc=ipc
+    )
     buffer = ctypes.create_string_buffer(program, len(program))
     head = struct.pack("@HP", len(program) // 8, ctypes.addressof(buffer))
     no_new_privileges()

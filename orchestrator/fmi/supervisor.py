@@ -24,14 +24,22 @@ from fmus.toolchain.removal import remove_tree
 from orchestrator.fmi import linux, wine
 from orchestrator.fmi.confinement import Means, confine
 from orchestrator.fmi.limits import TOO_MANY_TASKS, TOO_MUCH_DISK, TOO_MUCH_MEMORY, Limits
-from orchestrator.fmi.process_tree import descendants, end_descendants, size_of, size_of_removed, usage
+from orchestrator.fmi.process_tree import (
+    descendants,
+    end_descendants,
+    size_of,
+    size_of_removed,
+    usage,
+)
 
 _MOUNT_SETATTR, _HERE, _RECURSIVE, _READ_ONLY = 442, -100, 0x8000, 0x1
 _PRIVATE, _ALL_BELOW = 1 << 18, 1 << 14
 _NO_SETUID, _NO_DEVICES = 0x2, 0x4
-_FEWEST_NUMBERS = 301  # the smallest number of process numbers that the kernel lets a namespace have
+# the smallest number of process numbers that the kernel lets a namespace have
+_FEWEST_NUMBERS = 301
 _MOST_FILES = 4096
-_SHARED = 16 * 1024**2  # most that memory shared by name comes to [bytes]: outside of the folder, and of no process
+# most that memory shared by name comes to [bytes]: outside of the folder, and of no process
+_SHARED = 16 * 1024**2
 
 
 def enter_namespaces() -> None:
@@ -52,7 +60,9 @@ def mount_read_only(folder: Path, size: int, more: Iterable[Path] = ()) -> list[
     ``more``: folders in whose place there is an empty one in memory as well."""
     linux.unshare(linux.NEW_MOUNTS)
     linux.mount(None, "/", None, _PRIVATE | _ALL_BELOW)
-    sizes = {folder: size, Path("/dev/shm"): min(size, _SHARED)} | dict.fromkeys(more, min(size, _SHARED))
+    sizes = {folder: size, Path("/dev/shm"): min(size, _SHARED)} | dict.fromkeys(
+        more, min(size, _SHARED)
+    )
     own = [path for path in sizes if path.is_dir()]
     for path in own:
         options = f"size={sizes[path]},nr_inodes={_MOST_FILES},mode=0700"
@@ -74,11 +84,14 @@ def mount_read_only(folder: Path, size: int, more: Iterable[Path] = ()) -> list[
 
 
 def _set_attributes(path: Path, flags: int, on: int, off: int) -> None:
-    linux.call(_MOUNT_SETATTR, _HERE, os.fsencode(path), flags, struct.pack("<QQQQ", on, off, 0, 0), 32)
+    linux.call(
+        _MOUNT_SETATTR, _HERE, os.fsencode(path), flags, struct.pack("<QQQQ", on, off, 0, 0), 32
+    )
 
 
 _LOOK = 100  # time after which it is looked what the FMU's processes take [ms]
-_OURS = 256 * 1024**2  # memory that the worker may have in use before the FMU is loaded [bytes]; it takes some 100 MB
+# memory that the worker may have in use before the FMU is loaded [bytes]; it takes some 100 MB
+_OURS = 256 * 1024**2
 _LINUX = sys.platform == "linux"
 
 
@@ -184,7 +197,10 @@ def _keep(request: dict[str, Any], means: Means, work: Path, tell: int, alive: i
         try:
             sockets = wine.socket_bases() if request["windows"] else []
             lacking = mount_read_only(work, int(request["limits"]["disk"]), sockets)
-            means.read_only, means.own_processes = "files" not in lacking, "processes" not in lacking
+            means.read_only, means.own_processes = (
+                "files" not in lacking,
+                "processes" not in lacking,
+            )
         except OSError:
             pass  # `confine` knows what that leaves open
     linux.adopt_orphans()

@@ -5,8 +5,13 @@ from threading import Lock
 
 from fmpy.validation import validate_fmu
 
-_HARMLESS = ("not a legal variable name", "initial=\"calculated\" but provides",
-             "InitialUnknowns", "of the initial unknown", "display unit")  # fmt: skip
+_HARMLESS = (
+    "not a legal variable name",
+    'initial="calculated" but provides',
+    "InitialUnknowns",
+    "of the initial unknown",
+    "display unit",
+)
 """What breaks the standard without changing an answer."""
 
 _one_at_a_time = Lock()

@@ -15,12 +15,16 @@ from orchestrator.safe_files import file_hash
 
 DLL_ENDINGS = (".so", ".dll", ".dylib")
 DEVICE_ENDING = ".toml"  # of a file that lays a circuit around a DLL
-_KEPT = "dlls"  # not the folder of our own FMUs, which are trusted: a vendor's code runs in a process of its own
-_FOR_NOW = "for-now"  # beside a kept FMU, one whose DLL could not be tried at that time; each process tries once
+# not the folder of our own FMUs, which are trusted: a vendor's code runs in a process of its own
+_KEPT = "dlls"
+# beside a kept FMU, one whose DLL could not be tried at that time; each process tries once
+_FOR_NOW = "for-now"
 
 _log = logging.getLogger("gfor")
-_tried_now: dict[Path, Path] = {}  # FMUs for now that this process made, by where they would be kept for good
-READER = "orchestrator.fmi.dll_reading"  # module whose process, closed off, reads a DLL, also for Windows, under Wine
+# FMUs for now that this process made, by where they would be kept for good
+_tried_now: dict[Path, Path] = {}
+# module whose process, closed off, reads a DLL, also for Windows, under Wine
+READER = "orchestrator.fmi.dll_reading"
 
 
 def foreign_platforms(library: Path) -> tuple[str, ...]:
@@ -71,7 +75,11 @@ def as_fmu(path: Path) -> Path:
                 noted = {str(place): _hash(place) for place in (path.parent.resolve(), *dll.looked)}
                 keep(_noted(kept), json.dumps(noted).encode())
             return keep(kept, content)
-        _log.warning("%s: its state is not saved this time: %s; the next call tries it anew", path, dll.trial.why)
+        _log.warning(
+            "%s: its state is not saved this time: %s; the next call tries it anew",
+            path,
+            dll.trial.why,
+        )
         _tried_now[kept] = keep(kept.parent / _FOR_NOW / kept.name, content)
         return _tried_now[kept]
     except (DllError, DeviceFileError) as error:
@@ -88,7 +96,9 @@ def _unchanged(kept: Path, path: Path) -> bool:
     if not _noted(kept).exists():
         return True
     noted: dict[str, str | None] = json.loads(_noted(kept).read_text(encoding="utf-8"))
-    return str(path.parent.resolve()) in noted and all(_hash(Path(place)) == found for place, found in noted.items())
+    return str(path.parent.resolve()) in noted and all(
+        _hash(Path(place)) == found for place, found in noted.items()
+    )
 
 
 def _hash(place: Path) -> str | None:
@@ -107,7 +117,9 @@ def _digest(path: Path, library: Path) -> str:
         try:
             content = file.read_bytes()
         except OSError as error:
-            raise InputError(f"{file}: cannot be read: {error.strerror}; give the vendor's .so or .dll file") from error
+            raise InputError(
+                f"{file}: cannot be read: {error.strerror}; give the vendor's .so or .dll file"
+            ) from error
         found.update(hashlib.sha256(content).digest())
         found.update(file.name.encode("utf-8", "surrogateescape"))
     return found.hexdigest()[:32]
@@ -118,7 +130,9 @@ def _own_code() -> bytes:
     import fmus  # noqa: PLC0415 - the place alone
 
     root = Path(fmus.__file__).parent
-    files = sorted(file for part in ("vendor_dll", "toolchain") for file in (root / part).rglob("*.[pc]*"))
+    files = sorted(
+        file for part in ("vendor_dll", "toolchain") for file in (root / part).rglob("*.[pc]*")
+    )
     found = hashlib.sha256()
     for file in files:
         if file.suffix in (".py", ".c"):

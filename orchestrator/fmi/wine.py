@@ -27,19 +27,27 @@ _LOADERS = ("wine64", "/usr/lib/wine/wine64", "wine")
 _SERVERS = ("/usr/lib/wine/wineserver64", "/usr/lib/wine/wineserver", "wineserver")
 PREFIX = "wine"
 _LIBRARIES = "x86_64-windows"
-_WHERE = ("/usr/lib/x86_64-linux-gnu/wine", "/usr/lib/wine", "/usr/lib64/wine", "/usr/local/lib/wine",
-          "/usr/local/lib64/wine")  # fmt: skip
-_BESIDE = ("lib64/wine", "lib/wine")  # from the folder above the loader's, where Wine is not one of the system's own
+_WHERE = (
+    "/usr/lib/x86_64-linux-gnu/wine",
+    "/usr/lib/wine",
+    "/usr/lib64/wine",
+    "/usr/local/lib/wine",
+    "/usr/local/lib64/wine",
+)
+# from the folder above the loader's, where Wine is not one of the system's own
+_BESIDE = ("lib64/wine", "lib/wine")
 NOTE = "wine-socket"
 """Debian's server has its sockets in such a folder in the place that TMPDIR names; its name stands in the prefix."""
 _LONGEST = 20.0  # for the server to begin [s]
-SHARED = 24 * 1024**2  # size of the memory that a program shares with whoever asks it [bytes]; a mailbox and no more
+# size of the memory that a program shares with whoever asks it [bytes]; a mailbox and no more
+SHARED = 24 * 1024**2
 _LEFT_BEHIND = 86_400.0  # age of an empty folder for sockets at which nobody is about to use it [s]
 _NOT_STARTED = "wineboot.exe,services.exe,explorer.exe,winedevice.exe=d"
 """Programs of Windows that a library has no use for."""
 
 MISSING = (
-    "Windows libraries of 64 bits run under Wine here, and there is none; install it (Debian, Ubuntu: apt install wine)"
+    "Windows libraries of 64 bits run under Wine here, and there is none; "
+    "install it (Debian, Ubuntu: apt install wine)"
 )
 
 
@@ -93,7 +101,9 @@ def make_prefix(folder: Path) -> Path:
     (prefix / "dosdevices" / "z:").symlink_to("/")
     (prefix / ".update-timestamp").write_text("disable\n", encoding="ascii")
     for name in ("system", "user", "userdef"):
-        (prefix / f"{name}.reg").write_text("WINE REGISTRY Version 2\n#arch=win64\n", encoding="ascii")
+        (prefix / f"{name}.reg").write_text(
+            "WINE REGISTRY Version 2\n#arch=win64\n", encoding="ascii"
+        )
     note = prefix / "wineserver"
     note.write_text(NOTE, encoding="ascii")
     note.chmod(0o400)
@@ -102,9 +112,17 @@ def make_prefix(folder: Path) -> Path:
 
 def environment(prefix: Path, given: Mapping[str, str]) -> dict[str, str]:
     """Of a program in a prefix, from a process's own without what belongs to another Wine."""
-    kept = {name: value for name, value in given.items() if not name.startswith("WINE") and name != "DISPLAY"}
+    kept = {
+        name: value
+        for name, value in given.items()
+        if not name.startswith("WINE") and name != "DISPLAY"
+    }
     own = {"WINEPREFIX": str(prefix), "WINEDEBUG": "-all", "WINEDLLOVERRIDES": _NOT_STARTED}
-    own |= {"WINESERVER": find_wine().server, "TMP": "C:\\windows\\temp", "TEMP": "C:\\windows\\temp"}
+    own |= {
+        "WINESERVER": find_wine().server,
+        "TMP": "C:\\windows\\temp",
+        "TEMP": "C:\\windows\\temp",
+    }
     return kept | own | {"TMPDIR": str(prefix)}
 
 
@@ -166,17 +184,22 @@ class Server:
                 file.truncate(SHARED)
         self.environment = environment(self.prefix, os.environ)
         self.process = subprocess.Popen(
-            [find_wine().server, "-f", "-p"], env=self.environment, preexec_fn=_end_with_parent if tied else None,  # noqa: PLW1509 - tied: there is one thread
-
-            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
+            [find_wine().server, "-f", "-p"],
+            env=self.environment,
+            preexec_fn=_end_with_parent if tied else None,  # noqa: PLW1509 - tied: there is one thread
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
         self._connections: list[socket.socket] = []
         self._paths = _socket_folders(self.prefix)
         end = time.monotonic() + _LONGEST
         while not self._connected(programs):
             if time.monotonic() > end or self.process.poll() is not None:
                 self.close()
-                raise NoWineError("Wine's server does not start: its folder for sockets cannot be written")
+                raise NoWineError(
+                    "Wine's server does not start: its folder for sockets cannot be written"
+                )
             time.sleep(0.005)
 
     def _connected(self, wanted: int) -> bool:
@@ -191,7 +214,9 @@ class Server:
 
     def next_shared(self) -> Path:
         if not self.shared:
-            raise NoWineError("this process has as many programs under Wine as it may; use fewer instances at once")
+            raise NoWineError(
+                "this process has as many programs under Wine as it may; use fewer instances at once"
+            )
         return self.shared.pop()
 
     def start(self, program: Path, *words: str) -> "subprocess.Popen[bytes]":
@@ -201,8 +226,10 @@ class Server:
                 env=self.environment | {"WINESERVERSOCKET": str(connection.fileno())},
                 preexec_fn=_end_with_parent if self.tied else None,  # noqa: PLW1509 - as above
                 pass_fds=(connection.fileno(),),
-                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-            )  # fmt: skip
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            )
 
     def close(self) -> None:
         for connection in self._connections:
@@ -214,5 +241,7 @@ class Server:
             shutil.rmtree(path, ignore_errors=True)
 
 
-in_process: list[Server] = []  # the server of this process, which closed itself off after its start; none elsewhere
-PROGRAMS = 16  # that a process which closed itself off can start: instances at once, and those that crashed
+# the server of this process, which closed itself off after its start; none elsewhere
+in_process: list[Server] = []
+# that a process which closed itself off can start: instances at once, and those that crashed
+PROGRAMS = 16

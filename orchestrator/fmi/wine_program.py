@@ -25,13 +25,18 @@ LOAD, SYMBOL, CALL, READ, WRITE, ALLOCATE = range(6)
 
 class _Talk(ctypes.Structure):
     _fields_ = (
-        ("command", ctypes.c_int64), ("result", ctypes.c_int64), ("a", ctypes.c_int64 * 4), ("d", ctypes.c_double * 4),
-    )  # fmt: skip
+        ("command", ctypes.c_int64),
+        ("result", ctypes.c_int64),
+        ("a", ctypes.c_int64 * 4),
+        ("d", ctypes.c_double * 4),
+    )
 
 
 _ENDED = os.WEXITED | os.WNOHANG | os.WNOWAIT if hasattr(os, "waitid") else 0
 _FROM_OUTSIDE = tuple(
-    -getattr(signal, name) for name in ("SIGKILL", "SIGTERM", "SIGHUP", "SIGINT") if hasattr(signal, name)
+    -getattr(signal, name)
+    for name in ("SIGKILL", "SIGTERM", "SIGHUP", "SIGINT")
+    if hasattr(signal, name)
 )
 _TO_END = 2.0  # for a program that no longer answers to end [s]
 _WORDS = 4000  # most bytes of its last words that are read
@@ -61,7 +66,9 @@ def compile_programs() -> list[Path]:
         mailbox_library()
         return [proxy_path(), host_path()]
     except (OSError, RuntimeError) as error:
-        raise InputError(f"libraries for Windows run under Wine, by a compiled program: {error}") from error
+        raise InputError(
+            f"libraries for Windows run under Wine, by a compiled program: {error}"
+        ) from error
 
 
 @cache
@@ -116,7 +123,9 @@ class WineProgram:
     def attach(self) -> None:
         proxy().wine_attach(self.address, self._process.pid)
 
-    def ask(self, command: int, *arguments: int, data: bytes = b"", answer: int = 0) -> tuple[int, bytes]:
+    def ask(
+        self, command: int, *arguments: int, data: bytes = b"", answer: int = 0
+    ) -> tuple[int, bytes]:
         for k, value in enumerate(arguments):
             self._talk.a[k] = value
         self._memory[self._data : self._data + len(data)] = data
@@ -139,7 +148,9 @@ class WineProgram:
                 "memory; try again",
                 passing=True,
             )
-        return WineEndedError(f"its process under Wine ends: {self._said() or 'it crashes or ends its own process'}")
+        return WineEndedError(
+            f"its process under Wine ends: {self._said() or 'it crashes or ends its own process'}"
+        )
 
     def _said(self) -> str:
         """Last words of the program, in the mailbox's log: the crash."""
@@ -152,14 +163,23 @@ class WineProgram:
         handle, _ = self.ask(LOAD, data=f"Z:{library}".encode() + b"\0")
         if not handle:
             code = int(self._talk.a[0])
-            why = {126: "a library that it needs is missing", 193: "it is for another processor or damaged"}.get(code)
-            raise ValueError(f"Wine cannot load it: Windows error {code}{f' ({why})' if why else ''}")
+            why = {
+                126: "a library that it needs is missing",
+                193: "it is for another processor or damaged",
+            }.get(code)
+            raise ValueError(
+                f"Wine cannot load it: Windows error {code}{f' ({why})' if why else ''}"
+            )
         return handle
 
     def close(self) -> None:
         """End the program and Wine's server; in a process that is closed off, keep it for the next library."""
         process: subprocess.Popen[bytes] | None = getattr(self, "_process", None)
-        if process is not None and self._folder is None and os.waitid(os.P_PID, process.pid, _ENDED) is None:
+        if (
+            process is not None
+            and self._folder is None
+            and os.waitid(os.P_PID, process.pid, _ENDED) is None
+        ):
             _idle.append((self._path, process))
         elif process is not None:
             process.kill()
@@ -194,7 +214,9 @@ class WineLibrary:
             remedy = "its structures are of another layout; ask its author for a DLL of the interface's layout"
         return WineEndedError(f"while {self._doing}, {error}; {remedy}")
 
-    def _ask(self, command: int, *arguments: int, data: bytes = b"", answer: int = 0) -> tuple[int, bytes]:
+    def _ask(
+        self, command: int, *arguments: int, data: bytes = b"", answer: int = 0
+    ) -> tuple[int, bytes]:
         try:
             return self._program.ask(command, *arguments, data=data, answer=answer)
         except WineEndedError as error:
@@ -243,7 +265,9 @@ class WineLibrary:
         table = at + 24 + int.from_bytes(head[at + 20 : at + 22], "little")
         found = []
         for place in range(table, min(table + 40 * count, len(head) - 39), 40):
-            size, start, flags = (int.from_bytes(head[place + k : place + k + 4], "little") for k in (8, 12, 36))
+            size, start, flags = (
+                int.from_bytes(head[place + k : place + k + 4], "little") for k in (8, 12, 36)
+            )
             if flags & _WRITABLE:
                 found.append((base, base + start, size))
         return found

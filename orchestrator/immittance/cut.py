@@ -21,7 +21,8 @@ from orchestrator.immittance.sides import Behind, Exact, Rows, Sampled, Together
 from orchestrator.study.modes import running
 
 _PORT = ("v_re", "v_im"), ("i_re", "i_im")
-_ALIKE = 1e-6  # relative difference between two devices' currents for the network, which are perturbed one by one
+# relative difference between two devices' currents for the network, which are perturbed one by one
+_ALIKE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,8 @@ class Cut:
     currents: dict[str, complex]
     rated_hz: float | None  # None where no component has one
     warnings: tuple[str, ...]
-    eigenvalues: Complex  # of the closed system [rad/s]; empty where it is too large for all of them
+    # of the closed system [rad/s]; empty where it is too large for all of them
+    eigenvalues: Complex
     bus: str  # where the devices stand; "" where at several
     ports: tuple[tuple[str, tuple[str, ...]], ...]  # bus and devices of each pair of rows
     units: tuple[Unit, ...]  # that the device side is made of
@@ -52,7 +54,9 @@ def cut_of(prepared: PreparedScenario, bus: str | None, names: tuple[str, ...]) 
         find_operating_point(master)
         blocks = Blocks(master, without_step=True)
         if silent := [d for d, c in blocks.components.items() if c.A_c is None]:
-            raise InputError(f"component {silent[0]!r} gives no derivatives; scan its FMU and give that in its place")
+            raise InputError(
+                f"component {silent[0]!r} gives no derivatives; scan its FMU and give that in its place"
+            )
         model = continuous(blocks)
         spectrum = whole_spectrum(model)
         opened = _Opened(blocks, model, tuple(homes))
@@ -62,9 +66,20 @@ def cut_of(prepared: PreparedScenario, bus: str | None, names: tuple[str, ...]) 
         currents = {d: complex(*(values[f"{d}.{i}"] for i in _PORT[1])) for d in devices}
     device, network, units, ports = opened.sides(devices)
     places, found = {homes[name] for name in devices}, np.zeros(0, dtype=complex)
-    return Cut(devices, device, network, judge(model, spectrum).stable, voltages, currents, rated_frequency(prepared),
-               said, spectrum.eigenvalues if spectrum else found, places.pop() if len(places) == 1 else "",
-               tuple((homes[at[0]], at) for at in ports), units)  # fmt: skip
+    return Cut(
+        devices,
+        device,
+        network,
+        judge(model, spectrum).stable,
+        voltages,
+        currents,
+        rated_frequency(prepared),
+        said,
+        spectrum.eigenvalues if spectrum else found,
+        places.pop() if len(places) == 1 else "",
+        tuple((homes[at[0]], at) for at in ports),
+        units,
+    )
 
 
 def buses_of(master: Master) -> dict[str, str]:
@@ -96,7 +111,9 @@ def _devices(homes: dict[str, str], bus: str | None, names: tuple[str, ...]) -> 
             raise InputError(
                 f"--bus {one}: no device stands there; devices stand at {', '.join(sorted(set(homes.values())))}"
             )
-    found = tuple(name for name, home in homes.items() if {home, home.rpartition(".")[2]} & set(wanted))
+    found = tuple(
+        name for name, home in homes.items() if {home, home.rpartition(".")[2]} & set(wanted)
+    )
     return tuple(name for name in found if not names or name in names)
 
 
@@ -126,19 +143,28 @@ class _Opened:
         H_0[rows], K_0[rows] = 0.0, 0.0
         whole = np.linalg.inv(np.eye(len(K)) - K_0)
         through = K[rows] @ whole
-        return [F + G @ whole @ H_0, (G @ whole)[:, rows], H[rows] + through @ H_0, through[:, rows]]
+        return [
+            F + G @ whole @ H_0,
+            (G @ whole)[:, rows],
+            H[rows] + through @ H_0,
+            through[:, rows],
+        ]
 
     def _is_alike(self, one: str, other: str) -> bool:
         """Whether two devices see one voltage, and the network takes their currents alike."""
-        a, b = (np.concatenate([self.B[:, self._i[d]], self.D[:, self._i[d]]]) for d in (one, other))
+        a, b = (
+            np.concatenate([self.B[:, self._i[d]], self.D[:, self._i[d]]]) for d in (one, other)
+        )
         seen = [[self._read[k] for k in self._v[d]] for d in (one, other)]
         return seen[0] == seen[1] and bool(np.abs(a - b).max() <= _ALIKE * np.abs(a).max())
 
     def _separate(self) -> list[tuple[tuple[str, ...], Rows]]:
         """Devices and states of each unit: what hangs together without the voltages and currents at the buses."""
         n, p = self.B.shape
-        half = p // 2  # voltages come first; what they reach is joined by the currents that it gives
-        joined = np.zeros((n + 2 * p, n + 2 * p), dtype=bool)  # states, what is given, what is computed in its place
+        # voltages come first; what they reach is joined by the currents that it gives
+        half = p // 2
+        # states, what is given, what is computed in its place
+        joined = np.zeros((n + 2 * p, n + 2 * p), dtype=bool)
         joined[:n, :n], joined[:n, n + half : n + p] = self.A != 0, self.B[:, half:] != 0
         joined[n + p :, :n], joined[n + p :, n + half : n + p] = self.C != 0, self.D[:, half:] != 0
         for d in self._devices:
@@ -153,18 +179,26 @@ class _Opened:
             own = {self._read[k] for d in ds for k in self._v[d]}
             others = np.array([k for k in range(half) if self._read[k] not in own], dtype=np.int64)
             currents = np.concatenate([self._i[d] for d in ds])
-            if one in network or self.B[np.ix_(states, others)].any() or self.D[np.ix_(currents, others)].any():
+            if (
+                one in network
+                or self.B[np.ix_(states, others)].any()
+                or self.D[np.ix_(currents, others)].any()
+            ):
                 raise InputError(
                     f"no cut separates {', '.join(ds)} from the network: other signals than voltage and current "
                     "at its bus connect them, such as a remote measurement; `gfor modes` judges such a case"
                 )
         return [(ds, states) for _, ds, states in units]
 
-    def sides(self, devices: tuple[str, ...]) -> tuple[Any, Any, tuple[Unit, ...], list[tuple[str, ...]]]:
+    def sides(
+        self, devices: tuple[str, ...]
+    ) -> tuple[Any, Any, tuple[Unit, ...], list[tuple[str, ...]]]:
         """Those of a cut at some devices, the units at it, and the devices at each port."""
         own = [unit for unit in self._units if set(unit[0]) & set(devices)]
         if left := [d for unit in own for d in unit[0] if d not in devices]:
-            raise InputError(f"{', '.join(left)}: other signals connect it to what is cut; cut there, too")
+            raise InputError(
+                f"{', '.join(left)}: other signals connect it to what is cut; cut there, too"
+            )
         mine = [k for k, at in enumerate(self._ports) if set(at) & set(devices)]
         states = np.concatenate([kept for _, kept in self._units])
         net = np.setdiff1d(np.arange(len(self.A)), states)
@@ -175,7 +209,9 @@ class _Opened:
         at = [tuple(d for d in self._ports[k] if d in devices) for k in mine]
         device = units[0].side if len(units) == len(mine) == 1 else together
         every = list(range(len(self._ports)))
-        rest = tuple(self._unit(*unit, every) for unit in self._units if not set(unit[0]) & set(devices))
+        rest = tuple(
+            self._unit(*unit, every) for unit in self._units if not set(unit[0]) & set(devices)
+        )
         if not rest:
             return device, alone, units, at
         closed = self._open([self._given[k] for d in devices for k in self._v[d]])[0]
@@ -188,7 +224,9 @@ class _Opened:
         """Its currents count into it."""
         mine = [k for k, port in enumerate(ports) if set(self._ports[port]) & set(inside)]
         at = [[d for d in self._ports[ports[k]] if d in inside] for k in mine]
-        C, D = (np.concatenate([sum(M[self._i[d]] for d in ds) for ds in at]) for M in (self.C, self.D))
+        C, D = (
+            np.concatenate([sum(M[self._i[d]] for d in ds) for ds in at]) for M in (self.C, self.D)
+        )
         v = np.concatenate([self._v[ds[0]] for ds in at])
         B, D = self.B[np.ix_(states, v)], D[:, v]
         side = Exact(", ".join(inside), self.A[np.ix_(states, states)], B, C[:, states], D)

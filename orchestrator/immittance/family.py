@@ -13,7 +13,8 @@ from orchestrator.immittance.margins import crossings_of, gains_of, margins_of
 from orchestrator.immittance.poles import fits
 
 _TURN = np.deg2rad(4.0)  # turn of det(1 + L) between two of the frequencies that are kept of a scan
-_FITTED = 1e-6  # relative error of a loop that was scanned below which no further one is gone through
+# relative error of a loop that was scanned below which no further one is gone through
+_FITTED = 1e-6
 _EVERYWHERE = 2 * np.pi * np.geomspace(0.1, 1000, 15)
 _WINDOW, _WITHIN, _LEAST, _SAME_MODE, _DIRECT = 0.5, 60, 12, 0.02, 0.02
 """Frequencies around which modes are sought [rad/s]; the reach to both sides by their logarithm; points in it, and at
@@ -47,7 +48,9 @@ def figures_of(path: LoopPath, growing: int | None, rated: float) -> LoopFigures
     modes = [p for p in modes if p.real < 0 or not sign > 0]  # the count knows better what grows
     mode = None if not modes or (sign < 0 and modes[0].real < 0) else modes[0]
     beyond = [gain.value for gain in gains_of(path, crossings) if gain.value < 1]
-    weaker = (m.gain_up.value if m.gain_up else math.inf) if sign > 0 else min(beyond, default=math.nan)
+    weaker = (
+        (m.gain_up.value if m.gain_up else math.inf) if sign > 0 else min(beyond, default=math.nan)
+    )
     return LoopFigures(sign * m.distance.value, m.distance.frequency_hz, mode, weaker)
 
 
@@ -107,7 +110,9 @@ class Family:
         k = int(np.clip(np.searchsorted(self.nodes, value), 0, len(self.nodes) - 1))
         beside = {k} if self.nodes[k] == value else {max(k - 1, 0), k}
         # Between two scans the open loop has as many unstable poles as at one of them, the closed one as many, too.
-        possible = {self._count(path) + self.poles[i] for i in beside} & {self._growing[i] for i in beside}
+        possible = {self._count(path) + self.poles[i] for i in beside} & {
+            self._growing[i] for i in beside
+        }
         return path, possible.pop() if len(possible) == 1 else None
 
     @cached_property
@@ -121,15 +126,25 @@ class Family:
 
     def without(self, value: float) -> "Family":
         kept = self.nodes != value
-        return Family(self.nodes[kept], self.s, self.loops[kept], tuple(np.array(self.poles)[kept].tolist()),
-                       self.exact, self.rated, self.lead)  # fmt: skip
+        return Family(
+            self.nodes[kept],
+            self.s,
+            self.loops[kept],
+            tuple(np.array(self.poles)[kept].tolist()),
+            self.exact,
+            self.rated,
+            self.lead,
+        )
 
     def _path(self, L: Complex) -> LoopPath:
         return LoopPath(self.s, L, followed(np.linalg.eigvals(L)), self.lead)
 
     def _mixed(self, value: float, support: list[int], weights: Complex) -> Complex:
         shares = weights / (value - self.nodes[support])
-        return np.asarray(np.einsum("fk,kfab->fab", shares, self.loops[support]) / shares.sum(axis=1)[:, None, None])
+        return np.asarray(
+            np.einsum("fk,kfab->fab", shares, self.loops[support])
+            / shares.sum(axis=1)[:, None, None]
+        )
 
     @cached_property
     def _fitted(self) -> tuple[list[int], Complex]:
@@ -139,12 +154,20 @@ class Family:
         while True:
             others = np.setdiff1d(np.arange(n), support)
             differences = self.loops[others][:, None] - self.loops[support][None]
-            loewner = differences / (self.nodes[others][:, None] - self.nodes[support][None])[..., None, None, None]
+            loewner = (
+                differences
+                / (self.nodes[others][:, None] - self.nodes[support][None])[..., None, None, None]
+            )
             rows = np.moveaxis(loewner.reshape(*loewner.shape[:3], -1), (2, 0, 3, 1), (0, 1, 2, 3))
             rows = rows.reshape(len(self.s), -1, len(support))
             weights = np.linalg.svd(np.swapaxes(rows.conj(), 1, 2) @ rows)[2][:, -1].conj()
             missed = [
-                (np.linalg.norm(self._mixed(self.nodes[k], support, weights) - self.loops[k], axis=(1, 2)) / size).max()
+                (
+                    np.linalg.norm(
+                        self._mixed(self.nodes[k], support, weights) - self.loops[k], axis=(1, 2)
+                    )
+                    / size
+                ).max()
                 for k in others.tolist()
             ]
             if len(support) > len(others) or max(missed) < _FITTED:

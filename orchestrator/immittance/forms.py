@@ -18,7 +18,9 @@ def from_sequences(values: Vector) -> Complex:
     return np.asarray(_SEQUENCES.conj().T @ values @ _SEQUENCES)
 
 
-def powers_over(f: Numbers, Y: Vector, voltage: complex, current: complex, rated_hz: float) -> dict[str, Complex]:
+def powers_over(
+    f: Numbers, Y: Vector, voltage: complex, current: complex, rated_hz: float
+) -> dict[str, Complex]:
     """P and Q that a device feeds in, over frequency [pu], angle [rad] and relative magnitude of the voltage.
 
     With S = v·i* and i = Y·v in real and imaginary parts, a change dv gives dS = dv·i* + v·(Y·dv)*. A change of the
@@ -29,22 +31,34 @@ def powers_over(f: Numbers, Y: Vector, voltage: complex, current: complex, rated
     by_current = np.array([[voltage.real, voltage.imag], [voltage.imag, -voltage.real]])
     changes = np.array([[-voltage.imag, voltage.real], [voltage.real, voltage.imag]])
     J = (by_voltage + by_current @ Y) @ changes
-    return {"P/omega": J[:, 0, 0] * rated_hz / (1j * f), "P/theta": J[:, 0, 0], "Q/V": J[:, 1, 1], "P/V": J[:, 0, 1],
-            "Q/theta": J[:, 1, 0]}  # fmt: skip
+    return {
+        "P/omega": J[:, 0, 0] * rated_hz / (1j * f),
+        "P/theta": J[:, 0, 0],
+        "Q/V": J[:, 1, 1],
+        "P/V": J[:, 0, 1],
+        "Q/theta": J[:, 1, 0],
+    }
 
 
 def rows_in(scan: Scan, form: str, rated_hz: float) -> list[dict[str, float]]:
     """A row for each frequency [Hz], of real and imaginary parts; currents count into the device, powers out of it."""
     if len(scan.ports) > 1:
-        raise InputError(f"{scan.source} has the ports {', '.join(scan.ports)}; other forms are of a scan of one port")
+        raise InputError(
+            f"{scan.source} has the ports {', '.join(scan.ports)}; other forms are of a scan of one port"
+        )
     if form == "jacobian":
         return rows_of(scan.frequencies, _powers_of(scan, rated_hz))
     f, Y = scan.frequencies + rated_hz, _SEQUENCES @ scan.values @ _SEQUENCES.conj().T
     if form == "alphabeta":
-        return rows_of(f, {f"Y_{i + 1}{j + 1} [{scan.unit}]": Y[:, i, j] for i, j in np.ndindex(2, 2)})
-    below = scan.frequencies < rated_hz  # there it is the conjugate of the mirrored one of a frequency above
+        return rows_of(
+            f, {f"Y_{i + 1}{j + 1} [{scan.unit}]": Y[:, i, j] for i, j in np.ndindex(2, 2)}
+        )
+    # there it is the conjugate of the mirrored one of a frequency above
+    below = scan.frequencies < rated_hz
     whole = np.concatenate([Y[below, 1, 1].conj()[::-1], Y[:, 0, 0]])
-    return rows_of(np.concatenate([rated_hz - scan.frequencies[below][::-1], f]), {f"Y_1 [{scan.unit}]": whole})
+    return rows_of(
+        np.concatenate([rated_hz - scan.frequencies[below][::-1], f]), {f"Y_1 [{scan.unit}]": whole}
+    )
 
 
 def _powers_of(scan: Scan, rated_hz: float) -> dict[str, Complex]:
@@ -58,7 +72,10 @@ def _powers_of(scan: Scan, rated_hz: float) -> dict[str, Complex]:
     base = 1.0 if scan.unit == SIEMENS else SYSTEM_BASE_MVA
     current = complex(point.megawatt, -point.megavar) / base / point.kilovolt
     found = powers_over(scan.frequencies, -scan.values, complex(point.kilovolt), current, rated_hz)
-    return {f"{name} [{'MW' if name[0] == 'P' else 'Mvar'}]": base * values for name, values in found.items()}
+    return {
+        f"{name} [{'MW' if name[0] == 'P' else 'Mvar'}]": base * values
+        for name, values in found.items()
+    }
 
 
 def rows_of(f: Numbers, columns: dict[str, Complex]) -> list[dict[str, float]]:

@@ -19,9 +19,12 @@ _BEYOND = 30.0
 _END, _SMALL = 1.5, 0.95
 """Part of the range's end over which both sides must be passive, or the loci smaller than the second figure."""
 
-_BEGIN = np.deg2rad(60.0)  # most that det(1 + L) at the lowest frequency is off the real axis, where it begins
-_RANGE = (2.0, 400.0)  # what a scan has to hold at least [Hz]: swings, and what filters and delays do
-_SETTLED = 1.5  # growth of det(1 + L) over the last half of the range of models from which on it does not end there
+# most that det(1 + L) at the lowest frequency is off the real axis, where it begins
+_BEGIN = np.deg2rad(60.0)
+# what a scan has to hold at least [Hz]: swings, and what filters and delays do
+_RANGE = (2.0, 400.0)
+# growth of det(1 + L) over the last half of the range of models from which on it does not end there
+_SETTLED = 1.5
 _INVARIANT, _FRAMES = 1e-3, 16
 
 
@@ -50,7 +53,8 @@ class BusJudgement:
 class CutJudgement:
     verdict: NyquistVerdict
     reasons: tuple[str, ...]  # why it is not known
-    growing: int | None  # number of growing modes, a pair counting twice; None where it is not known
+    # number of growing modes, a pair counting twice; None where it is not known
+    growing: int | None
     # encirclements, by_loci: of −1 clockwise, by the determinant and by the eigenloci's crossings.
     encirclements: int
     by_loci: int
@@ -66,7 +70,11 @@ class CutJudgement:
 
 
 def judge_loop(
-    loop: CutLoop, *, frames_known: bool = True, range_hz: tuple[float, float] | None = None, modes: Complex = NO_MODES
+    loop: CutLoop,
+    *,
+    frames_known: bool = True,
+    range_hz: tuple[float, float] | None = None,
+    modes: Complex = NO_MODES,
 ) -> CutJudgement:
     """Count the encirclements, and ask all that could make the count wrong.
 
@@ -95,12 +103,34 @@ def judge_loop(
     reasons += [reason for bus in buses if (reason := _doubt(loop, bus))]
     if not frames_known and not reasons:
         reasons += _frames(loop, nodes, count)
-    verdict = NyquistVerdict.NOT_KNOWN if reasons else NyquistVerdict.UNSTABLE if growing else NyquistVerdict.STABLE
+    verdict = (
+        NyquistVerdict.NOT_KNOWN
+        if reasons
+        else NyquistVerdict.UNSTABLE
+        if growing
+        else NyquistVerdict.STABLE
+    )
     margins = margins_of(path, crossings)
-    active = {"device": bands_of(*_active(loop.device)), "network": bands_of(*_active(loop.network))}
+    active = {
+        "device": bands_of(*_active(loop.device)),
+        "network": bands_of(*_active(loop.network)),
+    }
     small = bands_of(path.hertz, np.linalg.norm(path.L, ord=2, axis=(1, 2)) < 1)
-    return CutJudgement(verdict, tuple(reasons), None if reasons else growing, count, by_loci, poles, tuple(crossings),
-                     margins, path, (low, high), active, small, buses)  # fmt: skip
+    return CutJudgement(
+        verdict,
+        tuple(reasons),
+        None if reasons else growing,
+        count,
+        by_loci,
+        poles,
+        tuple(crossings),
+        margins,
+        path,
+        (low, high),
+        active,
+        small,
+        buses,
+    )
 
 
 def _at_buses(loop: CutLoop, path: LoopPath, growing: int) -> tuple[BusJudgement, ...]:
@@ -110,19 +140,36 @@ def _at_buses(loop: CutLoop, path: LoopPath, growing: int) -> tuple[BusJudgement
     for k in range(path.buses):
         here = path.at_bus(k)
         count, by_loci = encirclements(here, exact=True)
-        own = sum(len(unit.side.unstable) for unit in loop.units if set(unit.rows.tolist()) == {2 * k, 2 * k + 1})
+        own = sum(
+            len(unit.side.unstable)
+            for unit in loop.units
+            if set(unit.rows.tolist()) == {2 * k, 2 * k + 1}
+        )
         crossings = crossings_of(here)
         found.append(
-            BusJudgement(k, count, by_loci, growing - count - own, tuple(crossings), margins_of(here, crossings))
+            BusJudgement(
+                k,
+                count,
+                by_loci,
+                growing - count - own,
+                tuple(crossings),
+                margins_of(here, crossings),
+            )
         )
     return tuple(found)
 
 
 def _doubt(loop: CutLoop, bus: BusJudgement) -> str:
     if bus.encirclements != bus.by_loci:
-        return (f"at port {bus.port + 1} the determinant goes round {bus.encirclements} times and the eigenloci "
-                f"{bus.by_loci} times")  # fmt: skip
-    return f"at port {bus.port + 1} fewer than no modes would grow without its devices" if bus.without < 0 else ""
+        return (
+            f"at port {bus.port + 1} the determinant goes round {bus.encirclements} times and the eigenloci "
+            f"{bus.by_loci} times"
+        )
+    return (
+        f"at port {bus.port + 1} fewer than no modes would grow without its devices"
+        if bus.without < 0
+        else ""
+    )
 
 
 def _principal(path: LoopPath, k: int) -> float:
@@ -181,18 +228,27 @@ def _ends(loop: CutLoop, path: LoopPath) -> list[str]:
         )
     if loop.is_exact:
         last, half = _principal(path, -1), int(np.argmax(path.hertz >= path.hertz[-1] / 2))
-        if abs(last - np.pi * round(last / np.pi)) > _BEGIN or abs(path.det[-1] / path.det[half]) > _SETTLED:
+        if (
+            abs(last - np.pi * round(last / np.pi)) > _BEGIN
+            or abs(path.det[-1] / path.det[half]) > _SETTLED
+        ):
             reasons.append(f"at {path.hertz[-1]:g} Hz the loop is not yet where it ends")
         return reasons
     top = path.hertz >= path.hertz[-1] / _END
     size = np.abs(path.loci[top]).max(axis=1)
     small = size.max() < _SMALL and size[-1] <= size[0] * 1.01
-    passive = not any((_active(side)[1] & (_active(side)[0] >= path.hertz[-1] / _END)).any()
-                      for side in (loop.device, loop.network))  # fmt: skip
+    passive = not any(
+        (_active(side)[1] & (_active(side)[0] >= path.hertz[-1] / _END)).any()
+        for side in (loop.device, loop.network)
+    )
     if (early := path.hertz[-1] < _RANGE[1]) or not (small or passive):
-        why = "loci may grow again" if early else "neither are both sides passive nor the loci small"
-        reasons.append(f"beyond {path.hertz[-1]:g} Hz an encirclement may follow: {why} ({size[-1]:.2g}); scan higher "
-                       f"frequencies, {_RANGE[1]:g} Hz at least")  # fmt: skip
+        why = (
+            "loci may grow again" if early else "neither are both sides passive nor the loci small"
+        )
+        reasons.append(
+            f"beyond {path.hertz[-1]:g} Hz an encirclement may follow: {why} ({size[-1]:.2g}); scan higher "
+            f"frequencies, {_RANGE[1]:g} Hz at least"
+        )
     return reasons
 
 
@@ -200,15 +256,23 @@ def _active(side: Side) -> tuple[Numbers, Numbers]:
     """Frequencies [Hz], and whether the side may deliver power there."""
     f = side.frequencies if isinstance(side, Sampled) else np.geomspace(0.01, 1e4, 400)
     M = side.at(2j * np.pi * f)
-    least = np.linalg.eigvalsh((M + M.conj().transpose(0, 2, 1)) / 2)[:, 0] if M.shape[1] == M.shape[2] else np.zeros(1)
-    slack = 1e-6 * np.linalg.norm(M, ord=2, axis=(1, 2)) + (side.bounds if isinstance(side, Sampled) else 0.0)
+    least = (
+        np.linalg.eigvalsh((M + M.conj().transpose(0, 2, 1)) / 2)[:, 0]
+        if M.shape[1] == M.shape[2]
+        else np.zeros(1)
+    )
+    slack = 1e-6 * np.linalg.norm(M, ord=2, axis=(1, 2)) + (
+        side.bounds if isinstance(side, Sampled) else 0.0
+    )
     return f, np.asarray(least < -slack)
 
 
 def _frames(loop: CutLoop, nodes: Numbers, count: int) -> list[str]:
     """Whether the verdict depends on the angle between the two frames, which is not known."""
     device = loop.device
-    if not isinstance(device, Sampled) or any(_turns_alike(s.at(2j * np.pi * nodes)) for s in (device, loop.network)):
+    if not isinstance(device, Sampled) or any(
+        _turns_alike(s.at(2j * np.pi * nodes)) for s in (device, loop.network)
+    ):
         return []
     for angle in np.linspace(0, np.pi, _FRAMES, endpoint=False)[1:]:  # half a turn changes nothing
         T = block_rotation([angle] * (device.values.shape[-1] // 2))
@@ -224,4 +288,6 @@ def _frames(loop: CutLoop, nodes: Numbers, count: int) -> list[str]:
 def _turns_alike(values: Vector) -> bool:
     J = block_rotation([np.pi / 2] * (values.shape[-1] // 2))
     size = np.linalg.norm(values, ord=2, axis=(1, 2))
-    return bool((np.linalg.norm(J @ values @ J.T - values, ord=2, axis=(1, 2)) < _INVARIANT * size).all())
+    return bool(
+        (np.linalg.norm(J @ values @ J.T - values, ord=2, axis=(1, 2)) < _INVARIANT * size).all()
+    )

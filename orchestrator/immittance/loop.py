@@ -12,11 +12,14 @@ from orchestrator.immittance.sides import ON_AXIS, Known, Side, Together, Unit
 
 _STEP = np.deg2rad(25.0)  # largest turn of det(1 + L) from one point of the path to the next
 _AT_A_BUS = np.deg2rad(60.0)  # the same of the loop at one bus of several
-_ALIKE = 0.1  # turns of the determinant and of the loci, added up, differ by less [rad] where loci are followed rightly
+# turns of the determinant and of the loci, added up, differ by less [rad] where loci are followed
+# rightly
+_ALIKE = 0.1
 _ROUNDS, _MOST, _AT_ONCE = 14, 60_000, 500
 _ROUND = 1e-6  # radius of the way round an undamped pole of a model, relative to it
 _NARROW = 0.5  # poles damped by less than this part have points of their own
-_WITHIN, _ENOUGH = 6, 1000  # points between two frequencies at first, unless there are enough of them
+# points between two frequencies at first, unless there are enough of them
+_WITHIN, _ENOUGH = 6, 1000
 _FALLS = 0.3  # part to which det(1 + L) of a free angle falls at least from 1e-3 to 1e-4 rad/s
 _ARC = 1e-4  # radius of the way round a pole on the axis, relative to the pole
 
@@ -155,7 +158,10 @@ class CutLoop:
                 far = 1j * _ROUND * pole * np.geomspace(1, 1e4, 30)
                 arc = _ROUND * pole * np.exp(1j * np.linspace(-np.pi / 2, np.pi / 2, 31))[1:-1]
                 s = np.concatenate(
-                    [s[np.abs(s.imag - pole) > 3 * _ROUND * pole], *(1j * pole + x for x in (far, -far, arc))]
+                    [
+                        s[np.abs(s.imag - pole) > 3 * _ROUND * pole],
+                        *(1j * pole + x for x in (far, -far, arc)),
+                    ]
                 )
                 s = s[np.argsort(s.imag)]
         L = self.values(s)
@@ -165,25 +171,46 @@ class CutLoop:
         for _ in range(_ROUNDS):
             wide = (np.abs(np.angle(marks[1:] / marks[:-1])) > most).any(axis=1)
             path = None if wide.any() else LoopPath(s, L, followed(np.linalg.eigvals(L)), self.lead)
-            places = np.flatnonzero(wide if path is None else np.abs(path.loci_turns - path.turns) > _ALIKE)
+            places = np.flatnonzero(
+                wide if path is None else np.abs(path.loci_turns - path.turns) > _ALIKE
+            )
             if not len(places) or len(s) > _MOST:
                 break
             middle = (s[places] + s[places + 1]) / 2
             more = self.values(middle)
             s = np.insert(s, places + 1, middle)
-            L, marks = (np.insert(a, places + 1, b, axis=0) for a, b in ((L, more), (marks, self._marks(more))))
-        return path if path and len(path.s) == len(s) else LoopPath(s, L, followed(np.linalg.eigvals(L)), self.lead)
+            L, marks = (
+                np.insert(a, places + 1, b, axis=0)
+                for a, b in ((L, more), (marks, self._marks(more)))
+            )
+        return (
+            path
+            if path and len(path.s) == len(s)
+            else LoopPath(s, L, followed(np.linalg.eigvals(L)), self.lead)
+        )
 
     def _on_axis(self, low: float, high: float) -> Numbers:
         """Undamped poles of the exact sides [rad/s], those of one place once."""
-        poles = np.concatenate([NO_MODES, *(x.poles for x in (self.device, self.network) if isinstance(x, Known))])
-        w = np.sort(poles.imag[(np.abs(poles.real) <= ON_AXIS * poles.imag) & (poles.imag > low) & (poles.imag < high)])
+        poles = np.concatenate(
+            [NO_MODES, *(x.poles for x in (self.device, self.network) if isinstance(x, Known))]
+        )
+        w = np.sort(
+            poles.imag[
+                (np.abs(poles.real) <= ON_AXIS * poles.imag)
+                & (poles.imag > low)
+                & (poles.imag < high)
+            ]
+        )
         return np.asarray(w[np.diff(w, prepend=0.0) > 0.3 * _ROUND * w])
 
     def _marks(self, L: Complex) -> Complex:
         """What must turn little from point to point: det(1 + L), and the same of the loop at each of several buses."""
         det = _det(L)[:, None]
-        return np.hstack([det, np.linalg.det(_at_buses(L))]) if self.is_exact and L.shape[-1] > 2 else det
+        return (
+            np.hstack([det, np.linalg.det(_at_buses(L))])
+            if self.is_exact and L.shape[-1] > 2
+            else det
+        )
 
     def _round_the_pole(self, s: Vector) -> Complex:
         """The path with an arc to the right of the capacitors' pole, and points ever closer to it on both sides."""
@@ -217,7 +244,9 @@ def followed(eigenvalues: Vector) -> Complex:
     return found
 
 
-def nodes_of(device: Side, network: Side, lowest_hz: float, highest_hz: float, modes: Complex = NO_MODES) -> Numbers:
+def nodes_of(
+    device: Side, network: Side, lowest_hz: float, highest_hz: float, modes: Complex = NO_MODES
+) -> Numbers:
     """Frequencies [Hz] at which both sides are best known, in their common range; dense around narrow poles where
     exact, and around what is known of the closed system's ``modes`` [rad/s]."""
     found = [side.frequencies for side in (device, network) if not side.is_exact]
@@ -234,5 +263,7 @@ def nodes_of(device: Side, network: Side, lowest_hz: float, highest_hz: float, m
 
 def common_range(device: Side, network: Side, exact: tuple[float, float]) -> tuple[float, float]:
     """Lowest and highest frequency [Hz] at which both sides are known."""
-    ranges = [(s.frequencies[0], s.frequencies[-1]) for s in (device, network) if not s.is_exact] or [exact]
+    ranges = [
+        (s.frequencies[0], s.frequencies[-1]) for s in (device, network) if not s.is_exact
+    ] or [exact]
     return max(low for low, _ in ranges), min(high for _, high in ranges)

@@ -10,8 +10,10 @@ from orchestrator.arrays import Numbers
 from orchestrator.immittance.loop import LoopPath
 
 _LEAST = 1e-4  # loci that cross the axis nearer to 0 tell nothing
-_LEVEL, _FLAT = 0.05, 0.5  # parts by which a locus that begins on the real axis may leave it, and change up to thrice f
-_TOUCHES, _FREE = 1e-9, 0.01  # distances from −1 of an undamped mode, and of the locus of a free angle near 0 Hz
+# parts by which a locus that begins on the real axis may leave it, and change up to thrice f
+_LEVEL, _FLAT = 0.05, 0.5
+# distances from −1 of an undamped mode, and of the locus of a free angle near 0 Hz
+_TOUCHES, _FREE = 1e-9, 0.01
 _NEAR = 0.3  # distance from −1 up to which a locus may come from there
 _SLOWEST = 0.05  # least frequency of a distance [Hz]: below, a free angle moves as far as one likes
 
@@ -43,7 +45,9 @@ class NyquistMargins:
     phase_deg: Margin | None  # least shift of the phase to either side [°]
     delay_s: Margin | None  # least delay [s]
     distance: Margin  # least singular value of 1 + L: the largest change of L in any direction
-    disk: Margin  # α of the symmetric disk: every entry may at once be multiplied by any f with |f − 1| < α/2·|f + 1|
+    # α of the symmetric disk: every entry may at once be multiplied by any f with |f − 1| < α/2·|f
+    # + 1|
+    disk: Margin
 
     @property
     def gain(self) -> Margin | None:
@@ -61,7 +65,9 @@ def crossings_of(path: LoopPath) -> list[Crossing]:
                 real = locus[i].real + t * (locus[i + 1].real - locus[i].real)
                 if real < -_LEAST:
                     at = path.hertz[i] + t * (path.hertz[i + 1] - path.hertz[i])
-                    found.append(Crossing(float(real), float(at), bool(locus[i + 1].imag > locus[i].imag)))
+                    found.append(
+                        Crossing(float(real), float(at), bool(locus[i + 1].imag > locus[i].imag))
+                    )
     return sorted(found, key=lambda c: c.frequency_hz)
 
 
@@ -72,7 +78,10 @@ def gains_of(path: LoopPath, crossings: list[Crossing]) -> list[Margin]:
     begins = [
         Margin(float(-1 / a.real), 0.0)
         for a, b in zip(path.loci[0], path.loci[later], strict=True)
-        if a.real < -_LEAST and not _is_free(a, b) and abs(a.imag) < _LEVEL * abs(a) and abs(b - a) < _FLAT * abs(a)
+        if a.real < -_LEAST
+        and not _is_free(a, b)
+        and abs(a.imag) < _LEVEL * abs(a)
+        and abs(b - a) < _FLAT * abs(a)
     ]
     return [*begins, *(Margin(-1 / c.real, c.frequency_hz) for c in crossings)]
 
@@ -99,9 +108,16 @@ def margins_of(path: LoopPath, crossings: list[Crossing]) -> NyquistMargins:
     one, disk = np.eye(path.L.shape[-1]), np.full(len(path.s), np.inf)
     disk[counted & (path.distance <= _TOUCHES)] = 0.0
     counted = counted & (path.distance > _TOUCHES)
-    disk[counted] = 1 / np.linalg.norm(np.linalg.inv(one + path.L[counted]) - one / 2, ord=2, axis=(1, 2))
+    disk[counted] = 1 / np.linalg.norm(
+        np.linalg.inv(one + path.L[counted]) - one / 2, ord=2, axis=(1, 2)
+    )
     return NyquistMargins(
-        up, down, _least(turned), _least(delayed), _where_least(path, path.distance), _where_least(path, disk)
+        up,
+        down,
+        _least(turned),
+        _least(delayed),
+        _where_least(path, path.distance),
+        _where_least(path, disk),
     )
 
 

@@ -16,29 +16,39 @@ from orchestrator.immittance.scan import PER_UNIT, PortPoint, Scan
 
 
 def scan_fmu(
-    path: Path, binding: Path | None, given: Mapping[str, float | bool | str], step_size: float, excitation: Excitation,
+    path: Path,
+    binding: Path | None,
+    given: Mapping[str, float | bool | str],
+    step_size: float,
+    excitation: Excitation,
     report: Callable[[str], None] | None = None,
-) -> Scan:  # fmt: skip
+) -> Scan:
     """Measure a device at the operating point of its values [pu on the system base of 100 MVA]."""
     require_fitting()
     bench = bench_at(bound_fmu(path, binding), given, step_size)
     return as_scan(path.name, measure(bench, excitation, report), complex(*bench.rest))
 
 
-def as_scan(name: str, response: FrequencyResponse, voltage: complex, kilovolt: float = 1.0) -> Scan:
+def as_scan(
+    name: str, response: FrequencyResponse, voltage: complex, kilovolt: float = 1.0
+) -> Scan:
     """The admittance of a measured response, d along the voltage, dense where the model fitted to it turns quickly.
 
     Its bounds hold what two amplitudes differ by and what the model misses of the measured values."""
     model, measured = fit(response), response.frequencies
     at, wide = np.abs(model.poles.imag) / (2 * np.pi), np.abs(model.poles.real) / (2 * np.pi)
     around = [at + k * wide for k in (-4, -2, -1, -0.5, -0.25, 0, 0.25, 0.5, 1, 2, 4)]
-    wanted = np.unique(np.concatenate([measured, np.geomspace(measured[0], measured[-1], 1500), *around]))
+    wanted = np.unique(
+        np.concatenate([measured, np.geomspace(measured[0], measured[-1], 1500), *around])
+    )
     inside = wanted[(wanted >= measured[0]) & (wanted <= measured[-1])]
     apart = np.diff(inside, prepend=-1.0) > 1e-6 * inside
     frequencies = inside[apart]
     values = -_without_hold(model, 2j * np.pi * frequencies)
     size = np.linalg.norm(values, ord=2, axis=(1, 2))
-    bounds = np.linalg.norm(response.bounds, axis=(1, 2)) / np.linalg.norm(response.values, ord=2, axis=(1, 2))
+    bounds = np.linalg.norm(response.bounds, axis=(1, 2)) / np.linalg.norm(
+        response.values, ord=2, axis=(1, 2)
+    )
     power = voltage * complex(*response.operating_point).conjugate() * SYSTEM_BASE_MVA
     point = PortPoint(abs(voltage) * kilovolt, power.real, power.imag, cmath.phase(voltage))
     share = np.interp(frequencies, measured, bounds) + model.error

@@ -18,7 +18,9 @@ from orchestrator.immittance.sides import Sampled
 def scans_in(prepared: PreparedScenario) -> dict[str, ComponentTable]:
     """The tables of a scenario's components that are known by scans."""
     tables, there = prepared.case.table.components, prepared.system.components
-    return {name: table for name, table in tables.items() if table.scan is not None and name in there}
+    return {
+        name: table for name, table in tables.items() if table.scan is not None and name in there
+    }
 
 
 def in_unit(scan: Scan, unit: str, kilovolt: float | None) -> Scan:
@@ -29,7 +31,11 @@ def in_unit(scan: Scan, unit: str, kilovolt: float | None) -> Scan:
             f"{scan.source} is in {scan.unit} and the other side in {unit}: give the rated voltage at the cut, as in "
             "--voltage '230 kV', of a scan in a case by voltage = \"230 kV\" (the base is 100 MVA)"
         )
-    return scan.in_siemens(kilovolt) if unit == SIEMENS else scan.scaled(kilovolt**2 / SYSTEM_BASE_MVA, unit)
+    return (
+        scan.in_siemens(kilovolt)
+        if unit == SIEMENS
+        else scan.scaled(kilovolt**2 / SYSTEM_BASE_MVA, unit)
+    )
 
 
 def in_one_frame(scans: dict[str, Scan], angle: float | None) -> bool:
@@ -39,7 +45,10 @@ def in_one_frame(scans: dict[str, Scan], angle: float | None) -> bool:
     if angle is not None:
         scans["device"] = scans["device"].rotated([angle] * len(scans["device"].ports))
         return True
-    stated = {side: [p.angle for p in scan.points.values() if p.angle is not None] for side, scan in scans.items()}
+    stated = {
+        side: [p.angle for p in scan.points.values() if p.angle is not None]
+        for side, scan in scans.items()
+    }
     if any(len(found) < len(scans[side].ports) for side, found in stated.items()):
         return False
     for side, found in stated.items():
@@ -47,7 +56,9 @@ def in_one_frame(scans: dict[str, Scan], angle: float | None) -> bool:
     return True
 
 
-def placed(scan: Scan, cut: Cut, name: str, kilovolt: float | None, angle: float | None) -> tuple[Scan, bool]:
+def placed(
+    scan: Scan, cut: Cut, name: str, kilovolt: float | None, angle: float | None
+) -> tuple[Scan, bool]:
     """A scan in per unit at a component's place, in the network's frame; whether it is known how that lies.
 
     The d axis of a scan that states an angle lies along the voltage of its bus, whatever that voltage's angle was."""
@@ -56,8 +67,12 @@ def placed(scan: Scan, cut: Cut, name: str, kilovolt: float | None, angle: float
     if not any(point.megawatt is not None for point in scan.points.values()):
         S = cut.voltages[name] * cut.currents[name].conjugate() * SYSTEM_BASE_MVA
         asked = f"{scan.source} states no operating point; was it scanned where {name} is here, at"
-        scan = replace(scan, questions=(*scan.questions, f"{asked} {S.real:.4g} MW and {S.imag:.4g} Mvar?"))
-    if angle is None and all(port in scan.points and scan.points[port].angle is not None for port in scan.ports):
+        scan = replace(
+            scan, questions=(*scan.questions, f"{asked} {S.real:.4g} MW and {S.imag:.4g} Mvar?")
+        )
+    if angle is None and all(
+        port in scan.points and scan.points[port].angle is not None for port in scan.ports
+    ):
         angle = float(np.angle(cut.voltages[name]))
     return (scan, False) if angle is None else (scan.rotated([angle]), True)
 
@@ -71,8 +86,13 @@ def at_ports(scans: Mapping[str, Scan], cut: Cut) -> Sampled:
     f = np.unique(np.concatenate([p.frequencies for p in parts.values()]))
     f = f[(f >= low) & (f <= high) & (np.diff(f, prepend=-1.0) > 1e-6 * f)]
     if len(f) < 8:  # as `checked` asks of one
-        raise InputError(f"{', '.join(s.source for s in scans.values())} have no common range of frequencies")
-    values, bounds = np.zeros((len(f), 2 * len(cut.ports), 2 * len(cut.ports)), dtype=complex), np.zeros(len(f))
+        raise InputError(
+            f"{', '.join(s.source for s in scans.values())} have no common range of frequencies"
+        )
+    values, bounds = (
+        np.zeros((len(f), 2 * len(cut.ports), 2 * len(cut.ports)), dtype=complex),
+        np.zeros(len(f)),
+    )
     for name, part in parts.items():
         rows = 2 * next(k for k, (_, here) in enumerate(cut.ports) if name in here) + np.arange(2)
         values[:, rows[:, None], rows] += part.at(2j * np.pi * f)
@@ -84,4 +104,6 @@ def sampled(scan: Scan, *, inverse: bool = False) -> Sampled:
     if not inverse:
         return Sampled(scan.source, scan.frequencies, scan.values, scan.bounds)
     Z = scan.impedance
-    return Sampled(scan.source, scan.frequencies, Z, scan.bounds * np.linalg.norm(Z, ord=2, axis=(1, 2)) ** 2)
+    return Sampled(
+        scan.source, scan.frequencies, Z, scan.bounds * np.linalg.norm(Z, ord=2, axis=(1, 2)) ** 2
+    )

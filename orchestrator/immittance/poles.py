@@ -59,8 +59,11 @@ def fits(s: Vector, G: Vector) -> list[tuple[Complex, Complex]]:
         data = np.concatenate([G[support], G[support].conj()])
         others = np.setdiff1d(np.arange(len(s)), support)
         cauchy = 1 / (s[others, None] - points[None, :])
-        loewner = np.concatenate([(G[others, c][:, None] - data[None, :, c]) * cauchy for c in range(G.shape[1])])
-        mirror = np.roll(loewner.conj(), len(support), axis=1)  # the rows of −s, whose support is the other half
+        loewner = np.concatenate(
+            [(G[others, c][:, None] - data[None, :, c]) * cauchy for c in range(G.shape[1])]
+        )
+        # the rows of −s, whose support is the other half
+        mirror = np.roll(loewner.conj(), len(support), axis=1)
         loewner = np.concatenate([loewner, mirror])
         # The smallest right singular vector, through the small square matrix of the QR factors.
         weights = np.linalg.svd(np.linalg.qr(loewner, mode="r"))[2][-1].conj()

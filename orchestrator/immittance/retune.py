@@ -15,11 +15,15 @@ from orchestrator.immittance.family import Family, LoopFigures, kept_points
 from orchestrator.immittance.judgement import NyquistVerdict
 from orchestrator.immittance.study import CutResult
 
-REACH = 4.0  # a parameter is followed from its value divided by this to its value times this, within its bounds
-GRID, _FIRST, _MOST = 41, 4, 10  # values at which it is told; scans before the first check, and at most
+# a parameter is followed from its value divided by this to its value times this, within its bounds
+REACH = 4.0
+# values at which it is told; scans before the first check, and at most
+GRID, _FIRST, _MOST = 41, 4, 10
 _CLOSE = 0.01  # error of the distance from −1 below which two checks in a row end the scanning
-_SAME = 1e-7  # relative change of the loop over the whole range below which a parameter does nothing
-_INSIDE, _TRIES = 0.01, 3  # part by which a needed value goes beyond the goal; scans that may confirm it
+# relative change of the loop over the whole range below which a parameter does nothing
+_SAME = 1e-7
+# part by which a needed value goes beyond the goal; scans that may confirm it
+_INSIDE, _TRIES = 0.01, 3
 
 
 @dataclass(frozen=True)
@@ -59,7 +63,8 @@ class Retuned:
     values: Numbers = field(default_factory=lambda: np.zeros(0))
     figures: list[LoopFigures] = field(default_factory=list)  # at ``values``
     remark: str = ""  # why it cannot be followed, or what was left out
-    needed: float | None = None  # least change that meets the goal; None where it is met now, or nowhere
+    # least change that meets the goal; None where it is met now, or nowhere
+    needed: float | None = None
     predicted: LoopFigures | None = None  # at ``needed``, before the scan that confirms it
 
     @property
@@ -73,13 +78,21 @@ class Retuned:
     @property
     def error(self) -> float:
         """Largest error of the last two checks; 1 where nothing could be predicted."""
-        return float(np.nan_to_num([abs(c.found - c.predicted) for c in self.checks[-2:]] or [1.0], nan=1.0).max())
+        return float(
+            np.nan_to_num(
+                [abs(c.found - c.predicted) for c in self.checks[-2:]] or [1.0], nan=1.0
+            ).max()
+        )
 
     @property
     def effort(self) -> float:
         """Relative change that is needed; infinite where none is enough."""
         now = self.setting.now
-        return math.inf if self.needed is None else abs(self.needed - now) / max(abs(now), abs(self.needed))
+        return (
+            math.inf
+            if self.needed is None
+            else abs(self.needed - now) / max(abs(now), abs(self.needed))
+        )
 
     def met(self, goal: float) -> bool:
         return bool(self.distances[np.searchsorted(self.values, self.setting.now)] >= goal)
@@ -89,7 +102,11 @@ Study = Callable[[Mapping[str, float]], CutResult]
 
 
 def retune(
-    study: Study, setting: Tunable, base: CutResult, goal: float, report: Callable[[str], None] = lambda text: None
+    study: Study,
+    setting: Tunable,
+    base: CutResult,
+    goal: float,
+    report: Callable[[str], None] = lambda text: None,
 ) -> Retuned:
     """Follow one parameter.
 
@@ -151,7 +168,9 @@ def _scan(study: Study, out: Retuned, value: float, report: Callable[[str], None
 
 def _settled(out: Retuned) -> bool:
     last = out.checks[-2:]
-    return len(last) == 2 and all(max(abs(c.found - c.predicted), c.expected_error) < _CLOSE for c in last)
+    return len(last) == 2 and all(
+        max(abs(c.found - c.predicted), c.expected_error) < _CLOSE for c in last
+    )
 
 
 def _check(study: Study, out: Retuned, report: Callable[[str], None]) -> None:
@@ -159,7 +178,9 @@ def _check(study: Study, out: Retuned, report: Callable[[str], None]) -> None:
     family = _family(out)
     nodes = family.nodes[1:-1]
     fewer = [family.without(value) for value in nodes.tolist() if value != out.setting.now][-2:]
-    apart = np.abs(np.searchsorted(out.setting.grid, family.nodes)[:, None] - np.arange(len(out.setting.grid))).min(0)
+    apart = np.abs(
+        np.searchsorted(out.setting.grid, family.nodes)[:, None] - np.arange(len(out.setting.grid))
+    ).min(0)
     open_ = out.setting.grid[apart > 1][::2] if (apart > 1).any() else out.setting.grid[apart > 0]
     said = np.array([family.distance(value) for value in open_.tolist()])
     other = np.array([[f.distance(value) for value in open_.tolist()] for f in fewer])
@@ -175,7 +196,11 @@ def _tell(out: Retuned) -> None:
     family = _family(out)
     out.values = np.unique(np.r_[out.setting.grid, family.nodes])
     out.figures = [family.figures(value) for value in out.values.tolist()]
-    if open_ := {f"{value:.4g}": r.judgement.reasons for value, r in sorted(out.scans.items()) if r.judgement.reasons}:
+    if open_ := {
+        f"{value:.4g}": r.judgement.reasons
+        for value, r in sorted(out.scans.items())
+        if r.judgement.reasons
+    }:
         why = next(iter(open_.values()))[0]
         out.remark = f"scans at {', '.join(open_)} give no verdict by themselves, and none of these is taken: {why}"
 
@@ -195,7 +220,9 @@ def _meet(study: Study, out: Retuned, goal: float, report: Callable[[str], None]
         result = _scan(study, out, value, report)
         _tell(out)
         found = out.figures[int(np.searchsorted(out.values, value))]
-        out.checks.append(Foretold(value, predicted.distance, abs(predicted.distance - goal), found.distance))
+        out.checks.append(
+            Foretold(value, predicted.distance, abs(predicted.distance - goal), found.distance)
+        )
         if found.distance >= goal and result.verdict is NyquistVerdict.STABLE:
             out.needed, out.predicted = value, predicted
             return

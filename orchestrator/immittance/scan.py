@@ -14,8 +14,11 @@ from orchestrator.arrays import Complex, Numbers, Vector
 from orchestrator.errors import InputError
 
 SIEMENS, PER_UNIT = "S", "pu"
-_TOP = 5.0  # frequencies down to this part of the highest tell signs: there a device's filter answers, not its control
-_ACTIVE = 0.5  # part of those at which both resistances must be negative for the sign to be called the generator's
+# frequencies down to this part of the highest tell signs: there a device's filter answers, not its
+# control
+_TOP = 5.0
+# part of those at which both resistances must be negative for the sign to be called the generator's
+_ACTIVE = 0.5
 
 # Parts of the rated frequency that a scan shows; right ones of devices and networks show 0.4 to 1.03.
 _OTHER_AXIS = -0.3  # below it the q axis is the other one
@@ -23,8 +26,10 @@ _IN_RAD = 2.0  # above it the frequencies are in rad/s, which show 2.9 to 6.4
 _LEFT_OUT = 0.1  # to either side of 0: dq and qd were left out
 _COIL = 0.3  # least likeness to a coil from which on it tells
 _FEW = 8  # points from which on it tells
-_CLEAR = 0.35  # most that an admittance may miss the relation by: resonances between coarse rows miss it by more
-_SURE = 0.2  # most that both miss a relation by, in their geometric mean, where it tells without a coil
+# most that an admittance may miss the relation by: resonances between coarse rows miss it by more
+_CLEAR = 0.35
+# most that both miss a relation by, in their geometric mean, where it tells without a coil
+_SURE = 0.2
 _TOPS = (_TOP, 2.5, np.inf)  # parts of the highest frequency from which on such a one is looked for
 
 _HOLE, _BESIDE = 3.0, 8
@@ -62,7 +67,9 @@ class Scan:
         try:
             return np.asarray(np.linalg.inv(self.values))
         except np.linalg.LinAlgError as error:
-            raise InputError(f"{self.source}: its admittance is singular at some frequency; scan it again") from error
+            raise InputError(
+                f"{self.source}: its admittance is singular at some frequency; scan it again"
+            ) from error
 
     def rotated(self, angles: Sequence[float]) -> "Scan":
         """The same in a frame behind which each port's own lies by an angle [rad]: v = T(angle)·v_own."""
@@ -97,9 +104,13 @@ def other_q_axis(values: Vector) -> Complex:
 
 def checked(source: str, frequencies: Numbers, values: Vector) -> tuple[str, ...]:
     if not (np.isfinite(values).all() and np.isfinite(frequencies).all()):
-        raise InputError(f"{source}: a value is not a finite number; scan that frequency again or leave its row out")
+        raise InputError(
+            f"{source}: a value is not a finite number; scan that frequency again or leave its row out"
+        )
     if len(frequencies) < 8:
-        raise InputError(f"{source}: there are {len(frequencies)} frequencies above 0; at least 8 are needed")
+        raise InputError(
+            f"{source}: there are {len(frequencies)} frequencies above 0; at least 8 are needed"
+        )
     steps = np.diff(frequencies)
     if (steps <= 0).any():
         k = int(np.argmax(steps <= 0))
@@ -107,11 +118,19 @@ def checked(source: str, frequencies: Numbers, values: Vector) -> tuple[str, ...
             f"{source}: the frequencies do not rise: {frequencies[k + 1]:g} Hz follows {frequencies[k]:g} Hz; sort the "
             "rows, and keep one of each frequency"
         )
-    beside = [np.r_[steps[max(0, k - _BESIDE) : k], steps[k + 1 : k + 1 + _BESIDE]].max() for k in range(len(steps))]
-    holes = [
-        f"{frequencies[k]:g} to {frequencies[k + 1]:g} Hz" for k in np.flatnonzero(steps > _HOLE * np.array(beside))
+    beside = [
+        np.r_[steps[max(0, k - _BESIDE) : k], steps[k + 1 : k + 1 + _BESIDE]].max()
+        for k in range(len(steps))
     ]
-    return (f"{source}: are rows missing from {', '.join(holes[:5])}? the steps beside are shorter",) if holes else ()
+    holes = [
+        f"{frequencies[k]:g} to {frequencies[k + 1]:g} Hz"
+        for k in np.flatnonzero(steps > _HOLE * np.array(beside))
+    ]
+    return (
+        (f"{source}: are rows missing from {', '.join(holes[:5])}? the steps beside are shorter",)
+        if holes
+        else ()
+    )
 
 
 def in_own_form(
@@ -148,15 +167,24 @@ def _rated_seen(frequencies: Numbers, values: Vector, rated_hz: float) -> float:
         if _COIL < coil < 1 / _COIL:
             seen = part if unlike < most else 1.0
             break
-    bands = [[_turning(frequencies, Z, rated_hz, frequencies[-1] / top)[1:] for Z in forms] for top in _TOPS]
+    bands = [
+        [_turning(frequencies, Z, rated_hz, frequencies[-1] / top)[1:] for Z in forms]
+        for top in _TOPS
+    ]
     met, opposite = (
-        min(math.sqrt(math.prod(math.hypot(part - sign, unlike) for part, unlike in band)) for band in bands) < _SURE
+        min(
+            math.sqrt(math.prod(math.hypot(part - sign, unlike) for part, unlike in band))
+            for band in bands
+        )
+        < _SURE
         for sign in (1, -1)
     )
     return -1.0 if opposite else 1.0 if met and seen < _OTHER_AXIS else seen
 
 
-def _turning(frequencies: Numbers, Z: Vector, rated_hz: float, start: float) -> tuple[float, float, float]:
+def _turning(
+    frequencies: Numbers, Z: Vector, rated_hz: float, start: float
+) -> tuple[float, float, float]:
     """Likeness to a coil from a frequency on, the rated frequency that is seen, and by what part the relation fails."""
     f = frequencies[(frequencies >= start) & (frequencies > 2 * rated_hz)]
     f = f[f <= frequencies[-1] - rated_hz]

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from orchestrator.arrays import Complex, Matrix, Numbers, Vector
 from orchestrator.immittance.poles import unstable_poles
 
-NEAR_ZERO = 1e-3  # this near to 0 [rad/s] poles are the free angle's and clocks'; the path passes on the right
+# this near to 0 [rad/s] poles are the free angle's and clocks'; the path passes on the right
+NEAR_ZERO = 1e-3
 
 ON_AXIS = 1e-7
 """Poles of models whose damping is less than this are on the axis, as of coils and capacitors without losses; the path
@@ -57,7 +58,8 @@ class Sampled:
     values: Vector
     bounds: Numbers
     is_exact: bool = False
-    parts: tuple["Sampled", ...] = ()  # scans that it is made of, whose unstable poles no other one covers
+    # scans that it is made of, whose unstable poles no other one covers
+    parts: tuple["Sampled", ...] = ()
 
     @cached_property
     def unstable(self) -> tuple[complex, ...]:
@@ -80,11 +82,15 @@ class Sampled:
         """Error of the interpolation at each frequency, from predicting its value by those beside it."""
         f, count = self.frequencies, len(self.frequencies)
         k = np.arange(2, count - 2)
-        cubic = _lagrange(f, self.values, f[k], k[:, None] + np.array([-2, -1, 1, 2])) - self.values[k]
+        cubic = (
+            _lagrange(f, self.values, f[k], k[:, None] + np.array([-2, -1, 1, 2])) - self.values[k]
+        )
         straight = _lagrange(f, self.values, f[k], k[:, None] + np.array([-1, 1])) - self.values[k]
         small, large = (np.linalg.norm(e, ord=2, axis=(1, 2)) for e in (cubic, straight))
         size = np.linalg.norm(self.values[k], ord=2, axis=(1, 2))
-        factor = np.where(small <= _RESOLVED * large, _SHARE, np.where(small < _NOISE * size, 1.0, _UNRESOLVED))
+        factor = np.where(
+            small <= _RESOLVED * large, _SHARE, np.where(small < _NOISE * size, 1.0, _UNRESOLVED)
+        )
         rounding = 1e-9 * size
         return np.pad(np.minimum(factor * small, large + 10 * small) + rounding, 2, mode="edge")
 
@@ -112,7 +118,9 @@ class Known:
 
     @property
     def unstable(self) -> tuple[complex, ...]:
-        return tuple(p for p in self.poles.tolist() if p.real > ON_AXIS * abs(p) and abs(p) > NEAR_ZERO)
+        return tuple(
+            p for p in self.poles.tolist() if p.real > ON_AXIS * abs(p) and abs(p) > NEAR_ZERO
+        )
 
     def error(self, s: Vector) -> Numbers:
         return np.zeros(len(s))
@@ -149,12 +157,16 @@ class Exact(Known):
         return self._direct(s) if self._modes is None else self._modal(s, self._modes)
 
     def _direct(self, s: Vector) -> Complex:
-        found = [self.C @ np.linalg.solve(x * np.eye(len(self.A)) - self.A, self.B) for x in s.tolist()]
+        found = [
+            self.C @ np.linalg.solve(x * np.eye(len(self.A)) - self.A, self.B) for x in s.tolist()
+        ]
         return np.asarray(np.array(found, dtype=complex).reshape(len(s), *self.D.shape) + self.D)
 
     def _modal(self, s: Vector, modes: tuple[Complex, Complex, Complex]) -> Complex:
         values, C, B = modes
-        parts = [(C / (s[k : k + _AT_ONCE, None, None] - values)) @ B for k in range(0, len(s), _AT_ONCE)]
+        parts = [
+            (C / (s[k : k + _AT_ONCE, None, None] - values)) @ B for k in range(0, len(s), _AT_ONCE)
+        ]
         return np.asarray(np.concatenate([*parts, np.zeros((0, *self.D.shape))]) + self.D)
 
     def negated(self) -> "Exact":
@@ -205,7 +217,9 @@ class Behind(Known):
     poles: Complex
 
     def at(self, s: Vector) -> Complex:
-        return np.concatenate([self._at(s[k : k + _AT_ONCE]) for k in range(0, max(len(s), 1), _AT_ONCE)])
+        return np.concatenate(
+            [self._at(s[k : k + _AT_ONCE]) for k in range(0, max(len(s), 1), _AT_ONCE)]
+        )
 
     def _at(self, s: Vector) -> Complex:
         Z = self.alone.at(s)

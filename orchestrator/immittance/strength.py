@@ -14,7 +14,8 @@ from orchestrator.immittance.loop import NO_MODES, CutLoop
 from orchestrator.immittance.margins import told
 from orchestrator.immittance.sides import Known, Side
 
-_MOST, _APART, _NEAR = 3, 1.15, 0.9  # critical frequencies told, least ratio of two, largest distance
+# critical frequencies told, least ratio of two, largest distance
+_MOST, _APART, _NEAR = 3, 1.15, 0.9
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,10 @@ def critical(loop: CutLoop, judgement: CutJudgement, cut: Cut) -> list[Critical]
     inner = np.flatnonzero((d <= np.r_[np.inf, d[:-1]]) & (d <= np.r_[d[1:], np.inf]) & (d < _NEAR))
     found: list[int] = []
     for k in inner[np.argsort(d[inner])].tolist():
-        if all(abs(np.log(path.hertz[k] / path.hertz[j])) > np.log(_APART) for j in found) and len(found) < _MOST:
+        if (
+            all(abs(np.log(path.hertz[k] / path.hertz[j])) > np.log(_APART) for j in found)
+            and len(found) < _MOST
+        ):
             found.append(k)
     return [_at(loop, cut, path.s[k], path.L[k]) for k in found]
 
@@ -51,7 +55,9 @@ def _at(loop: CutLoop, cut: Cut, s: complex, L: np.ndarray) -> Critical:
     u, sigma, vh = np.linalg.svd(np.eye(len(L)) + L)
     out, into = u[:, -1].conj() @ loop.impedance(here)[0], vh[-1].conj()
     devices = {
-        ", ".join(unit.devices): float((out[unit.rows] @ unit.side.at(here)[0] @ into[unit.rows]).real)
+        ", ".join(unit.devices): float(
+            (out[unit.rows] @ unit.side.at(here)[0] @ into[unit.rows]).real
+        )
         for unit in cut.units
     }
     buses: dict[str, float] = {}
@@ -60,7 +66,8 @@ def _at(loop: CutLoop, cut: Cut, s: complex, L: np.ndarray) -> Critical:
     return Critical(float(s.imag / (2 * np.pi)), float(sigma[-1]), buses, devices)
 
 
-_ALIKE = 0.2  # relative change of the reactance up to the rated frequency from which on no one impedance is meant
+# relative change of the reactance up to the rated frequency from which on no one impedance is meant
+_ALIKE = 0.2
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,14 @@ from orchestrator.immittance.judgement import CutJudgement, NyquistVerdict, judg
 from orchestrator.immittance.loop import NO_MODES, CutLoop, SeriesCapacitors, common_range
 from orchestrator.immittance.margins import NyquistMargins, margins_json
 from orchestrator.immittance.measured import scan_fmu
-from orchestrator.immittance.placing import at_ports, in_one_frame, in_unit, placed, sampled, scans_in
+from orchestrator.immittance.placing import (
+    at_ports,
+    in_one_frame,
+    in_unit,
+    placed,
+    sampled,
+    scans_in,
+)
 from orchestrator.immittance.scan import PER_UNIT, SIEMENS, Scan, check_sign
 from orchestrator.immittance.scan_files import ENDINGS, read_scan
 from orchestrator.immittance.sides import Sampled, Side
@@ -35,13 +42,15 @@ class CutRequest:
     device: Path | None
     network: Path | PreparedScenario | None
     frequency: float = 50.0
-    compensation: float = 0.0  # series capacitors, as share of the network's reactance at the rated frequency
+    # series capacitors, as share of the network's reactance at the rated frequency
+    compensation: float = 0.0
     # of the device's frame before the network's [rad]; None where the files or the sides state it.
     angle: float | None = None
     bus: str | None = None
     components: tuple[str, ...] = ()
     kilovolt: float | None = None  # rated voltage of what is in per unit
-    generator: frozenset[str] = frozenset()  # sides whose files count currents out of them: ``device``, ``network``
+    # sides whose files count currents out of them: ``device``, ``network``
+    generator: frozenset[str] = frozenset()
     per_unit: frozenset[str] = frozenset()  # sides whose files are in per unit of the system base
     units_checked: bool = False
     # scr, x_r: of the source behind R + jX that stands for the network; rating_mva: of the device, whose SCR is asked.
@@ -120,18 +129,29 @@ class CutResult:
             return None
         low, high = common_range(device, self.cut.device, (0.0, 0.0))
         inside = (device.frequencies >= low) & (device.frequencies <= high)
-        f, own = device.frequencies[inside], self.cut.device.at(2j * np.pi * device.frequencies[inside])
+        f, own = (
+            device.frequencies[inside],
+            self.cut.device.at(2j * np.pi * device.frequencies[inside]),
+        )
         if not len(f):
             return None
-        apart = np.linalg.norm(device.values[inside] - own, ord=2, axis=(1, 2)) / np.linalg.norm(own, 2, axis=(1, 2))
+        apart = np.linalg.norm(device.values[inside] - own, ord=2, axis=(1, 2)) / np.linalg.norm(
+            own, 2, axis=(1, 2)
+        )
         return {"largest_relative": float(apart.max()), "frequency_hz": float(f[np.argmax(apart)])}
 
     def as_json(self) -> dict[str, Any]:
         """Verdict and figures as JSON's types."""
         j = self.judgement
-        points = {s: {p: vars(v) for p, v in scan.points.items()} for s, scan in self.scans.items() if scan.points}
+        points = {
+            s: {p: vars(v) for p, v in scan.points.items()}
+            for s, scan in self.scans.items()
+            if scan.points
+        }
         of = self.request.network
-        return ({"models": of.models, "basis": of.basis} if isinstance(of, PreparedScenario) else {}) | {
+        return (
+            {"models": of.models, "basis": of.basis} if isinstance(of, PreparedScenario) else {}
+        ) | {
             "verdict": str(self.verdict),
             "reasons": list(j.reasons),
             "sentence": f"{self.verdict}: {self.because}",
@@ -148,14 +168,18 @@ class CutResult:
             "margins": margins_json(self.margins),
             "buses": self._buses_json(),
             "critical": [vars(one) for one in self.critical],
-            "strength": {"short_circuit_mva": self.short_circuit, "scr": self.scr, "scr_limit": self.scr_limit,
-                         "gscr": self.gscr},
+            "strength": {
+                "short_circuit_mva": self.short_circuit,
+                "scr": self.scr,
+                "scr_limit": self.scr_limit,
+                "gscr": self.gscr,
+            },
             "difference_from_case": self.difference,
             "active_hz": {side: [list(band) for band in bands] for side, bands in j.active.items()},
             "small_gain_hz": [list(band) for band in j.small_gain],
             "operating_points": points,
             "questions": list(self.questions),
-        }  # fmt: skip
+        }
 
     def _buses_json(self) -> list[dict[str, Any]]:
         """The closed system judged at each bus of several: `BusJudgement` with its bus, and the SCR there."""
@@ -164,12 +188,17 @@ class CutResult:
         found = []
         for one in self.judgement.buses:
             bus, devices = self.cut.ports[one.port]
-            found.append({
-                "bus": bus, "devices": list(devices), "verdict": str(self.verdict),
-                "encirclements": {"determinant": one.encirclements, "eigenloci": one.by_loci},
-                "growing_modes_without": one.without, "margins": margins_json(one.margins),
-                "scr": self.ratios.get(bus.rpartition(".")[2]),
-            })  # fmt: skip
+            found.append(
+                {
+                    "bus": bus,
+                    "devices": list(devices),
+                    "verdict": str(self.verdict),
+                    "encirclements": {"determinant": one.encirclements, "eigenloci": one.by_loci},
+                    "growing_modes_without": one.without,
+                    "margins": margins_json(one.margins),
+                    "scr": self.ratios.get(bus.rpartition(".")[2]),
+                }
+            )
         return found
 
 
@@ -180,7 +209,9 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
         request, cut, scans, known, lead = _opened(request, request.network)
     if request.device is not None:
         if cut is not None and len(cut.devices) > 1:
-            raise InputError(f"the cut holds {', '.join(cut.devices)}; name the one that the scan is of by --component")
+            raise InputError(
+                f"the cut holds {', '.join(cut.devices)}; name the one that the scan is of by --component"
+            )
         scans = {"device": _side(request, request.device, cut, report)}
     if isinstance(request.network, Path):
         scans["network"] = _read(request, "network", request.network)
@@ -190,20 +221,33 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
         scans = {side: in_unit(scan, unit, request.kilovolt) for side, scan in scans.items()}
         known = in_one_frame(scans, request.angle)
     elif request.device is not None:
-        scans["device"], known = placed(scans["device"], cut, cut.devices[0], request.kilovolt, request.angle)
-    questions = tuple(q for scan in scans.values() for q in scan.questions) + (cut.warnings if cut else ())
-    device: Side | None = sampled(scans["device"]) if "device" in scans else cut.device if cut else None
+        scans["device"], known = placed(
+            scans["device"], cut, cut.devices[0], request.kilovolt, request.angle
+        )
+    questions = tuple(q for scan in scans.values() for q in scan.questions) + (
+        cut.warnings if cut else ()
+    )
+    device: Side | None = (
+        sampled(scans["device"]) if "device" in scans else cut.device if cut else None
+    )
     rating, kilovolt = _rating(request, cut), request.kilovolt
     questions += tuple(
         f"{scan.source} was scanned at {point.megawatt:g} MW, and the device is rated at {rating:g} MVA; do both hold?"
-        for side, scan in scans.items() for point in scan.points.values()
+        for side, scan in scans.items()
+        for point in scan.points.values()
         if side != "network" and rating and abs(point.megawatt or 0.0) > 1.1 * rating
-    )  # fmt: skip
+    )
     for scan in scans.values():
-        kilovolt = kilovolt or next((point.kilovolt for point in scan.points.values() if point.kilovolt), None)
+        kilovolt = kilovolt or next(
+            (point.kilovolt for point in scan.points.values() if point.kilovolt), None
+        )
     base = SYSTEM_BASE_MVA if unit == PER_UNIT else kilovolt**2 if kilovolt else None
     network: Side | None = (
-        sampled(scans["network"], inverse=True) if "network" in scans else cut.network if cut else None
+        sampled(scans["network"], inverse=True)
+        if "network" in scans
+        else cut.network
+        if cut
+        else None
     )
     if request.scr is not None:
         network = _source(request, rating, base)
@@ -217,15 +261,23 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
     if request.compensation:
         loop = replace(loop, capacitors=_capacitors(loop, request))
     closed = cut if not scans and not request.compensation and request.scr is None else None
-    judgement = judge_loop(loop, frames_known=known, modes=closed.eigenvalues if closed else NO_MODES)
+    judgement = judge_loop(
+        loop, frames_known=known, modes=closed.eigenvalues if closed else NO_MODES
+    )
     if cut is not None and closed:
         judgement = beside_modes(judgement, cut)
-    prepared = request.network if isinstance(request.network, PreparedScenario) and request.scr is None else None
+    prepared = (
+        request.network
+        if isinstance(request.network, PreparedScenario) and request.scr is None
+        else None
+    )
     strengths = strengths_of(network, request.frequency, base, prepared, cut.bus if cut else "")
     return CutResult(request, loop, judgement, scans, cut, unit, questions, rating, *strengths)
 
 
-def _opened(request: CutRequest, case: PreparedScenario) -> tuple[CutRequest, Cut, dict[str, Scan], bool, float]:
+def _opened(
+    request: CutRequest, case: PreparedScenario
+) -> tuple[CutRequest, Cut, dict[str, Scan], bool, float]:
     """The case cut where it is asked for, or at its scans; those, whether their frames are known, and the lead of what
     a free angle makes of the loop."""
     held, scans, sure = scans_in(case), dict[str, Scan](), [True]
@@ -238,25 +290,43 @@ def _opened(request: CutRequest, case: PreparedScenario) -> tuple[CutRequest, Cu
     request = replace(request, frequency=cut.rated_hz or request.frequency)
     for name, table in held.items():
         scan = _read(request, "device", case.case.directory / str(table.scan))
-        scans[name], known = placed(scan, cut, name, table.voltage or request.kilovolt, request.angle)
+        scans[name], known = placed(
+            scan, cut, name, table.voltage or request.kilovolt, request.angle
+        )
         sure.append(known)
     lead = CutLoop(cut.device, cut.network).lead_at_rest
-    return request, replace(cut, device=at_ports(scans, cut)) if held else cut, scans, all(sure), lead
+    return (
+        request,
+        replace(cut, device=at_ports(scans, cut)) if held else cut,
+        scans,
+        all(sure),
+        lead,
+    )
 
 
 def _read(request: CutRequest, side: str, path: Path) -> Scan:
     if side == "network" and path.suffix.lower() not in ENDINGS:
-        raise InputError(f"{path}: the network is a scan's file or a case; an FMU can be the device")
+        raise InputError(
+            f"{path}: the network is a scan's file or a case; an FMU can be the device"
+        )
     scan, kv = read_scan(path, request.frequency, network=side == "network"), request.kilovolt
-    if off := [p.kilovolt for p in scan.points.values() if p.kilovolt and kv and not 0.8 < p.kilovolt / kv < 1.25]:
-        raise InputError(f"{path.name} was scanned at {off[0]:g} kV, and --voltage is {kv:g} kV; leave the option out")
+    if off := [
+        p.kilovolt
+        for p in scan.points.values()
+        if p.kilovolt and kv and not 0.8 < p.kilovolt / kv < 1.25
+    ]:
+        raise InputError(
+            f"{path.name} was scanned at {off[0]:g} kV, and --voltage is {kv:g} kV; leave the option out"
+        )
     scan = scan.scaled(1.0, PER_UNIT) if side in request.per_unit else scan
     scan = scan.turned_sign() if side in request.generator else scan
     check_sign(scan, f"--generator {side}")
     return scan
 
 
-def _side(request: CutRequest, path: Path, cut: Cut | None, report: Callable[[str], None] | None) -> Scan:
+def _side(
+    request: CutRequest, path: Path, cut: Cut | None, report: Callable[[str], None] | None
+) -> Scan:
     if path.suffix.lower() in ENDINGS:
         return _read(request, "device", path)
     values = dict(request.values)
@@ -269,11 +339,28 @@ def _side(request: CutRequest, path: Path, cut: Cut | None, report: Callable[[st
 
 def _rating(request: CutRequest, cut: Cut | None) -> float | None:
     """Of the device [MVA], as it is given or as the device has it."""
-    if request.rating_mva is None and cut is not None and isinstance(request.network, PreparedScenario):
+    if (
+        request.rating_mva is None
+        and cut is not None
+        and isinstance(request.network, PreparedScenario)
+    ):
         plans = [request.network.system.components[name] for name in cut.devices]
-        return sum(plan.number("S_n") for plan in plans if "S_n" in plan.description.variables) or None
-    if request.rating_mva is None and request.device and request.device.suffix.lower() not in ENDINGS:
-        return float(request.values.get("S_n", start_of(bound_fmu(request.device, request.binding), "S_n"))) or None
+        return (
+            sum(plan.number("S_n") for plan in plans if "S_n" in plan.description.variables) or None
+        )
+    if (
+        request.rating_mva is None
+        and request.device
+        and request.device.suffix.lower() not in ENDINGS
+    ):
+        return (
+            float(
+                request.values.get(
+                    "S_n", start_of(bound_fmu(request.device, request.binding), "S_n")
+                )
+            )
+            or None
+        )
     return request.rating_mva
 
 
@@ -281,10 +368,18 @@ def _source(request: CutRequest, rating: float | None, base: float | None) -> So
     if not (request.scr and request.scr > 0 and request.x_r > 0):
         raise InputError(f"--scr {request.scr:g}, --x-r {request.x_r:g}: both must exceed 0")
     if rating is None or base is None:
-        missing = "its rating by --rating '100 MVA'" if rating is None else "the rated voltage by --voltage '230 kV'"
-        raise InputError(f"--scr: a scan states no rating; give {missing}, to which the short-circuit ratio relates")
+        missing = (
+            "its rating by --rating '100 MVA'"
+            if rating is None
+            else "the rated voltage by --voltage '230 kV'"
+        )
+        raise InputError(
+            f"--scr: a scan states no rating; give {missing}, to which the short-circuit ratio relates"
+        )
     X = base / (request.scr * rating) / math.hypot(1.0, 1 / request.x_r)
-    return SourceBehind(f"a source of SCR {request.scr:g}", X / request.x_r, X, 2 * np.pi * request.frequency)
+    return SourceBehind(
+        f"a source of SCR {request.scr:g}", X / request.x_r, X, 2 * np.pi * request.frequency
+    )
 
 
 def _capacitors(loop: CutLoop, request: CutRequest) -> SeriesCapacitors:

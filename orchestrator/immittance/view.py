@@ -19,11 +19,16 @@ from orchestrator.results.storage import save_json
 GOAL = 0.3  # distance from −1 that a retuning is to reach: all of L may be off by so much of 1
 
 _MARGINS = (
-    ("gain up", "gain_up", "× {:.3f}"), ("gain down", "gain_down", "× {:.3f}"), ("phase, ±", "phase_deg", "{:.1f}°"),
-    ("delay, lag", "delay_s", "{:.2e} s"), ("distance from −1", "distance", "{:.3f}"), ("disk", "disk", "{:.3f}"),
-)  # fmt: skip
+    ("gain up", "gain_up", "× {:.3f}"),
+    ("gain down", "gain_down", "× {:.3f}"),
+    ("phase, ±", "phase_deg", "{:.1f}°"),
+    ("delay, lag", "delay_s", "{:.2e} s"),
+    ("distance from −1", "distance", "{:.3f}"),
+    ("disk", "disk", "{:.3f}"),
+)
 
-_NAMED, _LITTLE = 4, 5e-3  # buses and devices that take part, in a line, and what is too little for it
+# buses and devices that take part, in a line, and what is too little for it
+_NAMED, _LITTLE = 4, 5e-3
 
 Report = Callable[[str], None]
 
@@ -31,7 +36,9 @@ Report = Callable[[str], None]
 class Nyquist:
     """What `nyquist` found at a cut: ``result`` has loop, judgement and scans, ``retuned`` what `retune` found."""
 
-    def __init__(self, result: CutResult, study: Study, settings: Callable[[Sequence[str]], list[Tunable]]) -> None:
+    def __init__(
+        self, result: CutResult, study: Study, settings: Callable[[Sequence[str]], list[Tunable]]
+    ) -> None:
         self.result, self._study, self._settings = result, study, settings
         self.retuned: list[Retuned] = []
         self.goal = GOAL
@@ -47,14 +54,21 @@ class Nyquist:
         return self.result.judgement.reasons
 
     def retune(
-        self, parameters: Sequence[str] = (), *, distance: float = GOAL, report: Report = lambda text: None
+        self,
+        parameters: Sequence[str] = (),
+        *,
+        distance: float = GOAL,
+        report: Report = lambda text: None,
     ) -> list[Retuned]:
         """Follow the distance from −1 over parameters of the device (names or patterns; all tunable ones by default),
         and find the least change of each that is enough; those that are come first, by the size of the change.
 
         ``report``: Called with a sentence before each scan."""
         self.goal = distance
-        found = [retune(self._study, setting, self.result, distance, report) for setting in self._settings(parameters)]
+        found = [
+            retune(self._study, setting, self.result, distance, report)
+            for setting in self._settings(parameters)
+        ]
         self.retuned = sorted(found, key=lambda one: one.effort)
         return self.retuned
 
@@ -62,7 +76,10 @@ class Nyquist:
         """The same as ``gfor fmu nyquist --json`` prints, as JSON's types."""
         if not self.retuned:
             return self.result.as_json()
-        found = {"distance_wanted": self.goal, "parameters": [_one(x, self.goal) for x in self.retuned]}
+        found = {
+            "distance_wanted": self.goal,
+            "parameters": [_one(x, self.goal) for x in self.retuned],
+        }
         return self.result.as_json() | {"retune": found}
 
     def save_pictures(self, folder: str | Path) -> list[Path]:
@@ -100,8 +117,10 @@ def parts(found: Nyquist) -> Iterator[RenderableType]:
         said = ", ".join(f"{a:.4g}–{b:.4g} Hz" for a, b in bands) or "nowhere"
         yield escape(f"{side} ({named(getattr(result.loop, side).name)}) not passive: {said}")
     if (far := result.difference) is not None:
-        yield (f"The device differs from the case's own by {100 * far['largest_relative']:.2g} % at most, at "
-               f"{far['frequency_hz']:.4g} Hz")  # fmt: skip
+        yield (
+            f"The device differs from the case's own by {100 * far['largest_relative']:.2g} % at most, at "
+            f"{far['frequency_hz']:.4g} Hz"
+        )
     if found.retuned:
         yield from retuned_table(found.retuned, found.goal)
 
@@ -116,21 +135,47 @@ def _by_bus(result: CutResult) -> Iterator[RenderableType]:
         phase = f"{m['phase_deg']['value']:.1f}°" if m["phase_deg"] else "none"
         left = {True: "UNSTABLE", False: "stable"}[b["growing_modes_without"] > 0]
         scr = "" if b["scr"] is None else f"{b['scr']:.2f}"
-        rows.append((b["bus"], ", ".join(b["devices"]), f"{m['distance']['value']:.3f}",
-                     f"{m['distance']['frequency_hz']:.3f}", gain, phase, left, scr))  # fmt: skip
+        rows.append(
+            (
+                b["bus"],
+                ", ".join(b["devices"]),
+                f"{m['distance']['value']:.3f}",
+                f"{m['distance']['frequency_hz']:.3f}",
+                gain,
+                phase,
+                left,
+                scr,
+            )
+        )
     if rows:
         ratios = "SCR is" if result.gscr is None else f"SCR, and gSCR of {result.gscr:.3g}, are"
-        yield make_table(f"At each bus alone ({ratios} no margin: devices and settings differ at one ratio)", "Bus",
-                         "Devices", "Distance", "at [Hz]", "Gain", "Phase", "Without it", "SCR", rows=rows)  # fmt: skip
+        yield make_table(
+            f"At each bus alone ({ratios} no margin: devices and settings differ at one ratio)",
+            "Bus",
+            "Devices",
+            "Distance",
+            "at [Hz]",
+            "Gain",
+            "Phase",
+            "Without it",
+            "SCR",
+            rows=rows,
+        )
     for one in result.critical if rows else ():
         buses = _most(one.buses, "{} {:.0%}")
         devices = _most(one.devices, "{} {:+.3f}")
-        yield escape(f"At {one.frequency_hz:.4g} Hz, {one.distance:.3g} from −1: {buses}; per part by which a device "
-                     f"grows the distance changes by {devices}")  # fmt: skip
+        yield escape(
+            f"At {one.frequency_hz:.4g} Hz, {one.distance:.3g} from −1: {buses}; per part by which a device "
+            f"grows the distance changes by {devices}"
+        )
 
 
 def _most(found: dict[str, float], text: str) -> str:
-    most = [item for item in sorted(found.items(), key=lambda item: -abs(item[1]))[:_NAMED] if abs(item[1]) > _LITTLE]
+    most = [
+        item
+        for item in sorted(found.items(), key=lambda item: -abs(item[1]))[:_NAMED]
+        if abs(item[1]) > _LITTLE
+    ]
     return ", ".join(text.format(name, value) for name, value in most)
 
 
@@ -144,19 +189,40 @@ def _strength(result: CutResult) -> str:
 
 
 def _cells(margin: Margin | None, text: str) -> tuple[str, str]:
-    return ("none", "") if margin is None else (text.format(margin.value), f"{margin.frequency_hz:.3f}")
+    return (
+        ("none", "")
+        if margin is None
+        else (text.format(margin.value), f"{margin.frequency_hz:.3f}")
+    )
 
 
 def _one(x: Retuned, goal: float) -> dict[str, Any]:
-    known = [(v, f) for v, f in zip(x.values.tolist(), x.figures, strict=True) if math.isfinite(f.distance)]
+    known = [
+        (v, f)
+        for v, f in zip(x.values.tolist(), x.figures, strict=True)
+        if math.isfinite(f.distance)
+    ]
     return {
-        "name": x.setting.name, "unit": x.setting.unit, "now": x.setting.now, "range": [x.setting.low, x.setting.high],
-        "met": x.met(goal) if x.figures else None, "needed": x.needed, "confirmed": _confirmed(x), "remark": x.remark,
+        "name": x.setting.name,
+        "unit": x.setting.unit,
+        "now": x.setting.now,
+        "range": [x.setting.low, x.setting.high],
+        "met": x.met(goal) if x.figures else None,
+        "needed": x.needed,
+        "confirmed": _confirmed(x),
+        "remark": x.remark,
         "scans": [{"value": v, "verdict": str(r.verdict)} for v, r in sorted(x.scans.items())],
         "checks": [vars(c) for c in x.checks if math.isfinite(c.found + c.predicted)],
-        "curve": [{"value": v, "distance": f.distance, "damping_percent": _number(f.damping),
-                   "network_weaker_by": _number(f.weaker)} for v, f in known],
-    }  # fmt: skip
+        "curve": [
+            {
+                "value": v,
+                "distance": f.distance,
+                "damping_percent": _number(f.damping),
+                "network_weaker_by": _number(f.weaker),
+            }
+            for v, f in known
+        ],
+    }
 
 
 def _number(x: float) -> float | None:
@@ -167,18 +233,34 @@ def _confirmed(x: Retuned) -> dict[str, Any] | None:
     """What was predicted at the value that is needed, and what a scan and the coupled system's modes say there."""
     if x.needed is None or x.predicted is None:
         return None
-    result, own, cut = x.scans[x.needed], x.figures[int(np.searchsorted(x.values, x.needed))], x.scans[x.needed].cut
+    result, own, cut = (
+        x.scans[x.needed],
+        x.figures[int(np.searchsorted(x.values, x.needed))],
+        x.scans[x.needed].cut,
+    )
     own_modes = () if cut is None or cut.modes_stable is None or result.scans else cut.eigenvalues
     near = min(own_modes, key=lambda p: abs(p - own.mode), default=None) if own.mode else None
-    return {"predicted": x.predicted.distance, "verdict": str(result.verdict), "distance": own.distance,
-            "damping_percent": _number(own.damping),
-            "coupled_damping_percent": None if near is None else float(-100 * near.real / abs(near)),
-            "modes_stable": None if cut is None or result.scans else cut.modes_stable}  # fmt: skip
+    return {
+        "predicted": x.predicted.distance,
+        "verdict": str(result.verdict),
+        "distance": own.distance,
+        "damping_percent": _number(own.damping),
+        "coupled_damping_percent": None if near is None else float(-100 * near.real / abs(near)),
+        "modes_stable": None if cut is None or result.scans else cut.modes_stable,
+    }
 
 
 def retuned_table(found: Sequence[Retuned], goal: float) -> Iterator[RenderableType]:
     """The table, and what is to be known of it."""
-    columns = ("Parameter", "Now", "Needed", "Predicted", "Confirmed", "Damping [%]", "Coupled modes")
+    columns = (
+        "Parameter",
+        "Now",
+        "Needed",
+        "Predicted",
+        "Confirmed",
+        "Damping [%]",
+        "Coupled modes",
+    )
     rows = [_row(x, goal) for x in found if x.figures]
     yield make_table(f"What to retune for a distance of {goal:g} from −1", *columns, rows=rows)
     if rows:
@@ -192,12 +274,20 @@ def _row(x: Retuned, goal: float) -> tuple[str, ...]:
     unit = "" if x.setting.unit == "1" else f" {x.setting.unit}"
     head, said = (x.setting.name, f"{x.setting.now:.4g}{unit}"), _confirmed(x)
     if said is None:
-        judged = ~np.isin(x.values, [v for v, result in x.scans.items() if result.judgement.reasons])
+        judged = ~np.isin(
+            x.values, [v for v, result in x.scans.items() if result.judgement.reasons]
+        )
         k = int(np.nanargmax(np.where(judged, x.distances, -1.0)))
         best = "not alone; best" if not x.met(goal) else "none; best"
         return (*head, f"{best} {x.distances[k]:.3f} at {x.values[k]:.4g}", "", "", "", "")
     coupled = {True: "stable", False: "UNSTABLE", None: "not asked"}[said["modes_stable"]]
     if said["coupled_damping_percent"] is not None:
         coupled += f", {said['coupled_damping_percent']:.2f} %"
-    return (*head, f"{x.needed:.4g}{unit}", f"{said['predicted']:.4f}",
-            f"{said['verdict']}, {said['distance']:.4f}", f"{said['damping_percent'] or 0:.2f}", coupled)  # fmt: skip
+    return (
+        *head,
+        f"{x.needed:.4g}{unit}",
+        f"{said['predicted']:.4f}",
+        f"{said['verdict']}, {said['distance']:.4f}",
+        f"{said['damping_percent'] or 0:.2f}",
+        coupled,
+    )

@@ -8,7 +8,12 @@ from rich.markup import escape
 from orchestrator.interactions.point import SystemTask
 from orchestrator.interactions.request import InteractionsRequest
 from orchestrator.interactions.study import plan_interactions, run_interactions
-from orchestrator.interactions.view import Interactions, assignments_table, modes_table, systems_table
+from orchestrator.interactions.view import (
+    Interactions,
+    assignments_table,
+    modes_table,
+    systems_table,
+)
 from orchestrator.interactions.words import verdict_of
 from orchestrator.points.study import PointStudy
 
@@ -29,6 +34,13 @@ def _code(found: Interactions, fail_unstable: bool) -> int:
 
 
 STUDY = PointStudy(
-    request=InteractionsRequest, plan=plan_interactions, run=run_interactions, shown=Interactions, task=SystemTask,
-    counted="systems", parts=_parts, code=_code, warnings=lambda found: found.warnings,
-)  # fmt: skip
+    request=InteractionsRequest,
+    plan=plan_interactions,
+    run=run_interactions,
+    shown=Interactions,
+    task=SystemTask,
+    counted="systems",
+    parts=_parts,
+    code=_code,
+    warnings=lambda found: found.warnings,
+)

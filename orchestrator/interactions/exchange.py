@@ -8,13 +8,20 @@ from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.case import Case
 from orchestrator.cases.power_flow import PowerFlow
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import AnalysisTable, ComponentTable, EventTable, GridEventBase, Value
+from orchestrator.cases.schema import (
+    AnalysisTable,
+    ComponentTable,
+    EventTable,
+    GridEventBase,
+    Value,
+)
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.interactions.places import Place
 
-SAME_FLOW = 1e-6  # largest difference of a bus voltage [pu] between two systems at the same operating point
+# largest difference of a bus voltage [pu] between two systems at the same operating point
+SAME_FLOW = 1e-6
 
 _OF_PLACE = ("S_n", "P_0", "Q_0", "v_0", "theta_0", "f_n", "connected")
 """Values that belong to the place and not to the device: rating, start values, frequency, breaker."""
@@ -39,9 +46,13 @@ def settings_of(place: Place) -> dict[str, Value]:
     return {name: value for name, value in place.plan.parameters.items() if name not in _OF_PLACE}
 
 
-def file_at(place: Place, file: Path, binding: Path | None, values: Mapping[str, Value]) -> ComponentTable:
+def file_at(
+    place: Place, file: Path, binding: Path | None, values: Mapping[str, Value]
+) -> ComponentTable:
     if wrong := [name for name in values if name in _OF_PLACE]:
-        raise InputError(f"{file}: {', '.join(wrong)} cannot be set, because it is the place's, not the device's")
+        raise InputError(
+            f"{file}: {', '.join(wrong)} cannot be set, because it is the place's, not the device's"
+        )
     return ComponentTable(
         fmu=str(file.absolute()),
         binding=None if binding is None else str(binding.absolute()),
@@ -56,14 +67,20 @@ def _of_place(place: Place, device: FmuDescription | None = None) -> dict[str, V
     Rated frequency and breaker are left out where the device, if it is not of the catalogue, does not have them."""
     plan = place.plan
     found: dict[str, Value] = {name: plan.number(name) for name in ("S_n", "P_0")}
-    found |= {"Q_0": plan.number("Q_0")} if "Q_0" in plan.parameters else {"v_0": plan.number("v_0")}
+    found |= (
+        {"Q_0": plan.number("Q_0")} if "Q_0" in plan.parameters else {"v_0": plan.number("v_0")}
+    )
     if place.table.bus is None:  # no power flow computes the rest
         found |= {name: plan.number(name) for name in ("Q_0", "v_0", "theta_0")}
     if (f_n := _rated_frequency(place)) is not None:
         found["f_n"] = f_n
     if "connected" in plan.parameters:
         found["connected"] = bool(plan.parameters["connected"])
-    return found if device is None else {name: value for name, value in found.items() if name in device.variables}
+    return (
+        found
+        if device is None
+        else {name: value for name, value in found.items() if name in device.variables}
+    )
 
 
 def _rated_frequency(place: Place) -> float | None:
@@ -83,15 +100,21 @@ def exchanged_case(case: Case, exchanged: Mapping[str, ComponentTable]) -> Case:
         return case
     table = case.table
     scenarios = {
-        name: scenario if scenario.events is None else scenario.model_copy(update={"events": _kept(scenario.events)})
+        name: scenario
+        if scenario.events is None
+        else scenario.model_copy(update={"events": _kept(scenario.events)})
         for name, scenario in table.scenarios.items()
     }
     changed = table.model_copy(
         update={
-            "analysis": AnalysisTable(), "plots": [], "reference": None, "events": _kept(table.events),
-            "scenarios": scenarios, "solver": table.solver.model_copy(update={"record": ["*"]}),
+            "analysis": AnalysisTable(),
+            "plots": [],
+            "reference": None,
+            "events": _kept(table.events),
+            "scenarios": scenarios,
+            "solver": table.solver.model_copy(update={"record": ["*"]}),
         }
-    )  # fmt: skip
+    )
     return replace(case, table=changed, exchanged=dict(exchanged))
 
 

@@ -15,7 +15,8 @@ from orchestrator.interactions.point import SharedMode, SystemRecord
 from orchestrator.interactions.study import InteractionsResult
 from orchestrator.interactions.systems import NONE, WHOLE, Kind, SystemName
 
-SAME = 0.01  # A damping that falls by no more than this [points] is the same: what a perturbation leaves open
+# A damping that falls by no more than this [points] is the same: what a perturbation leaves open
+SAME = 0.01
 
 
 @dataclass(frozen=True)
@@ -111,13 +112,19 @@ class JudgedPair:
         if self.fights:
             return f"{self.text}: UNSTABLE together, though stable alone; {figures}{_where(self.joint)}"
         if self.joint.stable is False:
-            those = " and ".join(v for v, one in zip(self.vendors, self.alone, strict=True) if one.stable is False)
+            those = " and ".join(
+                v for v, one in zip(self.vendors, self.alone, strict=True) if one.stable is False
+            )
             return f"{self.text}: UNSTABLE together, and {those} alone as well; {figures}{_where(self.joint)}"
         word = "lower together" if self.fall > SAME else "no lower together"
         return f"{self.text}: stable, {word}: {figures}{_where(self.joint)}"
 
     def _missing(self) -> str:
-        systems = zip((self.text, *(f"{v} alone" for v in self.vendors)), (self.joint, *self.alone), strict=True)
+        systems = zip(
+            (self.text, *(f"{v} alone" for v in self.vendors)),
+            (self.joint, *self.alone),
+            strict=True,
+        )
         return "; ".join(f"{name}: {one.why_unknown}" for name, one in systems if not one.is_known)
 
 
@@ -158,7 +165,10 @@ class JudgedInteractions:
 
     @property
     def alone(self) -> dict[str, JudgedSystem]:
-        return {vendor: self.systems[SystemName(Kind.ALONE, (vendor,))] for vendor in self.result.plan.vendors}
+        return {
+            vendor: self.systems[SystemName(Kind.ALONE, (vendor,))]
+            for vendor in self.result.plan.vendors
+        }
 
     @property
     def interaction_modes(self) -> list[JudgedMode]:
@@ -188,7 +198,10 @@ class JudgedInteractions:
     def assignments(self) -> list[JudgedSystem]:
         """All assignments, the worst first: unstable ones, then the least damped; those without a verdict come last."""
         found = [system for name, system in self.systems.items() if name.kind is Kind.ASSIGNMENT]
-        return sorted(found, key=lambda one: (not one.is_known, one.stable is not False, one.least_damping or 0.0))
+        return sorted(
+            found,
+            key=lambda one: (not one.is_known, one.stable is not False, one.least_damping or 0.0),
+        )
 
     @property
     def worst_assignment(self) -> JudgedSystem | None:
@@ -207,7 +220,9 @@ class JudgedInteractions:
     def _judged(self, mode: SharedMode) -> JudgedMode:
         groups = self.participation(mode)
         threshold = self.result.plan.request.threshold
-        vendors = tuple(name for name, share in groups.items() if name not in NOT_VENDORS and share >= threshold)
+        vendors = tuple(
+            name for name, share in groups.items() if name not in NOT_VENDORS and share >= threshold
+        )
         return JudgedMode(mode, groups, vendors)
 
 
@@ -219,7 +234,9 @@ def _rank(pair: JudgedPair) -> tuple[bool, bool, float]:
 def doubts_of(judgement: JudgedInteractions) -> Sequence[str]:
     result, found = judgement.result, []
     plan = result.plan
-    if identified := list(dict.fromkeys(name for one in result.records.values() for name in one.identified)):
+    if identified := list(
+        dict.fromkeys(name for one in result.records.values() for name in one.identified)
+    ):
         found.append(
             f"{', '.join(identified)} was identified from outside: its share in a mode rests on the states of the "
             "model that was fitted to it"
@@ -229,14 +246,18 @@ def doubts_of(judgement: JudgedInteractions) -> Sequence[str]:
         for name, record in result.records.items()
         if record.error is not None
     ]
-    kinds = {record.failure.kind for record in result.records.values() if record.failure is not None}
+    kinds = {
+        record.failure.kind for record in result.records.values() if record.failure is not None
+    }
     if not plan.request.black_box and ErrorKind.HIDDEN_STATES in kinds:
         found.append("here too --black-box identifies the components that hide their states")
     if plan.swapped:
         found += [
             f"{vendor}'s converters have other settings at {name} than at {first.name}; where it is swapped to a place "
             f"of another vendor it has those at {first.name}"
-            for vendor, first in first_of({name: plan.places[name] for name in plan.swapped}).items()
+            for vendor, first in first_of(
+                {name: plan.places[name] for name in plan.swapped}
+            ).items()
             for name, place in plan.places.items()
             if place.vendor == vendor and settings_of(place) != settings_of(first)
         ]
@@ -254,4 +275,6 @@ def plan_text(swapped: Sequence[str], name: SystemName) -> str:
     """A system in words; of an assignment with the places: ``west: A, east: B``."""
     if name.kind is not Kind.ASSIGNMENT:
         return name.text
-    return ", ".join(f"{place}: {device}" for place, device in zip(swapped, name.names, strict=True))
+    return ", ".join(
+        f"{place}: {device}" for place, device in zip(swapped, name.names, strict=True)
+    )

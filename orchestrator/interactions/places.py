@@ -24,7 +24,9 @@ class Place:
     plan: ComponentPlan
 
 
-def places_of(components: Mapping[str, tuple[ComponentTable, ComponentPlan]], grid: str | None) -> dict[str, Place]:
+def places_of(
+    components: Mapping[str, tuple[ComponentTable, ComponentPlan]], grid: str | None
+) -> dict[str, Place]:
     """The converters of a scenario, by their component.
 
     A converter's vendor is the ``vendor`` of its table, else the name of its file, else its model."""
@@ -32,7 +34,9 @@ def places_of(components: Mapping[str, tuple[ComponentTable, ComponentPlan]], gr
     for name, (table, plan) in components.items():
         if name == grid or not plan.has_port or (table.vendor is None and plan.kind != "converter"):
             continue
-        vendor = table.vendor or (Path(table.file).stem if table.file is not None else table.model or "")
+        vendor = table.vendor or (
+            Path(table.file).stem if table.file is not None else table.model or ""
+        )
         if vendor in NOT_VENDORS:
             raise InputError(
                 f"components.{name}: its vendor is {vendor!r}, which is what a group of other components is called; "
@@ -43,7 +47,9 @@ def places_of(components: Mapping[str, tuple[ComponentTable, ComponentPlan]], gr
 
 
 def groups_of(
-    components: Mapping[str, tuple[ComponentTable, ComponentPlan]], places: Mapping[str, Place], grid: str | None
+    components: Mapping[str, tuple[ComponentTable, ComponentPlan]],
+    places: Mapping[str, Place],
+    grid: str | None,
 ) -> dict[str, str]:
     def group(name: str, table: ComponentTable, plan: ComponentPlan) -> str:
         if name in places:

@@ -94,7 +94,12 @@ def _record(result: ModesResult) -> SystemRecord:
     return SystemRecord(
         modes=tuple(SharedMode.of(mode) for mode in result.modes if mode.is_oscillation),
         growing=SharedMode.of(stability.mode) if grows and stability.mode is not None else None,
-        stability=stability.as_json(), because=stability.because(), warnings=result.warnings,
-        identified=tuple(name for name, source in result.linearised.items() if source == IDENTIFIED),
-        states=result.model.number_of_states, residual=result.operating_point.residual,
-    )  # fmt: skip
+        stability=stability.as_json(),
+        because=stability.because(),
+        warnings=result.warnings,
+        identified=tuple(
+            name for name, source in result.linearised.items() if source == IDENTIFIED
+        ),
+        states=result.model.number_of_states,
+        residual=result.operating_point.residual,
+    )

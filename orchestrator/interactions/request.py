@@ -21,7 +21,9 @@ frequency, as their network's frame turns with it."""
 def _files(read: Callable[[Any, str], Any]) -> FieldKind:
     def check(given: Any, argument: str) -> dict[str, Any]:
         if given and not isinstance(given, Mapping):
-            raise InputError(f"{argument} = {given!r}; give files by name, such as {{'vendor': 'vendor.fmu'}}")
+            raise InputError(
+                f"{argument} = {given!r}; give files by name, such as {{'vendor': 'vendor.fmu'}}"
+            )
         return {name: read(file, argument) for name, file in dict(given or {}).items()}
 
     return FieldKind("[NAME=]FILE", str, check, several=True)
@@ -51,39 +53,67 @@ class InteractionsRequest(OverPoints):
     values: Mapping[str, Any] | None = of_values()
     _: KW_ONLY
     threshold: float = asked(
-        SHARE, 0.05, "share of a mode from which on a vendor takes part in it (default: 5)",
+        SHARE,
+        0.05,
+        "share of a mode from which on a vendor takes part in it (default: 5)",
         python="share of a mode, from 0 to 0.5, from which on a vendor takes part in it",
-    )  # fmt: skip
+    )
     frequencies: tuple[float, float] = asked(
         FREQUENCIES, RANGE_HZ, "frequencies [Hz] (default: 0.1:100)", option="--range"
     )
     stand_in: str | None = asked(
-        NAME, None, "model at the places of the vendors that a system does without (default: static_generation, a "
-        "current without dynamics; gfor is the reference converter)", "MODEL",
-    )  # fmt: skip
+        NAME,
+        None,
+        "model at the places of the vendors that a system does without (default: static_generation, a "
+        "current without dynamics; gfor is the reference converter)",
+        "MODEL",
+    )
     swap: bool = asked(FLAG, False, "each vendor's device at each place, in all ways")
     devices: Mapping[str, str | Path] | tuple[str, ...] | tuple[Device, ...] = asked(
-        _DEVICES, (), "try this FMU or DLL at the places as well; it implies --swap (repeatable)", option="--device",
+        _DEVICES,
+        (),
+        "try this FMU or DLL at the places as well; it implies --swap (repeatable)",
+        option="--device",
         python="files, by name, of devices that are tried at the places as well; that implies ``swap``",
-    )  # fmt: skip
-    bindings: Mapping[str, str | Path] | tuple[str, ...] = asked(
-        _BINDINGS, (), "binding of a --device (repeatable)", option="--binding", python="files, by name of a device"
     )
-    places: Names = asked(NAMES, (), "swap only at this place (repeatable)", "COMPONENT", option="--place")
-    black_box: bool = asked(FLAG, False, "identify the components that hide their states from their inputs and outputs")
+    bindings: Mapping[str, str | Path] | tuple[str, ...] = asked(
+        _BINDINGS,
+        (),
+        "binding of a --device (repeatable)",
+        option="--binding",
+        python="files, by name of a device",
+    )
+    places: Names = asked(
+        NAMES, (), "swap only at this place (repeatable)", "COMPONENT", option="--place"
+    )
+    black_box: bool = asked(
+        FLAG, False, "identify the components that hide their states from their inputs and outputs"
+    )
 
     def given_devices(self) -> tuple[Device, ...]:
         if self.places and not (self.swap or self.devices):
-            raise InputError("--place says where devices are swapped; give --swap or a --device as well")
+            raise InputError(
+                "--place says where devices are swapped; give --swap or a --device as well"
+            )
         if isinstance(self.bindings, Mapping):
-            if lonely := [name for name in self.bindings if name not in cast("Mapping[str, Path]", self.devices)]:
+            if lonely := [
+                name
+                for name in self.bindings
+                if name not in cast("Mapping[str, Path]", self.devices)
+            ]:
                 there = ", ".join(map(str, self.devices)) or "none"
-                raise InputError(f"bindings: there is no device {lonely[0]!r}; the devices are: {there}")
+                raise InputError(
+                    f"bindings: there is no device {lonely[0]!r}; the devices are: {there}"
+                )
         elif self.bindings and not self.devices:
-            raise InputError("--binding is of a --device; a converter of the case has its binding in the case file")
+            raise InputError(
+                "--binding is of a --device; a converter of the case has its binding in the case file"
+            )
         if isinstance(self.devices, Mapping):
             bindings = cast("Mapping[str, Path]", self.bindings or {})
-            found = [Device(name, Path(file), bindings.get(name)) for name, file in self.devices.items()]
+            found = [
+                Device(name, Path(file), bindings.get(name)) for name, file in self.devices.items()
+            ]
         elif self.devices and isinstance(self.devices[0], Device):
             return self.devices
         else:

@@ -15,7 +15,13 @@ from orchestrator.interactions.exchange import exchanged_case, require_same_flow
 from orchestrator.interactions.places import Place, groups_of, places_of, vendors_of
 from orchestrator.interactions.point import SystemRecord, SystemTask, compute_system
 from orchestrator.interactions.request import InteractionsRequest
-from orchestrator.interactions.systems import Exchanged, Kind, SystemName, assignments, systems_of_vendors
+from orchestrator.interactions.systems import (
+    Exchanged,
+    Kind,
+    SystemName,
+    assignments,
+    systems_of_vendors,
+)
 from orchestrator.points.key import component_content
 from orchestrator.points.points import Work
 from orchestrator.points.task import StudyCase
@@ -25,7 +31,8 @@ from orchestrator.points.task import StudyCase
 class InteractionsPlan:
     case: Case
     prepared: PreparedScenario
-    layers: tuple[ParameterFile, ...]  # parameter files, and after them the values of the command line; weakest first
+    # parameter files, and after them the values of the command line; weakest first
+    layers: tuple[ParameterFile, ...]
     step_size: float | None  # communication step [s]; None for the case's
     request: InteractionsRequest
     places: dict[str, Place]  # the converters, by component
@@ -33,7 +40,8 @@ class InteractionsPlan:
     stand_in: str  # model at the places of the vendors that a system does without
     swapped: tuple[str, ...]  # places that are swapped; none without a swap
     systems: dict[SystemName, Exchanged]  # devices that are other than the case's, of every system
-    files: dict[str, list[str]]  # what stands for the files of such devices in keys, by model or file
+    # what stands for the files of such devices in keys, by model or file
+    files: dict[str, list[str]]
 
     @property
     def vendors(self) -> tuple[str, ...]:
@@ -50,10 +58,16 @@ class InteractionsPlan:
         return StudyCase.of(self.prepared, self.layers, self.step_size)
 
     def task(self, exchanged: Exchanged) -> SystemTask:
-        tables = {name: table.model_dump(exclude_defaults=True) for name, table in exchanged.items()}
+        tables = {
+            name: table.model_dump(exclude_defaults=True) for name, table in exchanged.items()
+        }
         files = {name: self.files[_content_name(table)] for name, table in exchanged.items()}
-        voltages = {bus: (v.real, v.imag) for bus, v in voltages_of(self.prepared.power_flow).items()}
-        return SystemTask(self.study, self.request.frequencies, tables, files, self.request.black_box, voltages)
+        voltages = {
+            bus: (v.real, v.imag) for bus, v in voltages_of(self.prepared.power_flow).items()
+        }
+        return SystemTask(
+            self.study, self.request.frequencies, tables, files, self.request.black_box, voltages
+        )
 
 
 @dataclass
@@ -78,7 +92,8 @@ def plan_interactions(case: Case, request: InteractionsRequest) -> InteractionsP
             "i_re, i_im that is no generator; to mark a component as a converter, set 'vendor' in its table"
         )
     sources = (c.source for c in prepared.system.connections)
-    phasors = any(s.component in places and s.variable == "y_re" for s in sources)  # an emf behind an admittance
+    # an emf behind an admittance
+    phasors = any(s.component in places and s.variable == "y_re" for s in sources)
     stand_in = request.stand_in or (f"{STAND_IN}_phasor" if phasors else STAND_IN)
     systems, swapped = systems_of_vendors(places, stand_in), tuple[str, ...]()
     devices = request.given_devices()
@@ -88,7 +103,17 @@ def plan_interactions(case: Case, request: InteractionsRequest) -> InteractionsP
     files = _tried(case, prepared, layers, step_size, systems)
     groups = groups_of(components, places, grid)
     return InteractionsPlan(
-        case, prepared, layers, step_size, request, places, groups, stand_in, swapped, systems, files
+        case,
+        prepared,
+        layers,
+        step_size,
+        request,
+        places,
+        groups,
+        stand_in,
+        swapped,
+        systems,
+        files,
     )
 
 
@@ -120,9 +145,12 @@ def _swapped(places: Mapping[str, Place], wanted: Sequence[str]) -> tuple[str, .
 
 
 def _tried(
-    case: Case, prepared: PreparedScenario, layers: Sequence[ParameterFile], step_size: float | None,
+    case: Case,
+    prepared: PreparedScenario,
+    layers: Sequence[ParameterFile],
+    step_size: float | None,
     systems: Mapping[SystemName, Exchanged],
-) -> dict[str, list[str]]:  # fmt: skip
+) -> dict[str, list[str]]:
     """Prepare one system for each device that is other than the case's: this finds what cannot stand there, and builds
     its FMU. What stands for its file in keys, by `_content_name`."""
     voltages, files = voltages_of(prepared.power_flow), dict[str, list[str]]()
@@ -133,18 +161,28 @@ def _tried(
             continue
         seen |= new
         try:
-            (changed,) = exchanged_case(case, exchanged).prepare([prepared.name], {}, step_size, None, layers)
+            (changed,) = exchanged_case(case, exchanged).prepare(
+                [prepared.name], {}, step_size, None, layers
+            )
         except CaseError as error:
-            what = ", ".join(f"{_content_name(exchanged[place])} at {place}" for place in sorted({p for p, _ in new}))
+            what = ", ".join(
+                f"{_content_name(exchanged[place])} at {place}"
+                for place in sorted({p for p, _ in new})
+            )
             head = "assignment" if name.kind is Kind.ASSIGNMENT else "stand-in"
             raise CaseError(
-                str(case.path), [Problem(f"{head}: {what}", str(problem)) for problem in error.problems]
+                str(case.path),
+                [Problem(f"{head}: {what}", str(problem)) for problem in error.problems],
             ) from error
         require_same_flow(voltages, changed)
         for place, table in exchanged.items():
-            files[_content_name(table)] = component_content(changed.system.components[place].description)
+            files[_content_name(table)] = component_content(
+                changed.system.components[place].description
+            )
     return files
 
 
 def _content_name(table: ComponentTable) -> str:
-    return f"{table.model or table.file or ''}{'' if table.binding is None else f' ({table.binding})'}"
+    return (
+        f"{table.model or table.file or ''}{'' if table.binding is None else f' ({table.binding})'}"
+    )

@@ -45,7 +45,8 @@ class SystemName:
 
 WHOLE, NONE = SystemName(Kind.WHOLE), SystemName(Kind.NONE)
 
-Exchanged = dict[str, ComponentTable]  # what stands at a place in place of the case's own device, by component
+# what stands at a place in place of the case's own device, by component
+Exchanged = dict[str, ComponentTable]
 
 
 def systems_of_vendors(places: Mapping[str, Place], model: str) -> dict[SystemName, Exchanged]:
@@ -58,16 +59,23 @@ def systems_of_vendors(places: Mapping[str, Place], model: str) -> dict[SystemNa
         )
 
     def only(kept: tuple[str, ...]) -> Exchanged:
-        return {name: stand_in_at(place, model) for name, place in places.items() if place.vendor not in kept}
+        return {
+            name: stand_in_at(place, model)
+            for name, place in places.items()
+            if place.vendor not in kept
+        }
 
     found = {WHOLE: Exchanged(), NONE: only(())}
     found |= {SystemName(Kind.ALONE, (vendor,)): only((vendor,)) for vendor in vendors}
     return found | {SystemName(Kind.PAIR, pair): only(pair) for pair in combinations(vendors, 2)}
 
 
-def assignments(places: Mapping[str, Place], at: Sequence[str], given: Sequence[Device]) -> dict[SystemName, Exchanged]:
+def assignments(
+    places: Mapping[str, Place], at: Sequence[str], given: Sequence[Device]
+) -> dict[SystemName, Exchanged]:
     templates = first_of({name: places[name] for name in at})
-    vendors = {place.vendor for place in places.values()}  # those at places that are not swapped as well
+    # those at places that are not swapped as well
+    vendors = {place.vendor for place in places.values()}
     if twice := [device.name for device in given if device.name in vendors]:
         raise InputError(
             f"--device {twice[0]}: a vendor of the case has this name already; give another one, as in NAME=FILE"
@@ -93,7 +101,9 @@ def assignments(places: Mapping[str, Place], at: Sequence[str], given: Sequence[
 
     found = {}
     for chosen in product(devices, repeat=len(at)):
-        tables = {name: at_place(places[name], device) for name, device in zip(at, chosen, strict=True)}
+        tables = {
+            name: at_place(places[name], device) for name, device in zip(at, chosen, strict=True)
+        }
         kept = {name: table for name, table in tables.items() if table is not None}
         found[SystemName(Kind.ASSIGNMENT, chosen)] = kept
     return found

@@ -19,7 +19,13 @@ from orchestrator.interactions.places import by_group
 from orchestrator.interactions.point import SharedMode
 from orchestrator.interactions.study import InteractionsResult
 from orchestrator.interactions.systems import Kind, SystemName
-from orchestrator.interactions.words import damping_text, frequency_text, sentences, stand_in_sentence, verdict_word
+from orchestrator.interactions.words import (
+    damping_text,
+    frequency_text,
+    sentences,
+    stand_in_sentence,
+    verdict_word,
+)
 from orchestrator.late import pd
 from orchestrator.report.cells import CELLS, Cell, CellLine, Cells
 from orchestrator.report.html.elements import Figures, document, paragraphs
@@ -74,7 +80,11 @@ class Interactions:
     def worst_assignment(self) -> dict[str, str] | None:
         """The device at each place where the system is damped least; None without a swap, or without a verdict."""
         worst = self.judgement.worst_assignment
-        return None if worst is None else dict(zip(self.result.plan.swapped, worst.name.names, strict=True))
+        return (
+            None
+            if worst is None
+            else dict(zip(self.result.plan.swapped, worst.name.names, strict=True))
+        )
 
     @property
     def sentences(self) -> list[str]:
@@ -124,14 +134,28 @@ class Interactions:
         plan = self.result.plan
 
         def cell(system: JudgedSystem) -> Cell:
-            return Cell(f"{verdict_word(system)}, {damping_text(system)} %", system.least_damping, system.stable)
+            return Cell(
+                f"{verdict_word(system)}, {damping_text(system)} %",
+                system.least_damping,
+                system.stable,
+            )
 
         sides = [CellLine(vendor, None) for vendor in plan.vendors]
-        pairs = [[cell(_together(self.judgement, a, b)) for b in plan.vendors] for a in plan.vendors]
+        pairs = [
+            [cell(_together(self.judgement, a, b)) for b in plan.vendors] for a in plan.vendors
+        ]
         title = f"Least damping of vendors alone and in pairs; {stand_in_sentence(self.judgement)}"
         values = {key: value for layer in plan.layers for key, value in layer.values.items()}
         return Cells(
-            title, plan.case, plan.prepared.name, plan.request.frequencies, sides, sides, pairs, values, plan.step_size
+            title,
+            plan.case,
+            plan.prepared.name,
+            plan.request.frequencies,
+            sides,
+            sides,
+            pairs,
+            values,
+            plan.step_size,
         )
 
     def __repr__(self) -> str:
@@ -144,7 +168,10 @@ class Interactions:
 
 def modes_table(judgement: JudgedInteractions) -> ColumnTable[JudgedMode]:
     plan = judgement.result.plan
-    groups = [*plan.vendors, *(g for g in dict.fromkeys(plan.groups.values()) if g not in plan.vendors)]
+    groups = [
+        *plan.vendors,
+        *(g for g in dict.fromkeys(plan.groups.values()) if g not in plan.vendors),
+    ]
 
     def share_of(group: str) -> Column[JudgedMode]:
         return Column(
@@ -154,13 +181,20 @@ def modes_table(judgement: JudgedInteractions) -> ColumnTable[JudgedMode]:
             f"share.{group}",
         )
 
-    return ColumnTable("As in the case", (
-        *mode_columns(lambda judged: judged.mode),
-        *map(share_of, groups),
-        Column("", lambda judged: judged.is_interaction, name="interaction"),
-        Column("", lambda judged: ", ".join(judged.vendors), name="shared_by"),
-        Column("Shared by", lambda judged: ", ".join(judged.vendors) if judged.is_interaction else ""),
-    ), judgement.modes)  # fmt: skip
+    return ColumnTable(
+        "As in the case",
+        (
+            *mode_columns(lambda judged: judged.mode),
+            *map(share_of, groups),
+            Column("", lambda judged: judged.is_interaction, name="interaction"),
+            Column("", lambda judged: ", ".join(judged.vendors), name="shared_by"),
+            Column(
+                "Shared by",
+                lambda judged: ", ".join(judged.vendors) if judged.is_interaction else "",
+            ),
+        ),
+        judgement.modes,
+    )
 
 
 def _figures(of: Callable[[Row], JudgedSystem]) -> list[Column[Row]]:
@@ -169,15 +203,25 @@ def _figures(of: Callable[[Row], JudgedSystem]) -> list[Column[Row]]:
         Column("Least damping [%]", of, damping_text),
         Column("", lambda row: of(row).least_damping, name="least_damping_percent"),
         Column("Mode", of, frequency_text),
-        Column("", lambda row: None if (mode := of(row).critical) is None else mode.frequency_hz, name="frequency_hz"),
+        Column(
+            "",
+            lambda row: None if (mode := of(row).critical) is None else mode.frequency_hz,
+            name="frequency_hz",
+        ),
     ]
 
 
 def systems_table(judgement: JudgedInteractions) -> ColumnTable[tuple[str, JudgedSystem, str]]:
     rows = [("no vendor", judgement.none, "")]
     rows += [(f"{vendor} alone", system, "") for vendor, system in judgement.alone.items()]
-    rows += [(pair.text, pair.joint, "–" if pair.fall is None else f"{pair.fall:+.2f}") for pair in judgement.pairs]
-    name, fall = Column[tuple[str, JudgedSystem, str]]("System", lambda r: r[0]), "Falls by [points]"
+    rows += [
+        (pair.text, pair.joint, "–" if pair.fall is None else f"{pair.fall:+.2f}")
+        for pair in judgement.pairs
+    ]
+    name, fall = (
+        Column[tuple[str, JudgedSystem, str]]("System", lambda r: r[0]),
+        "Falls by [points]",
+    )
     columns = (name, *_figures(lambda r: r[1]), Column(fall, lambda r: r[2]))
     return ColumnTable("Vendors alone and in pairs", columns, rows, left=2)
 
@@ -189,7 +233,9 @@ def assignments_table(judgement: JudgedInteractions) -> ColumnTable[JudgedSystem
         return Column(place, lambda one: one.name.names[k], name=f"at.{place}")
 
     columns = [*(at(k, place) for k, place in enumerate(swapped)), *_figures(lambda one: one)]
-    return ColumnTable("Each device at each place", columns, judgement.assignments, left=len(swapped) + 1)
+    return ColumnTable(
+        "Each device at each place", columns, judgement.assignments, left=len(swapped) + 1
+    )
 
 
 def warnings_of(judgement: JudgedInteractions) -> list[str]:
@@ -201,7 +247,10 @@ def warnings_of(judgement: JudgedInteractions) -> list[str]:
             systems = having.setdefault(text, [])
             if (called := plan_text(result.plan.swapped, name)) not in systems:
                 systems.append(called)
-    return [*doubts_of(judgement), *(f"{first_few(systems, str)}: {text}" for text, systems in having.items())]
+    return [
+        *doubts_of(judgement),
+        *(f"{first_few(systems, str)}: {text}" for text, systems in having.items()),
+    ]
 
 
 def _pair(pair: JudgedPair) -> dict[str, Any]:
@@ -213,39 +262,55 @@ def _pair(pair: JudgedPair) -> dict[str, Any]:
         "frequency_hz": None if pair.joint.critical is None else pair.joint.critical.frequency_hz,
         "falls_by_points": pair.fall,
         "unstable_though_stable_alone": pair.fights,
-        **{f"{which}_alone_{key}": value for which, _, record in each
-           for key, value in (("stable", record.stable), ("damping_percent", record.least_damping))},
-    }  # fmt: skip
+        **{
+            f"{which}_alone_{key}": value
+            for which, _, record in each
+            for key, value in (("stable", record.stable), ("damping_percent", record.least_damping))
+        },
+    }
 
 
 def as_json(judgement: JudgedInteractions) -> dict[str, Any]:
     plan, worst, swap = judgement.result.plan, judgement.worst_pair, judgement.worst_assignment
     groups = plan.groups
     found: dict[str, Any] = {
-        **plan.prepared.about, "stand_in": plan.stand_in,
-        "threshold_percent": 100 * plan.request.threshold, "range_hz": list(plan.request.frequencies),
-        "vendors": list(plan.vendors), "places": {name: place.vendor for name, place in plan.places.items()},
-        "groups": groups, "as_in_the_case": _system(judgement.whole, groups),
+        **plan.prepared.about,
+        "stand_in": plan.stand_in,
+        "threshold_percent": 100 * plan.request.threshold,
+        "range_hz": list(plan.request.frequencies),
+        "vendors": list(plan.vendors),
+        "places": {name: place.vendor for name, place in plan.places.items()},
+        "groups": groups,
+        "as_in_the_case": _system(judgement.whole, groups),
         "interaction_modes": [_shared(judged) for judged in judgement.interaction_modes],
         "no_vendor": _system(judgement.none, groups),
         "alone": {vendor: _system(system, groups) for vendor, system in judgement.alone.items()},
-        "pairs": [_pair(pair) | {"vendors": list(pair.vendors), "sentence": pair.sentence()}
-                  | _system(pair.joint, groups) for pair in judgement.pairs],
+        "pairs": [
+            _pair(pair)
+            | {"vendors": list(pair.vendors), "sentence": pair.sentence()}
+            | _system(pair.joint, groups)
+            for pair in judgement.pairs
+        ],
         "worst_pair": None if worst is None else list(worst.vendors),
         "unknown_pairs": [list(pair.vendors) for pair in judgement.unknown_pairs],
-    }  # fmt: skip
+    }
     if plan.swapped:
         found["assignments"] = [
-            {"at": dict(zip(plan.swapped, system.name.names, strict=True))} | _system(system, groups, modes=False)
+            {"at": dict(zip(plan.swapped, system.name.names, strict=True))}
+            | _system(system, groups, modes=False)
             for system in judgement.assignments
         ]
-        found["worst_assignment"] = None if swap is None else dict(zip(plan.swapped, swap.name.names, strict=True))
+        found["worst_assignment"] = (
+            None if swap is None else dict(zip(plan.swapped, swap.name.names, strict=True))
+        )
     return found | {"warnings": warnings_of(judgement)}
 
 
 def _shared(judged: JudgedMode) -> dict[str, Any]:
     mode = judged.mode
-    return eigenvalue_json(mode.eigenvalue, mode.damping_percent) | {"vendors": list(judged.vendors)}
+    return eigenvalue_json(mode.eigenvalue, mode.damping_percent) | {
+        "vendors": list(judged.vendors)
+    }
 
 
 def _system(system: JudgedSystem, groups: dict[str, str], *, modes: bool = True) -> dict[str, Any]:
@@ -254,10 +319,14 @@ def _system(system: JudgedSystem, groups: dict[str, str], *, modes: bool = True)
         "stable": system.stable,
         "stability": system.record.stability,
         "least_damping_percent": system.least_damping,
-        "critical": None if critical is None else eigenvalue_json(critical.eigenvalue, critical.damping_percent),
+        "critical": None
+        if critical is None
+        else eigenvalue_json(critical.eigenvalue, critical.damping_percent),
         "error": system.record.error,
     }
-    return found | ({"modes": [_mode(mode, groups) for mode in system.record.modes]} if modes else {})
+    return found | (
+        {"modes": [_mode(mode, groups) for mode in system.record.modes]} if modes else {}
+    )
 
 
 def _mode(mode: SharedMode, groups: dict[str, str]) -> dict[str, Any]:
@@ -275,7 +344,12 @@ def _page(found: Interactions) -> str:
     if plan.swapped:
         content.append(("Each device at each place", _swap(judgement, figures)))
     if found.warnings:
-        content.append(("Warnings", f"<ul>{''.join(f'<li>{escape(text)}</li>' for text in found.warnings)}</ul>"))
+        content.append(
+            (
+                "Warnings",
+                f"<ul>{''.join(f'<li>{escape(text)}</li>' for text in found.warnings)}</ul>",
+            )
+        )
     title = f"{plan.case.table.title or plan.case.name}: interactions"
     kind = f"{plan.prepared.title}, {len(plan.vendors)} vendors at {len(plan.places)} places"
     return document(title, kind, paragraphs(found.stable, found.sentences), content)
@@ -298,12 +372,17 @@ def _together(judgement: JudgedInteractions, a: str, b: str) -> JudgedSystem:
 
 
 def _swap(judgement: JudgedInteractions, figures: Figures) -> str:
-    swapped, found = judgement.result.plan.swapped, {system.name: system for system in judgement.assignments}
+    swapped, found = (
+        judgement.result.plan.swapped,
+        {system.name: system for system in judgement.assignments},
+    )
     text = assignments_table(judgement).html()
     if len(swapped) != 2:
         return text
     devices = sorted({name.names[0] for name in found})
-    cells = [[found[SystemName(Kind.ASSIGNMENT, (row, column))] for column in devices] for row in devices]
+    cells = [
+        [found[SystemName(Kind.ASSIGNMENT, (row, column))] for column in devices] for row in devices
+    ]
     picture = _heat_picture("Least damping of each assignment", devices, cells)
     words = f"Least damping [%]; row: the device at {swapped[0]}, column: at {swapped[1]}. U: unstable; ?: not known."
     return figures.add(picture, words)[0] + text

@@ -1,6 +1,11 @@
 """Sentences of a study of interactions."""
 
-from orchestrator.interactions.judgement import JudgedInteractions, JudgedSystem, place_of, plan_text
+from orchestrator.interactions.judgement import (
+    JudgedInteractions,
+    JudgedSystem,
+    place_of,
+    plan_text,
+)
 from orchestrator.report.tables import VerdictSentence
 
 _SHOWN = 3
@@ -23,7 +28,9 @@ def frequency_text(system: JudgedSystem) -> str:
 
 def verdict_of(judgement: JudgedInteractions) -> VerdictSentence:
     whole = judgement.whole.record
-    return VerdictSentence(whole.stable, verdict_word(judgement.whole), whole.error or whole.because)
+    return VerdictSentence(
+        whole.stable, verdict_word(judgement.whole), whole.error or whole.because
+    )
 
 
 def modes_sentence(judgement: JudgedInteractions) -> str:
@@ -39,7 +46,9 @@ def modes_sentence(judgement: JudgedInteractions) -> str:
 
 
 def alone_sentence(judgement: JudgedInteractions) -> str:
-    found = [(vendor, system) for vendor, system in judgement.alone.items() if system.stable is False]
+    found = [
+        (vendor, system) for vendor, system in judgement.alone.items() if system.stable is False
+    ]
     if not found:
         return ""
     shown = [f"{vendor}, {damping_text(one)} % at {frequency_text(one)}" for vendor, one in found]
@@ -54,9 +63,18 @@ def pairs_sentence(judgement: JudgedInteractions) -> str:
     known = len(judgement.pairs) - len(unknown)
     rest = "" if not unknown else f"; not known: {', '.join(pair.text for pair in unknown)}"
     grow = [pair.text for pair in judgement.pairs if pair.joint.stable is False]
-    rest = f"; UNSTABLE: {', '.join(grow)}{rest}" if grow and (worst is None or len(grow) > 1) else rest
+    rest = (
+        f"; UNSTABLE: {', '.join(grow)}{rest}"
+        if grow and (worst is None or len(grow) > 1)
+        else rest
+    )
     least = judgement.least_damped_pair
-    if least is not None and least is not worst and len(judgement.pairs) > 1 and least.joint.stable is not False:
+    if (
+        least is not None
+        and least is not worst
+        and len(judgement.pairs) > 1
+        and least.joint.stable is not False
+    ):
         where = f"{damping_text(least.joint)} % at {frequency_text(least.joint)}"
         rest = f"; the least damped pair is {least.text}, {where}{rest}"
     if worst is not None:
@@ -75,8 +93,12 @@ def swap_sentence(judgement: JudgedInteractions) -> str:
     if worst is None:
         return f"worst assignment: not known: {found[0].why_unknown}"
     grows = sum(one.stable is False for one in found)
-    counted = f"{grows} of {len(found)} are UNSTABLE" if grows else f"none of {len(found)} is UNSTABLE"
-    rest = f", {len(unknown)} {'has' if len(unknown) == 1 else 'have'} no verdict" if unknown else ""
+    counted = (
+        f"{grows} of {len(found)} are UNSTABLE" if grows else f"none of {len(found)} is UNSTABLE"
+    )
+    rest = (
+        f", {len(unknown)} {'has' if len(unknown) == 1 else 'have'} no verdict" if unknown else ""
+    )
     figure = f"least damping {damping_text(worst)} %{', ' if worst.critical else ''}{frequency_text(worst)}"
     return f"worst assignment: {plan_text(swapped, worst.name)}: {verdict_word(worst)}, {figure}; {counted}{rest}"
 
@@ -91,7 +113,11 @@ def stand_in_sentence(judgement: JudgedInteractions) -> str:
 
 def sentences(judgement: JudgedInteractions) -> list[str]:
     every = [
-        str(verdict_of(judgement)), modes_sentence(judgement), alone_sentence(judgement), pairs_sentence(judgement),
-        swap_sentence(judgement), stand_in_sentence(judgement),
-    ]  # fmt: skip
+        str(verdict_of(judgement)),
+        modes_sentence(judgement),
+        alone_sentence(judgement),
+        pairs_sentence(judgement),
+        swap_sentence(judgement),
+        stand_in_sentence(judgement),
+    ]
     return [text for text in every if text]

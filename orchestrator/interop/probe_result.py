@@ -21,7 +21,11 @@ from orchestrator.coupling.schedule import FirstInputs, Schedule
 from orchestrator.coupling.system import System
 from orchestrator.errors import InputError
 
-ORDERS = {"side by side": (("a", "b"),), "a, then b": (("a",), ("b",)), "b, then a": (("b",), ("a",))}
+ORDERS = {
+    "side by side": (("a", "b"),),
+    "a, then b": (("a",), ("b",)),
+    "b, then a": (("b",), ("a",)),
+}
 EXTRAPOLATIONS = (0.0, 0.5, 1.0)
 SIGNALS = ("a.y", "b.y", "a.u_held", "b.u_held", "a.stepped", "b.stepped")
 LABELS = (0, 1, -1)  # how many steps a row's outputs are ahead of its time
@@ -51,7 +55,9 @@ MasterTrajectory = tuple[Candidate, NDArray[np.float64]]
 
 
 @cache
-def candidates(step_size: float, steps: int, extrapolation: float = 0.0) -> tuple[MasterTrajectory, ...]:
+def candidates(
+    step_size: float, steps: int, extrapolation: float = 0.0
+) -> tuple[MasterTrajectory, ...]:
     """Every schedule with one kind of extrapolation, and its trajectory of ``steps`` + 1 rows."""
     found = []
     for schedule in _schedules(extrapolation):
@@ -60,7 +66,13 @@ def candidates(step_size: float, steps: int, extrapolation: float = 0.0) -> tupl
                 rows = np.full((steps + 1, len(SIGNALS)), np.nan)
                 source = values[max(0, early) : steps + 1 + early]
                 rows[max(0, -early) : max(0, -early) + len(source)] = source
-                what = schedule.name, schedule.first_inputs, schedule.extrapolation, early, bool(after_exchange)
+                what = (
+                    schedule.name,
+                    schedule.first_inputs,
+                    schedule.extrapolation,
+                    early,
+                    bool(after_exchange),
+                )
                 found.append((Candidate(*what, schedule.wire_by_wire), rows))
     return tuple(found)
 
@@ -87,7 +99,8 @@ _NEEDED = ("a.y", "b.y")
 @dataclass(frozen=True)
 class ProbeResult:
     times: NDArray[np.float64]  # labels [s], shape (n,), rising
-    values: NDArray[np.float64]  # shape (n, number of `SIGNALS`); NaN where a signal was not recorded
+    # shape (n, number of `SIGNALS`); NaN where a signal was not recorded
+    values: NDArray[np.float64]
     columns: dict[str, str]  # signal → heading of the column it was read from
 
 
@@ -102,7 +115,10 @@ def read_probe_result(path: Path, named: Mapping[str, str] | None = None) -> Pro
     heads, lines = _table(path)
     columns = _columns(path, heads, dict(named or {}))
     picked = np.array(
-        [[_number(path, line, heads, columns[s], row) for s in columns] for row, line in enumerate(lines)]
+        [
+            [_number(path, line, heads, columns[s], row) for s in columns]
+            for row, line in enumerate(lines)
+        ]
     )
     picked = picked[np.argsort(picked[:, 0], kind="stable")]
     last = np.append(np.diff(picked[:, 0]) > 0, True)  # the last of several rows with one time
@@ -117,29 +133,45 @@ def _table(path: Path) -> tuple[list[str], list[list[str]]]:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
-        raise InputError(f"{path}: it cannot be read: {error.strerror}; give the tool's output as CSV") from error
+        raise InputError(
+            f"{path}: it cannot be read: {error.strerror}; give the tool's output as CSV"
+        ) from error
     except UnicodeDecodeError as error:
-        raise InputError(f"{path}: it is not text ({error}); give the tool's output as CSV") from error
+        raise InputError(
+            f"{path}: it is not text ({error}); give the tool's output as CSV"
+        ) from error
     filled = [line for line in text.splitlines() if line.strip()]
     if len(filled) < 2:
-        raise InputError(f"{path}: it has no heading with rows below it; give the tool's output as CSV")
+        raise InputError(
+            f"{path}: it has no heading with rows below it; give the tool's output as CSV"
+        )
     separator = max(",;\t", key=filled[0].count)
     rows = [[entry.strip() for entry in row] for row in csv.reader(filled, delimiter=separator)]
     commas = separator != ","  # as the sign before decimals, where there is no point
-    return rows[0], [[e.replace(",", ".") if commas and "." not in e else e for e in row] for row in rows[1:]]
+    return rows[0], [
+        [e.replace(",", ".") if commas and "." not in e else e for e in row] for row in rows[1:]
+    ]
 
 
 def _columns(path: Path, heads: list[str], named: dict[str, str]) -> dict[str, int]:
     """Signal → index of its column, the time first."""
     if unknown := [signal for signal in named if signal not in ("time", *SIGNALS)]:
-        raise InputError(f"there is no signal {', '.join(unknown)}; signals: time, {', '.join(SIGNALS)}")
+        raise InputError(
+            f"there is no signal {', '.join(unknown)}; signals: time, {', '.join(SIGNALS)}"
+        )
     found: dict[str, int] = {}
     for signal in ("time", *SIGNALS):
         if signal in named and named[signal] not in heads:
-            raise InputError(f"{path}: it has no column {named[signal]!r}; columns: {', '.join(heads)}")
-        fitting = [named[signal]] if signal in named else [head for head in heads if _means(head, signal)]
+            raise InputError(
+                f"{path}: it has no column {named[signal]!r}; columns: {', '.join(heads)}"
+            )
+        fitting = (
+            [named[signal]] if signal in named else [head for head in heads if _means(head, signal)]
+        )
         if len(fitting) > 1:
-            raise InputError(f"{path}: {signal} may be any of {', '.join(fitting)}; say which with --column {signal}=…")
+            raise InputError(
+                f"{path}: {signal} may be any of {', '.join(fitting)}; say which with --column {signal}=…"
+            )
         if fitting:
             found[signal] = heads.index(fitting[0])
     if "time" not in found or not any(signal in found for signal in _NEEDED):
@@ -154,7 +186,11 @@ def _columns(path: Path, heads: list[str], named: dict[str, str]) -> dict[str, i
 def _means(head: str, signal: str) -> bool:
     plain = re.sub(r"\[[^\]]*\]\s*$|\([^)]*\)\s*$", "", head).strip().strip("\"'").lower()
     plain = re.sub(r"[^a-z0-9]+", ".", plain).strip(".")
-    return plain in _TIMES if signal == "time" else f".{plain}".endswith("." + signal.replace("_", "."))
+    return (
+        plain in _TIMES
+        if signal == "time"
+        else f".{plain}".endswith("." + signal.replace("_", "."))
+    )
 
 
 def _number(path: Path, line: list[str], heads: list[str], column: int, row: int) -> float:
@@ -164,5 +200,7 @@ def _number(path: Path, line: list[str], heads: list[str], column: int, row: int
     except ValueError:
         value = np.nan
     if not np.isfinite(value):
-        raise InputError(f"{path}, row {row + 1}, column {heads[column]!r}: {entry!r} is not a finite number")
+        raise InputError(
+            f"{path}, row {row + 1}, column {heads[column]!r}: {entry!r} is not a finite number"
+        )
     return value

@@ -28,7 +28,8 @@ class MasterRules:
     name: str
     title: str
     steps: Steps  # jacobi or Gauss-Seidel
-    first_inputs: FirstInputs = "consistent"  # what connected inputs hold in the first step; see `FirstInputs`
+    # what connected inputs hold in the first step; see `FirstInputs`
+    first_inputs: FirstInputs = "consistent"
     # a row labelled t holds what t/H + ``early_label`` steps gave: 1 where the time is noted before the step and the
     # outputs after it
     early_label: int = 0
@@ -39,7 +40,8 @@ class MasterRules:
     wire_by_wire: bool = False
     ticks_per_second: int | None = None
     last_label: LastLabel = "stop"  # see `LastLabel`
-    source: str = ""  # where in the master's source code or in the test results each choice can be seen
+    # where in the master's source code or in the test results each choice can be seen
+    source: str = ""
 
     def schedule(self, components: Sequence[str], order: Sequence[str] | None = None) -> Schedule:
         """The schedule for a system.
@@ -50,12 +52,19 @@ class MasterRules:
         not list every component once."""
         if self.steps == "side by side":
             if order is not None:
-                raise InputError(f"{self.title} steps all components side by side, so that they have no order")
+                raise InputError(
+                    f"{self.title} steps all components side by side, so that they have no order"
+                )
             groups: tuple[tuple[str, ...], ...] = (tuple(components),)
         else:
             groups = tuple((name,) for name in (order or components))
         chosen = Schedule(
-            self.name, groups, self.first_inputs, self.extrapolation, self.wire_by_wire, self.ticks_per_second
+            self.name,
+            groups,
+            self.first_inputs,
+            self.extrapolation,
+            self.wire_by_wire,
+            self.ticks_per_second,
         )
         chosen.check(set(components))
         return chosen
@@ -72,11 +81,15 @@ class MasterRules:
 
 MASTERS = {
     name: MasterRules(name, **rules)
-    for name, rules in tomllib.loads(Path(__file__).with_name("masters.toml").read_text(encoding="utf-8")).items()
+    for name, rules in tomllib.loads(
+        Path(__file__).with_name("masters.toml").read_text(encoding="utf-8")
+    ).items()
 }
 
 
 def master_rules(name: str) -> MasterRules:
     if name not in MASTERS:
-        raise InputError(f"there is no master {name!r} to run like; known are: {', '.join(MASTERS)}")
+        raise InputError(
+            f"there is no master {name!r} to run like; known are: {', '.join(MASTERS)}"
+        )
     return MASTERS[name]

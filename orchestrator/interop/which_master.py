@@ -8,7 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import InputError
-from orchestrator.interop.probe_result import EXTRAPOLATIONS, SIGNALS, Candidate, ProbeResult, candidates
+from orchestrator.interop.probe_result import (
+    EXTRAPOLATIONS,
+    SIGNALS,
+    Candidate,
+    ProbeResult,
+    candidates,
+)
 from orchestrator.interop.rules import MASTERS, MasterRules
 
 STEP_SIZE, STOP_TIME = 0.1, 2.0  # step size and stop time that the instructions ask for [s]
@@ -49,21 +55,29 @@ class Identified:
     def masters(self) -> tuple[str, ...]:
         """Known masters with one of these schedules; only those that end at the same row, if there are any."""
         alike = [rules for rules in MASTERS.values() if any(_is(fit, rules) for fit in self.fits)]
-        ending = [rules for rules in alike if rules.rows(self.step_size, self.stop_time) == self.last_row + 1]
+        ending = [
+            rules
+            for rules in alike
+            if rules.rows(self.step_size, self.stop_time) == self.last_row + 1
+        ]
         return tuple(rules.name for rules in ending or alike)
 
 
 PROPERTIES = tuple(field.name for field in fields(Candidate))
 
 
-def identify(result: ProbeResult, step_size: float = STEP_SIZE, stop_time: float = STOP_TIME) -> Identified:
+def identify(
+    result: ProbeResult, step_size: float = STEP_SIZE, stop_time: float = STOP_TIME
+) -> Identified:
     """Compare a result with every schedule.
 
     Raises an `InputError` if too few rows are at communication points, or the result shows that the steps had another
     size."""
     intervals = round(stop_time / step_size)
     if intervals < _LEAST_ROWS or abs(intervals * step_size - stop_time) > _ON_POINT * step_size:
-        raise InputError(f"{stop_time:g} s are not a whole number of steps of {step_size:g} s, {_LEAST_ROWS} at least")
+        raise InputError(
+            f"{stop_time:g} s are not a whole number of steps of {step_size:g} s, {_LEAST_ROWS} at least"
+        )
     points = result.times / step_size
     on_point = np.abs(points - np.round(points)) <= _ON_POINT
     index = np.round(points).astype(int)
@@ -77,7 +91,9 @@ def identify(result: ProbeResult, step_size: float = STEP_SIZE, stop_time: float
     differences = list(_differences(index[known], result.values[known], step_size, intervals))
     best, nearest = min(differences, key=lambda pair: pair[0])
     fits = tuple(c for d, c in differences if d <= max(10 * best, 1e-9)) if best <= _FITS else ()
-    return Identified(fits, nearest, best, int(known.sum()), int(index[on_point].max()), step_size, stop_time)
+    return Identified(
+        fits, nearest, best, int(known.sum()), int(index[on_point].max()), step_size, stop_time
+    )
 
 
 def _differences(
@@ -110,7 +126,9 @@ def _check_steps(result: ProbeResult, step_size: float) -> None:
 def _is(fit: Candidate, rules: MasterRules) -> bool:
     in_turn = fit.order != "side by side"
     same = ("first_inputs", "extrapolation", "early_label", "after_exchange", "wire_by_wire")
-    return in_turn == (rules.steps == "in turn") and all(getattr(fit, name) == getattr(rules, name) for name in same)
+    return in_turn == (rules.steps == "in turn") and all(
+        getattr(fit, name) == getattr(rules, name) for name in same
+    )
 
 
 def instructions(step_size: float, stop_time: float, platforms: tuple[str, ...]) -> str:
@@ -118,4 +136,10 @@ def instructions(step_size: float, stop_time: float, platforms: tuple[str, ...])
     usual = (step_size, stop_time) == (STEP_SIZE, STOP_TIME)
     options = "" if usual else f" --step {step_size:g} --stop {stop_time:g}"
     page = Path(__file__).with_name("instructions.txt").read_text(encoding="utf-8")
-    return page.format(step=step_size, stop=stop_time, signals=signals, platforms=", ".join(platforms), options=options)
+    return page.format(
+        step=step_size,
+        stop=stop_time,
+        signals=signals,
+        platforms=", ".join(platforms),
+        options=options,
+    )

@@ -33,7 +33,8 @@ class PointModel:
 
     model: LinearModel
     blocks: Blocks
-    components: dict[str, ComponentLinearization]  # with what damping controllers act on and measure
+    # with what damping controllers act on and measure
+    components: dict[str, ComponentLinearization]
     doubts: tuple[str, ...]  # a warning where a limit is so close that the model is doubtful
 
 
@@ -69,21 +70,41 @@ class PointBench(Closing):
         last digit, the model that is there is taken."""
         master = self._master
         assert master is not None
-        component, plan, exchange = master.components[name], master.system.components[name], master.exchanges[name]
-        at = StateAccess(component).read().tobytes(), RealBatch(component, exchange.inputs.names).read().tobytes()
+        component, plan, exchange = (
+            master.components[name],
+            master.system.components[name],
+            master.exchanges[name],
+        )
+        at = (
+            StateAccess(component).read().tobytes(),
+            RealBatch(component, exchange.inputs.names).read().tobytes(),
+        )
         path, asked = plan.description.path, (exchange.inputs.names, exchange.outputs.names)
-        key = (path, tuple(sorted(plan.parameters.items())), tuple(plan.inputs.items()), *asked, *at)
+        key = (
+            path,
+            tuple(sorted(plan.parameters.items())),
+            tuple(plan.inputs.items()),
+            *asked,
+            *at,
+        )
         if key not in self._models:
             if len(self._models) >= _KEPT:
                 self._models.clear()
             driven, observed = (DRIVEN, OBSERVED) if is_converter(plan) else ((), ())
             with other_step(master, name, 0.0):
                 found = linearize_slopes(
-                    exchange, master.time, master.clock.step_size, driven, observed, self._like.get(path)
+                    exchange,
+                    master.time,
+                    master.clock.step_size,
+                    driven,
+                    observed,
+                    self._like.get(path),
                 )
             self._models[key] = found
             known = self._like.setdefault(path, found)
-            if covers(found, known):  # without a unit, the grid has fewer inputs: the model of all serves longer
+            if covers(
+                found, known
+            ):  # without a unit, the grid has fewer inputs: the model of all serves longer
                 self._like[path] = found
             self.perturbed += 1
         else:
@@ -93,9 +114,15 @@ class PointBench(Closing):
     def linear_model(self) -> PointModel:
         assert self._master is not None
         whole = {name: self.linearized(name) for name in self._master.components}
-        blocks = Blocks(self._master, known={n: without_references(c) for n, c in whole.items()}, without_step=True)
+        blocks = Blocks(
+            self._master,
+            known={n: without_references(c) for n, c in whole.items()},
+            without_step=True,
+        )
         doubtful = [f"{name}: {few(c.doubtful, _SHOWN)}" for name, c in whole.items() if c.doubtful]
-        text = f"a limit is so close that the linear model is doubtful: {few(doubtful, _SHOWN, '; ')}"
+        text = (
+            f"a limit is so close that the linear model is doubtful: {few(doubtful, _SHOWN, '; ')}"
+        )
         return PointModel(continuous(blocks), blocks, whole, (text,) if doubtful else ())
 
     def close(self) -> None:
@@ -107,7 +134,9 @@ class PointBench(Closing):
 
 def is_converter(plan: ComponentPlan) -> bool:
     """Whether a component is a converter with references that a damping controller acts on, and a frequency."""
-    return plan.kind == "converter" and all(name in plan.description.variables for name in (*DRIVEN, *OBSERVED))
+    return plan.kind == "converter" and all(
+        name in plan.description.variables for name in (*DRIVEN, *OBSERVED)
+    )
 
 
 def without_references(c: Any) -> Any:
@@ -123,9 +152,14 @@ def _same_fmus(master: Master, prepared: PreparedScenario) -> bool:
         not (system.wires or other.wires)
         and system.connections == other.connections
         and list(system.components) == list(other.components)
-        and all(plan.description.path == other.components[n].description.path for n, plan in system.components.items())
+        and all(
+            plan.description.path == other.components[n].description.path
+            for n, plan in system.components.items()
+        )
         and all(map(is_ours, {plan.description.path for plan in system.components.values()}))
-        and all(plan.isolated == other.components[n].isolated for n, plan in system.components.items())
+        and all(
+            plan.isolated == other.components[n].isolated for n, plan in system.components.items()
+        )
         and master.schedule == prepared.schedule
         and master.clock.step_size == prepared.step_size
     )

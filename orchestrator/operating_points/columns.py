@@ -27,7 +27,8 @@ class Elements:
     shunts: tuple[str, ...]
     slack: str
     balancing: tuple[str, ...] = ()  # units at the slack bus that feed what is left
-    step_ups: Mapping[str, str] = field(default_factory=dict)  # branch whose loss is that of a unit alone → the unit
+    # branch whose loss is that of a unit alone → the unit
+    step_ups: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, prepared: PreparedScenario) -> "Elements":
@@ -42,11 +43,15 @@ class Elements:
         branches = [*(line.name for line in network.lines), *(x.name for x in network.transformers)]
         wanted = table.slack or prepared.source_slack or ""
         return cls(
-            table.grid, units, tuple(name for name in branches if f"{name}.connected" in switches),
+            table.grid,
+            units,
+            tuple(name for name in branches if f"{name}.connected" in switches),
             tuple(load.name for load in network.loads),
-            tuple(x.name for x in network.shunts if f"{x.name}.connected" in switches), units.get(wanted, wanted),
-            prepared.power_flow.balancing if prepared.power_flow else (), _step_ups(prepared, units),
-        )  # fmt: skip
+            tuple(x.name for x in network.shunts if f"{x.name}.connected" in switches),
+            units.get(wanted, wanted),
+            prepared.power_flow.balancing if prepared.power_flow else (),
+            _step_ups(prepared, units),
+        )
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -69,8 +74,10 @@ def _step_ups(prepared: PreparedScenario, units: Mapping[str, str]) -> dict[str,
     only = {bus: unit for unit, bus in units.items() if ends[bus] == 2}  # itself and one branch
     return {
         line.name: only[bus]
-        for line in network.lines for bus in (line.from_bus, line.to_bus) if bus in only and not line.B
-    }  # fmt: skip
+        for line in network.lines
+        for bus in (line.from_bus, line.to_bus)
+        if bus in only and not line.B
+    }
 
 
 @dataclass(frozen=True)
@@ -98,7 +105,11 @@ def reading_of(column: str, elements: Elements, prepared: PreparedScenario) -> R
     if column == "generation":
         return lambda text: _generation(_factor(column, text), elements, prepared)
     name, dot, quantity = column.partition(".")
-    if quantity in SERVICE and quantity != IN_SERVICE and name in {*elements.lines, *elements.loads, *elements.shunts}:
+    if (
+        quantity in SERVICE
+        and quantity != IN_SERVICE
+        and name in {*elements.lines, *elements.loads, *elements.shunts}
+    ):
         raise InputError(f"{name} is switched by the column {name}.{IN_SERVICE}, with 1 or 0")
     if dot and quantity == IN_SERVICE:
         return _service(column, name, elements, prepared)
@@ -111,7 +122,9 @@ def _factor(column: str, text: str) -> float:
     """A factor of the case's own power; percent would be far above."""
     factor = _positive(column, text)
     if factor >= _PERCENT:
-        raise ValueError(f"{column} = {text!r} is a factor of the case's own; write {factor / 100:g} for {factor:g} %")
+        raise ValueError(
+            f"{column} = {text!r} is a factor of the case's own; write {factor / 100:g} for {factor:g} %"
+        )
     return factor
 
 
@@ -124,35 +137,56 @@ def _service(column: str, name: str, elements: Elements, prepared: PreparedScena
         state = STATES.get(text.lower())
         if state is None:
             raise ValueError(f"{column} = {text!r}; it must be 1 or 0, true or false")
-        return Setting(_closing(column, name, elements, prepared)) if state else Setting(out=(name,))
+        return (
+            Setting(_closing(column, name, elements, prepared)) if state else Setting(out=(name,))
+        )
 
     return read
 
 
-def _closing(column: str, name: str, elements: Elements, prepared: PreparedScenario) -> dict[str, Value]:
+def _closing(
+    column: str, name: str, elements: Elements, prepared: PreparedScenario
+) -> dict[str, Value]:
     """The switches that are to be closed for an element that the case has out of service; none for one in service."""
     plans, grid = prepared.system.components, elements.grid
     if name in elements.loads:
         if not plans[grid].number(f"{name}.scale"):
-            raise ValueError(f"{column} = 1, but the case has {name} off by its scale of 0; give {grid}.{name}.scale")
+            raise ValueError(
+                f"{column} = 1, but the case has {name} off by its scale of 0; give {grid}.{name}.scale"
+            )
         return {}
-    switches = [(grid, f"{name}.connected"), *([(name, "connected")] if name in elements.units else [])]
-    found = [(owner, switch) for owner, switch in switches if switch in plans[owner].description.variables]
+    switches = [
+        (grid, f"{name}.connected"),
+        *([(name, "connected")] if name in elements.units else []),
+    ]
+    found = [
+        (owner, switch)
+        for owner, switch in switches
+        if switch in plans[owner].description.variables
+    ]
     return {f"{owner}.{switch}": True for owner, switch in found if not plans[owner].value(switch)}
 
 
-def _power(column: str, name: str, quantity: str, elements: Elements, prepared: PreparedScenario) -> Reading:
+def _power(
+    column: str, name: str, quantity: str, elements: Elements, prepared: PreparedScenario
+) -> Reading:
     if name in elements.loads:
         variable = f"{name}.{'P' if quantity == ACTIVE else 'Q'}"
         if variable not in prepared.system.components[elements.grid].description.variables:
-            raise InputError(f"the load {name} was built without reactive power, which cannot be given it here")
+            raise InputError(
+                f"the load {name} was built without reactive power, which cannot be given it here"
+            )
         return lambda text: Setting(drawn={f"{elements.grid}.{variable}": _number(column, text)})
     members = tuple(unit for unit, bus in elements.units.items() if name in (unit, bus))
     if not members:
         known = (*elements.units, *dict.fromkeys(elements.units.values()), *elements.loads)
-        raise InputError(f"there is no unit, bus with a unit, or load {name!r}; {close_names(name, known, '')}")
+        raise InputError(
+            f"there is no unit, bus with a unit, or load {name!r}; {close_names(name, known, '')}"
+        )
     if quantity == REACTIVE:
-        raise InputError(f"the reactive power of {name} follows from its voltage in the power flow; set {name}.v_0")
+        raise InputError(
+            f"the reactive power of {name} follows from its voltage in the power flow; set {name}.v_0"
+        )
     return lambda text: Setting(fed=(members, _number(column, text)))
 
 
@@ -160,17 +194,30 @@ def own_power(column: str, elements: Elements, prepared: PreparedScenario) -> fl
     """What a column of powers gives in the case itself [MW, Mvar]; None for another column."""
     name, _, quantity = column.partition(".")
     if quantity == ACTIVE and name not in elements.loads:
-        plans = {unit: prepared.system.components[unit] for unit, bus in elements.units.items() if name in (unit, bus)}
-        return sum(_dispatched(prepared, unit, plan) * float(plan.number("S_n")) for unit, plan in plans.items())
+        plans = {
+            unit: prepared.system.components[unit]
+            for unit, bus in elements.units.items()
+            if name in (unit, bus)
+        }
+        return sum(
+            _dispatched(prepared, unit, plan) * float(plan.number("S_n"))
+            for unit, plan in plans.items()
+        )
     if quantity not in (ACTIVE, REACTIVE):
         return None
     grid = prepared.system.components[elements.grid]
-    return grid.number(f"{name}.{'P' if quantity == ACTIVE else 'Q'}") * grid.number(f"{name}.scale")
+    return grid.number(f"{name}.{'P' if quantity == ACTIVE else 'Q'}") * grid.number(
+        f"{name}.scale"
+    )
 
 
 def _generation(factor: float, elements: Elements, prepared: PreparedScenario) -> Setting:
-    plans = {u: prepared.system.components[u] for u in elements.units if u not in elements.balancing}
-    return Setting({f"{unit}.P_0": factor * _dispatched(prepared, unit, plan) for unit, plan in plans.items()})
+    plans = {
+        u: prepared.system.components[u] for u in elements.units if u not in elements.balancing
+    }
+    return Setting(
+        {f"{unit}.P_0": factor * _dispatched(prepared, unit, plan) for unit, plan in plans.items()}
+    )
 
 
 def _dispatched(prepared: PreparedScenario, unit: str, plan: ComponentPlan) -> float:
@@ -186,12 +233,20 @@ def _variable(column: str, prepared: PreparedScenario) -> Reading:
             "it is none of time, name, hours, load, generation, ELEMENT.in_service, UNIT.P_mw, LOAD.P_mw, LOAD.Q_mvar, "
             f"and no component.variable; components: {', '.join([*prepared.system.components][:6])} …"
         )
-    infos = {n: found for n, p in plans.items() if (found := p.description.variables.get(variable)) is not None}
+    infos = {
+        n: found
+        for n, p in plans.items()
+        if (found := p.description.variables.get(variable)) is not None
+    }
     if not infos:
         known = next(iter(plans.values())).description.parameters
-        raise InputError(f"{pattern} has no parameter {variable!r}; {close_names(variable, known, '`gfor fmu info`')}")
+        raise InputError(
+            f"{pattern} has no parameter {variable!r}; {close_names(variable, known, '`gfor fmu info`')}"
+        )
     # Each component by its own name: other columns look up what they share with this one.
-    return lambda text: Setting({f"{n}.{variable}": convert(info, read_value(text)) for n, info in infos.items()})
+    return lambda text: Setting(
+        {f"{n}.{variable}": convert(info, read_value(text)) for n, info in infos.items()}
+    )
 
 
 def _number(column: str, text: str) -> float:

@@ -26,11 +26,17 @@ class Status(StrEnum):
 
 
 _STATUS = {
-    ErrorKind.ISLANDING: Status.ISLANDING, ErrorKind.INPUT: Status.VALUES, ErrorKind.VALUES: Status.VALUES,
-    ErrorKind.UNITS: Status.VALUES, ErrorKind.POWER_FLOW: Status.POWER_FLOW, ErrorKind.START: Status.STEADY_STATE,
-    ErrorKind.STEADY_STATE: Status.STEADY_STATE, ErrorKind.HIDDEN_STATES: Status.MODES,
-    ErrorKind.ANALYSIS: Status.MODES, ErrorKind.WORKER_LOST: Status.LOST,
-}  # fmt: skip
+    ErrorKind.ISLANDING: Status.ISLANDING,
+    ErrorKind.INPUT: Status.VALUES,
+    ErrorKind.VALUES: Status.VALUES,
+    ErrorKind.UNITS: Status.VALUES,
+    ErrorKind.POWER_FLOW: Status.POWER_FLOW,
+    ErrorKind.START: Status.STEADY_STATE,
+    ErrorKind.STEADY_STATE: Status.STEADY_STATE,
+    ErrorKind.HIDDEN_STATES: Status.MODES,
+    ErrorKind.ANALYSIS: Status.MODES,
+    ErrorKind.WORKER_LOST: Status.LOST,
+}
 
 
 @dataclass(frozen=True)

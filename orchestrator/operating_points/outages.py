@@ -42,8 +42,12 @@ def read_outages(text: str | None, elements: Elements) -> list[Outage]:
         lost = tuple(one.strip() for one in name.split("+"))
         for one in lost:
             if one not in elements.names:
-                hint = close_names(one, elements.names, f"write {', '.join(_KINDS)}, or names of elements")
-                raise InputError(f"--outages: there is no unit, line, load or shunt {one!r}; {hint}")
+                hint = close_names(
+                    one, elements.names, f"write {', '.join(_KINDS)}, or names of elements"
+                )
+                raise InputError(
+                    f"--outages: there is no unit, line, load or shunt {one!r}; {hint}"
+                )
         if any(set(lost) == set(other.elements) for other in found) or len(set(lost)) < len(lost):
             raise InputError(f"--outages: {name} is named twice; name it once")
         found.append(Outage(name, lost))
@@ -66,7 +70,8 @@ class Remains:
     loads: tuple[str, ...] = ()
     shunts: tuple[str, ...] = ()
     charging: tuple[str, ...] = ()  # the grid's variables of the charging of dead lines
-    ties: tuple[str, ...] = ()  # lost branches that stay closed, because a dead part hangs on each: nothing flows there
+    # lost branches that stay closed, because a dead part hangs on each: nothing flows there
+    ties: tuple[str, ...] = ()
     dead: tuple[str, ...] = ()
 
 
@@ -78,7 +83,9 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
     branches = [(x.name, x.from_bus, x.to_bus) for x in network.lines]
     branches += [(x.name, x.buses[0], bus) for x in network.transformers for bus in x.buses[1:]]
     part = _parts(network.buses, [ends for name, *ends in branches if _closed(name, out, values)])
-    power = {x.name: grid.number(f"{x.name}.scale") * grid.number(f"{x.name}.P") for x in network.loads}
+    power = {
+        x.name: grid.number(f"{x.name}.scale") * grid.number(f"{x.name}.P") for x in network.loads
+    }
     units = [name for name in elements.units if _closed(name, out, values)]
     rating = {name: prepared.system.components[name].number("S_n") for name in units}
     fed = {part[elements.units[name]] for name in units}
@@ -99,7 +106,9 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
         if load > _AUXILIARY * power_there:
             names = ", ".join(name for name in units if part[elements.units[name]] == k)
             buses = few((bus for bus in dead if part[bus] == k), _SHOWN)
-            return Remains(f"{buses} cut off, with {load:.4g} MW of load and the units {names}, which may go on alone")
+            return Remains(
+                f"{buses} cut off, with {load:.4g} MW of load and the units {names}, which may go on alone"
+            )
     ties, joined = [], {k: k for k in set(part.values())}
     for name, one, other in branches:
         a, b = joined[part[one]], joined[part[other]]
@@ -107,12 +116,22 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
             ties.append(name)
             joined = {k: a if at == b else at for k, at in joined.items()}
     if any(joined[part[bus]] != joined[main] for bus in dead):
-        return Remains(f"{few(dead, _SHOWN)} cut off by branches that the case or the point has open")
+        return Remains(
+            f"{few(dead, _SHOWN)} cut off by branches that the case or the point has open"
+        )
     opened = set(out) - set(ties)
     return Remains(
-        units=tuple(dict.fromkeys((*out_units, *(n for n in units if part[elements.units[n]] != main)))),
-        loads=tuple(x.name for x in network.loads if x.name in out or (part[x.bus] != main and power[x.name])),
-        shunts=tuple(x.name for x in network.shunts if x.name in elements.shunts and part[x.bus] != main),
+        units=tuple(
+            dict.fromkeys((*out_units, *(n for n in units if part[elements.units[n]] != main)))
+        ),
+        loads=tuple(
+            x.name
+            for x in network.loads
+            if x.name in out or (part[x.bus] != main and power[x.name])
+        ),
+        shunts=tuple(
+            x.name for x in network.shunts if x.name in elements.shunts and part[x.bus] != main
+        ),
         charging=tuple(
             x.variable("B")
             for x in network.lines

@@ -26,7 +26,8 @@ class OperatingPoints:
     # case, prepared: the case, and its scenario as it is without the values of any point
     case: Case
     prepared: PreparedScenario
-    layers: tuple[ParameterFile, ...]  # parameter files, and after them the values of the command line; weakest first
+    # parameter files, and after them the values of the command line; weakest first
+    layers: tuple[ParameterFile, ...]
     # points, outages: operating points, and outages; the first outage is the intact network
     points: tuple[OperatingCase, ...]
     outages: tuple[Outage, ...]
@@ -37,12 +38,18 @@ class OperatingPoints:
 
 
 def read_operating_points(
-    case: Case, request: OfCase, points: str | Path | None, outages: Names | None, scenario: str | None,
+    case: Case,
+    request: OfCase,
+    points: str | Path | None,
+    outages: Names | None,
+    scenario: str | None,
     off: Mapping[str, Value] | None = None,
-) -> OperatingPoints:  # fmt: skip
+) -> OperatingPoints:
     """Prepare the scenario, which builds the FMUs that it needs, and read its points and outages."""
     name = scenario or next(iter(case.scenarios))
-    overrides = {key: value for key, value in request.overrides.items() if key not in (off or {})} | dict(off or {})
+    overrides = {
+        key: value for key, value in request.overrides.items() if key not in (off or {})
+    } | dict(off or {})
     (prepared,) = case.prepare([name], overrides, request.step_size, None, request.files)
     layers = (*request.files, *([OptionValues.of(overrides)] if overrides else []))
     elements = Elements.of(prepared)
@@ -56,11 +63,16 @@ def read_operating_points(
             f"{_MOST} are computed: split the file"
         )
     items = tuple(
-        Item(p, o, point.values, tuple(dict.fromkeys((*point.out, *outage.elements))),
-             tuple(name for name in outage.elements if name not in point.out))
+        Item(
+            p,
+            o,
+            point.values,
+            tuple(dict.fromkeys((*point.out, *outage.elements))),
+            tuple(name for name in outage.elements if name not in point.out),
+        )
         for p, point in enumerate(rows)
         for o, outage in enumerate(lost)
         if o == 0 or set(outage.elements) - set(point.out)
-    )  # fmt: skip
+    )
     prepared = replace(prepared, questions=prepared.questions + asked)
     return OperatingPoints(case, prepared, layers, tuple(rows), tuple(lost), items)

@@ -11,11 +11,20 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.cases.sharing import load_of
 from orchestrator.errors import InputError, Problem
-from orchestrator.operating_points.columns import ACTIVE, IN_SERVICE, Elements, Reading, Setting, own_power, reading_of
+from orchestrator.operating_points.columns import (
+    ACTIVE,
+    IN_SERVICE,
+    Elements,
+    Reading,
+    Setting,
+    own_power,
+    reading_of,
+)
 from orchestrator.units import read_value
 
 _LABELS = ("time", "name")
-_ANOTHER_UNIT = 25.0  # times smaller than the case's own is a whole column of powers that is asked about
+# times smaller than the case's own is a whole column of powers that is asked about
+_ANOTHER_UNIT = 25.0
 _LEFT = 0.05  # part of the case's load that is asked about where points leave it to the slack
 
 
@@ -40,7 +49,9 @@ def read_points(path: Path, prepared: PreparedScenario, elements: Elements) -> l
     for row in rows:
         point = _point(row, label, readings, elements, prepared)
         if point.name in seen:
-            raise InputError(f"{point.place}: {label} = {point.name!r} stands in {seen[point.name]} already")
+            raise InputError(
+                f"{point.place}: {label} = {point.name!r} stands in {seen[point.name]} already"
+            )
         seen[point.name] = point.place
         found.append(point)
     return found
@@ -54,10 +65,16 @@ def settings_in(path: Path) -> dict[str, dict[str, Value]]:
     for row in rows:
         name = _name_of(row, label)
         if folder_of(name) in map(folder_of, found):
-            raise InputError(f"{place_of(row)}: {label} = {name!r} stands in an earlier row, or shares its folder")
+            raise InputError(
+                f"{place_of(row)}: {label} = {name!r} stands in an earlier row, or shares its folder"
+            )
         if "device" in columns and not row["device"].strip():
-            raise InputError(f"{place_of(row)}: device is empty; name the scan that is judged at {name}")
-        found[name] = {column: read_value(text) for column in columns if (text := row[column].strip())}
+            raise InputError(
+                f"{place_of(row)}: device is empty; name the scan that is judged at {name}"
+            )
+        found[name] = {
+            column: read_value(text) for column in columns if (text := row[column].strip())
+        }
     return found
 
 
@@ -69,11 +86,15 @@ def _labelled(path: Path) -> tuple[list[Row], str, list[str]]:
     """Rows, the column that names them, and those with what differs."""
     rows = rows_of(path, ())
     if not rows:
-        raise InputError(f"{path}: it has no row; give one for each operating point, with a column 'time' or 'name'")
+        raise InputError(
+            f"{path}: it has no row; give one for each operating point, with a column 'time' or 'name'"
+        )
     columns = [name for name in rows[0] if name and name != PLACE]
     label = next((name for name in _LABELS if name in columns), None)
     if label is None:
-        raise InputError(f"{path}: column 'time' or 'name' is missing; it names the operating points")
+        raise InputError(
+            f"{path}: column 'time' or 'name' is missing; it names the operating points"
+        )
     return rows, label, [name for name in columns if name not in (label, "hours")]
 
 
@@ -106,8 +127,11 @@ def questions_about(
     fed = {unit: own_power(f"{unit}.{ACTIVE}", elements, prepared) or 0.0 for unit in feeding}
     load = load_of(elements.loads, prepared.system.components[elements.grid])
     # a factor of 1 for generation leaves it to the slack by intention
-    leaves = {point.name: _left(point, prepared, elements, fed, load) for row, point in zip(rows, points, strict=True)
-              if float((row.get("generation") or "").strip() or 0) != 1}  # fmt: skip
+    leaves = {
+        point.name: _left(point, prepared, elements, fed, load)
+        for row, point in zip(rows, points, strict=True)
+        if float((row.get("generation") or "").strip() or 0) != 1
+    }
     worst = max(leaves, key=lambda name: abs(leaves[name]), default="")
     more = leaves.get(worst, 0.0)
     if abs(more) > _LEFT * abs(load):
@@ -118,7 +142,11 @@ def questions_about(
 
 
 def _left(
-    point: OperatingCase, prepared: PreparedScenario, elements: Elements, others: Mapping[str, float], load: float
+    point: OperatingCase,
+    prepared: PreparedScenario,
+    elements: Elements,
+    others: Mapping[str, float],
+    load: float,
 ) -> float:
     """What a point leaves to the slack [MW] of what the loads draw more and units out of service fed; 0 where that is
     nearer to the slack's own share than to all of it. ``others``: units beside the slack's, and what each feeds."""
@@ -132,14 +160,23 @@ def _left(
             per_unit = point.values.get(f"{unit}.P_0", power / rating)
             given += float(per_unit) * float(point.values.get(f"{unit}.S_n", rating)) - power
     share = min(max(1 - sum(others.values()) / load, 0.0), 1.0) if load else 0.0
-    return wanted - given if others and wanted and (wanted - given) / wanted > (1 + share) / 2 else 0.0
+    return (
+        wanted - given if others and wanted and (wanted - given) / wanted > (1 + share) / 2 else 0.0
+    )
 
 
 def _drawn(point: OperatingCase, prepared: PreparedScenario, elements: Elements) -> float:
     """Active power of the loads at a point [MW]."""
     plan, head = prepared.system.components[elements.grid], f"{elements.grid}."
-    own = {k.removeprefix(head): v for k, v in point.values.items() if k.startswith(head) and not isinstance(v, str)}
-    return load_of([x for x in elements.loads if x not in point.out], replace(plan, parameters=plan.parameters | own))
+    own = {
+        k.removeprefix(head): v
+        for k, v in point.values.items()
+        if k.startswith(head) and not isinstance(v, str)
+    }
+    return load_of(
+        [x for x in elements.loads if x not in point.out],
+        replace(plan, parameters=plan.parameters | own),
+    )
 
 
 def _reading(path: Path, column: str, elements: Elements, prepared: PreparedScenario) -> Reading:
@@ -150,7 +187,11 @@ def _reading(path: Path, column: str, elements: Elements, prepared: PreparedScen
 
 
 def _point(
-    row: Row, label: str, readings: dict[str, Reading], elements: Elements, prepared: PreparedScenario
+    row: Row,
+    label: str,
+    readings: dict[str, Reading],
+    elements: Elements,
+    prepared: PreparedScenario,
 ) -> OperatingCase:
     place = place_of(row)
     name = _name_of(row, label)
@@ -172,10 +213,17 @@ def _point(
     for column, setting in settings.items():
         if setting.fed is not None:
             values.take(column, _fed(column, *setting.fed, out, prepared, values.found, place))
-    scale = next((setting.scale for setting in settings.values() if setting.scale is not None), None)
-    scales = {load: _scale_of(load, scale, elements, prepared, values.found, place) for load in elements.loads}
+    scale = next(
+        (setting.scale for setting in settings.values() if setting.scale is not None), None
+    )
+    scales = {
+        load: _scale_of(load, scale, elements, prepared, values.found, place)
+        for load in elements.loads
+    }
     if scale is not None:
-        values.take("load", {f"{elements.grid}.{load}.scale": number for load, number in scales.items()})
+        values.take(
+            "load", {f"{elements.grid}.{load}.scale": number for load, number in scales.items()}
+        )
     for column, setting in settings.items():
         for key, power in setting.drawn.items():
             values.take(column, {key: _unscaled(column, power, scales[key.split(".")[-2]], place)})
@@ -201,34 +249,52 @@ class _Values:
 
 
 def _fed(
-    column: str, members: tuple[str, ...], power: float, out: tuple[str, ...], prepared: PreparedScenario,
-    values: Mapping[str, Value], place: str,
-) -> dict[str, Value]:  # fmt: skip
+    column: str,
+    members: tuple[str, ...],
+    power: float,
+    out: tuple[str, ...],
+    prepared: PreparedScenario,
+    values: Mapping[str, Value],
+    place: str,
+) -> dict[str, Value]:
     """P_0 of the units in service that together feed a power [MW]."""
     feeding = [unit for unit in members if unit not in out]
     if not feeding:
         if power:
-            raise InputError(f"{place}: {column} = {power:g}, but {', '.join(members)} is out of service; write 0")
+            raise InputError(
+                f"{place}: {column} = {power:g}, but {', '.join(members)} is out of service; write 0"
+            )
         return {}
-    ratings = (values.get(f"{unit}.S_n", prepared.system.components[unit].number("S_n")) for unit in feeding)
+    ratings = (
+        values.get(f"{unit}.S_n", prepared.system.components[unit].number("S_n"))
+        for unit in feeding
+    )
     rating = sum(float(r) for r in ratings)
     return {f"{unit}.P_0": power / rating for unit in feeding}
 
 
 def _scale_of(
-    load: str, scale: float | None, elements: Elements, prepared: PreparedScenario, values: Mapping[str, Value],
+    load: str,
+    scale: float | None,
+    elements: Elements,
+    prepared: PreparedScenario,
+    values: Mapping[str, Value],
     place: str,
-) -> float:  # fmt: skip
+) -> float:
     key = f"{elements.grid}.{load}.scale"
     if scale is not None and key in values:
-        raise InputError(f"{place}: the columns load and {key} both scale {load}; leave one of them empty")
+        raise InputError(
+            f"{place}: the columns load and {key} both scale {load}; leave one of them empty"
+        )
     own = prepared.system.components[elements.grid].number(f"{load}.scale")
     return float(values.get(key, own)) if scale is None else scale * own
 
 
 def _unscaled(column: str, power: float, scale: float, place: str) -> float:
     if not scale:
-        raise InputError(f"{place}: {column} = {power:g}, but the load is switched off (its scale is 0)")
+        raise InputError(
+            f"{place}: {column} = {power:g}, but the load is switched off (its scale is 0)"
+        )
     return power / scale
 
 
@@ -239,24 +305,30 @@ def _hours(row: Row, place: str) -> float:
     except ValueError:
         hours = float("nan")
     if not 0 < hours < float("inf"):
-        raise InputError(f"{place}: hours = {text!r}; it must be a number above 0: how long the point lasts")
+        raise InputError(
+            f"{place}: hours = {text!r}; it must be a number above 0: how long the point lasts"
+        )
     return hours
 
 
 def _check_switches(settings: Mapping[str, Setting], elements: Elements, place: str) -> None:
-    switched = {column.partition(".")[0]: column for column in settings if column.endswith(f".{IN_SERVICE}")}
+    switched = {
+        column.partition(".")[0]: column for column in settings if column.endswith(f".{IN_SERVICE}")
+    }
     for column in settings:
         for name, other in switched.items():
             switches = (f"{name}.connected", f"{elements.grid}.{name}.connected")
             if any(fnmatch.fnmatchcase(switch, column) for switch in switches):
-                both = f"the columns {other} and {column} both switch {name}; leave one of them empty"
+                both = (
+                    f"the columns {other} and {column} both switch {name}; leave one of them empty"
+                )
                 raise InputError(f"{place}: {both}")
 
 
 def _check_slack(out: tuple[str, ...], elements: Elements, place: str) -> None:
     left = {bus for unit, bus in elements.units.items() if unit not in out}
     if elements.slack and elements.slack not in left:
-        out_of_service = (
-            f"all units at the slack bus {elements.slack} are out of service, so nothing feeds what is left"
+        raise InputError(
+            f"{place}: all units at the slack bus {elements.slack} are out of service, "
+            "so nothing feeds what is left; take another slack in [power_flow]"
         )
-        raise InputError(f"{place}: {out_of_service}; take another slack in [power_flow]")

@@ -21,7 +21,9 @@ from orchestrator.operating_points.item import Item, Status
 from orchestrator.operating_points.outages import Remains, what_remains
 from orchestrator.points.failure import Failure
 
-ACCEPT = 1e-9  # largest change of a state over a communication step with which the power flow's point is a steady state
+# largest change of a state over a communication step with which the power flow's point is a steady
+# state
+ACCEPT = 1e-9
 
 _PACKAGE = Path(__file__).parent.parent
 
@@ -47,10 +49,19 @@ class PreparedItem:
 
 class ItemPreparation:
     def __init__(
-        self, case: Case, scenario: str, layers: Sequence[ParameterFile], step_size: float | None = None,
+        self,
+        case: Case,
+        scenario: str,
+        layers: Sequence[ParameterFile],
+        step_size: float | None = None,
         sharing: SharingRule | None = None,
-    ) -> None:  # fmt: skip
-        self._case, self._scenario, self._layers, self._step_size = case, scenario, tuple(layers), step_size
+    ) -> None:
+        self._case, self._scenario, self._layers, self._step_size = (
+            case,
+            scenario,
+            tuple(layers),
+            step_size,
+        )
         self.base = self._prepare({})
         self.elements = Elements.of(self.base)
         self._asked = {str(question) for question in self.base.questions}
@@ -71,7 +82,10 @@ class ItemPreparation:
         if units or loads:
             before = self._before_outage(item, own, without)
             assert before.power_flow is not None
-            fed, drawn = _power_of(units, before), load_of(loads, valued.system.components[self.elements.grid])
+            fed, drawn = (
+                _power_of(units, before),
+                load_of(loads, valued.system.components[self.elements.grid]),
+            )
             dispatch = Dispatch(self._sharing, before.power_flow.powers, fed - drawn)
         elif new := [bus for bus in remains.dead if bus not in without.dead]:
             text = f"{few(new, _SHOWN)} cut off, with neither load nor unit"
@@ -79,7 +93,10 @@ class ItemPreparation:
         found = self._prepare(values, dispatch)
         if dispatch is not None:
             assert found.power_flow is not None
-            plans, load = valued.system.components, load_of(loads, valued.system.components[self.elements.grid])
+            plans, load = (
+                valued.system.components,
+                load_of(loads, valued.system.components[self.elements.grid]),
+            )
             text = in_words(dispatch, found.power_flow.powers, plans, units, lost_load(load))
         return PreparedItem(without_units(found, remains.units), text)
 
@@ -93,11 +110,16 @@ class ItemPreparation:
         found = {**item.values, **switched_off(item.out, remains, valued, self.elements.grid)}
         shared = prepared.text or {*item.out, *remains.units} & {*self.elements.units}
         if shared and scenario.power_flow is not None:
-            powers = scenario.power_flow.powers  # else the case would share what the item leaves to the slack
-            found |= {f"{x}.P_0": powers[x].real for x in scenario.system.components if powers.get(x)}
+            # else the case would share what the item leaves to the slack
+            powers = scenario.power_flow.powers
+            found |= {
+                f"{x}.P_0": powers[x].real for x in scenario.system.components if powers.get(x)
+            }
         return found
 
-    def _before_outage(self, item: Item, own: tuple[str, ...], without: Remains) -> PreparedScenario:
+    def _before_outage(
+        self, item: Item, own: tuple[str, ...], without: Remains
+    ) -> PreparedScenario:
         """The item's operating point before its outage; that of the last item serves all of one point."""
         if self._before is None or self._before[0] != item.point:
             off = switched_off(own, without, self._valued(item), self.elements.grid)
@@ -106,7 +128,9 @@ class ItemPreparation:
 
     def warnings(self, prepared: PreparedScenario) -> tuple[str, ...]:
         """Questions that the scenario without the item's values does not raise."""
-        return tuple(str(question) for question in prepared.questions if str(question) not in self._asked)
+        return tuple(
+            str(question) for question in prepared.questions if str(question) not in self._asked
+        )
 
     def overloads(self, prepared: PreparedScenario) -> dict[str, float]:
         """Units beyond their rating [pu of it], and further than without the item's values."""
@@ -118,20 +142,33 @@ class ItemPreparation:
     def reactive(self, prepared: PreparedScenario) -> str:
         """The bus whose units are furthest beyond their limits of reactive power, and within without the values."""
         limits = self._case.table.power_flow and self._case.table.power_flow.reactive_limits
-        before, now = ((x.power_flow.beyond_limits if x.power_flow else ()) for x in (self.base, prepared))
-        found = [] if limits is False else [x for x in now if x.bus not in {one.bus for one in before}]
+        before, now = (
+            (x.power_flow.beyond_limits if x.power_flow else ()) for x in (self.base, prepared)
+        )
+        found = (
+            [] if limits is False else [x for x in now if x.bus not in {one.bus for one in before}]
+        )
         return max(found, key=lambda x: abs(x.q - x.limit)).text(kept=False) if found else ""
 
-    def _prepare(self, values: Mapping[str, Value], dispatch: Dispatch | None = None) -> PreparedScenario:
-        case = replace(self._case, sharing=SharingRule.SLACK)  # what a point has out of service is in its generation
-        (prepared,) = case.prepare([self._scenario], dict(values), self._step_size, None, self._layers, dispatch)
+    def _prepare(
+        self, values: Mapping[str, Value], dispatch: Dispatch | None = None
+    ) -> PreparedScenario:
+        # what a point has out of service is in its generation
+        case = replace(self._case, sharing=SharingRule.SLACK)
+        (prepared,) = case.prepare(
+            [self._scenario], dict(values), self._step_size, None, self._layers, dispatch
+        )
         return prepared
 
     def _valued(self, item: Item) -> PreparedScenario:
         """The base scenario with the item's own values in the grid, for what is said of islands."""
         grid = self.elements.grid
         plan = self.base.system.components[grid]
-        own = {k.partition(".")[2]: v for k, v in item.values.items() if k.startswith(f"{grid}.") and "*" not in k}
+        own = {
+            k.partition(".")[2]: v
+            for k, v in item.values.items()
+            if k.startswith(f"{grid}.") and "*" not in k
+        }
         numbers = {name: value for name, value in own.items() if not isinstance(value, str)}
         system = System()
         system.components.update(self.base.system.components)
@@ -142,7 +179,11 @@ class ItemPreparation:
 
 def _power_of(units: Collection[str], before: PreparedScenario) -> float:
     flow, plans = before.power_flow, before.system.components
-    return sum(flow.powers[name].real * plans[name].number("S_n") for name in units) if flow is not None else 0.0
+    return (
+        sum(flow.powers[name].real * plans[name].number("S_n") for name in units)
+        if flow is not None
+        else 0.0
+    )
 
 
 def failure(error: Exception, item: Item) -> tuple[Status, str, bool]:
@@ -151,7 +192,9 @@ def failure(error: Exception, item: Item) -> tuple[Status, str, bool]:
         return Status.INTERNAL, unexpected(error), found.lasting
     status = Status.of(found)
     if isinstance(error, StartError) and status is Status.STEADY_STATE:
-        given = {key.partition(".")[2] for key in item.values if key.partition(".")[0] == error.component}
+        given = {
+            key.partition(".")[2] for key in item.values if key.partition(".")[0] == error.component
+        }
         status = Status.VALUES if given - _OPERATING else status
     return status, found.text, found.lasting
 
@@ -160,20 +203,38 @@ def unexpected(error: Exception) -> str:
     """An error that is no user's mistake, with its place in our code, in words."""
     frames = traceback.extract_tb(error.__traceback__)
     ours = [frame for frame in frames if frame.filename.startswith(str(_PACKAGE))]
-    at = f" at {Path(ours[-1].filename).relative_to(_PACKAGE)}, line {ours[-1].lineno}" if ours else ""
-    blame = "" if isinstance(error, (MemoryError, OSError)) else "; gfor-cosim has failed here: please report it"
+    at = (
+        f" at {Path(ours[-1].filename).relative_to(_PACKAGE)}, line {ours[-1].lineno}"
+        if ours
+        else ""
+    )
+    blame = (
+        ""
+        if isinstance(error, (MemoryError, OSError))
+        else "; gfor-cosim has failed here: please report it"
+    )
     return f"{type(error).__name__}{at}: {error}{blame}"
 
 
-_DEAD_CHARGING = 1e-3  # part of its charging that a dead line keeps: a bus without any has no voltage
+# part of its charging that a dead line keeps: a bus without any has no voltage
+_DEAD_CHARGING = 1e-3
 
 
-def switched_off(out: Sequence[str], remains: Remains, prepared: PreparedScenario, grid: str) -> dict[str, Value]:
+def switched_off(
+    out: Sequence[str], remains: Remains, prepared: PreparedScenario, grid: str
+) -> dict[str, Value]:
     """Values that take elements out of service in the power flow and in the grid, with all that is dead then."""
-    opened = [name for name in (*out, *remains.units, *remains.shunts)
-              if name not in remains.loads and name not in remains.ties]  # fmt: skip
+    opened = [
+        name
+        for name in (*out, *remains.units, *remains.shunts)
+        if name not in remains.loads and name not in remains.ties
+    ]
     values: dict[str, Value] = {f"{grid}.{name}.connected": False for name in opened}
     plan = prepared.system.components[grid]
-    for scale in (f"{name}.scale" for name in remains.loads):  # some loads alone determine a voltage, and keep a trace
+    for scale in (
+        f"{name}.scale" for name in remains.loads
+    ):  # some loads alone determine a voltage, and keep a trace
         values[f"{grid}.{scale}"] = max(0.0, plan.description.variables[scale].minimum or 0.0)
-    return values | {f"{grid}.{name}": _DEAD_CHARGING * plan.number(name) for name in remains.charging}
+    return values | {
+        f"{grid}.{name}": _DEAD_CHARGING * plan.number(name) for name in remains.charging
+    }

@@ -10,13 +10,19 @@ from orchestrator.arrays import Numbers
 from orchestrator.oscillations.detection import phasors
 
 _REACH = 4.0  # widths of a line, 1/T, around its frequency; one further off is found by itself
-_LEFT = 0.03  # part of the power that close lines may leave: planted ones 0.005; of a mode in noise 0.07
-_SKIRT = 3.0  # power close beside the lines as a multiple of that further off: beside planted ones 0.6 to 1.1
+# part of the power that close lines may leave: planted ones 0.005; of a mode in noise 0.07
+_LEFT = 0.03
+# power close beside the lines as a multiple of that further off: beside planted ones 0.6 to 1.1
+_SKIRT = 3.0
 _NOTHING = 1e-4  # left by sines without noise, beside which a skirt is what the fit itself leaves
 _BETTER = 0.3  # of what fewer leave, from which on more are the better account
-_ALIKE = 2.0  # times what exponentials leave, up to which sines are as good an account: two modes leave far less
-_LARGEST = 4.0  # power of one beside that of all, beyond which they cancel each other and explain nothing
-_STEADY = 0.25  # change of the logarithm of an amplitude over the record up to which it may be a sine's; up to half, is
+# times what exponentials leave, up to which sines are as good an account: two modes leave far less
+_ALIKE = 2.0
+# power of one beside that of all, beyond which they cancel each other and explain nothing
+_LARGEST = 4.0
+# change of the logarithm of an amplitude over the record up to which it may be a sine's; up to
+# half, is
+_STEADY = 0.25
 _SEEN = 0.01  # power beside that of all from which on one is told
 
 
@@ -46,14 +52,24 @@ def doubt(kind: str, times: Numbers, z: Numbers, values: Numbers, frequency: flo
     change = np.abs(found.changes[near])
     close = len(apart) > 1 and found.left < _LEFT
     if kind == "forced":
-        return f"apart from others close by ({found}) it decays or grows" if close and change[0] > 0.5 * _STEADY else ""
+        return (
+            f"apart from others close by ({found}) it decays or grows"
+            if close and change[0] > 0.5 * _STEADY
+            else ""
+        )
     sines, more = (_explained(t, z, frequency, count, free=False) for count in (2, 3))
     sines = more if more.left < _BETTER * sines.left else sines
-    if sines.powers.max() < _LARGEST and sines.left < min(_LEFT, one.left, max(_ALIKE * found.left, _NOTHING)):
+    if sines.powers.max() < _LARGEST and sines.left < min(
+        _LEFT, one.left, max(_ALIKE * found.left, _NOTHING)
+    ):
         beside = np.median([skirt(times, x, sines.frequencies.tolist()) for x in values.T])
         if sines.left < _NOTHING or beside < _SKIRT:
             return f"steady sines at close frequencies ({sines}) would explain it as well"
-    return f"apart from others close by ({found}) it is steady" if close and change.min() < _STEADY else ""
+    return (
+        f"apart from others close by ({found}) it is steady"
+        if close and change.min() < _STEADY
+        else ""
+    )
 
 
 def most_explained(t: Numbers, z: Numbers, offsets: Numbers, count: int) -> tuple[Numbers, float]:
@@ -73,14 +89,18 @@ def _explained(times: Numbers, z: Numbers, frequency: float, count: int, *, free
     t, span = np.linspace(0, 1, len(z)), times[-1] - times[0]
 
     def solved(x: Numbers) -> tuple[Numbers, Numbers]:
-        waves = np.exp(np.outer(t, 2j * np.pi * x[:count] + (np.clip(x[count:], -50, 50) if free else 0)))
+        waves = np.exp(
+            np.outer(t, 2j * np.pi * x[:count] + (np.clip(x[count:], -50, 50) if free else 0))
+        )
         waves /= np.linalg.norm(waves, axis=0)
         sizes = np.linalg.lstsq(waves, z, rcond=None)[0]
         return z - waves @ sizes, sizes
 
     first, _ = most_explained(t, z, np.arange(-_REACH, _REACH + 0.01, 0.25), count)
     start = [*first, *[-1.0] * count * free]
-    x = least_squares(lambda x: solved(x)[0].view(float).ravel(), start, method="lm", max_nfev=300).x
+    x = least_squares(
+        lambda x: solved(x)[0].view(float).ravel(), start, method="lm", max_nfev=300
+    ).x
     rest, sizes = solved(x)
     powers = (np.abs(sizes) ** 2).mean(axis=1)
     seen = [k for k in np.argsort(-powers) if powers[k] >= min(_SEEN, powers.max())]
@@ -101,5 +121,12 @@ def skirt(times: Numbers, values: Numbers, lines: Sequence[float]) -> float:
     length = len(times) * float(times[1] - times[0])
     grid = np.fft.rfftfreq(len(rest), length / len(times))
     apart = np.abs(grid[:, None] - np.array(lines)).min(axis=1) * length
-    near, far = (apart > 1.5) & (apart < 5), (apart > 8) & (apart < min(25.0, 0.5 * lines[0] * length))
-    return float(power[near].mean() / (power[far].mean() or 1e-300)) if near.any() and far.any() else 1.0
+    near, far = (
+        (apart > 1.5) & (apart < 5),
+        (apart > 8) & (apart < min(25.0, 0.5 * lines[0] * length)),
+    )
+    return (
+        float(power[near].mean() / (power[far].mean() or 1e-300))
+        if near.any() and far.any()
+        else 1.0
+    )

@@ -9,7 +9,8 @@ from orchestrator.arrays import Numbers, Vector
 from orchestrator.oscillations.measurements import Measurements
 
 LOWEST_HZ, HIGHEST_HZ = 0.08, 8.0
-_ABOVE = 35.0  # power of a line beside the median of its neighbours: a mode that noise shakes seldom reaches it
+# power of a line beside the median of its neighbours: a mode that noise shakes seldom reaches it
+_ABOVE = 35.0
 _MOST = 6
 _LEAST_SHARE = 0.01  # part of the strongest oscillation's power from which on a weaker one is told
 _AS_CLEAR = 0.1  # power beside its noise, as a part of that of the clearest signal
@@ -64,10 +65,14 @@ def find_oscillations(signals: Signals) -> list[SpectralLine]:
     grid, each = spectra(signals.values, step)
     power = each.mean(axis=1)
     each = np.column_stack([power, each])
-    highest = np.lib.stride_tricks.sliding_window_view(np.pad(each, ((12, 12), (0, 0))), 25, axis=0).max(axis=-1)
+    highest = np.lib.stride_tricks.sliding_window_view(
+        np.pad(each, ((12, 12), (0, 0))), 25, axis=0
+    ).max(axis=-1)
     low, high = max(LOWEST_HZ, _PERIODS / length), min(HIGHEST_HZ, 0.4 / step)
     at, column = np.nonzero((each == highest) & ((grid >= low) & (grid <= high))[:, None])
-    above = each[at, column] / _background(each, at, column) - np.where(column > 0, np.log2(count), 0.0)
+    above = each[at, column] / _background(each, at, column) - np.where(
+        column > 0, np.log2(count), 0.0
+    )
     lines: dict[int, dict[int, float]] = {}
     for j in np.argsort(-above)[: (above > _ABOVE).sum()]:
         lines.setdefault(int(at[j]), {})[int(column[j]) - 1] = float(above[j])
@@ -100,8 +105,11 @@ def _background(power: Numbers, at: Vector, column: Vector) -> Numbers:
     """Medians further off than a line's own width: the larger of those of forty and of twelve independent bins."""
     medians = []
     for far in (101, 41):
-        beside = np.abs(at[:, None] + np.r_[-far:-14:2, 15:far:2])  # a spectrum is the same below 0 Hz
-        medians.append(np.median(power[np.minimum(beside, len(power) - 1), column[:, None]], axis=1))
+        # a spectrum is the same below 0 Hz
+        beside = np.abs(at[:, None] + np.r_[-far:-14:2, 15:far:2])
+        medians.append(
+            np.median(power[np.minimum(beside, len(power) - 1), column[:, None]], axis=1)
+        )
     return np.asarray(1e-300 + np.maximum(*medians))
 
 
@@ -115,10 +123,14 @@ def refined(signals: Signals, columns: list[int], guess: float) -> float:
     t = signals.times - signals.times.mean()
 
     def missing(frequency: float) -> float:
-        return -float((np.abs((strong * window).T @ np.exp(-2j * np.pi * frequency * t)) ** 2).sum())
+        return -float(
+            (np.abs((strong * window).T @ np.exp(-2j * np.pi * frequency * t)) ** 2).sum()
+        )
 
     near = 1 / (t[-1] - t[0])
-    best = minimize_scalar(missing, bounds=(guess - near, guess + near), method="bounded", options={"xatol": 1e-6})
+    best = minimize_scalar(
+        missing, bounds=(guess - near, guess + near), method="bounded", options={"xatol": 1e-6}
+    )
     return float(best.x)
 
 
@@ -137,12 +149,16 @@ def phasors(times: Numbers, values: Numbers, frequencies: Sequence[float]) -> Nu
     return np.asarray(found[3] + 1j * found[4])
 
 
-def envelope(times: Numbers, values: Numbers, frequency: float, periods: float = 3.0) -> tuple[Numbers, int]:
+def envelope(
+    times: Numbers, values: Numbers, frequency: float, periods: float = 3.0
+) -> tuple[Numbers, int]:
     """Complex amplitude over the time from a sliding window of some periods, and the window's half in samples."""
     step = float(times[1] - times[0])
     half = max(2, round(0.5 * periods / (frequency * step)))
     window = np.hanning(2 * half + 3)[1:-1]
-    slow = values - np.convolve(np.pad(values, half, mode="edge"), window / window.sum(), mode="valid")
+    slow = values - np.convolve(
+        np.pad(values, half, mode="edge"), window / window.sum(), mode="valid"
+    )
     turned = slow * np.exp(-2j * np.pi * frequency * times)
     return np.convolve(turned, 2 * window / window.sum(), mode="valid"), half
 

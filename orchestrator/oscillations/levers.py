@@ -16,7 +16,8 @@ from orchestrator.oscillations.verdict import Located
 from orchestrator.study.modes import changed, running
 
 _SWITCH = re.compile(r"(pod_p|pod_q|pss)\.enabled")
-_NEAR, _NAMED = 0.15, 3  # relative distance of a case's mode from what was seen; controllers in a sentence
+# relative distance of a case's mode from what was seen; controllers in a sentence
+_NEAR, _NAMED = 0.15, 3
 
 
 def levers_of(prepared: PreparedScenario, hertz: float) -> tuple[complex, list[dict[str, Any]]]:
@@ -32,7 +33,11 @@ def levers_of(prepared: PreparedScenario, hertz: float) -> tuple[complex, list[d
                 with changed(master, {key: not on}, {key: on}):
                     varied = model_of(master, blocks.with_component(master, name))
                 now = max(pairs_near(varied, mode.eigenvalue), key=mode.similarity).eigenvalue
-                lever = {"controller": key.removesuffix(".enabled"), "on": on, "damping_percent": damping_percent(now)}
+                lever = {
+                    "controller": key.removesuffix(".enabled"),
+                    "on": on,
+                    "damping_percent": damping_percent(now),
+                }
                 found.append((-abs(now - mode.eigenvalue), key, lever))
     return mode.eigenvalue, [lever for *_, lever in sorted(found, key=lambda x: x[:2])]
 
@@ -45,7 +50,12 @@ def with_levers(prepared: PreparedScenario, one: Located) -> Located:
     if abs(mode.imag / (2 * np.pi) / one.found.frequency - 1) > _NEAR:
         return replace(one, advice=f"{one.advice}; the case has no mode near")
     text = "{} switched {} makes that {:.2f} %"
-    said = [text.format(x["controller"], ("on", "off")[x["on"]], x["damping_percent"]) for x in levers[:_NAMED]]
+    said = [
+        text.format(x["controller"], ("on", "off")[x["on"]], x["damping_percent"])
+        for x in levers[:_NAMED]
+    ]
     there = f"the case's mode there has {damping_percent(mode):.2f} % of damping; {'; '.join(said)}"
     there = there if levers else "no POD or PSS is there; `gfor site CASE` tells where one helps"
-    return replace(one, advice=f"damp the mode, which nothing drives: {there}", controllers=tuple(levers))
+    return replace(
+        one, advice=f"damp the mode, which nothing drives: {there}", controllers=tuple(levers)
+    )

@@ -22,7 +22,8 @@ _SHARE = 0.8
 """Part of all that is fed that one place must feed to be named. Over 540 forcings with known places in `two_area` and
 `ieee39` the method that applies gives the right place 0.91 and more."""
 
-_BALANCE = 0.7  # what is fed beside what is taken, 0.75 and more with all units in view; with less, others feed too
+# what is fed beside what is taken, 0.75 and more with all units in view; with less, others feed too
+_BALANCE = 0.7
 _CONCENTRATED = 0.9  # participation of one place from which it is no mode's shape
 _POWER, _VOLTAGE = 0.16, 0.4
 """Reactive work beside dissipating work: up to the first the oscillation acts through active power, and the Q-V phase
@@ -41,7 +42,8 @@ class Opinion:
     reason: str
     # places with their part of what is fed, or of the participation, the largest first.
     ranking: tuple[tuple[str, float], ...]
-    alone: bool = False  # whether nothing else drives, which phasors alone never tell: what drives may take energy
+    # whether nothing else drives, which phasors alone never tell: what drives may take energy
+    alone: bool = False
 
 
 @dataclass(frozen=True)
@@ -60,13 +62,21 @@ class _Work:
         best = int(mean.argmax())
         name, share = self.names[best], float(mean[best] / scale)
         if mean[best] <= _CERTAIN * error[best]:
-            return Opinion(method, None, True, f"no place {verb} more than the noise explains", ranking)
+            return Opinion(
+                method, None, True, f"no place {verb} more than the noise explains", ranking
+            )
         if share < _SHARE:
             both = ", ".join(f"{n} {100 * x:.0f} %" for n, x in ranking[:3] if x > 0)
             return Opinion(method, None, True, f"several places {verb[:-1]} it: {both}", ranking)
         if fed < _BALANCE * taken:
-            return Opinion(method, None, True, f"{name} {verb} only {100 * fed / taken:.0f} % of what is taken: "
-                           "another place feeds, perhaps outside of what is observed", ranking)  # fmt: skip
+            return Opinion(
+                method,
+                None,
+                True,
+                f"{name} {verb} only {100 * fed / taken:.0f} % of what is taken: "
+                "another place feeds, perhaps outside of what is observed",
+                ranking,
+            )
         return Opinion(method, name, True, f"{name} {verb} {100 * share:.0f} % of it", ranking)
 
 
@@ -94,13 +104,17 @@ def _opinions(
         why = f"it acts through active power (reactive work {100 * ratio:.0f} % of the dissipating): says nothing here"
         phase = replace(phase, applies=False, place=None, reason=why)
     elif ratio >= _VOLTAGE:
-        why = (f"it acts through voltage (reactive work {100 * ratio:.0f} % of the dissipating), where energy flow is "
-               f"known to point elsewhere{f', here to {flow.place}' if flow.place else ''}")  # fmt: skip
+        why = (
+            f"it acts through voltage (reactive work {100 * ratio:.0f} % of the dissipating), where energy flow is "
+            f"known to point elsewhere{f', here to {flow.place}' if flow.place else ''}"
+        )
         flow = replace(flow, applies=False, place=None, reason=why)
     return [flow, dynamic_mode(places, measured.times, found), phase]
 
 
-def works(places: Sequence[Site], times: Numbers, found: SpectralLine, others: Sequence[float]) -> tuple[_Work, _Work]:
+def works(
+    places: Sequence[Site], times: Numbers, found: SpectralLine, others: Sequence[float]
+) -> tuple[_Work, _Work]:
     """Dissipating work Re(ΔP* jΔθ + ΔQ* jΔln V)/2 and reactive work Re(Δln V* ΔQ)/2 of each place.
 
     They are those of the mean phasors of several blocks, each turned by the phase that all signals share; errors are
@@ -110,27 +124,43 @@ def works(places: Sequence[Site], times: Numbers, found: SpectralLine, others: S
     return _Work(names, whole[0], errors[0]), _Work(names, whole[1], errors[1])
 
 
-def block_phasors(places: Sequence[Site], times: Numbers, found: SpectralLine, others: Sequence[float]) -> Complex:
+def block_phasors(
+    places: Sequence[Site], times: Numbers, found: SpectralLine, others: Sequence[float]
+) -> Complex:
     """Phasors of p, q, angle and ln v of each place in blocks, turned by the phase that the clear ones share."""
     step = float(times[1] - times[0])
     settle = 0 if found.begin is None else round(2 / (found.frequency * step))
     used = np.arange(min(found.first + settle, found.last - 4), found.last)
     count = int(np.clip(len(used) * step * found.frequency / _BLOCK_PERIODS, 2, _MOST_BLOCKS))
     beside = [found.frequency, *(order * found.frequency for order in found.harmonics), *others]
-    signals = np.column_stack([x for p in places for x in (p.p, p.q, p.angle, np.log(np.maximum(p.v, 1e-9)))])
-    blocks = np.array([phasors(times[block], signals[block], beside) for block in np.array_split(used, count)])
+    signals = np.column_stack(
+        [x for p in places for x in (p.p, p.q, p.angle, np.log(np.maximum(p.v, 1e-9)))]
+    )
+    blocks = np.array(
+        [phasors(times[block], signals[block], beside) for block in np.array_split(used, count)]
+    )
     clear = {name.replace(".speed", ".angle") for name in [*found.amplitudes][: found.clear]}
-    named = [name for p in places for name in (f"{p.name}.p", f"{p.name}.q", f"{p.bus}.angle", f"{p.bus}.v")]
+    named = [
+        name
+        for p in places
+        for name in (f"{p.name}.p", f"{p.name}.q", f"{p.bus}.angle", f"{p.bus}.v")
+    ]
     chosen = blocks[:, [name in clear for name in named]] if clear & {*named} else blocks
-    shared = np.linalg.svd(chosen / np.maximum(np.abs(chosen).mean(axis=0), 1e-300), full_matrices=False)[0][:, 0]
+    shared = np.linalg.svd(
+        chosen / np.maximum(np.abs(chosen).mean(axis=0), 1e-300), full_matrices=False
+    )[0][:, 0]
     return np.asarray(blocks * np.exp(-1j * np.angle(shared))[:, None])
 
 
-def felt_beyond(measured: Measurements, found: SpectralLine, others: Sequence[float], name: str) -> bool:
+def felt_beyond(
+    measured: Measurements, found: SpectralLine, others: Sequence[float], name: str
+) -> bool:
     """Whether a voltage at another bus than a place's own moves with it for sure: what drives a grid moves it."""
     (home,) = {place.bus for place in measured.places if place.name == name}
     away = [place.bus != home for place in measured.places]
-    whole, errors = jackknife(block_phasors(measured.places, measured.times, found, others), lambda mean: mean)
+    whole, errors = jackknife(
+        block_phasors(measured.places, measured.times, found, others), lambda mean: mean
+    )
     return bool((np.abs(whole) > 2 * _CERTAIN * errors).reshape(-1, 4)[away, 2:].any())
 
 
@@ -158,7 +188,9 @@ def dynamic_mode(places: Sequence[Site], times: Numbers, found: SpectralLine) ->
     data = np.column_stack(columns)[found.first : found.last : thin]
     data = data - data.mean(axis=0)
     delays = 4
-    stacked = np.concatenate([data[k : len(data) - delays + k + 1] for k in range(delays)], axis=1).T
+    stacked = np.concatenate(
+        [data[k : len(data) - delays + k + 1] for k in range(delays)], axis=1
+    ).T
     u, s, vh = np.linalg.svd(stacked[:, :-1], full_matrices=False)
     rank = max(2, min(int((s > 1e-2 * s[0]).sum()), 20))
     u, s, vh = u[:, :rank], s[:rank], vh[:rank]

@@ -55,7 +55,9 @@ class Measurements:
         return tuple(p for p in self.places if p.kind == "unit" or p.beyond not in observed)
 
 
-def made_ready(label: str, times: Numbers, places: Sequence[Site], remarks: Sequence[str] = ()) -> Measurements:
+def made_ready(
+    label: str, times: Numbers, places: Sequence[Site], remarks: Sequence[str] = ()
+) -> Measurements:
     """Bring a record into the form in which it is analysed; what was done to it is in the remarks.
 
     Raises `InputError` if too little is left."""
@@ -72,10 +74,14 @@ def made_ready(label: str, times: Numbers, places: Sequence[Site], remarks: Sequ
 
 
 def _each(place: Site, change: Callable[[Numbers], Numbers]) -> Site:
-    return replace(place, v=change(place.v), angle=change(place.angle), p=change(place.p), q=change(place.q))
+    return replace(
+        place, v=change(place.v), angle=change(place.angle), p=change(place.p), q=change(place.q)
+    )
 
 
-def _without_doubles(times: Numbers, places: Sequence[Site], said: list[str]) -> tuple[Numbers, list[Site]]:
+def _without_doubles(
+    times: Numbers, places: Sequence[Site], said: list[str]
+) -> tuple[Numbers, list[Site]]:
     """A time that is written twice, as simulators do at a discontinuity, counts with what comes after it."""
     if not np.isfinite(times).all() or (np.diff(times) < 0).any():
         raise InputError("the times of the record do not rise; sort its rows")
@@ -85,7 +91,9 @@ def _without_doubles(times: Numbers, places: Sequence[Site], said: list[str]) ->
     return times[keep], [_each(place, lambda x: x[keep]) for place in places]
 
 
-def _longest_stretch(times: Numbers, places: list[Site], said: list[str]) -> tuple[Numbers, list[Site]]:
+def _longest_stretch(
+    times: Numbers, places: list[Site], said: list[str]
+) -> tuple[Numbers, list[Site]]:
     """Even times, with missing rows as NaN; of a record with long gaps the longest part."""
     if len(times) < 2:
         return times, places
@@ -94,7 +102,9 @@ def _longest_stretch(times: Numbers, places: list[Site], said: list[str]) -> tup
     if len(cuts):
         edges = [0, *(int(c) + 1 for c in cuts), len(times)]
         a, b = max(pairwise(edges), key=lambda e: e[1] - e[0])
-        said.append(f"rows are missing: only the part from {times[a]:g} to {times[b - 1]:g} s is used")
+        said.append(
+            f"rows are missing: only the part from {times[a]:g} to {times[b - 1]:g} s is used"
+        )
         times, places = times[a:b], [_each(place, lambda x: x[a:b]) for place in places]
     even = times[0] + step * np.arange(round((times[-1] - times[0]) / step) + 1)
     if len(even) == len(times) and np.allclose(even, times, rtol=0, atol=0.02 * step):
@@ -109,13 +119,20 @@ def _longest_stretch(times: Numbers, places: list[Site], said: list[str]) -> tup
 
 def _filled(place: Site, times: Numbers, said: list[str]) -> Site | None:
     """Short gaps bridged by straight lines; None for a place with longer ones."""
-    bad = ~(np.isfinite(place.v) & np.isfinite(place.angle) & np.isfinite(place.p) & np.isfinite(place.q))
+    bad = ~(
+        np.isfinite(place.v)
+        & np.isfinite(place.angle)
+        & np.isfinite(place.p)
+        & np.isfinite(place.q)
+    )
     if not bad.any():
         return place
     edges = np.flatnonzero(np.diff(np.concatenate([[0], bad.astype(int), [0]])))
     longest = int((edges[1::2] - edges[::2]).max()) * float(times[1] - times[0])
     if longest > _LONGEST_GAP or bad.mean() > _MOST_FILLED:
-        said.append(f"{place.name} is left out: up to {longest:.3g} s of its samples are missing together")
+        said.append(
+            f"{place.name} is left out: up to {longest:.3g} s of its samples are missing together"
+        )
         return None
     said.append(f"{place.name}: {int(bad.sum())} missing samples are interpolated")
     turned = place.angle.copy()
@@ -139,7 +156,9 @@ def _thinned(label: str, times: Numbers, places: list[Site], said: list[str]) ->
         weights = firwin(10 * factor + 1, 0.8 / factor)
         half = len(weights) // 2
         if len(times) <= 4 * half:
-            raise InputError(f"{label}: {times[-1] - times[0]:.3g} s are too short a record to find an oscillation in")
+            raise InputError(
+                f"{label}: {times[-1] - times[0]:.3g} s are too short a record to find an oscillation in"
+            )
 
         def smooth(values: Numbers) -> Numbers:
             """Filtered around the straight line through its ends, so that angles may run away."""

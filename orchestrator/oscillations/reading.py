@@ -19,7 +19,14 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _COLUMN = re.compile(r"(?P<place>.+?)[ ._:](?P<what>vm|va|im|ia|p|q)", re.IGNORECASE)
-_BASES = {"p": ("MW", "pu"), "q": ("Mvar", "pu"), "va": ("rad",), "ia": ("rad",), "vm": ("kV", "pu"), "im": ("pu",)}
+_BASES = {
+    "p": ("MW", "pu"),
+    "q": ("Mvar", "pu"),
+    "va": ("rad",),
+    "ia": ("rad",),
+    "vm": ("kV", "pu"),
+    "im": ("pu",),
+}
 _FORM = (
     "it needs columns such as 'NORTH.vm [pu]', 'NORTH.va [deg]', 'NORTH.p [MW]', 'NORTH.q [Mvar]' (or 'NORTH.im', "
     "'NORTH.ia' of the current in pu): voltage of a bus and what a unit feeds into it; 'NORTH->SOUTH.p' is what leaves "
@@ -30,10 +37,14 @@ CONTEST_FILES = ("BusVolMag.txt", "BusVolAng.txt", "LinCurMag.txt", "LinCurAng.t
 
 def measurements_of(dataset: xr.Dataset, label: str) -> Measurements:
     times = np.asarray(dataset["time"].values, dtype=np.float64)
-    places, base = (_of_run(dataset), 1.0) if "places" in dataset.attrs else _of_columns(dataset, label)
+    places, base = (
+        (_of_run(dataset), 1.0) if "places" in dataset.attrs else _of_columns(dataset, label)
+    )
     if not places:
         more = "run again with 'record = [\"*\"]' in [solver], or with --force, which records what is needed"
-        raise InputError(f"{label}: no place has voltage, P and Q; {more if 'places' in dataset.attrs else _FORM}")
+        raise InputError(
+            f"{label}: no place has voltage, P and Q; {more if 'places' in dataset.attrs else _FORM}"
+        )
     return replace(made_ready(label, times, places), base=base)
 
 
@@ -57,7 +68,11 @@ def _of_run(dataset: xr.Dataset) -> list[Site]:
         else:
             continue
         kind: Kind = "branch" if beyond else "unit"
-        found.append(Site(name, kind, bus, np.abs(voltage), np.angle(voltage), power.real, power.imag, beyond))
+        found.append(
+            Site(
+                name, kind, bus, np.abs(voltage), np.angle(voltage), power.real, power.imag, beyond
+            )
+        )
     return found
 
 
@@ -73,7 +88,9 @@ def _of_columns(dataset: xr.Dataset, label: str) -> tuple[list[Site], float]:
             bases.setdefault("power" if what in "pq" else what, set()).add(base)
     per_unit = {base == "pu" for base in bases.get("power", {"pu"})}
     if len(per_unit) > 1:
-        raise InputError(f"{label}: some powers are in pu and some in MW or Mvar; give all in one of both")
+        raise InputError(
+            f"{label}: some powers are in pu and some in MW or Mvar; give all in one of both"
+        )
     found = []
     for place, own in columns.items():
         bus, arrow, beyond = (part.strip() for part in place.partition("->"))
@@ -86,7 +103,18 @@ def _of_columns(dataset: xr.Dataset, label: str) -> tuple[list[Site], float]:
         if "p" in seen and "q" in seen and not (arrow and not own.keys() & {"p", "im"}):
             sign = -1.0 if arrow else 1.0
             kind: Kind = "branch" if arrow else "unit"
-            found.append(Site(place, kind, bus, seen["vm"], seen["va"], sign * seen["p"], sign * seen["q"], beyond))
+            found.append(
+                Site(
+                    place,
+                    kind,
+                    bus,
+                    seen["vm"],
+                    seen["va"],
+                    sign * seen["p"],
+                    sign * seen["q"],
+                    beyond,
+                )
+            )
     return found, 1.0 if True in per_unit else 100.0
 
 
@@ -100,16 +128,22 @@ def _in_base(curve: xr.DataArray, what: str, where: str) -> tuple[Numbers, str]:
             return values * to_unit(f"1 {unit}", base), base
         except ValueError:
             continue
-    raise InputError(f"{where}: the unit {unit or 'is missing and'!r} is not {' or '.join(_BASES[what])}"
-                     f"{' or deg' if what in ('va', 'ia') else ''}; write it in brackets behind the name")  # fmt: skip
+    raise InputError(
+        f"{where}: the unit {unit or 'is missing and'!r} is not {' or '.join(_BASES[what])}"
+        f"{' or deg' if what in ('va', 'ia') else ''}; write it in brackets behind the name"
+    )
 
 
 def contest_cases(folder: Path) -> list[Path]:
     folders = (p for p in folder.glob("*") if p.is_dir())
     inside = sorted(folders, key=lambda p: [int(n) for n in re.findall(r"\d+", p.name)])
-    found = [path for path in (folder, *inside) if all((path / name).is_file() for name in CONTEST_FILES)]
+    found = [
+        path for path in (folder, *inside) if all((path / name).is_file() for name in CONTEST_FILES)
+    ]
     if not found:
-        raise InputError(f"--contest {folder}: neither it nor a folder in it holds {', '.join(CONTEST_FILES)}")
+        raise InputError(
+            f"--contest {folder}: neither it nor a folder in it holds {', '.join(CONTEST_FILES)}"
+        )
     return found
 
 
@@ -136,10 +170,22 @@ def read_contest(folder: Path) -> Measurements:
         power = vm[bus] * im[name] * np.exp(1j * (angle - np.deg2rad(ia[name])))
         alone = ends.count(parts[0]) == 1
         power = power if alone else -power
-        places.append(Site(" ".join((bus if alone else name).split()), "unit" if alone else "branch", parts[0],
-                            vm[bus], angle, power.real, power.imag, "" if alone else parts[2]))  # fmt: skip
+        places.append(
+            Site(
+                " ".join((bus if alone else name).split()),
+                "unit" if alone else "branch",
+                parts[0],
+                vm[bus],
+                angle,
+                power.real,
+                power.imag,
+                "" if alone else parts[2],
+            )
+        )
     if not places:
-        raise InputError(f"{folder}: no line of {CONTEST_FILES[2]} begins at a bus of {CONTEST_FILES[0]}")
+        raise InputError(
+            f"{folder}: no line of {CONTEST_FILES[2]} begins at a bus of {CONTEST_FILES[0]}"
+        )
     return made_ready(folder.name, times, places)
 
 
@@ -152,5 +198,7 @@ def _table(path: Path) -> tuple[Numbers, dict[str, Numbers]]:
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: it cannot be read as a table of the contest: {error}") from error
     if len(names) < 2 or values.shape[1] != len(names):
-        raise InputError(f"{path}: {len(names)} names in quotes stand above {values.shape[-1]} columns of numbers")
+        raise InputError(
+            f"{path}: {len(names)} names in quotes stand above {values.shape[-1]} columns of numbers"
+        )
     return values[:, 0], {name: values[:, k] for k, name in enumerate(names) if k}

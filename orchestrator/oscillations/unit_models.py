@@ -19,7 +19,12 @@ from orchestrator.results.storage import measuring_places
 from orchestrator.safe_files import file_hash
 from orchestrator.study.modes import running
 
-_VOLTAGE, _CURRENT, _EMF, _SHUNT = ("v_re", "v_im"), ("i_re", "i_im"), ("e_re", "e_im"), ("y_re", "y_im")
+_VOLTAGE, _CURRENT, _EMF, _SHUNT = (
+    ("v_re", "v_im"),
+    ("i_re", "i_im"),
+    ("e_re", "e_im"),
+    ("y_re", "y_im"),
+)
 
 
 def unit_models(prepared: PreparedScenario) -> UnitModels:
@@ -28,18 +33,27 @@ def unit_models(prepared: PreparedScenario) -> UnitModels:
         homes = {
             name: bus
             for name, bus in measuring_places(prepared).items()
-            if name in master.exchanges and {*_CURRENT} <= {*master.components[name].description.variables}
+            if name in master.exchanges
+            and {*_CURRENT} <= {*master.components[name].description.variables}
         }
         if not homes:
-            raise InputError(f"{prepared.case.name}: no unit takes a voltage (v_re, v_im) and shows a current (i_re, "
-                             "i_im), so there are no models to compare the record with")  # fmt: skip
+            raise InputError(
+                f"{prepared.case.name}: no unit takes a voltage (v_re, v_im) and shows a current (i_re, "
+                "i_im), so there are no models to compare the record with"
+            )
         grid = {bus.partition(".")[0] for bus in homes.values()} & set(master.components)
-        scales = [f"{name}.{v}" for name in sorted(grid) for v in master.components[name].description.variables
-                  if v.endswith(".scale")]  # fmt: skip
+        scales = [
+            f"{name}.{v}"
+            for name in sorted(grid)
+            for v in master.components[name].description.variables
+            if v.endswith(".scale")
+        ]
         observed = [f"{unit}.{i}" for unit in homes for i in _CURRENT]
         blocks = Blocks(master, inputs=scales, outputs=observed, without_step=True)
         model = continuous(blocks)
-        currents = {unit: complex(*master.components[unit].get([*_CURRENT]).values()) for unit in homes}
+        currents = {
+            unit: complex(*master.components[unit].get([*_CURRENT]).values()) for unit in homes
+        }
         values = dict(zip(master.output_names, master.y.tolist(), strict=True))
     F, G, H, K = (M.toarray() for M in (model.F, model.G, model.H, model.K))
     settled = np.linalg.inv(np.eye(len(K)) - K)
@@ -52,14 +66,18 @@ def unit_models(prepared: PreparedScenario) -> UnitModels:
         return lambda s: _response(s, A, G @ drive, C, drive[seen])
 
     first = len(row) + len(blocks.links)
-    loads = {name.removesuffix(".scale"): reach(settled[:, [first + k]]) for k, name in enumerate(scales)}
+    loads = {
+        name.removesuffix(".scale"): reach(settled[:, [first + k]]) for k, name in enumerate(scales)
+    }
     found = {}
     for unit, bus in homes.items():
         c = blocks.components[unit]
         assert c.A_c is not None and c.B_c is not None  # noqa: PT018 - `continuous` has refused it
         columns = [c.inputs.index(v) for v in _VOLTAGE]
         given, y = _CURRENT, complex(1.0)
-        if f"{unit}.i_re" not in row:  # a source behind an admittance y, which gives y times its own voltage
+        if (
+            f"{unit}.i_re" not in row
+        ):  # a source behind an admittance y, which gives y times its own voltage
             given, y = _EMF, complex(*(values.get(f"{unit}.{part}", 0.0) for part in _SHUNT))
         if not y or f"{unit}.{given[0]}" not in row:
             continue
@@ -92,7 +110,11 @@ def unlike(attributes: Mapping[str, Any], prepared: PreparedScenario) -> str:
     case, there = prepared.case, prepared.given
     found = ["the case file"] if attributes.get("case_file", case.text) != case.text else []
     for name, content in json.loads(attributes.get("inputs", "{}")).items():
-        if (path := case.directory / name) != case.path and path.is_file() and file_hash(path) != content:
+        if (
+            (path := case.directory / name) != case.path
+            and path.is_file()
+            and file_hash(path) != content
+        ):
             found.append(name)
     if attributes.get("scenario", prepared.name) != prepared.name:
         found.append(f"the scenario ({attributes['scenario']!r}, not {prepared.name!r})")

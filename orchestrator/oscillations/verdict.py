@@ -8,8 +8,22 @@ import numpy as np
 
 from orchestrator.arrays import Numbers
 from orchestrator.oscillations.close_lines import doubt, most_explained, skirt
-from orchestrator.oscillations.detection import Signals, SpectralLine, envelope, find_oscillations, phasors, signals_of
-from orchestrator.oscillations.location import DEF, DYNAMIC_MODE, QV_PHASE, Opinion, felt_beyond, opinions
+from orchestrator.oscillations.detection import (
+    Signals,
+    SpectralLine,
+    envelope,
+    find_oscillations,
+    phasors,
+    signals_of,
+)
+from orchestrator.oscillations.location import (
+    DEF,
+    DYNAMIC_MODE,
+    QV_PHASE,
+    Opinion,
+    felt_beyond,
+    opinions,
+)
 from orchestrator.oscillations.measurements import Measurements
 from orchestrator.oscillations.models import OWN_MODEL, UnitModels, own_models
 
@@ -22,7 +36,8 @@ _STEADY, _RESTLESS = 0.25, 0.35
 
 _TREND = 0.7  # part of the envelope's variance that an exponential must explain to be one
 _SINE = 1.85  # fourth moment beside the square of the second: 1.5 of a sine, 3 of noise
-_LEAST_PART = 0.2  # of the largest amplitude of its kind, from which a signal is looked at for disturbances
+# of the largest amplitude of its kind, from which a signal is looked at for disturbances
+_LEAST_PART = 0.2
 
 _CLEAN, _SKIRT = 0.04, 5.0
 """Spread of the envelope up to which nothing else is asked; beyond it what is left beside the line, near it and further
@@ -30,8 +45,11 @@ off, must not fall by more than the factor, as it does beside a mode with next t
 
 _SHOCK = 6.0  # deviation at the begin, in amplitudes, that a forcing's own transient does not reach
 _COHERENT = 0.975
-_PAIR = 0.87  # part of the envelope's power from which on two sines explain it; of a mode of 3 % in noise 0.4 to 0.87
-_CHANGE = 0.25  # change of the amplitude over the window from which on an oscillation decays or grows
+# part of the envelope's power from which on two sines explain it; of a mode of 3 % in noise 0.4 to
+# 0.87
+_PAIR = 0.87
+# change of the amplitude over the window from which on an oscillation decays or grows
+_CHANGE = 0.25
 
 
 @dataclass(frozen=True)
@@ -40,7 +58,8 @@ class Evidence:
     damping_percent: float  # from the envelope; negative where it grows
     envelope_spread: float  # standard deviation of the envelope as a part of its mean
     kurtosis: float  # 1.5 of a sine, 3 of noise
-    coherence: float  # length of the mean phasor beside the phasors' mean length: 1 where the phase stays
+    # length of the mean phasor beside the phasors' mean length: 1 where the phase stays
+    coherence: float
     skirt: float  # power beside the line as a multiple of that further off
     periods: float
     disturbed: bool  # whether it begins with a step or a shock in the signals
@@ -51,11 +70,23 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
     f, step = found.frequency, float(signals.times[1] - signals.times[0])
     settle = 0 if found.begin is None else round(2 / (f * step))
     used = slice(min(found.first + settle, found.last - 2), found.last)
-    columns = [*map(signals.names.index, [*found.amplitudes][: min(found.clear or _STRONGEST, _STRONGEST)])]
+    columns = [
+        *map(signals.names.index, [*found.amplitudes][: min(found.clear or _STRONGEST, _STRONGEST)])
+    ]
     t = signals.times[used]
     periods = len(t) * step * f
     if periods < _FEWEST_PERIODS:
-        return Evidence("not known", 0.0, 0.0, 0.0, 0.0, 0.0, periods, False, (f"only {periods:.1f} periods are seen",))
+        return Evidence(
+            "not known",
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            periods,
+            False,
+            (f"only {periods:.1f} periods are seen",),
+        )
     seen, envelopes = [], []
     for k in columns:
         z, half = envelope(t, signals.values[used, k], f)
@@ -70,13 +101,19 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
         envelopes.append(z)
         some = z[:: max(1, len(z) // 64), None]
         at = np.linspace(0, 1, len(some))
-        pair = most_explained(at, some, np.arange(-2, 2.01, 0.125), 2)[1] if spread > _RESTLESS else 0.0
+        pair = (
+            most_explained(at, some, np.arange(-2, 2.01, 0.125), 2)[1]
+            if spread > _RESTLESS
+            else 0.0
+        )
         seen.append([spread, kurtosis, abs(z.mean()) / size.mean(), slope, change, pair])
     beside = float(np.median([skirt(t, signals.values[used, k], [f]) for k in columns]))
     spread, kurtosis, coherence, slope, change, pair = np.median(seen, axis=0).tolist()
     damping = float(-100 * slope / np.hypot(slope, 2 * np.pi * f))
     shocked = _disturbed(signals, found)
-    figures = Evidence("not known", damping, spread, kurtosis, coherence, beside, periods, shocked, ())
+    figures = Evidence(
+        "not known", damping, spread, kurtosis, coherence, beside, periods, shocked, ()
+    )
     kind, reasons = _judged(figures, change, pair, found)
     if kind != "not known":
         shown = signals.values[used][half : len(t) - half, columns]
@@ -88,15 +125,25 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
 def forced_frequencies(times: Numbers, names: Sequence[str], values: Numbers) -> list[float]:
     """Of the oscillations in signals, shape (n, m), that are forced."""
     signals = Signals(times, tuple(names), values - values.mean(axis=0))
-    return [one.frequency for one in find_oscillations(signals) if evidence_of(signals, one).kind == "forced"]
+    return [
+        one.frequency
+        for one in find_oscillations(signals)
+        if evidence_of(signals, one).kind == "forced"
+    ]
 
 
-def _judged(seen: Evidence, change: float, pair: float, found: SpectralLine) -> tuple[OscillationKind, list[str]]:
-    harmonics = ", ".join(f"{order} x ({100 * part:.0f} %)" for order, part in found.harmonics.items())
+def _judged(
+    seen: Evidence, change: float, pair: float, found: SpectralLine
+) -> tuple[OscillationKind, list[str]]:
+    harmonics = ", ".join(
+        f"{order} x ({100 * part:.0f} %)" for order, part in found.harmonics.items()
+    )
     sharp = seen.envelope_spread <= _CLEAN or seen.skirt <= _SKIRT or bool(harmonics)
     steady = seen.envelope_spread < _STEADY and seen.kurtosis < _SINE and seen.coherence > _COHERENT
-    figures = (f"envelope ± {100 * seen.envelope_spread:.0f} %, kurtosis {seen.kurtosis:.2f}, phase coherence "
-               f"{seen.coherence:.2f}")  # fmt: skip
+    figures = (
+        f"envelope ± {100 * seen.envelope_spread:.0f} %, kurtosis {seen.kurtosis:.2f}, phase coherence "
+        f"{seen.coherence:.2f}"
+    )
     if abs(change) > _CHANGE and seen.coherence > 0.8 and not harmonics:
         way = "decays" if change < 0 else "grows"
         trend = f"its amplitude {way}, by {100 * abs(change):.0f} % over {seen.periods:.0f} periods ({figures})"
@@ -105,14 +152,24 @@ def _judged(seen: Evidence, change: float, pair: float, found: SpectralLine) -> 
         after = "a mode without damping would ring alike after the disturbance with which it begins"
         return "not known", [f"it is steady ({figures}), but {after}"]
     if steady and not sharp:
-        return "not known", [f"it is steady ({figures}), but its line widens as that of a mode that noise shakes"]
+        return "not known", [
+            f"it is steady ({figures}), but its line widens as that of a mode that noise shakes"
+        ]
     if steady:
-        said = [f"it is steady over {seen.periods:.0f} periods ({figures}): noise would make a mode's amplitude wander"]
-        said += [f"multiples of its frequency: {harmonics}, as of a limit or a switch"] if harmonics else []
+        said = [
+            f"it is steady over {seen.periods:.0f} periods ({figures}): noise would make a mode's amplitude wander"
+        ]
+        said += (
+            [f"multiples of its frequency: {harmonics}, as of a limit or a switch"]
+            if harmonics
+            else []
+        )
         return "forced", said
     restless = seen.envelope_spread > _RESTLESS
     if restless and pair > _PAIR:
-        return "not known", [f"it swells and fades as two steady sines at close frequencies would ({figures})"]
+        return "not known", [
+            f"it swells and fades as two steady sines at close frequencies would ({figures})"
+        ]
     if restless and seen.kurtosis > _SINE and seen.coherence < 0.9:
         return "mode", [f"its amplitude and phase wander as noise makes them ({figures})"]
     return "not known", [f"neither steady nor restless: {figures}"]
@@ -126,9 +183,16 @@ def _disturbed(signals: Signals, found: SpectralLine) -> bool:
     period = max(2, round(1 / (found.frequency * step)))
     at, end = found.first, found.last
     around = slice(max(0, at - 2 * period), at + 2 * period)
-    before, after = slice(max(0, at - 4 * period), max(1, at - period)), slice(at + period, min(end, at + 5 * period))
+    before, after = (
+        slice(max(0, at - 4 * period), max(1, at - period)),
+        slice(at + period, min(end, at + 5 * period)),
+    )
     for name, amplitude in found.amplitudes.items():
-        alike = (a for other, a in found.amplitudes.items() if other.rpartition(".")[2] == name.rpartition(".")[2])
+        alike = (
+            a
+            for other, a in found.amplitudes.items()
+            if other.rpartition(".")[2] == name.rpartition(".")[2]
+        )
         if amplitude < _LEAST_PART * max(alike) or not name.endswith((".p", ".q")):
             continue
         x = signals.values[:, signals.names.index(name)]
@@ -152,27 +216,39 @@ class Located:
     found: SpectralLine
     evidence: Evidence
     opinions: tuple[Opinion, ...]
-    drives: str | None  # a place that drives it, perhaps not alone; None where that is not known, or nothing forces it
+    # a place that drives it, perhaps not alone; None where that is not known, or nothing forces it
+    drives: str | None
     source: str | None  # the same, where it is known that nothing else drives
     reason: str  # why it is named, or why not
     advice: str  # what would confirm the answer, or what helps
-    controllers: tuple[dict[str, Any], ...] = ()  # of a case's mode: POD and PSS, the one that moves it most first
+    # of a case's mode: POD and PSS, the one that moves it most first
+    controllers: tuple[dict[str, Any], ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         return {
-            "frequency_hz": self.found.frequency, "kind": self.evidence.kind, "source": self.source,
-            "drives": self.drives, "reason": self.reason, "advice": self.advice, "begin": self.found.begin,
+            "frequency_hz": self.found.frequency,
+            "kind": self.evidence.kind,
+            "source": self.source,
+            "drives": self.drives,
+            "reason": self.reason,
+            "advice": self.advice,
+            "begin": self.found.begin,
             "harmonics": {str(order): part for order, part in self.found.harmonics.items()},
-            "evidence": asdict(self.evidence), "controllers": list(self.controllers),
-            "methods": [asdict(o) | {"ranking": [list(one) for one in o.ranking]} for o in self.opinions],
+            "evidence": asdict(self.evidence),
+            "controllers": list(self.controllers),
+            "methods": [
+                asdict(o) | {"ranking": [list(one) for one in o.ranking]} for o in self.opinions
+            ],
             "amplitudes": dict(list(self.found.amplitudes.items())[:_SHOWN]),
-        }  # fmt: skip
+        }
 
 
 def locate(measured: Measurements, models: UnitModels | None = None) -> list[Located]:
     """What is there; with the linear models of a case's units, these decide."""
     signals = signals_of(measured)
-    found = [one for one in find_oscillations(signals) if one.periods(measured.interval) >= _FEWEST_TOLD]
+    found = [
+        one for one in find_oscillations(signals) if one.periods(measured.interval) >= _FEWEST_TOLD
+    ]
     answers = []
     for one in found:
         evidence = evidence_of(signals, one)
@@ -185,13 +261,19 @@ def locate(measured: Measurements, models: UnitModels | None = None) -> list[Loc
                 evidence = replace(evidence, kind="forced", reasons=(own.reason,))
         drives, reason = _verdict(evidence, said)
         reason += f"; {OWN_MODEL}: {said[-1].reason}" if said[-1].method == OWN_MODEL else ""
-        if drives is not None and said[0].method != OWN_MODEL and not felt_beyond(measured, one, others, drives):
+        if (
+            drives is not None
+            and said[0].method != OWN_MODEL
+            and not felt_beyond(measured, one, others, drives)
+        ):
             reason = f"no other bus moves with {drives}: its measuring may err, or nothing else is in view"
             drives = None
         if not (sole := said[0].alone and drives is not None) and drives is not None:
             reason += f"; whether {drives} does so alone is not known"
         advice = _advice(measured, evidence, drives, sole=sole)
-        answers.append(Located(one, evidence, tuple(said), drives, drives if sole else None, reason, advice))
+        answers.append(
+            Located(one, evidence, tuple(said), drives, drives if sole else None, reason, advice)
+        )
     return answers
 
 
@@ -201,7 +283,9 @@ def _verdict(evidence: Evidence, said: Sequence[Opinion]) -> tuple[str | None, s
         known = evidence.kind == "mode" and "a mode of the system has no source"
         return None, f"{known or 'it is not known whether it is forced'}: {evidence.reasons[0]}"
     if said[0].method == OWN_MODEL:
-        others = "; ".join(f"{o.method}: {o.reason}" for o in said[1:] if o.applies and o.place != said[0].place)
+        others = "; ".join(
+            f"{o.method}: {o.reason}" for o in said[1:] if o.applies and o.place != said[0].place
+        )
         return said[0].place, f"{said[0].reason}{others and f' (besides, {others})'}"
     said = [o for o in said if o.method != OWN_MODEL]
     by_method = {o.method: o for o in said}

@@ -38,9 +38,16 @@ class Sources:
     """
 
     def __init__(
-        self, measured: Measurements, oscillations: Sequence[Located], prepared: PreparedScenario | None = None
+        self,
+        measured: Measurements,
+        oscillations: Sequence[Located],
+        prepared: PreparedScenario | None = None,
     ) -> None:
-        self.label, self.remarks, self.oscillations = measured.label, measured.remarks, list(oscillations)
+        self.label, self.remarks, self.oscillations = (
+            measured.label,
+            measured.remarks,
+            list(oscillations),
+        )
         self.places, self._measured = [place.name for place in measured.places], measured
         self._about = prepared.about if prepared else {"questions": []}
 
@@ -74,7 +81,11 @@ class Sources:
 
 
 def sources_of(
-    dataset: xr.Dataset, label: str, start: Time | None, stop: Time | None, prepared: PreparedScenario | None = None
+    dataset: xr.Dataset,
+    label: str,
+    start: Time | None,
+    stop: Time | None,
+    prepared: PreparedScenario | None = None,
 ) -> Sources:
     """The oscillations of a part of a record, beside the units' models in a scenario or in its own built-in case."""
     begin, end = part_of_record(dataset["time"].values, start, stop, label)
@@ -89,7 +100,9 @@ def sources_of(
             remark = f"the record is compared with no models of the units: {error}"
             measured = replace(measured, remarks=(*measured.remarks, remark))
     if prepared is None and "case_file" in dataset.attrs:
-        case = next(iter(json.loads(dataset.attrs.get("inputs", "{}"))), f"{dataset.attrs['case']}.toml")
+        case = next(
+            iter(json.loads(dataset.attrs.get("inputs", "{}"))), f"{dataset.attrs['case']}.toml"
+        )
         given = f"--case {case} --scenario {dataset.attrs['scenario']}"
         remark = f"without its own case the run is judged by its signals alone; the units' models decide: give {given}"
         measured = replace(measured, remarks=(remark, *measured.remarks))
@@ -118,7 +131,11 @@ def sources_table(found: Sequence[Sources]) -> PlainTable:
 def _rows(one: Sources) -> Iterator[Sequence[str]]:
     for x in one:
         half = 1.5 / x.found.frequency  # of the window that sees it begin
-        begin = f"in the first {half:.1f}" if x.found.begin is None else f"{x.found.begin:.1f} ± {half:.1f}"
+        begin = (
+            f"in the first {half:.1f}"
+            if x.found.begin is None
+            else f"{x.found.begin:.1f} ± {half:.1f}"
+        )
         multiples = ", ".join(str(order) for order in x.found.harmonics)
         source = x.source or (f"{x.drives}, perhaps others" if x.drives else "not known")
         yield one.label, f"{x.found.frequency:.4f}", str(x.evidence.kind), source, begin, multiples
@@ -129,8 +146,12 @@ def _rows(one: Sources) -> Iterator[Sequence[str]]:
 def opinions_table(head: str, one: Located) -> PlainTable:
     columns = ("Method", "Applies", "Names", "Places, the largest part first")
     rows = [
-        (o.method, "yes" if o.applies else "no", o.place or "–",
-         ", ".join(f"{name} {100 * share:.0f} %" for name, share in o.ranking[:_SHOWN]))
+        (
+            o.method,
+            "yes" if o.applies else "no",
+            o.place or "–",
+            ", ".join(f"{name} {100 * share:.0f} %" for name, share in o.ranking[:_SHOWN]),
+        )
         for o in one.opinions
-    ]  # fmt: skip
+    ]
     return make_table(head, *columns, left=4, rows=rows)

@@ -49,7 +49,9 @@ class KeptFigures:
 
 def figures_of(prepared: PreparedScenario, store: PointStore | None) -> KeptFigures:
     schedule = [prepared.schedule.name, *map(list, prepared.schedule.groups)]
-    return KeptFigures(store, StudyCase.of(prepared, step_size=prepared.step_size, schedule=schedule).mark)
+    return KeptFigures(
+        store, StudyCase.of(prepared, step_size=prepared.step_size, schedule=schedule).mark
+    )
 
 
 def digest(*arrays: Any) -> str:
@@ -66,12 +68,18 @@ class PodSetting:
     gain: float
     filters: LeadLag
 
-    def parameters(self, keys: Sequence[str], controller: str, stages: int) -> dict[str, bool | float | str]:
+    def parameters(
+        self, keys: Sequence[str], controller: str, stages: int
+    ) -> dict[str, bool | float | str]:
         """By ``component.variable``, with eight significant digits: far more precise than any controller's setting."""
         numbers = {"K": self.gain, "T_S1": self.filters.T_S1, "T_S2": self.filters.T_S2}
         found: dict[str, bool | float | str] = {"enabled": self.gain > 0}
         found |= {key: float(f"{number:.8g}") for key, number in numbers.items()} | {"N_S": stages}
-        return {f"{component}.{controller}.{key}": value for component in keys for key, value in found.items()}
+        return {
+            f"{component}.{controller}.{key}": value
+            for component in keys
+            for key, value in found.items()
+        }
 
 
 @dataclass(frozen=True)
@@ -95,7 +103,11 @@ class PodLoop:
     ``kept``: Figures that an earlier start of the same design has left."""
 
     def __init__(
-        self, master: Master, components: Sequence[str], controller: str, kept: KeptFigures | None = None
+        self,
+        master: Master,
+        components: Sequence[str],
+        controller: str,
+        kept: KeptFigures | None = None,
     ) -> None:
         self._kept = kept or KeptFigures()
         self._master, self._components, self._controller = master, tuple(components), controller
@@ -132,7 +144,10 @@ class PodLoop:
 
     def continuous_models(self, setting: PodSetting) -> tuple[LinearModel, LinearModel]:
         """The continuous models with half the gain and with the gain. The state matrix is linear in the gain."""
-        half, full = (self._continuous_model(replace(setting, gain=share * setting.gain)) for share in (0.5, 1.0))
+        half, full = (
+            self._continuous_model(replace(setting, gain=share * setting.gain))
+            for share in (0.5, 1.0)
+        )
         return half, full
 
     def _continuous_model(self, setting: PodSetting) -> LinearModel:
@@ -159,17 +174,24 @@ class PodLoop:
         ``filters``: The lead/lag at the new gain; by default that of ``start``."""
         setting = PodSetting(gain, filters or start.setting.filters)
         if start.setting.gain and start.setting.filters != setting.filters:
-            raise ValueError("a mode is followed along the gain; with other lead/lag it starts from a gain of 0")
+            raise ValueError(
+                "a mode is followed along the gain; with other lead/lag it starts from a gain of 0"
+            )
         if gain == start.setting.gain:
             return Placed(setting, start.pair)
         pair = digest(np.array(start.pair.eigenvalue), start.pair.left, start.pair.right)
         what = {"from": astuple(start.setting), "pair": pair, "to": astuple(setting)}
         found = self.figures("place", what, lambda: self._followed(start, setting))
-        return Placed(setting, Eigenpair(complex(found["eigenvalue"]), found["left"], found["right"]))
+        return Placed(
+            setting, Eigenpair(complex(found["eigenvalue"]), found["left"], found["right"])
+        )
 
     def _followed(self, start: Placed, setting: PodSetting) -> Arrays:
         pair = follow_along(
-            start.pair, lambda value: self.model(replace(setting, gain=value)), start.setting.gain, setting.gain
+            start.pair,
+            lambda value: self.model(replace(setting, gain=value)),
+            start.setting.gain,
+            setting.gain,
         )
         return {"eigenvalue": np.array(pair.eigenvalue), "left": pair.left, "right": pair.right}
 
@@ -179,17 +201,27 @@ class PodLoop:
         return self._kept.get({**own, **what}, compute)
 
     def _apply(self, setting: PodSetting) -> None:
-        values = {"enabled": setting.gain != 0, "K": setting.gain, "T_S1": setting.filters.T_S1,
-                  "T_S2": setting.filters.T_S2}  # fmt: skip
+        values = {
+            "enabled": setting.gain != 0,
+            "K": setting.gain,
+            "T_S1": setting.filters.T_S1,
+            "T_S2": setting.filters.T_S2,
+        }
         for name in self._components:
-            self._master.components[name].set({f"{self._controller}.{key}": value for key, value in values.items()})
+            self._master.components[name].set(
+                {f"{self._controller}.{key}": value for key, value in values.items()}
+            )
 
 
 def check_tunable(name: str, description: FmuDescription, controller: str) -> None:
     """A controller's gain and lead/lag must be tunable.
 
     ``controller``: ``pod_p`` or ``pod_q``."""
-    fixed = [v for v in (f"{controller}.{key}" for key in _TUNED) if description.variables[v].variability != "tunable"]
+    fixed = [
+        v
+        for v in (f"{controller}.{key}" for key in _TUNED)
+        if description.variables[v].variability != "tunable"
+    ]
     if fixed:
         raise InputError(
             f"component {name!r}: {', '.join(fixed)} cannot be changed while the FMU runs; a design needs them tunable"

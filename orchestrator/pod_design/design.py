@@ -42,7 +42,8 @@ from orchestrator.study.naming import named_modes
 StageReport = Callable[[str], None]
 
 _OFF = PodSetting(0.0, leads.NO_COMPENSATION)
-_MET = 5e-4  # a requirement counts as met if the damping ratio falls short of it by less: 0.05 points
+# a requirement counts as met if the damping ratio falls short of it by less: 0.05 points
+_MET = 5e-4
 
 
 @dataclass(frozen=True)
@@ -68,29 +69,47 @@ class DesignRequest(OfCase):
     scenario: str | None = of_scenario("its name; by default the one without this controller")
     values: Mapping[str, Any] | None = of_values()
     _: KW_ONLY
-    component: str | None = asked(NAME, None, "the converter, or a pattern for several with one setting")
+    component: str | None = asked(
+        NAME, None, "the converter, or a pattern for several with one setting"
+    )
     mode: str | None = asked(
-        NAME, None, "the case's mode to damp (default: its first; the least damped swing where it names none)"
+        NAME,
+        None,
+        "the case's mode to damp (default: its first; the least damped swing where it names none)",
     )
     damping: float | None = asked(DAMPING, None, "required damping, such as 20")
     damping_increment: float | None = asked(
-        DAMPING, None, "required increase of the damping in points (default: 10)", "POINTS",
+        DAMPING,
+        None,
+        "required increase of the damping in points (default: 10)",
+        "POINTS",
         python="required increase of the damping, in points and in the place of ``damping``",
-    )  # fmt: skip
-    delta_gain: float = asked(GAIN, 50.0, "gain of the finite-difference sensitivity [pu] (default: 50)")
+    )
+    delta_gain: float = asked(
+        GAIN, 50.0, "gain of the finite-difference sensitivity [pu] (default: 50)"
+    )
     gain_bounds: tuple[float, float] | None = asked(
-        GAIN_BOUNDS, None, "bounds of the gain [pu] (default: 200:400, and 0:400 in a search or with --points)"
+        GAIN_BOUNDS,
+        None,
+        "bounds of the gain [pu] (default: 200:400, and 0:400 in a search or with --points)",
     )
     stages: int | None = asked(STAGES, None, "lead/lag stages (default: the component's own)")
     compensated_gain: bool = asked(
         FLAG, False, "compute the gain from the sensitivity with the lead/lag in place", option=None
     )
     least_damping: float = asked(
-        DAMPING, 0.05, "damping below which no other mode may be pushed (default: 5)", option="--min-damping"
+        DAMPING,
+        0.05,
+        "damping below which no other mode may be pushed (default: 5)",
+        option="--min-damping",
     )
-    refine: bool = asked(FLAG, False, "search gain and lead/lag on the closed loop (without bounds: where needed)")
+    refine: bool = asked(
+        FLAG, False, "search gain and lead/lag on the closed loop (without bounds: where needed)"
+    )
     margins: bool = asked(FLAG, True, "compute the margins, which take longest", option=None)
-    progress: bool = asked(FLAG, False, "show a line with the stage that the design has come to", option=None)
+    progress: bool = asked(
+        FLAG, False, "show a line with the stage that the design has come to", option=None
+    )
 
     def bounds(self, *, search: bool) -> tuple[float, float]:
         return self.gain_bounds or (0.0 if search else 200.0, 400.0)
@@ -140,10 +159,13 @@ class PodDesign:
     refinement: Refinement | None
     # smallest gain with the design's lead/lag that has the required damping, else that with most; None where refined
     other_gain: Placed | None
-    final: Placed  # the closed loop with the final setting: the refined setting, or ``designed`` without refinement
+    # the closed loop with the final setting: the refined setting, or ``designed`` without
+    # refinement
+    final: Placed
     before: Surroundings
     after: Surroundings
-    broken: str | None  # the prohibited effect of the final setting on other modes; empty if there is no such effect
+    # the prohibited effect of the final setting on other modes; empty if there is no such effect
+    broken: str | None
     margins: Margins | None
     # what `LARGER_GAIN` does to other modes, as ``broken``; None where it does not, or without margins
     spoilt: str | None
@@ -181,7 +203,11 @@ class PodDesign:
         """The target's damping ratio with a gain that is larger by `VARIATION`, where the requirement is met and that
         is too little; None where it holds there, or that is not known."""
         there = self.margins.variations.get(LARGER_GAIN) if self.margins else None
-        return there if self.met and there is not None and there < self.required_damping - _MET else None
+        return (
+            there
+            if self.met and there is not None and there < self.required_damping - _MET
+            else None
+        )
 
     @property
     def achieved(self) -> complex:
@@ -205,7 +231,11 @@ class PodDesign:
 
 
 def design_pod(
-    case: Case, request: DesignRequest, report: StageReport, store: PointStore | None, search: SearchOnLinearModels
+    case: Case,
+    request: DesignRequest,
+    report: StageReport,
+    store: PointStore | None,
+    search: SearchOnLinearModels,
 ) -> PodDesign:
     """Design a controller and check it on the closed loop.
 
@@ -213,26 +243,42 @@ def design_pod(
     ``search``: gives a refinement settings to try."""
     require_controllers([request.controller])
     if request.damping is not None and request.damping_increment is not None:
-        raise InputError("--damping and --damping-increment both say what is required; give one of them")
+        raise InputError(
+            "--damping and --damping-increment both say what is required; give one of them"
+        )
     report("preparing the case")
     target = find_target(
-        case, request.controller, scenario=request.scenario, pattern=request.component, stages=request.stages,
-        overrides=request.overrides, parameters=request.files,
-    )  # fmt: skip
+        case,
+        request.controller,
+        scenario=request.scenario,
+        pattern=request.component,
+        stages=request.stages,
+        overrides=request.overrides,
+        parameters=request.files,
+    )
     own: dict[str, Value] = {}
     for name in target.components:
-        own |= {f"{name}.{request.controller}.enabled": False, f"{name}.{request.controller}.N_S": float(target.stages)}
+        own |= {
+            f"{name}.{request.controller}.enabled": False,
+            f"{name}.{request.controller}.N_S": float(target.stages),
+        }
     overrides = {key: value for key, value in request.overrides.items() if key not in own} | own
     name = mode_name(case, request.mode)
     (prepared,) = case.prepare([target.scenario], overrides, request.step_size, None, request.files)
     rules: CaseDefinition = case
 
     def naming(model: LinearModel, modes: list[Mode]) -> Mode | None:
-        fitting = named_modes(rules, model, modes).fits.get(name)  # with a gain of any size, a tie counts as a change
+        # with a gain of any size, a tie counts as a change
+        fitting = named_modes(rules, model, modes).fits.get(name)
         return None if fitting is None else fitting[0]
 
-    for value, option in ((request.delta_gain, "--delta-gain"), (request.bounds(search=True)[1], "--gain-bounds")):
-        check_range(prepared.system.components, target.components, f"{request.controller}.K", value, option)
+    for value, option in (
+        (request.delta_gain, "--delta-gain"),
+        (request.bounds(search=True)[1], "--gain-bounds"),
+    ):
+        check_range(
+            prepared.system.components, target.components, f"{request.controller}.K", value, option
+        )
     with running(prepared) as master:
         report("operating point")
         point = find_operating_point(master)
@@ -258,7 +304,16 @@ def design_pod(
                 )
             off = Placed(_OFF, pair_at(model, before.named.eigenvalue))
             start = _Start(
-                case.name, request, target, prepared, name, off, before.without(before.named), naming, examined, search
+                case.name,
+                request,
+                target,
+                prepared,
+                name,
+                off,
+                before.without(before.named),
+                naming,
+                examined,
+                search,
             )
             return _design(start, loop, report)
 
@@ -271,7 +326,9 @@ def _with_stability(stability: Stability) -> Iterator[None]:
     except (InputError, AnalysisError) as error:
         if stability.stable is not False:
             raise
-        raise type(error)(f"{error}\nWithout the controller the system is {stability.sentence()}") from error
+        raise type(error)(
+            f"{error}\nWithout the controller the system is {stability.sentence()}"
+        ) from error
 
 
 @dataclass(frozen=True)
@@ -303,13 +360,19 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
         if placed.setting not in judged:
             after = around(placed)
             damping = damping_ratio(after.counting(placed.eigenvalue))
-            least = min([damping_ratio(placed.eigenvalue), *(mode.damping_ratio for mode in after.others)])
-            judged[placed.setting] = Judgement(damping, breach(before, after, request.least_damping), least)
+            least = min(
+                [damping_ratio(placed.eigenvalue), *(mode.damping_ratio for mode in after.others)]
+            )
+            judged[placed.setting] = Judgement(
+                damping, breach(before, after, request.least_damping), least
+            )
         return judged[placed.setting]
 
     def settings() -> Sequence[tuple[str, PodSetting]]:
         report("refinement: a search and a grid of settings on the linear model")
-        return start.search(start.prepared.case, request, start.target, start.mode_name, loop, initial.imag)
+        return start.search(
+            start.prepared.case, request, start.target, start.mode_name, loop, initial.imag
+        )
 
     report("sensitivity of the mode")
     bare = loop.place(off, request.delta_gain)
@@ -327,7 +390,9 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
     broken = breach(before, after, request.least_damping)
     if request.refine or ((short or broken) and request.gain_bounds is None):
         bounds, evenly = request.bounds(search=True), request.mode is None
-        refinement = refine(loop, off, filters, required, bounds, judge, settings, evenly=evenly, report=report)
+        refinement = refine(
+            loop, off, filters, required, bounds, judge, settings, evenly=evenly, report=report
+        )
         final = refinement.chosen or designed
         after = around(final)
         broken = breach(before, after, request.least_damping)
@@ -336,7 +401,9 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
     if refinement is None and short:
         report("other gains")
         with suppress(AnalysisError):  # the mode cannot be followed
-            other_gain = sweep(loop, off, filters, required, request.bounds(search=False), "as designed").chosen
+            other_gain = sweep(
+                loop, off, filters, required, request.bounds(search=False), "as designed"
+            ).chosen
     margins = spoilt = None
     if request.margins and final.setting.gain and examined.stability.stable is not False:
         report("margins")
@@ -345,14 +412,31 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
             more = loop.place(off, (1 + VARIATION) * final.setting.gain, final.setting.filters)
             spoilt = breach(before, around(more), request.least_damping)
     return PodDesign(
-        request=request, case=start.case, target=start.target, prepared=start.prepared, mode_name=start.mode_name,
-        initial=initial, required_damping=required, predicted=predicted,
-        sensitivities=GainSensitivities(bare.eigenvalue, S, S_turned), filters=filters,
-        gain_non_compensated=gains[0], gain_compensated=gains[1], gain=gain, designed=designed, refinement=refinement,
-        other_gain=other_gain, final=final, before=before, after=after,
-        broken=broken or _unstable(examined.stability), margins=margins, spoilt=spoilt,
-        examined_before=start.examined, examined=examined,
-    )  # fmt: skip
+        request=request,
+        case=start.case,
+        target=start.target,
+        prepared=start.prepared,
+        mode_name=start.mode_name,
+        initial=initial,
+        required_damping=required,
+        predicted=predicted,
+        sensitivities=GainSensitivities(bare.eigenvalue, S, S_turned),
+        filters=filters,
+        gain_non_compensated=gains[0],
+        gain_compensated=gains[1],
+        gain=gain,
+        designed=designed,
+        refinement=refinement,
+        other_gain=other_gain,
+        final=final,
+        before=before,
+        after=after,
+        broken=broken or _unstable(examined.stability),
+        margins=margins,
+        spoilt=spoilt,
+        examined_before=start.examined,
+        examined=examined,
+    )
 
 
 def _unstable(stability: Stability) -> str | None:

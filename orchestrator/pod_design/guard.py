@@ -6,7 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from orchestrator.analysis.linear_model import LinearModel
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode, damping_ratio, find_spectrum, to_continuous
+from orchestrator.analysis.modes import (
+    ELECTROMECHANICAL_HZ,
+    Mode,
+    damping_ratio,
+    find_spectrum,
+    to_continuous,
+)
 from orchestrator.analysis.stability import fastest_growth
 
 Naming = Callable[[LinearModel, list[Mode]], Mode | None]
@@ -24,7 +30,8 @@ class Surroundings:
     others: tuple[Mode, ...]  # those from 0.1 to 2 Hz, least damped first
     # real part [1/s] of the eigenvalue that grows most, at any frequency, the target's included; 0 where none grows
     growth: float
-    named: Mode | None  # the mode to which the case's rule gives the target's name; normally the target itself
+    # the mode to which the case's rule gives the target's name; normally the target itself
+    named: Mode | None
     # the target, as it was followed; None if it lies outside of 0.1 to 2 Hz or was not followed
     followed: Mode | None = None
 
@@ -68,14 +75,18 @@ def surroundings(model: LinearModel, target: complex | None, naming: Naming) -> 
         others = tuple(m for m in others if abs(m.eigenvalue - target) > _SAME * abs(target))
         followed = next((m for m in spectrum.modes if m not in others), None)
     fastest = fastest_growth(spectrum.eigenvalues, step_map=model.step_size is not None)
-    return Surroundings(others, fastest.real if fastest else 0.0, naming(model, spectrum.modes), followed)
+    return Surroundings(
+        others, fastest.real if fastest else 0.0, naming(model, spectrum.modes), followed
+    )
 
 
 def breach(before: Surroundings, after: Surroundings, least: float) -> str | None:
     """The prohibited effect of a design: the system becomes unstable, or a mode falls below the least damping that was
     above it."""
     if after.growth > (1 + _EQUAL) * before.growth:
-        return f"the system becomes unstable: an eigenvalue has a real part of {after.growth:+.3g} 1/s"
+        return (
+            f"the system becomes unstable: an eigenvalue has a real part of {after.growth:+.3g} 1/s"
+        )
     worst = after.worst
     if worst is None or worst.damping_ratio >= least:
         return None
@@ -94,5 +105,7 @@ def extremes(model: LinearModel) -> tuple[complex, complex | None]:
     values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
     low, high = ELECTROMECHANICAL_HZ
     hertz = values.imag / (2 * np.pi)
-    weakest = min(values[(hertz >= low) & (hertz <= high)].tolist(), key=damping_ratio, default=complex(-1))
+    weakest = min(
+        values[(hertz >= low) & (hertz <= high)].tolist(), key=damping_ratio, default=complex(-1)
+    )
     return weakest, fastest_growth(values, step_map=model.step_size is not None)

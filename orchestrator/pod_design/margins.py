@@ -37,7 +37,9 @@ class LoopMargins:
     phase_hz: float | None  # frequency of the oscillation that this phase shift sustains [Hz]
     delay: float | None  # least delay that makes the loop unstable [s]; None as for ``phase_deg``
     delay_hz: float | None  # frequency of the oscillation that this delay sustains [Hz]
-    peak: float  # largest sensitivity 1/|1 + L|: 1 without feedback, above 2 is commonly held to be little robust
+    # largest sensitivity 1/|1 + L|: 1 without feedback, above 2 is commonly held to be little
+    # robust
+    peak: float
     peak_hz: float  # its frequency [Hz]
 
 
@@ -52,14 +54,23 @@ def loop_margins(half: LinearModel, full: LinearModel) -> LoopMargins:
     values = np.array([around.eigenvalues(w) for w in grid])
     distance = np.abs(1 + values).min(axis=1)
     crossings = list(_crossings(around, grid, values))
-    turned = min(((abs(math.remainder(np.angle(-value), 2 * math.pi)), w) for w, value in crossings), default=None)
-    delayed = min((((np.angle(value) + math.pi) % (2 * math.pi) / w, w) for w, value in crossings), default=None)
+    turned = min(
+        ((abs(math.remainder(np.angle(-value), 2 * math.pi)), w) for w, value in crossings),
+        default=None,
+    )
+    delayed = min(
+        (((np.angle(value) + math.pi) % (2 * math.pi) / w, w) for w, value in crossings),
+        default=None,
+    )
     hertz = 2 * math.pi
     return LoopMargins(
-        phase_deg=math.degrees(turned[0]) if turned else None, phase_hz=turned[1] / hertz if turned else None,
-        delay=float(delayed[0]) if delayed else None, delay_hz=delayed[1] / hertz if delayed else None,
-        peak=float(1 / distance.min()), peak_hz=float(grid[distance.argmin()] / hertz),
-    )  # fmt: skip
+        phase_deg=math.degrees(turned[0]) if turned else None,
+        phase_hz=turned[1] / hertz if turned else None,
+        delay=float(delayed[0]) if delayed else None,
+        delay_hz=delayed[1] / hertz if delayed else None,
+        peak=float(1 / distance.min()),
+        peak_hz=float(grid[distance.argmin()] / hertz),
+    )
 
 
 def _places(change: Matrix) -> tuple[Matrix, Matrix]:
@@ -95,7 +106,10 @@ def _crossings(around: _Loop, grid: Vector, values: Vector) -> Iterator[tuple[fl
         for i in np.flatnonzero(np.sign(sizes[:-1, k]) != np.sign(sizes[1:, k])):
             w = float(
                 optimize.brentq(
-                    lambda w, k=k: math.log(abs(around.eigenvalues(w)[k])), grid[i], grid[i + 1], rtol=1e-10
+                    lambda w, k=k: math.log(abs(around.eigenvalues(w)[k])),
+                    grid[i],
+                    grid[i + 1],
+                    rtol=1e-10,
                 )
             )
             yield w, complex(around.eigenvalues(w)[k])
@@ -110,7 +124,8 @@ LARGER_GAIN = f"K {100 * VARIATION:+.0f} %"
 
 @dataclass(frozen=True)
 class Margins:
-    limit: float  # damping ratio below which a mode from 0.1 to 2 Hz, the target included, counts as lost
+    # damping ratio below which a mode from 0.1 to 2 Hz, the target included, counts as lost
+    limit: float
     # up, down: factor on the gain up to which no mode is lost and no eigenvalue turns unstable; None where that happens
     # neither up to ``reach`` (up) nor down to a gain of 0 (down)
     up: float | None
@@ -140,13 +155,18 @@ def compute_margins(loop: PodLoop, off: Placed, nominal: Placed, least: float) -
 
     (up, lost_up), (down, lost_down) = (_edge(lost, stride) for stride in (_STRIDE, 1 / _STRIDE))
     found, why = _of_loop(loop, nominal.setting)
-    return Margins(limit, up, down, lost_up, lost_down, found, why, _variations(loop, off, nominal.setting))
+    return Margins(
+        limit, up, down, lost_up, lost_down, found, why, _variations(loop, off, nominal.setting)
+    )
 
 
 def _extremes(loop: PodLoop, setting: PodSetting) -> tuple[complex, complex | None]:
     def computed() -> Arrays:
         weakest, fastest = extremes(loop.model(setting))
-        return {"weakest": np.array(weakest), "fastest": np.array([] if fastest is None else [fastest], dtype=complex)}
+        return {
+            "weakest": np.array(weakest),
+            "fastest": np.array([] if fastest is None else [fastest], dtype=complex),
+        }
 
     found = loop.figures("extremes", {"setting": astuple(setting)}, computed)
     return complex(found["weakest"]), next(iter(found["fastest"].tolist()), None)
@@ -159,7 +179,9 @@ def _of_loop(loop: PodLoop, setting: PodSetting) -> tuple[LoopMargins | None, st
         return None, str(error)
 
 
-def _edge(lost: Callable[[float], complex | None], stride: float) -> tuple[float | None, complex | None]:
+def _edge(
+    lost: Callable[[float], complex | None], stride: float
+) -> tuple[float | None, complex | None]:
     """The last factor on the gain with which no mode is lost, on the way from 1 to 8, or to 1/8 and then 0; and the
     eigenvalue that is lost beyond it."""
     good, bad = 1.0, stride
@@ -190,5 +212,7 @@ def _variations(loop: PodLoop, off: Placed, setting: PodSetting) -> dict[str, fl
             changed["T_S1"] = (gain, replace(filters, T_S1=filters.T_S1 * factor))
             changed["T_S2"] = (gain, replace(filters, T_S2=filters.T_S2 * factor))
         for name, (value, varied) in changed.items():
-            found[f"{name} {100 * sign * VARIATION:+.0f} %"] = loop.place(off, value, varied).damping_ratio
+            found[f"{name} {100 * sign * VARIATION:+.0f} %"] = loop.place(
+                off, value, varied
+            ).damping_ratio
     return dict(sorted(found.items()))

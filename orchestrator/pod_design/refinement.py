@@ -40,7 +40,8 @@ side as long as that helps."""
 _ROUNDS = 5
 _WORTH = 5e-4  # the search ends when a round raises the damping ratio by less than this
 _SMALL_GAIN = 0.1  # gain that stands for 0 in the sensitivity at a gain of 0 [pu]
-_TOLERANCE = 2e-4  # the search for a gain ends when the damping ratio differs by less than this from the required one
+# the search for a gain ends when the damping ratio differs by less than this from the required one
+_TOLERANCE = 2e-4
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,8 @@ class GainSweep:
     why: str
     filters: leads.LeadLag
     points: tuple[Placed, ...]
-    chosen: Placed  # the smallest gain that meets the requirement, else the gain of the best damping
+    # the smallest gain that meets the requirement, else the gain of the best damping
+    chosen: Placed
     # the gains, that of ``chosen`` too, with which the system is unstable [pu]; empty for systems of more than
     # `_MOST_STATES` states, which are not examined
     unstable: tuple[float, ...] = ()
@@ -66,7 +68,8 @@ class Refinement:
     chosen: Placed | None = None
     score: float = -1.0  # damping ratio of ``chosen`` that counts
     met: bool = False  # whether ``chosen`` has the required damping
-    even: Placed | None = None  # the setting with the best least damping of all modes; None where it is not asked for
+    # the setting with the best least damping of all modes; None where it is not asked for
+    even: Placed | None = None
     notes: list[str] = field(default_factory=list)
 
     @property
@@ -76,9 +79,17 @@ class Refinement:
 
 
 def refine(
-    loop: PodLoop, off: Placed, filters: leads.LeadLag, required: float, bounds: tuple[float, float], judge: Judge,
-    search: SearchSettings, *, evenly: bool = False, report: Callable[[str], None] = lambda text: None,
-) -> Refinement:  # fmt: skip
+    loop: PodLoop,
+    off: Placed,
+    filters: leads.LeadLag,
+    required: float,
+    bounds: tuple[float, float],
+    judge: Judge,
+    search: SearchSettings,
+    *,
+    evenly: bool = False,
+    report: Callable[[str], None] = lambda text: None,
+) -> Refinement:
     """Search gain and lead/lag on the closed loop.
 
     ``required``: damping ratio of the target.
@@ -124,9 +135,14 @@ def refine(
 
 
 def sweep(
-    loop: PodLoop, off: Placed, filters: leads.LeadLag, required: float, bounds: tuple[float, float], why: str,
+    loop: PodLoop,
+    off: Placed,
+    filters: leads.LeadLag,
+    required: float,
+    bounds: tuple[float, float],
+    why: str,
     special: float | None = None,
-) -> GainSweep:  # fmt: skip
+) -> GainSweep:
     """The target over the range of the gain, and the gain that meets the requirement or comes nearest to it.
 
     ``off``: the target with the controller off; following begins there.
@@ -136,7 +152,9 @@ def sweep(
     ``special``: A gain within the bounds that the sweep always includes [pu]."""
     points: list[Placed] = []
     here = off
-    for gain in sorted({*np.linspace(*bounds, _GAINS).tolist(), *([] if special is None else [special])}):
+    for gain in sorted(
+        {*np.linspace(*bounds, _GAINS).tolist(), *([] if special is None else [special])}
+    ):
         try:
             here = loop.place(here, gain, filters)
         except AnalysisError:
@@ -155,13 +173,17 @@ def sweep(
     return GainSweep(why, filters, tuple(points), chosen, unstable, least[: len(points)])
 
 
-def _of_all_modes(loop: PodLoop, points: Sequence[Placed]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def _of_all_modes(
+    loop: PodLoop, points: Sequence[Placed]
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """The gains with which the system is unstable, and the least damping ratio of all modes from 0.1 to 2 Hz at each;
     empty for a system with more than `_MOST_STATES` states."""
     if len(loop.model(points[0].setting).names) > _MOST_STATES:
         return (), ()
     found = [extremes(loop.model(point.setting)) for point in points]
-    unstable = [p.setting.gain for p, (_, growing) in zip(points, found, strict=True) if growing is not None]
+    unstable = [
+        p.setting.gain for p, (_, growing) in zip(points, found, strict=True) if growing is not None
+    ]
     return tuple(unstable), tuple(damping_ratio(weakest) for weakest, _ in found)
 
 
@@ -170,7 +192,9 @@ def _crossing(loop: PodLoop, low: Placed, high: Placed, required: float) -> Plac
     for k in range(20):
         if high.damping_ratio - required <= _TOLERANCE:
             break
-        share = (required + _TOLERANCE / 2 - low.damping_ratio) / (high.damping_ratio - low.damping_ratio)
+        share = (required + _TOLERANCE / 2 - low.damping_ratio) / (
+            high.damping_ratio - low.damping_ratio
+        )
         share = min(max(share, 0.05), 0.95) if k % 3 < 2 else 0.5
         middle = loop.place(low, low.setting.gain + share * (high.setting.gain - low.setting.gain))
         low, high = (low, middle) if middle.damping_ratio >= required else (middle, high)
@@ -191,7 +215,9 @@ def _peak(loop: PodLoop, points: Sequence[Placed]) -> Placed:
     return best
 
 
-def _candidates(loop: PodLoop, result: Refinement, first: leads.LeadLag) -> Iterator[tuple[str, leads.LeadLag]]:
+def _candidates(
+    loop: PodLoop, result: Refinement, first: leads.LeadLag
+) -> Iterator[tuple[str, leads.LeadLag]]:
     """Lead/lag settings to try; each follows from the results of the sweeps before it."""
     yield "as designed", first
     if first.N_S == 0 or not result.sweeps:
@@ -205,7 +231,10 @@ def _candidates(loop: PodLoop, result: Refinement, first: leads.LeadLag) -> Iter
             break
         count = len(result.sweeps)
         yield f"re-centred, round {k}", candidate
-        if len(result.sweeps) == count or result.sweeps[-1].chosen.damping_ratio < base.damping_ratio + _WORTH:
+        if (
+            len(result.sweeps) == count
+            or result.sweeps[-1].chosen.damping_ratio < base.damping_ratio + _WORTH
+        ):
             break
         base = result.sweeps[-1].chosen
     base = result.chosen or result.best
@@ -218,7 +247,9 @@ def _candidates(loop: PodLoop, result: Refinement, first: leads.LeadLag) -> Iter
             turn, reached = turn + direction * _TURN, result.score
 
 
-def _searched(result: Refinement, search: SearchSettings) -> Iterator[tuple[str, leads.LeadLag, float | None]]:
+def _searched(
+    result: Refinement, search: SearchSettings
+) -> Iterator[tuple[str, leads.LeadLag, float | None]]:
     """The settings of a search, which is made only if no other setting has met the requirement."""
     try:
         found = search()
@@ -247,9 +278,13 @@ def recentred(loop: PodLoop, here: Placed) -> leads.LeadLag:
     slope = (moved.eigenvalue - here.eigenvalue) / change
     phase = leads.angle_deg(leads.local_non_compensated(slope, here.eigenvalue, filters))
     if here.eigenvalue.imag <= 0:
-        raise AnalysisError(f"at a gain of {gain:.4g} the mode no longer oscillates, so there is nothing to centre on")
+        raise AnalysisError(
+            f"at a gain of {gain:.4g} the mode no longer oscillates, so there is nothing to centre on"
+        )
     if abs(leads.compensation_deg(phase)) >= leads.LARGEST_TURN * filters.N_S:
-        raise AnalysisError(f"the sensitivity at a gain of {gain:.4g} points to {phase:.0f}°, too far for its stages")
+        raise AnalysisError(
+            f"the sensitivity at a gain of {gain:.4g} points to {phase:.0f}°, too far for its stages"
+        )
     return leads.lead_lag(phase, here.eigenvalue.imag, filters.N_S)
 
 

@@ -21,9 +21,12 @@ LABELS = {"pod_p": "POD-P", "pod_q": "POD-Q"}
 
 def sheet(d: PodDesign) -> Iterable[Table | str]:
     names = d.target.components
-    components = f"component {names[0]}" if len(names) == 1 else f"{len(names)} components with one setting"
-    yield f"[bold]{LABELS[d.request.controller]} design by eigenvalue sensitivity[/bold]: " + escape(
-        f"{d.case}, scenario {d.target.scenario}, mode {d.mode_name}, {components}"
+    components = (
+        f"component {names[0]}" if len(names) == 1 else f"{len(names)} components with one setting"
+    )
+    yield (
+        f"[bold]{LABELS[d.request.controller]} design by eigenvalue sensitivity[/bold]: "
+        + escape(f"{d.case}, scenario {d.target.scenario}, mode {d.mode_name}, {components}")
     )
     steps = [(str(number), *row) for number, row in enumerate(_steps(d), start=1)]
     yield _table("", "", "Step", "Formula", "Result", rows=steps)
@@ -36,7 +39,9 @@ def sheet(d: PodDesign) -> Iterable[Table | str]:
         yield _margins(d.margins, d)
     elif d.stability.stable is False:
         yield "[yellow]no margins: the system is unstable with this setting[/yellow]"
-    yield from (f"[dim]{escape(note)}[/dim]" for note in (d.refinement.notes if d.refinement else ()))
+    yield from (
+        f"[dim]{escape(note)}[/dim]" for note in (d.refinement.notes if d.refinement else ())
+    )
 
 
 def first_screen(d: PodDesign) -> Iterable[Table | str]:
@@ -44,7 +49,12 @@ def first_screen(d: PodDesign) -> Iterable[Table | str]:
     table = _table("", "", f"Mode {d.mode_name}", "Least damped, 0.1 to 2 Hz", "Next", "Stable")
     for title, around, target, stability in (
         ("as it is, the controller off", d.before, d.initial, d.stability_before),
-        (f"{LABELS[d.request.controller]}, {_setting(d.final)}", d.after, d.final.eigenvalue, d.stability),
+        (
+            f"{LABELS[d.request.controller]}, {_setting(d.final)}",
+            d.after,
+            d.final.eigenvalue,
+            d.stability,
+        ),
     ):
         values = sorted([target, *(mode.eigenvalue for mode in around.others)], key=damping_ratio)
         least, following = (_short(value) for value in [*values, None][:2])
@@ -55,7 +65,9 @@ def first_screen(d: PodDesign) -> Iterable[Table | str]:
 
 
 def _short(value: complex | None) -> str:
-    return "–" if value is None else f"{value.imag / math.tau:.3f} Hz, {percent(damping_ratio(value))}"
+    return (
+        "–" if value is None else f"{value.imag / math.tau:.3f} Hz, {percent(damping_ratio(value))}"
+    )
 
 
 def _steps(d: PodDesign) -> Iterable[tuple[str, str, str]]:
@@ -63,18 +75,28 @@ def _steps(d: PodDesign) -> Iterable[tuple[str, str, str]]:
     phase, N = angle_deg(S.value), d.target.stages
     omega = d.initial.imag
     yield "Target mode, POD off", "λ₀ = σ₀ ± jω₀", f"{mode_text(d.initial)}; ω₀ = {omega:.4f} rad/s"
-    asked = "as asked for" if d.request.damping is not None else f"ζ₀ + {percent(d.request.increment)}"
+    asked = (
+        "as asked for" if d.request.damping is not None else f"ζ₀ + {percent(d.request.increment)}"
+    )
     yield "Required damping", asked, f"ζ_d = {percent(d.required_damping)}"
     yield "Mode aimed at", "λ_d = −ζ_d·ω₀ ± jω₀", mode_text(d.predicted)
     yield f"Mode with K = ΔK = {K} pu, no lead/lag", "λ_NC (T_S1 = T_S2 = 0)", mode_text(S.mode)
-    yield "Non-compensated sensitivity", "Ŝ_NC = (λ_NC − λ₀)/ΔK", f"{abs(S.value):.6f} rad/s per pu ∠ {phase:.2f}°"
+    yield (
+        "Non-compensated sensitivity",
+        "Ŝ_NC = (λ_NC − λ₀)/ΔK",
+        f"{abs(S.value):.6f} rad/s per pu ∠ {phase:.2f}°",
+    )
     if N == 0:
         yield "Lead/lag", "N_S = 0", "none"
     else:
         kind = "lead" if phase >= 0 else "lag"
         formula = "(180° − φ_NC)/N_S" if phase >= 0 else "(180° + φ_NC)/N_S"
         each = abs(compensation_deg(phase)) / N
-        beyond = f"; more than {LARGEST_STAGE_ANGLE:g}°: consider more stages" if each > LARGEST_STAGE_ANGLE else ""
+        beyond = (
+            f"; more than {LARGEST_STAGE_ANGLE:g}°: consider more stages"
+            if each > LARGEST_STAGE_ANGLE
+            else ""
+        )
         yield f"Angle of each of N_S = {N} stages", f"φ = {formula}, {kind}", f"{each:.2f}°{beyond}"
         ratio = "(1 − sin φ)/(1 + sin φ)" if phase >= 0 else "(1 + sin φ)/(1 − sin φ)"
         yield "Filtering ratio", f"a = {ratio}", f"{f.filtering_ratio:.4f}"
@@ -90,16 +112,30 @@ def _steps(d: PodDesign) -> Iterable[tuple[str, str, str]]:
     )
     used = ("", " (not used)") if not d.request.compensated_gain else (" (not used)", "")
     yield "Gain", "K = |λ_d − λ₀|/|Ŝ_NC|", f"{d.gain_non_compensated:.2f} pu{used[0]}"
-    yield "Gain with the lead/lag's own sensitivity", "K = |λ_d − λ₀|/|Ŝ|", f"{d.gain_compensated:.2f} pu{used[1]}"
+    yield (
+        "Gain with the lead/lag's own sensitivity",
+        "K = |λ_d − λ₀|/|Ŝ|",
+        f"{d.gain_compensated:.2f} pu{used[1]}",
+    )
     low, high = d.request.bounds(search=False)
     bound = f"{d.active_bound} bound active" if d.active_bound else "no bound active"
     yield "Gain within its bounds", f"K ∈ [{low:g}, {high:g}] pu", f"{d.gain:.2f} pu ({bound})"
-    yield "Closed loop with this design", "eigenvalue of the coupled FMUs", mode_text(d.designed.eigenvalue)
+    yield (
+        "Closed loop with this design",
+        "eigenvalue of the coupled FMUs",
+        mode_text(d.designed.eigenvalue),
+    )
 
 
 def _refinement(r: Refinement, required: float) -> Table:
-    columns = ("Lead/lag", "T_S1 [s]", "T_S2 [s]", "Gain [pu] → least damping of all modes [%]",
-               f"Best, or first with {percent(required)}: the target", "the least of all")  # fmt: skip
+    columns = (
+        "Lead/lag",
+        "T_S1 [s]",
+        "T_S2 [s]",
+        "Gain [pu] → least damping of all modes [%]",
+        f"Best, or first with {percent(required)}: the target",
+        "the least of all",
+    )
     return _table("Refinement on the closed loop", *columns, rows=map(_swept, r.sweeps))
 
 
@@ -110,16 +146,20 @@ def _swept(s: GainSweep) -> tuple[str, ...]:
     dampings = ", ".join(f"{gain:.4g}→{100 * least:.1f}{mark}" for gain, least, mark in each)
     chosen = f"{s.chosen.setting.gain:.1f}{_MARK * (s.chosen.setting.gain in s.unstable)}"
     return (
-        s.why, f"{s.filters.T_S1:.4f}", f"{s.filters.T_S2:.4f}",
-        dampings or f"{gains[0]:g}…{gains[-1]:g} ({len(gains)})", f"K = {chosen}: {percent(s.chosen.damping_ratio)}",
+        s.why,
+        f"{s.filters.T_S1:.4f}",
+        f"{s.filters.T_S2:.4f}",
+        dampings or f"{gains[0]:g}…{gains[-1]:g} ({len(gains)})",
+        f"K = {chosen}: {percent(s.chosen.damping_ratio)}",
         "–" if s.chosen_least is None else percent(s.chosen_least),
-    )  # fmt: skip
+    )
 
 
 def _result(d: PodDesign) -> Table:
     f = d.final.setting.filters
     setting = (
-        f"K = {d.final.setting.gain:.2f} pu, N_S = {d.target.stages}, T_S1 = {f.T_S1:.4f} s, T_S2 = {f.T_S2:.4f} s"
+        f"K = {d.final.setting.gain:.2f} pu, N_S = {d.target.stages}, "
+        f"T_S1 = {f.T_S1:.4f} s, T_S2 = {f.T_S2:.4f} s"
     )
     rows = (
         ("Setting", "off", setting),
@@ -139,7 +179,10 @@ def _margins(m: Margins, d: PodDesign) -> Table:
     if m.down is not None and m.lost_down is not None:
         down = f"× {m.down:.2f} (K = {m.down * gain:.0f}), then {mode_text(m.lost_down)} is lost"
     rows = [(f"Gain up, {lost}", up), ("Gain down, the same", down), *_loop_rows(m)]
-    rows += [(f"Damping of the target with {name}, the rest as it is", percent(z)) for name, z in m.variations.items()]
+    rows += [
+        (f"Damping of the target with {name}, the rest as it is", percent(z))
+        for name, z in m.variations.items()
+    ]
     return _table("Margins of the final setting", "Quantity", "Value", rows=rows)
 
 
@@ -149,7 +192,11 @@ def _loop_rows(m: Margins) -> Iterable[tuple[str, str]]:
         return
     never = "no limit: the gain around the loop is 1 at no frequency"
     for name, size, hertz in (
-        ("Phase margin, the loop broken at K", m.loop.phase_deg and f"{m.loop.phase_deg:.1f}°", m.loop.phase_hz),
+        (
+            "Phase margin, the loop broken at K",
+            m.loop.phase_deg and f"{m.loop.phase_deg:.1f}°",
+            m.loop.phase_hz,
+        ),
         ("Delay margin", m.loop.delay and f"{1e3 * m.loop.delay:.1f} ms", m.loop.delay_hz),
         ("Largest sensitivity 1/|1 + L|", f"{m.loop.peak:.2f}", m.loop.peak_hz),
     ):

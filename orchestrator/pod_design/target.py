@@ -37,23 +37,41 @@ class Target:
 
 
 def find_target(
-    case: Case, controller: str, *, scenario: str | None, pattern: str | None, stages: int | None,
-    overrides: Mapping[str, Value], parameters: Sequence[ParameterFile],
-) -> Target:  # fmt: skip
+    case: Case,
+    controller: str,
+    *,
+    scenario: str | None,
+    pattern: str | None,
+    stages: int | None,
+    overrides: Mapping[str, Value],
+    parameters: Sequence[ParameterFile],
+) -> Target:
     """Find the scenario and its components. By default it is the scenario in which all PODs exist and are off."""
     if scenario is not None and scenario not in case.scenarios:
-        raise InputError(f"--scenario: there is no scenario {scenario!r}; the case has: {', '.join(case.scenarios)}")
+        raise InputError(
+            f"--scenario: there is no scenario {scenario!r}; the case has: {', '.join(case.scenarios)}"
+        )
     names = [scenario] if scenario is not None else list(case.scenarios)
     plans = {name: case.components_of(name, overrides, parameters) for name in names}
     if scenario is None:
         on = {
-            name for name, plan in plans.items() for each in DAMPING_CONTROLLERS
-            for unit in with_controller(plan, each) if plan[unit].value(f"{each}.enabled")
-        }  # fmt: skip
-        fitting = [name for name, plan in plans.items() if with_controller(plan, controller) and name not in on]
-        fitting = [name for name in fitting if case.scenarios[name].events is None] or fitting  # no fault's, say
+            name
+            for name, plan in plans.items()
+            for each in DAMPING_CONTROLLERS
+            for unit in with_controller(plan, each)
+            if plan[unit].value(f"{each}.enabled")
+        }
+        fitting = [
+            name
+            for name, plan in plans.items()
+            if with_controller(plan, controller) and name not in on
+        ]
+        # no fault's, say
+        fitting = [name for name in fitting if case.scenarios[name].events is None] or fitting
         if len(fitting) != 1:
-            what = "no scenario" if not fitting else f"more than one scenario ({', '.join(fitting)})"
+            what = (
+                "no scenario" if not fitting else f"more than one scenario ({', '.join(fitting)})"
+            )
             raise InputError(
                 f"{case.name}: {what} has components with {controller} and every POD off, which is what a design "
                 f"starts from; name one with --scenario, from: {', '.join(case.scenarios)}"
@@ -63,7 +81,11 @@ def find_target(
 
 
 def _components(
-    scenario: str, plan: Mapping[str, ComponentPlan], controller: str, pattern: str | None, stages: int | None
+    scenario: str,
+    plan: Mapping[str, ComponentPlan],
+    controller: str,
+    pattern: str | None,
+    stages: int | None,
 ) -> Target:
     having = with_controller(plan, controller)
     if not having:
@@ -91,14 +113,20 @@ def _components(
 
 
 def check_range(
-    plan: Mapping[str, ComponentPlan], components: Sequence[str], variable: str, value: float, option: str
+    plan: Mapping[str, ComponentPlan],
+    components: Sequence[str],
+    variable: str,
+    value: float,
+    option: str,
 ) -> None:
     for name in components:
         info = plan[name].description.variables[variable]
         low = info.minimum if info.minimum is not None else -math.inf
         high = info.maximum if info.maximum is not None else math.inf
         if not low <= value <= high:
-            raise InputError(f"{option}: {value:g} is out of range: {name}.{variable} takes from {low:g} to {high:g}")
+            raise InputError(
+                f"{option}: {value:g} is out of range: {name}.{variable} takes from {low:g} to {high:g}"
+            )
 
 
 def with_controller(plan: Mapping[str, ComponentPlan], controller: str) -> list[str]:
@@ -127,4 +155,6 @@ def naming_critical(table: CaseTable, modes: Sequence[Mode]) -> CaseTable:
         rule = NamedModeTable(name=CRITICAL, against=(list(together), list(against)))
     else:
         rule = NamedModeTable(name=CRITICAL, states=speeds[:1] or [modes[0].participation[0][0]])
-    return table.model_copy(update={"analysis": table.analysis.model_copy(update={"modes": [rule]})})
+    return table.model_copy(
+        update={"analysis": table.analysis.model_copy(update={"modes": [rule]})}
+    )

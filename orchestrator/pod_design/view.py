@@ -61,10 +61,18 @@ class ControllerDesign:
         """The mode before and after: eigenvalue [1/s, rad/s] and damping ratio, beside the required one."""
         r = self.result
         required = 100 * r.required_damping
-        rows = {"without the controller": (r.initial, None), "predicted": (r.predicted, required),
-                "with it": (r.achieved, required)}  # fmt: skip
-        cells = [(value.real, value.imag, damping_percent(value), wanted) for value, wanted in rows.values()]
-        return pd.DataFrame(cells, index=list(rows), columns=["real", "imag", "damping_percent", "required_percent"])
+        rows = {
+            "without the controller": (r.initial, None),
+            "predicted": (r.predicted, required),
+            "with it": (r.achieved, required),
+        }
+        cells = [
+            (value.real, value.imag, damping_percent(value), wanted)
+            for value, wanted in rows.values()
+        ]
+        return pd.DataFrame(
+            cells, index=list(rows), columns=["real", "imag", "damping_percent", "required_percent"]
+        )
 
     def as_json(self, parameter_file: str | Path | None = None) -> dict[str, Any]:
         """The same as ``gfor design --json`` prints, as JSON's types.
@@ -104,8 +112,14 @@ class ControllerDesign:
 
     def _repr_html_(self) -> str:
         setting = [f"{name} = {value}" for name, value in self.parameters.items()]
-        lines = [self.verdict, self.result.stability.sentence(), *(f"warning: {text}" for text in self.warnings)]
-        return page(repr(self).strip("<>").partition(": the")[0], [*lines, ", ".join(setting)], self.table())
+        lines = [
+            self.verdict,
+            self.result.stability.sentence(),
+            *(f"warning: {text}" for text in self.warnings),
+        ]
+        return page(
+            repr(self).strip("<>").partition(": the")[0], [*lines, ", ".join(setting)], self.table()
+        )
 
 
 def parameter_file_path(given: str | Path, argument: str = "path") -> Path:
@@ -123,29 +137,55 @@ def design_json(d: PodDesign) -> dict[str, Any]:
     S, setting = d.sensitivities, d.final.setting
     before, after = d.stability_before, d.stability
     return {
-        "controller": d.request.controller, "target_mode": _complex(d.initial), "sensitivity": _polar(S.value),
-        "T_S1": setting.filters.T_S1, "T_S2": setting.filters.T_S2, "N_S": d.target.stages, "K": setting.gain,
-        "K_unbounded": d.unbounded_gain, "predicted_mode": _complex(d.predicted),
+        "controller": d.request.controller,
+        "target_mode": _complex(d.initial),
+        "sensitivity": _polar(S.value),
+        "T_S1": setting.filters.T_S1,
+        "T_S2": setting.filters.T_S2,
+        "N_S": d.target.stages,
+        "K": setting.gain,
+        "K_unbounded": d.unbounded_gain,
+        "predicted_mode": _complex(d.predicted),
         "achieved_mode": _complex(d.achieved),
         "requirement": {
-            "damping_ratio": d.required_damping, "increment": d.required_damping - damping_ratio(d.initial),
-            "gain_bounds": list(d.request.bounds(search=d.refinement is not None)), "delta_gain": d.request.delta_gain,
+            "damping_ratio": d.required_damping,
+            "increment": d.required_damping - damping_ratio(d.initial),
+            "gain_bounds": list(d.request.bounds(search=d.refinement is not None)),
+            "delta_gain": d.request.delta_gain,
             "least_damping_of_others": d.request.least_damping,
         },
-        "met": d.met, "verdict": verdict(d),
-        **({"thin_margin_damping_ratio": d.thin_margin, "larger_gain_spoils": d.spoilt} if d.margins else {}),
+        "met": d.met,
+        "verdict": verdict(d),
+        **(
+            {"thin_margin_damping_ratio": d.thin_margin, "larger_gain_spoils": d.spoilt}
+            if d.margins
+            else {}
+        ),
         "target_damping_ratio": damping_ratio(d.initial),
-        "achieved_damping_ratio": d.achieved_damping, "followed_mode": _complex(d.final.eigenvalue),
-        "compensated_sensitivity": _polar(S.compensated), "K_non_compensated": d.gain_non_compensated,
-        "K_compensated": d.gain_compensated, "active_bound": d.active_bound,
-        "worst_other_mode": {"before": _other_json(d.before.worst), "after": _other_json(d.worst_other)},
-        "stable": after.stable, "largest_growth_rate": after.largest_growth_rate,
-        "stability": {"before": before.as_json(), "after": after.as_json()}, "warnings": list(d.warnings),
-        "largest_real_part": {"before": before.largest_growth_rate, "after": after.largest_growth_rate},
+        "achieved_damping_ratio": d.achieved_damping,
+        "followed_mode": _complex(d.final.eigenvalue),
+        "compensated_sensitivity": _polar(S.compensated),
+        "K_non_compensated": d.gain_non_compensated,
+        "K_compensated": d.gain_compensated,
+        "active_bound": d.active_bound,
+        "worst_other_mode": {
+            "before": _other_json(d.before.worst),
+            "after": _other_json(d.worst_other),
+        },
+        "stable": after.stable,
+        "largest_growth_rate": after.largest_growth_rate,
+        "stability": {"before": before.as_json(), "after": after.as_json()},
+        "warnings": list(d.warnings),
+        "largest_real_part": {
+            "before": before.largest_growth_rate,
+            "after": after.largest_growth_rate,
+        },
         "margins": _margins_json(d.margins) if d.margins else None,
-        "refinement": _refinement_json(d) if d.refinement else None, **d.prepared.about,
-        "mode": d.mode_name, "components": list(d.target.components),
-    }  # fmt: skip
+        "refinement": _refinement_json(d) if d.refinement else None,
+        **d.prepared.about,
+        "mode": d.mode_name,
+        "components": list(d.target.components),
+    }
 
 
 def parameters_of(d: PodDesign) -> dict[str, bool | float | str]:
@@ -174,24 +214,38 @@ def _polar(value: complex) -> dict[str, float]:
 def _other_json(mode: Mode | None) -> dict[str, Any] | None:
     if mode is None:
         return None
-    return _complex(mode.eigenvalue) | {"damping_ratio": mode.damping_ratio, "state": mode.participation[0][0]}
+    return _complex(mode.eigenvalue) | {
+        "damping_ratio": mode.damping_ratio,
+        "state": mode.participation[0][0],
+    }
 
 
 def _margins_json(m: Margins) -> dict[str, Any]:
     return {
-        "damping_limit": m.limit, "gain_up": m.up, "gain_down": m.down,
+        "damping_limit": m.limit,
+        "gain_up": m.up,
+        "gain_down": m.down,
         "lost_above": _complex(m.lost_up) if m.lost_up is not None else None,
-        "lost_below": _complex(m.lost_down) if m.lost_down is not None else None, "largest_factor_tried": m.reach,
+        "lost_below": _complex(m.lost_down) if m.lost_down is not None else None,
+        "largest_factor_tried": m.reach,
         "phase_margin_deg": m.loop.phase_deg if m.loop else None,
-        "phase_margin_hz": m.loop.phase_hz if m.loop else None, "delay_margin_s": m.loop.delay if m.loop else None,
-        "delay_margin_hz": m.loop.delay_hz if m.loop else None, "sensitivity_peak": m.loop.peak if m.loop else None,
-        "sensitivity_peak_hz": m.loop.peak_hz if m.loop else None, "damping_ratio_with": m.variations,
-    }  # fmt: skip
+        "phase_margin_hz": m.loop.phase_hz if m.loop else None,
+        "delay_margin_s": m.loop.delay if m.loop else None,
+        "delay_margin_hz": m.loop.delay_hz if m.loop else None,
+        "sensitivity_peak": m.loop.peak if m.loop else None,
+        "sensitivity_peak_hz": m.loop.peak_hz if m.loop else None,
+        "damping_ratio_with": m.variations,
+    }
 
 
 def _refinement_json(d: PodDesign) -> dict[str, Any]:
     def placed(p: Placed, **least: float | None) -> dict[str, Any]:
-        return {"K": p.setting.gain, "mode": _complex(p.eigenvalue), "damping_ratio": p.damping_ratio, **least}
+        return {
+            "K": p.setting.gain,
+            "mode": _complex(p.eigenvalue),
+            "damping_ratio": p.damping_ratio,
+            **least,
+        }
 
     def filters(f: LeadLag) -> dict[str, float]:
         return {"T_S1": f.T_S1, "T_S2": f.T_S2}
@@ -200,10 +254,18 @@ def _refinement_json(d: PodDesign) -> dict[str, Any]:
     assert refinement is not None
     return {
         "designed": filters(d.filters) | placed(d.designed),
-        "sweeps": [{
-            "lead_lag": s.why, **filters(s.filters),
-            "points": [placed(p, least_damping_ratio=least) for p, least in zip_longest(s.points, s.least)],
-            "chosen": placed(s.chosen, least_damping_ratio=s.chosen_least), "unstable_gains": list(s.unstable),
-        } for s in refinement.sweeps],
+        "sweeps": [
+            {
+                "lead_lag": s.why,
+                **filters(s.filters),
+                "points": [
+                    placed(p, least_damping_ratio=least)
+                    for p, least in zip_longest(s.points, s.least)
+                ],
+                "chosen": placed(s.chosen, least_damping_ratio=s.chosen_least),
+                "unstable_gains": list(s.unstable),
+            }
+            for s in refinement.sweeps
+        ],
         "notes": refinement.notes,
-    }  # fmt: skip
+    }

@@ -17,7 +17,8 @@ _SHOWING = ("acceptance", "api", "cli", "explore", "interop", "report")
 """Packages whose code does not change the result of any point; a test checks that the code of a point never imports
 them."""
 
-LIBRARIES = ("numpy", "scipy")  # what computes the figures beside our code; another version may give others
+# what computes the figures beside our code; another version may give others
+LIBRARIES = ("numpy", "scipy")
 
 _SENTENCE = re.compile(r"^(?!\d)(?=.*[a-z]{2})(?=.* )(?!.*->)(?!.*;\n)", re.DOTALL)
 """Texts that tell something: docstrings, and pieces of messages. Names and values are without a space, or begin with a
@@ -49,7 +50,9 @@ def _of_versions() -> "hashlib._Hash":
 
 def code_files() -> list[Path]:
     rooms = [path for path in _ROOT.iterdir() if path.is_dir() and path.name not in _SHOWING]
-    files = [file for room in rooms for ending in ("py", "c", "h") for file in room.rglob(f"*.{ending}")]
+    files = [
+        file for room in rooms for ending in ("py", "c", "h") for file in room.rglob(f"*.{ending}")
+    ]
     return sorted([*files, *_ROOT.glob("*.py")])
 
 
@@ -82,7 +85,10 @@ def needed_modules(module: str) -> set[str]:
 
 
 def _module_files() -> dict[str, Path]:
-    parts = {file: (_ROOT.name, *file.relative_to(_ROOT).with_suffix("").parts) for file in _ROOT.rglob("*.py")}
+    parts = {
+        file: (_ROOT.name, *file.relative_to(_ROOT).with_suffix("").parts)
+        for file in _ROOT.rglob("*.py")
+    }
     return {".".join(names).removesuffix(".__init__"): file for file, names in parts.items()}
 
 
@@ -96,7 +102,12 @@ def _code(name: str, file: Path) -> CodeType:
 def _imported(code: CodeType, files: dict[str, Path]) -> Iterator[str]:
     here = [name for name in code.co_names if name in files]
     yield from here
-    yield from (f"{package}.{name}" for package in here for name in code.co_names if f"{package}.{name}" in files)
+    yield from (
+        f"{package}.{name}"
+        for package in here
+        for name in code.co_names
+        if f"{package}.{name}" in files
+    )
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
             yield from _imported(constant, files)
@@ -104,7 +115,13 @@ def _imported(code: CodeType, files: dict[str, Path]) -> Iterator[str]:
 
 def _computing(code: CodeType) -> Iterator[object]:
     yield code.co_code, code.co_names, code.co_varnames, code.co_flags, code.co_exceptiontable
-    yield code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_freevars, code.co_cellvars
+    yield (
+        code.co_argcount,
+        code.co_posonlyargcount,
+        code.co_kwonlyargcount,
+        code.co_freevars,
+        code.co_cellvars,
+    )
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
             yield from _computing(constant)

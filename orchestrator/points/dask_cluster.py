@@ -36,7 +36,9 @@ class ClusterWatch:
         # evaluated on a worker, which needs nothing of ours for it
         found = client.run(eval, f"bool(__import__({module!r}))", on_error="return")
         self.able = sorted(worker for worker, has in found.items() if has is True)
-        self.unable = {worker: f" ({error})" for worker, error in sorted(found.items()) if error is not True}
+        self.unable = {
+            worker: f" ({error})" for worker, error in sorted(found.items()) if error is not True
+        }
         if found and not self.able:
             raise InputError(
                 f"--scheduler {address}: none of its {len(found)} workers can import gfor-cosim"
@@ -44,7 +46,10 @@ class ClusterWatch:
             )
         for worker, error in self.unable.items():
             _LOG.warning(
-                "--scheduler %s: worker %s cannot import gfor-cosim%s and is given nothing", address, worker, error
+                "--scheduler %s: worker %s cannot import gfor-cosim%s and is given nothing",
+                address,
+                worker,
+                error,
             )
         self._known, self._errors = set(self.able), dict[str, str]()
         self._seen = self._looked = time.monotonic()
@@ -57,9 +62,12 @@ class ClusterWatch:
         workers = self._workers() - set(self.unable)
         for worker in sorted(self._known - workers):
             _LOG.warning(
-                "--scheduler %s: worker %s is lost%s; %s", self._address, worker, self._last_error(worker),
+                "--scheduler %s: worker %s is lost%s; %s",
+                self._address,
+                worker,
+                self._last_error(worker),
                 "others compute its points" if workers else "no other is there",
-            )  # fmt: skip
+            )
         self._known = workers
         if workers:
             self._seen = now
@@ -99,7 +107,9 @@ _LOG = logging.getLogger("gfor")
 TLS_FILES = ("ca.pem", "cert.pem", "key.pem")
 """In the folder with certificates: the authority's, the client's, and the client's private key."""
 
-_PATIENCE = 30  # longest time to wait for a scheduler, for its first worker, and for another one when all are lost [s]
+# longest time to wait for a scheduler, for its first worker, and for another one when all are lost
+# [s]
+_PATIENCE = 30
 
 
 class DaskCluster:
@@ -115,7 +125,9 @@ class DaskCluster:
         if tls is None:
             return
         if not address.startswith("tls://"):
-            raise InputError(f"--scheduler {address}: --tls needs an address that begins with tls://")
+            raise InputError(
+                f"--scheduler {address}: --tls needs an address that begins with tls://"
+            )
         if missing := [name for name in TLS_FILES if not (tls / name).is_file()]:
             raise InputError(
                 f"--tls {tls}: there is no {' and no '.join(missing)}; the folder must hold {', '.join(TLS_FILES)}"
@@ -156,11 +168,17 @@ class DaskCluster:
         security = self._security(distributed)
         try:
             # A client that finds no scheduler is never closed, and waits for itself when it is collected.
-            asyncio.run_coroutine_threadsafe(self._call(distributed, security), loop.asyncio_loop).result()
+            asyncio.run_coroutine_threadsafe(
+                self._call(distributed, security), loop.asyncio_loop
+            ).result()
             client = distributed.Client(
                 self.address, timeout=_PATIENCE, set_as_default=False, security=security, loop=loop
             )
-        except (OSError, ValueError, TypeError) as error:  # Dask's, in this order: no answer, address, certificates
+        except (
+            OSError,
+            ValueError,
+            TypeError,
+        ) as error:  # Dask's, in this order: no answer, address, certificates
             raise InputError(
                 f"--scheduler {self.address}: no Dask scheduler answers there ({error}); start one with "
                 "`dask scheduler`, and give its address, such as tcp://host:8786, or tls://host:8786 with --tls"
@@ -186,7 +204,10 @@ class DaskCluster:
             return distributed.Security()
         authority, certificate, key = (str(self._tls / name) for name in TLS_FILES)
         return distributed.Security(
-            tls_ca_file=authority, tls_client_cert=certificate, tls_client_key=key, require_encryption=True
+            tls_ca_file=authority,
+            tls_client_cert=certificate,
+            tls_client_key=key,
+            require_encryption=True,
         )
 
     def _result(self, distributed: Any, future: Any) -> Any:

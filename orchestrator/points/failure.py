@@ -21,7 +21,9 @@ class Failure:
     @as_options()  # the same for everybody, wherever it was computed
     def of(cls, error: BaseException) -> Self:
         if isinstance(error, CosimError):
-            text = "; ".join(map(str, error.problems)) if isinstance(error, CaseError) else str(error)
+            text = (
+                "; ".join(map(str, error.problems)) if isinstance(error, CaseError) else str(error)
+            )
             return cls(error.kind, text, error.kind.lasting)
         if isinstance(error, np.linalg.LinAlgError):
             return cls(ErrorKind.ANALYSIS, f"no eigenvalues: {error}", True)
@@ -49,5 +51,7 @@ def failure_kept(result: Failing) -> Iterator[None]:
     try:
         with as_options():
             yield
-    except Exception as error:  # an unexpected error of a foreign FMU or library must not end the other points
+    except (
+        Exception
+    ) as error:  # an unexpected error of a foreign FMU or library must not end the other points
         result.failure = Failure.of(error)

@@ -28,9 +28,14 @@ def key_of(content: Mapping[str, Any], module: str) -> str:
 
 
 def scenario_content(prepared: PreparedScenario) -> dict[str, Any]:
-    fmus = {name: component_content(plan.description) for name, plan in prepared.system.components.items()}
+    fmus = {
+        name: component_content(plan.description)
+        for name, plan in prepared.system.components.items()
+    }
     wires = described(prepared.system.wires)
-    return {"scenario": prepared.name, "fmus": fmus, "values": prepared.values} | ({"wires": wires} if wires else {})
+    return {"scenario": prepared.name, "fmus": fmus, "values": prepared.values} | (
+        {"wires": wires} if wires else {}
+    )
 
 
 def component_content(description: FmuDescription) -> list[str]:
@@ -43,7 +48,10 @@ def component_content(description: FmuDescription) -> list[str]:
 def fingerprint(case: CaseDefinition) -> str:
     """Two hashes: of this package's code and the libraries' versions, and of the texts of the case and its parameter
     files."""
-    files = [f"{name}\0{file if isinstance(file, str) else file.text}" for name, file in case.parameter_files.items()]
+    files = [
+        f"{name}\0{file if isinstance(file, str) else file.text}"
+        for name, file in case.parameter_files.items()
+    ]
     texts = "\0".join([case.text, *files])
     return f"{code_hash()[:32]}-{hashlib.sha256(texts.encode()).hexdigest()[:32]}"
 
@@ -65,7 +73,9 @@ def same_case(reference: str, wanted: str, trust_fmus: bool = False) -> Case:
             "give all machines the same versions, and restart the workers"
         )
     if here != wanted:
-        own = [str(file.path) for file in case.parameter_files.values() if not isinstance(file, str)]
+        own = [
+            str(file.path) for file in case.parameter_files.values() if not isinstance(file, str)
+        ]
         which = f", or one of its parameter files ({', '.join(own)})" if own else ""
         raise InputError(
             f"{case.path}: this file{which} has another text now than when the study loaded it; load the case again, "

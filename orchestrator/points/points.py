@@ -37,7 +37,10 @@ class Work:
         return cls(executor, PointStore(folder / POINTS), report)
 
     def each(
-        self, compute: Callable[[AnyTask], Point], tasks: Sequence[AnyTask], sizes: Sequence[int] | None = None
+        self,
+        compute: Callable[[AnyTask], Point],
+        tasks: Sequence[AnyTask],
+        sizes: Sequence[int] | None = None,
     ) -> Iterator[tuple[int, Point]]:
         """Yield, in any order, the index of each task and its record."""
         counts = sizes or [1] * len(tasks)
@@ -53,7 +56,11 @@ class Work:
         self.report(self.computed + self.stored, total)
         for number, outcome in self.executor.run(compute, [tasks[index] for index in missing]):
             task, index = tasks[missing[number]], missing[number]
-            done: Any = task.failed(Failure.lost(outcome)) if isinstance(outcome, WorkerLostError) else outcome
+            done: Any = (
+                task.failed(Failure.lost(outcome))
+                if isinstance(outcome, WorkerLostError)
+                else outcome
+            )
             if self.store is not None and done.lasting:
                 self.store.save(task.key, *done.stored())
             self.computed += counts[index]
@@ -61,7 +68,10 @@ class Work:
             yield index, done
 
     def all(
-        self, compute: Callable[[AnyTask], Point], tasks: Sequence[AnyTask], sizes: Sequence[int] | None = None
+        self,
+        compute: Callable[[AnyTask], Point],
+        tasks: Sequence[AnyTask],
+        sizes: Sequence[int] | None = None,
     ) -> list[Point]:
         found = dict(self.each(compute, tasks, sizes))
         return [found[index] for index in range(len(tasks))]

@@ -28,7 +28,8 @@ worker busy."""
 
 _SAFE_PATH = "PYTHONSAFEPATH"
 
-_LONGEST = 60  # length of a folder's path in which sockets' names are short enough: about 100 bytes may be had
+# length of a folder's path in which sockets' names are short enough: about 100 bytes may be had
+_LONGEST = 60
 
 
 class Processes:
@@ -54,7 +55,9 @@ class Processes:
             for index in suspects:
                 yield index, self._run_alone(function, tasks[index])
 
-    def _run_together(self, function: Callable[[Task], Result], tasks: Sequence[Task], waiting: deque[int]) -> Any:
+    def _run_together(
+        self, function: Callable[[Task], Result], tasks: Sequence[Task], waiting: deque[int]
+    ) -> Any:
         """Compute the waiting tasks. If a worker dies, end early and return the tasks that were being computed."""
         under_way: dict[Future[Result], int] = {}
         suspects: list[int] = []
@@ -66,7 +69,9 @@ class Processes:
                 try:
                     while waiting and len(under_way) < _QUEUE_PER_WORKER * self.workers:
                         with calls:  # a worker that is only half known could not be ended
-                            under_way[pool.submit(_computed, function, tasks[waiting[0]])] = waiting[0]
+                            under_way[pool.submit(_computed, function, tasks[waiting[0]])] = (
+                                waiting[0]
+                            )
                         waiting.popleft()
                 except BrokenProcessPool:
                     break
@@ -101,7 +106,9 @@ class Processes:
                 _end_workers(pool)
             pool.shutdown(wait=True, cancel_futures=True)
 
-    def _run_alone(self, function: Callable[[Task], Result], task: Task) -> Result | WorkerLostError:
+    def _run_alone(
+        self, function: Callable[[Task], Result], task: Task
+    ) -> Result | WorkerLostError:
         for _ in range(ATTEMPTS - 1):
             pool = self._new_pool(1)
             try:
@@ -152,14 +159,16 @@ def _sockets_in_an_own_folder() -> None:
     finally:
         tempfile.tempdir = before
     leave(folder)  # whichever of the two modules was imported first
-    multiprocessing.util.Finalize(None, remove, args=(folder,), exitpriority=-101)  # it removes its own at -100
+    # it removes its own at -100
+    multiprocessing.util.Finalize(None, remove, args=(folder,), exitpriority=-101)
 
 
 class WorkerLeftError(Exception):
     """A worker was told to leave what it was at; it takes nothing more."""
 
 
-_ENDED = (BrokenProcessPool, WorkerLeftError, SystemExit)  # what a future says whose worker is gone, or was told to go
+# what a future says whose worker is gone, or was told to go
+_ENDED = (BrokenProcessPool, WorkerLeftError, SystemExit)
 
 
 class _Work:

@@ -13,14 +13,20 @@ from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.schema import Value
 
 POINTS_FILE = FieldKind(
-    "FILE", Path, lambda given, argument: None if given is None else kept(given, "points.csv", argument)
+    "FILE",
+    Path,
+    lambda given, argument: None if given is None else kept(given, "points.csv", argument),
 )
 ANYTHING = FieldKind("", str, lambda given, _: given)  # checked where it is used
 _VALUES = FieldKind("", str, case_values)
 _STEP = FieldKind("", str, in_seconds)
 _FILES = FieldKind("", Path, lambda given, argument: parameter_files(given))
 _SCENARIO = FieldKind(
-    "NAME", str, lambda given, name: text_or_none(given, name, "it is for one scenario: give its name, or leave it out")
+    "NAME",
+    str,
+    lambda given, name: text_or_none(
+        given, name, "it is for one scenario: give its name, or leave it out"
+    ),
 )
 
 
@@ -34,18 +40,29 @@ def of_scenarios() -> Any:
 
 def of_values() -> Any:
     return asked(
-        _VALUES, None, 'values by ``component.variable``, as with ``--set``: numbers, truth values, or text such as '
-        '``"1350 MW"``; they go before the parameter files', option=None,
-    )  # fmt: skip
+        _VALUES,
+        None,
+        "values by ``component.variable``, as with ``--set``: numbers, truth values, or text such as "
+        '``"1350 MW"``; they go before the parameter files',
+        option=None,
+    )
 
 
 def of_frequencies(python: str = "") -> Any:
     """The range of a study's modes; ``python`` says what they are for where "frequencies" does not."""
-    return asked(FREQUENCIES, ELECTROMECHANICAL_HZ, "frequencies [Hz] (0.1:2)", option="--range", python=python)
+    return asked(
+        FREQUENCIES,
+        ELECTROMECHANICAL_HZ,
+        "frequencies [Hz] (0.1:2)",
+        option="--range",
+        python=python,
+    )
 
 
 def of_black_box() -> Any:
-    return asked(FLAG, False, "identify the components that hide their states from their inputs and outputs")
+    return asked(
+        FLAG, False, "identify the components that hide their states from their inputs and outputs"
+    )
 
 
 class _Layered:
@@ -78,19 +95,28 @@ class _Layered:
 class OfCase(_Layered):
     """Asked of every study; scenario and values stand among the fields of each, where Python takes them by place."""
 
-    step: Time | None = asked(_STEP, None, "communication step [s]; the case's by default", option=None)
-    parameters: Paths = asked(_FILES, (), "parameter files, as ``gfor design`` writes them", option=None)
+    step: Time | None = asked(
+        _STEP, None, "communication step [s]; the case's by default", option=None
+    )
+    parameters: Paths = asked(
+        _FILES, (), "parameter files, as ``gfor design`` writes them", option=None
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class OverPoints(OfCase):
     """Asked of every study that computes points side by side; no value depends on it."""
 
-    workers: int | None = asked(ANYTHING, 1, "processes to compute in; one for each core where None", option=None)
+    workers: int | None = asked(
+        ANYTHING, 1, "processes to compute in; one for each core where None", option=None
+    )
     folder: str | Path | None = asked(
-        ANYTHING, None, "keeps the points: a later study with this folder reads them instead of computing them again; "
-        "without a folder they are forgotten", option=None,
-    )  # fmt: skip
+        ANYTHING,
+        None,
+        "keeps the points: a later study with this folder reads them instead of computing them again; "
+        "without a folder they are forgotten",
+        option=None,
+    )
     progress: bool = asked(FLAG, False, "show a bar", option=None)
 
 
@@ -99,10 +125,14 @@ class OverCluster(OverPoints):
     """A study whose points a Dask cluster may compute as well."""
 
     scheduler: str | None = asked(
-        ANYTHING, None, "address of a Dask cluster to compute on instead, such as ``tcp://host:8786``",
+        ANYTHING,
+        None,
+        "address of a Dask cluster to compute on instead, such as ``tcp://host:8786``",
         option=None,
-    )  # fmt: skip
+    )
     tls: str | Path | None = asked(
-        ANYTHING, None, "folder with ``ca.pem``, ``cert.pem`` and ``key.pem``, for a scheduler at ``tls://host:8786``",
+        ANYTHING,
+        None,
+        "folder with ``ca.pem``, ``cert.pem`` and ``key.pem``, for a scheduler at ``tls://host:8786``",
         option=None,
-    )  # fmt: skip
+    )

@@ -33,14 +33,20 @@ class PointStore:
             header = json.loads(arrays.pop("header").tobytes())
         except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error):
             return None
-        return (header, arrays) if isinstance(header, dict) and header.pop("key", None) == key else None
+        return (
+            (header, arrays)
+            if isinstance(header, dict) and header.pop("key", None) == key
+            else None
+        )
 
     def save(self, key: str, header: Mapping[str, Any], arrays: Arrays) -> None:
         """Write a point in one step: the file gets the name that `load` looks for only when it is complete."""
         text = json.dumps({**header, "key": key}).encode()
         try:
             with replacing(self._path(key)) as partial, partial.open("wb") as file:
-                np.savez(file, allow_pickle=False, header=np.frombuffer(text, dtype=np.uint8), **arrays)
+                np.savez(
+                    file, allow_pickle=False, header=np.frombuffer(text, dtype=np.uint8), **arrays
+                )
         except ResultsError as error:
             raise InputError(
                 f"--out: a finished point cannot be kept: {error}, and start the same command again: what is written "

@@ -28,15 +28,24 @@ _WORKER = "orchestrator.points.worker"
 
 
 def choose_executor(
-    workers: int | None, scheduler: str | None, imports: Sequence[str], tls: str | Path | None = None
+    workers: int | None,
+    scheduler: str | None,
+    imports: Sequence[str],
+    tls: str | Path | None = None,
 ) -> Executor:
     if scheduler is not None:
         if workers not in (None, 1):
-            raise InputError("workers and scheduler exclude each other; a Dask cluster brings its own workers")
+            raise InputError(
+                "workers and scheduler exclude each other; a Dask cluster brings its own workers"
+            )
         return DaskCluster(scheduler, None if tls is None else Path(tls))
     if tls is not None:
-        raise InputError(f"--tls {tls}: certificates are for a Dask cluster; name its address with --scheduler")
-    if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
+        raise InputError(
+            f"--tls {tls}: certificates are for a Dask cluster; name its address with --scheduler"
+        )
+    if workers is not None and (
+        isinstance(workers, bool) or not isinstance(workers, int) or workers < 1
+    ):
         raise InputError(f"workers = {workers!r}; it must be a whole number of at least 1")
     workers = workers or number_of_cores()
     return Processes(workers, (_WORKER, *imports)) if workers > 1 else Serial()
@@ -87,14 +96,22 @@ class PointStudy(Study[Asks, Shown], Generic[Asks, Plan, Result, Shown]):
     run: Callable[Concatenate[Plan, Work, ...], Result]  # computes all points of a plan
     shown: Callable[[Result], Shown]  # what users get of its result
     task: type[Task]  # whose module a worker imports
-    prepared: Callable[[Any], Sequence[PreparedScenario]] = lambda plan: [plan.prepared]  # the scenarios of a plan
+    # the scenarios of a plan
+    prepared: Callable[[Any], Sequence[PreparedScenario]] = lambda plan: [plan.prepared]
 
     @property
     def imports(self) -> tuple[str, ...]:
         return (self.task.__module__,)
 
     def compute(
-        self, planned: Plan, executor: Executor, folder: str | Path | None, report: CountReport, *more: Any
+        self,
+        planned: Plan,
+        executor: Executor,
+        folder: str | Path | None,
+        report: CountReport,
+        *more: Any,
     ) -> Shown:
         with TemporaryDirectory() as passing, closing(executor):
-            return self.shown(self.run(planned, Work.into(Path(folder or passing), executor, report), *more))
+            return self.shown(
+                self.run(planned, Work.into(Path(folder or passing), executor, report), *more)
+            )

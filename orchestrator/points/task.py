@@ -15,7 +15,14 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.points.codec import packed, plain, unpacked
 from orchestrator.points.failure import Failure
-from orchestrator.points.key import digest, fingerprint, key_of, reference_to, same_case, scenario_content
+from orchestrator.points.key import (
+    digest,
+    fingerprint,
+    key_of,
+    reference_to,
+    same_case,
+    scenario_content,
+)
 from orchestrator.points.store import Arrays
 
 
@@ -24,29 +31,45 @@ class StudyCase:
     """What all points of a study have in common: a scenario with its layers, found again by any worker."""
 
     reference: str  # name of a built-in case, or path of a file that every worker can read
-    fingerprint: str  # of the texts and of the code; a worker whose fingerprint differs refuses the task
+    # of the texts and of the code; a worker whose fingerprint differs refuses the task
+    fingerprint: str
     scenario: str
-    layers: tuple[ParameterFile, ...]  # parameter files and values of the command line, weakest first
+    # parameter files and values of the command line, weakest first
+    layers: tuple[ParameterFile, ...]
     step_size: float | None  # communication step [s]; None for the case's
     trust_fmus: bool  # as `load_case`: the user's word holds in every worker
     mark: str  # hash of all of it, and of the FMUs
 
     @classmethod
     def of(
-        cls, prepared: PreparedScenario, layers: Sequence[ParameterFile] = (), step_size: float | None = None,
-        text: str | None = None, **besides: Any,
-    ) -> Self:  # fmt: skip
+        cls,
+        prepared: PreparedScenario,
+        layers: Sequence[ParameterFile] = (),
+        step_size: float | None = None,
+        text: str | None = None,
+        **besides: Any,
+    ) -> Self:
         """The case of a scenario as it is without what differs between the points.
 
         ``text``: what stands for the case's own in keys. ``besides``: what the results depend on as well [JSON's
         types]."""
         case = prepared.case
         content = {
-            "case": case.text if text is None else text, **scenario_content(prepared),
-            "layers": [list(layer.values.items()) for layer in layers], "step": step_size, **besides,
-        }  # fmt: skip
-        return cls(reference_to(case), fingerprint(case), prepared.name, tuple(layers), step_size, case.trust_fmus,
-                   digest(content))  # fmt: skip
+            "case": case.text if text is None else text,
+            **scenario_content(prepared),
+            "layers": [list(layer.values.items()) for layer in layers],
+            "step": step_size,
+            **besides,
+        }
+        return cls(
+            reference_to(case),
+            fingerprint(case),
+            prepared.name,
+            tuple(layers),
+            step_size,
+            case.trust_fmus,
+            digest(content),
+        )
 
     def prepare(self, case: Case, values: Mapping[str, Value]) -> PreparedScenario:
         """The scenario with further values by ``component.variable``, which go before all layers."""
@@ -115,6 +138,8 @@ def computed(task: AnyTask, compute: Callable[[AnyTask, Case], Out]) -> Out:
     with alone():
         try:
             return compute(task, case)
-        except Exception as error:  # an unexpected error of a foreign FMU or library must not end the other points
+        except (
+            Exception
+        ) as error:  # an unexpected error of a foreign FMU or library must not end the other points
             failed: Out = task.failed(Failure.of(error))
             return failed

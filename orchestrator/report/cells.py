@@ -63,15 +63,24 @@ class Cells:
         """Write ``cells.json``; ``folder`` is where it will be read from, and the case is named from there."""
         fit = max(1, _MOST // max(1, len(self.columns)))
         content = {
-            "format": _FORMAT, "title": self.title, "scenario": self.scenario, "range": self.frequencies,
+            "format": _FORMAT,
+            "title": self.title,
+            "scenario": self.scenario,
+            "range": self.frequencies,
             "case": word_of(self.case, folder),
-            "hash": _hash(self.case), "values": dict(self.values), "sharing": self.sharing, "step": self.step,
+            "hash": _hash(self.case),
+            "values": dict(self.values),
+            "sharing": self.sharing,
+            "step": self.step,
             "followed": self.followed,
             "left_out": max(0, len(self.rows) - fit),
-            "rows": [asdict(side) for side in self.rows[:fit]], "columns": [asdict(side) for side in self.columns],
-            "cells": [[c and {n: v for n, v in asdict(c).items() if v not in (None, "")} for c in row]
-                      for row in self.cells[:fit]],
-        }  # fmt: skip
+            "rows": [asdict(side) for side in self.rows[:fit]],
+            "columns": [asdict(side) for side in self.columns],
+            "cells": [
+                [c and {n: v for n, v in asdict(c).items() if v not in (None, "")} for c in row]
+                for row in self.cells[:fit]
+            ],
+        }
         save_json(content, staging / CELLS)
         return staging / CELLS
 
@@ -79,7 +88,11 @@ class Cells:
 def word_of(case: CaseDefinition, folder: Path) -> str:
     """By which a case is found from a folder: the name of a built-in one, or the path of its file."""
     path = case.path
-    return path.parent.name if path.is_relative_to(BUILT_IN) else os.path.relpath(path.resolve(), folder.resolve())
+    return (
+        path.parent.name
+        if path.is_relative_to(BUILT_IN)
+        else os.path.relpath(path.resolve(), folder.resolve())
+    )
 
 
 def found_from(word: str, folder: Path) -> Path | str:
@@ -88,7 +101,10 @@ def found_from(word: str, folder: Path) -> Path | str:
 
 
 def _hash(case: Case) -> str:
-    values = [file.values if isinstance(file, ParameterFile) else file for file in case.parameter_files.values()]
+    values = [
+        file.values if isinstance(file, ParameterFile) else file
+        for file in case.parameter_files.values()
+    ]
     return hashlib.sha256(f"{case.text}{values}".encode()).hexdigest()
 
 
@@ -135,14 +151,24 @@ def read_cells(folder: Path) -> dict[str, Any]:
             raise InputError(
                 f"{file}: its format is {kept.format}, and only {_FORMAT} is known; compute the study anew"
             )
-        if len(kept.cells) != len(kept.rows) or any(len(row) != len(kept.columns) for row in kept.cells):
+        if len(kept.cells) != len(kept.rows) or any(
+            len(row) != len(kept.columns) for row in kept.cells
+        ):
             raise ValueError("rows and columns do not fit the cells")
         near = found_from(kept.case, folder)
         if isinstance(near, Path) and not near.is_file():
-            raise InputError(f"{file}: its case {near} is not there; put the folder where it was, beside its case")
+            raise InputError(
+                f"{file}: its case {near} is not there; put the folder where it was, beside its case"
+            )
         return found | {"case": str(near)}
     except (ValueError, TypeError, OSError, RecursionError) as error:
-        text = str(error).splitlines()[0] if not isinstance(error, ValidationError) else "; ".join(
-            f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()[:3]
-        )  # fmt: skip
-        raise InputError(f"{file}: it cannot be read as rows and columns: {text}; compute the study anew") from error
+        text = (
+            str(error).splitlines()[0]
+            if not isinstance(error, ValidationError)
+            else "; ".join(
+                f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()[:3]
+            )
+        )
+        raise InputError(
+            f"{file}: it cannot be read as rows and columns: {text}; compute the study anew"
+        ) from error

@@ -12,7 +12,9 @@ _HOW = {
 _SHOWN = 6
 
 
-def exceptions_in_words(sources: Mapping[str, str], fit_errors: Mapping[str, float] | None = None) -> str | None:
+def exceptions_in_words(
+    sources: Mapping[str, str], fit_errors: Mapping[str, float] | None = None
+) -> str | None:
     """One sentence about the components that were not perturbed; None where all were."""
     parts = []
     for source, how in _HOW.items():
@@ -25,5 +27,7 @@ def exceptions_in_words(sources: Mapping[str, str], fit_errors: Mapping[str, flo
 
 
 def _named(names: list[str], fit_errors: Mapping[str, float]) -> str:
-    shown = [f"{n} (fitting error {fit_errors[n]:.1e})" if n in fit_errors else n for n in names[:_SHOWN]]
+    shown = [
+        f"{n} (fitting error {fit_errors[n]:.1e})" if n in fit_errors else n for n in names[:_SHOWN]
+    ]
     return ", ".join(shown) + (f" … {len(names)} in all" if len(names) > _SHOWN else "")

@@ -9,7 +9,8 @@ from typing import Any
 from orchestrator.errors import InputError
 from orchestrator.late import pd
 
-Axes = Any  # ``matplotlib.axes.Axes``; to import the class takes a second, which only plots are worth
+# ``matplotlib.axes.Axes``; to import the class takes a second, which only plots are worth
+Axes = Any
 
 _ROWS = 40
 
@@ -32,7 +33,9 @@ def axes_or_new(given: Axes, width: float, height: float) -> Axes:
     if given is None:
         return new_axes(width, height)
     if not hasattr(given, "get_legend_handles_labels"):
-        raise InputError(f"ax = {given!r}; give Matplotlib Axes, such as those that another plot returned")
+        raise InputError(
+            f"ax = {given!r}; give Matplotlib Axes, such as those that another plot returned"
+        )
     return given
 
 
@@ -41,11 +44,15 @@ def curves_on(axes: Axes) -> int:
     return len(axes.get_legend_handles_labels()[1])
 
 
-def page(title: str, lines: Iterable[str] = (), table: pd.DataFrame | None = None, rest: str = "") -> str:
+def page(
+    title: str, lines: Iterable[str] = (), table: pd.DataFrame | None = None, rest: str = ""
+) -> str:
     """HTML of a result; of its table the first rows are shown, and ``rest`` is HTML already."""
     parts = [f"<p><b>{escape(title)}</b></p>", *(f"<p>{escape(line)}</p>" for line in lines)]
     if table is not None:
         counted = isinstance(table.index, pd.RangeIndex) and table.index.name is None
         figures = "{:.5g}".format
-        parts.append(table.to_html(max_rows=_ROWS, na_rep="", float_format=figures, index=not counted))
+        parts.append(
+            table.to_html(max_rows=_ROWS, na_rep="", float_format=figures, index=not counted)
+        )
     return "\n".join([*parts, rest])

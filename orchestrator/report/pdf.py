@@ -7,7 +7,14 @@ from pathlib import Path
 
 from orchestrator.errors import InputError
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "msedge", "chrome")
+BROWSERS = (
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "google-chrome-stable",
+    "msedge",
+    "chrome",
+)
 _PATIENCE = 120  # how long the browser may take [s]
 
 
@@ -23,14 +30,27 @@ def print_pdf(page: Path, target: Path) -> Path:
         )
     with tempfile.TemporaryDirectory() as profile:
         command = [
-            browser, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking",
-            "--disable-component-update", "--disable-sync", f"--user-data-dir={profile}", "--no-pdf-header-footer",
-            f"--print-to-pdf={target.resolve()}", page.resolve().as_uri(),
-        ]  # fmt: skip
+            browser,
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--no-first-run",
+            "--disable-background-networking",
+            "--disable-component-update",
+            "--disable-sync",
+            f"--user-data-dir={profile}",
+            "--no-pdf-header-footer",
+            f"--print-to-pdf={target.resolve()}",
+            page.resolve().as_uri(),
+        ]
         try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=_PATIENCE, check=False)
+            done = subprocess.run(
+                command, capture_output=True, text=True, timeout=_PATIENCE, check=False
+            )
         except (OSError, subprocess.TimeoutExpired) as error:
-            raise InputError(f"--pdf: {browser} does not print: {error}; print {page} by hand") from error
+            raise InputError(
+                f"--pdf: {browser} does not print: {error}; print {page} by hand"
+            ) from error
     if not target.is_file():
         said = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
         raise InputError(f"--pdf: {browser} printed nothing ({said}); print {page} by hand")

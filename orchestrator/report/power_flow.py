@@ -5,23 +5,38 @@ from typing import Any
 
 COLUMNS = {
     "machines": {
-        "name": "Unit", "bus": "Bus", "rating_mva": "Rating [MVA]", "p_mw": "P [MW]", "q_mvar": "Q [Mvar]",
+        "name": "Unit",
+        "bus": "Bus",
+        "rating_mva": "Rating [MVA]",
+        "p_mw": "P [MW]",
+        "q_mvar": "Q [Mvar]",
         "loading_percent": "Loading [%]",
     },
     "buses": {"name": "Bus", "v_pu": "Voltage [pu]", "angle_deg": "Angle [°]"},
     "branches": {
-        "name": "Branch", "from_bus": "From", "to_bus": "To", "p_from_mw": "P from [MW]",
-        "q_from_mvar": "Q from [Mvar]", "p_to_mw": "P to [MW]", "q_to_mvar": "Q to [Mvar]", "losses_mw": "Losses [MW]",
+        "name": "Branch",
+        "from_bus": "From",
+        "to_bus": "To",
+        "p_from_mw": "P from [MW]",
+        "q_from_mvar": "Q from [Mvar]",
+        "p_to_mw": "P to [MW]",
+        "q_to_mvar": "Q to [Mvar]",
+        "losses_mw": "Losses [MW]",
     },
-}  # fmt: skip
+}
 
-TEXTS = {"machines": 2, "buses": 1, "branches": 3}  # how many columns at the left of each table hold text
+# how many columns at the left of each table hold text
+TEXTS = {"machines": 2, "buses": 1, "branches": 3}
 _DIGITS = {"v_pu": 4, "angle_deg": 2, "rating_mva": None, "losses_mw": 3}
 
 
 def totals(found: dict[str, Any]) -> list[tuple[str, str]]:
     slack, voltages = found["slack"], [bus["v_pu"] for bus in found["buses"]]
-    share = "" if slack["share_percent"] is None else f", {slack['share_percent']:.0f} % of the generation"
+    share = (
+        ""
+        if slack["share_percent"] is None
+        else f", {slack['share_percent']:.0f} % of the generation"
+    )
     return [
         ("generation", f"{found['generation_mw']:.1f} MW"),
         ("losses in branches", f"{found['losses_mw']:.2f} MW"),

@@ -6,7 +6,10 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 def progress_bar(console: Console) -> Progress:
     columns = (
-        TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeRemainingColumn(),
-    )  # fmt: skip
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeRemainingColumn(),
+    )
     shown = console.is_terminal or console.is_jupyter
     return Progress(*columns, console=console, disable=not shown, transient=True)

@@ -62,16 +62,25 @@ class ColumnTable(Generic[Row]):
 
     def __rich__(self) -> PlainTable:
         rows = [[column.cell(row) for column in self.shown] for row in self.rows[: self.most]]
-        cells = [[c if isinstance(c, str) else Text(c.text, _ON_TERMINALS[c.mark]) for c in row] for row in rows]
-        table = make_table(self.title, *(column.heading for column in self.shown), left=self.left, rows=cells)
+        cells = [
+            [c if isinstance(c, str) else Text(c.text, _ON_TERMINALS[c.mark]) for c in row]
+            for row in rows
+        ]
+        table = make_table(
+            self.title, *(column.heading for column in self.shown), left=self.left, rows=cells
+        )
         table.caption = self._rest or None
         for column, shown in zip(self.shown, table.columns, strict=True):
             shown.justify = "left" if column.text else shown.justify
         return table
 
     def html(self) -> str:
-        cells = [[_on_page(column.cell(row)) for column in self.shown] for row in self.rows[: self.most]]
-        text = table_of_page(self.title, [column.heading for column in self.shown], cells, self.left)
+        cells = [
+            [_on_page(column.cell(row)) for column in self.shown] for row in self.rows[: self.most]
+        ]
+        text = table_of_page(
+            self.title, [column.heading for column in self.shown], cells, self.left
+        )
         return f"{text}<p>{escape(self._rest)}</p>" if self._rest else text
 
     @property
@@ -80,11 +89,16 @@ class ColumnTable(Generic[Row]):
         return f"{rest} more in {self.file}" if rest > 0 else ""
 
     def records(self) -> list[dict[str, Any]]:
-        return [{column.name: column.get(row) for column in self.columns if column.name} for row in self.rows]
+        return [
+            {column.name: column.get(row) for column in self.columns if column.name}
+            for row in self.rows
+        ]
 
     def frame(self) -> pd.DataFrame:
         """Whole numbers and times as names of points are such again, as tables of points have them."""
-        found = pd.DataFrame(self.records(), columns=[column.name for column in self.columns if column.name])
+        found = pd.DataFrame(
+            self.records(), columns=[column.name for column in self.columns if column.name]
+        )
         names = found.get("point")
         if names is None or not len(names):
             return found
@@ -95,7 +109,10 @@ class ColumnTable(Generic[Row]):
 
     def save(self, path: Path) -> None:
         """Write a CSV file; truth values are in lower case, as in JSON."""
-        plain = [{k: str(v).lower() if isinstance(v, bool) else v for k, v in row.items()} for row in self.records()]
+        plain = [
+            {k: str(v).lower() if isinstance(v, bool) else v for k, v in row.items()}
+            for row in self.records()
+        ]
         save_table(plain, path, [column.name for column in self.columns if column.name])
 
 
@@ -111,7 +128,11 @@ def damping(percent: float | None) -> str | Marked:
 
 
 def verdict(stable: bool | None) -> str | Marked:
-    words: dict[bool | None, str | Marked] = {True: "stable", False: Marked("UNSTABLE", "bad"), None: "not known"}
+    words: dict[bool | None, str | Marked] = {
+        True: "stable",
+        False: Marked("UNSTABLE", "bad"),
+        None: "not known",
+    }
     return words[stable]
 
 
@@ -121,5 +142,7 @@ def mode_columns(mode_of: Callable[[Row], Any]) -> list[Column[Row]]:
         Column("", lambda row: mode_of(row).eigenvalue.real, name="real"),
         Column("", lambda row: mode_of(row).eigenvalue.imag, name="imag"),
         Column("f [Hz]", lambda row: mode_of(row).frequency_hz, ".4f", name="frequency_hz"),
-        Column("Damping [%]", lambda row: mode_of(row).damping_percent, damping, name="damping_percent"),
+        Column(
+            "Damping [%]", lambda row: mode_of(row).damping_percent, damping, name="damping_percent"
+        ),
     ]

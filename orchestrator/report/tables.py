@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from orchestrator.fmi.description import FmuDescription, VariableInfo
 
 Told = TypeVar("Told")
-COLOURS = {True: "green", False: "red", None: "yellow"}  # of a verdict that is good, bad or not known
+# of a verdict that is good, bad or not known
+COLOURS = {True: "green", False: "red", None: "yellow"}
 
 
 @dataclass(frozen=True)
@@ -51,15 +52,23 @@ class PlainTable(Table):
 
     def add_row(self, *cells: Any, **options: Any) -> None:
         """Add a row; text in it is shown to the letter."""
-        super().add_row(*(Text(cell) if isinstance(cell, str) else cell for cell in cells), **options)
+        super().add_row(
+            *(Text(cell) if isinstance(cell, str) else cell for cell in cells), **options
+        )
 
 
-def make_table(title: str, *columns: str, left: int = 1, rows: Iterable[Sequence[Cell]] = ()) -> PlainTable:
+def make_table(
+    title: str, *columns: str, left: int = 1, rows: Iterable[Sequence[Cell]] = ()
+) -> PlainTable:
     """A table whose title, headings and cells are shown as they are; columns after the ``left`` first ones are of
     figures."""
-    table = PlainTable(title=escape(title), title_justify="left", title_style="bold", header_style="bold")
+    table = PlainTable(
+        title=escape(title), title_justify="left", title_style="bold", header_style="bold"
+    )
     for index, column in enumerate(columns):
-        table.add_column(escape(column), justify="left" if index < left else "right", overflow="fold")
+        table.add_column(
+            escape(column), justify="left" if index < left else "right", overflow="fold"
+        )
     for row in rows:
         table.add_row(*row)
     return table
@@ -93,13 +102,22 @@ def share_text(entry: tuple[str, float]) -> str:
 def fmu_variables(description: FmuDescription) -> Iterable[Table]:
     for causality in ("input", "output", "parameter", "calculatedParameter", "local"):
         variables = [
-            v for v in description.variables.values() if v.causality == causality and not v.name.startswith("der(")
+            v
+            for v in description.variables.values()
+            if v.causality == causality and not v.name.startswith("der(")
         ]
         if not variables:
             continue
         columns = ("Name", "Unit", "Start", "Range", "Variability", "Description")
         rows = [
-            (v.name, v.unit, "" if v.start is None else as_text(v.start), _bounds(v), v.variability, v.description)
+            (
+                v.name,
+                v.unit,
+                "" if v.start is None else as_text(v.start),
+                _bounds(v),
+                v.variability,
+                v.description,
+            )
             for v in variables
         ]
         yield make_table(f"{causality} ({len(variables)})", *columns, left=6, rows=rows)

@@ -39,9 +39,13 @@ class _Column(xr.backends.BackendArray):
             if first < last:
                 try:
                     with opened(piece.path) as file:
-                        found[first - begin : last - begin] = file[stored][first - piece.first : last - piece.first]
+                        found[first - begin : last - begin] = file[stored][
+                            first - piece.first : last - piece.first
+                        ]
                 except DAMAGED as error:
-                    raise InputError(f"{piece.path}: {self._name!r} cannot be read: {error}") from error
+                    raise InputError(
+                        f"{piece.path}: {self._name!r} cannot be read: {error}"
+                    ) from error
         return found
 
 

@@ -20,7 +20,16 @@ from orchestrator.results.comtrade.reading import LINE_FREQUENCY
 EXCEL = (".xlsx", ".xlsm")
 SUFFIXES = (".csv", ".tsv", *EXCEL)
 _HEADING = re.compile(r"\s*(.*?)\s*(?:[\[(]([^])]*)[])])?\s*")
-_SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0}
+_SECONDS = {
+    "": 1.0,
+    "s": 1.0,
+    "sec": 1.0,
+    "ms": 1e-3,
+    "msec": 1e-3,
+    "us": 1e-6,
+    "µs": 1e-6,
+    "min": 60.0,
+}
 _TIMES = ("time", "t", "timestamp", "datetime", "utc", "soc", "epoch", "zeit", "temps", "tiempo")
 _THOUSANDS = r"[-+]?\d{1,3}(?:[.,'\s]\d{3})+(?:[.,]\d+)?"
 _DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}([T\s].*)?|\d{1,2}:\d{2}(:.*)?")
@@ -38,7 +47,9 @@ def read_table(path: Path) -> xr.Dataset:
     name, unit = _parts(first)
     kind = table[first].dtype.kind if len(table) else ""
     stamps = _seconds_of_dates(table) if kind and kind not in "if" else None
-    if stamps is None and ((name.lower() not in _TIMES and not unit) or unit not in _SECONDS or kind not in ("i", "f")):
+    if stamps is None and (
+        (name.lower() not in _TIMES and not unit) or unit not in _SECONDS or kind not in ("i", "f")
+    ):
         raise InputError(
             f"{path}: its first column is {first!r}; it must be the time, as numbers below 'time', 't' or 'time [ms]', "
             "or as dates such as 2025-03-01 12:00:00.020, and a first line names the columns"
@@ -55,8 +66,15 @@ def read_table(path: Path) -> xr.Dataset:
             f"write '{first} [s]' or '{first} [ms]'"
         )
     _check_numbers(path, table)
-    found = {name: _parts(name) for name in map(str, table.columns[1:]) if name and table[name].dtype.kind in "if"}
-    columns = {short: ("time", table[full].to_numpy(float), {"units": u}) for full, (short, u) in found.items()}
+    found = {
+        name: _parts(name)
+        for name in map(str, table.columns[1:])
+        if name and table[name].dtype.kind in "if"
+    }
+    columns = {
+        short: ("time", table[full].to_numpy(float), {"units": u})
+        for full, (short, u) in found.items()
+    }
     times = np.round(times - times[0], 6) if times[0] > _EPOCH else times
     return xr.Dataset(columns, {"time": times, LINE_FREQUENCY: 0.0})
 
@@ -77,9 +95,15 @@ def _table(path: Path) -> pd.DataFrame:
     if odd := next((row for row in rows if len(row) != len(names)), None):
         both = "the comma both parts the columns and stands in the numbers: write decimal points, or ';' between them"
         remedy = both if mark == "," and len(rows[0]) == 2 * len(names) else "name them all"
-        raise InputError(f"{path}: the line above the numbers names {len(names)} columns, and {mark.join(odd)!r} has "
-                         f"{len(odd)}; {remedy}")  # fmt: skip
-    texts = pd.DataFrame(rows, columns=[f"{n} ({k})" if n in names[:k] else n for k, n in enumerate(names)], dtype=str)
+        raise InputError(
+            f"{path}: the line above the numbers names {len(names)} columns, and {mark.join(odd)!r} has "
+            f"{len(odd)}; {remedy}"
+        )
+    texts = pd.DataFrame(
+        rows,
+        columns=[f"{n} ({k})" if n in names[:k] else n for k, n in enumerate(names)],
+        dtype=str,
+    )
     return texts.apply(lambda column: _numbers(column, comma=mark != ","))
 
 
@@ -115,13 +139,23 @@ def _text(content: bytes) -> str:
 def _parted(rows: Sequence[list[str]]) -> tuple[list[str], list[list[str]]]:
     """Names of the columns, with units from a row of their own, and the rows from the first that begins with a time."""
     rows = [row for row in rows if row]
-    begin = next((k for k, row in enumerate(rows) if len(row) > 1 and row[1].strip() and _TIME.fullmatch(row[0])), 0)
+    begin = next(
+        (
+            k
+            for k, row in enumerate(rows)
+            if len(row) > 1 and row[1].strip() and _TIME.fullmatch(row[0])
+        ),
+        0,
+    )
     if not begin:
         return (rows[0] if rows else []), []
     names, above = [cell.strip() for cell in rows[begin - 1]], rows[begin - 2] if begin > 1 else []
     if above and len(above) == len(names) and names[0].strip("[]()-") in (*_SECONDS, "UTC"):
         units = [cell.strip("[]()-") for cell in names]
-        names = [f"{name.strip()} [{unit}]" if unit else name.strip() for name, unit in zip(above, units, strict=True)]
+        names = [
+            f"{name.strip()} [{unit}]" if unit else name.strip()
+            for name, unit in zip(above, units, strict=True)
+        ]
     return names, rows[begin:]
 
 
@@ -130,8 +164,16 @@ def _seconds_of_dates(table: pd.DataFrame) -> Numbers | None:
     texts = table.iloc[:, 0].astype(str).str.strip().str.replace(",", ".")
     if not texts.str.fullmatch(_DATE).all():
         return None
-    clock = table.iloc[:, 1].astype(str).str.strip().str.replace(",", ".") if table.shape[1] > 1 else texts
-    if texts.str.len().max() <= 10 and not texts.str.contains(":").any() and clock.str.fullmatch(_DATE).all():
+    clock = (
+        table.iloc[:, 1].astype(str).str.strip().str.replace(",", ".")
+        if table.shape[1] > 1
+        else texts
+    )
+    if (
+        texts.str.len().max() <= 10
+        and not texts.str.contains(":").any()
+        and clock.str.fullmatch(_DATE).all()
+    ):
         texts = texts + " " + clock
     if texts.str.contains("/").all() and texts.str.split(" ").str[0].nunique() == 1:
         texts = texts.str.split(" ", n=1).str[-1]  # whichever is the month: all are of one day
@@ -148,7 +190,10 @@ def _check_numbers(path: Path, table: pd.DataFrame) -> None:
     """Numbers that are taken for text would be missing without a word."""
     for name in (n for n in table.columns[1:] if table[n].dtype.kind not in "if"):
         texts = table[name].dropna().astype(str).str.strip()
-        marked, other = texts[texts.str.fullmatch(_THOUSANDS)], texts[pd.to_numeric(texts, errors="coerce").isna()]
+        marked, other = (
+            texts[texts.str.fullmatch(_THOUSANDS)],
+            texts[pd.to_numeric(texts, errors="coerce").isna()],
+        )
         if len(marked):
             said = f"{marked.iloc[0]!r}; write its numbers without marks between thousands"
         elif 0 < len(other) < len(texts):

@@ -14,7 +14,8 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-LOCK = ".lock"  # the file's name; it holds the number of the process that has it, and its machine's name
+# the file's name; it holds the number of the process that has it, and its machine's name
+LOCK = ".lock"
 
 
 @contextmanager

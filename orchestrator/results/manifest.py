@@ -49,14 +49,20 @@ class Manifest:
             size = path.stat().st_size
             same = size == written.bytes and sha256_of(path) == written.sha256
         except OSError as error:
-            text = f"{path}: this file of run {written.run} cannot be read: {error.strerror}; {_AGAIN}"
+            text = (
+                f"{path}: this file of run {written.run} cannot be read: {error.strerror}; {_AGAIN}"
+            )
             raise InputError(text) from error
         if size != written.bytes:
-            raise InputError(f"{path}: it has {size} bytes, and run {written.run} wrote {written.bytes}: it was cut "
-                             f"off, changed, or is of another run; {_AGAIN}")  # fmt: skip
+            raise InputError(
+                f"{path}: it has {size} bytes, and run {written.run} wrote {written.bytes}: it was cut "
+                f"off, changed, or is of another run; {_AGAIN}"
+            )
         if not same:
-            raise InputError(f"{path}: its content is not what run {written.run} wrote (SHA-256 differs): it was "
-                             f"damaged, changed, or is of another run; {_AGAIN}")  # fmt: skip
+            raise InputError(
+                f"{path}: its content is not what run {written.run} wrote (SHA-256 differs): it was "
+                f"damaged, changed, or is of another run; {_AGAIN}"
+            )
 
 
 def sha256_of(path: Path) -> str:
@@ -65,16 +71,22 @@ def sha256_of(path: Path) -> str:
 
 
 def write_manifest(
-    folder: Path, run: str, names: Iterable[str], scenarios: Iterable[str] = (), before: Manifest | None = None,
+    folder: Path,
+    run: str,
+    names: Iterable[str],
+    scenarios: Iterable[str] = (),
+    before: Manifest | None = None,
     about: Mapping[str, str] | None = None,
-) -> None:  # fmt: skip
+) -> None:
     """Write a folder's manifest, after its files.
 
     ``scenarios``: folders beside them that are of the same run.
     ``before``: what an earlier command said of the files' place: its files that are not written anew stay listed.
     ``about``: of a scenario's folder: its ``scenario``, and ``ended_early`` with the reason where its run did so."""
     paths = {name: folder / name for name in sorted(names)}
-    files = {name: WrittenFile(run, sha256_of(path), path.stat().st_size) for name, path in paths.items()}
+    files = {
+        name: WrittenFile(run, sha256_of(path), path.stat().st_size) for name, path in paths.items()
+    }
     listed = {**(before.files if before else {}), **files}
     beside = dict.fromkeys(scenarios, run) or (before.scenarios if before else {})
     entries = {name: asdict(listed[name]) for name in sorted(listed)}
@@ -85,7 +97,11 @@ def write_manifest(
 def made_now() -> dict[str, Any]:
     """Where results come from: version, date, and what the command line says of itself."""
     date = f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC"
-    return {"made_by": versions_of(["gfor-cosim"]), "date": date, **(origin.said[-1]() if origin.said else {})}
+    return {
+        "made_by": versions_of(["gfor-cosim"]),
+        "date": date,
+        **(origin.said[-1]() if origin.said else {}),
+    }
 
 
 def read_manifest(folder: Path) -> Manifest | None:
@@ -94,22 +110,27 @@ def read_manifest(folder: Path) -> Manifest | None:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         files = {
-            str(n): WrittenFile(str(f["run"]), str(f["sha256"]), int(f["bytes"])) for n, f in content["files"].items()
+            str(n): WrittenFile(str(f["run"]), str(f["sha256"]), int(f["bytes"]))
+            for n, f in content["files"].items()
         }
         beside = {str(n): str(run) for n, run in content["scenarios"].items()}
         return Manifest(folder, files, beside, str(content.get("scenario", "")))
     except FileNotFoundError:
         return None
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{path}: it cannot be read as the list of a run's files: {error}; {_AGAIN}") from error
+        raise InputError(
+            f"{path}: it cannot be read as the list of a run's files: {error}; {_AGAIN}"
+        ) from error
 
 
 def spare_result(path: Path) -> None:
     """Refuse a file to write that stands in the manifest beside it: results of a run are replaced by a run alone."""
     found = read_manifest(path.parent)
     if found and path.name in (*found.files, MANIFEST):
-        raise InputError(f"{path}: it is one of the results in {path.parent}, and would be written over; name another "
-                         "file to write")  # fmt: skip
+        raise InputError(
+            f"{path}: it is one of the results in {path.parent}, and would be written over; name another "
+            "file to write"
+        )
 
 
 def inputs_behind(result: Path) -> dict[str, str]:
@@ -142,7 +163,9 @@ def check_one_run(folder: Path, names: Iterable[str], inner: Iterable[str]) -> N
         return
     first = there[0]
     if first not in manifest.files:
-        raise InputError(f"{folder / first}: {MANIFEST} beside it does not list it, so its run is unknown; {_AGAIN}")
+        raise InputError(
+            f"{folder / first}: {MANIFEST} beside it does not list it, so its run is unknown; {_AGAIN}"
+        )
     run = manifest.files[first].run
     for name in there:
         found = manifest.files.get(name)
@@ -158,7 +181,11 @@ def check_one_run(folder: Path, names: Iterable[str], inner: Iterable[str]) -> N
 
 def _check_scenario(folder: Path, scenario: str, run: str, names: Iterable[str]) -> None:
     manifest = read_manifest(folder / scenario)
-    runs = {"no run that is known"} if manifest is None else {f.run for n, f in manifest.files.items() if n in {*names}}
+    runs = (
+        {"no run that is known"}
+        if manifest is None
+        else {f.run for n, f in manifest.files.items() if n in {*names}}
+    )
     if manifest is None or runs - {run}:
         raise InputError(
             f"{folder / scenario}: it is of run {', '.join(sorted(runs))}, and the summary in {folder} of run {run}: "

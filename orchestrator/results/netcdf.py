@@ -40,7 +40,8 @@ _SLACK = 1_000_000  # what a file needs beside its columns, at most [bytes]
 
 Attributes = Mapping[str, str | float]
 
-DAMAGED = (OSError, KeyError, RuntimeError, ValueError)  # what h5py raises on a file that is cut short or damaged
+# what h5py raises on a file that is cut short or damaged
+DAMAGED = (OSError, KeyError, RuntimeError, ValueError)
 
 
 def stored_name(name: str) -> str:
@@ -53,9 +54,13 @@ def name_of(stored: str) -> str:
 
 
 def netcdf_image(
-    names: Sequence[str], times: NDArray[np.float64], values: NDArray[np.float64], units: Mapping[str, Attributes],
-    attributes: Attributes, chunk: int,
-) -> bytes:  # fmt: skip
+    names: Sequence[str],
+    times: NDArray[np.float64],
+    values: NDArray[np.float64],
+    units: Mapping[str, Attributes],
+    attributes: Attributes,
+    chunk: int,
+) -> bytes:
     """A NetCDF-4 file as bytes.
 
     ``times``: [s], shape (n,).
@@ -73,11 +78,24 @@ def netcdf_image(
 
 
 def create_columns(
-    file: Any, names: Sequence[str], rows: int, units: Mapping[str, Attributes], attributes: Attributes, chunk: int
+    file: Any,
+    names: Sequence[str],
+    rows: int,
+    units: Mapping[str, Attributes],
+    attributes: Attributes,
+    chunk: int,
 ) -> list[Any]:
     """Empty columns of an HDF5 file, the time first, in the form that NetCDF-4 asks for."""
-    form = {"shape": (rows,), "dtype": "<f8", "chunks": (chunk,), "maxshape": (rows or None,), "compression": "gzip",
-            "compression_opts": LEVEL, "shuffle": True, "track_order": True}  # fmt: skip
+    form = {
+        "shape": (rows,),
+        "dtype": "<f8",
+        "chunks": (chunk,),
+        "maxshape": (rows or None,),
+        "compression": "gzip",
+        "compression_opts": LEVEL,
+        "shuffle": True,
+        "track_order": True,
+    }
     time = file.create_dataset("time", **form)
     time.make_scale("time")
     columns = [time]
@@ -123,7 +141,11 @@ class ReservedFile(RawIOBase):
 
     def seek(self, offset: int, whence: int = 0) -> int:
         """Go to a place; the end is that of what was written."""
-        return self._file.seek(self.size + offset) if whence == os.SEEK_END else self._file.seek(offset, whence)
+        return (
+            self._file.seek(self.size + offset)
+            if whence == os.SEEK_END
+            else self._file.seek(offset, whence)
+        )
 
     def tell(self) -> int:
         return self._file.tell()
@@ -148,7 +170,11 @@ def _reserve(file: BinaryIO, size: int) -> None:
 
 
 def join_netcdf(
-    parts: Sequence[Path], path: Path, names: Sequence[str], units: Mapping[str, Attributes], attributes: Attributes
+    parts: Sequence[Path],
+    path: Path,
+    names: Sequence[str],
+    units: Mapping[str, Attributes],
+    attributes: Attributes,
 ) -> None:
     """Join files of `netcdf_image`, of whole chunks but for the last, to one; chunks are copied as they are."""
     import h5py  # noqa: PLC0415 - as above

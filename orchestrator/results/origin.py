@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 WRITTEN = ("out", "into", "html", "save", "scan", "junit")  # options that name what is written
-_BESIDE = {".toml": (".csv", ".json"), ".cfg": (".dat",)}  # endings of what is written beside a file
+# endings of what is written beside a file
+_BESIDE = {".toml": (".csv", ".json"), ".cfg": (".dat",)}
 
 said: list[Callable[[], dict[str, Any]]] = []
 """The ``command`` in force, its ``directory``, hashes of ``code`` and ``inputs``; from Python without a command."""
@@ -27,13 +28,17 @@ def files_read(options: Mapping[str, Any]) -> dict[str, Path]:
     """Files that options name to be read, and those that the TOML files among them name."""
     found = {}
     given = (value for name, value in options.items() if name not in WRITTEN)
-    for text in (str(one) for value in given for one in (value if isinstance(value, list) else [value])):
+    for text in (
+        str(one) for value in given for one in (value if isinstance(value, list) else [value])
+    ):
         for path in (Path(text), Path(text.rpartition("=")[2])):
             with suppress(OSError, ValueError):
                 if path.is_file():
                     found[str(path)] = path
                     if path.suffix == ".toml":
-                        found |= files_named(path.read_text(encoding="utf-8", errors="replace"), path.parent)
+                        found |= files_named(
+                            path.read_text(encoding="utf-8", errors="replace"), path.parent
+                        )
     return found
 
 

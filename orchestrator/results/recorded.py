@@ -29,14 +29,18 @@ def open_recording(folder: Path) -> xr.Dataset:
     rows = 0
     for part in parts:
         if int(part.stem) != rows:
-            raise InputError(f"{folder}: the rows from number {rows} on are missing; the run has to be made again")
+            raise InputError(
+                f"{folder}: the rows from number {rows} on are missing; the run has to be made again"
+            )
         try:
             with opened(part) as file:
                 pieces.append(Piece(part, rows, len(file["time"])))
                 if part == parts[0]:
                     attributes, units = dict(file.attrs), _columns(file)
         except DAMAGED as error:
-            raise InputError(f"{part}: it cannot be read as part of a recording: {error}") from error
+            raise InputError(
+                f"{part}: it cannot be read as part of a recording: {error}"
+            ) from error
         rows += pieces[-1].rows
     return _read_when_used(pieces, attributes, units)
 
@@ -70,7 +74,9 @@ def _of_ours(path: Path) -> xr.Dataset | None:
             attributes, units, rows = dict(file.attrs), _columns(file), len(file["time"])
             if rows * len(units) * 8 > IN_MEMORY:
                 return _read_when_used([Piece(path, 0, rows)], attributes, units)
-            data = {name: ("time", file[stored_name(name)][...], about) for name, about in units.items()}
+            data = {
+                name: ("time", file[stored_name(name)][...], about) for name, about in units.items()
+            }
     except DAMAGED:  # no HDF5, as NetCDF-3 is not, or damaged; xarray says which
         return None
     return xr.Dataset(data, attrs=attributes)
@@ -80,7 +86,9 @@ def _is_ours(file: Any) -> bool:
     known = _OF_NETCDF.union(_SHOWN)
     shape = getattr(file.get("time"), "shape", ())
     return len(shape) == 1 and all(
-        getattr(file[name], "shape", ()) == shape and file[name].dtype == float and known.issuperset(file[name].attrs)
+        getattr(file[name], "shape", ()) == shape
+        and file[name].dtype == float
+        and known.issuperset(file[name].attrs)
         for name in file
     )
 
@@ -108,4 +116,6 @@ def warn_of_early_end(dataset: xr.Dataset, label: str) -> None:
     if reason is not None:
         times = dataset["time"].values
         reached = f", at t = {float(times[-1]):.6g} s" if len(times) else ""
-        warnings.warn(f"{label}: its run ended early{reached}: {reason}", ResultsWarning, stacklevel=3)
+        warnings.warn(
+            f"{label}: its run ended early{reached}: {reason}", ResultsWarning, stacklevel=3
+        )

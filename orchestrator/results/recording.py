@@ -15,14 +15,22 @@ from numpy.typing import NDArray
 
 from orchestrator.coupling.recorder import Block
 from orchestrator.errors import InputError, ResultsError
-from orchestrator.results.netcdf import DAMAGED, Attributes, join_netcdf, netcdf_image, opened, stored_name
+from orchestrator.results.netcdf import (
+    DAMAGED,
+    Attributes,
+    join_netcdf,
+    netcdf_image,
+    opened,
+    stored_name,
+)
 from orchestrator.results.storage import column_attributes, origin_of_rows
 from orchestrator.safe_files import flush, not_written, write_bytes
 
 if TYPE_CHECKING:
     from orchestrator.cases.prepare import PreparedScenario
 
-_NUMBER, _CSV_NUMBER = 8, 13  # bytes of a value: compressed parts with the joined file; digits in the table
+# bytes of a value: compressed parts with the joined file; digits in the table
+_NUMBER, _CSV_NUMBER = 8, 13
 
 
 def recorded_size(prepared: PreparedScenario, *, csv: bool) -> float:
@@ -32,7 +40,10 @@ def recorded_size(prepared: PreparedScenario, *, csv: bool) -> float:
 
 
 def require_room(scenarios: Sequence[PreparedScenario], folder: Path, *, csv: bool) -> None:
-    needed, free = sum(recorded_size(prepared, csv=csv) for prepared in scenarios), shutil.disk_usage(folder).free
+    needed, free = (
+        sum(recorded_size(prepared, csv=csv) for prepared in scenarios),
+        shutil.disk_usage(folder).free,
+    )
     if needed <= free:
         return
     longest = max(scenarios, key=lambda prepared: recorded_size(prepared, csv=csv))
@@ -59,7 +70,8 @@ FOLDER = "recording"  # of the files of a recording that is not finished, in its
 
 
 TRAJECTORY = "trajectory.nc"  # A recording that is finished
-ENDED_EARLY = "ended_early"  # attribute of a recording whose run ended before its stop time: the reason
+# attribute of a recording whose run ended before its stop time: the reason
+ENDED_EARLY = "ended_early"
 
 
 class RecordingFolder:
@@ -68,7 +80,9 @@ class RecordingFolder:
     Each is a NetCDF-4 file, written at once; the last one is replaced as it grows. So every moment leaves a recording
     that can be read, whatever ends the process."""
 
-    def __init__(self, folder: Path, prepared: PreparedScenario, further: Attributes | None = None) -> None:
+    def __init__(
+        self, folder: Path, prepared: PreparedScenario, further: Attributes | None = None
+    ) -> None:
         import h5py  # noqa: F401, PLC0415 - here rather than in the first step, whose time is measured
 
         self.folder = folder
@@ -76,7 +90,8 @@ class RecordingFolder:
         self._units = column_attributes(prepared.record, prepared)
         self._attributes: dict[str, Any] = origin_of_rows(prepared) | dict(further or {})
         self._chunk = 0
-        self._rows: int | None = None  # until a run begins: then what lies there is of an earlier one
+        # until a run begins: then what lies there is of an earlier one
+        self._rows: int | None = None
 
     def begin(self, names: Sequence[str]) -> None:
         self._names, self._chunk, self._rows = tuple(names), 0, 0
@@ -88,7 +103,9 @@ class RecordingFolder:
 
     def keep(self, first: int, times: NDArray[np.float64], values: NDArray[np.float64]) -> None:
         self._chunk = max(self._chunk, len(times))
-        image = netcdf_image(self._names, times, values, self._units, self._attributes, max(1, len(times)))
+        image = netcdf_image(
+            self._names, times, values, self._units, self._attributes, max(1, len(times))
+        )
         if not self.folder.is_dir():
             raise not_written(self.folder, FileNotFoundError(2, "No such file or directory"))
         write_bytes(self.folder / f"{first:012d}.nc", image)
@@ -124,7 +141,9 @@ class RecordingFolder:
         attributes = self._attributes | dict(further or {})
         if not parts:
             empty = np.empty((0, len(self._names)))
-            write_bytes(path, netcdf_image(self._names, np.empty(0), empty, self._units, attributes, 1))
+            write_bytes(
+                path, netcdf_image(self._names, np.empty(0), empty, self._units, attributes, 1)
+            )
         else:
             join_netcdf(parts, path, self._names, self._units, attributes)
         rmtree(self.folder, ignore_errors=True)
@@ -160,6 +179,8 @@ def rows_in(parts: Sequence[Path]) -> int:
 def _read(part: Path, names: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     try:
         with opened(part) as file:
-            return file["time"][...], np.column_stack([file[stored_name(name)][...] for name in names])
+            return file["time"][...], np.column_stack(
+                [file[stored_name(name)][...] for name in names]
+            )
     except DAMAGED as error:
         raise InputError(f"{part}: it cannot be read as part of a recording: {error}") from error

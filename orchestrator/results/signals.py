@@ -55,7 +55,9 @@ def outline(dataset: xr.Dataset, expression: str, most: int = MOST_DRAWN) -> xr.
         if part is None:
             return None
         seen, starts = part.values, np.arange(0, len(part), span)
-        extremes = np.column_stack([np.minimum.reduceat(seen, starts), np.maximum.reduceat(seen, starts)])
+        extremes = np.column_stack(
+            [np.minimum.reduceat(seen, starts), np.maximum.reduceat(seen, starts)]
+        )
         values.append(extremes.ravel())
         times.append(np.repeat(part["time"].values[starts], 2))
     return xr.DataArray(np.concatenate(values), dims="time", coords={"time": np.concatenate(times)})
@@ -65,4 +67,8 @@ def relative_difference(simulated: xr.DataArray, linear: xr.DataArray) -> float:
     """Largest difference of two responses at the same times, as a share of the first one's largest deviation."""
     deviation = float(np.abs(simulated.values - simulated.values[0]).max())
     both = min(len(simulated), len(linear))  # a run that failed is shorter
-    return float(np.abs(simulated.values[:both] - linear.values[:both]).max()) / deviation if deviation else np.nan
+    return (
+        float(np.abs(simulated.values[:both] - linear.values[:both]).max()) / deviation
+        if deviation
+        else np.nan
+    )

@@ -10,7 +10,13 @@ from secrets import token_hex
 from shutil import copy2, rmtree
 
 from orchestrator.errors import InputError
-from orchestrator.results.manifest import MANIFEST, Manifest, read_manifest, sha256_of, write_manifest
+from orchestrator.results.manifest import (
+    MANIFEST,
+    Manifest,
+    read_manifest,
+    sha256_of,
+    write_manifest,
+)
 from orchestrator.results.recording import ENDED_EARLY
 from orchestrator.safe_files import PARTIAL, flush, inputs, not_written
 
@@ -37,7 +43,9 @@ class ScenarioFolder:
         require_results(self.place)
         try:
             self.path.mkdir(parents=True, exist_ok=True)
-            for left in self.path.rglob(f"{PARTIAL}*"):  # a resumed run has the id of the one that was killed
+            for left in self.path.rglob(
+                f"{PARTIAL}*"
+            ):  # a resumed run has the id of the one that was killed
                 left.unlink()
         except OSError as error:
             raise not_written(self.path, error) from error
@@ -52,7 +60,9 @@ class ScenarioFolder:
 
         ``ended_early``: why the run ended before its stop time; None where it reached that."""
         try:
-            about = {"scenario": self.place.name} | ({} if ended_early is None else {ENDED_EARLY: ended_early})
+            about = {"scenario": self.place.name} | (
+                {} if ended_early is None else {ENDED_EARLY: ended_early}
+            )
             write_manifest(self.path, self.run, _files(self.path), about=about)
             _keep_others(self.place, self.path, self.run)
             flush(self.path)
@@ -64,9 +74,13 @@ class ScenarioFolder:
 
 def require_results(place: Path) -> None:
     """Refuse a place for a scenario's results where something is that no run has made."""
-    if place.is_file() or (place.is_dir() and any(place.iterdir()) and not (place / MANIFEST).is_file()):
-        raise InputError(f"{place}: the results of the scenario {place.name!r} go there, and no run has made what is "
-                         "there now; give another --out, or move it")  # fmt: skip
+    if place.is_file() or (
+        place.is_dir() and any(place.iterdir()) and not (place / MANIFEST).is_file()
+    ):
+        raise InputError(
+            f"{place}: the results of the scenario {place.name!r} go there, and no run has made what is "
+            "there now; give another --out, or move it"
+        )
 
 
 def _keep_others(old: Path, new: Path, run: str) -> None:
@@ -140,7 +154,11 @@ def remove_at_once(path: Path, run: str) -> None:
 
 def unfinished(folder: Path) -> list[Path]:
     """Folders of scenarios whose run did not end, or still goes on."""
-    return sorted(path for path in folder.glob(f"*{PARTIAL}*") if path.is_dir() and not path.name.startswith(PARTIAL))
+    return sorted(
+        path
+        for path in folder.glob(f"*{PARTIAL}*")
+        if path.is_dir() and not path.name.startswith(PARTIAL)
+    )
 
 
 @contextmanager
@@ -174,7 +192,9 @@ def check_free(folder: Path, contents: Mapping[str, bytes | None]) -> None:
 
     ``contents``: by name; None where it is not known yet."""
     for name, content in contents.items():
-        if _is_foreign(folder, name, None if content is None else hashlib.sha256(content).hexdigest()):
+        if _is_foreign(
+            folder, name, None if content is None else hashlib.sha256(content).hexdigest()
+        ):
             raise _foreign(folder / name, "give another --out, or move it")
 
 
@@ -205,10 +225,18 @@ def _readable(folder: Path) -> Manifest | None:
         found = read_manifest(folder)
     except InputError:
         return None
-    return found and Manifest(folder, {n: f for n, f in found.files.items() if (folder / n).is_file()}, found.scenarios)
+    return found and Manifest(
+        folder, {n: f for n, f in found.files.items() if (folder / n).is_file()}, found.scenarios
+    )
 
 
 def _files(folder: Path) -> list[str]:
     """Names of all files below a folder, but for manifests and what is not finished."""
-    found = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file() and path.name != MANIFEST)
-    return sorted(name.as_posix() for name in found if not any(PARTIAL in part for part in name.parts))
+    found = (
+        path.relative_to(folder)
+        for path in folder.rglob("*")
+        if path.is_file() and path.name != MANIFEST
+    )
+    return sorted(
+        name.as_posix() for name in found if not any(PARTIAL in part for part in name.parts)
+    )

@@ -32,16 +32,25 @@ def provenance(prepared: PreparedScenario) -> dict[str, str | float]:
     fmus = {name: plan.description for name, plan in prepared.system.components.items()}
     tolerance = prepared.schedule.tolerance
     return {
-        "case": prepared.case.name, "scenario": prepared.name, "title": prepared.title,
-        "case_file": prepared.case.text, "values": json.dumps(prepared.values),
+        "case": prepared.case.name,
+        "scenario": prepared.name,
+        "title": prepared.title,
+        "case_file": prepared.case.text,
+        "values": json.dumps(prepared.values),
         "given": json.dumps(prepared.given),
-        "events": "; ".join(map(str, prepared.events)), "step_size_s": prepared.step_size,
+        "events": "; ".join(map(str, prepared.events)),
+        "step_size_s": prepared.step_size,
         "schedule": f"{prepared.schedule.name}: {' | '.join(', '.join(g) for g in prepared.schedule.groups)}",
         **({} if tolerance is None else {"tolerance": tolerance}),
-        "fmus": json.dumps({n: {"model": d.model_name, "guid": d.guid, "tool": d.generation_tool}
-                            for n, d in fmus.items()}),
-        "versions": json.dumps(versions_of(packages)), "Conventions": "CF-1.10",
-    }  # fmt: skip
+        "fmus": json.dumps(
+            {
+                n: {"model": d.model_name, "guid": d.guid, "tool": d.generation_tool}
+                for n, d in fmus.items()
+            }
+        ),
+        "versions": json.dumps(versions_of(packages)),
+        "Conventions": "CF-1.10",
+    }
 
 
 def origin_of_rows(prepared: PreparedScenario) -> dict[str, str | float]:
@@ -96,7 +105,9 @@ class Recorded(Protocol):
         """A row for each time and a column for each name."""
 
 
-def column_attributes(names: Iterable[str], prepared: PreparedScenario) -> dict[str, dict[str, str]]:
+def column_attributes(
+    names: Iterable[str], prepared: PreparedScenario
+) -> dict[str, dict[str, str]]:
     components = prepared.system.components
     found = {"time": {"units": "s", "long_name": "Time"}}
     for name in names:
@@ -109,7 +120,10 @@ def column_attributes(names: Iterable[str], prepared: PreparedScenario) -> dict[
 def trajectory_dataset(recorder: Recorded, prepared: PreparedScenario) -> xr.Dataset:
     attributes = column_attributes(recorder.names, prepared)
     values = recorder.values
-    data = {name: ("time", values[:, k].copy(), attributes[name]) for k, name in enumerate(recorder.names)}
+    data = {
+        name: ("time", values[:, k].copy(), attributes[name])
+        for k, name in enumerate(recorder.names)
+    }
     time = ("time", recorder.times.copy(), attributes["time"])
     return xr.Dataset(data, coords={"time": time}, attrs=origin_of_rows(prepared))
 
@@ -118,7 +132,11 @@ def save_dataset(dataset: xr.Dataset, path: Path) -> None:
     """Write ``path``.nc and ``path``.csv of a recording in memory."""
     names = [str(name) for name in dataset.data_vars]
     units = {name: dataset[name].attrs for name in ("time", *names)}
-    values = np.column_stack([dataset[n].values for n in names]) if names else np.empty((dataset.sizes["time"], 0))
+    values = (
+        np.column_stack([dataset[n].values for n in names])
+        if names
+        else np.empty((dataset.sizes["time"], 0))
+    )
     chunk = max(1, min(BLOCK_ROWS, len(values)))
     image = netcdf_image(names, dataset["time"].values, values, units, dataset.attrs, chunk)
     write_bytes(path.with_suffix(".nc"), image)

@@ -31,6 +31,13 @@ def _code(found: Screening, fail_unstable: bool) -> int:
 
 
 STUDY = PointStudy(
-    request=ScreeningRequest, plan=plan_screening, run=run_screening, shown=Screening, task=StretchTask,
-    counted="items", parts=_parts, code=_code, remarks=lambda found: remarks(found.summary),
-)  # fmt: skip
+    request=ScreeningRequest,
+    plan=plan_screening,
+    run=run_screening,
+    shown=Screening,
+    task=StretchTask,
+    counted="items",
+    parts=_parts,
+    code=_code,
+    remarks=lambda found: remarks(found.summary),
+)

@@ -57,7 +57,8 @@ class FoundModes:
     growing_elsewhere: int | None
     # the one of them with the largest real part [rad/s]; None where there is none, or they were only counted
     fastest: complex | None = None
-    zeros: int = 0  # number of eigenvalues that are zero, where growth was counted: one may be the free angle
+    # number of eigenvalues that are zero, where growth was counted: one may be the free angle
+    zeros: int = 0
     # Growth [1/s] from which it was counted at all frequencies; slower growth was sought in the range and near 0 only.
     # 0 where all eigenvalues are known.
     slowest: float = 0.0
@@ -72,7 +73,12 @@ class FoundModes:
 
 
 def find_modes_here(
-    model: LinearModel, alone: Vector, wanted: CriticalRegion, neighbour: ModeSet | None, *, count: bool
+    model: LinearModel,
+    alone: Vector,
+    wanted: CriticalRegion,
+    neighbour: ModeSet | None,
+    *,
+    count: bool,
 ) -> FoundModes:
     """The modes of an operating point.
 
@@ -96,13 +102,19 @@ def find_modes_here(
     if not count:
         return FoundModes(found, searched, None)
     zeros, slow = _near_zero(model, found)
-    return FoundModes(found, searched, _elsewhere(equations, alone, found) + slow, None, zeros, GROWING)
+    return FoundModes(
+        found, searched, _elsewhere(equations, alone, found) + slow, None, zeros, GROWING
+    )
 
 
-def _from_search(model: LinearModel, equations: ShiftedEquations, wanted: CriticalRegion) -> ModeSet:
+def _from_search(
+    model: LinearModel, equations: ShiftedEquations, wanted: CriticalRegion
+) -> ModeSet:
     """The modes from a search over the region, or from all eigenvalues where it has missed some."""
     wide = wanted.wider
-    found = ModeSet.of(find_critical_modes(model, wide.lowest_hz, wide.highest_hz, wide.damping), model.names)
+    found = ModeSet.of(
+        find_critical_modes(model, wide.lowest_hz, wide.highest_hz, wide.damping), model.names
+    )
     if missed(equations, _columns(found), *_radians(wanted), wanted.damping):
         return _whole(model, wanted).modes
     return found
@@ -140,12 +152,16 @@ def _kept(modes: ModeSet, wanted: CriticalRegion) -> ModeSet:
     wider = wanted.wider
     held = [k for k, value in enumerate(modes.eigenvalues.tolist()) if wider.holds(value)]
     held.sort(key=lambda k: damping_ratio(complex(modes.eigenvalues[k])))
-    return replace(modes, eigenvalues=modes.eigenvalues[held], left=modes.left[held], right=modes.right[held])
+    return replace(
+        modes, eigenvalues=modes.eigenvalues[held], left=modes.left[held], right=modes.right[held]
+    )
 
 
 def _whole(model: LinearModel, wanted: CriticalRegion) -> FoundModes:
     spectrum = find_spectrum(model, wanted.wider.lowest_hz, wanted.wider.highest_hz)
-    modes = _kept(ModeSet.of([mode for mode in spectrum.modes if mode.is_oscillation], model.names), wanted)
+    modes = _kept(
+        ModeSet.of([mode for mode in spectrum.modes if mode.is_oscillation], model.names), wanted
+    )
     growing = spectrum.eigenvalues[grows(spectrum.eigenvalues)]
     others = growing[(np.abs(growing) > ZERO) & ~np.isin(growing, modes.eigenvalues)]
     fastest = complex(others[np.argmax(others.real)]) if len(others) else None
@@ -161,10 +177,14 @@ def _elsewhere(equations: ShiftedEquations, alone: Vector, found: ModeSet) -> in
 def _near_zero(model: LinearModel, found: ModeSet) -> tuple[int, int]:
     """How many eigenvalues are zero, and how many others near 0 grow too slowly to be counted; a pair counts twice."""
     # Arnoldi's method finds one copy of a zero that many have, and the nearest six would be clocks where there are six.
-    values = np.array([value for value, _, _ in nearest_pairs(model.coupled, complex(_BESIDE_ZERO), _NEAREST)])
+    values = np.array(
+        [value for value, _, _ in nearest_pairs(model.coupled, complex(_BESIDE_ZERO), _NEAREST)]
+    )
     zeros = np.abs(values) <= ZERO
     slow = values[~zeros & (values.real > UNSTABLE) & (values.real <= GROWING)]
-    known = [value for value in slow if np.abs(found.eigenvalues - value).min(initial=np.inf) < ZERO]
+    known = [
+        value for value in slow if np.abs(found.eigenvalues - value).min(initial=np.inf) < ZERO
+    ]
     # Arnoldi's method gives a real one an imaginary part of rounding, of either sign.
     upper = [value for value in slow.tolist() if value.imag > -ZERO and value not in known]
     return int(zeros.sum()), sum(1 + (value.imag > ZERO) for value in upper)

@@ -34,13 +34,17 @@ class StretchTask(Task):
     wanted: CriticalRegion
     anchor: Item  # the intact network at the first point, from which the rest is reached
     items: tuple[Item, ...]  # what is computed, in this order
-    whole: bool = False  # whether growing eigenvalues are counted at all items, rather than at the ends
+    # whether growing eigenvalues are counted at all items, rather than at the ends
+    whole: bool = False
     sharing: SharingRule | None = None  # how units share an outage; as the case says where None
 
     def content(self) -> Any:
         """Where the points stand in their file does not count."""
         chain = (self.anchor, *self.items)
-        said = [[item.point - self.anchor.point, item.intact, item.values, item.out, item.lost] for item in chain]
+        said = [
+            [item.point - self.anchor.point, item.intact, item.values, item.out, item.lost]
+            for item in chain
+        ]
         return plain([said, self.wanted, self.whole, self.sharing])
 
     def failed(self, failure: Failure) -> StretchRecord:
@@ -67,13 +71,17 @@ class _Worker:
     def __init__(self, task: StretchTask, case: Case, bench: PointBench) -> None:
         self._task, self._bench = task, bench
         study = task.study
-        self._preparation = ItemPreparation(case, study.scenario, study.layers, study.step_size, task.sharing)
+        self._preparation = ItemPreparation(
+            case, study.scenario, study.layers, study.step_size, task.sharing
+        )
         self._alone: dict[Any, Any] = {}
 
     def stretch(self) -> StretchRecord:
         """The stretch; where an end of it has growth that its items do not show, all of them are counted."""
         found = self._pass(everywhere=self._task.whole)
-        ends = [r.found for r in found if r.found is not None and r.found.growing_elsewhere is not None]
+        ends = [
+            r.found for r in found if r.found is not None and r.found.growing_elsewhere is not None
+        ]
         if any(end.growing_elsewhere for end in ends) and not all(
             r.found is None or r.found.growing_elsewhere is not None for r in found
         ):
@@ -96,15 +104,21 @@ class _Worker:
             result = self._item(item, neighbour, count=everywhere or first or k == len(items) - 1)
             if reference is not None and neighbour is not None and result.found is not None:
                 links = dict.fromkeys(range(len(result.found.modes.eigenvalues)), -1)
-                links |= {link.target: link.source for link in match(neighbour.modes, result.found.modes)}
-                result.record = replace(result.record, reference=reference, links=tuple(links.values()))
+                links |= {
+                    link.target: link.source for link in match(neighbour.modes, result.found.modes)
+                }
+                result.record = replace(
+                    result.record, reference=reference, links=tuple(links.values())
+                )
             results.append(result)
         self._count_the_last(items, results)
         return results
 
     def _count_the_last(self, items: list[Item], results: list[_Result]) -> None:
         """Count growth at the last item that has modes, where those behind it have none."""
-        last = max((k for k, result in enumerate(results) if result.found is not None), default=None)
+        last = max(
+            (k for k, result in enumerate(results) if result.found is not None), default=None
+        )
         if last is None:
             return
         found = results[last].found
@@ -112,7 +126,9 @@ class _Worker:
             counted = self._item(items[last], found, count=True)
             before = results[last].record
             if len(counted.record.eigenvalues) == len(before.eigenvalues):
-                counted.record = replace(counted.record, reference=before.reference, links=before.links)
+                counted.record = replace(
+                    counted.record, reference=before.reference, links=before.links
+                )
                 results[last] = counted
 
     def _record(self, results: list[_Result]) -> StretchRecord:
@@ -121,10 +137,13 @@ class _Worker:
         first = results[0].found
         last = results[intact[-1]].found if intact else None
         return StretchRecord(
-            tuple(result.record for result in results), None if first is None else _as_kept(first.modes),
-            None if last is None else _as_kept(last.modes), intact[-1] if intact else 0, self._bench.perturbed,
+            tuple(result.record for result in results),
+            None if first is None else _as_kept(first.modes),
+            None if last is None else _as_kept(last.modes),
+            intact[-1] if intact else 0,
+            self._bench.perturbed,
             self._bench.reused,
-        )  # fmt: skip
+        )
 
     def _item(self, item: Item, neighbour: FoundModes | None, *, count: bool) -> _Result:
         warnings: tuple[str, ...] = ()
@@ -132,15 +151,25 @@ class _Worker:
             prepared = self._preparation.prepared(item)
             warnings = self._preparation.warnings(prepared.scenario)
             found = self._modes(prepared.scenario, neighbour, warnings, count=count)
-            beyond, fed = self._preparation.overloads(prepared.scenario), self._preparation.reactive(prepared.scenario)
+            beyond, fed = (
+                self._preparation.overloads(prepared.scenario),
+                self._preparation.reactive(prepared.scenario),
+            )
             found.record = replace(found.record, text=prepared.text, beyond=beyond, reactive=fed)
             return found
-        except Exception as error:  # an error that nobody expected must neither end the other points nor be hidden
+        except (
+            Exception
+        ) as error:  # an error that nobody expected must neither end the other points nor be hidden
             kind, text, lasting = failure(error, item)
             return _Result(ItemRecord(kind, text, warnings=warnings, lasting=lasting))
 
     def _modes(
-        self, prepared: PreparedScenario, neighbour: FoundModes | None, warnings: tuple[str, ...], *, count: bool
+        self,
+        prepared: PreparedScenario,
+        neighbour: FoundModes | None,
+        warnings: tuple[str, ...],
+        *,
+        count: bool,
     ) -> _Result:
         master = self._bench.master(prepared)
         point = find_operating_point(master, accept=ACCEPT)
@@ -150,12 +179,17 @@ class _Worker:
             region = (wanted.wider.lowest_hz, wanted.wider.highest_hz)
             result = modes_from(prepared, master, point, blocks, region, wanted.wider.damping)
             modes = ModeSet.of(result.modes, result.model.names)
-            elsewhere = int(result.stability.stable is False and not (modes.eigenvalues.real > 0).any())
+            elsewhere = int(
+                result.stability.stable is False and not (modes.eigenvalues.real > 0).any()
+            )
             fastest = result.stability.mode if elsewhere else None
             found = FoundModes(
-                modes, True, None if result.stability.stable is None else elsewhere,
-                None if fastest is None else fastest.eigenvalue, result.stability.zeros,
-            )  # fmt: skip
+                modes,
+                True,
+                None if result.stability.stable is None else elsewhere,
+                None if fastest is None else fastest.eigenvalue,
+                result.stability.zeros,
+            )
             warnings = (*warnings, *result.warnings)
             record = self._item_record(found, {}, point.residual, warnings, certain=True)
             return _Result(replace(record, map_steps=result.model.period), found)
@@ -163,26 +197,43 @@ class _Worker:
         model, whole = linear.model, linear.components
         warnings = (*warnings, *linear.doubts)
         own = self._own_eigenvalues(whole) if count else np.zeros(0, dtype=complex)
-        found = find_modes_here(model, own, wanted, None if neighbour is None else neighbour.modes, count=count)
+        found = find_modes_here(
+            model, own, wanted, None if neighbour is None else neighbour.modes, count=count
+        )
         warnings = (*warnings, *standing_apart(master, model, found.zeros))
         residues = _residues(found.modes, whole)
-        record = self._item_record(found, residues, point.residual, warnings, certain=not linear.doubts)
+        record = self._item_record(
+            found, residues, point.residual, warnings, certain=not linear.doubts
+        )
         return _Result(record, found)
 
     def _item_record(
-        self, found: FoundModes, residues: Mapping[str, Any], residual: float, warnings: tuple[str, ...], *,
+        self,
+        found: FoundModes,
+        residues: Mapping[str, Any],
+        residual: float,
+        warnings: tuple[str, ...],
+        *,
         certain: bool,
-    ) -> ItemRecord:  # fmt: skip
+    ) -> ItemRecord:
         critical, counted = found.critical(self._task.wanted), found.growing_elsewhere is not None
         return ItemRecord(
-            Status.COMPUTED, warnings=warnings, residual=residual,
-            stable=False if found.grows else True if counted and certain else None, counted=counted,
+            Status.COMPUTED,
+            warnings=warnings,
+            residual=residual,
+            stable=False if found.grows else True if counted and certain else None,
+            counted=counted,
             growing_elsewhere=found.growing_elsewhere or 0,
             fastest=None if found.fastest is None else (found.fastest.real, found.fastest.imag),
-            searched=found.searched, zeros=found.zeros, slowest=found.slowest, eigenvalues=found.modes.eigenvalues,
-            critical=tuple(critical), shares=_shares(found.modes), residues=dict(residues),
+            searched=found.searched,
+            zeros=found.zeros,
+            slowest=found.slowest,
+            eigenvalues=found.modes.eigenvalues,
+            critical=tuple(critical),
+            shares=_shares(found.modes),
+            residues=dict(residues),
             links=(-1,) * len(found.modes.eigenvalues),
-        )  # fmt: skip
+        )
 
     def _own_eigenvalues(self, whole: Mapping[str, Any]) -> Any:
         parts = []
@@ -204,7 +255,9 @@ def _reference(items: list[Item], results: list[_Result], k: int) -> int | None:
 
 def _as_kept(modes: ModeSet) -> ModeSet:
     """With vectors of half the size, by which stretches are joined."""
-    return replace(modes, left=modes.left.astype(np.complex64), right=modes.right.astype(np.complex64))
+    return replace(
+        modes, left=modes.left.astype(np.complex64), right=modes.right.astype(np.complex64)
+    )
 
 
 def _shares(modes: ModeSet) -> dict[str, Any]:

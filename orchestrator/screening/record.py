@@ -23,10 +23,12 @@ class ItemRecord:
     # is so close that the linear model is doubtful
     stable: bool | None = None
     counted: bool = False  # whether growing eigenvalues were counted at all frequencies
-    growing_elsewhere: int = 0  # number of growing eigenvalues outside of what was searched; a pair counts twice
+    # number of growing eigenvalues outside of what was searched; a pair counts twice
+    growing_elsewhere: int = 0
     # real and imaginary part [rad/s] of the one of them that grows fastest; None where they were only counted
     fastest: tuple[float, float] | None = None
-    searched: bool = False  # whether the modes come from a search of their own rather than from a neighbour's
+    # whether the modes come from a search of their own rather than from a neighbour's
+    searched: bool = False
     # number of eigenvalues that are zero, where growth was counted: one may be the free angle, others are a frequency
     # or a voltage that nothing restores
     zeros: int = 0

@@ -8,11 +8,19 @@ from typing import Any
 from orchestrator.asked import FLAG, OUTAGES, FieldKind, Names, asked, one_of, percent, read_percent
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.errors import InputError
-from orchestrator.points.request import POINTS_FILE, OverCluster, of_frequencies, of_scenario, of_values
+from orchestrator.points.request import (
+    POINTS_FILE,
+    OverCluster,
+    of_frequencies,
+    of_scenario,
+    of_values,
+)
 from orchestrator.screening.modes import MOST_DAMPING, CriticalRegion
 
 _MOST = 100 * MOST_DAMPING
-_DAMPING = FieldKind("PERCENT", partial(read_percent, most=_MOST), partial(percent, most=_MOST), unit="%", times=100)
+_DAMPING = FieldKind(
+    "PERCENT", partial(read_percent, most=_MOST), partial(percent, most=_MOST), unit="%", times=100
+)
 
 
 @dataclass(frozen=True)
@@ -39,32 +47,44 @@ class ScreeningRequest(OverCluster):
     """
 
     points: Any = asked(
-        POINTS_FILE, None, "operating points: a CSV file, a row each (default: the case as it is)",
+        POINTS_FILE,
+        None,
+        "operating points: a CSV file, a row each (default: the case as it is)",
         python="CSV file or DataFrame, a row each: a column ``time`` or ``name``, and what differs from the case; or "
         '``{"night": {"load": 0.6}}``; the case as it is by default',
-    )  # fmt: skip
+    )
     outages: Names | None = asked(
-        OUTAGES, None, "n-1, lines, units, or names such as line_1_2,sg3 or line_1_2+sg3 (repeatable)"
+        OUTAGES,
+        None,
+        "n-1, lines, units, or names such as line_1_2,sg3 or line_1_2+sg3 (repeatable)",
     )
     scenario: str | None = of_scenario()
     values: Mapping[str, Any] | None = of_values()
     _: KW_ONLY
     sharing: str | None = asked(
-        one_of(SharingRule), None, "who feeds what an outage takes: droop (units by droop and rating, the default), "
+        one_of(SharingRule),
+        None,
+        "who feeds what an outage takes: droop (units by droop and rating, the default), "
         "rating, or slack (the slack alone)",
-    )  # fmt: skip
+    )
     frequencies: tuple[float, float] = of_frequencies(
         "modes from the first to the second are critical [Hz], where they are damped less than ``damping``"
     )
-    damping: float = asked(_DAMPING, 0.2, "damping below which a mode is critical, at most 60 (default: 20)")
+    damping: float = asked(
+        _DAMPING, 0.2, "damping below which a mode is critical, at most 60 (default: 20)"
+    )
     whole: bool = asked(
-        FLAG, False, "count growing modes of all frequencies at every point; takes longer",
+        FLAG,
+        False,
+        "count growing modes of all frequencies at every point; takes longer",
         python="whether growing modes of all frequencies are counted at every point, rather than at one in 24",
-    )  # fmt: skip
+    )
 
     @property
     def region(self) -> CriticalRegion:
         low, high = self.frequencies
         if not low > 0:
-            raise InputError(f"frequencies {low:g}:{high:g} (--range): a screening begins above 0 Hz")
+            raise InputError(
+                f"frequencies {low:g}:{high:g} (--range): a screening begins above 0 Hz"
+            )
         return CriticalRegion(low, high, self.damping)

@@ -19,7 +19,8 @@ from orchestrator.screening.point import StretchTask, compute_stretch
 from orchestrator.screening.record import ItemRecord, StretchRecord
 from orchestrator.screening.request import ScreeningRequest
 
-STRETCH = 48  # operating points with outages that are computed one from the other before the next full search
+# operating points with outages that are computed one from the other before the next full search
+STRETCH = 48
 
 
 @dataclass(frozen=True)
@@ -97,9 +98,13 @@ def run_screening(plan: ScreeningPlan, work: Work, shard: Shard | None = None) -
     sizes = [len(task.items) for task in tasks.values()]
     found = dict(zip(tasks, work.all(compute_stretch, list(tasks.values()), sizes), strict=True))
     return ScreeningResult(
-        plan, _joined(plan, found), work.computed, work.stored,
-        sum(record.perturbed for record in found.values()), sum(record.reused for record in found.values()),
-    )  # fmt: skip
+        plan,
+        _joined(plan, found),
+        work.computed,
+        work.stored,
+        sum(record.perturbed for record in found.values()),
+        sum(record.reused for record in found.values()),
+    )
 
 
 def _joined(plan: ScreeningPlan, found: Mapping[int, StretchRecord]) -> list[ScreenedItem]:
@@ -113,7 +118,12 @@ def _joined(plan: ScreeningPlan, found: Mapping[int, StretchRecord]) -> list[Scr
             own = [-1] * len(item.eigenvalues)
             if place and item.reference >= 0:
                 own = [numbers[item.reference][link] if link >= 0 else -1 for link in item.links]
-            elif place == 0 and before is not None and before.last is not None and record.first is not None:
+            elif (
+                place == 0
+                and before is not None
+                and before.last is not None
+                and record.first is not None
+            ):
                 earlier = before_numbers[before.last_place]
                 for link in match(before.last, record.first):
                     own[link.target] = earlier[link.source]

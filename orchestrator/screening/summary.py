@@ -12,7 +12,8 @@ from orchestrator.operating_points.item import Status
 from orchestrator.screening.study import ScreenedItem, ScreeningResult
 
 _LEADING = 2
-_ALIKE, _FREQUENCY = 0.8, 0.15  # one mode above this likeness of shares, within this part of the frequency
+# one mode above this likeness of shares, within this part of the frequency
+_ALIKE, _FREQUENCY = 0.8, 0.15
 
 _SHOWN = 5
 
@@ -38,7 +39,9 @@ class ModeAt:
 
     def participation(self, most: int | None = _SHOWN) -> list[tuple[str, float]]:
         """Components that take part most, and their factors."""
-        shares = [(name, float(values[self.place])) for name, values in self.item.record.shares.items()]
+        shares = [
+            (name, float(values[self.place])) for name, values in self.item.record.shares.items()
+        ]
         return sorted(shares, key=lambda entry: -entry[1])[:most]
 
     def ranking(self, most: int | None = _SHOWN) -> list[tuple[str, complex, complex]]:
@@ -82,10 +85,23 @@ class Summary:
     @property
     def beyond(self) -> str:
         """At how many items a unit is beyond its rating or its reactive power, and which one; "" where none is."""
-        total, fed = len(self.result.items), [one for item in self.result.items if (one := item.record.reactive)]
-        worst = [max((load, name, item.point.name, item.outage.name) for name, load in item.record.beyond.items())
-                 for item in self.result.items if item.record.beyond]  # fmt: skip
-        told = [f"at {len(fed)} of {total} limits of reactive power are exceeded: {fed[0]}"] if fed else []
+        total, fed = (
+            len(self.result.items),
+            [one for item in self.result.items if (one := item.record.reactive)],
+        )
+        worst = [
+            max(
+                (load, name, item.point.name, item.outage.name)
+                for name, load in item.record.beyond.items()
+            )
+            for item in self.result.items
+            if item.record.beyond
+        ]
+        told = (
+            [f"at {len(fed)} of {total} limits of reactive power are exceeded: {fed[0]}"]
+            if fed
+            else []
+        )
         if worst:
             load, unit, *at = max(worst)
             most = f"most {unit} with {100 * load:.3g} % ({', '.join(at)})"
@@ -142,7 +158,9 @@ def _joined(groups: list[list[ModeAt]], items: Sequence[ScreenedItem]) -> list[l
     found: list[tuple[list[ModeAt], set[int]]] = []
     for group in sorted(groups, key=len, reverse=True):
         own = {id(one.item) for one in group}
-        likeness = [(_likeness(known, group), k) for k, (known, at) in enumerate(found) if not at & own]
+        likeness = [
+            (_likeness(known, group), k) for k, (known, at) in enumerate(found) if not at & own
+        ]
         best, place = max(likeness, default=(0.0, -1))
         if best > _ALIKE:
             found[place][0].extend(group)
@@ -167,7 +185,9 @@ def _likeness(known: Sequence[ModeAt], other: Sequence[ModeAt]) -> float:
     return float(a @ b) / size if size else 0.0
 
 
-def duration(mode: ScreenedMode, *, outages: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def duration(
+    mode: ScreenedMode, *, outages: bool = False
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """A damping-duration curve: for how long the damping is at most so much.
 
     Returns hours and damping ratios [%], both rising."""

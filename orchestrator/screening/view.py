@@ -23,7 +23,14 @@ from orchestrator.results.storage import save_json
 from orchestrator.safe_files import made_folder, write_text
 from orchestrator.screening.study import ScreenedItem, ScreeningResult
 from orchestrator.screening.summary import ModeAt, ScreenedMode, Summary, duration, least_of
-from orchestrator.screening.words import OutageRow, by_outage, verdict_of, verdict_sentence, what_was_counted, where
+from orchestrator.screening.words import (
+    OutageRow,
+    by_outage,
+    verdict_of,
+    verdict_sentence,
+    what_was_counted,
+    where,
+)
 
 ITEMS, MODES, SUMMARY, PAGE = "items.csv", "modes.csv", "screening.json", "screening.html"
 
@@ -94,18 +101,35 @@ class Screening:
 
 
 def items_table(summary: Summary) -> ColumnTable[ScreenedItem]:
-    return ColumnTable("Items", (
-        Column("Point", lambda item: item.point.name, name="point"),
-        Column("Outage", lambda item: item.outage.name, name="outage"),
-        Column("", lambda item: item.point.hours, name="hours"),
-        Column("What", lambda item: str(item.record.status), name="status"),
-        Column("", lambda item: item.record.stable, name="stable"),
-        Column("", lambda item: item.record.counted, name="counted"),
-        Column("", lambda item: None if (one := least_of(item)) is None else one.damping, name="least_damping_percent"),
-        Column("", lambda item: None if (one := least_of(item)) is None else one.frequency, name="frequency_hz"),
-        Column("", lambda item: "; ".join(filter(None, (item.record.text, *item.record.warnings))), name="why"),
-        Column("Why", lambda item: item.record.text),
-    ), summary.result.items, left=4)  # fmt: skip
+    return ColumnTable(
+        "Items",
+        (
+            Column("Point", lambda item: item.point.name, name="point"),
+            Column("Outage", lambda item: item.outage.name, name="outage"),
+            Column("", lambda item: item.point.hours, name="hours"),
+            Column("What", lambda item: str(item.record.status), name="status"),
+            Column("", lambda item: item.record.stable, name="stable"),
+            Column("", lambda item: item.record.counted, name="counted"),
+            Column(
+                "",
+                lambda item: None if (one := least_of(item)) is None else one.damping,
+                name="least_damping_percent",
+            ),
+            Column(
+                "",
+                lambda item: None if (one := least_of(item)) is None else one.frequency,
+                name="frequency_hz",
+            ),
+            Column(
+                "",
+                lambda item: "; ".join(filter(None, (item.record.text, *item.record.warnings))),
+                name="why",
+            ),
+            Column("Why", lambda item: item.record.text),
+        ),
+        summary.result.items,
+        left=4,
+    )
 
 
 def _cells(summary: Summary) -> Cells:
@@ -119,40 +143,70 @@ def _cells(summary: Summary) -> Cells:
         if item is None:
             return None
         least, record = least_of(item), item.record
-        text = "; ".join(filter(None, ("" if record.status is Status.COMPUTED else record.status, record.text)))
+        text = "; ".join(
+            filter(None, ("" if record.status is Status.COMPUTED else record.status, record.text))
+        )
         if least is None:
-            return Cell(text or f"no mode below {100 * plan.wanted.damping:g} %", None, record.stable)
+            return Cell(
+                text or f"no mode below {100 * plan.wanted.damping:g} %", None, record.stable
+            )
         figures = f"{least.frequency:.3f} Hz, {least.damping:.2f} %"
-        return Cell("; ".join(filter(None, (figures, text))), least.damping, record.stable, least.value.real,
-                    least.frequency)  # fmt: skip
+        return Cell(
+            "; ".join(filter(None, (figures, text))),
+            least.damping,
+            record.stable,
+            least.value.real,
+            least.frequency,
+        )
 
     return Cells(
         f"Least damping of {plan.case.table.title or plan.case.name}: outages, worst first, by operating points",
-        plan.case, plan.prepared.name, (plan.wanted.lowest_hz, plan.wanted.highest_hz),
+        plan.case,
+        plan.prepared.name,
+        (plan.wanted.lowest_hz, plan.wanted.highest_hz),
         [CellLine(name, out=taken[name]) for name in outages],
         [CellLine(one.name, one.values, out=one.out) for one in plan.points],
         [[cell(of.get((name, point.name))) for point in plan.points] for name in outages],
-        joined_values(plan.layers), plan.tasks[0].study.step_size, plan.tasks[0].sharing,
-    )  # fmt: skip
+        joined_values(plan.layers),
+        plan.tasks[0].study.step_size,
+        plan.tasks[0].sharing,
+    )
 
 
 def _every_mode(summary: Summary) -> ColumnTable[tuple[ModeAt, str]]:
     names = {(id(one.item), one.place): mode.name for mode in summary.modes for one in mode.at}
-    rows = [(ModeAt(item, place), names[id(item), place]) for item in summary.result.items
-            for place in item.record.critical]  # fmt: skip
-    return ColumnTable("Modes", (
-        Column("", lambda row: row[0].item.point.name, name="point"),
-        Column("", lambda row: row[0].item.outage.name, name="outage"),
-        Column("", lambda row: row[1], name="mode"),
-        Column("", lambda row: row[0].value.real, name="real"),
-        Column("", lambda row: row[0].value.imag, name="imag"),
-        Column("", lambda row: row[0].frequency, name="frequency_hz"),
-        Column("", lambda row: row[0].damping, name="damping_percent"),
-        Column("", lambda row: " ".join(f"{name}:{share:.3f}" for name, share in row[0].participation(3)),
-               name="participation"),
-        Column("", lambda row: next((f"{n}:{max(abs(p), abs(q)):.4g}" for n, p, q in row[0].ranking(1)), ""),
-               name="converter"),
-    ), rows)  # fmt: skip
+    rows = [
+        (ModeAt(item, place), names[id(item), place])
+        for item in summary.result.items
+        for place in item.record.critical
+    ]
+    return ColumnTable(
+        "Modes",
+        (
+            Column("", lambda row: row[0].item.point.name, name="point"),
+            Column("", lambda row: row[0].item.outage.name, name="outage"),
+            Column("", lambda row: row[1], name="mode"),
+            Column("", lambda row: row[0].value.real, name="real"),
+            Column("", lambda row: row[0].value.imag, name="imag"),
+            Column("", lambda row: row[0].frequency, name="frequency_hz"),
+            Column("", lambda row: row[0].damping, name="damping_percent"),
+            Column(
+                "",
+                lambda row: " ".join(
+                    f"{name}:{share:.3f}" for name, share in row[0].participation(3)
+                ),
+                name="participation",
+            ),
+            Column(
+                "",
+                lambda row: next(
+                    (f"{n}:{max(abs(p), abs(q)):.4g}" for n, p, q in row[0].ranking(1)), ""
+                ),
+                name="converter",
+            ),
+        ),
+        rows,
+    )
 
 
 def verdict(summary: Summary) -> str:
@@ -170,12 +224,21 @@ def overview(summary: Summary, most: int = 12) -> ColumnTable[OutageRow]:
         return Column(name, lambda row: at.get((row.name, name)), _cell)
 
     if 1 < len(plan.points) <= _FEW:
-        return ColumnTable(title, [*columns, *(at_point(point.name) for point in plan.points)], rows, 1, most, ITEMS)
+        return ColumnTable(
+            title,
+            [*columns, *(at_point(point.name) for point in plan.points)],
+            rows,
+            1,
+            most,
+            ITEMS,
+        )
     columns += [
         Column("Worst point", lambda row: (row.worst or row.unjudged[0]).point.name),
         Column("Mode", lambda row: row.least, _who),
         Column("Damping [%]", lambda row: row.worst, _cell),
-        Column("Not judged", lambda row: f"{len(row.unjudged)} of {row.points}" if row.unjudged else ""),
+        Column(
+            "Not judged", lambda row: f"{len(row.unjudged)} of {row.points}" if row.unjudged else ""
+        ),
     ]
     return ColumnTable(title, columns, rows, 3, most, ITEMS)
 
@@ -196,29 +259,41 @@ def _cell(item: ScreenedItem | None) -> str | Marked:
     return "more" if least is None else damping(least.damping)
 
 
-def modes_table(summary: Summary, most: int = 12, *, whole: bool = False) -> ColumnTable[ScreenedMode]:
+def modes_table(
+    summary: Summary, most: int = 12, *, whole: bool = False
+) -> ColumnTable[ScreenedMode]:
     """Each mode where it is damped least, and the converter whose damping controller moves it most there.
 
     ``whole``: with eigenvalue and participation, for which a terminal is too narrow."""
     more: list[Column[ScreenedMode]] = [
         Column("λ [rad/s]", lambda mode: mode.worst.value, eigenvalue_text),
-        Column("Participation", lambda mode: ", ".join(f"{name} {x:.2f}" for name, x in mode.worst.participation(4))),
+        Column(
+            "Participation",
+            lambda mode: ", ".join(f"{name} {x:.2f}" for name, x in mode.worst.participation(4)),
+        ),
     ]
 
     def best(mode: ScreenedMode) -> tuple[str, float | None]:
         return next(((n, max(abs(p), abs(q))) for n, p, q in mode.worst.ranking(1)), ("–", None))
 
-    return ColumnTable("Modes, each where it is damped least", (
-        Column("Mode", lambda mode: mode.name, name="mode"),
-        Column("Point", lambda mode: mode.worst.item.point.name, name="point"),
-        Column("Outage", lambda mode: mode.worst.item.outage.name, name="outage"),
-        Column("", lambda mode: mode.worst.frequency, name="frequency_hz"),
-        Column("Damping [%]", lambda mode: mode.worst.damping, damping, "damping_percent"),
-        Column("Items", lambda mode: len(mode.at), name="items"),
-        *(more if whole else ()),
-        Column("Converter", lambda mode: best(mode)[0]),
-        Column("by gain [rad/s]", lambda mode: best(mode)[1], ".3g"),
-    ), summary.modes, 3, most, MODES)  # fmt: skip
+    return ColumnTable(
+        "Modes, each where it is damped least",
+        (
+            Column("Mode", lambda mode: mode.name, name="mode"),
+            Column("Point", lambda mode: mode.worst.item.point.name, name="point"),
+            Column("Outage", lambda mode: mode.worst.item.outage.name, name="outage"),
+            Column("", lambda mode: mode.worst.frequency, name="frequency_hz"),
+            Column("Damping [%]", lambda mode: mode.worst.damping, damping, "damping_percent"),
+            Column("Items", lambda mode: len(mode.at), name="items"),
+            *(more if whole else ()),
+            Column("Converter", lambda mode: best(mode)[0]),
+            Column("by gain [rad/s]", lambda mode: best(mode)[1], ".3g"),
+        ),
+        summary.modes,
+        3,
+        most,
+        MODES,
+    )
 
 
 def remarks(summary: Summary) -> list[str]:
@@ -232,7 +307,9 @@ def remarks(summary: Summary) -> list[str]:
         texts += [f"  … and {number - _SHOWN} more, in items.csv"] if number > _SHOWN else []
     every = summary.result.items
     kinds = kinds_of((item, item.record.warnings) for item in every)
-    texts += [f"at {len(x)} of {len(every)}, first at {where(x[0])}: {text}" for text, x in kinds[:_SHOWN]]
+    texts += [
+        f"at {len(x)} of {len(every)}, first at {where(x[0])}: {text}" for text, x in kinds[:_SHOWN]
+    ]
     if len(kinds) > _SHOWN:
         texts.append(f"… and {len(kinds) - _SHOWN} more warnings, in items.csv")
     return texts
@@ -242,26 +319,39 @@ def as_json(summary: Summary) -> dict[str, Any]:
     result = summary.result
     return {
         **result.plan.prepared.about,
-        "points": len(result.plan.points), "outages": len(result.plan.outages) - 1, "items": len(result.items),
-        "complete": result.complete, "stable": summary.stable,
-        "counted_at_all_frequencies": summary.counted, "slowest_growth_counted": summary.slowest,
-        "nothing_restores": [_where(item) | {"zero_eigenvalues": item.record.zeros} for item in summary.free],
+        "points": len(result.plan.points),
+        "outages": len(result.plan.outages) - 1,
+        "items": len(result.items),
+        "complete": result.complete,
+        "stable": summary.stable,
+        "counted_at_all_frequencies": summary.counted,
+        "slowest_growth_counted": summary.slowest,
+        "nothing_restores": [
+            _where(item) | {"zero_eigenvalues": item.record.zeros} for item in summary.free
+        ],
         "counts": {str(status): number for status, number in summary.counts.items()},
         "beyond_rating": summary.beyond or None,
         "unstable": [_where(item) for item in summary.unstable],
-        "failures": [_where(item) | {"status": str(item.record.status), "why": item.record.text}
-                     for item in summary.failures()],
+        "failures": [
+            _where(item) | {"status": str(item.record.status), "why": item.record.text}
+            for item in summary.failures()
+        ],
         "modes": [
             {
                 "name": mode.name,
-                "worst": _where(mode.worst.item) | eigenvalue_json(mode.worst.value, mode.worst.damping),
-                "participation": dict(mode.worst.participation()), "items": len(mode.at), "hours": mode.hours,
-                "converters": [{"component": name, "residue_p": abs(p), "residue_q": abs(q)}
-                               for name, p, q in mode.worst.ranking()],
+                "worst": _where(mode.worst.item)
+                | eigenvalue_json(mode.worst.value, mode.worst.damping),
+                "participation": dict(mode.worst.participation()),
+                "items": len(mode.at),
+                "hours": mode.hours,
+                "converters": [
+                    {"component": name, "residue_p": abs(p), "residue_q": abs(q)}
+                    for name, p, q in mode.worst.ranking()
+                ],
             }
             for mode in summary.modes
         ],
-    }  # fmt: skip
+    }
 
 
 def _where(item: ScreenedItem) -> dict[str, Any]:
@@ -279,7 +369,9 @@ def _page(summary: Summary) -> str:
     content.append(("All critical modes", _plane(summary, figures)))
     content.append(("Where a damping controller helps", _ranking(summary)))
     if failed := list(summary.failures()):
-        shown = ColumnTable("Points and outages without modes", items_table(summary).columns, failed, 4, 20, ITEMS)
+        shown = ColumnTable(
+            "Points and outages without modes", items_table(summary).columns, failed, 4, 20, ITEMS
+        )
         content.append(("Not computed", shown.html()))
     title = f"{plan.case.table.title or plan.case.name}: screening"
     kind = f"{plan.prepared.title}, {len(plan.points)} operating points, {len(plan.outages) - 1} outages"
@@ -300,9 +392,16 @@ def _durations(summary: Summary, figures: Figures) -> str:
                 curves.append(ChartCurve(mode.name, colour(k + 1), steps, np.repeat(percent, 2)))
         if curves:
             key = legend((curve.label, curve.colour) for curve in curves)
-            chart = line_chart(f"Damping and duration, {text}", "Hours with at most this damping", "Damping [%]",
-                               curves, 260)  # fmt: skip
-            picture, _ = figures.add(key + chart, f"For how long each mode is damped by at most so much, {text}.")
+            chart = line_chart(
+                f"Damping and duration, {text}",
+                "Hours with at most this damping",
+                "Damping [%]",
+                curves,
+                260,
+            )
+            picture, _ = figures.add(
+                key + chart, f"For how long each mode is damped by at most so much, {text}."
+            )
             parts.append(picture)
     return "".join(parts) or "<p>No critical mode was found.</p>"
 
@@ -319,11 +418,19 @@ def _over_points(summary: Summary, figures: Figures) -> str:
         intact = [one for one in mode.at if not one.item.outage.elements]
         if len(intact) > 1:
             at = np.array([place[one.item.point.name] for one in intact])
-            curves.append(ChartCurve(mode.name, colour(k + 1), at, np.array([one.damping for one in intact])))
+            curves.append(
+                ChartCurve(mode.name, colour(k + 1), at, np.array([one.damping for one in intact]))
+            )
     if not curves:
         return "<p>No critical mode was followed over several points.</p>"
     key = legend((curve.label, curve.colour) for curve in curves)
-    chart = line_chart("Damping over the points", "Operating point, in the file's order", "Damping [%]", curves, 260)
+    chart = line_chart(
+        "Damping over the points",
+        "Operating point, in the file's order",
+        "Damping [%]",
+        curves,
+        260,
+    )
     return figures.add(key + chart, "Damping of the modes in the intact network.")[0]
 
 
@@ -332,12 +439,14 @@ def _plane(summary: Summary, figures: Figures) -> str:
     shown = every if len(every) <= _MOST_MARKS else every[:: len(every) // _MOST_MARKS + 1]
     marks = [
         Mark(
-            one.value.real, one.frequency, colour(k + 1),
+            one.value.real,
+            one.frequency,
+            colour(k + 1),
             f"{one.item.point.name}, {one.item.outage.name}\n{one.frequency:.3f} Hz, {one.damping:.2f} %",
             "dot" if one.item.outage.elements else "cross",
         )
         for k, one in shown
-    ]  # fmt: skip
+    ]
     text = "Critical modes of all points and outages; crosses: the intact network, dots: outages."
     if len(shown) < len(every):
         text += f" {len(shown)} of {len(every)} are shown."
@@ -359,4 +468,6 @@ def _ranking(summary: Summary) -> str:
         where = f"at {mode.worst.item.point.name}, {mode.worst.item.outage.name}"
         if found := mode.worst.ranking():
             parts.append(ColumnTable(f"{mode.name}, {where}", columns, found).html())
-    return "".join(parts) if len(parts) > 1 else "<p>No converter of this scenario can be ranked.</p>"
+    return (
+        "".join(parts) if len(parts) > 1 else "<p>No converter of this scenario can be ranked.</p>"
+    )

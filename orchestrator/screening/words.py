@@ -23,7 +23,8 @@ from orchestrator.screening.summary import ModeAt, Summary, least_of
 @dataclass(frozen=True)
 class OutageRow:
     name: str
-    worst: ScreenedItem | None  # the item with the least damping, or that grows; None where none has modes
+    # the item with the least damping, or that grows; None where none has modes
+    worst: ScreenedItem | None
     least: ModeAt | None  # its least damped mode; None where it has none in the range
     unjudged: tuple[ScreenedItem, ...]  # items without modes
     points: int
@@ -40,15 +41,25 @@ def by_outage(summary: Summary) -> list[OutageRow]:
     rows = []
     for name, items in groups.items():
         known = [item for item in items if item.record.status is Status.COMPUTED]
-        worst = min(known, key=lambda item: (
-            item.record.stable is not False, one.damping if (one := least_of(item)) else np.inf
-        ), default=None)  # fmt: skip
+        worst = min(
+            known,
+            key=lambda item: (
+                item.record.stable is not False,
+                one.damping if (one := least_of(item)) else np.inf,
+            ),
+            default=None,
+        )
         least = None if worst is None else least_of(worst)
         unjudged = tuple(item for item in items if item.record.status is not Status.COMPUTED)
         rows.append(OutageRow(name, worst, least, unjudged, len(items)))
-    return sorted(rows, key=lambda row: (
-        not row.unstable, not (row.unstable or row.unjudged), row.least.damping if row.least else np.inf,
-    ))  # fmt: skip
+    return sorted(
+        rows,
+        key=lambda row: (
+            not row.unstable,
+            not (row.unstable or row.unjudged),
+            row.least.damping if row.least else np.inf,
+        ),
+    )
 
 
 def load_of(plan: ScreeningPlan, point: OperatingCase) -> float:
@@ -59,7 +70,9 @@ def load_of(plan: ScreeningPlan, point: OperatingCase) -> float:
     def number(name: str) -> float:
         return float(point.values.get(f"{elements.grid}.{name}", grid.number(name)))
 
-    return sum(number(f"{x}.scale") * number(f"{x}.P") for x in elements.loads if x not in point.out)
+    return sum(
+        number(f"{x}.scale") * number(f"{x}.P") for x in elements.loads if x not in point.out
+    )
 
 
 def not_judged(summary: Summary) -> str:
@@ -68,8 +81,12 @@ def not_judged(summary: Summary) -> str:
         return ""
     which = "all" if len(items) > 1 else "it is"
     common = [text for text in (_out(summary, items), _loading(summary, items)) if text]
-    kinds = ", ".join(f"{number} {status}" for status, number in Counter(i.record.status for i in items).items())
-    return f"{len(items)} not judged ({kinds})" + (f", {which} {' '.join(common)}" if common else "")
+    kinds = ", ".join(
+        f"{number} {status}" for status, number in Counter(i.record.status for i in items).items()
+    )
+    return f"{len(items)} not judged ({kinds})" + (
+        f", {which} {' '.join(common)}" if common else ""
+    )
 
 
 def _out(summary: Summary, items: Sequence[ScreenedItem]) -> str:
@@ -78,7 +95,10 @@ def _out(summary: Summary, items: Sequence[ScreenedItem]) -> str:
     if len(names) == 1:
         (name,) = names
         return f"with {name} out" if items[0].outage.elements else "of the intact network"
-    for kind, known in (("unit", set(elements.units)), ("line or transformer", set(elements.lines))):
+    for kind, known in (
+        ("unit", set(elements.units)),
+        ("line or transformer", set(elements.lines)),
+    ):
         if all(known & set(item.outage.elements) for item in items):
             return f"with a {kind} out"
     return ""
@@ -89,7 +109,10 @@ def _loading(summary: Summary, items: Sequence[ScreenedItem]) -> str:
     loads = {point.name: load_of(plan, point) for point in plan.points}
     if len(loads) == 2 and len(at := {item.point.name for item in items}) == 1:
         return f"at {at.pop()}"
-    middle, here = float(np.median(list(loads.values()))), [loads[item.point.name] for item in items]
+    middle, here = (
+        float(np.median(list(loads.values()))),
+        [loads[item.point.name] for item in items],
+    )
     if min(here) > middle:
         return f"at high load (from {min(here):.4g} MW on; half of the points have at most {middle:.4g} MW)"
     if max(here) < middle:
@@ -114,9 +137,8 @@ def verdict_of(summary: Summary) -> VerdictSentence:
     tail = f"; least damped: {where(least[0].item)}{_least(least[0].item)}" if least else ""
     if summary.free:
         first = summary.free[0]
-        tail += (
-            f"; at {counted(len(summary.free), 'item')}, first at {where(first)}, {zeros_in_words(first.record.zeros)}"
-        )
+        items, zeros = counted(len(summary.free), "item"), zeros_in_words(first.record.zeros)
+        tail += f"; at {items}, first at {where(first)}, {zeros}"
     tail += f"; {summary.beyond}" if summary.beyond else ""
     if summary.stable:
         text = f"nothing grows at any of {total} points and outages{_but_slowly(summary)}{tail}"
@@ -130,16 +152,24 @@ def verdict_of(summary: Summary) -> VerdictSentence:
             f"{uncounted} were searched only from {wanted.lowest_hz:g} to {wanted.highest_hz:g} Hz above -30 % damping "
             "(--whole counts all growth)"
         )
-    doubtful = sum(item.record.stable is None and item.record.counted for item in summary.result.items)
+    doubtful = sum(
+        item.record.stable is None and item.record.counted for item in summary.result.items
+    )
     missing += [f"{doubtful} stand at the edge of a limit"] if doubtful else []
-    text = f"nothing grows at {computed} of {total} points and outages, but {', '.join(missing)}{tail}"
+    text = (
+        f"nothing grows at {computed} of {total} points and outages, but {', '.join(missing)}{tail}"
+    )
     return VerdictSentence(None, "not known", text)
 
 
 def what_was_counted(summary: Summary) -> str:
     wanted, computed = summary.result.plan.wanted, summary.counts[Status.COMPUTED]
     searched = sum(item.record.searched for item in summary.result.items)
-    others = ", the others from a neighbour with a check that no mode is missed there" if searched < computed else ""
+    others = (
+        ", the others from a neighbour with a check that no mode is missed there"
+        if searched < computed
+        else ""
+    )
     return (
         f"Scenario {summary.result.plan.prepared.name}: modes from {wanted.lowest_hz:g} to {wanted.highest_hz:g} Hz "
         f"below {100 * wanted.damping:g} % damping, of the "
@@ -152,13 +182,19 @@ def what_was_counted(summary: Summary) -> str:
 
 def _what_was_linearised(summary: Summary) -> str:
     step = summary.result.plan.prepared.step_size
-    computed = [item.record.map_steps for item in summary.result.items if item.record.status is Status.COMPUTED]
+    computed = [
+        item.record.map_steps
+        for item in summary.result.items
+        if item.record.status is Status.COMPUTED
+    ]
     found = []
     for steps, number in sorted(Counter(computed).items()):
         which = "map over a communication step" if steps else "system without a communication step"
         if steps > 1:
             which = f"map over {steps} communication steps ({steps * step:g} s), after which sampled controllers repeat"
-        found.append(which if number == len(computed) else f"{which} at {number} of {len(computed)} items")
+        found.append(
+            which if number == len(computed) else f"{which} at {number} of {len(computed)} items"
+        )
     return ", of the ".join(found) or "system without a communication step"
 
 

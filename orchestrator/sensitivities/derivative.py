@@ -9,8 +9,11 @@ SIZES = (1e-2, 1e-3)
 """Differences are taken over this part of the parameter and over twice of it, and must agree; else over the second."""
 
 _AGREE = 0.02  # two sizes agree within this part of the derivative
-_KINK = 0.1  # A derivative upwards and one downwards that differ by more than this part belong to a limit on one side
-_STAYS_APART = 0.75  # where smooth, twice the change doubles the difference between up and down; at a kink it stays
+# A derivative upwards and one downwards that differ by more than this part belong to a limit on one
+# side
+_KINK = 0.1
+# where smooth, twice the change doubles the difference between up and down; at a kink it stays
+_STAYS_APART = 0.75
 
 _FLOOR = 2e-6
 """What an effect of one percent is not judged below, as a part of |λ|, with the first size: blocks that are perturbed
@@ -39,7 +42,9 @@ class Derivative:
     doubts: tuple[str, ...] = ()
 
 
-def differentiate(parameter: Parameter, shift_at: Callable[[float], Shift], eigenvalue: complex) -> Derivative | None:
+def differentiate(
+    parameter: Parameter, shift_at: Callable[[float], Shift], eigenvalue: complex
+) -> Derivative | None:
     """Central differences of two sizes; of one side where the parameter is at a bound, None where it has no room."""
     found: Derivative | None = None
     for size in SIZES:
@@ -47,8 +52,12 @@ def differentiate(parameter: Parameter, shift_at: Callable[[float], Shift], eige
         signs = [sign for sign in (1, -1) if parameter.allows(2 * sign * change)]
         if not signs:
             continue
-        slopes = {sign: [_slope(shift_at, parameter, sign * k * change) for k in (1, 2)] for sign in signs}
-        floor = _FLOOR * max(abs(eigenvalue), _SLOWEST) / (SHARE * parameter.scale) * (SIZES[0] / size)
+        slopes = {
+            sign: [_slope(shift_at, parameter, sign * k * change) for k in (1, 2)] for sign in signs
+        }
+        floor = (
+            _FLOOR * max(abs(eigenvalue), _SLOWEST) / (SHARE * parameter.scale) * (SIZES[0] / size)
+        )
         derivative = _judged(slopes, floor)
         found = found or derivative
         if not derivative.doubts:
@@ -58,7 +67,11 @@ def differentiate(parameter: Parameter, shift_at: Callable[[float], Shift], eige
 
 def _slope(shift_at: Callable[[float], Shift], parameter: Parameter, change: float) -> Shift:
     shift = shift_at(parameter.value + change)
-    return Shift(shift.step / change, None if shift.continuous is None else shift.continuous / change, shift.edges)
+    return Shift(
+        shift.step / change,
+        None if shift.continuous is None else shift.continuous / change,
+        shift.edges,
+    )
 
 
 def _judged(slopes: dict[int, list[Shift]], floor: float) -> Derivative:
@@ -68,14 +81,22 @@ def _judged(slopes: dict[int, list[Shift]], floor: float) -> Derivative:
     continuous, later = (_given([pair[k] for pair in rates]) for k in (0, 1))
     doubts = []
     if abs(step - twice) > _AGREE * abs(step) + floor:
-        doubts.append(f"two sizes of change disagree: {abs(step):.3g} and {abs(twice):.3g} rad/s a unit")
+        doubts.append(
+            f"two sizes of change disagree: {abs(step):.3g} and {abs(twice):.3g} rad/s a unit"
+        )
     if len(slopes) == 2:
         (up, up_2), (down, down_2) = ([shift.step for shift in slopes[sign]] for sign in (1, -1))
         apart, apart_2 = abs(up - down), abs(up_2 - down_2)
         if apart > _KINK * max(abs(up), abs(down)) + floor and apart > _STAYS_APART * apart_2:
-            doubts.append(f"upwards it moves the mode by {abs(up):.3g}, downwards by {abs(down):.3g} rad/s a unit")
-    if edges := sorted({name for pair in slopes.values() for shift in pair for name in shift.edges}):
-        doubts.append(f"beside its value the edge of a limit or of a dead band is near, in {', '.join(edges)}")
+            doubts.append(
+                f"upwards it moves the mode by {abs(up):.3g}, downwards by {abs(down):.3g} rad/s a unit"
+            )
+    if edges := sorted(
+        {name for pair in slopes.values() for shift in pair for name in shift.edges}
+    ):
+        doubts.append(
+            f"beside its value the edge of a limit or of a dead band is near, in {', '.join(edges)}"
+        )
     # What the first power of the change leaves out falls out of the two sizes: a half on one side, a quarter on both.
     ratio = 2 if len(slopes) == 1 else 4
     step = (ratio * step - twice) / (ratio - 1)

@@ -18,7 +18,8 @@ class Parameter:
     variable: str
     unit: str  # as the FMU declares it; "1" for a plain number
     value: float  # at the operating point, in ``unit``
-    tunable: bool  # whether the FMU takes a change while it runs; a fixed one is set before the start only
+    # whether the FMU takes a change while it runs; a fixed one is set before the start only
+    tunable: bool
     # minimum, maximum: declared bounds; None without
     minimum: float | None = None
     maximum: float | None = None
@@ -38,7 +39,9 @@ class Parameter:
         return above and (self.maximum is None or changed <= self.maximum)
 
 
-def parameters_of(master: Master, patterns: Sequence[str] = (), *, fixed: bool = False) -> list[Parameter]:
+def parameters_of(
+    master: Master, patterns: Sequence[str] = (), *, fixed: bool = False
+) -> list[Parameter]:
     """The Real parameters of all components that are asked for.
 
     ``patterns``: names ``component.variable``, also with ``*``; fixed parameters that fit are taken too. Without
@@ -46,14 +49,20 @@ def parameters_of(master: Master, patterns: Sequence[str] = (), *, fixed: bool =
     ``fixed``: without patterns, take the fixed ones as well."""
     descriptions = {name: running.description for name, running in master.components.items()}
     return parameters_in(
-        descriptions, lambda name, variable: master.components[name].get([variable])[variable], patterns, fixed=fixed
+        descriptions,
+        lambda name, variable: master.components[name].get([variable])[variable],
+        patterns,
+        fixed=fixed,
     )
 
 
 def parameters_in(
-    descriptions: Mapping[str, FmuDescription], value_of: Callable[[str, str], float], patterns: Sequence[str] = (), *,
+    descriptions: Mapping[str, FmuDescription],
+    value_of: Callable[[str, str], float],
+    patterns: Sequence[str] = (),
+    *,
     fixed: bool = False,
-) -> list[Parameter]:  # fmt: skip
+) -> list[Parameter]:
     """As `parameters_of`, of components that need not run.
 
     ``value_of``: value of a component's variable, in its unit; asked for the chosen ones only."""
@@ -69,13 +78,22 @@ def parameters_in(
     chosen = {
         name: (component, info)
         for name, (component, info) in real.items()
-        if (any(fnmatch.fnmatchcase(name, p) for p in patterns) if patterns else fixed or info.variability == "tunable")
+        if (
+            any(fnmatch.fnmatchcase(name, p) for p in patterns)
+            if patterns
+            else fixed or info.variability == "tunable"
+        )
     }
-    return [_parameter(component, info, value_of(component, info.name)) for component, info in chosen.values()]
+    return [
+        _parameter(component, info, value_of(component, info.name))
+        for component, info in chosen.values()
+    ]
 
 
 def _check_fits(
-    pattern: str, everything: dict[str, tuple[str, VariableInfo]], real: dict[str, tuple[str, VariableInfo]]
+    pattern: str,
+    everything: dict[str, tuple[str, VariableInfo]],
+    real: dict[str, tuple[str, VariableInfo]],
 ) -> None:
     if any(fnmatch.fnmatchcase(name, pattern) for name in real):
         return
@@ -86,9 +104,13 @@ def _check_fits(
                 "name a Real parameter"
             )
     hint = close_names(pattern, real, "`gfor fmu info` lists the parameters of an FMU")
-    raise InputError(f"--parameter {pattern}: no component of the scenario has such a parameter; {hint}")
+    raise InputError(
+        f"--parameter {pattern}: no component of the scenario has such a parameter; {hint}"
+    )
 
 
 def _parameter(component: str, info: VariableInfo, value: float) -> Parameter:
     tunable = info.variability == "tunable"
-    return Parameter(component, info.name, info.unit or "1", value, tunable, info.minimum, info.maximum)
+    return Parameter(
+        component, info.name, info.unit or "1", value, tunable, info.minimum, info.maximum
+    )

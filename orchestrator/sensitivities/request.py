@@ -31,22 +31,33 @@ class SensitivitiesRequest:
     """
 
     mode: str | None = asked(
-        NAME, None, "a mode that the case names, or 'critical' for the least damped one (default: the first named one)"
+        NAME,
+        None,
+        "a mode that the case names, or 'critical' for the least damped one (default: the first named one)",
     )
     parameters: Names = asked(
-        NAMES, (), "only this one, tunable or fixed; also a pattern (repeatable; default: all tunable ones)",
-        "COMPONENT.PARAMETER", option="--parameter",
+        NAMES,
+        (),
+        "only this one, tunable or fixed; also a pattern (repeatable; default: all tunable ones)",
+        "COMPONENT.PARAMETER",
+        option="--parameter",
         python="names ``component.variable``, also with ``*``; by default all tunable ones",
-    )  # fmt: skip
+    )
     _: KW_ONLY
-    fixed: bool = asked(FLAG, False, "fixed parameters too: the case is started several times for each")
+    fixed: bool = asked(
+        FLAG, False, "fixed parameters too: the case is started several times for each"
+    )
     held: bool = asked(
-        FLAG, False, "partial derivatives at the held operating point, instead of the total ones; tunable parameters "
+        FLAG,
+        False,
+        "partial derivatives at the held operating point, instead of the total ones; tunable parameters "
         "only",
-    )  # fmt: skip
+    )
     frequencies: tuple[float, float] = of_frequencies()
     directional: bool = asked(
-        FLAG, False, "linearise with the FMUs' own directional derivatives instead of by perturbation (with --native)"
+        FLAG,
+        False,
+        "linearise with the FMUs' own directional derivatives instead of by perturbation (with --native)",
     )
     report: Callable[[int, int], None] = asked(
         ANYTHING, nobody, "called with how many parameters are done, of how many", option=None

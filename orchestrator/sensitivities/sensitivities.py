@@ -43,7 +43,9 @@ _DOUBLE = 1e-3
 """Two eigenvalues nearer than this part of |λ| count as a double one: no derivative of either alone exists, and a
 defective pair is split this far by the perturbation's rounding."""
 
-_SAME = 0.1  # the step map's mode and the continuous model's differ by less than this part of |λ|; see `resolution`
+# the step map's mode and the continuous model's differ by less than this part of |λ|; see
+# `resolution`
+_SAME = 0.1
 _FAR = 0.1  # step map and continuous model disagree on a derivative from this part on
 
 _NO_STEADY_STATE = (
@@ -75,7 +77,11 @@ class Sensitivity:
     @property
     def damping_per_unit(self) -> float | None:
         """∂ζ/∂p [points of damping per unit of the parameter]; a point is 1 % of critical damping."""
-        return None if self.derivative is None else 100 * damping_change(self.eigenvalue, self.derivative)
+        return (
+            None
+            if self.derivative is None
+            else 100 * damping_change(self.eigenvalue, self.derivative)
+        )
 
     @property
     def frequency_per_percent(self) -> float | None:
@@ -90,10 +96,16 @@ class Sensitivity:
     @property
     def effect(self) -> float:
         """|Δλ| [rad/s] for one percent of the parameter, of 1 unit where it is 0; by which rows are sorted."""
-        return 0.0 if self.derivative is None else SHARE * self.parameter.scale * abs(self.derivative)
+        return (
+            0.0 if self.derivative is None else SHARE * self.parameter.scale * abs(self.derivative)
+        )
 
     def _for_a_percent(self, figure: float | None) -> float | None:
-        return None if figure is None or not self.parameter.value else SHARE * abs(self.parameter.value) * figure
+        return (
+            None
+            if figure is None or not self.parameter.value
+            else SHARE * abs(self.parameter.value) * figure
+        )
 
 
 @dataclass(frozen=True)
@@ -108,25 +120,38 @@ class SensitivityResult:
 def damping_change(eigenvalue: complex, change: complex) -> float:
     """dζ for a small change of λ, with ζ = −σ/|λ|."""
     size = abs(eigenvalue)
-    return float((eigenvalue.real * eigenvalue.imag * change.imag - eigenvalue.imag**2 * change.real) / size**3)
+    return float(
+        (eigenvalue.real * eigenvalue.imag * change.imag - eigenvalue.imag**2 * change.real)
+        / size**3
+    )
 
 
-def find_sensitivities(prepared: PreparedScenario, again: Again, request: SensitivitiesRequest) -> SensitivityResult:
+def find_sensitivities(
+    prepared: PreparedScenario, again: Again, request: SensitivitiesRequest
+) -> SensitivityResult:
     mode, held, directional = request.mode, request.held, request.directional
     patterns, report = names_of(request.parameters, "parameters"), request.report
     if held and request.fixed:
-        raise InputError("--held holds the operating point, which a fixed parameter moves; give one of them")
+        raise InputError(
+            "--held holds the operating point, which a fixed parameter moves; give one of them"
+        )
     with running(prepared) as master:
         point = find_operating_point(master)
         blocks = Blocks(master, derivatives=True, directional=directional)
         found = modes_from(prepared, master, point, blocks, request.frequencies)
         chosen = _chosen(found, mode)
         parameters = parameters_of(master, patterns, fixed=request.fixed)
-        at = _Mode(found.model, where_given(lambda: continuous(blocks)) if blocks.serves_continuous else None, chosen)
+        at = _Mode(
+            found.model,
+            where_given(lambda: continuous(blocks)) if blocks.serves_continuous else None,
+            chosen,
+        )
         rows: dict[Parameter, Sensitivity] = {}
         anew: list[Parameter] = []
         # Components whose FMU may take a tunable parameter up at its start alone: no effect is seen while it runs.
-        files = {name for name, table in prepared.case.table.components.items() if table.file is not None}
+        files = {
+            name for name, table in prepared.case.table.components.items() if table.file is not None
+        }
         unknown = files | set(foreign_components(master))
         acting = limits_that_act(master)
         for parameter in parameters:
@@ -135,7 +160,12 @@ def find_sensitivities(prepared: PreparedScenario, again: Again, request: Sensit
                     parameter, chosen, "held", "a fixed parameter moves the start: leave --held out"
                 )
             elif held or (parameter.tunable and _stays(master, parameter, blocks.period)):
-                row = _row(parameter, chosen, "held" if held else "stays", _in_running(master, blocks, at, parameter))
+                row = _row(
+                    parameter,
+                    chosen,
+                    "held" if held else "stays",
+                    _in_running(master, blocks, at, parameter),
+                )
                 if row.derivative == 0 and not held and parameter.component in unknown:
                     anew.append(parameter)
                 else:
@@ -144,16 +174,27 @@ def find_sensitivities(prepared: PreparedScenario, again: Again, request: Sensit
                 anew.append(parameter)
             report(len(rows), len(parameters))
     for parameter in anew:
-        rows[parameter] = _row(parameter, chosen, "moves", _started_anew(again, at, parameter, directional=directional))
+        rows[parameter] = _row(
+            parameter, chosen, "moves", _started_anew(again, at, parameter, directional=directional)
+        )
         report(len(rows), len(parameters))
-    unknown_name = next((text for text in found.unnamed.values() if mode is None and not found.named), None)
-    about_mode: tuple[str, ...] = (f"{unknown_name}; the mode here is the least damped one",) if unknown_name else ()
+    unknown_name = next(
+        (text for text in found.unnamed.values() if mode is None and not found.named), None
+    )
+    about_mode: tuple[str, ...] = (
+        (f"{unknown_name}; the mode here is the least damped one",) if unknown_name else ()
+    )
     if patterns:
         about_mode += _idle(prepared, rows)
     warnings = _neighbour(found.model, chosen)
-    ordered = sorted(rows.values(), key=lambda row: (row.derivative is None, -row.effect, row.parameter.name))
+    ordered = sorted(
+        rows.values(), key=lambda row: (row.derivative is None, -row.effect, row.parameter.name)
+    )
     if warnings:
-        ordered = [replace(x, doubts=(*x.doubts, "double eigenvalue")) if x.derivative else x for x in ordered]
+        ordered = [
+            replace(x, doubts=(*x.doubts, "double eigenvalue")) if x.derivative else x
+            for x in ordered
+        ]
     doubted = (_limited(row, acting) for row in ordered)
     return SensitivityResult(found, chosen, tuple(doubted), held, (*about_mode, *warnings))
 
@@ -162,9 +203,15 @@ def _idle(prepared: PreparedScenario, rows: Mapping[Parameter, Sensitivity]) -> 
     """What was asked for by name and cannot act, with the reason."""
     names: dict[str, list[str]] = {}
     for parameter, row in rows.items():
-        why = "" if row.derivative else why_idle(prepared.system, parameter.component, parameter.variable)
+        why = (
+            ""
+            if row.derivative
+            else why_idle(prepared.system, parameter.component, parameter.variable)
+        )
         names.setdefault(why, []).append(parameter.name)
-    return tuple(f"{first_few(found, str)} cannot act: {why}" for why, found in names.items() if why)
+    return tuple(
+        f"{first_few(found, str)} cannot act: {why}" for why, found in names.items() if why
+    )
 
 
 def _chosen(found: ModesResult, name: str | None) -> Mode:
@@ -176,10 +223,14 @@ def _chosen(found: ModesResult, name: str | None) -> Mode:
         known = ", ".join([*found.named, CRITICAL])
         if name in found.unnamed:
             raise InputError(f"--mode {name}: {found.unnamed[name]}; there are: {known}")
-        raise InputError(f"--mode {name}: scenario {found.prepared.name!r} has no mode of this name; it has: {known}")
+        raise InputError(
+            f"--mode {name}: scenario {found.prepared.name!r} has no mode of this name; it has: {known}"
+        )
     swinging = [mode for mode in found.modes if mode.is_oscillation]
     if not swinging:
-        raise InputError(f"scenario {found.prepared.name!r} has no oscillation in the range; give another --range")
+        raise InputError(
+            f"scenario {found.prepared.name!r} has no oscillation in the range; give another --range"
+        )
     return swinging[0]
 
 
@@ -188,16 +239,22 @@ class _Mode:
 
     def __init__(self, model: LinearModel, system: LinearModel | None, mode: Mode) -> None:
         self._model, self._system = model, system
-        left, right = (np.array([vector[name] for name in model.names]) for vector in (mode.left, mode.shape))
+        left, right = (
+            np.array([vector[name] for name in model.names]) for vector in (mode.left, mode.shape)
+        )
         self._pair = Eigenpair(mode.eigenvalue, left, right)
         exact = None if system is None else pair_at(system, mode.eigenvalue)
-        same = exact is not None and abs(exact.eigenvalue - mode.eigenvalue) < _SAME * abs(mode.eigenvalue)
+        same = exact is not None and abs(exact.eigenvalue - mode.eigenvalue) < _SAME * abs(
+            mode.eigenvalue
+        )
         self._exact = exact if same else None
 
     def shift(self, blocks: Blocks, master: Master) -> Shift:
         varied = model_of(master, blocks)
         if varied.names != self._model.names:
-            raise AnalysisError("with another value the outputs depend on other inputs, which changes the states")
+            raise AnalysisError(
+                "with another value the outputs depend on other inputs, which changes the states"
+            )
         system = None
         if self._system is not None and self._exact is not None:
             system = _shift(self._system, continuous(blocks), self._exact)
@@ -218,7 +275,9 @@ def _stays(master: Master, parameter: Parameter, period: int) -> bool:
         return _answer(master, parameter.component) if period == 1 else _after(master, period)
 
     before = answer()
-    for value in (parameter.value + sign * change for sign in (1, -1) if parameter.allows(sign * change)):
+    for value in (
+        parameter.value + sign * change for sign in (1, -1) if parameter.allows(sign * change)
+    ):
         try:
             with changed(master, {parameter.name: value}, {parameter.name: parameter.value}):
                 after = answer()
@@ -251,7 +310,9 @@ def _answer(master: Master, name: str) -> Numbers:
         component.free_state(saved)
 
 
-def _in_running(master: Master, blocks: Blocks, at: _Mode, parameter: Parameter) -> Callable[[float], Shift]:
+def _in_running(
+    master: Master, blocks: Blocks, at: _Mode, parameter: Parameter
+) -> Callable[[float], Shift]:
     def shift(value: float) -> Shift:
         with changed(master, {parameter.name: value}, {parameter.name: parameter.value}):
             return at.shift(blocks.with_component(master, parameter.component), master)
@@ -259,7 +320,9 @@ def _in_running(master: Master, blocks: Blocks, at: _Mode, parameter: Parameter)
     return shift
 
 
-def _started_anew(again: Again, at: _Mode, parameter: Parameter, *, directional: bool) -> Callable[[float], Shift]:
+def _started_anew(
+    again: Again, at: _Mode, parameter: Parameter, *, directional: bool
+) -> Callable[[float], Shift]:
     def shift(value: float) -> Shift:
         with running(again({parameter.name: value})) as master:
             try:
@@ -271,19 +334,29 @@ def _started_anew(again: Again, at: _Mode, parameter: Parameter, *, directional:
     return shift
 
 
-def _row(parameter: Parameter, mode: Mode, operating_point: str, shift_at: Callable[[float], Shift]) -> Sensitivity:
+def _row(
+    parameter: Parameter, mode: Mode, operating_point: str, shift_at: Callable[[float], Shift]
+) -> Sensitivity:
     try:
         derivative = differentiate(parameter, shift_at, mode.eigenvalue)
     except CaseError as error:
-        return _none(parameter, mode, operating_point, "; ".join(str(problem) for problem in error.problems))
+        return _none(
+            parameter, mode, operating_point, "; ".join(str(problem) for problem in error.problems)
+        )
     except CosimError as error:
         return _none(parameter, mode, operating_point, str(error))
     if derivative is None:
-        return _none(parameter, mode, operating_point, "its declared bounds leave no room for a change")
+        return _none(
+            parameter, mode, operating_point, "its declared bounds leave no room for a change"
+        )
     return Sensitivity(
-        parameter, mode.eigenvalue, derivative.step, derivative.continuous, operating_point,
+        parameter,
+        mode.eigenvalue,
+        derivative.step,
+        derivative.continuous,
+        operating_point,
         (*derivative.doubts, *_between_models(derivative, parameter, mode)),
-    )  # fmt: skip
+    )
 
 
 def _none(parameter: Parameter, mode: Mode, operating_point: str, reason: str) -> Sensitivity:
@@ -297,12 +370,16 @@ def _between_models(derivative: Derivative, parameter: Parameter, mode: Mode) ->
     floor = 1e-4 * abs(mode.eigenvalue) / (SHARE * parameter.scale)
     if abs(step - exact) <= _FAR * max(abs(step), abs(exact)) + floor:
         return ()
-    return (f"without a communication step it is {abs(exact):.3g}, with it {abs(step):.3g} rad/s a unit",)
+    return (
+        f"without a communication step it is {abs(exact):.3g}, with it {abs(step):.3g} rad/s a unit",
+    )
 
 
 def _neighbour(model: LinearModel, mode: Mode) -> tuple[str, ...]:
     """A warning where another eigenvalue is so near that no derivative of one alone exists."""
-    distances = sorted(abs(pair.eigenvalue - mode.eigenvalue) for pair in pairs_near(model, mode.eigenvalue))
+    distances = sorted(
+        abs(pair.eigenvalue - mode.eigenvalue) for pair in pairs_near(model, mode.eigenvalue)
+    )
     if len(distances) < 2 or distances[1] > _DOUBLE * abs(mode.eigenvalue):
         return ()
     return (
@@ -316,4 +393,6 @@ def _limited(row: Sensitivity, acting: Mapping[str, Sequence[str]]) -> Sensitivi
     limits = acting.get(row.parameter.component, ())
     if not limits or row.derivative is None:
         return row
-    return replace(row, doubts=(*row.doubts, *(f"a limit acts in this component: {name}" for name in limits)))
+    return replace(
+        row, doubts=(*row.doubts, *(f"a limit acts in this component: {name}" for name in limits))
+    )

@@ -58,36 +58,68 @@ class Sensitivities:
 
     def __repr__(self) -> str:
         mode = self.result.mode
-        return f"<Sensitivities of {mode.frequency_hz:.3g} Hz to {len(self.result.rows)} parameters>"
+        return (
+            f"<Sensitivities of {mode.frequency_hz:.3g} Hz to {len(self.result.rows)} parameters>"
+        )
 
     def _repr_html_(self) -> str:
-        return page(repr(self).strip("<>"), [f"warning: {text}" for text in self.warnings], self.table())
+        return page(
+            repr(self).strip("<>"), [f"warning: {text}" for text in self.warnings], self.table()
+        )
 
 
 def sensitivity_table(result: SensitivityResult) -> ColumnTable[Sensitivity]:
     mode = result.mode
     name = result.modes.name_of(mode) or "critical"
-    kind = "the operating point held" if result.held else "total: the operating point moves with the parameter"
+    kind = (
+        "the operating point held"
+        if result.held
+        else "total: the operating point moves with the parameter"
+    )
     title = f"{result.modes.prepared.title}, {name}, {mode.frequency_hz:.4f} Hz, {mode.damping_percent:.2f} %; {kind}"
-    return ColumnTable(title, (
-        Column("Parameter", lambda row: row.parameter.name, name="parameter"),
-        Column("Value", lambda row: row.parameter, lambda p: f"{p.value:.5g} {p.unit}".removesuffix(" 1")),
-        Column("", lambda row: row.parameter.value, name="value"),
-        Column("", lambda row: row.parameter.unit, name="unit"),
-        Column("", lambda row: "tunable" if row.parameter.tunable else "fixed", name="variability"),
-        Column("Hz per unit", lambda row: row.frequency_per_unit, _text, "frequency_hz_per_unit"),
-        Column("Points per unit", lambda row: row.damping_per_unit, _text, "damping_points_per_unit"),
-        Column("Hz per %", lambda row: row.frequency_per_percent, _text, "frequency_hz_per_percent"),
-        Column("Points per %", lambda row: row.damping_per_percent, _text, "damping_points_per_percent"),
-        Column("", lambda row: _part(row.derivative, "real"), name="real_per_unit"),
-        Column("", lambda row: _part(row.derivative, "imag"), name="imag_per_unit"),
-        Column("", lambda row: _part(row.continuous, "real"), name="continuous_real_per_unit"),
-        Column("", lambda row: _part(row.continuous, "imag"), name="continuous_imag_per_unit"),
-        Column("Point", lambda row: row.operating_point, name="operating_point"),
-        Column("", lambda row: "; ".join(row.doubts), name="doubts"),
-        Column("", lambda row: row.reason, name="reason"),
-        Column("Doubt", lambda row: row.reason or "; ".join(row.doubts), text=True),
-    ), result.rows)  # fmt: skip
+    return ColumnTable(
+        title,
+        (
+            Column("Parameter", lambda row: row.parameter.name, name="parameter"),
+            Column(
+                "Value",
+                lambda row: row.parameter,
+                lambda p: f"{p.value:.5g} {p.unit}".removesuffix(" 1"),
+            ),
+            Column("", lambda row: row.parameter.value, name="value"),
+            Column("", lambda row: row.parameter.unit, name="unit"),
+            Column(
+                "", lambda row: "tunable" if row.parameter.tunable else "fixed", name="variability"
+            ),
+            Column(
+                "Hz per unit", lambda row: row.frequency_per_unit, _text, "frequency_hz_per_unit"
+            ),
+            Column(
+                "Points per unit",
+                lambda row: row.damping_per_unit,
+                _text,
+                "damping_points_per_unit",
+            ),
+            Column(
+                "Hz per %", lambda row: row.frequency_per_percent, _text, "frequency_hz_per_percent"
+            ),
+            Column(
+                "Points per %",
+                lambda row: row.damping_per_percent,
+                _text,
+                "damping_points_per_percent",
+            ),
+            Column("", lambda row: _part(row.derivative, "real"), name="real_per_unit"),
+            Column("", lambda row: _part(row.derivative, "imag"), name="imag_per_unit"),
+            Column("", lambda row: _part(row.continuous, "real"), name="continuous_real_per_unit"),
+            Column("", lambda row: _part(row.continuous, "imag"), name="continuous_imag_per_unit"),
+            Column("Point", lambda row: row.operating_point, name="operating_point"),
+            Column("", lambda row: "; ".join(row.doubts), name="doubts"),
+            Column("", lambda row: row.reason, name="reason"),
+            Column("Doubt", lambda row: row.reason or "; ".join(row.doubts), text=True),
+        ),
+        result.rows,
+    )
 
 
 def rows_of(result: SensitivityResult) -> list[dict[str, Any]]:
@@ -101,11 +133,17 @@ def _part(value: complex | None, part: str) -> float | None:
 def as_json(result: SensitivityResult) -> dict[str, Any]:
     modes, mode = result.modes, result.mode
     return {
-        **modes.prepared.about, "stable": modes.stability.stable, "stability": modes.stability.as_json(),
-        "mode": {**eigenvalue_json(mode.eigenvalue, mode.damping_percent), "name": modes.name_of(mode)},
-        "derivative": "partial" if result.held else "total", "warnings": [*modes.warnings, *result.warnings],
+        **modes.prepared.about,
+        "stable": modes.stability.stable,
+        "stability": modes.stability.as_json(),
+        "mode": {
+            **eigenvalue_json(mode.eigenvalue, mode.damping_percent),
+            "name": modes.name_of(mode),
+        },
+        "derivative": "partial" if result.held else "total",
+        "warnings": [*modes.warnings, *result.warnings],
         "sensitivities": rows_of(result),
-    }  # fmt: skip
+    }
 
 
 def _text(figure: float | None) -> str:

@@ -17,11 +17,15 @@ def _parts(found: Siting) -> Iterator[RenderableType]:
 
 
 STUDY = StudyAtOnce(
-    request=SiteRequest, compute=lambda case, request, report: Siting(find_sites(case, request, report)),
-    prepared=lambda found: [found.result.prepared], parts=_parts,
+    request=SiteRequest,
+    compute=lambda case, request, report: Siting(find_sites(case, request, report)),
+    prepared=lambda found: [found.result.prepared],
+    parts=_parts,
     code=lambda found, _: 0 if found.agrees and not found.result.breaking else NOT_MET,
     counted="places",
     files="site.json, buses.csv and site.html with a map",
-    warnings=lambda found: [f"scenario {found.result.prepared.name!r}: {text}"
-                            for text in found.result.intact.found.unasked],
-)  # fmt: skip
+    warnings=lambda found: [
+        f"scenario {found.result.prepared.name!r}: {text}"
+        for text in found.result.intact.found.unasked
+    ],
+)

@@ -23,7 +23,8 @@ from orchestrator.siting.placing import STAGES, name_at, response_of
 from orchestrator.siting.residues import SeenMode
 from orchestrator.study.modes import modes_from, running
 
-AGREES = 0.05  # A coupled shift that is farther than this part from the predicted one confirms nothing
+# A coupled shift that is farther than this part from the predicted one confirms nothing
+AGREES = 0.05
 _SMALL = 2e-3  # part of |λ| by which the trial gain moves the mode
 
 _TURNS, _PARTS = (-30.0, 0.0, 30.0), (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
@@ -31,7 +32,8 @@ _TURNS, _PARTS = (-30.0, 0.0, 30.0), (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
 and parts of the largest gain."""
 
 _EQUAL = 2e-4  # least damping ratios in the same part of this size are equally good
-_SAME = 0.5  # least similarity with which a mode of the system with the device is taken for the one without it
+# least similarity with which a mode of the system with the device is taken for the one without it
+_SAME = 0.5
 
 
 @dataclass(frozen=True)
@@ -65,9 +67,13 @@ class Confirmation:
 
 
 def confirmed(
-    prepared: PreparedScenario, bus: str, seen: SeenMode, frequency_range: tuple[float, float], controller: str | None,
+    prepared: PreparedScenario,
+    bus: str,
+    seen: SeenMode,
+    frequency_range: tuple[float, float],
+    controller: str | None,
     gain: float,
-) -> Confirmation:  # fmt: skip
+) -> Confirmation:
     """Compare a mode's predicted shift with that of the coupled FMUs.
 
     ``prepared``: With the device at the bus.
@@ -83,18 +89,29 @@ def confirmed(
 
 
 def _as_it_is(
-    prepared: PreparedScenario, master: Master, bus: str, seen: SeenMode, frequency_range: tuple[float, float]
+    prepared: PreparedScenario,
+    master: Master,
+    bus: str,
+    seen: SeenMode,
+    frequency_range: tuple[float, float],
 ) -> Confirmation:
     blocks = Blocks(master, derivatives=True)
     found = modes_from(prepared, master, find_operating_point(master), blocks, frequency_range)
     pair, eigenvalue = same_mode(seen.mode, found.model), seen.mode.eigenvalue
     predicted = _predicted(master, blocks.components[name_at(bus)], bus, seen) - eigenvalue
     coupled, least = pair.eigenvalue - eigenvalue, _least(found.modes)
-    return Confirmation(bus, predicted, coupled, pair.eigenvalue, least=least, stable=found.stability.stable)
+    return Confirmation(
+        bus, predicted, coupled, pair.eigenvalue, least=least, stable=found.stability.stable
+    )
 
 
 def _with_pod(
-    master: Master, bus: str, seen: SeenMode, frequency_range: tuple[float, float], controller: str, gain: float
+    master: Master,
+    bus: str,
+    seen: SeenMode,
+    frequency_range: tuple[float, float],
+    controller: str,
+    gain: float,
 ) -> Confirmation:
     name, eigenvalue = name_at(bus), seen.mode.eigenvalue
     loop = PodLoop(master, [name], controller)
@@ -117,7 +134,9 @@ def _with_pod(
     reached = loop.place(start, tuned.gain, tuned.filters)
     least = _least(find_modes(loop.model(tuned), *frequency_range))
     stable = loop.examine(tuned).stability.stable
-    return Confirmation(bus, predicted, coupled, start.eigenvalue, tuned, reached.eigenvalue, least, stable)
+    return Confirmation(
+        bus, predicted, coupled, start.eigenvalue, tuned, reached.eigenvalue, least, stable
+    )
 
 
 def _predicted(master: Master, model: ComponentLinearization, bus: str, seen: SeenMode) -> complex:
@@ -145,7 +164,9 @@ def _tuned(loop: PodLoop, by_gain: complex, eigenvalue: complex, most: float) ->
 def same_mode(mode: Mode, model: LinearModel) -> Eigenpair:
     """The mode in a model with further states: the most similar one among those near."""
     common = {name: k for k, name in enumerate(model.names) if name in mode.shape}
-    left, right = (np.array([vector[name] for name in common]) for vector in (mode.left, mode.shape))
+    left, right = (
+        np.array([vector[name] for name in common]) for vector in (mode.left, mode.shape)
+    )
     own, places = Eigenpair(mode.eigenvalue, left, right), list(common.values())
     pairs = pairs_near(model, mode.eigenvalue)
     alike = {k: own.similarity(pair.within(places)) for k, pair in enumerate(pairs)}

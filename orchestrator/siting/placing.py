@@ -34,7 +34,9 @@ def converter(prepared: PreparedScenario, rating: float, controller: str | None)
 def foreign(fmu: Path, binding: Path | None, rating: float | None) -> ComponentTable:
     for path in (fmu, *([binding] if binding else [])):
         if not path.is_file():
-            raise InputError(f"{path}: there is no such file; --device takes pod_p, pod_q, droop or the path of an FMU")
+            raise InputError(
+                f"{path}: there is no such file; --device takes pod_p, pod_q, droop or the path of an FMU"
+            )
     own = str(binding.absolute()) if binding else None
     values = {"P_0": 0.0, "Q_0": 0.0, **({} if rating is None else {"S_n": rating})}
     return ComponentTable(fmu=str(fmu.absolute()), binding=own, parameters=values)
@@ -46,15 +48,21 @@ def name_at(bus: str) -> str:
 
 def placed(case: Case, device: ComponentTable, buses: Sequence[str]) -> Case:
     table = case.table
-    further: Mapping[str, ComponentTable] = {name_at(b): device.model_copy(update={"bus": b}) for b in buses}
+    further: Mapping[str, ComponentTable] = {
+        name_at(b): device.model_copy(update={"bus": b}) for b in buses
+    }
     if taken := [name for name in further if name in table.components]:
-        raise InputError(f"{case.path}: the name {taken[0]!r} is for what `gfor site` puts there; give it another name")
+        raise InputError(
+            f"{case.path}: the name {taken[0]!r} is for what `gfor site` puts there; give it another name"
+        )
     grid = table.power_flow.grid if table.power_flow else ""
     if groups := table.solver.groups:
         first = next((k for k, group in enumerate(groups) if grid not in group), 0)
         groups = [[*group, *further] if k == first else group for k, group in enumerate(groups)]
     solver = table.solver.model_copy(update={"groups": groups})
-    changed = table.model_copy(update={"components": {**table.components, **further}, "solver": solver})
+    changed = table.model_copy(
+        update={"components": {**table.components, **further}, "solver": solver}
+    )
     return replace(case, table=changed)
 
 

@@ -82,8 +82,13 @@ def situation_of(
     oscillating = [mode for mode in found.modes if mode.is_oscillation]
     poor = [mode for mode in oscillating if mode.damping_percent < below] or oscillating[:1]
     labels = [found.name_of(mode) or f"{mode.frequency_hz:.3f} Hz" for mode in poor]
-    labels = [text if text not in labels[:k] else f"{text} ({k + 1})" for k, text in enumerate(labels)]
-    seen = [_seen(label, mode, space, early, network.buses) for label, mode in zip(labels, poor, strict=True)]
+    labels = [
+        text if text not in labels[:k] else f"{text} ({k + 1})" for k, text in enumerate(labels)
+    ]
+    seen = [
+        _seen(label, mode, space, early, network.buses)
+        for label, mode in zip(labels, poor, strict=True)
+    ]
     voltages = {bus: complex(*parts[2 * k : 2 * k + 2]) for k, bus in enumerate(network.buses)}
     return Situation(name, found, tuple(seen), voltages)
 
@@ -96,17 +101,29 @@ def _early(blocks: Blocks, model: LinearModel) -> Matrix:
     return np.asarray(model.G @ model.settle(direct))
 
 
-def _seen(label: str, mode: Mode, space: StateSpace, early: Matrix, buses: Sequence[str]) -> SeenMode:
+def _seen(
+    label: str, mode: Mode, space: StateSpace, early: Matrix, buses: Sequence[str]
+) -> SeenMode:
     """The residues of one mode between the current and the voltage of each bus, and what is left without it.
 
     A device's current at a step's beginning is that of the step before, which an input's is not."""
     assert space.step_size is not None
     z, n = cmath.exp(mode.eigenvalue * space.step_size), len(space.A)
-    left, right = (np.array([vector[name] for name in space.states]) for vector in (mode.left, mode.shape))
+    left, right = (
+        np.array([vector[name] for name in space.states]) for vector in (mode.left, mode.shape)
+    )
     B = space.B - (1 - 1 / z) * early
     drive, shown = left.conj() @ B / (z * space.step_size), space.C @ right
-    bordered = np.block([[z * np.eye(n) - space.A, right[:, None]], [left.conj()[None], np.zeros((1, 1))]])
+    bordered = np.block(
+        [[z * np.eye(n) - space.A, right[:, None]], [left.conj()[None], np.zeros((1, 1))]]
+    )
     others = np.linalg.solve(bordered, np.vstack([B, np.zeros((1, B.shape[1]))]))[:n]
     at = {bus: slice(2 * k, 2 * k + 2) for k, bus in enumerate(buses)}
     back = {bus: space.C[i] @ others[:, i] + space.D[i, i] / z for bus, i in at.items()}
-    return SeenMode(label, mode, {b: drive[i] for b, i in at.items()}, {b: shown[i] for b, i in at.items()}, back)
+    return SeenMode(
+        label,
+        mode,
+        {b: drive[i] for b, i in at.items()},
+        {b: shown[i] for b, i in at.items()},
+        back,
+    )

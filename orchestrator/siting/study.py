@@ -10,7 +10,18 @@ from typing import Any, cast
 from orchestrator.analysis.linearization import Blocks
 from orchestrator.analysis.modes import damping_percent
 from orchestrator.analysis.steady_state import find_operating_point
-from orchestrator.asked import DAMPING, FILE, NAMES, OUTAGES, POSITIVE, RANKED, FieldKind, Names, asked, text_or_none
+from orchestrator.asked import (
+    DAMPING,
+    FILE,
+    NAMES,
+    OUTAGES,
+    POSITIVE,
+    RANKED,
+    FieldKind,
+    Names,
+    asked,
+    text_or_none,
+)
 from orchestrator.asked import positive as above_zero
 from orchestrator.cases.case import Case
 from orchestrator.cases.names import close_names
@@ -28,9 +39,12 @@ from orchestrator.study.modes import running
 
 PODS = {"pod_p": placing.ACTIVE, "pod_q": placing.REACTIVE}
 DROOP = "droop"
-_RATING = FieldKind("MVA", POSITIVE.read, lambda given, name: None if given is None else above_zero(given, name))
+_RATING = FieldKind(
+    "MVA", POSITIVE.read, lambda given, name: None if given is None else above_zero(given, name)
+)
 _DEVICE = FieldKind("DEVICE", str, lambda given, argument: str(text_or_none(str(given), argument)))
-HARDLY = 0.02  # A bus that moves a mode by less than this part of what the best bus does hardly reaches it
+# A bus that moves a mode by less than this part of what the best bus does hardly reaches it
+HARDLY = 0.02
 
 
 @dataclass(frozen=True)
@@ -54,23 +68,40 @@ class SiteRequest(OfCase):
     (('bus_2', 'bus_3'), True)
     """
 
-    device: str | Path = asked(_DEVICE, "pod_p", "pod_p (default), pod_q, droop, or a vendor's .fmu")
+    device: str | Path = asked(
+        _DEVICE, "pod_p", "pod_p (default), pod_q, droop, or a vendor's .fmu"
+    )
     scenario: str | None = of_scenario()
     values: Mapping[str, Any] | None = of_values()
     _: KW_ONLY
     binding: str | Path | None = asked(FILE, None, "binding of the vendor's FMU")
     below: float = asked(
-        DAMPING, 0.1, "damping of poorly damped modes (default: 10)",
+        DAMPING,
+        0.1,
+        "damping of poorly damped modes (default: 10)",
         python="damping [%] of the modes that are looked at; the least damped one where none is damped so little",
-    )  # fmt: skip
+    )
     frequencies: tuple[float, float] = of_frequencies()
-    outages: Names | None = asked(OUTAGES, None, "rank for these as well: n-1, lines, units, or names (repeatable)")
-    buses: Sequence[str] = asked(NAMES, (), "only these may be the place, such as 9, bus_9 or 'bus_1*' (repeatable)")
-    confirm: int = asked(RANKED, 3, "confirm the best N by coupled FMUs (default: 3)", python="how many of the best "
-                         "buses are confirmed by coupled FMUs")  # fmt: skip
-    rating: float | None = asked(_RATING, None, "of the converter that confirms (default: 100), or of the vendor's FMU "
-                                 "(default: its own)")  # fmt: skip
-    gain: float = asked(POSITIVE, 200.0, "largest of its POD [pu of its rating] (default: 200)", "K")
+    outages: Names | None = asked(
+        OUTAGES, None, "rank for these as well: n-1, lines, units, or names (repeatable)"
+    )
+    buses: Sequence[str] = asked(
+        NAMES, (), "only these may be the place, such as 9, bus_9 or 'bus_1*' (repeatable)"
+    )
+    confirm: int = asked(
+        RANKED,
+        3,
+        "confirm the best N by coupled FMUs (default: 3)",
+        python="how many of the best buses are confirmed by coupled FMUs",
+    )
+    rating: float | None = asked(
+        _RATING,
+        None,
+        "of the converter that confirms (default: 100), or of the vendor's FMU (default: its own)",
+    )
+    gain: float = asked(
+        POSITIVE, 200.0, "largest of its POD [pu of its rating] (default: 200)", "K"
+    )
 
     @property
     def name(self) -> str:
@@ -137,7 +168,10 @@ class SiteResult:
 
     def least(self, bus: str) -> tuple[float, str]:
         """What the device does there for the least damped mode where it does least [points], and in which situation."""
-        return min((self.shifts[DEVICE][s.name][s.modes[0].label][bus].damping, s.name) for s in self.situations)
+        return min(
+            (self.shifts[DEVICE][s.name][s.modes[0].label][bus].damping, s.name)
+            for s in self.situations
+        )
 
     @property
     def agrees(self) -> bool:
@@ -150,10 +184,14 @@ class SiteResult:
         return [one for one in self.confirmations if stable and one.stable is False]
 
 
-def find_sites(case: Case, request: SiteRequest, report: Callable[[int, int], None] = lambda a, b: None) -> SiteResult:
+def find_sites(
+    case: Case, request: SiteRequest, report: Callable[[int, int], None] = lambda a, b: None
+) -> SiteResult:
     """Linearise the case with and without outages, shift its modes by a device at every bus, and confirm the best."""
     if request.is_foreign and not request.name.lower().endswith(".fmu"):
-        raise InputError(f"--device {request.device}: give pod_p, pod_q, droop or the path of an .fmu")
+        raise InputError(
+            f"--device {request.device}: give pod_p, pod_q, droop or the path of an .fmu"
+        )
     scenario = request.scenario or next(iter(case.scenarios))
     open_case = replace(case, injections=True)
     preparation = ItemPreparation(open_case, scenario, request.layers, request.step_size)
@@ -178,17 +216,23 @@ def find_sites(case: Case, request: SiteRequest, report: Callable[[int, int], No
         report(k + 1, total)
     if not situations or situations[0].name != INTACT:
         low, high = request.frequencies
-        raise InputError(f"scenario {scenario!r} has no oscillation from {low:g} to {high:g} Hz; give another --range")
+        raise InputError(
+            f"scenario {scenario!r} has no oscillation from {low:g} to {high:g} Hz; give another --range"
+        )
     result = _shifted(case, request, situations, not_judged, scenario)
     result = replace(result, ranking=tuple(bus for bus in result.ranking if bus in buses))
     if not result.ranking:
-        raise InputError(f"--buses: {', '.join(request.buses)}: an outage cuts them off; give others")
+        raise InputError(
+            f"--buses: {', '.join(request.buses)}: an outage cuts them off; give others"
+        )
     return _with_confirmations(result, scenario, lambda done: report(len(outages) + done, total))
 
 
 def _candidates(wanted: Sequence[str], prepared: PreparedScenario) -> list[str]:
     known = list(prepared.network.buses) if prepared.network is not None else []
-    found = {name: fnmatch.filter(known, name) or fnmatch.filter(known, f"bus_{name}") for name in wanted}
+    found = {
+        name: fnmatch.filter(known, name) or fnmatch.filter(known, f"bus_{name}") for name in wanted
+    }
     if unknown := [name for name, there in found.items() if not there]:
         hint = close_names(unknown[0], known, f"the buses are {few(known, 8)}")
         raise InputError(f"--buses {unknown[0]}: there is no such bus; {hint}")
@@ -196,9 +240,16 @@ def _candidates(wanted: Sequence[str], prepared: PreparedScenario) -> list[str]:
 
 
 def _shifted(
-    case: Case, request: SiteRequest, situations: list[Situation], not_judged: dict[str, str], scenario: str
+    case: Case,
+    request: SiteRequest,
+    situations: list[Situation],
+    not_judged: dict[str, str],
+    scenario: str,
 ) -> SiteResult:
-    shifts = {kind: _all_shifts(situations, _ideal(kind), tuned=True) for kind in (placing.ACTIVE, placing.REACTIVE)}
+    shifts = {
+        kind: _all_shifts(situations, _ideal(kind), tuned=True)
+        for kind in (placing.ACTIVE, placing.REACTIVE)
+    }
     if request.is_foreign:
         shifts[DEVICE] = _of_foreign(case, request, situations, shifts[placing.ACTIVE], scenario)
     elif request.device == DROOP:
@@ -211,7 +262,9 @@ def _shifted(
 
 
 def _ideal(kind: str) -> Shift:
-    return lambda at, bus, seen: seen.shift(bus, placing.ideal_support(kind, at.voltages[bus], seen.mode.eigenvalue))
+    return lambda at, bus, seen: seen.shift(
+        bus, placing.ideal_support(kind, at.voltages[bus], seen.mode.eigenvalue)
+    )
 
 
 def _all_shifts(situations: Sequence[Situation], shift: Shift, *, tuned: bool) -> dict[str, ByMode]:
@@ -223,7 +276,11 @@ def _all_shifts(situations: Sequence[Situation], shift: Shift, *, tuned: bool) -
             most = max(map(abs, changes.values())) or 1.0
             eigenvalue, before = seen.mode.eigenvalue, seen.mode.damping_percent
             by_mode[seen.label] = {
-                bus: SupportShift(c, damping_percent(eigenvalue + (-abs(c) if tuned else c)) - before, abs(c) / most)
+                bus: SupportShift(
+                    c,
+                    damping_percent(eigenvalue + (-abs(c) if tuned else c)) - before,
+                    abs(c) / most,
+                )
                 for bus, c in changes.items()
             }
         found[at.name] = by_mode
@@ -231,7 +288,11 @@ def _all_shifts(situations: Sequence[Situation], shift: Shift, *, tuned: bool) -
 
 
 def _of_foreign(
-    case: Case, request: SiteRequest, situations: Sequence[Situation], active: Mapping[str, ByMode], scenario: str
+    case: Case,
+    request: SiteRequest,
+    situations: Sequence[Situation],
+    active: Mapping[str, ByMode],
+    scenario: str,
 ) -> dict[str, ByMode]:
     """A foreign device, linearised once at the bus that active power reaches best, and turned to the others."""
     intact = situations[0]
@@ -245,26 +306,37 @@ def _of_foreign(
 
         def shift(at: Situation, other: str, seen: SeenMode) -> complex:
             ahead = cmath.phase(at.voltages[other] / intact.voltages[bus])
-            return seen.settled(other, lambda there: placing.turned(placing.response_of(master, model, there), ahead))
+            return seen.settled(
+                other,
+                lambda there: placing.turned(placing.response_of(master, model, there), ahead),
+            )
 
         return _all_shifts(situations, shift, tuned=False)
 
 
 def _prepared(case: Case, request: SiteRequest, scenario: str) -> PreparedScenario:
-    (prepared,) = case.prepare([scenario], request.overrides, request.step_size, None, request.files)
+    (prepared,) = case.prepare(
+        [scenario], request.overrides, request.step_size, None, request.files
+    )
     return prepared
 
 
-def _with_confirmations(result: SiteResult, scenario: str, report: Callable[[int], None]) -> SiteResult:
+def _with_confirmations(
+    result: SiteResult, scenario: str, report: Callable[[int], None]
+) -> SiteResult:
     request, seen = result.request, result.intact.modes[0]
     device: ComponentTable = (
         placing.foreign(Path(request.device), request.binding_file, request.rating)
         if request.is_foreign
-        else placing.converter(result.prepared, request.rating or placing.OURS_MVA, request.controller)
+        else placing.converter(
+            result.prepared, request.rating or placing.OURS_MVA, request.controller
+        )
     )
     found = []
     for k, bus in enumerate(result.ranking[: request.confirm]):
         prepared = _prepared(placing.placed(result.case, device, [bus]), request, scenario)
-        found.append(confirmed(prepared, bus, seen, request.frequencies, request.controller, request.gain))
+        found.append(
+            confirmed(prepared, bus, seen, request.frequencies, request.controller, request.gain)
+        )
         report(k + 1)
     return replace(result, confirmations=tuple(found))

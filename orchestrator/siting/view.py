@@ -29,7 +29,8 @@ from orchestrator.siting.residues import SeenMode
 from orchestrator.siting.study import DEVICE, DROOP, SiteResult, SupportShift
 
 TITLES = {"pod_p": "POD-P", "pod_q": "POD-Q", DROOP: "a droop"}
-_NONE = 1e-5  # damping [points] by 1 MW/Hz below which no bus reaches a mode: 1000 give a hundredth of a point
+# damping [points] by 1 MW/Hz below which no bus reaches a mode: 1000 give a hundredth of a point
+_NONE = 1e-5
 
 _SHOWN, _NAMED = 12, 4
 
@@ -87,7 +88,9 @@ class Siting:
         return f"<Siting in {self.result.case.name}: {self.answer}>"
 
     def _repr_html_(self) -> str:
-        return page(f"Siting in {self.result.case.name}", [self.answer, *self.remarks], self.table())
+        return page(
+            f"Siting in {self.result.case.name}", [self.answer, *self.remarks], self.table()
+        )
 
 
 def unit(result: SiteResult, times: str = "1") -> str:
@@ -131,7 +134,11 @@ def _called(seen: SeenMode) -> str:
 
 def sureness(result: SiteResult) -> list[str]:
     before = result.intact.modes[0].mode.damping_percent
-    bad = [f"{at.name} ({_called(at.modes[0])})" for at in result.worst_first if at.found.stability.stable is False]
+    bad = [
+        f"{at.name} ({_called(at.modes[0])})"
+        for at in result.worst_first
+        if at.found.stability.stable is False
+    ]
     said = [f"UNSTABLE without the device: {few(bad, _NAMED)}"] if bad else []
     found = [_confirmed(result, one, before) for one in result.confirmations]
     return [*said, *(found or ["not confirmed by coupled FMUs"])]
@@ -160,14 +167,22 @@ def remarks(result: SiteResult) -> list[str]:
     for seen in result.intact.modes:
         shifts = result.shifts[DEVICE][result.intact.name][seen.label]
         top = max(shifts, key=lambda bus: abs(shifts[bus].change))
-        reach = max(abs(s.damping) for s in result.shifts[ACTIVE][result.intact.name][seen.label].values())
+        reach = max(
+            abs(s.damping) for s in result.shifts[ACTIVE][result.intact.name][seen.label].values()
+        )
         if reach < _NONE:
-            said.append(f"{_called(seen)}: no bus reaches this mode; it cannot be damped from the network")
+            said.append(
+                f"{_called(seen)}: no bus reaches this mode; it cannot be damped from the network"
+            )
         elif shifts[best].hardly:
-            said.append(f"{_called(seen)}: not controllable at {best} ({100 * shifts[best].part:.1g} % of {top})")
+            said.append(
+                f"{_called(seen)}: not controllable at {best} ({100 * shifts[best].part:.1g} % of {top})"
+            )
     hidden = result.intact.found.hidden
     for value in hidden.electromechanical if hidden else ():
-        said.append(f"not judged: {value.imag / math.tau:.3f} Hz, {damping_percent(value):.2f} %, outside of --range")
+        said.append(
+            f"not judged: {value.imag / math.tau:.3f} Hz, {damping_percent(value):.2f} %, outside of --range"
+        )
     said += [f"not judged: outage {name}: {why}" for name, why in result.not_judged.items()]
     return said
 
@@ -175,20 +190,26 @@ def remarks(result: SiteResult) -> list[str]:
 def as_json(result: SiteResult) -> dict[str, Any]:
     here, stable = result.intact.name, [at.found.stability.stable for at in result.situations]
     return {
-        **result.prepared.about, "device": result.request.device,
+        **result.prepared.about,
+        "device": result.request.device,
         "units": {
             "damping_points": unit(result),
             "real, imag": "eigenvalue's shift [rad/s] by 1 MW/Hz or 1 Mvar/Hz in phase with the bus's frequency, P "
             "withdrawn and Q injected while it is high; or by the device",
             "p, q": "the same for active and for reactive power; 1 pu of gain on 100 MVA is 100 MW by the rated Hz",
         },
-        "answer": answer(result), "sure": sureness(result), "remarks": remarks(result), "agrees": result.agrees,
+        "answer": answer(result),
+        "sure": sureness(result),
+        "remarks": remarks(result),
+        "agrees": result.agrees,
         "stable": False if False in stable else None if None in stable else True,
-        "warnings": list(result.intact.found.warnings), "code": code_hash(),
+        "warnings": list(result.intact.found.warnings),
+        "code": code_hash(),
         "modes": _modes(result.intact.modes),
         "buses": [
             {
-                "bus": bus, "rank": k + 1,
+                "bus": bus,
+                "rank": k + 1,
                 "shift": {m: _shift(by[bus]) for m, by in result.shifts[DEVICE][here].items()},
                 "p": {m: _shift(by[bus]) for m, by in result.shifts[ACTIVE][here].items()},
                 "q": {m: _shift(by[bus]) for m, by in result.shifts[REACTIVE][here].items()},
@@ -197,45 +218,74 @@ def as_json(result: SiteResult) -> dict[str, Any]:
             for k, bus in enumerate(result.ranking)
         ],
         "outages": [
-            {"outage": at.name, "modes": _modes(at.modes), "best": _best(result, at.name, at.modes[0].label)}
-            for at in result.worst_first if at.name != here
+            {
+                "outage": at.name,
+                "modes": _modes(at.modes),
+                "best": _best(result, at.name, at.modes[0].label),
+            }
+            for at in result.worst_first
+            if at.name != here
         ],
         "not_judged": dict(result.not_judged),
         "confirmed": [_confirmation(one) for one in result.confirmations],
-    }  # fmt: skip
+    }
 
 
 def _modes(modes: tuple[SeenMode, ...]) -> list[dict[str, Any]]:
     return [
-        {"mode": seen.label, **eigenvalue_json(seen.mode.eigenvalue, seen.mode.damping_percent),
-         "components": dict(list(seen.mode.by_component.items())[:3])}
+        {
+            "mode": seen.label,
+            **eigenvalue_json(seen.mode.eigenvalue, seen.mode.damping_percent),
+            "components": dict(list(seen.mode.by_component.items())[:3]),
+        }
         for seen in modes
-    ]  # fmt: skip
+    ]
 
 
 def _shift(shift: SupportShift) -> dict[str, Any]:
-    return {"damping_points": shift.damping, "real": shift.change.real, "imag": shift.change.imag,
-            "part_of_best": shift.part, "controllable": not shift.hardly}  # fmt: skip
+    return {
+        "damping_points": shift.damping,
+        "real": shift.change.real,
+        "imag": shift.change.imag,
+        "part_of_best": shift.part,
+        "controllable": not shift.hardly,
+    }
 
 
 def _best(result: SiteResult, situation: str, mode: str) -> dict[str, float]:
     shifts = result.shifts[DEVICE][situation][mode]
-    return {bus: shifts[bus].damping for bus in sorted(result.ranking, key=lambda bus: -shifts[bus].damping)[:3]}
+    return {
+        bus: shifts[bus].damping
+        for bus in sorted(result.ranking, key=lambda bus: -shifts[bus].damping)[:3]
+    }
 
 
 def _confirmation(one: Confirmation) -> dict[str, Any]:
     if one.failure:
         return {"bus": one.bus, "agrees": False, "failure": one.failure}
-    pod = {} if one.setting is None else {"K": one.setting.gain, "T_S1": one.setting.filters.T_S1,
-                                          "T_S2": one.setting.filters.T_S2, "N_S": one.setting.filters.N_S}  # fmt: skip
+    pod = (
+        {}
+        if one.setting is None
+        else {
+            "K": one.setting.gain,
+            "T_S1": one.setting.filters.T_S1,
+            "T_S2": one.setting.filters.T_S2,
+            "N_S": one.setting.filters.N_S,
+        }
+    )
     device = eigenvalue_json(one.with_device, damping_percent(one.with_device))
     return {
-        "bus": one.bus, "agrees": one.agrees, "error_percent": 100 * one.error,
+        "bus": one.bus,
+        "agrees": one.agrees,
+        "error_percent": 100 * one.error,
         "predicted": {"real": one.predicted.real, "imag": one.predicted.imag},
         "coupled": {"real": one.coupled.real, "imag": one.coupled.imag},
-        "with_device": device, "damping_percent": one.damping,
-        "least_damping_percent": one.least, "stable": one.stable, "pod": pod,
-    }  # fmt: skip
+        "with_device": device,
+        "damping_percent": one.damping,
+        "least_damping_percent": one.least,
+        "stable": one.stable,
+        "pod": pod,
+    }
 
 
 def rows(result: SiteResult) -> list[dict[str, Any]]:
@@ -243,8 +293,9 @@ def rows(result: SiteResult) -> list[dict[str, Any]]:
     content = as_json(result)
     return [
         {"bus": bus["bus"], "rank": bus["rank"], "mode": mode, **shift}
-        for bus in content["buses"] for mode, shift in bus["shift"].items()
-    ]  # fmt: skip
+        for bus in content["buses"]
+        for mode, shift in bus["shift"].items()
+    ]
 
 
 def ranking_table(result: SiteResult) -> Table:
@@ -254,12 +305,17 @@ def ranking_table(result: SiteResult) -> Table:
 
 
 def _cells(result: SiteResult, bus: str) -> list[str]:
-    shifts = (result.shifts[DEVICE][result.intact.name][seen.label][bus] for seen in result.intact.modes)
+    shifts = (
+        result.shifts[DEVICE][result.intact.name][seen.label][bus] for seen in result.intact.modes
+    )
     return ["hardly" if one.hardly else shown(result, one.damping) for one in shifts]
 
 
 def _page(result: SiteResult) -> str:
-    figures, title = Figures(), f"{result.case.table.title or result.case.name}: where to put {device_title(result)}"
+    figures, title = (
+        Figures(),
+        f"{result.case.table.title or result.case.name}: where to put {device_title(result)}",
+    )
     shade = "good" if result.agrees and result.confirmations else "soft"
     lines = "".join(f"<li>{escape(text)}</li>" for text in (*sureness(result), *remarks(result)))
     findings = f'<div class="findings"><p class="{shade}">{escape(answer(result))}</p><ul>{lines}</ul></div>'
@@ -271,9 +327,23 @@ def _page(result: SiteResult) -> str:
         best = []
         for at in outages:
             mode = at.modes[0]
-            there = ", ".join(f"{bus} {shown(result, x)}" for bus, x in _best(result, at.name, mode.label).items())
-            best.append([escape(at.name), escape(mode.label), damping(mode.mode.damping_percent), escape(there)])
-        content.append(("After outages", table("Worst first", ["Outage", "Mode", "Damping [%]", "Best"], best, left=2)))
+            there = ", ".join(
+                f"{bus} {shown(result, x)}" for bus, x in _best(result, at.name, mode.label).items()
+            )
+            best.append(
+                [
+                    escape(at.name),
+                    escape(mode.label),
+                    damping(mode.mode.damping_percent),
+                    escape(there),
+                ]
+            )
+        content.append(
+            (
+                "After outages",
+                table("Worst first", ["Outage", "Mode", "Damping [%]", "Best"], best, left=2),
+            )
+        )
     return document(title, f"{result.prepared.title}; code {code_hash()[:12]}", findings, content)
 
 
@@ -283,7 +353,12 @@ def _map(result: SiteResult, seen: SeenMode, figures: Figures) -> str:
     assert network is not None
     branches = [(line.from_bus, line.to_bus) for line in network.lines]
     branches += [(x.buses[0], bus) for x in network.transformers for bus in x.buses[1:]]
-    texts = {bus: f"{bus}: {shown(result, one.damping)} {unit(result, '100')}" for bus, one in shifts.items()}
+    texts = {
+        bus: f"{bus}: {shown(result, one.damping)} {unit(result, '100')}"
+        for bus, one in shifts.items()
+    }
     who = ", ".join(share_text(entry) for entry in list(seen.mode.by_component.items())[:3])
     text = f"{_called(seen)} ({who}): the redder and larger a bus, the farther support there moves the mode."
-    return figures.add(network_map(seen.label, branches, {b: one.part for b, one in shifts.items()}, texts), text)[0]
+    return figures.add(
+        network_map(seen.label, branches, {b: one.part for b, one in shifts.items()}, texts), text
+    )[0]

@@ -21,15 +21,25 @@ class SspArchive:
         self._members = set(names_in(path, _KIND))
         self.digest = hashlib.sha256(path.read_bytes()).hexdigest()
         if SYSTEM_FILE not in self._members:
-            raise InputError(f"{path}: the archive has no {SYSTEM_FILE} at its top; an SSP must, so export it again")
+            raise InputError(
+                f"{path}: the archive has no {SYSTEM_FILE} at its top; an SSP must, so export it again"
+            )
 
     def member(self, source: str) -> str:
         try:
             uri = urlsplit(source)
         except ValueError as error:
-            raise InputError(f"the source {source!r} is not a URI: {error}; export it again") from error
+            raise InputError(
+                f"the source {source!r} is not a URI: {error}; export it again"
+            ) from error
         path = unquote(uri.path)
-        if uri.scheme or uri.netloc or path.startswith("/") or "\\" in path or ".." in path.split("/"):
+        if (
+            uri.scheme
+            or uri.netloc
+            or path.startswith("/")
+            or "\\" in path
+            or ".." in path.split("/")
+        ):
             raise InputError(
                 f"the source {source!r} lies outside the archive; only what is packed into the .ssp is used: "
                 "export it with its resources"
@@ -46,7 +56,9 @@ class SspArchive:
     def read(self, member: str) -> bytes:
         content = read_member(self.path, member, _KIND)
         if content is None:
-            raise InputError(f"{self.path}: the archive has no {member!r}; export it again with all its resources")
+            raise InputError(
+                f"{self.path}: the archive has no {member!r}; export it again with all its resources"
+            )
         return content
 
     def xml(self, member: str) -> Element:
@@ -54,8 +66,14 @@ class SspArchive:
         check_xml(self.path, member, text)
         try:
             return ElementTree.fromstring(text)
-        except (ElementTree.ParseError, LookupError, ValueError) as error:  # the last two of its encoding
-            raise InputError(f"{self.path}: {member} is not XML: {error}; export it again") from error
+        except (
+            ElementTree.ParseError,
+            LookupError,
+            ValueError,
+        ) as error:  # the last two of its encoding
+            raise InputError(
+                f"{self.path}: {member} is not XML: {error}; export it again"
+            ) from error
 
     def unpack(self, member: str, folder: Path) -> Path:
         """Copy a member into the cache, under its own path in a folder there; an intact copy stays."""

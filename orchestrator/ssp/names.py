@@ -12,8 +12,10 @@ FMU_TYPE = "application/x-fmu-sharedlibrary"
 PARAMETER_SET_TYPE = "application/x-ssp-parameter-set"
 PARAMETER_MAPPING_TYPE = "application/x-ssp-parameter-mapping"
 
-STUDY_TYPE = f"{REVERSE_DOMAIN}.study"  # of our annotation, with the parts of a scenario that SSP cannot express
-OSP_TYPE = "com.opensimulationplatform"  # type of libcosim's annotation, which carries the communication step
+# of our annotation, with the parts of a scenario that SSP cannot express
+STUDY_TYPE = f"{REVERSE_DOMAIN}.study"
+# type of libcosim's annotation, which carries the communication step
+OSP_TYPE = "com.opensimulationplatform"
 
 NAMESPACES = {
     "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
@@ -47,4 +49,6 @@ def xml_text(root: Element) -> bytes:
 def plain_name(name: str, taken: Collection[str] = ()) -> str:
     """A name of letters, digits, ``_`` and ``-`` that is not taken yet; SSP itself allows any text."""
     plain = re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_") or "unnamed"
-    return next(n for n in (plain, *(f"{plain}_{k}" for k in range(2, len(taken) + 3))) if n not in taken)
+    return next(
+        n for n in (plain, *(f"{plain}_{k}" for k in range(2, len(taken) + 3))) if n not in taken
+    )

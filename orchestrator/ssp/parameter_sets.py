@@ -8,7 +8,8 @@ from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import InputError
 from orchestrator.ssp.names import SSP_VERSION, children, tag
 
-SET_NAME = "initialValues"  # one name for the sets of all components: some tools ask by name which to apply
+# one name for the sets of all components: some tools ask by name which to apply
+SET_NAME = "initialValues"
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +41,16 @@ def write_parameter_set(name: str, plan: ComponentPlan, tool: str) -> Element:
                 raise InputError(
                     f"component {name!r}: {variable} is of type {info.type}, whose values cannot be written to an SSP"
                 )
-    used = dict.fromkeys(variables[v].unit for v in values if variables[v].type == "Real" and variables[v].unit)
+    used = dict.fromkeys(
+        variables[v].unit for v in values if variables[v].type == "Real" and variables[v].unit
+    )
     write_units(root, tag("ssv:Units"), used, plan.description.units)
     return root
 
 
-def write_units(parent: Element, name: str, used: Iterable[str], known: Mapping[str, Mapping[str, str]]) -> None:
+def write_units(
+    parent: Element, name: str, used: Iterable[str], known: Mapping[str, Mapping[str, str]]
+) -> None:
     """Define the units that a file uses; a file without units gets no definitions.
 
     ``parent``: takes the group of units as its last element.
@@ -54,7 +59,9 @@ def write_units(parent: Element, name: str, used: Iterable[str], known: Mapping[
     if units := [(unit, known.get(unit, {})) for unit in used]:
         group = SubElement(parent, name)
         for unit, base in units:
-            SubElement(SubElement(group, tag("ssc:Unit"), name=unit), tag("ssc:BaseUnit"), dict(base))
+            SubElement(
+                SubElement(group, tag("ssc:Unit"), name=unit), tag("ssc:BaseUnit"), dict(base)
+            )
 
 
 def read_parameter_set(root: Element) -> dict[str, SspValue]:
@@ -93,7 +100,9 @@ def read_parameter_mapping(root: Element) -> dict[str, str]:
     mapping = {}
     for entry in children(root, "ssm:MappingEntry"):
         source, target = entry.get("source", ""), entry.get("target", "")
-        if change := next((e.tag.rpartition("}")[2] for e in entry if e.tag.endswith("Transformation")), None):
+        if change := next(
+            (e.tag.rpartition("}")[2] for e in entry if e.tag.endswith("Transformation")), None
+        ):
             raise InputError(
                 f"the mapping of {source!r} to {target!r} has a {change}, which is not supported; give the value as "
                 "the component takes it"

@@ -27,11 +27,18 @@ def read_ssp(path: Path, cache: Path) -> SspCase:
     description = archive.xml(SYSTEM_FILE)
     version = description.get("version", "unknown")
     if description.tag != tag("ssd:SystemStructureDescription") or not version.startswith("1."):
-        raise InputError(f"{path}: {SYSTEM_FILE} is of version {version}; SSP 1.0 can be read, ask for that export")
+        raise InputError(
+            f"{path}: {SYSTEM_FILE} is of version {version}; SSP 1.0 can be read, ask for that export"
+        )
     problems: list[Problem] = []
-    structure = read_structure(archive, description, lambda place, text: problems.append(Problem(place, text)))
+    structure = read_structure(
+        archive, description, lambda place, text: problems.append(Problem(place, text))
+    )
     name = description.get("name", "")
-    tables: dict[str, Any] = {"name": plain_name(name), "title": description.get("description", name)}
+    tables: dict[str, Any] = {
+        "name": plain_name(name),
+        "title": description.get("description", name),
+    }
     study, step = None, None
     try:
         tables["solver"] = _times(description)
@@ -55,7 +62,11 @@ def read_ssp(path: Path, cache: Path) -> SspCase:
     if study is not None:
         _add_study(tables, study, path)
     else:
-        suggested = [d.default_step_size for d in descriptions.values() if d is not None and d.default_step_size]
+        suggested = [
+            d.default_step_size
+            for d in descriptions.values()
+            if d is not None and d.default_step_size
+        ]
         tables["solver"] |= {"step_size": step or min(suggested)} if step or suggested else {}
         tables["solver"]["schedule"] = "jacobi"  # does not depend on the order of the elements
     return SspCase(tables, folder, archive.digest)
@@ -68,9 +79,13 @@ def _times(description: Element) -> dict[str, float]:
             try:
                 times[name] = float(text)
             except ValueError as error:
-                raise InputError(f"DefaultExperiment: {name} is {text!r}, which is no number") from error
+                raise InputError(
+                    f"DefaultExperiment: {name} is {text!r}, which is no number"
+                ) from error
     if times.get("startTime", 0.0) != 0:
-        raise InputError(f"DefaultExperiment: the start time is {times['startTime']:g} s; runs start at 0 s here")
+        raise InputError(
+            f"DefaultExperiment: the start time is {times['startTime']:g} s; runs start at 0 s here"
+        )
     return {"stop_time": times["stopTime"]} if "stopTime" in times else {}
 
 
@@ -101,8 +116,14 @@ def _values(structure: Structure, owner: Owner, fmu: FmuDescription | None) -> d
     if fmu is None:
         return {}
     fed = {variable for _, (sink, variable) in structure.connections if sink == owner}
-    values = {v: _converted(value, fmu.variables[v].unit) for v, value in given.items() if v in fmu.variables}
-    open_inputs = {v: fmu.variables[v].start_number for v in fmu.inputs if fmu.variables[v].type == "Real"}
+    values = {
+        v: _converted(value, fmu.variables[v].unit)
+        for v, value in given.items()
+        if v in fmu.variables
+    }
+    open_inputs = {
+        v: fmu.variables[v].start_number for v in fmu.inputs if fmu.variables[v].type == "Real"
+    }
     return {v: value for v, value in (open_inputs | values).items() if v not in fed}
 
 
@@ -116,7 +137,9 @@ def _converted(value: SspValue, unit: str) -> float | bool | str:
 def _add_study(tables: dict[str, Any], study: SspStudy, path: Path) -> None:
     for name, content in study.tables.items():
         if not isinstance(content, type(tables.get(name, content))):
-            raise InputError(f"{path}: the annotation {STUDY_TYPE} gives {name} as {content!r}; export the SSP again")
+            raise InputError(
+                f"{path}: the annotation {STUDY_TYPE} gives {name} as {content!r}; export the SSP again"
+            )
         tables[name] = tables.get(name, {}) | content if isinstance(content, dict) else content
     tables["solver"] |= {
         "step_size": study.step_size,
@@ -124,7 +147,13 @@ def _add_study(tables: dict[str, Any], study: SspStudy, path: Path) -> None:
         "groups": [list(group) for group in study.groups],
     }
     tables["events"] = [
-        {"type": "parameter_change", "time": time, "component": component, "parameter": variable, "value": value}
+        {
+            "type": "parameter_change",
+            "time": time,
+            "component": component,
+            "parameter": variable,
+            "value": value,
+        }
         for time, component, variable, value in study.settings
     ]
     tables["scenarios"] = {plain_name(study.scenario): {"title": study.title}}

@@ -20,7 +20,8 @@ from orchestrator.ssp.names import PARAMETER_SET_TYPE, SSP_VERSION, tag, xml_tex
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"  # where LS-REF has its files
 VERSION = "1.0.0-beta.1"  # of LS-REF
-TOLERANCE = 1e-9  # relative to the largest value of an output: what another compiler's mathematics may change
+# relative to the largest value of an output: what another compiler's mathematics may change
+TOLERANCE = 1e-9
 _LS = "http://fmi-standard.org/fmi-ls-manifest"
 _STEP, _STEPS, _JUMP_AT, _JUMP = 1e-4, 200, 50, 0.01
 
@@ -36,14 +37,24 @@ def reference_members(path: Path) -> dict[str, bytes]:
     stimuli, references, state = _run(description)
     platform = platform_of(description.fmi_version)
     files = {
-        "parameters.ssv": parameter_set("smoke test", {n: v.start for n, v in description.variables.items()
-                                                       if v.causality == "parameter" and v.start is not None},
-                                        description),
+        "parameters.ssv": parameter_set(
+            "smoke test",
+            {
+                n: v.start
+                for n, v in description.variables.items()
+                if v.causality == "parameter" and v.start is not None
+            },
+            description,
+        ),
         "stimuli.csv": stimuli,
         "references.csv": references,
         "smoke-test.exp": _smoke_test(),
-    } | ({f"steady-state.{platform}.bin": state} if state else {})  # fmt: skip
-    members = {"fmi-ls-manifest.xml": manifest({name: (*_purpose(name), text) for name, text in files.items()})} | files
+    } | ({f"steady-state.{platform}.bin": state} if state else {})
+    members = {
+        "fmi-ls-manifest.xml": manifest(
+            {name: (*_purpose(name), text) for name, text in files.items()}
+        )
+    } | files
     return {f"{FOLDER}/{name}": content for name, content in members.items()}
 
 
@@ -61,7 +72,11 @@ def platform_of(fmi_version: str) -> str:
 
 def _run(description: FmuDescription) -> tuple[bytes, bytes, bytes]:
     variables = description.variables.values()
-    inputs = {v.name: float(v.start or 0) for v in variables if v.causality == "input" and v.type == "Real"}
+    inputs = {
+        v.name: float(v.start or 0)
+        for v in variables
+        if v.causality == "input" and v.type == "Real"
+    }
     outputs = [v.name for v in variables if v.causality == "output" and v.type == "Real"]
     given, seen = [["time", *inputs]], [["time", *outputs]]
     with open_component("smoke_test", description) as component:
@@ -94,7 +109,9 @@ def as_csv(rows: Iterable[Sequence[str]]) -> bytes:
     return text.getvalue().encode()
 
 
-def parameter_set(name: str, values: Mapping[str, float | bool | str], description: FmuDescription) -> bytes:
+def parameter_set(
+    name: str, values: Mapping[str, float | bool | str], description: FmuDescription
+) -> bytes:
     root = Element(tag("ssv:ParameterSet"), version=SSP_VERSION, name=name)
     listed = SubElement(root, tag("ssv:Parameters"))
     for variable, value in values.items():
@@ -115,7 +132,11 @@ def _smoke_test() -> bytes:
         "From the start values; the first input rises. References are outputs read after each step, before the next "
         "inputs are set. The tolerance is relative to an output's largest value."
     )
-    sources = {"Parameters": "parameters.ssv", "Stimuli": "stimuli.csv", "References": "references.csv"}
+    sources = {
+        "Parameters": "parameters.ssv",
+        "Stimuli": "stimuli.csv",
+        "References": "references.csv",
+    }
     return experiment("smoke test", text, _STEPS * _STEP, _STEP, sources)
 
 
@@ -123,7 +144,11 @@ def experiment(name: str, text: str, stop: float, step: float, sources: Mapping[
     """A transient simulation; ``sources``: files by what they are, times in s."""
     root = Element("Experiments", name=name[:1].upper() + name[1:])
     found = SubElement(root, "Experiment", name=name, description=text, tolerance=repr(TOLERANCE))
-    SubElement(found, "TransientSimulation", {"startTime": "0.0", "stopTime": repr(stop), "stepSize": repr(step)})
+    SubElement(
+        found,
+        "TransientSimulation",
+        {"startTime": "0.0", "stopTime": repr(stop), "stepSize": repr(step)},
+    )
     for kind, source in sources.items():
         SubElement(found, kind, source=source)
     return xml_text(root)
@@ -142,7 +167,13 @@ def manifest(files: Mapping[str, tuple[str, str, str, bytes]]) -> bytes:
     )
     for name, (type_, role, text, content) in files.items():
         digest = hashlib.sha3_256(content).hexdigest()
-        attributes = {"type": type_, "source": name, "role": role, "description": text, "checksum": digest}
+        attributes = {
+            "type": type_,
+            "source": name,
+            "role": role,
+            "description": text,
+            "checksum": digest,
+        }
         SubElement(root, "Related", attributes)
     return xml_text(root)
 
@@ -159,7 +190,11 @@ def _purpose(name: str) -> tuple[str, str, str]:
             )
         case "bin":
             platform = name.split(".")[1]
-            return "application/octet-stream", f"serialized-state/{platform}", "State after initialisation"
+            return (
+                "application/octet-stream",
+                f"serialized-state/{platform}",
+                "State after initialisation",
+            )
         case _:
             if name.startswith("stimuli"):
                 return "text/csv", "other", "Inputs of the smoke test at each step"

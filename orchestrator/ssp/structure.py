@@ -6,7 +6,13 @@ from xml.etree.ElementTree import Element
 
 from orchestrator.errors import InputError
 from orchestrator.ssp.archive import SspArchive
-from orchestrator.ssp.names import FMU_TYPE, PARAMETER_MAPPING_TYPE, PARAMETER_SET_TYPE, children, tag
+from orchestrator.ssp.names import (
+    FMU_TYPE,
+    PARAMETER_MAPPING_TYPE,
+    PARAMETER_SET_TYPE,
+    children,
+    tag,
+)
 from orchestrator.ssp.parameter_sets import SspValue, read_parameter_mapping, read_parameter_set
 
 Owner = tuple[str, ...]  # path of a component or system below the top system; the top system is ()
@@ -29,7 +35,9 @@ class Structure:
     values: dict[Owner, dict[str, SspValue]] = field(default_factory=dict)
 
 
-def read_structure(archive: SspArchive, description: Element, note: Callable[[str, str], None]) -> Structure:
+def read_structure(
+    archive: SspArchive, description: Element, note: Callable[[str, str], None]
+) -> Structure:
     systems = children(description, "ssd:System")
     if len(systems) != 1:
         note("ssd:System", "there must be exactly one system at the top; export the SSP again")
@@ -62,7 +70,9 @@ class _Reader:
     def _walk(self, system: Element, owner: Owner) -> None:
         for path, what in _REFUSED.items():
             for element in children(system, path):
-                self._refuse((*owner, element.get("name", "")), f"it is {what}, which is not supported")
+                self._refuse(
+                    (*owner, element.get("name", "")), f"it is {what}, which is not supported"
+                )
         self._elements[owner] = []
         self._connectors(system, owner)
         for element, inner in _inside(system, owner):
@@ -86,9 +96,15 @@ class _Reader:
     def _source(self, component: Element, owner: Owner) -> str:
         """The component's member of the archive. If this is not an FMU, the problem is noted and the result is
         empty."""
-        kind, implementation = component.get("type", FMU_TYPE), component.get("implementation", "any")
+        kind, implementation = (
+            component.get("type", FMU_TYPE),
+            component.get("implementation", "any"),
+        )
         if kind != FMU_TYPE:
-            self._refuse(owner, f"it is of type {kind!r}; only FMUs ({FMU_TYPE}) and systems written out are supported")
+            self._refuse(
+                owner,
+                f"it is of type {kind!r}; only FMUs ({FMU_TYPE}) and systems written out are supported",
+            )
         elif implementation == "ModelExchange":
             self._refuse(owner, "it is to run as Model Exchange; only co-simulation is supported")
         else:
@@ -101,20 +117,34 @@ class _Reader:
     def _connection(self, connection: Element, owner: Owner) -> None:
         ends = [self._end(connection, end, owner) for end in ("start", "end")]
         text = " - ".join(map(_text, ends))
-        change = next((e.tag.rpartition("}")[2] for e in connection if e.tag.endswith("Transformation")), None)
+        change = next(
+            (e.tag.rpartition("}")[2] for e in connection if e.tag.endswith("Transformation")), None
+        )
         missing = [node for node in ends if node not in self._kinds]
         sources = [node for node in ends if self._sends(node, owner)]
         if change:
-            self._note(f"connection {text}", f"it has a {change}, which is not supported; do it inside a component")
+            self._note(
+                f"connection {text}",
+                f"it has a {change}, which is not supported; do it inside a component",
+            )
         elif missing:
-            self._note(f"connection {text}", f"there is no connector {' and no '.join(map(_text, missing))}")
+            self._note(
+                f"connection {text}",
+                f"there is no connector {' and no '.join(map(_text, missing))}",
+            )
         elif len(sources) != 1:
             kinds = " and ".join(self._kinds[node] for node in ends)
-            self._note(f"connection {text}", f"it joins connectors of kind {kinds}; one must send and one receive")
+            self._note(
+                f"connection {text}",
+                f"it joins connectors of kind {kinds}; one must send and one receive",
+            )
         else:
             (source,), (sink,) = sources, [node for node in ends if node not in sources]
             if self._feeding.setdefault(sink, source) != source:
-                self._note(f"connection {text}", f"{_text(sink)} is already fed by {_text(self._feeding[sink])}")
+                self._note(
+                    f"connection {text}",
+                    f"{_text(sink)} is already fed by {_text(self._feeding[sink])}",
+                )
 
     @staticmethod
     def _end(connection: Element, end: str, owner: Owner) -> Node:
@@ -157,22 +187,30 @@ class _Reader:
 
     def _values(self, binding: Element) -> Mapping[str, SspValue]:
         self._check_type(binding, PARAMETER_SET_TYPE)
-        values = read_parameter_set(self._content(binding, "ssd:ParameterValues", "ssv:ParameterSet"))
+        values = read_parameter_set(
+            self._content(binding, "ssd:ParameterValues", "ssv:ParameterSet")
+        )
         for mapping in children(binding, "ssd:ParameterMapping"):
             self._check_type(mapping, PARAMETER_MAPPING_TYPE)
             targets = read_parameter_mapping(self._content(mapping, ".", "ssm:ParameterMapping"))
-            return {target: values[source] for target, source in targets.items() if source in values}
+            return {
+                target: values[source] for target, source in targets.items() if source in values
+            }
         return values
 
     @staticmethod
     def _check_type(element: Element, expected: str) -> None:
         if element.get("type", expected) != expected or element.get("sourceBase", "SSD") != "SSD":
-            raise InputError(f"only the type {expected}, with sources relative to the archive, is supported")
+            raise InputError(
+                f"only the type {expected}, with sources relative to the archive, is supported"
+            )
 
     def _content(self, element: Element, inline: str, name: str) -> Element:
         if source := element.get("source"):
             return self._archive.xml(self._archive.member(source))
-        found = next((e for holder in children(element, inline) for e in children(holder, name)), None)
+        found = next(
+            (e for holder in children(element, inline) for e in children(holder, name)), None
+        )
         if found is None:
             raise InputError(f"it has neither a source nor a {name} of its own")
         return found

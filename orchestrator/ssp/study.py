@@ -26,7 +26,8 @@ class SspStudy:
     title: str
     step_size: float  # communication step [s]
     schedule: str
-    groups: tuple[tuple[str, ...], ...]  # groups of components of the schedule, in the order of stepping
+    # groups of components of the schedule, in the order of stepping
+    groups: tuple[tuple[str, ...], ...]
     # the changes by events, in order: time [s], component, variable, value
     settings: tuple[tuple[float, str, str, float | bool], ...]
     # tables of the case file that only this project knows, such as ``analysis`` and ``plots``
@@ -34,11 +35,18 @@ class SspStudy:
 
 
 def study_of(
-    scenario: str, title: str, step_size: float, schedule: Schedule, events: Sequence[Event], tables: Mapping[str, Any]
+    scenario: str,
+    title: str,
+    step_size: float,
+    schedule: Schedule,
+    events: Sequence[Event],
+    tables: Mapping[str, Any],
 ) -> SspStudy:
     """The study of a scenario. Each event is written as the variables that it sets."""
     if faults := faults_among(events):
-        raise InputError(f"an SSP cannot hold faults ({faults[0]}); remove them from the scenario to export it")
+        raise InputError(
+            f"an SSP cannot hold faults ({faults[0]}); remove them from the scenario to export it"
+        )
     settings = tuple(
         (event.time, component, variable, value)
         for event in events
@@ -60,7 +68,14 @@ def write_study(annotations: Element, study: SspStudy) -> None:
     events = SubElement(root, tag("gfor:Events"))
     for time, component, variable, value in study.settings:
         text = str(value).lower() if isinstance(value, bool) else repr(float(value))
-        SubElement(events, tag("gfor:Set"), time=repr(float(time)), component=component, variable=variable, value=text)
+        SubElement(
+            events,
+            tag("gfor:Set"),
+            time=repr(float(time)),
+            component=component,
+            variable=variable,
+            value=text,
+        )
     SubElement(root, tag("gfor:CaseTables")).text = tomli_w.dumps(study.tables)
 
 
@@ -90,16 +105,27 @@ def _read(annotation: Element) -> SspStudy:
     (root,) = children(annotation, "gfor:Study")
     (step,), (schedule,) = children(root, "gfor:CommunicationStep"), children(root, "gfor:Schedule")
     groups = tuple(
-        tuple(c.attrib["name"] for c in children(group, "gfor:Component")) for group in children(schedule, "gfor:Group")
+        tuple(c.attrib["name"] for c in children(group, "gfor:Component"))
+        for group in children(schedule, "gfor:Group")
     )
     settings = tuple(
-        (float(e.attrib["time"]), e.attrib["component"], e.attrib["variable"], _value(e.attrib["value"]))
+        (
+            float(e.attrib["time"]),
+            e.attrib["component"],
+            e.attrib["variable"],
+            _value(e.attrib["value"]),
+        )
         for e in children(root, "gfor:Events/gfor:Set")
     )
     return SspStudy(
-        root.attrib["scenario"], root.get("title", ""), float(step.attrib["seconds"]), schedule.attrib["name"], groups,
-        settings, parsed("".join(e.text or "" for e in children(root, "gfor:CaseTables"))),
-    )  # fmt: skip
+        root.attrib["scenario"],
+        root.get("title", ""),
+        float(step.attrib["seconds"]),
+        schedule.attrib["name"],
+        groups,
+        settings,
+        parsed("".join(e.text or "" for e in children(root, "gfor:CaseTables"))),
+    )
 
 
 def _value(text: str) -> float | bool:

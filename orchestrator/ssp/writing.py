@@ -9,12 +9,22 @@ from xml.etree.ElementTree import Element, SubElement
 from orchestrator.coupling.imperfections import described
 from orchestrator.coupling.system import ComponentPlan, System
 from orchestrator.errors import InputError
-from orchestrator.ssp.names import FMU_TYPE, PARAMETER_SET_TYPE, SSP_VERSION, SYSTEM_FILE, plain_name, tag, xml_text
+from orchestrator.ssp.names import (
+    FMU_TYPE,
+    PARAMETER_SET_TYPE,
+    SSP_VERSION,
+    SYSTEM_FILE,
+    plain_name,
+    tag,
+    xml_text,
+)
 from orchestrator.ssp.parameter_sets import write_parameter_set, write_units
 from orchestrator.ssp.study import SspStudy, write_osp_step, write_study
 
 
-def ssp_members(name: str, title: str, system: System, stop_time: float, study: SspStudy) -> dict[str, bytes]:
+def ssp_members(
+    name: str, title: str, system: System, stop_time: float, study: SspStudy
+) -> dict[str, bytes]:
     """Members of the archive by path: the structure, the components' values and their FMUs."""
     if disturbed := described(system.wires):
         raise InputError(
@@ -29,7 +39,11 @@ def ssp_members(name: str, title: str, system: System, stop_time: float, study: 
             stems = [Path(file).stem for file in files.values()]
             files[component] = f"resources/{plain_name(component, stems)}.ssv"
             sets[files[component]] = write_parameter_set(component, plan, tool)
-    contents = {SYSTEM_FILE: xml_text(_description(name, title, system, fmus, files, stop_time, study, tool))}
+    contents = {
+        SYSTEM_FILE: xml_text(
+            _description(name, title, system, fmus, files, stop_time, study, tool)
+        )
+    }
     contents |= {member: xml_text(root) for member, root in sets.items()}
     return contents | {member: path.read_bytes() for path, member in fmus.items()}
 
@@ -46,10 +60,18 @@ def _file_names(system: System) -> dict[Path, str]:
 
 
 def _description(
-    name: str, title: str, system: System, fmus: Mapping[Path, str], files: Mapping[str, str], stop_time: float,
-    study: SspStudy, tool: str,
-) -> Element:  # fmt: skip
-    root = Element(tag("ssd:SystemStructureDescription"), version=SSP_VERSION, name=name, generationTool=tool)
+    name: str,
+    title: str,
+    system: System,
+    fmus: Mapping[Path, str],
+    files: Mapping[str, str],
+    stop_time: float,
+    study: SspStudy,
+    tool: str,
+) -> Element:
+    root = Element(
+        tag("ssd:SystemStructureDescription"), version=SSP_VERSION, name=name, generationTool=tool
+    )
     if title:
         root.set("description", title)
     top = SubElement(root, tag("ssd:System"), name=plain_name(name))
@@ -68,21 +90,33 @@ def _description(
         units |= {unit: base for unit, base in plan.description.units.items() if unit not in units}
     used = {e.get("unit", "") for e in top.iter(tag("ssc:Real"))} - {""}
     write_units(root, tag("ssd:Units"), sorted(used), units)
-    experiment = SubElement(root, tag("ssd:DefaultExperiment"), startTime="0.0", stopTime=repr(float(stop_time)))
+    experiment = SubElement(
+        root, tag("ssd:DefaultExperiment"), startTime="0.0", stopTime=repr(float(stop_time))
+    )
     write_osp_step(SubElement(experiment, tag("ssd:Annotations")), study.step_size)
     write_study(SubElement(root, tag("ssd:Annotations")), study)
     return root
 
 
 def _component(
-    elements: Element, name: str, plan: ComponentPlan, source: str, values: str | None, system: System
+    elements: Element,
+    name: str,
+    plan: ComponentPlan,
+    source: str,
+    values: str | None,
+    system: System,
 ) -> None:
     """A component with connectors for its outputs and the inputs that something feeds.
 
     An input that is constant has its value from the parameter set and no connector: some tools take every input
     connector for a connected one."""
     component = SubElement(
-        elements, tag("ssd:Component"), name=name, type=FMU_TYPE, source=source, implementation="CoSimulation"
+        elements,
+        tag("ssd:Component"),
+        name=name,
+        type=FMU_TYPE,
+        source=source,
+        implementation="CoSimulation",
     )
     fed = [c.target.variable for c in system.connections if c.target.component == name]
     kinds = [(v, "input") for v in fed] + [(v, "output") for v in plan.description.outputs]
@@ -95,4 +129,6 @@ def _component(
             SubElement(connector, tag("ssc:Real"), {"unit": unit} if unit else {})
     if values is not None:
         bindings = SubElement(component, tag("ssd:ParameterBindings"))
-        SubElement(bindings, tag("ssd:ParameterBinding"), type=PARAMETER_SET_TYPE, source=quote(values))
+        SubElement(
+            bindings, tag("ssd:ParameterBinding"), type=PARAMETER_SET_TYPE, source=quote(values)
+        )

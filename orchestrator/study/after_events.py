@@ -14,7 +14,9 @@ def lasting_changes(prepared: PreparedScenario) -> Mapping[str, float | bool]:
     return {name: value for name, value in left.items() if ".fault." not in name}
 
 
-def modes_after(prepared: PreparedScenario, frequency_range: tuple[float, float]) -> ModesResult | str | None:
+def modes_after(
+    prepared: PreparedScenario, frequency_range: tuple[float, float]
+) -> ModesResult | str | None:
     """The modes from a power flow with what the events leave changed; the reason where there are none beside a switch
     that is left, else None. Units share what loads and references change, which no power flow tells."""
     values = lasting_changes(prepared)

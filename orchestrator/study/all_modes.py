@@ -16,14 +16,20 @@ from orchestrator.study.modes import Linearised, ModesResult, compute_modes, lin
 
 
 def compute_all_modes(
-    scenarios: Sequence[PreparedScenario], frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
-    critical: float | None = None, *, directional: bool = False,
-) -> list[ModesResult]:  # fmt: skip
+    scenarios: Sequence[PreparedScenario],
+    frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
+    critical: float | None = None,
+    *,
+    directional: bool = False,
+) -> list[ModesResult]:
     """The same as `compute_modes` of each scenario, in their order, to the last bit.
 
     FMUs of others are instantiated by one scenario at a time: they may allow one instance, or share a file."""
     if len(scenarios) < 2 or not all(all_ours(prepared) for prepared in scenarios):
-        return [compute_modes(one, frequency_range, critical, directional=directional) for one in scenarios]
+        return [
+            compute_modes(one, frequency_range, critical, directional=directional)
+            for one in scenarios
+        ]
     results: list[ModesResult] = []
     before: Linearised | None = None
     done: dict[str, NamedSystem] = {}
@@ -32,7 +38,9 @@ def compute_all_modes(
             with ExitStack() as fmus:
                 try:
                     master = fmus.enter_context(running(in_service(prepared)))
-                    begun = linearised(prepared, master, frequency_range, critical, directional=directional)
+                    begun = linearised(
+                        prepared, master, frequency_range, critical, directional=directional
+                    )
                 except Exception:
                     if before is not None:
                         before.finished()  # an error of its own comes first
@@ -53,4 +61,6 @@ def compute_all_modes(
 def all_ours(prepared: PreparedScenario) -> bool:
     """Whether no FMU of a scenario is another's: those may allow one instance, or share a file or a licence."""
     plans = prepared.system.components.values()
-    return all(plan.isolated is not True for plan in plans) and all(map(is_ours, {p.description.path for p in plans}))
+    return all(plan.isolated is not True for plan in plans) and all(
+        map(is_ours, {p.description.path for p in plans})
+    )

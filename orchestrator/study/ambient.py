@@ -42,8 +42,15 @@ class AmbientModes:
         Damping below which it is an alarm [%].
     """
 
-    def __init__(self, label: str, signals: Sequence[str], windows: Sequence[AmbientWindow], level: float) -> None:
-        self.label, self.signals, self.windows, self.level = label, list(signals), list(windows), level
+    def __init__(
+        self, label: str, signals: Sequence[str], windows: Sequence[AmbientWindow], level: float
+    ) -> None:
+        self.label, self.signals, self.windows, self.level = (
+            label,
+            list(signals),
+            list(windows),
+            level,
+        )
 
     def __iter__(self) -> Iterator[AmbientWindow]:
         return iter(self.windows)
@@ -58,7 +65,11 @@ class AmbientModes:
         """
         if mode.forced or mode.damping_percent >= self.level:
             return "forced" if mode.forced else ""
-        return "below" if mode.damping_percent + mode.damping_error_percent < self.level else "perhaps below"
+        return (
+            "below"
+            if mode.damping_percent + mode.damping_error_percent < self.level
+            else "perhaps below"
+        )
 
     @property
     def sentence(self) -> str:
@@ -75,19 +86,50 @@ class AmbientModes:
         """The same as ``gfor signal identify --ambient --json`` prints, as JSON's types."""
         rows = self.table().to_dict("records")
         windows = [
-            {"start": w.start, "stop": w.stop, "failure": w.failure, "modes": [
-                {key: row[key] for key in _FIGURES} | {"alarm": row["alarm"], "shape": {
-                    name: [z.real, z.imag] for name, z in zip(self.signals, m.shape, strict=True)}}
-                for row, m in zip([r for r in rows if r["start"] == w.start], w.modes, strict=True)]}
+            {
+                "start": w.start,
+                "stop": w.stop,
+                "failure": w.failure,
+                "modes": [
+                    {key: row[key] for key in _FIGURES}
+                    | {
+                        "alarm": row["alarm"],
+                        "shape": {
+                            name: [z.real, z.imag]
+                            for name, z in zip(self.signals, m.shape, strict=True)
+                        },
+                    }
+                    for row, m in zip(
+                        [r for r in rows if r["start"] == w.start], w.modes, strict=True
+                    )
+                ],
+            }
             for w in self.windows
-        ]  # fmt: skip
-        return {"record": self.label, "signals": self.signals, "level_percent": self.level, "sentence": self.sentence,
-                "windows": windows}  # fmt: skip
+        ]
+        return {
+            "record": self.label,
+            "signals": self.signals,
+            "level_percent": self.level,
+            "sentence": self.sentence,
+            "windows": windows,
+        }
 
     def table(self) -> pd.DataFrame:
         """One row for every mode of every window [s, Hz, %], with half-widths of 95 % intervals."""
-        rows = [(w.start, w.stop, m.frequency_hz, m.frequency_error_hz, m.damping_percent, m.damping_error_percent,
-                 m.share, self.alarm(m)) for w in self.windows for m in w.modes]  # fmt: skip
+        rows = [
+            (
+                w.start,
+                w.stop,
+                m.frequency_hz,
+                m.frequency_error_hz,
+                m.damping_percent,
+                m.damping_error_percent,
+                m.share,
+                self.alarm(m),
+            )
+            for w in self.windows
+            for m in w.modes
+        ]
         return pd.DataFrame(rows, columns=["start", "stop", *_FIGURES, "alarm"])
 
     def save_picture(self, path: str | Path) -> None:
@@ -100,11 +142,15 @@ class AmbientModes:
         rows = self.table()
         with rc_context(STYLE):
             figure = Figure(figsize=(8, 5), layout="constrained")
-            for axes, name in zip(figure.subplots(2, 1, sharex=True), ("frequency", "damping"), strict=True):
+            for axes, name in zip(
+                figure.subplots(2, 1, sharex=True), ("frequency", "damping"), strict=True
+            ):
                 unit = _FIGURES[0 if name == "frequency" else 2]
                 error = rows[_FIGURES[1 if name == "frequency" else 3]]
                 sure = [colour(2 if alarm == "below" else 1) for alarm in rows["alarm"]]
-                axes.errorbar(rows["stop"], rows[unit], yerr=error, fmt="none", ecolor="#bbb", elinewidth=1)
+                axes.errorbar(
+                    rows["stop"], rows[unit], yerr=error, fmt="none", ecolor="#bbb", elinewidth=1
+                )
                 axes.scatter(rows["stop"], rows[unit], s=8 + 60 * rows["share"], c=sure, zorder=3)
                 axes.set_ylabel("Frequency [Hz]" if name == "frequency" else "Damping [%]")
             axes.axhline(self.level, color=colour(2), linestyle="--")
@@ -119,14 +165,25 @@ class AmbientModes:
         with TemporaryDirectory() as folder:
             self.save_picture(picture := Path(folder) / "ambient.png")
             data = b64encode(picture.read_bytes()).decode()
-        rows = [[f"{r.stop:g}", f"{r.frequency_hz:.3f} ± {r.frequency_error_hz:.3f}",
-                 f"{damping(r.damping_percent, self.level)} ± {r.damping_error_percent:.1f}", f"{r.share:.0%}", r.alarm]
-                for r in self.table().itertuples()]  # fmt: skip
+        rows = [
+            [
+                f"{r.stop:g}",
+                f"{r.frequency_hz:.3f} ± {r.frequency_error_hz:.3f}",
+                f"{damping(r.damping_percent, self.level)} ± {r.damping_error_percent:.1f}",
+                f"{r.share:.0%}",
+                r.alarm,
+            ]
+            for r in self.table().itertuples()
+        ]
         columns = ["Window's end [s]", "f [Hz]", "Damping [%]", "Part of the variance", "Alarm"]
         chart = f'<img alt="modes over the time" style="max-width:100%" src="data:image/png;base64,{data}">'
         said = f"<p>{escape(self.sentence)}.</p>"
-        return document(f"Modes of {self.label} in noise", escape(", ".join(self.signals)), said, [
-            ("Over the time", chart), ("Modes", table("Modes", columns, rows))])  # fmt: skip
+        return document(
+            f"Modes of {self.label} in noise",
+            escape(", ".join(self.signals)),
+            said,
+            [("Over the time", chart), ("Modes", table("Modes", columns, rows))],
+        )
 
     def save(self, folder: str | Path) -> None:
         """Write ``ambient.json``, ``.csv``, ``.png`` and ``.html``."""
@@ -143,4 +200,10 @@ class AmbientModes:
         return page(repr(self).strip("<>"), [self.sentence], self.table())
 
 
-_FIGURES = ("frequency_hz", "frequency_error_hz", "damping_percent", "damping_error_percent", "share")
+_FIGURES = (
+    "frequency_hz",
+    "frequency_error_hz",
+    "damping_percent",
+    "damping_error_percent",
+    "share",
+)

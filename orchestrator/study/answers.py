@@ -20,14 +20,19 @@ from orchestrator.study.run import RunResult
 from orchestrator.watch.confirmation import PERIODS
 
 _LONGEST = 120  # of a remark [characters]; the whole text stands among the details
-_NEAR, _FAR = 0.5, 4.0  # damping after events [%]: up to here it decides nothing, from here on no run need show it
+# damping after events [%]: up to here it decides nothing, from here on no run need show it
+_NEAR, _FAR = 0.5, 4.0
 _MANY = 30  # periods in which a run shows whether a mode grows that hardly decays
 
 KINDS = {
-    "growth": "grows", "growing_oscillation": "an oscillation grows", "sustained_oscillation": "oscillates on",
-    "run_away": "runs away", "loss_of_synchronism": "loses synchronism", "not_finite": "values are no numbers",
+    "growth": "grows",
+    "growing_oscillation": "an oscillation grows",
+    "sustained_oscillation": "oscillates on",
+    "run_away": "runs away",
+    "loss_of_synchronism": "loses synchronism",
+    "not_finite": "values are no numbers",
     "failure": "fails",
-}  # fmt: skip
+}
 """In words, the findings that no stable system gives."""
 
 
@@ -53,7 +58,10 @@ class ScenarioAnswer:
 
 
 def of_modes(result: ModesResult) -> ScenarioAnswer:
-    verdict, mode = result.stability, min(result.modes, key=lambda m: m.damping_percent, default=None)
+    verdict, mode = (
+        result.stability,
+        min(result.modes, key=lambda m: m.damping_percent, default=None),
+    )
     swing = "" if mode is None else _swing(result, mode)
     remark = swing
     if verdict.stable is None:
@@ -61,14 +69,21 @@ def of_modes(result: ModesResult) -> ScenarioAnswer:
     elif verdict.stable is False and verdict.mode is not None:
         low, high = (0.0, 0.0) if result.hidden is None else result.hidden.frequency_range
         hertz = verdict.mode.frequency_hz
-        where = "" if low <= hertz <= high else f" at {hertz:.4g} Hz" if hertz else " without oscillation"
+        where = (
+            ""
+            if low <= hertz <= high
+            else f" at {hertz:.4g} Hz"
+            if hertz
+            else " without oscillation"
+        )
         by = f": {verdict.mode.participation[0][0]}" if where and verdict.mode.participation else ""
         because = "" if verdict.cause is not Cause.COUPLING else "; cause: the coupling"
         remark = f"grows at {verdict.mode.eigenvalue.real:+.3g} 1/s{where}{by}{because}"
         remark += f"; {swing}" if swing and not where else ""
     told = [remark] if remark else []
     told += [
-        f"{name}: {m.frequency_hz:.3f} Hz, {m.damping_percent:.2f} %" for name, m in _named_elsewhere(result, mode)
+        f"{name}: {m.frequency_hz:.3f} Hz, {m.damping_percent:.2f} %"
+        for name, m in _named_elsewhere(result, mode)
     ]
     told += [f"which mode is {name!r} is not known" for name in result.unnamed]
     remark = _with_misfits(result, "; ".join(told))
@@ -77,7 +92,9 @@ def of_modes(result: ModesResult) -> ScenarioAnswer:
 
 def _named_elsewhere(result: ModesResult, least: Mode | None) -> list[tuple[str, Mode]]:
     """The only mode that the case looks for, where another one is damped less."""
-    looked_for = list(result.named.items()) if len(result.prepared.case.table.analysis.modes) == 1 else []
+    looked_for = (
+        list(result.named.items()) if len(result.prepared.case.table.analysis.modes) == 1 else []
+    )
     return [(name, mode) for name, mode in looked_for if mode is not least]
 
 
@@ -87,7 +104,11 @@ def of_run(result: RunResult) -> ScenarioAnswer:
     if not isinstance(after := result.after, ModesResult):
         return answer
     left, swing = of_modes(after), _deciding(after)
-    if swing and swing.damping_percent < _NEAR and (swing.damping_percent > -_NEAR or _settles(result, answer, swing)):
+    if (
+        swing
+        and swing.damping_percent < _NEAR
+        and (swing.damping_percent > -_NEAR or _settles(result, answer, swing))
+    ):
         told = f"{answer.remark}; {swing.damping_percent:+.2f} % after the events, by a power flow, decides nothing"
         return replace(answer, after=swing, remark=told if answer.good else answer.remark)
     if left.good is False and answer.good is not False:
@@ -100,7 +121,9 @@ def _by_response(result: RunResult) -> ScenarioAnswer:
     by_modes = of_modes(result.modes)
     title, mode = by_modes.subject, by_modes.mode
     if isinstance(result.failure, RunInterruptedError):
-        return ScenarioAnswer(title, None, "interrupted", mode, short(str(result.failure), _LONGEST))
+        return ScenarioAnswer(
+            title, None, "interrupted", mode, short(str(result.failure), _LONGEST)
+        )
     if result.went_unstable:
         worst = result.went_unstable[0]
         what = f"{worst.component}: {KINDS[worst.kind]} from {worst.time:.4g} s"
@@ -112,7 +135,11 @@ def _by_response(result: RunResult) -> ScenarioAnswer:
     if missing := result.missing_limits:
         names = ", ".join(dict.fromkeys(finding.component for finding in missing))
         table = result.modes.prepared.case.table
-        how = "--set models=emt" if table.models and table.emt.step_size else "EMT models, whose names lack `_phasor`"
+        how = (
+            "--set models=emt"
+            if table.models and table.emt.step_size
+            else "EMT models, whose names lack `_phasor`"
+        )
         remark = f"the current limit of {names} would act, which the model lacks: repeat with {how}"
         return ScenarioAnswer(title, None, "not known", mode, short(remark, _LONGEST))
     end = result.modes.prepared.stop_time
@@ -121,17 +148,25 @@ def _by_response(result: RunResult) -> ScenarioAnswer:
         remark = f"the run ends at {end:g} s, before its events (t = {later}): without --stop it reaches them"
         return ScenarioAnswer(title, None, "not known", mode, short(remark, _LONGEST))
     if result.stable_in_simulation is None:
-        return ScenarioAnswer(title, None, "not known", mode, "not judged throughout; the findings say where and why")
+        return ScenarioAnswer(
+            title, None, "not known", mode, "not judged throughout; the findings say where and why"
+        )
     if by_modes.good is None:
         return by_modes
     if not result.modes.prepared.events:
-        return replace(by_modes, remark="; ".join(filter(None, ("no event disturbs it", by_modes.remark))))
-    if forced := [e for e in result.modes.prepared.events if isinstance(e, Forcing) and (e.end or end) >= end]:
+        return replace(
+            by_modes, remark="; ".join(filter(None, ("no event disturbs it", by_modes.remark)))
+        )
+    if forced := [
+        e for e in result.modes.prepared.events if isinstance(e, Forcing) and (e.end or end) >= end
+    ]:
         names = ", ".join(dict.fromkeys(f"{e.component}.{e.variable}" for e in forced))
         remark = f"keeps synchronism until {end:g} s; {names}: forced until then, so settling is not judged"
         return ScenarioAnswer(title, None, "not known", mode, short(remark, _LONGEST))
     if (wanted := _seen_from(result, mode)) > end:
-        remark = f"the run is too short to show whether what the events leave settles: --stop {wanted:g}"
+        remark = (
+            f"the run is too short to show whether what the events leave settles: --stop {wanted:g}"
+        )
         return ScenarioAnswer(title, None, "not known", mode, short(remark, _LONGEST))
     rest = f", before the events at {later}" if later else ""
     rest += f"; {by_modes.remark}" if by_modes.remark else ""
@@ -147,12 +182,23 @@ def _seen_from(result: RunResult, mode: Mode | None) -> float:
     open_ = not judged or (swing is not None and swing.damping_percent < _FAR)
     if mode is None or not open_ or not lasting_changes(result.modes.prepared):
         return 0.0
-    return _after(result, swing or mode, _MANY if swing and abs(swing.damping_percent) < _NEAR else PERIODS)
+    return _after(
+        result, swing or mode, _MANY if swing and abs(swing.damping_percent) < _NEAR else PERIODS
+    )
 
 
 def _after(result: RunResult, mode: Mode, periods: float) -> float:
     """So many periods of a mode after the last event [s]."""
-    return ceil(10 * (max(event.time for event in result.modes.prepared.events) + periods / mode.frequency_hz)) / 10
+    return (
+        ceil(
+            10
+            * (
+                max(event.time for event in result.modes.prepared.events)
+                + periods / mode.frequency_hz
+            )
+        )
+        / 10
+    )
 
 
 def _settles(result: RunResult, answer: ScenarioAnswer, swing: Mode) -> bool:
@@ -167,13 +213,20 @@ def _deciding(after: ModesResult) -> Mode | None:
     a mode's damping was up to 3 points off in systems that were tuned for it."""
     least = min(after.modes, key=lambda mode: mode.damping_percent, default=None)
     grows = after.stability.mode if after.stability.stable is False else least
-    if least is None or grows is None or grows.eigenvalue != least.eigenvalue or not least.is_oscillation:
+    if (
+        least is None
+        or grows is None
+        or grows.eigenvalue != least.eigenvalue
+        or not least.is_oscillation
+    ):
         return None
     return least
 
 
 def _with_misfits(result: ModesResult, remark: str) -> str:
-    faults = [f"{name}: {', '.join(m.fault for m in found)}" for name, found in result.misfits.items()]
+    faults = [
+        f"{name}: {', '.join(m.fault for m in found)}" for name, found in result.misfits.items()
+    ]
     return short("; ".join([*faults, remark] if remark else faults), _LONGEST)
 
 
@@ -182,12 +235,19 @@ def answers_table(answers: Sequence[ScenarioAnswer], frequency_range: tuple[floa
     table = make_table("", "Scenario", "Verdict", "f [Hz]", "Damping [%]", left=2)
     table.title = None
     when = ", before → after the events" if any(answer.after for answer in answers) else ""
-    table.add_column(f"Least damped mode from {low:g} to {high:g} Hz{when}: who swings; remark", overflow="fold")
+    table.add_column(
+        f"Least damped mode from {low:g} to {high:g} Hz{when}: who swings; remark", overflow="fold"
+    )
     for answer in answers:
         mode = answer.mode
         modes = [one for one in (mode, answer.after) if one]
-        figures = [" → ".join(found) or "–" for found in ([f"{m.frequency_hz:.3f}" for m in modes],
-                                                          [f"{m.damping_percent:.2f}" for m in modes])]  # fmt: skip
+        figures = [
+            " → ".join(found) or "–"
+            for found in (
+                [f"{m.frequency_hz:.3f}" for m in modes],
+                [f"{m.damping_percent:.2f}" for m in modes],
+            )
+        ]
         word = Text(answer.verdict, style=f"bold {COLOURS[answer.good]}")
         table.add_row(answer.subject, word, *figures, answer.remark)
     return table
@@ -199,8 +259,15 @@ def outside(results: Sequence[ModesResult]) -> str:
     if not counts or counts == [0]:
         return ""
     number = f"{counts[0]} to {counts[-1]}" if len(counts) > 1 else f"{counts[0]}"
-    swings = max((r.hidden for r in results if r.hidden is not None), key=lambda hidden: len(hidden.electromechanical))
-    wide = f", of which machines swing in {len(swings.electromechanical)}" if swings.electromechanical else ""
+    swings = max(
+        (r.hidden for r in results if r.hidden is not None),
+        key=lambda hidden: len(hidden.electromechanical),
+    )
+    wide = (
+        f", of which machines swing in {len(swings.electromechanical)}"
+        if swings.electromechanical
+        else ""
+    )
     return f"Outside of the range: {number} oscillatory modes{wide}; --details tells of them."
 
 

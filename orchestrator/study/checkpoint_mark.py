@@ -30,7 +30,11 @@ _SHOWN = 4  # so many differences are named
 def mark_of(prepared: PreparedScenario) -> dict[str, str]:
     """Everything that the values of a run depend on, by name."""
     groups = " | ".join(", ".join(group) for group in prepared.schedule.groups)
-    tolerance = "" if prepared.schedule.tolerance is None else f", tolerance {prepared.schedule.tolerance:g}"
+    tolerance = (
+        ""
+        if prepared.schedule.tolerance is None
+        else f", tolerance {prepared.schedule.tolerance:g}"
+    )
     found = {
         "gfor-cosim": version("gfor-cosim"),
         **library_versions(),
@@ -47,21 +51,33 @@ def mark_of(prepared: PreparedScenario) -> dict[str, str]:
     }
     for name, plan in prepared.system.components.items():
         file, port = component_content(plan.description)
-        found[f"the FMU of {name!r} ({plan.description.path.name})"] = file  # the name only: our own lie in a cache
+        # the name only: our own lie in a cache
+        found[f"the FMU of {name!r} ({plan.description.path.name})"] = file
         found[f"the binding of {name!r}"] = port
         found[f"whether {name!r} runs in a process of its own"] = str(plan.isolated)
         found |= {f"the start value of {name}.{v}": repr(x) for v, x in plan.inputs.items()}
-    found |= {f"the connection into {target}": str(plan) for target, plan in prepared.system.wires.items()}
+    found |= {
+        f"the connection into {target}": str(plan) for target, plan in prepared.system.wires.items()
+    }
     return found | {name: repr(value) for name, value in prepared.values.items()}
 
 
 def computed(prepared: PreparedScenario) -> dict[str, str]:
     """When and from what a run was computed: date, hash of the code, and hashes of the case's text and of all files."""
-    case, fmus = prepared.case, {plan.description.path for plan in prepared.system.components.values()}
-    paths = files_named(case.text, case.directory) | {path.name: path for path in sorted(fmus) if path.is_file()}
+    case, fmus = (
+        prepared.case,
+        {plan.description.path for plan in prepared.system.components.values()},
+    )
+    paths = files_named(case.text, case.directory) | {
+        path.name: path for path in sorted(fmus) if path.is_file()
+    }
     files = {name: sha256_of(path) for name, path in paths.items()}
     inputs = {case.path.name: hashlib.sha256(case.text.encode()).hexdigest(), **files}
-    return {"date": f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC", "code": code_hash(), "inputs": json.dumps(inputs)}
+    return {
+        "date": f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
+        "code": code_hash(),
+        "inputs": json.dumps(inputs),
+    }
 
 
 @lru_cache(maxsize=4)
@@ -89,19 +105,27 @@ def _entries(content: Any, keys: Keys = ()) -> Iterator[tuple[Keys, str]]:
 
 
 def differences(
-    then: Mapping[str, str], now: Mapping[str, str], texts: tuple[str, str] | None = None, file: Path | None = None
+    then: Mapping[str, str],
+    now: Mapping[str, str],
+    texts: tuple[str, str] | None = None,
+    file: Path | None = None,
 ) -> str:
     """What is not as it was, in words; empty where all is."""
     found = sorted(_differences(then, now), key=lambda words: not words.startswith(f"{_CASE} "))
     if texts is not None and _digest(texts[0]) == then.get(_CASE) != now.get(_CASE):
-        found = [*(_in_the_case(*texts, file) or [f"{_CASE} has its tables in another order"]), *found[1:]]
+        found = [
+            *(_in_the_case(*texts, file) or [f"{_CASE} has its tables in another order"]),
+            *found[1:],
+        ]
     return few(found, _SHOWN, "; ")
 
 
 def _in_the_case(was: str, is_now: str, file: Path | None) -> list[str]:
     """What differs between two texts of a case; a key that is there now with its line."""
     then, now = (dict(_entries(_read(text))) for text in (was, is_now))
-    places = {keys: place_in(is_now if keys in now else "", keys) or "its text" for keys in (*then, *now)}
+    places = {
+        keys: place_in(is_now if keys in now else "", keys) or "its text" for keys in (*then, *now)
+    }
     name = _CASE if file is None else f"{_CASE} {file}"
     by_place = ({places[keys]: value for keys, value in entries.items()} for entries in (then, now))
     return [f"in {name}, {words}" for words in _differences(*by_place)]

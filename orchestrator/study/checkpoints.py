@@ -20,7 +20,12 @@ from orchestrator.study.checkpoint_mark import differences, mark_of
 
 
 def take_back(
-    recording: RecordingFolder, names: tuple[str, ...], rows: int, block: int, whole: Iterable[Path], run: str
+    recording: RecordingFolder,
+    names: tuple[str, ...],
+    rows: int,
+    block: int,
+    whole: Iterable[Path],
+    run: str,
 ) -> bool:
     """Make a recording hold at least so many rows, from files into which they were joined if need be."""
     import h5py  # noqa: PLC0415 - a tenth of a second that only a resumed run needs
@@ -45,8 +50,11 @@ def take_back(
 
 CASE = "case.toml"  # among the checkpoints: the case's text when the run began
 EVERY = 60.0  # wall-clock time between two checkpoints [s]
-_SHARE = 0.02  # most of a run's time that may go into checkpoints: where one takes long, the next waits longer
-_SHORT = 10.0  # A scenario that was done in less wall-clock time [s] is run again: to keep it would cost a part of that
+# most of a run's time that may go into checkpoints: where one takes long, the next waits longer
+_SHARE = 0.02
+# A scenario that was done in less wall-clock time [s] is run again: to keep it would cost a part of
+# that
+_SHORT = 10.0
 
 
 def not_kept(prepared: PreparedScenario) -> dict[str, str]:
@@ -57,8 +65,12 @@ def not_kept(prepared: PreparedScenario) -> dict[str, str]:
         return {first: "with a tolerance nothing is kept, as the length of the next step is not"}
     if prepared.schedule.coupling == "newton":
         first = next(iter(prepared.system.components))
-        return {first: "under the schedule newton nothing is kept, as the derivatives of its steps are not"}
-    reasons = {name: why_not_kept(plan.description) for name, plan in prepared.system.components.items()}
+        return {
+            first: "under the schedule newton nothing is kept, as the derivatives of its steps are not"
+        }
+    reasons = {
+        name: why_not_kept(plan.description) for name, plan in prepared.system.components.items()
+    }
     return {name: reason for name, reason in reasons.items() if reason is not None}
 
 
@@ -70,10 +82,20 @@ class Checkpoints:
     ``say``: told, in one line each, what a user should know."""
 
     def __init__(
-        self, prepared: PreparedScenario, folder: Path, every: float, *, resume: bool, say: Callable[[str], None]
+        self,
+        prepared: PreparedScenario,
+        folder: Path,
+        every: float,
+        *,
+        resume: bool,
+        say: Callable[[str], None],
     ) -> None:
         self._name, self._say, self._every = prepared.name, say, every
-        self._mark, self._step_size, self._recorded = mark_of(prepared), prepared.step_size, prepared.record
+        self._mark, self._step_size, self._recorded = (
+            mark_of(prepared),
+            prepared.step_size,
+            prepared.record,
+        )
         self._path = folder / f"{quote(prepared.name, safe='')}{checkpoint_file.CHECKPOINT}"
         self._case, self._text, self._file = folder / CASE, prepared.case.text, prepared.case.path
         self._written = False
@@ -100,7 +122,8 @@ class Checkpoints:
 
     @property
     def exist(self) -> bool:
-        return self._path.exists() or self._kept is not None  # perhaps written by a copy of this process
+        # perhaps written by a copy of this process
+        return self._path.exists() or self._kept is not None
 
     def recording(self, prepared: PreparedScenario) -> RecordingFolder:
         """A recording beside the checkpoints, which has what was recorded until the newest."""
@@ -118,7 +141,9 @@ class Checkpoints:
             return
         rows, block = int(position["rows"]), int(position["block"])
         if not take_back(recording, self._recorded, rows, block, whole, run):
-            self.forget("what it has recorded until the checkpoint is not there any more, or is damaged")
+            self.forget(
+                "what it has recorded until the checkpoint is not there any more, or is damaged"
+            )
 
     def forget(self, reason: str) -> None:
         self._say(f"scenario {self._name!r} is computed from its start again: {reason}")
@@ -194,7 +219,9 @@ class Checkpoints:
             was: str | None = self._case.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError):
             was = None
-        if said := differences(then, self._mark, None if was is None else (was, self._text), self._file):
+        if said := differences(
+            then, self._mark, None if was is None else (was, self._text), self._file
+        ):
             raise InputError(
                 f"scenario {self._name!r} cannot be resumed: {said}; bring that back to what it was, or start the run "
                 "anew, without --resume"

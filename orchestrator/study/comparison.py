@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from orchestrator.analysis.identification import TOLERANCE, IdentifiedMode, identify_modes, sampling
-from orchestrator.analysis.mode_doubts import COARSER, SHORTER, WindowPart, part_of, with_doubts, worth_showing
+from orchestrator.analysis.mode_doubts import (
+    COARSER,
+    SHORTER,
+    WindowPart,
+    part_of,
+    with_doubts,
+    worth_showing,
+)
 from orchestrator.cases.names import close_names
 from orchestrator.errors import AnalysisError, InputError, few
 from orchestrator.results.comtrade.reading import is_comtrade, read_comtrade
@@ -34,7 +41,8 @@ _WEAKEST = 1e-3
 class Comparison:
     expression: str
     unit: str
-    deviations: tuple[float, float]  # largest deviation of each run from its own start [unit of the signal]
+    # largest deviation of each run from its own start [unit of the signal]
+    deviations: tuple[float, float]
     # largest, rms: difference between the runs at the times of the run with the longer interval [unit of the signal];
     # see `common_times`
     largest: float
@@ -78,9 +86,17 @@ def open_trajectory(path: Path) -> xr.Dataset:
 
 
 def _hint(path: Path) -> str:
-    if inside := sorted(p.parent.name for p in path.glob("*/trajectory.nc")) if path.is_dir() else []:
+    if (
+        inside := sorted(p.parent.name for p in path.glob("*/trajectory.nc"))
+        if path.is_dir()
+        else []
+    ):
         return f"choose a scenario in it: {', '.join(inside)}"
-    if begun := [folder.name for folder in unfinished(path.parent) if folder.name.startswith(f"{path.name}{PARTIAL}")]:
+    if begun := [
+        folder.name
+        for folder in unfinished(path.parent)
+        if folder.name.startswith(f"{path.name}{PARTIAL}")
+    ]:
         return f"its run did not end, or still goes on; what it recorded is in {', '.join(begun)} beside it"
     return "`gfor run` writes one a scenario"
 
@@ -97,7 +113,9 @@ def require_numbers(curve: xr.DataArray, expression: str, label: str) -> None:
 
 def recorded(dataset: xr.Dataset, expression: str, label: str) -> xr.DataArray:
     if not isinstance(expression, str):
-        raise InputError(f"signal = {expression!r}; give one signal, 'a.b' or the difference 'a.b - c.d' of two")
+        raise InputError(
+            f"signal = {expression!r}; give one signal, 'a.b' or the difference 'a.b - c.d' of two"
+        )
     found = signal(dataset, expression)
     if found is None:
         known = list(map(str, dataset.data_vars))
@@ -109,7 +127,9 @@ def recorded(dataset: xr.Dataset, expression: str, label: str) -> xr.DataArray:
     return found
 
 
-def strongest_modes(curve: xr.DataArray, start: float, stop: float | None = None) -> list[IdentifiedMode]:
+def strongest_modes(
+    curve: xr.DataArray, start: float, stop: float | None = None
+) -> list[IdentifiedMode]:
     """What a signal rings with between two times [s], strongest first; see `identify_modes`.
 
     What has less than a thousandth of the strongest's amplitude is left out, whatever the trend that an oscillation is
@@ -145,9 +165,13 @@ def _modes_of(window: xr.DataArray, coarser: float = 1.0) -> list[IdentifiedMode
     return identify_modes(window["time"].values, deviation, tolerance=coarser * TOLERANCE)
 
 
-def compare(a: xr.Dataset, b: xr.Dataset, expression: str, start: float, labels: tuple[str, str]) -> Comparison:
+def compare(
+    a: xr.Dataset, b: xr.Dataset, expression: str, start: float, labels: tuple[str, str]
+) -> Comparison:
     """Compare one signal of two runs; oscillations are looked for from ``start`` [s] on."""
-    first, second = (recorded(run, expression, label) for run, label in zip((a, b), labels, strict=True))
+    first, second = (
+        recorded(run, expression, label) for run, label in zip((a, b), labels, strict=True)
+    )
     for curve, label in zip((first, second), labels, strict=True):
         require_numbers(curve, expression, label)
     common = common_times(first["time"].values, second["time"].values, labels)
@@ -161,15 +185,24 @@ def compare(a: xr.Dataset, b: xr.Dataset, expression: str, start: float, labels:
     difference = y_2 - y_1
     worst = int(np.argmax(np.abs(difference)))
     return Comparison(
-        expression, str(first.attrs.get("units") or a[expression.partition(" - ")[0].strip()].attrs.get("units", "")),
-        (float(np.abs(y_1 - y_1[0]).max()), float(np.abs(y_2 - y_2[0]).max())), float(abs(difference[worst])),
-        float(np.sqrt(np.mean(difference**2))), float(common.times[worst]),
+        expression,
+        str(
+            first.attrs.get("units")
+            or a[expression.partition(" - ")[0].strip()].attrs.get("units", "")
+        ),
+        (float(np.abs(y_1 - y_1[0]).max()), float(np.abs(y_2 - y_2[0]).max())),
+        float(abs(difference[worst])),
+        float(np.sqrt(np.mean(difference**2))),
+        float(common.times[worst]),
         (_strongest(first, start), _strongest(second, start)),
-    )  # fmt: skip
+    )
 
 
 def most_different(
-    a: xr.Dataset, b: xr.Dataset, count: int = 10, labels: tuple[str, str] = ("the first run", "the second run")
+    a: xr.Dataset,
+    b: xr.Dataset,
+    count: int = 10,
+    labels: tuple[str, str] = ("the first run", "the second run"),
 ) -> list[str]:
     """Signals that both runs have, those first whose difference is largest beside their own deviation."""
     times = common_times(a["time"].values, b["time"].values, labels)

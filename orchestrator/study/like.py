@@ -29,9 +29,16 @@ class Emulation:
 
 
 def emulate(
-    system: System, rules: MasterRules, step_size: float, stop_time: float, record: Sequence[str], every: int = 1,
-    events: Sequence[Event] = (), order: Sequence[str] | None = None, observers: Sequence[Observer] = (),
-) -> Emulation:  # fmt: skip
+    system: System,
+    rules: MasterRules,
+    step_size: float,
+    stop_time: float,
+    record: Sequence[str],
+    every: int = 1,
+    events: Sequence[Event] = (),
+    order: Sequence[str] | None = None,
+    observers: Sequence[Observer] = (),
+) -> Emulation:
     """Run a system along another master's rules.
 
     ``every``: steps between two rows; the first row is that with label 0.
@@ -39,7 +46,9 @@ def emulate(
     other masters do not support events.
     ``order``: order in which the components step, for a master that steps them one after the other; by default the
     order of the system."""
-    if disturbed := [plan.name for plan in system.wires.values()] + [str(fault) for fault in faults_among(events)]:
+    if disturbed := [plan.name for plan in system.wires.values()] + [
+        str(fault) for fault in faults_among(events)
+    ]:
         raise InputError(
             f"{rules.title} knows no imperfections of connections and no faults, but the case has some "
             f"({'; '.join(disturbed[:3])}); leave them out to see what it would record"
@@ -67,9 +76,16 @@ def run_like(
 
     The operating point is not improved before and no modes are computed: another master does neither."""
     emulation = emulate(
-        prepared.system, rules, prepared.step_size, prepared.stop_time, prepared.record, prepared.record_every,
-        prepared.events, order, observers,
-    )  # fmt: skip
+        prepared.system,
+        rules,
+        prepared.step_size,
+        prepared.stop_time,
+        prepared.record,
+        prepared.record_every,
+        prepared.events,
+        order,
+        observers,
+    )
     schedule = rules.schedule(tuple(prepared.system.components), order)
     dataset = trajectory_dataset(emulation, replace(prepared, schedule=schedule))
     return dataset.assign_attrs(

@@ -70,15 +70,22 @@ def linear_model(
     parts = {output: variables_of(output) for output in outputs}
     if phasors := [output for output in outputs if "|" in output]:
         raise InputError(f"outputs: {phasors[0]!r}: a magnitude is not linear; give its two parts")
-    wanted, outputs = list(outputs), list(dict.fromkeys(name for names in parts.values() for name in names))
-    select = np.array([[(n == parts[w][0]) - 1.0 * (n in parts[w][1:]) for n in outputs] for w in wanted])
+    wanted, outputs = (
+        list(outputs),
+        list(dict.fromkeys(name for names in parts.values() for name in names)),
+    )
+    select = np.array(
+        [[(n == parts[w][0]) - 1.0 * (n in parts[w][1:]) for n in outputs] for w in wanted]
+    )
     with running(prepared) as master:
         if boxes is not None and any(map(obstacle, master.components.values())):
             space, point, examined = boxes(prepared, master, inputs, outputs)
             return _selected(space, select, wanted), point, examined
         point = find_operating_point(master)
         blocks = Blocks(master, inputs=inputs, outputs=outputs, derivatives=True)
-        examined = examine(master, blocks, compose(blocks, master.schedule), continuous_model(master, blocks))
+        examined = examine(
+            master, blocks, compose(blocks, master.schedule), continuous_model(master, blocks)
+        )
         if not as_continuous:
             return _selected(state_space(blocks, master.schedule), select, wanted), point, examined
         if not blocks.serves_continuous:
@@ -89,12 +96,19 @@ def linear_model(
         if examined.stability.stable is None:
             own = replace(own, stable=None, reason=examined.stability.reason)
         elif examined.stability.stable is not own.stable:
-            warnings = (f"with the communication step the system is {examined.stability.sentence()}", *warnings)
+            warnings = (
+                f"with the communication step the system is {examined.stability.sentence()}",
+                *warnings,
+            )
         return _selected(space, select, wanted), point, Examination(own, warnings)
 
 
 def _selected(space: StateSpace, select: Matrix, outputs: Sequence[str]) -> StateSpace:
-    return replace(space, C=select @ space.C, D=select @ space.D, outputs=tuple(outputs)) if outputs else space
+    return (
+        replace(space, C=select @ space.C, D=select @ space.D, outputs=tuple(outputs))
+        if outputs
+        else space
+    )
 
 
 def response_at_steady_state(prepared: PreparedScenario) -> xr.Dataset:
@@ -113,12 +127,18 @@ def linear_response(master: Master, prepared: PreparedScenario) -> xr.Dataset:
         if any(isinstance(value, bool) for value in settings.values())
     ]
     if faults := faults_among(prepared.events):
-        raise InputError(f"a linear model cannot follow a fault or a forcing ({faults[0]}); leave --linear out")
+        raise InputError(
+            f"a linear model cannot follow a fault or a forcing ({faults[0]}); leave --linear out"
+        )
     if switching:
-        raise InputError(f"a linear model cannot follow a switching event ({switching[0]}); leave --linear out")
+        raise InputError(
+            f"a linear model cannot follow a switching event ({switching[0]}); leave --linear out"
+        )
     inputs = default_inputs(prepared)
     if not inputs:
-        raise InputError(f"scenario {prepared.name!r} has no event that a linear model could answer to")
+        raise InputError(
+            f"scenario {prepared.name!r} has no event that a linear model could answer to"
+        )
     model = state_space(Blocks(master, inputs=inputs, outputs=prepared.record), master.schedule)
     distance = prepared.record_every * prepared.step_size
     count = 1 + int(np.floor(prepared.stop_time / distance + 1e-9))
@@ -132,7 +152,8 @@ def linear_response(master: Master, prepared: PreparedScenario) -> xr.Dataset:
                 name = f"{component}.{variable}"
                 change[inputs.index(name)] = float(value) - before[name]
                 before[name] = float(value)
-        after = times > event.time + prepared.step_size / 2  # what is recorded at the event's time is from before it
+        # what is recorded at the event's time is from before it
+        after = times > event.time + prepared.step_size / 2
         if after.any():
             total[after] += model.step_response(change, times[after] - event.time)
     data = {name: ("time", total[:, k]) for k, name in enumerate(prepared.record)}

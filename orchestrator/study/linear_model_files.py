@@ -27,16 +27,23 @@ def component_model(prepared: PreparedScenario, name: str) -> EmbeddedModel:
     plan = prepared.system.components[name]
     info = plan.description.variables
     inputs, outputs = (
-        [v for v in names if info[v].type == "Real"] for names in (plan.description.inputs, plan.description.outputs)
+        [v for v in names if info[v].type == "Real"]
+        for names in (plan.description.inputs, plan.description.outputs)
     )
     with running(prepared) as master:
         point = find_operating_point(master)
         open_inputs = [v for v in inputs if v not in master.exchanges[name].inputs.names]
         exact = plan.description.gives_directional_derivatives
         c = linearize_within(
-            master, name, prepared.step_size, open_inputs, outputs,
-            derivatives=True, without_step=True, directional=exact,
-        )  # fmt: skip
+            master,
+            name,
+            prepared.step_size,
+            open_inputs,
+            outputs,
+            derivatives=True,
+            without_step=True,
+            directional=exact,
+        )
         if c.A_c is None or c.B_c is None:
             raise AnalysisError(
                 f"component {name!r}: its FMU does not give its derivatives, so no continuous model can be made"
@@ -56,16 +63,25 @@ def component_model(prepared: PreparedScenario, name: str) -> EmbeddedModel:
         parameters=parameters,
         units={v: info[v].unit for v in (*c.states, *inputs, *outputs, *parameters)},
         origin={
-            "case": prepared.case.name, "scenario": prepared.name, "component": name, "step_size_s": prepared.step_size,
+            "case": prepared.case.name,
+            "scenario": prepared.name,
+            "component": name,
+            "step_size_s": prepared.step_size,
             "residual_per_step": point.residual,
-            "derivatives": "directional derivatives" if exact else f"central differences of {PERTURBATIONS[0]:g}",
+            "derivatives": "directional derivatives"
+            if exact
+            else f"central differences of {PERTURBATIONS[0]:g}",
             "fmu_guid": plan.description.guid,
         },
-    )  # fmt: skip
+    )
 
 
 def save_linear_model(
-    model: StateSpace, point: OperatingPoint, stability: Stability, prepared: PreparedScenario, folder: Path
+    model: StateSpace,
+    point: OperatingPoint,
+    stability: Stability,
+    prepared: PreparedScenario,
+    folder: Path,
 ) -> list[Path]:
     """Write A, B, C, D with names, operating point and verdict: ``linear_model.mat`` for MATLAB, one CSV a matrix."""
     matrices = {"A": model.A, "B": model.B, "C": model.C, "D": model.D}
@@ -93,4 +109,8 @@ def save_linear_model(
         lines = [{"": row, **dict(zip(columns, values, strict=True))} for row, values in labelled]
         save_table(lines, folder / f"{key}.csv")
     save_json(stability.as_json(), folder / "stability.json")
-    return [folder / "linear_model.mat", folder / "stability.json", *(folder / f"{key}.csv" for key in entries)]
+    return [
+        folder / "linear_model.mat",
+        folder / "stability.json",
+        *(folder / f"{key}.csv" for key in entries),
+    ]

@@ -23,11 +23,17 @@ class Choosable(Protocol):
 
 
 def load_model_weights(
-    scenarios: Sequence[Choosable], results: Sequence[ModesResult], frequency_range: tuple[float, float]
+    scenarios: Sequence[Choosable],
+    results: Sequence[ModesResult],
+    frequency_range: tuple[float, float],
 ) -> list[str]:
     """The least damped mode of the range with both load models, of the scenario where the lower one is least."""
     weights = [_weight(*each, frequency_range) for each in zip(scenarios, results, strict=True)]
-    known = [(least, text, r.prepared.name) for r, (least, text) in zip(results, weights, strict=True) if text]
+    known = [
+        (least, text, r.prepared.name)
+        for r, (least, text) in zip(results, weights, strict=True)
+        if text
+    ]
     if not known:
         return []
     _, text, name = min(known, key=lambda one: one[0])
@@ -35,7 +41,9 @@ def load_model_weights(
     return [text if alike else f"scenario {name!r}, the least damped of {len(known)}: {text}"]
 
 
-def _weight(scenario: Choosable, result: ModesResult, frequency_range: tuple[float, float]) -> tuple[float, str]:
+def _weight(
+    scenario: Choosable, result: ModesResult, frequency_range: tuple[float, float]
+) -> tuple[float, str]:
     """The least damping [%] with either load model, and the question; "" where there is none to ask."""
     network = result.prepared.case.table.network
     if not is_open(network) or result.prepared.network is None or not result.prepared.network.loads:
@@ -49,7 +57,9 @@ def _weight(scenario: Choosable, result: ModesResult, frequency_range: tuple[flo
         other = scenario.with_loads_as_powers()
         found = None if other is None else compute_modes(other.prepared, frequency_range)
     except CosimError as error:
-        text = f"the load model: with constant powers there are no modes: {str(error).splitlines()[0]}"
+        text = (
+            f"the load model: with constant powers there are no modes: {str(error).splitlines()[0]}"
+        )
         return -math.inf, text
     here, there = _least_damped(result), None if found is None else _least_damped(found)
     if here is None or there is None:

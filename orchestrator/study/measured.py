@@ -18,7 +18,8 @@ from dataclasses import dataclass
 from orchestrator.arrays import Vector
 from orchestrator.errors import InputError
 
-_NOISE = 1e-6  # times that differ by less than this part of the shorter interval are one time, rounded in two ways
+# times that differ by less than this part of the shorter interval are one time, rounded in two ways
+_NOISE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,9 @@ class CommonTimes:
 
     def values(self, run: int, signal: Numbers) -> Numbers:
         rows = self._rows[run]
-        found = signal[rows] if rows is not None else np.interp(self.times, self._recorded[run], signal)
+        found = (
+            signal[rows] if rows is not None else np.interp(self.times, self._recorded[run], signal)
+        )
         return np.asarray(found, dtype=float)
 
 
@@ -49,7 +52,9 @@ def common_times(a: Numbers, b: Numbers, labels: tuple[str, str]) -> CommonTimes
     fine = 1 - coarse
     times = both[coarse][inside[coarse]]
     if len(times) < 2:
-        raise InputError(f"{labels[0]} and {labels[1]} have no time in common; nothing can be compared")
+        raise InputError(
+            f"{labels[0]} and {labels[1]} have no time in common; nothing can be compared"
+        )
     at = np.searchsorted(both[fine], times - noise)
     met = bool(np.all(np.abs(both[fine][np.minimum(at, len(both[fine]) - 1)] - times) <= noise))
     rows: list[Vector | None] = [inside[coarse], at if met else None]
@@ -59,7 +64,9 @@ def common_times(a: Numbers, b: Numbers, labels: tuple[str, str]) -> CommonTimes
     return CommonTimes(times, remark, order, both)
 
 
-def _remark(both: tuple[Numbers, Numbers], coarse: int, count: int, labels: tuple[str, str], *, met: bool) -> str:
+def _remark(
+    both: tuple[Numbers, Numbers], coarse: int, count: int, labels: tuple[str, str], *, met: bool
+) -> str:
     intervals = [f"{_interval(times):.6g} s" for times in both]
     head = f"{labels[0]} is recorded every {intervals[0]}, {labels[1]} every {intervals[1]}"
     if met:
@@ -72,10 +79,12 @@ def _remark(both: tuple[Numbers, Numbers], coarse: int, count: int, labels: tupl
 
 
 _UNEVEN = 0.01  # part of the interval by which samples may be off
-_WAVEFORM = 0.5  # part of a signal's power near the line's frequency from which it is a value of the grid's wave
+# part of a signal's power near the line's frequency from which it is a value of the grid's wave
+_WAVEFORM = 0.5
 
 _NEAR = 0.15
-_LEAST_NOISE = 1e-5  # singular values below this part of the largest are noise: the resolution of 16 bits
+# singular values below this part of the largest are noise: the resolution of 16 bits
+_LEAST_NOISE = 1e-5
 
 
 def is_measured(curve: xr.DataArray) -> bool:
@@ -112,12 +121,13 @@ def _interval(times: Numbers) -> float:
 
 def _check(times: Numbers, values: Numbers, line_frequency: float) -> None:
     if len(times) < 2:
-        raise AnalysisError("no mode can be identified in a signal of fewer than 2 samples; give an earlier start")
+        raise AnalysisError(
+            "no mode can be identified in a signal of fewer than 2 samples; give an earlier start"
+        )
     if (missing := ~np.isfinite(values)).any():
         begin, end = _longest(~missing)
-        remedy = (
-            f"the longest stretch without a gap is from {times[begin]:.6g} to {times[end]:.6g} s; choose it by the "
-        )
+        stretch = f"from {times[begin]:.6g} to {times[end]:.6g} s"
+        remedy = f"the longest stretch without a gap is {stretch}; choose it by the "
         raise AnalysisError(
             f"{int(missing.sum())} of {len(values)} samples are missing, the first at t = "
             f"{times[int(missing.argmax())]:.6g} s; {remedy}start and the stop"

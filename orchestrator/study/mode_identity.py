@@ -25,10 +25,12 @@ from orchestrator.errors import AnalysisError, CosimError
 from orchestrator.fmi.instance import is_isolated, is_ours
 
 _STAYS = 1e-6  # A state that changes by less than this part of max(1, |value|) stays where it is
-MOST_STATES = 600  # of a system that is started on the way, or whose clear names are looked at again
+# of a system that is started on the way, or whose clear names are looked at again
+MOST_STATES = 600
 _MOST_STARTS = 12  # systems that are started on one way at most
 _MOST_FITTED = 6  # the same where each of them has a component to identify
-_SAME = 1e-6  # two eigenvalues that differ by less than this part of their size are one, computed in two ways
+# two eigenvalues that differ by less than this part of their size are one, computed in two ways
+_SAME = 1e-6
 
 
 @dataclass(frozen=True)
@@ -48,9 +50,13 @@ Undamped = Callable[[Mapping[str, float]], NamedSystem]  # gives the system itse
 
 
 def settled(
-    system: NamedSystem, computed: Computed, known: Mapping[str, NamedSystem], *, undamped: Undamped | None = None,
+    system: NamedSystem,
+    computed: Computed,
+    known: Mapping[str, NamedSystem],
+    *,
+    undamped: Undamped | None = None,
     far: bool = True,
-) -> NamedSystem:  # fmt: skip
+) -> NamedSystem:
     """A scenario's names, where shapes do not tell by following the mode that it was.
 
     ``known``: scenarios that are settled already, by name, with the values that hold for all.
@@ -62,8 +68,12 @@ def settled(
         origin = others.origin(name, contested=contested, far=far)
         if origin is not None:
             system = replace(system, naming=_settle(name, system, origin))
-        elif (lost := others.lost) and name in system.naming.named and (contested or others.checked):
-            system = replace(system, naming=_unfollowed(name, system.naming, lost, freed=others.checked))
+        elif (
+            (lost := others.lost) and name in system.naming.named and (contested or others.checked)
+        ):
+            system = replace(
+                system, naming=_unfollowed(name, system.naming, lost, freed=others.checked)
+            )
     return system
 
 
@@ -92,31 +102,50 @@ def _settle(name: str, system: NamedSystem, origin: _Origin) -> Naming:
     best, measure = naming.fits[name]
     was = f"the mode of {_figures(origin.mode.eigenvalue)} {origin.place}"
     try:
-        value = continuation.follow_along(origin.start, way.model_at, 0.0, 1.0, way.strides, way.common).eigenvalue
+        value = continuation.follow_along(
+            origin.start, way.model_at, 0.0, 1.0, way.strides, way.common
+        ).eigenvalue
     except continuation.ModesMeetError as error:
         where = f"meets another one {error.beyond:.0%} of the way from there, at {_figures(error.eigenvalue)}"
-        return _without(naming, name, f"{was} {where}, and cannot be told from it beyond", sure=sure)
+        return _without(
+            naming, name, f"{was} {where}, and cannot be told from it beyond", sure=sure
+        )
     except CosimError as error:
         text = str(error).splitlines()[0]
         return _without(naming, name, f"{was} cannot be followed from there: {text}", sure=sure)
     led = f"{was} is followed to {_figures(value)}"
-    mode = next((mode for mode in modes if abs(mode.eigenvalue - value) <= _SAME * abs(value)), None)
+    mode = next(
+        (mode for mode in modes if abs(mode.eigenvalue - value) <= _SAME * abs(value)), None
+    )
     if mode is None:
-        return _without(naming, name, f"{led}, out of the range in which names are given", sure=sure)
+        return _without(
+            naming, name, f"{led}, out of the range in which names are given", sure=sure
+        )
     if any(mode is bearer for other, bearer in naming.named.items() if other != name):
         return _without(naming, name, f"{led}, which has another name", sure=sure)
     if measure(mode) < LEFT_OVER * measure(best):
-        exchanged = f"on the way it exchanges its nature with the one of {_figures(best.eigenvalue)}"
-        return _without(naming, name, f"{led}; {exchanged}, which fits the name better now", sure=sure)
+        exchanged = (
+            f"on the way it exchanges its nature with the one of {_figures(best.eigenvalue)}"
+        )
+        return _without(
+            naming, name, f"{led}; {exchanged}, which fits the name better now", sure=sure
+        )
     rivals = [one for one in modes if one is not mode and measure(one) >= LEFT_OVER * measure(mode)]
     weaker = min(rivals, key=lambda one: one.damping_ratio, default=mode)
     told: tuple[str, ...] = ()
     if weaker.damping_ratio < mode.damping_ratio:
-        told = (f"{name!r}: {led}; the mode of {_figures(weaker.eigenvalue)}, which fits too, is damped less",)
+        told = (
+            f"{name!r}: {led}; the mode of {_figures(weaker.eigenvalue)}, which fits too, is damped less",
+        )
     elif mode is not best:
         told = (f"{name!r}: {led}; the mode of {_figures(best.eigenvalue)} fits about as well",)
     reasons = {other: text for other, text in naming.reasons.items() if other != name}
-    return replace(naming, named={**naming.named, name: mode}, reasons=reasons, remarks=(*naming.remarks, *told))
+    return replace(
+        naming,
+        named={**naming.named, name: mode},
+        reasons=reasons,
+        remarks=(*naming.remarks, *told),
+    )
 
 
 def _without(naming: Naming, name: str, reason: str, *, sure: bool) -> Naming:
@@ -124,21 +153,35 @@ def _without(naming: Naming, name: str, reason: str, *, sure: bool) -> Naming:
     if sure:
         return _freed(naming, name, reason)
     return replace(
-        naming, remarks=(*naming.remarks, f"{name!r}, by its shape, may be another mode than there: {reason}")
+        naming,
+        remarks=(
+            *naming.remarks,
+            f"{name!r}, by its shape, may be another mode than there: {reason}",
+        ),
     )
 
 
 def _unfollowed(name: str, naming: Naming, lost: str, *, freed: bool) -> Naming:
     """The naming where a mode could not be followed from a place at which it has the name."""
     if freed:
-        return _freed(naming, name, f"whether it is the mode that has the name {lost} is not known; look at its shape")
-    text = f"{name!r}, by its shape, which another mode has in part, may be another mode than {lost}"
+        return _freed(
+            naming,
+            name,
+            f"whether it is the mode that has the name {lost} is not known; look at its shape",
+        )
+    text = (
+        f"{name!r}, by its shape, which another mode has in part, may be another mode than {lost}"
+    )
     return replace(naming, remarks=(*naming.remarks, text))
 
 
 def _freed(naming: Naming, name: str, reason: str) -> Naming:
     named = {other: mode for other, mode in naming.named.items() if other != name}
-    return replace(naming, named=named, reasons={**naming.reasons, name: f"no mode is named {name!r}: {reason}"})
+    return replace(
+        naming,
+        named=named,
+        reasons={**naming.reasons, name: f"no mode is named {name!r}: {reason}"},
+    )
 
 
 def _figures(eigenvalue: complex) -> str:
@@ -152,15 +195,27 @@ class _Others:
     ``lost``: Where the name last looked for is borne by a mode from which no way leads here; empty if nowhere."""
 
     def __init__(
-        self, system: NamedSystem, computed: Computed, known: Mapping[str, NamedSystem],
+        self,
+        system: NamedSystem,
+        computed: Computed,
+        known: Mapping[str, NamedSystem],
         undamped: Undamped | None = None,
-    ) -> None:  # fmt: skip
-        self._system, self._computed, self._known, self._by_gains = system, computed, known, undamped
+    ) -> None:
+        self._system, self._computed, self._known, self._by_gains = (
+            system,
+            computed,
+            known,
+            undamped,
+        )
         self._kept: dict[tuple[str, bool], NamedSystem | None] = {}
         self._ways: dict[str, _Way | None] = {}
         order = system.prepared.case.scenarios
         own, here = system.prepared.name, list(order).index(system.prepared.name)
-        alike = [name for name, table in order.items() if set(table.remove) == set(order[own].remove) and name != own]
+        alike = [
+            name
+            for name, table in order.items()
+            if set(table.remove) == set(order[own].remove) and name != own
+        ]
         self._earlier = [name for name in alike if list(order).index(name) < here]
         self._later = [name for name in alike if name not in self._earlier]
         self._small = len(system.model.names) <= MOST_STATES
@@ -174,12 +229,17 @@ class _Others:
             system = self._undamped()
             if system is not None and name in system.naming.named:
                 self.checked = True
-                if (found := self._from("without its damping controllers", system, name, sure=True)) is not None:
+                if (
+                    found := self._from("without its damping controllers", system, name, sure=True)
+                ) is not None:
                     return found
         self.checked = self.checked or self._differs_in_foreign()
         tied = name in self._system.naming.reasons
         for place, system, sure in self._systems(contested=contested, tied=tied, far=far):
-            if name in system.naming.named and (found := self._from(place, system, name, sure=sure)) is not None:
+            if (
+                name in system.naming.named
+                and (found := self._from(place, system, name, sure=sure)) is not None
+            ):
                 return found
         return None
 
@@ -198,7 +258,9 @@ class _Others:
     def _way_from(self, other: NamedSystem) -> _Way | None:
         """Where the operating point moves, a mixture of both models is none that a parameter takes."""
         one, two = other.point.states, self._system.point.states
-        stays = one.keys() == two.keys() and all(abs(one[k] - x) <= _STAYS * max(1.0, abs(x)) for k, x in two.items())
+        stays = one.keys() == two.keys() and all(
+            abs(one[k] - x) <= _STAYS * max(1.0, abs(x)) for k, x in two.items()
+        )
         if stays and (mixed := continuation.between(other.model, self._system.model)) is not None:
             return _Way(mixed)
         return self._way_of_values(other)
@@ -210,7 +272,9 @@ class _Others:
         if not values:
             return None
         models, starts = (other.model, self._system.model), 0
-        fitted = {name for model in models for name, how in model.sources.items() if how == IDENTIFIED}
+        fitted = {
+            name for model in models for name, how in model.sources.items() if how == IDENTIFIED
+        }
         most = _MOST_FITTED if fitted else _MOST_STARTS
 
         def model_at(part: float) -> LinearModel:
@@ -219,23 +283,37 @@ class _Others:
                 return self._system.model
             if (starts := starts + 1) > most:
                 raise AnalysisError(f"{most} steps on the way did not do")
-            mixed = {name: x if x == y else (1 - part) * x + part * y for name, (x, y) in values.items()}
+            mixed = {
+                name: x if x == y else (1 - part) * x + part * y for name, (x, y) in values.items()
+            }
             return self._computed(_as(b.beside(b.name, False, mixed), b)).model  # type: ignore[misc]
 
         ours = set(self._system.model.names)
-        common = tuple(n for n in other.model.names if n in ours and n.partition(".")[0] not in fitted)
-        return _Way(model_at, continuation.COSTLY, common if fitted or models[0].names != models[1].names else ())
+        common = tuple(
+            n for n in other.model.names if n in ours and n.partition(".")[0] not in fitted
+        )
+        return _Way(
+            model_at,
+            continuation.COSTLY,
+            common if fitted or models[0].names != models[1].names else (),
+        )
 
     def _differs_in_foreign(self) -> bool:
         """Whether a value of somebody else's FMU is another than in the scenario before, or in the case's file."""
         b = self._system.prepared
         paths = {name: plan.description.path for name, plan in b.system.components.items()}
         foreign = {path for path in set(paths.values()) if not is_ours(path)}
-        a = self._beside(*((self._earlier[0], False) if self._earlier else (b.name, True))) if foreign else None
+        a = (
+            self._beside(*((self._earlier[0], False) if self._earlier else (b.name, True)))
+            if foreign
+            else None
+        )
         values = {} if a is None else _differing(a, b) or {}
         return any(paths[name.partition(".")[0]] in foreign for name in values)
 
-    def _systems(self, *, contested: bool, tied: bool, far: bool) -> Iterator[tuple[str, NamedSystem, bool]]:
+    def _systems(
+        self, *, contested: bool, tied: bool, far: bool
+    ) -> Iterator[tuple[str, NamedSystem, bool]]:
         """Earlier scenarios with the names that they have got; of all others those names that are clear by shape.
         Behind each, whether a clear shape here is not believed where the mode from there has another."""
         doubted = tied or self.checked
@@ -268,7 +346,9 @@ class _Others:
         try:
             if self._by_gains is not None:
                 return self._by_gains(gains)
-            other = None if prepared.beside is None else prepared.beside(prepared.name, False, gains)
+            other = (
+                None if prepared.beside is None else prepared.beside(prepared.name, False, gains)
+            )
             return None if other is None or not _runs_beside(other) else self._computed(other)
         except CosimError:  # a gain of 0 need not be allowed
             return None
@@ -293,7 +373,11 @@ class _Others:
             return None
         if not plain and name in self._earlier:
             return settled(found, self._computed, self._known, far=False)
-        clear = {key: mode for key, mode in found.naming.named.items() if key not in found.naming.contested}
+        clear = {
+            key: mode
+            for key, mode in found.naming.named.items()
+            if key not in found.naming.contested
+        }
         return replace(found, naming=replace(found.naming, named=clear))
 
 
@@ -312,7 +396,9 @@ def _differing(a: PreparedScenario, b: PreparedScenario) -> dict[str, tuple[floa
     for key in dict.fromkeys((*a.given, *b.given)):
         pattern, _, variable = key.partition(".")
         plans = b.system.components
-        names = [n for n in fnmatch.filter(plans, pattern) if variable in plans[n].description.variables]
+        names = [
+            n for n in fnmatch.filter(plans, pattern) if variable in plans[n].description.variables
+        ]
         if not names and a.given.get(key) != b.given.get(key):
             return None
         for name in names:
@@ -321,7 +407,10 @@ def _differing(a: PreparedScenario, b: PreparedScenario) -> dict[str, tuple[floa
             if controller in DAMPING_CONTROLLERS and part in ("enabled", "K"):
                 x, y = _gain(one, controller), _gain(two, controller)
                 if x != y:
-                    found |= {f"{name}.{controller}.enabled": (True, True), f"{name}.{controller}.K": (x, y)}
+                    found |= {
+                        f"{name}.{controller}.enabled": (True, True),
+                        f"{name}.{controller}.K": (x, y),
+                    }
                 continue
             p, q = one.value(variable), two.value(variable)
             if p == q:
@@ -353,4 +442,6 @@ def _gain(plan: ComponentPlan, controller: str) -> float:
 def _runs_beside(prepared: PreparedScenario) -> bool:
     """Whether its FMUs can be instantiated beside those of another scenario: our own, and those with a process each."""
     plans = prepared.system.components.values()
-    return all(plan.isolated is not False or is_isolated(plan.description, None) is False for plan in plans)
+    return all(
+        plan.isolated is not False or is_isolated(plan.description, None) is False for plan in plans
+    )

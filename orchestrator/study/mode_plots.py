@@ -19,7 +19,11 @@ def plot_signals(table: PlotTable, results: Sequence[RunResult], path: Path) -> 
     """Draw one figure of a case file, all scenarios in each panel; False if nothing of it was recorded.
 
     A panel whose signal no scenario recorded says so."""
-    if all(signal(r.dataset.isel(time=slice(1)), panel.signal) is None for panel in table.panels for r in results):
+    if all(
+        signal(r.dataset.isel(time=slice(1)), panel.signal) is None
+        for panel in table.panels
+        for r in results
+    ):
         return False
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 1.3 + 1.9 * len(table.panels)), layout="constrained")
@@ -28,14 +32,27 @@ def plot_signals(table: PlotTable, results: Sequence[RunResult], path: Path) -> 
             several = len(results) == 1 and bool(panel.also)
             for k, expression in enumerate((panel.signal, *panel.also)):
                 draw_signal(
-                    axis, results, expression, panel.scale, k if several else 0, expression if several else None
+                    axis,
+                    results,
+                    expression,
+                    panel.scale,
+                    k if several else 0,
+                    expression if several else None,
                 )
             if several and axis.lines:
                 axis.legend(loc="best", fontsize="x-small")
             axis.set_ylabel(panel.label)
             if not axis.lines:
                 said = f"{panel.signal} was not recorded"
-                axis.text(0.5, 0.5, said, transform=axis.transAxes, ha="center", va="center", parse_math=False)
+                axis.text(
+                    0.5,
+                    0.5,
+                    said,
+                    transform=axis.transAxes,
+                    ha="center",
+                    va="center",
+                    parse_math=False,
+                )
         dashed = "; dashed: linear model" if any(r.linear is not None for r in results) else ""
         axes[0].set_title(f"{table.title}{dashed}", loc="left")
         axes[-1].set_xlabel("Time [s]")
@@ -49,17 +66,25 @@ def plot_signals(table: PlotTable, results: Sequence[RunResult], path: Path) -> 
 
 
 def draw_signal(
-    axis: Any, results: Sequence[RunResult], expression: str, scale: float = 1.0, first: int = 0,
+    axis: Any,
+    results: Sequence[RunResult],
+    expression: str,
+    scale: float = 1.0,
+    first: int = 0,
     label: str | None = None,
-) -> None:  # fmt: skip
+) -> None:
     """One signal of all runs that recorded it; dashed, the linear model's response where there is one."""
     for index, result in enumerate(results, start=first):
         data = outline(result.dataset, expression)
         if data is not None:
-            axis.plot(data["time"], scale * data, color=colour(index), label=label or result.modes.label)
+            axis.plot(
+                data["time"], scale * data, color=colour(index), label=label or result.modes.label
+            )
         follows = outline(result.linear, expression) if result.linear is not None else None
         if follows is not None:
-            axis.plot(follows["time"], scale * follows, color="black", linewidth=0.8, linestyle="--")
+            axis.plot(
+                follows["time"], scale * follows, color="black", linewidth=0.8, linestyle="--"
+            )
     axis.margins(x=0)
 
 
@@ -82,7 +107,12 @@ def plot_eigenvalues(results: Sequence[ModesResult], title: str, path: Path) -> 
 
 
 def draw_eigenvalues(
-    axis: Any, results: Sequence[ModesResult], first: int = 0, *, radians: bool = False, annotate: bool = False
+    axis: Any,
+    results: Sequence[ModesResult],
+    first: int = 0,
+    *,
+    radians: bool = False,
+    annotate: bool = False,
 ) -> None:
     """Eigenvalue map with rays of equal damping; other people's figures as open circles.
 
@@ -90,17 +120,23 @@ def draw_eigenvalues(
     ``annotate``: frequency and damping beside each mode, with its name where it has one."""
     turn = 2 * np.pi if radians else 1.0
     named = [m.frequency_hz for r in results for m in r.named.values()]
-    highest_hz = 1.25 * max([*named, *(t.frequency_hz for r in results for t in r.references.values())], default=0.8)
+    highest_hz = 1.25 * max(
+        [*named, *(t.frequency_hz for r in results for t in r.references.values())], default=0.8
+    )
     if first:
         highest_hz = max(highest_hz, axis.get_ylim()[1] / turn)
-    shown = {id(r): [m for m in r.modes if m.frequency_hz <= highest_hz and m.eigenvalue.real > -3] for r in results}
+    shown = {
+        id(r): [m for m in r.modes if m.frequency_hz <= highest_hz and m.eigenvalue.real > -3]
+        for r in results
+    }
     for index, result in enumerate(results, start=first):
         modes = shown[id(result)]
         axis.scatter(
             [m.eigenvalue.real for m in modes],
             [m.frequency_hz * turn for m in modes],
             marker="x",
-            s=[70 if result.name_of(m) else 30 for m in modes] or 30,  # the legend takes its mark from here
+            # the legend takes its mark from here
+            s=[70 if result.name_of(m) else 30 for m in modes] or 30,
             linewidths=[2.0 if result.name_of(m) else 1.0 for m in modes] or 1.0,
             color=colour(index),
             label=result.label,
@@ -108,11 +144,26 @@ def draw_eigenvalues(
         )
         for mode in modes if annotate else ():
             text = f"{result.name_of(mode) or ''} {mode.frequency_hz:.2f} Hz, {mode.damping_percent:.1f} %"
-            look = {"textcoords": "offset points", "size": "x-small", "ha": "right", "color": colour(index)}
-            axis.annotate(text.strip(), (mode.eigenvalue.real, mode.frequency_hz * turn), (-7, 3), **look)
+            look = {
+                "textcoords": "offset points",
+                "size": "x-small",
+                "ha": "right",
+                "color": colour(index),
+            }
+            axis.annotate(
+                text.strip(), (mode.eigenvalue.real, mode.frequency_hz * turn), (-7, 3), **look
+            )
         for reference in result.references.values():
             real, hertz = _real_and_hz(reference)
-            axis.scatter(real, hertz * turn, marker="o", s=110, facecolors="none", edgecolors=colour(index), zorder=3)
+            axis.scatter(
+                real,
+                hertz * turn,
+                marker="o",
+                s=110,
+                facecolors="none",
+                edgecolors=colour(index),
+                zorder=3,
+            )
     left = min([-1.0, *(1.1 * m.eigenvalue.real for modes in shown.values() for m in modes)])
     if first:
         left = min(left, axis.get_xlim()[0])
@@ -130,7 +181,9 @@ def _real_and_hz(reference: ReferenceModeTable) -> tuple[float, float]:
     if reference.real is not None:
         return reference.real, reference.frequency_hz
     ratio = reference.damping_percent / 100
-    return float(-ratio / np.sqrt(1 - ratio**2) * 2 * np.pi * reference.frequency_hz), reference.frequency_hz
+    return float(
+        -ratio / np.sqrt(1 - ratio**2) * 2 * np.pi * reference.frequency_hz
+    ), reference.frequency_hz
 
 
 def damping_rays(axis: Any, left: float, highest: float, turn: float = 1.0) -> None:
@@ -145,19 +198,31 @@ def damping_rays(axis: Any, left: float, highest: float, turn: float = 1.0) -> N
         ratio = percent / 100
         slope = ratio / np.sqrt(1 - ratio**2) * 2 * np.pi / turn  # −Re λ per unit of the axis
         end = min(highest, -left / slope)
-        axis.plot([0, -slope * end], [0, end], color="#b0b0b0", linewidth=0.7, linestyle="--", zorder=1, gid=_RAY)
+        axis.plot(
+            [0, -slope * end],
+            [0, end],
+            color="#b0b0b0",
+            linewidth=0.7,
+            linestyle="--",
+            zorder=1,
+            gid=_RAY,
+        )
         labels.append(_place_of_label(axis, slope, labels))
         behind = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
         words = {"color": "#888888", "fontsize": 8, "ha": "center", "va": "center"}
         axis.text(*labels[-1], f"{percent} %", bbox=behind, zorder=1.5, gid=_RAY, **words)
 
 
-def _place_of_label(axis: Any, slope: float, others: Sequence[tuple[float, float]]) -> tuple[float, float]:
+def _place_of_label(
+    axis: Any, slope: float, others: Sequence[tuple[float, float]]
+) -> tuple[float, float]:
     """Where a ray's label lies on it: as far out as the edges and the other labels leave room."""
     (left, right), (_, highest) = axis.get_xlim(), axis.get_ylim()
     width, height = _RAY_LABEL[0] * (right - left), _RAY_LABEL[1] * highest
     hertz = min(highest - 0.6 * height, (-left - 0.6 * width) / slope)
-    while hertz > height and any(abs(hertz - y) < height and abs(slope * hertz + x) < width for x, y in others):
+    while hertz > height and any(
+        abs(hertz - y) < height and abs(slope * hertz + x) < width for x, y in others
+    ):
         hertz -= 0.25 * height
     return -slope * hertz, hertz
 
@@ -172,7 +237,9 @@ def plot_participation(results: Sequence[ModesResult], path: Path) -> bool:
         axes = figure.subplots(len(names), 1, squeeze=False)[:, 0]
         for axis, name in zip(axes, names, strict=True):
             draw_participation(axis, results, name)
-            axis.set_title(f"Mode {name}" if len(names) > 1 else f"{name.capitalize()} mode", loc="left")
+            axis.set_title(
+                f"Mode {name}" if len(names) > 1 else f"{name.capitalize()} mode", loc="left"
+            )
         handles, labels = axes[0].get_legend_handles_labels()
         add_legend(figure, handles, labels)
         save_figure(figure, path)
@@ -208,7 +275,11 @@ def plot_mode_shapes(results: Sequence[ModesResult], path: Path) -> bool:
                 axis = axes[row, column]
                 draw_mode_shape(axis, result, name, colour(column))
                 mode = result.named.get(name)
-                figures = f"\n{mode.frequency_hz:.2f} Hz, {mode.damping_percent:.1f} %" if mode else "\nnone in range"
+                figures = (
+                    f"\n{mode.frequency_hz:.2f} Hz, {mode.damping_percent:.1f} %"
+                    if mode
+                    else "\nnone in range"
+                )
                 axis.set_title(f"{name}: {result.prepared.title}{figures}", fontsize=8.5)
         save_figure(figure, path)
     return True
@@ -231,5 +302,7 @@ def draw_mode_shape(axis: Any, result: ModesResult, name: str, shade: str) -> No
         value = mode.shape[state] / leader
         axis.plot([np.angle(value)] * 2, [0, abs(value)], color=shade, linewidth=1.0, alpha=0.85)
         axis.plot(np.angle(value), abs(value), marker="o", markersize=2.5, color=shade)
-    right, left = (", ".join(s.partition(".")[0] for s in side[:_NAMED]) for side in (together, against))
+    right, left = (
+        ", ".join(s.partition(".")[0] for s in side[:_NAMED]) for side in (together, against)
+    )
     axis.set_xlabel(f"→ {right}\n← {left}", fontsize=7.5)

@@ -42,7 +42,9 @@ from orchestrator.study.mode_identity import NamedSystem, settled
 from orchestrator.study.naming import named_modes
 from orchestrator.study.start_errors import start_error
 
-_LEADING = 3  # of the states of an electromechanical mode: angle and speed of one machine, and the speed of another
+# of the states of an electromechanical mode: angle and speed of one machine, and the speed of
+# another
+_LEADING = 3
 
 BlackBoxes = Callable[[Master], Mapping[str, ComponentLinearization]]
 """Identifies components of a running system that hide their states."""
@@ -54,8 +56,10 @@ class ModesResult:
     operating_point: OperatingPoint
     model: LinearModel
     modes: list[spectra.Mode]
-    named: dict[str, spectra.Mode]  # the modes that the case looks for by their shape, as far as they are in range
-    references: dict[str, ReferenceModeTable]  # somebody else's figures for them, where their conditions hold
+    # the modes that the case looks for by their shape, as far as they are in range
+    named: dict[str, spectra.Mode]
+    # somebody else's figures for them, where their conditions hold
+    references: dict[str, ReferenceModeTable]
     warnings: tuple[str, ...]
     swing: tuple[str, ...]  # states that show who swings against whom, mostly speeds
     areas: dict[str, str]
@@ -64,10 +68,12 @@ class ModesResult:
     hidden: Hidden | None
     # the continuous model, without a communication step; None where a component gives no derivatives
     system: LinearModel | None
-    eigenvalues: Sequence[complex] = ()  # all of ``model`` [rad/s]; none where it is too large for them
+    # all of ``model`` [rad/s]; none where it is too large for them
+    eigenvalues: Sequence[complex] = ()
     # of the components that were identified: largest relative difference of model and measured response
     fit_errors: dict[str, float] = field(default_factory=dict)
-    unnamed: Mapping[str, str] = field(default_factory=dict)  # why no mode bears a name that the case gives, by name
+    # why no mode bears a name that the case gives, by name
+    unnamed: Mapping[str, str] = field(default_factory=dict)
     misfits: Mapping[str, list[Misfit]] = field(default_factory=dict)
 
     @property
@@ -81,7 +87,9 @@ class ModesResult:
     @property
     def unasked(self) -> list[str]:
         """The warnings without the questions, which are asked before anything is computed."""
-        asked = {str(question) for question in (*self.prepared.questions, *self.prepared.about_rows)}
+        asked = {
+            str(question) for question in (*self.prepared.questions, *self.prepared.about_rows)
+        }
         return [text for text in self.warnings if text not in asked]
 
     @property
@@ -107,9 +115,12 @@ class ModesResult:
 
 
 def compute_modes(
-    prepared: PreparedScenario, frequency_range: tuple[float, float] = spectra.ELECTROMECHANICAL_HZ,
-    critical: float | None = None, *, directional: bool = False,
-) -> ModesResult:  # fmt: skip
+    prepared: PreparedScenario,
+    frequency_range: tuple[float, float] = spectra.ELECTROMECHANICAL_HZ,
+    critical: float | None = None,
+    *,
+    directional: bool = False,
+) -> ModesResult:
     """Initialise a scenario's FMUs, verify their steady state, and linearise around it.
 
     ``critical``: damping ratio below which modes are looked for, by sparse search; None for the full spectrum. The
@@ -119,27 +130,46 @@ def compute_modes(
         return modes_of(prepared, master, frequency_range, critical, directional=directional)
 
 
-def running(prepared: PreparedScenario, federation: Federation | None = None, threads: int | None = 1) -> Master:
+def running(
+    prepared: PreparedScenario, federation: Federation | None = None, threads: int | None = 1
+) -> Master:
     """The scenario's FMUs, initialised; those of a federation still in this process."""
     opener = open_plan if federation is None else federation.open
     try:
-        return Master(prepared.system, prepared.schedule, prepared.step_size, prepared.stop_time, opener, threads)
+        return Master(
+            prepared.system,
+            prepared.schedule,
+            prepared.step_size,
+            prepared.stop_time,
+            opener,
+            threads,
+        )
     except ComponentError as error:
         raise start_error(prepared, error) or error from error
 
 
 def modes_of(
-    prepared: PreparedScenario, master: Master, frequency_range: tuple[float, float], critical: float | None = None, *,
+    prepared: PreparedScenario,
+    master: Master,
+    frequency_range: tuple[float, float],
+    critical: float | None = None,
+    *,
     directional: bool = False,
-) -> ModesResult:  # fmt: skip
+) -> ModesResult:
     """`compute_modes` of a running system, whose FMUs stand at the operating point afterwards."""
-    return _computed(linearised(prepared, master, frequency_range, critical, directional=directional))
+    return _computed(
+        linearised(prepared, master, frequency_range, critical, directional=directional)
+    )
 
 
 def linearised(
-    prepared: PreparedScenario, master: Master, frequency_range: tuple[float, float], critical: float | None = None, *,
+    prepared: PreparedScenario,
+    master: Master,
+    frequency_range: tuple[float, float],
+    critical: float | None = None,
+    *,
     directional: bool = False,
-) -> "Linearised":  # fmt: skip
+) -> "Linearised":
     """The same before its eigenvalues are computed."""
     misfits, said = misfits_of(master), start_warnings(master)
     point = find_operating_point(master)
@@ -149,12 +179,21 @@ def linearised(
 
 
 def modes_from(
-    prepared: PreparedScenario, master: Master, point: OperatingPoint, blocks: Blocks,
-    frequency_range: tuple[float, float], critical: float | None = None, black_boxes: BlackBoxes | None = None,
-) -> ModesResult:  # fmt: skip
+    prepared: PreparedScenario,
+    master: Master,
+    point: OperatingPoint,
+    blocks: Blocks,
+    frequency_range: tuple[float, float],
+    critical: float | None = None,
+    black_boxes: BlackBoxes | None = None,
+) -> ModesResult:
     """The modes of components that were linearised at an operating point; ``black_boxes`` as `identified`."""
     misfits = misfits_of(master)
-    return _computed(Linearised(prepared, master, point, blocks, frequency_range, critical, (), misfits, black_boxes))
+    return _computed(
+        Linearised(
+            prepared, master, point, blocks, frequency_range, critical, (), misfits, black_boxes
+        )
+    )
 
 
 def _computed(system: "Linearised") -> ModesResult:
@@ -169,13 +208,24 @@ class Linearised:
     ``said`` are earlier warnings, behind those of ``misfits``, which are as `misfits_of` gives them."""
 
     def __init__(
-        self, prepared: PreparedScenario, master: Master, point: OperatingPoint, blocks: Blocks,
-        frequency_range: tuple[float, float], critical: float | None, said: tuple[str, ...] = (),
-        misfits: Mapping[str, list[Misfit]] = MappingProxyType({}), black_boxes: BlackBoxes | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        prepared: PreparedScenario,
+        master: Master,
+        point: OperatingPoint,
+        blocks: Blocks,
+        frequency_range: tuple[float, float],
+        critical: float | None,
+        said: tuple[str, ...] = (),
+        misfits: Mapping[str, list[Misfit]] = MappingProxyType({}),
+        black_boxes: BlackBoxes | None = None,
+    ) -> None:
         self._misfits = misfits
         self._prepared, self._master, self._point, self._blocks = prepared, master, point, blocks
-        self._range, self._critical, self._said = frequency_range, critical, (*sentences(misfits), *said)
+        self._range, self._critical, self._said = (
+            frequency_range,
+            critical,
+            (*sentences(misfits), *said),
+        )
         self._black_boxes = black_boxes
         self._model, self._system = model_of(master, blocks), continuous_model(master, blocks)
         self.named: NamedSystem | None = None
@@ -197,13 +247,18 @@ class Linearised:
     def _spectrum_of_map(self) -> tuple[spectra.Spectrum | None, list[spectra.Mode]]:
         """The step map's spectrum, and the critical modes where only they are asked for."""
         if self._critical is not None:
-            return whole_spectrum(self._model), find_critical_modes(self._model, *self._range, self._critical)
+            return whole_spectrum(self._model), find_critical_modes(
+                self._model, *self._range, self._critical
+            )
         first, last = _named_range(self._range)
         return spectra.find_spectrum(self._model, first, max(last, spectra.HIGHEST_SWING_HZ)), []
 
     def _at_gains(self, gains: Mapping[str, float]) -> LinearModel:
         """The model with other values of parameters that leave the operating point where it is."""
-        gains = {n: gain for n, gain in gains.items() if n.partition(".")[0] in self._master.components}  # in service
+        # in service
+        gains = {
+            n: gain for n, gain in gains.items() if n.partition(".")[0] in self._master.components
+        }
         before = {name: _value(self._prepared, name) for name in gains}
         blocks = self._blocks
         with changed(self._master, gains, before):
@@ -223,21 +278,41 @@ class Linearised:
             shown = [mode for mode in swinging if low <= mode.frequency_hz <= high]
             directional = self._blocks.directional
             self.named = identified(
-                prepared, self._point, model, swinging, self._range, known, self._at_gains,
-                directional=directional, black_boxes=self._black_boxes,
-            )  # fmt: skip
+                prepared,
+                self._point,
+                model,
+                swinging,
+                self._range,
+                known,
+                self._at_gains,
+                directional=directional,
+                black_boxes=self._black_boxes,
+            )
             naming = self.named.naming
-            named = {name: mode for name, mode in naming.named.items() if low <= mode.frequency_hz <= high}
+            named = {
+                name: mode
+                for name, mode in naming.named.items()
+                if low <= mode.frequency_hz <= high
+            }
         else:
             swinging = shown = critical_modes
             naming, named, oscillating = Naming({}), {}, []
         examined = examine(
-            self._master, self._blocks, model, self._system, spectrum=spectrum, of_system=self._of_system.result(),
-            modes=swinging, shown=shown, frequency_range=self._range,
-        )  # fmt: skip
+            self._master,
+            self._blocks,
+            model,
+            self._system,
+            spectrum=spectrum,
+            of_system=self._of_system.result(),
+            modes=swinging,
+            shown=shown,
+            frequency_range=self._range,
+        )
         analysis = prepared.case.table.analysis
         own = prepared.case.scenarios[prepared.name].events
-        failing = component_faults(prepared.case.table.events if own is None else own, prepared.system)
+        failing = component_faults(
+            prepared.case.table.events if own is None else own, prepared.system
+        )
         return ModesResult(
             prepared=prepared,
             operating_point=self._point,
@@ -247,13 +322,24 @@ class Linearised:
             references=dict(prepared.references),
             misfits=self._misfits,
             warnings=(
-                *self._said, *map(str, prepared.questions), *examined.warnings, *naming.doubts,
+                *self._said,
+                *map(str, prepared.questions),
+                *examined.warnings,
+                *naming.doubts,
                 *(f"{fault}: the modes are those before it" for fault in failing),
             ),
-            swing=tuple(name for name in model.names if any(fnmatch.fnmatchcase(name, p) for p in analysis.swing)),
+            swing=tuple(
+                name
+                for name in model.names
+                if any(fnmatch.fnmatchcase(name, p) for p in analysis.swing)
+            ),
             areas=areas_of(analysis.areas, prepared.system),
             stability=examined.stability.doubted(
-                [f"{name} does not fit its binding: {m.fault}" for name, found in self._misfits.items() for m in found]
+                [
+                    f"{name} does not fit its binding: {m.fault}"
+                    for name, found in self._misfits.items()
+                    for m in found
+                ]
             ),
             hidden=None
             if spectrum is None
@@ -267,18 +353,27 @@ class Linearised:
             ),
             system=self._system,
             eigenvalues=() if spectrum is None else spectrum.eigenvalues.tolist(),
-            fit_errors={name: c.disagreement for name, c in self._blocks.components.items() if c.source == IDENTIFIED},
+            fit_errors={
+                name: c.disagreement
+                for name, c in self._blocks.components.items()
+                if c.source == IDENTIFIED
+            },
             unnamed=naming.reasons,
-        )  # fmt: skip
+        )
 
 
 def identified(
-    prepared: PreparedScenario, point: OperatingPoint, model: LinearModel, modes: Sequence[spectra.Mode],
+    prepared: PreparedScenario,
+    point: OperatingPoint,
+    model: LinearModel,
+    modes: Sequence[spectra.Mode],
     frequency_range: tuple[float, float] = spectra.ELECTROMECHANICAL_HZ,
     known: Mapping[str, NamedSystem] = MappingProxyType({}),
-    at_gains: Callable[[Mapping[str, float]], LinearModel] | None = None, *, directional: bool = False,
+    at_gains: Callable[[Mapping[str, float]], LinearModel] | None = None,
+    *,
+    directional: bool = False,
     black_boxes: BlackBoxes | None = None,
-) -> NamedSystem:  # fmt: skip
+) -> NamedSystem:
     """A linearised scenario with the names of its modes, by shape and where two fit by following.
 
     ``at_gains``: the linear model with other gains of damping controllers, where the scenario still runs.
@@ -286,13 +381,19 @@ def identified(
     first, last = _named_range(frequency_range)
 
     def named(other: PreparedScenario, at: OperatingPoint, linear: LinearModel) -> NamedSystem:
-        found = [mode for mode in spectra.find_spectrum(linear, first, last).modes if mode.is_oscillation]
+        found = [
+            mode for mode in spectra.find_spectrum(linear, first, last).modes if mode.is_oscillation
+        ]
         return NamedSystem(other, at, linear, found, named_modes(other.case, linear, found))
 
     def computed(other: PreparedScenario) -> NamedSystem:
         with running(in_service(other)) as master:
             boxes = black_boxes(master) if black_boxes else {}
-            at = OperatingPoint(math.nan, math.nan, math.nan, 0, {}) if boxes else find_operating_point(master)
+            at = (
+                OperatingPoint(math.nan, math.nan, math.nan, 0, {})
+                if boxes
+                else find_operating_point(master)
+            )
             linear = model_of(master, Blocks(master, directional=directional, known=boxes))
         return named(other, at, linear)
 
@@ -300,14 +401,21 @@ def identified(
         NamedSystem(prepared, point, model, modes, named_modes(prepared.case, model, modes)),
         computed,
         known,
-        undamped=None if at_gains is None else lambda gains: named(prepared, point, at_gains(gains)),
+        undamped=None
+        if at_gains is None
+        else lambda gains: named(prepared, point, at_gains(gains)),
     )
 
 
 @contextmanager
-def changed(master: Master, values: Mapping[str, float], before: Mapping[str, float]) -> Iterator[None]:
+def changed(
+    master: Master, values: Mapping[str, float], before: Mapping[str, float]
+) -> Iterator[None]:
     """Inside, running FMUs have other values of tunable parameters; they are put back with their states."""
-    saved = {name: master.components[name].save_state() for name in {key.partition(".")[0] for key in values}}
+    saved = {
+        name: master.components[name].save_state()
+        for name in {key.partition(".")[0] for key in values}
+    }
     try:
         for key, value in values.items():
             _set(master, key, value)
@@ -334,7 +442,9 @@ def _set(master: Master, key: str, value: float) -> None:
 
 def _named_range(shown: tuple[float, float]) -> tuple[float, float]:
     """Names are given before the range is applied, so that a mode outside it leaves its name to no other [Hz]."""
-    return min(shown[0], spectra.ELECTROMECHANICAL_HZ[0]), max(shown[1], spectra.ELECTROMECHANICAL_HZ[1])
+    return min(shown[0], spectra.ELECTROMECHANICAL_HZ[0]), max(
+        shown[1], spectra.ELECTROMECHANICAL_HZ[1]
+    )
 
 
 def _is_swing(mode: spectra.Mode, speeds: Sequence[str]) -> bool:
@@ -346,13 +456,24 @@ def _is_swing(mode: spectra.Mode, speeds: Sequence[str]) -> bool:
 def unknown_modes(prepared: PreparedScenario, reasons: Sequence[str]) -> ModesResult:
     """The result for a system that can be simulated but not linearised: no modes, and a warning with the reasons."""
     why = "; ".join(reasons)
-    said = *map(str, prepared.questions), f"no steady state was looked for and there are no modes: {why}"
+    said = (
+        *map(str, prepared.questions),
+        f"no steady state was looked for and there are no modes: {why}",
+    )
     return ModesResult(
-        prepared=prepared, operating_point=OperatingPoint(math.nan, math.nan, math.nan, 0, {}),
-        model=LinearModel.from_matrix(np.zeros((0, 0)), (), prepared.step_size), modes=[], named={}, references={},
-        warnings=said, swing=(), areas={}, hidden=None, system=None,
+        prepared=prepared,
+        operating_point=OperatingPoint(math.nan, math.nan, math.nan, 0, {}),
+        model=LinearModel.from_matrix(np.zeros((0, 0)), (), prepared.step_size),
+        modes=[],
+        named={},
+        references={},
+        warnings=said,
+        swing=(),
+        areas={},
+        hidden=None,
+        system=None,
         stability=Stability(None, reason=f"the system cannot be linearised: {why}"),
-    )  # fmt: skip
+    )
 
 
 def modes_json(
@@ -375,19 +496,42 @@ def modes_json(
 def _scenario_json(r: ModesResult) -> dict[str, Any]:
     named = {table.name: r.named.get(table.name) for table in r.prepared.case.table.analysis.modes}
     return {
-        "name": r.prepared.name, "subject": r.prepared.subject, "models": r.prepared.models,
+        "name": r.prepared.name,
+        "subject": r.prepared.subject,
+        "models": r.prepared.models,
         "basis": r.prepared.basis,
-        "residual": r.operating_point.residual, "states": r.model.number_of_states,
-        "stable": r.stability.stable, "largest_growth_rate": r.stability.largest_growth_rate,
-        "stability": r.stability.as_json(), "outside_range": None if r.hidden is None else r.hidden.as_json(),
-        "power_flow": power_flow_json(r.prepared), "linearised": r.linearised, "fit_errors": r.fit_errors,
+        "residual": r.operating_point.residual,
+        "states": r.model.number_of_states,
+        "stable": r.stability.stable,
+        "largest_growth_rate": r.stability.largest_growth_rate,
+        "stability": r.stability.as_json(),
+        "outside_range": None if r.hidden is None else r.hidden.as_json(),
+        "power_flow": power_flow_json(r.prepared),
+        "linearised": r.linearised,
+        "fit_errors": r.fit_errors,
         "warnings": list(r.warnings),
-        "named": {name: m and eigenvalue_json(m.eigenvalue, m.damping_percent) for name, m in named.items()},
-        "modes": [{
-            **eigenvalue_json(m.eigenvalue, m.damping_percent), "name": r.name_of(m),
-            "participation": [{"state": s, "factor": f} for s, f in m.participation if f >= 1e-4],
-            "components": {c: f for c, f in m.by_component.items() if f >= 1e-4}, "areas": r.by_area(m),
-            "shape": [{"state": s, "magnitude": abs(m.shape[s]), "angle_deg": math.degrees(phase(m.shape[s]))}
-                      for s in r.swing],
-        } for m in r.modes],
-    }  # fmt: skip
+        "named": {
+            name: m and eigenvalue_json(m.eigenvalue, m.damping_percent)
+            for name, m in named.items()
+        },
+        "modes": [
+            {
+                **eigenvalue_json(m.eigenvalue, m.damping_percent),
+                "name": r.name_of(m),
+                "participation": [
+                    {"state": s, "factor": f} for s, f in m.participation if f >= 1e-4
+                ],
+                "components": {c: f for c, f in m.by_component.items() if f >= 1e-4},
+                "areas": r.by_area(m),
+                "shape": [
+                    {
+                        "state": s,
+                        "magnitude": abs(m.shape[s]),
+                        "angle_deg": math.degrees(phase(m.shape[s])),
+                    }
+                    for s in r.swing
+                ],
+            }
+            for m in r.modes
+        ],
+    }

@@ -6,7 +6,18 @@ from math import inf
 from typing import Any
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.asked import DAMPING, FLAG, FREQUENCIES, NAMES, FieldKind, Names, asked, names, one_of, plain_value
+from orchestrator.asked import (
+    DAMPING,
+    FLAG,
+    FREQUENCIES,
+    NAMES,
+    FieldKind,
+    Names,
+    asked,
+    names,
+    one_of,
+    plain_value,
+)
 from orchestrator.cases.given import Time, in_seconds
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.sharing import SharingRule
@@ -21,22 +32,35 @@ _SHARING, _SCHEDULE, _STOP = one_of(SharingRule), one_of(SCHEDULES), FieldKind("
 @dataclass(frozen=True, kw_only=True)
 class Preparing(OfCase):
     schedule: ScheduleName | None = asked(
-        _SCHEDULE, None, "``gauss-seidel``, ``jacobi``, ``midpoint`` or ``newton``; the case's by default", option=None
+        _SCHEDULE,
+        None,
+        "``gauss-seidel``, ``jacobi``, ``midpoint`` or ``newton``; the case's by default",
+        option=None,
     )
     tolerance: float | None = asked(
-        ANYTHING, None, "steps of a run are as long as this error of a coupled output allows, of 1 or of its value, "
+        ANYTHING,
+        None,
+        "steps of a run are as long as this error of a coupled output allows, of 1 or of its value, "
         "from 1e-8 to 0.1; under ``newton`` unless the schedule is ``midpoint``; by default steps are fixed, or the "
-        "case's", option=None,
-    )  # fmt: skip
+        "case's",
+        option=None,
+    )
     sharing: str | None = asked(
-        _SHARING, None, "how the other units feed what units fed that ``values`` take out of service, such as "
+        _SHARING,
+        None,
+        "how the other units feed what units fed that ``values`` take out of service, such as "
         '``sg5.connected``: ``"droop"``, ``"rating"``, or ``"slack"``; as the case says by default, which is by droop; '
-        "where ``values`` give powers (``P_0``) as well, nothing is shared", option=None,
-    )  # fmt: skip
+        "where ``values`` give powers (``P_0``) as well, nothing is shared",
+        option=None,
+    )
 
     def scheduled(self, prepared: PreparedScenario) -> PreparedScenario:
         """A scenario with another schedule and steps within a tolerance, where they are given."""
-        if self.tolerance is not None and self.schedule is not None and self.schedule not in SECOND_ORDER:
+        if (
+            self.tolerance is not None
+            and self.schedule is not None
+            and self.schedule not in SECOND_ORDER
+        ):
             raise InputError(
                 f"schedule {self.schedule!r} with tolerance = {self.tolerance!r}: a tolerance goes with midpoint or "
                 "newton; choose one of them, or leave the schedule out, which takes newton"
@@ -70,11 +94,17 @@ class ScenarioRequest(Preparing):
     values: Mapping[str, Any] | None = of_values()
     _: KW_ONLY
     force: Names = asked(
-        NAMES, (), "references that swing, in the place of the case's events: ``\"sg1 0.8 Hz 2 %\"``, as ``gfor run "
-        "--force``", option=None,
-    )  # fmt: skip
+        NAMES,
+        (),
+        'references that swing, in the place of the case\'s events: ``"sg1 0.8 Hz 2 %"``, as ``gfor run '
+        "--force``",
+        option=None,
+    )
     fault: Names = asked(
-        NAMES, (), 'short circuits in the place of the case\'s events: ``"bus_9, 150 ms"``', option=None
+        NAMES,
+        (),
+        'short circuits in the place of the case\'s events: ``"bus_9, 150 ms"``',
+        option=None,
     )
 
 
@@ -97,7 +127,9 @@ class ScenariosRequest(Preparing):
     names: Names = of_scenarios()
     values: Mapping[str, Any] | None = of_values()
     _: KW_ONLY
-    stop: Time | None = asked(_STOP, None, "time at which runs end [s]; the case's by default", option=None)
+    stop: Time | None = asked(
+        _STOP, None, "time at which runs end [s]; the case's by default", option=None
+    )
 
 
 @dataclass(frozen=True)
@@ -121,28 +153,42 @@ class ModesRequest:
     """
 
     frequencies: tuple[float, float] = asked(
-        FREQUENCIES, ELECTROMECHANICAL_HZ, "frequencies shown [Hz] (default: 0.1:2)", option="--range"
+        FREQUENCIES,
+        ELECTROMECHANICAL_HZ,
+        "frequencies shown [Hz] (default: 0.1:2)",
+        option="--range",
     )
     critical: float | None = asked(
-        DAMPING, None, "only modes with less damping than this (20 by default), by sparse search instead of the full "
-        "spectrum", option=None, python="damping below which modes are looked for, by sparse search; by default the "
+        DAMPING,
+        None,
+        "only modes with less damping than this (20 by default), by sparse search instead of the full "
+        "spectrum",
+        option=None,
+        python="damping below which modes are looked for, by sparse search; by default the "
         "whole spectrum is computed",
-    )  # fmt: skip
+    )
     _: KW_ONLY
     directional: bool = asked(
-        FLAG, False, "linearise with the FMUs' own directional derivatives instead of by perturbation (with --native)"
+        FLAG,
+        False,
+        "linearise with the FMUs' own directional derivatives instead of by perturbation (with --native)",
     )
     black_box: bool = of_black_box()
     report: Callable[[str], None] | None = asked(
-        ANYTHING, None, "called with a sentence before each run of an identification, which may take minutes; such as "
-        "``print``", option=None,
-    )  # fmt: skip
+        ANYTHING,
+        None,
+        "called with a sentence before each run of an identification, which may take minutes; such as "
+        "``print``",
+        option=None,
+    )
 
     def check(self) -> None:
         if self.critical is not None and not self.frequencies[0] > 0:
             raise InputError("--critical needs --range to begin above 0 Hz, such as 0.1:2")
         if self.black_box and self.directional:
-            raise InputError("--black-box identifies, --directional asks the FMUs for derivatives; give one of them")
+            raise InputError(
+                "--black-box identifies, --directional asks the FMUs for derivatives; give one of them"
+            )
 
 
 def _read_errors(text: str) -> tuple[float, float]:
@@ -158,7 +204,9 @@ def _read_errors(text: str) -> tuple[float, float]:
 def _errors(given: Any, argument: str) -> tuple[float, float]:
     errors = [plain_value(error) for error in given] if isinstance(given, Sequence) else []
     if len(errors) != 2 or not all(isinstance(x, int | float) and 0 < x < inf for x in errors):
-        raise InputError(f"{argument} = {given!r}; give two errors above 0 [Hz, points], such as (0.001, 0.1)")
+        raise InputError(
+            f"{argument} = {given!r}; give two errors above 0 [Hz, points], such as (0.001, 0.1)"
+        )
     return float(errors[0]), float(errors[1])
 
 
@@ -181,7 +229,9 @@ def _schedules(given: Any, argument: str) -> tuple[str, ...]:
 
 
 _ERRORS = FieldKind("HZ:POINTS", _read_errors, _errors)
-_STEPS = FieldKind("H,H,...", lambda text: _lengths([part.strip() for part in text.split(",")], "--try"), _lengths)
+_STEPS = FieldKind(
+    "H,H,...", lambda text: _lengths([part.strip() for part in text.split(",")], "--try"), _lengths
+)
 _SCHEDULES = FieldKind(f"{{{','.join(SCHEDULES)}}}", _read_schedule, _schedules, several=True)
 
 
@@ -210,16 +260,27 @@ class StepsRequest:
     """
 
     allowed: tuple[float, float] = asked(
-        _ERRORS, (1e-3, 0.1), "accepted error of a critical mode's frequency [Hz] and damping [points] (default: "
-        "0.001:0.1)", option="--error",
-    )  # fmt: skip
+        _ERRORS,
+        (1e-3, 0.1),
+        "accepted error of a critical mode's frequency [Hz] and damping [points] (default: "
+        "0.001:0.1)",
+        option="--error",
+    )
     steps: Sequence[Time] = asked(
-        _STEPS, (), "communication steps to try, such as '100 us,500 us' (default: 0.5 to 50 times the case's own)",
+        _STEPS,
+        (),
+        "communication steps to try, such as '100 us,500 us' (default: 0.5 to 50 times the case's own)",
         option="--try",
-    )  # fmt: skip
+    )
     schedules: Names = asked(
-        _SCHEDULES, (), f"schedule to try (repeatable; default: {', '.join(TRIED)})", option="--schedule"
+        _SCHEDULES,
+        (),
+        f"schedule to try (repeatable; default: {', '.join(TRIED)})",
+        option="--schedule",
     )
     frequencies: tuple[float, float] = asked(
-        FREQUENCIES, ELECTROMECHANICAL_HZ, "frequencies of the critical modes [Hz] (default: 0.1:2)", option="--range"
+        FREQUENCIES,
+        ELECTROMECHANICAL_HZ,
+        "frequencies of the critical modes [Hz] (default: 0.1:2)",
+        option="--range",
     )

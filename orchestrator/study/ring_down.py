@@ -21,7 +21,8 @@ LEAST_PERIODS = 1  # least number of the mode's periods in the window of a ring-
 _ENDS: frozenset[Kind] = frozenset({"run_away", "loss_of_synchronism", "not_finite", "failure"})
 """Findings after which the response is no swing around the operating point."""
 
-_SAME = 0.2  # relative difference of frequency up to which an oscillation that is found is the mode itself
+# relative difference of frequency up to which an oscillation that is found is the mode itself
+_SAME = 0.2
 
 
 def ring_down_of(

@@ -105,15 +105,27 @@ class RunResult:
             return False
         if self.before_its_events:
             return None
-        return None if any(finding.kind == NOT_JUDGED or not finding.represented for finding in self.findings) else True
+        return (
+            None
+            if any(
+                finding.kind == NOT_JUDGED or not finding.represented for finding in self.findings
+            )
+            else True
+        )
 
 
 def run_scenario(
-    prepared: PreparedScenario, frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
-    observers: Sequence[Observer] = (), *, linear: bool = False, recording: RecordingFolder | None = None,
-    checkpoints: Checkpoints | None = None, federates: Federates | None = None, threads: int | None = 1,
+    prepared: PreparedScenario,
+    frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
+    observers: Sequence[Observer] = (),
+    *,
+    linear: bool = False,
+    recording: RecordingFolder | None = None,
+    checkpoints: Checkpoints | None = None,
+    federates: Federates | None = None,
+    threads: int | None = 1,
     boxes: Callable[..., ModesResult] | None = None,
-) -> RunResult:  # fmt: skip
+) -> RunResult:
     """Compute the modes of a scenario and its response to the case's events, the linear model's as well if wanted.
 
     A system that cannot be linearised is simulated from its initial state, with a warning instead of modes.
@@ -128,28 +140,52 @@ def run_scenario(
             observers = [*observers, Pace(federates.announce)]
         with Federation(prepared, federates) as federation:
             ready = federation.prepared
-            return _run(ready, frequency_range, observers, linear, recording, None, threads, boxes, federation)
+            return _run(
+                ready,
+                frequency_range,
+                observers,
+                linear,
+                recording,
+                None,
+                threads,
+                boxes,
+                federation,
+            )
     try:
-        return _run(prepared, frequency_range, observers, linear, recording, checkpoints, threads, boxes)
+        return _run(
+            prepared, frequency_range, observers, linear, recording, checkpoints, threads, boxes
+        )
     except NotTakenUpError as error:
         if checkpoints is None:
             raise
         checkpoints.forget(str(error))
-        return _run(prepared, frequency_range, observers, linear, recording, checkpoints, threads, boxes)
+        return _run(
+            prepared, frequency_range, observers, linear, recording, checkpoints, threads, boxes
+        )
 
 
 def _run(
-    prepared: PreparedScenario, frequency_range: tuple[float, float], observers: Sequence[Observer], linear: bool,
-    recording: RecordingFolder | None, checkpoints: Checkpoints | None, threads: int | None,
-    boxes: Callable[..., ModesResult] | None, federation: Federation | None = None,
-) -> RunResult:  # fmt: skip
+    prepared: PreparedScenario,
+    frequency_range: tuple[float, float],
+    observers: Sequence[Observer],
+    linear: bool,
+    recording: RecordingFolder | None,
+    checkpoints: Checkpoints | None,
+    threads: int | None,
+    boxes: Callable[..., ModesResult] | None,
+    federation: Federation | None = None,
+) -> RunResult:
     watch = Watch(prepared, recording)
     statistics = None
     failure: CosimError | None = None
     after = modes_after(prepared, frequency_range)
     with running(prepared, federation, threads) as master:
-        protections = {name: found for name, c in master.components.items() if (found := protections_of(c))}
-        reasons = [text for c in master.components.values() if (text := obstacle_of(c) or obstacle(c))]
+        protections = {
+            name: found for name, c in master.components.items() if (found := protections_of(c))
+        }
+        reasons = [
+            text for c in master.components.values() if (text := obstacle_of(c) or obstacle(c))
+        ]
         if reasons and boxes is not None:
             modes = boxes(prepared, master, frequency_range)
         elif reasons:
@@ -158,7 +194,9 @@ def _run(
             modes = replace(modes, warnings=(*started, *modes.warnings), misfits=misfits)
         else:
             modes = modes_of(prepared, master, frequency_range)
-        if reasons and not (boxes or federation):  # a look is in steps, which a foreign federate cannot take back
+        if reasons and not (
+            boxes or federation
+        ):  # a look is in steps, which a foreign federate cannot take back
             modes = replace(modes, warnings=(*modes.warnings, *_diverging(master)))
         shifts = _shifts(master, modes)
         follows = linear_response(master, prepared) if linear else None
@@ -166,7 +204,10 @@ def _run(
             if federation is not None:
                 federation.begin(master)
             statistics = master.run(
-                prepared.stop_time, prepared.events, [*watch.observers, *observers], checkpoints or NOT_KEPT
+                prepared.stop_time,
+                prepared.events,
+                [*watch.observers, *observers],
+                checkpoints or NOT_KEPT,
             )
         except NotTakenUpError:
             raise
@@ -175,7 +216,10 @@ def _run(
         except KeyboardInterrupt:
             failure = RunInterruptedError(f"{calls.how} at t = {master.time:.6g} s")
     dataset, failure = _recorded(watch, prepared, recording, failure)
-    known, later = (() if not isinstance(r, ModesResult) or r.fit_errors else r.eigenvalues for r in (modes, after))
+    known, later = (
+        () if not isinstance(r, ModesResult) or r.fit_errors else r.eigenvalues
+        for r in (modes, after)
+    )
     findings = watch.findings(failure, master.late_starts, modes.misfits, known, later)
     ring_down, why_none = (None, "") if failure else ring_down_of(modes, dataset, findings)
     unprotected = tuple(
@@ -189,9 +233,26 @@ def _run(
         if plan.isolated is False and is_isolated(plan.description, None)
     )
     not_known = [after] if isinstance(after, str) else []
-    about_run = (*map(str, prepared.about_rows), *filter(None, [why_none]), *not_known, *unprotected, *inside)
+    about_run = (
+        *map(str, prepared.about_rows),
+        *filter(None, [why_none]),
+        *not_known,
+        *unprotected,
+        *inside,
+    )
     modes = replace(modes, warnings=(*modes.warnings, *about_run))
-    return RunResult(modes, dataset, statistics, ring_down, shifts, follows, failure, findings, protections, after)
+    return RunResult(
+        modes,
+        dataset,
+        statistics,
+        ring_down,
+        shifts,
+        follows,
+        failure,
+        findings,
+        protections,
+        after,
+    )
 
 
 def _diverging(master: Master) -> list[str]:
@@ -204,7 +265,10 @@ def _diverging(master: Master) -> list[str]:
 
 
 def _recorded(
-    watch: Watch, prepared: PreparedScenario, recording: RecordingFolder | None, failure: CosimError | None
+    watch: Watch,
+    prepared: PreparedScenario,
+    recording: RecordingFolder | None,
+    failure: CosimError | None,
 ) -> tuple[xr.Dataset, CosimError | None]:
     """What was recorded, and the failure, which may be that it cannot be written."""
     further = computed(prepared) | ({} if failure is None else {ENDED_EARLY: str(failure)})
@@ -229,7 +293,9 @@ def _shifts(master: Master, modes: ModesResult) -> list[ModeShift]:
     except AnalysisError:
         return []
     schedules = {master.schedule.name: master.schedule}
-    if not master.schedule.is_second_order:  # else components are not told the step, as they would be under jacobi
+    if (
+        not master.schedule.is_second_order
+    ):  # else components are not told the step, as they would be under jacobi
         schedules["jacobi"] = jacobi(tuple(master.components))
     shifts = []
     for part in STEPS:

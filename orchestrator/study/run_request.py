@@ -18,7 +18,9 @@ from orchestrator.study.checkpoints import EVERY, Checkpoints
 
 def _observers(given: Any, argument: str) -> Sequence[Observer]:
     parts = ("every", "begin", "observe", "end")
-    if not isinstance(given, Sequence) or not all(hasattr(one, part) for one in given for part in parts):
+    if not isinstance(given, Sequence) or not all(
+        hasattr(one, part) for one in given for part in parts
+    ):
         raise InputError(f"{argument} = {given!r}; give a list of observers, or leave it out")
     return given
 
@@ -33,12 +35,17 @@ def _of_kind(kind: type, rule: str) -> FieldKind:
 
 
 _TIME, _OBSERVERS = FieldKind("T", str, in_seconds), FieldKind("", str, _observers)
-_RECORDING = _of_kind(RecordingFolder, "give a RecordingFolder; `checkpoints` takes a folder's path")
+_RECORDING = _of_kind(
+    RecordingFolder, "give a RecordingFolder; `checkpoints` takes a folder's path"
+)
 _FEDERATES = _of_kind(Federates, 'give Federates(("gfor",)) of orchestrator.federation.choice')
 _THREADS = FieldKind(
-    "N", read_whole(1, MOST_THREADS),
-    lambda given, argument: None if given is None else whole_number(given, argument, 1, MOST_THREADS),
-)  # fmt: skip
+    "N",
+    read_whole(1, MOST_THREADS),
+    lambda given, argument: (
+        None if given is None else whole_number(given, argument, 1, MOST_THREADS)
+    ),
+)
 
 
 @dataclass(frozen=True)
@@ -65,32 +72,53 @@ class RunRequest:
     the voltage falls to 0.92 pu
     """
 
-    stop: Time | None = asked(_TIME, None, "time at which the run ends [s]; the case's by default", option=None)
+    stop: Time | None = asked(
+        _TIME, None, "time at which the run ends [s]; the case's by default", option=None
+    )
     _: KW_ONLY
     linear: bool = asked(FLAG, False, "lay the linear model's response over the simulated one")
     progress: bool = asked(FLAG, False, "show a bar", option=None)
-    observers: Sequence[Observer] = asked(_OBSERVERS, (), "what else looks on at every communication step", option=None)
+    observers: Sequence[Observer] = asked(
+        _OBSERVERS, (), "what else looks on at every communication step", option=None
+    )
     recording: RecordingFolder | None = asked(
-        _RECORDING, None, "a folder on the disk that takes the rows while the run goes on; by default they stay in "
+        _RECORDING,
+        None,
+        "a folder on the disk that takes the rows while the run goes on; by default they stay in "
         "memory, and those of a run that would need more than 256 MB go to a temporary folder, which is removed when "
-        "Python ends", option=None,
-    )  # fmt: skip
+        "Python ends",
+        option=None,
+    )
     checkpoints: str | Path | Checkpoints | None = asked(
-        ANYTHING, None, "folder in which the run is kept while it goes on; by default none. It is empty again at the "
-        "end, but for the recording of a run that would need more than 256 MB", option=None,
-    )  # fmt: skip
-    checkpoint_every: Time = asked(_TIME, EVERY, "wall-clock time between two checkpoints [s]", option=None)
+        ANYTHING,
+        None,
+        "folder in which the run is kept while it goes on; by default none. It is empty again at the "
+        "end, but for the recording of a run that would need more than 256 MB",
+        option=None,
+    )
+    checkpoint_every: Time = asked(
+        _TIME, EVERY, "wall-clock time between two checkpoints [s]", option=None
+    )
     federates: Federates | None = asked(
-        _FEDERATES, None, 'components that run as federates at HELICS, such as ``Federates(("gfor",))`` of '
-        "`orchestrator.federation.choice`; by default everything runs here", option=None,
-    )  # fmt: skip
+        _FEDERATES,
+        None,
+        'components that run as federates at HELICS, such as ``Federates(("gfor",))`` of '
+        "`orchestrator.federation.choice`; by default everything runs here",
+        option=None,
+    )
     threads: int | None = asked(
-        _THREADS, None, "threads that step native FMUs (default: as many as are faster than one, up to one for each "
-        "core); no value depends on it", python="how many step native FMUs, from 1 to 64. By default as many as make "
+        _THREADS,
+        None,
+        "threads that step native FMUs (default: as many as are faster than one, up to one for each "
+        "core); no value depends on it",
+        python="how many step native FMUs, from 1 to 64. By default as many as make "
         "a step shortest, up to one for each core, and only while they are seen to be faster than one. No value "
         "depends on it",
-    )  # fmt: skip
+    )
     black_box: bool = asked(
-        FLAG, False, "identify the components that hide their states, for the modes before the events; else there are "
-        "none", option=None,
-    )  # fmt: skip
+        FLAG,
+        False,
+        "identify the components that hide their states, for the modes before the events; else there are "
+        "none",
+        option=None,
+    )

@@ -7,7 +7,13 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from orchestrator.analysis.identification import IdentifiedMode, Sampling
-from orchestrator.analysis.mode_doubts import is_trend, nothing_swings, over_a_trend, short_window, told_apart
+from orchestrator.analysis.mode_doubts import (
+    is_trend,
+    nothing_swings,
+    over_a_trend,
+    short_window,
+    told_apart,
+)
 from orchestrator.late import pd
 from orchestrator.report.notebook import page
 from orchestrator.results.mode_json import eigenvalue_json
@@ -126,7 +132,9 @@ class RunComparison:
         doubt.
     """
 
-    def __init__(self, labels: tuple[str, str], signals: Sequence[Comparison], remarks: Sequence[str] = ()) -> None:
+    def __init__(
+        self, labels: tuple[str, str], signals: Sequence[Comparison], remarks: Sequence[str] = ()
+    ) -> None:
         self.labels, self.signals, self.remarks = labels, list(signals), list(remarks)
 
     def __iter__(self) -> Iterator[Comparison]:
@@ -136,23 +144,33 @@ class RunComparison:
         """Largest deviation of each run, largest difference and its time [s], and the strongest oscillation of each."""
         rows = [
             {
-                "signal": c.expression, "unit": c.unit, "deviation_a": c.deviations[0], "deviation_b": c.deviations[1],
-                "largest_difference": c.largest, "at_s": c.at, "rms": c.rms,
+                "signal": c.expression,
+                "unit": c.unit,
+                "deviation_a": c.deviations[0],
+                "deviation_b": c.deviations[1],
+                "largest_difference": c.largest,
+                "at_s": c.at,
+                "rms": c.rms,
                 "frequency_hz_a": c.modes[0].frequency_hz if c.modes[0] else None,
                 "damping_percent_a": c.modes[0].damping_percent if c.modes[0] else None,
                 "frequency_hz_b": c.modes[1].frequency_hz if c.modes[1] else None,
                 "damping_percent_b": c.modes[1].damping_percent if c.modes[1] else None,
             }
             for c in self.signals
-        ]  # fmt: skip
+        ]
         return pd.DataFrame(rows).set_index("signal")
 
     def as_json(self) -> list[dict[str, Any]]:
         """The same as ``gfor signal compare --json`` prints, as JSON's types."""
-        return [asdict(c) | {"modes": [m and identified_mode_json(m) for m in c.modes]} for c in self.signals]
+        return [
+            asdict(c) | {"modes": [m and identified_mode_json(m) for m in c.modes]}
+            for c in self.signals
+        ]
 
     def __repr__(self) -> str:
-        return f"<RunComparison of {self.labels[0]} and {self.labels[1]}: {len(self.signals)} signals>"
+        return (
+            f"<RunComparison of {self.labels[0]} and {self.labels[1]}: {len(self.signals)} signals>"
+        )
 
     def _repr_html_(self) -> str:
         return page(f"a: {self.labels[0]}; b: {self.labels[1]}", self.remarks, self.table())

@@ -6,13 +6,18 @@ from orchestrator.errors import ComponentError, ErrorKind, Problem, StartError
 from orchestrator.fmi.instance import is_ours
 
 _INITIALISATION = "InitializationMode"
-_PREFACE = "parameters cannot be used: "  # begins what our models say of values that do not fit together
+# begins what our models say of values that do not fit together
+_PREFACE = "parameters cannot be used: "
 _FULL = 1.0  # apparent power [pu] beyond which a unit is asked for more than its rating
 
 
 def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError | None:
     """The error of a component that refused to initialise; None for any other call, and where its process died."""
-    refused = error.status.removeprefix("fmi2").removeprefix("fmi3") in ("Error", "Discard", "an error in the log")
+    refused = error.status.removeprefix("fmi2").removeprefix("fmi3") in (
+        "Error",
+        "Discard",
+        "an error in the log",
+    )
     if not refused or _INITIALISATION not in error.call or error.component not in prepared.places:
         return None
     name, plan = error.component, prepared.system.components[error.component]
@@ -20,7 +25,9 @@ def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError
         error.log.removeprefix(f"{name}: ").removeprefix(_PREFACE)
         or "the FMU says no more than that its initialisation failed"
     )
-    given = {v: plan.number(v) for v in ("P_0", "Q_0", "S_n", "v_0") if v in plan.description.variables}
+    given = {
+        v: plan.number(v) for v in ("P_0", "Q_0", "S_n", "v_0") if v in plan.description.variables
+    }
     most = power_limits(plan, given["Q_0"])[1] if {"P_0", "Q_0"} <= set(given) else float("inf")
     share = given["P_0"] / most if "P_0" in given and most > 0 else 0.0
     need = f"would need {100 * share:.0f} % of what its limits allow, and " if share > 1 else ""
@@ -29,9 +36,8 @@ def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError
         computed = prepared.power_flow is not None and name in prepared.power_flow.powers
         by = "the power flow asks it for" if computed else "it is to start at"
         voltage = f" at v = {given['v_0']:.4g} pu" if "v_0" in given else ""
-        text += (
-            f"; {by} P_0 = {given['P_0']:.4g} and Q_0 = {given['Q_0']:.4g} pu of S_n = {given['S_n']:g} MVA{voltage}"
-        )
+        powers = f"P_0 = {given['P_0']:.4g} and Q_0 = {given['Q_0']:.4g} pu"
+        text += f"; {by} {powers} of S_n = {given['S_n']:g} MVA{voltage}"
         if computed and (need or abs(complex(given["P_0"], given["Q_0"])) > _FULL):
             text += (
                 ". Give others more of the power (P_0 of units; a screening of outages shares it by itself), lower the "

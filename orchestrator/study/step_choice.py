@@ -11,7 +11,13 @@ from orchestrator.analysis.blocks import Blocks
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearity import doubts
 from orchestrator.analysis.linearization import compose, continuous_model
-from orchestrator.analysis.modes import damping_percent, damping_ratio, eigenvalues, find_spectrum, oscillations
+from orchestrator.analysis.modes import (
+    damping_percent,
+    damping_ratio,
+    eigenvalues,
+    find_spectrum,
+    oscillations,
+)
 from orchestrator.analysis.stability import WHOLE, fastest_growth
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.prepare import PreparedScenario
@@ -21,15 +27,18 @@ from orchestrator.coupling.schedule import SECOND_ORDER, Schedule, ScheduleName
 from orchestrator.errors import AnalysisError, CosimError, InputError
 from orchestrator.study.modes import running
 
-MULTIPLES = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 10.0, 20.0, 50.0)  # steps that are tried, in parts of the case's own
-TRIED: tuple[ScheduleName, ...] = ("gauss-seidel", "midpoint", "newton")  # schedules that are tried where none is named
+# steps that are tried, in parts of the case's own
+MULTIPLES = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 10.0, 20.0, 50.0)
+# schedules that are tried where none is named
+TRIED: tuple[ScheduleName, ...] = ("gauss-seidel", "midpoint", "newton")
 LEAST_DAMPED = 6  # so many modes are compared, least damped first
 SWINGING = 0.5  # largest damping ratio of a compared mode
 _COUPLING_FACTOR, _COUPLING_RATE = 2.0, 1.0
 """As in `orchestrator.analysis.stability`: growth beyond the first figure times the continuous system's plus the second
 [1/s] is the coupling's."""
 
-_AFTER_THE_FIRST = 2  # so many steps in turn that are not within the error end the search with a schedule
+# so many steps in turn that are not within the error end the search with a schedule
+_AFTER_THE_FIRST = 2
 
 
 @dataclass(frozen=True)
@@ -54,13 +63,17 @@ class TriedStep:
     # whether the step makes nothing grow that does not grow in the continuous system, and hides no growth
     stable: bool = False
     refused: str = ""  # why nothing could be computed; else empty
-    doubts: tuple[str, ...] = ()  # why the figures may be none of the run's, such as a limit at the operating point
+    # why the figures may be none of the run's, such as a limit at the operating point
+    doubts: tuple[str, ...] = ()
 
     def is_within(self, allowed: Allowed) -> bool:
         """Whether the step is stable, beyond doubt, and moves no critical mode by more than is allowed."""
         if self.refused or self.doubts or not self.stable:
             return False
-        return bool(np.abs(self.hertz).max() <= allowed.hertz and np.abs(self.points).max() <= allowed.points)
+        return bool(
+            np.abs(self.hertz).max() <= allowed.hertz
+            and np.abs(self.points).max() <= allowed.points
+        )
 
 
 @dataclass(frozen=True)
@@ -69,7 +82,8 @@ class StepChoice:
 
     prepared: PreparedScenario
     allowed: Allowed
-    critical: NDArray[np.complex128]  # the continuous system's critical modes [rad/s], least damped first
+    # the continuous system's critical modes [rad/s], least damped first
+    critical: NDArray[np.complex128]
     growth: float  # largest growth rate of the continuous system [1/s]; 0 where nothing grows
     trials: tuple[TriedStep, ...]
     # steps [s] that were not tried, as an event of the case or its end does not fall on them
@@ -96,13 +110,18 @@ class StepChoice:
         """Steps within the error that do not count, because a shorter one is not."""
         best = self.largest(schedule)
         shortest = 0.0 if best is None else best.step_size
-        return [t for t in self.of(schedule) if t.step_size > shortest and t.is_within(self.allowed)]
+        return [
+            t for t in self.of(schedule) if t.step_size > shortest and t.is_within(self.allowed)
+        ]
 
 
 def choose_step(
-    prepared: PreparedScenario, allowed: Allowed, steps: Sequence[float] = (), schedules: Sequence[ScheduleName] = (),
+    prepared: PreparedScenario,
+    allowed: Allowed,
+    steps: Sequence[float] = (),
+    schedules: Sequence[ScheduleName] = (),
     frequency_range: tuple[float, float] = (0.1, 2.0),
-) -> StepChoice:  # fmt: skip
+) -> StepChoice:
     """What schedules do to a scenario's critical modes at several steps, against the continuous system."""
     lengths, left_out = _fitting(prepared, steps)
     with running(prepared.rescheduled("gauss-seidel")) as master:
@@ -122,8 +141,12 @@ def choose_step(
         critical, growth = _critical(exact, frequency_range), _growth(exact, step_map=False)
         trials: list[TriedStep] = []
         for name in dict.fromkeys(schedules or TRIED):
-            trials += _tried(prepared, master, name, lengths, critical, growth, None if steps else allowed)
-    return StepChoice(prepared, allowed, critical, growth, tuple(trials), tuple(left_out) if steps else ())
+            trials += _tried(
+                prepared, master, name, lengths, critical, growth, None if steps else allowed
+            )
+    return StepChoice(
+        prepared, allowed, critical, growth, tuple(trials), tuple(left_out) if steps else ()
+    )
 
 
 def _fitting(prepared: PreparedScenario, steps: Sequence[float]) -> tuple[list[float], list[float]]:
@@ -147,7 +170,9 @@ def _fitting(prepared: PreparedScenario, steps: Sequence[float]) -> tuple[list[f
     return found, left_out
 
 
-def _critical(exact: NDArray[np.complex128], frequency_range: tuple[float, float]) -> NDArray[np.complex128]:
+def _critical(
+    exact: NDArray[np.complex128], frequency_range: tuple[float, float]
+) -> NDArray[np.complex128]:
     low, high = (2 * np.pi * hertz for hertz in frequency_range)
     swings = exact[oscillations(exact)]
     ratio = np.array([damping_ratio(value) for value in swings.tolist()])
@@ -166,9 +191,14 @@ def _growth(values: NDArray[np.complex128], *, step_map: bool) -> float:
 
 
 def _tried(
-    prepared: PreparedScenario, master: Master, name: ScheduleName, steps: Sequence[float],
-    critical: NDArray[np.complex128], growth: float, allowed: Allowed | None,
-) -> list[TriedStep]:  # fmt: skip
+    prepared: PreparedScenario,
+    master: Master,
+    name: ScheduleName,
+    steps: Sequence[float],
+    critical: NDArray[np.complex128],
+    growth: float,
+    allowed: Allowed | None,
+) -> list[TriedStep]:
     """Trials of one schedule; up to some steps that are too long, where it is said what is allowed."""
     trials: list[TriedStep] = []
     for step in steps:
@@ -176,20 +206,32 @@ def _tried(
             trial = _trial(prepared, master, name, step, critical, growth)
         except CosimError as error:
             nothing = np.zeros(0)
-            trial = TriedStep(name, step, nothing, nothing, nothing.astype(complex), refused=str(error))
+            trial = TriedStep(
+                name, step, nothing, nothing, nothing.astype(complex), refused=str(error)
+            )
         trials.append(trial)
         last = trials[-_AFTER_THE_FIRST:]
-        if allowed and len(last) == _AFTER_THE_FIRST and not any(one.is_within(allowed) for one in last):
+        if (
+            allowed
+            and len(last) == _AFTER_THE_FIRST
+            and not any(one.is_within(allowed) for one in last)
+        ):
             break
     return trials
 
 
 def _trial(
-    prepared: PreparedScenario, master: Master, name: ScheduleName, step: float, critical: NDArray[np.complex128],
+    prepared: PreparedScenario,
+    master: Master,
+    name: ScheduleName,
+    step: float,
+    critical: NDArray[np.complex128],
     growth: float,
-) -> TriedStep:  # fmt: skip
+) -> TriedStep:
     schedule = prepared.rescheduled(name).schedule
-    if name == "newton" and (stuck := [n for n, c in master.components.items() if not c.description.can_save_state]):
+    if name == "newton" and (
+        stuck := [n for n, c in master.components.items() if not c.description.can_save_state]
+    ):
         raise AnalysisError(f"component {', '.join(stuck)} declares no canGetAndSetFMUstate")
     blocks = Blocks(master, step, schedule=schedule)
     model = compose(blocks, schedule)
@@ -199,13 +241,22 @@ def _trial(
     seen = _partners(values, critical)
     rate = _growth(values, step_map=True)
     return TriedStep(
-        name, step, (seen.imag - critical.imag) / (2 * np.pi),
-        np.array([damping_percent(a) - damping_percent(b) for a, b in zip(seen, critical, strict=True)]), seen, rate,
-        keeps_stability(rate, growth, seen, critical), doubts=_doubts(blocks, schedule, model),
-    )  # fmt: skip
+        name,
+        step,
+        (seen.imag - critical.imag) / (2 * np.pi),
+        np.array(
+            [damping_percent(a) - damping_percent(b) for a, b in zip(seen, critical, strict=True)]
+        ),
+        seen,
+        rate,
+        keeps_stability(rate, growth, seen, critical),
+        doubts=_doubts(blocks, schedule, model),
+    )
 
 
-def keeps_stability(rate: float, growth: float, seen: NDArray[np.complex128], critical: NDArray[np.complex128]) -> bool:
+def keeps_stability(
+    rate: float, growth: float, seen: NDArray[np.complex128], critical: NDArray[np.complex128]
+) -> bool:
     """Whether a step makes nothing grow by itself, and leaves each critical mode on its side of the imaginary axis.
 
     ``rate`` and ``growth``: largest growth rates [1/s] of the step map and of the continuous system; 0 where nothing
@@ -216,7 +267,9 @@ def keeps_stability(rate: float, growth: float, seen: NDArray[np.complex128], cr
     return not grown and not crossed
 
 
-def _partners(values: NDArray[np.complex128], wanted: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def _partners(
+    values: NDArray[np.complex128], wanted: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
     """For each wanted eigenvalue one of the given ones, no one twice, so that all are as near as they can be."""
     from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - only this study needs it
 
@@ -238,20 +291,27 @@ def step_choice_json(choice: StepChoice) -> dict[str, Any]:
         "scenario": choice.prepared.name,
         "allowed": {"hertz": choice.allowed.hertz, "points": choice.allowed.points},
         "critical": [
-            {"frequency_hz": z.imag / (2 * np.pi), "damping_percent": damping_percent(z)} for z in choice.critical
+            {"frequency_hz": z.imag / (2 * np.pi), "damping_percent": damping_percent(z)}
+            for z in choice.critical
         ],
         "continuous_growth_rate": choice.growth,
         "largest_step_s": {
-            name: None if (best := choice.largest(name)) is None else best.step_size for name in choice.schedules
+            name: None if (best := choice.largest(name)) is None else best.step_size
+            for name in choice.schedules
         },
         "left_out_s": list(choice.left_out),
         "trials": [
             {
-                "schedule": trial.schedule, "step_size_s": trial.step_size, "frequency_error_hz": trial.hertz.tolist(),
-                "damping_error_points": trial.points.tolist(), "growth_rate": None if trial.refused else trial.growth,
-                "stable": None if trial.refused else trial.stable, "within": trial.is_within(choice.allowed),
-                "refused": trial.refused, "doubts": list(trial.doubts),
+                "schedule": trial.schedule,
+                "step_size_s": trial.step_size,
+                "frequency_error_hz": trial.hertz.tolist(),
+                "damping_error_points": trial.points.tolist(),
+                "growth_rate": None if trial.refused else trial.growth,
+                "stable": None if trial.refused else trial.stable,
+                "within": trial.is_within(choice.allowed),
+                "refused": trial.refused,
+                "doubts": list(trial.doubts),
             }
             for trial in choice.trials
         ],
-    }  # fmt: skip
+    }

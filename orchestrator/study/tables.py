@@ -17,22 +17,32 @@ from orchestrator.study.run import RunResult
 def steady_states(results: Sequence[ModesResult]) -> Table:
     columns = ("Scenario", "States", "Residual per step", "Drift [1/s]", "Power-flow residual [pu]")
     rows = [
-        (r.prepared.title, str(r.model.number_of_states),
-         *("–" if math.isnan(v) else f"{v:.1e}" for v in (r.operating_point.residual, r.operating_point.drift)),
-         f"{r.prepared.power_flow.residual:.1e}" if r.prepared.power_flow else "–")
+        (
+            r.prepared.title,
+            str(r.model.number_of_states),
+            *(
+                "–" if math.isnan(v) else f"{v:.1e}"
+                for v in (r.operating_point.residual, r.operating_point.drift)
+            ),
+            f"{r.prepared.power_flow.residual:.1e}" if r.prepared.power_flow else "–",
+        )
         for r in results
-    ]  # fmt: skip
+    ]
     return make_table("Steady state", *columns, rows=rows)
 
 
 def named_modes(results: Sequence[ModesResult], reference_title: str | None) -> Table:
     """The modes that a case looks for, beside somebody else's figures where there are any."""
-    names = list(dict.fromkeys(name for r in results for name in [*r.named, *r.unnamed, *r.references]))
+    names = list(
+        dict.fromkeys(name for r in results for name in [*r.named, *r.unnamed, *r.references])
+    )
     compared = any(r.references for r in results)
     columns = ["Scenario", "Mode [rad/s]", "f [Hz]", "Damping [%]"]
     if compared:
         columns += [f"{reference_title}: f [Hz]", "Damping [%]"]
-    table = make_table("Electromechanical modes" if len(names) > 1 else "Electromechanical mode", *columns)
+    table = make_table(
+        "Electromechanical modes" if len(names) > 1 else "Electromechanical mode", *columns
+    )
     for name in names:
         for r in results:
             mode, reference = r.named.get(name), r.references.get(name)
@@ -40,7 +50,11 @@ def named_modes(results: Sequence[ModesResult], reference_title: str | None) -> 
             if mode is None:
                 row += ["not known" if name in r.unnamed else "none in range", "", ""]
             else:
-                row += [eigenvalue_text(mode.eigenvalue), f"{mode.frequency_hz:.3f}", f"{mode.damping_percent:.2f}"]
+                row += [
+                    eigenvalue_text(mode.eigenvalue),
+                    f"{mode.frequency_hz:.3f}",
+                    f"{mode.damping_percent:.2f}",
+                ]
             if reference is not None:
                 row += [f"{reference.frequency_hz:.2f}", f"{reference.damping_percent:.2f}"]
             table.add_row(*row)
@@ -56,7 +70,10 @@ def all_modes(result: ModesResult) -> Table:
     table.add_column("Most associated states (participation)", overflow="fold")
     for mode in result.modes:
         associated = ", ".join(f"{name} ({factor:.2f})" for name, factor in mode.participation[:3])
-        name, figures = result.name_of(mode) or "", (f"{mode.frequency_hz:.4f}", f"{mode.damping_percent:.2f}")
+        name, figures = (
+            result.name_of(mode) or "",
+            (f"{mode.frequency_hz:.4f}", f"{mode.damping_percent:.2f}"),
+        )
         style = "bold" if name else None
         table.add_row(eigenvalue_text(mode.eigenvalue), *figures, name, associated, style=style)
     return table
@@ -96,28 +113,48 @@ def power_flows(results: Sequence[ModesResult]) -> Iterator[Table]:
 
 
 def ring_downs(results: Sequence[RunResult]) -> Table:
-    columns = ("Scenario", "f simulated [Hz]", "f mode [Hz]", "Damping simulated [%]", "Damping mode [%]")
+    columns = (
+        "Scenario",
+        "f simulated [Hz]",
+        "f mode [Hz]",
+        "Damping simulated [%]",
+        "Damping mode [%]",
+    )
     rows = [
-        (r.modes.prepared.title, f"{seen.frequency_hz:.4f}", f"{mode.frequency_hz:.4f}",
-         f"{seen.damping_percent:.2f}", f"{mode.damping_percent:.2f}")
+        (
+            r.modes.prepared.title,
+            f"{seen.frequency_hz:.4f}",
+            f"{mode.frequency_hz:.4f}",
+            f"{seen.damping_percent:.2f}",
+            f"{mode.damping_percent:.2f}",
+        )
         for r in results
         if (mode := r.modes.electromechanical) and (seen := r.ring_down)
-    ]  # fmt: skip
-    return make_table("Ring-down of the simulated response against the eigenvalue", *columns, rows=rows)
+    ]
+    return make_table(
+        "Ring-down of the simulated response against the eigenvalue", *columns, rows=rows
+    )
 
 
 def linear_differences(results: Sequence[RunResult]) -> Table:
     """Largest difference between the linear model's response and the simulated one, signal by signal."""
     plots = results[0].modes.prepared.case.table.plots
     signals = dict.fromkeys(panel.signal for plot in plots for panel in plot.panels)
-    table = make_table("Linear model against the simulation: largest difference, of the largest deviation",
-                   "Scenario", *signals)  # fmt: skip
+    table = make_table(
+        "Linear model against the simulation: largest difference, of the largest deviation",
+        "Scenario",
+        *signals,
+    )
     for r in results:
         if r.linear is not None:
             cells = []
             for expression in signals:
                 seen, follows = signal(r.dataset, expression), signal(r.linear, expression)
-                share = math.nan if seen is None or follows is None else relative_difference(seen, follows)
+                share = (
+                    math.nan
+                    if seen is None or follows is None
+                    else relative_difference(seen, follows)
+                )
                 cells.append("–" if math.isnan(share) else f"{share:.2%}")
             table.add_row(r.modes.prepared.title, *cells)
     return table
@@ -126,7 +163,9 @@ def linear_differences(results: Sequence[RunResult]) -> Table:
 def mode_shifts(results: Sequence[RunResult]) -> Table:
     steps = sorted({s.step_size for r in results for s in r.shifts})
     columns = ("Scenario", "Schedule", *(f"{h * 1e6:g} µs" for h in steps))
-    table = make_table("Shift of the electromechanical mode by the communication step [rad/s]", *columns, left=2)
+    table = make_table(
+        "Shift of the electromechanical mode by the communication step [rad/s]", *columns, left=2
+    )
     for r in results:
         for schedule in sorted({s.schedule for s in r.shifts}):
             values = {s.step_size: s.shift for s in r.shifts if s.schedule == schedule}
@@ -135,7 +174,16 @@ def mode_shifts(results: Sequence[RunResult]) -> Table:
 
 
 def run_statistics(results: Sequence[RunResult]) -> Table:
-    table = make_table("Run", "Scenario", "Steps", "Steps/s", "× real time", "Threads", "Inside FMUs", "Of each FMU")
+    table = make_table(
+        "Run",
+        "Scenario",
+        "Steps",
+        "Steps/s",
+        "× real time",
+        "Threads",
+        "Inside FMUs",
+        "Of each FMU",
+    )
     for r in results:
         if s := r.statistics:
             shares = sorted(((c.name, c.share) for c in s.components), key=lambda entry: -entry[1])

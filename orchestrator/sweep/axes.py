@@ -22,10 +22,13 @@ from orchestrator.fmi.description import VariableInfo
 from orchestrator.units import read_value, to_unit
 
 _FORMS = "START:STOP:COUNT, log:START:STOP:COUNT or a list such as 0.1,0.2,0.5"
-_KEYS = r"[^.\s]+\.[^\s,]+(\s*,\s*[^.\s]+\.[^\s,]+)*"  # one ``component.parameter`` or several; each may be a pattern
+# one ``component.parameter`` or several; each may be a pattern
+_KEYS = r"[^.\s]+\.[^\s,]+(\s*,\s*[^.\s]+\.[^\s,]+)*"
 _LENGTH, _SCR = "length", "scr"
 _MOST = 100_000
-_ALPHA_INFO = VariableInfo(ALPHA, 0, "Real", "parameter", "fixed", "", None, 0.0, 1.0, "Share of the converters")
+_ALPHA_INFO = VariableInfo(
+    ALPHA, 0, "Real", "parameter", "fixed", "", None, 0.0, 1.0, "Share of the converters"
+)
 
 
 @dataclass(frozen=True)
@@ -50,13 +53,16 @@ class Axis:
     multiple_of: float | None = None
     # what is set together, each with the factor on the value; the key alone where empty.
     members: tuple[tuple[str, float], ...] = ()
-    scale: Callable[[float], float] | None = None  # what a value comes to before that factor; itself where None
+    # what a value comes to before that factor; itself where None
+    scale: Callable[[float], float] | None = None
 
     def sets(self, value: Value) -> dict[str, Value]:
         if not self.members:
             return {self.key: value}
         scaled = value if self.scale is None else self.scale(float(value))
-        return {key: scaled if factor == 1 else factor * float(scaled) for key, factor in self.members}
+        return {
+            key: scaled if factor == 1 else factor * float(scaled) for key, factor in self.members
+        }
 
 
 def parse_vary(text: str) -> Vary:
@@ -65,7 +71,9 @@ def parse_vary(text: str) -> Vary:
 
     Raises `ValueError` if the text has another form; the message says what is wrong and how to write it."""
     key, equals, given = (part.strip() for part in text.partition("="))
-    named = re.fullmatch(_KEYS, key) or (":" in key and all(part.strip() for part in key.split(":")))
+    named = re.fullmatch(_KEYS, key) or (
+        ":" in key and all(part.strip() for part in key.split(":"))
+    )
     if not equals or not named or not given:
         raise ValueError(f"{text!r} is not of the form component.parameter={_FORMS}")
     if ":" not in given:
@@ -81,13 +89,17 @@ def parse_vary(text: str) -> Vary:
     if len(parts) == 2:
         return Vary(key, (read_value(parts[0]), read_value(parts[1])), 0, logarithmic, ())
     if not re.fullmatch(r"\d+", parts[2]) or not 2 <= int(parts[2]) <= _MOST:
-        raise ValueError(f"{text!r}: COUNT = {parts[2]!r}; it must be a whole number from 2 to {_MOST}")
+        raise ValueError(
+            f"{text!r}: COUNT = {parts[2]!r}; it must be a whole number from 2 to {_MOST}"
+        )
     return Vary(key, (read_value(parts[0]), read_value(parts[1])), int(parts[2]), logarithmic, ())
 
 
 def resolve(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
     if vary.limits is not None and not vary.count:
-        raise InputError(f"--vary {vary.key}: COUNT is missing; write {_FORMS}, or search for a limit with --until")
+        raise InputError(
+            f"--vary {vary.key}: COUNT is missing; write {_FORMS}, or search for a limit with --until"
+        )
     if ":" in vary.key:
         return _length_axis(vary, scenarios)
     if vary.key == ALPHA:
@@ -97,20 +109,43 @@ def resolve(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
     if re.search(r",|\..*[*?\[]", vary.key):
         return _joint_axis(vary, scenarios)
     pattern, _, variable = vary.key.partition(".")
-    plans = {n: p for s in scenarios for n, p in s.system.components.items() if fnmatch.fnmatchcase(n, pattern)}
+    plans = {
+        n: p
+        for s in scenarios
+        for n, p in s.system.components.items()
+        if fnmatch.fnmatchcase(n, pattern)
+    }
     if not plans:
         names = dict.fromkeys(name for s in scenarios for name in s.system.components)
         raise InputError(
             f"--vary {vary.key}: no component of the chosen scenarios is called {pattern!r}; "
             f"they have: {', '.join([*names][:12])}"
-            + whose(pattern, {n: p.description.variables for s in scenarios for n, p in s.system.components.items()})
+            + whose(
+                pattern,
+                {
+                    n: p.description.variables
+                    for s in scenarios
+                    for n, p in s.system.components.items()
+                },
+            )
         )
-    infos = [p.description.variables[variable] for p in plans.values() if variable in p.description.variables]
+    infos = [
+        p.description.variables[variable]
+        for p in plans.values()
+        if variable in p.description.variables
+    ]
     if len({info.unit for info in infos}) > 1:
-        raise InputError(f"--vary {vary.key}: the variables that fit have different units; vary them one by one")
+        raise InputError(
+            f"--vary {vary.key}: the variables that fit have different units; vary them one by one"
+        )
     if not infos:
         # The preparation of a point says it best, with the names that are close.
-        return Axis(vary.key, "", vary.key, tuple(v for v in (vary.limits or vary.values) if not isinstance(v, str)))
+        return Axis(
+            vary.key,
+            "",
+            vary.key,
+            tuple(v for v in (vary.limits or vary.values) if not isinstance(v, str)),
+        )
     return _axis(vary, infos[0])
 
 
@@ -129,13 +164,19 @@ def _joint_axis(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
             for v in fnmatch.filter(plan.description.parameters, variable)
         }
         if not found:
-            raise InputError(f"--vary {part}: no parameter of the chosen scenarios fits this pattern")
+            raise InputError(
+                f"--vary {part}: no parameter of the chosen scenarios fits this pattern"
+            )
         keys |= found
     each = [resolve(replace(vary, key=key), scenarios) for key in keys]
     if len({axis.unit for axis in each}) > 1:
         units = ", ".join(f"{axis.key} [{axis.unit or '1'}]" for axis in each)
-        raise InputError(f"--vary {vary.key}: one value cannot be that of {units}; vary them one by one")
-    return replace(each[0], key=vary.key, title=vary.key, members=tuple((axis.key, 1.0) for axis in each))
+        raise InputError(
+            f"--vary {vary.key}: one value cannot be that of {units}; vary them one by one"
+        )
+    return replace(
+        each[0], key=vary.key, title=vary.key, members=tuple((axis.key, 1.0) for axis in each)
+    )
 
 
 def _length_axis(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
@@ -159,7 +200,9 @@ def _length_axis(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
         for line in (lines[name] for name in found):
             for quantity in ("X", "R", "B") if line.B else ("X", "R"):
                 members |= _of_line(vary, scenarios, line.variable(quantity))
-    info = VariableInfo(_LENGTH, 0, "Real", "parameter", "fixed", "", None, 1e-6, None, f"Length of {names}")
+    info = VariableInfo(
+        _LENGTH, 0, "Real", "parameter", "fixed", "", None, 1e-6, None, f"Length of {names}"
+    )
     return replace(_axis(vary, info), members=tuple(members.items()))
 
 
@@ -171,17 +214,39 @@ def _scr_axis(vary: Vary, bus: str, scenarios: Sequence[PreparedScenario]) -> Ax
         found = ShortCircuit.of(one)
         bus = found.known(bus)
         if one.network and any(bus in x.buses for x in one.network.transformers):
-            raise InputError(f"{bus} has a transformer of three windings, which is not scaled; choose another bus")
+            raise InputError(
+                f"{bus} has a transformer of three windings, which is not scaled; choose another bus"
+            )
         in_mva = any(isinstance(value, str) for value in vary.limits or vary.values)
-        ratings = [sum(S for at, S in ShortCircuit.of(s).converters.values() if at == bus) for s in scenarios]
+        ratings = [
+            sum(S for at, S in ShortCircuit.of(s).converters.values() if at == bus)
+            for s in scenarios
+        ]
         if not in_mva and not max(ratings):
-            raise InputError(f"no converter stands at {bus}, whose rating an SCR is of; give the short-circuit power, "
-                             f"such as '{bus}=3000 MVA:800 MVA:5'")  # fmt: skip
+            raise InputError(
+                f"no converter stands at {bus}, whose rating an SCR is of; give the short-circuit power, "
+                f"such as '{bus}=3000 MVA:800 MVA:5'"
+            )
         members: dict[str, float] = {}
         for line in one.network.lines if one.network else ():
-            for quantity in ("X", "R", "X_C")[: 3 if line.X_C else 2] if bus in (line.from_bus, line.to_bus) else ():
+            for quantity in (
+                ("X", "R", "X_C")[: 3 if line.X_C else 2]
+                if bus in (line.from_bus, line.to_bus)
+                else ()
+            ):
                 members |= _of_line(vary, scenarios, line.variable(quantity))
-        info = VariableInfo(_SCR, 0, "Real", "parameter", "fixed", "MVA" if in_mva else "", None, 1e-3, None, vary.key)
+        info = VariableInfo(
+            _SCR,
+            0,
+            "Real",
+            "parameter",
+            "fixed",
+            "MVA" if in_mva else "",
+            None,
+            1e-3,
+            None,
+            vary.key,
+        )
         axis = _axis(vary, info)
         unit = 1.0 if in_mva else max(ratings)
         scale = partial(_factor, found, bus, unit)
@@ -200,13 +265,17 @@ def _of_line(vary: Vary, scenarios: Sequence[PreparedScenario], variable: str) -
     grid = scenarios[0].grid
     values = {scenario.system.components[grid].number(variable) for scenario in scenarios}
     if len(values) > 1:
-        raise InputError(f"--vary {vary.key}: {grid}.{variable} differs among the scenarios; choose one by --scenario")
+        raise InputError(
+            f"--vary {vary.key}: {grid}.{variable} differs among the scenarios; choose one by --scenario"
+        )
     return {f"{grid}.{variable}": values.pop()}
 
 
 def refuse_doubles(axes: Sequence[Axis], scenarios: Sequence[PreparedScenario]) -> None:
     names = [*dict.fromkeys(name for s in scenarios for name in s.system.components)]
-    single = [replace(axis, key=key) for axis in axes for key, _ in axis.members or ((axis.key, 1.0),)]
+    single = [
+        replace(axis, key=key) for axis in axes for key, _ in axis.members or ((axis.key, 1.0),)
+    ]
     for one, other in itertools.combinations(single, 2):
         (pattern, _, variable), (second, _, same) = one.key.partition("."), other.key.partition(".")
         if variable != same:
@@ -229,7 +298,9 @@ def _imperfection_axis(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axi
     except InputError as error:
         raise InputError(f"--vary {error}") from error
     axis = _axis(vary, info)
-    return replace(axis, multiple_of=scenarios[0].step_size) if vary.key.endswith(".delay") else axis
+    return (
+        replace(axis, multiple_of=scenarios[0].step_size) if vary.key.endswith(".delay") else axis
+    )
 
 
 def _axis(vary: Vary, info: VariableInfo) -> Axis:
@@ -238,22 +309,34 @@ def _axis(vary: Vary, info: VariableInfo) -> Axis:
             values = [convert(info, value) for value in vary.values]
         else:
             start, stop = (_number(info, limit) for limit in vary.limits)
-            for limit in (start, stop):  # what was written is named, rather than a value between the two
+            for limit in (
+                start,
+                stop,
+            ):  # what was written is named, rather than a value between the two
                 convert(replace(info, type="Real"), limit)
-            values = [convert(info, value) for value in _spaced(start, stop, vary.count, vary.logarithmic)]
+            values = [
+                convert(info, value) for value in _spaced(start, stop, vary.count, vary.logarithmic)
+            ]
     except ValueError as error:
         raise InputError(f"--vary {vary.key}: {error}") from error
     if len(set(values)) < len(values):
         raise InputError(f"--vary {vary.key}: a value stands in the list twice; leave one out")
     step = 1.0 if info.type == "Integer" else None
     return Axis(
-        vary.key, "" if info.unit == "1" else info.unit, info.description, tuple(values), vary.logarithmic, step
+        vary.key,
+        "" if info.unit == "1" else info.unit,
+        info.description,
+        tuple(values),
+        vary.logarithmic,
+        step,
     )
 
 
 def _number(info: VariableInfo, limit: Value) -> float:
     if info.type == "Boolean" or isinstance(limit, bool):
-        raise ValueError(f"{info.name} = {limit!r} is no limit of a range; list the values, such as false,true")
+        raise ValueError(
+            f"{info.name} = {limit!r} is no limit of a range; list the values, such as false,true"
+        )
     number = to_unit(limit, info.unit)
     if not math.isfinite(number):
         raise ValueError(f"{info.name} = {number}; a limit of a range must be a finite number")

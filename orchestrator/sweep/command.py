@@ -29,6 +29,13 @@ def _code(sweep: ParameterSweep, fail_unstable: bool) -> int:
 
 
 STUDY = PointStudy(
-    request=SweepRequest, plan=plan_sweep, run=run_sweep, shown=ParameterSweep, task=SweepPointTask,
-    prepared=lambda plan: plan.scenarios, parts=_parts, code=_code, remarks=lambda sweep: sweep.remarks,
-)  # fmt: skip
+    request=SweepRequest,
+    plan=plan_sweep,
+    run=run_sweep,
+    shown=ParameterSweep,
+    task=SweepPointTask,
+    prepared=lambda plan: plan.scenarios,
+    parts=_parts,
+    code=_code,
+    remarks=lambda sweep: sweep.remarks,
+)

@@ -25,7 +25,8 @@ from orchestrator.sweep.trajectories import GridPlace, Trajectory
 _FIGURES = ("real", "imag", "frequency", "damping", "similarity")
 _ATTRIBUTES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
-_IN_DATASET = {"real": "eigenvalue_real", "imag": "eigenvalue_imag"}  # xarray's own attributes have the short names
+# xarray's own attributes have the short names
+_IN_DATASET = {"real": "eigenvalue_real", "imag": "eigenvalue_imag"}
 _SEPARATOR = "; "  # between the warnings of one point
 _BEGINNINGS = "start followed refined entered broken"
 
@@ -39,8 +40,13 @@ class Samples:
         self._curves: dict[int, Curve] = {}
         self.axes = result.plan.axes
         records = (r.modes for s in result.scenarios for r in s.points.values() if r.modes)
-        every, patterns = dict.fromkeys(n for r in records for n in r.names), result.plan.case.table.analysis.swing
-        self.states = [name for name in every if any(fnmatch.fnmatchcase(name, p) for p in patterns)]
+        every, patterns = (
+            dict.fromkeys(n for r in records for n in r.names),
+            result.plan.case.table.analysis.swing,
+        )
+        self.states = [
+            name for name in every if any(fnmatch.fnmatchcase(name, p) for p in patterns)
+        ]
         self.components = [*dict.fromkeys(name.partition(".")[0] for name in every)]
 
     def of(self, sweep: ScenarioSweep, trajectory: Trajectory) -> Curve:
@@ -48,14 +54,18 @@ class Samples:
             self._curves[id(trajectory)] = list(self._samples(sweep, trajectory))
         return self._curves[id(trajectory)]
 
-    def _samples(self, sweep: ScenarioSweep, trajectory: Trajectory) -> Iterator[tuple[GridPlace, dict[str, Any]]]:
+    def _samples(
+        self, sweep: ScenarioSweep, trajectory: Trajectory
+    ) -> Iterator[tuple[GridPlace, dict[str, Any]]]:
         for place, point in trajectory.points.items():
             modes = sweep.points[place].modes
             if modes is None:
                 continue
             value = complex(modes.eigenvalues[point.mode])
             factors = modes.participation()[point.mode]
-            states = {n: float(f) for n, f in zip(modes.names, factors, strict=True) if n in self.states}
+            states = {
+                n: float(f) for n, f in zip(modes.names, factors, strict=True) if n in self.states
+            }
             components: dict[str, float] = {}
             for name, factor in zip(modes.names, factors, strict=True):
                 component = name.partition(".")[0]
@@ -63,11 +73,17 @@ class Samples:
             yield (
                 place,
                 {
-                    "real": value.real, "imag": value.imag, "frequency": value.imag / (2 * np.pi),
-                    "damping": damping_percent(value), "similarity": point.similarity, "named": point.named,
-                    "beginning": point.beginning, "states": states, "components": components,
+                    "real": value.real,
+                    "imag": value.imag,
+                    "frequency": value.imag / (2 * np.pi),
+                    "damping": damping_percent(value),
+                    "similarity": point.similarity,
+                    "named": point.named,
+                    "beginning": point.beginning,
+                    "states": states,
+                    "components": components,
                 },
-            )  # fmt: skip
+            )
 
     def setting(self, place: GridPlace) -> dict[str, float | bool]:
         return {axis.key: axis.values[int(i)] for axis, i in zip(self.axes, place, strict=True)}
@@ -99,39 +115,69 @@ def sweep_dataset(samples: Samples) -> xr.Dataset:
                     array[at] = sample[name]
                 named[at], beginning[at] = sample["named"], sample["beginning"]
                 of_states[at] = [sample["states"].get(name, np.nan) for name in samples.states]
-                of_components[at] = [sample["components"].get(name, np.nan) for name in samples.components]
+                of_components[at] = [
+                    sample["components"].get(name, np.nan) for name in samples.components
+                ]
         for place in itertools.product(*map(range, sizes)):
             residual[(s, *place)] = sweep.points[place].residual
             errors[(s, *place)] = sweep.points[place].error or ""
             warnings[(s, *place)] = _SEPARATOR.join(sweep.points[place].warnings)
             verdict = sweep.points[place].stability
-            for key, array in (("stable", stable), ("largest_growth_rate", growth), ("frequency_hz", hertz)):
+            for key, array in (
+                ("stable", stable),
+                ("largest_growth_rate", growth),
+                ("frequency_hz", hertz),
+            ):
                 if verdict.get(key) is not None:
                     array[(s, *place)] = verdict[key]
     flags = {"flag_values": list(range(5)), "flag_meanings": _BEGINNINGS, "_FillValue": np.int8(-1)}
     at_points = {
-        "residual": residual, "stable": stable, "largest_growth_rate": growth, "largest_growth_frequency": hertz,
-        "error": errors.astype(str), "warnings": warnings.astype(str),
-    }  # fmt: skip
+        "residual": residual,
+        "stable": stable,
+        "largest_growth_rate": growth,
+        "largest_growth_frequency": hertz,
+        "error": errors.astype(str),
+        "warnings": warnings.astype(str),
+    }
     arrays: dict[str, tuple[list[str], Any]] = {
         **{_IN_DATASET.get(name, name): (dims, array) for name, array in figures.items()},
-        "named": (dims, named), "beginning": (dims, beginning), "participation": ([*dims, "state"], of_states),
+        "named": (dims, named),
+        "beginning": (dims, beginning),
+        "participation": ([*dims, "state"], of_states),
         "component_participation": ([*dims, "component"], of_components),
         **{name: (dims[:-1], array) for name, array in at_points.items()},
-    }  # fmt: skip
-    data: dict[str, Any] = {name: (*found, dict(_ATTRIBUTES[name])) for name, found in arrays.items()}
+    }
+    data: dict[str, Any] = {
+        name: (*found, dict(_ATTRIBUTES[name])) for name, found in arrays.items()
+    }
     data["beginning"][2].update(flags)
     data["stable"][2]["_FillValue"] = np.int8(-1)
     coordinates: dict[str, Any] = {
-        "scenario": ("scenario", [s.prepared.name for s in result.scenarios], {"long_name": "Scenario"}),
-        "trajectory": ("trajectory", np.arange(1, longest + 1, dtype=np.int32), {"long_name": "Trajectory"}),
-        "trajectory_name": (["scenario", "trajectory"], np.array(names, dtype=str), {"long_name": "Name"}),
+        "scenario": (
+            "scenario",
+            [s.prepared.name for s in result.scenarios],
+            {"long_name": "Scenario"},
+        ),
+        "trajectory": (
+            "trajectory",
+            np.arange(1, longest + 1, dtype=np.int32),
+            {"long_name": "Trajectory"},
+        ),
+        "trajectory_name": (
+            ["scenario", "trajectory"],
+            np.array(names, dtype=str),
+            {"long_name": "Name"},
+        ),
         "state": ("state", samples.states, {"long_name": "State"}),
         "component": ("component", samples.components, {"long_name": "Component"}),
     }
     for axis in axes:
         values = [float(value) for value in axis.values]
-        coordinates[axis.key] = (axis.key, values, {"units": axis.unit or "1", "long_name": axis.title})
+        coordinates[axis.key] = (
+            axis.key,
+            values,
+            {"units": axis.unit or "1", "long_name": axis.title},
+        )
     return xr.Dataset(data, coords=coordinates, attrs=_attributes(samples))
 
 
@@ -140,33 +186,46 @@ def _attributes(samples: Samples) -> dict[str, Any]:
     origin = provenance(result.plan.scenarios[0])
     everyone = [provenance(prepared) for prepared in result.plan.scenarios]
     own = {
-        key: json.dumps({p["scenario"]: p[key] for p in everyone}) for key in ("title", "values", "schedule", "fmus")
+        key: json.dumps({p["scenario"]: p[key] for p in everyone})
+        for key in ("title", "values", "schedule", "fmus")
     }
     low, high = result.plan.frequency_range
-    return {k: v for k, v in origin.items() if k not in ("scenario", "events")} | own | {
-        "overrides": json.dumps(result.plan.overrides),
-        "models": result.plan.scenarios[0].models or "",
-        "basis": json.dumps(result.plan.scenarios[0].basis),
-        "warned": json.dumps([*_asked(samples), *warned(samples)]),
-        "frequency_range_hz": [low, high],
-    }  # fmt: skip
+    return (
+        {k: v for k, v in origin.items() if k not in ("scenario", "events")}
+        | own
+        | {
+            "overrides": json.dumps(result.plan.overrides),
+            "models": result.plan.scenarios[0].models or "",
+            "basis": json.dumps(result.plan.scenarios[0].basis),
+            "warned": json.dumps([*_asked(samples), *warned(samples)]),
+            "frequency_range_hz": [low, high],
+        }
+    )
 
 
 def _asked(samples: Samples) -> dict[str, None]:
-    return {str(question): None for sweep in samples.result.scenarios for question in sweep.prepared.questions}
+    return {
+        str(question): None
+        for sweep in samples.result.scenarios
+        for question in sweep.prepared.questions
+    }
 
 
 def warned(samples: Samples) -> list[str]:
     """Each kind of warning once, with the number of points that have it."""
     asked = _asked(samples)  # said already, before the sweep
     points = [record for sweep in samples.result.scenarios for record in sweep.points.values()]
-    kinds = kinds_of((record, (text for text in record.warnings if text not in asked)) for record in points)
+    kinds = kinds_of(
+        (record, (text for text in record.warnings if text not in asked)) for record in points
+    )
     return [f"at {len(having)} of {len(points)} points: {text}" for text, having in kinds]
 
 
 def sweep_rows(samples: Samples) -> list[dict[str, Any]]:
     rows = []
-    units = {axis.key: f"{axis.key} [{axis.unit}]" if axis.unit else axis.key for axis in samples.axes}
+    units = {
+        axis.key: f"{axis.key} [{axis.unit}]" if axis.unit else axis.key for axis in samples.axes
+    }
     for sweep in samples.result.scenarios:
         for trajectory in sweep.trajectories:
             for place, sample in samples.of(sweep, trajectory):
@@ -177,14 +236,24 @@ def sweep_rows(samples: Samples) -> list[dict[str, Any]]:
                     if (unit := _ATTRIBUTES[_IN_DATASET.get(name, name)]["units"])
                 }
                 shares = {f"participation {s}": _share(sample["states"], s) for s in samples.states}
-                shares |= {f"participation {c}": _share(sample["components"], c) for c in samples.components}
+                shares |= {
+                    f"participation {c}": _share(sample["components"], c)
+                    for c in samples.components
+                }
                 rows.append(
-                    {"scenario": sweep.prepared.name, **setting, "trajectory": trajectory.name, **figures}
+                    {
+                        "scenario": sweep.prepared.name,
+                        **setting,
+                        "trajectory": trajectory.name,
+                        **figures,
+                    }
                     | {"named": int(sample["named"]), "beginning": sample["beginning"].name.lower()}
                     | {**shares, **_verdict(sweep.points[place]), "error": ""}
                     | {"warnings": _SEPARATOR.join(sweep.points[place].warnings)}
                 )
-    empty = dict.fromkeys(rows[0] if rows else ["scenario", *units.values(), "error", "warnings"], "")
+    empty = dict.fromkeys(
+        rows[0] if rows else ["scenario", *units.values(), "error", "warnings"], ""
+    )
     for sweep, place, error in samples.result.failures():
         setting = {units[key]: value for key, value in samples.setting(place).items()}
         rows.append(empty | {"scenario": sweep.prepared.name, **setting, "error": error})
@@ -215,31 +284,56 @@ def sweep_json(samples: Samples) -> dict[str, Any]:
     found = {} if not limits else (limits[0] if len(limits) == 1 else {}) | {"limits": limits}
     return found | {
         "case": result.plan.case.name,
-        "parameters": [{"name": a.key, "unit": a.unit, "values": list(a.values)} for a in samples.axes],
+        "parameters": [
+            {"name": a.key, "unit": a.unit, "values": list(a.values)} for a in samples.axes
+        ],
         "step_size_s": result.plan.scenarios[0].step_size,
-        "points": {"computed": result.computed, "stored": result.stored, "refining": result.refined},
-        "scenarios": [{
-            "name": sweep.prepared.name, "title": sweep.prepared.title, "stable": sweep.stable,
-            "unstable": [{"values": samples.setting(place)} | sweep.points[place].stability
-                         for place in sweep.unstable(samples.axes)],
-            "trajectories": [{
-                "name": trajectory.name,
-                "points": [_point_json(samples.setting(p), f) for p, f in samples.of(sweep, trajectory)],
-            } for trajectory in sweep.trajectories],
-            "failed": failed[sweep.prepared.name],
-            "warnings": [{"values": samples.setting(place), "warnings": list(said)}
-                         for place in grid_places(samples.axes) if (said := sweep.points[place].warnings)],
-        } for sweep in result.scenarios],
-    }  # fmt: skip
+        "points": {
+            "computed": result.computed,
+            "stored": result.stored,
+            "refining": result.refined,
+        },
+        "scenarios": [
+            {
+                "name": sweep.prepared.name,
+                "title": sweep.prepared.title,
+                "stable": sweep.stable,
+                "unstable": [
+                    {"values": samples.setting(place)} | sweep.points[place].stability
+                    for place in sweep.unstable(samples.axes)
+                ],
+                "trajectories": [
+                    {
+                        "name": trajectory.name,
+                        "points": [
+                            _point_json(samples.setting(p), f)
+                            for p, f in samples.of(sweep, trajectory)
+                        ],
+                    }
+                    for trajectory in sweep.trajectories
+                ],
+                "failed": failed[sweep.prepared.name],
+                "warnings": [
+                    {"values": samples.setting(place), "warnings": list(said)}
+                    for place in grid_places(samples.axes)
+                    if (said := sweep.points[place].warnings)
+                ],
+            }
+            for sweep in result.scenarios
+        ],
+    }
 
 
 def _point_json(setting: dict[str, float | bool], sample: dict[str, Any]) -> dict[str, Any]:
     return {
-        "values": setting, **eigenvalue_json(complex(sample["real"], sample["imag"]), sample["damping"]),
-        "similarity": None if np.isnan(sample["similarity"]) else sample["similarity"], "named": sample["named"],
-        "beginning": sample["beginning"].name.lower(), "participation": sample["states"],
+        "values": setting,
+        **eigenvalue_json(complex(sample["real"], sample["imag"]), sample["damping"]),
+        "similarity": None if np.isnan(sample["similarity"]) else sample["similarity"],
+        "named": sample["named"],
+        "beginning": sample["beginning"].name.lower(),
+        "participation": sample["states"],
         "components": sample["components"],
-    }  # fmt: skip
+    }
 
 
 def save_sweep(samples: Samples, folder: Path) -> list[str]:
@@ -248,6 +342,8 @@ def save_sweep(samples: Samples, folder: Path) -> list[str]:
     save_table(sweep_rows(samples), folder / "sweep.csv")
     if not samples.result.limits:
         return ["sweep.nc", "sweep.csv"]
-    found = json.dumps([limit.as_json() for limit in samples.result.limits], indent=1, ensure_ascii=False)
+    found = json.dumps(
+        [limit.as_json() for limit in samples.result.limits], indent=1, ensure_ascii=False
+    )
     (folder / "limits.json").write_text(found, encoding="utf-8")
     return ["sweep.nc", "sweep.csv", "limits.json"]

@@ -21,7 +21,8 @@ COARSE = 9  # values of the coarse grid where none are asked for
 HALVINGS = 8  # of the stretch between two values of the grid
 _LONGEST = 150  # characters of a failure that a sentence shows
 _PARTS = 3  # components that are named where nothing swings against something
-_SAME = 0.02  # the growing mode is one of those in the range where both differ by less than this part of its size
+# the growing mode is one of those in the range where both differ by less than this part of its size
+_SAME = 0.02
 _NO_POINT = {ErrorKind.POWER_FLOW, ErrorKind.START, ErrorKind.STEADY_STATE, ErrorKind.ISLANDING}
 
 
@@ -135,7 +136,11 @@ class ParameterLimit:
 
     def _dip(self) -> str:
         """The least damping on the way, where it is less than at both ends."""
-        held = [x for x in takewhile(lambda x: x["kind"] == str(Ending.HOLDS), self.tried) if x["damping_percent"]]
+        held = [
+            x
+            for x in takewhile(lambda x: x["kind"] == str(Ending.HOLDS), self.tried)
+            if x["damping_percent"]
+        ]
         least = min(held, key=lambda x: x["damping_percent"], default=None)
         if least is None or least is held[0] or least is held[-1]:
             return ""
@@ -143,7 +148,11 @@ class ParameterLimit:
 
     def _again(self, how: str = "again at") -> str:
         shown = few(map(self._value, self.again), 2)
-        return f" ({self.until.holding} {how} {shown}: the range is not of one piece)" if self.again else ""
+        return (
+            f" ({self.until.holding} {how} {shown}: the range is not of one piece)"
+            if self.again
+            else ""
+        )
 
     @property
     def remarks(self) -> list[str]:
@@ -157,18 +166,32 @@ class ParameterLimit:
 
     def _mode(self, mode: dict[str, Any]) -> str:
         named, hertz = f"{mode['name']!r}, " if mode["name"] else "", mode["frequency_hz"]
-        where = f"{hertz:.3f} Hz, {mode['damping_percent']:.2f} %" if hertz else f"{mode['real']:+.3g} 1/s, no swing"
+        where = (
+            f"{hertz:.3f} Hz, {mode['damping_percent']:.2f} %"
+            if hertz
+            else f"{mode['real']:+.3g} 1/s, no swing"
+        )
         return f"{named}{where} ({self.who})"
 
     def as_json(self) -> dict[str, Any]:
         return {
-            "scenario": self.scenario, "parameter": self.key, "unit": self.unit,
+            "scenario": self.scenario,
+            "parameter": self.key,
+            "unit": self.unit,
             "until": f"{self.until.damping:g} %" if self.until.damping else "unstable",
-            "limit": self.limit, "reason": None if self.limit is not None else self.sentence,
-            "holds_at": self.holds_at, "beyond": self.beyond, "ends_with": str(self.kind), "mode": self.mode,
-            "beyond_rating": self.strained and {"value": self.strained[0], "units": self.strained[1]},
-            "why": self.why, "holds_again_at": list(self.again), "tried": list(self.tried), "sentence": self.sentence,
-        }  # fmt: skip
+            "limit": self.limit,
+            "reason": None if self.limit is not None else self.sentence,
+            "holds_at": self.holds_at,
+            "beyond": self.beyond,
+            "ends_with": str(self.kind),
+            "mode": self.mode,
+            "beyond_rating": self.strained
+            and {"value": self.strained[0], "units": self.strained[1]},
+            "why": self.why,
+            "holds_again_at": list(self.again),
+            "tried": list(self.tried),
+            "sentence": self.sentence,
+        }
 
 
 def mode_behind(record: PointRecord, speeds: Sequence[str]) -> tuple[dict[str, Any] | None, str]:
@@ -182,17 +205,23 @@ def mode_behind(record: PointRecord, speeds: Sequence[str]) -> tuple[dict[str, A
         return None, ""
     if grows:
         value = complex(verdict["largest_growth_rate"], 2 * np.pi * verdict["frequency_hz"])
-        near = np.abs(modes.eigenvalues - value)  # the step map may be stable where the system is not
+        # the step map may be stable where the system is not
+        near = np.abs(modes.eigenvalues - value)
         place = int(near.argmin()) if len(near) and near.min() <= _SAME * abs(value) else None
     else:
-        place = min(range(len(modes.eigenvalues)), key=lambda k: damping_percent(complex(modes.eigenvalues[k])))
+        place = min(
+            range(len(modes.eigenvalues)),
+            key=lambda k: damping_percent(complex(modes.eigenvalues[k])),
+        )
         value = complex(modes.eigenvalues[place])
     if place is None:  # outside of the range: the verdict knows the states
         shares: dict[str, float] = {}
         for entry in verdict["participation"]:
             component = entry["state"].partition(".")[0]
             shares[component] = shares.get(component, 0.0) + entry["factor"]
-        return _mode_json("", value, shares), ", ".join(e["state"] for e in verdict["participation"][:_PARTS])
+        return _mode_json("", value, shares), ", ".join(
+            e["state"] for e in verdict["participation"][:_PARTS]
+        )
     mode = make_mode(value, modes.left[place], modes.right[place], modes.names)
     name = next((name for name, k in record.named.items() if k == place), "")
     return _mode_json(name, value, mode.by_component), _who(mode, speeds)
@@ -200,15 +229,26 @@ def mode_behind(record: PointRecord, speeds: Sequence[str]) -> tuple[dict[str, A
 
 def _mode_json(name: str, value: complex, components: dict[str, float]) -> dict[str, Any]:
     return {
-        "name": name, "frequency_hz": value.imag / (2 * np.pi), "damping_percent": damping_percent(value),
-        "real": value.real, "imag": value.imag,
-        "components": {component: share for component, share in components.items() if share >= 0.01},
-    }  # fmt: skip
+        "name": name,
+        "frequency_hz": value.imag / (2 * np.pi),
+        "damping_percent": damping_percent(value),
+        "real": value.real,
+        "imag": value.imag,
+        "components": {
+            component: share for component, share in components.items() if share >= 0.01
+        },
+    }
 
 
 def _who(mode: Mode, speeds: Sequence[str]) -> str:
-    states = [name for name in mode.shape if any(fnmatch.fnmatchcase(name, pattern) for pattern in speeds)]
-    together, against = (", ".join(s.partition(".")[0] for s in side) for side in mode.swing(states))
+    states = [
+        name for name in mode.shape if any(fnmatch.fnmatchcase(name, pattern) for pattern in speeds)
+    ]
+    together, against = (
+        ", ".join(s.partition(".")[0] for s in side) for side in mode.swing(states)
+    )
     if mode.participation_of(states) >= 0.1 and together:
         return f"{together} against {against}" if against else together
-    return ", ".join(f"{name} {share:.0%}" for name, share in list(mode.by_component.items())[:_PARTS])
+    return ", ".join(
+        f"{name} {share:.0%}" for name, share in list(mode.by_component.items())[:_PARTS]
+    )

@@ -15,7 +15,8 @@ from orchestrator.sweep.dataset import Curve, Samples
 from orchestrator.sweep.sweep import ScenarioSweep
 from orchestrator.sweep.trajectories import Trajectory
 
-_LEAST_DAMPED = 75.0  # the complex plane leaves out modes whose damping stays above this [%] at all points
+# the complex plane leaves out modes whose damping stays above this [%] at all points
+_LEAST_DAMPED = 75.0
 
 _DASHES = ("-", "--", ":", "-.")
 
@@ -61,7 +62,9 @@ def draw_trajectories(axis: Any, samples: Samples) -> bool:
             curve = samples.of(sweep, trajectory)
             if any(sample["damping"] < _LEAST_DAMPED for _, sample in curve):
                 drawn.append((k, trajectory, curve))
-    points = [sample for _, _, curve in drawn for _, sample in curve if sample["damping"] < _LEAST_DAMPED]
+    points = [
+        sample for _, _, curve in drawn for _, sample in curve if sample["damping"] < _LEAST_DAMPED
+    ]
     if not points:
         return False
     left = min(-1.0, 1.05 * min(p["real"] for p in points))
@@ -71,13 +74,30 @@ def draw_trajectories(axis: Any, samples: Samples) -> bool:
         strong = trajectory.carries is not None
         for piece in _rows(curve):
             at = [s["real"] for _, s in piece], [s["frequency"] for _, s in piece]
-            axis.plot(*at, color=colour(k), linewidth=1.8 if strong else 0.9, alpha=1.0 if strong else 0.7)
+            axis.plot(
+                *at, color=colour(k), linewidth=1.8 if strong else 0.9, alpha=1.0 if strong else 0.7
+            )
             axis.plot(*at, ".", color=colour(k), markersize=4.5 if strong else 2.5)
-            axis.plot(at[0][0], at[1][0], "o", color=colour(k), markerfacecolor="white", markersize=6, zorder=4)
+            axis.plot(
+                at[0][0],
+                at[1][0],
+                "o",
+                color=colour(k),
+                markerfacecolor="white",
+                markersize=6,
+                zorder=4,
+            )
         if strong:
             ends = [(s["real"], s["frequency"]) for _, s in curve]
             number = trajectory.name.removeprefix(trajectory.carries or "").strip()
-            axis.annotate(number, ends[-1], xytext=(5, 3), textcoords="offset points", color=colour(k), fontsize=9)
+            axis.annotate(
+                number,
+                ends[-1],
+                xytext=(5, 3),
+                textcoords="offset points",
+                color=colour(k),
+                fontsize=9,
+            )
     for k, sweep in enumerate(samples.result.scenarios):
         unstable = len(sweep.unstable(samples.axes))
         words = f": UNSTABLE at {unstable} of its points" if unstable else ""
@@ -88,7 +108,9 @@ def draw_trajectories(axis: Any, samples: Samples) -> bool:
     axis.axvline(0, color="#888888", linewidth=0.8)
     axis.set_xlabel("Real part [1/s]")
     axis.set_ylabel("Frequency [Hz]")
-    title = "\n".join(f"{axis_label(a)} from {a.values[0]:g} to {a.values[-1]:g}" for a in samples.axes)
+    title = "\n".join(
+        f"{axis_label(a)} from {a.values[0]:g} to {a.values[-1]:g}" for a in samples.axes
+    )
     axis.set_title(f"{title} (circle: start; thick: named modes)", loc="left")
     return True
 
@@ -107,7 +129,13 @@ def _named(samples: Samples) -> list[tuple[int, ScenarioSweep, Trajectory, Curve
     ]
 
 
-def _draw(axis: Any, samples: Samples, curve: Curve, value: Callable[[dict[str, Any]], float], **style: Any) -> None:
+def _draw(
+    axis: Any,
+    samples: Samples,
+    curve: Curve,
+    value: Callable[[dict[str, Any]], float],
+    **style: Any,
+) -> None:
     last = samples.axes[-1]
     for piece in _rows(curve):
         x = np.array([float(last.values[int(place[-1])]) for place, _ in piece])
@@ -132,9 +160,13 @@ def plot_swing(samples: Samples, path: Path) -> bool:
 
 
 def _plot_panels(
-    samples: Samples, path: Path, panels: Sequence[tuple[str, Callable[[dict[str, Any]], float]]], height: float, *,
+    samples: Samples,
+    path: Path,
+    panels: Sequence[tuple[str, Callable[[dict[str, Any]], float]]],
+    height: float,
+    *,
     sharey: bool = False,
-) -> bool:  # fmt: skip
+) -> bool:
     curves = _named(samples)
     if not curves or not panels:
         return False

@@ -16,22 +16,26 @@ from orchestrator.study.modes import ModesResult, compute_modes
 @dataclass(frozen=True)
 class PointRecord(Kept):
     modes: ModeSet | None = None  # least damped first
-    named: dict[str, int] = field(default_factory=dict)  # names that the case gives to some of these modes, by index
+    # names that the case gives to some of these modes, by index
+    named: dict[str, int] = field(default_factory=dict)
     failure: Failure | None = None  # why there are none; None for a point with modes
     residual: float = float("nan")  # of the steady state, as in `OperatingPoint`
     warnings: tuple[str, ...] = ()
-    linearised: dict[str, str] = field(default_factory=dict)  # how the linear model of every component was found
+    # how the linear model of every component was found
+    linearised: dict[str, str] = field(default_factory=dict)
     # stability, because: the verdict over the whole spectrum, as `Stability.as_json` gives it, and its figures in
     # words; empty where the point failed
     stability: dict[str, Any] = field(default_factory=dict)
     because: str = ""
-    overloads: dict[str, float] = field(default_factory=dict)  # units beyond their rating [pu of it]
+    # units beyond their rating [pu of it]
+    overloads: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class SweepPointTask(Task):
     record = PointRecord
-    overrides: dict[str, Value]  # the varied values by ``component.variable``, which override all layers
+    # the varied values by ``component.variable``, which override all layers
+    overrides: dict[str, Value]
     frequency_range: tuple[float, float]  # of the modes [Hz]
     black_box: bool = False  # identify the components that hide their states
 
@@ -42,7 +46,9 @@ def compute_point(task: SweepPointTask) -> PointRecord:
 
 def _modes(task: SweepPointTask, case: Case) -> PointRecord:
     prepared = task.study.prepare(case, task.overrides)
-    asked = tuple(question for question in prepared.questions if question not in prepared.idle.values())
+    asked = tuple(
+        question for question in prepared.questions if question not in prepared.idle.values()
+    )
     # A sweep follows modes from point to point itself, and asks of all scenarios together.
     find = coupled_with_boxes if task.black_box else compute_modes
     return _record(find(replace(prepared, beside=None, questions=asked), task.frequency_range))
@@ -52,8 +58,14 @@ def _record(result: ModesResult) -> PointRecord:
     modes = result.modes
     return PointRecord(
         ModeSet.of(modes, result.model.names),
-        {name: next(i for i, m in enumerate(modes) if m is mode) for name, mode in result.named.items()},
-        residual=result.operating_point.residual, warnings=result.warnings, linearised=result.linearised,
-        stability=result.stability.as_json(), because=result.stability.because(),
+        {
+            name: next(i for i, m in enumerate(modes) if m is mode)
+            for name, mode in result.named.items()
+        },
+        residual=result.operating_point.residual,
+        warnings=result.warnings,
+        linearised=result.linearised,
+        stability=result.stability.as_json(),
+        because=result.stability.because(),
         overloads=overloads(result.prepared.system.components, result.prepared.case.table.meant),
-    )  # fmt: skip
+    )

@@ -7,7 +7,13 @@ from typing import Any
 from orchestrator.asked import FieldKind, Names, asked, plain_value, read_part
 from orchestrator.cases.given import check_case_name
 from orchestrator.errors import InputError
-from orchestrator.points.request import OverCluster, of_black_box, of_frequencies, of_scenarios, of_values
+from orchestrator.points.request import (
+    OverCluster,
+    of_black_box,
+    of_frequencies,
+    of_scenarios,
+    of_values,
+)
 from orchestrator.sweep.axes import Vary, parse_vary
 from orchestrator.sweep.limit import Until
 
@@ -18,7 +24,10 @@ def read_until(text: str) -> Until:
     """``unstable``, or a damping [%]."""
     if text.strip().lower() == "unstable":
         return Until()
-    return Until(100 * read_part("a damping from 0 to 100 % such as '5 %', or 'unstable'", 1e-6, 99.999)(text))
+    return Until(
+        100
+        * read_part("a damping from 0 to 100 % such as '5 %', or 'unstable'", 1e-6, 99.999)(text)
+    )
 
 
 def _until(given: Any, argument: str) -> Until | None:
@@ -38,12 +47,18 @@ def _varied(vary: Any, argument: str) -> tuple[Vary, ...]:
         for key, values in vary.items():
             check_case_name(key, argument)
             if isinstance(values, str | Mapping) or not isinstance(values, Iterable):
-                raise InputError(f"{argument}: {key} = {values!r}; a sweep needs a list of values, {_HOW}")
+                raise InputError(
+                    f"{argument}: {key} = {values!r}; a sweep needs a list of values, {_HOW}"
+                )
         lists = {key: tuple(map(plain_value, values)) for key, values in vary.items()}
         if empty := [key for key, values in lists.items() if not values]:
-            raise InputError(f"{', '.join(empty)}: a sweep needs values, such as {{'grid.X_L': [0.1, 0.3]}}")
+            raise InputError(
+                f"{', '.join(empty)}: a sweep needs values, such as {{'grid.X_L': [0.1, 0.3]}}"
+            )
         vary = [Vary(key, None, len(values), False, values) for key, values in lists.items()]
-    given: list[Any] = [vary] if isinstance(vary, str) else list(vary) if isinstance(vary, Iterable) else [None]
+    given: list[Any] = (
+        [vary] if isinstance(vary, str) else list(vary) if isinstance(vary, Iterable) else [None]
+    )
     if not given or not all(isinstance(one, str | Vary) for one in given):
         raise InputError(f"{argument} = {vary!r}; give what is varied, {_HOW}")
     try:
@@ -58,10 +73,20 @@ def _read_scr(text: str) -> Vary:
 
 
 _VARY = FieldKind(
-    "COMPONENT.PARAMETER=START:STOP:COUNT", parse_vary, _varied, several=True,
-    besides=(("--scr", "BUS=START:STOP:COUNT", "SCR of the converters at a bus, or its short-circuit power "
-              "('bus_9=3000 MVA:800 MVA:5'): R and X of all branches that end there are multiplied", _read_scr),),
-)  # fmt: skip
+    "COMPONENT.PARAMETER=START:STOP:COUNT",
+    parse_vary,
+    _varied,
+    several=True,
+    besides=(
+        (
+            "--scr",
+            "BUS=START:STOP:COUNT",
+            "SCR of the converters at a bus, or its short-circuit power "
+            "('bus_9=3000 MVA:800 MVA:5'): R and X of all branches that end there are multiplied",
+            _read_scr,
+        ),
+    ),
+)
 _UNTIL = FieldKind("unstable|PERCENT", read_until, _until)
 
 
@@ -86,19 +111,27 @@ class SweepRequest(OverCluster):
     """
 
     vary: Mapping[str, Iterable[Any]] | Iterable[str | Vary] = asked(
-        _VARY, (), "what to vary; also =log:START:STOP:COUNT and =0.1,0.2,0.5 (repeatable: a full grid, followed along "
+        _VARY,
+        (),
+        "what to vary; also =log:START:STOP:COUNT and =0.1,0.2,0.5 (repeatable: a full grid, followed along "
         "the last one); several together: 'grid.X_a,grid.X_b=…', 'grid.X_line_7_*=…', 'line_7_9,line_8_9: "
-        "length=1:4:7'", python='values by ``component.parameter``, or texts as with ``--vary``: '
+        "length=1:4:7'",
+        python="values by ``component.parameter``, or texts as with ``--vary``: "
         '``"grid.X_L=0.1:0.5:9"``; modes are followed along the last one',
-    )  # fmt: skip
+    )
     scenarios: Names = of_scenarios()
     values: Mapping[str, Any] | None = of_values()
     _: KW_ONLY
     until: str | float | Until | None = asked(
-        _UNTIL, None, "how far the range START:STOP may go before the system is unstable, or a mode of --range is "
-        "damped less than so many percent: coarse grid (COUNT, 9), then bisection", python='``"unstable"``, or a '
+        _UNTIL,
+        None,
+        "how far the range START:STOP may go before the system is unstable, or a mode of --range is "
+        "damped less than so many percent: coarse grid (COUNT, 9), then bisection",
+        python='``"unstable"``, or a '
         'damping such as ``"5 %"``: bisect how far the only range that is varied may go, such as ``"grid.X_L=0.1:2"``; '
         "the result is in ``limits``",
-    )  # fmt: skip
+    )
     black_box: bool = of_black_box()
-    frequencies: tuple[float, float] = of_frequencies("modes from the first to the second are followed [Hz]")
+    frequencies: tuple[float, float] = of_frequencies(
+        "modes from the first to the second are followed [Hz]"
+    )

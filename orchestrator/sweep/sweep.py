@@ -20,18 +20,29 @@ from orchestrator.errors import CaseError, InputError, Problem
 from orchestrator.points.points import Work
 from orchestrator.points.task import StudyCase
 from orchestrator.sweep.axes import Axis, Vary, grid_places, refuse_doubles, resolve
-from orchestrator.sweep.limit import COARSE, Ending, ParameterLimit, Until, least_damping, mode_behind, search
+from orchestrator.sweep.limit import (
+    COARSE,
+    Ending,
+    ParameterLimit,
+    Until,
+    least_damping,
+    mode_behind,
+    search,
+)
 from orchestrator.sweep.point import PointRecord, SweepPointTask, compute_point
 from orchestrator.sweep.request import SweepRequest
 from orchestrator.sweep.trajectories import GridPlace, Trajectory, find_trajectories
 
-REFINEMENTS = 5  # how often the way between two points is halved where a mode is not recognised from one to the other
+# how often the way between two points is halved where a mode is not recognised from one to the
+# other
+REFINEMENTS = 5
 
 
 @dataclass(frozen=True)
 class SweepPlan:
     case: Case
-    axes: tuple[Axis, ...]  # varied parameters; the last one runs fastest, and modes are followed along it
+    # varied parameters; the last one runs fastest, and modes are followed along it
+    axes: tuple[Axis, ...]
     scenarios: tuple[PreparedScenario, ...]  # the scenarios, prepared without the varied values
     # parameter files, and after them the values of the command line, that hold for all points; weakest first.
     layers: tuple[ParameterFile, ...]
@@ -51,7 +62,10 @@ class SweepPlan:
         return len(self.scenarios) * int(np.prod([len(axis.values) for axis in self.axes]))
 
     def values(self, place: GridPlace) -> dict[str, Value]:
-        given = [axis.sets(_value_at(axis, position)) for axis, position in zip(self.axes, place, strict=True)]
+        given = [
+            axis.sets(_value_at(axis, position))
+            for axis, position in zip(self.axes, place, strict=True)
+        ]
         return {key: value for one in given for key, value in one.items()}
 
     @cached_property
@@ -59,7 +73,9 @@ class SweepPlan:
         return {one.name: StudyCase.of(one, self.layers, self.step_size) for one in self.scenarios}
 
     def task(self, prepared: PreparedScenario, place: GridPlace) -> SweepPointTask:
-        return SweepPointTask(self.studies[prepared.name], self.values(place), self.frequency_range, self.black_box)
+        return SweepPointTask(
+            self.studies[prepared.name], self.values(place), self.frequency_range, self.black_box
+        )
 
 
 def _value_at(axis: Axis, position: float) -> Value:
@@ -81,7 +97,11 @@ class ScenarioSweep:
 
     def unstable(self, axes: Sequence[Axis]) -> list[GridPlace]:
         """Places of the grid where a mode grows at any frequency, the fastest first."""
-        found = [place for place in grid_places(axes) if self.points[place].stability.get("stable") is False]
+        found = [
+            place
+            for place in grid_places(axes)
+            if self.points[place].stability.get("stable") is False
+        ]
         return sorted(found, key=lambda place: -self.points[place].stability["largest_growth_rate"])
 
     def counts(self, axes: Sequence[Axis]) -> Counter[bool | None]:
@@ -101,8 +121,10 @@ class SweepResult:
     # computed, stored: number of points computed now, and number of points read from an earlier start.
     computed: int = 0
     stored: int = 0
-    refined: int = 0  # number of refining points between grid points; both numbers above include them
-    limits: list[ParameterLimit] = field(default_factory=list)  # of each scenario, where they are searched for
+    # number of refining points between grid points; both numbers above include them
+    refined: int = 0
+    # of each scenario, where they are searched for
+    limits: list[ParameterLimit] = field(default_factory=list)
 
     def failures(self) -> Iterator[tuple[ScenarioSweep, GridPlace, str]]:
         """Points of the grid that have no modes, and why."""
@@ -116,15 +138,31 @@ class SweepResult:
 def plan_sweep(case: Case, request: SweepRequest) -> SweepPlan:
     vary, until = cast("Sequence[Vary]", request.vary), cast("Until | None", request.until)
     if not vary:
-        raise InputError("nothing is varied; give --vary, such as --vary grid.X_L=0.1:0.5:9, or --scr bus_9=5:1.2:5")
+        raise InputError(
+            "nothing is varied; give --vary, such as --vary grid.X_L=0.1:0.5:9, or --scr bus_9=5:1.2:5"
+        )
     vary = vary if until is None else [_searched(vary)]
-    prepared = case.prepare(request.scenarios, request.overrides, request.step_size, None, request.files)
+    prepared = case.prepare(
+        request.scenarios, request.overrides, request.step_size, None, request.files
+    )
     axes = tuple(resolve(one, prepared) for one in vary)
-    plan = SweepPlan(case, axes, tuple(prepared), request.layers, request.step_size, request.frequencies, (), until,
-                     request.black_box)  # fmt: skip
+    plan = SweepPlan(
+        case,
+        axes,
+        tuple(prepared),
+        request.layers,
+        request.step_size,
+        request.frequencies,
+        (),
+        until,
+        request.black_box,
+    )
     refuse_doubles(axes, prepared)
     ends = [plan.values(tuple(end % len(axis.values) for axis in axes)) for end in (0, -1)]
-    idle = [_check_end(plan, varied) for varied in (ends if any(axis.key == ALPHA for axis in axes) else ends[:1])]
+    idle = [
+        _check_end(plan, varied)
+        for varied in (ends if any(axis.key == ALPHA for axis in axes) else ends[:1])
+    ]
     return replace(plan, idle=tuple(idle[0]))
 
 
@@ -135,7 +173,9 @@ def _searched(vary: Sequence[Vary]) -> Vary:
             "move together stand in it with commas)"
         )
     if vary[0].limits is None:
-        raise InputError(f"--vary {vary[0].key}: --until needs a range such as {vary[0].key}=0.1:1.0, not a list")
+        raise InputError(
+            f"--vary {vary[0].key}: --until needs a range such as {vary[0].key}=0.1:1.0, not a list"
+        )
     return vary[0] if vary[0].count else replace(vary[0], count=COARSE)
 
 
@@ -156,7 +196,9 @@ def _check_end(plan: SweepPlan, varied: Mapping[str, Value]) -> list[Problem]:
     if found:
         everywhere = len(plan.scenarios)
         wrong = [
-            p if len(names) == everywhere else Problem(p.place, f"{p.text} (scenario {', '.join(names)})")
+            p
+            if len(names) == everywhere
+            else Problem(p.place, f"{p.text} (scenario {', '.join(names)})")
             for p, names in found.items()
         ]
         raise CaseError(str(plan.case.path), wrong)
@@ -168,12 +210,16 @@ def run_sweep(plan: SweepPlan, work: Work) -> SweepResult:
     recognised."""
     result = SweepResult(plan, [ScenarioSweep(prepared) for prepared in plan.scenarios])
     grid = list(grid_places(plan.axes))
-    wanted: list[tuple[ScenarioSweep, GridPlace]] = [(sweep, place) for sweep in result.scenarios for place in grid]
+    wanted: list[tuple[ScenarioSweep, GridPlace]] = [
+        (sweep, place) for sweep in result.scenarios for place in grid
+    ]
     _fill(result, wanted, work)
     if plan.until is not None:
         result.limits = [_limit(result, sweep, work) for sweep in result.scenarios]
     for depth in range(1, REFINEMENTS + 1):
-        gaps = [(s, place) for s in result.scenarios for place in _gaps(plan, s, 0.5 ** (depth - 1))]
+        gaps = [
+            (s, place) for s in result.scenarios for place in _gaps(plan, s, 0.5 ** (depth - 1))
+        ]
         if not gaps:
             break
         result.refined += len(gaps)
@@ -185,7 +231,9 @@ def run_sweep(plan: SweepPlan, work: Work) -> SweepResult:
     return result
 
 
-def _fill(result: SweepResult, wanted: Sequence[tuple[ScenarioSweep, GridPlace]], work: Work) -> None:
+def _fill(
+    result: SweepResult, wanted: Sequence[tuple[ScenarioSweep, GridPlace]], work: Work
+) -> None:
     tasks = [result.plan.task(sweep.prepared, place) for sweep, place in wanted]
     for index, record in work.each(compute_point, tasks):
         sweep, place = wanted[index]
@@ -204,7 +252,10 @@ def _limit(result: SweepResult, sweep: ScenarioSweep, work: Work) -> ParameterLi
         return until.kind(sweep.points[(place,)])
 
     def between(low: float, high: float) -> bool:
-        return _value_at(axis, (low + high) / 2) not in (_value_at(axis, low), _value_at(axis, high))
+        return _value_at(axis, (low + high) / 2) not in (
+            _value_at(axis, low),
+            _value_at(axis, high),
+        )
 
     def value(place: float | None) -> float | None:
         return None if place is None else float(_value_at(axis, place))
@@ -216,21 +267,44 @@ def _limit(result: SweepResult, sweep: ScenarioSweep, work: Work) -> ParameterLi
     shown = sweep.points[(float(worst) if beyond is None else beyond,)]
     mode, who = mode_behind(shown, plan.case.table.analysis.swing)
     tried = [
-        {"value": float(axis.values[k]), "kind": str(until.kind(record)), "damping_percent": least_damping(record),
-         "largest_growth_rate": record.stability.get("largest_growth_rate"), "error": record.error}
+        {
+            "value": float(axis.values[k]),
+            "kind": str(until.kind(record)),
+            "damping_percent": least_damping(record),
+            "largest_growth_rate": record.stability.get("largest_growth_rate"),
+            "error": record.error,
+        }
         for k, record in enumerate(grid)
-    ]  # fmt: skip
+    ]
     within = sweep.points[(0,)].overloads
-    strained = next((
-        (float(_value_at(axis, place[0])), over) for place, record in sorted(sweep.points.items(), key=lambda x: x[0])
-        if holds is not None and place[0] <= holds and (over := tuple(n for n in record.overloads if n not in within))
-    ), None)  # fmt: skip
+    strained = next(
+        (
+            (float(_value_at(axis, place[0])), over)
+            for place, record in sorted(sweep.points.items(), key=lambda x: x[0])
+            if holds is not None
+            and place[0] <= holds
+            and (over := tuple(n for n in record.overloads if n not in within))
+        ),
+        None,
+    )
     why = shown.error or (str(shown.stability.get("reason", "")) if end is Ending.NOT_KNOWN else "")
     return ParameterLimit(
-        axis.key, axis.unit, sweep.prepared.name, sweep.prepared.title, until, end, value(holds), value(beyond), mode,
-        who, tuple(tried), tuple(float(axis.values[k]) for k in again), why, float(axis.values[worst]),
+        axis.key,
+        axis.unit,
+        sweep.prepared.name,
+        sweep.prepared.title,
+        until,
+        end,
+        value(holds),
+        value(beyond),
+        mode,
+        who,
+        tuple(tried),
+        tuple(float(axis.values[k]) for k in again),
+        why,
+        float(axis.values[worst]),
         strained,
-    )  # fmt: skip
+    )
 
 
 def _margin(record: PointRecord) -> float:
@@ -245,7 +319,9 @@ def _gaps(plan: SweepPlan, sweep: ScenarioSweep, width: float) -> Iterator[GridP
     axis = plan.axes[-1]
     if any(isinstance(value, bool) for value in axis.values):
         return
-    modes: dict[GridPlace, ModeSet] = {p: r.modes for p, r in sweep.points.items() if r.modes is not None}
+    modes: dict[GridPlace, ModeSet] = {
+        p: r.modes for p, r in sweep.points.items() if r.modes is not None
+    }
     for place in sorted(modes):
         *row, at = place
         following = (*row, at + width)

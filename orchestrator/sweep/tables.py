@@ -22,7 +22,9 @@ def trajectories(samples: Samples) -> Table:
 
     The table shows the trajectories with a name, or all trajectories if the case names no mode."""
     title = f"Trajectories over {', '.join(axis_label(axis) for axis in samples.axes)}"
-    table = make_table(title, "Mode", "f [Hz]", "Damping [%]", "Least [%]", "Most [%]", "Points", "Similarity")
+    table = make_table(
+        title, "Mode", "f [Hz]", "Damping [%]", "Least [%]", "Most [%]", "Points", "Similarity"
+    )
     anything = any(t.carries for s in samples.result.scenarios for t in s.trajectories)
     for sweep in samples.result.scenarios:
         for trajectory in sweep.trajectories:
@@ -53,7 +55,11 @@ def stability(samples: Samples) -> list[str]:
     order = {False: 0, None: 1, True: 2}
     total = math.prod(len(axis.values) for axis in axes)
     for sweep in sorted(samples.result.scenarios, key=lambda s: order[s.stable]):
-        title, places, known = escape(sweep.prepared.title), sweep.unstable(axes), sweep.counts(axes)
+        title, places, known = (
+            escape(sweep.prepared.title),
+            sweep.unstable(axes),
+            sweep.counts(axes),
+        )
         rest = f" ({known[True]} stable, {known[None]} not known)" if known[None] else ""
         if places:
             worst = sweep.points[places[0]].because
@@ -63,12 +69,16 @@ def stability(samples: Samples) -> list[str]:
             )
             lines.append(f"[bold red]UNSTABLE[/]: {title}: {where}")
         elif sweep.stable is False:
-            lines.append(f"[bold red]UNSTABLE[/]: {title}: between two points of the grid{rest}; take more points")
+            lines.append(
+                f"[bold red]UNSTABLE[/]: {title}: between two points of the grid{rest}; take more points"
+            )
         elif known[None]:
             what = f"{known[None]} of {total} points have no verdict, {known[True]} are stable, 0 are unstable"
             lines.append(f"[bold yellow]not known[/]: {title}: {what}")
         elif sweep.stable is None:
-            lines.append(f"[bold yellow]not known[/]: {title}: a point between those of the grid has no verdict")
+            lines.append(
+                f"[bold yellow]not known[/]: {title}: a point between those of the grid has no verdict"
+            )
         else:
             lines.append(f"[bold green]stable[/]: {title}: nothing grows at any of {total} points")
     return lines
@@ -86,7 +96,10 @@ def limits(samples: Samples) -> list[str]:
 def _turns(samples: Samples, sweep: ScenarioSweep) -> str:
     if len([axis for axis in samples.axes if len(axis.values) > 1]) != 1:
         return ""
-    places = sorted(grid_places(samples.axes), key=lambda place: [float(v) for v in samples.setting(place).values()])
+    places = sorted(
+        grid_places(samples.axes),
+        key=lambda place: [float(v) for v in samples.setting(place).values()],
+    )
     words = {True: "stable", False: "unstable", None: "not known"}
     verdicts = [sweep.points[place].stability.get("stable") for place in places]
     turns = [
@@ -99,7 +112,10 @@ def _turns(samples: Samples, sweep: ScenarioSweep) -> str:
 
 
 def remarks(samples: Samples) -> list[str]:
-    result, texts = samples.result, [f"question: {question}" for question in samples.result.plan.idle]
+    result, texts = (
+        samples.result,
+        [f"question: {question}" for question in samples.result.plan.idle],
+    )
     texts += [text for limit in result.limits for text in limit.remarks]
     if failures := list(result.failures()):
         texts.append(f"{counted(len(failures), 'point')} of {result.plan.number_of_points} failed:")

@@ -9,7 +9,8 @@ import numpy as np
 from orchestrator.analysis.mode_tracking import Followed, ModeSet, near_an_end, number_trajectories
 from orchestrator.sweep.point import PointRecord
 
-GridPlace = tuple[float, ...]  # indices of a point on all axes; refining points have a fractional one on the last axis
+# indices of a point on all axes; refining points have a fractional one on the last axis
+GridPlace = tuple[float, ...]
 
 
 class Beginning(IntEnum):
@@ -38,7 +39,9 @@ class Trajectory:
 
 
 def find_trajectories(
-    points: Mapping[GridPlace, PointRecord], names: Sequence[str], frequency_range: tuple[float, float]
+    points: Mapping[GridPlace, PointRecord],
+    names: Sequence[str],
+    frequency_range: tuple[float, float],
 ) -> list[Trajectory]:
     """Follow the modes of a scenario along the last axis, row by row.
 
@@ -59,7 +62,9 @@ def find_trajectories(
         for i, number in enumerate(followed.trajectory[place]):
             alike, beginning = _history(followed, modes, first, place, i, frequency_range)
             trajectory = trajectories.setdefault(number, Trajectory())
-            trajectory.points[place] = TrajectoryPoint(i, alike, beginning, i in record.named.values())
+            trajectory.points[place] = TrajectoryPoint(
+                i, alike, beginning, i in record.named.values()
+            )
     return _with_names(list(trajectories.values()), points, names)
 
 
@@ -90,16 +95,26 @@ def _route(modes: Iterable[GridPlace]) -> Iterator[tuple[GridPlace, list[GridPla
 
 
 def _history(
-    followed: Followed[GridPlace], modes: Mapping[GridPlace, ModeSet], first: set[GridPlace], place: GridPlace,
-    index: int, frequency_range: tuple[float, float],
-) -> tuple[float, Beginning]:  # fmt: skip
+    followed: Followed[GridPlace],
+    modes: Mapping[GridPlace, ModeSet],
+    first: set[GridPlace],
+    place: GridPlace,
+    index: int,
+    frequency_range: tuple[float, float],
+) -> tuple[float, Beginning]:
     number, refined, alike = followed.trajectory[place][index], False, 1.0
     while True:
         origin = followed.origin[place][index]
         if origin is None:
             frequency = float(modes[place].frequencies[index])
             entered = near_an_end(frequency, frequency_range)
-            return np.nan, (Beginning.START if place in first else Beginning.ENTERED if entered else Beginning.BROKEN)
+            return np.nan, (
+                Beginning.START
+                if place in first
+                else Beginning.ENTERED
+                if entered
+                else Beginning.BROKEN
+            )
         alike = min(alike, followed.similarity[place][index])
         if _on_grid(origin):
             return alike, Beginning.REFINED if refined else Beginning.FOLLOWED
@@ -113,7 +128,9 @@ def _with_names(
     """Trajectories sorted: first those with a name in the order in which they first carry it, then the others by
     frequency."""
     carriers: dict[str, list[Trajectory]] = {name: [] for name in names}
-    for place in sorted(p for p, record in points.items() if record.modes is not None and _on_grid(p)):
+    for place in sorted(
+        p for p, record in points.items() if record.modes is not None and _on_grid(p)
+    ):
         for name, i in points[place].named.items():
             owner = next(t for t in trajectories if place in t.points and t.points[place].mode == i)
             if owner.carries is None:

@@ -54,7 +54,9 @@ class ParameterSweep:
         names = data["trajectory_name"].values
         known = sorted({str(one) for one in names.ravel() if one})
         if name not in known:
-            raise InputError(f"no mode was followed as {name!r}; the followed modes: {', '.join(known) or 'none'}")
+            raise InputError(
+                f"no mode was followed as {name!r}; the followed modes: {', '.join(known) or 'none'}"
+            )
         found = [
             data.isel(scenario=[s], trajectory=int(t)).drop_vars(["trajectory", "trajectory_name"])
             for s, t in zip(*(names == name).nonzero(), strict=True)
@@ -66,7 +68,11 @@ class ParameterSweep:
 
         ``named`` says whether the case's name falls on the mode there."""
         rows = [
-            {"scenario": sweep.prepared.name, **self.samples.setting(place), "mode": trajectory.name}
+            {
+                "scenario": sweep.prepared.name,
+                **self.samples.setting(place),
+                "mode": trajectory.name,
+            }
             | eigenvalue_json(complex(sample["real"], sample["imag"]), sample["damping"])
             | {"named": bool(sample["named"])}
             for sweep in self.result.scenarios
@@ -83,7 +89,9 @@ class ParameterSweep:
             {"scenario": sweep.prepared.name, **self.samples.setting(place), "error": error}
             for sweep, place, error in self.result.failures()
         ]
-        return pd.DataFrame(rows, columns=["scenario", *(axis.key for axis in self.samples.axes), "error"])
+        return pd.DataFrame(
+            rows, columns=["scenario", *(axis.key for axis in self.samples.axes), "error"]
+        )
 
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor sweep --json`` prints, as JSON's types."""
@@ -112,7 +120,11 @@ class ParameterSweep:
                     continue
                 for place, one in samples.of(sweep, trajectory):
                     stable = sweep.points[place].stability.get("stable")
-                    word = {True: "", False: "; another mode grows" if one["real"] < 0 else "", None: "; not known"}
+                    word = {
+                        True: "",
+                        False: "; another mode grows" if one["real"] < 0 else "",
+                        None: "; not known",
+                    }
                     text = f"{one['frequency']:.3f} Hz, {one['damping']:.2f} %{word[stable]}"
                     cell = Cell(text, one["damping"], stable, one["real"], one["frequency"])
                     key = sweep.prepared.name, trajectory.name, tuple(place[k] for k in others)
@@ -120,7 +132,10 @@ class ParameterSweep:
         titles = {sweep.prepared.name: sweep.prepared.title for sweep in self.result.scenarios}
 
         def side(scenario: str, mode: str, setting: tuple[float, ...]) -> CellLine:
-            chosen = [(plan.axes[k], plan.axes[k].values[int(x)]) for k, x in zip(others, setting, strict=True)]
+            chosen = [
+                (plan.axes[k], plan.axes[k].values[int(x)])
+                for k, x in zip(others, setting, strict=True)
+            ]
             words = [f"{axis.key} = {value:g} {axis.unit}".rstrip() for axis, value in chosen]
             values = {key: value for axis, one in chosen for key, value in axis.sets(one).items()}
             who = [titles[scenario]] if len(titles) > 1 else []
@@ -128,12 +143,17 @@ class ParameterSweep:
 
         axis = plan.axes[last]
         return Cells(
-            f"Damping of followed modes over {axis.key} [{axis.unit or 1}]", plan.case, plan.scenarios[0].name,
-            plan.frequency_range, [side(*key) for key in rows],
+            f"Damping of followed modes over {axis.key} [{axis.unit or 1}]",
+            plan.case,
+            plan.scenarios[0].name,
+            plan.frequency_range,
+            [side(*key) for key in rows],
             [CellLine(f"{value:g}", axis.sets(value)) for value in axis.values],
-            [[row.get(k) for k in range(len(axis.values))] for row in rows.values()], plan.overrides,
-            plan.step_size, followed=True,
-        )  # fmt: skip
+            [[row.get(k) for k in range(len(axis.values))] for row in rows.values()],
+            plan.overrides,
+            plan.step_size,
+            followed=True,
+        )
 
     def plot(self, ax: Axes = None) -> Axes:
         """The modes in the complex plane, on Matplotlib Axes or a new figure's; a circle where each begins."""
@@ -141,7 +161,9 @@ class ParameterSweep:
 
         axes = axes_or_new(ax, 8.0, 6.2)
         if not draw_trajectories(axes, self.samples):
-            raise InputError("no point of the sweep has a mode that could be drawn; see its failures()")
+            raise InputError(
+                "no point of the sweep has a mode that could be drawn; see its failures()"
+            )
         axes.legend(loc="best", fontsize="small")
         return axes
 
@@ -154,6 +176,13 @@ class ParameterSweep:
         return f"{self.result.plan.number_of_points} points, {failed} of them without modes"
 
     def _repr_html_(self) -> str:
-        words = {True: "stable at all points", False: "UNSTABLE at some points", None: "stability not known"}
-        lines = [self._points(), *(f"{s.prepared.title}: {words[s.stable]}" for s in self.result.scenarios)]
+        words = {
+            True: "stable at all points",
+            False: "UNSTABLE at some points",
+            None: "stability not known",
+        }
+        lines = [
+            self._points(),
+            *(f"{s.prepared.title}: {words[s.stable]}" for s in self.result.scenarios),
+        ]
         return page(repr(self).strip("<>").partition(":")[0], lines, self.table())

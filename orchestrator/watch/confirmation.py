@@ -26,7 +26,10 @@ class KnownModes:
     def rate(self, hertz: float) -> float | None:
         """Largest real part [1/s] at a frequency or, as magnitudes show it, at half of it; None without modes there."""
         sizes = [(z.real, z.imag / (2 * np.pi * hertz)) for z in self.modes]
-        return max((rate for rate, part in sizes if min(abs(part - 1), abs(2 * part - 1)) < SAME), default=None)
+        return max(
+            (rate for rate, part in sizes if min(abs(part - 1), abs(2 * part - 1)) < SAME),
+            default=None,
+        )
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,9 @@ class Swing:
     def is_explained(self, hertz: float) -> bool:
         """Whether modes that the model knows to decay make a fast swing that does not grow far."""
         first, *_, last = (float(part.mean()) for part in np.array_split(self.signal, 3))
-        swing_still = self.turns_hz is not None and self.known.holds and self.times[-1] < self.gone(hertz)
+        swing_still = (
+            self.turns_hz is not None and self.known.holds and self.times[-1] < self.gone(hertz)
+        )
         return swing_still and last < _FAR * first
 
     def gone(self, hertz: float) -> float:
@@ -55,17 +60,21 @@ class Swing:
         return float(self.response[0][0]) + _GONE / -rate if rate is not None and rate < 0 else 0.0
 
 
-STEADY = 0.05  # the logarithm of a sustained oscillation's amplitude changes less over the judged part
+# the logarithm of a sustained oscillation's amplitude changes less over the judged part
+STEADY = 0.05
 
 PERIODS = 4.5
 """Number of periods that the response must have of an oscillation that grows or lasts. With fewer it cannot be told
 from a beat with a mode of a similar frequency: of eleven faults on nine buses, each watched until 50 different times,
 those that seemed to grow in every part of the response had 4 at most."""
 
-SAME = 0.05  # largest relative difference of frequency between the judged part and the whole response
+# largest relative difference of frequency between the judged part and the whole response
+SAME = 0.05
 AGREE = 2.0  # largest factor between the growth rates of the judged part and of the whole response
-_GONE, _FAR = 3.0, 2.0  # time constants of a mode until it is gone, and factor by which a beat grows between thirds
-_GROWN, _EVEN = 0.7, 1.3  # least true growth over fifths, as a logarithm, and its mean by its least: a beat bends more
+# time constants of a mode until it is gone, and factor by which a beat grows between thirds
+_GONE, _FAR = 3.0, 2.0
+# least true growth over fifths, as a logarithm, and its mean by its least: a beat bends more
+_GROWN, _EVEN = 0.7, 1.3
 
 FAR_ABOVE, RISING = 10.0, 1.3
 """A swing of any shape grows if it rises by the first factor from the first to the last quarter, and by the second one
@@ -89,7 +98,9 @@ def rms(signal: Numbers) -> float:
 
 def rises(signal: Numbers, *, extents: bool = False) -> bool:
     sizes = [float(part.mean()) if extents else rms(part) for part in np.array_split(signal, 4)]
-    return sizes[3] > FAR_ABOVE * sizes[0] and all(late > RISING * early for early, late in pairwise(sizes))
+    return sizes[3] > FAR_ABOVE * sizes[0] and all(
+        late > RISING * early for early, late in pairwise(sizes)
+    )
 
 
 def doubt(swing: Swing, oscillation: Oscillation) -> str:
@@ -105,8 +116,16 @@ def doubt(swing: Swing, oscillation: Oscillation) -> str:
         return f"{periods:.2g} periods cannot tell that from a beat of oscillations that decay"
     whole = strongest_oscillation(times, signal)
     if not grows:
-        falls = whole is not None and _same(whole, oscillation) and change(swing, whole.rate) < -2 * STEADY
-        return f"over the whole response it decays at {whole.rate:+.3g} 1/s" if falls and whole is not None else ""
+        falls = (
+            whole is not None
+            and _same(whole, oscillation)
+            and change(swing, whole.rate) < -2 * STEADY
+        )
+        return (
+            f"over the whole response it decays at {whole.rate:+.3g} 1/s"
+            if falls and whole is not None
+            else ""
+        )
     if whole is None or not _same(whole, oscillation):
         return "the whole response does not show that oscillation as the strongest"
     if not oscillation.rate / AGREE < whole.rate < AGREE * oscillation.rate:
@@ -126,7 +145,9 @@ def _fast_doubt(swing: Swing, hertz: float, *, grows: bool) -> str:
         return ""
     sizes = np.array([np.median(part) for part in np.array_split(swing.response[1][1:], 5)])
     rates = np.diff(np.log(sizes)) if (sizes > 0).all() else np.zeros(1)
-    if grows and (rises(swing.signal, extents=True) or _GROWN < rates.sum() < 4 * _EVEN * rates.min()):
+    if grows and (
+        rises(swing.signal, extents=True) or _GROWN < rates.sum() < 4 * _EVEN * rates.min()
+    ):
         return ""
     tells = swing.known.holds and swing.known.rate(hertz) is not None
     return f"modes that decay may beat like that{'' if tells else ' (no model tells, as none holds here)'}"
@@ -153,7 +174,11 @@ def needed_end(swing: Swing, oscillation: Oscillation | None = None) -> float:
     longer = begin + 1.5 * (end - begin)
     if oscillation is None:
         return longer
-    return max(longer, begin + 1.2 * PERIODS / oscillation.frequency_hz, swing.gone(oscillation.frequency_hz))
+    return max(
+        longer,
+        begin + 1.2 * PERIODS / oscillation.frequency_hz,
+        swing.gone(oscillation.frequency_hz),
+    )
 
 
 def _same(one: Oscillation, other: Oscillation) -> bool:

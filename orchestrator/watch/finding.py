@@ -4,11 +4,31 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-Kind = Literal["growth", "growing_oscillation", "sustained_oscillation", "run_away", "undisturbed_motion",
-               "active_limit", "loss_of_synchronism", "not_judged", "not_finite", "failure", "misfit"]  # fmt: skip
+Kind = Literal[
+    "growth",
+    "growing_oscillation",
+    "sustained_oscillation",
+    "run_away",
+    "undisturbed_motion",
+    "active_limit",
+    "loss_of_synchronism",
+    "not_judged",
+    "not_finite",
+    "failure",
+    "misfit",
+]
 
-UNSTABLE: frozenset[Kind] = frozenset(("growth", "growing_oscillation", "sustained_oscillation", "run_away",
-                                       "loss_of_synchronism", "not_finite", "failure"))  # fmt: skip
+UNSTABLE: frozenset[Kind] = frozenset(
+    (
+        "growth",
+        "growing_oscillation",
+        "sustained_oscillation",
+        "run_away",
+        "loss_of_synchronism",
+        "not_finite",
+        "failure",
+    )
+)
 """Kinds of finding that a stable system cannot give. ``not_judged`` is a remark: noise hides what there may
 be, or the run ends too early after an event; ``misfit`` is of a device and its binding, whatever the run does."""
 
@@ -25,14 +45,20 @@ class Finding:
     component: str
     variable: str
     message: str
-    until: float | None = None  # its end [s]; None if it lasts to the end of the run, or has no duration
+    # its end [s]; None if it lasts to the end of the run, or has no duration
+    until: float | None = None
     # by name, with the unit in it or in the variable's: growth rates, frequencies, amplitudes, durations
     figures: Mapping[str, float] = field(default_factory=dict)
     represented: bool = True  # False of a limit that would act and that the model lacks
 
     def as_json(self) -> dict[str, Any]:
         return {
-            "kind": self.kind, "time": self.time, "until": self.until, "component": self.component,
-            "variable": self.variable, "message": self.message, **self.figures,
+            "kind": self.kind,
+            "time": self.time,
+            "until": self.until,
+            "component": self.component,
+            "variable": self.variable,
+            "message": self.message,
+            **self.figures,
             **({} if self.represented else {"represented": False}),
-        }  # fmt: skip
+        }

@@ -6,7 +6,8 @@ from functools import partial
 
 from orchestrator.coupling.system import System
 
-BYPASS_TIME = 0.01  # with which the state of a block that is left out follows its input [s], as the models have it
+# with which the state of a block that is left out follows its input [s], as the models have it
+BYPASS_TIME = 0.01
 
 
 @dataclass(frozen=True)
@@ -35,10 +36,12 @@ class Limit:
     # reconstruction of the limited quantity from a derivative, if the signal only follows this quantity
     lead: Lead | None = None
     enabled: str | None = None  # switch that must be on for the limited signal to have an effect
-    represented: bool = True  # Whether the model has the limit. Otherwise the FMU only shows when the limit would act.
+    # Whether the model has the limit. Otherwise the FMU only shows when the limit would act.
+    represented: bool = True
     low: str | None = None  # parameter with the lower limit; None if the magnitude is limited
     scale: str | None = None  # signal that both limits are multiplied by
-    unless: str | None = None  # Parameter that is above 0 where another limit acts instead. An FMU need not have it.
+    # Parameter that is above 0 where another limit acts instead. An FMU need not have it.
+    unless: str | None = None
     knows: tuple[str, ...] = ()
     lacks: tuple[str, ...] = ()
 
@@ -52,7 +55,9 @@ class Limit:
         return (*self.variables(), *self.knows, *(p for p in parameters if p is not None))
 
     def fits(self, variables: Container[str]) -> bool:
-        return all(name in variables for name in self.needed()) and not any(name in variables for name in self.lacks)
+        return all(name in variables for name in self.needed()) and not any(
+            name in variables for name in self.lacks
+        )
 
 
 _EXCITER, _GOVERNOR, _PSS = "exciter", "governor", "pss"
@@ -72,32 +77,73 @@ def _names(part: str, *names: str) -> tuple[str, ...]:
 def _stabiliser(stage: int, lead: str, lag: str, **further: object) -> Limit:
     state = f"{_PSS}.lead_lag_{stage}"
     output = Lead(state, f"{_PSS}.{lead}", lag=f"{_PSS}.{lag}")
-    return _part(_PSS, "output limit of the stabiliser", f"lead_lag_{stage}", "V_STMAX", "V_STMIN", lead=output,
-                 enabled=f"{_PSS}.enabled", **further)  # fmt: skip
+    return _part(
+        _PSS,
+        "output limit of the stabiliser",
+        f"lead_lag_{stage}",
+        "V_STMAX",
+        "V_STMIN",
+        lead=output,
+        enabled=f"{_PSS}.enabled",
+        **further,
+    )
 
 
 MACHINE_LIMITS = (
     # SEXS; IEEET1 and DC1A; AC1A, whose amplifier has two pairs of limits; AC4A without the rectifier's loading; ST1A.
     _exciter("ceiling of the exciter", "amplifier", "E_MAX", "E_MIN"),
-    _exciter("ceiling of the regulator", "amplifier", "V_RMAX", "V_RMIN", knows=_names(_EXCITER, "E")),
-    _exciter("ceiling of the regulator", "amplifier", "V_RMAX", "V_RMIN", knows=_names(_EXCITER, "V_E")),
+    _exciter(
+        "ceiling of the regulator", "amplifier", "V_RMAX", "V_RMIN", knows=_names(_EXCITER, "E")
+    ),
+    _exciter(
+        "ceiling of the regulator", "amplifier", "V_RMAX", "V_RMIN", knows=_names(_EXCITER, "V_E")
+    ),
     _exciter("limit of the amplifier", "amplifier", "V_AMAX", "V_AMIN"),
-    Limit("ceiling of the exciter", "E_fd", "exciter.V_RMAX", low="exciter.V_RMIN", scale="v_t",
-          knows=_names(_EXCITER, "V_AMAX", "K_LR")),
-    Limit("ceiling of the exciter", "E_fd", "exciter.V_RMAX", low="exciter.V_RMIN",
-          knows=_names(_EXCITER, "amplifier", "V_IMAX"), lacks=_names(_EXCITER, "K_LR")),
-    _exciter("limit of the regulator", "bridge", "V_RMAX", "V_RMIN", knows=_names(_EXCITER, "regulator"),
-             lead=Lead("exciter.bridge", "exciter.T_A", lag="exciter.T_A")),
+    Limit(
+        "ceiling of the exciter",
+        "E_fd",
+        "exciter.V_RMAX",
+        low="exciter.V_RMIN",
+        scale="v_t",
+        knows=_names(_EXCITER, "V_AMAX", "K_LR"),
+    ),
+    Limit(
+        "ceiling of the exciter",
+        "E_fd",
+        "exciter.V_RMAX",
+        low="exciter.V_RMIN",
+        knows=_names(_EXCITER, "amplifier", "V_IMAX"),
+        lacks=_names(_EXCITER, "K_LR"),
+    ),
+    _exciter(
+        "limit of the regulator",
+        "bridge",
+        "V_RMAX",
+        "V_RMIN",
+        knows=_names(_EXCITER, "regulator"),
+        lead=Lead("exciter.bridge", "exciter.T_A", lag="exciter.T_A"),
+    ),
     _stabiliser(2, "T_3", "T_4", lacks=_names(_PSS, "lead_lag_3")),
     _stabiliser(3, "T_10", "T_11"),
     # TGOV1 and GAST; IEEEG1; HYGOV, whose limited signal is that before the gate's servo.
     _part(_GOVERNOR, "limit of the valve", "valve", "V_MAX", "V_MIN"),
     _part(_GOVERNOR, "limit of the valve", "gate", "P_MAX", "P_MIN"),
-    Limit("limit of the valve's speed", f"der({_GOVERNOR}.gate)", f"{_GOVERNOR}.U_o", low=f"{_GOVERNOR}.U_c"),
-    _part(_GOVERNOR, "limit of the gate", "gate", "G_MAX", "G_MIN",
-          lead=Lead("governor.gate", "governor.T_g")),
+    Limit(
+        "limit of the valve's speed",
+        f"der({_GOVERNOR}.gate)",
+        f"{_GOVERNOR}.U_o",
+        low=f"{_GOVERNOR}.U_c",
+    ),
+    _part(
+        _GOVERNOR,
+        "limit of the gate",
+        "gate",
+        "G_MAX",
+        "G_MIN",
+        lead=Lead("governor.gate", "governor.T_g"),
+    ),
     Limit("limit of the gate's speed", "der(governor.gate)", "governor.VELM"),
-)  # fmt: skip
+)
 """Limits by the names of parts in `fmus.synchronous_generator`."""
 
 _READ = frozenset(name for limit in MACHINE_LIMITS for name in limit.variables())

@@ -10,11 +10,13 @@ from orchestrator.arrays import Numbers
 from orchestrator.errors import AnalysisError
 
 LEAST_PERIODS = 2  # number of periods that an oscillation needs to be recognised
-_HIGHEST_HZ = 10.0  # A signal is thinned to show frequencies up to this one [Hz], unless it turns more often
+# A signal is thinned to show frequencies up to this one [Hz], unless it turns more often
+_HIGHEST_HZ = 10.0
 _PER_PERIOD = 5  # least number of samples in a period of an oscillation that can be recognised
 
 
-_MOST_SAMPLES = 600  # A long stretch of a fast oscillation is judged by this number of samples at its end
+# A long stretch of a fast oscillation is judged by this number of samples at its end
+_MOST_SAMPLES = 600
 _ENOUGH_SAMPLES, _BEYOND = 300, 3
 """A slow oscillation is thinned to the first number of samples, but must keep frequencies up to the second number times
 its own."""
@@ -29,22 +31,32 @@ class Oscillation:
     amplitude: float
 
 
-def strongest_oscillation(times: Numbers, signal: Numbers, least_periods: float = LEAST_PERIODS) -> Oscillation | None:
+def strongest_oscillation(
+    times: Numbers, signal: Numbers, least_periods: float = LEAST_PERIODS
+) -> Oscillation | None:
     """Find the strongest oscillation by the matrix pencil; None if no oscillation lasts `LEAST_PERIODS`, or if it is
     too fast for the samples."""
     if too_fast(times, signal):
         return None
     crossing = crossings_hz(times, signal)
-    enough = round(_MOST_SAMPLES / (_PER_PERIOD * max(crossing, _HIGHEST_HZ / 2) * float(times[1] - times[0])))
+    enough = round(
+        _MOST_SAMPLES / (_PER_PERIOD * max(crossing, _HIGHEST_HZ / 2) * float(times[1] - times[0]))
+    )
     times, signal = times[-enough:], signal[-enough:]
     length = float(times[-1] - times[0])
-    highest = max(min(_HIGHEST_HZ, max(_ENOUGH_SAMPLES / (10 * length), _BEYOND * crossing)), 1.2 * crossing)
+    highest = max(
+        min(_HIGHEST_HZ, max(_ENOUGH_SAMPLES / (10 * length), _BEYOND * crossing)), 1.2 * crossing
+    )
     try:
         found = identify_modes(times, signal - signal.mean(), highest_hz=highest)
     except AnalysisError:
         return None
     all_modes = (  # an oscillation is a pair of exponentials
-        Oscillation(m.frequency_hz, m.eigenvalue.real, 2 * m.amplitude * float(np.exp(m.eigenvalue.real * length)))
+        Oscillation(
+            m.frequency_hz,
+            m.eigenvalue.real,
+            2 * m.amplitude * float(np.exp(m.eigenvalue.real * length)),
+        )
         for m in found
     )
     oscillating = [m for m in all_modes if m.frequency_hz * length >= least_periods]
@@ -71,5 +83,7 @@ def without_trend(signal: Numbers) -> Numbers:
 
 @lru_cache(maxsize=64)
 def _cubics(count: int) -> Numbers:
-    basis: Numbers = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, count), 3))[0]
+    basis: Numbers = np.linalg.qr(
+        np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, count), 3)
+    )[0]
     return basis

@@ -11,7 +11,16 @@ from orchestrator.arrays import Numbers
 from orchestrator.coupling.system import System
 from orchestrator.watch import oscillation as oscillations
 from orchestrator.watch import swing_findings
-from orchestrator.watch.confirmation import KEPT, STEADY, KnownModes, Swing, change, doubt, irregular_doubt, rms
+from orchestrator.watch.confirmation import (
+    KEPT,
+    STEADY,
+    KnownModes,
+    Swing,
+    change,
+    doubt,
+    irregular_doubt,
+    rms,
+)
 from orchestrator.watch.finding import NOT_JUDGED, Finding, Kind
 from orchestrator.watch.limit import is_inner
 from orchestrator.watch.seen import Seen, is_derivative, unit
@@ -22,16 +31,21 @@ FEWEST_LOOKS = 60
 end."""
 
 SMALLEST = 1e-7  # smallest oscillation that is reported, as a part of 1 or of the signal's start
-SMALLEST_FAST = 1e-5  # smallest reported oscillation that is too fast for the looks; only its extent is known
-SMALLEST_PART = 0.01  # smallest reported oscillation, as a part of the signal's largest deviation since the event
+# smallest reported oscillation that is too fast for the looks; only its extent is known
+SMALLEST_FAST = 1e-5
+# smallest reported oscillation, as a part of the signal's largest deviation since the event
+SMALLEST_PART = 0.01
 SAME_FREQUENCY = 0.05
 """An oscillation is confirmed if the stretch and its second half show the same frequency, with at most this relative
 difference."""
 
-EXPLAINED = 0.5  # A swing consists of one oscillation if the oscillation makes at least this part of it
-IRREGULAR = 1e-3  # smallest reported swing without a single oscillation, as a part of 1 or of the signal's start
+# A swing consists of one oscillation if the oscillation makes at least this part of it
+EXPLAINED = 0.5
+# smallest reported swing without a single oscillation, as a part of 1 or of the signal's start
+IRREGULAR = 1e-3
 _PASSES = 8  # least number of crossings of an irregular swing with its trend within the last third
-_FAST = 0.25  # number of turns between two looks from which an output is judged by its extremes between the looks
+# number of turns between two looks from which an output is judged by its extremes between the looks
+_FAST = 0.25
 _RESOLVED = 4.0
 """An output is judged by its looks, however often it turns, if it moves by this factor more over several turns than
 between two looks: a small ripple makes the turns, and a swing that the looks resolve makes the motion."""
@@ -44,7 +58,8 @@ CLEAN = 0.15
 """In a stretch with noise, the largest part of a swing that a reported oscillation leaves unexplained. An oscillation
 that noise excites wanders in amplitude and phase, and leaves more."""
 
-_SMOOTHEST = 3  # signals in which a clean oscillation is searched in a stretch with noise: those least noisy
+# signals in which a clean oscillation is searched in a stretch with noise: those least noisy
+_SMOOTHEST = 3
 _TRIED = 8  # number of signals in which oscillations are searched: those that swing most at the end
 ONE = 0.3
 """An oscillation continues over events if it explains the swing between any two of them except for less than this
@@ -52,7 +67,13 @@ part."""
 
 
 def unsettled_response(
-    seen: Seen, system: System, stretch: Stretch, units: Sequence[str], known: KnownModes, *, noisy: bool = False
+    seen: Seen,
+    system: System,
+    stretch: Stretch,
+    units: Sequence[str],
+    known: KnownModes,
+    *,
+    noisy: bool = False,
 ) -> list[Finding]:
     """At most one growing and one sustained oscillation in a stretch, each in the signal where it is strongest.
 
@@ -65,13 +86,19 @@ def unsettled_response(
         return []
     begin = _judged_from(stretch)
     times = seen.times[first:]
-    slow = (_swing(name, y[first:], times, begin) for name, y in resting_signals(seen, system).items())
+    slow = (
+        _swing(name, y[first:], times, begin) for name, y in resting_signals(seen, system).items()
+    )
     fast = (_fast_swing(name, seen, first, begin) for name in seen.turns)
     swings = [replace(swing, known=known) for swing in chain(slow, fast) if swing is not None]
     swings.sort(key=lambda s: (s.name.partition(".")[0] not in units, -s.size))
     # An oscillation faster than the looks appears in the signals as a slower one, therefore it is searched first.
     quick = [s for s in swings if s.turns_hz is not None]
-    others = [s for s in swings if s.turns_hz is None and not (quick and oscillations.too_fast(s.times, s.signal))]
+    others = [
+        s
+        for s in swings
+        if s.turns_hz is None and not (quick and oscillations.too_fast(s.times, s.signal))
+    ]
     if noisy:
         grown = [s for s in swings if swing_findings.swing_rises(s)]
         told = _told(grown[:_TRIED], system, stretch, irregular_as_well=not stretch.breaks)
@@ -80,7 +107,10 @@ def unsettled_response(
     told = _told(quick[:_TRIED], system, stretch, irregular_as_well=False)
     if judgements(told):
         return told
-    return _told(others[:_TRIED], system, stretch, irregular_as_well=not quick and not stretch.breaks) or told
+    return (
+        _told(others[:_TRIED], system, stretch, irregular_as_well=not quick and not stretch.breaks)
+        or told
+    )
 
 
 def judgements(found: Sequence[Finding]) -> list[Finding]:
@@ -98,7 +128,12 @@ def _judged_from(stretch: Stretch) -> float:
 
 
 def _told(
-    swings: Sequence[Swing], system: System, stretch: Stretch, *, irregular_as_well: bool, clean: bool = False
+    swings: Sequence[Swing],
+    system: System,
+    stretch: Stretch,
+    *,
+    irregular_as_well: bool,
+    clean: bool = False,
 ) -> list[Finding]:
     """The first finding of each kind; a swing without a frequency only where there is none with one, and a remark on a
     swing in doubt only where there is no finding."""
@@ -110,7 +145,11 @@ def _told(
             continue
         if oscillation is not None:
             finding = _regular(swing, oscillation, unit(swing.name, system), stretch)
-            if finding is None or finding.kind in told or not _goes_on(swing, oscillation, stretch.breaks):
+            if (
+                finding is None
+                or finding.kind in told
+                or not _goes_on(swing, oscillation, stretch.breaks)
+            ):
                 continue
             if swing.is_explained(oscillation.frequency_hz):
                 continue
@@ -122,9 +161,15 @@ def _told(
         elif irregular_as_well and _is_irregular(swing):
             why = "" if swing_findings.swing_rises(swing) else irregular_doubt(swing)
             if not why:
-                irregular.append(swing_findings.irregular_swing(swing, unit(swing.name, system), stretch))
+                irregular.append(
+                    swing_findings.irregular_swing(swing, unit(swing.name, system), stretch)
+                )
             elif not doubtful:
-                doubtful.append(swing_findings.doubtful_irregular_swing(swing, why, unit(swing.name, system), stretch))
+                doubtful.append(
+                    swing_findings.doubtful_irregular_swing(
+                        swing, why, unit(swing.name, system), stretch
+                    )
+                )
     return [*told.values()] or irregular[:1] or doubtful
 
 
@@ -164,11 +209,16 @@ def _goes_on(swing: Swing, oscillation: oscillations.Oscillation, breaks: Sequen
         middles = [float(np.median(rest[rows])) for rows in pieces]
         return max(middles) - min(middles) < ONE
     turn = np.exp((oscillation.rate + 2j * np.pi * oscillation.frequency_hz) * since)
-    shapes = [oscillations.without_trend(np.column_stack([turn[rows].real, turn[rows].imag])) for rows in pieces]
+    shapes = [
+        oscillations.without_trend(np.column_stack([turn[rows].real, turn[rows].imag]))
+        for rows in pieces
+    ]
     swings = [oscillations.without_trend(swing.signal[rows]) for rows in pieces]
     share = np.linalg.lstsq(np.concatenate(shapes), np.concatenate(swings), rcond=None)[0]
-    return all(np.linalg.norm(y - shape @ share) < ONE * np.linalg.norm(y)
-               for shape, y in zip(shapes, swings, strict=True))  # fmt: skip
+    return all(
+        np.linalg.norm(y - shape @ share) < ONE * np.linalg.norm(y)
+        for shape, y in zip(shapes, swings, strict=True)
+    )
 
 
 def _pieces(times: Numbers, breaks: Sequence[float], shortest: float) -> list[NDArray[np.int_]]:
@@ -225,15 +275,24 @@ def _fast_swing(name: str, seen: Seen, first: int, begin: float) -> Swing | None
     return Swing(name, size, scale, (times, ripple), times[stretch], ripple[stretch], hz)
 
 
-def _regular(swing: Swing, oscillation: oscillations.Oscillation, unit: str, stretch: Stretch) -> Finding | None:
+def _regular(
+    swing: Swing, oscillation: oscillations.Oscillation, unit: str, stretch: Stretch
+) -> Finding | None:
     grown = change(swing, oscillation.rate)
     if grown < -STEADY:
         return None
-    return (swing_findings.growing if grown > STEADY else swing_findings.sustained)(swing, oscillation, unit, stretch)
+    return (swing_findings.growing if grown > STEADY else swing_findings.sustained)(
+        swing, oscillation, unit, stretch
+    )
 
 
 def _is_irregular(swing: Swing) -> bool:
-    passes = 2 * oscillations.crossings_hz(swing.times, swing.signal) * float(swing.times[-1] - swing.times[0]) / 3
+    passes = (
+        2
+        * oscillations.crossings_hz(swing.times, swing.signal)
+        * float(swing.times[-1] - swing.times[0])
+        / 3
+    )
     return swing.turns_hz is None and swing.size >= IRREGULAR and passes >= _PASSES
 
 
@@ -242,12 +301,20 @@ def _single(swing: Swing) -> oscillations.Oscillation | None:
     does not show it."""
     half = len(swing.times) // 2
     whole = oscillations.strongest_oscillation(swing.times, swing.signal)
-    late = oscillations.strongest_oscillation(swing.times[half:], swing.signal[half:], least_periods=1)
-    if whole is None or late is None or whole.amplitude < EXPLAINED * np.sqrt(2) * swing.size * swing.scale:
+    late = oscillations.strongest_oscillation(
+        swing.times[half:], swing.signal[half:], least_periods=1
+    )
+    if (
+        whole is None
+        or late is None
+        or whole.amplitude < EXPLAINED * np.sqrt(2) * swing.size * swing.scale
+    ):
         return None
     if abs(whole.frequency_hz - late.frequency_hz) > SAME_FREQUENCY * whole.frequency_hz:
         return None
-    enough = late.frequency_hz * float(swing.times[-1] - swing.times[half]) >= oscillations.LEAST_PERIODS
+    enough = (
+        late.frequency_hz * float(swing.times[-1] - swing.times[half]) >= oscillations.LEAST_PERIODS
+    )
     return late if enough else whole
 
 
@@ -261,4 +328,6 @@ def _fast(swing: Swing) -> oscillations.Oscillation | None:
     scatter = float(np.std(sizes - rate * times - start))
     if abs(rate) * float(times[-1] - times[0]) < scatter:
         rate = 0.0
-    return oscillations.Oscillation(swing.turns_hz, rate, float(swing.signal[-max(1, len(sizes) // 10) :].mean()) / 2)
+    return oscillations.Oscillation(
+        swing.turns_hz, rate, float(swing.signal[-max(1, len(sizes) // 10) :].mean()) / 2
+    )

@@ -20,13 +20,15 @@ synchronous area need not stay connected (Regulation (EU) 2016/631, article 13, 
 instantaneous trips of the Western, the Eastern and the Texas Interconnection (NERC PRC-024, attachment 1). Great
 Britain and Ireland have 52 Hz for minutes, and Québec 55.5 to 66 Hz."""
 
-BAND = (0.9, 1.1)  # of the speed of a unit out of synchronism, as parts of its start: it is no frequency of the grid
+# of the speed of a unit out of synchronism, as parts of its start: it is no frequency of the grid
+BAND = (0.9, 1.1)
 
 OUTSIDE = 1.0
 """A frequency is reported if it is outside of its band for longer than this in all [s]. A deep dip may push a rotor
 there for a short time."""
 
-OUTSIDE_AT_END = 0.2  # the same for a frequency outside without a break until the end [s]; none outside of `BAND`
+# the same for a frequency outside without a break until the end [s]; none outside of `BAND`
+OUTSIDE_AT_END = 0.2
 
 LEAST_AWAY = 0.004
 """A frequency that moves away is told in a short stretch from this distance from the rated one on, as a part of it:
@@ -46,9 +48,13 @@ LEAST_SPEED = 5e-4
 """Smallest drift of a speed in half of the stretch, as a part of its start: more than the dead band of a primary
 control (20 mHz)."""
 
-LEAST_VOLTAGE = 0.01  # least drift of a voltage in half of the stretch, of 1 or of the start: a tap changer's step
-SMOOTH = 0.15  # the swing around a drift, as root mean square, must be less than this part of the drift
-HELD = 0.5  # part of the ratings on the grid from which governors at their limits leave a frequency without a hold
+# least drift of a voltage in half of the stretch, of 1 or of the start: a tap changer's step
+LEAST_VOLTAGE = 0.01
+# the swing around a drift, as root mean square, must be less than this part of the drift
+SMOOTH = 0.15
+# part of the ratings on the grid from which governors at their limits leave a frequency without a
+# hold
+HELD = 0.5
 _RATE_TIME = 1.0  # the reported rate is the mean over this time at the end [s]
 
 
@@ -81,13 +87,21 @@ class _Drift:
     @property
     def time_constant(self) -> float:
         """Of the exponential with these two rates [s]; infinite if it does not slow down."""
-        return self.apart / float(np.log(self.third / self.fourth)) if abs(self.fourth) < abs(self.third) else np.inf
+        return (
+            self.apart / float(np.log(self.third / self.fourth))
+            if abs(self.fourth) < abs(self.third)
+            else np.inf
+        )
 
     @property
     def rest(self) -> float:
         """Value at which an exponential with these two rates comes to rest."""
         slowing = self.fourth / self.third
-        return self.value + self.fourth * slowing**0.5 * self.time_constant if slowing < 1 else np.inf * self.fourth
+        return (
+            self.value + self.fourth * slowing**0.5 * self.time_constant
+            if slowing < 1
+            else np.inf * self.fourth
+        )
 
     @property
     def near(self) -> bool:
@@ -97,7 +111,11 @@ class _Drift:
 
 
 def speed_signals(system: System) -> list[str]:
-    return [f"{name}.{SPEED}" for name, plan in system.components.items() if SPEED in plan.description.outputs]
+    return [
+        f"{name}.{SPEED}"
+        for name, plan in system.components.items()
+        if SPEED in plan.description.outputs
+    ]
 
 
 def run_away(
@@ -108,7 +126,9 @@ def run_away(
     ``slipped``: whether units lost synchronism. In this case a speed must be outside of `BAND` at the end to be
     reported."""
     speeds = list(_speeds(seen, system, settings))
-    yield from _farthest(seen.times, speeds, stretches, system, allowed=np.inf if slipped else OUTSIDE)
+    yield from _farthest(
+        seen.times, speeds, stretches, system, allowed=np.inf if slipped else OUTSIDE
+    )
     yield from _farthest(seen.times, list(_voltages(seen)), stretches, system, allowed=None)
 
 
@@ -131,7 +151,11 @@ def _voltages(seen: Seen) -> Iterator[_Course]:
 
 
 def _farthest(
-    times: Numbers, courses: Sequence[_Course], stretches: Sequence[Stretch], system: System, allowed: float | None
+    times: Numbers,
+    courses: Sequence[_Course],
+    stretches: Sequence[Stretch],
+    system: System,
+    allowed: float | None,
 ) -> Iterator[Finding]:
     found = []
     for course in courses:
@@ -151,7 +175,9 @@ def _outside(times: Numbers, course: _Course, allowed: float) -> float | None:
         return float(times[int(np.argmax(far))]) if far[-1] else None
     outside = course.on & _beyond(course.signal / _rated(course.signal), ALLOWED)
     interval = float(times[1] - times[0])
-    at_end = 0 if not outside[-1] else len(outside) if outside.all() else int(np.argmin(outside[::-1]))
+    at_end = (
+        0 if not outside[-1] else len(outside) if outside.all() else int(np.argmin(outside[::-1]))
+    )
     if not far[-1] and at_end * interval < OUTSIDE_AT_END and outside.sum() * interval <= allowed:
         return None
     return float(times[int(np.argmax(outside))])
@@ -183,7 +209,9 @@ def still_moving_away(
     total = weights.sum(axis=0)
     if not (total > 0).all():
         return []
-    mean = (weights * np.array([course.signal / _rated(course.signal) for course in speeds])).sum(axis=0) / total
+    mean = (weights * np.array([course.signal / _rated(course.signal) for course in speeds])).sum(
+        axis=0
+    ) / total
     largest = speeds[int(weights[:, -1].argmax())]
     course = _Course(largest.name, "frequency", mean, total > 0, LEAST_SPEED)
     drift = _drift(seen.times, course, last, shortest=SHORTEST)
@@ -212,10 +240,19 @@ def still_moving_away(
     return [Finding("not_judged", last.begin, component, variable, message, None, figures)]
 
 
-def _at_their_limits(speeds: Sequence[_Course], shares: Numbers, limits: Sequence[Finding]) -> list[str]:
+def _at_their_limits(
+    speeds: Sequence[_Course], shares: Numbers, limits: Sequence[Finding]
+) -> list[str]:
     """Units whose governors are at a limit at the end; none if they have less than `HELD` of the ratings."""
-    acting = {f.component for f in limits if f.kind == "active_limit" and f.until is None and "governor." in f.variable}
-    units = {course.name.partition(".")[0]: float(share) for course, share in zip(speeds, shares, strict=True)}
+    acting = {
+        f.component
+        for f in limits
+        if f.kind == "active_limit" and f.until is None and "governor." in f.variable
+    }
+    units = {
+        course.name.partition(".")[0]: float(share)
+        for course, share in zip(speeds, shares, strict=True)
+    }
     held = [name for name in units if name in acting]
     return held if sum(units[name] for name in held) >= HELD else []
 
@@ -240,11 +277,17 @@ def _drift(times: Numbers, course: _Course, stretch: Stretch, shortest: float) -
     start = course.signal[first]
     if abs(y[-1] - y[0]) < (1 - SMOOTH) * course.least or abs(y[-1] - start) < abs(y[0] - start):
         return None
-    third, fourth = (_rate(*quarter) for quarter in zip(np.array_split(t, 2), np.array_split(y, 2), strict=True))
+    third, fourth = (
+        _rate(*quarter) for quarter in zip(np.array_split(t, 2), np.array_split(y, 2), strict=True)
+    )
     length = float(t[-1] - t[0])
     drift = (third + fourth) / 2 * length
     bent = np.polyval(np.polyfit(t - t[0], y, 2), t - t[0])
-    if abs(drift) < course.least or third * fourth <= 0 or float(np.std(y - bent)) >= SMOOTH * abs(drift):
+    if (
+        abs(drift) < course.least
+        or third * fourth <= 0
+        or float(np.std(y - bent)) >= SMOOTH * abs(drift)
+    ):
         return None
     return _Drift(third, fourth, length / 2, float(y[-1]))
 
@@ -254,7 +297,12 @@ def _rate(times: Numbers, signal: Numbers) -> float:
 
 
 def _finding(
-    times: Numbers, course: _Course, stretch: Stretch | None, outside: float | None, unit: str, others: int
+    times: Numbers,
+    course: _Course,
+    stretch: Stretch | None,
+    outside: float | None,
+    unit: str,
+    others: int,
 ) -> Finding:
     begin, last = (stretch.begin, stretch.last) if stretch is not None else (outside or 0.0, True)
     row = len(times) - 1 if stretch is None or last else int(np.searchsorted(times, stretch.end))
@@ -262,7 +310,11 @@ def _finding(
     late = slice(int(np.searchsorted(times, times[row] - _RATE_TIME)), row + 1)
     value = float(course.signal[row])
     rate = _rate(times[late], course.signal[late]) if row - late.start > 1 else 0.0
-    left = f"; it leaves {ALLOWED[0]:g} to {ALLOWED[1]:g} pu at t = {outside:.4g} s" if outside is not None else ""
+    left = (
+        f"; it leaves {ALLOWED[0]:g} to {ALLOWED[1]:g} pu at t = {outside:.4g} s"
+        if outside is not None
+        else ""
+    )
     well = f"; so {'does' if others == 1 else 'do'} {others} more" if others else ""
     message = (
         f"the {course.what} runs away from t = {begin:.4g} s on: {shown(course.name)} is {value:.4g} {unit} at "
@@ -270,4 +322,12 @@ def _finding(
     )
     component, _, variable = course.name.partition(".")
     figures = {"value": value, "rate": rate}
-    return Finding("run_away", begin, component, variable, message, None if last else float(times[row]), figures)
+    return Finding(
+        "run_away",
+        begin,
+        component,
+        variable,
+        message,
+        None if last else float(times[row]),
+        figures,
+    )

@@ -14,7 +14,8 @@ from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.system import System
 from orchestrator.errors import InputError
 
-LOOK_INTERVAL = 5e-3  # about the time between two looks [s]; extremes of coupled outputs show what happens between
+# about the time between two looks [s]; extremes of coupled outputs show what happens between
+LOOK_INTERVAL = 5e-3
 MOST_LOOKS = 20_000  # largest number of looks; in longer runs the looks are farther apart
 
 
@@ -42,7 +43,9 @@ class Seen:
         if count == len(self.times):
             return self
         parts = (self.values, self.last, self.low, self.high, self.turns)
-        return Seen(self.times[:count], *({name: y[:count] for name, y in part.items()} for part in parts))
+        return Seen(
+            self.times[:count], *({name: y[:count] for name, y in part.items()} for part in parts)
+        )
 
     @property
     def interval(self) -> float:
@@ -55,8 +58,12 @@ def rescaled(seen: Seen, misfits: Mapping[str, Sequence[Misfit]]) -> Seen:
 
     A device that slips from the start stays as it is: its current moves, and at rest it does not."""
     values = dict(seen.values)
-    for name in (signal.removesuffix(".omega") for signal in seen.values if signal.endswith(".omega")):
-        rest = next((m.figures["omega"] for m in misfits.get(name, ()) if "omega" in m.figures), 1.0)
+    for name in (
+        signal.removesuffix(".omega") for signal in seen.values if signal.endswith(".omega")
+    ):
+        rest = next(
+            (m.figures["omega"] for m in misfits.get(name, ()) if "omega" in m.figures), 1.0
+        )
         current = seen.last.get(f"{name}.i_re")
         signal: Numbers = values[f"{name}.omega"] / rest
         if current is None or (rest == 1 and abs(signal[0] - 1) <= FREQUENCY_APART):
@@ -65,7 +72,10 @@ def rescaled(seen: Seen, misfits: Mapping[str, Sequence[Misfit]]) -> Seen:
         size = np.hypot(current, seen.last[f"{name}.i_im"])
         most = _STILL * max(size[0], _STILL)
         if np.ptp(size[:looks]) < most:
-            moved, apart = np.logical_or.accumulate(np.abs(size - size[0]) >= most), np.abs(signal - 1)
+            moved, apart = (
+                np.logical_or.accumulate(np.abs(size - size[0]) >= most),
+                np.abs(signal - 1),
+            )
             if np.any(~moved & (apart <= FREQUENCY_APART / 2)):
                 signal = np.where(moved | np.logical_or.accumulate(apart <= _SETTLED), signal, 1.0)
             values[f"{name}.omega"] = signal
@@ -128,7 +138,9 @@ class Watcher:
         self._last_index = run.index
         self._recorder.observe(run)
         tracks = run.tracks
-        for kept, now in zip(self._tracks, (run.y, tracks.low, tracks.high, tracks.turns), strict=True):
+        for kept, now in zip(
+            self._tracks, (run.y, tracks.low, tracks.high, tracks.turns), strict=True
+        ):
             kept[self._count] = now
         run.tracks.look(run.y)
         self._count += 1
@@ -139,15 +151,26 @@ class Watcher:
     def position(self) -> dict[str, Any]:
         """All that was seen so far, for `resume`: numbers, and arrays by name."""
         if self._run is None:
-            raise InputError("the watch has seen nothing yet; ask for its position after the run began")
+            raise InputError(
+                "the watch has seen nothing yet; ask for its position after the run began"
+            )
         rows = {f"rows_{name}": value for name, value in self._recorder.position().items()}
         looks = self._tracks[:, : self._count].copy()
-        return {"index": self._last_index, "tracks": looks, "since": self._run.tracks.saved(), **rows}
+        return {
+            "index": self._last_index,
+            "tracks": looks,
+            "since": self._run.tracks.saved(),
+            **rows,
+        }
 
     def resume(self, position: Mapping[str, Any]) -> None:
         """Go on from a position at the next `begin`."""
         self._position = position
-        rows = {name.removeprefix("rows_"): value for name, value in position.items() if name.startswith("rows_")}
+        rows = {
+            name.removeprefix("rows_"): value
+            for name, value in position.items()
+            if name.startswith("rows_")
+        }
         self._recorder.resume(rows)
 
     def seen(self, recorded: Recorder | None) -> Seen:
@@ -156,7 +179,9 @@ class Watcher:
         if recorded is not None and self.every % distance == 0:
             further = _columns(recorded.names, recorded.values[:: self.every // distance])
             values |= {name: column[: self._count] for name, column in further}
-        last, low, high, turns = (dict(_columns(self._outputs, part[: self._count])) for part in self._tracks)
+        last, low, high, turns = (
+            dict(_columns(self._outputs, part[: self._count])) for part in self._tracks
+        )
         return Seen(self._recorder.times, values, last, low, high, turns)
 
 

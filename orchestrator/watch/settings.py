@@ -13,7 +13,9 @@ from orchestrator.coupling.system import System
 _FAULT = ".fault.on"  # the switch of a fault at a bus, whose values act only while it is on
 
 
-def left_changed(system: System, events: Sequence[Event], until: float = math.inf) -> Mapping[str, float | bool]:
+def left_changed(
+    system: System, events: Sequence[Event], until: float = math.inf
+) -> Mapping[str, float | bool]:
     """Values by ``component.variable`` that are others after the events until a time [s] than at the start; without
     those of faults that are over."""
     now = {
@@ -23,8 +25,16 @@ def left_changed(system: System, events: Sequence[Event], until: float = math.in
         for name, settings in event.changes().items()
         for variable, value in settings.items()
     }
-    over = tuple(name.removesuffix("on") for name, value in now.items() if name.endswith(_FAULT) and not value)
-    return {name: value for name, value in now.items() if not name.startswith(over) and value != _start(system, name)}
+    over = tuple(
+        name.removesuffix("on")
+        for name, value in now.items()
+        if name.endswith(_FAULT) and not value
+    )
+    return {
+        name: value
+        for name, value in now.items()
+        if not name.startswith(over) and value != _start(system, name)
+    }
 
 
 def _start(system: System, name: str) -> float | None:
@@ -39,7 +49,11 @@ class Settings:
     def __init__(self, system: System, events: Sequence[Event], times: Numbers) -> None:
         self._system, self._events, self._times = system, events, times
         self._faults = {event.time for event in events if isinstance(event, Fault)}
-        if any(isinstance(i, Noise | Quantisation) for plan in system.wires.values() for i in plan.permanent.values()):
+        if any(
+            isinstance(i, Noise | Quantisation)
+            for plan in system.wires.values()
+            for i in plan.permanent.values()
+        ):
             self._faults.add(0.0)  # nothing stands still from the beginning
         self._changes = [
             (event.time, f"{name}.{variable}", float(value))
@@ -54,7 +68,8 @@ class Settings:
         held = np.full(len(self._times), plan.number(parameter))
         for time, name, value in self._changes:
             if name == f"{component}.{parameter}":
-                held[self._times > time] = value  # a look at an event's time shows the state before the event
+                # a look at an event's time shows the state before the event
+                held[self._times > time] = value
         return held
 
     def effective_times(self) -> list[float]:
@@ -69,10 +84,14 @@ class Settings:
 
     def as_at_start(self, time: float) -> bool:
         """Whether all that was set until a time [s] has its start value again, as after a fault that opens nothing."""
-        return not left_changed(self._system, self._events, time) and all(fault > time for fault in self._faults)
+        return not left_changed(self._system, self._events, time) and all(
+            fault > time for fault in self._faults
+        )
 
     def ends_fault(self, time: float) -> bool:
-        return any(when == time and name.endswith(_FAULT) and not on for when, name, on in self._changes)
+        return any(
+            when == time and name.endswith(_FAULT) and not on for when, name, on in self._changes
+        )
 
     def connected(self, component: str) -> Numbers:
         """Whether a component is on the grid, from its own breaker and the grid's port for it: 1 or 0, shape (n,)."""

@@ -9,7 +9,8 @@ import numpy as np
 from orchestrator.arrays import Numbers
 from orchestrator.watch.seen import Seen
 
-NOTICED = 0.01  # an event is noticed if it bends a signal by this part of its range since the last noticed one
+# an event is noticed if it bends a signal by this part of its range since the last noticed one
+NOTICED = 0.01
 _KINK_LOOKS = 4  # number of looks after an event that show its immediate effect
 _USUAL_LOOKS, _USUAL = 20, 2.0
 """A bend counts if it exceeds the first number times the signal's own motion in the second number of looks before the

@@ -8,7 +8,8 @@ from orchestrator.watch.oscillation import Oscillation, too_fast
 from orchestrator.watch.seen import shown
 from orchestrator.watch.stretches import Stretch
 
-_PARTS, _SHORT = 40, 0.1  # most pieces, and their least length [s]; the oscillation is searched in the first
+# most pieces, and their least length [s]; the oscillation is searched in the first
+_PARTS, _SHORT = 40, 0.1
 
 
 def swing_rises(swing: Swing) -> bool:
@@ -25,7 +26,9 @@ def _since(swing: Swing, frequency: float | None) -> float:
         return float(times[0])
     sizes = [float(y.mean()) if swing.turns_hz else rms(y) for y in np.array_split(signal, count)]
     last = float(np.mean(sizes[-max(1, count // 4) :]))
-    ago = next((k for k, size in enumerate(reversed(sizes)) if not KEPT * last < size < last / KEPT), count)
+    ago = next(
+        (k for k, size in enumerate(reversed(sizes)) if not KEPT * last < size < last / KEPT), count
+    )
     return float(np.array_split(times, count)[count - max(ago, 1)][0])
 
 
@@ -63,7 +66,9 @@ def doubtful_swing(swing: Swing, oscillation: Oscillation, why: str, stretch: St
 
 def _remedy(swing: Swing, oscillation: Oscillation | None, stretch: Stretch) -> str:
     end = needed_end(swing, oscillation)
-    return f"let the run go on to t = {end:.3g} s" if stretch.last else "give the events more distance"
+    return (
+        f"let the run go on to t = {end:.3g} s" if stretch.last else "give the events more distance"
+    )
 
 
 def irregular_swing(swing: Swing, unit: str, stretch: Stretch) -> Finding:
@@ -90,7 +95,9 @@ def doubtful_irregular_swing(swing: Swing, why: str, unit: str, stretch: Stretch
         f"{_remedy(swing, None, stretch)}"
     )
     place = _place(swing.name)
-    return Finding(NOT_JUDGED, stretch.begin, *place, message, _until(stretch), {"amplitude": amplitude})
+    return Finding(
+        NOT_JUDGED, stretch.begin, *place, message, _until(stretch), {"amplitude": amplitude}
+    )
 
 
 def _irregular_amplitude(swing: Swing) -> float:

@@ -130,8 +130,12 @@ def _mean(angles: Numbers, on: NDArray[np.bool_]) -> Numbers:
     return mean
 
 
-def _pair(sides: NDArray[np.int_], group: Sequence[int], other: Sequence[int], relative: Numbers) -> _Pair | None:
-    rows = [row for a in group for b in other if (row := _row_apart(sides[a], sides[b])) is not None]
+def _pair(
+    sides: NDArray[np.int_], group: Sequence[int], other: Sequence[int], relative: Numbers
+) -> _Pair | None:
+    rows = [
+        row for a in group for b in other if (row := _row_apart(sides[a], sides[b])) is not None
+    ]
     if not rows:
         return None
     both = np.isfinite(relative)
@@ -144,7 +148,9 @@ def _angle(seen: Seen, system: System, settings: Settings, name: str) -> Numbers
     if variable == _SPEED:
         described = system.components[name].description
         f_n = described.port.f_n if isinstance(described, BoundDescription) else 50.0
-        steps = 2 * np.pi * _start(system, settings, name, "f_n", f_n) * seen.interval * (signal - 1.0)
+        steps = (
+            2 * np.pi * _start(system, settings, name, "f_n", f_n) * seen.interval * (signal - 1.0)
+        )
         turned = np.concatenate([[0.0], np.cumsum((steps[1:] + steps[:-1]) / 2)])
         signal = _start(system, settings, name, "theta_0", 0.0) + turned
     return signal
@@ -160,7 +166,11 @@ def _forget_turns_off_the_grid(angles: Numbers, on: NDArray[np.bool_]) -> None:
 
 def _rating(system: System, settings: Settings, name: str) -> float:
     """Rating of a unit [MVA]; that of a stiff source is infinite."""
-    return np.inf if _angle_variable(system, name) == "source.theta" else _start(system, settings, name, "S_n", 0.0)
+    return (
+        np.inf
+        if _angle_variable(system, name) == "source.theta"
+        else _start(system, settings, name, "S_n", 0.0)
+    )
 
 
 def _start(system: System, settings: Settings, name: str, parameter: str, default: float) -> float:
@@ -169,7 +179,11 @@ def _start(system: System, settings: Settings, name: str, parameter: str, defaul
 
 
 def _finding(
-    times: Numbers, variable: str, group: Sequence[str], apart: Sequence[_Pair], names: Sequence[str]
+    times: Numbers,
+    variable: str,
+    group: Sequence[str],
+    apart: Sequence[_Pair],
+    names: Sequence[str],
 ) -> Finding:
     pairs = sorted(apart, key=lambda pair: pair.row)
     time = float(times[pairs[0].row])
@@ -188,7 +202,11 @@ def _finding(
     figures = {
         "turns": max(pair.turns for pair in pairs),
         "slips_at_the_end": float(any(pair.slips for pair in pairs)),
-        **({f"turns_against_{o[0]}": pair.turns for pair, o in zip(pairs, others, strict=True)} if pairs[1:] else {}),
+        **(
+            {f"turns_against_{o[0]}": pair.turns for pair, o in zip(pairs, others, strict=True)}
+            if pairs[1:]
+            else {}
+        ),
     }
     return Finding("loss_of_synchronism", time, group[0], variable, message, None, figures)
 

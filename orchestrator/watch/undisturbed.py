@@ -33,7 +33,10 @@ class Unrest:
 
     def explains(self, finding: Finding) -> bool:
         """Whether a forcing makes an oscillation: it has its frequency, or a multiple of it."""
-        if self.frequency is None or finding.kind not in ("sustained_oscillation", "growing_oscillation"):
+        if self.frequency is None or finding.kind not in (
+            "sustained_oscillation",
+            "growing_oscillation",
+        ):
             return False
         order = finding.figures["frequency_hz"] / self.frequency
         return order > 0.5 and abs(order - round(order)) < _SAME
@@ -63,7 +66,9 @@ def disturbances(system: System, events: Sequence[Event], end: float) -> list[Un
         key = (str(event.connection), _kind(event.imperfection, least=False))
         if not key[1]:
             continue
-        acts = key in permanent if isinstance(event, WireRecovery) else bool(_kind(event.imperfection))
+        acts = (
+            key in permanent if isinstance(event, WireRecovery) else bool(_kind(event.imperfection))
+        )
         if acts:
             since.setdefault(key, event.time)
         elif key in since:
@@ -111,11 +116,15 @@ def not_judged(masked: Mapping[Stretch, Sequence[Unrest]]) -> list[Finding]:
     return [Finding("not_judged", spans[0][0], component, variable, message, until)]
 
 
-LEAST_GROWTH = 1e-6  # smallest reported growth: distance of a signal from its start, as a part of 1 or of the start
-LEAST_MOTION = 1e-4  # least motion reported without growth, as from a start off the steady state, in the same unit
-_STEEP = 0.2  # A motion grows by itself if it had less than this part of its extent after half the time
+# smallest reported growth: distance of a signal from its start, as a part of 1 or of the start
+LEAST_GROWTH = 1e-6
+# least motion reported without growth, as from a start off the steady state, in the same unit
+LEAST_MOTION = 1e-4
+# A motion grows by itself if it had less than this part of its extent after half the time
+_STEEP = 0.2
 FEWEST_LOOKS = 3  # least number of looks over which a growth rises; a faster rise is a jump
-_ROUNDING, _LARGE = 1e-13, 0.03  # range in which a growth is measured, as parts of 1 or of the start
+# range in which a growth is measured, as parts of 1 or of the start
+_ROUNDING, _LARGE = 1e-13, 0.03
 _AGREE = 0.2  # largest relative difference between two measurements of a growth that agree
 
 
@@ -135,12 +144,18 @@ def undisturbed_motion(seen: Seen, system: System, until: float) -> Iterator[Fin
     begin = {name: int(np.argmax(m >= least)) for name, m in motions.items() if m[-1] >= least}
     first = min(begin, key=lambda name: (begin[name], -motions[name][begin[name]]))
     time = float(seen.times[begin[first]])
-    who = f"{first} moves first and most" if first == most else f"{first} moves first; {most} moves most"
+    who = (
+        f"{first} moves first and most"
+        if first == most
+        else f"{first} moves first; {most} moves most"
+    )
     sizes = f"{who}, by {size:.3g} of 1 or of its start until t = {until:.4g} s, before anything happens"
     component, _, variable = first.partition(".")
     if not steep:
         message = f"the undisturbed state does not stand still from t = {time:.4g} s: {sizes}"
-        yield Finding("undisturbed_motion", time, component, variable, message, None, {"motion": size})
+        yield Finding(
+            "undisturbed_motion", time, component, variable, message, None, {"motion": size}
+        )
         return
     growth = _growth(seen, motions)
     how = f"with {growth.frequency_hz:.4g} Hz" if growth.frequency_hz else "without oscillation"
@@ -183,7 +198,9 @@ def _growth(seen: Seen, motions: Mapping[str, Numbers]) -> Oscillation:
 
     The rate follows from the extent over every communication step, and the frequency from the turns. If the looks are
     close enough for the frequency, the matrix pencil gives both more exactly."""
-    coupled = {name: m for name, m in motions.items() if name in seen.turns and _is_growth(m)} or motions
+    coupled = {
+        name: m for name, m in motions.items() if name in seen.turns and _is_growth(m)
+    } or motions
     size = min(_LARGE, 0.3 * max(float(m[-1]) for m in coupled.values()))
     row = min(int(np.argmax(m >= size)) for m in coupled.values() if m[-1] >= size)
     name = max(coupled, key=lambda n: coupled[n][row])
@@ -194,9 +211,13 @@ def _growth(seen: Seen, motions: Mapping[str, Numbers]) -> Oscillation:
     late = slice((rows.start + rows.stop) // 2, rows.stop)
     turns = float(seen.turns[name][late].sum()) if name in seen.turns else 0.0
     frequency = turns / 2 / (seen.interval * (late.stop - late.start)) if turns > 1 else 0.0
-    exact = strongest_oscillation(times, (seen.last if name in seen.last else seen.values)[name][rows])
+    exact = strongest_oscillation(
+        times, (seen.last if name in seen.last else seen.values)[name][rows]
+    )
     if exact is not None and abs(exact.rate - rate) < _AGREE * rate:
-        aliased = name in seen.turns and abs(exact.frequency_hz - frequency) > _AGREE * frequency + 1 / np.ptp(times)
+        aliased = name in seen.turns and abs(
+            exact.frequency_hz - frequency
+        ) > _AGREE * frequency + 1 / np.ptp(times)
         if not aliased:
             return exact
     return Oscillation(frequency, rate, float(coupled[name][-1]))

@@ -20,24 +20,37 @@ from orchestrator.errors import ComponentError, CosimError, NotFiniteError
 from orchestrator.watch.confirmation import KnownModes
 from orchestrator.watch.finding import MISFIT, UNSTABLE, Finding, Kind
 from orchestrator.watch.limits import above_declared, active_limits, limit_signals
-from orchestrator.watch.response import enough_looks, judgements, resting_signals, unsettled_response
+from orchestrator.watch.response import (
+    enough_looks,
+    judgements,
+    resting_signals,
+    unsettled_response,
+)
 from orchestrator.watch.run_away import run_away, speed_signals, still_moving_away
 from orchestrator.watch.seen import Seen, Watcher, look_every, rescaled, unit
 from orchestrator.watch.settings import Settings
 from orchestrator.watch.stretches import Stretch, stretches
 from orchestrator.watch.synchronism import angle_signals, lost_synchronism
-from orchestrator.watch.undisturbed import Unrest, among, disturbances, not_judged, undisturbed_motion
+from orchestrator.watch.undisturbed import (
+    Unrest,
+    among,
+    disturbances,
+    not_judged,
+    undisturbed_motion,
+)
 
 SETTLING = 2.0
 """Shortest stretch in which a swing that goes on is a fault [s]. In a shorter one it may be what an event excites in
 the network, such as a current's offset, which takes up to a second to decay; growth is a fault in any."""
 
-SHORTEST_BETWEEN = 1.0  # shortest stretch of which a departure is told [s]: a fault that is cleared is shorter
+# shortest stretch of which a departure is told [s]: a fault that is cleared is shorter
+SHORTEST_BETWEEN = 1.0
 
 LEAST_DEPARTURE, LEAST_SHARE = 1e-3, 0.1
 """Least motion that is told, as a part of 1 or of the signal's start, and as a part of all its motion."""
 
-MORE = 1.2  # A signal departs if it moves by this factor more in the last quarter than in each quarter before
+# A signal departs if it moves by this factor more in the last quarter than in each quarter before
+MORE = 1.2
 _FEWEST = 40  # least number of looks by which a departure is judged
 
 
@@ -50,12 +63,18 @@ def too_short(stretches: Sequence[Stretch]) -> list[Finding]:
         for s in stretches
     )
     last = stretches[-1]
-    remedy = f"let the run go on to t = {last.begin + SETTLING:.4g} s" if last.last else "give the events more distance"
+    remedy = (
+        f"let the run go on to t = {last.begin + SETTLING:.4g} s"
+        if last.last
+        else "give the events more distance"
+    )
     message = (
         f"whether the response settles is not judged {spans}: what an event excites may still decay after less than "
         f"{SETTLING:g} s; {remedy}"
     )
-    return [Finding("not_judged", stretches[0].begin, "", "", message, None if last.last else last.end)]
+    return [
+        Finding("not_judged", stretches[0].begin, "", "", message, None if last.last else last.end)
+    ]
 
 
 def still_departing(seen: Seen, system: System, stretches: Sequence[Stretch]) -> list[Finding]:
@@ -91,7 +110,9 @@ def _departure(signal: Numbers) -> float:
 
     The first look is that before the event, and what moves at once is no departure."""
     *before, last = (float(np.ptp(part)) for part in np.array_split(signal, 4))
-    large = last > max(LEAST_DEPARTURE * max(1.0, abs(float(signal[0]))), LEAST_SHARE * float(np.ptp(signal)))
+    large = last > max(
+        LEAST_DEPARTURE * max(1.0, abs(float(signal[0]))), LEAST_SHARE * float(np.ptp(signal))
+    )
     return last if large and last > MORE * max(before) else 0.0
 
 
@@ -109,7 +130,11 @@ class Watch:
         kind = FilteredRecorder if prepared.record_filtered else Recorder
         self.recorder = kind(prepared.record, prepared.record_every, sink=sink, keep=keep)
         needed = dict.fromkeys(
-            [*limit_signals(prepared.system), *angle_signals(prepared.system), *speed_signals(prepared.system)]
+            [
+                *limit_signals(prepared.system),
+                *angle_signals(prepared.system),
+                *speed_signals(prepared.system),
+            ]
         )
         self._looks_at_records = every % prepared.record_every == 0 and not prepared.record_filtered
         if self._looks_at_records:
@@ -132,18 +157,31 @@ class Watch:
         ``misfits``: Of devices and their bindings, by component.
         ``modes``, ``later``: Eigenvalues of the linear model at the start, and of that which the events leave [rad/s];
         empty if not all are known."""
-        seen = rescaled(self._watcher.seen(self.recorder if self._looks_at_records else None), misfits)
+        seen = rescaled(
+            self._watcher.seen(self.recorder if self._looks_at_records else None), misfits
+        )
         whole = failure is None
         system = self._prepared.system
-        told = judged(seen, system, self._prepared.events, modes, later, whole=whole) if len(seen.times) > 1 else ()
-        found = chain(_late(late_starts or {}), _failure(failure), _not_finite(seen), _misfits(misfits), told)
+        told = (
+            judged(seen, system, self._prepared.events, modes, later, whole=whole)
+            if len(seen.times) > 1
+            else ()
+        )
+        found = chain(
+            _late(late_starts or {}), _failure(failure), _not_finite(seen), _misfits(misfits), told
+        )
         return sorted(found, key=lambda finding: finding.time)
 
 
 def judged(
-    seen: Seen, system: System, events: Sequence[Event], modes: Sequence[complex] = (), later: Sequence[complex] = (),
-    *, whole: bool = True,
-) -> list[Finding]:  # fmt: skip
+    seen: Seen,
+    system: System,
+    events: Sequence[Event],
+    modes: Sequence[complex] = (),
+    later: Sequence[complex] = (),
+    *,
+    whole: bool = True,
+) -> list[Finding]:
     """All findings from the signals.
 
     ``whole``: Whether the run came to its end; of one that did not, nobody asks whether it settles."""
@@ -156,14 +194,19 @@ def judged(
     if happened and happened[0] > 0:
         parts.insert(0, Stretch(0.0, happened[0]))
     found = [
-        *undisturbed, *above_declared(seen, system), *active_limits(seen, system, settings), *lost,
+        *undisturbed,
+        *above_declared(seen, system),
+        *active_limits(seen, system, settings),
+        *lost,
         *run_away(seen, system, settings, parts, slipped=bool(lost)),
-    ]  # fmt: skip
+    ]
     if any(finding.figures["slips_at_the_end"] for finding in lost):
         return found  # all signals swing with the slip
     if happened and [finding.kind for finding in undisturbed] != ["undisturbed_motion"]:
         parts = [part for part in parts if part.begin >= happened[0]]
-    units = [name for name, plan in system.components.items() if "omega" in plan.description.outputs]
+    units = [
+        name for name, plan in system.components.items() if "omega" in plan.description.outputs
+    ]
     at_a_limit = any(finding.kind == "active_limit" and finding.until is None for finding in found)
     modes, later = ((), ()) if at_a_limit else (modes, later)
     known = partial(_known, settings, modes, later, max(happened, default=0.0))
@@ -179,19 +222,37 @@ def judged(
 
 
 def _known(
-    settings: Settings, modes: Sequence[complex], later: Sequence[complex], last: float, begin: float
+    settings: Settings,
+    modes: Sequence[complex],
+    later: Sequence[complex],
+    last: float,
+    begin: float,
 ) -> KnownModes:
     """What is known of the modes in a stretch by its begin; ``last`` is the time of the last event [s]."""
     as_before = settings.as_at_start(begin)
-    return KnownModes(later, True) if later and not as_before and begin >= last else KnownModes(modes, as_before)
+    return (
+        KnownModes(later, True)
+        if later and not as_before and begin >= last
+        else KnownModes(modes, as_before)
+    )
 
 
 class _Responses:
     def __init__(
-        self, seen: Seen, system: System, units: Sequence[str], disturbances: Sequence[Unrest], settings: Settings,
+        self,
+        seen: Seen,
+        system: System,
+        units: Sequence[str],
+        disturbances: Sequence[Unrest],
+        settings: Settings,
         known: Callable[[float], KnownModes],
-    ) -> None:  # fmt: skip
-        self._seen, self._system, self._units, self._disturbances = seen, system, units, disturbances
+    ) -> None:
+        self._seen, self._system, self._units, self._disturbances = (
+            seen,
+            system,
+            units,
+            disturbances,
+        )
         self._settings, self._known = settings, known
         self.masked: dict[Stretch, Sequence[Unrest]] = {}
         self.short: list[Stretch] = []
@@ -203,16 +264,27 @@ class _Responses:
         told = self._one(part, told=len(pieces) == 1)
         if part.breaks and not judgements(told):
             told = [f for piece in pieces for f in self._one(piece)] or told
-        if not told and not among(self._disturbances, part) and not self._settings.ends_fault(part.end):
+        if (
+            not told
+            and not among(self._disturbances, part)
+            and not self._settings.ends_fault(part.end)
+        ):
             self.clear.append(part)
         return told
 
     def _one(self, part: Stretch, *, told: bool = True) -> list[Finding]:
         acting = among(self._disturbances, part)
         known = self._known(part.begin)
-        found = unsettled_response(self._seen, self._system, part, self._units, known, noisy=bool(acting))
+        found = unsettled_response(
+            self._seen, self._system, part, self._units, known, noisy=bool(acting)
+        )
         found = [finding for finding in found if not any(one.explains(finding) for one in acting)]
-        if acting and told and not found and unsettled_response(self._seen, self._system, part, self._units, known):
+        if (
+            acting
+            and told
+            and not found
+            and unsettled_response(self._seen, self._system, part, self._units, known)
+        ):
             self.masked[part] = acting
         if part.end - part.begin >= SETTLING * (1 - 1e-9):
             return found
@@ -228,7 +300,9 @@ def _first_of_each(found: Iterable[Finding]) -> list[Finding]:
     for finding in found:
         by_kind.setdefault(finding.kind, []).append(finding)
     return [
-        replace(first, message=f"{first.message}; the same again from t = {again[0].time:.4g} s") if again else first
+        replace(first, message=f"{first.message}; the same again from t = {again[0].time:.4g} s")
+        if again
+        else first
         for first, *again in by_kind.values()
     ]
 
@@ -246,7 +320,9 @@ def _late(starts: Mapping[str, LateStart]) -> Iterator[Finding]:
 
 def _misfits(found: Mapping[str, Sequence[Misfit]]) -> Iterator[Finding]:
     for name, misfits in found.items():
-        yield from (Finding(MISFIT, 0.0, name, "", m.sentence(name), None, m.figures) for m in misfits)
+        yield from (
+            Finding(MISFIT, 0.0, name, "", m.sentence(name), None, m.figures) for m in misfits
+        )
 
 
 def _failure(error: CosimError | None) -> Sequence[Finding]:

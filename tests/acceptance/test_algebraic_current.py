@@ -29,7 +29,9 @@ def test_an_algebraic_current_is_named(X_PU, tmp_path, capsys):
     assert any("component 'box'" in text for text in summary["warnings"])
 
 
-@pytest.mark.parametrize("options", [{}, {"X_PU": 0.1}, {"SHUNT": 0.05, "depends": ("v_re", "v_im")}])
+@pytest.mark.parametrize(
+    "options", [{}, {"X_PU": 0.1}, {"SHUNT": 0.05, "depends": ("v_re", "v_im")}]
+)
 def test_a_current_that_is_a_state_is_not_named(options, tmp_path, capsys):
     code, _, said = run(converter("stateful", RATING=200.0, **options), tmp_path, capsys)
     assert code == 0

@@ -23,9 +23,14 @@ def admittance(gallery, name):
 
 @pytest.mark.slow
 def test_a_port_of_powers_in_si_units_gives_the_same_admittance(gallery):
-    plain, powers = admittance(gallery, "converter_without_state"), admittance(gallery, "converter_power_si")
+    plain, powers = (
+        admittance(gallery, "converter_without_state"),
+        admittance(gallery, "converter_power_si"),
+    )
     assert not bound_fmu(*gallery("converter_without_state")).can_save_state
-    difference = np.linalg.norm(plain.values - powers.values, axis=(1, 2)) / np.linalg.norm(plain.values, axis=(1, 2))
+    difference = np.linalg.norm(plain.values - powers.values, axis=(1, 2)) / np.linalg.norm(
+        plain.values, axis=(1, 2)
+    )
     assert difference.max() < 1e-3
     content = Admittance(plain, 1 + 0j).as_json()
     assert content["lines"] == len(plain.values)
@@ -37,10 +42,16 @@ def test_a_port_of_powers_in_si_units_gives_the_same_admittance(gallery):
 
 @pytest.mark.slow
 def test_direct_feedthrough_is_measured_without_a_step(gallery):
-    plain, shunted = admittance(gallery, "converter_without_state"), admittance(gallery, "converter_feedthrough")
+    plain, shunted = (
+        admittance(gallery, "converter_without_state"),
+        admittance(gallery, "converter_feedthrough"),
+    )
     assert not plain.feedthrough.any()
     assert np.abs(shunted.feedthrough).max() > 0.01
-    assert np.abs(shunted.strictly_proper - plain.strictly_proper).max() < 0.05 * np.abs(plain.values).max()
+    assert (
+        np.abs(shunted.strictly_proper - plain.strictly_proper).max()
+        < 0.05 * np.abs(plain.values).max()
+    )
 
 
 @pytest.mark.nightly

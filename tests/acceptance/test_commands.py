@@ -40,7 +40,10 @@ def case(tmp_path):
         assert text.count(ours) == 1
         bound = f'binding = "{binding}"\n' if binding else ""
         text = text.replace(ours, f'fmu = "{fmu}"\n{bound}{extra}')
-        head, tail = text.partition("[scenarios.base]")[0], text.partition("[analysis]")[2].partition("[reference]")[0]
+        head, tail = (
+            text.partition("[scenarios.base]")[0],
+            text.partition("[analysis]")[2].partition("[reference]")[0],
+        )
         path = tmp_path / "case.toml"
         path.write_text(f"{head}[scenarios.vendor]\n[analysis]{tail}", encoding="utf-8")
         return path
@@ -114,7 +117,15 @@ def test_a_faulty_one_ends_with_1_and_says_what_to_do(gfor, gallery, tmp_path):
 def test_one_cause_is_told_once(gfor, gallery):
     """A step that is discarded at 0.3 s ends three checks; what to do about it stands once as well."""
     code, text, _ = gfor(
-        "fmu", "check", gallery("discards")[0], "--only", "loads", "--only", "runs", "--only", "steady_state"
+        "fmu",
+        "check",
+        gallery("discards")[0],
+        "--only",
+        "loads",
+        "--only",
+        "runs",
+        "--only",
+        "steady_state",
     )
     assert code == 1
     assert text.count("fmi2DoStep returned fmi2Discard") == 1
@@ -134,13 +145,18 @@ def test_a_hostile_file_is_a_finding_and_not_an_accident(gfor, gallery, tmp_path
     ("arguments", "words"),
     [
         (("none.fmu",), "there is no such file"),
-        (("FMU", "--only", "nothing"), "there is no check 'nothing'; there are: archive, binding, fmi_validity"),
+        (
+            ("FMU", "--only", "nothing"),
+            "there is no check 'nothing'; there are: archive, binding, fmi_validity",
+        ),
         (("FMU", "--binding", "none.toml"), "`gfor fmu bind FILE.fmu` drafts one"),
         (("FMU", "--time-limit", "-1"), "must be a number above 0"),
     ],
 )
 def test_what_cannot_be_used(arguments, words, gfor, gallery):
-    code, out, error = gfor("fmu", "check", *[gallery("gain")[0] if a == "FMU" else a for a in arguments])
+    code, out, error = gfor(
+        "fmu", "check", *[gallery("gain")[0] if a == "FMU" else a for a in arguments]
+    )
     assert code == 2
     assert out == ""
     assert words in error
@@ -156,7 +172,9 @@ def test_what_cannot_be_used(arguments, words, gfor, gallery):
 )
 def test_a_check_at_the_step_of_use(fmu, step, verdict, words, gfor, gallery):
     """Of the last one, an own step of 10 ms, every third step does nothing at 7 ms, and runs agree at common times."""
-    code, text, _ = gfor("fmu", "check", gallery(fmu)[0], "--only", "sample_time", "--step", step, "--json")
+    code, text, _ = gfor(
+        "fmu", "check", gallery(fmu)[0], "--only", "sample_time", "--step", step, "--json"
+    )
     result = json.loads(text)["checks"][-1]
     assert code == (verdict == "fail")
     assert result["verdict"] == verdict
@@ -171,12 +189,17 @@ def test_a_check_as_a_case_uses_it(gfor, gallery, case):
     assert (use.step_size, use.point.P) == (1e-4, pytest.approx(0.9))
     assert use.values["S_n"] > 0
     assert found.samefile(binding)
-    code, text, error = gfor("fmu", "check", fmu, "--case", path, "--only", "power_balance", "--json")
+    code, text, error = gfor(
+        "fmu", "check", fmu, "--case", path, "--only", "power_balance", "--json"
+    )
     assert code == 0, error
     assert "at 8 points" in json.loads(text)["checks"][-1]["evidence"]
     code, _, error = gfor("fmu", "check", gallery("gain")[0], "--case", path)
     assert code == 2
-    assert "no component is gain.fmu; say which one it is with --component (components that are FMUs: gfor)" in error
+    assert (
+        "no component is gain.fmu; say which one it is with --component (components that are FMUs: gfor)"
+        in error
+    )
     code, _, error = gfor("fmu", "check", fmu, "--component", "gfor")
     assert code == 2
     assert "give case as well" in error
@@ -187,7 +210,9 @@ def test_the_first_scenario_that_has_the_component_is_used(gfor, gallery, case):
     path = case(fmu)
     text = path.read_text(encoding="utf-8")
     bare = '[scenarios.bare]\nremove = ["gfor"]\n'
-    path.write_text(text.replace("[scenarios.vendor]", f"{bare}[scenarios.vendor]"), encoding="utf-8")
+    path.write_text(
+        text.replace("[scenarios.vendor]", f"{bare}[scenarios.vendor]"), encoding="utf-8"
+    )
     code, out, error = gfor("fmu", "check", fmu, "--case", path, "--only", "units")
     assert code == 0, error
     assert "As component 'gfor' in scenario 'vendor' of case.toml: P_0 = 0.9, " in out
@@ -238,9 +263,13 @@ def test_a_vendors_fmu_stands_in_a_case(gfor, gallery, case, tmp_path):
 
 
 def test_a_vendors_fmu_that_crashes_leaves_what_was_computed(gfor, gallery, case, tmp_path):
-    code, _, error = gfor("run", case(gallery("crash")[0]), "--stop", "0.2", "--out", tmp_path / "out")
+    code, _, error = gfor(
+        "run", case(gallery("crash")[0]), "--stop", "0.2", "--out", tmp_path / "out"
+    )
     assert code == 1
-    assert "component 'gfor' at t = 0.05 s: fmi2DoStep returned crash: its process died with" in error
+    assert (
+        "component 'gfor' at t = 0.05 s: fmi2DoStep returned crash: its process died with" in error
+    )
     run = xr.open_dataset(tmp_path / "out" / "vendor" / "trajectory.nc")
     assert float(run["time"].max()) == pytest.approx(0.05, abs=0.0051)
 
@@ -249,7 +278,10 @@ def test_a_vendors_fmu_that_ends_by_itself_says_so(gfor, case, tmp_path):
     fmu = build(converter("ends_soon", ENDS_AT=0.05), tmp_path)
     code, _, error = gfor("run", case(fmu), "--stop", "0.1", "--out", tmp_path / "out")
     assert code == 1
-    assert "component 'gfor': it ended its simulation at t = 0.05 s by itself, which is no error; let the run" in error
+    assert (
+        "component 'gfor': it ended its simulation at t = 0.05 s by itself, which is no error; let the run"
+        in error
+    )
     run = xr.open_dataset(tmp_path / "out" / "vendor" / "trajectory.nc")
     assert float(run["time"].max()) == pytest.approx(0.05, abs=0.0051)
 
@@ -284,7 +316,9 @@ def test_our_converter_as_a_foreign_file_has_the_same_modes(gfor, fmu_path, case
     foreign = tmp_path / "foreign.fmu"
     foreign.write_bytes(fmu_path("gfor").read_bytes())
     found = [
-        json.loads(gfor("modes", case(foreign, extra=extra), "--json")[1])["scenarios"][0]["modes"][0]
+        json.loads(gfor("modes", case(foreign, extra=extra), "--json")[1])["scenarios"][0]["modes"][
+            0
+        ]
         for extra in ("isolated = true\n", "isolated = false\n")
     ]
     assert found[0]["real"] == pytest.approx(-0.389, abs=0.002)
@@ -293,7 +327,10 @@ def test_our_converter_as_a_foreign_file_has_the_same_modes(gfor, fmu_path, case
 
 def test_a_binding_without_an_fmu(gfor, case, tmp_path):
     path = case("x.fmu")
-    path.write_text(path.read_text().replace('fmu = "x.fmu"', 'model = "gfor"\nbinding = "x.toml"'), encoding="utf-8")
+    path.write_text(
+        path.read_text().replace('fmu = "x.fmu"', 'model = "gfor"\nbinding = "x.toml"'),
+        encoding="utf-8",
+    )
     code, _, error = gfor("modes", path)
     assert code == 2
     assert "'binding' is for an FMU of others" in error
@@ -311,7 +348,10 @@ def test_a_file_alone_brings_no_foreign_code_into_this_process(gfor, gallery, ca
 
 def test_the_user_may_trust_it(gfor, gallery, case, tmp_path):
     path = case(gallery("converter")[0], extra="isolated = false\n")
-    assert load(path, trust_fmus=True).scenario("vendor").prepared.system.components["gfor"].isolated is False
+    assert (
+        load(path, trust_fmus=True).scenario("vendor").prepared.system.components["gfor"].isolated
+        is False
+    )
     found = []
     for name, word in (("trusted", ["--trust-fmus"]), ("isolated", [])):
         if not word:
@@ -320,14 +360,19 @@ def test_the_user_may_trust_it(gfor, gallery, case, tmp_path):
         assert code == 0, error
         (scenario,) = json.loads((tmp_path / name / "summary.json").read_text())["scenarios"]
         found.append(scenario["isolated"])
-        said = "component 'gfor' runs in gfor's own process, because the case and --trust-fmus say so"
-        assert (said in scenario["warnings"], said in " ".join(error.split())) == (bool(word), bool(word))
+        said = (
+            "component 'gfor' runs in gfor's own process, because the case and --trust-fmus say so"
+        )
+        assert (said in scenario["warnings"], said in " ".join(error.split())) == (
+            bool(word),
+            bool(word),
+        )
     assert found[0] == {}
     assert [p["name"] for p in found[1]["gfor"]] == list(NAMES)
     gfor("report", tmp_path / "trusted")
-    assert "own process, because the case and --trust-fmus say so" in (tmp_path / "trusted" / "report.html").read_text(
-        encoding="utf-8"
-    )
+    assert "own process, because the case and --trust-fmus say so" in (
+        tmp_path / "trusted" / "report.html"
+    ).read_text(encoding="utf-8")
     gfor("report", tmp_path / "isolated")
     assert "gfor ran in a process of its own, with: the FMU&#x27;s processes end" in (
         tmp_path / "isolated" / "report.html"

@@ -78,14 +78,21 @@ def test_a_saved_state_comes_back_also_from_bytes(component):
 
 def test_derivatives_are_given_or_refused_in_words(component):
     if isinstance(component, BoundComponent | HostedComponent):
-        with pytest.raises(ComponentError, match="component 'box': fmi2GetDirectionalDerivative returned nothing: "):
+        with pytest.raises(
+            ComponentError, match="component 'box': fmi2GetDirectionalDerivative returned nothing: "
+        ):
             component.jacobian(["i_re"], ["v_re"])
     else:
-        assert np.isfinite(component.jacobian(["i_re", "i_im"], ["v_re"])).tolist() == [[True], [True]]
+        assert np.isfinite(component.jacobian(["i_re", "i_im"], ["v_re"])).tolist() == [
+            [True],
+            [True],
+        ]
 
 
 def test_a_refused_call_names_the_component_and_the_call(component):
-    with pytest.raises(ComponentError, match="component 'box' at t = 0 s: fmi2DoStep returned fmi2") as caught:
+    with pytest.raises(
+        ComponentError, match="component 'box' at t = 0 s: fmi2DoStep returned fmi2"
+    ) as caught:
         component.step(0.0, -1.0)
     assert "step" in caught.value.log
 
@@ -101,7 +108,9 @@ def test_an_interrupt_while_it_is_asked_stays_an_interrupt(fmu_path):
 
     def asked():
         with HostedComponent("box", process) as opened:
-            process._library = SimpleNamespace(mailbox_post=library.mailbox_post, mailbox_wait=interrupted)
+            process._library = SimpleNamespace(
+                mailbox_post=library.mailbox_post, mailbox_wait=interrupted
+            )
             try:
                 opened.set(START)
             finally:

@@ -34,7 +34,9 @@ def test_a_dip_is_a_part_of_the_voltage_that_the_device_has(monkeypatch):
 
 def test_a_hosted_fmu_is_given_one_row_of_as_many_values():
     given = []
-    process = SimpleNamespace(run=lambda number, into, rows, out: given.append((number, into, rows.copy(), out)) or [0])
+    process = SimpleNamespace(
+        run=lambda number, into, rows, out: given.append((number, into, rows.copy(), out)) or [0]
+    )
     references, values = (c_uint * 2)(7, 9), (c_double * 2)(1.5, -2.5)
     fake = SimpleNamespace(_process=process, number=3)
     assert HostedComponent._set_real(fake, 0, addressof(references), 2, addressof(values)) == 0
@@ -43,7 +45,9 @@ def test_a_hosted_fmu_is_given_one_row_of_as_many_values():
 
 
 @pytest.mark.parametrize(("load", "wanted"), [(0.1, 1), (6, 3), (1000, 8)])
-def test_on_a_crowded_machine_an_answer_is_waited_for_up_to_eight_times_as_long(load, wanted, monkeypatch):
+def test_on_a_crowded_machine_an_answer_is_waited_for_up_to_eight_times_as_long(
+    load, wanted, monkeypatch
+):
     monkeypatch.setattr(limits.os, "getloadavg", lambda: (load, 0.0, 0.0), raising=False)
     monkeypatch.setattr(limits.os, "cpu_count", lambda: 2)
     assert limits.crowded() == wanted
@@ -67,7 +71,9 @@ def test_after_a_dip_that_it_does_not_survive_a_third_of_it_for_half_as_long_is_
 
 def test_an_input_that_starts_at_its_limit_is_moved_all_the_same():
     info = SimpleNamespace(start_number=1.0, minimum=1.0, maximum=1.2)
-    fake = SimpleNamespace(inputs=["u"], port=None, description=SimpleNamespace(variables={"u": info}))
+    fake = SimpleNamespace(
+        inputs=["u"], port=None, description=SimpleNamespace(variables={"u": info})
+    )
     assert Subject.amplitudes.fget(fake) == pytest.approx([0.05])
     info.maximum = 1.06
     assert Subject.amplitudes.fget(fake) == pytest.approx([0.03])
@@ -75,7 +81,9 @@ def test_an_input_that_starts_at_its_limit_is_moved_all_the_same():
 
 def test_a_current_is_that_of_the_rating_with_which_it_runs(monkeypatch):
     """0.6 + 0.3j of 100 MVA are half as much of 200 MVA."""
-    monkeypatch.setattr(port, "RealBatch", lambda component, names: SimpleNamespace(read=lambda: (0.6, 0.3)))
+    monkeypatch.setattr(
+        port, "RealBatch", lambda component, names: SimpleNamespace(read=lambda: (0.6, 0.3))
+    )
     running = SimpleNamespace(
         parameters={"S_n": 200.0},
         component=SimpleNamespace(description=SimpleNamespace(variables={})),

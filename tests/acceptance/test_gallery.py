@@ -77,17 +77,26 @@ def test_a_check_finds_its_fault_and_leaves_the_good_one_alone(name, only, galle
     (failure,) = found.failures
     assert failure.evidence
     assert failure.remedy
-    clean = check_fmu(*gallery("lag" if name.endswith("lag") else "converter"), LIMITS, (only,), run_for=0.3)
+    clean = check_fmu(
+        *gallery("lag" if name.endswith("lag") else "converter"), LIMITS, (only,), run_for=0.3
+    )
     assert clean.trusted
     assert clean.results[-1].verdict == "pass"
 
 
 @pytest.mark.parametrize(
     ("name", "fault", "words"),
-    [("shows_kw_as_mw", "wrong units", "P_meas is declared in MW and shows 1000 times the P that flows"),
-     ("shows_pu_as_mw", "wrong units", "shows 0.0006667 times the P that flows (1/S_n)"),
-     ("converter_shows_mw", "", "no wrong unit is seen"), ("converter_shows_pu", "", "no wrong unit is seen")],
-)  # fmt: skip
+    [
+        (
+            "shows_kw_as_mw",
+            "wrong units",
+            "P_meas is declared in MW and shows 1000 times the P that flows",
+        ),
+        ("shows_pu_as_mw", "wrong units", "shows 0.0006667 times the P that flows (1/S_n)"),
+        ("converter_shows_mw", "", "no wrong unit is seen"),
+        ("converter_shows_pu", "", "no wrong unit is seen"),
+    ],
+)
 def test_power_in_another_unit_than_declared_is_told(name, fault, words, gallery):
     """An honest one shows it before its filter's losses."""
     found = check_fmu(*gallery(name), LIMITS, ("shown_power",), run_for=0.3)
@@ -96,14 +105,20 @@ def test_power_in_another_unit_than_declared_is_told(name, fault, words, gallery
 
 
 def test_a_sum_of_times_in_single_precision_shows_after_a_rest(gallery):
-    found = check_fmu(*gallery("sum_of_single_precision"), LIMITS, ("steady_state", "later_times"), run_for=1.0)
+    found = check_fmu(
+        *gallery("sum_of_single_precision"), LIMITS, ("steady_state", "later_times"), run_for=1.0
+    )
     assert found.faults == ["counts time"]
 
 
 @pytest.mark.parametrize(
     ("name", "only", "words"),
     [
-        ("held", "sample_time", "its outputs change every 1 ms only: 90% of all steps of 100 µs do nothing"),
+        (
+            "held",
+            "sample_time",
+            "its outputs change every 1 ms only: 90% of all steps of 100 µs do nothing",
+        ),
         ("sixty_hertz", "rated_frequency", "so it is made for 60 Hz where 50 Hz is bound"),
         ("crash_in_dip", "limits", "s: its process died with SIGSEGV in fmi2DoStep"),
         ("limit_of_a_short_time", "limits", " s at 0.1"),
@@ -132,15 +147,26 @@ def test_a_crash_is_told_with_the_checks_that_led_to_it(tmp_path):
     found = check_fmu(path, None, LIMITS, ("repeatability", "reset", "sample_time"), run_for=0.3)
     (failure,) = found.failures
     assert (failure.check, failure.fault) == ("sample_time", "crash")
-    assert "not so in a new process: what came before it, repeatability, reset, damaged" in failure.evidence
+    assert (
+        "not so in a new process: what came before it, repeatability, reset, damaged"
+        in failure.evidence
+    )
     alone = check_fmu(path, None, LIMITS, ("sample_time",), run_for=0.3)
     assert alone.faults == []
 
 
 def test_an_omega_that_lags_is_told(tmp_path):
-    found = check_fmu(build(converter("lags", FAULT_OMEGA_LAGS=2.0), tmp_path), None, LIMITS, ("signs",), run_for=0.3)
+    found = check_fmu(
+        build(converter("lags", FAULT_OMEGA_LAGS=2.0), tmp_path),
+        None,
+        LIMITS,
+        ("signs",),
+        run_for=0.3,
+    )
     assert found.results[-1].verdict == "remark"
-    assert "still on its way to the network's 0.999, and its power rests" in found.results[-1].evidence
+    assert (
+        "still on its way to the network's 0.999, and its power rests" in found.results[-1].evidence
+    )
 
 
 def test_an_answer_that_another_rating_changes_is_told(tmp_path):
@@ -151,7 +177,8 @@ def test_an_answer_that_another_rating_changes_is_told(tmp_path):
     assert found.verdict == "remark"
     assert "its answer to less voltage and frequency is" in found.evidence
     path = build(converter("blocks", FAULT_BLOCKS_BELOW=0.35), tmp_path)
-    assert check_fmu(path, None, LIMITS, only, run_for=0.3).trusted  # no current in a dip, at any rating
+    # no current in a dip, at any rating
+    assert check_fmu(path, None, LIMITS, only, run_for=0.3).trusted
 
 
 def test_a_limit_that_was_not_watched_to_the_end_is_said(gallery, monkeypatch):
@@ -162,7 +189,9 @@ def test_a_limit_that_was_not_watched_to_the_end_is_said(gallery, monkeypatch):
 
 def test_an_angle_that_turns_back_by_less_than_a_turn_is_told(tmp_path):
     path = build(converter("wraps", WRAPS_BY=6.0), tmp_path)
-    found = check_fmu(path, None, LIMITS, ("steady_state", "power_balance", "signs"), run_for=0.3).results[-1]
+    found = check_fmu(
+        path, None, LIMITS, ("steady_state", "power_balance", "signs"), run_for=0.3
+    ).results[-1]
     assert found.verdict == "remark"
     assert "pu away" in found.evidence
     assert "theta_0 = 3 rad" in found.evidence
@@ -182,20 +211,28 @@ def test_a_sign_that_turns_with_larger_changes_of_the_frequency_is_found(tmp_pat
 
 @pytest.mark.parametrize(
     ("defines", "only", "fault"),
-    [({"FAULT_TRIPLES_IN_SWELL": 0.3}, "after_dips", "changed by a disturbance"),
-     ({"FAULT_LIMIT_OFF_WHERE": "(m[Q_REF] < -0.2)"}, "limits", "no current limit")],
-)  # fmt: skip
-def test_what_a_lasting_overvoltage_and_a_dip_while_absorbing_bring_is_found(defines, only, fault, tmp_path):
+    [
+        ({"FAULT_TRIPLES_IN_SWELL": 0.3}, "after_dips", "changed by a disturbance"),
+        ({"FAULT_LIMIT_OFF_WHERE": "(m[Q_REF] < -0.2)"}, "limits", "no current limit"),
+    ],
+)
+def test_what_a_lasting_overvoltage_and_a_dip_while_absorbing_bring_is_found(
+    defines, only, fault, tmp_path
+):
     path = build(converter("plant", **defines), tmp_path)
     assert check_fmu(path, None, LIMITS, (only,), run_for=0.3, seed=1).faults == [fault]
 
 
-def test_a_drift_that_begins_after_half_a_minute_is_looked_for_where_it_showed(tmp_path, monkeypatch):
+def test_a_drift_that_begins_after_half_a_minute_is_looked_for_where_it_showed(
+    tmp_path, monkeypatch
+):
     """At rest there would be no time for it; the run with small changes had."""
     monkeypatch.setattr(port, "_PART", 0.0)
     path = build(converter("drifts", FAULT_DRIFTS_AFTER=30.0, FAULT_DRIFTS_BY=0.1), tmp_path)
     assert check_fmu(path, None, LIMITS, ("steady_state",)).trusted
-    assert check_fmu(path, None, LIMITS, ("runs", "steady_state")).faults == ["leaves its steady state"]
+    assert check_fmu(path, None, LIMITS, ("runs", "steady_state")).faults == [
+        "leaves its steady state"
+    ]
 
 
 @pytest.mark.parametrize("name", ["gain_of_the_fourth_dip", "gain_for_a_while", "wound_up"])
@@ -218,7 +255,9 @@ def test_a_place_at_which_its_small_answer_jumps_is_told(tmp_path):
 
 def test_power_that_moves_in_steps_is_told(tmp_path):
     path = build(converter("coarse", FAULT_COARSE_POWER=0.01), tmp_path)
-    found = check_fmu(path, None, LIMITS, ("steady_state", "power_balance", "operating_points"), run_for=0.3)
+    found = check_fmu(
+        path, None, LIMITS, ("steady_state", "power_balance", "operating_points"), run_for=0.3
+    )
     assert found.results[-1].verdict == "remark"
     assert "it takes its power in steps" in found.results[-1].evidence
 
@@ -226,10 +265,14 @@ def test_power_that_moves_in_steps_is_told(tmp_path):
 def test_what_was_not_judged_stands_in_the_verdict(gallery, monkeypatch):
     """A droop of reactive power whose law is not seen, of the wrong sign besides."""
     monkeypatch.setattr(droop, "droop", lambda found: None)
-    found = check_fmu(*gallery("q_measured"), LIMITS, ("steady_state", "power_balance", "signs"), run_for=0.3)
+    found = check_fmu(
+        *gallery("q_measured"), LIMITS, ("steady_state", "power_balance", "signs"), run_for=0.3
+    )
     assert found.trusted
     assert found.not_judged == ["the sign of its droop of reactive power"]
-    assert "no check failed; not judged: the sign of its droop of reactive power" in repr(Acceptance(found))
+    assert "no check failed; not judged: the sign of its droop of reactive power" in repr(
+        Acceptance(found)
+    )
 
 
 def test_a_crowded_machine_makes_no_good_fmu_hang(gallery, monkeypatch):
@@ -286,14 +329,25 @@ def test_pages_and_table_count_the_galleries_members():
     whole = len(good()) + 2 * len(OURS)
     faults = len(faulty()) + len(HOSTILE)
     named = {m.name for m in (*good(), *faulty())} | set(HOSTILE)
-    rows = [line.split("|")[1].strip() for line in TABLE.read_text(encoding="utf-8").splitlines() if "| yes |" in line]
+    rows = [
+        line.split("|")[1].strip()
+        for line in TABLE.read_text(encoding="utf-8").splitlines()
+        if "| yes |" in line
+    ]
     assert {row for row in rows if "(" not in row} == named
     assert len(rows) == whole + faults
-    pages = {"README.md": "{} FMUs", ".docs/validation/index.md": "{} FMUs",
-             ".docs/validation/foreign-fmus.md": "has {} FMUs: {} good ones"}  # fmt: skip
+    pages = {
+        "README.md": "{} FMUs",
+        ".docs/validation/index.md": "{} FMUs",
+        ".docs/validation/foreign-fmus.md": "has {} FMUs: {} good ones",
+    }
     for page, words in pages.items():
-        assert words.format(whole + faults, whole) in (ROOT / page).read_text(encoding="utf-8"), page
-    assert f"{faults} faulty ones" in (ROOT / ".docs/validation/foreign-fmus.md").read_text(encoding="utf-8")
+        assert words.format(whole + faults, whole) in (ROOT / page).read_text(encoding="utf-8"), (
+            page
+        )
+    assert f"{faults} faulty ones" in (ROOT / ".docs/validation/foreign-fmus.md").read_text(
+        encoding="utf-8"
+    )
 
 
 @pytest.mark.slow
@@ -303,7 +357,9 @@ def test_some_good_ones_pass_and_some_faulty_ones_are_caught(gallery):
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         reports = list(pool.map(lambda row: checked(*gallery(row[1].name), row[1].only), rows))
     for (fault, member), report in zip(rows, reports, strict=True):
-        assert (fault in report.faults) if fault else report.trusted, f"{member.name}: {report.failures}"
+        assert (fault in report.faults) if fault else report.trusted, (
+            f"{member.name}: {report.failures}"
+        )
 
 
 @pytest.mark.nightly
@@ -311,10 +367,14 @@ def test_some_good_ones_pass_and_some_faulty_ones_are_caught(gallery):
 def test_the_confusion_table(gallery, fmu_path, tmp_path):
     rows = [(m.name, "", "", *gallery(m.name), m.only) for m in good()]
     rows += [(f"{name} (Python-backed)", "", "", fmu_path(name), None) for name in OURS]
-    rows += [(f"{name} (native)", "", "", cached(NativeFmu(build_model(name))), None) for name in OURS]
+    rows += [
+        (f"{name} (native)", "", "", cached(NativeFmu(build_model(name))), None) for name in OURS
+    ]
     rows += [(m.name, m.fault, m.thread, *gallery(m.name), m.only) for m in faulty()]
     plain, _ = gallery("gain")
-    rows += [(name, fault, "", make(tmp_path, plain), None) for name, (make, fault) in HOSTILE.items()]
+    rows += [
+        (name, fault, "", make(tmp_path, plain), None) for name, (make, fault) in HOSTILE.items()
+    ]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         reports = list(pool.map(lambda row: checked(*row[3:]), rows))
     lines, wrong = [], []
@@ -322,12 +382,24 @@ def test_the_confusion_table(gallery, fmu_path, tmp_path):
         caught = (fault in report.faults) if fault else report.trusted
         assert not [r for r in report.results if "failed by itself" in r.evidence]
         also = ", ".join(f for f in report.faults if f != fault)
-        said = f"[{thread}](https://github.com/{thread.replace('#', '/issues/')})" if thread else "—"
-        lines.append(f"| {name} | {fault or '—'} | {said} | {'yes' if caught else 'NO'} | {also or '—'} |")
-        wrong += [] if caught else [f"{name}: {fault or 'good'}, found {report.faults}: {report.failures}"]
+        said = (
+            f"[{thread}](https://github.com/{thread.replace('#', '/issues/')})" if thread else "—"
+        )
+        lines.append(
+            f"| {name} | {fault or '—'} | {said} | {'yes' if caught else 'NO'} | {also or '—'} |"
+        )
+        wrong += (
+            []
+            if caught
+            else [f"{name}: {fault or 'good'}, found {report.faults}: {report.failures}"]
+        )
     assert not wrong, "\n".join(wrong)
     table = "\n".join(
-        ["| FMU | its fault | reported in | caught, or passed if good | also found |", "|---|---|---|---|---|", *lines]
+        [
+            "| FMU | its fault | reported in | caught, or passed if good | also found |",
+            "|---|---|---|---|---|",
+            *lines,
+        ]
     )
     if os.environ.get("GFOR_WRITE_TABLES"):
         before = TABLE.read_text(encoding="utf-8").partition("| FMU |")[0]

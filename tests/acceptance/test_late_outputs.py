@@ -59,7 +59,9 @@ def case(gallery, tmp_path):
 
 
 def test_a_run_says_whose_outputs_came_late(case, tmp_path, capsys):
-    assert main(["run", str(case("outputs_at_exit")), "--json", "--out", str(tmp_path / "out")]) == 0
+    assert (
+        main(["run", str(case("outputs_at_exit")), "--json", "--out", str(tmp_path / "out")]) == 0
+    )
     (summary,) = json.loads(capsys.readouterr().out)
     first = summary["findings"][0]
     assert (first["kind"], first["component"], first["time"]) == ("undisturbed_motion", "box", 0.0)

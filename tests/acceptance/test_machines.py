@@ -13,8 +13,20 @@ TIME = np.linspace(0, 2, 400)
 def limits(kind, variables=None, **answer):
     """The verdict on one answer, of a mean current of 5 pu unless said otherwise."""
     event = ride_through.Disturbance("dip", 0.3, 1.0)
-    answers = [ride_through.Answer(event, **{"peak": 5.0, "early": 5.0, "mean": 5.0, "away": 0.0, "blocked": 0.0,
-                                             "gone": False, **answer})]  # fmt: skip
+    answers = [
+        ride_through.Answer(
+            event,
+            **{
+                "peak": 5.0,
+                "early": 5.0,
+                "mean": 5.0,
+                "away": 0.0,
+                "blocked": 0.0,
+                "gone": False,
+                **answer,
+            },
+        )
+    ]
     described = SimpleNamespace(kind=kind, variables=variables or {})
     subject = SimpleNamespace(description=described, is_machine=kind == "machine")
     return ride_through._judged(subject, answers, [], 0)

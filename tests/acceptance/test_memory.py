@@ -74,7 +74,10 @@ def test_resets_that_could_not_be_measured_are_no_pass(gallery, quick, monkeypat
 def test_a_good_fmu_passes_and_says_what_was_left_out(gallery, quick):
     found = checked(gallery("converter")[0])
     assert found.verdict == "pass"
-    assert "not measured: later step, because the check 'runs' did not run long enough" in found.evidence
+    assert (
+        "not measured: later step, because the check 'runs' did not run long enough"
+        in found.evidence
+    )
     assert found.figures["fmi2Reset"] < 120
 
 
@@ -93,8 +96,13 @@ def test_a_leak_of_each_reset_is_found_though_one_block_frees_more(gallery, quic
 
 
 def test_a_platform_that_tells_nothing_of_files_is_named(gallery, quick, monkeypatch):
-    monkeypatch.setattr(resources, "_of_files", lambda subject: _Unknown("nothing tells", refused=False))
-    assert "; not measured: open files, because nothing tells" in checked(gallery("converter")[0]).evidence
+    monkeypatch.setattr(
+        resources, "_of_files", lambda subject: _Unknown("nothing tells", refused=False)
+    )
+    assert (
+        "; not measured: open files, because nothing tells"
+        in checked(gallery("converter")[0]).evidence
+    )
 
 
 class Counted:

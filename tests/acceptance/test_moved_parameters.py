@@ -10,11 +10,19 @@ from orchestrator.fmi.description import VariableInfo
 
 def moved(start, unit=None, minimum=None, maximum=None):
     info = SimpleNamespace(
-        causality="parameter", variability="tunable", type="Real", start=str(start), start_number=float(start),
-        unit=unit, minimum=minimum, maximum=maximum,
-    )  # fmt: skip
+        causality="parameter",
+        variability="tunable",
+        type="Real",
+        start=str(start),
+        start_number=float(start),
+        unit=unit,
+        minimum=minimum,
+        maximum=maximum,
+    )
     assert all(hasattr(VariableInfo, n) or n in VariableInfo.__annotations__ for n in vars(info))
-    subject = SimpleNamespace(description=SimpleNamespace(variables={"k": info}), use=SimpleNamespace(values={}))
+    subject = SimpleNamespace(
+        description=SimpleNamespace(variables={"k": info}), use=SimpleNamespace(values={})
+    )
     return elsewhere(subject).get("k")
 
 

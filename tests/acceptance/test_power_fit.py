@@ -9,7 +9,9 @@ from orchestrator.binding.misfits import diagnosis, of_power
 ASKED = np.array([0.5, 0.3 + 0.2j, -0.4 + 0.1j, -0.2j, 0.7])
 
 
-@pytest.mark.parametrize("law", [(1, 0, 0), (-1, 0, 0), (0.2 + 0.1j, 0.8, 0), (1, 0, 0.05 - 0.02j), (0.5j, 0.1, -0.3)])
+@pytest.mark.parametrize(
+    "law", [(1, 0, 0), (-1, 0, 0), (0.2 + 0.1j, 0.8, 0), (1, 0, 0.05 - 0.02j), (0.5j, 0.1, -0.3)]
+)
 def test_a_law_is_found_with_nothing_left(law):
     a, b, c = law
     *found, rest = _fit(ASKED, a * ASKED + b * ASKED.conj() + c)
@@ -19,10 +21,15 @@ def test_a_law_is_found_with_nothing_left(law):
 
 @pytest.mark.parametrize(
     ("law", "fault", "words"),
-    [((np.exp(0.1j), 0, 0, 0), "wrong frame", "turned by -5.7°"), ((0.985, 0.015, 0, 0), "power not as asked", "0.015"),
-     ((0.97, 0, 0, 0), "wrong base", "0.97 times"), ((-1, 0, 0, 0), "wrong sign", "opposite"),
-     ((0.5, 0.5, 0, 0), "wrong axes", "signed differently"), ((0.1, 1, 0, 0), "wrong axes", "scaled")],
-)  # fmt: skip
+    [
+        ((np.exp(0.1j), 0, 0, 0), "wrong frame", "turned by -5.7°"),
+        ((0.985, 0.015, 0, 0), "power not as asked", "0.015"),
+        ((0.97, 0, 0, 0), "wrong base", "0.97 times"),
+        ((-1, 0, 0, 0), "wrong sign", "opposite"),
+        ((0.5, 0.5, 0, 0), "wrong axes", "signed differently"),
+        ((0.1, 1, 0, 0), "wrong axes", "scaled"),
+    ],
+)
 def test_a_law_has_its_name(law, fault, words):
     """A share of P that is lost turns nothing."""
     name, says = diagnosis("i", *map(complex, law[:3]), law[3])

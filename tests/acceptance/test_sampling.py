@@ -16,13 +16,19 @@ from orchestrator.acceptance.checks import sampling
         (1e6, 1e9, [200, 2000, 20000]),
     ],
 )
-def test_what_is_no_multiple_of_the_step_is_looked_at_for_longer(every, affordable, tried, monkeypatch):
+def test_what_is_no_multiple_of_the_step_is_looked_at_for_longer(
+    every, affordable, tried, monkeypatch
+):
     lengths = []
     monkeypatch.setattr(
-        sampling, "affordable", lambda subject, length, h: lengths.append(length) or min(length, affordable)
+        sampling,
+        "affordable",
+        lambda subject, length, h: lengths.append(length) or min(length, affordable),
     )
     monkeypatch.setattr(
-        sampling, "_changes", lambda subject, steps, h: (np.diff(np.arange(steps + 1) // every) > 0)[:, None]
+        sampling,
+        "_changes",
+        lambda subject, steps, h: (np.diff(np.arange(steps + 1) // every) > 0)[:, None],
     )
     found = sampling._sample_time(None, 1e-3)
     assert lengths == tried

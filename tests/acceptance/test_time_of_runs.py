@@ -35,9 +35,15 @@ def result_of(monkeypatch, seconds, share, nan_at=np.inf, stop=1.0):
         yield fmu
 
     subject = SimpleNamespace(
-        step_size=1e-4, description=SimpleNamespace(stop_time=stop), steps=lambda hold: None, memory={},
-        running=opened, memory_in_use=lambda: 0, watched=["y"], port=False,
-    )  # fmt: skip
+        step_size=1e-4,
+        description=SimpleNamespace(stop_time=stop),
+        steps=lambda hold: None,
+        memory={},
+        running=opened,
+        memory_in_use=lambda: 0,
+        watched=["y"],
+        port=False,
+    )
     return running.runs(subject), clock
 
 

@@ -55,29 +55,50 @@ def test_an_orderly_end_is_a_remark_and_what_fits_is_checked(gallery):
     assert report.trusted
     runs = result(report, "runs")
     assert runs.verdict == "remark"
-    assert runs.evidence == "it ended its simulation at t = 0.8 s by itself, before the 1 s that it declares"
+    assert (
+        runs.evidence
+        == "it ended its simulation at t = 0.8 s by itself, before the 1 s that it declares"
+    )
     assert [result(report, name).verdict for name in ("repeatability", "state")] == ["pass", "pass"]
 
 
 def test_a_step_that_is_discarded_is_no_end(gallery):
     report = checked(gallery("discards")[0], "runs")
     assert report.faults == ["error in a step"]
-    assert "it logs no text; by FMI it did not compute the whole step" in result(report, "runs").evidence
+    assert (
+        "it logs no text; by FMI it did not compute the whole step"
+        in result(report, "runs").evidence
+    )
 
 
 def test_an_end_with_an_error_in_the_log_is_no_orderly_one(gallery):
     """Exporters set fmi2Terminated whenever a step failed."""
     report = checked(gallery("ends_of_an_error")[0], "runs")
     assert report.faults == ["error in a step"]
-    assert "fmi2DoStep returned fmi2Discard: the solver does not converge" in result(report, "runs").evidence
+    assert (
+        "fmi2DoStep returned fmi2Discard: the solver does not converge"
+        in result(report, "runs").evidence
+    )
 
 
 @pytest.mark.parametrize(
     ("fault", "time", "words"),
     [
-        ({"FAULT_DISCARD_AT": 0.0}, 0.0, "fmi2DoStep returned fmi2Discard: it logs no text; by FMI it did not compute"),
-        ({"FAULT_DISCARD_AT": 0.0, "FAULT_DISCARD_PART": 0.25}, 0.0, r"it computed the step up to t = 2\.5e-05 s only"),
-        ({"STRICT_TIME": 1}, 0.5, "fmi2DoStep returned fmi2Error: it logs no text; by FMI it cannot go on from here"),
+        (
+            {"FAULT_DISCARD_AT": 0.0},
+            0.0,
+            "fmi2DoStep returned fmi2Discard: it logs no text; by FMI it did not compute",
+        ),
+        (
+            {"FAULT_DISCARD_AT": 0.0, "FAULT_DISCARD_PART": 0.25},
+            0.0,
+            r"it computed the step up to t = 2\.5e-05 s only",
+        ),
+        (
+            {"STRICT_TIME": 1},
+            0.5,
+            "fmi2DoStep returned fmi2Error: it logs no text; by FMI it cannot go on from here",
+        ),
     ],
 )
 @pytest.mark.parametrize("isolated", [False, True])
@@ -121,7 +142,11 @@ def test_a_missing_system_library_is_named_and_said_once(gallery, gfor, tmp_path
     assert (report["trusted"], report["faults"]) == (False, [])
     assert report["not_supported"] == ["missing system library"]
     (said,) = [c for c in report["checks"] if c["whose"]]
-    assert (said["check"], said["verdict"], said["whose"]) == ("loads", "not supported", "not supported here")
+    assert (said["check"], said["verdict"], said["whose"]) == (
+        "loads",
+        "not supported",
+        "not supported here",
+    )
 
 
 @linux
@@ -129,7 +154,10 @@ def test_a_library_that_the_fmu_brings_and_does_not_find_is_its_own_fault(galler
     fmu = changed(gallery("converter")[0], tmp_path, binary=without_libm, extra=["libq.so.3"])
     report = checked(fmu, "loads")
     assert report.faults == ["binary not loadable"]
-    assert "libq.so.3, which lies beside it and where it does not look" in result(report, "loads").evidence
+    assert (
+        "libq.so.3, which lies beside it and where it does not look"
+        in result(report, "loads").evidence
+    )
 
 
 @linux
@@ -166,7 +194,10 @@ def test_an_absent_function_matters_where_it_is_declared(gallery):
     assert fine.trusted
     loads = result(fine, "loads")
     assert (loads.verdict, result(fine, "reset").verdict) == ("remark", "pass")
-    assert loads.evidence == "its binary has no fmi2DeSerializeFMUstate, which nothing that it declares needs"
+    assert (
+        loads.evidence
+        == "its binary has no fmi2DeSerializeFMUstate, which nothing that it declares needs"
+    )
     broken = checked(gallery("missing_function")[0], "loads", "runs", "state")
     assert broken.faults == ["missing function"]
     assert {r.verdict for r in broken.results[2:]} == {"not applicable"}
@@ -182,7 +213,10 @@ def test_a_file_listed_twice_matters_where_its_bytes_differ(gallery, tmp_path):
     report = checked(same, "loads")
     assert report.trusted
     archive = result(report, "archive")
-    assert (archive.verdict, archive.evidence) == ("remark", "it lists extra/a.txt twice, with equal bytes")
+    assert (archive.verdict, archive.evidence) == (
+        "remark",
+        "it lists extra/a.txt twice, with equal bytes",
+    )
     assert (extract(same, tmp_path / "out") / "extra" / "a.txt").read_bytes() == b"1"
     assert checked(other).faults == ["hostile archive"]
     with pytest.raises(HostileFmuError, match=r"the same file as 'extra/a\.txt', with other bytes"):
@@ -193,11 +227,16 @@ def test_a_file_listed_twice_matters_where_its_bytes_differ(gallery, tmp_path):
 
 
 def test_a_crash_of_a_forbidden_call_is_a_remark_with_its_place(gallery):
-    report = checked(gallery("converter_that_forbidden_calls_crash")[0], "call_order", "repeatability")
+    report = checked(
+        gallery("converter_that_forbidden_calls_crash")[0], "call_order", "repeatability"
+    )
     assert report.trusted
     said = result(report, "call_order")
     assert (said.verdict, said.whose) == ("remark", "provoked by a forbidden call")
-    assert "after a step before initialisation, crash: its process died with SIGSEGV in fmi2DoStep" in said.evidence
+    assert (
+        "after a step before initialisation, crash: its process died with SIGSEGV in fmi2DoStep"
+        in said.evidence
+    )
     assert result(report, "repeatability").verdict == "pass"
 
 
@@ -215,7 +254,9 @@ def test_a_relay_switches_when_the_step_lets_it(gallery):
     report = checked(gallery("tank")[0], *only)
     assert report.trusted
     said = result(report, "step_invariance")
-    assert said.evidence.startswith("relay switches at other moments with another step, and nothing else differs")
+    assert said.evidence.startswith(
+        "relay switches at other moments with another step, and nothing else differs"
+    )
     assert result(report, "internal_step").verdict == "not applicable"
     for wrong in ("tank_by_calls", "tank_beside_a_counter"):
         assert checked(gallery(wrong)[0], *only).faults == ["step-dependent answer"], wrong
@@ -227,7 +268,9 @@ def test_a_relay_switches_when_the_step_lets_it(gallery):
 @linux
 def test_an_fmu_that_leaves_a_process_with_each_instance_gets_a_verdict(tmp_path):
     path = build(converter("forks", FAULT_FORK=1), tmp_path)
-    found = check_fmu(path, None, Limits(seconds=10.0, tasks=20), ("independence", "memory"), run_for=0.3)
+    found = check_fmu(
+        path, None, Limits(seconds=10.0, tasks=20), ("independence", "memory"), run_for=0.3
+    )
     assert found.failures[0].fault == "too many processes"
     assert "more than 20 processes and threads" in found.failures[0].evidence
     assert "have each process" in found.failures[0].remedy
@@ -240,26 +283,48 @@ def faults_of(function):
         for call in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(call, ast.Call) and getattr(call.func, "id", "") == function:
                 inside = [part for a in call.args[1:2] for part in (a, *ast.walk(a))]
-                choices = [c for part in inside if isinstance(part, ast.IfExp) for c in (part.body, part.orelse)]
-                yield from (c.value for c in (*call.args[1:2], *choices) if isinstance(c, ast.Constant))
+                choices = [
+                    c
+                    for part in inside
+                    if isinstance(part, ast.IfExp)
+                    for c in (part.body, part.orelse)
+                ]
+                yield from (
+                    c.value for c in (*call.args[1:2], *choices) if isinstance(c, ast.Constant)
+                )
 
 
 def faults_returned():
     """First words of pairs of texts that functions of the checks return: a fault, and what shows it."""
-    for path in (*Path("orchestrator/acceptance/checks").glob("*.py"), *Path("orchestrator/binding").glob("*.py")):
+    for path in (
+        *Path("orchestrator/acceptance/checks").glob("*.py"),
+        *Path("orchestrator/binding").glob("*.py"),
+    ):
         for part in ast.walk(ast.parse(path.read_text("utf-8"))):
-            if isinstance(part, ast.FunctionDef) and "tuple[str, str]" in ast.unparse(part.returns or ast.Constant("")):
+            if isinstance(part, ast.FunctionDef) and "tuple[str, str]" in ast.unparse(
+                part.returns or ast.Constant("")
+            ):
                 for end in ast.walk(part):
                     pair = end.value if isinstance(end, ast.Return) else None
                     if isinstance(pair, ast.Tuple) and isinstance(pair.elts[0], ast.Tuple):
                         pair = pair.elts[0]
-                    if isinstance(pair, ast.Tuple) and isinstance(pair.elts[0], ast.Constant) and pair.elts[0].value:
+                    if (
+                        isinstance(pair, ast.Tuple)
+                        and isinstance(pair.elts[0], ast.Constant)
+                        and pair.elts[0].value
+                    ):
                         yield pair.elts[0].value
 
 
 def test_every_fault_that_is_named_has_a_remedy():
     returned = {fault for fault in faults_returned() if fault is not None}
     assert {"wrong sign", "keeps moving", "wrong axes"} <= returned
-    named = {*returned, *faults_of("failed"), *faults_of("HostileFmuError"), "hostile archive", *_REFUSED.values()}
+    named = {
+        *returned,
+        *faults_of("failed"),
+        *faults_of("HostileFmuError"),
+        "hostile archive",
+        *_REFUSED.values(),
+    }
     assert len(named) > 40
     assert named - set(REMEDIES) == set()

@@ -18,7 +18,10 @@ def shaken(modes, length=120.0, seed=0, rate=20.0):
     for k, (frequency, percent) in enumerate(modes):
         w, d = 2 * np.pi * frequency, percent / 100
         pole = np.exp((-d + 1j * np.sqrt(1 - d * d)) * w / rate)
-        white, z = rng.standard_normal((len(t), 2)) @ np.array([1, 1j]), np.zeros(len(t) + 200, complex)
+        white, z = (
+            rng.standard_normal((len(t), 2)) @ np.array([1, 1j]),
+            np.zeros(len(t) + 200, complex),
+        )
         for n in range(len(z) - 1):
             z[n + 1] = pole * z[n] + white[n % len(t)]
         one = z[200:].real / z.real.std()
@@ -44,9 +47,13 @@ def windows(count, length):
     """Frequency [Hz] and damping [%] of the mode of the areas in windows with noise of loads, and how often in view."""
     found = []
     for seed in range(count):
-        measured = record("two_area", {}, times=times_of(length), loads=5e-3, measuring=5e-5, seed=seed)
+        measured = record(
+            "two_area", {}, times=times_of(length), loads=5e-3, measuring=5e-5, seed=seed
+        )
         speeds = np.column_stack([np.gradient(p.angle, measured.interval) for p in measured.places])
-        near = [m for m in ambient_modes(measured.times, speeds) if abs(m.frequency_hz - 0.58) < 0.1]
+        near = [
+            m for m in ambient_modes(measured.times, speeds) if abs(m.frequency_hz - 0.58) < 0.1
+        ]
         if near:
             one = min(near, key=lambda m: abs(m.frequency_hz - 0.58))
             found.append((one.frequency_hz, one.damping_percent, one.damping_error_percent))
@@ -77,7 +84,13 @@ def test_a_hundred_windows_of_a_minute():
 
 
 def csv(path, times, values):
-    np.savetxt(path, np.column_stack([times, values]), delimiter=",", header="time [s],a.f,b.f", comments="")
+    np.savetxt(
+        path,
+        np.column_stack([times, values]),
+        delimiter=",",
+        header="time [s],a.f,b.f",
+        comments="",
+    )
     return path
 
 
@@ -93,7 +106,10 @@ def test_alarms_over_windows(gfor, tmp_path):
     assert sum("below" in one for one in alarms) >= 4
     assert json.loads((tmp_path / "out" / "ambient.json").read_text()) == said
     assert {p.suffix for p in (tmp_path / "out").iterdir()} >= {".json", ".csv", ".png", ".html"}
-    assert gfor_api.ambient(file, ["a.f", "b.f"], window="60 s", level=5.0).as_json()["windows"] == said["windows"]
+    assert (
+        gfor_api.ambient(file, ["a.f", "b.f"], window="60 s", level=5.0).as_json()["windows"]
+        == said["windows"]
+    )
     assert "surely below 5 %" in gfor("signal", "identify", file, "a.f", *given[:5])[1]
 
 
@@ -104,7 +120,9 @@ def test_a_well_damped_mode_raises_no_alarm():
 
 def test_a_forced_oscillation_is_no_mode_without_damping(tmp_path):
     t, values = shaken(((0.5, 8.0),))
-    found = gfor_api.ambient(csv(tmp_path / "f.csv", t, values + 1.5 * sine(t, 0.9, 1.0, begin=0.0)[:, None]), "a.f")
+    found = gfor_api.ambient(
+        csv(tmp_path / "f.csv", t, values + 1.5 * sine(t, 0.9, 1.0, begin=0.0)[:, None]), "a.f"
+    )
     (one,) = [m for m in found.windows[0].modes if abs(m.frequency_hz - 0.9) < 0.02]
     assert found.alarm(one) == "forced"
 
@@ -118,6 +136,9 @@ def test_what_cannot_be_used_is_refused(gfor, tmp_path):
     with pytest.raises(AnalysisError, match="constant"):
         ambient_modes(t, np.ones((len(t), 1)))
     file = csv(tmp_path / "noise.csv", t, values)
-    for more, text in ((("--alarm", "3 %"), "--ambient"), (("--ambient", "--window", "90 s"), "shorter window")):
+    for more, text in (
+        (("--alarm", "3 %"), "--ambient"),
+        (("--ambient", "--window", "90 s"), "shorter window"),
+    ):
         code, _, error = gfor("signal", "identify", file, "a.f", *more)
         assert (code, text in error) == (2, True)

@@ -49,7 +49,8 @@ def test_screenings_and_designs_tell_it_at_their_points(monkeypatch, tmp_path):
     case, store = load_case("two_area"), PointStore(tmp_path / "points")
     (tmp_path / "points.csv").write_text("name\nonly\n")
     (item,) = run_screening(
-        plan_screening(case, ScreeningRequest(tmp_path / "points.csv", None, "gfor")), Work(Serial(), store)
+        plan_screening(case, ScreeningRequest(tmp_path / "points.csv", None, "gfor")),
+        Work(Serial(), store),
     ).items
     plan = plan_points_design(case, PointsDesignRequest(tmp_path / "points.csv", ranked=0))
     (found,) = modes_at(plan, plan.off, (), Work(Serial(), store))

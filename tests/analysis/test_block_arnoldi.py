@@ -27,10 +27,14 @@ def in_blocks(monkeypatch):
 def model(*swinging, size=SIZE):
     """A dense matrix with given pairs of eigenvalues, and others that decay."""
     blocks = [[[s.real, s.imag], [-s.imag, s.real]] for s in swinging]
-    A = scipy.linalg.block_diag(*blocks, *([[-d]] for d in np.linspace(20, 60, size - 2 * len(blocks))))
+    A = scipy.linalg.block_diag(
+        *blocks, *([[-d]] for d in np.linspace(20, 60, size - 2 * len(blocks)))
+    )
     turn = np.random.default_rng(4).standard_normal((size, size))
     turn = np.eye(size) + 0.2 * turn / np.sqrt(size)
-    return LinearModel.from_matrix(turn @ A @ np.linalg.inv(turn), tuple(f"x{k}" for k in range(size)), None)
+    return LinearModel.from_matrix(
+        turn @ A @ np.linalg.inv(turn), tuple(f"x{k}" for k in range(size)), None
+    )
 
 
 def test_vectors_stay_orthogonal_where_little_of_them_is_new():
@@ -54,7 +58,9 @@ def one_by_one(found, wanted):
 def whole():
     """A network with units, one of them unstable, and its modes in the region by the full spectrum."""
     given = system(planted=True)
-    return given, [m for m in find_modes(given, *REGION[:2]) if -0.1 <= m.damping_ratio <= REGION[2]]
+    return given, [
+        m for m in find_modes(given, *REGION[:2]) if -0.1 <= m.damping_ratio <= REGION[2]
+    ]
 
 
 def test_both_searches_find_the_modes_of_the_full_spectrum(whole, monkeypatch):
@@ -80,9 +86,13 @@ def test_a_crowd_that_is_too_large_for_the_vectors_is_cut(in_blocks, monkeypatch
     crowd = [complex(-0.09 * w, w) for w in np.linspace(6.0, 6.6, 40)]
     monkeypatch.setattr(BlockArnoldi.__init__, "__defaults__", (5 * WIDTH,))
     searched = []
-    monkeypatch.setattr(critical_modes, "Search", lambda *given: searched.append(given[1]) or Search(*given))
+    monkeypatch.setattr(
+        critical_modes, "Search", lambda *given: searched.append(given[1]) or Search(*given)
+    )
     found = find_critical_modes(model(*crowd), 0.94, 1.06, 0.1)
-    assert sorted(m.eigenvalue.imag for m in found) == pytest.approx([value.imag for value in crowd], abs=1e-10)
+    assert sorted(m.eigenvalue.imag for m in found) == pytest.approx(
+        [value.imag for value in crowd], abs=1e-10
+    )
     assert len(searched) > 2  # the stretches alone
 
 
@@ -101,7 +111,9 @@ def test_equal_and_nearly_equal_modes_are_all_found_with_vectors_of_their_own(in
     mode = complex(-0.2, 5.0)
     whole = model(*(mode + k * apart for k in range(4)))
     found = find_critical_modes(whole, 0.75, 0.85, 0.1)
-    assert sorted(m.eigenvalue.real for m in found) == pytest.approx([-0.2 + k * apart for k in range(4)], abs=1e-10)
+    assert sorted(m.eigenvalue.real for m in found) == pytest.approx(
+        [-0.2 + k * apart for k in range(4)], abs=1e-10
+    )
     shapes = np.array([list(m.shape.values()) for m in found]).T
     assert np.linalg.matrix_rank(shapes, tol=1e-6 * np.linalg.norm(shapes)) == 4
 
@@ -115,7 +127,10 @@ def test_a_mode_that_is_there_more_often_than_can_be_seen_is_refused(in_blocks):
 
 def blocks_with(values, accuracy):
     blocks = BlockArnoldi(lambda x: x, SIZE)
-    blocks.values, blocks.accuracy = np.array(values, dtype=complex), np.array(accuracy, dtype=float)
+    blocks.values, blocks.accuracy = (
+        np.array(values, dtype=complex),
+        np.array(accuracy, dtype=float),
+    )
     return blocks
 
 
@@ -126,13 +141,15 @@ BEYOND = [0.5] * 8
     ("values", "accuracy", "known"),
     [
         ([3.0, 2.0, *BEYOND], [1e-9, 1e-9, *[1e-3] * 8], True),
-        ([3.0, 2.0, *BEYOND], [1e-5, 1e-9, *[1e-3] * 8], False),  # one that is wanted has not settled
+        # one that is wanted has not settled
+        ([3.0, 2.0, *BEYOND], [1e-5, 1e-9, *[1e-3] * 8], False),
         ([3.0, 2.0, *BEYOND], [1e-9, 1e-5, *[1e-3] * 8], True),  # one that is not wanted
         ([3.0, 2.0, *BEYOND], [1e-9, 0.1, *[1e-3] * 8], False),  # nobody knows yet where it is
         ([3.0, 2.0, *BEYOND], [1e-9, 1e-9, *[0.4] * 8], True),  # half the way to the limit
         ([3.0, 2.0, *BEYOND], [1e-9, 1e-9, *[0.6] * 8], False),
         ([3.0, 2.0, *BEYOND[1:]], [1e-9, 1e-9, *[1e-3] * 7], False),  # too few beyond
-        ([3.0, 2.0, 0.95, *BEYOND[1:]], [1e-9, 1e-9, 0.04, *[1e-3] * 7], False),  # may belong inside
+        # may belong inside
+        ([3.0, 2.0, 0.95, *BEYOND[1:]], [1e-9, 1e-9, 0.04, *[1e-3] * 7], False),
     ],
 )
 def test_a_disc_is_known_only_where_all_that_matters_has_settled(values, accuracy, known):
@@ -154,7 +171,9 @@ def test_an_adjoint_that_is_another_systems_is_noticed(in_blocks, monkeypatch):
     other, search = Search(model(mode * 1.01), 5.1j), Search(model(mode), 5.1j)
     assert search.reaching(0.5) is not None
     monkeypatch.setattr(
-        search, "_solver", linear_model.ShiftedSolver(search._solver.solve, other._solver.solve_adjoint)
+        search,
+        "_solver",
+        linear_model.ShiftedSolver(search._solver.solve, other._solver.solve_adjoint),
     )
     with pytest.raises(AnalysisError, match="does not converge"):
         search.pairs([0])

@@ -61,7 +61,8 @@ def device(folder, name, **defines):
 def loop(folder, fmu, K):
     """A device with the feedback u = K·y."""
     path = folder / "loop.toml"
-    path.write_text(f"""
+    path.write_text(
+        f"""
 name = "loop"
 title = "Loop"
 source = "none"
@@ -83,7 +84,9 @@ from = "gain.y"
 to = "device.u"
 [scenarios.base]
 title = "Base"
-""", encoding="utf-8")  # fmt: skip
+""",
+        encoding="utf-8",
+    )
     (prepared,) = load_case(str(path)).prepare()
     return prepared
 
@@ -108,20 +111,27 @@ def test_growth_that_an_fmu_does_not_declare_leaves_the_verdict_not_known(tmp_pa
 
 
 @pytest.mark.parametrize(
-    "edge", [{"BAND": 3e-6}, {"BAND": 8e-6}, {"LIMIT": 5e-6}, {"LIMIT": 5e-6, "CURVED": 2e9}], ids=str
+    "edge",
+    [{"BAND": 3e-6}, {"BAND": 8e-6}, {"LIMIT": 5e-6}, {"LIMIT": 5e-6, "CURVED": 2e9}],
+    ids=str,
 )
 def test_a_system_that_is_stable_within_an_edge_only_is_not_called_stable(tmp_path, edge):
     found = modes(tmp_path, device(tmp_path, "narrow", **edge))
     assert found.stability.largest_growth_rate < 0  # within the edge
     assert found.stability.stable is None
-    assert "after a disturbance of 1e-06 of each state, and not after one of 1e-05" in found.stability.reason
+    assert (
+        "after a disturbance of 1e-06 of each state, and not after one of 1e-05"
+        in found.stability.reason
+    )
 
 
 def test_a_state_that_moves_by_curvature_alone_is_near_no_edge(tmp_path, monkeypatch):
     found = []
     compare = coupled_response.worst_disagreement
     monkeypatch.setattr(
-        coupled_response, "worst_disagreement", lambda *given: found.append(compare(*given)) or found[-1]
+        coupled_response,
+        "worst_disagreement",
+        lambda *given: found.append(compare(*given)) or found[-1],
     )
     stability = modes(tmp_path, device(tmp_path, "curved", CURVED=2e9)).stability
     assert (stability.stable, stability.reason) == (True, "")
@@ -133,13 +143,17 @@ def test_a_linear_model_of_an_fmu_that_hides_growth_is_not_called_stable(tmp_pat
     prepared = loop(tmp_path, device(tmp_path, "hiding", HIDDEN=1), -0.5)
     _, _, examined = linear_model(prepared, [], ["device.y"], as_continuous=as_continuous)
     assert examined.stability.stable is None
-    assert "component 'device' does not answer as its linear model does" in examined.stability.reason
+    assert (
+        "component 'device' does not answer as its linear model does" in examined.stability.reason
+    )
 
 
 def test_a_state_that_stands_still_though_its_derivative_does_not_is_named(tmp_path):
     found = modes(tmp_path, device(tmp_path, "sampled", SAMPLED=1))
     assert found.stability.stable is None
-    assert "'device' stands still over a communication step of 0.001 s (x)" in found.stability.reason
+    assert (
+        "'device' stands still over a communication step of 0.001 s (x)" in found.stability.reason
+    )
 
 
 def test_sampled_control_that_also_declares_no_derivative_is_seen_in_its_response(tmp_path):
@@ -154,7 +168,10 @@ def test_the_system_is_left_as_it_was(tmp_path):
         blocks = Blocks(master)
         model = compose(blocks, master.schedule)
         assert judge(model).stable
-        before = {name: component.get([*component.description.variables]) for name, component in everything(master)}
+        before = {
+            name: component.get([*component.description.variables])
+            for name, component in everything(master)
+        }
         y = master.y.copy()
         assert coupled_response.worst_disagreement(master, model).error > 0.05
         assert (master.y == y).all()
@@ -176,7 +193,9 @@ def test_our_own_fmus_are_not_run_for_it(monkeypatch):
     assert compute_modes(prepared).stability.stable is True
 
 
-def test_a_copy_of_our_converter_that_counts_as_foreign_agrees_to_a_hundredth(tmp_path, monkeypatch):
+def test_a_copy_of_our_converter_that_counts_as_foreign_agrees_to_a_hundredth(
+    tmp_path, monkeypatch
+):
     case = load_case("two_area")
     (prepared,) = case.prepare(["gfor"], {"*.native": True})
     plan = prepared.system.components["gfor"]
@@ -203,7 +222,14 @@ def test_a_device_that_runs_away_while_it_is_measured_is_not_identified(tmp_path
     """At its limit it answers as calmly as a stable device: v follows the input, x stays at 200."""
     excitation = Excitation(method, lowest_hz=0.5, highest_hz=100.0, lines=20)
     honest, runaway = (
-        Bench(read_description(device(tmp_path, name, **defines)), {}, np.zeros(1), ("u",), ("y",), step_size=1e-3)
+        Bench(
+            read_description(device(tmp_path, name, **defines)),
+            {},
+            np.zeros(1),
+            ("u",),
+            ("y",),
+            step_size=1e-3,
+        )
         for name, defines in (("honest", {}), ("runaway", {"RUNAWAY": 1}))
     )
     assert np.abs(measure(honest, excitation).operating_point).max() == 0

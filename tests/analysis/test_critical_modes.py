@@ -17,7 +17,8 @@ RNG = np.random.default_rng(3)
 def oscillators(frequencies, damping, overdamped=120):
     """A coordinate change of many oscillators and of what decays without swinging."""
     blocks = [
-        [[0, 1], [-((2 * np.pi * f) ** 2), -4 * np.pi * f * z]] for f, z in zip(frequencies, damping, strict=True)
+        [[0, 1], [-((2 * np.pi * f) ** 2), -4 * np.pi * f * z]]
+        for f, z in zip(frequencies, damping, strict=True)
     ]
     A = scipy.linalg.block_diag(*blocks, *([[-d]] for d in np.linspace(0.05, 40, overdamped)))
     T = np.eye(len(A)) + 0.1 * RNG.standard_normal((len(A), len(A))) / np.sqrt(len(A))
@@ -57,7 +58,11 @@ def test_a_mode_on_the_point_of_the_search_leaves_the_others_their_digits(apart,
     points = []
     with monkeypatch.context() as seen:
         plain = critical_modes.Search
-        seen.setattr(critical_modes, "Search", lambda model, centre: points.append(centre) or plain(model, centre))
+        seen.setattr(
+            critical_modes,
+            "Search",
+            lambda model, centre: points.append(centre) or plain(model, centre),
+        )
         find_critical_modes(model(), 0.75, 0.85)
     (point,) = points
     low, high = 2 * np.pi * 0.75, 2 * np.pi * 0.85
@@ -67,7 +72,9 @@ def test_a_mode_on_the_point_of_the_search_leaves_the_others_their_digits(apart,
     rng = np.random.default_rng(4)
     Q, P = (np.linalg.qr(rng.standard_normal(A.shape))[0] for _ in range(2))
     T = Q @ np.diag(np.logspace(0, 1, len(A))) @ P
-    system = LinearModel.from_matrix(T @ A @ np.linalg.inv(T), tuple(f"x{k}" for k in range(len(A))), None)
+    system = LinearModel.from_matrix(
+        T @ A @ np.linalg.inv(T), tuple(f"x{k}" for k in range(len(A))), None
+    )
     found = [mode.eigenvalue for mode in find_critical_modes(system, 0.75, 0.85)]
     wanted = [mode for mode in modes if low <= mode.imag <= high]
     assert len(found) == len(wanted) == 6
@@ -89,7 +96,9 @@ def test_equations_with_outputs_under_way_mean_their_matrix():
     n, m = 250, 12
     F, G, H = (sp.random_array(shape, density=0.02, rng=RNG) for shape in ((n, n), (n, m), (m, n)))
     K = sp.csr_array(np.tril(0.3 * RNG.standard_normal((m, m)), -1))
-    system = LinearModel(*(sp.csr_array(x) for x in (F, G, H, K)), tuple(f"x{k}" for k in range(n)), None, 0.0)
+    system = LinearModel(
+        *(sp.csr_array(x) for x in (F, G, H, K)), tuple(f"x{k}" for k in range(n)), None, 0.0
+    )
     A = F.toarray() + G.toarray() @ np.linalg.solve(np.eye(m) - K.toarray(), H.toarray())
     b = RNG.standard_normal(n)
     assert np.allclose(system.A, A, atol=1e-12)
@@ -103,7 +112,9 @@ def test_equations_with_outputs_under_way_mean_their_matrix():
     assert nearest_eigenvalue(system, wanted) == pytest.approx(nearest)
 
 
-@pytest.mark.parametrize("arguments", [(2.0, 0.1, 0.2), (0.0, 2.0, 0.2), (0.1, 2.0, 0.0), (0.1, 2.0, 1.2)])
+@pytest.mark.parametrize(
+    "arguments", [(2.0, 0.1, 0.2), (0.0, 2.0, 0.2), (0.1, 2.0, 0.0), (0.1, 2.0, 1.2)]
+)
 def test_a_search_over_nothing_is_refused(arguments):
     with pytest.raises(AnalysisError, match="is none"):
         find_critical_modes(model(), *arguments)
@@ -114,10 +125,14 @@ def test_equal_modes_of_equal_units_are_all_found():
     A = scipy.linalg.block_diag(block, block, block, *([[-d]] for d in np.linspace(0.05, 40, 250)))
     T = np.linalg.qr(RNG.standard_normal((len(A), len(A))))[0]
     system = LinearModel.from_matrix(T @ A @ T.T, tuple(f"x{k}" for k in range(len(A))), None)
-    assert [m.frequency_hz for m in find_critical_modes(system)] == pytest.approx(3 * [0.8 * np.sqrt(1 - 0.05**2)])
+    assert [m.frequency_hz for m in find_critical_modes(system)] == pytest.approx(
+        3 * [0.8 * np.sqrt(1 - 0.05**2)]
+    )
 
 
-@pytest.mark.parametrize("cell", [_Cell(1.0, 40.0, 0.02, 0.05), _Cell(1.0, 1.1, -0.3, 0.4), _Cell(2.0, 2.1, 0.5, 0.9)])
+@pytest.mark.parametrize(
+    "cell", [_Cell(1.0, 40.0, 0.02, 0.05), _Cell(1.0, 1.1, -0.3, 0.4), _Cell(2.0, 2.1, 0.5, 0.9)]
+)
 def test_two_halves_of_a_cell_are_the_cell(cell):
     rng = np.random.default_rng(1)
     for omega, ratio in zip(rng.uniform(0.5, 50, 200), rng.uniform(-0.5, 0.95, 200), strict=True):

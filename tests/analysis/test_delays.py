@@ -56,7 +56,8 @@ def test_a_delay_of_few_steps_is_exact_at_every_frequency(steps):
     with Master(loop(Delay(steps * H)), LOOP, H) as master:
         model = compose(Blocks(master), LOOP)
     found = np.linalg.eigvals(model.A)
-    found = found[np.argsort(-np.abs(found))][: steps + 1]  # the place of the step before adds a zero
+    # the place of the step before adds a zero
+    found = found[np.argsort(-np.abs(found))][: steps + 1]
     expected = multipliers(steps)
     for value in expected:
         assert np.abs(found - value).min() < 1e-7
@@ -115,14 +116,20 @@ def test_the_representation_knows_its_error():
     assert representation_error(long, 1j * 12 / 0.2, 1e-4) < 1e-5
     assert representation_error(long, 1j * 24 / 0.2, None) < 1e-8
     assert representation_error(long, 1j * 100 / 0.2, 1e-4) > 0.01
-    assert representation_error(WireLink("a.y -> b.u", 5e-3, is_cut=False), 1j * 20_000, 1e-4) < 1e-9
+    assert (
+        representation_error(WireLink("a.y -> b.u", 5e-3, is_cut=False), 1j * 20_000, 1e-4) < 1e-9
+    )
 
 
 @pytest.mark.parametrize("steps", [1, 5, SHORT + 50])
 @pytest.mark.parametrize("wire", [0, 1])
 @pytest.mark.parametrize(
     "schedule",
-    [gauss_seidel((("lag",), ("gain",))), gauss_seidel((("gain",), ("lag",))), jacobi(("lag", "gain"))],
+    [
+        gauss_seidel((("lag",), ("gain",))),
+        gauss_seidel((("gain",), ("lag",))),
+        jacobi(("lag", "gain")),
+    ],
     ids=["lag first", "gain first", "side by side"],
 )
 def test_the_step_map_moves_as_the_running_system(schedule, wire, steps):
@@ -142,7 +149,9 @@ def test_the_response_to_an_input_is_that_of_the_run():
     system = with_gain(Delay(30 * H), bias=1.0)
     with Master(system, schedule, H) as master:
         find_operating_point(master)
-        space = state_space(Blocks(master, inputs=["gain.K"], outputs=["gain.y", "lag.y"]), schedule)
+        space = state_space(
+            Blocks(master, inputs=["gain.K"], outputs=["gain.y", "lag.y"]), schedule
+        )
         before = [master.components[c].get(["y"])["y"] for c in ("gain", "lag")]
         recorder = Recorder(["gain.y", "lag.y"], 1)
         step = 1e-5
@@ -167,7 +176,9 @@ def test_a_bias_moves_the_operating_point_and_no_mode():
     with Master(with_gain(Bias(0.3)), schedule, H) as master:
         point = find_operating_point(master)
         assert point.states["lag.x"] == pytest.approx(-2 * 0.3 / 3, abs=1e-12)  # x = −2·(x + 0.3)
-        assert np.allclose(np.sort(eigenvalues(compose(Blocks(master), schedule))), np.sort(modes), rtol=1e-7)
+        assert np.allclose(
+            np.sort(eigenvalues(compose(Blocks(master), schedule))), np.sort(modes), rtol=1e-7
+        )
         master.run(0.1)
         assert master.components["lag"].get(["x"])["x"] == pytest.approx(-0.2, abs=1e-12)
 
@@ -177,7 +188,9 @@ def test_a_substitute_gives_the_operating_point_of_the_open_loop():
         assert find_operating_point(master).states["lag.x"] == pytest.approx(-1.4, abs=1e-10)
 
 
-@pytest.mark.parametrize(("imperfection", "kind"), [(Noise(0.1, 3), "noise"), (Quantisation(0.1), "quantisation")])
+@pytest.mark.parametrize(
+    ("imperfection", "kind"), [(Noise(0.1, 3), "noise"), (Quantisation(0.1), "quantisation")]
+)
 def test_noise_and_quantisation_leave_point_and_modes_and_the_verdict_says_so(imperfection, kind):
     schedule = gauss_seidel((("lag",), ("gain",)))
     with Master(with_gain(imperfection, bias=1.0), schedule, H) as master:
@@ -198,7 +211,10 @@ def test_a_cut_and_a_fault_to_come_are_said_beside_the_verdict():
         blocks = Blocks(master, derivatives=True)
         said = examine(master, blocks, compose(blocks, schedule), continuous(blocks)).warnings
     assert any("lag.y -> gain.u is frozen: it is cut" in s for s in said)
-    assert any("gain.y -> lag.u has faults later (delay of 0.1 s): the modes are those before" in s for s in said)
+    assert any(
+        "gain.y -> lag.u has faults later (delay of 0.1 s): the modes are those before" in s
+        for s in said
+    )
 
 
 def test_delays_between_two_steps_are_interpolated_for_other_steps():
@@ -207,5 +223,6 @@ def test_delays_between_two_steps_are_interpolated_for_other_steps():
         exact = lambertw(K * 0.02).real / 0.02
         for step in (5e-4, 3e-3, 8e-3):
             values = eigenvalues(compose(Blocks(master, step), LOOP))
-            held = exact - step / 2 * exact**2 / (1 + exact * 0.02)  # holding the input delays it by half a step more
+            # holding the input delays it by half a step more
+            held = exact - step / 2 * exact**2 / (1 + exact * 0.02)
             assert abs(values[np.argmax(values.real)] - held) < abs(exact) * (exact * step) ** 2

@@ -62,7 +62,9 @@ def test_a_kind_without_derivatives_is_refused_with_the_remedy():
     prepared = load_case("two_area").prepare(["base"], {"*.native": True, "sg2.native": False})[0]
     with (
         Master(prepared.system, prepared.schedule, prepared.step_size) as master,
-        pytest.raises(AnalysisError, match=r"component 'sg2'.*no directional derivatives.*--native"),
+        pytest.raises(
+            AnalysisError, match=r"component 'sg2'.*no directional derivatives.*--native"
+        ),
     ):
         Blocks(master, directional=True)
 
@@ -79,8 +81,11 @@ def lag_with_wrong_derivatives(folder, monkeypatch, state=1.0, entry=1.0, *, set
         functions = right(of)
         known = functions["direction"].inputs
         scaled = list(known)
-        scaled[4], scaled[5] = [state * d for d in known[4]], [entry * d for d in known[5]]  # directions of x and u
-        return functions | {"direction": Function("direction", known, functions["direction"].of(*scaled))}
+        # directions of x and u
+        scaled[4], scaled[5] = [state * d for d in known[4]], [entry * d for d in known[5]]
+        return functions | {
+            "direction": Function("direction", known, functions["direction"].of(*scaled))
+        }
 
     monkeypatch.setattr(native_fmu, "derivative_functions", wrong)
     path = export(NativeFmu(model), folder / "made", (host_platform(),))
@@ -88,8 +93,12 @@ def lag_with_wrong_derivatives(folder, monkeypatch, state=1.0, entry=1.0, *, set
         closed = folder / "closed.fmu"
         with zipfile.ZipFile(path) as old, zipfile.ZipFile(closed, "w") as new:
             for name in old.namelist():
-                new.writestr(name, old.read(name).replace(b'settable="true"', b'settable="false"')
-                             if name == "modelDescription.xml" else old.read(name))  # fmt: skip
+                new.writestr(
+                    name,
+                    old.read(name).replace(b'settable="true"', b'settable="false"')
+                    if name == "modelDescription.xml"
+                    else old.read(name),
+                )
         path = closed
     system = System()
     system.add("lag", read_description(path), {"T": 0.5})
@@ -109,7 +118,10 @@ def by_derivatives(master):
 def test_wrong_derivatives_are_refused_with_their_name(tmp_path, monkeypatch, state, entry, of, n):
     with (
         lag_with_wrong_derivatives(tmp_path, monkeypatch, state, entry) as master,
-        pytest.raises(AnalysisError, match=rf"component 'lag'.*wrong in {n} of 4.*(der\(x\)|y) by {of} is given as"),
+        pytest.raises(
+            AnalysisError,
+            match=rf"component 'lag'.*wrong in {n} of 4.*(der\(x\)|y) by {of} is given as",
+        ),
     ):
         by_derivatives(master)
 
@@ -122,7 +134,9 @@ def test_where_states_cannot_be_set_the_response_tells(tmp_path, monkeypatch, st
             assert found.source == "directional"
             assert found.A[0, 0] == pytest.approx(np.exp(-1e-3 / 0.5), rel=1e-12)
         else:
-            with pytest.raises(AnalysisError, match="directional derivatives is not what the FMU does"):
+            with pytest.raises(
+                AnalysisError, match="directional derivatives is not what the FMU does"
+            ):
                 by_derivatives(master)
 
 

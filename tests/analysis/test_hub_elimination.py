@@ -24,7 +24,9 @@ def system(coupling=0.02, planted=False):
     if planted:
         hertz[7], ratios[7] = 0.4, -0.03
     units = [
-        scipy.linalg.block_diag([[0, 1], [-((2 * np.pi * f) ** 2), -4 * np.pi * f * z]], [[-rng.uniform(1, 9)]])
+        scipy.linalg.block_diag(
+            [[0, 1], [-((2 * np.pi * f) ** 2), -4 * np.pi * f * z]], [[-rng.uniform(1, 9)]]
+        )
         for f, z in zip(hertz, ratios, strict=True)
     ]
     n, m = STATES, 3 * UNITS  # w: the voltages, what units give, what leads nowhere
@@ -41,7 +43,9 @@ def system(coupling=0.02, planted=False):
     H[:UNITS, -2:] = 0.1 * rng.standard_normal((UNITS, 2))
     if planted:
         K[:UNITS, UNITS + 7] = 0
-    return LinearModel(*map(sp.csr_array, (F, G, H, K)), tuple(f"x{k}" for k in range(n)), None, 0.0)
+    return LinearModel(
+        *map(sp.csr_array, (F, G, H, K)), tuple(f"x{k}" for k in range(n)), None, 0.0
+    )
 
 
 @pytest.fixture(autouse=True)

@@ -24,7 +24,10 @@ def test_one_mode_on_a_drift(eigenvalue):
 
 def test_close_and_well_damped_modes_are_told_apart():
     wanted = [-1.1 + 4.8j, -0.73 + 2.12j, -0.53 + 0.88j]
-    signal = sum(exponential(v, a, p) for v, a, p in zip(wanted, (1.0, 0.7, 0.4), (0.1, 1.0, 2.0), strict=True))
+    signal = sum(
+        exponential(v, a, p)
+        for v, a, p in zip(wanted, (1.0, 0.7, 0.4), (0.1, 1.0, 2.0), strict=True)
+    )
     modes = identify_modes(TIMES, signal)
     for value in wanted:
         assert nearest(modes, value).eigenvalue == pytest.approx(value, abs=1e-2)
@@ -34,7 +37,9 @@ def test_close_and_well_damped_modes_are_told_apart():
 def test_as_many_modes_as_a_system_of_several_areas_has_are_found():
     """Six oscillations beside a drift are an order of thirteen; a pencil of a lower one blends them."""
     wanted = [complex(-0.02 - 0.06 * k, 2 * np.pi * (0.25 + 0.28 * k)) for k in range(6)]
-    signal = sum(exponential(v, 1 - 0.12 * k, 0.5 * k) for k, v in enumerate(wanted)) + 0.5 * np.exp(-0.2 * TIMES)
+    signal = sum(
+        exponential(v, 1 - 0.12 * k, 0.5 * k) for k, v in enumerate(wanted)
+    ) + 0.5 * np.exp(-0.2 * TIMES)
     found = identify_modes(TIMES, signal)
     for k, value in enumerate(wanted):
         mode = nearest(found, value)
@@ -51,7 +56,8 @@ def test_noise_is_not_a_mode():
 
 
 @pytest.mark.parametrize(
-    ("times", "signal", "word"), [(TIMES, np.ones_like(TIMES), "constant"), (TIMES[:15], TIMES[:15], "15 samples")]
+    ("times", "signal", "word"),
+    [(TIMES, np.ones_like(TIMES), "constant"), (TIMES[:15], TIMES[:15], "15 samples")],
 )
 def test_what_holds_no_mode_is_said(times, signal, word):
     with pytest.raises(AnalysisError, match=word):
@@ -63,7 +69,11 @@ def test_what_holds_no_mode_is_said(times, signal, word):
     [
         (0.05, 20.0, "record more often"),
         (0.05, 50.0, "record more often (solver.record_interval), and identify a shorter part"),
-        (0.002, 120.0, "identify a shorter part of the record (start, stop), as at most 1200 samples are used"),
+        (
+            0.002,
+            120.0,
+            "identify a shorter part of the record (start, stop), as at most 1200 samples are used",
+        ),
         (0.05, 120.0, "identify a shorter part"),
         (0.001, 10.0, "look at the record itself, which has a sample every 0.001 s"),
         (0.008, 8.0, "look at the record itself"),
@@ -80,14 +90,20 @@ def test_the_advice_is_what_makes_the_samples_denser(step, stop, advised):
     more = min(used(step / k, stop).interval for k in (2, 4, 10))
     shorter = min(used(step, stop / k).interval for k in (2, 4, 10))
     both = min(used(step / k, stop / k).interval for k in (2, 4, 10))
-    denser = {way for way, interval in (("more", more), ("shorter", shorter)) if interval < 0.9 * one.interval}
+    denser = {
+        way
+        for way, interval in (("more", more), ("shorter", shorter))
+        if interval < 0.9 * one.interval
+    }
     if "look at" in advised:
         assert not denser
         assert both >= 0.9 * one.interval
     else:
         assert both < 0.9 * one.interval
         assert ("record more" in one.remedy) == ("more" in denser) or "and identify" in one.remedy
-        assert ("identify a shorter" in one.remedy) == ("shorter" in denser) or "and identify" in one.remedy
+        assert ("identify a shorter" in one.remedy) == (
+            "shorter" in denser
+        ) or "and identify" in one.remedy
 
 
 @pytest.mark.parametrize("hum", [49.7, 99.4])
@@ -107,4 +123,6 @@ def test_modes_do_not_depend_on_the_unit_of_the_signal(unit):
     signal = np.exp(-0.3 * t) * np.cos(7 * t) + 0.4 * np.exp(-0.5 * t) * np.cos(3 * t) + noise
     one, other = identify_modes(t, signal), identify_modes(t, unit * signal)
     assert [m.eigenvalue for m in other] == pytest.approx([m.eigenvalue for m in one], rel=1e-6)
-    assert [m.amplitude for m in other] == pytest.approx([unit * m.amplitude for m in one], rel=1e-6)
+    assert [m.amplitude for m in other] == pytest.approx(
+        [unit * m.amplitude for m in one], rel=1e-6
+    )

@@ -32,7 +32,11 @@ def test_step_map_is_that_of_finite_differences_of_the_whole_step(schedule, memo
         composed = compose(Blocks(master), master.schedule)
         state = CoupledState(master)
         x, y = state.read(), master.y.copy()
-        memory = [master.output_names.index(n.removesuffix(HELD)) for n in composed.names if n.endswith(HELD)]
+        memory = [
+            master.output_names.index(n.removesuffix(HELD))
+            for n in composed.names
+            if n.endswith(HELD)
+        ]
 
         def step(dx: np.ndarray, dy: np.ndarray) -> np.ndarray:
             with state.put_back():
@@ -78,7 +82,10 @@ def test_an_fmu_that_hides_a_direct_dependency_is_refused():
         system.connect(source, target)
     with (
         Master(system, midpoint(IN_TURN), 1e-3) as master,
-        pytest.raises(AnalysisError, match=r"component 'b': its FMU declares that y does not depend on u .* \(0\.5\)"),
+        pytest.raises(
+            AnalysisError,
+            match=r"component 'b': its FMU declares that y does not depend on u .* \(0\.5\)",
+        ),
     ):
         compose(Blocks(master), master.schedule)
 
@@ -87,6 +94,8 @@ def test_blocks_of_other_parts_are_refused():
     system = system_of(ring("a", "b"), a=("integrator",), b=("lag",))
     with (
         Master(system, midpoint(IN_TURN, 1e-3), 2e-3) as master,
-        pytest.raises(ValueError, match="linearised for 2 parts of a step, and schedule 'midpoint' has 1"),
+        pytest.raises(
+            ValueError, match="linearised for 2 parts of a step, and schedule 'midpoint' has 1"
+        ),
     ):
         compose(Blocks(master), midpoint(IN_TURN))

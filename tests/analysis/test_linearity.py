@@ -105,7 +105,9 @@ def test_a_mode_that_an_edge_may_turn_is_named_so():
 @pytest.mark.parametrize("limit", [0.01, 0.1])
 def test_the_limit_of_a_damping_controller_does_not_decide_its_stability(limit):
     """Growth at 45.7 Hz, with its own directional derivatives as with a perturbation, whatever the output's limit."""
-    (prepared,) = load_case("two_area").prepare(["pod_q"], {"gfor.pod_q.K": 5000.0, "gfor.pod_q.limit": limit})
+    (prepared,) = load_case("two_area").prepare(
+        ["pod_q"], {"gfor.pod_q.K": 5000.0, "gfor.pod_q.limit": limit}
+    )
     stability = compute_modes(prepared).stability
     assert stability.stable is False
     assert stability.largest_growth_rate == pytest.approx(2.773, abs=2e-3)
@@ -115,7 +117,10 @@ def test_a_drift_counts_by_the_second_however_short_the_step():
     """1e-4 per second is 1e-10 in a step of 1 µs."""
     system = System()
     system.add("a", small_fmu("integrator"), {"gain": 1.0}, {"u": 1e-4})
-    with Master(system, gauss_seidel((("a",),)), 1e-6) as master, pytest.raises(AnalysisError, match="no steady state"):
+    with (
+        Master(system, gauss_seidel((("a",),)), 1e-6) as master,
+        pytest.raises(AnalysisError, match="no steady state"),
+    ):
         find_operating_point(master)
 
 
@@ -129,7 +134,9 @@ def test_modes_at_a_limit_s_edge_are_shown_with_a_warning(gfor):
     assert code == 0
     assert "electromechanical" in shown
     assert "component 'gfor' is not linear at the operating point" in " ".join(said.split())
-    _, _, said = gfor("modes", "two_area", "--scenario", "gfor", "--set", "gfor.voltage_control.i_q_max=0.9")
+    _, _, said = gfor(
+        "modes", "two_area", "--scenario", "gfor", "--set", "gfor.voltage_control.i_q_max=0.9"
+    )
     assert said == ""
 
 
@@ -147,12 +154,21 @@ def test_modes_at_a_limit_s_edge_are_shown_with_a_warning(gfor):
 )
 def test_no_command_calls_stable_what_stands_at_a_limit_s_edge(gfor, tmp_path, command):
     """A disturbance of 1e-5 of the load ends there in lost synchronism."""
-    words, options = (command[:2], command[2:]) if command[0] == "export" else (command[:1], command[1:])
+    words, options = (
+        (command[:2], command[2:]) if command[0] == "export" else (command[:1], command[1:])
+    )
     name = words[0]
-    out = () if name == "modes" else ("--out", str(tmp_path / ("x.toml" if name == "design" else "x")))
-    code, shown, _ = gfor(*words, "two_area", "--scenario", "gfor", *EDGE, *options, *out, "--fail-unstable")
+    out = (
+        ()
+        if name == "modes"
+        else ("--out", str(tmp_path / ("x.toml" if name == "design" else "x")))
+    )
+    code, shown, _ = gfor(
+        *words, "two_area", "--scenario", "gfor", *EDGE, *options, *out, "--fail-unstable"
+    )
     assert code == 1
-    first = " ".join(shown.splitlines()[:4])  # of the table with a line a scenario, or of the sentence
+    # of the table with a line a scenario, or of the sentence
+    first = " ".join(shown.splitlines()[:4])
     assert "not known" in first
     assert "│ stable" not in first
     assert "answers differently up and down" in " ".join(shown.split())

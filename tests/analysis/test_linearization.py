@@ -20,7 +20,9 @@ DEVICES = ("gfor", "sg1", "sg2")
 
 
 def prepared(scenario: str, **overrides):
-    (ready,) = load_case("two_area").prepare([scenario], {k.replace("__", "."): v for k, v in overrides.items()})
+    (ready,) = load_case("two_area").prepare(
+        [scenario], {k.replace("__", "."): v for k, v in overrides.items()}
+    )
     return ready
 
 
@@ -61,7 +63,11 @@ def test_step_map_equals_brute_force_including_what_the_exchange_remembers(sched
         composed = compose(Blocks(master), schedule)
         state = CoupledState(master)
         x = state.read()
-        memory = [master.output_names.index(n.removesuffix(HELD)) for n in composed.names if n.endswith(HELD)]
+        memory = [
+            master.output_names.index(n.removesuffix(HELD))
+            for n in composed.names
+            if n.endswith(HELD)
+        ]
         y = master.y[memory].copy()
 
         def step(dx: np.ndarray, dy: np.ndarray) -> np.ndarray:
@@ -84,7 +90,9 @@ def test_step_map_equals_brute_force_including_what_the_exchange_remembers(sched
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
-@pytest.mark.parametrize("values", [{}, {"grid__X_L": 0.37}, {"gfor__droop__R_f": 0.02, "sg1__P_0": 0.7}])
+@pytest.mark.parametrize(
+    "values", [{}, {"grid__X_L": 0.37}, {"gfor__droop__R_f": 0.02, "sg1__P_0": 0.7}]
+)
 def test_continuous_model_from_fmus_equals_exact_jacobians(scenario, values):
     if scenario == "base":
         values = {k: v for k, v in values.items() if not k.startswith("gfor")}

@@ -16,7 +16,11 @@ def swing(t, hertz, damping, size=1.0, phase=0.3):
 def found(y, start=0.0, stop=20.0, noise=0.0, step=0.01):
     t = np.arange(round(20.0 / step) + 1) * step
     values = 1.0 + y(t) + noise * np.random.default_rng(4).standard_normal(len(t))
-    run = xr.Dataset({"g.x": ("time", values, {"units": "pu"})}, coords={"time": t}, attrs={"scenario": "planted"})
+    run = xr.Dataset(
+        {"g.x": ("time", values, {"units": "pu"})},
+        coords={"time": t},
+        attrs={"scenario": "planted"},
+    )
     return gfor.identify(run, "g.x", start, stop)
 
 
@@ -85,7 +89,11 @@ def test_a_mode_that_is_there_for_a_part_of_the_window_only():
 def test_compare_marks_what_it_doubts():
     t = np.arange(801) * 0.01
     runs = [
-        xr.Dataset({"g.x": ("time", swing(t, hertz, 4), {"units": "pu"})}, coords={"time": t}, attrs={"scenario": name})
+        xr.Dataset(
+            {"g.x": ("time", swing(t, hertz, 4), {"units": "pu"})},
+            coords={"time": t},
+            attrs={"scenario": name},
+        )
         for name, hertz in (("clear", 0.8), ("slow", 0.2))
     ]
     compared = gfor.compare(*runs, ["g.x"])
@@ -101,7 +109,10 @@ def test_a_trend_neither_hides_a_mode_nor_takes_its_energy(tmp_path, slope):
     """A straight line comes out as exponentials of huge amplitudes that cancel, or as a swing of 1000 s."""
     modes = measured(tmp_path, lambda t: slope * t + swing(t, 0.6, 5, 0.05))
     mode = min(modes, key=lambda m: abs(m.frequency_hz - 0.6))
-    assert (mode.frequency_hz, mode.damping_percent) == (pytest.approx(0.6, abs=1e-3), pytest.approx(5, abs=0.1))
+    assert (mode.frequency_hz, mode.damping_percent) == (
+        pytest.approx(0.6, abs=1e-3),
+        pytest.approx(5, abs=0.1),
+    )
     assert mode.doubts == ()
     said = [text for text in modes.remarks if "smaller modes may be hidden" in text]
     assert len(said) == (abs(slope) > 0.03)
@@ -133,7 +144,10 @@ def test_a_decay_and_growth_within_the_window_are_no_trends():
 
 def test_noise_alone_is_said_to_show_nothing(tmp_path):
     modes = measured(tmp_path, lambda t: 0 * t, noise=0.01, seed=0)
-    assert (len(modes), modes.remarks[-1]) == (0, "Nothing above the noise: the window shows no mode.")
+    assert (len(modes), modes.remarks[-1]) == (
+        0,
+        "Nothing above the noise: the window shows no mode.",
+    )
 
 
 def test_too_few_periods_are_not_rounded_to_enough():
@@ -150,23 +164,32 @@ def test_the_amplitude_of_an_oscillation_is_half_of_its_peak_as_the_help_says(gf
 
 def again(t, at, phase=1.5):
     """0.6 Hz with 5 %, excited at 0 s and once more."""
-    return swing(t, 0.6, 5, 0.1) + np.where(t > at, swing(np.maximum(t - at, 0), 0.6, 5, 0.1, phase), 0)
+    return swing(t, 0.6, 5, 0.1) + np.where(
+        t > at, swing(np.maximum(t - at, 0), 0.6, 5, 0.1, phase), 0
+    )
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.002])
 @pytest.mark.parametrize("start", [0.0, 2.0])
 def test_a_second_disturbance_in_the_window_is_in_doubt(tmp_path, start, noise):
     """No model order shows it, as all of them fit one free response to two."""
-    strongest = max(measured(tmp_path, lambda t: again(t, 10), noise, start=start), key=lambda m: m.amplitude)
+    strongest = max(
+        measured(tmp_path, lambda t: again(t, 10), noise, start=start), key=lambda m: m.amplitude
+    )
     assert abs(strongest.eigenvalue - (-0.1887 + 3.77j)) > 0.05
     assert "half of the window shows 0.6" in "; ".join(strongest.doubts)
-    assert any("half of the window shows" in d for d in measured(tmp_path, lambda t: again(t, 6)).modes[0].doubts)
+    assert any(
+        "half of the window shows" in d
+        for d in measured(tmp_path, lambda t: again(t, 6)).modes[0].doubts
+    )
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_lower_order_that_loses_a_mode_is_no_doubt_by_itself(tmp_path, seed):
     """Two modes with so much noise that a lower order has one of them only, or none."""
-    both = measured(tmp_path, lambda t: swing(t, 0.4, 4, 0.1) + swing(t, 1.0, 4, 0.08, 0.5), 0.005, seed=seed)
+    both = measured(
+        tmp_path, lambda t: swing(t, 0.4, 4, 0.1) + swing(t, 1.0, 4, 0.08, 0.5), 0.005, seed=seed
+    )
     assert doubts(both, 0.4) == doubts(both, 1.0) == ""
     assert doubts(measured(tmp_path, lambda t: swing(t, 0.4, 4, 0.1), 0.02, seed=seed), 0.4) == ""
 
@@ -178,6 +201,8 @@ def test_a_mode_that_is_not_there_is_not_said_to_be_moved(tmp_path):
 
 
 def test_close_and_fast_modes_are_not_in_doubt_for_what_a_half_cannot_tell(tmp_path):
-    close = measured(tmp_path, lambda t: swing(t, 0.5, 5, 0.1) + swing(t, 0.55, 4, 0.1, 2), 0.001, seed=1)
+    close = measured(
+        tmp_path, lambda t: swing(t, 0.5, 5, 0.1) + swing(t, 0.55, 4, 0.1, 2), 0.001, seed=1
+    )
     assert "half of the window" not in doubts(close, 0.5) + doubts(close, 0.55)
     assert doubts(measured(tmp_path, lambda t: swing(t, 8, 2, 0.1)), 8) == ""

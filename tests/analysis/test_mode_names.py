@@ -15,7 +15,10 @@ def mode(hertz, damping=0.05, **moving):
     """States by their participation and angle [degrees]."""
     rest = 1.0 - sum(factor for factor, _ in moving.values())
     factors = {name: factor for name, (factor, _) in moving.items()} | {"rest": rest}
-    shape = {name: np.sqrt(factor) * np.exp(1j * np.radians(angle)) for name, (factor, angle) in moving.items()}
+    shape = {
+        name: np.sqrt(factor) * np.exp(1j * np.radians(angle))
+        for name, (factor, angle) in moving.items()
+    }
     w = 2 * np.pi * hertz
     return Mode(complex(-damping * w, w), tuple(factors.items()), shape | {"rest": 1.0})
 
@@ -60,7 +63,9 @@ def test_a_mode_has_one_name_and_the_other_is_told():
     found = names(ALL, measures)
     assert dict(found.named) == {"one": INTER}
     (text,) = found.doubts
-    assert text.startswith("no mode is named 'other': the one that fits it best, at 0.63 Hz, is 'one'")
+    assert text.startswith(
+        "no mode is named 'other': the one that fits it best, at 0.63 Hz, is 'one'"
+    )
     few = name_modes([INTER], measures)
     assert dict(few.named) == {"one": INTER}
     assert "'other'" in few.doubts[0]
@@ -68,8 +73,14 @@ def test_a_mode_has_one_name_and_the_other_is_told():
 
 def test_the_sum_decides_who_gets_a_mode_that_two_names_want():
     """'first' fits both modes, 'second' one alone: in whatever order they stand."""
-    strong, weak = (mode(1.0, a=(0.3, 0), b=(0.3, 180), c=(0.01, 0)), mode(1.2, a=(0.2, 0), b=(0.2, 180), c=(0.2, 0)))
-    measures = {"first": partial(opposition, side="a", other="b"), "second": partial(opposition, side="c", other="b")}
+    strong, weak = (
+        mode(1.0, a=(0.3, 0), b=(0.3, 180), c=(0.01, 0)),
+        mode(1.2, a=(0.2, 0), b=(0.2, 180), c=(0.2, 0)),
+    )
+    measures = {
+        "first": partial(opposition, side="a", other="b"),
+        "second": partial(opposition, side="c", other="b"),
+    }
     for order in (measures, dict(reversed(measures.items()))):
         assert dict(names([weak, strong], order).named) == {"first": strong, "second": weak}
 
@@ -79,7 +90,9 @@ def test_two_modes_that_fit_alike_are_told_and_neither_is_named():
     measure = {"x": partial(opposition, side="a", other="b")}
     found = names([one, two], measure)
     assert found.named == {}
-    assert found.doubts[0].startswith("no mode is named 'x': those at 1 Hz and 1.2 Hz fit it about equally")
+    assert found.doubts[0].startswith(
+        "no mode is named 'x': those at 1 Hz and 1.2 Hz fit it about equally"
+    )
     assert found.fits["x"][0] is one
     assert found.contested == ("x",)
     clear = mode(1.2, a=(0.22, 0), b=(0.22, 180))

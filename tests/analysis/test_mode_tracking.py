@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from orchestrator.analysis.linear_model import LinearModel
-from orchestrator.analysis.mode_tracking import ModeSet, is_ambiguous, match, number_trajectories, similarities
+from orchestrator.analysis.mode_tracking import (
+    ModeSet,
+    is_ambiguous,
+    match,
+    number_trajectories,
+    similarities,
+)
 from orchestrator.analysis.modes import find_modes
 
 RANGE = (0.1, 2.0)
@@ -16,7 +22,11 @@ def mode_set(A, names, frequency_range=(0.0, 100.0)):
     """The modes of a matrix, sorted by damping as everywhere: the order alone says nothing."""
     modes = find_modes(LinearModel.from_matrix(A, names, None), *frequency_range)
     rows = [np.array([[getattr(m, s)[n] for n in names] for m in modes]) for s in ("left", "shape")]
-    return ModeSet(np.array([m.eigenvalue for m in modes]), *(r.reshape(len(modes), len(names)) for r in rows), names)
+    return ModeSet(
+        np.array([m.eigenvalue for m in modes]),
+        *(r.reshape(len(modes), len(names)) for r in rows),
+        names,
+    )
 
 
 def oscillators(f_a, f_b, coupling=0.0, damping=(0.3, 0.2), scale=1.0):
@@ -58,7 +68,9 @@ def test_crossing_modes_keep_their_names():
 def test_veering_modes_never_cross():
     """With a coupling and fine steps each stays above or below, and its shape goes over to the other's."""
     share = np.linspace(0, 1, 401)
-    sets = [oscillators(0.8 + 0.4 * s, 1.2 - 0.4 * s, coupling=3.0, damping=(0.1, 0.1)) for s in share]
+    sets = [
+        oscillators(0.8 + 0.4 * s, 1.2 - 0.4 * s, coupling=3.0, damping=(0.1, 0.1)) for s in share
+    ]
     found = along(sets)
     assert len(found) == 2
     low, high = sorted(found.values(), key=lambda curve: curve[0])
@@ -113,7 +125,9 @@ def test_states_that_come_and_go_do_not_lose_the_modes():
 
 def shared(similarity):
     """Two sets of one mode each, whose product of eigenvectors is the similarity."""
-    a = ModeSet(np.array([1j]), np.array([[1, 0]], complex), np.array([[1, 0]], complex), ("x", "y"))
+    a = ModeSet(
+        np.array([1j]), np.array([[1, 0]], complex), np.array([[1, 0]], complex), ("x", "y")
+    )
     vector = np.array([[np.sqrt(similarity), np.sqrt(1 - similarity)]], complex)
     return a, ModeSet(np.array([1.01j]), vector, vector, ("x", "y"))
 
@@ -122,10 +136,14 @@ def shared(similarity):
 def test_more_than_half_of_a_mode_is_the_mode(alike):
     a, b = shared(alike)
     assert similarities(a, b).item() == pytest.approx(alike)
-    assert [link.similarity for link in match(a, b)] == ([pytest.approx(alike)] if alike > 0.5 else [])
+    assert [link.similarity for link in match(a, b)] == (
+        [pytest.approx(alike)] if alike > 0.5 else []
+    )
 
 
-@pytest.mark.parametrize(("best", "other", "linked"), [(0.62, 0.30, True), (0.62, 0.34, False), (0.55, 0.2, True)])
+@pytest.mark.parametrize(
+    ("best", "other", "linked"), [(0.62, 0.30, True), (0.62, 0.34, False), (0.55, 0.2, True)]
+)
 def test_a_mode_with_a_rival_nearly_as_good_is_taken_for_neither(best, other, linked):
     a, _ = shared(1.0)
     vectors = np.sqrt(np.array([[best, 1 - best], [other, 1 - other]], complex))
@@ -141,9 +159,13 @@ def test_a_point_without_modes():
 
 def test_rows_are_linked_by_what_they_have_in_common():
     """Over two parameters a mode keeps its name from row to row, also one that enters its row late."""
-    points = {(r, c): oscillators(0.5, 1.6 + 0.1 * r - 0.1 * c + 0.3) for r in range(3) for c in range(4)}
+    points = {
+        (r, c): oscillators(0.5, 1.6 + 0.1 * r - 0.1 * c + 0.3) for r in range(3) for c in range(4)
+    }
     route = [
-        ((r, c), [place for place in ((r, c - 1), (r - 1, c)) if min(place) >= 0]) for r in range(3) for c in range(4)
+        ((r, c), [place for place in ((r, c - 1), (r - 1, c)) if min(place) >= 0])
+        for r in range(3)
+        for c in range(4)
     ]
     result = number_trajectories(points, route)
     numbers = {frequency > 1: set() for frequency in (0.5, 1.5)}

@@ -38,14 +38,17 @@ def test_participation_belongs_to_the_states_of_the_mode_and_sums_to_one():
 
 def test_participation_does_not_depend_on_units():
     T = np.diag([1.0, 1e4])
-    plain, scaled = (find_modes(model(a, None))[0] for a in (OSCILLATOR, T @ OSCILLATOR @ np.linalg.inv(T)))
+    plain, scaled = (
+        find_modes(model(a, None))[0] for a in (OSCILLATOR, T @ OSCILLATOR @ np.linalg.inv(T))
+    )
     assert dict(plain.participation) == pytest.approx(dict(scaled.participation), abs=1e-9)
 
 
 def test_modes_come_least_damped_first_and_only_in_range():
     frequencies, damping = (0.3, 0.9, 1.4, 5.0), (0.2, 0.05, 0.1, 0.01)
     blocks = [
-        [[0, 1], [-((2 * np.pi * f) ** 2), -2 * z * 2 * np.pi * f]] for f, z in zip(frequencies, damping, strict=True)
+        [[0, 1], [-((2 * np.pi * f) ** 2), -2 * z * 2 * np.pi * f]]
+        for f, z in zip(frequencies, damping, strict=True)
     ]
     modes = find_modes(model(scipy.linalg.block_diag(*blocks, [[-1.0]]), None), 0.1, 2.0)
     assert [m.damping_ratio for m in modes] == pytest.approx([0.05, 0.1, 0.2])
@@ -74,7 +77,9 @@ def coupled_pair():
     stiffness = np.array([[-k, k, 0], [k / 2, -k / 2, 0], [0, 0, -400.0]])
     A[:3, 3:], A[3:, :3], A[3:, 3:] = np.eye(3), stiffness, -0.1 * np.eye(3)
     names = ("a.angle", "b.angle", "c.angle", "a.speed", "b.speed", "c.speed")
-    return max(find_modes(LinearModel.from_matrix(A, names, None), 0.5, 2), key=lambda m: m.frequency_hz)
+    return max(
+        find_modes(LinearModel.from_matrix(A, names, None), 0.5, 2), key=lambda m: m.frequency_hz
+    )
 
 
 def test_participation_of_components_and_groups_is_the_sum_over_their_states():
@@ -84,7 +89,9 @@ def test_participation_of_components_and_groups_is_the_sum_over_their_states():
     assert list(mode.by_component) == ["a", "b", "c"]
     assert sum(mode.by_component.values()) == pytest.approx(1)
     areas = {"a": "north", "b": "north"}
-    assert mode.by_group(lambda state: areas.get(state.partition(".")[0])) == pytest.approx({"north": 1.0})
+    assert mode.by_group(lambda state: areas.get(state.partition(".")[0])) == pytest.approx(
+        {"north": 1.0}
+    )
 
 
 def test_swing_tells_both_sides_and_leaves_out_what_does_not_move():

@@ -42,9 +42,20 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def closed(folder):
     """Our converter with its model inside, and states that cannot be set, as other people's are."""
-    arguments = ["fmu", "build", "gfor", "--native", "--platform", "linux64", "--with-linear-model", "two_area"]
+    arguments = [
+        "fmu",
+        "build",
+        "gfor",
+        "--native",
+        "--platform",
+        "linux64",
+        "--with-linear-model",
+        "two_area",
+    ]
     assert main([*arguments, "--scenario", "pod_pq", "--dest", str(folder)]) == 0
-    unsettable = {"modelDescription.xml": lambda text: text.replace(b'settable="true"', b'settable="false"')}
+    unsettable = {
+        "modelDescription.xml": lambda text: text.replace(b'settable="true"', b'settable="false"')
+    }
     return rewritten(folder / "gfor.fmu", folder / "closed.fmu", unsettable)
 
 
@@ -52,7 +63,17 @@ def closed(folder):
 def system_with(folder, closed):
     """A function from a change of the packed model's JSON to the two-area system with that FMU."""
     ours = folder / "ours.ssp"
-    arguments = ["export", "ssp", "two_area", "--scenario", "pod_pq", "--set", "*.native=true", "--out", str(ours)]
+    arguments = [
+        "export",
+        "ssp",
+        "two_area",
+        "--scenario",
+        "pod_pq",
+        "--set",
+        "*.native=true",
+        "--out",
+        str(ours),
+    ]
     assert main(arguments) == 0
 
     def make(change=lambda model: None, name="honest"):
@@ -62,7 +83,9 @@ def system_with(folder, closed):
             return json.dumps(model).encode()
 
         fmu = rewritten(closed, folder / f"{name}.fmu", {MODEL: edited})
-        return rewritten(ours, folder / f"{name}.ssp", {"resources/gfor.fmu": lambda _: fmu.read_bytes()})
+        return rewritten(
+            ours, folder / f"{name}.ssp", {"resources/gfor.fmu": lambda _: fmu.read_bytes()}
+        )
 
     return make
 
@@ -118,7 +141,9 @@ def test_an_element_that_made_a_damped_mode_unstable_is_refused(system_with, cap
     assert main(["modes", str(system_with(change, "forged"))]) == 1
     said = capsys.readouterr().err
     assert "component 'gfor': the linear model inside its FMU is not what the FMU does" in said
-    assert re.search(r"\d s into small steps of v_re, v_im, der\(droop\.theta\) is \S+ per unit", said)
+    assert re.search(
+        r"\d s into small steps of v_re, v_im, der\(droop\.theta\) is \S+ per unit", said
+    )
     assert re.search(r"off by \d+\S* % of its largest value", said)
     assert "gfor modes --black-box" in said
 
@@ -168,7 +193,9 @@ def test_an_element_that_should_be_zero(master, with_model):
             with_model(dataclasses.replace(model, A=A))
 
 
-@pytest.mark.parametrize("change", [{"gfor.droop.R_f": 0.051}, {"gfor.P_0": 0.62}, {"gfor.pod_q.enabled": False}])
+@pytest.mark.parametrize(
+    "change", [{"gfor.droop.R_f": 0.051}, {"gfor.P_0": 0.62}, {"gfor.pod_q.enabled": False}]
+)
 def test_matrices_of_another_point_under_the_right_names(master, with_model, change):
     """What the file says of its operating point is right, the matrices are of another one."""
     honest = read_embedded_model(master.components["gfor"].description.path)
@@ -188,19 +215,38 @@ def test_the_honest_model_is_used_and_said_to_be_packed(system_with, folder, cap
     assert result.linearised == {"gfor": "packed", **others}
     assert min(abs(mode.damping_percent - 23.91) for mode in result.modes) < 0.01
     assert main(["modes", str(system_with())]) == 0
-    assert "Linear models: gfor from the model packed in its FMU, which was compared" in capsys.readouterr().out
+    assert (
+        "Linear models: gfor from the model packed in its FMU, which was compared"
+        in capsys.readouterr().out
+    )
     assert main(["modes", str(system_with()), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["scenarios"][0]["linearised"] == result.linearised
     out = folder / "run"
     assert main(["run", str(system_with()), "--stop", "20 ms", "--out", str(out)]) == 0
     assert "gfor from the model packed in its FMU" in capsys.readouterr().out
-    assert json.loads((out / "summary.json").read_text())["scenarios"][0]["linearised"] == result.linearised
+    assert (
+        json.loads((out / "summary.json").read_text())["scenarios"][0]["linearised"]
+        == result.linearised
+    )
     assert main(["report", str(out), "--out", str(folder / "report.html")]) == 0
     page = (folder / "report.html").read_text()
     assert "gfor from the model packed in its FMU" in page
     assert "Modes come from perturbing the running FMUs" not in page
     capsys.readouterr()
-    assert main(["export", "linear", str(system_with()), "--input", "sg1.governor.delta_P_ref", "--out", str(out)]) == 0
+    assert (
+        main(
+            [
+                "export",
+                "linear",
+                str(system_with()),
+                "--input",
+                "sg1.governor.delta_P_ref",
+                "--out",
+                str(out),
+            ]
+        )
+        == 0
+    )
     assert "gfor from the model packed in its FMU" in capsys.readouterr().out
     written = scipy.io.loadmat(out / "pod_pq" / "linear_model.mat")
     assert json.loads(written["provenance"][0])["linearised"]["gfor"] == "packed"
@@ -210,7 +256,9 @@ def test_where_all_is_perturbed_the_terminal_says_nothing_of_it(capsys):
     assert main(["modes", "two_area", "--scenario", "base"]) == 0
     assert "Linear models" not in capsys.readouterr().out
     assert main(["modes", "two_area", "--scenario", "base", "--json"]) == 0
-    assert set(json.loads(capsys.readouterr().out)["scenarios"][0]["linearised"].values()) == {"perturbed"}
+    assert set(json.loads(capsys.readouterr().out)["scenarios"][0]["linearised"].values()) == {
+        "perturbed"
+    }
 
 
 def test_the_fmu_is_left_where_it_was(master):

@@ -37,7 +37,13 @@ def test_newtons_method_finds_the_point_that_repeats(monkeypatch):
         monkeypatch.setattr(periodic, name, lambda *_, **__: None)
     monkeypatch.setattr(periodic, "_Period", Linear)
     monkeypatch.setattr(periodic, "_names_and_scales", lambda *_: (("a", "b"), None))
-    master = SimpleNamespace(schedule=SimpleNamespace(groups=()), clock=SimpleNamespace(step_size=1e-4))
+    master = SimpleNamespace(
+        schedule=SimpleNamespace(groups=()), clock=SimpleNamespace(step_size=1e-4)
+    )
     found = periodic.find_periodic_point(master, 1e-9, 5)
     assert found.x == pytest.approx(np.linalg.solve(np.eye(2) - A, OFFSET), rel=1e-5)
-    assert (found.names, found.counting.any(), found.residual < 1e-9 < found.first) == (("a", "b"), False, True)
+    assert (found.names, found.counting.any(), found.residual < 1e-9 < found.first) == (
+        ("a", "b"),
+        False,
+        True,
+    )

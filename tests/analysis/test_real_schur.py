@@ -39,11 +39,16 @@ def test_values_are_the_drivers_to_the_last_bit_and_vectors_belong_to_them(name:
     form = RealSchur(A)
     values, lefts, rights = scipy.linalg.eig(A, left=True, right=True)
     assert np.array_equal(form.values, values)
-    chosen = list(range(len(A)))[::-2]  # both halves of pairs, in another order than that of the columns
+    # both halves of pairs, in another order than that of the columns
+    chosen = list(range(len(A)))[::-2]
     for k, left, right in zip(chosen, *(side.T for side in form.vectors(chosen)), strict=True):
-        assert np.allclose(A @ right, values[k] * right, atol=1e-9 * np.abs(A).max() * np.abs(right).max())
+        assert np.allclose(
+            A @ right, values[k] * right, atol=1e-9 * np.abs(A).max() * np.abs(right).max()
+        )
         for own, other in ((left, lefts[:, k]), (right, rights[:, k])):
-            assert abs(np.vdot(own, other)) == pytest.approx(np.linalg.norm(own) * np.linalg.norm(other), rel=1e-9)
+            assert abs(np.vdot(own, other)) == pytest.approx(
+                np.linalg.norm(own) * np.linalg.norm(other), rel=1e-9
+            )
 
 
 def test_left_and_right_vectors_of_different_modes_are_orthogonal() -> None:
@@ -64,7 +69,9 @@ def test_what_is_not_a_number_is_refused() -> None:
         RealSchur(np.array([[1.0, np.nan], [0.0, 1.0]]))
 
 
-def test_without_lapacks_routines_the_driver_gives_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_lapacks_routines_the_driver_gives_the_same(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     assert lapack() is not None
     A = _random(20)
     usual = RealSchur(A)
@@ -73,7 +80,9 @@ def test_without_lapacks_routines_the_driver_gives_the_same(monkeypatch: pytest.
     other = RealSchur(A)
     assert np.array_equal(usual.values, other.values)
     for own, driven in zip(vectors, other.vectors([4, 7]), strict=True):
-        assert np.allclose(*(v / v[np.abs(v[:, 0]).argmax()] for v in (own, driven)), rtol=1e-8, atol=1e-12)
+        assert np.allclose(
+            *(v / v[np.abs(v[:, 0]).argmax()] for v in (own, driven)), rtol=1e-8, atol=1e-12
+        )
 
 
 @pytest.mark.parametrize("step_size", [None, 1e-3])
@@ -95,11 +104,19 @@ def test_modes_of_a_large_system_are_those_of_a_small_one(
     assert small.rightmost is not None
     assert large.rightmost is not None
     assert large.rightmost.eigenvalue.real == large.eigenvalues.real.max()
-    assert {m.eigenvalue for m in large.modes} == {z for z in large.eigenvalues if 0.05 <= z.imag / (2 * np.pi) <= 5.0}
-    for one, other in zip([*small.modes, small.rightmost], [*large.modes, large.rightmost], strict=True):
+    assert {m.eigenvalue for m in large.modes} == {
+        z for z in large.eigenvalues if 0.05 <= z.imag / (2 * np.pi) <= 5.0
+    }
+    for one, other in zip(
+        [*small.modes, small.rightmost], [*large.modes, large.rightmost], strict=True
+    ):
         assert one.eigenvalue == other.eigenvalue
-        assert dict(one.participation) == pytest.approx(dict(other.participation), rel=1e-8, abs=1e-12)
-        assert np.allclose(list(one.shape.values()), list(other.shape.values()), rtol=1e-8, atol=1e-12)
+        assert dict(one.participation) == pytest.approx(
+            dict(other.participation), rel=1e-8, abs=1e-12
+        )
+        assert np.allclose(
+            list(one.shape.values()), list(other.shape.values()), rtol=1e-8, atol=1e-12
+        )
         assert np.allclose(list(one.left.values()), list(other.left.values()), rtol=1e-8, atol=1e-9)
 
 

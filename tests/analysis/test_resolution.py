@@ -22,7 +22,9 @@ def advised(text):
 
 def test_an_emt_model_at_100_ms_is_refused_with_a_step_that_helps():
     """The step map has −30 % at 1.4 Hz, the system 10.6 % at 0.58 Hz."""
-    with pytest.raises(InputError, match=r"does not resolve a mode.*0\.58\d* Hz with 10\.6 % damping") as caught:
+    with pytest.raises(
+        InputError, match=r"does not resolve a mode.*0\.58\d* Hz with 10\.6 % damping"
+    ) as caught:
         modes_at(0.1)
     step = advised(str(caught.value))
     assert step >= 1e-4
@@ -64,7 +66,9 @@ def test_phasor_models_at_milliseconds_raise_no_question(step, scenario):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("case", "scenario"), [("infinite_bus", "dip"), ("norm631", "without"), ("norm631", "with")])
+@pytest.mark.parametrize(
+    ("case", "scenario"), [("infinite_bus", "dip"), ("norm631", "without"), ("norm631", "with")]
+)
 def test_built_in_cases_at_their_own_step_raise_no_question(case, scenario):
     assert modes_at(None, case, scenario).warnings == ()
 

@@ -13,7 +13,11 @@ from orchestrator.errors import AnalysisError
 def test_a_common_period_may_be_as_long_as_the_longest(steps, refused, monkeypatch):
     """Three steps of a third of it are not one third of a rounding longer."""
     step = sampled.LONGEST / 3
-    monkeypatch.setattr(sampled, "repeating", lambda master: {"a": (steps * Fraction(step).limit_denominator(10**12),)})
+    monkeypatch.setattr(
+        sampled,
+        "repeating",
+        lambda master: {"a": (steps * Fraction(step).limit_denominator(10**12),)},
+    )
     if refused:
         with pytest.raises(AnalysisError, match="more than 1 s"):
             sampled.steps_of_period(SimpleNamespace(), step)

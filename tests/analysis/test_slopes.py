@@ -10,7 +10,13 @@ from orchestrator.analysis import slope_linearization as slopes
 
 @pytest.mark.parametrize(
     ("up", "down", "alike"),
-    [(-1000.0, -1001.0, True), (-1000.0, -1300.0, False), (1e-4, -1e-4, True), (0.02, -0.02, False), (0.0, 0.0, True)],
+    [
+        (-1000.0, -1001.0, True),
+        (-1000.0, -1300.0, False),
+        (1e-4, -1e-4, True),
+        (0.02, -0.02, False),
+        (0.0, 0.0, True),
+    ],
 )
 def test_slopes_that_differ_by_more_than_a_tenth_are_no_linear_model(up, down, alike, monkeypatch):
     description = SimpleNamespace(states=("x",), rates=("der(x)",))

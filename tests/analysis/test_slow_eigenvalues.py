@@ -8,7 +8,9 @@ from tests.cases.psse.test_questions import CASE, DYR, RAW
 
 SEXS = "'SEXS' 1  0.1 10.0 50.0 0.05 -5.0 5.0 /"
 PLAIN = "\n".join(
-    f"{x[:2]}{SEXS}" if "EXST1" in x else x for x in DYR.splitlines() if "TGOV1" not in x and "STAB1" not in x
+    f"{x[:2]}{SEXS}" if "EXST1" in x else x
+    for x in DYR.splitlines()
+    if "TGOV1" not in x and "STAB1" not in x
 )
 REACTIVE = 0.0547716
 """Of unit 2 [pu, S_n], from the power flow."""
@@ -34,7 +36,8 @@ def test_a_system_without_governors_is_judged(stability):
 
 
 def test_a_governor_at_its_limit_leaves_the_verdict_open(stability):
-    of_turbine = 700 / 900 + 0.0025 * (abs(complex(700 / 900, REACTIVE)) / 1.01) ** 2  # ZR's losses included
+    # ZR's losses included
+    of_turbine = 700 / 900 + 0.0025 * (abs(complex(700 / 900, REACTIVE)) / 1.01) ** 2
     found = stability(AT_LIMIT.format(limit=of_turbine + 2e-6))
     assert found.stable is None
     assert "sg2" in found.reason

@@ -27,14 +27,18 @@ def crowd(planted, pairs=70):
     rng = np.random.default_rng(5)
     hertz = np.geomspace(0.02, 800, pairs)
     blocks = [pair(f, -0.06 * 2 * np.pi * f) for f in hertz]
-    A = scipy.linalg.block_diag([[0.0]], *blocks, *([[-d]] for d in np.geomspace(0.05, 3e3, 40)), *planted)
+    A = scipy.linalg.block_diag(
+        [[0.0]], *blocks, *([[-d]] for d in np.geomspace(0.05, 3e3, 40)), *planted
+    )
     T = np.eye(len(A)) + 0.02 * rng.standard_normal(A.shape) / math.sqrt(len(A))
     return T @ A @ np.linalg.inv(T)
 
 
 def model(A, step_size=None):
     names = tuple(f"device.x{k}" for k in range(len(A)))
-    return LinearModel.from_matrix(A if step_size is None else scipy.linalg.expm(A * step_size), names, step_size)
+    return LinearModel.from_matrix(
+        A if step_size is None else scipy.linalg.expm(A * step_size), names, step_size
+    )
 
 
 @pytest.mark.parametrize("hertz", PLANTED)
@@ -124,7 +128,9 @@ def test_a_clock_is_no_second_zero_but_a_frequency_that_nothing_holds_is(step_si
 @pytest.mark.parametrize("step_size", [None, STEP])
 def test_what_stands_apart_is_named_and_can_be_left_out(step_size):
     """An integrator that is driven, or that drives, is neither a clock nor a controller that is off."""
-    A = scipy.linalg.block_diag([[0.0]], [[0.0, 0.3], [0.0, -1.0]], [[0.0]], [[0.0, 0.0], [0.2, -2.0]])
+    A = scipy.linalg.block_diag(
+        [[0.0]], [[0.0, 0.3], [0.0, -1.0]], [[0.0]], [[0.0, 0.0], [0.2, -2.0]]
+    )
     found = model(A, step_size)
     assert found.apart == tuple(found.names[k] for k in (0, 3))
     assert found.clocks == 2
@@ -139,7 +145,9 @@ def test_the_system_or_the_coupling_is_named():
     verdict = judge(model(growing, STEP), system=model(damped))
     assert verdict.cause is Cause.COUPLING
     assert "the coupling (without a communication step: -0.2 1/s)" in verdict.sentence()
-    assert judge(model(np.array(pair(1.0, 50.0)), STEP), system=model(growing)).cause is Cause.COUPLING
+    assert (
+        judge(model(np.array(pair(1.0, 50.0)), STEP), system=model(growing)).cause is Cause.COUPLING
+    )
     assert judge(model(growing, STEP)).cause is Cause.UNKNOWN
 
 
@@ -151,17 +159,29 @@ def test_what_the_step_hides_is_said():
 
 
 def test_modes_outside_a_range_are_counted_and_real_poles_are_none():
-    values = np.linalg.eigvals(scipy.linalg.block_diag(pair(0.05, -0.1), pair(1.0, -0.1), pair(5.0, -0.2), [[-3.0]]))
+    values = np.linalg.eigvals(
+        scipy.linalg.block_diag(pair(0.05, -0.1), pair(1.0, -0.1), pair(5.0, -0.2), [[-3.0]])
+    )
     found = hidden(values, 0.1, 2.0)
     assert found.count == 2
     assert found.least_damped.imag == pytest.approx(2 * np.pi * 5.0)
-    assert "2 oscillatory modes lie outside 0.1 to 2 Hz; the least damped of them: 5 Hz, 0.64 %" in found.sentence()
+    assert (
+        "2 oscillatory modes lie outside 0.1 to 2 Hz; the least damped of them: 5 Hz, 0.64 %"
+        in found.sentence()
+    )
 
 
 def test_a_double_real_pole_split_by_rounding_is_no_oscillation():
-    assert oscillations(np.array([-9740 + 21.6j, -9740 - 21.6j, -3.0, 0.5, -10 + 1j, -10 - 1j])).tolist() == [
-        False, False, False, False, True, False,
-    ]  # fmt: skip
+    assert oscillations(
+        np.array([-9740 + 21.6j, -9740 - 21.6j, -3.0, 0.5, -10 + 1j, -10 - 1j])
+    ).tolist() == [
+        False,
+        False,
+        False,
+        False,
+        True,
+        False,
+    ]
 
 
 def test_the_range_does_not_touch_the_verdict():
@@ -172,7 +192,10 @@ def test_the_range_does_not_touch_the_verdict():
 
 def test_a_double_zero_that_the_perturbation_splits_is_no_growth():
     """Without governors nothing restores the frequency; the step map's own pair is an error divided by the step."""
-    split, exact = np.diag([2.6e-3, -2.6e-3, -1.0]), np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    split, exact = (
+        np.diag([2.6e-3, -2.6e-3, -1.0]),
+        np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
+    )
     verdict = judge(model(split, STEP), system=model(exact))
     assert verdict.stable is True
     assert verdict.zeros == 2
@@ -187,4 +210,6 @@ def test_electromechanical_modes_outside_of_the_range_are_named_with_a_range_tha
     assert found.sentence().endswith(
         "electromechanical: 2.098 Hz, 12.05 %; 0.052 Hz, 52.21 %: show them by --range 0.052:2.1"
     )
-    assert [m["frequency_hz"] for m in found.as_json()["electromechanical"]] == pytest.approx([2.098, 0.052])
+    assert [m["frequency_hz"] for m in found.as_json()["electromechanical"]] == pytest.approx(
+        [2.098, 0.052]
+    )

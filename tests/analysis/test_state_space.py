@@ -34,12 +34,16 @@ def test_the_response_to_a_small_load_step_is_that_of_the_system(kind):
     linear = model.step_response([1e-5, 0.0], recorder.times)[1:]
     scale = np.abs(seen).max(axis=0)
     # Voltage and power jump with the load; what is seen there is one communication step of delay, which shrinks with H.
-    assert np.all(np.abs(linear - seen).max(axis=0) < np.array([1e-3, 1e-3, 1.2e-2, 1.2e-2]) * scale)
+    assert np.all(
+        np.abs(linear - seen).max(axis=0) < np.array([1e-3, 1e-3, 1.2e-2, 1.2e-2]) * scale
+    )
 
 
 def test_the_final_value_of_a_step_is_the_static_gain():
     with running() as master:
-        model = state_space(Blocks(master, inputs=INPUTS[:1], outputs=("sg1.omega",)), master.schedule)
+        model = state_space(
+            Blocks(master, inputs=INPUTS[:1], outputs=("sg1.omega",)), master.schedule
+        )
     stable = np.linalg.eigvals(model.A)
     assert np.abs(stable).max() < 1 + 1e-9
     late = model.step_response([0.01], np.array([0.0, 60.0, 120.0]))

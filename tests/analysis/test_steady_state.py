@@ -39,7 +39,8 @@ def test_a_wrong_start_is_moved_to_the_fixed_point_even_of_an_unstable_system():
         assert find_operating_point(master).iterations == 0
 
 
-@pytest.mark.parametrize("worth", [-1.0, 0.3])  # of the direction that one size of perturbation gives
+# of the direction that one size of perturbation gives
+@pytest.mark.parametrize("worth", [-1.0, 0.3])
 def test_a_direction_that_a_limit_spoils_is_taken_anew(worth, monkeypatch):
     exact = steady_state._newton_correction
 
@@ -52,7 +53,10 @@ def test_a_direction_that_a_limit_spoils_is_taken_anew(worth, monkeypatch):
 
 
 def test_where_power_does_not_balance_at_rated_frequency_there_is_no_fixed_point():
-    with master_of("gfor", {"sg1.P_0": -0.2}) as master, pytest.raises(AnalysisError, match="no steady state") as error:
+    with (
+        master_of("gfor", {"sg1.P_0": -0.2}) as master,
+        pytest.raises(AnalysisError, match="no steady state") as error,
+    ):
         find_operating_point(master)
     assert "generation and load" in str(error.value)
 

@@ -21,7 +21,9 @@ def run():
     return gfor.load("infinite_bus").scenario("dip").run(stop=1.1)
 
 
-@pytest.mark.parametrize("values", [{"grid": {"X_L": 0.3}}, {"grid.X_L": np.float64(0.3)}, {"grid.X_L": "0.3"}])
+@pytest.mark.parametrize(
+    "values", [{"grid": {"X_L": 0.3}}, {"grid.X_L": np.float64(0.3)}, {"grid.X_L": "0.3"}]
+)
 def test_a_value_is_taken_however_it_is_written(case, values):
     assert case.scenario("pod_p", values).values["grid.X_L"] == 0.3
 
@@ -81,7 +83,9 @@ def test_one_name_is_as_good_as_a_list_of_one(case, tmp_path):
             case.choose(wrong)
 
 
-@pytest.mark.parametrize("frequencies", [2, None, "0.1", (0.1,), (2, 0.1), ("x", "y"), (0.1, float("nan")), (-1, 2)])
+@pytest.mark.parametrize(
+    "frequencies", [2, None, "0.1", (0.1,), (2, 0.1), ("x", "y"), (0.1, float("nan")), (-1, 2)]
+)
 def test_frequencies_are_two_numbers_in_order(case, frequencies):
     with pytest.raises(InputError, match="frequencies"):
         case.scenario("pod_p").modes(frequencies)
@@ -129,11 +133,13 @@ def test_what_is_asked_of_a_design_is_of_its_kind(case, wanted, words):
 
 
 @pytest.mark.parametrize(
-    ("path", "words"), [("design.json", "name it design.toml"), (None, "give the path"), (3, "give the path")]
+    ("path", "words"),
+    [("design.json", "name it design.toml"), (None, "give the path"), (3, "give the path")],
 )
 def test_a_design_is_not_saved_over_its_own_json(tmp_path, monkeypatch, path, words):
     monkeypatch.chdir(tmp_path)
-    design = ControllerDesign(None)  # the path is refused before anything of the design is looked at
+    # the path is refused before anything of the design is looked at
+    design = ControllerDesign(None)
     with pytest.raises(InputError, match=words):
         design.save(path, "a command")
     assert list(tmp_path.iterdir()) == []
@@ -156,7 +162,10 @@ def test_what_is_compared_must_be_runs(run):
 
 @pytest.mark.parametrize("start", ["500 ms", "0.5 s", np.float64(0.5), 0.5])
 def test_a_start_is_a_time_however_it_is_written(run, start):
-    assert gfor.compare(run, run, "gfor.omega", start).signals == gfor.compare(run, run, "gfor.omega", 0.5).signals
+    assert (
+        gfor.compare(run, run, "gfor.omega", start).signals
+        == gfor.compare(run, run, "gfor.omega", 0.5).signals
+    )
     assert gfor.identify(run, "gfor.omega", start).start == pytest.approx(0.5)
 
 
@@ -171,7 +180,9 @@ def test_a_start_that_leaves_nothing_is_refused(run, start):
 def test_a_run_too_short_for_its_rings_says_so(run):
     found = gfor.compare(run, run, "gfor.omega")
     assert found.signals[0].modes == (None, None)
-    assert [text.partition(":")[0] for text in found.remarks] == [f"{x} (dip) ends at t = 1.1 s" for x in "ab"]
+    assert [text.partition(":")[0] for text in found.remarks] == [
+        f"{x} (dip) ends at t = 1.1 s" for x in "ab"
+    ]
     assert "give an earlier start" in found._repr_html_()
 
 
@@ -211,30 +222,87 @@ def fmu(tmp_path_factory):
         (lambda _: gfor.load("a" * 5000), "case = 'aaaa.* is no path that a file can have"),
         (lambda case: case.scenario("gfor", {"grid.X_L": 10**400}), "a whole number beyond 1e308"),
         (lambda case: case.scenario("gfor", step=10**400), "a whole number beyond 1e308"),
-        (lambda case: case.sweep({"grid.X_L": [0.1]}, workers="2"), "workers = '2'; it must be a whole number"),
-        (lambda case: case.sweep({"grid.X_L": [0.1]}, workers=True), "workers = True; it must be a whole number"),
-        (lambda case: case.sweep({"grid.X_L": [0.1]}, folder="/proc/x"), "folder = '/proc/x': points cannot be kept"),
-        (lambda case: case.sweep({"grid.X_L": [0.1]}, folder=__file__), "points cannot be kept there"),
-        (lambda case: case.scenario("gfor", {"grid": {"X_L": 0.1}, "grid.X_L": 0.2}), "'grid.X_L' is given twice"),
-        (lambda case: case.scenario("gfor").run(observers=[3]), r"observers = \[3\]; give a list of observers"),
-        (lambda case: case.scenario("gfor").run(observers=None), "observers = None; give a list of observers"),
-        (lambda case: case.scenario("gfor").run(recording="rec"), "recording = 'rec'; give a RecordingFolder"),
-        (lambda case: case.scenario("gfor").run(federates="gfor"), r"federates = 'gfor'; give Federates"),
+        (
+            lambda case: case.sweep({"grid.X_L": [0.1]}, workers="2"),
+            "workers = '2'; it must be a whole number",
+        ),
+        (
+            lambda case: case.sweep({"grid.X_L": [0.1]}, workers=True),
+            "workers = True; it must be a whole number",
+        ),
+        (
+            lambda case: case.sweep({"grid.X_L": [0.1]}, folder="/proc/x"),
+            "folder = '/proc/x': points cannot be kept",
+        ),
+        (
+            lambda case: case.sweep({"grid.X_L": [0.1]}, folder=__file__),
+            "points cannot be kept there",
+        ),
+        (
+            lambda case: case.scenario("gfor", {"grid": {"X_L": 0.1}, "grid.X_L": 0.2}),
+            "'grid.X_L' is given twice",
+        ),
+        (
+            lambda case: case.scenario("gfor").run(observers=[3]),
+            r"observers = \[3\]; give a list of observers",
+        ),
+        (
+            lambda case: case.scenario("gfor").run(observers=None),
+            "observers = None; give a list of observers",
+        ),
+        (
+            lambda case: case.scenario("gfor").run(recording="rec"),
+            "recording = 'rec'; give a RecordingFolder",
+        ),
+        (
+            lambda case: case.scenario("gfor").run(federates="gfor"),
+            r"federates = 'gfor'; give Federates",
+        ),
         (lambda _: gfor.read_linear_model(None), "fmu = None; give the path of a file"),
-        (lambda case: case.scenario("gfor", {"grid.X_L": np.array([0.1, 0.2])}), r"grid.X_L is given several values"),
-        (lambda _: gfor.certify(__file__, "miso", declared=1.1), r"declared = 1.1; give values by name"),
-        (lambda _: gfor.certify(__file__, reactances="0.1"), "reactances = '0.1'; give line reactances in pu"),
-        (lambda _: gfor.certify(__file__, reactances=0.1), "reactances = 0.1; give line reactances in pu"),
-        (lambda _: gfor.certify(__file__, reactances=[None]), "reactances = None; give line reactances in pu"),
-        (lambda _: gfor.build("synchronous_generator", parts="genrou"), "parts = 'genrou'; give models by part"),
-        (lambda case: case.interactions("gfor", devices="a.fmu"), "devices = 'a.fmu'; give files by name"),
-        (lambda case: case.interactions("gfor", bindings="a.toml"), "bindings = 'a.toml'; give files by name"),
-        (lambda _: gfor.admittance(__file__, frequencies=(0, 10)), r"\(0, 10\); the lowest must be above 0"),
+        (
+            lambda case: case.scenario("gfor", {"grid.X_L": np.array([0.1, 0.2])}),
+            r"grid.X_L is given several values",
+        ),
+        (
+            lambda _: gfor.certify(__file__, "miso", declared=1.1),
+            r"declared = 1.1; give values by name",
+        ),
+        (
+            lambda _: gfor.certify(__file__, reactances="0.1"),
+            "reactances = '0.1'; give line reactances in pu",
+        ),
+        (
+            lambda _: gfor.certify(__file__, reactances=0.1),
+            "reactances = 0.1; give line reactances in pu",
+        ),
+        (
+            lambda _: gfor.certify(__file__, reactances=[None]),
+            "reactances = None; give line reactances in pu",
+        ),
+        (
+            lambda _: gfor.build("synchronous_generator", parts="genrou"),
+            "parts = 'genrou'; give models by part",
+        ),
+        (
+            lambda case: case.interactions("gfor", devices="a.fmu"),
+            "devices = 'a.fmu'; give files by name",
+        ),
+        (
+            lambda case: case.interactions("gfor", bindings="a.toml"),
+            "bindings = 'a.toml'; give files by name",
+        ),
+        (
+            lambda _: gfor.admittance(__file__, frequencies=(0, 10)),
+            r"\(0, 10\); the lowest must be above 0",
+        ),
         (lambda _: gfor.nyquist(3), "device = 3; give the path of a file"),
         (lambda case: gfor.nyquist(case, frequency="x"), "frequency: 'x' is not a number"),
         (lambda case: gfor.nyquist(case, compensation=None), "compensation = None; give a share"),
         (lambda case: gfor.nyquist(case, rating="5 kV"), "rating: '5 kV' is in kV"),
-        (lambda case: gfor.nyquist(case, voltage=np.array([1, 2])), "voltage = .*; give a voltage in kV"),
+        (
+            lambda case: gfor.nyquist(case, voltage=np.array([1, 2])),
+            "voltage = .*; give a voltage in kV",
+        ),
         (lambda case: case.modes(), r"it belongs to a scenario: case.scenario\(…\).modes"),
         (lambda case: case.run(), r"it belongs to a scenario: case.scenario\(…\).run"),
     ],
@@ -254,9 +322,11 @@ def test_a_signal_is_one_name(run, nothing):
 
 @pytest.mark.parametrize("current", [-1, 110, np.nan, "1.1 MW", True, None])
 def test_a_current_and_a_rating_are_in_their_range(current):
-    scenario = gfor.load("infinite_bus").scenario("dip")  # refused before its power flow is asked for, which it lacks
+    # refused before its power flow is asked for, which it lacks
+    scenario = gfor.load("infinite_bus").scenario("dip")
     with pytest.raises(
-        InputError, match=r"converter_current.* a converter's current in pu|converter_current: '1.1 MW'"
+        InputError,
+        match=r"converter_current.* a converter's current in pu|converter_current: '1.1 MW'",
     ):
         scenario.strengths(current)
     with pytest.raises(InputError, match=r"rating.* a rating above 0 in MVA|rating: 'x'"):
@@ -275,9 +345,15 @@ def test_nyquist_takes_a_case(case):
 
 
 def test_a_step_response_is_of_all_inputs_at_equal_distances():
-    model = gfor.load("infinite_bus").scenario("load_step").linearize(["gfor.droop.delta_P_ref"], ["gfor.omega"])
+    model = (
+        gfor.load("infinite_bus")
+        .scenario("load_step")
+        .linearize(["gfor.droop.delta_P_ref"], ["gfor.omega"])
+    )
     times = np.arange(0.0, 0.1, 0.01)
-    assert np.array_equal(model.step_response(0.01, times), model.step_response([0.01], list(times)))
+    assert np.array_equal(
+        model.step_response(0.01, times), model.step_response([0.01], list(times))
+    )
     with pytest.raises(InputError, match=r"give one number for each input: gfor.droop.delta_P_ref"):
         model.step_response([0.01, 0.0], times)
     for wrong in ([0.0, 0.01, 0.03], [], [-1.0, 0.0]):
@@ -314,7 +390,10 @@ def test_a_linear_model_has_the_inputs_that_are_given_and_else_those_of_the_even
     model = scenario.linearize(["gfor.droop.delta_Q_ref"], ["gfor.p"])
     assert (model.inputs, model.outputs) == (("gfor.droop.delta_Q_ref",), ("gfor.p",))
     changed = {
-        f"{c}.{v}" for event in scenario.prepared.events for c, values in event.changes().items() for v in values
+        f"{c}.{v}"
+        for event in scenario.prepared.events
+        for c, values in event.changes().items()
+        for v in values
     }
     assert set(scenario.linearize().inputs) == changed
     assert "gfor.droop.delta_Q_ref" not in changed
@@ -334,11 +413,17 @@ def test_a_matrix_is_named_by_a_letter():
         ({"folder": None}, "folder = None; give the path of a folder"),
         ({"folder": __file__}, "an FMU cannot be written there: File exists"),
         ({"folder": "/proc/x"}, "an FMU cannot be written there"),
-        ({"platforms": ["amiga"]}, "there is no platform 'amiga'; choose from darwin64, linux64, win64"),
+        (
+            {"platforms": ["amiga"]},
+            "there is no platform 'amiga'; choose from darwin64, linux64, win64",
+        ),
         ({"platforms": ["amiga"], "native": True}, "there is no platform 'amiga'"),
         ({"platforms": 3}, "platforms = 3; give a name"),
         ({"extra": {"../../x": b""}}, r"'\.\./\.\./x' is not a path in the FMU's folder extra/"),
-        ({"extra": {"extra/../modelDescription.xml": b""}}, "is not a path in the FMU's folder extra/"),
+        (
+            {"extra": {"extra/../modelDescription.xml": b""}},
+            "is not a path in the FMU's folder extra/",
+        ),
         ({"extra": {"modelDescription.xml": b""}}, "is not a path in the FMU's folder extra/"),
         ({"extra": {"extra/x": "text"}}, "is of type str; give bytes"),
         ({"extra": ["x"]}, "give bytes by path"),
@@ -351,18 +436,26 @@ def test_a_build_that_cannot_be_is_refused(tmp_path, wanted, words):
 
 
 def test_one_platform_is_as_good_as_a_list_of_one(tmp_path):
-    assert gfor.build("infinite_bus", tmp_path, platforms="linux64", extra={"extra/a/b.txt": b"1"}).exists()
+    assert gfor.build(
+        "infinite_bus", tmp_path, platforms="linux64", extra={"extra/a/b.txt": b"1"}
+    ).exists()
 
 
 @pytest.mark.parametrize(
     ("wanted", "words"),
     [
-        ({"memory_limit": 4}, "memory_limit = 4 is 4 MB, too little to load any FMU; give at least 32 MB"),
+        (
+            {"memory_limit": 4},
+            "memory_limit = 4 is 4 MB, too little to load any FMU; give at least 32 MB",
+        ),
         ({"memory_limit": True}, "memory_limit = True; give an amount of memory in MB"),
         ({"memory_limit": "4 s"}, "'4 s' is in s, but MB is needed"),
         ({"memory_limit": "1 kB"}, "is 0.001 MB, too little"),
         ({"component": ["grid"], "case": "infinite_bus"}, r"component = \['grid'\]; give one name"),
-        ({"component": "nope", "case": "infinite_bus"}, "there is no component 'nope'; there are: gfor, grid"),
+        (
+            {"component": "nope", "case": "infinite_bus"},
+            "there is no component 'nope'; there are: gfor, grid",
+        ),
         ({"case": 3}, "case = 3; give the path"),
         ({"binding": 3}, "binding = 3; give the path of a file"),
     ],

@@ -9,10 +9,22 @@ import pytest
 import orchestrator
 
 MODULES = (
-    *(f"api.{name}" for name in ("acceptance", "admittance", "binding", "case", "certification", "comparison")),
+    *(
+        f"api.{name}"
+        for name in ("acceptance", "admittance", "binding", "case", "certification", "comparison")
+    ),
     *(f"api.{name}" for name in ("comtrade", "export", "fmu", "identification", "linear")),
     *(f"api.{name}" for name in ("models", "nyquist", "results", "saved", "scenario", "source")),
-    *(f"{name}.view" for name in ("coordinated_design", "interactions", "pod_design", "screening", "sensitivities")),
+    *(
+        f"{name}.view"
+        for name in (
+            "coordinated_design",
+            "interactions",
+            "pod_design",
+            "screening",
+            "sensitivities",
+        )
+    ),
     *("siting.view", "sweep.view"),
 )
 
@@ -27,7 +39,9 @@ def examples():
 EXAMPLES = examples()
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.name.removeprefix("orchestrator."))
+@pytest.mark.parametrize(
+    "example", EXAMPLES, ids=lambda example: example.name.removeprefix("orchestrator.")
+)
 def test_an_example_runs(example, tmp_path, monkeypatch):
     pyplot = pytest.importorskip("matplotlib.pyplot")
     pyplot.switch_backend("Agg")

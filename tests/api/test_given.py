@@ -45,7 +45,9 @@ def test_points_are_tables_and_mappings():
     case = gfor.load("two_area_rms")
     frame = pd.DataFrame({"name": ["short", "long"], "grid.X_L": [0.1, 0.2]})
     rows = {"short": {"grid.X_L": 0.1}, "long": {"grid.X_L": 0.2}}
-    of_frame, of_rows = (case.screen(points, scenario="gfor", outages="units") for points in (frame, rows))
+    of_frame, of_rows = (
+        case.screen(points, scenario="gfor", outages="units") for points in (frame, rows)
+    )
     assert of_frame.items().equals(of_rows.items())
     assert of_frame.items()["point"].unique().tolist() == ["short", "long"]
     table = of_frame.table()
@@ -56,7 +58,9 @@ def test_points_are_tables_and_mappings():
 
 
 def test_a_gap_in_a_table_of_points_is_asked_about():
-    with pytest.warns(UserWarning, match="question: points: load: the case's value is taken at NaN"):
+    with pytest.warns(
+        UserWarning, match="question: points: load: the case's value is taken at NaN"
+    ):
         kept(pd.DataFrame({"load": [np.nan, 0.9], "hours": [1.0, 2.0]}), "points.csv", "points")
 
 
@@ -64,7 +68,8 @@ def test_a_point_without_values_is_the_case_as_it_is():
     case = gfor.load("two_area_rms")
     items = case.screen({"usual": {}, "long": {"grid.X_L": 0.2}}, scenario="gfor").items()
     assert items["point"].tolist() == ["usual", "long"]
-    assert case.screen({7: {}}, scenario="gfor").items()["point"].tolist() == [7]  # its name is what was given
+    # its name is what was given
+    assert case.screen({7: {}}, scenario="gfor").items()["point"].tolist() == [7]
 
 
 def test_a_binding_is_a_mapping(tmp_path):
@@ -98,7 +103,10 @@ def test_what_was_saved_is_opened(case, modes, tmp_path):
 
 def test_a_recording_says_what_it_was_computed_from(tmp_path):
     (tmp_path / "own.txt").write_text("1")
-    text = '# from "own.txt", not from "gone.txt"\n' + (BUILT_IN / "infinite_bus" / "case.toml").read_text()
+    text = (
+        '# from "own.txt", not from "gone.txt"\n'
+        + (BUILT_IN / "infinite_bus" / "case.toml").read_text()
+    )
     (tmp_path / "own.toml").write_text(text)
     run = gfor.load(tmp_path / "own.toml").scenario("dip").run(stop=1e-3)
     run.save(tmp_path / "out")
@@ -114,11 +122,16 @@ def test_a_recording_says_what_it_was_computed_from(tmp_path):
 def test_all_eigenvalues_and_the_map_in_one_unit(modes):
     assert len(modes.eigenvalues) == modes.stability.eigenvalues - modes.stability.zeros
     assert modes.eigenvalues[0].real == pytest.approx(modes.stability.largest_growth_rate, rel=1e-6)
-    assert all(np.abs(modes.eigenvalues - mode.eigenvalue).min() < 1e-6 * abs(mode.eigenvalue) for mode in modes)
+    assert all(
+        np.abs(modes.eigenvalues - mode.eigenvalue).min() < 1e-6 * abs(mode.eigenvalue)
+        for mode in modes
+    )
     axes = modes.plot(radians=True)
     assert axes.get_ylabel() == "Imaginary part [rad/s]"
     points = next(c for c in axes.collections if len(c.get_offsets()))
-    assert list(points.get_offsets()[0]) == pytest.approx([modes[0].eigenvalue.real, modes[0].eigenvalue.imag])
+    assert list(points.get_offsets()[0]) == pytest.approx(
+        [modes[0].eigenvalue.real, modes[0].eigenvalue.imag]
+    )
 
 
 def test_linear_models_go_to_scipy_and_control(case, monkeypatch):
@@ -134,7 +147,9 @@ def test_linear_models_go_to_scipy_and_control(case, monkeypatch):
     monkeypatch.setitem(sys.modules, "control", None)
     with pytest.raises(InputError, match="pip install control"):
         both.to_control()
-    monkeypatch.setitem(sys.modules, "control", SimpleNamespace(ss=lambda *a, **names: (a[4], names)))
+    monkeypatch.setitem(
+        sys.modules, "control", SimpleNamespace(ss=lambda *a, **names: (a[4], names))
+    )
     step, names = both.to_control()
     assert (step, names["inputs"]) == (0, ["gfor_droop_delta_P_ref"])
     assert names["outputs"] == ["gfor_p_gfor_omega", "gfor_p"]
@@ -143,7 +158,10 @@ def test_linear_models_go_to_scipy_and_control(case, monkeypatch):
 def test_what_was_given_as_tables_is_named_as_it_was_given(case):
     with pytest.raises(CaseError) as refused:
         case.with_(solver={"stop_tim": 3}).scenario("dip")
-    assert str(refused.value) == "case: 1 problem\n  - solver.stop_tim: this key is unknown; did you mean stop_time?"
+    assert (
+        str(refused.value)
+        == "case: 1 problem\n  - solver.stop_tim: this key is unknown; did you mean stop_time?"
+    )
     with pytest.raises(CaseError, match="case: 3 problems\n  - line 2, foo: this key"):
         gfor.load('name = "x"\nfoo = 3\n[components.g]\nmodel = "gfor"\n').scenario()
     with pytest.raises(InputError, match="points, row 2: load = -1"):

@@ -13,13 +13,50 @@ from orchestrator.cli import COMMANDS
 
 ROOT = Path(__file__).parents[2]
 NAMES = {
-    *("Case", "CosimError", "Modes", "Run", "Scenario", "build", "built_in_cases", "check", "compare", "load"),
+    *(
+        "Case",
+        "CosimError",
+        "Modes",
+        "Run",
+        "Scenario",
+        "build",
+        "built_in_cases",
+        "check",
+        "compare",
+        "load",
+    ),
     *("admittance", "bind", "certify", "export", "verify"),
     *("LinearSystem", "ParameterSweep", "Screening", "open"),
-    *("Acceptance", "Admittance", "ControllerDesign", "CoordinatedDesign", "Fmu", "FmuInfo", "Interactions"),
-    *("IssuedCertificate", "Nyquist", "RunComparison", "Saved", "Sensitivities", "SignalModes", "Siting", "Sources"),
+    *(
+        "Acceptance",
+        "Admittance",
+        "ControllerDesign",
+        "CoordinatedDesign",
+        "Fmu",
+        "FmuInfo",
+        "Interactions",
+    ),
+    *(
+        "IssuedCertificate",
+        "Nyquist",
+        "RunComparison",
+        "Saved",
+        "Sensitivities",
+        "SignalModes",
+        "Siting",
+        "Sources",
+    ),
     *("StepChoice", "Verification"),
-    *("ambient", "export_comtrade", "identify", "info", "nyquist", "open_fmu", "read_linear_model", "source"),
+    *(
+        "ambient",
+        "export_comtrade",
+        "identify",
+        "info",
+        "nyquist",
+        "open_fmu",
+        "read_linear_model",
+        "source",
+    ),
 }
 
 
@@ -44,9 +81,14 @@ def test_a_study_that_is_called_without_a_case_is_told_where_it_is():
     import orchestrator.report  # noqa: PLC0415 - one that is for the terminal alone
     import orchestrator.sweep  # noqa: PLC0415 - the package, which hides that there is no such name
 
-    with pytest.raises(AttributeError, match=r"use gfor.load\('two_area'\).sweep\(…\), or `gfor sweep` at .*: .*load"):
+    with pytest.raises(
+        AttributeError,
+        match=r"use gfor.load\('two_area'\).sweep\(…\), or `gfor sweep` at .*: .*load",
+    ):
         orchestrator.sweep("two_area")
-    with pytest.raises(AttributeError, match=r"use `gfor report` at the terminal; functions: .*load"):
+    with pytest.raises(
+        AttributeError, match=r"use `gfor report` at the terminal; functions: .*load"
+    ):
         orchestrator.report("results")
     assert {"sweep", "screen"} <= {*dir(orchestrator.load("two_area"))}
 
@@ -65,7 +107,9 @@ def test_importing_takes_no_time_and_no_library():
         "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
         "assert 'load' in dir(gfor)"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, cwd=ROOT)
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False, cwd=ROOT
+    )
     assert done.returncode == 0, done.stderr
     assert float(done.stdout) < 0.3
 
@@ -77,16 +121,26 @@ def test_modes_need_no_plots():
         "gfor.load('infinite_bus').scenario('dip').modes().table()\n"
         "assert 'matplotlib' not in sys.modules"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, cwd=ROOT)
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False, cwd=ROOT
+    )
     assert done.returncode == 0, done.stderr
 
 
 def test_the_reference_page_lists_every_name():
     page = (ROOT / ".docs" / "reference" / "python.md").read_text(encoding="utf-8")
     listed = set(re.findall(r"^::: (orchestrator\.\S+)$", page, re.MULTILINE))
-    made = {name for name in orchestrator._HOMES if hasattr(getattr(orchestrator, name), "__signature__")}
+    made = {
+        name
+        for name in orchestrator._HOMES
+        if hasattr(getattr(orchestrator, name), "__signature__")
+    }
     assert made == {"certify"}  # from a request: a hook lists it
-    homes = {f"orchestrator.{home}.{name}" for name, home in orchestrator._HOMES.items() if name not in made}
+    homes = {
+        f"orchestrator.{home}.{name}"
+        for name, home in orchestrator._HOMES.items()
+        if name not in made
+    }
     assert homes <= listed
 
 
@@ -114,9 +168,17 @@ def test_type_checkers_see_types(tmp_path):
         "reveal_type(gfor.compare)\n",
         encoding="utf-8",
     )
-    command = [sys.executable, "-m", "mypy", "--strict", "--config-file", str(ROOT / "pyproject.toml")]
+    command = [
+        sys.executable,
+        "-m",
+        "mypy",
+        "--strict",
+        "--config-file",
+        str(ROOT / "pyproject.toml"),
+    ]
     done = subprocess.run(
-        [*command, str(tmp_path / "use.py")],  # with mypy's cache of the checkout, which .ci/run has just filled
+        # with mypy's cache of the checkout, which .ci/run has just filled
+        [*command, str(tmp_path / "use.py")],
         capture_output=True,
         text=True,
         check=False,

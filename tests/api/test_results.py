@@ -55,7 +55,9 @@ def _no_figures_left():
 
 
 def test_modes_are_those_of_the_command(gfor, modes):
-    code, out, _ = gfor("modes", "two_area", "--scenario", "gfor", "--set", "grid.X_L=0.3", "--json")
+    code, out, _ = gfor(
+        "modes", "two_area", "--scenario", "gfor", "--set", "grid.X_L=0.3", "--json"
+    )
     assert code == 0
     assert json.loads(out) == json.loads(json.dumps(modes.as_json()))
     printed = json.loads(out)["scenarios"][0]["modes"]
@@ -82,7 +84,9 @@ def test_a_run_is_that_of_the_command(gfor, tmp_path, run):
 
 def test_a_linear_model_is_that_of_the_command(gfor, tmp_path, two_area):
     names = ("--input", "gfor.droop.delta_P_ref", "--output", "sg1.omega")
-    code, _, _ = gfor("export", "linear", "two_area", "--scenario", "gfor", *names, "--out", tmp_path)
+    code, _, _ = gfor(
+        "export", "linear", "two_area", "--scenario", "gfor", *names, "--out", tmp_path
+    )
     assert code == 0
     model = two_area.scenario("gfor").linearize(["gfor.droop.delta_P_ref"], ["sg1.omega"])
     for name in "ABCD":
@@ -95,7 +99,17 @@ def test_a_linear_model_is_that_of_the_command(gfor, tmp_path, two_area):
 
 
 def test_a_sweep_is_that_of_the_command(gfor, tmp_path, two_area):
-    options = ("--scenario", "gfor", "--vary", "grid.X_L=0.1,0.2", "--workers", 1, "--json", "--out", tmp_path)
+    options = (
+        "--scenario",
+        "gfor",
+        "--vary",
+        "grid.X_L=0.1,0.2",
+        "--workers",
+        1,
+        "--json",
+        "--out",
+        tmp_path,
+    )
     code, out, _ = gfor("sweep", "two_area", *options)
     assert code == 0
     sweep = two_area.sweep({"grid.X_L": np.array([0.1, 0.2])}, ["gfor"], folder=tmp_path)
@@ -122,7 +136,9 @@ def test_a_comparison_and_its_modes_are_those_of_the_commands(gfor, tmp_path, ru
     code, _, _ = gfor("run", "infinite_bus", "--scenario", "dip", "--stop", 1.2, "--out", tmp_path)
     assert code == 0
     folder = tmp_path / "dip"
-    code, out, _ = gfor("signal", "compare", folder, folder, "--signal", "gfor.omega", "--start", 0.2, "--json")
+    code, out, _ = gfor(
+        "signal", "compare", folder, folder, "--signal", "gfor.omega", "--start", 0.2, "--json"
+    )
     compared = face.compare(folder, folder, ["gfor.omega"], start=0.2)
     assert (code, json.loads(out)) == (0, json.loads(json.dumps(compared.as_json())))
     code, out, err = gfor("signal", "identify", folder, "gfor.omega", "--start", 0.2, "--json")
@@ -138,7 +154,9 @@ def test_a_comparison_and_its_modes_are_those_of_the_commands(gfor, tmp_path, ru
 @pytest.mark.slow
 def test_a_design_is_that_of_the_command(gfor, tmp_path, two_area):
     file = tmp_path / "pod_p.toml"
-    code, out, _ = gfor("design", "two_area", "--controller", "pod_p", "--no-margins", "--json", "--out", file)
+    code, out, _ = gfor(
+        "design", "two_area", "--controller", "pod_p", "--no-margins", "--json", "--out", file
+    )
     assert code == 0
     design = two_area.design("pod_p", margins=False)
     printed = json.loads(out)
@@ -153,12 +171,17 @@ def test_a_design_is_that_of_the_command(gfor, tmp_path, two_area):
     by_file = two_area.scenario("gfor", parameters=[saved])
     assert by_file.values == two_area.scenario("gfor", design.parameters).values
     assert "requirement met" in design._repr_html_()
-    assert "the lower bound of the gain is active, 18.45 pu were computed before it: gain_bounds 0" in design.verdict
+    assert (
+        "the lower bound of the gain is active, 18.45 pu were computed before it: gain_bounds 0"
+        in design.verdict
+    )
     assert design.verdict in design._repr_html_()
     assert design.table().loc["with it", "damping_percent"] > 20
 
 
-@pytest.mark.parametrize("again", [lambda result: pickle.loads(pickle.dumps(result)), copy.deepcopy])
+@pytest.mark.parametrize(
+    "again", [lambda result: pickle.loads(pickle.dumps(result)), copy.deepcopy]
+)
 def test_results_can_be_pickled_and_copied(modes, run, again):
     same = again(modes)
     assert same.table().equals(modes.table())
@@ -175,13 +198,17 @@ def test_results_can_be_pickled_and_copied(modes, run, again):
 def test_another_stop_keeps_step_parameter_files_and_values(tmp_path):
     file = tmp_path / "values.toml"
     file.write_text('[set]\n"gfor.P_0" = 0.45\n', encoding="utf-8")
-    scenario = face.load("infinite_bus").scenario("dip", {"gfor.v_0": 1.01}, step="50 us", parameters=file)
+    scenario = face.load("infinite_bus").scenario(
+        "dip", {"gfor.v_0": 1.01}, step="50 us", parameters=file
+    )
     ready = scenario.run(stop=0.02).result.modes.prepared
     assert (ready.stop_time, ready.step_size) == (0.02, 5e-5)
     assert (ready.values["gfor.P_0"], ready.values["gfor.v_0"]) == (0.45, 1.01)
 
 
-def test_a_design_is_made_with_the_step_files_and_values_that_are_given(two_area, tmp_path, monkeypatch):
+def test_a_design_is_made_with_the_step_files_and_values_that_are_given(
+    two_area, tmp_path, monkeypatch
+):
     file = tmp_path / "values.toml"
     file.write_text('[set]\n"grid.X_L" = 0.15\n', encoding="utf-8")
 
@@ -189,7 +216,9 @@ def test_a_design_is_made_with_the_step_files_and_values_that_are_given(two_area
         pass
 
     def prepared(case, request, *_):
-        raise PreparedError(request.step_size, [one.values for one in request.files], dict(request.overrides))
+        raise PreparedError(
+            request.step_size, [one.values for one in request.files], dict(request.overrides)
+        )
 
     monkeypatch.setattr("orchestrator.coordinated_design.one_point.design_pod", prepared)
     with pytest.raises(PreparedError) as seen:
@@ -213,8 +242,14 @@ def test_values_may_be_numpys_and_have_units():
     ("mistake", "says"),
     [
         (lambda: face.load("two_aera"), "built-in: four_vsc, "),
-        (lambda: face.load("infinite_bus").scenario(), "2 scenarios; choose one of: dip, load_step"),
-        (lambda: face.load("infinite_bus").scenario("dip", step=-1), "step = -1; it must be a time above 0"),
+        (
+            lambda: face.load("infinite_bus").scenario(),
+            "2 scenarios; choose one of: dip, load_step",
+        ),
+        (
+            lambda: face.load("infinite_bus").scenario("dip", step=-1),
+            "step = -1; it must be a time above 0",
+        ),
         (lambda: face.load("infinite_bus").scenario("dip", step="1 m"), "step: '1 m' is in m"),
         (lambda: face.load("infinite_bus").scenario("dip").modes((2, 1)), "the lower one first"),
         (
@@ -223,15 +258,26 @@ def test_values_may_be_numpys_and_have_units():
         ),
         (lambda: face.load("infinite_bus").scenario("dip").modes((0, 2), 20), "begin above 0 Hz"),
         (lambda: face.load("infinite_bus").sweep({"grid.X": []}), "grid.X: a sweep needs values"),
-        (lambda: face.load("infinite_bus").sweep({"grid.X": [0.1]}, workers=0), "workers = 0; it must be"),
+        (
+            lambda: face.load("infinite_bus").sweep({"grid.X": [0.1]}, workers=0),
+            "workers = 0; it must be",
+        ),
         (lambda: face.certify("vendor.fmu", pod="z"), "pod = 'z'; give one of none, p, q, pq"),
         (lambda: face.load("two_area_rms").site(below=0.1), "below = 0.1; it is in percent"),
         (
-            lambda: face.load("infinite_bus").sweep({"grid.X": [0.1]}, workers=2, scheduler="tcp://host:1"),
+            lambda: face.load("infinite_bus").sweep(
+                {"grid.X": [0.1]}, workers=2, scheduler="tcp://host:1"
+            ),
             "workers and scheduler exclude each other",
         ),
-        (lambda: face.check("a.fmu", component="gfor"), "component = 'gfor' names a component of a case; give case"),
-        (lambda: face.check("a.fmu", scenario="dip"), "scenario = 'dip' names a scenario of a case; give case"),
+        (
+            lambda: face.check("a.fmu", component="gfor"),
+            "component = 'gfor' names a component of a case; give case",
+        ),
+        (
+            lambda: face.check("a.fmu", scenario="dip"),
+            "scenario = 'dip' names a scenario of a case; give case",
+        ),
         (lambda: face.check("a.fmu", time_limit=0), "time_limit = 0; it must be a time above 0"),
         (lambda: face.check("a.fmu", memory_limit=-1), "memory_limit = -1; it must be above 0 MB"),
         (lambda: face.identify("a", "grid.v"), "there is no trajectory.nc"),
@@ -239,8 +285,14 @@ def test_values_may_be_numpys_and_have_units():
         (lambda: face.load("infinite_bus").sweep("grid.X"), "not of the form component.parameter"),
         (lambda: face.load("two_area").design("pod_x"), "there are: pod_p, pod_q"),
         (lambda: face.load("two_area").design("pod_p", dampning=0.2), "dampning"),
-        (lambda: face.load("two_area").design("pod_p", damping=20, damping_increment=10), "give one of them"),
-        (lambda: face.load("two_area").design("pod_p", damping=0.2), "write 20 for a damping ratio of 0.2"),
+        (
+            lambda: face.load("two_area").design("pod_p", damping=20, damping_increment=10),
+            "give one of them",
+        ),
+        (
+            lambda: face.load("two_area").design("pod_p", damping=0.2),
+            "write 20 for a damping ratio of 0.2",
+        ),
         (lambda: face.build("gforr"), "there is no model 'gforr'; there are: "),
         (lambda: face.build("gfor", fmi="3.0"), "native"),
         (lambda: face.compare("a", "b"), "there is no trajectory.nc"),
@@ -337,7 +389,9 @@ def test_participation_is_that_of_the_modes(modes):
     for number, mode in enumerate(modes, start=1):
         assert factors[number].to_dict() == dict(mode.participation)
     shape = modes.dataset["shape"].sel(mode=1)
-    assert {str(k): v for k, v in zip(shape.state.values, shape.values, strict=True) if v} == modes[0].shape
+    assert {str(k): v for k, v in zip(shape.state.values, shape.values, strict=True) if v} == modes[
+        0
+    ].shape
     assert modes.dataset["damping"].values.tolist() == modes.table()["damping_percent"].tolist()
 
 
@@ -362,7 +416,11 @@ def test_an_fmu_is_set_stepped_and_read(fmu_path):
         fmu.step(1e-3)
         assert fmu.time == 1e-3
         assert fmu.table().loc["v", "unit"] == "pu"
-        for mistake in (lambda: fmu.get("w"), lambda: fmu.set({"w": 1}), lambda: fmu.set({"f_n": "3 MW"})):
+        for mistake in (
+            lambda: fmu.get("w"),
+            lambda: fmu.set({"w": 1}),
+            lambda: fmu.set({"f_n": "3 MW"}),
+        ):
             with pytest.raises(InputError, match="infinite_bus"):
                 mistake()
         with pytest.raises(InputError, match="a time above 0"):
@@ -374,7 +432,12 @@ def test_an_fmu_that_was_closed_says_so(fmu_path):
     fmu = face.open_fmu(fmu_path("infinite_bus"))
     fmu.close()
     fmu.close()
-    for call in (lambda: fmu.step(1e-4), lambda: fmu.get("v"), fmu.values, lambda: fmu.set({"dip.depth": 0.2})):
+    for call in (
+        lambda: fmu.step(1e-4),
+        lambda: fmu.get("v"),
+        fmu.values,
+        lambda: fmu.set({"dip.depth": 0.2}),
+    ):
         with pytest.raises(InputError, match="infinite_bus: this FMU was closed; open it again"):
             call()
     with pytest.raises(InputError, match="closed"), fmu:
@@ -390,15 +453,23 @@ def test_an_fmu_is_checked(fmu_path):
 
 
 def test_an_fmu_is_checked_as_a_case_uses_it(fmu_path, gfor, tmp_path):
-    fmu, options = fmu_path("infinite_bus"), {"case": "infinite_bus", "component": "grid", "scenario": "load_step"}
-    report = face.check(fmu, only=["runs"], time_limit="20 s", memory_limit=2000, step="200 us", **options)
+    fmu, options = (
+        fmu_path("infinite_bus"),
+        {"case": "infinite_bus", "component": "grid", "scenario": "load_step"},
+    )
+    report = face.check(
+        fmu, only=["runs"], time_limit="20 s", memory_limit=2000, step="200 us", **options
+    )
     assert "component 'grid' in scenario 'load_step'" in report.as_json()["used_as"]
     assert "steps of 0.0002 s" in report.table().loc["runs", "evidence"]
     words = [word for name, value in options.items() for word in (f"--{name}", value)]
     code, out, _ = gfor("fmu", "check", fmu, *words, "--only", "runs", "--step", 2e-4, "--json")
     assert code == 0
     assert json.loads(out)["used_as"] == report.as_json()["used_as"]
-    assert report.save_junit(tmp_path / "junit.xml").read_text(encoding="utf-8").count("<testcase") == 2
+    assert (
+        report.save_junit(tmp_path / "junit.xml").read_text(encoding="utf-8").count("<testcase")
+        == 2
+    )
 
 
 def test_an_fmu_shows_what_it_declares(fmu_path, gfor):

@@ -34,7 +34,17 @@ COMMANDS_ALONE = {
         "generator",
         "junit",
     ),
-    *("method", "no_csv", "json", "with_linear_model", "per_unit", "units_checked", "scr", "retune", "beside"),
+    *(
+        "method",
+        "no_csv",
+        "json",
+        "with_linear_model",
+        "per_unit",
+        "units_checked",
+        "scr",
+        "retune",
+        "beside",
+    ),
 }
 """Options of errors that no function of the face has."""
 
@@ -76,7 +86,10 @@ def test_what_was_given_as_tables_is_named_as_it_was_given():
 
 
 def test_what_is_kept_of_a_point_is_the_same_for_everybody():
-    for error in (InputError("use --workers"), CaseError("x.toml", [Problem("--set a.b", "wrong")])):
+    for error in (
+        InputError("use --workers"),
+        CaseError("x.toml", [Problem("--set a.b", "wrong")]),
+    ):
         with as_options():
             kept = Failure.of(error)
         assert Failure.of(error) == kept
@@ -97,19 +110,25 @@ def faces():
 
 def test_an_option_of_an_error_is_a_keyword_of_some_function():
     """All texts of the program that name an option: it has a keyword, or is known to be of commands alone."""
-    keywords = {k for f in faces() for k in ([f] if isinstance(f, str) else inspect.signature(f).parameters)}
+    keywords = {
+        k for f in faces() for k in ([f] if isinstance(f, str) else inspect.signature(f).parameters)
+    }
     named = {}
     for path in [*(ROOT / "orchestrator").rglob("*.py")]:
         if any(other in path.as_posix() for other in OTHERS):
             continue
         tree = ast.parse(path.read_text(encoding="utf-8"))
-        raised = [node for node in ast.walk(tree) if isinstance(node, ast.Raise) and node.exc is not None]
+        raised = [
+            node for node in ast.walk(tree) if isinstance(node, ast.Raise) and node.exc is not None
+        ]
         texts = [c.value for r in raised for c in ast.walk(r.exc) if isinstance(c, ast.Constant)]
         for text in texts:
             if isinstance(text, str):
                 named |= dict.fromkeys(OPTION.findall(text), path.name)
     assert len(named) > 20
-    unknown = {o: p for o, p in named.items() if keyword(o) not in keywords | COMMANDS_ALONE | FOREIGN}
+    unknown = {
+        o: p for o, p in named.items() if keyword(o) not in keywords | COMMANDS_ALONE | FOREIGN
+    }
     assert not unknown
 
 

@@ -56,7 +56,9 @@ class Detuning:
     def prepared(self) -> tuple[Case, PreparedScenario]:
         case = load_case(CASES[self.case])
         values = {"*.native": True} | self.values
-        (ready,) = case.prepare([self.scenario], values, step_size=self.step_size, stop_time=SECONDS)
+        (ready,) = case.prepare(
+            [self.scenario], values, step_size=self.step_size, stop_time=SECONDS
+        )
         if self.jacobi:
             ready = replace(ready, schedule=jacobi(tuple(ready.system.components)))
         return case, ready
@@ -78,14 +80,20 @@ class Answers:
         stable = self.system <= 0 and self.coupled <= 0
         only_coupled = self.system <= 0 < self.coupled
         blamed = self.program.cause is Cause.COUPLING if only_coupled else True
-        return self.program.stable == stable and blamed and (self.simulated > 0) == (self.coupled > 0)
+        return (
+            self.program.stable == stable and blamed and (self.simulated > 0) == (self.coupled > 0)
+        )
 
     @property
     def verdict(self) -> str:
         """The program's, in a few words."""
         cause = f" by the {self.program.cause}" if self.program.cause else ""
-        hidden = ", hidden by the step" if self.program.stable is False and self.coupled <= 0 else ""
-        return f"{self.program.verdict}{cause}{hidden}" + ("" if self.agree else ": **they differ**")
+        hidden = (
+            ", hidden by the step" if self.program.stable is False and self.coupled <= 0 else ""
+        )
+        return f"{self.program.verdict}{cause}{hidden}" + (
+            "" if self.agree else ": **they differ**"
+        )
 
 
 # -- linear --------------------------------------------------------------------------------------------
@@ -98,7 +106,9 @@ def growth(values: np.ndarray) -> float:
 
 def exact_growth(case: Case, ready: PreparedScenario, detuning: Detuning) -> tuple[float, float]:
     """Of the continuous system, and of the step map with exactly integrated devices."""
-    network = network_of(case, detuning.scenario, detuning.values) if detuning.case == "wscc9" else None
+    network = (
+        network_of(case, detuning.scenario, detuning.values) if detuning.case == "wscc9" else None
+    )
     system = growth(np.linalg.eigvals(exact_continuous(ready, network)[0]))
     multipliers = np.linalg.eigvals(exact_step_map(ready, network)).astype(complex)
     coupled = np.log(multipliers[np.abs(multipliers) > 1e-9]) / ready.step_size
@@ -115,11 +125,15 @@ def pulses(ready: PreparedScenario) -> list[Event]:
         for v in sorted(ready.system.components["grid"].description.variables)
         if v.endswith(".scale")
     )
-    events: list[Event] = [LoadChange(t, "grid", load, scale) for t, scale in ((0.1, 1 + PULSE), (0.2, 1.0))]
+    events: list[Event] = [
+        LoadChange(t, "grid", load, scale) for t, scale in ((0.1, 1 + PULSE), (0.2, 1.0))
+    ]
     for k, name in enumerate(sorted(set(ready.system.components) - {"grid"})):
         reference = "exciter.V_ref" if name.startswith("sg") else "droop.P_ref"
         size = PULSE * (0.6 + 0.3 * k) * (-1) ** k
-        events += [ReferenceChange(t, name, reference, delta) for t, delta in ((0.1, size), (0.2, 0.0))]
+        events += [
+            ReferenceChange(t, name, reference, delta) for t, delta in ((0.1, size), (0.2, 0.0))
+        ]
     return events
 
 
@@ -178,7 +192,10 @@ def ask(detuning: Detuning) -> Answers:
 
 # -- drawing -------------------------------------------------------------------------------------------
 
-UNITS = {"two_area": (("sg1", "sg2"), ("gfor",)), "wscc9": (("sg1", "sg2", "sg3"), ("gfor1", "gfor2", "gfor3"))}
+UNITS = {
+    "two_area": (("sg1", "sg2"), ("gfor",)),
+    "wscc9": (("sg1", "sg2", "sg3"), ("gfor1", "gfor2", "gfor3")),
+}
 EXCITERS = {"sg1": ("K_PR", "K_IR"), "sg2": ("K_A", "T_C")}
 GAINS = {"K_A": 200.0, "T_C": 1.0, "K_PR": 3.15, "K_IR": 3.15}
 
@@ -192,7 +209,9 @@ def drawn_values(rng: np.random.Generator, case: str, scenario: str) -> dict[str
     """One to three groups of parameters of one device each, and the network."""
     machines, converters = UNITS[case]
     values: dict[str, float | bool] = {}
-    for group in rng.choice(["droop", "pod", "avr", "governor", "network"], rng.integers(1, 4), replace=False):
+    for group in rng.choice(
+        ["droop", "pod", "avr", "governor", "network"], rng.integers(1, 4), replace=False
+    ):
         sg, gfor = rng.choice(machines), rng.choice(converters)
         if group == "droop" and scenario != "base":
             values[f"{gfor}.droop.R_f"] = spread(rng, 0.05, 0.2, 60)
@@ -209,8 +228,14 @@ def drawn_values(rng: np.random.Generator, case: str, scenario: str) -> dict[str
         elif group == "governor":
             values[f"{sg}.governor.inverse_R"] = spread(rng, 20, 0.1, 10)
         elif group == "network":
-            line = "X_L" if case == "two_area" else rng.choice(["X_line_5_6", "X_line_6_7", "X_line_8_9"])
-            start = {"X_L": 0.1, "X_line_5_6": 0.17, "X_line_6_7": 0.1008, "X_line_8_9": 0.161}[line]
+            line = (
+                "X_L"
+                if case == "two_area"
+                else rng.choice(["X_line_5_6", "X_line_6_7", "X_line_8_9"])
+            )
+            start = {"X_L": 0.1, "X_line_5_6": 0.17, "X_line_6_7": 0.1008, "X_line_8_9": 0.161}[
+                line
+            ]
             values[f"grid.{line}"] = spread(rng, start, 0.2, 5)
     return values
 
@@ -219,7 +244,11 @@ def drawn(seed: int, index: int) -> Detuning:
     """One candidate; every fifth is coupled as it should not be."""
     rng = np.random.default_rng([seed, index])
     case = ("two_area", "wscc9")[index % 2]
-    choices = ("base", "gfor", "pod_p", "pod_q", "pod_pq") if case == "two_area" else ("base", "gfor", "pod_pq")
+    choices = (
+        ("base", "gfor", "pod_p", "pod_q", "pod_pq")
+        if case == "two_area"
+        else ("base", "gfor", "pod_pq")
+    )
     scenario = str(rng.choice(choices))
     values = drawn_values(rng, case, scenario)
     detuning = Detuning(f"{case} {index}", case, scenario, values)
@@ -250,14 +279,24 @@ def row(detuning: Detuning, answers: Answers | str) -> str:
     how = f"{1e6 * detuning.step_size:g} µs{', Jacobi' if detuning.jacobi else ''}"
     if isinstance(answers, str):
         return f"| {detuning.name} | {detuning.scenario} | {set_to} | {how} | {answers} |"
-    figures = " | ".join(f"{x:+.4g}" for x in (answers.program.largest_growth_rate, answers.coupled, answers.system))
-    simulated = answers.ending if np.isinf(answers.simulated) else f"{answers.simulated:+.3g} ({answers.ending})"
+    figures = " | ".join(
+        f"{x:+.4g}" for x in (answers.program.largest_growth_rate, answers.coupled, answers.system)
+    )
+    simulated = (
+        answers.ending
+        if np.isinf(answers.simulated)
+        else f"{answers.simulated:+.3g} ({answers.ending})"
+    )
     return f"| {detuning.name} | {detuning.scenario} | {set_to} | {how} | {figures} | {simulated} | {answers.verdict} |"
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("indices", type=int, nargs="*", default=FORTY, help="of other draws than the forty")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "indices", type=int, nargs="*", default=FORTY, help="of other draws than the forty"
+    )
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args()

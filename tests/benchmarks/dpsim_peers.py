@@ -71,9 +71,22 @@ def simulation(d: Any, *, recorded: bool) -> tuple[Any, list[Any]]:
     for m in SYSTEM.machines:
         part = d.emt.ph3.SynchronGenerator6bOrderVBR(f"G{m.bus}", d.LogLevel.off)
         part.set_operational_parameters_per_unit(
-            BASE, VOLTS, HERTZ, m.H, m.X_d, m.X_q, m.X_l, m.X_d1, m.X_q1, m.T_d10, m.T_q10, m.X_d2, m.X_d2,
-            m.T_d20, m.T_q20,
-        )  # fmt: skip
+            BASE,
+            VOLTS,
+            HERTZ,
+            m.H,
+            m.X_d,
+            m.X_q,
+            m.X_l,
+            m.X_d1,
+            m.X_q1,
+            m.T_d10,
+            m.T_q10,
+            m.X_d2,
+            m.X_d2,
+            m.T_d20,
+            m.T_q20,
+        )
         part.connect([buses[m.bus]])
         machines.append(part)
     for load in SYSTEM.loads:
@@ -84,7 +97,10 @@ def simulation(d: Any, *, recorded: bool) -> tuple[Any, list[Any]]:
     for line in SYSTEM.branches:
         part = d.emt.ph3.PiLine(f"T{line.a}{line.b}", d.LogLevel.off)
         part.set_parameters(
-            three(max(line.R, LEAST) * OHMS), three(line.X * OHMS / OMEGA), three(line.B / OHMS / OMEGA), three(0.0)
+            three(max(line.R, LEAST) * OHMS),
+            three(line.X * OHMS / OMEGA),
+            three(line.B / OHMS / OMEGA),
+            three(0.0),
         )
         part.connect([buses[line.a], buses[line.b]])
         parts.append(part)
@@ -138,7 +154,17 @@ def timed(command: list[str], pattern: str) -> tuple[float, float]:
 
 def main() -> None:
     """Print one line for each, the better of two, and the ratios."""
-    run = [sys.executable, "-m", "orchestrator.cli", "run", "wscc9", "--scenario", "base", "--step", "100 us"]
+    run = [
+        sys.executable,
+        "-m",
+        "orchestrator.cli",
+        "run",
+        "wscc9",
+        "--scenario",
+        "base",
+        "--step",
+        "100 us",
+    ]
     run += ["--stop", f"{STOP:g}", "--out", "{folder}/out"]
     peer = [sys.executable, *DPSIM[1:]]
     ours = r"│ +100000 │ +([\d,]+) │"
@@ -154,8 +180,12 @@ def main() -> None:
         best[name] = max(timed(command, pattern), timed(command, pattern))
         print(f"{name}: {best[name][0]:,.0f} steps/s, {best[name][1]:.2f} s in all", flush=True)
     for name in ("native FMUs", "Python-backed FMUs"):
-        silent, full = (best[name][0] / best[f"DPsim, {kind}"][0] for kind in ("nothing recorded", "12 signals"))
-        print(f"{name}: {silent:.2f} times DPsim that records nothing, {full:.2f} times DPsim with 12 signals")
+        silent, full = (
+            best[name][0] / best[f"DPsim, {kind}"][0] for kind in ("nothing recorded", "12 signals")
+        )
+        print(
+            f"{name}: {silent:.2f} times DPsim that records nothing, {full:.2f} times DPsim with 12 signals"
+        )
 
 
 if __name__ == "__main__":

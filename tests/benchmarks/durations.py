@@ -21,7 +21,9 @@ def measured(*options: str) -> dict[str, float]:
     with TemporaryDirectory() as folder:
         path = Path(folder) / "seconds"
         environment = {**os.environ, MEASURED: str(path)}
-        subprocess.run([sys.executable, "-m", "pytest", *options], cwd=ROOT, env=environment, check=False)
+        subprocess.run(
+            [sys.executable, "-m", "pytest", *options], cwd=ROOT, env=environment, check=False
+        )
         return read_list(path)
 
 
@@ -31,8 +33,12 @@ def write(seconds: dict[str, float], path: Path = LIST) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="python -m tests.benchmarks.durations", description=__doc__.split("\n")[0])
-    parser.add_argument("--longest", action="store_true", help="show the list's twenty longest instead")
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.benchmarks.durations", description=__doc__.split("\n")[0]
+    )
+    parser.add_argument(
+        "--longest", action="store_true", help="show the list's twenty longest instead"
+    )
     if parser.parse_args().longest:
         for test, seconds in sorted(read_list().items(), key=lambda entry: -entry[1])[:20]:
             print(f"{seconds:8.1f} s  {test}")

@@ -107,7 +107,9 @@ def empty_fmu(folder: Path, inputs: int, outputs: int, lean: bool) -> FmuDescrip
     name = f"Empty_{inputs}_{outputs}_{'lean' if lean else 'plain'}"
     more = _LEAN.format(inputs=inputs, outputs=outputs) if lean else ""
     script = folder / f"{name.lower()}_model.py"
-    script.write_text(_EMPTY.format(name=name, inputs=inputs, outputs=outputs, more=more), encoding="utf-8")
+    script.write_text(
+        _EMPTY.format(name=name, inputs=inputs, outputs=outputs, more=more), encoding="utf-8"
+    )
     with redirect_stdout(StringIO()):
         return read_description(FmuBuilder.build_FMU(script, dest=folder))
 
@@ -140,8 +142,12 @@ def print_speed(prepared: PreparedScenario) -> None:
     with tempfile.TemporaryDirectory() as folder:
         for lean, what in ((False, "with attributes"), (True, "with their variables in a list")):
             copy = empty_copy(prepared.system, Path(folder), lean)
-            empty, _ = best_rate(lambda c=copy: Master(c, prepared.schedule, prepared.step_size), STEPS)  # type: ignore[misc]
-            print(f"  {n} empty pythonfmu models {what}: {empty:,.0f} steps/s; ours / empty = {rate / empty:.2f}")
+            empty, _ = best_rate(
+                lambda c=copy: Master(c, prepared.schedule, prepared.step_size), STEPS
+            )  # type: ignore[misc]
+            print(
+                f"  {n} empty pythonfmu models {what}: {empty:,.0f} steps/s; ours / empty = {rate / empty:.2f}"
+            )
 
 
 def print_native(case: Case, backed: PreparedScenario) -> None:
@@ -218,7 +224,9 @@ def print_linearisation(case: Case, prepared: PreparedScenario) -> None:
     parts = linearise(prepared)
     ours = parts.blocks + parts.compose
     brute, difference = brute_force(prepared, parts.model)
-    print(f"{parts.model.number_of_states} states: {whole:.1f} s from built FMUs to modes (compute_modes); of this:")
+    print(
+        f"{parts.model.number_of_states} states: {whole:.1f} s from built FMUs to modes (compute_modes); of this:"
+    )
     print(
         f"  instances {parts.instances:.2f} s, steady state {parts.steady_state:.2f} s, blocks {parts.blocks:.2f} s, "
         f"compose {parts.compose:.2f} s, eigenvalues alone {parts.eigenvalues:.2f} s"
@@ -229,7 +237,9 @@ def print_linearisation(case: Case, prepared: PreparedScenario) -> None:
         f"{BRUTE_FORCE_SAMPLE} states; brute force / ours = {brute / ours:.1f}; with two perturbation sizes, as blocks "
         f"take them: {2 * brute / ours:.1f}"
     )
-    print(f"  largest difference between the two in those {BRUTE_FORCE_SAMPLE} columns: {difference:.1e}")
+    print(
+        f"  largest difference between the two in those {BRUTE_FORCE_SAMPLE} columns: {difference:.1e}"
+    )
 
 
 # -- growth --------------------------------------------------------------------------------------
@@ -275,16 +285,40 @@ converter = "gfor"
 
 
 def print_growth() -> None:
-    print("growth (rings of generators; seconds of the linearisation's parts, total from built FMUs to eigenvalues):")
-    columns = ("FMUs", "states", "steps/s", "us/step/FMU", "outside", "steady", "blocks", "compose", "eigen", "total")
+    print(
+        "growth (rings of generators; seconds of the linearisation's parts, total from built FMUs to eigenvalues):"
+    )
+    columns = (
+        "FMUs",
+        "states",
+        "steps/s",
+        "us/step/FMU",
+        "outside",
+        "steady",
+        "blocks",
+        "compose",
+        "eigen",
+        "total",
+    )
     print("  " + "".join(f"{c:>12}" for c in columns), flush=True)
     with tempfile.TemporaryDirectory() as folder:
         for fmus in RING_FMUS:
             (prepared,) = load_case(ring_case(Path(folder), fmus - 1)).prepare()
             rate, share = best_rate(lambda p=prepared: start(p), max(500, 100_000 // fmus))  # type: ignore[misc]
             parts = linearise(prepared)
-            seconds = (parts.steady_state, parts.blocks, parts.compose, parts.eigenvalues, parts.total)
-            cells = [f"{fmus}", f"{parts.model.number_of_states}", f"{rate:,.0f}", f"{1e6 / rate / fmus:.2f}"]
+            seconds = (
+                parts.steady_state,
+                parts.blocks,
+                parts.compose,
+                parts.eigenvalues,
+                parts.total,
+            )
+            cells = [
+                f"{fmus}",
+                f"{parts.model.number_of_states}",
+                f"{rate:,.0f}",
+                f"{1e6 / rate / fmus:.2f}",
+            ]
             cells += [f"{1 - share:.1%}", *(f"{s:.2f}" for s in seconds)]
             print("  " + "".join(f"{c:>12}" for c in cells), flush=True)
 

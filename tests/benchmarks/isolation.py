@@ -46,7 +46,9 @@ def main() -> None:
         for name, path in paths.items():
             inside, _ = microseconds(path, isolated=False)
             outside, start = microseconds(path, isolated=True)
-            print(f"{name}: {inside:.2f} us in process, {outside:.2f} us isolated, started in {start:.2f} s")
+            print(
+                f"{name}: {inside:.2f} us in process, {outside:.2f} us isolated, started in {start:.2f} s"
+            )
 
 
 if __name__ == "__main__":

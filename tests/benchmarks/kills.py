@@ -59,7 +59,9 @@ def left_behind(group: int, tmp: Path) -> Iterator[str]:
         pass
 
 
-def attempt(case: Path, folder: Path, kind: int, moment: float, wanted: dict[str, Any]) -> tuple[str, list[str]]:
+def attempt(
+    case: Path, folder: Path, kind: int, moment: float, wanted: dict[str, Any]
+) -> tuple[str, list[str]]:
     """End a run at a moment [s] and resume it; where that was, and what is wrong."""
     out, tmp = folder / "out", folder / "tmp"
     words = (case, *WORDS, "--out", out, "--checkpoint", "0.05")
@@ -78,7 +80,11 @@ def attempt(case: Path, folder: Path, kind: int, moment: float, wanted: dict[str
         there = out.rglob("*") if out.exists() else []
         return where, [
             *wrong,
-            *(f"it is there: {path.name}" for path in there if path.name not in (".lock", ".checkpoints")),
+            *(
+                f"it is there: {path.name}"
+                for path in there
+                if path.name not in (".lock", ".checkpoints")
+            ),
         ]
     if code != 0 and where != "when all was done":
         again = started(tmp, "--resume", out)
@@ -88,8 +94,13 @@ def attempt(case: Path, folder: Path, kind: int, moment: float, wanted: dict[str
     try:
         found = values_of(out)
     except ValueError as error:  # a file that nobody can read
-        there = [f"{path.relative_to(out)} ({path.stat().st_size} B)" for path in sorted(out.rglob("*"))]
-        return where, [*wrong, f"exit code {code}; {' '.join(str(error).split())[:200]}; there is: {', '.join(there)}"]
+        there = [
+            f"{path.relative_to(out)} ({path.stat().st_size} B)" for path in sorted(out.rglob("*"))
+        ]
+        return where, [
+            *wrong,
+            f"exit code {code}; {' '.join(str(error).split())[:200]}; there is: {', '.join(there)}",
+        ]
     names = [name for name in {*found, *wanted} if found.get(name) != wanted.get(name)]
     return where, [*wrong, *(f"other values: {name}" for name in sorted(names))]
 
@@ -119,11 +130,15 @@ def main() -> None:
     chance = random.Random(seed)
     with tempfile.TemporaryDirectory() as top, ThreadPoolExecutor(AT_A_TIME) as pool:
         case = write_case(Path(top) / "events.toml", STOP, TIMES)
-        wholes = list(pool.map(lambda k: undisturbed(case, Path(top) / f"whole_{k}"), range(AT_A_TIME)))
+        wholes = list(
+            pool.map(lambda k: undisturbed(case, Path(top) / f"whole_{k}"), range(AT_A_TIME))
+        )
         wanted, life = wholes[0][0], max(seconds for _, seconds in wholes)
         assert all(values == wanted for values, _ in wholes)
         print(f"seed {seed}; an undisturbed run takes {life:.1f} s of a processor", flush=True)
-        moments = [(kind, chance.uniform(0, life)) for kind, count in tries.items() for _ in range(count)]
+        moments = [
+            (kind, chance.uniform(0, life)) for kind, count in tries.items() for _ in range(count)
+        ]
         chance.shuffle(moments)
         found: Counter[tuple[str, str]] = Counter()
         wrong = 0
@@ -134,7 +149,10 @@ def main() -> None:
 
         for kind, moment, where, errors in pool.map(one, range(len(moments))):
             name = signal.Signals(kind).name
-            print(f"{name} at {moment:5.2f} s: {where}: {'; '.join(errors) or 'equal to the last bit'}", flush=True)
+            print(
+                f"{name} at {moment:5.2f} s: {where}: {'; '.join(errors) or 'equal to the last bit'}",
+                flush=True,
+            )
             found[name, where] += 1
             wrong += bool(errors)
         for (name, where), count in sorted(found.items()):

@@ -13,7 +13,11 @@ from orchestrator.api.case import load
 from orchestrator.coupling.schedule import SCHEDULES, ScheduleName
 from orchestrator.study.modes import running
 
-RUNS: tuple[tuple[ScheduleName, float], ...] = (("gauss-seidel", 1e-4), ("midpoint", 5e-4), ("newton", 5e-4))
+RUNS: tuple[tuple[ScheduleName, float], ...] = (
+    ("gauss-seidel", 1e-4),
+    ("midpoint", 5e-4),
+    ("newton", 5e-4),
+)
 """Schedules with their steps [s]; the first is what the others are compared with."""
 
 SAME_STEP: tuple[tuple[ScheduleName, float], ...] = tuple((name, 1e-4) for name in SCHEDULES)
@@ -28,7 +32,9 @@ SHORT = {"two_area": 0.2, "ieee118": 0.015}
 TURNS = 5
 
 
-def measure(case: str, turn: float, runs: Sequence[tuple[ScheduleName, float]], *, native: bool) -> list[float]:
+def measure(
+    case: str, turn: float, runs: Sequence[tuple[ScheduleName, float]], *, native: bool
+) -> list[float]:
     """Processor time a simulated second [s] of each of some runs, the best of some turns.
 
     Parameters
@@ -46,7 +52,9 @@ def measure(case: str, turn: float, runs: Sequence[tuple[ScheduleName, float]], 
     file, best = load(case), [float("inf")] * len(runs)
     with ExitStack() as stack:
         masters = [
-            stack.enter_context(running(file.scenario("pod_pq", values, step=step, schedule=schedule).prepared))
+            stack.enter_context(
+                running(file.scenario("pod_pq", values, step=step, schedule=schedule).prepared)
+            )
             for schedule, step in runs
         ]
         for k in range(1, TURNS + 1):
@@ -59,7 +67,9 @@ def measure(case: str, turn: float, runs: Sequence[tuple[ScheduleName, float]], 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(prog="python -m tests.benchmarks.larger_steps", description=__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.benchmarks.larger_steps", description=__doc__.split("\n")[0]
+    )
     parser.add_argument("--native", action="store_true")
     parser.add_argument("--same-step", action="store_true")
     options = parser.parse_args(arguments)
@@ -69,7 +79,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         for (schedule, step), seconds in zip(runs, found, strict=True):
             rate = f"{1 / (seconds * step):,.0f} steps/s, " if options.same_step else ""
             ratio = seconds / found[0]
-            print(f"{case}: {schedule} at {step:g} s: {seconds:.3g} s, {rate}ratio {ratio:.2f}", flush=True)
+            print(
+                f"{case}: {schedule} at {step:g} s: {seconds:.3g} s, {rate}ratio {ratio:.2f}",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

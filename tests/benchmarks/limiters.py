@@ -72,16 +72,32 @@ class Row:
     def text(self) -> str:
         """As a line of the page's table."""
 
-        cells = [self.limiter, f"{self.power:g}", f"{self.ratio:g}", f"{self.peak:.2f}", f"{self.steady:.2f}"]
-        cells += [f"≥ {most:g}" if most == tried[-1] else f"{most:g}" for most, tried in (
-            (self.dip, DIPS), (self.short, DIPS), (self.forwards, JUMPS), (self.backwards, JUMPS)
-        )]  # fmt: skip
+        cells = [
+            self.limiter,
+            f"{self.power:g}",
+            f"{self.ratio:g}",
+            f"{self.peak:.2f}",
+            f"{self.steady:.2f}",
+        ]
+        cells += [
+            f"≥ {most:g}" if most == tried[-1] else f"{most:g}"
+            for most, tried in (
+                (self.dip, DIPS),
+                (self.short, DIPS),
+                (self.forwards, JUMPS),
+                (self.backwards, JUMPS),
+            )
+        ]
         return f"| {' | '.join(cells)} |"
 
 
-def dip(grid: AtGrid, values: dict[str, float], left: float, seconds: float, after: float = _AFTER) -> Response:
+def dip(
+    grid: AtGrid, values: dict[str, float], left: float, seconds: float, after: float = _AFTER
+) -> Response:
     """A dip to a part of the source's voltage."""
-    return grid.run(values, [(_BEFORE, {}), (seconds, {"source.v": left}), (after, {"source.v": 1.0})])
+    return grid.run(
+        values, [(_BEFORE, {}), (seconds, {"source.v": left}), (after, {"source.v": 1.0})]
+    )
 
 
 def jump(grid: AtGrid, values: dict[str, float], degrees: float) -> Response:
@@ -115,10 +131,16 @@ def row(limiter: str, power: float, ratio: float) -> Row:
     deep = dip(grid, values, 0.2, 0.15, after=0.3)["i_s"]
     at = round((_BEFORE + 0.14) / 1e-3)
     return Row(
-        limiter, power, ratio, float(deep.max()), float(deep[at]),
-        critical_clearing_time(grid, values, 0.2), critical_clearing_time(grid, values, 0.0),
-        largest_jump(grid, values, 1), largest_jump(grid, values, -1),
-    )  # fmt: skip
+        limiter,
+        power,
+        ratio,
+        float(deep.max()),
+        float(deep[at]),
+        critical_clearing_time(grid, values, 0.2),
+        critical_clearing_time(grid, values, 0.0),
+        largest_jump(grid, values, 1),
+        largest_jump(grid, values, -1),
+    )
 
 
 def rows(word: str = "") -> Iterator[Row]:
@@ -129,7 +151,9 @@ def rows(word: str = "") -> Iterator[Row]:
 
 
 def main(words: list[str]) -> None:
-    print("| Limit | P_0 | SCR | peak | in the dip | dip to 0.2 | dip to 0 | jump ahead | jump back |")
+    print(
+        "| Limit | P_0 | SCR | peak | in the dip | dip to 0.2 | dip to 0 | jump ahead | jump back |"
+    )
     print("|---|---|---|---|---|---|---|---|---|")
     for found in rows(*words):
         print(found.text(), flush=True)

@@ -85,7 +85,9 @@ def libcosim(observe: bool) -> tuple[Stepper, Reader]:
 
 def ecos(_observe: bool) -> tuple[Stepper, Reader]:
     simulation = drivers.ecos_simulation(job_of_two_area())
-    return lambda count: simulation.step(count) and None, lambda: simulation.get_real("::".join(WATCHED))
+    return lambda count: simulation.step(count) and None, lambda: simulation.get_real(
+        "::".join(WATCHED)
+    )
 
 
 def container(sequential: bool, stretch: int) -> Runner:
@@ -116,9 +118,17 @@ MASTERS: dict[str, tuple[Runner, str, str]] = {
     "libcosim (Jacobi)": (libcosim, "libcosimpy", "ours, Jacobi"),
     "Ecos (Jacobi)": (ecos, "ecospy tbb", "ours, Jacobi"),
     "container, parallel": (container(False, 1), CONTAINER, "ours, Jacobi"),
-    f"container, parallel, {LONG} steps a doStep": (container(False, LONG), CONTAINER, "ours, Jacobi"),
+    f"container, parallel, {LONG} steps a doStep": (
+        container(False, LONG),
+        CONTAINER,
+        "ours, Jacobi",
+    ),
     "container, sequential": (container(True, 1), CONTAINER, "ours, Gauss-Seidel"),
-    f"container, sequential, {LONG} steps a doStep": (container(True, LONG), CONTAINER, "ours, Gauss-Seidel"),
+    f"container, sequential, {LONG} steps a doStep": (
+        container(True, LONG),
+        CONTAINER,
+        "ours, Gauss-Seidel",
+    ),
 }
 
 
@@ -151,7 +161,9 @@ def run_apart(label: str) -> dict[str, Any] | str:
         if line.startswith("RESULT"):
             return json.loads(line.removeprefix("RESULT"))
     package = MASTERS[label][1]
-    if package and ("ModuleNotFoundError" in done.stderr or "cannot open shared object" in done.stderr):
+    if package and (
+        "ModuleNotFoundError" in done.stderr or "cannot open shared object" in done.stderr
+    ):
         return f"not installed: pip install {package}"
     said = done.stderr.strip().splitlines() or [f"return code {done.returncode}"]
     return f"did not run: {said[-1]}"
@@ -160,7 +172,9 @@ def run_apart(label: str) -> dict[str, Any] | str:
 def table(results: dict[str, dict[str, Any] | str]) -> Sequence[str]:
     ours = results["ours, Gauss-Seidel"]
     assert isinstance(ours, dict), ours
-    lines = [f"{'master':42} {'steps/s':>9} {'ours / it':>9}  largest difference of sg1.omega from ours [pu]"]
+    lines = [
+        f"{'master':42} {'steps/s':>9} {'ours / it':>9}  largest difference of sg1.omega from ours [pu]"
+    ]
     for label, result in results.items():
         if isinstance(result, str):
             lines.append(f"{label:42} {result}")

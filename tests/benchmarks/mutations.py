@@ -10,6 +10,7 @@ import argparse
 import hashlib
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -54,8 +55,11 @@ class Mutation:
     tests: tuple[str, ...]
 
     def applied(self, text: str) -> str | None:
-        """The file's text with the mistake; None where ``old`` does not occur exactly once."""
-        return text.replace(self.old, self.new) if text.count(self.old) == 1 else None
+        """The file's text with the mistake; None where ``old`` does not occur exactly once, however it is laid out."""
+        places = list(re.finditer(in_any_layout(self.old), text))
+        if len(places) != 1:
+            return None
+        return text[: places[0].start()] + self.new + text[places[0].end() :]
 
     def key(self, root: Path) -> str:
         """Names what a result rests on: the entry, the file, and the files of tests."""
@@ -74,6 +78,13 @@ class Outcome:
     seconds: float = 0.0
     by: str = ""
     key: str = ""
+
+
+def in_any_layout(code: str) -> str:
+    """A pattern that matches code whichever way the formatter breaks its lines."""
+    pattern = re.sub(r"\\?\s+", r"\\s+", re.escape(code))
+    pattern = re.sub(r"(\\[(\[{])(\\s\+)?", r"\1\\s*", pattern)
+    return re.sub(r"(\\s\+)?(\\[)\]}])", r",?\\s*\2", pattern)
 
 
 def read_list(path: Path = LIST) -> list[Mutation]:
@@ -97,7 +108,9 @@ class Copy:
     def passes_without(self, tests: tuple[str, ...], limit: float) -> bool:
         """Whether some tests, and at least one, pass as the code is; first builds may take them longer."""
         if tests not in self._plain:
-            self._plain[tests] = self._run(tests, limit + _FIRST_BUILDS, self._caches / "plain")[0] == 0
+            self._plain[tests] = (
+                self._run(tests, limit + _FIRST_BUILDS, self._caches / "plain")[0] == 0
+            )
         return self._plain[tests]
 
     def try_out(self, mutation: Mutation, limit: float) -> Outcome:
@@ -126,7 +139,9 @@ class Copy:
             return replace(found, verdict=UNCLEAR)
         return found
 
-    def _made(self, path: Path, before: str, after: str, tests: Sequence[str], limit: float) -> Outcome:
+    def _made(
+        self, path: Path, before: str, after: str, tests: Sequence[str], limit: float
+    ) -> Outcome:
         # Built files are named by what they are made from, but not by the code that makes them: each gets a cache.
         cache = self._caches / "mutated"
         shutil.copytree(self._caches / "plain", cache, copy_function=os.link, dirs_exist_ok=True)
@@ -140,7 +155,9 @@ class Copy:
         seconds = round(perf_counter() - begin, 1)
         if code is None:
             return Outcome(TOO_SLOW, seconds)
-        return Outcome(SURVIVED if code in (0, 5) else CAUGHT, seconds, first)  # 5: nothing was selected
+        return Outcome(
+            SURVIVED if code in (0, 5) else CAUGHT, seconds, first
+        )  # 5: nothing was selected
 
     def _run(self, tests: Sequence[str], limit: float, cache: Path) -> tuple[int | None, str]:
         """Exit code of pytest, None if it took too long, and the first test that failed."""
@@ -161,12 +178,21 @@ class Copy:
         drop = ("CI", "PYTEST_ADDOPTS", "PYTEST_XDIST_WORKER", "PYTEST_CURRENT_TEST")
         environment = {name: value for name, value in os.environ.items() if name not in drop}
         # Bytecode is told from older by seconds and size: a mistake of equal length would not be seen.
-        environment |= {"PYTHONPATH": str(self.tree), "PYTHONDONTWRITEBYTECODE": "1", "GFOR_COSIM_CACHE": str(cache)}
+        environment |= {
+            "PYTHONPATH": str(self.tree),
+            "PYTHONDONTWRITEBYTECODE": "1",
+            "GFOR_COSIM_CACHE": str(cache),
+        }
         environment["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"  # a start costs a fifth
         process = subprocess.Popen(
-            command, cwd=self.tree, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+            command,
+            cwd=self.tree,
+            env=environment,
+            text=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
             start_new_session=True,
-        )  # fmt: skip
+        )
         try:
             printed, _ = process.communicate(timeout=limit)
         except subprocess.TimeoutExpired:
@@ -185,7 +211,11 @@ def _files(root: Path) -> list[str]:
 
 
 def run_all(
-    mutations: Iterable[Mutation], root: Path, workers: int, limit: float, tell: Callable[[Mutation, Outcome], None]
+    mutations: Iterable[Mutation],
+    root: Path,
+    workers: int,
+    limit: float,
+    tell: Callable[[Mutation, Outcome], None],
 ) -> None:
     """Try mutations out, each worker in a copy of its own; equal selections are run once without a mistake."""
     groups: dict[tuple[str, ...], list[Mutation]] = {}
@@ -204,7 +234,10 @@ def run_all(
                 with lock:
                     tell(mutation, outcome)
 
-    with tempfile.TemporaryDirectory(prefix="mutations") as folder, ThreadPoolExecutor(workers) as pool:
+    with (
+        tempfile.TemporaryDirectory(prefix="mutations") as folder,
+        ThreadPoolExecutor(workers) as pool,
+    ):
         for done in [pool.submit(work, Path(folder) / str(k)) for k in range(workers)]:
             done.result()
 
@@ -214,7 +247,9 @@ def page(mutations: Sequence[Mutation], outcomes: dict[str, Outcome]) -> str:
     known = [(m, outcomes[m.name]) for m in mutations if m.name in outcomes]
     count = Counter(outcome.verdict for _, outcome in known)
     score = f"**{count[CAUGHT]} of {len(known)} caught**" + (
-        f"; {len(mutations) - len(known)} of the list were not run" if len(known) < len(mutations) else ""
+        f"; {len(mutations) - len(known)} of the list were not run"
+        if len(known) < len(mutations)
+        else ""
     )
     lines = [
         "# Would the tests notice?",
@@ -224,12 +259,18 @@ def page(mutations: Sequence[Mutation], outcomes: dict[str, Outcome]) -> str:
         "",
         score + ".",
         "",
-        *(f"- {verdict} ({count[verdict]}): {text}" for verdict, text in MEANING.items() if count[verdict]),
+        *(
+            f"- {verdict} ({count[verdict]}): {text}"
+            for verdict, text in MEANING.items()
+            if count[verdict]
+        ),
         "",
         "| Mistake | File | Verdict | First test that failed |",
         "|---|---|---|---|",
     ]
-    for mutation, outcome in sorted(known, key=lambda entry: (entry[1].verdict == CAUGHT, entry[0].file)):
+    for mutation, outcome in sorted(
+        known, key=lambda entry: (entry[1].verdict == CAUGHT, entry[0].file)
+    ):
         name, by = (text.replace("|", "\\|") for text in (mutation.name, outcome.by))
         verdict = outcome.verdict if outcome.verdict == CAUGHT else f"**{outcome.verdict}**"
         lines.append(f"| {name} | `{mutation.file}` | {verdict} | {f'`{by}`' if by else '–'} |")
@@ -237,37 +278,59 @@ def page(mutations: Sequence[Mutation], outcomes: dict[str, Outcome]) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="python -m tests.benchmarks.mutations", description=__doc__.split("\n")[0])
-    parser.add_argument("--only", action="append", metavar="NAME", help="those with this in their name (repeatable)")
-    parser.add_argument("--workers", type=int, default=1, metavar="N", help="copies that work side by side (1)")
-    parser.add_argument("--limit", type=float, default=300.0, metavar="S", help="seconds for one run of tests (300)")
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.benchmarks.mutations", description=__doc__.split("\n")[0]
+    )
+    parser.add_argument(
+        "--only", action="append", metavar="NAME", help="those with this in their name (repeatable)"
+    )
+    parser.add_argument(
+        "--workers", type=int, default=1, metavar="N", help="copies that work side by side (1)"
+    )
+    parser.add_argument(
+        "--limit", type=float, default=300.0, metavar="S", help="seconds for one run of tests (300)"
+    )
     parser.add_argument("--again", action="store_true", help="run also those whose result is known")
     options = parser.parse_args(arguments)
 
     mutations = read_list()
-    chosen = [m for m in mutations if not options.only or any(text in m.name for text in options.only)]
+    chosen = [
+        m for m in mutations if not options.only or any(text in m.name for text in options.only)
+    ]
     if not chosen:
         parser.error(f"no mutation has {' or '.join(map(repr, options.only))} in its name")
     stored = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else {}
     known = {name: Outcome(**entry) for name, entry in stored.items()}
-    known = {m.name: known[m.name] for m in mutations if m.name in known and known[m.name].key == m.key(ROOT)}
+    known = {
+        m.name: known[m.name]
+        for m in mutations
+        if m.name in known and known[m.name].key == m.key(ROOT)
+    }
     if options.again:
-        known = {name: outcome for name, outcome in known.items() if name not in {m.name for m in chosen}}
+        known = {
+            name: outcome for name, outcome in known.items() if name not in {m.name for m in chosen}
+        }
 
     def tell(mutation: Mutation, outcome: Outcome) -> None:
-        print(f"{outcome.verdict}: {mutation.name} ({outcome.seconds:.0f} s) {outcome.by}", flush=True)
+        print(
+            f"{outcome.verdict}: {mutation.name} ({outcome.seconds:.0f} s) {outcome.by}", flush=True
+        )
         known[mutation.name] = outcome
         write()
 
     def write() -> None:
         entries = {name: asdict(known[name]) for name in sorted(known)}
-        RESULTS.write_text(json.dumps(entries, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        RESULTS.write_text(
+            json.dumps(entries, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
+        )
         PAGE.write_text(page(mutations, known), encoding="utf-8")
 
     run_all([m for m in chosen if m.name not in known], ROOT, options.workers, options.limit, tell)
     write()
     verdicts = [known[m.name].verdict for m in chosen]
-    print(f"{verdicts.count(CAUGHT)} of {len(verdicts)} caught; the table is in {PAGE.relative_to(ROOT)}")
+    print(
+        f"{verdicts.count(CAUGHT)} of {len(verdicts)} caught; the table is in {PAGE.relative_to(ROOT)}"
+    )
     return 0 if all(verdict == CAUGHT for verdict in verdicts) else 1
 
 

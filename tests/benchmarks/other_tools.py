@@ -22,12 +22,19 @@ def said(path: Path) -> str:
     try:
         done = subprocess.run(
             [sys.executable, "-m", "orchestrator.cli", "fmu", "check", str(path)],
-            capture_output=True, text=True, timeout=_PATIENCE, check=False,
-        )  # fmt: skip
+            capture_output=True,
+            text=True,
+            timeout=_PATIENCE,
+            check=False,
+        )
     except subprocess.TimeoutExpired:
         return f"no answer in {_PATIENCE} s"
     lines = (done.stdout.strip() or done.stderr.strip()).splitlines()
-    return lines[-1].removeprefix("error: ").removeprefix(f"{path}: ").removeprefix(f"{path.name}: ") if lines else ""
+    return (
+        lines[-1].removeprefix("error: ").removeprefix(f"{path}: ").removeprefix(f"{path.name}: ")
+        if lines
+        else ""
+    )
 
 
 def main() -> None:

@@ -69,7 +69,9 @@ def delayed_case(name: str, folder: Path) -> Case:
         raw["components"]["gfor"]["model"] = "gfor_pod_input"
         converters = ["gfor"]
     raw["connections"] = [{"from": f"{c}.omega", "to": f"{c}.omega_pod"} for c in converters]
-    raw["imperfections"] = {"latency": {"type": "delay", "connection": "gfor*.omega -> gfor*.omega_pod", "delay": 0.0}}
+    raw["imperfections"] = {
+        "latency": {"type": "delay", "connection": "gfor*.omega -> gfor*.omega_pod", "delay": 0.0}
+    }
     raw["scenarios"] = {pod: raw["scenarios"][pod] for pod in PODS}
     path = folder / "case.toml"
     path.write_text(tomli_w.dumps(raw), encoding="utf-8")
@@ -87,14 +89,19 @@ class Latency:
     def model(self, delay: float) -> LinearModel:
         """The step map with this delay [s]."""
         wires = [c for c in self.master.system.connections if c.target.variable == "omega_pod"]
-        self.blocks.links = {c.target: WireLink(str(c), delay, is_cut=False) for c in wires} if delay else {}
+        self.blocks.links = (
+            {c.target: WireLink(str(c), delay, is_cut=False) for c in wires} if delay else {}
+        )
         return compose(self.blocks, self.master.schedule)
 
     def damping(self, delay: float) -> dict[str, complex]:
         """The modes that fit the case's names best [rad/s], also where another one fits about as well."""
         model = self.model(delay)
         modes = [mode for mode in find_spectrum(model, *_EM_HZ).modes if mode.is_oscillation]
-        return {name: mode.eigenvalue for name, (mode, _) in named_modes(self.case, model, modes).fits.items()}
+        return {
+            name: mode.eigenvalue
+            for name, (mode, _) in named_modes(self.case, model, modes).fits.items()
+        }
 
     def mode(self, delay: float) -> complex:
         """The first of them."""
@@ -106,7 +113,9 @@ class Latency:
         modes = find_spectrum(model, _EM_HZ[0], _FASTEST_HZ).modes
         shape = min(modes, key=lambda mode: abs(mode.eigenvalue - wanted)).shape
         states = np.array([shape[name] for name in model.names])
-        outputs = model.settle((model.H @ states).real.copy()) + 1j * model.settle((model.H @ states).imag.copy())
+        outputs = model.settle((model.H @ states).real.copy()) + 1j * model.settle(
+            (model.H @ states).imag.copy()
+        )
         return states, complex(outputs[self.master.output_names.index("gfor.omega")])
 
     def worst(self, delay: float) -> complex:
@@ -116,7 +125,9 @@ class Latency:
             critical = find_critical_modes(model, _EM_HZ[0], _FASTEST_HZ, 0.06)
             return critical[0].eigenvalue if critical else complex(-1.0)
         values = eigenvalues(model)
-        swinging = values[(values.imag > 2 * np.pi * 0.05) & (values.imag < 2 * np.pi * _FASTEST_HZ)]
+        swinging = values[
+            (values.imag > 2 * np.pi * 0.05) & (values.imag < 2 * np.pi * _FASTEST_HZ)
+        ]
         return complex(swinging[np.argmax(swinging.real / np.abs(swinging))])
 
     def margin(self, least: float, looks: Sequence[float], close: float) -> tuple[float, complex]:
@@ -160,7 +171,9 @@ def latency(case: Case, scenario: str) -> Iterator[Latency]:
         yield Latency(case, Blocks(master), master)
 
 
-def rung_down(case: Case, scenario: str, delay: float, system: Latency, eigenvalue: complex) -> complex:
+def rung_down(
+    case: Case, scenario: str, delay: float, system: Latency, eigenvalue: complex
+) -> complex:
     """A mode [rad/s] of the two-area system in a run that begins in it: the states, and what is on its way, move in it.
 
     So the mode is seen by itself where another one grows as well.
@@ -188,9 +201,14 @@ def rung_down(case: Case, scenario: str, delay: float, system: Latency, eigenval
             if bank is not None:
                 (ring,) = bank._rings
                 ago = np.arange(len(ring), 0, -1)  # the oldest stands where the next is written
-                ring[:] = 1 + _AMPLITUDE * (measured * np.exp(-eigenvalue * ago * prepared.step_size)).real
+                ring[:] = (
+                    1
+                    + _AMPLITUDE * (measured * np.exp(-eigenvalue * ago * prepared.step_size)).real
+                )
         master.run(2.0, (), [recorder])
-    return nearest(identify_modes(recorder.times, recorder.values[:, 0] - recorder.values[:, 1]), eigenvalue).eigenvalue
+    return nearest(
+        identify_modes(recorder.times, recorder.values[:, 0] - recorder.values[:, 1]), eigenvalue
+    ).eigenvalue
 
 
 def percent(value: complex) -> float:
@@ -206,7 +224,10 @@ def main(name: str = "two_area") -> None:
             with latency(case, pod) as system:
                 for least in (0.0, 0.05):
                     delay, mode = system.margin(least, *LOOKS[name])
-                    print(f"{title}: damping {100 * least:g} % at {1e3 * delay:.1f} ms, {mode:.4g} rad/s", flush=True)
+                    print(
+                        f"{title}: damping {100 * least:g} % at {1e3 * delay:.1f} ms, {mode:.4g} rad/s",
+                        flush=True,
+                    )
                 for delay in DELAYS if name == "two_area" else ():
                     mode = system.mode(delay)
                     seen = rung_down(case, pod, delay, system, mode)
@@ -226,12 +247,19 @@ def draw(picture: str) -> None:
             with latency(case, pod) as system:
                 delays = np.linspace(0, 0.2, 21)
                 label = f"{title}, inter-area mode"
-                axes.plot(1e3 * delays, [percent(system.mode(d)) for d in delays], f"C{k}-", label=label)
+                axes.plot(
+                    1e3 * delays, [percent(system.mode(d)) for d in delays], f"C{k}-", label=label
+                )
                 seen = [percent(rung_down(case, pod, d, system, system.mode(d))) for d in DELAYS]
                 axes.plot(1e3 * np.array(DELAYS), seen, f"C{k}o", label=f"{title}, simulated")
                 if pod != "pod_q":
                     worst = [percent(system.worst(d)) for d in delays]
-                    axes.plot(1e3 * delays, worst, f"C{k}:", label=f"{title}, least damped mode up to 20 Hz")
+                    axes.plot(
+                        1e3 * delays,
+                        worst,
+                        f"C{k}:",
+                        label=f"{title}, least damped mode up to 20 Hz",
+                    )
     axes.axhline(0, color="black", linewidth=0.8)
     axes.set(xlabel="Delay of the POD controllers' input [ms]", ylabel="Damping [%]")
     axes.legend(fontsize="small")

@@ -26,7 +26,16 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from fmus.toolchain.cache import cache_directory
-from tests.benchmarks.mutations import CAUGHT, ROOT, SURVIVED, TOO_SLOW, UNCLEAR, Copy, Mutation, Outcome
+from tests.benchmarks.mutations import (
+    CAUGHT,
+    ROOT,
+    SURVIVED,
+    TOO_SLOW,
+    UNCLEAR,
+    Copy,
+    Mutation,
+    Outcome,
+)
 
 HERE = Path(__file__).parent
 RESULTS, READ = HERE / "random_mutations.json", HERE / "random_mutations.toml"
@@ -34,7 +43,14 @@ PACKAGES = ("orchestrator", "fmus", "gfor_fmu")
 EQUIVALENT = "equivalent"
 
 _SWAPS = {ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*"}
-_COMPARISONS = {ast.Lt: "<=", ast.LtE: "<", ast.Gt: ">=", ast.GtE: ">", ast.Eq: "!=", ast.NotEq: "=="}
+_COMPARISONS = {
+    ast.Lt: "<=",
+    ast.LtE: "<",
+    ast.Gt: ">=",
+    ast.GtE: ">",
+    ast.Eq: "!=",
+    ast.NotEq: "==",
+}
 _QUIET = (ast.Raise, ast.JoinedStr, ast.AnnAssign, ast.arguments, ast.Import, ast.ImportFrom)
 """Below these no mistake is made: messages, annotations and defaults."""
 
@@ -64,7 +80,9 @@ class Places:
         return self._starts[line - 1] + len(self._lines[line - 1].encode()[:column].decode())
 
     def _span(self, node: ast.expr) -> tuple[int, int]:
-        return self._offset(node.lineno, node.col_offset), self._offset(node.end_lineno, node.end_col_offset)
+        return self._offset(node.lineno, node.col_offset), self._offset(
+            node.end_lineno, node.end_col_offset
+        )
 
     def _source(self, node: ast.expr) -> str:
         begin, end = self._span(node)
@@ -103,7 +121,11 @@ class Places:
             and not isinstance(node.operand, ast.Constant)
         ):
             yield "sign", self._source(node.operand)
-        elif isinstance(node, ast.Compare) and len(node.ops) == 1 and type(node.ops[0]) in _COMPARISONS:
+        elif (
+            isinstance(node, ast.Compare)
+            and len(node.ops) == 1
+            and type(node.ops[0]) in _COMPARISONS
+        ):
             sides = self._source(node.left), self._source(node.comparators[0])
             yield "comparison", f"{sides[0]} {_COMPARISONS[type(node.ops[0])]} {sides[1]}"
         elif isinstance(node, ast.BoolOp):
@@ -121,7 +143,11 @@ class Places:
                 between = self.text[first[1] : second[0]]
                 yield (
                     "swapped arguments",
-                    self.text[begin : first[0]] + texts[0] + between + texts[1] + self.text[second[1] : end],
+                    self.text[begin : first[0]]
+                    + texts[0]
+                    + between
+                    + texts[1]
+                    + self.text[second[1] : end],
                 )
         elif (
             isinstance(node, ast.Subscript)
@@ -135,7 +161,8 @@ class Places:
 
 def _text(node: ast.BinOp) -> bool:
     return any(
-        isinstance(part, ast.JoinedStr) or (isinstance(part, ast.Constant) and isinstance(part.value, str))
+        isinstance(part, ast.JoinedStr)
+        or (isinstance(part, ast.Constant) and isinstance(part.value, str))
         for part in ast.walk(node)
     )
 
@@ -152,7 +179,9 @@ def drawn(seed: int, count: int, root: Path = ROOT) -> list[Drawn]:
         for path in sorted((root / package).rglob("*.py")):
             name = path.relative_to(root).as_posix()
             for mistake in Places(name, path.read_text(encoding="utf-8")).mistakes():
-                by_kind.setdefault(mistake.name.split(" ", 1)[1].partition(":")[0], []).append(mistake)
+                by_kind.setdefault(mistake.name.split(" ", 1)[1].partition(":")[0], []).append(
+                    mistake
+                )
     random_ = random.Random(seed)
     chosen: dict[str, Drawn] = {}
     while len(chosen) < count:
@@ -169,17 +198,31 @@ def stages(mistake: Drawn, root: Path = ROOT) -> list[tuple[str, ...]]:
         p.relative_to(root).as_posix(): p.read_text(encoding="utf-8")
         for p in sorted((root / "tests").rglob("test_*.py"))
     }
-    files = {name: text for name, text in files.items() if "/benchmarks/" not in name and "/pages/" not in name}
+    files = {
+        name: text
+        for name, text in files.items()
+        if "/benchmarks/" not in name and "/pages/" not in name
+    }
     near = [
         name
         for name, text in files.items()
         if re.search(rf"\b{re.escape(module)}\b", text) or Path(name).stem == f"test_{stem}"
     ]
-    near = near or [name for name, text in files.items() if re.search(rf"\b{re.escape(stem)}\b", text)]
+    near = near or [
+        name for name, text in files.items() if re.search(rf"\b{re.escape(stem)}\b", text)
+    ]
     in_folder = [name for name in files if name.startswith(f"{own}/") and name not in near]
     users = _folders_that_import(module, root)
-    far = [name for name in files if name not in near and name not in in_folder and name.split("/")[1] in users]
-    return [(*near, "-m", "not slow"), (*in_folder, *far, "-m", "not slow"), (*near, *in_folder, "-m", "slow")]
+    far = [
+        name
+        for name in files
+        if name not in near and name not in in_folder and name.split("/")[1] in users
+    ]
+    return [
+        (*near, "-m", "not slow"),
+        (*in_folder, *far, "-m", "not slow"),
+        (*near, *in_folder, "-m", "slow"),
+    ]
 
 
 def _mirror(file: str) -> str:
@@ -207,7 +250,9 @@ class Trial:
         self._copy, self._limit = Copy(root, folder), limit
         kept = cache_directory("fmus").parent
         if kept.is_dir():
-            shutil.copytree(kept, folder / "caches" / "plain", copy_function=_link, dirs_exist_ok=True)
+            shutil.copytree(
+                kept, folder / "caches" / "plain", copy_function=_link, dirs_exist_ok=True
+            )
 
     def outcome(self, mistake: Drawn, most: int) -> tuple[Outcome, int]:
         """Verdict and the stage that gave it (1, 2, 3)."""
@@ -236,15 +281,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument(
-        "--stages", type=int, default=3, help="1: nearest tests, 2: all fast ones, 3: slow ones too (3)"
+        "--stages",
+        type=int,
+        default=3,
+        help="1: nearest tests, 2: all fast ones, 3: slow ones too (3)",
     )
     parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--limit", type=float, default=600.0, metavar="S", help="seconds for one run of tests (600)")
+    parser.add_argument(
+        "--limit", type=float, default=600.0, metavar="S", help="seconds for one run of tests (600)"
+    )
     options = parser.parse_args(arguments)
 
     kept = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else {}
     read = (
-        {e["name"]: e["why"] for e in tomllib.loads(READ.read_text(encoding="utf-8")).get("equivalent", [])}
+        {
+            e["name"]: e["why"]
+            for e in tomllib.loads(READ.read_text(encoding="utf-8")).get("equivalent", [])
+        }
         if READ.exists()
         else {}
     )
@@ -255,23 +308,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for mistake in share:
             before = kept.get(mistake.name)
             if before and (
-                before["verdict"] == CAUGHT or (before["verdict"] == SURVIVED and before["stage"] >= options.stages)
+                before["verdict"] == CAUGHT
+                or (before["verdict"] == SURVIVED and before["stage"] >= options.stages)
             ):
                 continue
             outcome, stage = (
-                (Outcome(EQUIVALENT), 0) if mistake.name in read else trial.outcome(mistake, options.stages)
+                (Outcome(EQUIVALENT), 0)
+                if mistake.name in read
+                else trial.outcome(mistake, options.stages)
             )
             kept[mistake.name] = {**asdict(outcome), "stage": stage}
             print(
-                f"{outcome.verdict} (stage {stage}, {outcome.seconds:.0f} s): {mistake.name} {outcome.by}", flush=True
+                f"{outcome.verdict} (stage {stage}, {outcome.seconds:.0f} s): {mistake.name} {outcome.by}",
+                flush=True,
             )
             RESULTS.write_text(
-                json.dumps(dict(sorted(kept.items())), indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
+                json.dumps(dict(sorted(kept.items())), indent=1, ensure_ascii=False) + "\n",
+                encoding="utf-8",
             )
 
-    with tempfile.TemporaryDirectory(prefix="random-mutations") as folder, ThreadPoolExecutor(options.workers) as pool:
+    with (
+        tempfile.TemporaryDirectory(prefix="random-mutations") as folder,
+        ThreadPoolExecutor(options.workers) as pool,
+    ):
         shares = [mistakes[k :: options.workers] for k in range(options.workers)]
-        for job in [pool.submit(work, share, Path(folder) / str(k)) for k, share in enumerate(shares)]:
+        for job in [
+            pool.submit(work, share, Path(folder) / str(k)) for k, share in enumerate(shares)
+        ]:
             job.result()
 
     verdicts = Counter(EQUIVALENT if m.name in read else kept[m.name]["verdict"] for m in mistakes)

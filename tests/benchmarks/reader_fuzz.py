@@ -44,15 +44,52 @@ from tests.cases.psse.test_dyr import DYR
 from tests.coupling.small_fmus import small_fmu
 from tests.fmi.fuzz import text_changed as xml_changed
 from tests.results.test_comtrade import CFG, DAT
-from tests.ssp.packages import OSP_STEP, bindings, component, experiment, system, values, wire, write
+from tests.ssp.packages import (
+    OSP_STEP,
+    bindings,
+    component,
+    experiment,
+    system,
+    values,
+    wire,
+    write,
+)
 from tests.support.vendor_dlls import DEVICE
 
 NUMBERS = (
-    *("0", "-1", "1e308", "-1e999", "1e-320", "nan", "inf", "9" * 30, "9" * 400, "1" + "0" * 5000, "0x10", "1_0", ""),
+    *(
+        "0",
+        "-1",
+        "1e308",
+        "-1e999",
+        "1e-320",
+        "nan",
+        "inf",
+        "9" * 30,
+        "9" * 400,
+        "1" + "0" * 5000,
+        "0x10",
+        "1_0",
+        "",
+    ),
     *("4294967296", "0.5", "1.5.2", "١", "1e", "+", "1,5", "1/0", "true", "1979-05-27", "07:32:00"),
 )
 VALUES = (
-    *("[]", "[[]]", "{}", "{ a = 1 }", '""', '"x"', "true", "-0", "nan", "inf", "1e400", "9" * 400, '["a", 1]'),
+    *(
+        "[]",
+        "[[]]",
+        "{}",
+        "{ a = 1 }",
+        '""',
+        '"x"',
+        "true",
+        "-0",
+        "nan",
+        "inf",
+        "1e400",
+        "9" * 400,
+        '["a", 1]',
+    ),
     *(
         "[{ a = 1 }]",
         "1979-05-27T07:32:00Z",
@@ -157,7 +194,9 @@ class Kind:
         """A changed file in a folder, with the good ones beside it."""
         for name, content in self.files.items():
             change = chance.choice((bytes_changed, self.change, self.change))
-            (folder / name).write_bytes(change(chance, content) if name == self.changed else content)
+            (folder / name).write_bytes(
+                change(chance, content) if name == self.changed else content
+            )
         return folder / self.changed
 
 
@@ -205,7 +244,9 @@ parameters = ["p.toml"]
 """
 LINES = "name,from,to,R,X,B\nl1,a,b,0.001,0.01,0.1\nl2,b,c,0.001,0.01,0.1\n"
 LOADS = "bus,p_mw,q_mvar\na,10,1\nb,20,2\n"
-PARAMETERS = '# by hand\n[set]\n"gfor.P_0" = 0.5\n"gfor.S_n" = "100 MVA"\ngfor.pod_p.enabled = true\n'
+PARAMETERS = (
+    '# by hand\n[set]\n"gfor.P_0" = 0.5\n"gfor.S_n" = "100 MVA"\ngfor.pod_p.enabled = true\n'
+)
 POINTS = "time,hours,grid.X_L,load,gfor.P_mw,gfor.in_service\na,2,0.1,1,10,1\nb,1,0.12,0.99,,1\nc,1,0.15,1.01,,0\n"
 STUDY = (
     f'<ssd:Annotations><ssc:Annotation type="{STUDY_TYPE}"><gfor:Study scenario="base" title="Ring">'
@@ -215,15 +256,19 @@ STUDY = (
     "</ssc:Annotation></ssd:Annotations>"
 )
 INTERFACE = DllInterface(
-    {"ModelName": "droop", "ModelVersion": "1.0"}, (1, 1, 0, 0), 1e-4, 1,
+    {"ModelName": "droop", "ModelVersion": "1.0"},
+    (1, 1, 0, 0),
+    1e-4,
+    1,
     (Signal("i", "", "kA", 9, 3), Signal("p_ref", "", "pu", 9, 1), Signal("v_ref", "", "pu", 9, 1)),
     (Signal("e", "", "kV", 9, 3), Signal("p", "", "pu", 9, 1)),
     (
         DllParameter("mp", "", "Droop", "pu", 9, False, 0.02, 0.0, 1.0),
         DllParameter("file", "", "Table", "", 10, False, "", None, None),
     ),
-    (0, 0, 3), ("Initialize", "Outputs"),
-)  # fmt: skip
+    (0, 0, 3),
+    ("Initialize", "Outputs"),
+)
 FULL_DEVICE = DEVICE.format(delay=0) + (
     '[parameters]\nmp = 0.03\n[texts]\nfile = "t.csv"\n[start]\ntrims = ["P"]\nlongest = "5 s"\ntrim_after = 1\n'
 )
@@ -237,7 +282,9 @@ def _ssd() -> bytes:
     )
     top = system("top", ring, (wire("a.y", "b.u"), wire("b.y", "a.u")))
     with TemporaryDirectory() as folder:
-        path = write(Path(folder) / "ring.ssp", top, experiment("0.1", OSP_STEP) + STUDY, valid=False)
+        path = write(
+            Path(folder) / "ring.ssp", top, experiment("0.1", OSP_STEP) + STUDY, valid=False
+        )
         with zipfile.ZipFile(path) as archive:
             return archive.read(SYSTEM_FILE)
 
@@ -283,19 +330,29 @@ def kinds() -> dict[str, Kind]:
     binding = draft_binding(read_description(fmu))
     recording = {"rec.cfg": CFG.encode(), "rec.dat": DAT.encode()}
     words = b"".join(
-        n.to_bytes(4, "little") + (20000 * n).to_bytes(4, "little") + b"\1\0\2\0\3\0\1\0" for n in (1, 2, 3)
+        n.to_bytes(4, "little") + (20000 * n).to_bytes(4, "little") + b"\1\0\2\0\3\0\1\0"
+        for n in (1, 2, 3)
     )
     binary = {"rec.cfg": CFG.replace("ASCII", "BINARY").encode(), "rec.dat": words}
-    planned = {"grid.raw": raw(33).encode(), "grid.dyr": DYR.encode(), "case.toml": DYR_CASE.encode()}
+    planned = {
+        "grid.raw": raw(33).encode(),
+        "grid.dyr": DYR.encode(),
+        "case.toml": DYR_CASE.encode(),
+    }
     built_in = (BUILT_IN / "four_vsc" / "case.toml").read_bytes()
     with_files = {
-        "case.toml": FILES.encode(), "lines.csv": LINES.encode(), "loads.csv": LOADS.encode(),
-        "p.toml": PARAMETERS.encode(), "theirs.fmu": small_fmu("gain").path.read_bytes(),
-    }  # fmt: skip
+        "case.toml": FILES.encode(),
+        "lines.csv": LINES.encode(),
+        "loads.csv": LOADS.encode(),
+        "p.toml": PARAMETERS.encode(),
+        "theirs.fmu": small_fmu("gain").path.read_bytes(),
+    }
     return {
         "case": Kind({"case.toml": built_in + EVENTS.encode()}, "case.toml", _read_case),
         "case with files": Kind(with_files, "case.toml", _read_case),
-        "lines": Kind(with_files, "lines.csv", lambda path: _read_case(path.with_name("case.toml"))),
+        "lines": Kind(
+            with_files, "lines.csv", lambda path: _read_case(path.with_name("case.toml"))
+        ),
         "case of a planner": Kind(planned, "case.toml", _read_case),
         "parameters": Kind({"p.toml": PARAMETERS.encode()}, "p.toml", read_parameter_file),
         "raw 33": Kind({"grid.raw": raw(33).encode()}, "grid.raw", read_raw),
@@ -307,16 +364,21 @@ def kinds() -> dict[str, Kind]:
         "binary dat": Kind(binary, "rec.dat", read_comtrade),
         "ssd": Kind({"s.ssd": _ssd()}, "s.ssd", _read_ssd, _markup_changed),
         "description": Kind(
-            {"modelDescription.xml": read_model_description_text(fmu)}, "modelDescription.xml", _read_description,
+            {"modelDescription.xml": read_model_description_text(fmu)},
+            "modelDescription.xml",
+            _read_description,
             _markup_changed,
         ),
         "binding": Kind(
-            {"binding.toml": binding.encode()}, "binding.toml",
+            {"binding.toml": binding.encode()},
+            "binding.toml",
             lambda path: bind(read_description(fmu), path),
         ),
-        "points": Kind({"points.csv": POINTS.encode()}, "points.csv", lambda path: read_points(path, *prepared)),
+        "points": Kind(
+            {"points.csv": POINTS.encode()}, "points.csv", lambda path: read_points(path, *prepared)
+        ),
         "device": Kind({"device.toml": FULL_DEVICE.encode()}, "device.toml", _read_device),
-    }  # fmt: skip
+    }
 
 
 @dataclass(frozen=True)
@@ -343,15 +405,28 @@ def fuzzed(kind: str, one: Kind, seeds: Sequence[int], folder: Path) -> Iterator
         except CosimError:
             yield "refused"
         except Exception as error:
-            frames = [f for f in traceback.extract_tb(error.__traceback__) if "site-packages" not in f.filename]
-            yield Defect(kind, seed, repr(error)[:200], f"{Path(frames[-1].filename).name}:{frames[-1].lineno}")
+            frames = [
+                f
+                for f in traceback.extract_tb(error.__traceback__)
+                if "site-packages" not in f.filename
+            ]
+            yield Defect(
+                kind,
+                seed,
+                repr(error)[:200],
+                f"{Path(frames[-1].filename).name}:{frames[-1].lineno}",
+            )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="python -m tests.benchmarks.reader_fuzz", description=__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.benchmarks.reader_fuzz", description=__doc__.split("\n")[0]
+    )
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--count", type=int, default=200, help="files of each kind (200)")
-    parser.add_argument("--only", action="append", metavar="KIND", help="this kind alone (repeatable)")
+    parser.add_argument(
+        "--only", action="append", metavar="KIND", help="this kind alone (repeatable)"
+    )
     parser.add_argument("--keep", type=Path, metavar="FOLDER", help="keep the files in this folder")
     options = parser.parse_args(arguments)
     defects: list[Defect] = []
@@ -365,7 +440,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             found = list(fuzzed(name, kind, seeds, folder))
             wrong = [one for one in found if isinstance(one, Defect)]
             count = Counter(one for one in found if not isinstance(one, Defect))
-            print(f"{name}: {count['read']} read, {count['refused']} refused, {len(wrong)} defects", flush=True)
+            print(
+                f"{name}: {count['read']} read, {count['refused']} refused, {len(wrong)} defects",
+                flush=True,
+            )
             for one in wrong:
                 print(f"    {one.seed}: {one.error} at {one.where}", flush=True)
             defects += wrong

@@ -20,7 +20,9 @@ STEP = 0.7
 """Largest change of a logarithm between two points, and from one half of the way to the other."""
 
 
-def count_within(model: LinearModel, lowest_hz: float, highest_hz: float, damping: float) -> tuple[int, int]:
+def count_within(
+    model: LinearModel, lowest_hz: float, highest_hz: float, damping: float
+) -> tuple[int, int]:
     """Number of eigenvalues with damping ratios from −0.1 to a given one, and of points at which all was factorised.
 
     Parameters
@@ -39,7 +41,9 @@ def count_within(model: LinearModel, lowest_hz: float, highest_hz: float, dampin
 
     @cache
     def of_blocks(point: complex) -> complex:
-        lu = spla.splu((P - np.exp(point * model.step_size) * at_rest).tocsc(), options={"Equil": False})
+        lu = spla.splu(
+            (P - np.exp(point * model.step_size) * at_rest).tocsc(), options={"Equil": False}
+        )
         return Factors(lu, 0).log_determinant
 
     @cache
@@ -80,7 +84,9 @@ def _turns(line: list[complex], logarithm: Callable[[complex], complex]) -> int:
         while waiting:
             a, b = waiting.pop()
             middle = (a + b) / 2
-            first, second = (_wrapped(logarithm(y) - logarithm(x)) for x, y in ((a, middle), (middle, b)))
+            first, second = (
+                _wrapped(logarithm(y) - logarithm(x)) for x, y in ((a, middle), (middle, b))
+            )
             if max(abs(first), abs(second)) <= STEP and abs(second - first) <= STEP:
                 turn += (first + second).imag
             else:

@@ -49,7 +49,11 @@ def main():
     parser.add_argument("case", nargs="?", default="ieee118")
     parser.add_argument("--scenario", default="gfor")
     parser.add_argument("--points", type=int, default=48)
-    parser.add_argument("--outages", default="n-1", help="of one more screening at the case's own point; '' for none")
+    parser.add_argument(
+        "--outages",
+        default="n-1",
+        help="of one more screening at the case's own point; '' for none",
+    )
     options = parser.parse_args()
     case = load_case(options.case)
     with tempfile.TemporaryDirectory() as passing:

@@ -34,12 +34,21 @@ WORDS: dict[str, tuple[str, ...]] = {
     "linearize": ("export", "linear", "infinite_bus", "--scenario", "dip", "--out", "out"),
     "export-ssp": ("export", "ssp", "infinite_bus", "--scenario", "dip", "--out", "out"),
     "export-comtrade": ("export", "comtrade", "before/dip", "--out", "out"),
-    "sensitivities": ("sensitivities", "two_area", "--scenario", "gfor", "--parameter", "gfor.*", "--out", "out"),
+    "sensitivities": (
+        "sensitivities",
+        "two_area",
+        "--scenario",
+        "gfor",
+        "--parameter",
+        "gfor.*",
+        "--out",
+        "out",
+    ),
     "report": ("report", "before", "--out", "out.html"),
     "admittance": ("fmu", "admittance", "gfor.fmu", "--from-hz", "1", "--out", "out"),
     "build": ("fmu", "build", "gfor", "--dest", "out"),
     "bind": ("fmu", "bind", "gfor.fmu", "--out", "out.toml"),
-}  # fmt: skip
+}
 """Words of a command by its name here; ``before`` and ``gfor.fmu`` are there."""
 
 
@@ -56,7 +65,9 @@ def begun(folder: Path, words: tuple[str, ...]) -> int:
         temporary._process = os.getpid()  # it removes its temporary folders itself
         os.environ["TMPDIR"] = tempfile.tempdir = str(folder / "tmp")
         for number, name in ((1, "stdout"), (2, "stderr")):
-            os.dup2(os.open(folder.parent / f"{folder.name}.{name}", os.O_WRONLY | os.O_CREAT), number)
+            os.dup2(
+                os.open(folder.parent / f"{folder.name}.{name}", os.O_WRONLY | os.O_CREAT), number
+            )
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         signal.signal(signal.SIGINT, signal.default_int_handler)
         sys.argv = ["gfor", *words]
@@ -117,12 +128,16 @@ def prepared(folder: Path, before: Path) -> Path:
     return folder
 
 
-def tried(top: Path, before: Path, name: str, count: int, chance: random.Random) -> tuple[Counter[str], list[str]]:
+def tried(
+    top: Path, before: Path, name: str, count: int, chance: random.Random
+) -> tuple[Counter[str], list[str]]:
     """Send a command signals, one a life; how they ended, and what is wrong."""
     found, errors = Counter[str](), list[str]()
     usual, life = ended(begun(prepared(top / name, before), WORDS[name]))
     if usual not in (0, 3):
-        said = "".join((top / f"{name}.{kind}").read_text(encoding="utf-8") for kind in ("stdout", "stderr"))
+        said = "".join(
+            (top / f"{name}.{kind}").read_text(encoding="utf-8") for kind in ("stdout", "stderr")
+        )
         return Counter({"not run": 1}), [f"undisturbed it ends with {usual}\n{said[-2000:]}"]
     for k in range(count):
         kind, moment = chance.choice(list(CODES)), chance.uniform(0, life)
@@ -131,7 +146,8 @@ def tried(top: Path, before: Path, name: str, count: int, chance: random.Random)
         code, _ = ended(child, kind, moment)
         found["done before" if code == usual else str(code)] += 1
         errors += [
-            f"{signal.Signals(kind).name} at {moment:.2f} s: {w}" for w in wrong(folder, child, code, kind, usual)
+            f"{signal.Signals(kind).name} at {moment:.2f} s: {w}"
+            for w in wrong(folder, child, code, kind, usual)
         ]
     return found, errors
 
@@ -140,7 +156,12 @@ def made(folder: Path) -> Path:
     """What the commands read: a run, and an FMU."""
     folder.mkdir()
     for words in ((*RUN, "--out", "before"), ("fmu", "build", "gfor", "--dest", ".")):
-        subprocess.run([sys.executable, "-m", "orchestrator.cli", *words], cwd=folder, check=True, capture_output=True)
+        subprocess.run(
+            [sys.executable, "-m", "orchestrator.cli", *words],
+            cwd=folder,
+            check=True,
+            capture_output=True,
+        )
     return folder
 
 
@@ -158,7 +179,9 @@ def main_of(words: list[str]) -> int:
         for k, name in enumerate(names):
             share = (count - k + len(names) - 1) // len(names)
             found, errors = tried(top, before, name, share, chance)
-            print(f"{name:16} {share:4} signals: {dict(found)}, {len(errors)} with errors", flush=True)
+            print(
+                f"{name:16} {share:4} signals: {dict(found)}, {len(errors)} with errors", flush=True
+            )
             for error in errors:
                 print(error, flush=True)
             wrongs += len(errors)

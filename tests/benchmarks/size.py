@@ -29,7 +29,14 @@ from orchestrator.analysis.stability import WHOLE
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import load_case
 from orchestrator.cases.network_data import network_data
-from orchestrator.cases.power_flow import FlowLine, FlowLoad, FlowShunt, FlowUnit, PowerFlow, solve_power_flow
+from orchestrator.cases.power_flow import (
+    FlowLine,
+    FlowLoad,
+    FlowShunt,
+    FlowUnit,
+    PowerFlow,
+    solve_power_flow,
+)
 from orchestrator.cases.schema import NetworkTable
 from orchestrator.coupling.master import Master
 from tests.benchmarks.region_count import count_within
@@ -49,10 +56,14 @@ _LOADING, _LEAST_MVA = 0.6, 20.0
 def write_case(name: str, folder: Path) -> Path:
     """A case file, with ratings by which no unit is loaded by more than `_LOADING` of its rating."""
     data = network_data(NetworkTable(pandapower=name, stray_B=STRAY), folder)
-    units = [FlowUnit(g.label, bus, 100.0, g.p_mw / 100, g.v_pu) for bus, g in data.generation.items()]
+    units = [
+        FlowUnit(g.label, bus, 100.0, g.p_mw / 100, g.v_pu) for bus, g in data.generation.items()
+    ]
     begun = time.process_time()
     flow = _flow(data, units)
-    print(json.dumps({"flow": time.process_time() - begun, "buses": len(data.buses)}), file=sys.stderr)
+    print(
+        json.dumps({"flow": time.process_time() - begun, "buses": len(data.buses)}), file=sys.stderr
+    )
     ratings = {u.name: max(abs(flow.powers[u.name]) * u.S_n / _LOADING, _LEAST_MVA) for u in units}
     rows = ["bus,rating_mva", *(f"{label},{rating:.1f}" for label, rating in ratings.items())]
     (folder / "units.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
@@ -88,7 +99,10 @@ generator_parameters = {{ transformer.X_t = 0.0, transformer.R_t = 0.0, machine.
 
 
 def _flow(data: Any, units: list[FlowUnit]) -> PowerFlow:
-    lines = [FlowLine(x.name, x.from_bus, x.to_bus, R=x.R, X=x.X, B=x.B, tap=x.tap, shift=x.shift) for x in data.lines]
+    lines = [
+        FlowLine(x.name, x.from_bus, x.to_bus, R=x.R, X=x.X, B=x.B, tap=x.tap, shift=x.shift)
+        for x in data.lines
+    ]
     loads = [FlowLoad(x.bus, x.p_mw, x.q_mvar) for x in data.loads]
     shunts = [FlowShunt(x.bus, x.g_mw / 100, x.b_mvar / 100) for x in data.shunts]
     return solve_power_flow(data.buses, lines, loads, units, data.slack, shunts)
@@ -103,7 +117,11 @@ def measure(name: str, native: str, *, check: bool, count: bool) -> dict[str, fl
         begun, wall = _processor_time(), time.perf_counter()
         yield
         row[key], row[f"{key}_wall"] = _processor_time() - begun, time.perf_counter() - wall
-        print(f"  {name}: {key} {row[key]:.2f} s, wall {row[f'{key}_wall']:.1f} s", file=sys.stderr, flush=True)
+        print(
+            f"  {name}: {key} {row[key]:.2f} s, wall {row[f'{key}_wall']:.1f} s",
+            file=sys.stderr,
+            flush=True,
+        )
 
     with tempfile.TemporaryDirectory() as folder:
         path = write_case(name, Path(folder))
@@ -114,7 +132,9 @@ def measure(name: str, native: str, *, check: bool, count: bool) -> dict[str, fl
         with timed("prepare"):
             case.prepare(overrides=choices)
         components = prepared.system.components
-        row["buses"] = sum(output.endswith(".v_re") for output in components["grid"].description.outputs)
+        row["buses"] = sum(
+            output.endswith(".v_re") for output in components["grid"].description.outputs
+        )
         row["fmus"] = len(components)
         with timed("instances"):
             master = Master(prepared.system, prepared.schedule, prepared.step_size)
@@ -130,7 +150,9 @@ def measure(name: str, native: str, *, check: bool, count: bool) -> dict[str, fl
             row["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
             if count:
                 with timed("count"):
-                    row["counted"], row["points"] = count_within(model, LOWEST_HZ, HIGHEST_HZ, BELOW)
+                    row["counted"], row["points"] = count_within(
+                        model, LOWEST_HZ, HIGHEST_HZ, BELOW
+                    )
             if check and len(model.names) <= WHOLE:
                 row |= _against_dense(eigenvalues(model), critical)
             begun = time.process_time()
@@ -156,28 +178,56 @@ def _processor_time() -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("cases", nargs="*", default=CASES)
-    parser.add_argument("--one", action="store_true", help="measure one case in this process, and print JSON")
+    parser.add_argument(
+        "--one", action="store_true", help="measure one case in this process, and print JSON"
+    )
     parser.add_argument("--check", action="store_true", help="compare with the dense eigenvalues")
-    parser.add_argument("--native", default="sg*,gfor*", help="patterns of components that are compiled without Python")
-    parser.add_argument("--count", action="store_true", help="count the critical modes by turns of the determinant")
+    parser.add_argument(
+        "--native",
+        default="sg*,gfor*",
+        help="patterns of components that are compiled without Python",
+    )
+    parser.add_argument(
+        "--count", action="store_true", help="count the critical modes by turns of the determinant"
+    )
     given = parser.parse_args()
     if given.one:
-        print(json.dumps(measure(given.cases[0], given.native, check=given.check, count=given.count)))
+        print(
+            json.dumps(measure(given.cases[0], given.native, check=given.check, count=given.count))
+        )
         return
     rows = {}
     for name in given.cases:
-        command = [sys.executable, "-m", "tests.benchmarks.size", name, "--one", "--native", given.native]
+        command = [
+            sys.executable,
+            "-m",
+            "tests.benchmarks.size",
+            name,
+            "--one",
+            "--native",
+            given.native,
+        ]
         with tempfile.TemporaryDirectory() as cache:
             environment = os.environ | {"XDG_CACHE_HOME": cache, "OPENBLAS_NUM_THREADS": "1"}
             done = subprocess.run(
-                [*command, *(["--check"] if given.check else []), *(["--count"] if given.count else [])],
-                env=environment, stdout=subprocess.PIPE, text=True, check=False,
-            )  # fmt: skip
+                [
+                    *command,
+                    *(["--check"] if given.check else []),
+                    *(["--count"] if given.count else []),
+                ],
+                env=environment,
+                stdout=subprocess.PIPE,
+                text=True,
+                check=False,
+            )
         if done.returncode:
             print(f"{name}: not reached (exit status {done.returncode}); the reason stands above")
             continue
         rows[name] = json.loads(done.stdout)
-        print(f"{name}: " + ", ".join(f"{key} {value:.4g}" for key, value in rows[name].items()), flush=True)
+        print(
+            f"{name}: " + ", ".join(f"{key} {value:.4g}" for key, value in rows[name].items()),
+            flush=True,
+        )
     if len(rows) > 1:
         buses = np.log([row["buses"] for row in rows.values()])
         for key in ("build", "prepare", "steady", "linearise", "modes", "peak_mb", "steps"):

@@ -18,12 +18,25 @@ import numpy as np
 from orchestrator.oscillations import location
 from orchestrator.oscillations.models import OWN_MODEL
 from orchestrator.oscillations.verdict import locate
-from tests.support.forced_records import make_model, model, record, save, sine, times_of, unit_models_of
+from tests.support.forced_records import (
+    make_model,
+    model,
+    record,
+    save,
+    sine,
+    times_of,
+    unit_models_of,
+)
 
-CASES = {"two_area": (0.3, 0.5817, 0.9), "ieee39": (0.4, 0.722, 1.25), "ieee118": (0.4, 0.717, 1.12)}
+CASES = {
+    "two_area": (0.3, 0.5817, 0.9),
+    "ieee39": (0.4, 0.722, 1.25),
+    "ieee118": (0.4, 0.717, 1.12),
+}
 """Frequencies [Hz], the second at the mode of the areas, the third of `ieee39` amid its local modes."""
 
-SMALL = ("two_area", "ieee39")  # whose models are kept; that of ieee118 is made first: --models --case ieee118
+# whose models are kept; that of ieee118 is made first: --models --case ieee118
+SMALL = ("two_area", "ieee39")
 AMPLITUDE = 0.02
 LOADS, MEASURING = 5e-4, 5e-5
 NO_CASE = "no case"
@@ -34,7 +47,9 @@ TIMES = times_of(60.0)
 def answers(case, forced, frequency, seed, hidden=(), loads=LOADS):
     """What is found near a frequency with the units' own models, and without."""
     inputs = {reference: sine(TIMES, frequency, AMPLITUDE) for reference in forced}
-    measured = record(case, inputs, times=TIMES, loads=loads, measuring=MEASURING, seed=seed, without=hidden)
+    measured = record(
+        case, inputs, times=TIMES, loads=loads, measuring=MEASURING, seed=seed, without=hidden
+    )
     for judge, models in ((OWN_MODEL, unit_models_of(model(case))), (NO_CASE, None)):
         found = locate(measured, models)
         near = next((x for x in found if abs(x.found.frequency - frequency) < 0.01), None)
@@ -53,7 +68,10 @@ def forcings(case, half, part):
     tries = [(k, r, f) for k, r in enumerate(system.references) for f in CASES[case]]
     for number, reference, frequency in tries[part[0] - 1 :: part[1]]:
         unit = reference.partition(".")[0]
-        kind = ("P" if "P_ref" in reference else "V", system.buses[system.units.index(unit)] not in hidden)
+        kind = (
+            "P" if "P_ref" in reference else "V",
+            system.buses[system.units.index(unit)] not in hidden,
+        )
         for judge, one in answers(case, [reference], frequency, number, hidden):
             counts[kind, judge, "not found" if one is None else named(one.drives, [unit])] += 1
             for o in one.opinions if one and judge == NO_CASE else ():
@@ -61,8 +79,14 @@ def forcings(case, half, part):
                 counts[kind, o.method, "first"] += bool(o.ranking) and o.ranking[0][0] == unit
     for kind in sorted({kind for kind, *_ in counts}, reverse=True):
         for judge in (OWN_MODEL, NO_CASE, *METHODS):
-            cells = [counts[kind, judge, k] for k in ("right", "none", "not found", "wrong", "first")]
-            view = "all PMUs" if not half else "every second bus, " + ("seen" if kind[1] else "not seen")
+            cells = [
+                counts[kind, judge, k] for k in ("right", "none", "not found", "wrong", "first")
+            ]
+            view = (
+                "all PMUs"
+                if not half
+                else "every second bus, " + ("seen" if kind[1] else "not seen")
+            )
             print("|", " | ".join(map(str, (case, view, kind[0], judge, *cells))), "|", flush=True)
 
 
@@ -78,7 +102,9 @@ def pairs(case, count):
         for judge, x in answers(case, [one, other], frequency, number):
             counts[judge, "drives", named(x and x.drives, units)] += 1
             counts[judge, "source", "none" if x is None or x.source is None else "one of two"] += 1
-            counts[judge, "both named in the reason"] += x is not None and all(u in x.reason for u in units)
+            counts[judge, "both named in the reason"] += x is not None and all(
+                u in x.reason for u in units
+            )
     print(case, dict(counts), flush=True)
 
 
@@ -99,7 +125,9 @@ def main():
     parser.add_argument("--noise", type=int)
     options = parser.parse_args()
     if not (options.models or options.pairs or options.noise):
-        print("| Case | View | Forced | Judge | Right | None named | Not found | Wrong | Ranks it first |")
+        print(
+            "| Case | View | Forced | Judge | Right | None named | Not found | Wrong | Ranks it first |"
+        )
         print("|---|---|---|---|---|---|---|---|---|")
     for case in options.case or SMALL:
         if options.models:

@@ -21,7 +21,17 @@ COMMANDS = {
     "ieee39": ("modes", "ieee39", "--scenario", "base"),
     "ieee118": ("modes", "ieee118", "--scenario", "pod_pq"),
     "ieee118_all": ("modes", "ieee118"),
-    "wscc9_run": ("run", "wscc9", "--scenario", "pod_p", "--native", "--stop", "10", "--out", "{folder}/wscc9"),
+    "wscc9_run": (
+        "run",
+        "wscc9",
+        "--scenario",
+        "pod_p",
+        "--native",
+        "--stop",
+        "10",
+        "--out",
+        "{folder}/wscc9",
+    ),
 }
 """Name → words of the command ``gfor``."""
 
@@ -30,12 +40,21 @@ def measured(checkout: Path, words: tuple[str, ...], repeats: int) -> tuple[floa
     """Median of processor time and of time on the clock [s], from kept FMUs and compiled modules."""
     with tempfile.TemporaryDirectory() as folder:
         environment = {
-            **{name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"},
+            **{
+                name: value
+                for name, value in os.environ.items()
+                if name != "PYTHONDONTWRITEBYTECODE"
+            },
             "PYTHONPATH": str(checkout),
             "PYTHONPYCACHEPREFIX": str(Path(folder) / "compiled"),
             "OPENBLAS_NUM_THREADS": "1",
         }
-        command = [sys.executable, "-m", "orchestrator.cli", *(word.format(folder=folder) for word in words)]
+        command = [
+            sys.executable,
+            "-m",
+            "orchestrator.cli",
+            *(word.format(folder=folder) for word in words),
+        ]
         times = [_once(command, environment, checkout) for _ in range(repeats + 1)][1:]
     return median(cpu for cpu, _ in times), median(clock for _, clock in times)
 
@@ -51,17 +70,24 @@ def main() -> None:
     """Print one line for each command."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--against", type=Path, help="root of another checkout")
-    parser.add_argument("--repeats", type=int, default=5, help="times that each command is measured (default: 5)")
-    parser.add_argument("--only", action="append", choices=COMMANDS, help="only this command (repeatable)")
+    parser.add_argument(
+        "--repeats", type=int, default=5, help="times that each command is measured (default: 5)"
+    )
+    parser.add_argument(
+        "--only", action="append", choices=COMMANDS, help="only this command (repeatable)"
+    )
     options = parser.parse_args()
     for name in options.only or COMMANDS:
         cpu, clock = measured(ROOT, COMMANDS[name], options.repeats)
-        line = f"gfor {' '.join(COMMANDS[name])}: {cpu:.2f} s of processor, {clock:.2f} s on the clock"
+        line = (
+            f"gfor {' '.join(COMMANDS[name])}: {cpu:.2f} s of processor, {clock:.2f} s on the clock"
+        )
         if options.against is not None:
-            other, other_clock = measured(options.against.resolve(), COMMANDS[name], options.repeats)
-            line += (
-                f"; there {other:.2f} and {other_clock:.2f} s: {other / cpu:.1f} and {other_clock / clock:.1f} times"
+            other, other_clock = measured(
+                options.against.resolve(), COMMANDS[name], options.repeats
             )
+            ratios = f"{other / cpu:.1f} and {other_clock / clock:.1f} times"
+            line += f"; there {other:.2f} and {other_clock:.2f} s: {ratios}"
         print(line, flush=True)
 
 

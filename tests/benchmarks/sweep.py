@@ -34,7 +34,9 @@ def sweep(points: int, executor: str, folder: str) -> None:
 
     where = (int(executor), None) if executor.isdigit() else (None, executor)
     chosen = choose_executor(*where, [SweepPointTask.__module__])
-    plan = plan_sweep(load_case("two_area"), SweepRequest([parse_vary(f"grid.X_L=0.01:0.6:{points}")]))
+    plan = plan_sweep(
+        load_case("two_area"), SweepRequest([parse_vary(f"grid.X_L=0.01:0.6:{points}")])
+    )
     start = time.perf_counter()
     result = run_sweep(plan, Work(chosen, PointStore(Path(folder))))
     chosen.close()
@@ -91,11 +93,18 @@ def main() -> None:
                     flush=True,
                 )
                 reference = reference or list(numbers(folder))
-                print(f"    equal to the last bit: {list(numbers(folder)) == reference}", flush=True)
+                print(
+                    f"    equal to the last bit: {list(numbers(folder)) == reference}", flush=True
+                )
             (whole_1, points_1), (whole_2, points_2) = times["1"][-1], times["2"][-1]
-            print(f"  two processes are {points_1 / points_2:.2f} times as fast, in all {whole_1 / whole_2:.2f}; "
-                  f"at counting {ceiling:.2f}", flush=True)  # fmt: skip
-        best = [[min(column) for column in zip(*measured, strict=True)] for measured in times.values()]
+            print(
+                f"  two processes are {points_1 / points_2:.2f} times as fast, in all {whole_1 / whole_2:.2f}; "
+                f"at counting {ceiling:.2f}",
+                flush=True,
+            )
+        best = [
+            [min(column) for column in zip(*measured, strict=True)] for measured in times.values()
+        ]
         print(f"best times: {best[0][1] / best[1][1]:.2f}, in all {best[0][0] / best[1][0]:.2f}")
         try:
             from distributed import LocalCluster  # noqa: PLC0415 - an extra
@@ -103,8 +112,10 @@ def main() -> None:
             return
         with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
             whole, seconds, _ = timed(points, cluster.scheduler_address, f"{top}/dask")
-        print(f"Dask, two workers: points {seconds:.1f} s; "
-              f"equal to the last bit: {list(numbers(f'{top}/dask')) == reference}")  # fmt: skip
+        print(
+            f"Dask, two workers: points {seconds:.1f} s; "
+            f"equal to the last bit: {list(numbers(f'{top}/dask')) == reference}"
+        )
 
 
 if __name__ == "__main__":

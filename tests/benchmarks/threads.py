@@ -66,7 +66,8 @@ def print_case(prepared: PreparedScenario, threads: int) -> None:
             if name != "1 thread":
                 masters[name].advance(SETTLED)
         measured = {name: Measured() for name in ways}
-        costs = np.full(len(prepared.system.components), np.inf)  # the least of all turns: others disturb some
+        # the least of all turns: others disturb some
+        costs = np.full(len(prepared.system.components), np.inf)
         for _ in range(TURNS):
             before = np.array(alone.seconds())
             for name, master in masters.items():
@@ -74,22 +75,31 @@ def print_case(prepared: PreparedScenario, threads: int) -> None:
             costs = np.minimum(costs, (np.array(alone.seconds()) - before) / steps)
             same = {master.y.tobytes() for master in masters.values()}
             assert len(same) == 1, "threads gave another value"
-        used = {name: master.statistics(1, 1.0, master.seconds()).threads for name, master in masters.items()}
+        used = {
+            name: master.statistics(1, 1.0, master.seconds()).threads
+            for name, master in masters.items()
+        }
     finally:
         for master in masters.values():
             master.close()
     inside, bound = amdahl(masters["1 thread"], threads, costs)
-    print(f"{prepared.case.name}, {len(prepared.system.components)} FMUs, {1e6 * inside:.1f} us a step inside FMUs; "
-          f"{threads} threads can be {bound:.2f} times as fast at best")  # fmt: skip
+    print(
+        f"{prepared.case.name}, {len(prepared.system.components)} FMUs, {1e6 * inside:.1f} us a step inside FMUs; "
+        f"{threads} threads can be {bound:.2f} times as fast at best"
+    )
     reference = measured["1 thread"]
     for name, found in measured.items():
         ratios = np.array(reference.clock) / np.array(found.clock)
         median = float(np.median(found.clock))
         best = min(reference.clock) / min(found.clock)
         speed = f"{1 / median:9,.0f} steps/s, {prepared.step_size / median:.2f} x real time"
-        print(f"  {name:10} ({used[name]} used): {speed}; ratio {np.median(ratios):.2f} (best turns {best:.2f});")
+        print(
+            f"  {name:10} ({used[name]} used): {speed}; ratio {np.median(ratios):.2f} (best turns {best:.2f});"
+        )
         caller, process = 1e6 * np.median(found.caller), 1e6 * np.median(found.process)
-        print(f"    processor time of the caller {caller:.1f} us, of all threads {process:.1f} us a step")
+        print(
+            f"    processor time of the caller {caller:.1f} us, of all threads {process:.1f} us a step"
+        )
 
 
 def main() -> None:

@@ -43,11 +43,17 @@ def main() -> None:
         print(steps_per_second(STEPS // 50)[0])
         return
     rate, share = steps_per_second(STEPS)
-    print(f"compiled kernel: {rate:,.0f} communication steps/s, {share:.0%} of the time inside FMUs")
+    print(
+        f"compiled kernel: {rate:,.0f} communication steps/s, {share:.0%} of the time inside FMUs"
+    )
     environment = os.environ | {"GFOR_COSIM_KERNEL": "python"}
     command = [sys.executable, "-m", "tests.benchmarks.two_area"]
-    slow = float(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout)
-    print(f"pure-Python kernel: {slow:,.0f} communication steps/s; compiled / Python = {rate / slow:.0f}")
+    slow = float(
+        subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+    )
+    print(
+        f"pure-Python kernel: {slow:,.0f} communication steps/s; compiled / Python = {rate / slow:.0f}"
+    )
     first, again = modes_seconds(), modes_seconds()
     print(f"modes of five scenarios: {first:.1f} s with all imports, {again:.1f} s again")
 

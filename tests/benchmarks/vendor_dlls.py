@@ -53,7 +53,9 @@ def main() -> None:
         print(f"{'device':<24} {'own process':>12} {'in process':>12} {'ratio to gfor':>14}")
         base = 0.0
         for name, path in devices.items():
-            apart, inside = (steps_per_second(path, isolated=isolated) for isolated in (True, False))
+            apart, inside = (
+                steps_per_second(path, isolated=isolated) for isolated in (True, False)
+            )
             base = base or apart
             print(f"{name:<24} {apart:>12.0f} {inside:>12.0f} {apart / base:>14.2f}")
 

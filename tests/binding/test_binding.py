@@ -88,7 +88,9 @@ def test_a_frame_that_is_turned_and_a_current_into_the_converter(gallery, bindin
     turned = OURS.replace('S_n = { variable = "S_n" }\n', "")
     for table in ("voltage", "current"):
         turned = turned.replace(f"[{table}]", f'[{table}]\nframe_angle = "-40 deg"')
-    turned = turned.replace('base = "100 MVA"', 'base = "100 MVA"\ndirection = "into the converter"')
+    turned = turned.replace(
+        'base = "100 MVA"', 'base = "100 MVA"\ndirection = "into the converter"'
+    )
     plain = response(bound_fmu(gallery("converter")[0]))
     bound = response(bind(read_description(gallery("converter")[0]), binding(turned)))
     np.testing.assert_allclose(-bound[:, :2], plain, rtol=0, atol=1e-10)
@@ -122,10 +124,14 @@ def test_our_converter_behind_a_binding_is_our_converter(fmu_path, binding):
     for bound in (False, True):
         prepared = load_case("two_area").prepare(["pod_pq"])[0]
         if bound:
-            prepared.system.components["gfor"].description = bound_fmu(fmu_path("gfor"), binding(OURS))
+            prepared.system.components["gfor"].description = bound_fmu(
+                fmu_path("gfor"), binding(OURS)
+            )
         with Master(prepared.system, prepared.schedule, prepared.step_size) as master:
             master.advance(500)
-            ends.append((master.y.copy(), master.components["gfor"].get(["omega", "p", "q", "pod_p.K"])))
+            ends.append(
+                (master.y.copy(), master.components["gfor"].get(["omega", "p", "q", "pod_p.K"]))
+            )
     np.testing.assert_array_equal(ends[0][0], ends[1][0])
     assert ends[0][1] == pytest.approx(ends[1][1], rel=1e-14)
 
@@ -138,21 +144,53 @@ def test_our_converter_behind_a_binding_is_our_converter(fmu_path, binding):
     [
         ('S_n = "1500 MVA"', 'S_n = "1500 kV"', "rating: S_n: .*kV.*MVA is needed"),
         ('S_n = "1500 MVA"', 'S_n = "-3 MVA"', "S_n = -3 MVA; it must exceed 0"),
-        ('["v_re", "v_im"]', '["v_re", "v_xx"]', "voltage: the FMU has no variable 'v_xx'; `gfor fmu info"),
-        ('["v_re", "v_im"]', '["v_re", "v_re"]', "voltage: form 'rectangular' needs 2 different variables"),
-        ('["v_re", "v_im"]', '["v_re", "i_im"]', "voltage: i_im is of causality output; input is needed"),
-        ('["v_re", "v_im"]', '["v_re", "v_im"]\nunit = "kV"', "unit = 'kV', but the FMU declares v_re in 'pu'"),
+        (
+            '["v_re", "v_im"]',
+            '["v_re", "v_xx"]',
+            "voltage: the FMU has no variable 'v_xx'; `gfor fmu info",
+        ),
+        (
+            '["v_re", "v_im"]',
+            '["v_re", "v_re"]',
+            "voltage: form 'rectangular' needs 2 different variables",
+        ),
+        (
+            '["v_re", "v_im"]',
+            '["v_re", "i_im"]',
+            "voltage: i_im is of causality output; input is needed",
+        ),
+        (
+            '["v_re", "v_im"]',
+            '["v_re", "v_im"]\nunit = "kV"',
+            "unit = 'kV', but the FMU declares v_re in 'pu'",
+        ),
         ('["v_re", "v_im"]', '["v_re", "v_im"]\nbase = "33 kV"', "V_n under"),
         ('base = "100 MVA"', 'base = "100 kV"', "base: .*MVA is needed"),
         ('base = "100 MVA"', 'bass = "100 MVA"', "current.bass: this key is unknown"),
-        ('"rectangular"\nvariables = ["v', '"sideways"\nvariables = ["v', "voltage.form: it must be"),
+        (
+            '"rectangular"\nvariables = ["v',
+            '"sideways"\nvariables = ["v',
+            "voltage.form: it must be",
+        ),
         ("P_0 = {", "P_1 = {", "start.P_1: there is no start value of that name; choose from S_n"),
         ('P_0 = { variable = "P_0" }', 'P_0 = { variable = "Q_0" }', "Q_0: bound more than once"),
-        ('P_0 = { variable = "P_0"', 'P_0 = { variable = "REQUIRED"', "start.P_0.*: still to be filled in: variable"),
-        ("[signals]", "[parameters]\nnone = 3\n[signals]", "parameters.none: the FMU has no parameter of that name"),
-        ("[rating]", '[fmu]\nguid = "{other}"\n[rating]', "the binding is for the FMU {other}, this one is"),
+        (
+            'P_0 = { variable = "P_0"',
+            'P_0 = { variable = "REQUIRED"',
+            "start.P_0.*: still to be filled in: variable",
+        ),
+        (
+            "[signals]",
+            "[parameters]\nnone = 3\n[signals]",
+            "parameters.none: the FMU has no parameter of that name",
+        ),
+        (
+            "[rating]",
+            '[fmu]\nguid = "{other}"\n[rating]',
+            "the binding is for the FMU {other}, this one is",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_mistake_is_told_with_its_place(old, new, words, fmu_path, binding):
     assert old in OURS
     with pytest.raises(BindingError, match=words) as caught:
@@ -162,14 +200,18 @@ def test_a_mistake_is_told_with_its_place(old, new, words, fmu_path, binding):
 
 def test_a_binding_says_what_the_fmu_is(fmu_path, binding):
     own = read_description(fmu_path("gfor"))
-    kind = {said: bind(own, binding(f"{said}\n{OURS}")).kind for said in ("", 'fmu.kind = "machine"')}
+    kind = {
+        said: bind(own, binding(f"{said}\n{OURS}")).kind for said in ("", 'fmu.kind = "machine"')
+    }
     assert list(kind.values()) == ["converter", "machine"]
     with pytest.raises(BindingError, match=r"fmu\.kind: .*'converter' or 'machine'"):
         bind(own, binding(f'fmu.kind = "engine"\n{OURS}'))
 
 
 def test_all_mistakes_are_told_together(fmu_path, binding):
-    text = OURS.replace('"v_re", "v_im"', '"v_re", "x"').replace('variable = "omega"', 'variable = "y"')
+    text = OURS.replace('"v_re", "v_im"', '"v_re", "x"').replace(
+        'variable = "omega"', 'variable = "y"'
+    )
     with pytest.raises(BindingError, match="2 problems"):
         bound_fmu(fmu_path("gfor"), binding(text))
 
@@ -177,7 +219,9 @@ def test_all_mistakes_are_told_together(fmu_path, binding):
 def test_what_is_in_volts_needs_to_say_which(gallery, binding):
     path, good = gallery("converter_qd_si")
     text = good.read_text(encoding="utf-8").replace('value = "phase peak"', "", 1)
-    with pytest.raises(BindingError, match="a voltage in kV needs the key 'value', one of: line-to-line rms"):
+    with pytest.raises(
+        BindingError, match="a voltage in kV needs the key 'value', one of: line-to-line rms"
+    ):
         bound_fmu(path, binding(text))
 
 
@@ -195,11 +239,20 @@ def test_the_draft_for_our_own_converter_needs_no_change(fmu_path, binding):
     description = read_description(fmu_path("gfor"))
     text = draft_binding(description)
     assert "REQUIRED" not in text.partition("[fmu]")[2]
-    assert bind(description, binding(text)).port == bind(description, binding(OURS, "ours.toml")).port
+    assert (
+        bind(description, binding(text)).port == bind(description, binding(OURS, "ours.toml")).port
+    )
 
 
-@pytest.mark.parametrize(("name", "form"), [("converter_qd_si", "dq"), ("converter_polar_si", "polar"),
-                                            ("converter_abc_si", "abc"), ("converter_power_si", "power")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "form"),
+    [
+        ("converter_qd_si", "dq"),
+        ("converter_polar_si", "polar"),
+        ("converter_abc_si", "abc"),
+        ("converter_power_si", "power"),
+    ],
+)
 def test_a_draft_marks_guesses_and_what_it_cannot_know(name, form, gallery, binding):
     description = read_description(gallery(name)[0])
     text = draft_binding(description)
@@ -230,22 +283,36 @@ def test_a_switch_has_a_name_of_ours(binding, fmu_path):
     """A Boolean parameter is shown under our name, and takes what is set there."""
     found = bound_fmu(fmu_path("gfor"), binding(OURS + SWITCH))
     info = found.variables["pod_p.enabled"]
-    assert (info.type, info.causality, found.inner_names["pod_p.enabled"]) == ("Boolean", "parameter", "pod_q.enabled")
+    assert (info.type, info.causality, found.inner_names["pod_p.enabled"]) == (
+        "Boolean",
+        "parameter",
+        "pod_q.enabled",
+    )
     with open_component("box", found, isolated=False) as component:
         for value in (True, False):
             component.set({"pod_p.enabled": value})
             assert component.values(["pod_p.enabled"]) == {"pod_p.enabled": value}
             assert component.inner.values(["pod_q.enabled", "pod_p.enabled"]) == {
-                "pod_q.enabled": value, "pod_p.enabled": False
-            }  # fmt: skip
+                "pod_q.enabled": value,
+                "pod_p.enabled": False,
+            }
 
 
 @pytest.mark.parametrize(
     ("entry", "said"),
     [
-        ('"pod_p.enabled" = { variable = "omega" }', "omega is of causality output; parameter or input is needed"),
-        ('"pod_p.enabled" = { variable = "pod_p.K" }', "pod_p.K is of type Real; Boolean is needed here"),
-        ('"pod_p.enabled" = { variable = "pod_q.enabled", unit = "pu" }', "has no unit and no base; remove them"),
+        (
+            '"pod_p.enabled" = { variable = "omega" }',
+            "omega is of causality output; parameter or input is needed",
+        ),
+        (
+            '"pod_p.enabled" = { variable = "pod_p.K" }',
+            "pod_p.K is of type Real; Boolean is needed here",
+        ),
+        (
+            '"pod_p.enabled" = { variable = "pod_q.enabled", unit = "pu" }',
+            "has no unit and no base; remove them",
+        ),
         ('delta_p_pod = { variable = "pod_q.enabled" }', "is of type Boolean; Real is needed here"),
     ],
 )

@@ -23,16 +23,29 @@ TEXTS = {
     "theta_0": "Grid voltage angle at start [deg]",
     "omega": "Frequency [Hz]",
 }
-NAMES = {"P_0": "Pcons", "Q_0": "Qcons", "v_0": "Umag", "theta_0": "turn", "omega": "freq", "S_n": "size"}
+NAMES = {
+    "P_0": "Pcons",
+    "Q_0": "Qcons",
+    "v_0": "Umag",
+    "theta_0": "turn",
+    "omega": "freq",
+    "S_n": "size",
+}
 
 
 def described(folder, texts=TEXTS):
     """The converter as an exporter without units would have it: odd names, and all in the descriptions."""
 
     def change(text):
-        text = re.sub(rb' unit="[^"]*"', b"", re.sub(rb"<UnitDefinitions>.*</UnitDefinitions>", b"", text, flags=re.S))
+        text = re.sub(
+            rb' unit="[^"]*"',
+            b"",
+            re.sub(rb"<UnitDefinitions>.*</UnitDefinitions>", b"", text, flags=re.S),
+        )
         for name, words in texts.items():
-            text = text.replace(f'name="{name}"'.encode(), f'name="{name}" description="{words}"'.encode())
+            text = text.replace(
+                f'name="{name}"'.encode(), f'name="{name}" description="{words}"'.encode()
+            )
         for name, odd in NAMES.items():
             text = text.replace(f'name="{name}"'.encode(), f'name="{odd}"'.encode())
         return text
@@ -53,7 +66,9 @@ def test_units_values_direction_and_starts_come_from_the_descriptions(tmp_path):
     assert 'direction = "into the converter"  # GUESS' in current
     assert re.search(r'\[start\.P_0\]\nvariable = "Pcons".*\nunit = "MW".*\nsign = -1', starts)
     assert re.search(r'\[start\.Q_0\]\nvariable = "Qcons".*\nunit = "Mvar".*\nsign = -1', starts)
-    assert re.search(r'\[start\.v_0\]\nvariable = "Umag".*\nunit = "kV".*\nvalue = "line-to-line rms"', starts)
+    assert re.search(
+        r'\[start\.v_0\]\nvariable = "Umag".*\nunit = "kV".*\nvalue = "line-to-line rms"', starts
+    )
     assert re.search(r'\[start\.theta_0\]\nvariable = "turn".*\nunit = "deg"', starts)
     assert re.search(r'variable = "freq".*\nunit = "Hz"', signals)
     assert 'V_n = "REQUIRED' in voltage
@@ -99,7 +114,9 @@ def test_the_kind_of_a_voltage(text, kind):
     assert kind_of_voltage(text) == kind
 
 
-@pytest.mark.parametrize(("text", "kind"), [("Current, peak", "peak"), ("rms current [A]", "rms"), ("speak up", "")])
+@pytest.mark.parametrize(
+    ("text", "kind"), [("Current, peak", "peak"), ("rms current [A]", "rms"), ("speak up", "")]
+)
 def test_the_kind_of_a_current(text, kind):
     assert kind_of_current(text) == kind
 

@@ -25,7 +25,12 @@ def test_a_voltage_in_volts(unit, value, number):
 
 @pytest.mark.parametrize(
     ("unit", "value", "number"),
-    [("kA", "rms", 3.76533), ("kA", "phase rms", 3.76533), ("kA", "peak", 5.32498), ("A", "phase peak", 5324.98)],
+    [
+        ("kA", "rms", 3.76533),
+        ("kA", "phase rms", 3.76533),
+        ("kA", "peak", 5.32498),
+        ("A", "phase peak", 5324.98),
+    ],
 )
 def test_a_current_in_amperes(unit, value, number):
     """S_n = √3·V_n·I: 1500/(√3·230) kA."""
@@ -44,7 +49,8 @@ def test_per_unit_on_another_base():
 
 
 @pytest.mark.parametrize(
-    ("unit", "number"), [("MW", 1500.0), ("kW", 1.5e6), ("Mvar", 1500.0), ("MVA", 1500.0), ("GW", 1.5)]
+    ("unit", "number"),
+    [("MW", 1500.0), ("kW", 1.5e6), ("Mvar", 1500.0), ("MVA", 1500.0), ("GW", 1.5)],
 )
 def test_a_power_in_watts(unit, number):
     assert BASES.power_unit(unit, None, "p") == pytest.approx(number)

@@ -56,4 +56,9 @@ def runge_kutta(scenario):
 
 def response(step_map, frequencies):
     A, B, C = step_map
-    return np.array([C @ np.linalg.solve(np.exp(2j * np.pi * f * H) * np.eye(len(A)) - A, B) for f in frequencies])
+    return np.array(
+        [
+            C @ np.linalg.solve(np.exp(2j * np.pi * f * H) * np.eye(len(A)) - A, B)
+            for f in frequencies
+        ]
+    )

@@ -2,7 +2,11 @@
 
 import pytest
 
-from orchestrator.black_box.coupled_modes import component_participation, is_black_box, linearize_with_box
+from orchestrator.black_box.coupled_modes import (
+    component_participation,
+    is_black_box,
+    linearize_with_box,
+)
 from orchestrator.black_box.frequency_response import Excitation
 from orchestrator.errors import InputError
 from orchestrator.study.modes import modes_of, running

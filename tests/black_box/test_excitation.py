@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from orchestrator.black_box.frequency_response import line_response, multisine, odd_lines, pulse_response
+from orchestrator.black_box.frequency_response import (
+    line_response,
+    multisine,
+    odd_lines,
+    pulse_response,
+)
 
 H = 1e-3
 A = np.array([[0.97, 0.1], [-0.1, 0.95]])
@@ -22,7 +27,9 @@ def simulate(u, periods=1):
 
 
 def exact(frequencies):
-    return np.array([C @ np.linalg.solve(np.exp(2j * np.pi * f * H) * np.eye(2) - A, B) for f in frequencies])
+    return np.array(
+        [C @ np.linalg.solve(np.exp(2j * np.pi * f * H) * np.eye(2) - A, B) for f in frequencies]
+    )
 
 
 def test_the_lines_are_odd_distinct_and_reach_both_ends():
@@ -41,7 +48,8 @@ def test_a_multisine_has_its_amplitude_equal_lines_and_nothing_else():
     spectrum = np.abs(np.fft.rfft(u))
     assert np.ptp(spectrum[lines]) < 1e-12 * spectrum.max()
     assert np.delete(spectrum, lines).max() < 1e-12 * spectrum.max()
-    assert np.abs(u).max() / u.std() < 4  # as a sum in phase it would be the root of twice their number
+    # as a sum in phase it would be the root of twice their number
+    assert np.abs(u).max() / u.std() < 4
 
 
 def test_both_ways_give_the_exact_response():

@@ -20,7 +20,17 @@ def hidden(tmp_path_factory):
     """The two-area system with such a converter: nothing of its file is ours but the equations."""
     folder = tmp_path_factory.mktemp("hidden")
     ours, target = folder / "ours.ssp", folder / "hidden.ssp"
-    arguments = ["export", "ssp", "two_area", "--scenario", "pod_p", "--set", "*.native=true", "--out", str(ours)]
+    arguments = [
+        "export",
+        "ssp",
+        "two_area",
+        "--scenario",
+        "pod_p",
+        "--set",
+        "*.native=true",
+        "--out",
+        str(ours),
+    ]
     assert main(arguments) == 0
     with zipfile.ZipFile(ours) as old:
         fmu = zipfile.ZipFile(io.BytesIO(old.read("resources/gfor.fmu")))
@@ -54,7 +64,10 @@ def test_one_way_to_linearise_at_a_time(gfor):
 
 
 def test_where_nothing_hides_nothing_is_identified(gfor):
-    shown = [gfor("modes", "two_area", "--scenario", "base", "--json", *more)[1] for more in ([], ["--black-box"])]
+    shown = [
+        gfor("modes", "two_area", "--scenario", "base", "--json", *more)[1]
+        for more in ([], ["--black-box"])
+    ]
     assert shown[0] == shown[1]
 
 
@@ -75,13 +88,23 @@ def test_the_modes_of_an_fmu_that_hides_its_states(hidden, gfor):
     code, shown, _ = gfor("modes", hidden, "--black-box", "--json")
     assert code == 0
     (found,) = json.loads(shown)["scenarios"]
-    assert found["linearised"] == {"gfor": "identified", "sg1": "perturbed", "sg2": "perturbed", "grid": "perturbed"}
+    assert found["linearised"] == {
+        "gfor": "identified",
+        "sg1": "perturbed",
+        "sg2": "perturbed",
+        "grid": "perturbed",
+    }
     assert 0 < found["fit_errors"]["gfor"] < 1e-4
-    (white,) = json.loads(gfor("modes", "two_area", "--scenario", "pod_p", "--json")[1])["scenarios"]
+    (white,) = json.loads(gfor("modes", "two_area", "--scenario", "pod_p", "--json")[1])[
+        "scenarios"
+    ]
     for mode in white["modes"]:
         if mode["damping_percent"] > 60:
             continue
-        same = min(found["modes"], key=lambda m: abs(m["real"] - mode["real"]) + abs(m["imag"] - mode["imag"]))
+        same = min(
+            found["modes"],
+            key=lambda m: abs(m["real"] - mode["real"]) + abs(m["imag"] - mode["imag"]),
+        )
         assert same["frequency_hz"] == pytest.approx(mode["frequency_hz"], abs=1e-3)
         assert same["damping_percent"] == pytest.approx(mode["damping_percent"], abs=0.01)
         assert same["name"] == mode["name"]
@@ -94,6 +117,8 @@ def test_a_system_that_moves_beside_the_box_is_no_steady_state():
     parameters["theta_0"] += 1e-7
     with (
         Master(prepared.system, prepared.schedule, prepared.step_size) as master,
-        pytest.raises(AnalysisError, match=r"no steady state.*step changes a state of component .grid."),
+        pytest.raises(
+            AnalysisError, match=r"no steady state.*step changes a state of component .grid."
+        ),
     ):
         linearize_with_box(master, "gfor")

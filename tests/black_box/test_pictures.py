@@ -15,13 +15,19 @@ def test_the_fit_is_drawn_at_the_communication_points_frequency(monkeypatch):
     monkeypatch.setattr(files, "save_figure", lambda figure, path: figures.append(figure))
     f = np.array([1.0, 10.0, 100.0])
     response = SimpleNamespace(
-        frequencies=f, step_size=STEP, inputs=("v",), outputs=("i",), bounds=np.full((3, 1, 1), 1e-3),
+        frequencies=f,
+        step_size=STEP,
+        inputs=("v",),
+        outputs=("i",),
+        bounds=np.full((3, 1, 1), 1e-3),
         values=np.exp(-2j * np.pi * f * STEP)[:, None, None],
-    )  # fmt: skip
+    )
     model = SimpleNamespace(response=lambda z: 1 / z[:, None, None], D=np.zeros((1, 1)))
     passive = SimpleNamespace(frequencies=f, relative=np.zeros(3))
     files._plot(response, model, passive, None)
     phase = figures[0].axes[1]
     measured, fitted = phase.lines
-    assert np.allclose(np.interp(f, fitted.get_xdata(), fitted.get_ydata()), measured.get_ydata(), atol=0.05)
+    assert np.allclose(
+        np.interp(f, fitted.get_xdata(), fitted.get_ydata()), measured.get_ydata(), atol=0.05
+    )
     assert np.allclose(measured.get_ydata(), 180 - 360 * f * STEP)

@@ -31,9 +31,18 @@ def measured(outer=OUTER):
     x = 2j * np.pi * FREQUENCIES * STEP
     held = values * ((1 - np.exp(-x)) / x)[:, None, None]
     current = (INNER - outer) / complex(R, X)
-    return FrequencyResponse(FREQUENCIES, held, np.zeros(values.shape), np.zeros((2, 2)),
-                             np.array([current.real, current.imag]), STEP, ("v_re", "v_im"), ("i_re", "i_im"), 0.0,
-                             "multisine")  # fmt: skip
+    return FrequencyResponse(
+        FREQUENCIES,
+        held,
+        np.zeros(values.shape),
+        np.zeros((2, 2)),
+        np.array([current.real, current.imag]),
+        STEP,
+        ("v_re", "v_im"),
+        ("i_re", "i_im"),
+        0.0,
+        "multisine",
+    )
 
 
 def test_slow_changes_give_the_derivatives_of_the_powers():
@@ -58,8 +67,18 @@ def test_a_turned_frame_changes_nothing():
     matrix = np.array([[turn.real, -turn.imag], [turn.imag, turn.real]])
     straight = measured()
     current = matrix @ straight.operating_point
-    other = FrequencyResponse(FREQUENCIES, matrix @ straight.values @ matrix.T, straight.bounds, straight.feedthrough,
-                              current, STEP, straight.inputs, straight.outputs, 0.0, "multisine")  # fmt: skip
+    other = FrequencyResponse(
+        FREQUENCIES,
+        matrix @ straight.values @ matrix.T,
+        straight.bounds,
+        straight.feedthrough,
+        current,
+        STEP,
+        straight.inputs,
+        straight.outputs,
+        0.0,
+        "multisine",
+    )
     one, two = stiffness(straight, OUTER, 50.0), stiffness(other, OUTER * turn, 50.0)
     for name, values in one.powers.items():
         assert np.allclose(values, two.powers[name])

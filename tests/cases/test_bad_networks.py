@@ -419,7 +419,11 @@ BAD = [
         id="event before the start",
     ),
     pytest.param(
-        CASE, "scale = 1.05\n", "", "line 26, events.0.scale: this key is missing; add it", id="event without scale"
+        CASE,
+        "scale = 1.05\n",
+        "",
+        "line 26, events.0.scale: this key is missing; add it",
+        id="event without scale",
     ),
     pytest.param(
         CASE,
@@ -445,10 +449,14 @@ def problems(tmp_path):
     def found(where, old, new):
         assert old in where
         for name, text in (("case.toml", CASE), ("units.csv", UNITS)):
-            (tmp_path / name).write_text(text.replace(old, new, 1) if text is where else text, encoding="utf-8")
+            (tmp_path / name).write_text(
+                text.replace(old, new, 1) if text is where else text, encoding="utf-8"
+            )
         with pytest.raises(CaseError) as caught:
             load_case(tmp_path / "case.toml").prepare()
-        return [str(problem).replace(f"{tmp_path}{os.sep}", "") for problem in caught.value.problems]
+        return [
+            str(problem).replace(f"{tmp_path}{os.sep}", "") for problem in caught.value.problems
+        ]
 
     return found
 
@@ -462,17 +470,29 @@ def test_one_mistake_gives_one_problem(problems, where, old, new, said):
 @pytest.mark.parametrize(
     ("where", "old", "new", "said"),
     [
-        pytest.param(CASE, "slack =", "slak =", ["slak: this key is unknown", "'slack' is missing"], id="slack"),
         pytest.param(
-            CASE, "generator =", "generater =", ["generator: this key is missing", "generater: this key is unknown"],
+            CASE,
+            "slack =",
+            "slak =",
+            ["slak: this key is unknown", "'slack' is missing"],
+            id="slack",
+        ),
+        pytest.param(
+            CASE,
+            "generator =",
+            "generater =",
+            ["generator: this key is missing", "generater: this key is unknown"],
             id="generator",
         ),
         pytest.param(
-            CASE, "X = 0.1, R = 0.01, B = 0.1 }\nwest", "x = 0.1, R = 0.01, B = 0.1 }\nwest",
-            ["lines.east.X: this key is missing", "lines.east.x: this key is unknown"], id="reactance",
+            CASE,
+            "X = 0.1, R = 0.01, B = 0.1 }\nwest",
+            "x = 0.1, R = 0.01, B = 0.1 }\nwest",
+            ["lines.east.X: this key is missing", "lines.east.x: this key is unknown"],
+            id="reactance",
         ),
     ],
-)  # fmt: skip
+)
 def test_a_misspelt_key_is_unknown_and_missing(problems, where, old, new, said):
     found = problems(where, old, new)
     assert len(found) == 2
@@ -482,16 +502,34 @@ def test_a_misspelt_key_is_unknown_and_missing(problems, where, old, new, said):
 @pytest.mark.parametrize(
     ("where", "old", "new", "said"),
     [
-        pytest.param(UNITS, "150,4", "150,6500", "units.csv, line 3, sg2.machine.H: sg2: machine.H = 6500 s is",
-                     id="inertia in MWs"),
-        pytest.param(CASE, "B = 0.1 }\nwest", "B = 0.1, shift = 30 }\nwest",
-                     "line 14, network.lines.east.shift: grid: shift_east = 30 rad is", id="degrees"),
-        pytest.param(UNITS, "1.02,-100,150", "1.02,-100,3", "line 5, power_flow: limits of reactive", id="Qmax"),
+        pytest.param(
+            UNITS,
+            "150,4",
+            "150,6500",
+            "units.csv, line 3, sg2.machine.H: sg2: machine.H = 6500 s is",
+            id="inertia in MWs",
+        ),
+        pytest.param(
+            CASE,
+            "B = 0.1 }\nwest",
+            "B = 0.1, shift = 30 }\nwest",
+            "line 14, network.lines.east.shift: grid: shift_east = 30 rad is",
+            id="degrees",
+        ),
+        pytest.param(
+            UNITS,
+            "1.02,-100,150",
+            "1.02,-100,3",
+            "line 5, power_flow: limits of reactive",
+            id="Qmax",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_can_be_meant_is_asked(tmp_path, where, old, new, said):
     for name, text in (("case.toml", CASE), ("units.csv", UNITS)):
-        (tmp_path / name).write_text(text.replace(old, new, 1) if text is where else text, encoding="utf-8")
+        (tmp_path / name).write_text(
+            text.replace(old, new, 1) if text is where else text, encoding="utf-8"
+        )
     (ready,) = load_case(tmp_path / "case.toml").prepare()
     asked = [str(question).replace(f"{tmp_path}{os.sep}", "") for question in ready.questions]
     assert any(question.startswith(said) for question in asked), asked
@@ -504,8 +542,9 @@ def test_a_pattern_fits_what_has_the_variable(tmp_path):
     (tmp_path / "units.csv").write_text(UNITS, encoding="utf-8")
     (ready,) = load_case(tmp_path / "case.toml").prepare()
     assert {n: x for n, x in ready.values.items() if n.endswith("R_f")} == {
-        "gfor1.droop.R_f": 0.04, "gfor2.droop.R_f": 0.04,
-    }  # fmt: skip
+        "gfor1.droop.R_f": 0.04,
+        "gfor2.droop.R_f": 0.04,
+    }
 
 
 def test_nothing_is_compiled_where_the_power_flow_fails(tmp_path, monkeypatch):

@@ -10,7 +10,9 @@ from orchestrator.errors import CaseError
 
 def native(components):
     """Names of those that run without Python: their FMUs give directional derivatives."""
-    return {name for name, plan in components.items() if plan.description.gives_directional_derivatives}
+    return {
+        name for name, plan in components.items() if plan.description.gives_directional_derivatives
+    }
 
 
 @pytest.mark.parametrize(
@@ -31,7 +33,9 @@ def test_a_pattern_chooses_and_the_last_choice_decides(given, found):
 def test_a_stronger_layer_decides(tmp_path):
     path = tmp_path / "values.toml"
     path.write_text('[set]\n"*.native" = true\n"gfor.pod_p.K" = 150.0\n', encoding="utf-8")
-    components = load_case("two_area").components_of("gfor", {"grid.native": False}, [read_parameter_file(path)])
+    components = load_case("two_area").components_of(
+        "gfor", {"grid.native": False}, [read_parameter_file(path)]
+    )
     assert native(components) == {"sg1", "sg2", "gfor"}
     assert components["gfor"].parameters["pod_p.K"] == 150.0
 
@@ -48,7 +52,8 @@ def test_a_choice_is_no_value_of_the_scenario():
         ({"gfor.native": 1.0}, "--set gfor.native: native = 1.0; it must be true or false"),
         ({"gfor.native": "yes"}, "--set gfor.native: native = 'yes'; it must be true or false"),
         ({"gfr.native": True}, "--set gfr.native: there is no component 'gfr'"),
-        ({"units.alpha": 0.3}, "--set units.alpha: there is no component 'units'"),  # this case has no units
+        # this case has no units
+        ({"units.alpha": 0.3}, "--set units.alpha: there is no component 'units'"),
         ({"gfor.alpha": 0.3}, "--set gfor.alpha: component 'gfor' has no variable 'alpha'"),
     ],
 )

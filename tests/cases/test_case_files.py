@@ -189,7 +189,9 @@ def test_a_file_that_is_not_text(tmp_path):
 def test_a_missing_file(tmp_path):
     with pytest.raises(InputError) as caught:
         load_case(tmp_path / "none.toml")
-    text = "there is no such file, nor a built-in case of that name; built-in: " + ", ".join(built_in_cases())
+    text = "there is no such file, nor a built-in case of that name; built-in: " + ", ".join(
+        built_in_cases()
+    )
     assert str(caught.value) == f"{tmp_path / 'none.toml'}: {text}"
     assert "two_area" in built_in_cases()
 
@@ -209,15 +211,47 @@ def test_a_file_without_what_nothing_can_be_checked_without(written, text, expec
     ("old", "new", "problem"),
     [
         ('"1 ms"', "0", "line 3, solver.step_size: it must be greater than 0 s (value seen: 0 s)"),
-        ('"1 ms"', "1", "line 3, solver.step_size: it must be less than or equal to 0.1 s (value seen: 1 s)"),
-        ('to = "k.u"', 'to = "k.u"\nvia = "z"', "line 14, connections.0.via: this key is unknown; check its spelling"),
+        (
+            '"1 ms"',
+            "1",
+            "line 3, solver.step_size: it must be less than or equal to 0.1 s (value seen: 1 s)",
+        ),
+        (
+            'to = "k.u"',
+            'to = "k.u"\nvia = "z"',
+            "line 14, connections.0.via: this key is unknown; check its spelling",
+        ),
         ('fmu = "fmus/k.fmu"', "", "line 8, components.k: give either 'model'"),
-        ("K = -3.0", 'K = "minus"', "line 10, components.k.parameters.K: K: 'minus' is not a number with a unit"),
-        ("K = -3.0", "K = true", "line 10, components.k.parameters.K: K = True; it must be a number"),
-        ("K = -3.0", "K = nan", "line 10, components.k.parameters.K: K = nan; it must be a finite number"),
-        ("K = -3.0", "y = 1", "line 10, components.k.parameters.y: y is of causality output; only parameters and"),
-        ("K = -3.0 }", 'K = -3.0 }\nbus = "b"', "line 11, components.k.bus: a bus needs a [power_flow] table"),
-        ('"20 ms"', '"20.5 ms"', "line 4, solver.stop_time: the stop at 0.0205 s is not a communication point"),
+        (
+            "K = -3.0",
+            'K = "minus"',
+            "line 10, components.k.parameters.K: K: 'minus' is not a number with a unit",
+        ),
+        (
+            "K = -3.0",
+            "K = true",
+            "line 10, components.k.parameters.K: K = True; it must be a number",
+        ),
+        (
+            "K = -3.0",
+            "K = nan",
+            "line 10, components.k.parameters.K: K = nan; it must be a finite number",
+        ),
+        (
+            "K = -3.0",
+            "y = 1",
+            "line 10, components.k.parameters.y: y is of causality output; only parameters and",
+        ),
+        (
+            "K = -3.0 }",
+            'K = -3.0 }\nbus = "b"',
+            "line 11, components.k.bus: a bus needs a [power_flow] table",
+        ),
+        (
+            '"20 ms"',
+            '"20.5 ms"',
+            "line 4, solver.stop_time: the stop at 0.0205 s is not a communication point",
+        ),
     ],
 )
 def test_one_mistake(written, old, new, problem):
@@ -226,7 +260,8 @@ def test_one_mistake(written, old, new, problem):
     case = written(text)
     found = problems_of(case.prepare)
     assert found[0].startswith(problem)
-    consequences = [p for p in found[1:] if "nothing feeds" not in p]  # of a component that is not there
+    # of a component that is not there
+    consequences = [p for p in found[1:] if "nothing feeds" not in p]
     assert consequences == []
 
 
@@ -237,7 +272,11 @@ EVENT = '[[events]]\ntype = "parameter_change"\ntime = 0.01\ncomponent = "k"\npa
     ("old", "new", "problem"),
     [
         ('"k"', '"z"', "line 17, events.0: there is no component 'z'"),
-        ('"K"', '"Q"', "line 17, events.0: component 'k' has no variable 'Q' for this event to set"),
+        (
+            '"K"',
+            '"Q"',
+            "line 17, events.0: component 'k' has no variable 'Q' for this event to set",
+        ),
         ('"K"', '"y"', "line 17, events.0: k.y is "),
         ("value = 2", "value = 200", "line 17, events.0: K = 200; it must be at most 100"),
         (
@@ -254,14 +293,21 @@ def test_one_mistake_in_an_event(written, old, new, problem):
     assert the_problem(lambda: written(LOOP + text).prepare()).startswith(problem)
 
 
-@pytest.mark.parametrize("event", [EVENT.replace("value = 2", ""), EVENT.replace('"parameter_change"', '"explosion"')])
+@pytest.mark.parametrize(
+    "event", [EVENT.replace("value = 2", ""), EVENT.replace('"parameter_change"', '"explosion"')]
+)
 def test_a_wrong_event_does_not_hide_the_other_mistakes(written, event):
     problems = problems_of(lambda: written(LOOP.replace("K = -3.0", "K = -300") + event).prepare())
-    assert [re.match(r"line \d+", problem).group() for problem in problems] == ["line 17", "line 10"]
+    assert [re.match(r"line \d+", problem).group() for problem in problems] == [
+        "line 17",
+        "line 10",
+    ]
 
 
 def test_a_wrong_value_of_a_key_that_must_be_there_is_one_problem(written):
-    problem = the_problem(lambda: written(LOOP + EVENT.replace("time = 0.01", "time = -1")).prepare())
+    problem = the_problem(
+        lambda: written(LOOP + EVENT.replace("time = 0.01", "time = -1")).prepare()
+    )
     assert problem.startswith("line 19, events.0.time: it must be greater than or equal to 0")
 
 
@@ -271,7 +317,9 @@ def test_the_value_of_an_event_may_have_a_unit(written):
 
 
 def test_the_value_of_an_event_that_is_not_a_number(written):
-    assert "line 17, events.0" in the_problem(written(LOOP + EVENT.replace("value = 2", 'value = "two"')).prepare)
+    assert "line 17, events.0" in the_problem(
+        written(LOOP + EVENT.replace("value = 2", 'value = "two"')).prepare
+    )
 
 
 def test_an_event_on_an_input_that_something_feeds(written):
@@ -290,7 +338,10 @@ def test_a_wrong_name_in_the_schedule_is_a_problem_of_the_file(written):
 
 def test_unknown_scenarios_and_overrides_are_reported(written):
     case = written(LOOP)
-    assert the_problem(case.prepare, ["z"]) == "--scenario: there is no scenario 'z'; the case has: loop"
+    assert (
+        the_problem(case.prepare, ["z"])
+        == "--scenario: there is no scenario 'z'; the case has: loop"
+    )
     assert problems_of(case.prepare, (), {"k.G": 1.0, "z.K": 1.0, "k.K": "1 MW"}) == [
         "--set k.G: component 'k' has no variable 'G'; "
         f"`gfor fmu info {case.path.parent / 'fmus' / 'k.fmu'}` lists them",
@@ -312,8 +363,16 @@ def test_fmus_of_ones_own_are_found_beside_the_case_file(written, tmp_path, monk
     monkeypatch.chdir(tmp_path.parent)
     (ready,) = written(LOOP.replace("fmus/x.fmu", "./fmus/x.fmu")).prepare()
     assert ready.system.components["x"].description.path == tmp_path / "fmus" / "x.fmu"
-    assert [str(c.source) + " " + str(c.target) for c in ready.system.connections] == ["x.y k.u", "k.y x.u"]
-    assert (ready.name, ready.step_size, ready.stop_time, ready.record_every) == ("loop", 0.001, 0.02, 2)
+    assert [str(c.source) + " " + str(c.target) for c in ready.system.connections] == [
+        "x.y k.u",
+        "k.y x.u",
+    ]
+    assert (ready.name, ready.step_size, ready.stop_time, ready.record_every) == (
+        "loop",
+        0.001,
+        0.02,
+        2,
+    )
     assert ready.record == ("x.y", "k.y")
     assert ready.power_flow is None
     assert ready.values == {"k.K": -3.0}
@@ -325,7 +384,9 @@ def test_an_absolute_path_is_taken_as_it_is(written):
     assert ready.system.components["x"].description.path == small_fmu("integrator").path
 
 
-@pytest.mark.parametrize(("schedule", "powers"), [("gauss-seidel", (1 - 3e-3, 20)), ("jacobi", None)])
+@pytest.mark.parametrize(
+    ("schedule", "powers"), [("gauss-seidel", (1 - 3e-3, 20)), ("jacobi", None)]
+)
 def test_the_schedule_of_the_file_is_the_one_that_runs(written, schedule, powers):
     text = LOOP.replace("[components.x]", f'schedule = "{schedule}"\n[components.x]', 1)
     (ready,) = written(text.replace("x.fmu", 'x.fmu"\nparameters.x_0 = 2 # ', 1)).prepare()
@@ -347,7 +408,9 @@ def test_step_and_stop_go_before_the_files(written):
 
 
 def test_patterns_choose_what_is_recorded(written):
-    (ready,) = written(LOOP.replace("[components.x]", 'record = ["k.*", "*.q"]\n[components.x]', 1)).prepare()
+    (ready,) = written(
+        LOOP.replace("[components.x]", 'record = ["k.*", "*.q"]\n[components.x]', 1)
+    ).prepare()
     assert ready.record == ("k.y",)
 
 
@@ -396,7 +459,9 @@ def test_an_override_for_a_removed_component_is_left_out_of_that_scenario_only(w
 
 
 def test_a_pattern_sets_every_component_that_fits(written):
-    text = LOOP.replace("components.x]", "components.k2]\nfmu = 'fmus/k.fmu'\ninputs.u = 1\n[components.x]", 1)
+    text = LOOP.replace(
+        "components.x]", "components.k2]\nfmu = 'fmus/k.fmu'\ninputs.u = 1\n[components.x]", 1
+    )
     (ready,) = written(text).prepare(overrides={"k*.K": 6.0})
     assert ready.values == {"k.K": 6.0, "k2.K": 6.0}
 
@@ -439,15 +504,47 @@ def test_a_network_of_ones_own_starts_in_steady_state(written):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('slack = "sg"', 'slack = "b3"', "line 6, power_flow.slack: 'b3' is neither a unit of this scenario nor a bus"),
+        (
+            'slack = "sg"',
+            'slack = "b3"',
+            "line 6, power_flow.slack: 'b3' is neither a unit of this scenario nor a bus",
+        ),
         ('grid = "grid"', 'grid = "net"', "line 5, power_flow.grid: there is no component 'net'"),
-        ('bus = "b3"', 'bus = "b4"', "line 7, network: network 'three_grid': load 'd3' is at bus 'b4', which does not"),
-        ("X = 0.02, B", "X = 0, B", "line 7, network: network 'three_grid': line 'l12' has the reactance 0 pu"),
-        ('bus = "b2"', 'bus = "b9"', "line 7, network: network 'three_grid': port 'vsc' is at bus 'b9'"),
-        ('"0.9 GW"', '"9 GW"', "line 4, power_flow: scenario 'three': power flow: no solution found"),
-        ("P_0 = 0.8", "P_0 = 0.8, Q_0 = 0.1", "line 19, components.vsc.parameters.Q_0: vsc: Q_0 = 0.1 pu and v_0 = "),
-        ('S_n = "1000 MVA"', 'S_n = "100 MVA"', "line 4, power_flow: scenario 'three': sg would have to feed P_0 = "),
-        ('p = "0.9 GW"', 'p = "0.9 pu"', "line 11, network.loads.d3.p: '0.9 pu' is in pu, but MW is needed"),
+        (
+            'bus = "b3"',
+            'bus = "b4"',
+            "line 7, network: network 'three_grid': load 'd3' is at bus 'b4', which does not",
+        ),
+        (
+            "X = 0.02, B",
+            "X = 0, B",
+            "line 7, network: network 'three_grid': line 'l12' has the reactance 0 pu",
+        ),
+        (
+            'bus = "b2"',
+            'bus = "b9"',
+            "line 7, network: network 'three_grid': port 'vsc' is at bus 'b9'",
+        ),
+        (
+            '"0.9 GW"',
+            '"9 GW"',
+            "line 4, power_flow: scenario 'three': power flow: no solution found",
+        ),
+        (
+            "P_0 = 0.8",
+            "P_0 = 0.8, Q_0 = 0.1",
+            "line 19, components.vsc.parameters.Q_0: vsc: Q_0 = 0.1 pu and v_0 = ",
+        ),
+        (
+            'S_n = "1000 MVA"',
+            'S_n = "100 MVA"',
+            "line 4, power_flow: scenario 'three': sg would have to feed P_0 = ",
+        ),
+        (
+            'p = "0.9 GW"',
+            'p = "0.9 pu"',
+            "line 11, network.loads.d3.p: '0.9 pu' is in pu, but MW is needed",
+        ),
     ],
 )
 def test_one_mistake_in_a_network(written, old, new, words):
@@ -464,14 +561,19 @@ def test_a_line_to_a_bus_that_is_not_in_the_list(written):
 def test_units_at_one_bus_must_want_one_voltage(written):
     text = THREE_BUSES.replace('bus = "b2"', 'bus = "b1"')
     problem = the_problem(written(text).prepare)
-    assert "bus 'b1' cannot have two voltages (sg wants 1, vsc wants 1.01); give its units the same v_0" in problem
+    assert (
+        "bus 'b1' cannot have two voltages (sg wants 1, vsc wants 1.01); give its units the same v_0"
+        in problem
+    )
 
 
 # -- the built-in case -----------------------------------------------------------------------------
 
 
 def angle(**overrides):
-    (ready,) = load_case("two_area").prepare(["gfor"], {k.replace("__", ".", 1): v for k, v in overrides.items()})
+    (ready,) = load_case("two_area").prepare(
+        ["gfor"], {k.replace("__", ".", 1): v for k, v in overrides.items()}
+    )
     return ready.values["sg1.theta_0"] - ready.values["sg2.theta_0"], ready
 
 
@@ -481,7 +583,11 @@ def test_an_override_moves_the_power_flow():
         theta, ready = angle(grid__X_L=X)
         assert cmath.sin(theta).real == pytest.approx(X, abs=1e-9)
         assert ready.values["grid.X_L"] == X
-        assert ready.values["gfor.theta_0"] == ready.values["sg1.theta_0"] == ready.values["grid.bus_2.theta_0"]
+        assert (
+            ready.values["gfor.theta_0"]
+            == ready.values["sg1.theta_0"]
+            == ready.values["grid.bus_2.theta_0"]
+        )
     theta, _ = angle(**{"grid__load_2.P": "2550 MW"})  # 150 MW now
     assert cmath.sin(theta).real == pytest.approx(0.15, abs=1e-9)
 
@@ -495,7 +601,10 @@ def test_the_two_area_scenarios():
     assert ready["gfor"].values["grid.load_2.P"] == 2600.0
     assert ready["gfor"].schedule.groups == (("gfor", "sg1", "sg2"), ("grid",))
     assert all(r.events == (LoadChange(1.0, "grid", "load_2", 1.01),) for r in ready.values())
-    switches = {n: (r.values.get("gfor.pod_p.enabled"), r.values.get("gfor.pod_q.enabled")) for n, r in ready.items()}
+    switches = {
+        n: (r.values.get("gfor.pod_p.enabled"), r.values.get("gfor.pod_q.enabled"))
+        for n, r in ready.items()
+    }
     assert switches == {
         "base": (None, None),
         "gfor": (None, None),
@@ -507,6 +616,8 @@ def test_the_two_area_scenarios():
 
 def test_a_removed_components_override_leaves_the_base_scenario_as_it_is():
     case = load_case("two_area")
-    plain, changed = (case.prepare(["base"], overrides)[0].values for overrides in ({}, {"gfor.droop.R_f": 0.02}))
+    plain, changed = (
+        case.prepare(["base"], overrides)[0].values for overrides in ({}, {"gfor.droop.R_f": 0.02})
+    )
     assert plain == changed
     assert case.prepare(["gfor"], {"gfor.droop.R_f": 0.02})[0].values["gfor.droop.R_f"] == 0.02

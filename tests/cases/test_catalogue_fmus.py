@@ -56,7 +56,12 @@ WANTED = [
     ("synchronous_generator", None, False, (("exciter", "st1a"),)),
     ("two_area_grid", TWO_AREA, False, ()),
     ("two_area_grid", replace(TWO_AREA, stray_B=0.1), False, ()),
-    ("two_area_grid", replace(TWO_AREA, lines=(replace(TWO_AREA.lines[0], X=0.1 + 1e-16),)), False, ()),
+    (
+        "two_area_grid",
+        replace(TWO_AREA, lines=(replace(TWO_AREA.lines[0], X=0.1 + 1e-16),)),
+        False,
+        (),
+    ),
 ]
 
 
@@ -70,7 +75,9 @@ def fresh():
 def test_no_model_is_built_to_find_its_kept_fmu(monkeypatch):
     built = catalogue_fmu("infinite_bus")
     plan_fmu.cache_clear()
-    monkeypatch.setattr(catalogue_fmus, "build_model", lambda *_, **__: pytest.fail("the model is built"))
+    monkeypatch.setattr(
+        catalogue_fmus, "build_model", lambda *_, **__: pytest.fail("the model is built")
+    )
     assert plan_fmu("infinite_bus").description.guid == built.guid
 
 
@@ -99,13 +106,17 @@ def test_a_note_of_an_fmu_that_is_gone_leads_to_its_building(tmp_path, monkeypat
     assert first.path.is_file()
 
 
-@pytest.mark.parametrize(("model", "network"), [("phasor_grid", NETWORK), ("grid", NETWORK), ("gfor", None)])
+@pytest.mark.parametrize(
+    ("model", "network"), [("phasor_grid", NETWORK), ("grid", NETWORK), ("gfor", None)]
+)
 def test_a_plan_says_of_the_variables_what_the_fmu_says(model, network, tmp_path, monkeypatch):
     """All that a case is checked by: names, bounds, start values, states. Only dependencies need the equations."""
     monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path / "cache"))
     planned = plan_fmu(model, network)
     assert not planned.is_there
-    monkeypatch.setattr(catalogue_fmus, "build_model", lambda *_, **__: pytest.fail("it is built twice"))
+    monkeypatch.setattr(
+        catalogue_fmus, "build_model", lambda *_, **__: pytest.fail("it is built twice")
+    )
     built = build_fmu(planned)
     assert planned.description.variables == built.variables
     assert planned.description.states == built.states
@@ -119,7 +130,9 @@ def test_a_long_description_is_not_read_again(tmp_path, monkeypatch):
     monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(dependencies, "MOST", 0)
     with monkeypatch.context() as patch:
-        patch.setattr(catalogue_fmus, "read_description", lambda path: pytest.fail(f"{path} is read"))
+        patch.setattr(
+            catalogue_fmus, "read_description", lambda path: pytest.fail(f"{path} is read")
+        )
         built = build_fmu(plan_fmu("phasor_grid", NETWORK))
     assert built == read_description(built.path)
     assert built.guid != "not-built"

@@ -7,7 +7,12 @@ import orchestrator as gfor
 from orchestrator.errors import CaseError
 from tests.screening.five_machines import five_machines
 
-IN_ANDES = (-0.927208 + 7.621295j, -1.038623 + 8.421924j, -1.020135 + 8.781521j, -0.995953 + 9.229679j)
+IN_ANDES = (
+    -0.927208 + 7.621295j,
+    -1.038623 + 8.421924j,
+    -1.020135 + 8.781521j,
+    -0.995953 + 9.229679j,
+)
 """Swings of `five_machines`, loads as impedances, as ANDES 2.0.0 computed them from the same files [rad/s]."""
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore:question")]
@@ -23,7 +28,9 @@ def folder(tmp_path_factory):
 def swings(folder, conventions, **values):
     text = (folder / "five.toml").read_text(encoding="utf-8")
     case = folder / "chosen.toml"
-    case.write_text(text.replace("[units]", f"[conventions]\n{conventions}\n[units]"), encoding="utf-8")
+    case.write_text(
+        text.replace("[units]", f"[conventions]\n{conventions}\n[units]"), encoding="utf-8"
+    )
     modes = gfor.load(case).scenario("base", values).modes().result.modes
     found = np.array([mode.eigenvalue for mode in modes])
     return _swings_of(found)
@@ -57,11 +64,21 @@ def test_each_assumption_alone_and_an_override_by_name(folder):
 
 
 def test_machines_with_stator_transients_and_other_programs_are_refused(folder):
-    text = (folder / "five.toml").read_text(encoding="utf-8").replace("_phasor", "").replace('"phasor_grid"', '"grid"')
+    text = (
+        (folder / "five.toml")
+        .read_text(encoding="utf-8")
+        .replace("_phasor", "")
+        .replace('"phasor_grid"', '"grid"')
+    )
     text = text.replace('raw = "five.raw"', 'raw = "five.raw"\nstray_B = 0.05')
-    for like, words in (("psse", "its emf has the speed in it"), ("eurostag", "'psse', 'powerfactory' or 'andes'")):
+    for like, words in (
+        ("psse", "its emf has the speed in it"),
+        ("eurostag", "'psse', 'powerfactory' or 'andes'"),
+    ):
         case = folder / "emt.toml"
-        case.write_text(text.replace("[units]", f'[conventions]\nlike = "{like}"\n[units]'), encoding="utf-8")
+        case.write_text(
+            text.replace("[units]", f'[conventions]\nlike = "{like}"\n[units]'), encoding="utf-8"
+        )
         with pytest.raises(CaseError, match=words):
             gfor.load(case).scenario("base")
 
@@ -70,8 +87,13 @@ def test_machines_with_stator_transients_and_other_programs_are_refused(folder):
 def test_andes_still_has_them(folder):
     andes = pytest.importorskip("andes", reason="ANDES is not installed")
     andes.config_logger(40)
-    system = andes.load(str(folder / "five.raw"), addfile=str(folder / "five.dyr"), setup=False, no_output=True,
-                        default_config=True)  # fmt: skip
+    system = andes.load(
+        str(folder / "five.raw"),
+        addfile=str(folder / "five.dyr"),
+        setup=False,
+        no_output=True,
+        default_config=True,
+    )
     for name in ("p2p", "p2i", "p2z", "q2q", "q2i", "q2z"):
         setattr(system.PQ.config, name, 1.0 if name.endswith("z") else 0.0)
     system.setup()
@@ -79,4 +101,6 @@ def test_andes_still_has_them(folder):
     system.TDS.config.criteria = 0
     system.TDS.init()
     system.EIG.run()
-    np.testing.assert_allclose(_swings_of(np.array([complex(z) for z in system.EIG.mu])), IN_ANDES, atol=1e-5)
+    np.testing.assert_allclose(
+        _swings_of(np.array([complex(z) for z in system.EIG.mu])), IN_ANDES, atol=1e-5
+    )

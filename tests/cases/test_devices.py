@@ -19,12 +19,22 @@ def test_a_device_is_called_by_its_file_or_as_it_is_told():
 def test_files_of_one_name_are_told_apart_by_as_many_folders_as_it_takes():
     assert names("a/x.fmu", "b/x.fmu", "c/other.fmu") == ["a_x", "b_x", "other"]
     assert names("a/v/x.fmu", "b/v/x.fmu") == ["a_v_x", "b_v_x"]
-    assert names("b/x.fmu", "a/x.fmu") == ["b_x", "a_x"]  # whatever their order: kept points stay with their device
-    assert names("a/X.fmu", "b/x.fmu") == ["a_X", "b_x"]  # some file systems have one folder for both
+    # whatever their order: kept points stay with their device
+    assert names("b/x.fmu", "a/x.fmu") == ["b_x", "a_x"]
+    # some file systems have one folder for both
+    assert names("a/X.fmu", "b/x.fmu") == ["a_X", "b_x"]
 
 
-@pytest.mark.parametrize("files", [("a/x.fmu", "a/x.fmu"), ("a/x.fmu", "a/../a/x.fmu"), ("a/x.fmu", "a/x.so"),
-                                   ("n=a.fmu", "N=b.fmu"), ("b.fmu", "b=a.fmu")])  # fmt: skip
+@pytest.mark.parametrize(
+    "files",
+    [
+        ("a/x.fmu", "a/x.fmu"),
+        ("a/x.fmu", "a/../a/x.fmu"),
+        ("a/x.fmu", "a/x.so"),
+        ("n=a.fmu", "N=b.fmu"),
+        ("b.fmu", "b=a.fmu"),
+    ],
+)
 def test_two_devices_with_one_folder_are_refused(files):
     with pytest.raises(InputError, match="give each a name of its own"):
         devices_of(files)
@@ -59,9 +69,13 @@ def test_every_device_has_its_own_binding():
 
 @pytest.mark.parametrize(
     ("files", "bindings", "said"),
-    [(["a.fmu", "b.fmu"], ["x.toml"], "does not say whose it is"), (["a.fmu", "b.fmu"], ["c=x.toml"], "one of a, b"),
-     (["a.fmu"], ["x.toml", "y.toml"], "a has x.toml already"), (["a.fmu"], ["a=x.toml", "y.toml"], "already")],
-)  # fmt: skip
+    [
+        (["a.fmu", "b.fmu"], ["x.toml"], "does not say whose it is"),
+        (["a.fmu", "b.fmu"], ["c=x.toml"], "one of a, b"),
+        (["a.fmu"], ["x.toml", "y.toml"], "a has x.toml already"),
+        (["a.fmu"], ["a=x.toml", "y.toml"], "already"),
+    ],
+)
 def test_a_binding_of_nobody_or_a_second_one_is_refused(files, bindings, said):
     with pytest.raises(InputError, match=said):
         devices_of(files, bindings)
@@ -75,5 +89,7 @@ def test_a_devices_own_value_counts_before_one_of_all_wherever_it_stands():
 
 
 def test_a_value_of_a_device_that_is_not_there_is_one_error():
-    with pytest.raises(InputError, match=r"--set three:K: there is no device 'three'; the devices are one, two"):
+    with pytest.raises(
+        InputError, match=r"--set three:K: there is no device 'three'; the devices are one, two"
+    ):
         devices_of(["one=a.fmu", "two=b.fmu"], settings=[("three:K", 2.0)])

@@ -42,7 +42,8 @@ parameters = {{ S_n = "500 MVA", P_0 = 0.6, v_0 = 1.01 }}
 model = "phasor_grid"
 """
 
-ONE, TWO, EARTH = 0.1j, 0.1j, 1.0  # legs from b1, from b2 and to earth at a bus m with a load of 100 MW
+# legs from b1, from b2 and to earth at a bus m with a load of 100 MW
+ONE, TWO, EARTH = 0.1j, 0.1j, 1.0
 WHOLE = {
     "resistance": f"""\
 lines.one = {{ from = "b1", to = "m", X = {ONE.imag} }}
@@ -111,26 +112,40 @@ def test_equivalents_are_named_once(prepared, kind):
     network = reduced(kind)
     value = re.search(rf"{'R' if kind == 'resistance' else 'X'} = (-[\d.]+)", network)
     assert value is not None  # there is something to name
-    (question,) = [str(q) for q in prepared(network).questions if "branches have a negative" in str(q)]
+    (question,) = [
+        str(q) for q in prepared(network).questions if "branches have a negative" in str(q)
+    ]
     lines = network.count("lines.") + 1
     assert (
-        f"1 of {lines} branches have a negative {kind}: 'between' ({float(value[1]):g} pu); as equivalents" in question
+        f"1 of {lines} branches have a negative {kind}: 'between' ({float(value[1]):g} pu); as equivalents"
+        in question
     )
     meant = f'meant = ["grid.{"R" if kind == "resistance" else "X"}_*"]\n'
-    assert not [q for q in prepared(network, lambda text: meant + text).questions if "branches" in str(q)]
+    assert not [
+        q for q in prepared(network, lambda text: meant + text).questions if "branches" in str(q)
+    ]
 
 
 @pytest.mark.parametrize("kind", WHOLE)
 def test_an_emt_network_refuses_them_with_the_reason(prepared, kind):
     def as_emt(text):
-        return text.replace("phasor_grid", "grid").replace("_phasor", "").replace('step_size = "5 ms"\n', "")
+        return (
+            text.replace("phasor_grid", "grid")
+            .replace("_phasor", "")
+            .replace('step_size = "5 ms"\n', "")
+        )
 
-    with pytest.raises(CaseError, match=rf"line 'between' has the {kind} -\d\.\d+ pu .*would grow in an EMT network"):
+    with pytest.raises(
+        CaseError,
+        match=rf"line 'between' has the {kind} -\d\.\d+ pu .*would grow in an EMT network",
+    ):
         prepared(reduced(kind), as_emt)
 
 
 def test_a_reactance_of_nothing_is_refused(prepared):
-    with pytest.raises(CaseError, match=r"line 'none' has the reactance 0 pu .*; its size must be at least 1e-05"):
+    with pytest.raises(
+        CaseError, match=r"line 'none' has the reactance 0 pu .*; its size must be at least 1e-05"
+    ):
         prepared('lines.none = { from = "b1", to = "b2", X = 0, R = -0.1 }')
 
 
@@ -141,10 +156,12 @@ def test_a_pivot_that_vanishes_gives_no_wrong_voltage(how, beside, solved):
     pivoting there would be a solution. Without, there is none to be had; never a wrong one.
     """
     lines = (
-        Line("am", "a", "m", X=0.1), Line("mb", "m", "b", X=-0.1 / (1 + beside)),
-        *(Line(f"{x}c", x, "c", X=0.07) for x in "ab"), *(Line(f"{x}d", x, "d", X=0.09) for x in "ab"),
+        Line("am", "a", "m", X=0.1),
+        Line("mb", "m", "b", X=-0.1 / (1 + beside)),
+        *(Line(f"{x}c", x, "c", X=0.07) for x in "ab"),
+        *(Line(f"{x}d", x, "d", X=0.09) for x in "ab"),
         Line("cd", "c", "d", X=0.05),
-    )  # fmt: skip
+    )
     network = Network("n", ("m", "a", "b", "c", "d"), lines, (), (Port("g", "a"),), phasors=True)
     model = phasor_grid.phasor_grid(network)
     model = written_out(model, checked=True) if how == "code" else model

@@ -63,7 +63,12 @@ def test_an_event_and_a_table_come_to_the_same_imperfection(tmp_path, kind, rest
     begun, ended = prepare(case_with(tmp_path, "", event(kind, f'{rest}\nend = "2 s"'))).events
     assert isinstance(begun, WireFault)
     assert isinstance(ended, WireRecovery)
-    assert (begun.time, begun.imperfection, ended.time, ended.imperfection) == (1.0, expected, 2.0, expected)
+    assert (begun.time, begun.imperfection, ended.time, ended.imperfection) == (
+        1.0,
+        expected,
+        2.0,
+        expected,
+    )
     assert str(begun.connection) == V_RE
     table = f'[imperfections.one]\ntype = "{kind}"\nconnection = "{V_RE}"\n{rest}'
     (plan,) = prepare(case_with(tmp_path, table)).system.wires.values()
@@ -83,7 +88,9 @@ def test_a_scenario_and_the_command_line_set_the_numbers(tmp_path):
     assert not prepare(case).system.wires
     (plan,) = prepare(case, overrides={"imperfections.late.delay": "3 ms"}).system.wires.values()
     assert plan.delay == 3e-3
-    assert "no imperfection 'lat'; did you mean late?" in problems(case, overrides={"imperfections.lat.delay": 1.0})
+    assert "no imperfection 'lat'; did you mean late?" in problems(
+        case, overrides={"imperfections.lat.delay": 1.0}
+    )
     assert "imperfections.late.dela" in problems(case, overrides={"imperfections.late.dela": 1.0})
 
 
@@ -97,7 +104,9 @@ def test_a_scenario_that_removes_the_component_has_no_fault_of_it(tmp_path):
 def test_the_trip_of_a_converter_opens_its_breaker_and_its_current_ends(tmp_path):
     case = case_with(tmp_path, "", event("component_trip", 'component = "gfor"', "0.1 s", ""))
     prepared = prepare(case, stop_time=0.2)
-    assert prepared.events == (UnitSwitching(0.1, "grid", "gfor", connected=False, has_breaker=True),)
+    assert prepared.events == (
+        UnitSwitching(0.1, "grid", "gfor", connected=False, has_breaker=True),
+    )
     with running(prepared) as master:
         master.run(0.2, prepared.events)
         current = master.components["gfor"].get(["i_re", "i_im"])
@@ -120,12 +129,21 @@ def test_faults_of_components(tmp_path):
 @pytest.mark.parametrize(
     ("events", "words"),
     [
-        (event("bias", "value = 0.1", connection="grid.bus_2.v -> gfor.v_re"), "there is no connection"),
-        (event("bias", "value = 0.1", connection="gfor.v_re"), "component.output -> component.input"),
+        (
+            event("bias", "value = 0.1", connection="grid.bus_2.v -> gfor.v_re"),
+            "there is no connection",
+        ),
+        (
+            event("bias", "value = 0.1", connection="gfor.v_re"),
+            "component.output -> component.input",
+        ),
         (event("bias", 'value = "1 kV"'), "value"),
         (event("bias", "value = inf"), "it must be a finite number"),
         (event("noise", "deviation = -1\nseed = 1"), "deviation = -1 pu; it must be at least 0"),
-        (event("noise", "deviation = 1\nseed = 1\nbandwidth = 5000"), "bandwidth = 5000 Hz; it must be below 5000 Hz"),
+        (
+            event("noise", "deviation = 1\nseed = 1\nbandwidth = 5000"),
+            "bandwidth = 5000 Hz; it must be below 5000 Hz",
+        ),
         (event("noise", "deviation = 1\nseed = -1"), "seed"),
         (event("delay", "delay = 0.12345e-3"), "no multiple of the communication step of 0.0001 s"),
         (event("delay", "delay = -1"), "delay"),
@@ -134,14 +152,35 @@ def test_faults_of_components(tmp_path):
         (event("bias", "value = 0.1\nend = 1.0"), "end = 1 s is not after time = 1 s"),
         (event("bias", "value = 0.1", "25 s"), "never happens, as the run stops at 20 s"),
         (event("bias", "value = 0.1", "20 s"), "never happens, as the run stops at 20 s"),
-        (event("bias", "value = 0.1") * 2, "the bias of grid.bus_2.v_re -> gfor.v_re is set at 1 s by line"),
-        (event("freeze") + event("drop_out", "substitute = 0"), "the loss of grid.bus_2.v_re -> gfor.v_re is set at"),
-        (event("delay", "delay = 1e-3\nend = 3") + event("delay", "delay = 2e-3", "2 s"), "lasts from 1 s to 3 s"),
-        (event("delay", "delay = 1e-3") + event("delay", "delay = 2e-3", "2 s"), "lasts from 1 s to the run's end"),
-        (event("time_out", 'component = "gfor"', connection=""), "'isolated = true' to try a time-out"),
+        (
+            event("bias", "value = 0.1") * 2,
+            "the bias of grid.bus_2.v_re -> gfor.v_re is set at 1 s by line",
+        ),
+        (
+            event("freeze") + event("drop_out", "substitute = 0"),
+            "the loss of grid.bus_2.v_re -> gfor.v_re is set at",
+        ),
+        (
+            event("delay", "delay = 1e-3\nend = 3") + event("delay", "delay = 2e-3", "2 s"),
+            "lasts from 1 s to 3 s",
+        ),
+        (
+            event("delay", "delay = 1e-3") + event("delay", "delay = 2e-3", "2 s"),
+            "lasts from 1 s to the run's end",
+        ),
+        (
+            event("time_out", 'component = "gfor"', connection=""),
+            "'isolated = true' to try a time-out",
+        ),
         (event("nan_output", 'component = "gfo"', connection=""), "there is no component 'gfo'"),
-        (event("load_change", 'load = "load_2"\nscale = 1.1', connection="") * 2, "grid.load_2.scale is set at 1 s by"),
-        (event("load_change", 'load = "load_2"\nscale = 1.1', "30 s", ""), "never happens, as the run stops at 20 s"),
+        (
+            event("load_change", 'load = "load_2"\nscale = 1.1', connection="") * 2,
+            "grid.load_2.scale is set at 1 s by",
+        ),
+        (
+            event("load_change", 'load = "load_2"\nscale = 1.1', "30 s", ""),
+            "never happens, as the run stops at 20 s",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused_with_its_line(tmp_path, events, words):
@@ -151,7 +190,9 @@ def test_what_cannot_be_is_refused_with_its_line(tmp_path, events, words):
 
 
 def test_faults_that_follow_one_another_need_no_gap(tmp_path):
-    events = event("delay", "delay = 1e-3\nend = 2") + event("delay", "delay = 2e-3\nend = 3", "2 s")
+    events = event("delay", "delay = 1e-3\nend = 2") + event(
+        "delay", "delay = 2e-3\nend = 3", "2 s"
+    )
     times = [(type(e), e.time) for e in prepare(case_with(tmp_path, "", events)).events]
     assert times == [(WireFault, 1.0), (WireFault, 2.0), (WireRecovery, 3.0)]
 
@@ -160,7 +201,9 @@ def test_an_event_after_a_stop_that_was_chosen_for_the_run_is_said(tmp_path):
     case = case_with(tmp_path, "", event("bias", "value = 0.1"))
     prepared = prepare(case, stop_time=0.5)
     assert not prepared.events
-    assert any("never happens, as the run stops at 0.5 s (--stop)" in str(q) for q in prepared.questions)
+    assert any(
+        "never happens, as the run stops at 0.5 s (--stop)" in str(q) for q in prepared.questions
+    )
 
 
 # -- who must know of them -------------------------------------------------------------------------
@@ -172,7 +215,20 @@ FAULT = event("bias", "value = 0.01", "0.1 s")
 @pytest.mark.parametrize(("more", "events", "words"), [(LATE, "", "delay"), ("", FAULT, "fault")])
 def test_an_ssp_is_refused_rather_than_written_without_them(tmp_path, capsys, more, events, words):
     case = case_with(tmp_path, more, events)
-    assert main(["export", "ssp", str(case.path), "--scenario", "gfor", "--out", str(tmp_path / "x.ssp")]) == 2
+    assert (
+        main(
+            [
+                "export",
+                "ssp",
+                str(case.path),
+                "--scenario",
+                "gfor",
+                "--out",
+                str(tmp_path / "x.ssp"),
+            ]
+        )
+        == 2
+    )
     assert words in capsys.readouterr().err
     assert not (tmp_path / "x.ssp").exists()
 
@@ -225,11 +281,24 @@ def test_a_sweep_varies_a_delay_in_whole_steps(tmp_path, capsys):
     case = case_with(tmp_path, LATE)
     out = tmp_path / "sweep"
     vary = "imperfections.late.delay=0:2 ms:3"
-    arguments = ["sweep", str(case.path), "--scenario", "gfor", "--vary", vary, "--out", str(out), "--workers", "1"]
+    arguments = [
+        "sweep",
+        str(case.path),
+        "--scenario",
+        "gfor",
+        "--vary",
+        vary,
+        "--out",
+        str(out),
+        "--workers",
+        "1",
+    ]
     assert main(arguments) == 0
     rows = next(out.rglob("sweep.csv")).read_text(encoding="utf-8").splitlines()
     assert "imperfections.late.delay" in rows[0]
-    assert {row.split(",")[rows[0].split(",").index("imperfections.late.delay [s]")] for row in rows[1:]} >= {"0.0"}
+    assert {
+        row.split(",")[rows[0].split(",").index("imperfections.late.delay [s]")] for row in rows[1:]
+    } >= {"0.0"}
     assert main([*arguments[:5], "imperfections.lat.delay=0:1:3"]) == 2
     assert "no imperfection 'lat'" in capsys.readouterr().err
 
@@ -240,7 +309,12 @@ def test_a_sweep_varies_a_delay_in_whole_steps(tmp_path, capsys):
 def test_many_events_are_read_without_looking_through_all_of_them_for_each(tmp_path):
     """With a search through the file, or through all problems, for each of them this takes many minutes."""
     events = "".join(
-        event("load_change", f'load = "load_2"\nscale = {1 + 1e-6 * (k % 7):.7f}', f"{(k + 1) * 1e-4:.4f}", "")
+        event(
+            "load_change",
+            f'load = "load_2"\nscale = {1 + 1e-6 * (k % 7):.7f}',
+            f"{(k + 1) * 1e-4:.4f}",
+            "",
+        )
         for k in range(20_000)
     )
     assert len(prepare(case_with(tmp_path, "", events), stop_time=3.0).events) == 20_000
@@ -257,14 +331,17 @@ def test_a_later_trip_is_named_by_the_modes(tmp_path):
     case = case_with(tmp_path, "", event("component_trip", 'component = "gfor"', "5 s", ""))
     said = "component 'gfor' trips at t = 5 s: the modes are those before it"
     assert said in compute_modes(prepare(case)).warnings
-    assert not any("trips" in text for text in compute_modes(prepare(case, "base")).warnings)  # it has no converter
+    # it has no converter
+    assert not any("trips" in text for text in compute_modes(prepare(case, "base")).warnings)
 
 
 def test_a_permanent_loss_without_a_steady_state_is_named_first(tmp_path):
     table = '[imperfections.lost]\ntype = "drop_out"\nconnection = "grid.*.v_* -> gfor.v_*"\nsubstitute = "zero"'
     with pytest.raises(AnalysisError) as caught:
         compute_modes(prepare(case_with(tmp_path, table)))
-    assert str(caught.value).startswith(f"no steady state found with {V_RE}: lost, replaced by 0; grid.")
+    assert str(caught.value).startswith(
+        f"no steady state found with {V_RE}: lost, replaced by 0; grid."
+    )
     assert "as an event" in str(caught.value)
     assert "start values" not in str(caught.value)
 
@@ -275,7 +352,10 @@ def test_a_delay_as_long_as_the_run_is_refused(tmp_path, events):
     table = "" if events else f'[imperfections.late]\ntype = "delay"\nconnection = "{V_RE}"\n{rest}'
     case = case_with(tmp_path, table, event("delay", rest) if events else "")
     text = problems(case)
-    assert "delay = 20 s, but the run ends at 20 s: nothing that is sent in it arrives; give a shorter delay" in text
+    assert (
+        "delay = 20 s, but the run ends at 20 s: nothing that is sent in it arrives; give a shorter delay"
+        in text
+    )
 
 
 def test_a_delay_beyond_a_shorter_stop_is_asked_about(tmp_path):
@@ -288,5 +368,9 @@ def test_a_delay_beyond_a_shorter_stop_is_asked_about(tmp_path):
 def test_modes_beyond_what_a_long_delay_allows_are_named(tmp_path):
     table = f'[imperfections.late]\ntype = "delay"\nconnection = "{V_RE}"\ndelay = 15'
     result = compute_modes(prepare(case_with(tmp_path, table)))
-    assert any("up to 0.255 Hz; what it shows from there to 2 Hz" in text for text in result.warnings)  # 24 / (2π·15)
-    assert result.stability.stable is False  # it grows without an oscillation, where the delay is right
+    # 24 / (2π·15)
+    assert any(
+        "up to 0.255 Hz; what it shows from there to 2 Hz" in text for text in result.warnings
+    )
+    # it grows without an oscillation, where the delay is right
+    assert result.stability.stable is False

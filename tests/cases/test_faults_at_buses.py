@@ -23,7 +23,11 @@ def test_a_fault_begins_ends_and_its_line_opens(tmp_path):
         BusFault(0.15000000000000002, "grid", "b3", False),
         LineSwitching(0.15000000000000002, "grid", "l23", False),
     )
-    found = watch(ready, ("grid.b3.v", "grid.l23.p", "grid.b3.fault.i_re", "sg.omega"), (0.0999, 0.149, 0.16, 0.3))
+    found = watch(
+        ready,
+        ("grid.b3.v", "grid.l23.p", "grid.b3.fault.i_re", "sg.omega"),
+        (0.0999, 0.149, 0.16, 0.3),
+    )
     before, during, after, later = found
     assert before["grid.b3.v"] > 0.9
     assert before["grid.b3.fault.i_re"] == 0
@@ -65,7 +69,10 @@ def test_it_is_known_to_every_scenario_and_the_steady_state_does_not_see_it(tmp_
     [
         (FAULT.replace("b3", "b4"), "component 'grid' has no bus 'b4'; did you mean"),
         (FAULT + 'cleared_by = "l23"\n', "'cleared_by' needs 'duration'"),
-        (FAULT + 'duration = "0.1 s"\ncleared_by = "l32"\n', "has no line 'l32'; did you mean l31 or l23"),
+        (
+            FAULT + 'duration = "0.1 s"\ncleared_by = "l32"\n',
+            "has no line 'l32'; did you mean l31 or l23",
+        ),
         (FAULT + "R = -0.1\n", "R"),
         (FAULT + 'duration = "12.34567 ms"\n', "communication"),
     ],

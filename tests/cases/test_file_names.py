@@ -18,9 +18,24 @@ panels = [{{ signal = "gfor.p", label = "P" }}]
 """
 GOOD = {"case": '"small"', "scenario": '"one"', "plot": '"power"'}
 BAD = [
-    '"../../../x"', '"/abs/x"', '".."', '""', '" "', '"a/b"', '"a\\\\b"', '"C:x"', '"nul"', '"COM1.txt"', '"a\\u0000b"',
-    '"a\\nb"', f'"{"x" * 201}"', '"-rf"', '"=1+1"', '"a."', '"x.part-1"',
-]  # fmt: skip
+    '"../../../x"',
+    '"/abs/x"',
+    '".."',
+    '""',
+    '" "',
+    '"a/b"',
+    '"a\\\\b"',
+    '"C:x"',
+    '"nul"',
+    '"COM1.txt"',
+    '"a\\u0000b"',
+    '"a\\nb"',
+    f'"{"x" * 201}"',
+    '"-rf"',
+    '"=1+1"',
+    '"a."',
+    '"x.part-1"',
+]
 
 
 def problems_of(path):
@@ -43,11 +58,17 @@ def test_a_name_that_leads_elsewhere_is_refused_where_the_case_is_read(tmp_path,
     path = tmp_path / "case.toml"
     path.write_text(CASE.format(**GOOD | {kind: name}), encoding="utf-8")
     (problem,) = problems_of(path)
-    line = {"case": "line 1, name", "scenario": "line 4, scenarios", "plot": "line 7, plots.0.name"}[kind]
+    line = {
+        "case": "line 1, name",
+        "scenario": "line 4, scenarios",
+        "plot": "line 7, plots.0.name",
+    }[kind]
     assert problem.place.startswith(line)
     assert "name" in problem.text
 
 
-@pytest.mark.parametrize("name", ["two_area", "Fall 3", "Überlast", "P=0.3", "a.b", "x" * 200, "console", "com10"])
+@pytest.mark.parametrize(
+    "name", ["two_area", "Fall 3", "Überlast", "P=0.3", "a.b", "x" * 200, "console", "com10"]
+)
 def test_names_that_people_use_are_accepted(name):
     assert file_name(name) == name

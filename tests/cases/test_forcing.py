@@ -50,7 +50,9 @@ def test_the_words_of_the_command():
     assert event_of("force", "gfor 0.8 Hz 0.05 pu").amplitude == 0.05
 
 
-@pytest.mark.parametrize("text", ["sg35 0.8 2 %", "sg35 0.8 Hz", "0.8 Hz 2 %", "sg35 0.8 Hz 2 % triangle", ""])
+@pytest.mark.parametrize(
+    "text", ["sg35 0.8 2 %", "sg35 0.8 Hz", "0.8 Hz 2 %", "sg35 0.8 Hz 2 % triangle", ""]
+)
 def test_other_words_are_refused_with_the_form(text):
     with pytest.raises(InputError, match="UNIT FREQUENCY AMPLITUDE"):
         event_of("force", text)
@@ -74,8 +76,13 @@ def test_what_cannot_be_forced_is_told_with_the_words_of_the_command(force, said
 
 def test_a_unit_that_only_another_scenario_has_is_asked_about():
     case = gfor.load("two_area_rms")
-    asked = {name: case.scenario(name, force="gfor 0.6 Hz 2 %").prepared.questions for name in ("base", "gfor")}
-    assert [str(q) for q in asked["base"]] == ["--force 'gfor 0.6 Hz 2 %' cannot act: the scenario has no gfor"]
+    asked = {
+        name: case.scenario(name, force="gfor 0.6 Hz 2 %").prepared.questions
+        for name in ("base", "gfor")
+    }
+    assert [str(q) for q in asked["base"]] == [
+        "--force 'gfor 0.6 Hz 2 %' cannot act: the scenario has no gfor"
+    ]
     assert not asked["gfor"]
 
 
@@ -86,7 +93,11 @@ def test_two_forcings_of_one_reference_are_refused():
 
 @pytest.fixture(scope="module")
 def run():
-    return gfor.load("two_area_rms").scenario("gfor", force="sg1.governor.P_ref 0.8 Hz 2 %").run(stop=20.0)
+    return (
+        gfor.load("two_area_rms")
+        .scenario("gfor", force="sg1.governor.P_ref 0.8 Hz 2 %")
+        .run(stop=20.0)
+    )
 
 
 def test_the_unit_swings_at_that_frequency_alone(run):
@@ -108,7 +119,9 @@ def test_the_response_is_not_called_unstable(run):
 
 def test_a_linear_response_refuses_a_forcing():
     with pytest.raises(InputError, match="cannot follow"):
-        gfor.load("two_area_rms").scenario("gfor", force="sg1 0.8 Hz 2 %").run(stop=2.0, linear=True)
+        gfor.load("two_area_rms").scenario("gfor", force="sg1 0.8 Hz 2 %").run(
+            stop=2.0, linear=True
+        )
 
 
 def test_the_run_tells_who_was_forced(run):
@@ -132,7 +145,9 @@ def test_a_fault_in_words(text, given):
     assert (fault.bus, fault.time, fault.duration, fault.cleared_by) == given
 
 
-@pytest.mark.parametrize("text", ["bus_9 150 ms", "bus_9, 150", "bus_9", "bus_9, -1 ms", "bus_9, 150 ms, line_7_9"])
+@pytest.mark.parametrize(
+    "text", ["bus_9 150 ms", "bus_9, 150", "bus_9", "bus_9, -1 ms", "bus_9, 150 ms, line_7_9"]
+)
 def test_a_fault_without_its_parts_is_refused(text):
     with pytest.raises(InputError, match=f"^--fault '{text}': "):
         event_of("fault", text)
@@ -144,6 +159,7 @@ def test_a_fault_takes_the_place_of_all_events():
     assert [event.time for event in prepared.events] == [2.0, 2.15]
     assert prepared.subject == 'SG + GFOR, with fault "bus_2, 150 ms, from 2 s", grid.X_L = 0.2'
     with pytest.raises(
-        CaseError, match=r"fault 'bus_4, 150 ms': component 'grid' has no bus 'bus_4'; did you mean bus_3 or bus_2"
+        CaseError,
+        match=r"fault 'bus_4, 150 ms': component 'grid' has no bus 'bus_4'; did you mean bus_3 or bus_2",
     ):
         case.scenario("gfor", fault="bus_4, 150 ms")

@@ -31,7 +31,9 @@ def test_an_emt_model_among_phasors_is_one_error(tmp_path):
         loaded(tmp_path, PHASORS.replace("gfor_phasor", "gfor")).prepare()
     (problem,) = caught.value.problems
     assert problem.place == "line 18, components.vsc.model"
-    assert problem.text.startswith("vsc: 'gfor' is an EMT model, and the network 'grid' is one of phasors")
+    assert problem.text.startswith(
+        "vsc: 'gfor' is an EMT model, and the network 'grid' is one of phasors"
+    )
     assert "take 'gfor_phasor', or model = 'grid' for the network" in problem.text
 
 
@@ -41,7 +43,9 @@ def test_the_hint_is_given_once_for_all_units_of_a_model(tmp_path):
     with pytest.raises(CaseError) as caught:
         loaded(tmp_path, PHASORS + second + more).prepare()
     (problem,) = caught.value.problems
-    assert problem.text.startswith("other and 1 more: 'synchronous_generator_st4b_pss2a' is an EMT model")
+    assert problem.text.startswith(
+        "other and 1 more: 'synchronous_generator_st4b_pss2a' is an EMT model"
+    )
     assert "it has no phasor form" in problem.text
 
 
@@ -49,7 +53,9 @@ def test_a_phasor_model_in_an_emt_network_is_questioned(tmp_path):
     """Before, nothing said so, and the coupling was found unstable at every step."""
     (ready,) = loaded(tmp_path, THREE_BUSES.replace('"gfor"', '"gfor_phasor"')).prepare()
     (asked,) = [question for question in ready.questions if "rating" not in question.text]
-    assert "vsc: 'gfor_phasor' is a phasor model, and the network 'grid' is an EMT one" in asked.text
+    assert (
+        "vsc: 'gfor_phasor' is a phasor model, and the network 'grid' is an EMT one" in asked.text
+    )
     (ready,) = loaded(tmp_path, PHASORS).prepare()
     assert not [question for question in ready.questions if "rating" not in question.text]
 
@@ -61,10 +67,15 @@ def test_buses_of_phasors_need_no_capacitance(tmp_path):
         for text in (HANGING, HANGING.replace("[network]", "[network]\nstray_B = 1e-7"))
     )
     assert abs(plain - stray) < 1e-6
-    with pytest.raises(CaseError, match=r"bus 'b4' has neither a load with P > 0 nor line charging, .*stray_B"):
-        loaded(tmp_path, THREE_BUSES.replace('"b3"]', '"b3", "b4"]').replace(
-            "loads.d3", 'lines.l24 = { from = "b2", to = "b4", X = 0.1 }\nloads.d3')
-        ).prepare()  # fmt: skip
+    with pytest.raises(
+        CaseError, match=r"bus 'b4' has neither a load with P > 0 nor line charging, .*stray_B"
+    ):
+        loaded(
+            tmp_path,
+            THREE_BUSES.replace('"b3"]', '"b3", "b4"]').replace(
+                "loads.d3", 'lines.l24 = { from = "b2", to = "b4", X = 0.1 }\nloads.d3'
+            ),
+        ).prepare()
 
 
 def test_a_bus_that_its_last_line_leaves_has_no_voltage(tmp_path):

@@ -81,7 +81,11 @@ def test_units_may_have_grid_following_converters(tmp_path):
 @pytest.mark.slow
 def test_the_guide_shows_what_is_computed(tmp_path):
     case = guide_case(tmp_path)
-    rows = {row[0]: row[1:] for table in in_markdown(GUIDE.read_text(encoding="utf-8")) for row in table[1:]}
+    rows = {
+        row[0]: row[1:]
+        for table in in_markdown(GUIDE.read_text(encoding="utf-8"))
+        for row in table[1:]
+    }
     assert list(rows) == [case.scenario(name).title for name in case.scenarios]
     for name in case.scenarios:
         found = electromechanical(case.scenario(name))

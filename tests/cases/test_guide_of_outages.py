@@ -51,7 +51,9 @@ def test_a_late_clearing_loses_synchronism(case):
         assert name == "late" or "not_judged" in kinds
         lost[name] = [finding for finding in run.findings if finding.kind == "loss_of_synchronism"]
         time = run.signal("sg1.omega").time.values
-        current = np.hypot(*(run.signal(f"grid.bus_7.fault.i_{part}").values for part in ("re", "im")))
+        current = np.hypot(
+            *(run.signal(f"grid.bus_7.fault.i_{part}").values for part in ("re", "im"))
+        )
         assert current.max() == pytest.approx(17.8, abs=0.05)
         assert current[time < 1.08][-1] == pytest.approx(11.9, abs=0.1)
     assert not lost["cleared"]

@@ -35,7 +35,9 @@ def test_nested_brackets_are_one_error(case, gfor):
 
 def test_a_case_file_of_many_megabytes_is_refused_before_it_is_read(case):
     path = case("#" * (MOST_BYTES + 1))
-    with pytest.raises(InputError, match=rf"has {MOST_BYTES + 1} bytes; at most {MOST_BYTES} are read"):
+    with pytest.raises(
+        InputError, match=rf"has {MOST_BYTES + 1} bytes; at most {MOST_BYTES} are read"
+    ):
         load_case(path)
 
 
@@ -82,6 +84,8 @@ def test_an_fmu_of_hundreds_of_thousands_of_variables_is_refused(tmp_path):
     path = tmp_path / "big.fmu"
     variables = "<ScalarVariable/>" * (MOST_XML_ELEMENTS + 1)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
-        archive.writestr("modelDescription.xml", f"<fmiModelDescription>{variables}</fmiModelDescription>")
+        archive.writestr(
+            "modelDescription.xml", f"<fmiModelDescription>{variables}</fmiModelDescription>"
+        )
     with pytest.raises(InputError, match=f"more than {MOST_XML_ELEMENTS} elements"):
         read_description(path)

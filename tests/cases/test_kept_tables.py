@@ -12,9 +12,15 @@ from orchestrator.errors import InputError
 
 NUMBERS = np.array([[0.1 + 0.2, -0.0, np.inf], [np.nan, 5e-324, 1 / 3]])
 TABLES = SourceTables(
-    "net", 100.0, NUMBERS, NUMBERS.T.copy(), np.zeros((0, 10)), np.array([[0.3 + 0.1j, -1e-9j]]), {0: "a", 7: "é"},
+    "net",
+    100.0,
+    NUMBERS,
+    NUMBERS.T.copy(),
+    np.zeros((0, 10)),
+    np.array([[0.3 + 0.1j, -1e-9j]]),
+    {0: "a", 7: "é"},
     50.0,
-)  # fmt: skip
+)
 
 
 @pytest.fixture(autouse=True)
@@ -33,7 +39,12 @@ def test_tables_come_back_to_the_last_bit():
     for name in ("bus", "branch", "gen", "branch_to_earth"):
         one, other = getattr(TABLES, name), getattr(back, name)
         assert (one.dtype, one.shape, one.tobytes()) == (other.dtype, other.shape, other.tobytes())
-    assert (back.name, back.base_mva, back.labels, back.frequency) == ("net", 100.0, {0: "a", 7: "é"}, 50.0)
+    assert (back.name, back.base_mva, back.labels, back.frequency) == (
+        "net",
+        100.0,
+        {0: "a", 7: "é"},
+        50.0,
+    )
 
 
 @pytest.mark.parametrize(("name", "content"), [("other", b""), ("net", b"{}")])
@@ -47,7 +58,9 @@ def test_another_network_is_made(name, content):
 def test_another_version_makes_the_tables_anew(monkeypatch, library):
     kept_tables("net", b"", lambda: TABLES)
     installed = module.installed_version
-    monkeypatch.setattr(module, "installed_version", lambda name: "0.0.1" if name == library else installed(name))
+    monkeypatch.setattr(
+        module, "installed_version", lambda name: "0.0.1" if name == library else installed(name)
+    )
     with pytest.raises(AssertionError):
         kept_tables("net", b"", never)
 
@@ -84,7 +97,9 @@ def test_a_built_in_case_has_the_tables_of_its_network_beside_it(monkeypatch):
     monkeypatch.setattr(network_sources, "kept_tables", lambda *_: never())
     found = network_sources.read_pandapower("case39", folder)
     for name in ("bus", "branch", "gen", "branch_to_earth"):
-        assert np.allclose(getattr(found, name), getattr(made, name), rtol=1e-9, atol=1e-9, equal_nan=True)
+        assert np.allclose(
+            getattr(found, name), getattr(made, name), rtol=1e-9, atol=1e-9, equal_nan=True
+        )
     assert (found.name, found.base_mva, found.labels) == (made.name, made.base_mva, made.labels)
     with pytest.raises(AssertionError):
         network_sources.read_pandapower("case9", folder)

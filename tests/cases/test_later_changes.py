@@ -55,7 +55,9 @@ def test_a_parameter_file_that_cannot_be_read_concerns_its_scenario_only(folder)
     (folder / "one.toml").unlink()
     case = gfor.load(folder / "case.toml")
     assert case.scenario("two").values["k.K"] == -3.0
-    with pytest.raises(InputError, match=r"parameters\.0: .*one\.toml: the parameter file cannot be read"):
+    with pytest.raises(
+        InputError, match=r"parameters\.0: .*one\.toml: the parameter file cannot be read"
+    ):
         case.scenario("one")
 
 
@@ -82,7 +84,9 @@ def test_a_sweep_after_an_edit_says_what_happened(folder, name):
     case = gfor.load(folder / "case.toml")
     with (folder / name).open("a", encoding="utf-8") as file:
         file.write("\n# edited\n")
-    with pytest.raises(InputError, match=r"has another text now than when the study loaded it; load the case again"):
+    with pytest.raises(
+        InputError, match=r"has another text now than when the study loaded it; load the case again"
+    ):
         case.sweep({"k.K": [-2.0, -1.0]}, ["one"])
 
 

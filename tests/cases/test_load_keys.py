@@ -42,9 +42,18 @@ loads.wind = { bus = "b2", p = "-50 MW", active = "power", reactive = "impedance
     ("law", "words"),
     [
         ('active = "constant"', "active"),
-        ("active = { z = 0.5 }", "load 'town': the shares of its active power are z = 0.5.*must sum to 1"),
-        ('active = "power"\nv_min = 0.1', "load 'town' has a share of constant power down to v_min = 0.1 pu"),
-        ('active = "power"\ntau = "1 us"', r"load 'town' has the lag tau = 1e-06 s; in this network it must be from"),
+        (
+            "active = { z = 0.5 }",
+            "load 'town': the shares of its active power are z = 0.5.*must sum to 1",
+        ),
+        (
+            'active = "power"\nv_min = 0.1',
+            "load 'town' has a share of constant power down to v_min = 0.1 pu",
+        ),
+        (
+            'active = "power"\ntau = "1 us"',
+            r"load 'town' has the lag tau = 1e-06 s; in this network it must be from",
+        ),
     ],
 )
 def test_what_is_wrong_is_named(law, words, tmp_path):

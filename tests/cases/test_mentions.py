@@ -32,12 +32,24 @@ PANEL = '{ signal = "gfor.omega"'
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        (MODES, 'against = [["sg1.machine.omega"], ["nosuch"]]', "'nosuch': no scenario has a state"),
+        (
+            MODES,
+            'against = [["sg1.machine.omega"], ["nosuch"]]',
+            "'nosuch': no scenario has a state",
+        ),
         (MODES, 'states = ["nosuch.*"]', "'nosuch.*': no scenario has a state"),
         (MODES, 'states = ["sg1.machine.omga"]', "did you mean sg1.machine.omega"),
-        ("areas = {", 'swing = ["*.machine.nosuch"]\nareas = {', "'*.machine.nosuch': no scenario has a state"),
+        (
+            "areas = {",
+            'swing = ["*.machine.nosuch"]\nareas = {',
+            "'*.machine.nosuch': no scenario has a state",
+        ),
         ('area_2 = ["sg2"]', 'area_2 = ["sg3"]', "'sg3': no scenario has such a component or bus"),
-        (RING, RING.replace("sg1.omega", "sg1.omga"), "no scenario has an output 'sg1.omga'; did you mean sg1.omega"),
+        (
+            RING,
+            RING.replace("sg1.omega", "sg1.omga"),
+            "no scenario has an output 'sg1.omga'; did you mean sg1.omega",
+        ),
         (RING, RING.replace(" - ", " + "), "no scenario has an output 'sg1.omega + sg2.omega'"),
         (RING, RING.replace(" - sg2", " - sg1.p - sg2"), "write 'component.variable', 'component"),
         (PANEL, PANEL.replace("omega", "omga"), "no scenario has an output 'gfor.omga'"),
@@ -56,11 +68,21 @@ def test_a_name_that_matches_nothing_is_an_error_with_its_line(tmp_path, text, o
 def test_a_component_may_be_absent_from_some_scenarios(tmp_path, text):
     """The base scenario has no converter, whose signals are plotted."""
     assert problems(tmp_path, text, "base") == []
-    assert problems(tmp_path, text.replace('area_2 = ["sg2"]', 'area_2 = ["sg2", "bus_3"]'), "gfor") == []
+    assert (
+        problems(tmp_path, text.replace('area_2 = ["sg2"]', 'area_2 = ["sg2", "bus_3"]'), "gfor")
+        == []
+    )
 
 
 def test_states_of_a_component_whose_file_does_not_name_them_may_be_asked_for():
     named = SimpleNamespace(foreign={"vendor_1", "plant"})
-    assert [_of_foreign(named, pattern) for pattern in ("vendor_?.x", "plant.a.b", "sg1.x", "x", "vendor_1")] == [
-        True, True, False, False, False,
-    ]  # fmt: skip
+    assert [
+        _of_foreign(named, pattern)
+        for pattern in ("vendor_?.x", "plant.a.b", "sg1.x", "x", "vendor_1")
+    ] == [
+        True,
+        True,
+        False,
+        False,
+        False,
+    ]

@@ -25,8 +25,16 @@ def problems(tmp_path, text, overrides=None):
     [
         ('bus = "b2"', 'bus = "B2"', "at bus 'B2', which does not exist; did you mean 'b2'?"),
         ('bus = "b2"', "bus = 2", "at bus '2', which does not exist; did you mean 'b2'?"),
-        ('bus = "b3", p', "bus = 3, p", "load 'd3' is at bus '3', which does not exist; did you mean 'b3'?"),
-        ('to = "b3"', 'to = "bus_3"', "line 'l23' ends at bus 'bus_3', which does not exist; did you mean 'b3'?"),
+        (
+            'bus = "b3", p',
+            "bus = 3, p",
+            "load 'd3' is at bus '3', which does not exist; did you mean 'b3'?",
+        ),
+        (
+            'to = "b3"',
+            'to = "bus_3"',
+            "line 'l23' ends at bus 'bus_3', which does not exist; did you mean 'b3'?",
+        ),
         ('bus = "b2"', 'bus = "middle"', "port 'vsc' is at bus 'middle', which does not exist"),
     ],
 )
@@ -49,8 +57,14 @@ def test_a_variable_of_a_part_is_found_without_the_part(tmp_path):
 @pytest.mark.parametrize(
     ("wanted", "hint"),
     [
-        ("gfor*.current_limit", "phasor and EMT models name it differently: here it is gfor*.current_demand"),
-        ("gfor1.current_limit", "phasor and EMT models name it differently: here it is gfor1.current_demand"),
+        (
+            "gfor*.current_limit",
+            "phasor and EMT models name it differently: here it is gfor*.current_demand",
+        ),
+        (
+            "gfor1.current_limit",
+            "phasor and EMT models name it differently: here it is gfor1.current_demand",
+        ),
         ("gfor1.current_demands", "did you mean gfor1.current_demand?"),
         ("GFOR1.Current_Demand", "did you mean gfor1.current_demand?"),
     ],
@@ -59,18 +73,28 @@ def test_an_output_of_the_other_kind_of_model_names_its_twin(wanted, hint):
     assert close_names(wanted, ["gfor1.current_demand", "gfor1.p"]) == hint
 
 
-@pytest.mark.parametrize(("name", "key"), [("own.raw", "raw"), ("own.dyr", "dyr"), ("own.m", "matpower")])
+@pytest.mark.parametrize(
+    ("name", "key"), [("own.raw", "raw"), ("own.dyr", "dyr"), ("own.m", "matpower")]
+)
 def test_another_programs_file_is_no_case(tmp_path, name, key):
     (tmp_path / name).write_text("0, 100.0, 33 /")
-    with pytest.raises(InputError, match=rf'{name}: this is .*, not a case; .* has {key} = "{name}"'):
+    with pytest.raises(
+        InputError, match=rf'{name}: this is .*, not a case; .* has {key} = "{name}"'
+    ):
         load_case(tmp_path / name)
 
 
 def test_a_line_is_looked_for_in_the_grid(gfor):
-    for words in (("modes", "two_area", "--set", "AB.X=0.1"), ("sweep", "two_area", "--vary", "AB.X=1:2:3")):
+    for words in (
+        ("modes", "two_area", "--set", "AB.X=0.1"),
+        ("sweep", "two_area", "--vary", "AB.X=1:2:3"),
+    ):
         _, _, error = gfor(*words)
         assert "it is of 'grid'" not in error
-    for words in (("modes", "wscc9", "--set", "line_4_5.X=0.1"), ("sweep", "wscc9", "--vary", "line_4_5.X=1:2:3")):
+    for words in (
+        ("modes", "wscc9", "--set", "line_4_5.X=0.1"),
+        ("sweep", "wscc9", "--vary", "line_4_5.X=1:2:3"),
+    ):
         code, _, error = gfor(*words)
         assert code == 2
         assert "it is of 'grid': write grid.line_4_5.…" in error
@@ -78,7 +102,10 @@ def test_a_line_is_looked_for_in_the_grid(gfor):
 
 def test_a_value_of_the_same_digits_in_another_unit_is_asked_about(gfor):
     asked = "is 0.001 times what it is in the files; is the unit meant?"
-    found = [gfor("modes", "wscc9", "--set", f"grid.load_5.P={value}")[2] for value in ("125 kW", "125 MW", "130")]
+    found = [
+        gfor("modes", "wscc9", "--set", f"grid.load_5.P={value}")[2]
+        for value in ("125 kW", "125 MW", "130")
+    ]
     assert [asked in error for error in found] == [True, False, False]
     assert 'meant = ["grid.load_5.P"]' in " ".join(found[0].split())
 
@@ -86,14 +113,18 @@ def test_a_value_of_the_same_digits_in_another_unit_is_asked_about(gfor):
 def test_a_pattern_names_variables_as_it_names_components():
     case = load_case("wscc9")
     (found,) = case.prepare(["base"], {"grid.load_*.scale": 0.9})
-    own = {v: x for v, x in found.system.components["grid"].parameters.items() if v.endswith(".scale")}
+    own = {
+        v: x for v, x in found.system.components["grid"].parameters.items() if v.endswith(".scale")
+    }
     assert own == {"load_5.scale": 0.9, "load_6.scale": 0.9, "load_8.scale": 0.9}
     with pytest.raises(CaseError, match=r"no variable 'laod_\*.scale'"):
         case.prepare(["base"], {"grid.laod_*.scale": 0.9})
 
 
 def test_a_component_that_is_not_there_has_no_variable(monkeypatch):
-    monkeypatch.setattr(assignment, "_meant", lambda draft, name, variable: ["pod.K"] if variable == "K" else [])
+    monkeypatch.setattr(
+        assignment, "_meant", lambda draft, name, variable: ["pod.K"] if variable == "K" else []
+    )
     plan = SimpleNamespace(description=SimpleNamespace(variables={"H": None}))
     draft = SimpleNamespace(system=SimpleNamespace(components={"sg1": plan}))
     asked = (("sg1", "H"), ("sg1", "K"), ("sg1", "X"), ("sg2", "H"), ("sg2", "K"))
@@ -123,4 +154,6 @@ def test_a_word_that_is_no_state_is_refused(value):
     with pytest.raises(CaseError) as caught:
         load_case("two_area").prepare(["base"], {"sg1.status": value})
     rule = "it must be true or false; sg1 is switched by sg1.connected"
-    assert [str(p) for p in caught.value.problems] == [f"--set sg1.status: status = {value!r}; {rule}"]
+    assert [str(p) for p in caught.value.problems] == [
+        f"--set sg1.status: status = {value!r}; {rule}"
+    ]

@@ -64,8 +64,22 @@ def test_two_legs_of_a_transformer_with_their_ratios_become_one_exactly(negative
         ((Line("am", "a", "m", X=0.6), Line("mb", "m", "b", X=-0.35)), {"a", "m", "b"}),
         ((Line("am", "a", "m", X=0.3), Line("mb", "m", "b", X=-0.35)), {"a", "b"}),
         ((Line("am", "a", "m", X=0.6, B=0.1), Line("mb", "m", "b", X=-0.35)), {"a", "b"}),
-        ((Line("am", "a", "m", X=0.6, B=0.1), Line("mb", "m", "b", X=-0.1), Line("mc", "m", "c", X=0.2)), {"a", "b"}),
-        ((Line("am", "a", "m", X=0.6), Line("mb", "m", "b", X=-0.3), Line("mc", "m", "c", X=0.2)), {"a", "b", "c"}),
+        (
+            (
+                Line("am", "a", "m", X=0.6, B=0.1),
+                Line("mb", "m", "b", X=-0.1),
+                Line("mc", "m", "c", X=0.2),
+            ),
+            {"a", "b"},
+        ),
+        (
+            (
+                Line("am", "a", "m", X=0.6),
+                Line("mb", "m", "b", X=-0.3),
+                Line("mc", "m", "c", X=0.2),
+            ),
+            {"a", "b", "c"},
+        ),
     ],
 )
 def test_what_is_not_exact_is_left_and_refused_by_name(lines, kept):
@@ -73,7 +87,9 @@ def test_what_is_not_exact_is_left_and_refused_by_name(lines, kept):
     assert (found, merged) == (list(lines), set())
     assert without_star_points(list(lines), kept) == (list(lines), [], set())
     buses = tuple(dict.fromkeys(b for x in lines for b in (x.from_bus, x.to_bus)))
-    with pytest.raises(ValueError, match=r"line 'mb' has the reactance -0.* pu between buses 'm' and 'b'"):
+    with pytest.raises(
+        ValueError, match=r"line 'mb' has the reactance -0.* pu between buses 'm' and 'b'"
+    ):
         Network("n", buses, lines, tuple(Load(f"l{b}", b, 1.0) for b in buses), ())
 
 
@@ -89,7 +105,9 @@ def test_a_star_point_becomes_a_transformer_exactly():
     assert transformer.name == "transformer_m"
     legs, inner = legs_of(transformer), inner_buses(transformer)
     wanted = two_port(lines, ["a", "m", "b", "c"], ["a", "b", "c"])
-    assert two_port(legs, ["a", "b", "c", *inner], ["a", "b", "c"]) == pytest.approx(wanted, abs=1e-12)
+    assert two_port(legs, ["a", "b", "c", *inner], ["a", "b", "c"]) == pytest.approx(
+        wanted, abs=1e-12
+    )
 
 
 CASE = """
@@ -116,7 +134,9 @@ def test_a_transformer_of_a_case_file_starts_in_steady_state(tmp_path):
     (found,) = watch(ready, ("grid.b3.v", "grid.b2.v", "grid.t.winding_3.p"), (0.05,))
     assert set(ready.power_flow.voltages) >= {"b1", "b2", "b3"}
     for bus in ("b2", "b3"):
-        assert found[f"grid.{bus}.v"] == pytest.approx(abs(ready.power_flow.voltages[bus]), abs=1e-6)
+        assert found[f"grid.{bus}.v"] == pytest.approx(
+            abs(ready.power_flow.voltages[bus]), abs=1e-6
+        )
     assert found["grid.t.winding_3.p"] == pytest.approx(-3.0, abs=1e-5)
 
 
@@ -132,9 +152,15 @@ def test_case300_loads_as_it_is_shipped(tmp_path):
     assert len(network.buses) == 299
     flow = solve_power_flow(
         network.buses,
-        [FlowLine(x.name, x.from_bus, x.to_bus, x.R, x.X, x.B, x.tap, x.shift) for x in network.lines],
+        [
+            FlowLine(x.name, x.from_bus, x.to_bus, x.R, x.X, x.B, x.tap, x.shift)
+            for x in network.lines
+        ],
         [FlowLoad(x.bus, x.p_mw, x.q_mvar) for x in network.loads],
-        [FlowUnit(b, b, g.rating_mva, g.p_mw / g.rating_mva, g.v_pu) for b, g in data.generation.items()],
+        [
+            FlowUnit(b, b, g.rating_mva, g.p_mw / g.rating_mva, g.v_pu)
+            for b, g in data.generation.items()
+        ],
         data.slack,
         [FlowShunt(x.bus, x.g_mw / 100, x.b_mvar / 100) for x in network.shunts],
     )
@@ -142,4 +168,6 @@ def test_case300_loads_as_it_is_shipped(tmp_path):
     runpp(net, calculate_voltage_angles=True, numba=False)
     for name, v, angle in zip(net.bus.name, net.res_bus.vm_pu, net.res_bus.va_degree, strict=True):
         if f"bus_{name}" in flow.voltages:
-            assert flow.voltages[f"bus_{name}"] == pytest.approx(v * np.exp(1j * np.deg2rad(angle)), abs=1e-6)
+            assert flow.voltages[f"bus_{name}"] == pytest.approx(
+                v * np.exp(1j * np.deg2rad(angle)), abs=1e-6
+            )

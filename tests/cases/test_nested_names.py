@@ -23,7 +23,10 @@ def case(tmp_path, scenario):
     ],
 )
 def test_quoted_and_unquoted_names_mean_the_same(scenario, tmp_path):
-    assert case(tmp_path, scenario).scenarios["long"].set == {"vsc.pod_p.K": 150.0, "grid.X_l12": 0.05}
+    assert case(tmp_path, scenario).scenarios["long"].set == {
+        "vsc.pod_p.K": 150.0,
+        "grid.X_l12": 0.05,
+    }
 
 
 def test_a_wrong_value_of_an_unquoted_name_is_one_problem_about_it(tmp_path):

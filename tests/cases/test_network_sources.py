@@ -47,10 +47,14 @@ mpc.branch = [
 
 def solved(data):
     """Our power flow of a source's network."""
-    lines = [FlowLine(x.name, x.from_bus, x.to_bus, x.R, x.X, x.B, x.tap, x.shift) for x in data.lines]
+    lines = [
+        FlowLine(x.name, x.from_bus, x.to_bus, x.R, x.X, x.B, x.tap, x.shift) for x in data.lines
+    ]
     loads = [FlowLoad(x.bus, x.p_mw, x.q_mvar) for x in data.loads]
     shunts = [FlowShunt(x.bus, x.g_mw / 100, x.b_mvar / 100) for x in data.shunts]
-    units = [FlowUnit(f"u{bus}", bus, 100.0, g.p_mw / 100, g.v_pu) for bus, g in data.generation.items()]
+    units = [
+        FlowUnit(f"u{bus}", bus, 100.0, g.p_mw / 100, g.v_pu) for bus, g in data.generation.items()
+    ]
     return solve_power_flow(data.buses, lines, loads, units, data.slack, shunts)
 
 
@@ -61,8 +65,9 @@ def reference(net):
         pp.runpp(net, calculate_voltage_angles=True, numba=False, tolerance_mva=1e-10)
     found = net.res_bus[net.bus.in_service]
     return {
-        f"bus_{net.bus.name[k]}": cmath.rect(v.vm_pu, np.deg2rad(v.va_degree)) for k, v in found.iterrows()
-    }  # fmt: skip
+        f"bus_{net.bus.name[k]}": cmath.rect(v.vm_pu, np.deg2rad(v.va_degree))
+        for k, v in found.iterrows()
+    }
 
 
 def compare(flow, wanted):
@@ -89,7 +94,9 @@ def test_a_pandapower_network_with_everything_from_a_file(tmp_path):
     net = pp.create_empty_network(f_hz=60.0)
     names = ["north", "north copy", "south", "mine", "village", "far", "dead", "harbour"]
     levels = (110, 110, 110, 20, 10, 110, 110, 20)
-    a, b, c, d, e, f, g, h = (pp.create_bus(net, kv, name=n) for kv, n in zip(levels, names, strict=True))
+    a, b, c, d, e, f, g, h = (
+        pp.create_bus(net, kv, name=n) for kv, n in zip(levels, names, strict=True)
+    )
     pp.create_ext_grid(net, a, vm_pu=1.02, va_degree=20.0)
     pp.create_switch(net, a, b, et="b", closed=True)
     for target in (c, f):
@@ -112,7 +119,10 @@ def test_a_pandapower_network_with_everything_from_a_file(tmp_path):
     inner = set(data.buses) - outer
     assert len(inner) == 2  # the star point of the transformer, and the open end of the line
     flow, wanted = solved(data), reference(net)
-    compare(replace(flow, voltages={bus: flow.voltages[bus] for bus in outer}), {bus: wanted[bus] for bus in outer})
+    compare(
+        replace(flow, voltages={bus: flow.voltages[bus] for bus in outer}),
+        {bus: wanted[bus] for bus in outer},
+    )
     assert data.slack == "bus_north"
     assert next(x for x in data.loads if x.bus == "bus_village").p_mw == pytest.approx(5)
 
@@ -152,7 +162,17 @@ def as_pandapower():
             continue
         if ratio:
             pp.create_transformer_from_parameters(
-                net, at[f], at[t], 200, ratio * 345, 345, 100 * r, 100 * abs(complex(r, x)), 0, 0, shift_degree=shift
+                net,
+                at[f],
+                at[t],
+                200,
+                ratio * 345,
+                345,
+                100 * r,
+                100 * abs(complex(r, x)),
+                0,
+                0,
+                shift_degree=shift,
             )
             for end, tap in ((f, ratio), (t, 1)):
                 pp.create_shunt(net, at[end], q_mvar=-b / 2 * 200 / tap**2)
@@ -171,14 +191,30 @@ def as_pandapower():
     ("table", "words"),
     [
         ({"matpower": "none.m"}, "none.m: there is no such file; give the path of a MATPOWER case"),
-        ({"matpower": "notes.txt"}, "notes.txt: a MATPOWER case ends in .m or .mat, and this file in '.txt'"),
+        (
+            {"matpower": "notes.txt"},
+            "notes.txt: a MATPOWER case ends in .m or .mat, and this file in '.txt'",
+        ),
         ({"matpower": "script.m"}, "script.m: it (is not|cannot be read as) a MATPOWER case"),
         ({"matpower": "broken.mat"}, "broken.mat: it cannot be read as a MATPOWER case"),
-        ({"matpower": "short.m"}, r"short.m: mpc.branch must be a table of numbers with 11 columns or more"),
-        ({"pandapower": "case93"}, "there is no pandapower network 'case93'; did you mean case9 or"),
-        ({"pandapower": "logging"}, "there is no pandapower network 'logging'"),  # a module that it imports
-        ({"pandapower": "quite_different"}, "'quite_different'; give one of pandapower.networks, or the path"),
-        ({"pandapower": "none.json"}, r"none.json: there is no such file; save a network with pandapower.to_json"),
+        (
+            {"matpower": "short.m"},
+            r"short.m: mpc.branch must be a table of numbers with 11 columns or more",
+        ),
+        (
+            {"pandapower": "case93"},
+            "there is no pandapower network 'case93'; did you mean case9 or",
+        ),
+        # a module that it imports
+        ({"pandapower": "logging"}, "there is no pandapower network 'logging'"),
+        (
+            {"pandapower": "quite_different"},
+            "'quite_different'; give one of pandapower.networks, or the path",
+        ),
+        (
+            {"pandapower": "none.json"},
+            r"none.json: there is no such file; save a network with pandapower.to_json",
+        ),
         ({"pandapower": "text.json"}, "text.json: it is no network saved with pandapower.to_json"),
     ],
 )
@@ -189,7 +225,8 @@ def test_a_source_that_cannot_be_used(table, words, tmp_path):
     (tmp_path / "text.json").write_text("[1, 2")
     head, _, tail = SMALL.partition("mpc.branch")
     short = "\n".join(
-        " ".join(line.split()[:7]) + ";" if line.startswith("    ") else line for line in tail.splitlines()
+        " ".join(line.split()[:7]) + ";" if line.startswith("    ") else line
+        for line in tail.splitlines()
     )
     (tmp_path / "short.m").write_text(f"{head}mpc.branch{short}")
     with pytest.raises(InputError, match=words):

@@ -88,15 +88,21 @@ def test_a_file_of_values_is_for_the_scenario_it_was_made_for(files, tmp_path):
     case, _ = made(files)
     (tmp_path / "pod.toml").write_text('[set]\n"gfor.pod_p.enabled" = true\n')
     file = read_parameter_file(tmp_path / "pod.toml")
-    with pytest.raises(CaseError, match=r"line 2, gfor.pod_p.enabled: it would switch this on in converter too"):
+    with pytest.raises(
+        CaseError, match=r"line 2, gfor.pod_p.enabled: it would switch this on in converter too"
+    ):
         case.prepare(["converter", "pod_p"], parameters=[file])
     case.prepare(["base", "pod_p"], parameters=[file])  # only one of them has the controller
     (alone,) = case.prepare(["converter"], {"sg1.machine.H": 4.0}, parameters=[file])
     assert alone.changed == "pod.toml, sg1.machine.H = 4.0"
     assert case.prepare(["converter"])[0].changed == ""
-    with pytest.raises(CaseError, match=r"it would switch this on in pod_q beside gfor.pod_q.enabled, where it is off"):
+    with pytest.raises(
+        CaseError,
+        match=r"it would switch this on in pod_q beside gfor.pod_q.enabled, where it is off",
+    ):
         case.prepare(["pod_q"], parameters=[file])
-    case.prepare(["pod_q"], {"gfor.pod_q.enabled": True}, parameters=[file])  # who says so means both
+    # who says so means both
+    case.prepare(["pod_q"], {"gfor.pod_q.enabled": True}, parameters=[file])
 
 
 def test_a_mode_is_followed_along_the_gains_to_what_the_device_brings(files, monkeypatch):
@@ -104,8 +110,11 @@ def test_a_mode_is_followed_along_the_gains_to_what_the_device_brings(files, mon
     strong = {"gfor.pod_p.K": 160, "gfor.pod_p.T_S1": 0.22, "gfor.pod_p.T_S2": 0.0485}
     dispatch, pod = (compute_modes(*case.prepare([name], strong)) for name in ("dispatch", "pod_p"))
     weakest, same = sorted(pod.modes, key=lambda mode: mode.damping_percent)[:2]
-    assert abs(weakest.frequency_hz - same.frequency_hz) > 0.4  # the POD's own mode is damped least now
-    now = f"({same.damping_percent:.2f} %, and the least damped now {weakest.damping_percent:.2f} %)"
+    # the POD's own mode is damped least now
+    assert abs(weakest.frequency_hz - same.frequency_hz) > 0.4
+    now = (
+        f"({same.damping_percent:.2f} %, and the least damped now {weakest.damping_percent:.2f} %)"
+    )
     (sentence,) = beside.told([dispatch, pod])
     assert sentence.endswith(now)
 
@@ -115,7 +124,10 @@ def test_a_mode_is_followed_along_the_gains_to_what_the_device_brings(files, mon
     monkeypatch.setattr(beside.continuation, "follow_along", meets)
     (sentence,) = beside.told([dispatch, pod])
     least = weakest.damping_percent - min(mode.damping_percent for mode in dispatch.modes)
-    assert f"POD-P at least {least:+.2f} points (least damped: {weakest.damping_percent:.2f} %)" in sentence
+    assert (
+        f"POD-P at least {least:+.2f} points (least damped: {weakest.damping_percent:.2f} %)"
+        in sentence
+    )
     assert sentence.endswith("as the mode meets another one at 70% of the controllers' gains")
 
 
@@ -124,14 +136,23 @@ def test_what_the_device_brings_is_told_apart_from_the_dispatch(files):
     dispatch, converter = map(compute_modes, case.prepare(["dispatch", "converter"]))
     least = [min(mode.damping_percent for mode in result.modes) for result in (dispatch, converter)]
     (sentence,) = beside.told([dispatch, converter])
-    assert f"{least[0]:.2f} %), at the same power flow: Converter {least[1] - least[0]:+.2f} points" in sentence
-    assert list(beside.told([converter])) == ["What the change of power flow alone does: --scenario dispatch beside"]
+    assert (
+        f"{least[0]:.2f} %), at the same power flow: Converter {least[1] - least[0]:+.2f} points"
+        in sentence
+    )
+    assert list(beside.told([converter])) == [
+        "What the change of power flow alone does: --scenario dispatch beside"
+    ]
     (moved,) = map(compute_modes, case.prepare(["converter"], {"gfor.P_0": 0.5}))
-    assert "Converter: not known, as its power flow is another one" in "".join(beside.told([dispatch, moved]))
+    assert "Converter: not known, as its power flow is another one" in "".join(
+        beside.told([dispatch, moved])
+    )
     # The same as a negative load of the network, which is a constant current there, without any device
     fed = 100 * dispatch.prepared.power_flow.powers["injection"]
     load = f'[network.loads.fed]\nbus = "bus_13"\np = {-fed.real}\nq = {-fed.imag}\n\n[units]'
-    text = new.text.replace("[units]", load, 1).replace('remove = ["gfor"]', 'remove = ["injection", "gfor"]')
+    text = new.text.replace("[units]", load, 1).replace(
+        'remove = ["gfor"]', 'remove = ["injection", "gfor"]'
+    )
     case.path.write_text(text, encoding="utf-8")
     (alike,) = map(compute_modes, load_case(case.path).prepare(["dispatch"]))
     assert min(mode.damping_percent for mode in alike.modes) == pytest.approx(least[0], abs=0.01)
@@ -142,7 +163,9 @@ def test_a_case_that_cannot_start_is_said_at_once(gfor, files):
     code, out, err = gfor(*files, "--out", files[0].parent / "case.toml")
     assert code == 2
     assert "scenario 'base': sg" in err
-    assert "governor.V_MAX: the operating point of the power flow lies at or above this limit" in err
+    assert (
+        "governor.V_MAX: the operating point of the power flow lies at or above this limit" in err
+    )
     assert "Next:" not in out
     assert (files[0].parent / "case.toml").exists()
 
@@ -192,7 +215,9 @@ def test_questions_stand_at_the_lines_that_they_are_about(files):
 def test_without_a_converter(files):
     case, new = made(files, None)
     assert [prepared.name for prepared in new.scenarios] == ["base", "fault"]
-    assert "machines: emf w·e''; [conventions] like = \"psse\" takes PSS/E's" in "".join(new.assumed)
+    assert "machines: emf w·e''; [conventions] like = \"psse\" takes PSS/E's" in "".join(
+        new.assumed
+    )
     (fault,) = case.prepare(["fault"])
     assert [event.time for event in fault.events] == [1.0, 1.1]
 
@@ -276,7 +301,9 @@ LINES = "from,to,kv,R_ohm,X_ohm,B_us,R,X,B\n1,2,,,,,0,0.02,0\n2,4,,,,,0.004,0.05
 def tables(folder, lines=LINES):
     """Two machines and a line of 0.05 pu between them, and what a planner would type for the line at 345 kV."""
     (folder / "lines.csv").write_text(lines)
-    (folder / "machines.csv").write_text("bus,rating_mva,p_mw,v_pu\n3,500,300,1.01\n1,900,500,1.02\n")
+    (folder / "machines.csv").write_text(
+        "bus,rating_mva,p_mw,v_pu\n3,500,300,1.01\n1,900,500,1.02\n"
+    )
     (folder / "loads.csv").write_text("bus,p_mw,q_mvar\n2,400,50\n4,400,50\n")
     (folder / "buses.csv").write_text("bus\n1\n2\n3\n4\n")
     (folder / "empty.csv").write_text("bus,p_mw\n")
@@ -286,11 +313,18 @@ def tables(folder, lines=LINES):
 def test_a_case_comes_from_nothing_but_tables(tmp_path):
     case, new = made(tables(tmp_path), "bus 4, 100 MVA, 60 MW, less sg3", frequency="60 Hz")
     (base,) = case.prepare(["base"])
-    assert (base.network.buses, base.power_flow.slack) == (("bus_1", "bus_2", "bus_3", "bus_4"), "bus_1")
-    assert {plan.number("f_n") for name, plan in base.system.components.items() if name != "grid"} == {60}
+    assert (base.network.buses, base.power_flow.slack) == (
+        ("bus_1", "bus_2", "bus_3", "bus_4"),
+        "bus_1",
+    )
+    assert {
+        plan.number("f_n") for name, plan in base.system.components.items() if name != "grid"
+    } == {60}
     assert "slack bus_1, 60 Hz" in "".join(new.assumed)
     z = 345**2 / 100
-    ohms = LINES.replace("2,4,,,,,0.004,0.05,0.1", f"2,4,345,{0.004 * z},{0.05 * z},{0.1 / z * 1e6},,,")
+    ohms = LINES.replace(
+        "2,4,,,,,0.004,0.05,0.1", f"2,4,345,{0.004 * z},{0.05 * z},{0.1 / z * 1e6},,,"
+    )
     (again,) = made(tables(tmp_path, ohms), None)[0].prepare(["base"])
     assert abs(again.power_flow.voltages["bus_3"] - base.power_flow.voltages["bus_3"]) < 1e-12
     for wrong, said in (
@@ -299,7 +333,13 @@ def test_a_case_comes_from_nothing_but_tables(tmp_path):
         ("2,4,345,1,1,1,1,1,1", "both"),
     ):
         with pytest.raises(InputError, match=said):
-            made(tables(tmp_path, LINES.replace("2,4,,,,,0.004,0.05,0.1" if wrong[-2] == "," else "2,4,", wrong)), None)
+            made(
+                tables(
+                    tmp_path,
+                    LINES.replace("2,4,,,,,0.004,0.05,0.1" if wrong[-2] == "," else "2,4,", wrong),
+                ),
+                None,
+            )
 
 
 def test_it_asks_at_a_terminal(gfor, files, monkeypatch):
@@ -317,7 +357,9 @@ def test_it_asks_at_a_terminal(gfor, files, monkeypatch):
 def test_every_further_signal_of_a_panel_is_looked_for(files):
     case, new = made(files)
     case.path.write_text(new.text.replace('"sg2.omega"', '"sg2.omgea"'), encoding="utf-8")
-    with pytest.raises(InputError, match=r"no scenario has an output 'sg2.omgea'; did you mean sg2.omega"):
+    with pytest.raises(
+        InputError, match=r"no scenario has an output 'sg2.omgea'; did you mean sg2.omega"
+    ):
         load_case(case.path).prepare(["base"])
 
 
@@ -326,4 +368,7 @@ def test_a_vendors_switches_become_scenarios(fmu_path):
     assert _switched(device) == _switched(None) == {"p": False, "q": False}
     assert _switched(read_description(fmu_path("synchronous_generator"))) == {}
     on = replace(device.variables["pod_q.enabled"], start="true")
-    assert _switched(replace(device, variables={**device.variables, "pod_q.enabled": on})) == {"p": False, "q": True}
+    assert _switched(replace(device, variables={**device.variables, "pod_q.enabled": on})) == {
+        "p": False,
+        "q": True,
+    }

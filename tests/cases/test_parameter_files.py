@@ -17,8 +17,15 @@ def write(tmp_path):
 
 
 def test_what_is_written_is_read(write):
-    values = {"gfor*.pod_p.K": 200.0, "gfor.pod_p.enabled": True, "gfor.pod_p.N_S": 2, "grid.load_2.P": "2600 MW"}
-    file = read_parameter_file(write(parameter_file_text(values, ["made by\nsomebody", "for a test"])))
+    values = {
+        "gfor*.pod_p.K": 200.0,
+        "gfor.pod_p.enabled": True,
+        "gfor.pod_p.N_S": 2,
+        "grid.load_2.P": "2600 MW",
+    }
+    file = read_parameter_file(
+        write(parameter_file_text(values, ["made by\nsomebody", "for a test"]))
+    )
     assert file.values == values
     assert file.text.startswith("# made by\n# somebody\n# for a test\n")
 
@@ -31,7 +38,9 @@ def test_unquoted_keys_and_tables_mean_the_same(write):
 
 def test_scenario_then_file_then_command_line(write):
     case = load_case("two_area")
-    file = read_parameter_file(write('[set]\n"gfor.pod_p.K" = 150.0\n"gfor.pod_p.enabled" = false\n'))
+    file = read_parameter_file(
+        write('[set]\n"gfor.pod_p.K" = 150.0\n"gfor.pod_p.enabled" = false\n')
+    )
 
     def values(**arguments):
         (ready,) = case.prepare(["pod_p"], **arguments)
@@ -53,12 +62,21 @@ def test_a_case_file_names_parameter_files(write):
         "case.toml",
     )
     (ready,) = load_case(path).prepare(["pod_p"])
-    assert [ready.values[f"gfor.pod_p.{v}"] for v in ("enabled", "K", "T_S1")] == [True, 150.0, 0.25]
+    assert [ready.values[f"gfor.pod_p.{v}"] for v in ("enabled", "K", "T_S1")] == [
+        True,
+        150.0,
+        0.25,
+    ]
 
 
 def test_a_case_file_that_names_a_missing_one(write):
-    text = load_case("two_area").text.replace('set = { "gfor.pod_p.enabled" = true }', 'parameters = ["none.toml"]', 1)
-    with pytest.raises(CaseError, match=r"line \d+, scenarios.pod_p.parameters.*none.toml: the parameter file cannot"):
+    text = load_case("two_area").text.replace(
+        'set = { "gfor.pod_p.enabled" = true }', 'parameters = ["none.toml"]', 1
+    )
+    with pytest.raises(
+        CaseError,
+        match=r"line \d+, scenarios.pod_p.parameters.*none.toml: the parameter file cannot",
+    ):
         load_case(write(text, "case.toml")).prepare(["pod_p"])
 
 
@@ -79,15 +97,23 @@ def test_a_file_that_is_none(write, text, words):
 
 
 def test_a_value_that_does_not_fit_names_file_and_line(write):
-    file = read_parameter_file(write('[set]\n"gfor.pod_p.K" = -1.0\n"gfor.pod_p.T_X" = 1\n"converter.pod_p.K" = 1\n'))
+    file = read_parameter_file(
+        write('[set]\n"gfor.pod_p.K" = -1.0\n"gfor.pod_p.T_X" = 1\n"converter.pod_p.K" = 1\n')
+    )
     with pytest.raises(CaseError) as caught:
         load_case("two_area").prepare(["gfor"], parameters=[file])
     said = str(caught.value)
     assert "values.toml, line 2, gfor.pod_p.K: pod_p.K = -1 pu; it must be at least 0 pu" in said
-    assert "values.toml, line 3, gfor.pod_p.T_X: component 'gfor' has no variable 'pod_p.T_X'" in said
+    assert (
+        "values.toml, line 3, gfor.pod_p.T_X: component 'gfor' has no variable 'pod_p.T_X'" in said
+    )
     assert "values.toml, line 4, converter.pod_p.K: there is no component 'converter'" in said
 
 
 def test_a_share_of_converters_comes_from_a_file_as_well(write):
     file = read_parameter_file(write('[set]\n"units.alpha" = 0.0\n'))
-    assert not [n for n in load_case("ieee118").components_of("gfor", parameters=[file]) if n.startswith("gfor")]
+    assert not [
+        n
+        for n in load_case("ieee118").components_of("gfor", parameters=[file])
+        if n.startswith("gfor")
+    ]

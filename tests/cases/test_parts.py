@@ -74,8 +74,9 @@ def models(case, scenario="plain", overrides=None):
 
 def test_a_component_is_made_of_the_parts_it_names(write):
     assert models(write()) == {
-        "gn": "classical_manual_constant_torque", "gs": "classical_manual_constant_power",
-    }  # fmt: skip
+        "gn": "classical_manual_constant_torque",
+        "gs": "classical_manual_constant_power",
+    }
 
 
 def test_a_scenarios_pattern_changes_a_part_of_those_that_have_it(write):
@@ -95,12 +96,15 @@ def test_the_system_of_chosen_parts_runs_from_its_power_flow(write):
 
 
 def test_units_choose_in_their_table_and_each_row_for_itself(write):
-    rows = "bus,rating_mva,p_mw,v_pu,governor\nnorth,100,30,1.0,\nsouth,100,30,1.0,constant_torque\n"
+    rows = (
+        "bus,rating_mva,p_mw,v_pu,governor\nnorth,100,30,1.0,\nsouth,100,30,1.0,constant_torque\n"
+    )
     own = CASE[CASE.index("[components.gn]") : CASE.index("[scenarios.plain]")]
     case = write((own, UNITS), units=rows)
     assert models(case) == {
-        "sgnorth": "classical_manual_constant_power", "sgsouth": "classical_manual_constant_torque",
-    }  # fmt: skip
+        "sgnorth": "classical_manual_constant_power",
+        "sgsouth": "classical_manual_constant_torque",
+    }
 
 
 @pytest.mark.parametrize(
@@ -111,10 +115,22 @@ def test_units_choose_in_their_table_and_each_row_for_itself(write):
             'governor = "tgov"',
             "there is no governor 'tgov'; did you mean 'tgov1'? there are: constant_power, constant_torque, tgov1",
         ),
-        ('governor = "constant_power"', 'exciter = "sexs"', "the classical machine has no field winding"),
+        (
+            'governor = "constant_power"',
+            'exciter = "sexs"',
+            "the classical machine has no field winding",
+        ),
         ('governor = "constant_power"', 'stabilizer = "pss1a"', "manual excitation has none"),
-        ('machine = "classical"\ngovernor', 'machine = ["genrou"]\ngovernor', "components.gs.machine"),
-        ('model = "grid"\n', 'model = "grid"\nexciter = "sexs"\n', "the model 'grid' has no such part to choose"),
+        (
+            'machine = "classical"\ngovernor',
+            'machine = ["genrou"]\ngovernor',
+            "components.gs.machine",
+        ),
+        (
+            'model = "grid"\n',
+            'model = "grid"\nexciter = "sexs"\n',
+            "the model 'grid' has no such part to choose",
+        ),
     ],
 )
 def test_a_part_that_cannot_be_is_one_error_at_its_component(write, old, new, said):
@@ -127,9 +143,15 @@ def test_a_part_that_cannot_be_is_one_error_at_its_component(write, old, new, sa
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"gs.exciter": 3.0}, "--set gs.exciter: exciter = 3.0; it must be the name of a part, in quotes"),
+        (
+            {"gs.exciter": 3.0},
+            "--set gs.exciter: exciter = 3.0; it must be the name of a part, in quotes",
+        ),
         ({"gz.exciter": "sexs"}, "--set gz.exciter: there is no component 'gz'"),
-        ({"grid.machine": "genrou"}, "machine = 'genrou': the model 'grid' has no such part to choose"),
+        (
+            {"grid.machine": "genrou"},
+            "machine = 'genrou': the model 'grid' has no such part to choose",
+        ),
     ],
 )
 def test_a_wrong_choice_on_the_command_line_is_named(write, given, said):
@@ -156,7 +178,9 @@ def test_machine_data_are_judged_on_the_rating(write, S_data, asked):
 
 
 def test_a_question_shows_machine_data_on_both_bases(write):
-    values = "parameters = { P_0 = 0.3, machine.S_data = 1000, machine.X_d1 = 30.0, machine.H = 0.6 }"
+    values = (
+        "parameters = { P_0 = 0.3, machine.S_data = 1000, machine.X_d1 = 30.0, machine.H = 0.6 }"
+    )
     (prepared,) = write(("parameters = { P_0 = 0.3 }", values)).prepare(["plain"])
     (text,) = [question.text for question in prepared.questions]
     assert "machine.X_d1 = 30 pu on machine.S_data, 3 pu on S_n, is outside of 0.05 to 1 pu" in text

@@ -31,16 +31,21 @@ def swing_of(ready):
     with Master(ready.system, ready.schedule, ready.step_size) as master:
         point = find_operating_point(master)
         modes = find_modes(linearize(master), 0.1, 3.0)
-        return point, max(modes, key=lambda m: m.participation_of(["sg.machine.omega", "vsc.droop.theta"]))
+        return point, max(
+            modes, key=lambda m: m.participation_of(["sg.machine.omega", "vsc.droop.theta"])
+        )
 
 
-def test_the_power_flow_is_the_networks_steady_state_and_the_swing_is_that_of_the_emt_models(prepared):
+def test_the_power_flow_is_the_networks_steady_state_and_the_swing_is_that_of_the_emt_models(
+    prepared,
+):
     point, found = swing_of(prepared())
     # Ratio, phase shift, charging, shunt and inductive loads are as the power flow has them.
     assert point.initial_residual < 1e-9
     assert point.iterations <= 1
     _, wanted = swing_of(prepared(RING))
-    assert 2 < wanted.frequency_hz < 3  # far faster than what phasor models are for, 6 % of rated frequency
+    # far faster than what phasor models are for, 6 % of rated frequency
+    assert 2 < wanted.frequency_hz < 3
     assert found.frequency_hz == pytest.approx(wanted.frequency_hz, rel=0.01)
     assert found.damping_percent == pytest.approx(wanted.damping_percent, abs=1.0)
 
@@ -74,7 +79,9 @@ def test_lines_loads_and_units_trip_and_return(prepared):
 def test_what_a_device_feeds_is_what_the_grid_gets(prepared):
     """A step apart in time at most: the device's figures are of the step done, the grid's of that to come."""
     event = '[[events]]\ntype = "load_change"\ntime = "0.1 s"\nload = "town"\nscale = 1.05\n'
-    rows = watch(prepared(PHASOR + event), ["grid.vsc.p", "vsc.p", "grid.vsc.q", "vsc.q"], [0.3, 0.305])
+    rows = watch(
+        prepared(PHASOR + event), ["grid.vsc.p", "vsc.p", "grid.vsc.q", "vsc.q"], [0.3, 0.305]
+    )
     for quantity in "pq":
         fed, got = rows[1][f"vsc.{quantity}"] * 5.0, rows[0][f"grid.vsc.{quantity}"]
         assert fed == pytest.approx(got, abs=0.01)

@@ -97,7 +97,8 @@ LARGE = {"ieee118", "ieee39"}
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow if n in LARGE else ()) for n in built_in_cases()]
+    "name",
+    [pytest.param(n, marks=pytest.mark.slow if n in LARGE else ()) for n in built_in_cases()],
 )
 def test_built_in_cases_raise_no_question(name):
     case = load_case(name)
@@ -111,11 +112,14 @@ def test_the_defaults_of_every_model_are_plausible_and_obey_the_rules(name):
     for v in build_model(name).parameters:
         assert v.usual is None or v.usual.fits(v.start), v.name
     for rule in RULES:
-        assert not {rule.larger, rule.smaller} <= start.keys() or rule.holds(start[rule.larger], start[rule.smaller])
+        assert not {rule.larger, rule.smaller} <= start.keys() or rule.holds(
+            start[rule.larger], start[rule.smaller]
+        )
 
 
 RECORDED_PARTS = [
-    {"machine": r.part} if r.kind == "machine" else {"exciter": "sexs"} | {r.kind: r.part} for r in DYR_RECORDS.values()
+    {"machine": r.part} if r.kind == "machine" else {"exciter": "sexs"} | {r.kind: r.part}
+    for r in DYR_RECORDS.values()
 ]
 
 
@@ -126,7 +130,12 @@ def test_the_defaults_of_every_part_that_a_record_can_be_are_plausible(parts):
 
 
 def test_every_range_and_rule_is_of_a_variable_that_some_model_has():
-    known = {v.name for name in model_names() if not needs_arguments(name) for v in build_model(name).parameters}
+    known = {
+        v.name
+        for name in model_names()
+        if not needs_arguments(name)
+        for v in build_model(name).parameters
+    }
     recorded = [build_model("synchronous_generator_phasor", **parts) for parts in RECORDED_PARTS]
     known |= {v.name for model in recorded for v in model.parameters}
     ranged = {*FOLLOWING, *FORMING, *MACHINE, *USUAL, *(v.name for v in RATED)}
@@ -167,7 +176,9 @@ def test_a_port_that_does_not_say_what_it_is_is_a_converters(fmu_path):
 @pytest.mark.parametrize("value", [6500.0, 0.0999, 15.5])
 def test_an_inertia_constant_outside_of_its_range_is_questioned_with_its_line(questions, value):
     (question,) = questions(("machine.H = 6.5", f"machine.H = {value}"))
-    assert question.startswith(f"line {H_LINE}, components.sg.parameters.machine.H: sg: machine.H = {value:g} s")
+    assert question.startswith(
+        f"line {H_LINE}, components.sg.parameters.machine.H: sg: machine.H = {value:g} s"
+    )
     assert "0.5 to 15 s" in question
     assert ("433 times too large, and usual by a factor of 1000" in question) == (value == 6500)
 
@@ -188,7 +199,9 @@ def test_an_inertia_constant_outside_of_its_range_is_questioned_with_its_line(qu
 )
 def test_a_unit_slip_in_a_machine_is_questioned(questions, variable, value):
     (question,) = questions(machine(f"{variable} = {value}"))
-    assert question.startswith(f"line {H_LINE + 1}, components.sg.parameters.{variable}: sg: {variable} = {value:g}")
+    assert question.startswith(
+        f"line {H_LINE + 1}, components.sg.parameters.{variable}: sg: {variable} = {value:g}"
+    )
 
 
 @pytest.mark.parametrize(
@@ -212,7 +225,9 @@ def test_a_unit_slip_in_a_converter_is_questioned(questions, variable, value):
 
 def test_a_droop_that_made_a_system_grow_in_silence_is_questioned(questions):
     (question,) = questions(("droop.R_f = 0.05", "droop.R_f = 3"))
-    assert re.match(rf"line {S_N_LINE + 2}, .*droop.R_f = 3 pu is outside of 0.001 to 0.3 pu", question)
+    assert re.match(
+        rf"line {S_N_LINE + 2}, .*droop.R_f = 3 pu is outside of 0.001 to 0.3 pu", question
+    )
 
 
 @pytest.mark.parametrize("rating", ['"500 kVA"', "0.5"])
@@ -233,16 +248,30 @@ def test_a_rating_in_kva_without_its_unit_is_questioned(questions):
     [
         ("X = 0.02, R = 0.002", "X = 0.002, R = 0.02", "R_l23 = 0.02 pu is 10 times X_l23"),
         ("R = 0.002, B = 0.02", "R = 0.002, B = 20", "B_l23 = 20 pu is outside of 0 to 10 pu"),
-        ("X = 0.02, R = 0.002", "X = 0.02, R = 0.002, tap = 230", "tap_l23 = 230 is outside of 0.7 to 1.4"),
-        ("X = 0.02, R = 0.002", "X = 0.02, R = 0.002, X_C = 0.019", "l23.X_C = 0.019 pu is 0.95 of X_l23 = 0.02 pu"),
-        ("X = 0.02, R = 0.002", "X = 0.02, R = 0.002, X_C = 2e-5", "l23.X_C = 2e-05 pu is 0.001 of X_l23 = 0.02 pu"),
+        (
+            "X = 0.02, R = 0.002",
+            "X = 0.02, R = 0.002, tap = 230",
+            "tap_l23 = 230 is outside of 0.7 to 1.4",
+        ),
+        (
+            "X = 0.02, R = 0.002",
+            "X = 0.02, R = 0.002, X_C = 0.019",
+            "l23.X_C = 0.019 pu is 0.95 of X_l23 = 0.02 pu",
+        ),
+        (
+            "X = 0.02, R = 0.002",
+            "X = 0.02, R = 0.002, X_C = 2e-5",
+            "l23.X_C = 2e-05 pu is 0.001 of X_l23 = 0.02 pu",
+        ),
     ],
 )
 def test_a_line_with_absurd_data_is_questioned_with_its_line(questions, old, new, said):
     text = CASE.replace(old, new)
     try:
         asked = questions(text=text)
-    except CaseError as error:  # with such a line the power flow has no solution, and the question says why
+    except (
+        CaseError
+    ) as error:  # with such a line the power flow has no solution, and the question says why
         asked = [str(p).replace("questioned besides: ", "") for p in error.problems]
     number = 1 + next(k for k, line in enumerate(text.splitlines()) if line.startswith("l23"))
     assert any(q.startswith(f"line {number}, network.lines.l23") and said in q for q in asked)
@@ -259,13 +288,27 @@ t = { buses = ["b1", "b2", "b3"], X_12 = 0.1, X_13 = 0.2, X_23 = 0.12 }
     [
         ("X_12 = 0.1", "X_12 = 0.1", None),
         ("X_13 = 0.2", "X_13 = 15, X_23 = 15", "t.X_1 + X_3 = 15 pu is outside of 1e-05 to 10 pu"),
-        ("X_12 = 0.1", "X_12 = 0.1, R_12 = 0.6", "t.R_1 + R_2 = 0.6 pu is 6 times t.X_1 + X_2 = 0.1 pu"),
-        ("X_12 = 0.1", "X_12 = 0.1, tap = [220.0, 1.0, 1.0]", "t.tap_1 = 220 is outside of 0.7 to 1.4"),
-        ("X_12 = 0.1", "X_12 = 0.1, shift = [0.0, 30.0, 0.0]", "t.shift_2 = 30 rad is more than half a turn"),
+        (
+            "X_12 = 0.1",
+            "X_12 = 0.1, R_12 = 0.6",
+            "t.R_1 + R_2 = 0.6 pu is 6 times t.X_1 + X_2 = 0.1 pu",
+        ),
+        (
+            "X_12 = 0.1",
+            "X_12 = 0.1, tap = [220.0, 1.0, 1.0]",
+            "t.tap_1 = 220 is outside of 0.7 to 1.4",
+        ),
+        (
+            "X_12 = 0.1",
+            "X_12 = 0.1, shift = [0.0, 30.0, 0.0]",
+            "t.shift_2 = 30 rad is more than half a turn",
+        ),
     ],
 )
 def test_a_transformer_with_absurd_data_is_questioned_with_its_line(questions, old, new, said):
-    table = TRANSFORMER.replace(", X_23 = 0.12", "" if "X_23" in new else ", X_23 = 0.12").replace(old, new)
+    table = TRANSFORMER.replace(", X_23 = 0.12", "" if "X_23" in new else ", X_23 = 0.12").replace(
+        old, new
+    )
     text = CASE.replace("[components.grid]", f"{table}[components.grid]")
     try:
         asked = questions(text=text)
@@ -275,7 +318,10 @@ def test_a_transformer_with_absurd_data_is_questioned_with_its_line(questions, o
         assert asked == []
         return
     number = 1 + next(k for k, line in enumerate(text.splitlines()) if line.startswith("t = "))
-    assert any(q.startswith(f"line {number}, network.three_winding_transformers.t") and said in q for q in asked), asked
+    assert any(
+        q.startswith(f"line {number}, network.three_winding_transformers.t") and said in q
+        for q in asked
+    ), asked
 
 
 def test_the_answer_about_a_transformer_is_taken(questions):
@@ -290,8 +336,14 @@ def test_the_answer_about_a_transformer_is_taken(questions):
 def test_a_value_that_is_meant_is_not_questioned(questions):
     changes = [("machine.H = 6.5", "machine.H = 25")]
     assert len(questions(*changes)) == 1
-    assert questions(*changes, ('name = "plausible"', 'name = "plausible"\nmeant = ["s*.machine.H"]')) == []
-    assert len(questions(*changes, ('name = "plausible"', 'name = "plausible"\nmeant = ["vsc.*"]'))) == 1
+    assert (
+        questions(*changes, ('name = "plausible"', 'name = "plausible"\nmeant = ["s*.machine.H"]'))
+        == []
+    )
+    assert (
+        len(questions(*changes, ('name = "plausible"', 'name = "plausible"\nmeant = ["vsc.*"]')))
+        == 1
+    )
 
 
 @pytest.mark.slow
@@ -314,11 +366,16 @@ converter = "gfor"
 generator_parameters = { transformer.X_t = 0.0, transformer.R_t = 0.0, machine.T_d10 = 8000.0 }
 """
     rows = "\n".join(f"{bus},1000,{6500 if bus == 33 else 5}" for bus in range(30, 40))
-    (tmp_path / "units.csv").write_text(f"bus,rating_mva,sg.machine.H\n{rows}\n".replace("39,1000", "39,9000"))
+    (tmp_path / "units.csv").write_text(
+        f"bus,rating_mva,sg.machine.H\n{rows}\n".replace("39,1000", "39,9000")
+    )
     (tmp_path / "case.toml").write_text(text, encoding="utf-8")
     (prepared,) = load_case(tmp_path / "case.toml").prepare()
     common, own = sorted(map(str, prepared.questions), key=lambda text: "machine.H" in text)
-    assert re.match(r"line 15, units.generator_parameters.*: sg30, sg31, sg32 and 7 more: machine.T_d10 = 8000", common)
+    assert re.match(
+        r"line 15, units.generator_parameters.*: sg30, sg31, sg32 and 7 more: machine.T_d10 = 8000",
+        common,
+    )
     assert re.match(r".*units.csv, line 5, sg33.machine.H: sg33: machine.H = 6500 s", own)
 
 
@@ -333,7 +390,9 @@ generator_parameters = { transformer.X_t = 0.0, transformer.R_t = 0.0, machine.T
 )
 def test_a_rating_that_moves_a_power_is_asked_about(values, moves):
     found = [
-        str(q) for q in load_case("two_area").prepare(["base"], values)[0].questions if "in parts of S_n" in str(q)
+        str(q)
+        for q in load_case("two_area").prepare(["base"], values)[0].questions
+        if "in parts of S_n" in str(q)
     ]
     assert [moves in text for text in found] == [True] * bool(moves), found
 
@@ -343,11 +402,16 @@ def test_questions_about_two_values_at_one_place_both_stay():
     draft = SimpleNamespace(found=found, given=SimpleNamespace(case=SimpleNamespace(meant=())))
     question(draft, [UnusualValue("a.H", "units.csv, line 5", "H is large")])
     question(draft, [UnusualValue("a.S_n", "units.csv, line 5", "S_n is small")])
-    assert [one.text.partition(";")[0] for one in found.questions] == ["a: H is large", "a: S_n is small"]
+    assert [one.text.partition(";")[0] for one in found.questions] == [
+        "a: H is large",
+        "a: S_n is small",
+    ]
 
 
 def test_a_question_is_put_once_on_the_terminal_and_stands_in_the_json(gfor, tmp_path):
-    text = CASE.replace("machine.H = 6.5", "machine.H = 6500") + "[scenarios.one]\n[scenarios.two]\n"
+    text = (
+        CASE.replace("machine.H = 6.5", "machine.H = 6500") + "[scenarios.one]\n[scenarios.two]\n"
+    )
     (tmp_path / "case.toml").write_text(text, encoding="utf-8")
     code, out, err = gfor("modes", tmp_path / "case.toml", "--json")
     assert code == 0
@@ -360,7 +424,9 @@ def test_a_question_is_put_once_on_the_terminal_and_stands_in_the_json(gfor, tmp
 
 
 def test_two_rated_frequencies_in_one_network_are_refused_with_the_line(questions):
-    text = CASE.replace("[network]\n", '[network]\nfrequency = "60 Hz"\n').replace("6.5\n", '6.5\nf_n = "50 Hz"\n')
+    text = CASE.replace("[network]\n", '[network]\nfrequency = "60 Hz"\n').replace(
+        "6.5\n", '6.5\nf_n = "50 Hz"\n'
+    )
     (problem,) = refused(questions, text=text)
     assert problem.startswith(
         f"line {H_LINE + 2}, components.sg.parameters.f_n: sg is rated at 50 Hz and grid at 60 Hz"
@@ -378,8 +444,12 @@ def test_all_at_60_hz_are_one_network(questions):
 
 
 @pytest.mark.parametrize("rated", ["60 Hz", "50 Hz"])
-def test_a_foreign_fmu_bound_with_another_frequency_is_refused(questions, tmp_path, fmu_path, rated):
-    (tmp_path / "vendor.toml").write_text(OURS.replace("[rating]", f'[rating]\nf_n = "{rated}"'), encoding="utf-8")
+def test_a_foreign_fmu_bound_with_another_frequency_is_refused(
+    questions, tmp_path, fmu_path, rated
+):
+    (tmp_path / "vendor.toml").write_text(
+        OURS.replace("[rating]", f'[rating]\nf_n = "{rated}"'), encoding="utf-8"
+    )
     changes = [('model = "gfor"', f"fmu = '{fmu_path('gfor')}'\nbinding = \"vendor.toml\"")]
     if rated == "50 Hz":
         assert questions(*changes) == []
@@ -387,16 +457,24 @@ def test_a_foreign_fmu_bound_with_another_frequency_is_refused(questions, tmp_pa
     problem, asked = refused(questions, *changes)
     assert "f_n = 60 Hz, and the FMU's f_n is 50 Hz by itself" in asked
     line = 1 + CASE.replace(*changes[0]).splitlines().index('binding = "vendor.toml"')
-    assert problem.startswith(f"line {line}, components.vsc.binding: vsc is rated at 60 Hz and grid at 50 Hz")
+    assert problem.startswith(
+        f"line {line}, components.vsc.binding: vsc is rated at 60 Hz and grid at 50 Hz"
+    )
     assert "rating.f_n" in problem
 
 
 @pytest.mark.parametrize("rating", ["1500 MVA", "4 MVA"])
-def test_a_binding_with_another_rating_than_the_fmu_starts_with_is_questioned(questions, tmp_path, fmu_path, rating):
+def test_a_binding_with_another_rating_than_the_fmu_starts_with_is_questioned(
+    questions, tmp_path, fmu_path, rating
+):
     text = OURS.replace('S_n = "1500 MVA"', f'S_n = "{rating}"')
     (tmp_path / "vendor.toml").write_text(text, encoding="utf-8")
     changes = [('model = "gfor"', f"fmu = '{fmu_path('gfor')}'\nbinding = \"vendor.toml\"")]
-    asked = [q for q in questions(*changes, ('S_n = "500 MVA"', 'S_n = "1500 MVA"')) if "the binding has" in q]
+    asked = [
+        q
+        for q in questions(*changes, ('S_n = "500 MVA"', 'S_n = "1500 MVA"'))
+        if "the binding has" in q
+    ]
     assert len(asked) == (rating == "4 MVA")
     assert all("S_n = 4 MVA, and the FMU's S_n is 1500 MVA by itself" in q for q in asked)
 
@@ -409,23 +487,44 @@ def test_systems_that_are_not_coupled_may_have_two_frequencies(questions):
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("machine.X_d2 = 0.4", "machine.X_d2 = 0.4 pu must not exceed machine.X_d1 = 0.34 pu (the default)"),
-        ("machine.X_d1 = 2.135", "machine.X_d1 = 2.135 pu must be less than machine.X_d = 2.135 pu (the default)"),
-        ("machine.X_q1 = 2.1", "machine.X_q1 = 2.1 pu must not exceed machine.X_q = 2.046 pu (the default)"),
-        ("machine.X_l = 0.269", "machine.X_l = 0.269 pu must be less than machine.X_d2 = 0.269 pu (the default)"),
-        ("machine.T_d20 = 30.0", "machine.T_d20 = 30 s must be less than machine.T_d10 = 6.47 s (the default)"),
-        ("machine.T_q10 = 0.02", "machine.T_q20 = 0.034 s (the default) must be less than machine.T_q10 = 0.02 s"),
+        (
+            "machine.X_d2 = 0.4",
+            "machine.X_d2 = 0.4 pu must not exceed machine.X_d1 = 0.34 pu (the default)",
+        ),
+        (
+            "machine.X_d1 = 2.135",
+            "machine.X_d1 = 2.135 pu must be less than machine.X_d = 2.135 pu (the default)",
+        ),
+        (
+            "machine.X_q1 = 2.1",
+            "machine.X_q1 = 2.1 pu must not exceed machine.X_q = 2.046 pu (the default)",
+        ),
+        (
+            "machine.X_l = 0.269",
+            "machine.X_l = 0.269 pu must be less than machine.X_d2 = 0.269 pu (the default)",
+        ),
+        (
+            "machine.T_d20 = 30.0",
+            "machine.T_d20 = 30 s must be less than machine.T_d10 = 6.47 s (the default)",
+        ),
+        (
+            "machine.T_q10 = 0.02",
+            "machine.T_q20 = 0.034 s (the default) must be less than machine.T_q10 = 0.02 s",
+        ),
     ],
 )
 def test_data_that_no_machine_can_have_are_refused_with_their_line(questions, line, said):
     problems = refused(questions, machine(line))
     variable = line.partition(" ")[0]
     assert any(
-        p.startswith(f"line {H_LINE + 1}, components.sg.parameters.{variable}: ") and said in p for p in problems
+        p.startswith(f"line {H_LINE + 1}, components.sg.parameters.{variable}: ") and said in p
+        for p in problems
     )
 
 
-@pytest.mark.parametrize("line", ["machine.X_q1 = 2.046", "machine.X_q2 = 0.573", "machine.X_d2 = 0.34"])
+@pytest.mark.parametrize(
+    "line", ["machine.X_q1 = 2.046", "machine.X_q2 = 0.573", "machine.X_d2 = 0.34"]
+)
 def test_a_machine_without_some_winding_is_data_like_any_other(questions, line):
     assert questions(machine(line)) == []
 
@@ -449,7 +548,11 @@ def test_a_converter_that_is_loaded_beyond_its_rating_is_questioned(questions, p
         )
         assert "more than the rating of the converter" in question
         assert (
-            questions(("P_0 = 0.8", f"P_0 = {power}"), ('name = "plausible"', 'name = "p"\nmeant = ["vsc.S_n"]')) == []
+            questions(
+                ("P_0 = 0.8", f"P_0 = {power}"),
+                ('name = "plausible"', 'name = "p"\nmeant = ["vsc.S_n"]'),
+            )
+            == []
         )
 
 

@@ -29,7 +29,8 @@ def test_a_load_at_the_end_of_a_line():
     assert flow.voltages["source"] == pytest.approx(1.0, abs=TOLERANCE)
     assert flow.voltages["end"] == pytest.approx(expected, abs=TOLERANCE)
     losses = X * (P**2 + Q**2) / v**2
-    assert flow.powers["unit"] == pytest.approx(complex(P, Q + losses) / 2, abs=TOLERANCE)  # on 200 MVA
+    # on 200 MVA
+    assert flow.powers["unit"] == pytest.approx(complex(P, Q + losses) / 2, abs=TOLERANCE)
     assert flow.residual < TOLERANCE
 
 
@@ -76,7 +77,12 @@ def test_every_bus_of_a_meshed_network_is_in_balance():
         FlowLine("cd", "c", "d", 0.03, 0.20, 0.02),
         FlowLine("cd again", "c", "d", 0.05, 0.25, 0.02),
     ]
-    loads = [FlowLoad("b", 90, 30), FlowLoad("d", 60, -10), FlowLoad("d", 20, 5), FlowLoad("a", 10, 0)]
+    loads = [
+        FlowLoad("b", 90, 30),
+        FlowLoad("d", 60, -10),
+        FlowLoad("d", 20, 5),
+        FlowLoad("a", 10, 0),
+    ]
     units = [
         FlowUnit("s", "a", 100.0, 0.9, 1.01),
         FlowUnit("t", "a", 50.0, 0.1, 1.01),
@@ -121,7 +127,8 @@ def test_units_at_one_bus_share_by_rating():
     assert powers["large"].real == pytest.approx((50 + 60 - 40) / 400, abs=TOLERANCE)
     assert (powers["busy"].real, powers["idle"].real) == (0.8, 0.0)
     assert powers["busy"].imag == pytest.approx(powers["idle"].imag, abs=TOLERANCE)
-    assert powers["busy"].imag > 0.2  # of 200 MVA: the load's 40 Mvar and half of what the line consumes
+    # of 200 MVA: the load's 40 Mvar and half of what the line consumes
+    assert powers["busy"].imag > 0.2
 
 
 def test_more_than_a_line_can_carry():
@@ -129,7 +136,9 @@ def test_more_than_a_line_can_carry():
 
     def solve(p_mw):
         line = FlowLine("line", "a", "b", 0.0, X, 0.0)
-        return solve_power_flow(["a", "b"], [line], [FlowLoad("b", p_mw, 0)], [FlowUnit("u", "a", 1e3, 0, 1.0)], "a")
+        return solve_power_flow(
+            ["a", "b"], [line], [FlowLoad("b", p_mw, 0)], [FlowUnit("u", "a", 1e3, 0, 1.0)], "a"
+        )
 
     assert abs(solve(0.99 * 100 / (2 * X)).voltages["b"]) > math.sqrt(0.5)
     with pytest.raises(InputError) as caught:
@@ -137,7 +146,10 @@ def test_more_than_a_line_can_carry():
     text = str(caught.value)
     assert text.startswith("power flow: no solution found. The iterations end with ")
     assert "at bus 'b' (largest mismatch by iteration: " in text
-    assert "With all loads and all units' power at 99% it has a solution: the lines cannot carry the power" in text
+    assert (
+        "With all loads and all units' power at 99% it has a solution: the lines cannot carry the power"
+        in text
+    )
     assert "Lower P_0 or the loads, or the line reactances" in text
     assert text.endswith("deg), X = 0.2 pu, which would carry 252 MW")
     for times, share in ((1.0005, "99%"), (4000, "0%")):
@@ -148,7 +160,11 @@ def test_more_than_a_line_can_carry():
 
 
 def test_units_at_one_bus_that_want_two_voltages():
-    units = [FlowUnit("u", "a", 100, 0, 1.0), FlowUnit("w", "a", 100, 0, 1.02), FlowUnit("z", "b", 100, 0, 0.9)]
+    units = [
+        FlowUnit("u", "a", 100, 0, 1.0),
+        FlowUnit("w", "a", 100, 0, 1.02),
+        FlowUnit("z", "b", 100, 0, 0.9),
+    ]
     with pytest.raises(InputError) as caught:
         solve_power_flow(["a", "b"], [FlowLine("l", "a", "b", 0, X, 0)], [], units, "a")
     assert str(caught.value) == (
@@ -156,7 +172,9 @@ def test_units_at_one_bus_that_want_two_voltages():
     )
 
 
-@pytest.mark.parametrize("units", [[], [FlowUnit("w", "c", 100, 0.1, 1.0)]], ids=["load alone", "with a unit"])
+@pytest.mark.parametrize(
+    "units", [[], [FlowUnit("w", "c", 100, 0.1, 1.0)]], ids=["load alone", "with a unit"]
+)
 def test_a_bus_without_a_way_to_the_slack(units):
     with pytest.raises(InputError, match="'c'"):
         solve_power_flow(

@@ -17,14 +17,18 @@ def text():
 def references(tmp_path, text):
     def find(condition, overrides=None):
         assert WHEN in text
-        (tmp_path / "case.toml").write_text(text.replace(WHEN, f"when = {{ {condition} }}"), encoding="utf-8")
+        (tmp_path / "case.toml").write_text(
+            text.replace(WHEN, f"when = {{ {condition} }}"), encoding="utf-8"
+        )
         (prepared,) = load_case(tmp_path / "case.toml").prepare(["pod_p"], overrides)
         return list(prepared.references)
 
     return find
 
 
-@pytest.mark.parametrize("condition", ['"grid.X_L" = "0.1 pu"', "grid.X_L = 0.1", '"sg1.S_n" = "1.5 GVA"'])
+@pytest.mark.parametrize(
+    "condition", ['"grid.X_L" = "0.1 pu"', "grid.X_L = 0.1", '"sg1.S_n" = "1.5 GVA"']
+)
 def test_a_condition_is_compared_in_the_unit_of_its_variable(references, condition):
     assert references(condition) == ["electromechanical"]
 

@@ -23,8 +23,10 @@ FILES = {
     "a table of loads": ('loads_file = "loads.csv"', "loads.csv", "bus,p_mw\n1,2\n"),
     "a table of units": (
         'buses = ["a"]\n[units]\nfile = "units.csv"\ngenerator = "synchronous_generator"\nconverter = "gfor"',
-        "units.csv", "bus,rating_mva,p_mw,v_pu\na,x,1,1\n"),
-}  # fmt: skip
+        "units.csv",
+        "bus,rating_mva,p_mw,v_pu\na,x,1,1\n",
+    ),
+}
 
 
 @pytest.mark.parametrize("name", FILES)

@@ -32,7 +32,10 @@ def prepared(five):
 @pytest.fixture
 def two():
     """A source of 0.1 pu, a line of 0.15 pu, and behind a ratio of 1.05 another of 0.2 pu."""
-    lines = (FlowLine("a", "x", "y", 0.0, 0.15, 0.3), FlowLine("b", "y", "z", 0.0, 0.2, 0.0, tap=1.05))
+    lines = (
+        FlowLine("a", "x", "y", 0.0, 0.15, 0.3),
+        FlowLine("b", "y", "z", 0.0, 0.2, 0.0, tap=1.05),
+    )
     return ShortCircuit(("x", "y", "z"), lines, {"x": 1 / 0.1j}, {"c": ("y", 50.0)})
 
 
@@ -83,12 +86,21 @@ def test_as_pandapower_by_iec_60909(prepared):
     index = {bus: pandapower.create_bus(net, vn_kv=110.0) for bus in ours.buses}
     for x in ours.lines:
         pandapower.create_impedance(
-            net, index[x.from_bus], index[x.to_bus], rft_pu=x.R, xft_pu=x.X, sn_mva=100.0, rft0_pu=x.R, xft0_pu=x.X
+            net,
+            index[x.from_bus],
+            index[x.to_bus],
+            rft_pu=x.R,
+            xft_pu=x.X,
+            sn_mva=100.0,
+            rft0_pu=x.R,
+            xft0_pu=x.X,
         )
     for bus, y in ours.sources.items():
         z = 1 / y
         power = C_MAX * 100 / abs(z)
-        pandapower.create_ext_grid(net, index[bus], s_sc_max_mva=power, rx_max=z.real / z.imag, r0x0_max=1, x0x_max=1)
+        pandapower.create_ext_grid(
+            net, index[bus], s_sc_max_mva=power, rx_max=z.real / z.imag, r0x0_max=1, x0x_max=1
+        )
     calc_sc(net, fault="3ph", case="max", ip=False, ith=False)
     for found in ours.strengths():
         theirs = net.res_bus_sc.at[index[found.bus], "ikss_ka"] * 110 * math.sqrt(3) / C_MAX

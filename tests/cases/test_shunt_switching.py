@@ -20,8 +20,13 @@ def prepared(folder, text, overrides=None, base=RING):
 def test_a_shunt_trips_and_comes_back(b, tmp_path):
     base = RING.replace('b = "30 Mvar"', f'b = "{b}", g = "5 MW"')
     ready = prepared(tmp_path, TRIP + BACK, base=base)
-    assert ready.events == (ShuntSwitching(0.1, "grid", "bank", False), ShuntSwitching(0.3, "grid", "bank", True))
-    before, off, back = (row["grid.b3.v"] for row in watch(ready, ("grid.b3.v",), (0.09, 0.29, 0.39)))
+    assert ready.events == (
+        ShuntSwitching(0.1, "grid", "bank", False),
+        ShuntSwitching(0.3, "grid", "bank", True),
+    )
+    before, off, back = (
+        row["grid.b3.v"] for row in watch(ready, ("grid.b3.v",), (0.09, 0.29, 0.39))
+    )
     assert (before - off) * (1 if b == "90 Mvar" else -1) > 0.002
     assert abs(back - before) < 0.5 * abs(off - before)
 
@@ -32,7 +37,9 @@ def test_the_power_flow_knows_a_shunt_that_is_off(b, tmp_path):
     off = prepared(tmp_path, BACK.replace("0.3", "0.1"), {"grid.bank.connected": False}, base)
     left = 0.09 if b == "90 Mvar" else 1e-9  # a thousandth of an open capacitor stays
     without = prepared(tmp_path, "", None, RING.replace('b = "30 Mvar"', f'b = "{left} Mvar"'))
-    assert off.power_flow.voltages["b3"] == pytest.approx(without.power_flow.voltages["b3"], abs=1e-9)
+    assert off.power_flow.voltages["b3"] == pytest.approx(
+        without.power_flow.voltages["b3"], abs=1e-9
+    )
     (standing,) = watch(off, ("grid.b3.v",), (0.0999,))
     assert standing["grid.b3.v"] == pytest.approx(abs(off.power_flow.voltages["b3"]), abs=1e-6)
 

@@ -57,7 +57,12 @@ def watch(ready, names, times):
     with Master(ready.system, ready.schedule, ready.step_size) as master:
         for time in times:
             master.run(time, [e for e in ready.events if e.time >= master.time])
-            rows.append({n: master.components[n.split(".")[0]].get([n.partition(".")[2]]).popitem()[1] for n in names})
+            rows.append(
+                {
+                    n: master.components[n.split(".")[0]].get([n.partition(".")[2]]).popitem()[1]
+                    for n in names
+                }
+            )
     return rows
 
 
@@ -81,28 +86,46 @@ def test_a_line_trips_and_recloses(prepared):
 
 
 def test_the_same_with_an_event_of_its_own(prepared):
-    text = EVENT + 'type = "line_trip"\nline = "l23"\n[[events]]\ntype = "line_reclosing"\ntime = 0.2\nline = "l23"\n'
-    assert prepared(text).events == (LineSwitching(0.1, "grid", "l23", False), LineSwitching(0.2, "grid", "l23", True))
+    text = (
+        EVENT
+        + 'type = "line_trip"\nline = "l23"\n[[events]]\ntype = "line_reclosing"\ntime = 0.2\nline = "l23"\n'
+    )
+    assert prepared(text).events == (
+        LineSwitching(0.1, "grid", "l23", False),
+        LineSwitching(0.2, "grid", "l23", True),
+    )
 
 
 def test_a_load_trips_and_returns(prepared):
     text = EVENT + 'type = "load_trip"\nload = "works"\n'
     text += '[[events]]\ntype = "load_reconnection"\ntime = "0.2 s"\ncomponent = "grid"\nload = "works"\n'
     ready = prepared(text)
-    assert ready.events == (LoadSwitching(0.1, "grid", "works", 0.0), LoadSwitching(0.2, "grid", "works", 1.0))
+    assert ready.events == (
+        LoadSwitching(0.1, "grid", "works", 0.0),
+        LoadSwitching(0.2, "grid", "works", 1.0),
+    )
     before, off, on = watch(ready, ["sg.p", "vsc.p"], [0.1, 0.199, 0.39])
     total = [row["sg.p"] * 10 + row["vsc.p"] * 5 for row in (before, off, on)]
-    assert total[0] - total[1] == pytest.approx(2, abs=0.4)  # 200 MW, less what a higher voltage draws
+    # 200 MW, less what a higher voltage draws
+    assert total[0] - total[1] == pytest.approx(2, abs=0.4)
     assert total[2] == pytest.approx(total[0], abs=0.2)
 
 
 def test_a_unit_trips_on_both_sides_and_returns(prepared):
     text = EVENT + 'type = "unit_trip"\nunit = "vsc"\n'
-    ready = prepared(text + '[[events]]\ntype = "unit_reconnection"\ntime = "0.11 s"\nunit = "vsc"\n')
+    ready = prepared(
+        text + '[[events]]\ntype = "unit_reconnection"\ntime = "0.11 s"\nunit = "vsc"\n'
+    )
     assert ready.events[0] == UnitSwitching(0.1, "grid", "vsc", False)
-    assert ready.events[0].changes() == {"vsc": {"connected": False}, "grid": {"vsc.connected": False}}
+    assert ready.events[0].changes() == {
+        "vsc": {"connected": False},
+        "grid": {"vsc.connected": False},
+    }
     assert str(ready.events[0]) == "t = 0.1 s: vsc.connected = 0, grid.vsc.connected = 0"
-    assert ready.events[1].changes() == {"vsc": {"connected": True}, "grid": {"vsc.connected": True}}
+    assert ready.events[1].changes() == {
+        "vsc": {"connected": True},
+        "grid": {"vsc.connected": True},
+    }
     alone = prepared(text)
     before, _, off = watch(alone, ["grid.vsc.p", "vsc.omega", "vsc.p"], [0.1, 0.102, 0.39])
     assert before["grid.vsc.p"] == pytest.approx(3, abs=1e-6)
@@ -116,7 +139,9 @@ def vendor_fmu(breaker=None):
     m = ModelBuilder("vendor", "Constant current, as another tool might export it")
     S_n = m.parameter("S_n", 100.0, "MVA", "Rating")
     values = {"P_0": ("pu", 0.5), "Q_0": ("pu", 0.0), "v_0": ("pu", 1.01), "theta_0": ("rad", 0.0)}
-    p, q, v, theta = (m.parameter(n, x, unit, n, base="S_n" * (unit == "pu")) for n, (unit, x) in values.items())
+    p, q, v, theta = (
+        m.parameter(n, x, unit, n, base="S_n" * (unit == "pu")) for n, (unit, x) in values.items()
+    )
     for part in ("re", "im"):
         m.input(f"v_{part}", "pu", "Bus voltage", base="bus")
     i = current_of_power(p, q, polar(v, theta)) * (S_n / 100)
@@ -138,8 +163,13 @@ def test_another_system_base_is_refused_where_it_is_set(prepared):
     line = 1 + next(k for k, text in enumerate(base.splitlines()) if "S_base" in text)
     with pytest.raises(CaseError, match="S_base") as caught:
         prepared("", None, base)
-    assert f"line {line}, components.vsc.parameters.S_base: component 'vsc': {OTHER_BASE}" in str(caught.value)
-    assert the_problem(prepared, "", {"sg.S_base": "90 MVA"}) == f"--set sg.S_base: component 'sg': {OTHER_BASE}"
+    assert f"line {line}, components.vsc.parameters.S_base: component 'vsc': {OTHER_BASE}" in str(
+        caught.value
+    )
+    assert (
+        the_problem(prepared, "", {"sg.S_base": "90 MVA"})
+        == f"--set sg.S_base: component 'sg': {OTHER_BASE}"
+    )
 
 
 def test_the_system_base_itself_may_be_set(prepared):
@@ -173,7 +203,9 @@ def test_a_foreign_unit_without_a_breaker_of_its_own_is_opened_on_the_grids_side
     assert after["vsc.i_re"] == before["vsc.i_re"]  # it does not know
 
 
-@pytest.mark.parametrize("opened", ["grid.l23.connected", "grid.l31.connected", "grid.vsc.connected", "vsc.connected"])
+@pytest.mark.parametrize(
+    "opened", ["grid.l23.connected", "grid.l31.connected", "grid.vsc.connected", "vsc.connected"]
+)
 def test_an_outage_from_the_start_has_its_own_operating_point(prepared, opened):
     ready = prepared(overrides={opened: False})
     whole = prepared()
@@ -192,34 +224,62 @@ def test_an_outage_from_the_start_has_its_own_operating_point(prepared, opened):
     ("event", "words"),
     [
         ('type = "line_trip"\nline = "l32"', "component 'grid' has no line 'l32'; did you mean l3"),
-        ('type = "line_trip"\nline = "wire"', "component 'grid' has no line 'wire'; it has: l12, l23, l31"),
-        ('type = "load_trip"\nload = "twon"', "component 'grid' has no load 'twon'; did you mean town?"),
-        ('type = "load_change"\nscale = 2\nload = "twon"', "component 'grid' has no load 'twon'; did you mean town?"),
+        (
+            'type = "line_trip"\nline = "wire"',
+            "component 'grid' has no line 'wire'; it has: l12, l23, l31",
+        ),
+        (
+            'type = "load_trip"\nload = "twon"',
+            "component 'grid' has no load 'twon'; did you mean town?",
+        ),
+        (
+            'type = "load_change"\nscale = 2\nload = "twon"',
+            "component 'grid' has no load 'twon'; did you mean town?",
+        ),
         ('type = "branch_change"\nX = 1\nline = "l99"', "component 'grid' has no line 'l99'"),
-        ('type = "unit_trip"\nunit = "vcs"', "component 'grid' has no unit 'vcs'; did you mean vsc?"),
-        ('type = "line_trip"\nline = "l12"\ncomponent = "net"', "there is no component 'net'; the case has: sg, vsc"),
-        ('type = "line_trip"\nline = "l12"\nreclose_after = 0', "reclose_after: it must be greater than 0"),
-        ('type = "line_trip"\nline = "l12"\nreclose_after = 0.00015', "the event at 0.10015 s is not a communication"),
+        (
+            'type = "unit_trip"\nunit = "vcs"',
+            "component 'grid' has no unit 'vcs'; did you mean vsc?",
+        ),
+        (
+            'type = "line_trip"\nline = "l12"\ncomponent = "net"',
+            "there is no component 'net'; the case has: sg, vsc",
+        ),
+        (
+            'type = "line_trip"\nline = "l12"\nreclose_after = 0',
+            "reclose_after: it must be greater than 0",
+        ),
+        (
+            'type = "line_trip"\nline = "l12"\nreclose_after = 0.00015',
+            "the event at 0.10015 s is not a communication",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_mistake_in_a_switching(prepared, event, words):
     assert words in the_problem(prepared, EVENT + event + "\n")
 
 
 # No bus has capacitance: loads alone determine the voltages.
-BARE = RING.replace(", B = 0.04", "").replace("shunts.bank", "# ").replace(
-    "[components.sg]", 'loads.own = { bus = "b1", p = "400 MW" }\n[components.sg]', 1
-)  # fmt: skip
+BARE = (
+    RING.replace(", B = 0.04", "")
+    .replace("shunts.bank", "# ")
+    .replace("[components.sg]", 'loads.own = { bus = "b1", p = "400 MW" }\n[components.sg]', 1)
+)
 
 
 def test_a_load_that_alone_holds_its_bus_cannot_be_switched_off(prepared):
     problem = the_problem(prepared, EVENT + 'type = "load_trip"\nload = "works"\n', None, BARE)
-    assert "load 'works' cannot be switched off, because nothing else determines the voltage of its bus" in problem
+    assert (
+        "load 'works' cannot be switched off, because nothing else determines the voltage of its bus"
+        in problem
+    )
 
 
 def test_without_a_grid_the_component_must_be_named(tmp_path):
     (tmp_path / "case.toml").write_text(
-        'name = "x"\n[components.g]\nmodel = "two_area_grid"\n' + EVENT + 'type = "line_trip"\nline = "L"\n'
+        'name = "x"\n[components.g]\nmodel = "two_area_grid"\n'
+        + EVENT
+        + 'type = "line_trip"\nline = "L"\n'
     )
     with pytest.raises(CaseError, match="the key 'component' is missing; name the grid here"):
         load_case(tmp_path / "case.toml").prepare()
@@ -232,7 +292,10 @@ def test_opening_the_only_way_to_a_bus_is_an_island(prepared):
 
 def test_what_the_slack_feeds_is_shared_when_it_is_open(prepared):
     """Here it is too much for the other unit, unless the case leaves it to whoever is the slack then."""
-    off, text = {"sg.connected": False}, RING.replace("[power_flow]\n", '[power_flow]\nsharing = "slack"\n')
+    off, text = (
+        {"sg.connected": False},
+        RING.replace("[power_flow]\n", '[power_flow]\nsharing = "slack"\n'),
+    )
     assert "vsc would need 127 % of its 555 MW" in the_problem(prepared, "", off)
     alone = prepared("", off, text).power_flow.powers["vsc"] * 500
     assert 700 < alone.real < 720  # the loads, and what the lines lose
@@ -246,11 +309,16 @@ def test_a_power_flow_without_solution_names_the_branch(prepared):
 
 
 def test_all_loads_of_a_bus_without_capacitance_switched_off_is_refused_with_the_rule(prepared):
-    text = BARE.replace("[components.sg]", 'loads.mill = { bus = "b2", p = "50 MW" }\n[components.sg]', 1)
+    text = BARE.replace(
+        "[components.sg]", 'loads.mill = { bus = "b2", p = "50 MW" }\n[components.sg]', 1
+    )
     events = "".join(f'{EVENT}type = "load_trip"\nload = "{name}"\n' for name in ("works", "mill"))
     ready = prepared(events, None, text)
     rule = "the voltage of b2 hangs on its loads; leave one of them switched on"
-    with Master(ready.system, ready.schedule, ready.step_size) as master, pytest.raises(ComponentError, match=rule):
+    with (
+        Master(ready.system, ready.schedule, ready.step_size) as master,
+        pytest.raises(ComponentError, match=rule),
+    ):
         master.run(0.2, ready.events)
 
 
@@ -262,8 +330,14 @@ def trip(kind, element, time="0.1 s"):
     ("events", "asked"),
     [
         (trip("line", "l23") + trip("line", "l31"), "from t = 0.1 s on no unit is connected to b3"),
-        (trip("line", "l23") + trip("line", "l31", "0.2 s"), "from t = 0.2 s on no unit is connected to b3"),
-        (trip("line", "l12") + trip("line", "l23") + trip("unit", "vsc"), "no unit is connected to b2"),
+        (
+            trip("line", "l23") + trip("line", "l31", "0.2 s"),
+            "from t = 0.2 s on no unit is connected to b3",
+        ),
+        (
+            trip("line", "l12") + trip("line", "l23") + trip("unit", "vsc"),
+            "no unit is connected to b2",
+        ),
         (trip("line", "l23") + trip("line", "l31") + trip("load", "town"), ""),
         (trip("line", "l12") + trip("line", "l23"), ""),
         (trip("line", "l31"), ""),

@@ -28,7 +28,9 @@ def mode(frequency, ratio):
 def modes(*entries):
     """A set of modes, each of a frequency, a damping ratio and a state of its own."""
     states = sorted({name for *_, name in entries} | {"a", "b", "c", "d"})
-    shapes = np.array([[float(name == state) for state in states] for *_, name in entries], dtype=complex)
+    shapes = np.array(
+        [[float(name == state) for state in states] for *_, name in entries], dtype=complex
+    )
     values = np.array([mode(f, ratio) for f, ratio, _ in entries])
     return ModeSet(values, shapes, shapes, tuple(states))
 
@@ -97,7 +99,9 @@ def test_partners_are_chosen_together():
     assert _partners(alike) == {0: 1, 1: 0}
 
 
-@pytest.mark.parametrize(("was", "same"), [(0.056, False), (0.079, False), (0.081, True), (1.87, True), (1.88, False)])
+@pytest.mark.parametrize(
+    ("was", "same"), [(0.056, False), (0.079, False), (0.081, True), (1.87, True), (1.88, False)]
+)
 def test_a_judged_mode_is_compared_with_none_far_from_the_judged_range(was, same):
     having = modes((0.33, 0.04, "a"))
     (found,) = eigenvalue_test(having, modes((was, 0.03, "a")))
@@ -110,9 +114,11 @@ def test_a_judged_mode_is_compared_with_none_far_from_the_judged_range(was, same
 
 @pytest.mark.parametrize(
     ("state", "said"),
-    [("a", "0.308 Hz with 13.82 %, is at 0.209 Hz with 26.20 % with the converter"),
-     ("converter", "0.308 Hz with 13.82 %, has no counterpart with the converter")],
-)  # fmt: skip
+    [
+        ("a", "0.308 Hz with 13.82 %, is at 0.209 Hz with 26.20 % with the converter"),
+        ("converter", "0.308 Hz with 13.82 %, has no counterpart with the converter"),
+    ],
+)
 def test_what_becomes_of_the_least_damped_mode_is_said(state, said):
     lacking = modes((0.3076, 0.1382, "a"), (0.05, 0.01, "b"), (0.9, 0.5, "c"))
     found = tuple(eigenvalue_test(modes((0.209, 0.262, state)), lacking))
@@ -120,7 +126,9 @@ def test_what_becomes_of_the_least_damped_mode_is_said(state, said):
     assert point.of_base_critical() == f"the least damped mode without the converter, {said}"
 
 
-@pytest.mark.parametrize(("frequency", "judged"), [(0.099, False), (0.1, True), (1.5, True), (1.501, False)])
+@pytest.mark.parametrize(
+    ("frequency", "judged"), [(0.099, False), (0.1, True), (1.5, True), (1.501, False)]
+)
 def test_only_modes_from_a_tenth_to_one_and_a_half_hertz_are_judged(frequency, judged):
     assert bool(eigenvalue_test(modes((frequency, -0.1, "a")), modes((0.5, 0.1, "b")))) == judged
 
@@ -131,7 +139,9 @@ def test_growth_is_a_fault_at_any_frequency_unless_it_was_there_before():
     assert stability_fault(1e-5, -0.1) is None
 
 
-@pytest.mark.parametrize(("growth", "faulty"), [(0.5e-3, False), (0.9e-3, False), (1.2e-3, True), (0.1, True)])
+@pytest.mark.parametrize(
+    ("growth", "faulty"), [(0.5e-3, False), (0.9e-3, False), (1.2e-3, True), (0.1, True)]
+)
 def test_what_counts_as_growth(growth, faulty):
     """The free angle's eigenvalue is zero to 1e-3; a system that doubles within ten minutes is not stable."""
     assert bool(stability_fault(growth, -0.1)) == faulty
@@ -154,7 +164,9 @@ def test_half_of_a_mode_makes_it_the_same():
         shape = np.array([[np.sqrt(alike), np.sqrt(1 - alike)]], complex)
         having = ModeSet(np.array([mode(0.5, 0.03)]), shape, shape, ("a", "b"))
         one = np.array([[1.0, 0.0]], complex)
-        (found,) = eigenvalue_test(having, ModeSet(np.array([mode(0.5, 0.02)]), one, one, ("a", "b")))
+        (found,) = eigenvalue_test(
+            having, ModeSet(np.array([mode(0.5, 0.02)]), one, one, ("a", "b"))
+        )
         assert (found.before is not None, found.accepted) == (same, same)
 
 
@@ -162,7 +174,9 @@ TIMES = np.arange(0, 40, 0.005)
 
 
 def ring(*parts):
-    return sum(a * np.exp(mode(f, r).real * TIMES) * np.cos(mode(f, r).imag * TIMES) for a, f, r in parts)
+    return sum(
+        a * np.exp(mode(f, r).real * TIMES) * np.cos(mode(f, r).imag * TIMES) for a, f, r in parts
+    )
 
 
 def test_the_signals_modes_are_judged():
@@ -178,7 +192,8 @@ def test_what_lies_outside_the_range_or_is_negligible_is_not_judged():
     assert modal_test(TIMES, ring((1, 0.4, 0.08), (0.5, 2.0, 0.01)), 0.5).accepted
     assert modal_test(TIMES, ring((1, 0.4, 0.08), (0.004, 1.1, 0.03)), 0.5).accepted
     assert modal_test(TIMES, np.exp(-TIMES), 0.5).accepted
-    assert not modal_test(TIMES, np.ones_like(TIMES), 0.5).accepted  # nothing was excited: nothing is shown
+    # nothing was excited: nothing is shown
+    assert not modal_test(TIMES, np.ones_like(TIMES), 0.5).accepted
 
 
 @pytest.mark.parametrize(("amplitude", "accepted"), [(0.008, True), (0.013, False), (0.03, False)])
@@ -191,7 +206,9 @@ def test_a_signals_mode_is_judged_at_five_percent(ratio, accepted):
     assert modal_test(TIMES, ring((1, 0.7, ratio)), 0.5).accepted == accepted
 
 
-@pytest.mark.parametrize(("frequency", "judged"), [(0.095, False), (0.105, True), (1.49, True), (1.51, False)])
+@pytest.mark.parametrize(
+    ("frequency", "judged"), [(0.095, False), (0.105, True), (1.49, True), (1.51, False)]
+)
 def test_a_signals_mode_is_judged_from_a_tenth_to_one_and_a_half_hertz(frequency, judged):
     assert modal_test(TIMES, ring((1, 0.6, 0.08), (0.9, frequency, 0.02)), 0.5).accepted != judged
 
@@ -199,16 +216,20 @@ def test_a_signals_mode_is_judged_from_a_tenth_to_one_and_a_half_hertz(frequency
 def test_the_bus_frequency_is_the_turn_of_the_angle_without_the_network_transient():
     drift, swing = 0.2, 0.01 * np.sin(2 * np.pi * 0.5 * TIMES)
     angle = 2 * np.pi * (drift * TIMES) + swing
-    transient = 1e-3 * np.exp(-3 * TIMES) * np.exp(-2j * np.pi * 50 * TIMES)  # a direct current, seen from the frame
+    # a direct current, seen from the frame
+    transient = 1e-3 * np.exp(-3 * TIMES) * np.exp(-2j * np.pi * 50 * TIMES)
     v = np.exp(1j * angle) + transient * np.exp(2j * np.pi * drift * TIMES)
     found = bus_frequency(TIMES, v.real, v.imag, 50.0)
     wanted = 50 + drift + np.gradient(swing, TIMES) / (2 * np.pi)
-    decay_in_a_period = 1e-3 * (1 - np.exp(-3 * 0.02)) / (2 * np.pi * 0.02)  # 0.5 mHz; unfiltered it would be 50 mHz
+    # 0.5 mHz; unfiltered it would be 50 mHz
+    decay_in_a_period = 1e-3 * (1 - np.exp(-3 * 0.02)) / (2 * np.pi * 0.02)
     assert np.abs(found - wanted)[10:-10].max() < decay_in_a_period
     assert np.abs(found - wanted)[1000:-10].max() < 1e-5
 
 
 def test_a_verdict_that_is_not_known_is_no_fault_and_excuses_no_growth():
-    known, unknown = ({"stable": stable, "sentence": "not known: x_q is off"} for stable in (True, None))
+    known, unknown = (
+        {"stable": stable, "sentence": "not known: x_q is off"} for stable in (True, None)
+    )
     assert stability_fault(-0.1, -0.1, unknown, known) is None
     assert stability_fault(0.5, -0.1, unknown, known)

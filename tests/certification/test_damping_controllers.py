@@ -8,7 +8,14 @@ import pytest
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.certification import study as study_module
 from orchestrator.certification.case_file import write_case
-from orchestrator.certification.damping_controllers import DECLARED, READ, SET, UNKNOWN, UNSEEN, damping_controllers
+from orchestrator.certification.damping_controllers import (
+    DECLARED,
+    READ,
+    SET,
+    UNKNOWN,
+    UNSEEN,
+    damping_controllers,
+)
 from orchestrator.certification.request import PODS, CertificationRequest
 from orchestrator.errors import InputError
 from tests.certification.fabricated import figures, rings
@@ -35,8 +42,16 @@ def test_what_is_named_is_set_and_what_is_not_is_switched_off(tmp_path, fmu_path
 
 @pytest.mark.parametrize(("pod", "said"), [("p", False), ("none", True), ("q", True)])
 def test_a_contradiction_is_refused(tmp_path, fmu_path, gfor, pod, said):
-    code, _, error = gfor("certify", fmu_path("gfor"), "--pod", pod, "--set", f"pod_p.enabled={str(said).lower()}",
-                          "--out", tmp_path)  # fmt: skip
+    code, _, error = gfor(
+        "certify",
+        fmu_path("gfor"),
+        "--pod",
+        pod,
+        "--set",
+        f"pod_p.enabled={str(said).lower()}",
+        "--out",
+        tmp_path,
+    )
     assert code == 2
     assert f"--pod {pod} needs pod_p.enabled = {str(not said).lower()}" in error
     assert "--set has" in error
@@ -59,7 +74,17 @@ def test_a_vendors_own_switch_is_set_and_listed(tmp_path, gallery, gfor, monkeyp
     """A variable of any name, as `R_f` here, is given by --set; what it means the applicant declares."""
     monkeypatch.setattr(study_module, "compute_point", rings)
     fmu, binding = gallery("converter_power_si")
-    arguments = ("certify", fmu, "--binding", binding, "--no-check", "--pod", "p", "--set", "R_f=0.04")
+    arguments = (
+        "certify",
+        fmu,
+        "--binding",
+        binding,
+        "--no-check",
+        "--pod",
+        "p",
+        "--set",
+        "R_f=0.04",
+    )
     assert gfor(*arguments, "--reactances", "0.1", "--workers", 1, "--out", tmp_path)[0] == 3
     content = figures(tmp_path)
     assert content["values"] == {"R_f": 0.04}
@@ -73,7 +98,9 @@ def test_a_vendors_own_switch_is_set_and_listed(tmp_path, gallery, gfor, monkeyp
 def test_a_switch_that_the_binding_sets_must_agree(tmp_path, fmu_path):
     binding = tmp_path / "mine.toml"
     binding.write_text(BOUND, encoding="utf-8")  # it switches POD-Q on
-    with pytest.raises(InputError, match=r"--pod p needs pod_q.enabled = false, but the binding .* = true"):
+    with pytest.raises(
+        InputError, match=r"--pod p needs pod_q.enabled = false, but the binding .* = true"
+    ):
         controllers(CertificationRequest(fmu_path("gfor"), binding, pod="p"))
     found = controllers(CertificationRequest(fmu_path("gfor"), binding, pod="q"))
     assert (found.source, found.settings) == (SET, {"pod_p.enabled": False})
@@ -83,13 +110,18 @@ def test_a_switch_that_the_binding_sets_must_agree(tmp_path, fmu_path):
 def test_a_switch_of_another_name_is_set_through_the_binding(tmp_path, fmu_path):
     binding = tmp_path / "mine.toml"
     switch = '[signals]\n"pod_p.enabled" = { variable = "pod_q.enabled" }\n'
-    binding.write_text(BOUND.replace("[parameters]", f"{switch}[parameters]"), encoding="utf-8")  # it is set there
-    with pytest.raises(InputError, match=r"--pod none needs pod_p.enabled = false, but the binding .* = true"):
+    # it is set there
+    binding.write_text(BOUND.replace("[parameters]", f"{switch}[parameters]"), encoding="utf-8")
+    with pytest.raises(
+        InputError, match=r"--pod none needs pod_p.enabled = false, but the binding .* = true"
+    ):
         controllers(CertificationRequest(fmu_path("gfor"), binding, pod="none"))
     binding.write_text(BOUND.replace('"pod_q.enabled" = true', "") + switch, encoding="utf-8")
     found = controllers(CertificationRequest(fmu_path("gfor"), binding, pod="p"))
     assert (found.pod, found.settings) == ("p", {"pod_p.enabled": True})
-    case = write_case(CertificationRequest(fmu_path("gfor"), binding, pod="p"), found.settings, tmp_path)
+    case = write_case(
+        CertificationRequest(fmu_path("gfor"), binding, pod="p"), found.settings, tmp_path
+    )
     assert case.prepare(["with"])[0].values["converter.pod_p.enabled"] is True
 
 
@@ -106,13 +138,26 @@ def without_outputs(description, *names):
         (("delta_p_pod",), "none", SET, "without POD"),
         (("delta_p_pod",), "q", SET, "with POD-Q"),
         (("delta_p_pod",), "p", f"{SET}; {UNSEEN} (POD-P)", f"with POD-P ({UNSEEN})"),
-        (("delta_p_pod", "delta_q_pod"), "pq", f"{SET}; {UNSEEN} (POD-P and POD-Q)",
-         f"with POD-P and POD-Q ({UNSEEN})"),
-        (("pod_p.enabled", "pod_q.enabled"), "p", DECLARED, "with POD-P as declared by the applicant"),
-        (("pod_p.enabled",), "pq", f"{SET}, except POD-P: {DECLARED}",
-         "with POD-P as declared by the applicant and POD-Q"),
+        (
+            ("delta_p_pod", "delta_q_pod"),
+            "pq",
+            f"{SET}; {UNSEEN} (POD-P and POD-Q)",
+            f"with POD-P and POD-Q ({UNSEEN})",
+        ),
+        (
+            ("pod_p.enabled", "pod_q.enabled"),
+            "p",
+            DECLARED,
+            "with POD-P as declared by the applicant",
+        ),
+        (
+            ("pod_p.enabled",),
+            "pq",
+            f"{SET}, except POD-P: {DECLARED}",
+            "with POD-P as declared by the applicant and POD-Q",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_no_output_shows_and_what_is_only_declared_is_said_in_the_headline(
     fmu_path, hidden, pod, source, headline
 ):
@@ -126,8 +171,21 @@ def test_the_certificate_says_in_its_first_line_that_a_controller_is_only_declar
 ):
     monkeypatch.setattr(study_module, "compute_point", rings)
     fmu, binding = gallery("converter_power_si")
-    _, text, _ = gfor("certify", fmu, "--binding", binding, "--no-check", "--pod", "p", "--reactances", "0.1",
-                      "--workers", 1, "--out", tmp_path)  # fmt: skip
+    _, text, _ = gfor(
+        "certify",
+        fmu,
+        "--binding",
+        binding,
+        "--no-check",
+        "--pod",
+        "p",
+        "--reactances",
+        "0.1",
+        "--workers",
+        1,
+        "--out",
+        tmp_path,
+    )
     said = " ".join(text.split())
     assert "with POD-P as declared by the applicant was judged nowhere" in said
     assert "what POD-P changes is not known: no switch turns it off" in said

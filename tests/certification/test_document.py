@@ -39,20 +39,44 @@ def document(tmp_path_factory, gallery):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study_module, "compute_point", rings)
-        words = ["certify", fmu, "--binding", binding, "--reactances", "0.1", "--workers", 1, "--out", folder,
-                 "--details", folder / "details.toml", "--check", folder / "report.json"]  # fmt: skip
+        words = [
+            "certify",
+            fmu,
+            "--binding",
+            binding,
+            "--reactances",
+            "0.1",
+            "--workers",
+            1,
+            "--out",
+            folder,
+            "--details",
+            folder / "details.toml",
+            "--check",
+            folder / "report.json",
+        ]
         assert main([*map(str, words), *(["--pdf"] if find_browser() else [])]) == 3
     content = json.loads((folder / "certificate.json").read_text(encoding="utf-8"))
     return SimpleNamespace(
-        folder=folder, content=content, binding=binding, page=(folder / "certificate.html").read_text(encoding="utf-8")
+        folder=folder,
+        content=content,
+        binding=binding,
+        page=(folder / "certificate.html").read_text(encoding="utf-8"),
     )
 
 
 def test_details_stand_on_the_page_and_what_is_absent_is_a_line(document):
     for text in ("7/2026", "Acme &lt;Power&gt;", "Lab 3", "2026-11-22"):
         assert text in document.page
-    blanks = re.findall(r"<td class=text>([^<]*)</td><td class=text><span class=\"blank\">", document.page)
-    assert blanks == ["Network operator", "Place", "Signature of the tester", "Signature of the applicant"]
+    blanks = re.findall(
+        r"<td class=text>([^<]*)</td><td class=text><span class=\"blank\">", document.page
+    )
+    assert blanks == [
+        "Network operator",
+        "Place",
+        "Signature of the tester",
+        "Signature of the applicant",
+    ]
     assert document.content["details"]["applicant"] == "Acme <Power>"
 
 
@@ -63,8 +87,16 @@ def test_the_fmu_its_binding_and_all_its_parameters_stand_there(document):
         assert escape(line) in document.page
     rows = {row["name"]: row for row in document.content["parameters"]}
     assert set(rows) == {"S_n", "P_0", "Q_0", "v_0", "theta_0", "R_f", "tau"}
-    assert rows["tau"] == {"name": "tau", "unit": "s", "start": 0.1, "used": 0.1, "changed_by": "", "description": ""}
-    assert rows["P_0"]["used"] == pytest.approx(1350.0)  # [MW]: what the study's 0.9 pu are for this FMU
+    assert rows["tau"] == {
+        "name": "tau",
+        "unit": "s",
+        "start": 0.1,
+        "used": 0.1,
+        "changed_by": "",
+        "description": "",
+    }
+    # [MW]: what the study's 0.9 pu are for this FMU
+    assert rows["P_0"]["used"] == pytest.approx(1350.0)
     assert rows["P_0"]["changed_by"] == "the study, P_0 of the binding"
     for label in ("Author", "Version", "Description", "Made by", "Rating", "Voltage"):
         assert f"<td class=text>{label}</td>" in document.page
@@ -77,7 +109,9 @@ def test_machine_versions_and_hashes_stand_there(document):
     for name, value in document.content["files"].items():
         assert hashlib.sha256((document.folder / name).read_bytes()).hexdigest() == value
         assert name in ("certificate.html", "certificate.pdf") or value in document.page
-    assert {"converter.fmu", "vendor.toml", "case.toml", "responses.nc", "check.json"} < set(document.content["files"])
+    assert {"converter.fmu", "vendor.toml", "case.toml", "responses.nc", "check.json"} < set(
+        document.content["files"]
+    )
 
 
 def test_what_was_read_into_the_norm_and_what_this_does_not_prove_stand_there(document):
@@ -110,8 +144,19 @@ def one_mode(scenario, *modes):
     t = np.arange(0, 20, 0.01)
     signal = np.exp(-t) * np.sin(3 * t)
     modes = ModeSet(np.array(values), shapes, shapes, names)
-    return PointResult(0.1, scenario, modes, ["sg1"] * len(names), -0.1, residual=0.0, power=1350.0, times=t,
-                       signals={POWER: signal}, identified=5, fit_errors={"converter": 3e-4})  # fmt: skip
+    return PointResult(
+        0.1,
+        scenario,
+        modes,
+        ["sg1"] * len(names),
+        -0.1,
+        residual=0.0,
+        power=1350.0,
+        times=t,
+        signals={POWER: signal},
+        identified=5,
+        fit_errors={"converter": 3e-4},
+    )
 
 
 def test_a_damping_that_is_lowered_is_remarked_and_modes_beside_are_listed():
@@ -119,8 +164,9 @@ def test_a_damping_that_is_lowered_is_remarked_and_modes_beside_are_listed():
     having = one_mode("with", (0.5, 0.0871), (1.0, 0.101), (2.0, 0.01), (0.07, 0.5))
     found = judge(having, lacking, "none", 1.0)
     assert [(m.before_percent, m.damping_percent) for m in found.lowered] == [
-        pytest.approx((25.33, 8.71)), pytest.approx((30, 1))
-    ]  # fmt: skip
+        pytest.approx((25.33, 8.71)),
+        pytest.approx((30, 1)),
+    ]
     assert found.eigenvalues_accepted
     assert [m.frequency_hz for m in found.neighbours] == pytest.approx([0.07, 2.0])
     assert converter_model([having]) == (
@@ -158,7 +204,10 @@ def test_what_is_wrong_with_details_is_said_with_its_line(tmp_path):
         (lambda r: r["sha256"].update(fmu="0" * 64), "it is of another FMU or binding"),
         (lambda r: r.update(tool="gfor-cosim 0.0.1"), "it was made by gfor-cosim 0.0.1"),
         (lambda r: r["checks"].pop(), "it does not hold memory"),
-        (lambda r: r["checks"].append(failed("runs", "crash", "it died").as_dict()), "its checks say otherwise"),
+        (
+            lambda r: r["checks"].append(failed("runs", "crash", "it died").as_dict()),
+            "its checks say otherwise",
+        ),
         (lambda r: r.pop("checks"), "it is no report"),
     ],
 )
@@ -167,6 +216,8 @@ def test_a_report_of_checks_is_of_this_fmu_and_whole(tmp_path, fmu_path, gfor, c
     report = AcceptanceReport(fmu, None, [passed(name, "fine") for name in CHECKS]).as_dict()
     change(report)
     (tmp_path / "report.json").write_text(json.dumps(report), encoding="utf-8")
-    code, _, error = gfor("certify", fmu, "--check", tmp_path / "report.json", "--out", tmp_path / "out")
+    code, _, error = gfor(
+        "certify", fmu, "--check", tmp_path / "report.json", "--out", tmp_path / "out"
+    )
     assert code == 2
     assert text in error

@@ -24,7 +24,9 @@ def one_row():
     """Two tables with their jumps alone."""
     kept = dict(CODES)
     for key, code in (("ercot", ERCOT), ("fingrid", FINGRID)):
-        CODES[key] = replace(code, rows=tuple(row for row in code.rows if row.name.endswith("jumps"))[:1])
+        CODES[key] = replace(
+            code, rows=tuple(row for row in code.rows if row.name.endswith("jumps"))[:1]
+        )
     yield
     CODES.update(kept)
 
@@ -37,7 +39,9 @@ def converter(tmp_path_factory):
 @pytest.fixture(scope="module")
 def certified(converter, tmp_path_factory):
     folder = tmp_path_factory.mktemp("certified")
-    gfor.certify(converter, "ercot", check=False, folder=folder / "ercot", into=folder / "certified.fmu")
+    gfor.certify(
+        converter, "ercot", check=False, folder=folder / "ercot", into=folder / "certified.fmu"
+    )
     return folder / "certified.fmu"
 
 
@@ -50,14 +54,18 @@ def _gfor_command(request):
 @pytest.fixture(scope="module")
 def script(tmp_path_factory):
     """The page's program."""
-    (block,) = (b for b in blocks(ROOT / ".docs" / "how-to" / "certify.md") if b.path == "repeat.py")
+    (block,) = (
+        b for b in blocks(ROOT / ".docs" / "how-to" / "certify.md") if b.path == "repeat.py"
+    )
     path = tmp_path_factory.mktemp("page") / "repeat.py"
     path.write_text(block.text, encoding="utf-8")
     return path
 
 
 def repeated(script, fmu):
-    done = subprocess.run([sys.executable, str(script), str(fmu)], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, str(script), str(fmu)], capture_output=True, text=True, check=True
+    )
     return done.stdout.splitlines()
 
 
@@ -83,9 +91,13 @@ def test_fmpy_alone_repeats_it_and_sees_another_fmu(certified, script, tmp_path)
 
 def test_a_certificate_by_another_code_is_not_replaced(converter, tmp_path, gfor_command):
     (tmp_path / "certificate.json").write_text('{"code": "miso"}')
-    code, _, said = gfor_command("certify", converter, "--code", "ercot", "--no-check", "--out", tmp_path)
+    code, _, said = gfor_command(
+        "certify", converter, "--code", "ercot", "--no-check", "--out", tmp_path
+    )
     assert code == 2
-    assert "it holds a certificate by miso, which one by ercot would replace" in " ".join(said.split())
+    assert "it holds a certificate by miso, which one by ercot would replace" in " ".join(
+        said.split()
+    )
     spare_another(tmp_path, "miso", converter, None)
 
 
@@ -104,42 +116,71 @@ def test_what_is_no_certificate_is_not_replaced(converter, tmp_path, name):
 
 
 @pytest.mark.parametrize(
-    ("name", "code"), [("converter.fmu", "ercot"), ("case.toml", "nts631"), ("row_dip.toml", "ercot")]
+    ("name", "code"),
+    [("converter.fmu", "ercot"), ("case.toml", "nts631"), ("row_dip.toml", "ercot")],
 )
-def test_files_of_others_in_the_folder_are_not_replaced(converter, tmp_path, gfor_command, name, code):
+def test_files_of_others_in_the_folder_are_not_replaced(
+    converter, tmp_path, gfor_command, name, code
+):
     out = tmp_path / "own"
     out.mkdir()
     (out / name).write_text("mine")
     found, _, said = gfor_command("certify", converter, "--code", code, "--no-check", "--out", out)
     assert found == 2
-    assert f"{out / name}: this file would be written over, and no command has written it" in " ".join(said.split())
+    assert (
+        f"{out / name}: this file would be written over, and no command has written it"
+        in " ".join(said.split())
+    )
     with pytest.raises(gfor.CosimError, match="no command has written it"):
         gfor.certify(converter, code, folder=out, check=False)
     assert (out / name).read_text() == "mine"
     other = "ercot" if code == "nts631" else "nts631"
     (out / name).write_bytes(converter.read_bytes())
-    spare_another(out, other, converter, None)  # the same FMU; a case that this code writes none over
+    # the same FMU; a case that this code writes none over
+    spare_another(out, other, converter, None)
     (out / "case.toml").write_text("# Damping test of gfor.fmu, written by `gfor certify`.")
     spare_another(out, "nts631", converter, None)  # it was killed before its first point
 
 
-def test_a_second_code_joins_and_the_same_code_replaces_its_own(certified, converter, tmp_path, gfor_command):
+def test_a_second_code_joins_and_the_same_code_replaces_its_own(
+    certified, converter, tmp_path, gfor_command
+):
     both = tmp_path / "both.fmu"
     shutil.copy(certified, both)
     for _ in range(2):
-        code, _, _ = gfor_command("certify", converter, "--code", "fingrid", "--no-check", "--out", tmp_path / "out",
-                                  "--into", both)  # fmt: skip
+        code, _, _ = gfor_command(
+            "certify",
+            converter,
+            "--code",
+            "fingrid",
+            "--no-check",
+            "--out",
+            tmp_path / "out",
+            "--into",
+            both,
+        )
         assert code in (0, 1, 3)
     with zipfile.ZipFile(both) as archive:
         names = archive.namelist()
     assert len(names) == len(set(names))
-    assert {name.split("/")[2] for name in names if name.startswith(FOLDER)} == {"ercot", "fingrid", "tested.json"}
+    assert {name.split("/")[2] for name in names if name.startswith(FOLDER)} == {
+        "ercot",
+        "fingrid",
+        "tested.json",
+    }
     code, said, _ = gfor_command("verify", both, "--files-only", "--json")
-    assert [one["code"] for one in json.loads(said)["certificates"] if one["holds"]] == ["ercot", "fingrid"]
+    assert [one["code"] for one in json.loads(said)["certificates"] if one["holds"]] == [
+        "ercot",
+        "fingrid",
+    ]
 
 
-@pytest.mark.parametrize("member", ["responses.nc", "row_phase_jumps.toml", "certificate.json", "certificate.html"])
-def test_a_changed_member_of_the_certificate_does_not_hold(certified, member, tmp_path, gfor_command):
+@pytest.mark.parametrize(
+    "member", ["responses.nc", "row_phase_jumps.toml", "certificate.json", "certificate.html"]
+)
+def test_a_changed_member_of_the_certificate_does_not_hold(
+    certified, member, tmp_path, gfor_command
+):
     forged, name = tmp_path / "forged.fmu", f"{FOLDER}/ercot/{member}"
     shutil.copy(certified, forged)
     with zipfile.ZipFile(forged) as archive:
@@ -153,12 +194,14 @@ def test_a_changed_member_of_the_certificate_does_not_hold(certified, member, tm
 def test_a_changed_byte_of_the_fmu_does_not_hold(certified, tmp_path, gfor_command):
     content, forged = bytearray(certified.read_bytes()), tmp_path / "forged.fmu"
     with zipfile.ZipFile(certified) as archive:
-        content[archive.getinfo("modelDescription.xml").header_offset + 10] ^= 1  # its time, which nothing reads
+        # its time, which nothing reads
+        content[archive.getinfo("modelDescription.xml").header_offset + 10] ^= 1
     forged.write_bytes(content)
     code, said, _ = gfor_command("verify", forged, "--files-only", "--json")
     assert code == 5
     assert any(
-        "it is not the file that was certified" in text for text in json.loads(said)["certificates"][0]["faults"]
+        "it is not the file that was certified" in text
+        for text in json.loads(said)["certificates"][0]["faults"]
     )
 
 
@@ -177,7 +220,11 @@ def test_a_file_of_a_stranger_is_refused_in_words(certified, tmp_path, gfor_comm
     shutil.copy(certified, hostile)
     with zipfile.ZipFile(hostile, "a") as archive:
         archive.writestr(f"{FOLDER}/ercot/../../../../out.json", "{}")
-    for fmu, words in ((emptied, "there is no certificate in it"), (cut, "damaged"), (hostile, "a path out of")):
+    for fmu, words in (
+        (emptied, "there is no certificate in it"),
+        (cut, "damaged"),
+        (hostile, "a path out of"),
+    ):
         code, _, said = gfor_command("verify", fmu, "--files-only")
         assert code == 2
         assert words in " ".join(said.split()), said
@@ -198,7 +245,9 @@ def test_what_cannot_take_a_certificate_is_refused_before_anything_is_computed(
         (referenced, tmp_path / "new.fmu", "manifest of LS-REF already"),
         (converter, library, "exists and is no FMU"),
     ):
-        code, _, said = gfor_command("certify", fmu, "--code", "ercot", "--no-check", "--into", into, "--out", tmp_path)
+        code, _, said = gfor_command(
+            "certify", fmu, "--code", "ercot", "--no-check", "--into", into, "--out", tmp_path
+        )
         assert code == 2
         assert words in " ".join(said.split()), said
     code, _, said = gfor_command("verify", other)

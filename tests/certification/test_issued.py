@@ -56,7 +56,9 @@ def forged(folder, content):
     """Make the page and all hashes fit, as whoever knows this program can."""
     old = json.loads((folder / "certificate.json").read_text(encoding="utf-8"))
     page = folder / "certificate.html"
-    page.write_text(page.read_text(encoding="utf-8").replace(figures_hash(old), figures_hash(content)), "utf-8")
+    page.write_text(
+        page.read_text(encoding="utf-8").replace(figures_hash(old), figures_hash(content)), "utf-8"
+    )
     content["files"] = {name: file_hash(folder / name) for name in content["files"]}
     del content["seal"]
     write_sealed(content, folder / "certificate.json")
@@ -66,7 +68,9 @@ def test_a_point_that_was_taken_out_with_its_word_is_missed(issued, gfor):
     """Beyond the norm's own reactances nothing counts how many there are, but the responses do."""
     folder = issued("nts631_of_0_2")
     data = xr.load_dataset(folder / "responses.nc", engine="scipy")
-    data.isel(X_L=[0, 0]).assign_coords(X_L=[0.3, 0.7]).to_netcdf(folder / "responses.nc", engine="scipy")
+    data.isel(X_L=[0, 0]).assign_coords(X_L=[0.3, 0.7]).to_netcdf(
+        folder / "responses.nc", engine="scipy"
+    )
     forged(folder, json.loads((folder / "certificate.json").read_text(encoding="utf-8")))
     code, faults = verified(gfor, folder)
     assert (code, faults) == (5, ["the record has no points for the responses at X_L = 0.7 pu"])
@@ -128,16 +132,24 @@ def a_verdict(content):
 
 @pytest.mark.parametrize(
     ("name", "change", "said"),
-    [("nts631_of_0_2", a_damping, "damping_percent"), ("nts631_of_0_2", an_eigenvalue, "damping_percent"),
-     ("nts631_pod_p", a_swing, "depth"), ("nts631_pod_p", a_mode_less, "modal.modes"),
-     ("nts631_pod_p", a_column, "remark"), ("nts631_of_0_2", an_excuse, "a mode without the converter is none"),
-     ("fingrid", a_column_of_a_known_name, "details"), ("fingrid", files_of_a_row, "files"),
-     ("nts631_of_0_2", a_verdict, "verdict"),
-     ("fingrid", a_value, "not what the table of fingrid and the certified values give"),
-     ("fingrid", another_code, "the table of nogrr245 has none of the rows"),
-     ("fingrid", a_margin, "margin"), ("fingrid", a_text, "0.987 pu"), ("fingrid", a_column, "remark"),
-     ("fingrid", a_verdict, "verdict")],
-)  # fmt: skip
+    [
+        ("nts631_of_0_2", a_damping, "damping_percent"),
+        ("nts631_of_0_2", an_eigenvalue, "damping_percent"),
+        ("nts631_pod_p", a_swing, "depth"),
+        ("nts631_pod_p", a_mode_less, "modal.modes"),
+        ("nts631_pod_p", a_column, "remark"),
+        ("nts631_of_0_2", an_excuse, "a mode without the converter is none"),
+        ("fingrid", a_column_of_a_known_name, "details"),
+        ("fingrid", files_of_a_row, "files"),
+        ("nts631_of_0_2", a_verdict, "verdict"),
+        ("fingrid", a_value, "not what the table of fingrid and the certified values give"),
+        ("fingrid", another_code, "the table of nogrr245 has none of the rows"),
+        ("fingrid", a_margin, "margin"),
+        ("fingrid", a_text, "0.987 pu"),
+        ("fingrid", a_column, "remark"),
+        ("fingrid", a_verdict, "verdict"),
+    ],
+)
 def test_a_change_is_seen_though_every_hash_fits(issued, gfor, name, change, said):
     folder = issued(name)
     content = json.loads((folder / "certificate.json").read_text(encoding="utf-8"))

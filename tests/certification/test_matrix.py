@@ -16,7 +16,13 @@ from orchestrator.certification.codes.row_verdict import RowVerdict
 from orchestrator.certification.criteria import ModalTest, ModeVerdict
 from orchestrator.certification.judgement import PointVerdict, TimeVerdict
 from orchestrator.certification.margins import CriterionMargin, narrowest
-from orchestrator.certification.matrix import CertificateMatrix, MatrixCell, in_words, matrix_json, matrix_page
+from orchestrator.certification.matrix import (
+    CertificateMatrix,
+    MatrixCell,
+    in_words,
+    matrix_json,
+    matrix_page,
+)
 from orchestrator.certification.swings import SwingTest
 
 
@@ -25,26 +31,43 @@ def cell(device="a", code="miso", verdict="passes", **given):
 
 
 def matrix(*cells):
-    devices, codes = (tuple(dict.fromkeys(getattr(c, n) for c in cells)) for n in ("device", "code"))
+    devices, codes = (
+        tuple(dict.fromkeys(getattr(c, n) for c in cells)) for n in ("device", "code")
+    )
     return CertificateMatrix(devices, codes, {(c.device, c.code): c for c in cells})
 
 
-PASSES, FAILS, INCOMPLETE = cell(), cell(code="aemo", verdict="fails"), cell(code="ercot", verdict="incomplete")
-REFUSED, LOST = cell(code="fingrid", refused=True), cell("b", "miso", "not tested", failure="no licence")
+PASSES, FAILS, INCOMPLETE = (
+    cell(),
+    cell(code="aemo", verdict="fails"),
+    cell(code="ercot", verdict="incomplete"),
+)
+REFUSED, LOST = (
+    cell(code="fingrid", refused=True),
+    cell("b", "miso", "not tested", failure="no licence"),
+)
 
 
 @pytest.mark.parametrize(
     ("cells", "code"),
-    [((PASSES,), 0), ((PASSES, REFUSED), 4), ((REFUSED, INCOMPLETE, PASSES), 3), ((INCOMPLETE, LOST), 2),
-     ((PASSES, LOST), 2), ((LOST, INCOMPLETE, REFUSED, FAILS), 1)],
-)  # fmt: skip
+    [
+        ((PASSES,), 0),
+        ((PASSES, REFUSED), 4),
+        ((REFUSED, INCOMPLETE, PASSES), 3),
+        ((INCOMPLETE, LOST), 2),
+        ((PASSES, LOST), 2),
+        ((LOST, INCOMPLETE, REFUSED, FAILS), 1),
+    ],
+)
 def test_the_worst_certificate_decides_the_exit_code(cells, code):
     assert matrix(*cells).exit_code == code
 
 
 def test_the_sentence_counts_every_kind():
     said = matrix(PASSES, FAILS, INCOMPLETE, REFUSED).sentence()
-    assert said == "Of 4 certificates: 2 passed, 1 failed, 1 incomplete. Acceptance tests failed: a."
+    assert (
+        said == "Of 4 certificates: 2 passed, 1 failed, 1 incomplete. Acceptance tests failed: a."
+    )
     assert matrix(LOST).sentence() == "Of 1 certificate: 1 not tested."
 
 
@@ -54,7 +77,10 @@ def margin(value, accepted=None, criterion="settles"):
 
 
 def test_a_failure_without_a_figure_is_not_hidden_by_good_margins():
-    bad = cell(verdict="fails", margins=[margin(0.3), margin(None, accepted=False, criterion="stable"), margin(0.1)])
+    bad = cell(
+        verdict="fails",
+        margins=[margin(0.3), margin(None, accepted=False, criterion="stable"), margin(0.1)],
+    )
     assert bad.narrowest == margin(0.1)
     assert [m.criterion for m in bad.failed] == ["stable"]
     assert in_words(bad) == ["fails", "row: stable", "+10 % row: settles"]
@@ -103,11 +129,16 @@ def test_the_norms_margins_are_in_parts_of_5_percent_and_of_the_ratio_of_swings(
 
 def test_a_row_without_a_verdict_or_an_answer_gives_no_margin():
     """AEMO's ±60° are shown only: a failure there must not stand as the narrowest margin."""
-    bad, good = (RowFinding("settles", "", "code", 1.0, 1.0, m, m >= 0, "found") for m in (-5.0, 0.2))
+    bad, good = (
+        RowFinding("settles", "", "code", 1.0, 1.0, m, m >= 0, "found") for m in (-5.0, 0.2)
+    )
     rows = {row.name: row for row in CODES["aemo"].rows}
     made = object.__new__(Certificate)
-    made.verdicts = [RowVerdict(rows["jump_60"], (bad,)), RowVerdict(rows["jump_10"], (good,)),
-                     RowVerdict(rows["rocof"], unknown="no licence")]  # fmt: skip
+    made.verdicts = [
+        RowVerdict(rows["jump_60"], (bad,)),
+        RowVerdict(rows["jump_10"], (good,)),
+        RowVerdict(rows["rocof"], unknown="no licence"),
+    ]
     assert [(m.place, m.margin) for m in made.margins] == [("jump_10", 0.2)]
 
 
@@ -123,7 +154,9 @@ def test_a_point_that_is_refused_for_something_else_has_no_figure():
 
 
 def test_the_page_links_every_certificate_and_escapes_foreign_names():
-    whole = matrix(cell("<b>", margins=[margin(0.1)]), cell("<b>", "aemo", "fails", margins=[margin(-0.2)]))
+    whole = matrix(
+        cell("<b>", margins=[margin(0.1)]), cell("<b>", "aemo", "fails", margins=[margin(-0.2)])
+    )
     page = matrix_page(whole, [], None)
     assert "&lt;b&gt;" in page
     assert "<b>/" not in page
@@ -139,7 +172,9 @@ def test_figures_without_a_verdict_stand_in_the_matrix_and_decide_nothing():
     whole.cells["a", "gb"] = lost
     assert whole.exit_code == 0
     assert whole.sentence() == "Of 2 certificates: 2 passed. Figures without a verdict: gb."
-    assert matrix(shown).sentence() == "No certificate was asked for. Figures without a verdict: gb."
+    assert (
+        matrix(shown).sentence() == "No certificate was asked for. Figures without a verdict: gb."
+    )
     assert in_words(shown) == ["no verdict", "least |P/theta|: 9.1", "not met"]
     page = matrix_page(whole, [], None)
     assert 'href="b/gb/frequency.png"' in page
@@ -158,7 +193,11 @@ def test_devices_of_one_file_name_keep_their_results_beside_one_that_cannot_be_u
         (tmp_path / name).mkdir()
         shutil.copyfile(gfor_api.build(name, tmp_path / "fmu"), tmp_path / name / "device.fmu")
     (tmp_path / "broken.fmu").write_text("no archive")
-    files = [tmp_path / "gfor" / "device.fmu", tmp_path / "gfl" / "device.fmu", tmp_path / "broken.fmu"]
+    files = [
+        tmp_path / "gfor" / "device.fmu",
+        tmp_path / "gfl" / "device.fmu",
+        tmp_path / "broken.fmu",
+    ]
     words = ["--code", "ercot", "--no-check", "--workers", 1]
     code, text, error = gfor("certify", *files, *words, "--out", tmp_path / "out", "--json")
     assert code == 1
@@ -170,11 +209,21 @@ def test_devices_of_one_file_name_keep_their_results_beside_one_that_cannot_be_u
     assert "broken, ercot" in error
     assert ours["narrowest"]["margin"] > 0 > follower["narrowest"]["margin"]
     for found, device in ((ours, "gfor"), (follower, "gfl")):
-        certificate = json.loads((tmp_path / "out" / found["certificate"]).read_text(encoding="utf-8"))
+        certificate = json.loads(
+            (tmp_path / "out" / found["certificate"]).read_text(encoding="utf-8")
+        )
         assert certificate["model"] == device
-        least = min(c["margin"] for r in certificate["rows"] for c in r["criteria"] if c["margin"] is not None)
+        least = min(
+            c["margin"]
+            for r in certificate["rows"]
+            for c in r["criteria"]
+            if c["margin"] is not None
+        )
         assert found["narrowest"]["margin"] == least
-    assert json.loads((tmp_path / "out" / "matrix.json").read_text(encoding="utf-8"))["cells"] == content["cells"]
+    assert (
+        json.loads((tmp_path / "out" / "matrix.json").read_text(encoding="utf-8"))["cells"]
+        == content["cells"]
+    )
     page = (tmp_path / "out" / "matrix.html").read_text(encoding="utf-8")
     for link in re.findall(r'href="([^"#:]+certificate[^"]*)"', page):
         assert (tmp_path / "out" / link).is_file()
@@ -188,12 +237,21 @@ def test_devices_of_one_file_name_keep_their_results_beside_one_that_cannot_be_u
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [(["a.fmu", "b.fmu"], "there is no such file"), (["x.fmu", "--code", "all"], "there is no such file"),
-     (["a.fmu", "b.fmu", "--check", "report.json"], "a report of `gfor fmu check` is of one FMU"),
-     (["a.fmu", "b.fmu", "--binding", "v.toml"], "does not say whose it is"),
-     (["a.fmu", "--code", "all", "--pod", "p"], "only --code nts631 has it"),
-     (["a.fmu", "--code", "all", "--set", "sg1.machine.H=4"], "the test bench has no such component")],
-)  # fmt: skip
+    [
+        (["a.fmu", "b.fmu"], "there is no such file"),
+        (["x.fmu", "--code", "all"], "there is no such file"),
+        (
+            ["a.fmu", "b.fmu", "--check", "report.json"],
+            "a report of `gfor fmu check` is of one FMU",
+        ),
+        (["a.fmu", "b.fmu", "--binding", "v.toml"], "does not say whose it is"),
+        (["a.fmu", "--code", "all", "--pod", "p"], "only --code nts631 has it"),
+        (
+            ["a.fmu", "--code", "all", "--set", "sg1.machine.H=4"],
+            "the test bench has no such component",
+        ),
+    ],
+)
 def test_nothing_that_can_be_tested_is_one_error(gfor, tmp_path, monkeypatch, words, said):
     monkeypatch.chdir(tmp_path)
     code, out, error = gfor("certify", *words)

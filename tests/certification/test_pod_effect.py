@@ -23,8 +23,15 @@ def point(on=ON, off=OFF, recorded=ON, named=True, X_L=0.1):
     power = 1 + 0.1 * np.real(np.exp(recorded * after)) + 0.02 * np.real(np.exp(OTHER * after))
     values, shapes = np.array([on, OTHER]), np.empty((2, 0), complex)
     swings = np.array([off, on] if named else [np.nan, np.nan], dtype=complex)
-    return PointResult(X_L, "with", ModeSet(values, shapes, shapes, ()), times=t, signals={POWER: power},
-                       off=np.array([off, OTHER]), swings=swings)  # fmt: skip
+    return PointResult(
+        X_L,
+        "with",
+        ModeSet(values, shapes, shapes, ()),
+        times=t,
+        signals={POWER: power},
+        off=np.array([off, OTHER]),
+        swings=swings,
+    )
 
 
 def judged(*points, controllers=CONTROLLERS):
@@ -37,7 +44,9 @@ def test_an_honest_one_is_accepted_and_its_figures_are_told():
     assert v.accepted
     figures = v.pod.as_json()["modal"]
     assert figures["off"]["damping_percent"] == pytest.approx(100 * 0.4 / abs(OFF))
-    assert figures["response"]["damping_percent"] == pytest.approx(figures["on"]["damping_percent"], abs=0.5)
+    assert figures["response"]["damping_percent"] == pytest.approx(
+        figures["on"]["damping_percent"], abs=0.5
+    )
     assert figures["better_off"] < 0.1
     assert figures["disagrees"] is False
     assert "11.04 %" in pod_section([v])
@@ -45,11 +54,21 @@ def test_an_honest_one_is_accepted_and_its_figures_are_told():
 
 @pytest.mark.parametrize(
     ("planted", "said"),
-    [(point(on=-0.2 + 3.4j, recorded=-0.2 + 3.4j), "does not damp"), (point(on=OFF, recorded=ON), "does not damp"),
-     (point(on=OFF, recorded=OFF), "does not damp"), (point(recorded=OFF), "acts otherwise in the response"),
-     (point(recorded=OFF, named=False), "acts otherwise in the response")],
-    ids=["wrong sign", "only above an amplitude", "off though declared", "limit at a tiny amplitude", "no shape"],
-)  # fmt: skip
+    [
+        (point(on=-0.2 + 3.4j, recorded=-0.2 + 3.4j), "does not damp"),
+        (point(on=OFF, recorded=ON), "does not damp"),
+        (point(on=OFF, recorded=OFF), "does not damp"),
+        (point(recorded=OFF), "acts otherwise in the response"),
+        (point(recorded=OFF, named=False), "acts otherwise in the response"),
+    ],
+    ids=[
+        "wrong sign",
+        "only above an amplitude",
+        "off though declared",
+        "limit at a tiny amplitude",
+        "no shape",
+    ],
+)
 def test_each_plant_is_told(planted, said):
     (v,) = judged(planted)
     assert not v.accepted
@@ -76,7 +95,9 @@ def test_a_certificate_keeps_what_it_is_judged_by(named):
     made = point(named=named)
     (v,) = judged(made)
     stated = v.pod.as_json()
-    again = replace(made, **kept_off(stated), signals={POWER: made.signals[POWER].astype(np.float32)})
+    again = replace(
+        made, **kept_off(stated), signals={POWER: made.signals[POWER].astype(np.float32)}
+    )
     assert judged(again)[0].pod.as_json() == stated
 
 
@@ -85,7 +106,9 @@ def test_a_response_that_is_damped_otherwise_is_a_finding():
     assert v.pod.disagrees
     assert "<b>yes</b>" in pod_section([v])
     assert "<b>yes</b>" not in pod_section(judged(point()))
-    assert all(word not in pod_section(judged(point(named=False))) for word in ("<b>yes</b>", ">no<"))
+    assert all(
+        word not in pod_section(judged(point(named=False))) for word in ("<b>yes</b>", ">no<")
+    )
 
 
 def test_a_point_that_could_not_be_had_with_it_off_is_computed_anew():

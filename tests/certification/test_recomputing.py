@@ -32,7 +32,17 @@ def short(tmp_path, monkeypatch):
 
 def certified(folder, fmu, *arguments, X_L="0.3"):
     """The one point of a certificate."""
-    words = ["certify", str(fmu), "--no-check", "--workers", "1", "--reactances", X_L, "--out", str(folder)]
+    words = [
+        "certify",
+        str(fmu),
+        "--no-check",
+        "--workers",
+        "1",
+        "--reactances",
+        X_L,
+        "--out",
+        str(folder),
+    ]
     assert main([*words, *map(str, arguments)]) in (1, 3)
     content = json.loads((folder / "certificate.json").read_text(encoding="utf-8"))
     (point,) = content["points"]
@@ -73,7 +83,10 @@ def test_every_kind_of_setting_is_in_the_case_file(tmp_path, short, fmu_path, ca
     assert stated([*point["modes"], *point["modes_beside"]]) == modes_again(point, "with", capsys)
     assert stated(point["modes_without"]) == modes_again(point, "without", capsys)
     run_as_printed(point["again"]["with"]["response"], capsys)
-    again, kept = xr.load_dataset("again/with/trajectory.nc"), xr.load_dataset("responses.nc").sel(scenario="with")
+    again, kept = (
+        xr.load_dataset("again/with/trajectory.nc"),
+        xr.load_dataset("responses.nc").sel(scenario="with"),
+    )
     v = (again[f"grid.bus_2.{part}"].values for part in ("v_re", "v_im"))
     assert content["signal"] == FREQUENCY
     assert np.array_equal(bus_frequency(again.time.values, *v, 50.0), kept[FREQUENCY].values[0])
@@ -83,8 +96,12 @@ def test_every_kind_of_setting_is_in_the_case_file(tmp_path, short, fmu_path, ca
         less = "\n".join(line for line in text.splitlines() if not line.startswith(f'"{key}" ='))
         assert less.count("\n") < text.count("\n")
         Path("less.toml").write_text(less, encoding="utf-8")
-        command = {"with": {"modes": point["again"]["with"]["modes"].replace("case.toml", "less.toml")}}
-        assert modes_again({"again": command}, "with", capsys) != stated([*point["modes"], *point["modes_beside"]])
+        command = {
+            "with": {"modes": point["again"]["with"]["modes"].replace("case.toml", "less.toml")}
+        }
+        assert modes_again({"again": command}, "with", capsys) != stated(
+            [*point["modes"], *point["modes_beside"]]
+        )
 
 
 @pytest.mark.slow
@@ -113,7 +130,9 @@ def test_a_black_box(tmp_path, short, gallery, fmu_path, capsys, monkeypatch, fo
         content, point = certified(folder, fmu, "--binding", binding, "--pod", "p")
         assert content["pod_source"].startswith("declared by the applicant")
     else:
-        content, point = certified(folder, fmu_path("gfor", True), "--black-box", "--set", "pod_p.K=100", "--pod", "p")
+        content, point = certified(
+            folder, fmu_path("gfor", True), "--black-box", "--set", "pod_p.K=100", "--pod", "p"
+        )
         assert content["black_box"]
     assert point["converter_model"]["source"] == "identified"
     assert 0 < point["converter_model"]["fit_error"] < 0.01
@@ -127,4 +146,6 @@ def test_a_black_box(tmp_path, short, gallery, fmu_path, capsys, monkeypatch, fo
     found = xr.load_dataset("again/with/trajectory.nc")
     v = (found[f"grid.bus_2.{part}"].values for part in ("v_re", "v_im"))
     assert np.array_equal(bus_frequency(found.time.values, *v, 50.0), kept[FREQUENCY].values[0])
-    assert np.array_equal(found[POWER].values.astype(np.float32), kept[POWER].values[0].astype(np.float32))
+    assert np.array_equal(
+        found[POWER].values.astype(np.float32), kept[POWER].values[0].astype(np.float32)
+    )

@@ -60,7 +60,10 @@ def _grid_of(path):
     data = network_data(case.table.network, case.path.parent)
     ports = tuple(Port(n, t.bus) for n, t in case.table.components.items() if t.bus)
     return build_model(
-        "grid", network=Network("norm631_grid", data.buses, data.lines, data.loads, ports, data.shunts, data.stray_B)
+        "grid",
+        network=Network(
+            "norm631_grid", data.buses, data.lines, data.loads, ports, data.shunts, data.stray_B
+        ),
     )
 
 
@@ -86,7 +89,12 @@ def test_the_reactances_are_the_norms():
 
 
 def test_a_pod_p_is_judged_by_the_frequency_and_everything_else_by_the_power():
-    assert [watched(pod) for pod in ("none", "p", "q", "pq")] == [POWER, FREQUENCY, POWER, FREQUENCY]
+    assert [watched(pod) for pod in ("none", "p", "q", "pq")] == [
+        POWER,
+        FREQUENCY,
+        POWER,
+        FREQUENCY,
+    ]
 
 
 TIMES = np.arange(0, 61, 0.005)
@@ -101,7 +109,15 @@ def point(scenario, ratio, growth=-0.1, rings=None):
     signal = 0.9 + 0.01 * (1 - np.exp(-rings * omega * after) * np.cos(omega * after))
     modes = ModeSet(np.array([value]), shape, shape, ("sg1.machine.omega", "sg1.machine.delta"))
     return PointResult(
-        0.1, scenario, modes, ["sg1"], growth, residual=1e-13, power=1350.0, times=TIMES, signals={POWER: signal}
+        0.1,
+        scenario,
+        modes,
+        ["sg1"],
+        growth,
+        residual=1e-13,
+        power=1350.0,
+        times=TIMES,
+        signals={POWER: signal},
     )
 
 
@@ -121,7 +137,9 @@ def test_each_criterion_can_fail_a_point(having, lacking, fault):
 
 
 def test_a_failure_of_the_study_is_no_pass():
-    failed = PointResult(0.1, "with", failure="component 'converter' at t = 3 s: fmi2DoStep returned fmi2Error: boom")
+    failed = PointResult(
+        0.1, "with", failure="component 'converter' at t = 3 s: fmi2DoStep returned fmi2Error: boom"
+    )
     verdict = judge(failed, point("without", 0.2), "none", 1.0)
     assert not verdict.accepted
     assert "boom" in verdict.faults[0]
@@ -131,7 +149,9 @@ def test_a_failure_of_the_study_is_no_pass():
 
 
 def test_an_fmu_of_60_hz_is_told_its_codes(tmp_path, fmu_path):
-    with pytest.raises(InputError, match="rated at 60 Hz, and NTS 631 is a code of 50 Hz; of 60 Hz are --code miso"):
+    with pytest.raises(
+        InputError, match="rated at 60 Hz, and NTS 631 is a code of 50 Hz; of 60 Hz are --code miso"
+    ):
         certify(CertificationRequest(fmu_path("gfor"), None, {"f_n": 60.0}), None, tmp_path)
 
 
@@ -139,7 +159,11 @@ def test_what_cannot_be_used_is_said_at_once(tmp_path, fmu_path, capsys):
     with pytest.raises(InputError, match="there is no such file"):
         write_case(CertificationRequest(tmp_path / "missing.fmu"), {}, tmp_path)
     with pytest.raises(CaseError, match="has no variable"):
-        certify(CertificationRequest(fmu_path("gfor"), values={"pod_x.enabled": True}), Processes(1), tmp_path)
+        certify(
+            CertificationRequest(fmu_path("gfor"), values={"pod_x.enabled": True}),
+            Processes(1),
+            tmp_path,
+        )
     with pytest.raises(SystemExit):
         main(["certify", str(fmu_path("gfor")), "--reactances", "0.1,0.1"])
     assert "are no reactances" in capsys.readouterr().err
@@ -151,28 +175,56 @@ def test_what_cannot_be_used_is_said_at_once(tmp_path, fmu_path, capsys):
 
 
 def test_an_interrupted_test_continues_and_gives_the_same(tmp_path, fmu_path, gfor, monkeypatch):
-    arguments = ("certify", fmu_path("gfor"), "--no-check", "--reactances", "0.1,0.3", "--workers", 1, "--out")
+    arguments = (
+        "certify",
+        fmu_path("gfor"),
+        "--no-check",
+        "--reactances",
+        "0.1,0.3",
+        "--workers",
+        1,
+        "--out",
+    )
     monkeypatch.setattr(study_module, "compute_point", rings)
     assert gfor(*arguments, tmp_path / "whole")[0] == 3
     out = tmp_path / "out"
     monkeypatch.setattr(study_module, "compute_point", interrupted_after(3, rings))
     code, text, error = gfor(*arguments, out)
     assert (code, text) == (130, "")
-    assert error.splitlines()[1:] == [f"interrupted: 3 of 4 points are in {out}; the same command continues from there"]
+    assert error.splitlines()[1:] == [
+        f"interrupted: 3 of 4 points are in {out}; the same command continues from there"
+    ]
     monkeypatch.setattr(study_module, "compute_point", rings)
     code, text, _ = gfor(*arguments, out)
     assert code == 3
     assert "3 of 4 points were there already" in text
     assert figures(out) == figures(tmp_path / "whole")
-    xr.testing.assert_identical(*(xr.load_dataset(folder / "responses.nc") for folder in (out, tmp_path / "whole")))
+    xr.testing.assert_identical(
+        *(xr.load_dataset(folder / "responses.nc") for folder in (out, tmp_path / "whole"))
+    )
 
 
 def test_what_was_changed_is_computed_anew(tmp_path, fmu_path, gfor, monkeypatch):
     """The system without the converter is not touched by the converter's settings."""
     monkeypatch.setattr(study_module, "compute_point", rings)
     fmu = Path(shutil.copy(fmu_path("gfor"), tmp_path))
-    arguments = ("certify", fmu, "--no-check", "--reactances", "0.1", "--workers", 1, "--out", tmp_path / "out")
-    for changes, kept in (((), 0), ((), 2), (("--set", "pod_q.enabled=true"), 1), (("--set", "sg1.machine.H=4"), 0)):
+    arguments = (
+        "certify",
+        fmu,
+        "--no-check",
+        "--reactances",
+        "0.1",
+        "--workers",
+        1,
+        "--out",
+        tmp_path / "out",
+    )
+    for changes, kept in (
+        ((), 0),
+        ((), 2),
+        (("--set", "pod_q.enabled=true"), 1),
+        (("--set", "sg1.machine.H=4"), 0),
+    ):
         text = gfor(*arguments, *changes)[1]
         assert (f"{kept} of 2 points were there already" in text) == bool(kept)
     with zipfile.ZipFile(fmu, "a") as archive:  # and its guid stays
@@ -182,11 +234,23 @@ def test_what_was_changed_is_computed_anew(tmp_path, fmu_path, gfor, monkeypatch
 
 def test_a_point_that_failed_is_tried_again(tmp_path, fmu_path, gfor, monkeypatch):
     arguments = (
-        "certify", fmu_path("gfor"), "--no-check", "--reactances", "0.1", "--workers", 1, "--out", tmp_path
-    )  # fmt: skip
+        "certify",
+        fmu_path("gfor"),
+        "--no-check",
+        "--reactances",
+        "0.1",
+        "--workers",
+        1,
+        "--out",
+        tmp_path,
+    )
 
     def fails(task):
-        return rings(task) if task.scenario == "without" else PointResult(task.X_L, task.scenario, failure="no licence")
+        return (
+            rings(task)
+            if task.scenario == "without"
+            else PointResult(task.X_L, task.scenario, failure="no licence")
+        )
 
     monkeypatch.setattr(study_module, "compute_point", fails)
     code, text, _ = gfor(*arguments)
@@ -225,7 +289,15 @@ def test_threads_of_one_worker_compute_one_point_at_a_time(tmp_path, fmu_path, m
 
 @pytest.mark.slow
 def test_our_converter_passes_and_the_report_can_be_checked_by_hand(tmp_path, fmu_path, capsys):
-    arguments = ["--no-check", "--set", "pod_p.enabled=true", "--reactances", "0.3", "--workers", "2"]
+    arguments = [
+        "--no-check",
+        "--set",
+        "pod_p.enabled=true",
+        "--reactances",
+        "0.3",
+        "--workers",
+        "2",
+    ]
     assert main(["certify", str(fmu_path("gfor")), *arguments, "--out", str(tmp_path)]) == 3
     assert "is accepted where it was judged" in capsys.readouterr().out
     kept = figures(tmp_path)
@@ -264,9 +336,15 @@ def test_our_converter_passes_and_the_report_can_be_checked_by_hand(tmp_path, fm
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("controller", "sign_turned", "gain", "reactances"),
-    [("pod_q", False, 2000.0, (0.1, 0.3)), ("pod_p", True, 2000.0, (0.01,)), ("pod_q", True, 200.0, (0.1,))],
+    [
+        ("pod_q", False, 2000.0, (0.1, 0.3)),
+        ("pod_p", True, 2000.0, (0.01,)),
+        ("pod_q", True, 200.0, (0.1,)),
+    ],
 )
-def test_a_detuned_pod_fails_where_its_eigenvalues_say(tmp_path, executor, controller, sign_turned, gain, reactances):
+def test_a_detuned_pod_fails_where_its_eigenvalues_say(
+    tmp_path, executor, controller, sign_turned, gain, reactances
+):
     """A tenfold gain, a turned sign, or both; a turned POD-Q of the usual gain is told by what it changes."""
     model = turned(controller) if sign_turned else build_model("gfor")
     values = {f"{controller}.enabled": True, f"{controller}.K": gain}
@@ -275,7 +353,9 @@ def test_a_detuned_pod_fails_where_its_eigenvalues_say(tmp_path, executor, contr
     own = {f"converter.{name}": value for name, value in values.items()}
     wanted = {X: is_bad(exact_eigenvalues(model, result.case, own, X)) for X in reactances}
     for verdict in result.verdicts:
-        against = any("does not damp the electromechanical mode" in fault for fault in verdict.faults)
+        against = any(
+            "does not damp the electromechanical mode" in fault for fault in verdict.faults
+        )
         assert verdict.accepted != (wanted[verdict.X_L] or against), verdict.faults
         assert against or gain > 1000
     assert any(wanted.values()) == (gain > 1000)
@@ -292,7 +372,9 @@ def test_a_detuned_pod_fails_where_its_eigenvalues_say(tmp_path, executor, contr
 def test_a_converter_that_hides_its_states_gets_the_same_verdict(tmp_path, executor, fmu_path):
     results = [
         certify(
-            CertificationRequest(cached(PythonFmu(build_model("gfor"))), reactances=(0.2,), black_box=black_box),
+            CertificationRequest(
+                cached(PythonFmu(build_model("gfor"))), reactances=(0.2,), black_box=black_box
+            ),
             executor,
             tmp_path,
         )

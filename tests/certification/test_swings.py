@@ -14,7 +14,7 @@ def damped(ratio, frequency=0.5, sign=1.0, times=TIMES):
     omega, after = 2 * np.pi * frequency, np.clip(times - EVENT, 0, None)
     return 0.9 + sign * 0.02 * (
         1 - np.exp(-ratio * omega * after) * np.cos(omega * np.sqrt(1 - ratio**2) * after)
-    )  # fmt: skip
+    )
 
 
 def ratio_after_four_periods(ratio):
@@ -24,7 +24,9 @@ def ratio_after_four_periods(ratio):
 @pytest.mark.parametrize("ratio", [-0.01, 0.0, 0.02, 0.05, 0.0545, 0.0556, 0.08, 0.12])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("frequency", [0.2, 0.5, 1.4])
-def test_the_ratio_is_that_of_four_periods_and_its_limit_lies_at_five_and_a_half_percent(ratio, sign, frequency):
+def test_the_ratio_is_that_of_four_periods_and_its_limit_lies_at_five_and_a_half_percent(
+    ratio, sign, frequency
+):
     test = swing_test(TIMES, damped(ratio, frequency, sign), EVENT)
     assert test.ratio == pytest.approx(ratio_after_four_periods(ratio), rel=0.01)
     assert test.accepted == (ratio > 0.0551)
@@ -32,22 +34,42 @@ def test_the_ratio_is_that_of_four_periods_and_its_limit_lies_at_five_and_a_half
 
 def test_the_distances_can_be_checked_by_hand():
     """Straight pieces: maxima 10 at 2 s, 8 at 6 s, minimum 1 at 3 s; the line is at 9.5 there."""
-    corners = [(0, 0.0), (1, 0.0), (1.5, -1.0), (2, 10.0), (3, 1.0), (6, 8.0), (8, 2.0), (9, 6.0), (40, 5.0)]
+    corners = [
+        (0, 0.0),
+        (1, 0.0),
+        (1.5, -1.0),
+        (2, 10.0),
+        (3, 1.0),
+        (6, 8.0),
+        (8, 2.0),
+        (9, 6.0),
+        (40, 5.0),
+    ]
     times = np.linspace(0, 40, 40001)
     test = swing_test(times, np.interp(times, *zip(*corners, strict=True)), EVENT)
-    assert (test.dropped.time, test.dropped.value, test.dropped.is_maximum) == (pytest.approx(1.5), -1.0, False)
+    assert (test.dropped.time, test.dropped.value, test.dropped.is_maximum) == (
+        pytest.approx(1.5),
+        -1.0,
+        False,
+    )
     first, second = test.swings
-    assert (first.before.value, first.minimum.value, first.after.value) == pytest.approx((10.0, 1.0, 8.0), abs=1e-3)
+    assert (first.before.value, first.minimum.value, first.after.value) == pytest.approx(
+        (10.0, 1.0, 8.0), abs=1e-3
+    )
     assert first.line == pytest.approx(9.5, abs=1e-3)
     assert first.depth == pytest.approx(8.5, abs=2e-3)
-    assert second.depth == pytest.approx(8 - 2 * 2 / 3 - 2, abs=3e-3)  # the line falls from 8 at 6 s to 6 at 9 s
+    # the line falls from 8 at 6 s to 6 at 9 s
+    assert second.depth == pytest.approx(8 - 2 * 2 / 3 - 2, abs=3e-3)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_the_first_extremum_is_left_out(sign):
     signal = damped(0.1, sign=sign)
     points = extrema(TIMES, signal, EVENT)
-    test, other = swing_test(TIMES, signal, EVENT), swing_test(TIMES, signal, EVENT, drop_first=False)
+    test, other = (
+        swing_test(TIMES, signal, EVENT),
+        swing_test(TIMES, signal, EVENT, drop_first=False),
+    )
     assert test.dropped == points[0]
     assert points[0].is_maximum == (sign > 0)
     assert other.dropped is None
@@ -111,7 +133,9 @@ def corners(*points):
 def test_a_turn_counts_from_a_thousandth_of_the_range(part, counts):
     """The range is 10; the signal turns back by a part of it near the end."""
     small = 10 * part
-    times, signal = corners((0, 0.0), (1, 0.0), (2, 10.0), (3, 5.0), (20, 6.0), (21, 6.0 - small), (40, 6.5))
+    times, signal = corners(
+        (0, 0.0), (1, 0.0), (2, 10.0), (3, 5.0), (20, 6.0), (21, 6.0 - small), (40, 6.5)
+    )
     late = [p for p in extrema(times, signal, EVENT) if p.time > 15]
     assert len(late) == (2 if counts else 0)
 
@@ -120,7 +144,9 @@ def test_a_turn_counts_from_a_thousandth_of_the_range(part, counts):
 def test_what_stood_still_for_ten_seconds_has_died_out(quiet, accepted):
     """That long is a period of the slowest mode that is judged."""
     end = 40 - quiet
-    times, signal = corners((0, 0.0), (1, 0.0), (2, 10.0), (3, 5.0), (end - 1, 7.0), (end, 6.0), (40, 6.5))
+    times, signal = corners(
+        (0, 0.0), (1, 0.0), (2, 10.0), (3, 5.0), (end - 1, 7.0), (end, 6.0), (40, 6.5)
+    )
     assert swing_test(times, signal, EVENT).accepted == accepted
 
 

@@ -24,9 +24,16 @@ def certified(tmp_path, fmu_path, gfor, monkeypatch):
         monkeypatch.setattr(study_module, "compute_point", points)
         words = [] if "--check-them" in arguments else ["--no-check"]
         rest = [a for a in arguments if a != "--check-them"]
-        code, text, error = gfor("certify", fmu_path("gfor"), *words, "--workers", 1, "--out", tmp_path, *rest)
+        code, text, error = gfor(
+            "certify", fmu_path("gfor"), *words, "--workers", 1, "--out", tmp_path, *rest
+        )
         assert code not in (2, 130), error
-        return code, text, figures(tmp_path), (tmp_path / "certificate.html").read_text(encoding="utf-8")
+        return (
+            code,
+            text,
+            figures(tmp_path),
+            (tmp_path / "certificate.html").read_text(encoding="utf-8"),
+        )
 
     return run
 
@@ -50,11 +57,17 @@ def test_all_thirteen_pass_and_a_failed_acceptance_test_is_loud(certified, monke
     code, text, content, page = certified()
     assert code == 0
     assert "passes the damping test at all 13 line reactances" in " ".join(text.split())
-    assert (content["verdict"], content["passed"], content["judged"]) == ("passes", True, "13 of 13")
+    assert (content["verdict"], content["passed"], content["judged"]) == (
+        "passes",
+        True,
+        "13 of 13",
+    )
     assert "Damping test of &#x27;gfor&#x27;: passed</h1>" in page
 
     def check(fmu, binding, *_):
-        return AcceptanceReport(fmu, binding, [passed("archive", "fine"), failed("runs", "crash", "it died")])
+        return AcceptanceReport(
+            fmu, binding, [passed("archive", "fine"), failed("runs", "crash", "it died")]
+        )
 
     monkeypatch.setattr("orchestrator.acceptance.runner.check_fmu", check)
     code, _, content, page = certified("--check-them")
@@ -69,41 +82,63 @@ def test_all_thirteen_pass_and_a_failed_acceptance_test_is_loud(certified, monke
 @pytest.mark.parametrize(
     ("reactances", "judged"),
     [(REACTANCES[:2], "2 of 13"), ((*REACTANCES[:12], 0.59), "12 of 13"), ((0.7,), "0 of 13")],
-)  # fmt: skip
+)
 def test_less_than_thirteen_are_incomplete(certified, reactances, judged):
     """Others do not replace one that is missing."""
     code, text, content, page = certified("--reactances", said(reactances))
     assert code == 3
     assert f"incomplete: {judged}" in " ".join(text.split())
     assert "passes" not in content["sentence"]
-    assert (content["verdict"], content["passed"], content["judged"]) == ("incomplete", False, judged)
+    assert (content["verdict"], content["passed"], content["judged"]) == (
+        "incomplete",
+        False,
+        judged,
+    )
     assert f"incomplete ({judged})</h1>" in page
-    assert ("beyond the norm" in page.partition("<h2>How the code was read")[0]) == (reactances[-1] not in REACTANCES)
+    assert ("beyond the norm" in page.partition("<h2>How the code was read")[0]) == (
+        reactances[-1] not in REACTANCES
+    )
 
 
 UNSTABLE = {"growth": 104.6}
-OVER = {"kind": "misfit", "component": "converter", "message": "6.41 pu of its rating over a cycle", "time": 12.0,
-        "declared": 1.2, "mean": 6.41}  # fmt: skip
+OVER = {
+    "kind": "misfit",
+    "component": "converter",
+    "message": "6.41 pu of its rating over a cycle",
+    "time": 12.0,
+    "declared": 1.2,
+    "mean": 6.41,
+}
 
 
 @pytest.mark.parametrize(
     ("changes", "fault"),
     [
         (UNSTABLE, "unstable"),
-        ({"stability": {"stable": False, "sentence": "UNSTABLE: a mode grows at 900 Hz"}}, "grows at 900 Hz"),
+        (
+            {"stability": {"stable": False, "sentence": "UNSTABLE: a mode grows at 900 Hz"}},
+            "grows at 900 Hz",
+        ),
         ({"growth": float("nan")}, "not a number"),
         ({"power": 0.0}, "0 MW at the start and not 1350 MW"),
         ({"power": float("nan")}, "nan MW"),
         ({"modes": None}, "no mode"),
         (
-            {"modes": ModeSet(np.empty(0, complex), np.empty((0, 2)), np.empty((0, 2)), ("a", "b")), "components": []},
+            {
+                "modes": ModeSet(
+                    np.empty(0, complex), np.empty((0, 2)), np.empty((0, 2)), ("a", "b")
+                ),
+                "components": [],
+            },
             "no mode",
         ),
         ({"signals": {}}, "no response"),
         ({"findings": [OVER]}, "6.41 pu of its rating"),
     ],
 )
-def test_a_point_whose_judged_modes_are_fine_fails_for_what_else_is_wrong(certified, changes, fault):
+def test_a_point_whose_judged_modes_are_fine_fails_for_what_else_is_wrong(
+    certified, changes, fault
+):
     code, _, content, page = certified("--reactances", "0.1,0.3", points=only(0.3, **changes))
     assert code == 1
     assert content["verdict"] == "fails"
@@ -115,9 +150,15 @@ def test_a_point_whose_judged_modes_are_fine_fails_for_what_else_is_wrong(certif
 def test_a_response_that_the_watch_did_not_judge_is_not_passed(certified):
     said = "growth and lasting oscillations are not judged between t = 1 s and t = 20 s: noise can explain the motion"
     finding = {"kind": "not_judged", "message": said, "time": 1.0}
-    code, _, content, page = certified("--reactances", "0.1,0.3", points=only(0.3, findings=[finding]))
+    code, _, content, page = certified(
+        "--reactances", "0.1,0.3", points=only(0.3, findings=[finding])
+    )
     assert code == 3
-    assert (content["verdict"], content["passed"], content["judged"]) == ("incomplete", False, "1 of 13")
+    assert (content["verdict"], content["passed"], content["judged"]) == (
+        "incomplete",
+        False,
+        "1 of 13",
+    )
     judged = {point["X_L"]: point["judged"] for point in content["points"]}
     assert judged == {0.1: True, 0.3: False}
     assert said in page
@@ -205,7 +246,9 @@ LIMIT_CYCLE = 1 + EARLY + 0.125 * np.sin(2 * np.pi * 0.4 * AFTER) * (AFTER > 11)
         (POWER, 1 + EARLY + 0.2 * np.maximum(T - 12, 0), None),
     ],
 )
-def test_a_response_that_slips_or_swings_for_ever_fails_whatever_its_first_swings_are(certified, name, signal, fault):
+def test_a_response_that_slips_or_swings_for_ever_fails_whatever_its_first_swings_are(
+    certified, name, signal, fault
+):
     """A straight drift is no swing."""
 
     def compute(task):
@@ -214,7 +257,8 @@ def test_a_response_that_slips_or_swings_for_ever_fails_whatever_its_first_swing
             found.signals[name] = signal
         return found
 
-    watched_too = ("--pod", "p") if name == POWER else ()  # the norm's own criteria watch the other signal
+    # the norm's own criteria watch the other signal
+    watched_too = ("--pod", "p") if name == POWER else ()
     code, _, content, page = certified("--reactances", "0.1", *watched_too, points=compute)
     assert code == (3 if fault is None else 1), content["sentence"]
     assert fault is None or fault in content["sentence"]
@@ -223,9 +267,15 @@ def test_a_response_that_slips_or_swings_for_ever_fails_whatever_its_first_swing
 
 @pytest.mark.parametrize(
     ("kind", "fails"),
-    [("loss_of_synchronism", True), ("sustained_oscillation", True), ("growing_oscillation", True), ("run_away", True),
-     ("active_limit", False), ("undisturbed_motion", False)],
-)  # fmt: skip
+    [
+        ("loss_of_synchronism", True),
+        ("sustained_oscillation", True),
+        ("growing_oscillation", True),
+        ("run_away", True),
+        ("active_limit", False),
+        ("undisturbed_motion", False),
+    ],
+)
 def test_what_the_watch_saw_of_an_unstable_run_fails_the_point(certified, kind, fails):
     finding = Finding(kind, 3.0, "converter", "omega", "the converter does it").as_json()
     code, _, content, _ = certified("--reactances", "0.1,0.3", points=only(0.3, findings=[finding]))
@@ -235,7 +285,9 @@ def test_what_the_watch_saw_of_an_unstable_run_fails_the_point(certified, kind, 
 
 
 def test_findings_are_stored_and_a_point_that_was_not_watched_is_computed_anew():
-    finding = Finding("sustained_oscillation", 3.0, "converter", "omega", "it swings", None, {"f": 1.0}).as_json()
+    finding = Finding(
+        "sustained_oscillation", 3.0, "converter", "omega", "it swings", None, {"f": 1.0}
+    ).as_json()
     header, arrays = PointResult(0.1, "with", findings=[finding]).stored()
     assert PointResult.restored(dict(header), dict(arrays)).findings == [finding]
     del header["findings"]
@@ -250,7 +302,13 @@ def test_the_terminal_shows_which_mode_it_was_without_the_converter(certified):
 def test_the_help_names_the_exit_codes(gfor):
     _, text, _ = gfor("certify", "--help")
     text = " ".join(text.split())
-    for code in ("0 the converter passes", "1 it fails", "3 the test is incomplete", "4 it passes, and", "130 interr"):
+    for code in (
+        "0 the converter passes",
+        "1 it fails",
+        "3 the test is incomplete",
+        "4 it passes, and",
+        "130 interr",
+    ):
         assert code in text
 
 
@@ -266,11 +324,16 @@ def test_where_the_base_system_fails_nothing_is_judged(certified):
     assert "not judged" in page
 
 
-@pytest.mark.parametrize("setting", ["sg1.governor.enabled=true", "sg1.machine.H=4", "S_n=1490 MVA", "P_0=0.89"])
+@pytest.mark.parametrize(
+    "setting", ["sg1.governor.enabled=true", "sg1.machine.H=4", "S_n=1490 MVA", "P_0=0.89"]
+)
 def test_a_study_that_was_changed_is_not_the_norms(certified, setting):
     code, _, content, _ = certified("--set", setting, "--reactances", "0.1")
     assert code == 3
-    assert f"the study is not the norm's, it was changed by {content['departures'][0]}" in content["sentence"]
+    assert (
+        f"the study is not the norm's, it was changed by {content['departures'][0]}"
+        in content["sentence"]
+    )
     assert setting.partition("=")[0] in content["departures"][0]
     assert not content["passed"]
 

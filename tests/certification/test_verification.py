@@ -32,7 +32,15 @@ def original(tmp_path_factory, fmu_path):
     arguments = ["--no-check", "--reactances", "0.1,0.3", "--workers", "1", "--pod", "q"]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study_module, "compute_point", rings)
-        words = ["certify", str(fmu_path("gfor")), "--binding", str(binding), *arguments, "--out", str(folder / "out")]
+        words = [
+            "certify",
+            str(fmu_path("gfor")),
+            "--binding",
+            str(binding),
+            *arguments,
+            "--out",
+            str(folder / "out"),
+        ]
         assert main(words) == 3
     return folder / "out"
 
@@ -92,22 +100,48 @@ def test_what_nobody_touched_holds(certificate, gfor):
 
 @pytest.mark.parametrize(
     ("reactances", "other", "verdict", "points", "code"),
-    [("0.1,0.3", {}, "incomplete", "2 of 13", 3), ("0.1", {"power": 0.0}, "fails", "1 of 13", 1),
-     ("0.1", {"stability": {"stable": None, "sentence": "not known: it differs"}}, "incomplete", "0 of 13", 3),
-     (",".join(map(str, REACTANCES)), {}, "passes", "13 of 13", 0)],
-)  # fmt: skip
+    [
+        ("0.1,0.3", {}, "incomplete", "2 of 13", 3),
+        ("0.1", {"power": 0.0}, "fails", "1 of 13", 1),
+        (
+            "0.1",
+            {"stability": {"stable": None, "sentence": "not known: it differs"}},
+            "incomplete",
+            "0 of 13",
+            3,
+        ),
+        (",".join(map(str, REACTANCES)), {}, "passes", "13 of 13", 0),
+    ],
+)
 def test_a_certificate_that_holds_is_no_pass(
     tmp_path, fmu_path, gfor, monkeypatch, reactances, other, verdict, points, code
 ):
     monkeypatch.setattr(study_module, "compute_point", lambda task: replace(rings(task), **other))
-    assert gfor("certify", fmu_path("gfor"), "--no-check", "--pod", "q", "--reactances", reactances, "--workers", 1,
-                "--out", tmp_path)[0] == code  # fmt: skip
+    assert (
+        gfor(
+            "certify",
+            fmu_path("gfor"),
+            "--no-check",
+            "--pod",
+            "q",
+            "--reactances",
+            reactances,
+            "--workers",
+            1,
+            "--out",
+            tmp_path,
+        )[0]
+        == code
+    )
     got, found = verified(gfor, tmp_path, "--files-only")
     assert (got, found["holds"]) == (code, True)
     assert (found["verdict"], found["points"], found["passes"]) == (verdict, points, code == 0)
     got, text, _ = gfor("verify", tmp_path, "--files-only")
     assert got == code
-    assert text.strip().splitlines()[-1] == f"Its verdict: {verdict}, {points} line reactances of the norm judged."
+    assert (
+        text.strip().splitlines()[-1]
+        == f"Its verdict: {verdict}, {points} line reactances of the norm judged."
+    )
 
 
 @pytest.mark.parametrize("pod", ["p", "pq", "none"])
@@ -115,9 +149,22 @@ def test_what_is_only_declared_holds_as_well(tmp_path, gallery, gfor, monkeypatc
     """The FMU shows no damping controller, so that the sentence says whose word it is."""
     monkeypatch.setattr(study_module, "compute_point", rings)
     fmu, binding = gallery("converter_power_si")
-    arguments = ("--binding", binding, "--pod", pod, "--no-check", "--reactances", "0.1", "--workers", 1)
+    arguments = (
+        "--binding",
+        binding,
+        "--pod",
+        pod,
+        "--no-check",
+        "--reactances",
+        "0.1",
+        "--workers",
+        1,
+    )
     assert gfor("certify", fmu, *arguments, "--out", tmp_path)[0] == 3
-    assert "as declared by the applicant" in json.loads((tmp_path / "certificate.json").read_text("utf-8"))["sentence"]
+    assert (
+        "as declared by the applicant"
+        in json.loads((tmp_path / "certificate.json").read_text("utf-8"))["sentence"]
+    )
     assert verified(gfor, tmp_path, "--files-only")[1]["faults"] == []
 
 
@@ -170,7 +217,9 @@ def drop_departures(content):
 
 
 @pytest.mark.parametrize("sealed", [False, True])
-@pytest.mark.parametrize("change", [set_verdict, set_sentence, set_damping, set_growth, set_power, set_ratio])
+@pytest.mark.parametrize(
+    "change", [set_verdict, set_sentence, set_damping, set_growth, set_power, set_ratio]
+)
 def test_an_edited_figure_or_word_does_not_agree(certificate, gfor, change, sealed):
     """Also where the JSON's own hash was computed again: the words follow from the figures."""
     edited(certificate, change, sealed=sealed)
@@ -186,9 +235,15 @@ def test_a_figure_without_words_is_held_by_the_hash(certificate, gfor):
 
 @pytest.mark.parametrize(
     ("damping", "signal", "code", "said"),
-    [(1e-9, 1e-9, 3, "the digits differ"), (1e-4, 0.0, 5, "comes out and"), (0.0, 1e-3, 5, "of its range")],
+    [
+        (1e-9, 1e-9, 3, "the digits differ"),
+        (1e-4, 0.0, 5, "comes out and"),
+        (0.0, 1e-3, 5, "of its range"),
+    ],
 )
-def test_points_that_come_out_otherwise(certificate, gfor, monkeypatch, damping, signal, code, said):
+def test_points_that_come_out_otherwise(
+    certificate, gfor, monkeypatch, damping, signal, code, said
+):
     """Rounding is said and allowed; more is a disagreement."""
 
     def compute(task):
@@ -246,7 +301,12 @@ FORGED = {
     "growth": at("points", 0, "growth", "with", value=-9.9),
     "stability": at("points", 0, "stability", "with", "sentence", value="xx"),
     "power": at("points", 0, "power", value=1351.0),
-    "lowered": at("points", 0, "lowered", value=[{"frequency_hz": 1.0, "from_percent": 9.0, "to_percent": 1.0}]),
+    "lowered": at(
+        "points",
+        0,
+        "lowered",
+        value=[{"frequency_hz": 1.0, "from_percent": 9.0, "to_percent": 1.0}],
+    ),
     "modes_without": at("points", 0, "modes_without", value=[]),
     "without": at("points", 0, "modes", 0, "without", value=None),
     "swings": at("points", 0, "time", "swings", "swings", value=[]),
@@ -268,9 +328,20 @@ def test_no_entry_can_be_changed_and_sealed_again(certificate, gfor, name):
 
 
 @pytest.mark.parametrize(
-    "name", ["pod", "pod_values", "pod_source", "values", "departures", "judged", "missing", "author", "sentence",
-             "lowered"]
-)  # fmt: skip
+    "name",
+    [
+        "pod",
+        "pod_values",
+        "pod_source",
+        "values",
+        "departures",
+        "judged",
+        "missing",
+        "author",
+        "sentence",
+        "lowered",
+    ],
+)
 def test_what_follows_from_the_files_is_derived_again(certificate, gfor, name):
     """Also where the page was given the hash of the other figures."""
     path = certificate / "certificate.json"
@@ -278,8 +349,13 @@ def test_what_follows_from_the_files_is_derived_again(certificate, gfor, name):
     edited(certificate, FORGED[name], sealed=True)
     after = figures_hash(json.loads(path.read_text(encoding="utf-8")))
     replaced(certificate, "certificate.html", before, after)
-    edited(certificate, lambda c: c["files"].update({"certificate.html": file_hash(certificate / "certificate.html")}),
-           sealed=True)  # fmt: skip
+    edited(
+        certificate,
+        lambda c: c["files"].update(
+            {"certificate.html": file_hash(certificate / "certificate.html")}
+        ),
+        sealed=True,
+    )
     code, found = verified(gfor, certificate, "--files-only")
     assert code == 5
     assert not any("hash" in text or "SHA" in text for text in found["faults"])
@@ -295,7 +371,10 @@ def test_what_follows_from_the_files_is_derived_again(certificate, gfor, name):
         (at("files", value=[1]), "files"),
         (at("files", value="abc"), "files"),
         (at("points", 0, "modes", value=None), "points.0.modes"),
-        (at("points", 0, "modes", 0, "damping_percent", value="abc"), "points.0.modes.0.damping_percent"),
+        (
+            at("points", 0, "modes", 0, "damping_percent", value="abc"),
+            "points.0.modes.0.damping_percent",
+        ),
         (at("points", 0, "X_L", value=None), "points.0.X_L"),
         (at("acceptance", value=3), "acceptance"),
         (at("sentence", value="\ud800"), "half a character"),
@@ -318,9 +397,21 @@ def test_deep_json_and_a_page_of_other_bytes_are_no_traceback(certificate, gfor)
 
 def test_a_refused_request_leaves_a_finished_certificate_as_it_was(certificate, gfor):
     files = {p.name: p.read_bytes() for p in certificate.iterdir() if p.is_file()}
-    words = ["certify", certificate / "converter.fmu", "--set", "nosuch=1", "--no-check", "--out", certificate]
+    words = [
+        "certify",
+        certificate / "converter.fmu",
+        "--set",
+        "nosuch=1",
+        "--no-check",
+        "--out",
+        certificate,
+    ]
     code, _, error = gfor(*words)
-    assert (code, "has no variable 'nosuch'" in error, "makes from the request" in error) == (2, True, True)
+    assert (code, "has no variable 'nosuch'" in error, "makes from the request" in error) == (
+        2,
+        True,
+        True,
+    )
     assert {p.name: p.read_bytes() for p in certificate.iterdir() if p.is_file()} == files
     assert not list(certificate.glob(".request_*"))
 
@@ -352,8 +443,12 @@ def test_a_name_with_a_new_line_is_escaped_in_the_case_file(tmp_path, fmu_path):
 def test_a_report_in_which_nothing_was_passed_is_refused(tmp_path, fmu_path):
     fmu = fmu_path("gfor")
     checks = [{"check": name, "verdict": "not applicable", "fault": ""} for name in CHECKS]
-    report = {"tool": acceptance._tool(), "trusted": True, "checks": checks,
-              "sha256": {"fmu": file_hash(fmu), "binding": None}}  # fmt: skip
+    report = {
+        "tool": acceptance._tool(),
+        "trusted": True,
+        "checks": checks,
+        "sha256": {"fmu": file_hash(fmu), "binding": None},
+    }
     path = tmp_path / "check.json"
     path.write_text(json.dumps(report), encoding="utf-8")
     with pytest.raises(InputError, match="none of its checks was passed"):

@@ -7,9 +7,12 @@ import pytest
 from orchestrator.certification.compared import faults_of
 
 RECORD = {
-    "source": "ENTSO-E's text", "readings": ["a reading"], "date": "2024", "rows": [{"row": "dip_0", "title": "0 pu"}],
+    "source": "ENTSO-E's text",
+    "readings": ["a reading"],
+    "date": "2024",
+    "rows": [{"row": "dip_0", "title": "0 pu"}],
     "environment": {"gfor-cosim": "0.3", "Commit": "abc"},
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,9 @@ def built(gfor, monkeypatch, tmp_path):
 
     def tried(*words):
         made = []
-        monkeypatch.setattr(command, "build", lambda model, *_, **how: made.append((model.name, how)) or "built")
+        monkeypatch.setattr(
+            command, "build", lambda model, *_, **how: made.append((model.name, how)) or "built"
+        )
         code, _, error = gfor("fmu", "build", *words, "--dest", tmp_path)
         return code, made, " ".join(error.split())
 
@@ -34,7 +36,11 @@ def test_a_host_gets_what_its_row_says(name, built):
     code, ((model, how),), error = built("gfor", "--for", name)
     assert code == 0
     assert model == "gfor" + ENDINGS[host.port]
-    assert (how["native"], how["fmi"], how["platforms"]) == (host.native, host.fmi, list(host.platforms))
+    assert (how["native"], how["fmi"], how["platforms"]) == (
+        host.native,
+        host.fmi,
+        list(host.platforms),
+    )
     assert f"for {name}: {host.kind}, FMI {host.fmi}, " in error
     assert host.source in error
     assert "--native" not in error
@@ -72,15 +78,24 @@ def test_an_fmu_for_a_host_is_what_was_said(gfor, tmp_path):
     assert code == 0, error
     with zipfile.ZipFile(tmp_path / "gfor.fmu") as archive:
         names = archive.namelist()
-    assert {name.split("/")[1] for name in names if name.startswith("binaries/")} == {"linux64", "win64"}
+    assert {name.split("/")[1] for name in names if name.startswith("binaries/")} == {
+        "linux64",
+        "win64",
+    }
     assert not [name for name in names if name.endswith(".py")]
     assert read_description(tmp_path / "gfor.fmu").title
 
 
 def test_the_page_has_the_table():
-    rows = [[cell.strip() for cell in line.strip("| \n").split("|")] for line in PAGE.read_text().splitlines()]
+    rows = [
+        [cell.strip() for cell in line.strip("| \n").split("|")]
+        for line in PAGE.read_text().splitlines()
+    ]
     shown = {row[0].strip("`"): row[1:] for row in rows if len(row) == 7 and row[0].startswith("`")}
-    sources = {name: "here" if host.source == "here" else f"<{host.source}>" for name, host in HOSTS.items()}
+    sources = {
+        name: "here" if host.source == "here" else f"<{host.source}>"
+        for name, host in HOSTS.items()
+    }
     assert shown == {
         name: [host.kind, host.fmi, host.port, ", ".join(host.platforms), host.why, sources[name]]
         for name, host in HOSTS.items()
@@ -90,5 +105,6 @@ def test_the_page_has_the_table():
 def test_rows_can_be_built_and_have_sources():
     for host in HOSTS.values():
         assert set(host.platforms) <= set(TARGETS)
-        assert host.native or "darwin64" not in host.platforms  # pythonfmu's wrapper has no binary for macOS
+        # pythonfmu's wrapper has no binary for macOS
+        assert host.native or "darwin64" not in host.platforms
         assert host.source == "here" or re.match(r"https://\S+$", host.source)

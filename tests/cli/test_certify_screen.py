@@ -24,20 +24,30 @@ def criterion(name, value, limit, margin, *, accepted):
 
 
 VERDICTS = [
-    RowVerdict(row("jump"), (criterion("current", 1.2, 1.3, 0.07, accepted=True),
-                             criterion("settles", 1.128, 0.01, -111.8, accepted=False))),
+    RowVerdict(
+        row("jump"),
+        (
+            criterion("current", 1.2, 1.3, 0.07, accepted=True),
+            criterion("settles", 1.128, 0.01, -111.8, accepted=False),
+        ),
+    ),
     RowVerdict(row("dip"), (criterion("voltage", 0.9, 0.5, 0.8, accepted=True),)),
     RowVerdict(row("weak"), unknown="the worker died"),
-]  # fmt: skip
+]
 
 
 def shown(f_n):
     slip = {"kind": "misfit", "message": "converter: wrong rated frequency: omega is 0.8333"}
     code = SimpleNamespace(title="ERCOT", f_n=50.0, rows=[v.row for v in VERDICTS], left_out=())
     found = Certificate(
-        SimpleNamespace(values={}, departures=()), SimpleNamespace(model_name="vendor"), code, f_n, VERDICTS,
-        {name: SimpleNamespace(findings=[slip]) for name in ("jump", "dip")}, Path("row.toml"),
-    )  # fmt: skip
+        SimpleNamespace(values={}, departures=()),
+        SimpleNamespace(model_name="vendor"),
+        code,
+        f_n,
+        VERDICTS,
+        {name: SimpleNamespace(findings=[slip]) for name in ("jump", "dip")},
+        Path("row.toml"),
+    )
     console = Console(width=150, record=True, file=StringIO())
     show(found, [Path("certificate.html")], Path("out"), console)
     return console.export_text()
@@ -55,8 +65,17 @@ def test_a_rated_frequency_of_others_stands_in_the_first_line():
 
 def test_the_verdict_stands_first_and_each_row_has_a_line(screen):
     first = screen.split("└")[0].splitlines()
-    cells = [[cell.strip() for cell in line.strip("│").split("│")] for line in first if line.startswith("│")]
-    assert [c[:2] for c in cells] == [["all", "fails"], ["jump", "fails"], ["dip", "accepted"], ["weak", "not judged"]]
+    cells = [
+        [cell.strip() for cell in line.strip("│").split("│")]
+        for line in first
+        if line.startswith("│")
+    ]
+    assert [c[:2] for c in cells] == [
+        ["all", "fails"],
+        ["jump", "fails"],
+        ["dip", "accepted"],
+        ["weak", "not judged"],
+    ]
     assert cells[0][4] == "2 judged, 1 failed, 1 not judged"
     assert cells[1][2:] == ["1 of 2", "−1.12 pu", "settles: 1.128 pu away"]
     assert cells[2][2:] == ["1 of 1", "+80 %", "nearest: voltage"]
@@ -76,10 +95,14 @@ def test_a_fault_of_the_device_is_told_once(screen):
 
 @pytest.mark.parametrize(
     ("margin", "known", "text"),
-    [(None, (), "–"), (0.125, (), "+12.5 %"), (-0.5, (1.0, 1.5), "−50 %"),
-     (-112.72, (0.01, 1.137), "−1.13 in its unit"), (-112.72, (0.01, 1.137, "Hz"), "−1.13 Hz"),
-
-     (187.87, (), "+> 10 times")],
-)  # fmt: skip
+    [
+        (None, (), "–"),
+        (0.125, (), "+12.5 %"),
+        (-0.5, (1.0, 1.5), "−50 %"),
+        (-112.72, (0.01, 1.137), "−1.13 in its unit"),
+        (-112.72, (0.01, 1.137, "Hz"), "−1.13 Hz"),
+        (187.87, (), "+> 10 times"),
+    ],
+)
 def test_margins_are_no_percent_of_next_to_nothing(margin, known, text):
     assert margin_text(margin, *known) == text

@@ -50,7 +50,9 @@ def test_help_opens_with_the_newcomers_page_and_lists_all(gfor):
 def test_a_group_alone_lists_its_commands(gfor, group):
     code, out, err = gfor(group)
     assert (code, err) == (0, "")
-    listed = {f"{group} {line.split()[0]}" for line in out.splitlines() if re.match(r" {4}\w", line)}
+    listed = {
+        f"{group} {line.split()[0]}" for line in out.splitlines() if re.match(r" {4}\w", line)
+    }
     assert listed == {name for name in COMMANDS if name.startswith(f"{group} ")}
 
 
@@ -60,8 +62,10 @@ def test_an_old_spelling_is_the_same_command_with_a_note(gfor, old):
     words = OLD[old].split()
     command = [words[0]] if words[-1].startswith("--") else words
     code, out, err = gfor(old, "--help")
-    assert (code, out, err) == (*gfor(*command, "--help")[:2], f"note: gfor {old} is now gfor {OLD[old]}; the old "
-                                "spelling works until 1.0\n")  # fmt: skip
+    assert (code, out, err) == (
+        *gfor(*command, "--help")[:2],
+        f"note: gfor {old} is now gfor {OLD[old]}; the old spelling works until 1.0\n",
+    )
 
 
 def test_an_old_spelling_gives_the_same_json(gfor, fmu_path):
@@ -79,13 +83,19 @@ def test_what_is_of_one_black_box_needs_its_name(refused):
     case = ("modes", "two_area")
     assert "give --black-box as well" in refused(*case, "--component", "gfor")
     assert "--method is for a black box" in refused(*case, "--black-box", "--method", "pulse")
-    assert "--details does not go with --component" in refused(*case, "--black-box", "--component", "gfor", "--details")
+    assert "--details does not go with --component" in refused(
+        *case, "--black-box", "--component", "gfor", "--details"
+    )
 
 
 def test_alone_it_answers_a_newcomers_questions_with_lines_that_parse(gfor):
     code, out, err = gfor()
     assert (code, err) == (0, "")
-    lines = [re.split(r" {2,}", line.strip())[0] for line in out.splitlines() if line.startswith("  gfor ")]
+    lines = [
+        re.split(r" {2,}", line.strip())[0]
+        for line in out.splitlines()
+        if line.startswith("  gfor ")
+    ]
     assert out.count("?\n") >= 4
     assert len(lines) >= 15
     assert len(out.splitlines()) <= 36
@@ -145,7 +155,10 @@ def test_modes_as_json(gfor):
         factors = [entry["factor"] for entry in mode["participation"]]
         assert factors == sorted(factors, reverse=True)
         assert 0.9 < sum(factors) < 1.0001
-        assert all(entry["state"].split(".")[0] in ("gfor", "sg1", "sg2", "grid") for entry in mode["participation"])
+        assert all(
+            entry["state"].split(".")[0] in ("gfor", "sg1", "sg2", "grid")
+            for entry in mode["participation"]
+        )
     (electromechanical,) = [mode for mode in modes if mode["name"] == "electromechanical"]
     assert electromechanical["frequency_hz"] == pytest.approx(0.58, abs=0.02)
     assert electromechanical["participation"][0]["state"] == "sg1.machine.omega"
@@ -161,7 +174,9 @@ def test_a_range_of_frequencies(gfor):
 
 
 def test_modes_as_a_table_with_overrides_and_a_step(gfor):
-    code, out, err = gfor("modes", "two_area", "--scenario", "base", "--set", "grid.X_L=0.3", "--step", "200 us")
+    code, out, err = gfor(
+        "modes", "two_area", "--scenario", "base", "--set", "grid.X_L=0.3", "--step", "200 us"
+    )
     assert (code, err) == (0, "")
     assert "Base (only SG): 35 states" in out
     assert "sg1.machine.omega" in out
@@ -178,24 +193,51 @@ def test_modes_as_a_table_with_overrides_and_a_step(gfor):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--set", "X_L"], "argument --set: 'X_L' is not of the form component.parameter=value, such as grid.X_L=0.2"),
-        (["--set", "X_L=3"], "argument --set: 'X_L=3' is not of the form component.parameter=value"),
+        (
+            ["--set", "X_L"],
+            "argument --set: 'X_L' is not of the form component.parameter=value, such as grid.X_L=0.2",
+        ),
+        (
+            ["--set", "X_L=3"],
+            "argument --set: 'X_L=3' is not of the form component.parameter=value",
+        ),
         (["--set", "grid.X_L="], "argument --set: 'grid.X_L=' is not of the form"),
-        (["--set", "grid.X_M=1"], "--set grid.X_M: component 'grid' has no variable 'X_M'; did you mean X_L"),
-        (["--set", "net.X_L=1"], "--set net.X_L: there is no component 'net'; the case has: gfor, sg1, sg2, grid"),
+        (
+            ["--set", "grid.X_M=1"],
+            "--set grid.X_M: component 'grid' has no variable 'X_M'; did you mean X_L",
+        ),
+        (
+            ["--set", "net.X_L=1"],
+            "--set net.X_L: there is no component 'net'; the case has: gfor, sg1, sg2, grid",
+        ),
         (["--set", "grid.X_L=1 MW"], "--set grid.X_L: X_L: '1 MW' is in MW, but pu is needed"),
         (["--set", "grid.X_L=-1"], "--set grid.X_L: X_L = -1 pu; it must be at least 1e-05 pu"),
         (["--set", "grid.X_L=true"], "--set grid.X_L: X_L = True; it must be a number"),
-        (["--set", "gfor.pod_p.enabled=2"], "--set gfor.pod_p.enabled: pod_p.enabled = 2.0; it must be true or false"),
-        (["--set", "sg1.omega=1"], "--set sg1.omega: omega is of causality output; only parameters and inputs"),
-        (["--range", "2:1"], "argument --range: '2:1' is not a range; write LO:HI in Hz with 0 ≤ LO < HI, such as"),
+        (
+            ["--set", "gfor.pod_p.enabled=2"],
+            "--set gfor.pod_p.enabled: pod_p.enabled = 2.0; it must be true or false",
+        ),
+        (
+            ["--set", "sg1.omega=1"],
+            "--set sg1.omega: omega is of causality output; only parameters and inputs",
+        ),
+        (
+            ["--range", "2:1"],
+            "argument --range: '2:1' is not a range; write LO:HI in Hz with 0 ≤ LO < HI, such as",
+        ),
         (["--range", "1"], "argument --range: '1' is not a range"),
         (["--range", "a:b"], "argument --range: 'a:b' is not a range"),
         (["--range", "nan:1"], "argument --range: 'nan:1' is not a range"),
         (["--step", "0"], "argument --step: '0' must exceed 0"),
         (["--step", "1 MW"], "argument --step: '1 MW' is in MW, but s is needed"),
-        (["--step", "0.3 ms"], "is not a communication point; with steps of 0.0003 s the nearest is"),
-        (["--scenario", "none"], "there is no scenario 'none'; the case has: base, gfor, pod_p, pod_q, pod_pq"),
+        (
+            ["--step", "0.3 ms"],
+            "is not a communication point; with steps of 0.0003 s the nearest is",
+        ),
+        (
+            ["--scenario", "none"],
+            "there is no scenario 'none'; the case has: base, gfor, pod_p, pod_q, pod_pq",
+        ),
         (["--frequency", "1"], "unrecognized arguments: --frequency 1"),
     ],
 )
@@ -216,8 +258,9 @@ def test_a_folder_that_cannot_be_written(refused, tmp_path):
 
 
 def test_an_unknown_case(refused, tmp_path):
-    assert "error: none: there is no such file, nor a built-in case of that name; built-in: " in refused(
-        "modes", "none"
+    assert (
+        "error: none: there is no such file, nor a built-in case of that name; built-in: "
+        in refused("modes", "none")
     )
     assert "none.toml: there is no such file" in refused("run", tmp_path / "none.toml")
 
@@ -267,7 +310,9 @@ def test_build_of_a_model_that_needs_a_network(refused, tmp_path):
 
 
 def test_build_for_an_unknown_platform(refused, tmp_path):
-    assert "invalid choice: 'amiga'" in refused("fmu", "build", "gfor", "--dest", tmp_path, "--platform", "amiga")
+    assert "invalid choice: 'amiga'" in refused(
+        "fmu", "build", "gfor", "--dest", tmp_path, "--platform", "amiga"
+    )
 
 
 @pytest.fixture
@@ -279,7 +324,9 @@ def damaged(tmp_path):
         with zipfile.ZipFile(small_fmu("gain").path) as good, zipfile.ZipFile(path, "w") as bad:
             for name in filter(keep, good.namelist()):
                 content = good.read(name)
-                bad.writestr(name, change(content.decode()) if name == "modelDescription.xml" else content)
+                bad.writestr(
+                    name, change(content.decode()) if name == "modelDescription.xml" else content
+                )
         return path
 
     return write
@@ -294,19 +341,24 @@ def test_info_on_a_file_that_is_not_an_archive(refused, tmp_path):
 
 def test_info_on_an_archive_without_a_model_description(refused, damaged):
     path = damaged(keep=lambda name: name != "modelDescription.xml")
-    assert "damaged.fmu: the archive has no modelDescription.xml at its top" in refused("fmu", "info", path)
+    assert "damaged.fmu: the archive has no modelDescription.xml at its top" in refused(
+        "fmu", "info", path
+    )
 
 
 def test_info_on_another_fmi_version(refused, damaged):
     path = damaged(lambda text: text.replace('fmiVersion="2.0"', 'fmiVersion="1.0"'))
-    assert "it is an FMU of FMI 1.0; this master runs co-simulation of FMI 2.0 and 3.0" in refused("fmu", "info", path)
+    assert "it is an FMU of FMI 1.0; this master runs co-simulation of FMI 2.0 and 3.0" in refused(
+        "fmu", "info", path
+    )
 
 
 def test_info_on_model_exchange_only(refused, damaged):
     exchange = '<ModelExchange modelIdentifier="small_gain" />'
     path = damaged(lambda text: re.sub(r"<CoSimulation .*?/>", exchange, text, flags=re.DOTALL))
-    assert "it is not an FMU for co-simulation (for Model Exchange only), which this master needs" in refused(
-        "fmu", "info", path
+    assert (
+        "it is not an FMU for co-simulation (for Model Exchange only), which this master needs"
+        in refused("fmu", "info", path)
     )
 
 
@@ -320,8 +372,12 @@ def test_info_on_an_fmu_for_other_platforms(gfor, refused, damaged, monkeypatch)
     path = damaged(keep=lambda name: not name.startswith(f"binaries/{fmpy.platform}/"))
     code, out, _ = gfor("fmu", "info", path)
     assert code == 0
-    assert f"It cannot run here: it has no binary for this platform ({fmpy.platform})" in " ".join(out.split())
-    assert f"it has no binary for this platform ({fmpy.platform}), only for: " in refused("fmu", "bind", path)
+    assert f"It cannot run here: it has no binary for this platform ({fmpy.platform})" in " ".join(
+        out.split()
+    )
+    assert f"it has no binary for this platform ({fmpy.platform}), only for: " in refused(
+        "fmu", "bind", path
+    )
 
 
 # -- run -------------------------------------------------------------------------------------------
@@ -333,7 +389,10 @@ def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run") / "results"
     command = ["run", "two_area", "--stop", "0.2", "--scenario", "pod_p", "--out", str(folder)]
     done = subprocess.run(
-        [sys.executable, "-m", "orchestrator.cli", *command], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "orchestrator.cli", *command],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0
     (question,) = done.stderr.splitlines()
@@ -389,7 +448,10 @@ def test_plots_tables_and_the_case_itself_are_left_in_the_folder(results):
     [
         (("--threads", "0"), "'0' is not a whole number from 1 to 64"),
         (("--threads", "65"), "'65' is not a whole number from 1 to 64"),
-        (("--threads", "2", "--like", "libcosim"), "--like steps as another master does, on one thread"),
+        (
+            ("--threads", "2", "--like", "libcosim"),
+            "--like steps as another master does, on one thread",
+        ),
     ],
 )
 def test_threads_that_cannot_be_had_are_refused(gfor, words, said):
@@ -405,7 +467,9 @@ def test_summary_and_tables_show_the_same_mode(results):
     assert scenario["residual"] <= 1e-9
     assert 0 < scenario["share_in_fmus"] <= 1
     assert scenario["steps_per_second"] > 100
-    assert scenario["real_time_factor"] == pytest.approx(scenario["steps_per_second"] * scenario["step_size_s"])
+    assert scenario["real_time_factor"] == pytest.approx(
+        scenario["steps_per_second"] * scenario["step_size_s"]
+    )
     assert scenario["threads"] == 1
     assert "× real time" in printed
     assert "(Python-backed); with --native several threads can." in " ".join(printed.split())
@@ -452,7 +516,10 @@ def test_a_component_that_fails_in_the_middle(gfor, tmp_path):
     code, out, err = gfor("run", small_case(tmp_path, KICK), "--workers", 1, "--out", folder)
     assert code == 1
     assert "Traceback" not in out + err
-    found = re.search(r"error: scenario 'one': component 'burst' at t = (\S+) s: fmi2DoStep returned \w+: (.*)", err)
+    found = re.search(
+        r"error: scenario 'one': component 'burst' at t = (\S+) s: fmi2DoStep returned \w+: (.*)",
+        err,
+    )
     assert float(found.group(1)) == pytest.approx(0.05 + np.pi / 20, abs=2e-3)
     assert "burst: state x is no longer finite" in found.group(2)
     assert f"What was computed until then is in {folder}" in err
@@ -471,11 +538,16 @@ def test_a_component_that_fails_in_the_middle(gfor, tmp_path):
 
 
 def test_the_summary_as_json_is_all_that_is_printed(gfor, tmp_path):
-    code, out, err = gfor("run", small_case(tmp_path, ""), "--json", "--out", tmp_path / "out", "--stop", "20 ms")
+    code, out, err = gfor(
+        "run", small_case(tmp_path, ""), "--json", "--out", tmp_path / "out", "--stop", "20 ms"
+    )
     assert (code, err) == (0, "")
     summary = json.loads(out)
     assert [scenario["name"] for scenario in summary] == ["one", "two"]
-    assert json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["scenarios"] == summary
+    assert (
+        json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["scenarios"]
+        == summary
+    )
 
 
 def test_without_a_folder_results_go_below_the_current_one(gfor, tmp_path, monkeypatch):
@@ -488,13 +560,19 @@ def test_without_a_folder_results_go_below_the_current_one(gfor, tmp_path, monke
 
 def test_modes_leaves_participation_shapes_and_plots(gfor, tmp_path):
     folder = tmp_path / "modes"
-    code, out, _ = gfor("modes", "two_area", "--scenario", "base", "--scenario", "pod_p", "--out", folder)
+    code, out, _ = gfor(
+        "modes", "two_area", "--scenario", "base", "--scenario", "pod_p", "--out", folder
+    )
     assert code == 0
     assert "area_1" in out
     for name in ("eigenvalues.png", "participation.png", "mode_shapes.png"):
         assert (folder / name).stat().st_size > 5_000
     with (folder / "participation.csv").open(encoding="utf-8") as file:
-        rows = [r for r in csv.DictReader(file) if r["scenario"] == "base" and r["name"] == "electromechanical"]
+        rows = [
+            r
+            for r in csv.DictReader(file)
+            if r["scenario"] == "base" and r["name"] == "electromechanical"
+        ]
     by = {
         kind: {r["element"]: float(r["participation"]) for r in rows if r["of"] == kind}
         for kind in ("component", "area")
@@ -502,13 +580,25 @@ def test_modes_leaves_participation_shapes_and_plots(gfor, tmp_path):
     assert by["component"]["sg1"] > by["component"]["sg2"] > 0.2
     assert by["area"]["area_1"] == pytest.approx(by["component"]["sg1"], rel=1e-5)
     with (folder / "mode_shapes.csv").open(encoding="utf-8") as file:
-        shape = {r["state"]: r for r in csv.DictReader(file) if r["scenario"] == "base" and r["name"]}
+        shape = {
+            r["state"]: r for r in csv.DictReader(file) if r["scenario"] == "base" and r["name"]
+        }
     assert float(shape["sg1.machine.omega"]["magnitude"]) == 1
     assert abs(float(shape["sg2.machine.omega"]["angle [deg]"])) > 150
 
 
 def test_critical_modes_alone(gfor):
-    code, out, _ = gfor("modes", "two_area", "--scenario", "gfor", "--scenario", "pod_p", "--critical", "15", "--json")
+    code, out, _ = gfor(
+        "modes",
+        "two_area",
+        "--scenario",
+        "gfor",
+        "--scenario",
+        "pod_p",
+        "--critical",
+        "15",
+        "--json",
+    )
     assert code == 0
     with_pod_off, with_pod_on = json.loads(out)["scenarios"]
     (mode,) = with_pod_off["modes"]

@@ -21,7 +21,9 @@ def save(folder, eigenvalue, offset=0.0, times=TIMES, **attributes):
         "b.omega": ("time", np.ones_like(times) + offset, {"units": "pu"}),
     }
     folder.mkdir()
-    xr.Dataset(data, {"time": times}, attributes).to_netcdf(folder / "trajectory.nc", engine="scipy")
+    xr.Dataset(data, {"time": times}, attributes).to_netcdf(
+        folder / "trajectory.nc", engine="scipy"
+    )
     return folder
 
 
@@ -32,7 +34,18 @@ def runs(tmp_path):
 
 def test_two_runs_side_by_side(runs, capsys):
     assert (
-        main(["signal", "compare", *map(str, runs), "--signal", "a.omega - b.omega", "--signal", "b.omega", "--json"])
+        main(
+            [
+                "signal",
+                "compare",
+                *map(str, runs),
+                "--signal",
+                "a.omega - b.omega",
+                "--signal",
+                "b.omega",
+                "--json",
+            ]
+        )
         == 0
     )
     ring, still = json.loads(capsys.readouterr().out)
@@ -62,9 +75,16 @@ def test_runs_of_two_cases_are_told(tmp_path, gfor):
 
 
 def test_runs_of_a_network_that_was_edited_between_are_told(tmp_path, gfor):
-    made_of = [json.dumps({"own.raw": "1a", "own.dyr": content, f"{content}.fmu": content}) for content in "abb"]
-    one, other, same = (save(tmp_path / f"r{k}", -0.3 + 4j, inputs=text) for k, text in enumerate(made_of))
-    assert "of files that differ: own.dyr" in " ".join(gfor("signal", "compare", one, other)[2].split())
+    made_of = [
+        json.dumps({"own.raw": "1a", "own.dyr": content, f"{content}.fmu": content})
+        for content in "abb"
+    ]
+    one, other, same = (
+        save(tmp_path / f"r{k}", -0.3 + 4j, inputs=text) for k, text in enumerate(made_of)
+    )
+    assert "of files that differ: own.dyr" in " ".join(
+        gfor("signal", "compare", one, other)[2].split()
+    )
     assert "differ" not in gfor("signal", "compare", other, same)[2]
 
 
@@ -89,7 +109,9 @@ def test_what_cannot_be_compared_is_said(runs, arguments, word, capsys):
     assert word in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("command", [["signal", "compare", "{0}", "{1}"], ["signal", "identify", "{0}", "a.omega"]])
+@pytest.mark.parametrize(
+    "command", [["signal", "compare", "{0}", "{1}"], ["signal", "identify", "{0}", "a.omega"]]
+)
 @pytest.mark.parametrize(
     ("start", "words"),
     [
@@ -109,7 +131,8 @@ def test_a_start_that_leaves_nothing_is_refused(runs, gfor, command, start, word
 def test_a_start_may_have_a_unit_and_be_the_beginning(runs, gfor):
     for start, same in (("1200 ms", "1.2"), ("0 s", "0")):
         printed = [
-            gfor("signal", "identify", runs[0], "a.omega", "--start", text, "--json")[1] for text in (start, same)
+            gfor("signal", "identify", runs[0], "a.omega", "--start", text, "--json")[1]
+            for text in (start, same)
         ]
         assert printed[0] == printed[1]
         assert json.loads(printed[0])
@@ -131,13 +154,20 @@ def test_other_intervals_and_short_runs_are_said(runs, gfor, tmp_path):
     code, out, err = gfor("signal", "compare", runs[0], short, "--json")
     assert code == 0
     assert [c["modes"][1] for c in json.loads(out)] == [None, None]
-    assert "short ends at t = 1.49 s: its oscillations, which are read from t = 2 s on, are not shown" in err
+    assert (
+        "short ends at t = 1.49 s: its oscillations, which are read from t = 2 s on, are not shown"
+        in err
+    )
 
 
 @pytest.mark.parametrize(("interval", "near"), [(0.01, False), (1.0, True)])
 def test_identify_says_what_the_records_can_show(tmp_path, capsys, interval, near):
     """0.5733 Hz, recorded every second, appears at 0.4267 Hz."""
-    run = str(save(tmp_path / "run", complex(-0.02, 2 * np.pi * 0.5733), times=np.arange(0, 100, interval)))
+    run = str(
+        save(
+            tmp_path / "run", complex(-0.02, 2 * np.pi * 0.5733), times=np.arange(0, 100, interval)
+        )
+    )
     assert main(["signal", "identify", run, "a.omega"]) == 0
     out = capsys.readouterr().out
     assert ("0.4267" in out) == near
@@ -149,7 +179,11 @@ def test_identify_says_what_the_records_can_show(tmp_path, capsys, interval, nea
     assert isinstance(json.loads(captured.out), list)
     assert "show nothing above" in captured.err
     assert "time in ms" not in captured.err
-    in_ms = save(tmp_path / "ms", complex(-0.02, 2 * np.pi * 0.5733) / 1e3, times=1e3 * np.arange(0, 100, interval))
+    in_ms = save(
+        tmp_path / "ms",
+        complex(-0.02, 2 * np.pi * 0.5733) / 1e3,
+        times=1e3 * np.arange(0, 100, interval),
+    )
     assert main(["signal", "identify", str(in_ms), "a.omega"]) == 0
     assert "Is the time in ms?" in capsys.readouterr().out
 
@@ -161,8 +195,13 @@ def test_a_ring_down_that_is_recorded_too_coarsely_is_left_out(tmp_path, interva
     ring_down = SimpleNamespace(signal="a.omega", start=2.0)
     case = SimpleNamespace(table=SimpleNamespace(analysis=SimpleNamespace(ring_down=ring_down)))
     prepared = SimpleNamespace(case=case, events=())
-    modes = SimpleNamespace(prepared=prepared, electromechanical=SimpleNamespace(eigenvalue=value, frequency_hz=0.5733))
+    modes = SimpleNamespace(
+        prepared=prepared, electromechanical=SimpleNamespace(eigenvalue=value, frequency_hz=0.5733)
+    )
     with xr.open_dataset(folder / "trajectory.nc", engine="scipy") as data:
         seen, why = ring_down_of(modes, data, [])
-    assert (seen is not None, "no ring-down is shown: a.omega is known every" in why) == (shown, not shown)
+    assert (seen is not None, "no ring-down is shown: a.omega is known every" in why) == (
+        shown,
+        not shown,
+    )
     assert seen is None or seen.frequency_hz == pytest.approx(0.5733, abs=1e-3)

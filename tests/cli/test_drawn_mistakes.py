@@ -12,19 +12,29 @@ from orchestrator.errors import InputError
 
 @pytest.mark.parametrize("given", ["fmu", "dll", "binding"])
 def test_a_device_needs_a_place(given):
-    options = Namespace(fmu=None, dll=None, binding=None, converter=None, models=None, out=None, files=[Path("a.raw")])
+    options = Namespace(
+        fmu=None,
+        dll=None,
+        binding=None,
+        converter=None,
+        models=None,
+        out=None,
+        files=[Path("a.raw")],
+    )
     setattr(options, given, Path("vendor.file"))
     with pytest.raises(InputError, match="are for a converter; say where by --converter"):
         new._wanted(options)
 
 
 @pytest.mark.parametrize(
-    ("checkpoint", "required", "said"), [(5.0, False, "told"), (None, True, "refused"), (5.0, True, "refused"),
-                                         (None, False, "")]
-)  # fmt: skip
+    ("checkpoint", "required", "said"),
+    [(5.0, False, "told"), (None, True, "refused"), (5.0, True, "refused"), (None, False, "")],
+)
 def test_what_cannot_be_resumed_is_told_before_the_run(monkeypatch, checkpoint, required, said):
     told = []
-    monkeypatch.setattr(checkpoints, "not_kept", lambda prepared: {"vendor": "it cannot serialise its state"})
+    monkeypatch.setattr(
+        checkpoints, "not_kept", lambda prepared: {"vendor": "it cannot serialise its state"}
+    )
     monkeypatch.setattr(checkpoints, "warn", lambda name, texts: told.extend(texts))
     plan = SimpleNamespace(description=SimpleNamespace(path=Path("vendor.fmu")))
     scenario = SimpleNamespace(name="base", system=SimpleNamespace(components={"vendor": plan}))

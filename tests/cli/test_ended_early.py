@@ -41,7 +41,9 @@ def test_everything_that_reads_it_says_so(gfor, folders):
     assert about["ended_early"].startswith("interrupted at t = 2.6")
     with xr.open_dataset(whole / "dip" / "trajectory.nc") as data:
         assert "ended_early" not in data.attrs
-    assert "ended_early" not in json.loads((whole / "dip" / "manifest.json").read_text(encoding="utf-8"))
+    assert "ended_early" not in json.loads(
+        (whole / "dip" / "manifest.json").read_text(encoding="utf-8")
+    )
     early = "its run ended early, at t = 2.6"
     for words in (
         ("signal", "identify", cut / "dip", "gfor.omega", "--start", "1.2"),
@@ -51,7 +53,9 @@ def test_everything_that_reads_it_says_so(gfor, folders):
         code, _, error = gfor(*words)
         assert code == 0, error
         assert early in " ".join(error.split()), words
-    assert "ends at t = 3 s, and" in " ".join(gfor("signal", "compare", whole / "dip", cut / "dip")[2].split())
+    assert "ends at t = 3 s, and" in " ".join(
+        gfor("signal", "compare", whole / "dip", cut / "dip")[2].split()
+    )
     for words in (
         ("signal", "identify", whole / "dip", "gfor.omega", "--start", "1.2"),
         ("signal", "compare", whole / "dip", whole / "dip"),
@@ -65,7 +69,10 @@ def test_in_python(folders):
     whole, cut = folders
     with pytest.warns(ResultsWarning, match="ended early"):
         gfor_api.identify(cut / "dip", "gfor.omega", start=1.2)
-    with pytest.warns(ResultsWarning, match="ended early"), pytest.warns(ResultsWarning, match="ends at t = 3 s"):
+    with (
+        pytest.warns(ResultsWarning, match="ended early"),
+        pytest.warns(ResultsWarning, match="ends at t = 3 s"),
+    ):
         gfor_api.compare(whole / "dip", cut / "dip")
     scenario = gfor_api.load("infinite_bus").scenario("dip")
     with warnings.catch_warnings():

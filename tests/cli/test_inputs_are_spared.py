@@ -18,7 +18,13 @@ DESIGN = ("design", "case.toml", "--controller", "pod_p")
 @pytest.fixture
 def files(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    texts = {"case.toml": CASE, "net.raw": "0, 100 /", "own.toml": "[set]\n", "points.csv": "name\na\n", "rec.csv": "t"}
+    texts = {
+        "case.toml": CASE,
+        "net.raw": "0, 100 /",
+        "own.toml": "[set]\n",
+        "points.csv": "name\na\n",
+        "rec.csv": "t",
+    }
     for name, text in texts.items():
         (tmp_path / name).write_text(text)
     yield
@@ -36,7 +42,7 @@ def files(tmp_path, monkeypatch):
         (["signal", "source", "rec.csv", "--html", "rec.csv"], "rec.csv"),
         (["certify", "rec.csv", "--code", "miso", "--into", "rec.csv"], "rec.csv"),
     ],
-)  # fmt: skip
+)
 def test_a_file_that_is_read_is_not_written_over(gfor, files, tmp_path, arguments, spared):
     (tmp_path / "link.toml").symlink_to("own.toml")
     code, out, err = gfor(*arguments)
@@ -118,11 +124,18 @@ def put(folder, run, **files):
 
 def test_what_was_computed_stays_beside_a_file_that_is_in_its_way(tmp_path):
     (tmp_path / "modes.csv").write_text("mine")
-    with pytest.raises(InputError, match=r"modes\.csv: .*no command has written it; the results are in .*one"):
+    with pytest.raises(
+        InputError, match=r"modes\.csv: .*no command has written it; the results are in .*one"
+    ):
         put(tmp_path, "one", modes="new", other="new")
     assert (tmp_path / "modes.csv").read_text() == "mine"
-    assert {path.name for path in (tmp_path / "one").iterdir()} == {"modes.csv", "other.csv", MANIFEST}
-    (tmp_path / "one").rename(tmp_path / ".part-one")  # as if it had been killed while it put its files there
+    assert {path.name for path in (tmp_path / "one").iterdir()} == {
+        "modes.csv",
+        "other.csv",
+        MANIFEST,
+    }
+    # as if it had been killed while it put its files there
+    (tmp_path / "one").rename(tmp_path / ".part-one")
     for text in ("new", "newer"):
         put(tmp_path, text, modes=text)
     assert (tmp_path / "modes.csv").read_text() == "newer"
@@ -141,11 +154,15 @@ def test_a_case_that_was_edited_since_is_told_in_a_report(gfor, study, tmp_path)
     assert "not as they were" not in gfor("report", "r")[2]
     with (tmp_path / "own.toml").open("a") as file:
         file.write("# another one\n")
-    assert "not as they were when results were made of them: own.toml (of r)" in gfor("report", "r")[2]
+    assert (
+        "not as they were when results were made of them: own.toml (of r)" in gfor("report", "r")[2]
+    )
     assert "make the results again" in (tmp_path / "r/report.html").read_text()
 
 
-def test_another_file_of_that_name_where_a_report_is_made_is_no_input(gfor, study, tmp_path, monkeypatch):
+def test_another_file_of_that_name_where_a_report_is_made_is_no_input(
+    gfor, study, tmp_path, monkeypatch
+):
     gfor(*study, "--out", "r")
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")

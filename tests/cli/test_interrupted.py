@@ -16,7 +16,16 @@ from orchestrator.points.study import PointStudy
 from orchestrator.study import run as study
 
 RUN = ("run", "infinite_bus", "--scenario", "dip", "--stop", "1.3")
-SWEEP = ("sweep", "infinite_bus", "--scenario", "dip", "--vary", "gfor.P_0=0.4,0.6", "--workers", "1")
+SWEEP = (
+    "sweep",
+    "infinite_bus",
+    "--scenario",
+    "dip",
+    "--vary",
+    "gfor.P_0=0.4,0.6",
+    "--workers",
+    "1",
+)
 
 
 def interrupts(*_, **__):
@@ -26,8 +35,13 @@ def interrupts(*_, **__):
 def resumed(gfor, said):
     """Do what the last line advises."""
     advice = said.splitlines()[-1]
-    words = shlex.split(advice[advice.index("gfor run --resume") : advice.index(" begins") if " begins" in advice else
-                               advice.index(" goes on")])  # fmt: skip
+    words = shlex.split(
+        advice[
+            advice.index("gfor run --resume") : advice.index(" begins")
+            if " begins" in advice
+            else advice.index(" goes on")
+        ]
+    )
     code, _, error = gfor(*words[1:])
     return code, error
 
@@ -95,8 +109,12 @@ def test_the_interval_of_the_checkpoints_is_kept(gfor, tmp_path, monkeypatch):
     monkeypatch.setattr(Checkpoints, "__init__", noted)
     with monkeypatch.context() as planted:
         planted.setattr(study, "modes_of", interrupts)
-        for words in ((*RUN, "--checkpoint", "7", "--out"), ("run", "--resume"), ("run", "--checkpoint", "5",
-                      "--resume"), ("run", "--resume")):  # fmt: skip
+        for words in (
+            (*RUN, "--checkpoint", "7", "--out"),
+            ("run", "--resume"),
+            ("run", "--checkpoint", "5", "--resume"),
+            ("run", "--resume"),
+        ):
             assert gfor(*words, tmp_path)[0] == 130
     assert gfor("run", "--resume", tmp_path)[0] == 0
     assert seen == [7, 7, 5, 5, 5]

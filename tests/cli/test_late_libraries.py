@@ -20,5 +20,7 @@ def test_modes_from_kept_fmus_import_no_heavy_library(case, gfor):
         f"assert main(['modes', {case!r}, '--scenario', 'base']) == 0\n"
         f"found = {HEAVY!r} & set(sys.modules)\nassert not found, found"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, cwd=ROOT)
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False, cwd=ROOT
+    )
     assert done.returncode == 0, done.stderr

@@ -13,7 +13,18 @@ from orchestrator.cli import main
 
 
 def test_the_files_hold_the_model_with_its_names(tmp_path, capsys):
-    code = main(["export", "linear", "two_area", "--scenario", "gfor", "--continuous", "--out", str(tmp_path)])
+    code = main(
+        [
+            "export",
+            "linear",
+            "two_area",
+            "--scenario",
+            "gfor",
+            "--continuous",
+            "--out",
+            str(tmp_path),
+        ]
+    )
     assert code == 0
     assert "62 states, 1 inputs, 7 outputs" in capsys.readouterr().out
     content = scipy.io.loadmat(tmp_path / "gfor" / "linear_model.mat", simplify_cells=True)
@@ -31,7 +42,9 @@ def test_the_files_hold_the_model_with_its_names(tmp_path, capsys):
 
 def test_the_exported_model_answers_as_the_simulation_does(tmp_path, capsys):
     folder = tmp_path / "out"
-    code = main(["run", "two_area", "--scenario", "gfor", "--linear", "--stop", "6", "--out", str(folder)])
+    code = main(
+        ["run", "two_area", "--scenario", "gfor", "--linear", "--stop", "6", "--out", str(folder)]
+    )
     assert code == 0
     assert "Linear model against the simulation" in capsys.readouterr().out
     (scenario,) = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["scenarios"]
@@ -50,7 +63,9 @@ def test_a_continuous_and_a_stepped_model_answer_alike():
     A, B = np.array([[-2.0]]), np.array([[3.0]])
     H = 1e-3
     names = (("x",), ("u",), ("y",))
-    stepped = StateSpace(np.exp(A * H), (np.exp(-2 * H) - 1) / -2 * B, np.eye(1), np.zeros((1, 1)), *names, H)
+    stepped = StateSpace(
+        np.exp(A * H), (np.exp(-2 * H) - 1) / -2 * B, np.eye(1), np.zeros((1, 1)), *names, H
+    )
     whole = StateSpace(A, B, np.eye(1), np.zeros((1, 1)), *names, None)
     times = 0.004 + 0.01 * np.arange(100)
     exact = 1.5 * (1 - np.exp(-2 * times))
@@ -63,7 +78,10 @@ def test_a_continuous_and_a_stepped_model_answer_alike():
     [
         (["export", "linear", "two_area", "--input", "sg1.S_n"], "fixed parameter"),
         (["export", "linear", "two_area", "--output", "sg1.speed"], "no variable 'sg1.speed'"),
-        (["run", "two_area", "--linear", "--stop", "0.5"], "no event that a linear model could answer to"),
+        (
+            ["run", "two_area", "--linear", "--stop", "0.5"],
+            "no event that a linear model could answer to",
+        ),
     ],
 )
 def test_what_cannot_be_linear_is_said(arguments, word, tmp_path, capsys):
@@ -73,6 +91,8 @@ def test_what_cannot_be_linear_is_said(arguments, word, tmp_path, capsys):
 
 def test_a_parameter_at_its_bound_is_perturbed_to_the_other_side(gfor, tmp_path):
     """The dip's depth is 0, and may not be less."""
-    code, shown, said = gfor("export", "linear", "infinite_bus", "--scenario", "dip", "--out", str(tmp_path))
+    code, shown, said = gfor(
+        "export", "linear", "infinite_bus", "--scenario", "dip", "--out", str(tmp_path)
+    )
     assert (code, said) == (0, "")
     assert "1 inputs" in shown

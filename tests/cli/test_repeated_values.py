@@ -15,9 +15,15 @@ from orchestrator.screening.request import ScreeningRequest
 @pytest.mark.parametrize(
     ("given", "found"),
     [
-        ([("gfor.P_0", 0.5), ("gf*.P_0", 0.2), ("gfor.P_0", 0.5)], [("gf*.P_0", 0.2), ("gfor.P_0", 0.5)]),
+        (
+            [("gfor.P_0", 0.5), ("gf*.P_0", 0.2), ("gfor.P_0", 0.5)],
+            [("gf*.P_0", 0.2), ("gfor.P_0", 0.5)],
+        ),
         ([("gfor.P_0", 0.5), ("gfor.P_0", 0.4)], [("gfor.P_0", 0.4)]),
-        ([("*.native", True), ("gfor.native", False)], [("*.native", True), ("gfor.native", False)]),
+        (
+            [("*.native", True), ("gfor.native", False)],
+            [("*.native", True), ("gfor.native", False)],
+        ),
     ],
 )
 def test_the_last_of_a_name_takes_the_last_place(given, found):
@@ -27,12 +33,30 @@ def test_the_last_of_a_name_takes_the_last_place(given, found):
 def test_the_last_value_counts_in_a_sweep_and_for_modes(gfor, tmp_path):
     def modes(*texts):
         sets = [word for text in texts for word in ("--set", text)]
-        code, out, _ = gfor("modes", "infinite_bus", "--scenario", "dip", "--range", "0:100", "--json", *sets)
+        code, out, _ = gfor(
+            "modes", "infinite_bus", "--scenario", "dip", "--range", "0:100", "--json", *sets
+        )
         assert code == 0
-        code, swept, _ = gfor("sweep", "infinite_bus", "--scenario", "dip", "--range", "0:100", "--json", *sets,
-                              "--vary", "gfor.pod_p.K=1,2", "--workers", 1, "--out", tmp_path / texts[-1])  # fmt: skip
+        code, swept, _ = gfor(
+            "sweep",
+            "infinite_bus",
+            "--scenario",
+            "dip",
+            "--range",
+            "0:100",
+            "--json",
+            *sets,
+            "--vary",
+            "gfor.pod_p.K=1,2",
+            "--workers",
+            1,
+            "--out",
+            tmp_path / texts[-1],
+        )
         assert code == 0
-        return json.loads(out)["scenarios"][0]["modes"], json.loads(swept)["scenarios"][0]["trajectories"]
+        return json.loads(out)["scenarios"][0]["modes"], json.loads(swept)["scenarios"][0][
+            "trajectories"
+        ]
 
     repeated, alone = modes("gfor.P_0=0.5", "gf*.P_0=0.2", "gfor.P_0=0.5"), modes("gfor.P_0=0.5")
     assert repeated == alone
@@ -46,7 +70,9 @@ def test_an_option_of_one_value_is_refused_a_second_time(gfor):
     ):
         code, _, error = gfor(*words)
         assert code == 2
-        assert f"argument {words[-2]}: it is given twice, and takes one value; give it once" in error
+        assert (
+            f"argument {words[-2]}: it is given twice, and takes one value; give it once" in error
+        )
 
 
 def test_kinds_of_outages_that_are_given_apart_are_all_taken():

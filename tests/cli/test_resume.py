@@ -16,7 +16,9 @@ from orchestrator.cases.case import BUILT_IN
 from orchestrator.cli.checkpoints import StudyCheckpoints
 from orchestrator.results.staging import mend, staged
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no process can be sent these signals there")
+pytestmark = pytest.mark.skipif(
+    sys.platform == "win32", reason="no process can be sent these signals there"
+)
 
 EVENT = """
 [[events]]
@@ -52,9 +54,13 @@ def started(tmp, *words):
     call = [sys.executable, "-m", "orchestrator.cli", "run", *map(str, words)]
     tmp.mkdir(parents=True, exist_ok=True)
     return subprocess.Popen(
-        call, env=os.environ | {"TMPDIR": str(tmp)}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        call,
+        env=os.environ | {"TMPDIR": str(tmp)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
         start_new_session=True,
-    )  # fmt: skip
+    )
 
 
 def finished(tmp, *words):
@@ -73,11 +79,18 @@ def values_of(folder):
     found = {}
     for path in sorted(folder.rglob("*")):
         name = path.relative_to(folder).as_posix()
-        if path.is_dir() or path.name == "manifest.json" or name == ".lock" or DONE_WITH.match(name):
+        if (
+            path.is_dir()
+            or path.name == "manifest.json"
+            or name == ".lock"
+            or DONE_WITH.match(name)
+        ):
             continue
         if path.suffix == ".nc":
             with xr.open_dataset(path) as data:
-                attributes = {key: value for key, value in data.attrs.items() if key not in ("run", "date")}
+                attributes = {
+                    key: value for key, value in data.attrs.items() if key not in ("run", "date")
+                }
                 found[name] = attributes, {str(n): data[n].values.tobytes() for n in data.variables}
         elif path.name == "summary.json":
             found[name] = json.loads(path.read_text(encoding="utf-8"))
@@ -174,11 +187,16 @@ def test_a_run_killed_before_its_first_checkpoint_says_that_it_begins_anew(tmp_p
 def test_an_isolated_fmu_goes_on_in_a_new_process(case, tmp_path):
     text = case.read_text(encoding="utf-8")
     own = tmp_path / "isolated.toml"
-    own.write_text(text.replace("[components.gfor]\n", "[components.gfor]\nisolated = true\n"), encoding="utf-8")
+    own.write_text(
+        text.replace("[components.gfor]\n", "[components.gfor]\nisolated = true\n"),
+        encoding="utf-8",
+    )
     assert own.read_text(encoding="utf-8") != text
     finished(tmp_path / "tmp", own, "--scenario", "pod_p", "--out", tmp_path / "whole")
     out = tmp_path / "out"
-    process = started(tmp_path / "tmp", own, "--scenario", "pod_p", "--out", out, "--checkpoint", "0.05")
+    process = started(
+        tmp_path / "tmp", own, "--scenario", "pod_p", "--out", out, "--checkpoint", "0.05"
+    )
     _, error = stopped_at_random(process, out, 1.0, signal.SIGTERM)
     assert process.returncode == 143, error
     assert list((tmp_path / "tmp").iterdir()) == []
@@ -195,7 +213,10 @@ def test_an_isolated_fmu_goes_on_in_a_new_process(case, tmp_path):
     [
         ((), "the case is missing: gfor run CASE"),
         (("--resume", "{}"), "there is no interrupted run in it"),
-        (("two_area", "--resume", "{}"), "goes on with the run as it was asked for, so CASE cannot go with it"),
+        (
+            ("two_area", "--resume", "{}"),
+            "goes on with the run as it was asked for, so CASE cannot go with it",
+        ),
         (("--resume", "{}", "--set", "a.b=1", "--no-csv"), "so --set, --no-csv cannot go with it"),
         (("--resume", "{}", "--checkpoint", "0"), "so --checkpoint 0 cannot go with it"),
     ],
@@ -216,7 +237,9 @@ def test_a_request_that_cannot_be_read_is_refused(gfor, tmp_path):
 
 
 def test_a_run_that_came_to_its_end_leaves_nothing_to_resume(gfor, tmp_path):
-    code, _, _ = gfor("run", "infinite_bus", "--scenario", "dip", "--stop", "0.1", "--out", tmp_path)
+    code, _, _ = gfor(
+        "run", "infinite_bus", "--scenario", "dip", "--stop", "0.1", "--out", tmp_path
+    )
     assert code == 0
     assert not (tmp_path / ".checkpoints").exists()
 
@@ -224,7 +247,9 @@ def test_a_run_that_came_to_its_end_leaves_nothing_to_resume(gfor, tmp_path):
 def test_fmus_without_serialised_states_are_named_or_refused(gfor, tmp_path, monkeypatch):
     from orchestrator.study import checkpoints  # noqa: PLC0415
 
-    monkeypatch.setattr(checkpoints, "why_not_kept", lambda fmu: "it declares no canSerializeFMUstate")
+    monkeypatch.setattr(
+        checkpoints, "why_not_kept", lambda fmu: "it declares no canSerializeFMUstate"
+    )
     words = ("run", "infinite_bus", "--scenario", "dip", "--stop", "0.1", "--out", tmp_path)
     code, _, error = gfor(*words)
     assert code == 0
@@ -251,7 +276,9 @@ def test_a_signal_while_the_checkpoints_go_finds_the_run_done(gfor, tmp_path, mo
         end(self, whole=whole)
 
     monkeypatch.setattr(StudyCheckpoints, "end", interrupted)
-    code, _, error = gfor("run", "infinite_bus", "--scenario", "dip", "--stop", "0.1", "--out", tmp_path)
+    code, _, error = gfor(
+        "run", "infinite_bus", "--scenario", "dip", "--stop", "0.1", "--out", tmp_path
+    )
     assert code == 0, error
     assert not [path.name for path in tmp_path.iterdir() if path.name.startswith(".")]
 
@@ -263,7 +290,9 @@ def test_what_a_kill_left_before_the_first_rows_goes_with_the_next_start(gfor, t
         folder.mkdir(parents=True)
         if left:
             (folder / left).touch()
-    _, _, error = gfor("run", "infinite_bus", "--scenario", "dip", "--stop", "0.1", "--out", tmp_path)
+    _, _, error = gfor(
+        "run", "infinite_bus", "--scenario", "dip", "--stop", "0.1", "--out", tmp_path
+    )
     assert "that did not end, or still go on: dip.part-20260101T000002-0;" in error
     assert [path.name for path in tmp_path.glob("*.part-*")] == ["dip.part-20260101T000002-0"]
 

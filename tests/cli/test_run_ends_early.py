@@ -14,8 +14,20 @@ from orchestrator.errors import AnalysisError
 from orchestrator.study import run as study
 from orchestrator.study.run import run_scenario
 
-WORDS = ("run", "two_area", "--scenario", "base", "--scenario", "gfor", "--scenario", "pod_p", "--stop", "2",
-         "--workers", "1")  # fmt: skip
+WORDS = (
+    "run",
+    "two_area",
+    "--scenario",
+    "base",
+    "--scenario",
+    "gfor",
+    "--scenario",
+    "pod_p",
+    "--stop",
+    "2",
+    "--workers",
+    "1",
+)
 NEVER = "SG + GFOR; never begun: SG + GFOR POD-P"
 
 
@@ -39,7 +51,11 @@ def test_in_the_middle_of_a_scenario(gfor, monkeypatch, tmp_path, output):
     assert float(whole["time"].max()) == pytest.approx(2.0)
     assert float(part["time"].max()) == pytest.approx(1.6)
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
-    assert summary["ended_early"] == {"word": "interrupted", "place": f"in {NEVER}", "not_begun": ["pod_p"]}
+    assert summary["ended_early"] == {
+        "word": "interrupted",
+        "place": f"in {NEVER}",
+        "not_begun": ["pod_p"],
+    }
     base, other = summary["scenarios"]
     assert (base["failure"], base["interrupted"]) == (None, False)
     assert (other["failure"], other["interrupted"]) == ("interrupted at t = 1.6 s", True)
@@ -71,7 +87,9 @@ def test_between_two_scenarios(gfor, monkeypatch, tmp_path, error, code, said):
     word = "interrupted" if code == 130 else "failed"
     assert printed.startswith(f"{word} in {NEVER.replace(';', ', of which nothing is kept;')}\n")
     assert text.startswith(f"{said}\nWhat was computed until then is in ")
-    assert len(json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["scenarios"]) == 1
+    assert (
+        len(json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["scenarios"]) == 1
+    )
 
 
 def test_before_anything_is_done(gfor, monkeypatch, tmp_path):
@@ -79,7 +97,9 @@ def test_before_anything_is_done(gfor, monkeypatch, tmp_path):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(study, "run_scenario", none)
-    said = f"interrupted: gfor run --resume {tmp_path} begins it again; there was no checkpoint yet\n"
+    said = (
+        f"interrupted: gfor run --resume {tmp_path} begins it again; there was no checkpoint yet\n"
+    )
     assert gfor(*WORDS, "--out", tmp_path) == (130, "", said)
     assert gfor(*WORDS, "--out", tmp_path, "--checkpoint", "0") == (130, "", "interrupted\n")
 
@@ -92,7 +112,9 @@ def test_a_library_in_c_made_another_error_of_the_interrupt(gfor, monkeypatch, t
             raise SystemError("returned a result with an exception set") from interrupt
 
     monkeypatch.setattr(study, "run_scenario", as_h5py_does)
-    said = f"interrupted: gfor run --resume {tmp_path} begins it again; there was no checkpoint yet\n"
+    said = (
+        f"interrupted: gfor run --resume {tmp_path} begins it again; there was no checkpoint yet\n"
+    )
     assert gfor(*WORDS, "--out", tmp_path) == (130, "", said)
 
 
@@ -106,6 +128,10 @@ sys.exit(cli.main())
     (tmp_path / "planted.py").write_text(code, encoding="utf-8")
     call = [sys.executable, "-m", "planted", "modes"]  # of a script, Python forgets the interrupt
     done = subprocess.run(
-        call, capture_output=True, text=True, check=False, env=os.environ | {"PYTHONPATH": str(tmp_path)}
+        call,
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | {"PYTHONPATH": str(tmp_path)},
     )
     assert (done.returncode, done.stderr) == (130, "interrupted\n")

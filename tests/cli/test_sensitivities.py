@@ -9,7 +9,15 @@ import orchestrator as face
 
 
 def test_the_command_prints_and_writes_what_the_interface_gives(gfor, tmp_path):
-    options = ("two_area", "--scenario", "pod_p", "--parameter", "gfor.pod_p.K", "--parameter", "gfor.pod_p.T_S*")
+    options = (
+        "two_area",
+        "--scenario",
+        "pod_p",
+        "--parameter",
+        "gfor.pod_p.K",
+        "--parameter",
+        "gfor.pod_p.T_S*",
+    )
     code, out, _ = gfor("sensitivities", *options, "--json", "--out", tmp_path)
     assert code == 0
     (printed,) = json.loads(out)
@@ -33,7 +41,10 @@ def test_the_command_prints_and_writes_what_the_interface_gives(gfor, tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--mode", "intermachine"], "has no mode of this name; it has: electromechanical, critical"),
+        (
+            ["--mode", "intermachine"],
+            "has no mode of this name; it has: electromechanical, critical",
+        ),
         (["--parameter", "gfor.pod_p.KK"], "did you mean gfor.pod_p.K"),
         (["--parameter", "gfor.pod_p.N_S"], "gfor.pod_p.N_S is of type Integer"),
         (["--parameter", "*.enabled"], "is of type Boolean"),

@@ -13,11 +13,21 @@ import pytest
 from orchestrator.cases.case import BUILT_IN
 from orchestrator.cli import run, side_by_side
 from orchestrator.cli.side_by_side import SideBySide, number_of_workers
-from orchestrator.errors import CaseError, ComponentError, CosimError, ErrorKind, InputError, NotFiniteError, Problem
+from orchestrator.errors import (
+    CaseError,
+    ComponentError,
+    CosimError,
+    ErrorKind,
+    InputError,
+    NotFiniteError,
+    Problem,
+)
 from orchestrator.fmi.interrupts import calls
 from tests.cli.test_resume import checkpoints_in, finished, started, values_of, write_case
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere scenarios run one after the other")
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux", reason="elsewhere scenarios run one after the other"
+)
 
 ERRORS = (
     ComponentError("gfor", "fmi2DoStep", "fmi2Error", "it diverges", 1.5, ErrorKind.HANG),
@@ -53,12 +63,16 @@ def untimed(text, folder):
 def test_all_files_are_those_of_one_after_the_other(tmp_path, own):
     text = (BUILT_IN / "infinite_bus" / "case.toml").read_text(encoding="utf-8")
     case = tmp_path / "case.toml"
-    case.write_text(text.replace("[components.gfor]\n", f"[components.gfor]\n{own}"), encoding="utf-8")
+    case.write_text(
+        text.replace("[components.gfor]\n", f"[components.gfor]\n{own}"), encoding="utf-8"
+    )
     assert own in case.read_text(encoding="utf-8")
     found = []
     for workers in (1, 2):
         out = tmp_path / str(workers)
-        process = started(tmp_path / "tmp", case, "--stop", "1.3", "--linear", "--out", out, "--workers", workers)
+        process = started(
+            tmp_path / "tmp", case, "--stop", "1.3", "--linear", "--out", out, "--workers", workers
+        )
         code, said, error = printed(process)
         assert code == 0, error
         assert list((tmp_path / "tmp").iterdir()) == []
@@ -144,7 +158,9 @@ def case(tmp_path_factory):
 
 
 def copies_of(process):
-    return [int(pid) for pid in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
+    return [
+        int(pid) for pid in Path(f"/proc/{process}/task/{process}/children").read_text().split()
+    ]
 
 
 def outcomes_of(work, workers=2, count=4):
@@ -160,7 +176,9 @@ def test_each_tells_its_progress_and_they_come_in_order():
     def work(index, report):
         report(index, 10)
         time.sleep(0.1 if index == 0 else 0.0)
-        return CosimError(f"number {index} of process {os.getpid()}") if index > 2 else KeyError(index)
+        return (
+            CosimError(f"number {index} of process {os.getpid()}") if index > 2 else KeyError(index)
+        )
 
     outcomes, seen = outcomes_of(work, workers=4)
     assert [index for index, _ in outcomes] == [0, 1, 2, 3]
@@ -211,7 +229,11 @@ def test_an_interrupt_is_passed_on_once():
 
     with calls.terminable(), SideBySide(2, work) as copies:
         outcomes = copies.outcomes(3, interrupt)
-    assert [(index, str(error)) for index, error in outcomes] == [(0, "interrupted"), (1, "interrupted"), (2, "")]
+    assert [(index, str(error)) for index, error in outcomes] == [
+        (0, "interrupted"),
+        (1, "interrupted"),
+        (2, ""),
+    ]
     assert isinstance(outcomes[2][1], KeyboardInterrupt)
 
 
@@ -242,15 +264,22 @@ def test_an_interrupt_when_all_is_done_is_not_lost():
         copies.outcomes(1, lambda *_: os.kill(os.getpid(), signal.SIGINT))
 
 
-@pytest.mark.parametrize(("own", "words", "made"), [
-    ("", (), [2]), ("isolated = true\n", (), []), ("isolated = true\n", ("--workers", 2), [2]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("own", "words", "made"),
+    [
+        ("", (), [2]),
+        ("isolated = true\n", (), []),
+        ("isolated = true\n", ("--workers", 2), [2]),
+    ],
+)
 def test_others_fmus_run_one_scenario_after_the_other_unless_it_is_asked_for(
     gfor, monkeypatch, tmp_path, own, words, made
 ):
     monkeypatch.setattr(side_by_side, "number_of_cores", lambda: 2)
     text = (BUILT_IN / "infinite_bus" / "case.toml").read_text(encoding="utf-8")
-    (tmp_path / "case.toml").write_text(text.replace("[components.gfor]\n", f"[components.gfor]\n{own}"))
+    (tmp_path / "case.toml").write_text(
+        text.replace("[components.gfor]\n", f"[components.gfor]\n{own}")
+    )
     seen = []
 
     class Seen(SideBySide):

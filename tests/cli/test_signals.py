@@ -5,7 +5,9 @@ import sys
 
 import pytest
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="it counts the processor's time of a process")
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux", reason="it counts the processor's time of a process"
+)
 
 
 @pytest.mark.slow

@@ -39,7 +39,9 @@ def test_a_folder_is_called_a_folder(command, tmp_path, capsys):
 
 
 def test_an_fmu_that_cannot_save_its_state_is_told_all_that_linearisation_needs(gallery):
-    with open_component("box", read_description(gallery("converter_without_state")[0]), isolated=False) as component:
+    with open_component(
+        "box", read_description(gallery("converter_without_state")[0]), isolated=False
+    ) as component:
         said = obstacle(component)
     assert "canGetAndSetFMUstate" in said
     assert "continuous states that a master may set" in said
@@ -54,7 +56,10 @@ def test_a_model_that_breaks_a_rule_is_one_error_of_one_line(monkeypatch, tmp_pa
     monkeypatch.setattr(models, "build_model", lambda name: lag())
     assert main(["fmu", "build", "infinite_bus", "--dest", str(tmp_path)]) == 2
     said = capsys.readouterr().err
-    assert "error: model 'infinite_bus' cannot be built: variable 'K' is in pu and names no base" in said
+    assert (
+        "error: model 'infinite_bus' cannot be built: variable 'K' is in pu and names no base"
+        in said
+    )
     assert "Traceback" not in said
 
 
@@ -70,5 +75,7 @@ def test_an_identification_says_what_it_is_doing():
     said = []
     measure(bench_of("gfor"), Excitation(lowest_hz=5.0, lines=10), said.append)
     assert "brought to rest" in said[0]
-    assert [line.rpartition(", ")[2] for line in said[1:]] == [f"run {k} of 4" for k in (1, 2, 3, 4)]
+    assert [line.rpartition(", ")[2] for line in said[1:]] == [
+        f"run {k} of 4" for k in (1, 2, 3, 4)
+    ]
     assert sum("v_re" in line for line in said) == 2

@@ -5,7 +5,18 @@ import shutil
 
 import pytest
 
-WORDS = ("run", "infinite_bus", "--scenario", "dip", "--scenario", "load_step", "--stop", "1.2", "--no-csv", "--linear")
+WORDS = (
+    "run",
+    "infinite_bus",
+    "--scenario",
+    "dip",
+    "--scenario",
+    "load_step",
+    "--stop",
+    "1.2",
+    "--no-csv",
+    "--linear",
+)
 
 
 def test_a_report_refuses_a_manifest_of_another_scenario(gfor, tmp_path):
@@ -16,7 +27,9 @@ def test_a_report_refuses_a_manifest_of_another_scenario(gfor, tmp_path):
     manifest.write_text(json.dumps(content | {"scenario": "load_step"}), encoding="utf-8")
     code, _, error = gfor("report", tmp_path)
     assert code == 2
-    assert "is the recording of scenario 'load_step', and lies in the folder of 'dip'" in " ".join(error.split())
+    assert "is the recording of scenario 'load_step', and lies in the folder of 'dip'" in " ".join(
+        error.split()
+    )
 
 
 @pytest.mark.parametrize("swapped", ["folder", "trajectory.nc", "linear.nc"])
@@ -33,4 +46,6 @@ def test_a_report_refuses_them(gfor, tmp_path, swapped):
         shutil.copy(tmp_path / "load_step" / swapped, tmp_path / "dip" / swapped)
     code, _, error = gfor("report", tmp_path)
     assert code == 2
-    assert "is the recording of scenario 'load_step', and lies in the folder of 'dip'" in " ".join(error.split())
+    assert "is the recording of scenario 'load_step', and lies in the folder of 'dip'" in " ".join(
+        error.split()
+    )

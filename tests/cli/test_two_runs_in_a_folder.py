@@ -26,11 +26,24 @@ SHORT = ("run", "infinite_bus", "--scenario", "dip", "--stop", "0.1")
 @pytest.fixture
 def live(tmp_path):
     """A run that goes on for long in another process, and its folder."""
-    words = ("infinite_bus", "--scenario", "dip", "--stop", "2000", "--checkpoint", "0.1", "--out", tmp_path / "out")
+    words = (
+        "infinite_bus",
+        "--scenario",
+        "dip",
+        "--stop",
+        "2000",
+        "--checkpoint",
+        "0.1",
+        "--out",
+        tmp_path / "out",
+    )
     process = subprocess.Popen(
         [sys.executable, "-m", "orchestrator.cli", "run", *map(str, words)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ | {"TMPDIR": str(tmp_path)},
-    )  # fmt: skip
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"TMPDIR": str(tmp_path)},
+    )
     end = time.monotonic() + 120
     while not checkpoints_in(tmp_path / "out"):
         assert process.poll() is None, process.communicate()
@@ -46,7 +59,11 @@ def live(tmp_path):
 def test_a_live_run_keeps_its_folder(gfor, live):
     process, out = live
     request = (out / ".checkpoints" / "request.json").read_bytes()
-    for words in (("run", "--resume", out), (*SHORT, "--out", out), (*SHORT, "--like", "fmpy_ssp", "--out", out)):
+    for words in (
+        ("run", "--resume", out),
+        (*SHORT, "--out", out),
+        (*SHORT, "--like", "fmpy_ssp", "--out", out),
+    ):
         code, _, error = gfor(*words)
         assert code == 2, words
         assert f"process {process.pid} works in this folder" in error
@@ -77,7 +94,10 @@ def test_a_killed_run_leaves_its_folder_to_the_next(gfor, live):
 
 
 def test_the_lock_is_given_back_after_an_error(tmp_path):
-    with held(tmp_path), pytest.raises(InputError, match=f"process {os.getpid()} works in this folder"):
+    with (
+        held(tmp_path),
+        pytest.raises(InputError, match=f"process {os.getpid()} works in this folder"),
+    ):
         held(tmp_path).__enter__()
     with pytest.raises(ZeroDivisionError), held(tmp_path):
         1 / 0  # noqa: B018
@@ -119,7 +139,11 @@ def test_rows_that_are_not_the_runs_are_not_published(gfor, monkeypatch, tmp_pat
 
 @pytest.mark.parametrize(
     "words",
-    [("report", "{0}"), ("signal", "identify", "{0}/dip", "gfor.omega"), ("signal", "compare", "{0}/dip", "{0}/dip")],
+    [
+        ("report", "{0}"),
+        ("signal", "identify", "{0}/dip", "gfor.omega"),
+        ("signal", "compare", "{0}/dip", "{0}/dip"),
+    ],
 )
 def test_an_empty_recording_is_one_error(gfor, tmp_path, words):
     assert gfor(*SHORT, "--out", tmp_path)[0] == 0
@@ -133,7 +157,9 @@ def test_an_empty_recording_is_one_error(gfor, tmp_path, words):
     assert "nothing was recorded in it" in error
 
 
-@pytest.mark.parametrize("left", ["dip.checkpoint", "dip.previous", "../dip.part-{}/recording/000000000000.nc", ""])
+@pytest.mark.parametrize(
+    "left", ["dip.checkpoint", "dip.previous", "../dip.part-{}/recording/000000000000.nc", ""]
+)
 def test_a_new_run_says_that_it_gives_up_an_interrupted_one(gfor, tmp_path, left):
     """What a run of another id left: a checkpoint, the one before it, rows without a checkpoint, or nothing."""
     request = tmp_path / ".checkpoints" / "request.json"

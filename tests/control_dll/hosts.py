@@ -57,7 +57,9 @@ class ControlHost:
         place = self._at[name]
         kind = np.int32 if DATA_TYPES[place.row.data_type].kind == "Integer" else np.float64
         size = DATA_TYPES[place.row.data_type].size
-        self._parameters[place.offset : place.offset + size] = np.array([value], kind).view(np.uint8)
+        self._parameters[place.offset : place.offset + size] = np.array([value], kind).view(
+            np.uint8
+        )
 
     def call(self, name, time=0.0):
         self.instance.time = time
@@ -86,7 +88,8 @@ class Circuit:
     def __init__(self, e, sample_time, voltage, omega):
         """``voltage`` is the bus's phasor [V, peak of a phase]."""
         L, R, C, D, T, S = (e[name] for name in ("L_c", "R_c", "C_c", "R_cap", "L_t", "R_t"))
-        a = np.zeros((5, 5), complex)  # i_s, u_c, i_g of one phase; the bridge's voltage, held; the bus's, which turns
+        # i_s, u_c, i_g of one phase; the bridge's voltage, held; the bus's, which turns
+        a = np.zeros((5, 5), complex)
         a[0] = [-(R + D) / L, -1 / L, D / L, 1 / L, 0]
         a[1] = [1 / C, 0, -1 / C, 0, 0]
         a[2] = [D / T, 1 / T, -(D + S) / T, 0, -1 / T]
@@ -125,7 +128,18 @@ class Circuit:
 def compiled_host(folder, target, ending=""):
     """The host in C for a machine; by a library's flags, or the compiler would build its C library once more."""
     program = folder / f"host{ending}"
-    compiler = [sys.executable, "-m", "ziglang", "cc", "-target", target, "-O2", "-g0", "-s", "-fno-sanitize=undefined"]
+    compiler = [
+        sys.executable,
+        "-m",
+        "ziglang",
+        "cc",
+        "-target",
+        target,
+        "-O2",
+        "-g0",
+        "-s",
+        "-fno-sanitize=undefined",
+    ]
     subprocess.run([*compiler, str(HOST), "-o", str(program)], check=True, capture_output=True)
     return program
 
@@ -134,8 +148,13 @@ def driven(call, drive, folder, width=8, environment=None):
     """What the host in C wrote and said."""
     (folder / "in.bin").write_bytes(np.ascontiguousarray(drive).tobytes())
     words = [str(word) for word in call]
-    words[words.index("IN")], words[words.index("OUT")] = str(folder / "in.bin"), str(folder / "out.bin")
-    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=300, env=environment)
+    words[words.index("IN")], words[words.index("OUT")] = (
+        str(folder / "in.bin"),
+        str(folder / "out.bin"),
+    )
+    done = subprocess.run(
+        words, capture_output=True, text=True, check=False, timeout=300, env=environment
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return np.frombuffer((folder / "out.bin").read_bytes()).reshape(-1, width), done.stdout
 

@@ -22,10 +22,16 @@ def power(written):
     def run(sample_time, change=lambda u: u, sheet=lambda e: e, **values):
         dll = written(sample_time=sample_time)
         control = ControlHost(dll.libraries["linux64"], **values)
-        circuit = Circuit(sheet(elements(dll.sheet.read_text(encoding="utf-8"))), sample_time, VOLT, OMEGA)
+        circuit = Circuit(
+            sheet(elements(dll.sheet.read_text(encoding="utf-8"))), sample_time, VOLT, OMEGA
+        )
         circuit.begin(1350e6)
         control.inputs[:] = change(circuit.measured())
-        assert [control.call(name) for name in ("FirstCall", "CheckParameters", "Initialize")] == [0, 0, 0]
+        assert [control.call(name) for name in ("FirstCall", "CheckParameters", "Initialize")] == [
+            0,
+            0,
+            0,
+        ]
         found = []
         for k in range(round(END / sample_time)):
             if k == round(JUMP / sample_time):
@@ -85,7 +91,15 @@ def test_the_circuit_starts_at_rest(power):
         {"output_lead": 0.0},
         {"angle_0": 0.01},
     ],
-    ids=["phases swapped", "i_s reversed", "i_s 2 % large", "no R_cap", "L_t 2 % large", "no lead", "angle"],
+    ids=[
+        "phases swapped",
+        "i_s reversed",
+        "i_s 2 % large",
+        "no R_cap",
+        "L_t 2 % large",
+        "no lead",
+        "angle",
+    ],
 )
 def test_a_wrong_connection_shows(power, converter, mistake):
     try:

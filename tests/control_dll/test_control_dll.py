@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 from fmus.control_dll import export
-from fmus.control_dll.export import DLL_TARGETS, ControlDllError, control_part_of, with_values, write_dll
+from fmus.control_dll.export import (
+    DLL_TARGETS,
+    ControlDllError,
+    control_part_of,
+    with_values,
+    write_dll,
+)
 from fmus.vendor_dll.fmu import dll_fmu, read_dll
 from orchestrator.cli import main
 from orchestrator.fmi.description import read_description
@@ -24,9 +30,13 @@ def host(tmp_path_factory):
     return compiled_host(tmp_path_factory.mktemp("host"), DLL_TARGETS["linux64"][0])
 
 
-def test_a_host_in_c_gets_the_signals_of_the_fmu_to_the_last_bit(part, written, drive, host, tmp_path):
+def test_a_host_in_c_gets_the_signals_of_the_fmu_to_the_last_bit(
+    part, written, drive, host, tmp_path
+):
     given = [f"{name.replace('.', '_')}={value}" for name, value in PODS.items()]
-    ours, said = driven([host, "dll", written().libraries["linux64"], "IN", "OUT", *given], drive, tmp_path)
+    ours, said = driven(
+        [host, "dll", written().libraries["linux64"], "IN", "OUT", *given], drive, tmp_path
+    )
     call, model = fmu_call(part, PODS, tmp_path)
     theirs, _ = driven([host, *call], drive, tmp_path)
     assert len(ours) == len(drive)
@@ -40,7 +50,9 @@ def test_a_parameter_given_by_name_is_the_fmus_parameter(part, written, drive, h
     """A different value gives different signals: equality above is not that of two deaf programs."""
     library = written().libraries["linux64"]
     plain, _ = driven([host, "dll", library, "IN", "OUT"], drive, tmp_path)
-    other, _ = driven([host, "dll", library, "IN", "OUT", "droop_R_V=0.1", "pod_p_enabled=1"], drive, tmp_path)
+    other, _ = driven(
+        [host, "dll", library, "IN", "OUT", "droop_R_V=0.1", "pod_p_enabled=1"], drive, tmp_path
+    )
     call, _ = fmu_call(part, {"droop.R_V": 0.1, "pod_p.enabled": 1}, tmp_path)
     theirs, _ = driven([host, *call], drive, tmp_path)
     assert not np.allclose(plain[:, :3], other[:, :3], rtol=1e-9)
@@ -49,7 +61,11 @@ def test_a_parameter_given_by_name_is_the_fmus_parameter(part, written, drive, h
 
 def test_our_importer_reads_it_and_runs_it(written, drive, tmp_path):
     dll = read_dll(written(**PODS).libraries["linux64"])
-    assert (dll.interface.sample_time, dll.interface.mode, dll.interface.states) == (STEP, 1, (5, 0, 22))
+    assert (dll.interface.sample_time, dll.interface.mode, dll.interface.states) == (
+        STEP,
+        1,
+        (5, 0, 22),
+    )
     assert dll.trial.state == "arrays", dll.trial.why
     bare = ControlHost(written(**PODS).libraries["linux64"])
     bare.inputs[:] = drive[0]
@@ -81,7 +97,9 @@ def test_all_of_its_state_is_in_the_hosts_arrays(written, drive):
 def started(written, inputs, **values):
     control = ControlHost(written.libraries["linux64"], **values)
     control.inputs[:] = inputs
-    codes = [control.call(name) for name in ("PrintInfo", "FirstCall", "CheckParameters", "Initialize")]
+    codes = [
+        control.call(name) for name in ("PrintInfo", "FirstCall", "CheckParameters", "Initialize")
+    ]
     assert codes == [0, 0, 0, 0], control.error
     return control
 
@@ -103,7 +121,11 @@ def test_a_rule_of_the_model_is_told(written):
 
 def test_an_rms_program_is_refused(written):
     control = ControlHost(written().libraries["linux64"], mode=2)
-    assert [control.call(name) for name in ("CheckParameters", "Initialize", "Iterate")] == [2, 2, 2]
+    assert [control.call(name) for name in ("CheckParameters", "Initialize", "Iterate")] == [
+        2,
+        2,
+        2,
+    ]
     assert "it is for EMT programs" in control.error
 
 
@@ -120,7 +142,9 @@ def test_a_sample_before_the_start_is_refused(written):
         ("pod_p_limit", -1, "parameter pod_p_limit must be from 0 to 1e+30"),
     ],
 )
-def test_a_parameter_that_may_not_change_so_is_refused_in_the_run(written, drive, name, value, words):
+def test_a_parameter_that_may_not_change_so_is_refused_in_the_run(
+    written, drive, name, value, words
+):
     control = started(written(), drive[0])
     control.sample(drive[1])
     before = control.doubles.copy()
@@ -188,13 +212,26 @@ def test_what_cannot_be_written_is_refused(part, tmp_path):
 
 
 def test_the_command_writes_library_and_sheet(tmp_path, capsys):
-    call = ["export", "dll", "gfor", "--platform", "linux64", "--dest", str(tmp_path), "--set", "S_n=500"]
+    call = [
+        "export",
+        "dll",
+        "gfor",
+        "--platform",
+        "linux64",
+        "--dest",
+        str(tmp_path),
+        "--set",
+        "S_n=500",
+    ]
     assert main(call) == 0
     library, sheet = capsys.readouterr().out.split()
     assert read_dll(Path(library)).interface.sample_time == 2e-5
     text = Path(sheet).read_text(encoding="utf-8")
     assert "| power | 500 MVA | S_n |" in text
-    assert f"| L_c | converter-side inductor, bridge to capacitor | {0.15 * 230**2 / 500 / 0.1 / np.pi:.10g} mH" in text
+    assert (
+        f"| L_c | converter-side inductor, bridge to capacitor | {0.15 * 230**2 / 500 / 0.1 / np.pi:.10g} mH"
+        in text
+    )
     assert main([*call, "--set", "S_n=abc"]) == 2
     assert "give NAME=VALUE with a number" in capsys.readouterr().err
     assert main(["export", "dll", "gfl", "--dest", str(tmp_path)]) == 2

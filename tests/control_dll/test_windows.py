@@ -18,14 +18,25 @@ pytestmark = pytest.mark.slow
 
 GIVEN = [f"{name.replace('.', '_')}={value}" for name, value in PODS.items()]
 MACHINES = {"win64": lief.PE.Header.MACHINE_TYPES.AMD64, "win32": lief.PE.Header.MACHINE_TYPES.I386}
-FUNCTIONS = ("GetInfo", "PrintInfo", "FirstCall", "CheckParameters", "Initialize", "Outputs", "Iterate", "Terminate")
+FUNCTIONS = (
+    "GetInfo",
+    "PrintInfo",
+    "FirstCall",
+    "CheckParameters",
+    "Initialize",
+    "Outputs",
+    "Iterate",
+    "Terminate",
+)
 
 
 @pytest.mark.parametrize("platform", MACHINES)
 def test_the_library_exports_the_interface_under_plain_names(written, platform):
     library = lief.PE.parse(str(written(platform).libraries[platform]))
     assert library.header.machine == MACHINES[platform]
-    assert {entry.name for entry in library.get_export().entries} == {f"Model_{name}" for name in FUNCTIONS}
+    assert {entry.name for entry in library.get_export().entries} == {
+        f"Model_{name}" for name in FUNCTIONS
+    }
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +46,11 @@ def under_wine(tmp_path_factory, written, drive):
     if wine is None:
         pytest.skip("wine is not installed")
     home = tmp_path_factory.mktemp("wine")
-    environment = {"PATH": os.environ["PATH"], "WINEPREFIX": str(home / "prefix"), "WINEDEBUG": "-all"}
+    environment = {
+        "PATH": os.environ["PATH"],
+        "WINEPREFIX": str(home / "prefix"),
+        "WINEDEBUG": "-all",
+    }
 
     def run(platform, call):
         folder = tmp_path_factory.mktemp(platform)
@@ -45,7 +60,9 @@ def under_wine(tmp_path_factory, written, drive):
     return run
 
 
-def test_under_wine_64_bits_are_the_fmus_to_the_last_bit(part, written, under_wine, drive, tmp_path):
+def test_under_wine_64_bits_are_the_fmus_to_the_last_bit(
+    part, written, under_wine, drive, tmp_path
+):
     ours = under_wine("win64", ["dll", written("win64").libraries["win64"], "IN", "OUT", *GIVEN])
     call, _ = fmu_call(part, PODS, tmp_path, "win64")
     assert len(ours) == len(drive)

@@ -18,25 +18,37 @@ from orchestrator.pod_design.lead_lag import NO_COMPENSATION, lead_lag_turning
 PLACE = PodPlace("gfor", "pod_p")
 GROUP = PodGroup("pod_p", ("gfor",), ("gfor",), 2)
 LARGEST = 400.0
-GRID = list(product(np.linspace(-120, 120, 13), np.geomspace(0.5, 4.0, 6), np.geomspace(10, LARGEST, 9)))
+GRID = list(
+    product(np.linspace(-120, 120, 13), np.geomspace(0.5, 4.0, 6), np.geomspace(10, LARGEST, 9))
+)
 
 
 def close_modes(seed, apart=0.08):
     """Two modes that lie close together, one of them hardly seen; a third one, a faster control mode, and a washout."""
     random = np.random.default_rng(seed)
     hertz = 0.9 * (1 + apart * np.array([0.0, 1.0])) * random.uniform(0.9, 1.1)
-    poles = [(2 * np.pi * f, zeta) for f, zeta in zip(hertz, random.uniform(0.03, 0.06, 2), strict=True)]
-    poles += [(2 * np.pi * random.uniform(1.3, 1.8), random.uniform(0.06, 0.1)), (2 * np.pi * 3.0, 0.3)]
+    poles = [
+        (2 * np.pi * f, zeta) for f, zeta in zip(hertz, random.uniform(0.03, 0.06, 2), strict=True)
+    ]
+    poles += [
+        (2 * np.pi * random.uniform(1.3, 1.8), random.uniform(0.06, 0.1)),
+        (2 * np.pi * 3.0, 0.3),
+    ]
     blocks = [w * np.array([[-z, np.sqrt(1 - z**2)], [-np.sqrt(1 - z**2), -z]]) for w, z in poles]
     A = scipy.linalg.block_diag(*blocks)
-    moved = np.repeat([0.02, 0.08, 0.04, 0.02], 2) * random.uniform(0.5, 1.5, 8)  # by the largest gain, of its size
+    # by the largest gain, of its size
+    moved = np.repeat([0.02, 0.08, 0.04, 0.02], 2) * random.uniform(0.5, 1.5, 8)
     sizes = np.repeat([w for w, _ in poles], 2)
     U = np.sqrt(moved * sizes / LARGEST)[:, None] * random.standard_normal((8, 1))
     V = np.sqrt(moved * sizes / LARGEST)[None] * random.standard_normal((1, 8))
     # a washout of 5 s and a low-pass of 20 ms in the signal's way
     slow, fast = 1 / 5.0, 1 / 0.02
     whole = np.block(
-        [[A, np.zeros((8, 2))], [V, np.array([[-slow, 0.0]])], [fast * V, np.array([[-fast * slow, -fast]])]]
+        [
+            [A, np.zeros((8, 2))],
+            [V, np.array([[-slow, 0.0]])],
+            [fast * V, np.array([[-fast * slow, -fast]])],
+        ]
     )
     entries, exits = np.vstack([U, np.zeros((2, 1))]), np.array([[0.0] * 9 + [1.0]])
     names = tuple(f"x{k}" for k in range(10))
@@ -78,9 +90,12 @@ def test_a_mode_that_nothing_moves_is_left_as_it_is():
     w, zeta = 2 * np.pi * 1.1, 0.02
     block = np.array([[-zeta * w, w], [-w, -zeta * w]])
     whole = OpenLoops.of(
-        scipy.linalg.block_diag(alone.A, block), np.vstack([alone.U, np.zeros((2, 1))]),
-        np.hstack([alone.V, np.zeros((1, 2))]), [PLACE], (*alone.names, "y1", "y2"),
-    )  # fmt: skip
+        scipy.linalg.block_diag(alone.A, block),
+        np.vstack([alone.U, np.zeros((2, 1))]),
+        np.hstack([alone.V, np.zeros((1, 2))]),
+        [PLACE],
+        (*alone.names, "y1", "y2"),
+    )
     found, expected = searched(whole).best(), searched(alone).best()
     assert found.worth.worst == pytest.approx(expected.worth.worst, rel=1e-3)
 
@@ -101,7 +116,11 @@ def test_the_direct_term_of_a_reduced_system_has_the_right_sign(monkeypatch):
     reduced = OpenLoops.of(A, U, V, [PLACE], names)
     assert len(reduced.A) == 2
     found = {}
-    for key, loops in {"whole": whole, "reduced": reduced, "wrong": replace(reduced, D=-reduced.D)}.items():
+    for key, loops in {
+        "whole": whole,
+        "reduced": reduced,
+        "wrong": replace(reduced, D=-reduced.D),
+    }.items():
         values = loops.eigenvalues(setting)
         found[key] = min((z for z in values if z.imag > 1), key=lambda z: abs(z - 1j * slow))
     wrong = abs(found["wrong"] - found["whole"])

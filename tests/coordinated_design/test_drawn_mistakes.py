@@ -7,7 +7,15 @@ import pytest
 from scipy.linalg import eig
 
 from orchestrator.coordinated_design import view
-from orchestrator.coordinated_design.objective import ALLOWED, BANDS_HZ, RatedPoint, Watched, Worth, band_of, floors_of
+from orchestrator.coordinated_design.objective import (
+    ALLOWED,
+    BANDS_HZ,
+    RatedPoint,
+    Watched,
+    Worth,
+    band_of,
+    floors_of,
+)
 from orchestrator.coordinated_design.point import PointModes
 from orchestrator.coordinated_design.search import SettingSearch, Tried, _Program
 from orchestrator.coordinated_design.settings import PodGroup
@@ -20,7 +28,9 @@ from orchestrator.pod_design.lead_lag import LeadLag
 
 @pytest.mark.parametrize("place", range(len(BANDS_HZ)))
 def test_a_band_begins_at_its_frequency(place):
-    below, above = (complex(-0.1, 2 * np.pi * BANDS_HZ[place] * factor) for factor in (0.999, 1.001))
+    below, above = (
+        complex(-0.1, 2 * np.pi * BANDS_HZ[place] * factor) for factor in (0.999, 1.001)
+    )
     assert (band_of(below), band_of(above)) == (place, place + 1)
 
 
@@ -38,7 +48,9 @@ def test_a_residue_is_what_a_small_gain_moves():
     point = SimpleNamespace(loops=SimpleNamespace(U=U, V=V))
     (residue,) = RatedPoint._residues(point, 0, left, 3 * right)
     moved = np.linalg.eigvals(A + 1e-6 * U @ V)
-    assert residue == pytest.approx((moved[np.argmin(abs(moved - values[0]))] - values[0]) / 1e-6, rel=1e-4)
+    assert residue == pytest.approx(
+        (moved[np.argmin(abs(moved - values[0]))] - values[0]) / 1e-6, rel=1e-4
+    )
 
 
 @pytest.mark.parametrize(("gain", "enabled"), [(0.0, False), (123.456789012, True)])
@@ -47,7 +59,11 @@ def test_a_controller_without_gain_is_switched_off(gain, enabled):
     values = values_of([PodGroup("pod_p", ("gfor1", "gfor2"), ("gfor*",), 2)], [setting])
     assert values["gfor*.pod_p.enabled"] is enabled
     assert values["gfor*.pod_p.K"] == pytest.approx(gain, rel=1e-7)
-    assert (values["gfor*.pod_p.T_S1"], values["gfor*.pod_p.T_S2"], values["gfor*.pod_p.N_S"]) == (0.2, 0.05, 2)
+    assert (values["gfor*.pod_p.T_S1"], values["gfor*.pod_p.T_S2"], values["gfor*.pod_p.N_S"]) == (
+        0.2,
+        0.05,
+        2,
+    )
 
 
 @pytest.mark.parametrize(("groups", "alone"), [(1, 0), (2, 2)])
@@ -57,7 +73,9 @@ def test_as_many_starts_as_were_asked_for_are_improved(groups, alone, monkeypatc
     improved = []
     monkeypatch.setattr(search, "tried", lambda x: Tried(x, Worth(0.1, -1.0)))
     monkeypatch.setattr(search, "_coarse", lambda: (np.array([float(k), 0.0]) for k in range(9)))
-    monkeypatch.setattr(search, "_alone", lambda: [search.tried(np.array([-5.0 - k, 0.0])) for k in range(alone)])
+    monkeypatch.setattr(
+        search, "_alone", lambda: [search.tried(np.array([-5.0 - k, 0.0])) for k in range(alone)]
+    )
     monkeypatch.setattr(search, "improved", lambda one: improved.append(one) or one)
     search.best(3, polish=False)
     assert len(improved) == alone + 3
@@ -66,11 +84,22 @@ def test_as_many_starts_as_were_asked_for_are_improved(groups, alone, monkeypatc
 def test_the_table_of_points_says_what_is_allowed_and_why_not():
     modes = SimpleNamespace(computed=True, status="computed", warnings=("w",))
     where = {"point": SimpleNamespace(name="p1", hours=2), "outage": SimpleNamespace(name="tie")}
-    point = SimpleNamespace(**where, before=modes, after=modes, stable=True, target_before=None, target=None,
-                            worth=SimpleNamespace(allowed=False), why_not="n")  # fmt: skip
+    point = SimpleNamespace(
+        **where,
+        before=modes,
+        after=modes,
+        stable=True,
+        target_before=None,
+        target=None,
+        worth=SimpleNamespace(allowed=False),
+        why_not="n",
+    )
     table = view.points_table(SimpleNamespace(points=[point]))
-    assert {c.name: c.cell(point) for c in table.columns if c.name in ("outage", "allowed", "why", "stable")} == {
-        "outage": "tie", "allowed": "false", "why": "n; w", "stable": "true"}  # fmt: skip
+    assert {
+        c.name: c.cell(point)
+        for c in table.columns
+        if c.name in ("outage", "allowed", "why", "stable")
+    } == {"outage": "tie", "allowed": "false", "why": "n; w", "stable": "true"}
 
 
 @pytest.mark.parametrize(

@@ -53,7 +53,9 @@ def points(tmp_path):
 @pytest.fixture
 def planned(case, points):
     def plan(*controllers, outages=None, **wanted):
-        return plan_points_design(case, PointsDesignRequest(points, controllers, outages, ranked=0, **wanted))
+        return plan_points_design(
+            case, PointsDesignRequest(points, controllers, outages, ranked=0, **wanted)
+        )
 
     return plan
 
@@ -65,7 +67,11 @@ def store(tmp_path):
 
 def rated_of(plan, found, largest=400.0):
     own = dict.fromkeys(plan.candidates, largest)
-    return [RatedPoint(k, one.loops, plan.aim, own) for k, one in enumerate(found) if one.loops is not None]
+    return [
+        RatedPoint(k, one.loops, plan.aim, own)
+        for k, one in enumerate(found)
+        if one.loops is not None
+    ]
 
 
 def near(values, low=0.5, high=30.0):
@@ -80,13 +86,17 @@ def test_a_closed_loop_is_that_of_the_fmus(name, points, store, monkeypatch):
 
     Phasor converters know the communication step, and their POD-Q acts on an output at once.
     """
-    plan = plan_points_design(load_case(name), PointsDesignRequest(points, ("pod_p", "pod_q"), ranked=0))
+    plan = plan_points_design(
+        load_case(name), PointsDesignRequest(points, ("pod_p", "pod_q"), ranked=0)
+    )
     setting = {
         P: PodSetting(90.0, lead_lag_turning(-40.0, 4.0, 2)),
         Q: PodSetting(150.0, lead_lag_turning(25.0, 3.0, 2)),
     }
     opened = modes_at(plan, plan.off, plan.candidates, Work(Serial(), store))
-    closed = modes_at(plan, study.values_of(plan.groups, list(setting.values())), (), Work(Serial(), store))
+    closed = modes_at(
+        plan, study.values_of(plan.groups, list(setting.values())), (), Work(Serial(), store)
+    )
     for before, after in zip(opened, closed, strict=True):
         expected = near(after.values)
         assert len(expected) >= 4
@@ -134,7 +144,9 @@ def test_two_controllers_are_not_worse_than_one(planned, store):
     found = {}
     for plan in (one, both):
         rated = rated_of(plan, modes_at(plan, plan.off, plan.candidates, Work(Serial(), store)))[:2]
-        found[len(plan.groups)] = SettingSearch(SettingSpace(plan.groups, (0.0, 400.0), 3.6), rated).best(starts=1)
+        found[len(plan.groups)] = SettingSearch(
+            SettingSpace(plan.groups, (0.0, 400.0), 3.6), rated
+        ).best(starts=1)
     assert found[2].worth.worst >= found[1].worth.worst - 1e-4
 
 
@@ -176,8 +188,12 @@ def test_a_point_that_a_nominal_design_destabilises_is_seen(case, tmp_path, stor
     for name, rows in (("nominal", "short,0.02\n"), ("all", "short,0.02\nlong,0.6\n")):
         path = tmp_path / f"{name}.csv"
         path.write_text(f"name,grid.X_L\n{rows}")
-        request = PointsDesignRequest(path, ("pod_p",), gain_bounds=(0.0, 4000.0), ranked=0, least_damping=0.0)
-        verdicts[name] = design_over_points(plan_points_design(case, request), Work(Serial(), store)).verdict
+        request = PointsDesignRequest(
+            path, ("pod_p",), gain_bounds=(0.0, 4000.0), ranked=0, least_damping=0.0
+        )
+        verdicts[name] = design_over_points(
+            plan_points_design(case, request), Work(Serial(), store)
+        ).verdict
     assert verdicts["nominal"].stable is True
     assert verdicts["all"].stable is False
     assert [one.point.name for one in verdicts["all"].unstable] == ["long"]
@@ -202,7 +218,9 @@ def test_a_wrong_sign_of_a_loop_is_seen(planned, store, monkeypatch):
     for one in verdict.known:
         setting = {P: design.settings[0]}
         assert one.target.damping_ratio == pytest.approx(one.worth.worst)
-        believed = min(damping_ratio(z) for z in near(one.before.loops.eigenvalues(setting), 0.7, 12.0))
+        believed = min(
+            damping_ratio(z) for z in near(one.before.loops.eigenvalues(setting), 0.7, 12.0)
+        )
         assert abs(believed - one.worth.worst) > 0.01
 
 
@@ -211,18 +229,30 @@ def test_harm_that_the_search_did_not_show_is_told(case, tmp_path, store, monkey
     """Where the loops' models lack the mode that grows, the least damping alone shows nothing."""
     measured = point.measure
     if blind:
-        monkeypatch.setattr(point, "measure", lambda *given: replace(measured(*given), U=0 * measured(*given).U))
+        monkeypatch.setattr(
+            point, "measure", lambda *given: replace(measured(*given), U=0 * measured(*given).U)
+        )
     monkeypatch.setattr(
-        SettingSearch, "best", lambda search: search.tried(search._space.vector([-120.0], [2.0], [1000.0]))
+        SettingSearch,
+        "best",
+        lambda search: search.tried(search._space.vector([-120.0], [2.0], [1000.0])),
     )
     monkeypatch.setattr(study, "_frequency", lambda points: 3.6)
     path = tmp_path / "long.csv"
     path.write_text("name,grid.X_L\nlong,0.6\n")
-    request = PointsDesignRequest(path, ("pod_p",), gain_bounds=(0.0, 4000.0), ranked=0, least_damping=0.0)
+    request = PointsDesignRequest(
+        path, ("pod_p",), gain_bounds=(0.0, 4000.0), ranked=0, least_damping=0.0
+    )
     verdict = design_over_points(plan_points_design(case, request), Work(Serial(), store)).verdict
     assert verdict.stable is False
     assert len(verdict.unforeseen) == blind
-    assert any("its linear models showed no harm to other modes, and there is" in t for t in remarks(verdict)) is blind
+    assert (
+        any(
+            "its linear models showed no harm to other modes, and there is" in t
+            for t in remarks(verdict)
+        )
+        is blind
+    )
 
 
 def test_a_fast_mode_that_a_lead_drives_stays_in_a_reduced_system(monkeypatch):
@@ -248,7 +278,9 @@ def test_a_fast_mode_that_a_lead_drives_stays_in_a_reduced_system(monkeypatch):
 def test_points_without_modes_leave_the_verdict_not_known(planned, store, monkeypatch):
     """All else is fine, but the only line's outage cuts the system in two."""
     chosen(monkeypatch, [0.03, 0.7, 0.19])
-    verdict = design_over_points(planned("pod_p", outages="L", damping=0.1), Work(Serial(), store)).verdict
+    verdict = design_over_points(
+        planned("pod_p", outages="L", damping=0.1), Work(Serial(), store)
+    ).verdict
     assert verdict.met is None
     assert verdict.stable is None
     assert len(verdict.failed) == 4
@@ -265,12 +297,15 @@ def test_a_mode_that_is_pushed_down_is_harm(planned, store):
     found = modes_at(plan, plan.off, plan.candidates, Work(Serial(), store))
     rated = rated_of(plan, found, 1e5)
     weak, strong = (
-        {P: PodSetting(gain, lead_lag_turning(turn, 7.2, 2))} for gain, turn in ((20.0, 0.0), (2000.0, -120.0))
+        {P: PodSetting(gain, lead_lag_turning(turn, 7.2, 2))}
+        for gain, turn in ((20.0, 0.0), (2000.0, -120.0))
     )
     assert all(one.worth(weak).allowed for one in rated)
     harmed = [growth(one.loops.eigenvalues(strong)) > 0 for one in rated]
     assert any(harmed)
-    assert all(not one.worth(strong).allowed for one, grows in zip(rated, harmed, strict=True) if grows)
+    assert all(
+        not one.worth(strong).allowed for one, grows in zip(rated, harmed, strict=True) if grows
+    )
 
 
 def test_a_name_follows_its_mode_from_the_loops_that_are_open(planned, points, store):
@@ -287,7 +322,10 @@ def test_a_name_follows_its_mode_from_the_loops_that_are_open(planned, points, s
     found = with_followed_names(["electromechanical"], before, after, setting)
     borne = 0
     for first, last, other, lie in zip(before, found, after, lying, strict=True):
-        assert with_followed_names(["electromechanical"], [first], [lie], setting) == [last] or last.named == {}
+        assert (
+            with_followed_names(["electromechanical"], [first], [lie], setting) == [last]
+            or last.named == {}
+        )
         assert with_followed_names([], [first], [other], setting) == [other]
         if "electromechanical" not in first.named:
             assert last.named == {}
@@ -313,8 +351,9 @@ def test_a_name_that_cannot_be_followed_is_borne_by_none(planned, points, store,
     plan = planned("pod_p", modes=("electromechanical",), damping=0.1)
     verdict = design_over_points(plan, Work(Serial(), store)).verdict
     assert all(one.unnamed for one in verdict.known)
-    assert "its mode meets another one while the gains grow, so all modes from 0.1 to 2 Hz count" in " ".join(
-        remarks(verdict)
+    assert (
+        "its mode meets another one while the gains grow, so all modes from 0.1 to 2 Hz count"
+        in " ".join(remarks(verdict))
     )
 
 
@@ -327,7 +366,9 @@ def test_a_mode_that_is_named_counts_alone(planned, points, store):
         every = RatedPoint(0, one.loops, Aim((), 0.05), {P: 400.0}).worth({}).worst
         assert every <= named + 1e-12
         if "electromechanical" in one.named:
-            assert named == pytest.approx(damping_ratio(complex(one.values[one.named["electromechanical"]])))
+            assert named == pytest.approx(
+                damping_ratio(complex(one.values[one.named["electromechanical"]]))
+            )
         else:  # two modes fit the name about equally, so that all count
             assert named == every
     assert ["electromechanical" in one.named for one in found] == [True, True, True, False]
@@ -386,7 +427,10 @@ def test_a_column_for_what_is_designed_is_refused(case, tmp_path):
     [
         (("--outages", "L"), "--outages belongs to a design over operating points"),
         (("--controller", "pod_q"), "--controller is given 2 times"),
-        (("--points", "points.csv", "--refine"), "--refine belongs to a design for one operating point"),
+        (
+            ("--points", "points.csv", "--refine"),
+            "--refine belongs to a design for one operating point",
+        ),
         (("--points", "points.csv", "--damping-increment", "5"), "--damping-increment belongs"),
     ],
 )
@@ -400,8 +444,19 @@ def test_options_of_the_other_design_are_refused(gfor, options, said):
 def test_the_command_writes_what_other_commands_take(gfor, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "two.csv").write_text("name,grid.X_L\nshort,0.05\nusual,0.1\n")
-    common = ("design", "two_area", "--controller", "pod_p", "--points", "two.csv", "--workers", "1")
-    code, out, error = gfor(*common, "--damping", "20", "--json", "--out", "mine.toml", "--fail-unstable")
+    common = (
+        "design",
+        "two_area",
+        "--controller",
+        "pod_p",
+        "--points",
+        "two.csv",
+        "--workers",
+        "1",
+    )
+    code, out, error = gfor(
+        *common, "--damping", "20", "--json", "--out", "mine.toml", "--fail-unstable"
+    )
     assert (code, error) == (0, "")
     found = json.loads(out)
     assert found["met"] is True
@@ -413,37 +468,85 @@ def test_the_command_writes_what_other_commands_take(gfor, tmp_path, monkeypatch
     assert "gfor,pod_p," in (tmp_path / "mine_ranking.csv").read_text()
     worst = []
     for line in ("0.05", "0.1"):
-        _, printed, _ = gfor("modes", "two_area", "--scenario", "gfor", "--parameters", "mine.toml", "--set",
-                             f"grid.X_L={line}", "--json")  # fmt: skip
-        worst.append(min(mode["damping_percent"] for mode in json.loads(printed)["scenarios"][0]["modes"]))
+        _, printed, _ = gfor(
+            "modes",
+            "two_area",
+            "--scenario",
+            "gfor",
+            "--parameters",
+            "mine.toml",
+            "--set",
+            f"grid.X_L={line}",
+            "--json",
+        )
+        worst.append(
+            min(mode["damping_percent"] for mode in json.loads(printed)["scenarios"][0]["modes"])
+        )
     assert min(worst) == pytest.approx(100 * found["worst_damping_ratio"]["after"], abs=0.1)
-    code, out, _ = gfor(*common, "--outages", "L", "--gain-bounds", "0:100", "--rank", "0", "--fail-unstable")
+    code, out, _ = gfor(
+        *common, "--outages", "L", "--gain-bounds", "0:100", "--rank", "0", "--fail-unstable"
+    )
     assert code == 1
     assert "have no modes (2 islanding)" in " ".join(out.split())
 
 
 @pytest.mark.slow
-def test_every_setting_that_is_named_gives_its_figure_when_it_is_typed_in(gfor, tmp_path, monkeypatch):
+def test_every_setting_that_is_named_gives_its_figure_when_it_is_typed_in(
+    gfor, tmp_path, monkeypatch
+):
     """Those of the ranking too: the least damping of all modes, not that of the mode that a controller moves well."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "one.csv").write_text("name,grid.X_L\nusual,0.1\n")
-    code, out, _ = gfor("design", "two_area_rms", "--controller", "pod_p", "--controller", "pod_q", "--points",
-                        "one.csv", "--rank", "2", "--damping", "80", "--json", "--workers", "1")  # fmt: skip
+    code, out, _ = gfor(
+        "design",
+        "two_area_rms",
+        "--controller",
+        "pod_p",
+        "--controller",
+        "pod_q",
+        "--points",
+        "one.csv",
+        "--rank",
+        "2",
+        "--damping",
+        "80",
+        "--json",
+        "--workers",
+        "1",
+    )
     found = json.loads(out)
     assert code == 3
     assert found["met"] is False
     assert found["verdict"].startswith("NOT REACHED: 80 %")
     assert "CANNOT be had" not in found["verdict"], "of two settings no grid was compared"
     alone = [[(one["controller"], one)] for one in found["ranking"]]
-    figures = [one["worst_damping_ratio"] for one in found["ranking"]] + [found["worst_damping_ratio"]["after"]]
+    figures = [one["worst_damping_ratio"] for one in found["ranking"]] + [
+        found["worst_damping_ratio"]["after"]
+    ]
     assert len(alone) == 2
-    for settings, figure in zip([*alone, [(s["controller"], s) for s in found["settings"]]], figures, strict=True):
+    for settings, figure in zip(
+        [*alone, [(s["controller"], s) for s in found["settings"]]], figures, strict=True
+    ):
         options = []
         for controller, one in settings:
             values = {"enabled": "true", **{name: one[name] for name in ("K", "T_S1", "T_S2")}}
-            options += [word for key, v in values.items() for word in ("--set", f"gfor.{controller}.{key}={v}")]
-        _, printed, _ = gfor("modes", "two_area_rms", "--scenario", "gfor", "--set", "grid.X_L=0.1", *options,
-                           "--step", "1 ms", "--json")  # fmt: skip
+            options += [
+                word
+                for key, v in values.items()
+                for word in ("--set", f"gfor.{controller}.{key}={v}")
+            ]
+        _, printed, _ = gfor(
+            "modes",
+            "two_area_rms",
+            "--scenario",
+            "gfor",
+            "--set",
+            "grid.X_L=0.1",
+            *options,
+            "--step",
+            "1 ms",
+            "--json",
+        )
         modes = json.loads(printed)["scenarios"][0]["modes"]
         expected = min(mode["damping_percent"] for mode in modes)  # of the step map
         assert 100 * figure == pytest.approx(expected, abs=0.2)
@@ -458,20 +561,45 @@ def test_settings_named_of_a_network_file_give_their_figures_when_they_are_typed
     parameters is typed back as well as the settings of the ranking."""
     monkeypatch.chdir(tmp_path)
     five_machines(tmp_path)
-    assert gfor("new", "five.raw", "five.dyr", "--converter", "bus 12, 150 MVA, 60 MW, less sg1", "--out", "case.toml")[
-        0
-    ] in (0, None)
+    assert gfor(
+        "new",
+        "five.raw",
+        "five.dyr",
+        "--converter",
+        "bus 12, 150 MVA, 60 MW, less sg1",
+        "--out",
+        "case.toml",
+    )[0] in (0, None)
     (tmp_path / "one.csv").write_text("name,grid.load_11.scale\nusual,1\n")
     kind = ("--set", f"models={models}")
-    code, out, error = gfor("design", "case.toml", "--controller", "pod_p", "--points", "one.csv", "--scenario",
-                            "converter", *kind, "--rank", "1", "--damping", "60", "--json", "--workers", "1", "--out",
-                            "best.toml")  # fmt: skip
+    code, out, error = gfor(
+        "design",
+        "case.toml",
+        "--controller",
+        "pod_p",
+        "--points",
+        "one.csv",
+        "--scenario",
+        "converter",
+        *kind,
+        "--rank",
+        "1",
+        "--damping",
+        "60",
+        "--json",
+        "--workers",
+        "1",
+        "--out",
+        "best.toml",
+    )
     assert code == 3, error
     found = json.loads(out)
     (alone,) = found["ranking"]
 
     def least(*options):
-        _, printed, _ = gfor("modes", "case.toml", "--scenario", "converter", *kind, *options, "--json")
+        _, printed, _ = gfor(
+            "modes", "case.toml", "--scenario", "converter", *kind, *options, "--json"
+        )
         return min(mode["damping_percent"] for mode in json.loads(printed)["scenarios"][0]["modes"])
 
     values = {"enabled": "true", **{name: alone[name] for name in ("K", "T_S1", "T_S2")}}
@@ -484,7 +612,11 @@ def test_settings_named_of_a_network_file_give_their_figures_when_they_are_typed
 
 def test_that_a_damping_cannot_be_had_needs_a_grid(planned, store, monkeypatch):
     """Without one only the best that was found is said; and a search that was cut short is helped by the grid."""
-    monkeypatch.setattr(SettingSearch, "best", lambda search: search.tried(search._space.vector([90.0], [3.0], [5.0])))
+    monkeypatch.setattr(
+        SettingSearch,
+        "best",
+        lambda search: search.tried(search._space.vector([90.0], [3.0], [5.0])),
+    )
     plan = planned("pod_p", damping=0.8)
     helped = design_over_points(plan, Work(Serial(), store)).verdict
     assert "CANNOT be had with K ≤ 400 pu: best" in verdict_sentence(helped)
@@ -496,11 +628,25 @@ def test_that_a_damping_cannot_be_had_needs_a_grid(planned, store, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_design_for_one_point_finds_what_a_design_over_that_point_finds(gfor, tmp_path, monkeypatch):
+def test_a_design_for_one_point_finds_what_a_design_over_that_point_finds(
+    gfor, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "one.csv").write_text("name,grid.X_L\nusual,0.1\n")
-    common = ("design", "two_area_rms", "--controller", "pod_p", "--damping", "70", "--gain-bounds", "0:400", "--json")
-    code, out, _ = gfor(*common, "--refine", "--no-margins", "--set", "grid.X_L=0.1", "--step", "1 ms")
+    common = (
+        "design",
+        "two_area_rms",
+        "--controller",
+        "pod_p",
+        "--damping",
+        "70",
+        "--gain-bounds",
+        "0:400",
+        "--json",
+    )
+    code, out, _ = gfor(
+        *common, "--refine", "--no-margins", "--set", "grid.X_L=0.1", "--step", "1 ms"
+    )
     refined = json.loads(out)
     assert (code, refined["met"]) == (3, False)
     code, out, _ = gfor(*common, "--points", "one.csv", "--workers", "1")
@@ -513,4 +659,7 @@ def test_a_design_for_one_point_finds_what_a_design_over_that_point_finds(gfor, 
     assert "CANNOT be had with K ≤ 400 pu" in over["verdict"]
     for sweep in refined["refinement"]["sweeps"]:
         assert len(sweep["points"]) >= 9
-        assert all(p["least_damping_ratio"] <= p["damping_ratio"] + 1e-9 for p in sweep["points"] + [sweep["chosen"]])
+        assert all(
+            p["least_damping_ratio"] <= p["damping_ratio"] + 1e-9
+            for p in sweep["points"] + [sweep["chosen"]]
+        )

@@ -17,11 +17,18 @@ WHERE = [(OperatingCase("now", 1.0, {}, (), "points.csv:2"), Outage("intact"))]
 def modes(*pairs):
     """A spectrum of frequencies [Hz] and damping ratios, with the free angle."""
     values = [2 * np.pi * hertz * complex(-zeta, np.sqrt(1 - zeta**2)) for hertz, zeta in pairs]
-    return PointModes(Status.COMPUTED, values=np.array([*values, *np.conj(values), 0.0]), swinging=(0,), who=("sg1",))
+    return PointModes(
+        Status.COMPUTED,
+        values=np.array([*values, *np.conj(values), 0.0]),
+        swinging=(0,),
+        who=("sg1",),
+    )
 
 
 def verdict(before, after, wanted, least=0.05):
-    return PointsVerdict(list(judged(WHERE, [modes(*before)], [modes(*after)], Aim((), least), {})), wanted)
+    return PointsVerdict(
+        list(judged(WHERE, [modes(*before)], [modes(*after)], Aim((), least), {})), wanted
+    )
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,8 @@ def test_the_error_follows_the_tolerance_over_three_decades(schedule):
     assert slope == pytest.approx(2 / 3, abs=0.1)
     assert steps == sorted(steps)
     assert rejected < 5  # a longer pair is tried where it will hold
-    assert steps[0] < 0.1 * END / STEP  # longer than the communication step where the tolerance allows
+    # longer than the communication step where the tolerance allows
+    assert steps[0] < 0.1 * END / STEP
 
 
 def test_rows_stand_at_their_times_and_events_at_theirs():
@@ -87,13 +88,17 @@ def stays_where_it_is(monkeypatch):
     """Planted: ``b`` does not go back to a saved state."""
     restore = LoadedComponent.restore_state
     monkeypatch.setattr(
-        LoadedComponent, "restore_state", lambda self, state: None if self.name == "b" else restore(self, state)
+        LoadedComponent,
+        "restore_state",
+        lambda self, state: None if self.name == "b" else restore(self, state),
     )
 
 
 def test_a_component_that_does_not_go_back_is_found(monkeypatch):
     stays_where_it_is(monkeypatch)
-    with pytest.raises(CouplingError, match=r"the same step was done twice .*; some FMU does not restore all"):
+    with pytest.raises(
+        CouplingError, match=r"the same step was done twice .*; some FMU does not restore all"
+    ):
         within(1e-4, midpoint)
 
 
@@ -133,7 +138,8 @@ def test_without_saved_states_there_is_no_tolerance():
     for source, target in ring("a", "b"):
         system.connect(source, target)
     with pytest.raises(
-        InputError, match=r"steps that are too long are taken back, and component 'b' declares no canGet"
+        InputError,
+        match=r"steps that are too long are taken back, and component 'b' declares no canGet",
     ):
         Master(system, replace(midpoint(IN_TURN), tolerance=1e-4), STEP)
 
@@ -178,13 +184,17 @@ def test_the_command_runs_within_a_tolerance_and_shows_the_steps_it_took(gfor, t
         "within": ("--tolerance", "1e-5"),
     }.items():
         out = tmp_path / name
-        code, text, _ = gfor("run", "two_area_rms", "--scenario", "gfor", "--stop", "2", "--out", out, *options)
+        code, text, _ = gfor(
+            "run", "two_area_rms", "--scenario", "gfor", "--stop", "2", "--out", out, *options
+        )
         assert code == 0
         with xr.open_dataset(out / "gfor" / "trajectory.nc") as data:
             found[name] = data["gfor.omega"].sel(time=slice(1.0, 2.0)).load()
     off = {name: float(abs(values - found["short"]).max()) for name, values in found.items()}
     assert 0 < off["within"] < 0.5 * off["own"]
-    said = re.search(r"tolerance 1e-05: (\d+) steps of [\d.]+ to 2\.5 ms; (no|\d+) pairs? of steps w", text)
+    said = re.search(
+        r"tolerance 1e-05: (\d+) steps of [\d.]+ to 2\.5 ms; (no|\d+) pairs? of steps w", text
+    )
     assert said
     assert re.search(rf"SG \+ GFOR │ +{said[1]} │", text)
 

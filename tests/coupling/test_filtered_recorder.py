@@ -49,15 +49,20 @@ def test_rows_are_the_convolution_with_the_ends_held(system):
     record(run, recorder, 1236)
     recorder.end(run)
     weights = firwin(1001, 0.9 / 20, window=("kaiser", 7.857))
-    padded = np.concatenate([np.repeat(inputs[:1], 500, axis=0), inputs, np.repeat(inputs[-1:], 500, axis=0)])
-    expected = np.column_stack([np.convolve(column, weights, mode="valid") for column in padded.T])[::20]
+    padded = np.concatenate(
+        [np.repeat(inputs[:1], 500, axis=0), inputs, np.repeat(inputs[-1:], 500, axis=0)]
+    )
+    expected = np.column_stack([np.convolve(column, weights, mode="valid") for column in padded.T])[
+        ::20
+    ]
     assert recorder.values.shape == expected.shape == (62, 2)
     assert np.allclose(recorder.values, expected, rtol=0, atol=1e-9)
     assert np.allclose(recorder.times, 20 * STEP * np.arange(62), rtol=1e-14)
 
 
 @pytest.mark.parametrize(
-    ("hertz", "left"), [(0.0, 1.0), (5.0, 1.0), (19.0, 1.0), (26.0, 0.0), (40.0, 0.0), (48.0, 0.0), (313.0, 0.0)]
+    ("hertz", "left"),
+    [(0.0, 1.0), (5.0, 1.0), (19.0, 1.0), (26.0, 0.0), (40.0, 0.0), (48.0, 0.0), (313.0, 0.0)],
 )
 def test_what_rows_cannot_show_is_taken_away_and_the_rest_is_not_delayed(system, hertz, left):
     """Rows every 20 ms show up to 25 Hz; 20 Hz pass. Without the filter 48 Hz would pass for 2 Hz."""

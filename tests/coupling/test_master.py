@@ -61,7 +61,9 @@ def ring(*names):
 def oscillator():
     """Two integrators in a ring: ẋ_a = 30·x_b, ẋ_b = −20·x_a."""
     return system_of(
-        ring("a", "b"), a=("integrator", {"gain": 30.0, "x_0": 1.0}), b=("integrator", {"gain": -20.0, "x_0": 0.5})
+        ring("a", "b"),
+        a=("integrator", {"gain": 30.0, "x_0": 1.0}),
+        b=("integrator", {"gain": -20.0, "x_0": 0.5}),
     )
 
 
@@ -105,7 +107,9 @@ def test_two_integrators_one_after_the_other(groups, step):
 
 @pytest.mark.parametrize("step_size", [1e-4, 1e-3, 1.7e-3], ids=lambda h: f"H = {h} s")
 def test_two_lags_one_after_the_other(step_size):
-    system = system_of(ring("a", "b"), a=("lag", {"T": 0.005, "x_0": 2.0}), b=("lag", {"T": 0.02, "x_0": -1.0}))
+    system = system_of(
+        ring("a", "b"), a=("lag", {"T": 0.005, "x_0": 2.0}), b=("lag", {"T": 0.02, "x_0": -1.0})
+    )
     seen = trajectory(system, gauss_seidel((("a",), ("b",))), ["a.y", "b.y"], step_size=step_size)
     keep_a, keep_b = lag_factor(step_size, 0.005), lag_factor(step_size, 0.02)
 
@@ -157,13 +161,17 @@ def test_what_is_fed_through_arrives_before_the_first_step_however_long_the_chai
         x=("integrator", {"x_0": 3.0}, {"u": 0.0}),
         **{name: ("gain", {"K": 2.0}) for name in names},
     )
-    with Master(system, gauss_seidel(tuple((name,) for name in [*reversed(names), "x"])), H) as master:
+    with Master(
+        system, gauss_seidel(tuple((name,) for name in [*reversed(names), "x"])), H
+    ) as master:
         first = dict(zip(master.output_names, master.y.tolist(), strict=True))
     assert first == {"x.y": 3.0} | {f"k{n}.y": 3.0 * 2.0 ** (n + 1) for n in range(count - 1)}
 
 
 def test_a_loop_of_gains_starts_where_it_agrees_with_itself():
-    system = system_of(ring("a", "b"), a=("gain", {"K": 0.5, "offset": 1.0}), b=("gain", {"K": 0.5}))
+    system = system_of(
+        ring("a", "b"), a=("gain", {"K": 0.5, "offset": 1.0}), b=("gain", {"K": 0.5})
+    )
     with Master(system, jacobi(("a", "b")), H) as master:
         assert master.y == pytest.approx([4 / 3, 2 / 3], rel=1e-9)
 
@@ -230,7 +238,9 @@ def test_a_step_size_that_no_clock_can_have(step_size):
         Clock(step_size)
 
 
-@pytest.mark.parametrize(("time", "nearest"), [(0.00234, "0.002"), (0.00251, "0.003"), (-0.001, "0")])
+@pytest.mark.parametrize(
+    ("time", "nearest"), [(0.00234, "0.002"), (0.00251, "0.003"), (-0.001, "0")]
+)
 def test_a_time_between_communication_points(time, nearest):
     with pytest.raises(InputError) as caught:
         Clock(H).index(time, "the stop")
@@ -248,7 +258,9 @@ def test_an_infinite_time_is_refused(time):
 def told_time(tmp_path_factory):
     """An FMU that repeats the time and the size of the step that it was told."""
     variables = [Variable("u", 0, "input", 0, "1")]
-    variables += [Variable(name, k, "output", unit="s") for k, name in enumerate(("time", "step"), start=1)]
+    variables += [
+        Variable(name, k, "output", unit="s") for k, name in enumerate(("time", "step"), start=1)
+    ]
     variables += [Variable("held", 3, "output", unit="1")]
     source = Source("told_time", "../../coupling/told_time.c", {}, tuple(variables))
     return read_description(build(source, tmp_path_factory.mktemp("told_time")))
@@ -273,7 +285,9 @@ def test_a_step_is_told_the_time_at_which_it_begins_and_gets_the_input_of_then(t
 # -- events ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("schedule", [jacobi(("k", "x")), gauss_seidel((("x",), ("k",)))], ids=lambda s: s.name)
+@pytest.mark.parametrize(
+    "schedule", [jacobi(("k", "x")), gauss_seidel((("x",), ("k",)))], ids=lambda s: s.name
+)
 @pytest.mark.parametrize("at", [0, 3])
 def test_an_event_counts_from_the_step_that_starts_at_its_time(schedule, at):
     """The gain's output jumps with its parameter; the integrator sees it in the very next step."""
@@ -314,19 +328,27 @@ def test_an_event_may_change_several_components_before_their_partners_see_any_of
 def test_an_event_that_breaks_a_rule_of_the_fmu_is_refused_before_its_partners_see_it():
     system = system_of([("k.y", "x.u")], k=("guarded_gain", {}, {"u": 1.0}), x=("integrator",))
     rule = r"component 'k' at t = 0\.002 s: .* K must exceed 0; raise it"
-    with Master(system, gauss_seidel((("x",), ("k",))), H) as master, pytest.raises(ComponentError, match=rule):
+    with (
+        Master(system, gauss_seidel((("x",), ("k",))), H) as master,
+        pytest.raises(ComponentError, match=rule),
+    ):
         master.run(0.01, [ParameterChange(2 * H, "k", "K", 0.0)])
 
 
 def test_an_event_between_communication_points_stops_the_run_before_it_starts():
     with Master(oscillator(), jacobi(("a", "b")), H) as master:
-        with pytest.raises(InputError, match=r"an event at 0\.0025 s is not a communication point.* nearest"):
+        with pytest.raises(
+            InputError, match=r"an event at 0\.0025 s is not a communication point.* nearest"
+        ):
             master.run(0.01, [ParameterChange(0.0025, "a", "gain", 1.0)])
         assert master.index == 0
 
 
 def test_a_stop_between_communication_points():
-    with Master(oscillator(), jacobi(("a", "b")), H) as master, pytest.raises(InputError, match="the stop at"):
+    with (
+        Master(oscillator(), jacobi(("a", "b")), H) as master,
+        pytest.raises(InputError, match="the stop at"),
+    ):
         master.run(0.0105)
 
 
@@ -346,12 +368,16 @@ def test_an_event_that_the_fmu_refuses_names_time_component_and_reason():
 
 def test_inputs_that_nothing_feeds_are_all_named():
     system = system_of([("a.y", "b.u")], a=("integrator",), b=("gain",), c=("lag",))
-    with pytest.raises(InputError, match=r"inputs that nothing feeds: a\.u, c\.u; connect them or give"):
+    with pytest.raises(
+        InputError, match=r"inputs that nothing feeds: a\.u, c\.u; connect them or give"
+    ):
         Master(system, jacobi(("a", "b", "c")), H)
 
 
 def test_constants_feed_inputs_from_the_first_step():
-    system = system_of(x=("integrator", {"gain": 4.0, "x_0": 1.0}, {"u": 2.5}), k=("gain", {}, {"u": -6.0}))
+    system = system_of(
+        x=("integrator", {"gain": 4.0, "x_0": 1.0}, {"u": 2.5}), k=("gain", {}, {"u": -6.0})
+    )
     seen = trajectory(system, jacobi(("x", "k")), ["x.y", "k.y"], 3)
     assert np.abs(seen - [[1 + 10 * H * k, -6] for k in range(4)]).max() < TOLERANCE
 
@@ -374,7 +400,9 @@ def test_constants_feed_inputs_from_the_first_step():
 )
 def test_a_connection_that_cannot_be_made_names_both_ends_and_why(source, target, reason):
     wires = [("k.y", "b.u")]
-    system = system_of(wires, a=("integrator",), b=("integrator",), k=("gain",), p=("power_source",))
+    system = system_of(
+        wires, a=("integrator",), b=("integrator",), k=("gain",), p=("power_source",)
+    )
     with pytest.raises(InputError) as caught:
         system.connect(source, target)
     assert str(caught.value).startswith(f"connection {source} → {target}: {reason}")
@@ -383,11 +411,15 @@ def test_a_connection_that_cannot_be_made_names_both_ends_and_why(source, target
 
 def test_connections_that_were_put_into_the_list_itself_feed_their_inputs_too():
     components = {"a": ("integrator",), "b": ("integrator",), "k": ("gain",)}
-    system, other = system_of([("k.y", "b.u")], **components), system_of([("k.y", "b.u"), ("b.y", "a.u")], **components)
+    system, other = (
+        system_of([("k.y", "b.u")], **components),
+        system_of([("k.y", "b.u"), ("b.y", "a.u")], **components),
+    )
     system.connections.append(other.connections[1])
     with pytest.raises(InputError, match=r"a\.u is already fed by b\.y"):
         system.connect("k.y", "a.u")
-    system.connections = [other.connections[1], other.connections[1]]  # another list of the same length
+    # another list of the same length
+    system.connections = [other.connections[1], other.connections[1]]
     system.connect("k.y", "b.u")
     with pytest.raises(InputError, match=r"b\.u is already fed by k\.y"):
         system.connect("a.y", "b.u")
@@ -425,7 +457,11 @@ def test_observers_are_begun_called_and_ended_in_order():
     calls = []
     with Master(oscillator(), jacobi(("a", "b")), H) as master:
         master.run(2 * H, (), [Probe(1, calls)])
-    assert calls == [("probe", "begin", 2), *[("probe", "observe", k) for k in (0, 1, 2)], ("probe", "end", 2)]
+    assert calls == [
+        ("probe", "begin", 2),
+        *[("probe", "observe", k) for k in (0, 1, 2)],
+        ("probe", "end", 2),
+    ]
 
 
 def test_each_observer_looks_as_often_as_it_wants_whatever_others_and_events_do():
@@ -456,7 +492,9 @@ def test_observers_are_ended_after_a_failure_at_the_point_that_was_reached():
 def test_observers_already_begun_are_ended_if_another_cannot_begin():
     calls = []
     with Master(oscillator(), jacobi(("a", "b")), H) as master:
-        with pytest.raises(InputError, match=r"cannot record 'a\.nothing'.*`gfor fmu info` lists them"):
+        with pytest.raises(
+            InputError, match=r"cannot record 'a\.nothing'.*`gfor fmu info` lists them"
+        ):
             master.run(H, (), [Probe(1, calls), Recorder(["a.nothing"], 1)])
         assert master.index == 0
     assert [call for _, call, _ in calls] == ["begin", "observe", "end"]
@@ -468,7 +506,8 @@ def test_the_recorder_keeps_the_order_of_its_names_and_its_interval():
         master.run(10 * H, (), [recorder])
     a, b = recursion(lambda a, b: (a + H * 30 * b, b - H * 20 * a), (1.0, 0.5), 10).T
     assert recorder.times.tolist() == [0, 4 * H, 8 * H]
-    expected = np.column_stack([b, a, np.append(a[0], a[:-1])])[::4]  # an input is what the last step was given
+    # an input is what the last step was given
+    expected = np.column_stack([b, a, np.append(a[0], a[:-1])])[::4]
     assert np.abs(recorder.values - expected).max() < TOLERANCE
 
 
@@ -550,7 +589,9 @@ def test_a_system_that_cannot_run_never_unpacks_an_fmu(temporary):
 
 
 def test_instances_of_one_fmu_share_its_folder_and_nothing_else(temporary):
-    system = system_of(a=("integrator", {"x_0": 1.0}, {"u": 1.0}), b=("integrator", {"x_0": 2.0}, {"u": -1.0}))
+    system = system_of(
+        a=("integrator", {"x_0": 1.0}, {"u": 1.0}), b=("integrator", {"x_0": 2.0}, {"u": -1.0})
+    )
     with Master(system, jacobi(("a", "b")), H) as master:
         assert len(list(temporary.iterdir())) == 1
         master.run(5 * H)
@@ -571,7 +612,9 @@ def test_statistics_count_steps_and_share_out_the_time():
     assert [c.steps for c in statistics.components] == [400, 400]
     assert all(0 < c.share < 1 for c in statistics.components)
     assert 0 < sum(c.seconds for c in statistics.components) < statistics.seconds
-    assert statistics.share_in_fmus == pytest.approx(sum(c.seconds for c in statistics.components) / statistics.seconds)
+    assert statistics.share_in_fmus == pytest.approx(
+        sum(c.seconds for c in statistics.components) / statistics.seconds
+    )
     assert 0 < statistics.share_in_fmus < 1
     assert statistics.steps_per_second == pytest.approx(400 / statistics.seconds)
     assert statistics.simulated == pytest.approx(0.4)

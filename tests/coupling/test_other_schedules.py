@@ -37,7 +37,8 @@ def oscillation(first_a, first_b, groups, steps=STEPS):
 
 @pytest.mark.parametrize("groups", [SIDE_BY_SIDE, IN_TURN])
 @pytest.mark.parametrize(
-    ("first_inputs", "first"), [("consistent", (0.5, 1.0)), ("once", (0.5, 1.0)), ("zero", (0, 0)), ("start", (0, 0))]
+    ("first_inputs", "first"),
+    [("consistent", (0.5, 1.0)), ("once", (0.5, 1.0)), ("zero", (0, 0)), ("start", (0, 0))],
 )
 def test_the_first_step_has_the_inputs_that_the_schedule_says(groups, first_inputs, first):
     found = trajectory(oscillator(), Schedule("other", groups, first_inputs), ["a.y", "b.y"])
@@ -47,7 +48,9 @@ def test_the_first_step_has_the_inputs_that_the_schedule_says(groups, first_inpu
 def feedthrough():
     """a: integrator of g's output, g = 0.5·a + 2: what g gives at the start depends on whether a was told it."""
     return system_of(
-        ring("a", "g"), a=("integrator", {"gain": 10.0, "x_0": 1.0}), g=("gain", {"K": 0.5, "offset": 2.0})
+        ring("a", "g"),
+        a=("integrator", {"gain": 10.0, "x_0": 1.0}),
+        g=("gain", {"K": 0.5, "offset": 2.0}),
     )
 
 
@@ -62,18 +65,26 @@ def test_outputs_that_follow_inputs_directly_are_consistent_or_not(first_inputs,
 def test_start_values_that_differ_cannot_be_taken_from_one_output():
     system = system_of(
         [("s.y", "a.u"), ("s.y", "p.u")],
-        s=("integrator", {}, {"u": 1.0}), a=("integrator", {}), p=("started_gain", {}),
-    )  # fmt: skip
-    with pytest.raises(InputError, match=r"s\.y feeds a\.u, which starts from 0, and p\.u, which starts from 0\.5"):
+        s=("integrator", {}, {"u": 1.0}),
+        a=("integrator", {}),
+        p=("started_gain", {}),
+    )
+    with pytest.raises(
+        InputError, match=r"s\.y feeds a\.u, which starts from 0, and p\.u, which starts from 0\.5"
+    ):
         Master(system, Schedule("other", (("s", "a", "p"),), "start"), H)
 
 
 @pytest.mark.parametrize("extrapolation", [0.5, 1.0])
 def test_inputs_rise_on_as_they_rose_before(extrapolation):
-    found = trajectory(oscillator(), Schedule("other", SIDE_BY_SIDE, extrapolation=extrapolation), ["a.y", "b.y"])
+    found = trajectory(
+        oscillator(), Schedule("other", SIDE_BY_SIDE, extrapolation=extrapolation), ["a.y", "b.y"]
+    )
     a, b, rows = np.array([1.0]), np.array([0.5]), [(1.0, 0.5)]
     for _ in range(STEPS):
-        ahead_a, ahead_b = (v[-1] + extrapolation * (v[-1] - (v[-2] if len(v) > 1 else v[-1])) for v in (a, b))
+        ahead_a, ahead_b = (
+            v[-1] + extrapolation * (v[-1] - (v[-2] if len(v) > 1 else v[-1])) for v in (a, b)
+        )
         a, b = np.append(a, a[-1] + H * 30 * ahead_b), np.append(b, b[-1] - H * 20 * ahead_a)
         rows.append((a[-1], b[-1]))
     assert np.allclose(found, rows, rtol=0, atol=1e-14)
@@ -110,7 +121,9 @@ def test_wire_by_wire_an_output_is_read_after_the_inputs_before_it(observed):
 
 def test_a_master_that_counts_ticks_tells_differences_of_times():
     """Of times k·H that are rounded, so that its steps are not quite equal: stepped here one by one, digit by digit."""
-    found = trajectory(oscillator(), Schedule("other", SIDE_BY_SIDE, ticks_per_second=10**9), ["a.y", "b.y"])
+    found = trajectory(
+        oscillator(), Schedule("other", SIDE_BY_SIDE, ticks_per_second=10**9), ["a.y", "b.y"]
+    )
     times = [k * 10**6 / 1e9 for k in range(STEPS + 1)]
     with Master(oscillator(), Schedule("plain", SIDE_BY_SIDE), H) as master:
         for k, (time, end) in enumerate(pairwise(times)):

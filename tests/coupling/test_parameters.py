@@ -34,5 +34,7 @@ def test_an_fmu_that_forgets_them_when_it_is_set_up_keeps_them(tmp_path):
 
 def test_an_fmu_that_does_not_take_them_is_named(tmp_path):
     path = lag(tmp_path, "forgets_at_entry", FAULT_FORGETS_AT_ENTRY=1)
-    with pytest.raises(ComponentError, match=r"'lag'.*the parameter d was set to 0\.25 and reads 0\.5"):
+    with pytest.raises(
+        ComponentError, match=r"'lag'.*the parameter d was set to 0\.25 and reads 0\.5"
+    ):
         Master(system(path), jacobi(("lag",)), 1e-3)

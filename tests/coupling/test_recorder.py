@@ -98,7 +98,9 @@ def test_blocks_hold_what_memory_would(run, rows):
 
 
 @pytest.mark.parametrize(("slow", "known"), [(0.0, 10), (0.4, 4)])
-def test_rows_that_wait_are_handed_over_unless_that_takes_too_much_of_the_time(run, monkeypatch, slow, known):
+def test_rows_that_wait_are_handed_over_unless_that_takes_too_much_of_the_time(
+    run, monkeypatch, slow, known
+):
     """A row comes every 2 s and may wait for 5 s; where handing over takes 0.4 s, for 40 s."""
 
     class Slow(Rows):

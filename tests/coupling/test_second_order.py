@@ -87,7 +87,12 @@ def response(schedule: Schedule, step_size: float) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("schedule", "ratio"),
-    [(midpoint(IN_TURN), 4), (newton(IN_TURN), 4), (gauss_seidel(IN_TURN), 2), (jacobi(("a", "b")), 2)],
+    [
+        (midpoint(IN_TURN), 4),
+        (newton(IN_TURN), 4),
+        (gauss_seidel(IN_TURN), 2),
+        (jacobi(("a", "b")), 2),
+    ],
     ids=["midpoint", "newton", "gauss-seidel", "jacobi"],
 )
 def test_the_error_falls_with_the_square_of_the_step_over_an_event(schedule, ratio):
@@ -101,7 +106,9 @@ def test_the_error_falls_with_the_square_of_the_step_over_an_event(schedule, rat
 @BOTH
 def test_outputs_that_follow_inputs_directly_agree_after_each_step(schedule):
     system = system_of(
-        ring("a", "g"), a=("integrator", {"gain": 10.0, "x_0": 1.0}), g=("gain", {"K": 0.5, "offset": 2.0})
+        ring("a", "g"),
+        a=("integrator", {"gain": 10.0, "x_0": 1.0}),
+        g=("gain", {"K": 0.5, "offset": 2.0}),
     )
     found = trajectory(system, schedule((("g",), ("a",))), ["a.y", "g.y"], 20)
     assert np.allclose(found[:, 1], 0.5 * found[:, 0] + 2, rtol=0, atol=1e-9)
@@ -114,10 +121,15 @@ def two_gains() -> System:
 def test_midpoint_refuses_a_loop_of_direct_feedthrough_that_newton_solves():
     with (
         Master(two_gains(), midpoint(IN_TURN), H) as master,
-        pytest.raises(CouplingError, match=r"feed-through closes a loop through some of a, b: .* take gauss-seidel"),
+        pytest.raises(
+            CouplingError,
+            match=r"feed-through closes a loop through some of a, b: .* take gauss-seidel",
+        ),
     ):
         master.run(H)
-    assert trajectory(two_gains(), newton(IN_TURN), ["b.y"], 3)[-1, 0] == pytest.approx(10, abs=1e-8)
+    assert trajectory(two_gains(), newton(IN_TURN), ["b.y"], 3)[-1, 0] == pytest.approx(
+        10, abs=1e-8
+    )
 
 
 def test_newton_refuses_an_fmu_that_cannot_be_taken_back():
@@ -126,7 +138,9 @@ def test_newton_refuses_an_fmu_that_cannot_be_taken_back():
         system.add(name, replace(small_fmu(model), can_save_state=name != "b"))
     for source, target in ring("a", "b"):
         system.connect(source, target)
-    with pytest.raises(InputError, match="component 'b' declares no canGetAndSetFMUstate; take midpoint"):
+    with pytest.raises(
+        InputError, match="component 'b' declares no canGetAndSetFMUstate; take midpoint"
+    ):
         Master(system, newton(IN_TURN), H)
 
 
@@ -134,7 +148,9 @@ def test_newton_is_stable_in_a_loop_in_which_held_inputs_are_not():
     """ω = √600 rad/s: at H = 0.1 s Gauss-Seidel and midpoint grow, the trapezoidal rule does not."""
     ends = {}
     for schedule in (gauss_seidel(IN_TURN), midpoint(IN_TURN), newton(IN_TURN)):
-        ends[schedule.name] = np.abs(trajectory(oscillator(), schedule, ["a.y"], 60, step_size=0.1)[-1, 0])
+        ends[schedule.name] = np.abs(
+            trajectory(oscillator(), schedule, ["a.y"], 60, step_size=0.1)[-1, 0]
+        )
     assert ends["gauss-seidel"] > 1e3
     assert ends["midpoint"] > 1e3
     assert ends["newton"] < 2

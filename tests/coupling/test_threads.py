@@ -33,7 +33,9 @@ from tests.coupling.small_fmus import MODELS, small_fmu
 H = 1e-3
 NAMES = tuple("abcdefgh")
 
-pytestmark = pytest.mark.skipif(compiled_loop.loop_library() is None, reason="no compiler for this platform")
+pytestmark = pytest.mark.skipif(
+    compiled_loop.loop_library() is None, reason="no compiler for this platform"
+)
 
 
 @cache
@@ -62,7 +64,11 @@ def neighbours(model="lag", first=None):
     """Eight FMUs, each fed by the one before it."""
     system = System()
     for k, name in enumerate(NAMES):
-        system.add(name, (first or {}).get(name, native(model)), {"x_0": 1.0 + 0.1 * k} if model != "blow_up" else {})
+        system.add(
+            name,
+            (first or {}).get(name, native(model)),
+            {"x_0": 1.0 + 0.1 * k} if model != "blow_up" else {},
+        )
     for one, other in zip(NAMES, (*NAMES[1:], NAMES[0]), strict=True):
         system.connect(f"{one}.y", f"{other}.u")
     return system
@@ -76,7 +82,12 @@ def both(make, threads, **run):
         with Master(*make, threads=number) as master:
             statistics = master.run(run["stop"], run.get("events", ()), [recorder])
             states = [c.serialize_state(c.save_state()) for c in master.components.values()]
-            all_of_it = (recorder.values.tobytes(), master.y.tobytes(), master.tracks.saved().tobytes(), *states)
+            all_of_it = (
+                recorder.values.tobytes(),
+                master.y.tobytes(),
+                master.tracks.saved().tobytes(),
+                *states,
+            )
             found.append([hashlib.sha256(part).hexdigest() for part in all_of_it])
             assert np.isfinite(recorder.values).all()
     assert statistics.threads == threads
@@ -87,13 +98,18 @@ def both(make, threads, **run):
 
 
 @pytest.mark.parametrize("threads", [2, 3, 9])
-@pytest.mark.parametrize("schedule", [jacobi(NAMES), gauss_seidel((NAMES[:5], NAMES[5:]))], ids=lambda s: s.name)
+@pytest.mark.parametrize(
+    "schedule", [jacobi(NAMES), gauss_seidel((NAMES[:5], NAMES[5:]))], ids=lambda s: s.name
+)
 def test_neighbours_within_a_group_see_nothing_new(schedule, threads):
     """Ten of them for a core each, where threads lose theirs at any moment."""
     one, several = both(
-        (neighbours("integrator"), schedule, H), threads, names=[f"{n}.y" for n in NAMES], stop=2.0,
+        (neighbours("integrator"), schedule, H),
+        threads,
+        names=[f"{n}.y" for n in NAMES],
+        stop=2.0,
         events=[ParameterChange(0.505, "c", "gain", -2.0)],
-    )  # fmt: skip
+    )
     assert one == several
 
 
@@ -103,7 +119,9 @@ def test_a_case_with_its_event(case):
     (grid, changes), *_ = ready.events[0].changes().items()
     events = [ParameterChange(0.1, grid, name, value) for name, value in changes.items()]
     names = [n for n in ready.record if n.endswith((".omega", ".v"))][:20]
-    one, several = both((ready.system, ready.schedule, ready.step_size), 2, names=names, stop=0.3, events=events)
+    one, several = both(
+        (ready.system, ready.schedule, ready.step_size), 2, names=names, stop=0.3, events=events
+    )
     assert one == several
 
 
@@ -127,7 +145,9 @@ def test_a_state_that_is_restored_goes_on_alike():
 def test_threads_round_as_the_caller_does(busy, trusted):
     """A library that changes rounding, or drops the smallest numbers, does so on its caller's thread alone."""
     library = ctypes.CDLL(ctypes.util.find_library("m"))
-    upward = {"x86_64": 0x800, "AMD64": 0x800, "aarch64": 0x400000, "arm64": 0x400000}[os.uname().machine]
+    upward = {"x86_64": 0x800, "AMD64": 0x800, "aarch64": 0x400000, "arm64": 0x400000}[
+        os.uname().machine
+    ]
     ends, blocks = {}, 0
     for threads, mode in ((3, upward), (1, upward), (1, 0)):
         with busy_master(busy, threads) as master:
@@ -177,7 +197,9 @@ def sums(master):
 
 def test_fmus_of_others_stay_on_one_thread(busy):
     """Their instances may share data, which two threads would spoil in silence."""
-    with busy_master(busy, 3, x=native("integrator"), y=native("lag"), z=small_fmu("gain")) as master:
+    with busy_master(
+        busy, 3, x=native("integrator"), y=native("lag"), z=small_fmu("gain")
+    ) as master:
         seen = set()
         for _ in range(10):
             master.advance(50)
@@ -218,7 +240,12 @@ def test_costly_calls_are_shared_out_first_and_those_of_the_caller_count():
 
 @pytest.mark.parametrize(
     ("costs", "group", "best"),
-    [([1e-6] * 4, 3, 1), ([1e-3] * 8, 8, 8), ([1e-3, 1e-6, 1e-6], 3, 1), ([4e-6, 4e-6, 1e-3], 2, 2)],
+    [
+        ([1e-6] * 4, 3, 1),
+        ([1e-3] * 8, 8, 8),
+        ([1e-3, 1e-6, 1e-6], 3, 1),
+        ([4e-6, 4e-6, 1e-3], 2, 2),
+    ],
 )
 def test_as_many_threads_as_make_a_step_shortest(costs, group, best):
     groups = [range(group), range(group, len(costs))]
@@ -265,7 +292,9 @@ def failing(threads, constants, model="blow_up", steps=3000):
         return str(caught.value), master.index, master.y.tobytes(), master.tracks.saved().tobytes()
 
 
-@pytest.mark.parametrize("constants", [(1.0,) * 5 + (25.0,) + (1.0,) * 2, (9.0,) * 8, (1.0, 25.0, 1.0, 25.0) * 2])
+@pytest.mark.parametrize(
+    "constants", [(1.0,) * 5 + (25.0,) + (1.0,) * 2, (9.0,) * 8, (1.0, 25.0, 1.0, 25.0) * 2]
+)
 def test_the_first_of_those_that_fail_in_one_step_is_named(constants):
     """Each says why on its thread, for which it needs Python's lock."""
     alone = failing(1, constants)

@@ -110,7 +110,10 @@ def test_an_event_replaces_the_permanent_delay_until_it_ends():
 def test_a_delay_that_is_no_whole_number_of_steps_is_refused_with_the_nearest():
     system = ramp_into_two()
     system.disturb(system.connections[0], Delay(2.4 * H))
-    with pytest.raises(InputError, match=r"ramp.y -> sink.u: a delay of 0.0024 s is no multiple .* nearest is 0.002 s"):
+    with pytest.raises(
+        InputError,
+        match=r"ramp.y -> sink.u: a delay of 0.0024 s is no multiple .* nearest is 0.002 s",
+    ):
         Master(system, IN_TURN, H)
 
 
@@ -156,7 +159,9 @@ def test_a_quantised_value_is_the_nearest_multiple():
     assert set(np.unique(values[:, 0])) == {0.0, 0.25, 0.5}
 
 
-@pytest.mark.parametrize(("value", "carried"), [(0.125, 0.0), (0.375, 0.5), (-0.125, 0.0), (-0.375, -0.5)])
+@pytest.mark.parametrize(
+    ("value", "carried"), [(0.125, 0.0), (0.375, 0.5), (-0.125, 0.0), (-0.375, -0.5)]
+)
 def test_a_half_goes_to_the_even_multiple(value, carried):
     system = ramp_into_two()
     system.components["ramp"].inputs["u"], system.components["ramp"].parameters["x_0"] = 0.0, value
@@ -195,7 +200,9 @@ def test_noise_has_its_deviation_and_no_memory(inner_loop):
 
 
 def test_noise_with_a_bandwidth_has_the_same_deviation_and_the_low_pass_memory(inner_loop):
-    values = noise_of(Noise(0.3, 1, bandwidth=20.0), 200_000 if inner_loop == "compiled" else 20_000)
+    values = noise_of(
+        Noise(0.3, 1, bandwidth=20.0), 200_000 if inner_loop == "compiled" else 20_000
+    )
     keep = np.exp(-2 * np.pi * 20.0 * H)
     effective = len(values) * (1 - keep) / (1 + keep)
     assert abs(values.std() / 0.3 - 1) < 4 / np.sqrt(2 * effective)
@@ -204,7 +211,9 @@ def test_noise_with_a_bandwidth_has_the_same_deviation_and_the_low_pass_memory(i
 
 def test_noise_is_the_same_to_the_last_bit_whatever_else_there_is():
     alone = noise_of(Noise(0.3, 1, 50.0), 3000)
-    assert np.array_equal(alone, noise_of(Noise(0.3, 1, 50.0), 3000, others=[Noise(1.0, 1), Delay(5 * H)]))
+    assert np.array_equal(
+        alone, noise_of(Noise(0.3, 1, 50.0), 3000, others=[Noise(1.0, 1), Delay(5 * H)])
+    )
     assert np.array_equal(alone, noise_of(Noise(0.3, 1, 50.0), 3000, parts=7))
     assert not np.array_equal(alone, noise_of(Noise(0.3, 2, 50.0), 3000))
 
@@ -238,7 +247,11 @@ def test_a_run_from_a_saved_state_is_the_same_run_to_the_last_bit():
         system.disturb(system.connections[0], imperfection)
     with Master(system, IN_TURN, H) as master:
         master.run(0.123)
-        ramp, wires, index = master.components["ramp"].get(["y"])["y"], master.wires.state(), master.index
+        ramp, wires, index = (
+            master.components["ramp"].get(["y"])["y"],
+            master.wires.state(),
+            master.index,
+        )
         master.run(0.3)
         expected = master.arriving("sink").copy()
     with Master(system, IN_TURN, H) as master:
@@ -301,7 +314,10 @@ def test_the_same_kind_twice_is_refused():
 
 def test_a_component_that_gives_no_numbers_ends_the_run_at_that_time():
     recorder = Recorder(["sink.y"], 1)
-    with Master(ramp_into_two(), IN_TURN, H) as master, pytest.raises(NotFiniteError, match=r"'ramp' at t = 0.1 s.*y"):
+    with (
+        Master(ramp_into_two(), IN_TURN, H) as master,
+        pytest.raises(NotFiniteError, match=r"'ramp' at t = 0.1 s.*y"),
+    ):
         master.run(0.4, [NotANumber(0.1, "ramp")], [recorder])
     assert len(recorder.times) == 101
 
@@ -320,5 +336,8 @@ def test_a_component_that_answers_no_more_is_ended_by_the_isolations_limit(monke
 
 
 def test_a_component_without_a_process_of_its_own_cannot_fall_silent():
-    with Master(ramp_into_two(), IN_TURN, H) as master, pytest.raises(InputError, match="isolated = true"):
+    with (
+        Master(ramp_into_two(), IN_TURN, H) as master,
+        pytest.raises(InputError, match="isolated = true"),
+    ):
         master.run(0.4, [Silence(0.1, "ramp")])

@@ -30,7 +30,9 @@ def run(tmp_path_factory):
 def recorded(found, signals, values=None, scenario="dip"):
     desk = Desk(found[0], False, found[2]["recorded"])
     values = found[2].get("values", {}) if values is None else values
-    return desk.answer({"ask": "recorded", "scenario": scenario, "values": values, "signals": signals}, print)
+    return desk.answer(
+        {"ask": "recorded", "scenario": scenario, "values": values, "signals": signals}, print
+    )
 
 
 @pytest.mark.parametrize("place", ["results", "results/dip", "results/dip/trajectory.nc"])
@@ -40,11 +42,21 @@ def test_a_run_opens_with_its_case_values_and_signals(run, place):
     answer = recorded(found, ["gfor.p"])
     times, values = answer["curves"]["gfor.p"]
     kept = gfor.open(run / "results")["dip/trajectory.nc"]["gfor.p"]
-    assert (min(values), max(values), times[-1]) == (float(kept.min()), float(kept.max()), float(kept["time"][-1]))
+    assert (min(values), max(values), times[-1]) == (
+        float(kept.min()),
+        float(kept.max()),
+        float(kept["time"][-1]),
+    )
     assert answer["differs"] == []
     assert recorded(found, ["gfor.p"], {"gfor.P_0": 0.4})["differs"] == ["gfor.P_0 was 0.5, is 0.4"]
     other = Desk("infinite_bus", False, found[2]["recorded"])
-    question = {"ask": "recorded", "scenario": "dip", "values": {"gfor.P_0": 0.5}, "signals": [], "step": 5e-5}
+    question = {
+        "ask": "recorded",
+        "scenario": "dip",
+        "values": {"gfor.P_0": 0.5},
+        "signals": [],
+        "step": 5e-5,
+    }
     differs = other.answer(question | {"events": []}, print)["differs"]
     assert [text.split(":")[0] for text in differs] == ["events", "step_size_s"]
     with pytest.raises(InputError, match="nothing was recorded of scenario 'load_step'"):
@@ -53,13 +65,18 @@ def test_a_run_opens_with_its_case_values_and_signals(run, place):
 
 def test_a_run_of_another_case_is_refused(run, tmp_path, capsys):
     changed = tmp_path / "own.toml"
-    changed.write_text((run / "own.toml").read_text(encoding="utf-8").replace("P_0 = 0.6", "P_0 = 0.7"), "utf-8")
+    changed.write_text(
+        (run / "own.toml").read_text(encoding="utf-8").replace("P_0 = 0.6", "P_0 = 0.7"), "utf-8"
+    )
     summary = json.loads((run / "results" / "summary.json").read_text(encoding="utf-8"))
     place = tmp_path / "results"
     place.mkdir()
     (place / "dip").symlink_to(run / "results" / "dip")
     (place / "case.toml").symlink_to(run / "results" / "case.toml")
-    for content, text in ((summary, "not as it was when"), ({"case": "own"}, "does not tell which case was run")):
+    for content, text in (
+        (summary, "not as it was when"),
+        ({"case": "own"}, "does not tell which case was run"),
+    ):
         (place / "summary.json").write_text(json.dumps(content), encoding="utf-8")
         assert main(["explore", str(place), "--no-browser"]) == 2
         assert text in capsys.readouterr().err
@@ -71,7 +88,9 @@ def test_a_recording_goes_beside_a_case(tmp_path, capsys):
     file.write_text("\n".join(["time,P1,Q1", *rows]), encoding="utf-8")
     assert main(["explore", str(file)]) == 2
     assert f"gfor explore CASE --beside {file}" in capsys.readouterr().err
-    assert main(["explore", "infinite_bus", "--beside", str(tmp_path / "no.csv"), "--no-browser"]) == 2
+    assert (
+        main(["explore", "infinite_bus", "--beside", str(tmp_path / "no.csv"), "--no-browser"]) == 2
+    )
     capsys.readouterr()
     desk = Desk("infinite_bus", False, {"": str(file)})
     answer = desk.answer({"ask": "recorded", "scenario": "dip", "signals": ["P1"]}, print)
@@ -90,18 +109,31 @@ def test_rows_of_a_certificate_open_with_their_limits(issued, name):
     if name == "fingrid":
         said = {row["row"]: row["accepted"] for row in content["rows"]}
         assert {
-            row["name"]: cells[0]["stable"] for row, cells in zip(study["rows"], study["cells"], strict=True)
+            row["name"]: cells[0]["stable"]
+            for row, cells in zip(study["rows"], study["cells"], strict=True)
         } == said
-        assert any(curve["dashed"] for row in study["cells"] for one in row[0]["pictures"] for curve in one["curves"])
+        assert any(
+            curve["dashed"]
+            for row in study["cells"]
+            for one in row[0]["pictures"]
+            for curve in one["curves"]
+        )
     first = study["cells"][0][0]["pictures"][0]["curves"][0]["data"]
     assert np.all(np.diff(first[0]) > 0)
-    matrix = {"cells": [
-        {"code": "x", "device": device, "certificate": f"{name}/certificate.json"} for device in ("a", "<b>")
-    ]}  # fmt: skip
+    matrix = {
+        "cells": [
+            {"code": "x", "device": device, "certificate": f"{name}/certificate.json"}
+            for device in ("a", "<b>")
+        ]
+    }
     (folder.parent / "matrix.json").write_text(json.dumps(matrix), encoding="utf-8")
     both = opened(str(folder.parent))[2]["study"]
     assert [column["name"] for column in both["columns"]] == ["a", "<b>"]
-    assert [row[0] for row in both["cells"]] == [row[1] for row in both["cells"]] == [row[0] for row in study["cells"]]
+    assert (
+        [row[0] for row in both["cells"]]
+        == [row[1] for row in both["cells"]]
+        == [row[0] for row in study["cells"]]
+    )
 
 
 @pytest.mark.parametrize("change", [a_damping, an_eigenvalue])

@@ -21,11 +21,22 @@ __all__ = ["issued"]
 
 pytestmark = pytest.mark.slow
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-OPTIONS = ["--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking",
-           "--disable-component-update", "--disable-sync", "--disable-quic"]  # fmt: skip
+CHROMIUM = (
+    shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+)
+OPTIONS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-quic",
+]
 PATIENCE = 60_000  # [ms]
-needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
+needs_chromium = pytest.mark.skipif(
+    CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)"
+)
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +45,9 @@ def browser():
         pytest.skip("needs chromium (Debian: apt-get install chromium)")
     playwright = pytest.importorskip("playwright.sync_api")
     with playwright.sync_playwright() as tools:
-        found = tools.chromium.launch(executable_path=CHROMIUM, args=[*OPTIONS, "--js-flags=--expose-gc"])
+        found = tools.chromium.launch(
+            executable_path=CHROMIUM, args=[*OPTIONS, "--js-flags=--expose-gc"]
+        )
         yield found
         found.close()
 
@@ -62,7 +75,9 @@ def opened(browser, address):
     view.set_default_timeout(PATIENCE)
     errors = []
     view.on("pageerror", lambda error: errors.append(str(error)))
-    view.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+    view.on(
+        "console", lambda message: errors.append(message.text) if message.type == "error" else None
+    )
     view.goto(address)
     computed(view, 1)
     view.locator("#signal-names option").first.wait_for(state="attached")
@@ -102,7 +117,9 @@ def rows(view):
 
 
 def shown(modes):
-    return [[f"{m['frequency_hz']:.4f}", f"{m['damping_percent']:.2f}".replace("-", "−")] for m in modes]
+    return [
+        [f"{m['frequency_hz']:.4f}", f"{m['damping_percent']:.2f}".replace("-", "−")] for m in modes
+    ]
 
 
 @needs_chromium
@@ -223,8 +240,13 @@ def test_a_click_on_the_diagram_takes_a_unit_out_and_makes_a_line_longer(view, c
 def test_responses_are_drawn_and_a_run_is_streamed(browser, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = gfor.load("infinite_bus").file.text
-    (tmp_path / "case.toml").write_text(re.sub(r'stop_time = "[^"]*"', 'stop_time = "1.5 s"', text), encoding="utf-8")
-    with served(str(tmp_path / "case.toml"), "load_step") as explorer, opened(browser, explorer.address) as view:
+    (tmp_path / "case.toml").write_text(
+        re.sub(r'stop_time = "[^"]*"', 'stop_time = "1.5 s"', text), encoding="utf-8"
+    )
+    with (
+        served(str(tmp_path / "case.toml"), "load_step") as explorer,
+        opened(browser, explorer.address) as view,
+    ):
         view.locator("#tab-response").click()
         view.locator("#linear").click()
         view.locator("#plots .curve.linear").first.wait_for(state="attached")
@@ -261,7 +283,10 @@ def test_names_are_never_markup(browser, tmp_path):
     text = re.sub(r"^title = .*$", lambda _: f"title = {quoted}", text, flags=re.MULTILINE)
     assert text.count(quoted) >= 2
     (tmp_path / "case.toml").write_text(text, encoding="utf-8")
-    with served(str(tmp_path / "case.toml"), "dip") as explorer, opened(browser, explorer.address) as view:
+    with (
+        served(str(tmp_path / "case.toml"), "dip") as explorer,
+        opened(browser, explorer.address) as view,
+    ):
         assert HOSTILE in view.locator("#verdict").inner_text()
         assert HOSTILE in view.locator("#title").inner_text()
         assert view.locator("img, section script, header script").count() == 0
@@ -274,13 +299,27 @@ def test_names_are_never_markup(browser, tmp_path):
 @needs_chromium
 def test_a_saved_page_moves_without_a_server(browser, tmp_path, capsys):
     page = tmp_path / "page.html"
-    words = ["explore", "two_area", "--scenario", "pod_p", "--vary", "gfor.pod_p.K=100:200:3", "--save", str(page)]
+    words = [
+        "explore",
+        "two_area",
+        "--scenario",
+        "pod_p",
+        "--vary",
+        "gfor.pod_p.K=100:200:3",
+        "--save",
+        str(page),
+    ]
     assert main(words) == 0
     with opened(browser, page.as_uri()) as view:
         slider = view.locator('.control[data-name="gfor.pod_p.K"] input[type="range"]')
         slider.focus()
         slider.press("Home")
-        assert main(["modes", "two_area", "--scenario", "pod_p", "--set", "gfor.pod_p.K=100", "--json"]) == 0
+        assert (
+            main(
+                ["modes", "two_area", "--scenario", "pod_p", "--set", "gfor.pod_p.K=100", "--json"]
+            )
+            == 0
+        )
         out = capsys.readouterr().out
         content = json.loads(out[out.index("{") :])["scenarios"][0]
         assert [row[:2] for row in rows(view)] == shown(content["modes"])
@@ -297,7 +336,8 @@ def test_a_value_with_a_wanted_damping_is_found(view, capsys):
     computed(view, 2)
     content = of_command(view, capsys)
     assert 15 <= min(mode["damping_percent"] for mode in content["modes"]) < 15.005
-    assert view.evaluate("state.values['gfor.pod_p.K']") == pytest.approx(27, abs=0.5)  # not the other, 550
+    # not the other, 550
+    assert view.evaluate("state.values['gfor.pod_p.K']") == pytest.approx(27, abs=0.5)
     first, other = said.inner_text().split("\n")[:2]
     assert first.startswith("15.00 % at K 2")
     assert "below it is less than 15 %" in first
@@ -312,7 +352,10 @@ def test_stability_is_lost_beyond_the_sliders_range_and_said_in_the_sweeps_words
         control.locator("button", has_text="until unstable").click()
         control.locator(".finder", has_text="values were tried").wait_for()
         said = control.locator(".finder [role=status]").inner_text().split("\n")[0]
-        holds, fails = map(float, re.match(r"stable up to X_L (\S+), UNSTABLE at (\S+): a mode grows", said).groups())
+        holds, fails = map(
+            float,
+            re.match(r"stable up to X_L (\S+), UNSTABLE at (\S+): a mode grows", said).groups(),
+        )
         desk = Desk("two_area", False)
         question = {"ask": "modes", "scenario": "gfor"}
         for value, stable in ((holds, True), (fails, False)):
@@ -328,14 +371,18 @@ def test_a_refused_outage_and_a_search_that_cannot_act_say_so(browser):
         view.locator("#tab-network").click()
         view.locator('.thing[data-thing="unit sg2"]').click(force=True)
         view.locator("#element input[type=checkbox]").click()
-        view.locator("#failure", has_text="not computed; what is shown is the state before").wait_for()
+        view.locator(
+            "#failure", has_text="not computed; what is shown is the state before"
+        ).wait_for()
         assert view.locator("#element input[type=checkbox]").is_checked()
         assert view.locator(".control").count() == 0
         assert view.evaluate("state.values") == {}
         assert view.locator("#verdict").inner_text() == before
         idle = add(view, "gfor.pod_p.K")  # its controller is off
         idle.locator("button", has_text="find").click()
-        idle.locator(".finder", has_text="gfor.pod_p.K cannot act: gfor.pod_p.enabled is false").wait_for()
+        idle.locator(
+            ".finder", has_text="gfor.pod_p.K cannot act: gfor.pod_p.enabled is false"
+        ).wait_for()
 
 
 @needs_chromium
@@ -344,7 +391,8 @@ def test_rows_of_a_certificate_show_their_limits(browser, issued):
     study = found[2]["study"]
     study["columns"][0]["name"] = "<img src=x onerror=alert(1)>"
     explorer = Explorer(
-        found[0], {"scenario": found[1].scenarios[-1], "values": {}, "range": [0.1, 2.0], "study": study}
+        found[0],
+        {"scenario": found[1].scenarios[-1], "values": {}, "range": [0.1, 2.0], "study": study},
     )
     threading.Thread(target=explorer.serve, daemon=True).start()
     with opened(browser, explorer.address) as view:
@@ -352,7 +400,9 @@ def test_rows_of_a_certificate_show_their_limits(browser, issued):
         view.keyboard.press("Enter")
         view.locator("#study-plots .curve.limit").first.wait_for(state="attached")
         assert view.locator("#study-plots .curve:not(.limit)").count() >= 1
-        assert study["cells"][0][0]["text"].split("\n")[0] in view.locator("#study-said").inner_text()
+        assert (
+            study["cells"][0][0]["text"].split("\n")[0] in view.locator("#study-said").inner_text()
+        )
         assert view.locator("img").count() == 0
     explorer.close()
 

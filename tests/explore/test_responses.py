@@ -16,4 +16,10 @@ def test_a_streamed_signal_is_the_variable_the_difference_or_the_magnitude():
     run = SimpleNamespace(time=0.1, components={"gfor": gfor, "sg1": sg1})
     streamed.observe(run)
     streamed.end(run)
-    assert said == [{"time": [0.1], "signals": {names[0]: [0.9], names[1]: [0.4], names[2]: [0.5]}, "until": 0.2}]
+    assert said == [
+        {
+            "time": [0.1],
+            "signals": {names[0]: [0.9], names[1]: [0.4], names[2]: [0.5]},
+            "until": 0.2,
+        }
+    ]

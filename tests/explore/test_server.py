@@ -59,7 +59,9 @@ def test_the_page_and_its_files_are_there_for_who_knows_the_token(explorer):
     assert json.loads(asked(explorer, f"/{explorer.token}/beginning")[1]) == BEGINNING
 
 
-@pytest.mark.parametrize("path", ["/", "//", "/page.html", "/wrong/", "/wrong/page.js", "/wrong/beginning", "/%C3%A9/"])
+@pytest.mark.parametrize(
+    "path", ["/", "//", "/page.html", "/wrong/", "/wrong/page.js", "/wrong/beginning", "/%C3%A9/"]
+)
 def test_nothing_is_said_without_the_token(explorer, path):
     status, content, _ = asked(explorer, path)
     assert (status, content) == (403, b"Forbidden")
@@ -139,7 +141,9 @@ def test_a_page_that_comes_again_is_answered(explorer):
 
 
 def test_the_page_loads_nothing_from_elsewhere():
-    text = "".join(content_of(name).decode() for name in FILES).replace("http://www.w3.org/2000/svg", "")
+    text = "".join(content_of(name).decode() for name in FILES).replace(
+        "http://www.w3.org/2000/svg", ""
+    )
     for part in ("http:", "https:", "//cdn", "@import", "import("):
         assert part not in text
     assert re.findall(r'<script src="([^"]+)">', content_of("page.html").decode()) == list(SCRIPTS)
@@ -147,7 +151,14 @@ def test_the_page_loads_nothing_from_elsewhere():
 
 def test_the_page_makes_no_markup_of_a_text():
     text = "".join(content_of(name).decode() for name in SCRIPTS)
-    for part in ("innerHTML", "outerHTML", "insertAdjacentHTML", "document.write", "eval(", "DOMParser"):
+    for part in (
+        "innerHTML",
+        "outerHTML",
+        "insertAdjacentHTML",
+        "document.write",
+        "eval(",
+        "DOMParser",
+    ):
         assert part not in text
 
 
@@ -167,18 +178,25 @@ def answer(computing, page="p", say=lambda part: None, **more):
     return computing.ask(page, {**QUESTION, **more}, say)
 
 
-@pytest.mark.parametrize("values", [{}, {"gfor.pod_p.K": 137.25, "grid.X_L": 0.31}, {"gfor.pod_p.enabled": False}])
+@pytest.mark.parametrize(
+    "values", [{}, {"gfor.pod_p.K": 137.25, "grid.X_L": 0.31}, {"gfor.pod_p.enabled": False}]
+)
 def test_figures_are_those_of_the_command_that_is_copied(computing, capsys, values):
     found = answer(computing, values=values)["answer"]
     words = found["copied"]["command"].split()
     assert words[:2] == ["gfor", "modes"]
     assert main([*words[1:], "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {**found["modes"], "questions": found["modes"]["questions"]}
+    assert json.loads(capsys.readouterr().out) == {
+        **found["modes"],
+        "questions": found["modes"]["questions"],
+    }
     assert found["verdict"] == found["modes"]["scenarios"][0]["stability"]["sentence"]
 
 
 @pytest.mark.slow
-def test_the_scenario_and_the_python_that_are_copied_give_the_same_figures(computing, tmp_path, capsys):
+def test_the_scenario_and_the_python_that_are_copied_give_the_same_figures(
+    computing, tmp_path, capsys
+):
     values = {"gfor.pod_p.K": 137.25, "grid.X_L": 0.31}
     found = answer(computing, values=values)["answer"]
     file = gfor.load("two_area").file
@@ -195,9 +213,19 @@ def test_the_scenario_and_the_python_that_are_copied_give_the_same_figures(compu
 @pytest.mark.slow
 def test_slopes_are_those_of_the_sensitivities(computing):
     found = answer(computing, ask="slopes", parameter="gfor.pod_p.K")["answer"]
-    row = gfor.load("two_area").scenario("pod_p").sensitivities(parameters="gfor.pod_p.K").table().iloc[0]
-    (k,) = [k for k, (re_, im) in enumerate(found["eigenvalues"]) if abs(im / 6.283185 - 0.7633) < 1e-3]
-    assert found["slopes"][k] == pytest.approx([row["real_per_unit"], row["imag_per_unit"]], rel=2e-3)
+    row = (
+        gfor.load("two_area")
+        .scenario("pod_p")
+        .sensitivities(parameters="gfor.pod_p.K")
+        .table()
+        .iloc[0]
+    )
+    (k,) = [
+        k for k, (re_, im) in enumerate(found["eigenvalues"]) if abs(im / 6.283185 - 0.7633) < 1e-3
+    ]
+    assert found["slopes"][k] == pytest.approx(
+        [row["real_per_unit"], row["imag_per_unit"]], rel=2e-3
+    )
 
 
 def test_a_value_that_cannot_be_is_refused_in_the_commands_words(computing, capsys):
@@ -211,12 +239,19 @@ def test_a_value_that_cannot_be_is_refused_in_the_commands_words(computing, caps
 def test_parameters_have_units_bounds_and_words(computing):
     found = answer(computing, ask="parameters")["answer"]
     (gain,) = [p for p in found["parameters"] if p["parameter"] == "gfor.pod_p.K"]
-    assert (gain["value"], gain["unit"], gain["minimum"], gain["variability"]) == (200.0, "pu", 0.0, "tunable")
+    assert (gain["value"], gain["unit"], gain["minimum"], gain["variability"]) == (
+        200.0,
+        "pu",
+        0.0,
+        "tunable",
+    )
     assert gain["description"].startswith("Gain")
     assert {line["name"] for line in found["diagram"]["lines"]} == {"L"}
     assert {unit["name"]: unit["machine"] for unit in found["diagram"]["units"]} == {
-        "sg1": True, "sg2": True, "gfor": False,
-    }  # fmt: skip
+        "sg1": True,
+        "sg2": True,
+        "gfor": False,
+    }
 
 
 @pytest.mark.slow
@@ -303,7 +338,9 @@ class in_background:  # noqa: N801 - reads as what it does
     def __init__(self, computing, **more):
         self._found = []
         self._computing = computing
-        self._thread = threading.Thread(target=lambda: self._found.append(answer(computing, **more)), daemon=True)
+        self._thread = threading.Thread(
+            target=lambda: self._found.append(answer(computing, **more)), daemon=True
+        )
         self._thread.start()
 
     def __call__(self):
@@ -324,7 +361,10 @@ def test_a_case_that_changes_on_disk_is_read_again(tmp_path):
     path.write_text(gfor.load("infinite_bus").file.text, encoding="utf-8")
     computing = Computing(str(path))
     before = computing.ask("p", {"ask": "open"}, lambda part: None)["answer"]
-    path.write_text(path.read_text(encoding="utf-8").replace("[scenarios.dip]", "[scenarios.sag]"), encoding="utf-8")
+    path.write_text(
+        path.read_text(encoding="utf-8").replace("[scenarios.dip]", "[scenarios.sag]"),
+        encoding="utf-8",
+    )
     after = computing.ask("p", {"ask": "open"}, lambda part: None)["answer"]
     assert set(after["scenarios"]) - set(before["scenarios"]) == {"sag"}
     assert after["stamp"] != before["stamp"]
@@ -338,7 +378,9 @@ def test_a_run_is_streamed_and_kept_as_that_of_the_command(tmp_path, monkeypatch
     case = re.sub(r'stop_time = "[^"]*"', 'stop_time = "1.2 s"', text)
     (tmp_path / "short.toml").write_text(case, encoding="utf-8")
     computing, parts = Computing("short.toml"), []
-    found = computing.ask("p", {"ask": "run", "scenario": "dip", "signals": ["grid.v"]}, parts.append)["answer"]
+    found = computing.ask(
+        "p", {"ask": "run", "scenario": "dip", "signals": ["grid.v"]}, parts.append
+    )["answer"]
     computing.close()
     assert found["folder"].startswith(os.path.join("results", "explore"))
     assert tomllib.loads((tmp_path / found["folder"] / "case.toml").read_text(encoding="utf-8"))
@@ -359,9 +401,12 @@ def test_a_run_is_streamed_and_kept_as_that_of_the_command(tmp_path, monkeypatch
 def test_the_command_prints_its_address_and_ends_by_ctrl_c():
     words = [sys.executable, "-m", "orchestrator.cli", "explore", "infinite_bus", "--no-browser"]
     with subprocess.Popen(
-        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        words,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),  # noqa: PLW1509
-    ) as process:  # fmt: skip
+    ) as process:
         address = process.stdout.readline().split()[0]
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/[\w-]{32}/", address)
         process.send_signal(signal.SIGINT)
@@ -373,7 +418,10 @@ def test_the_command_prints_its_address_and_ends_by_ctrl_c():
     ("words", "says"),
     [
         (["nothing"], "nothing"),
-        (["two_area", "--scenario", "none"], "there is no scenario 'none'; the case has: base, gfor"),
+        (
+            ["two_area", "--scenario", "none"],
+            "there is no scenario 'none'; the case has: base, gfor",
+        ),
     ],
 )
 def test_what_cannot_be_shown_is_said_at_once(words, says, capsys):
@@ -426,5 +474,7 @@ def test_an_ssp_is_opened_and_its_modes_are_those_of_the_case(tmp_path):
         desk.answer(asked, print)["modes"]["scenarios"][0],
         scenario.modes((0.05, 50.0)).as_json()["scenarios"][0],
     )
-    assert [m["imag"] for m in mine["modes"]] == pytest.approx([m["imag"] for m in own["modes"]], rel=1e-9)
+    assert [m["imag"] for m in mine["modes"]] == pytest.approx(
+        [m["imag"] for m in own["modes"]], rel=1e-9
+    )
     assert str(archive) in desk.answer(asked, print)["copied"]["command"]

@@ -18,7 +18,11 @@ from tests.explore.test_page import browser, computed, needs_chromium, of_comman
 
 __all__ = ["browser"]
 
-POINTS = {"night": {"load": 0.9, "generation": 0.9}, "day": {"line_4_5.in_service": 0}, "late": {"sg3.in_service": 0}}
+POINTS = {
+    "night": {"load": 0.9, "generation": 0.9},
+    "day": {"line_4_5.in_service": 0},
+    "late": {"sg3.in_service": 0},
+}
 
 
 @pytest.fixture(scope="module", params=["slack", "droop"])
@@ -35,13 +39,22 @@ def screened(request, tmp_path_factory):
 def test_cells_of_a_screening_have_the_figures_of_its_items(screened):
     folder, items = screened
     study = read_cells(folder)
-    assert (study["case"], study["scenario"], [c["name"] for c in study["columns"]]) == ("wscc9", "gfor", [*POINTS])
-    places = {(r["name"], c["name"]): cell for r, row in zip(study["rows"], study["cells"], strict=True)
-              for c, cell in zip(study["columns"], row, strict=True)}  # fmt: skip
+    assert (study["case"], study["scenario"], [c["name"] for c in study["columns"]]) == (
+        "wscc9",
+        "gfor",
+        [*POINTS],
+    )
+    places = {
+        (r["name"], c["name"]): cell
+        for r, row in zip(study["rows"], study["cells"], strict=True)
+        for c, cell in zip(study["columns"], row, strict=True)
+    }
     assert len(places) >= len(items) == 8
     for item in items.itertuples():
         cell = places[item.outage, item.point]
-        assert cell.get("percent", math.nan) == pytest.approx(item.least_damping_percent, nan_ok=True)
+        assert cell.get("percent", math.nan) == pytest.approx(
+            item.least_damping_percent, nan_ok=True
+        )
         assert cell.get("stable") == item.stable
 
 
@@ -55,38 +68,72 @@ def test_the_live_case_of_each_cell_has_the_modes_of_the_screening(screened):
         for column, cell in zip(study["columns"], cells, strict=True):
             if "percent" not in (cell or {}):
                 continue
-            question = {"ask": "cell", "scenario": "gfor", "values": study["values"] | column["values"],
-                        "own": column["out"], "lost": row["out"], "sharing": study["sharing"]}  # fmt: skip
+            question = {
+                "ask": "cell",
+                "scenario": "gfor",
+                "values": study["values"] | column["values"],
+                "own": column["out"],
+                "lost": row["out"],
+                "sharing": study["sharing"],
+            }
             values = desk.answer(question, print)["values"]
             modes = gfor.load("wscc9").scenario("gfor", values).modes(tuple(study["range"]))
             least = min(mode.damping_percent for mode in modes)
-            assert least == pytest.approx(cell["percent"], abs=0.01)  # a screening has no communication step
+            # a screening has no communication step
+            assert least == pytest.approx(cell["percent"], abs=0.01)
             seen.append((row["name"], column["name"]))
-    assert {("intact", "late"), ("load_8", "day")} <= set(seen)  # a unit out, and a lost load that others feed less for
+    # a unit out, and a lost load that others feed less for
+    assert {("intact", "late"), ("load_8", "day")} <= set(seen)
 
 
 @pytest.mark.slow
 def test_cells_of_a_sweep_are_its_followed_modes(tmp_path):
-    sweep = gfor.load("two_area").sweep({"gfor.pod_p.K": [100, 150]}, "pod_p", workers=1, progress=False)
+    sweep = gfor.load("two_area").sweep(
+        {"gfor.pod_p.K": [100, 150]}, "pod_p", workers=1, progress=False
+    )
     sweep.save(tmp_path)
     study = read_cells(tmp_path)
     table = sweep.table()
     named = table[table["mode"] == "electromechanical"]
-    assert [cell["percent"] for cell in study["cells"][0]] == pytest.approx(list(named["damping_percent"]))
-    assert [column["values"] for column in study["columns"]] == [{"gfor.pod_p.K": 100.0}, {"gfor.pod_p.K": 150.0}]
+    assert [cell["percent"] for cell in study["cells"][0]] == pytest.approx(
+        list(named["damping_percent"])
+    )
+    assert [column["values"] for column in study["columns"]] == [
+        {"gfor.pod_p.K": 100.0},
+        {"gfor.pod_p.K": 150.0},
+    ]
     assert study["followed"] is True
 
 
-@pytest.mark.parametrize(("change", "text"), [
-    ({"format": 7}, "format is 7"), ({"cells": []}, "do not fit"), ({"rows": [{"name": 3}]}, "rows.0.name"),
-    ({"range": None}, "range"), ({"values": []}, "values"), ({"cells": [[{"percent": float("nan")}]]}, "finite"),
-    ({"rows": [], "cells": []}, "rows"), (None, "there is no cells.json"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"format": 7}, "format is 7"),
+        ({"cells": []}, "do not fit"),
+        ({"rows": [{"name": 3}]}, "rows.0.name"),
+        ({"range": None}, "range"),
+        ({"values": []}, "values"),
+        ({"cells": [[{"percent": float("nan")}]]}, "finite"),
+        ({"rows": [], "cells": []}, "rows"),
+        (None, "there is no cells.json"),
+    ],
+)
 def test_what_is_no_study_is_refused_by_name(tmp_path, capsys, change, text):
     if change is not None:
-        whole = {"format": 1, "title": "", "case": "wscc9", "hash": "", "scenario": "gfor", "range": [0.1, 2.0],
-                 "values": {}, "sharing": None, "followed": False, "rows": [{"name": "a"}], "columns": [{"name": "b"}],
-                 "cells": [[None]]}  # fmt: skip
+        whole = {
+            "format": 1,
+            "title": "",
+            "case": "wscc9",
+            "hash": "",
+            "scenario": "gfor",
+            "range": [0.1, 2.0],
+            "values": {},
+            "sharing": None,
+            "followed": False,
+            "rows": [{"name": "a"}],
+            "columns": [{"name": "b"}],
+            "cells": [[None]],
+        }
         (tmp_path / "cells.json").write_text(json.dumps(whole | change), encoding="utf-8")
     assert main(["explore", str(tmp_path), "--no-browser"]) == 2
     error = capsys.readouterr().err
@@ -104,7 +151,13 @@ def test_what_is_copied_names_the_step_of_the_study():
 @contextmanager
 def served(folder):
     study = read_cells(folder)
-    beginning = {"case": study["case"], "scenario": "gfor", "values": {}, "range": study["range"], "study": study}
+    beginning = {
+        "case": study["case"],
+        "scenario": "gfor",
+        "values": {},
+        "range": study["range"],
+        "study": study,
+    }
     explorer = Explorer(study["case"], beginning)
     threading.Thread(target=explorer.serve, daemon=True).start()
     yield explorer
@@ -117,8 +170,11 @@ def served(folder):
 @pytest.mark.filterwarnings("ignore::orchestrator.api.scenario.UnusualDataWarning")
 def test_a_click_on_a_cell_opens_it_and_faults_places_and_scenario_are_kept(
     browser,
-    screened, capsys, tmp_path, monkeypatch,
-):  # fmt: skip
+    screened,
+    capsys,
+    tmp_path,
+    monkeypatch,
+):
     monkeypatch.chdir(tmp_path)
     folder, _ = screened
     with served(folder) as explorer, opened(browser, explorer.address) as view:
@@ -133,7 +189,9 @@ def test_a_click_on_a_cell_opens_it_and_faults_places_and_scenario_are_kept(
             f"Live, least damped: {least['frequency_hz']:.3f} Hz, {least['damping_percent']:.2f} %"
             in view.locator("#study-said").inner_text()
         )
-        figures = [row.locator("td").all_inner_texts()[:2] for row in view.locator("#table tbody tr").all()]
+        figures = [
+            row.locator("td").all_inner_texts()[:2] for row in view.locator("#table tbody tr").all()
+        ]
         assert figures == shown(content["modes"])
         view.locator("#tab-network").click()
         bus = view.locator('[data-thing="bus bus_7"]')
@@ -164,7 +222,11 @@ def test_a_click_on_a_cell_opens_it_and_faults_places_and_scenario_are_kept(
 def test_a_converter_with_a_pod_can_be_out():
     """Modes are named with all PODs at rest; one that is out of service has no instance to be set."""
     values = {f"grid.{unit}.connected": False for unit in ("gfor1", "sg1")}
-    values |= {"sg2.P_0": 1.030949925781284, "sg3.P_0": 1.0521636820326883, "sg4.P_0": 1.030949925781284}
+    values |= {
+        "sg2.P_0": 1.030949925781284,
+        "sg3.P_0": 1.0521636820326883,
+        "sg4.P_0": 1.030949925781284,
+    }
     modes = gfor.load("kundur").scenario("pod_p", values).modes()
     assert min(mode.damping_percent for mode in modes) == pytest.approx(-4.95, abs=0.01)
 

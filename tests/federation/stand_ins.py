@@ -11,17 +11,24 @@ PERIOD = 100e-6
 def joined(broker, name="load"):
     info = h.helicsCreateFederateInfo()
     h.helicsFederateInfoSetCoreTypeFromString(info, "zmq")
-    h.helicsFederateInfoSetCoreInitString(info, f"--federates=1 --broker_address={broker} --loglevel=error")
+    h.helicsFederateInfoSetCoreInitString(
+        info, f"--federates=1 --broker_address={broker} --loglevel=error"
+    )
     h.helicsFederateInfoSetFlagOption(info, h.HELICS_FLAG_UNINTERRUPTIBLE, True)
     return h.helicsCreateValueFederate(name, info)
 
 
-def gain(broker, output="load.y", subscribed="load.u", silent_from=1e9, hangs_from=1e9, bad_from=1e9):
+def gain(
+    broker, output="load.y", subscribed="load.u", silent_from=1e9, hangs_from=1e9, bad_from=1e9
+):
     """The output is K·input + offset, with K and offset as gfor gives them."""
     federate = joined(broker)
     y = h.helicsFederateRegisterGlobalPublication(federate, output, h.HELICS_DATA_TYPE_DOUBLE, "")
     u = h.helicsFederateRegisterSubscription(federate, subscribed, "")
-    start = [h.helicsFederateRegisterSubscription(federate, f"load.{name}", "") for name in ("K", "offset")]
+    start = [
+        h.helicsFederateRegisterSubscription(federate, f"load.{name}", "")
+        for name in ("K", "offset")
+    ]
     h.helicsFederateEnterExecutingMode(federate)
     K, offset = (h.helicsInputGetDouble(value) for value in start)
     h.helicsPublicationPublishDouble(y, K * 1.0 + offset)  # of an input that starts at 1

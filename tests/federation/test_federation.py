@@ -122,7 +122,8 @@ def assert_same(one, other):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("names", "schedule"), [(("gfor",), "gauss-seidel"), (("gfor", "sg1"), "jacobi"), (("sg2", "grid"), "gauss-seidel")]
+    ("names", "schedule"),
+    [(("gfor",), "gauss-seidel"), (("gfor", "sg1"), "jacobi"), (("sg2", "grid"), "gauss-seidel")],
 )
 def test_a_case_gives_the_local_master_s_numbers(names, schedule, temporary, started):
     (ready,) = load_case("two_area").prepare(["pod_p"], stop_time=0.02)
@@ -162,7 +163,8 @@ def test_a_program_of_others_takes_a_component_s_place(prepared, stand_in, tempo
     assert result.failure is None
     assert set(started) == {"the hub"}
     recorder = Recorder(ready.record, ready.record_every)
-    with Master(ready.system, ready.schedule, ready.step_size) as master:  # from the same start, as without modes
+    # from the same start, as without modes
+    with Master(ready.system, ready.schedule, ready.step_size) as master:
         master.run(ready.stop_time, observers=[recorder])
     for name, values in zip(recorder.names, recorder.values.T, strict=True):
         np.testing.assert_array_equal(result.dataset[name].values, values, err_msg=name)
@@ -173,7 +175,10 @@ def test_a_program_of_others_takes_a_component_s_place(prepared, stand_in, tempo
 
 def test_times_of_groups_follow_one_another(prepared):
     layout = make_layout(prepared(), ("x", "load"), ())
-    assert [(s.publish, s.compute, s.read) for s in layout.slots] == [(0, 25_000, 50_000), (50_000, 75_000, 100_000)]
+    assert [(s.publish, s.compute, s.read) for s in layout.slots] == [
+        (0, 25_000, 50_000),
+        (50_000, 75_000, 100_000),
+    ]
     assert [(p.name, p.slot, p.inputs, p.needed) for p in layout.parts] == [
         ("x", 0, ("u",), ("y",)),
         ("load", 1, ("u",), ("y",)),
@@ -193,7 +198,10 @@ def test_a_step_that_helics_cannot_keep(step_size, names, prepared):
     ("kind", "said"),
     [
         ("wrong_output", r"no global publication 'load\.y'.*it publishes 'load\.z', is that meant"),
-        ("wrong_input", r"somebody subscribes to 'load\.uu', which nobody publishes; did you mean 'load\.u'"),
+        (
+            "wrong_input",
+            r"somebody subscribes to 'load\.uu', which nobody publishes; did you mean 'load\.u'",
+        ),
     ],
 )
 def test_a_federate_with_other_names(kind, said, prepared, stand_in, temporary, started):
@@ -208,10 +216,16 @@ def test_a_federate_with_other_names(kind, said, prepared, stand_in, temporary, 
     [
         ("silent", ComponentError, r"component 'load' at t = 0\.001 s.*no value: of load\.y"),
         ("nan", NotFiniteError, r"component 'load'.*y is no finite number"),
-        ("hangs", ComponentError, r"component 'load' at t = 0\.001 s.*did not ask for its next time within 2 s"),
+        (
+            "hangs",
+            ComponentError,
+            r"component 'load' at t = 0\.001 s.*did not ask for its next time within 2 s",
+        ),
     ],
 )
-def test_a_federate_that_goes_wrong_keeps_what_was_recorded(kind, error, said, prepared, stand_in, temporary, started):
+def test_a_federate_that_goes_wrong_keeps_what_was_recorded(
+    kind, error, said, prepared, stand_in, temporary, started
+):
     ready, port = prepared(), broker_port(None)
     stand_in(kind, port)
     choice = Federates(external=("load",), port=port, patience=2.0)
@@ -236,7 +250,10 @@ def test_a_federate_that_is_killed(prepared, temporary, started):
             pass
 
     result = run_scenario(prepared(), observers=[Kills()], federates=Federates(("load",)))
-    assert re.search(r"component 'load' at t = 0\.00\d+ s: its federate returned crash.*SIGKILL", str(result.failure))
+    assert re.search(
+        r"component 'load' at t = 0\.00\d+ s: its federate returned crash.*SIGKILL",
+        str(result.failure),
+    )
     assert result.dataset.sizes["time"] >= 5
 
 
@@ -269,18 +286,26 @@ def test_a_port_in_use(taken, prepared):
 
 def test_no_broker(prepared):
     with pytest.raises(InputError, match=r"nothing answers there.*helics_broker -f N"):
-        run_scenario(prepared(), federates=Federates(("load",), broker=f"tcp://127.0.0.1:{broker_port(None)}"))
+        run_scenario(
+            prepared(),
+            federates=Federates(("load",), broker=f"tcp://127.0.0.1:{broker_port(None)}"),
+        )
 
 
 def test_nobody_joins(prepared, temporary, started):
-    with pytest.raises(InputError, match=r"no federate named 'load' joined the federation at .* within 4 s"):
-        run_scenario(prepared(), federates=Federates(external=("load",), port=broker_port(None), to_join=4.0))
+    with pytest.raises(
+        InputError, match=r"no federate named 'load' joined the federation at .* within 4 s"
+    ):
+        run_scenario(
+            prepared(), federates=Federates(external=("load",), port=broker_port(None), to_join=4.0)
+        )
 
 
 def test_another_version(prepared, temporary, started, monkeypatch):
     monkeypatch.setattr(processes, "PROTOCOL", 99)
     with pytest.raises(
-        InputError, match=r"component 'load': its federate is gfor-cosim .* with protocol 1 .* protocol 99"
+        InputError,
+        match=r"component 'load': its federate is gfor-cosim .* with protocol 1 .* protocol 99",
     ):
         run_scenario(prepared(), federates=Federates(("load",)))
 
@@ -288,7 +313,9 @@ def test_another_version(prepared, temporary, started, monkeypatch):
 def test_an_event_in_a_foreign_federate(prepared, stand_in, temporary, started):
     port = broker_port(None)
     stand_in("gain", port)
-    with pytest.raises(InputError, match="'load' is a foreign federate, in which gfor can change nothing"):
+    with pytest.raises(
+        InputError, match="'load' is a foreign federate, in which gfor can change nothing"
+    ):
         run_scenario(prepared(more=EVENT), federates=Federates(external=("load",), port=port))
 
 
@@ -296,16 +323,30 @@ def test_an_event_in_a_foreign_federate(prepared, stand_in, temporary, started):
     ("words", "said"),
     [
         (("--federate", "gfor"), "need --engine helics"),
-        (("--engine", "helics", "--federate", "sg9"), "has no component 'sg9'; components: gfor, sg1, sg2, grid"),
-        (("--engine", "helics", "--federate", "gfor", "--external", "gfor"), "either started by gfor or external"),
+        (
+            ("--engine", "helics", "--federate", "sg9"),
+            "has no component 'sg9'; components: gfor, sg1, sg2, grid",
+        ),
+        (
+            ("--engine", "helics", "--federate", "gfor", "--external", "gfor"),
+            "either started by gfor or external",
+        ),
         (("--engine", "helics", "--broker", "tcp://"), "an address has the form tcp://host:port"),
-        (("--engine", "helics", "--checkpoint", "5"), "a run with federates keeps no checkpoints; leave out"),
+        (
+            ("--engine", "helics", "--checkpoint", "5"),
+            "a run with federates keeps no checkpoints; leave out",
+        ),
         (("--engine", "helics", "--federate", "sg9"), "if it is interrupted, it cannot be resumed"),
-        (("--engine", "helics", "--like", "fmpy_ssp"), "leave out either --like or --engine helics"),
+        (
+            ("--engine", "helics", "--like", "fmpy_ssp"),
+            "leave out either --like or --engine helics",
+        ),
     ],
 )
 def test_a_choice_that_cannot_be(words, said, gfor, tmp_path):
-    code, _, error = gfor("run", "two_area", "--scenario", "gfor", "--stop", "0.01", "--out", tmp_path, *words)
+    code, _, error = gfor(
+        "run", "two_area", "--scenario", "gfor", "--stop", "0.01", "--out", tmp_path, *words
+    )
     assert code == 2
     assert said in error
 
@@ -315,10 +356,22 @@ def test_a_choice_that_cannot_be(words, said, gfor, tmp_path):
 @pytest.mark.parametrize("number", ["SIGTERM", "SIGKILL"])
 def test_nothing_is_left_when_gfor_is_killed(number, prepared, tmp_path):
     case = prepared("100 s").case.path
-    words = [sys.executable, "-m", "orchestrator.cli", "run", str(case), "--engine", "helics", "--federate", "load"]
+    words = [
+        sys.executable,
+        "-m",
+        "orchestrator.cli",
+        "run",
+        str(case),
+        "--engine",
+        "helics",
+        "--federate",
+        "load",
+    ]
     environment = {**os.environ, "TMPDIR": str(tmp_path)}
     with (tmp_path / "said.txt").open("wb") as said:
-        process = subprocess.Popen([*words, "--out", str(tmp_path / "out")], stderr=said, env=environment)
+        process = subprocess.Popen(
+            [*words, "--out", str(tmp_path / "out")], stderr=said, env=environment
+        )
     try:
         _until(lambda: "steps/s" in (tmp_path / "said.txt").read_text(encoding="utf-8"))
         children = _of_federation(process.pid)
@@ -342,7 +395,9 @@ def _of_federation(parent):
             status = (folder / "stat").read_text(encoding="utf-8").rpartition(")")[2].split()
         except OSError:
             continue
-        if int(status[1]) == parent and any(word.startswith("orchestrator.federation.") for word in words):
+        if int(status[1]) == parent and any(
+            word.startswith("orchestrator.federation.") for word in words
+        ):
             found.append(int(folder.name))
     return found
 
@@ -356,7 +411,15 @@ def _until(holds, seconds=60.0):
 
 def test_a_component_of_ours_that_was_started_by_hand(prepared, temporary, started):
     ready, port = prepared(), broker_port(None)
-    words = ["master", "federate", str(ready.case.path), "--component", "load", "--broker", f"tcp://127.0.0.1:{port}"]
+    words = [
+        "master",
+        "federate",
+        str(ready.case.path),
+        "--component",
+        "load",
+        "--broker",
+        f"tcp://127.0.0.1:{port}",
+    ]
     late = "import time, sys; time.sleep(3); from orchestrator.cli import main; sys.exit(main(sys.argv[1:]))"
     with subprocess.Popen([sys.executable, "-c", late, *words], stdout=subprocess.PIPE) as process:
         try:
@@ -380,12 +443,16 @@ def test_a_federate_without_a_broker(gfor, prepared):
 @pytest.mark.slow
 def test_the_program_of_the_guide(tmp_path, temporary, started):
     """A constant admittance in the place of the converter: its current follows the voltage that it is given."""
-    page = (Path(__file__).parents[2] / ".docs" / "how-to" / "federation.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / ".docs" / "how-to" / "federation.md").read_text(
+        encoding="utf-8"
+    )
     program, port = tmp_path / "admittance.py", broker_port(None)
     program.write_text(re.search(r"```python\n(.*?)```", page, re.DOTALL)[1], encoding="utf-8")
     (ready,) = load_case("two_area").prepare(["gfor"], stop_time=0.02)
     flow = ready.values
-    current = complex(flow["gfor.P_0"], -flow["gfor.Q_0"]) * flow["gfor.S_n"] / 100 / flow["gfor.v_0"]
+    current = (
+        complex(flow["gfor.P_0"], -flow["gfor.Q_0"]) * flow["gfor.S_n"] / 100 / flow["gfor.v_0"]
+    )
     with subprocess.Popen([sys.executable, str(program), f"tcp://127.0.0.1:{port}"]) as process:
         try:
             result = run_scenario(ready, federates=Federates(external=("gfor",), port=port))

@@ -24,11 +24,45 @@ from orchestrator.fmi.limits import Limits, apply_limits
 
 XML = "modelDescription.xml"
 NAMES = (
-    *("../out", "../../../../out", "/out", "C:\\out", "..\\out", "a/../../out", "CON", "a\0b", "a//b", "x" * 300, ""),
-    *("resources/" + "d/" * 600 + "f", "modeldescription.XML", "binaries", "a\nb", "\u202eout", "a:b", "-", "~", " "),
+    *(
+        "../out",
+        "../../../../out",
+        "/out",
+        "C:\\out",
+        "..\\out",
+        "a/../../out",
+        "CON",
+        "a\0b",
+        "a//b",
+        "x" * 300,
+        "",
+    ),
+    *(
+        "resources/" + "d/" * 600 + "f",
+        "modeldescription.XML",
+        "binaries",
+        "a\nb",
+        "\u202eout",
+        "a:b",
+        "-",
+        "~",
+        " ",
+    ),
 )
 VALUES = (
-    *("", "-1", "4294967296", "99999999999999999999", "NaN", "inf", "1e999", "true", "2.0", "../../out", "\u202e"),
+    *(
+        "",
+        "-1",
+        "4294967296",
+        "99999999999999999999",
+        "NaN",
+        "inf",
+        "1e999",
+        "true",
+        "2.0",
+        "../../out",
+        "\u202e",
+    ),
     *("x" * 100_000, "&lt;", "{0}", "%s%n", "0x10", "1.0", "continuous", "Real", "output", "None"),
 )
 WORDS = (
@@ -47,7 +81,14 @@ DOCTYPES = (
 def mutated(chance: random.Random, good: bytes) -> bytes:
     """One mutation of an archive: of its bytes, its entries, or its model description."""
     kind = chance.choice(
-        (bytes_changed, bytes_changed, cut, entries_changed, entries_changed, *[description_changed] * 5)
+        (
+            bytes_changed,
+            bytes_changed,
+            cut,
+            entries_changed,
+            entries_changed,
+            *[description_changed] * 5,
+        )
     )
     return kind(chance, good)
 
@@ -70,7 +111,10 @@ def cut(chance, good):
 
 def entries_changed(chance, good):
     buffer = io.BytesIO()
-    with zipfile.ZipFile(io.BytesIO(good)) as source, zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as target:
+    with (
+        zipfile.ZipFile(io.BytesIO(good)) as source,
+        zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as target,
+    ):
         for entry in source.namelist():
             if chance.random() < 0.9:
                 target.writestr(entry, source.read(entry))
@@ -89,13 +133,18 @@ def entries_changed(chance, good):
     content = bytearray(buffer.getvalue())
     if chance.random() < 0.3:  # flags, methods and sizes in the directory
         for match in list(re.finditer(rb"PK\x01\x02", content))[-3:]:
-            content[match.start() + chance.choice((6, 8, 10, 16, 20, 24, 28, 42))] ^= 1 << chance.randrange(8)
+            content[match.start() + chance.choice((6, 8, 10, 16, 20, 24, 28, 42))] ^= (
+                1 << chance.randrange(8)
+            )
     return bytes(content)
 
 
 def description_changed(chance, good):
     buffer = io.BytesIO()
-    with zipfile.ZipFile(io.BytesIO(good)) as source, zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as target:
+    with (
+        zipfile.ZipFile(io.BytesIO(good)) as source,
+        zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as target,
+    ):
         for entry in source.namelist():
             content = source.read(entry)
             target.writestr(entry, text_changed(chance, content) if entry == XML else content)
@@ -153,7 +202,9 @@ def another_encoding(chance, text):
 
 
 def a_deep_nest(chance, text):
-    return text.replace("<ModelVariables>", "<a>" * chance.choice((10, 1000, 100_000)) + "<ModelVariables>", 1)
+    return text.replace(
+        "<ModelVariables>", "<a>" * chance.choice((10, 1000, 100_000)) + "<ModelVariables>", 1
+    )
 
 
 def another_word(chance, text):
@@ -161,8 +212,17 @@ def another_word(chance, text):
     return text.replace(old, new, chance.choice((1, 1000)))
 
 
-EDITS = (other_value, other_attribute, other_count, a_mark, a_gap, a_document_type, another_encoding, a_deep_nest,
-         another_word)  # fmt: skip
+EDITS = (
+    other_value,
+    other_attribute,
+    other_count,
+    a_mark,
+    a_gap,
+    a_document_type,
+    another_encoding,
+    a_deep_nest,
+    another_word,
+)
 
 
 def outcome(path: Path, folder: Path) -> str:
@@ -209,4 +269,13 @@ def main(seed: int, count: int, folder: Path, sources: list[Path]) -> dict[str, 
 
 
 if __name__ == "__main__":
-    print(json.dumps(main(int(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3]), [Path(p) for p in sys.argv[4:]])))
+    print(
+        json.dumps(
+            main(
+                int(sys.argv[1]),
+                int(sys.argv[2]),
+                Path(sys.argv[3]),
+                [Path(p) for p in sys.argv[4:]],
+            )
+        )
+    )

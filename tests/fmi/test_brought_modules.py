@@ -69,7 +69,10 @@ def foreign(tmp_path_factory):
     for number in (1, 2):
         folder = tmp_path_factory.mktemp(f"foreign{number}")
         script = folder / "foreign.py"
-        script.write_text("from pythonfmu import Fmi2Causality, Fmi2Slave, Real\n" + _SLAVE[_SLAVE.index("class") :])
+        script.write_text(
+            "from pythonfmu import Fmi2Causality, Fmi2Slave, Real\n"
+            + _SLAVE[_SLAVE.index("class") :]
+        )
         path, known = list(sys.path), set(sys.modules)
         fmu = Path(builder.FmuBuilder.build_FMU(script, dest=folder))
         sys.path[:] = path
@@ -90,17 +93,30 @@ def foreign(tmp_path_factory):
 
 def test_modules_of_an_fmu_are_its_own_alone(foreign):
     done = subprocess.run(
-        [sys.executable, "-c", _LOAD, *map(str, foreign)], capture_output=True, text=True, check=False
+        [sys.executable, "-c", _LOAD, *map(str, foreign)],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
-    assert found == {"values": [11111.0, 11112.0], "shadowed": [], "front": True, "left": [], "after": True}
+    assert found == {
+        "values": [11111.0, 11112.0],
+        "shadowed": [],
+        "front": True,
+        "left": [],
+        "after": True,
+    }
 
 
 def test_a_package_is_installed_after_an_fmu_that_brings_a_part_of_it(tmp_path):
     """A case's Python-backed FMUs are loaded before the wrapper's binaries are looked for."""
     words = ["fmu", "build", "gfor", "--with-linear-model", "two_area", "--scenario", "pod_p"]
     done = subprocess.run(
-        [sys.executable, "-m", "orchestrator.cli", *words], capture_output=True, text=True, check=False, cwd=tmp_path
+        [sys.executable, "-m", "orchestrator.cli", *words],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
     )
     assert (done.returncode, done.stdout) == (0, "gfor.fmu\n"), done.stderr

@@ -94,11 +94,16 @@ def test_parameters_of_every_type_are_set_by_name(component):
 
 
 def test_an_unknown_name_is_an_input_error_with_a_remedy(component):
-    with pytest.raises(InputError, match=r"component 'converter' has no variable 'pod\.K'; `gfor fmu info` lists them"):
+    with pytest.raises(
+        InputError,
+        match=r"component 'converter' has no variable 'pod\.K'; `gfor fmu info` lists them",
+    ):
         component.set({"pod.K": 1.0})
 
 
-@pytest.mark.parametrize("read", [lambda c: c.get(["pod.K"]), lambda c: RealBatch(c, ["v_re", "pod.K"])])
+@pytest.mark.parametrize(
+    "read", [lambda c: c.get(["pod.K"]), lambda c: RealBatch(c, ["v_re", "pod.K"])]
+)
 def test_reading_an_unknown_name_is_an_input_error(read, component):
     with pytest.raises(InputError, match=r"'converter' has no variable 'pod\.K'"):
         read(component)
@@ -139,7 +144,9 @@ def test_a_refused_parameter_is_reported_in_the_fmus_words(component):
 
 
 def test_a_refused_initialisation_is_reported_in_the_fmus_words(component):
-    with pytest.raises(ComponentError, match=r"fmi2ExitInitializationMode .*lower P_0 or raise S_n"):
+    with pytest.raises(
+        ComponentError, match=r"fmi2ExitInitializationMode .*lower P_0 or raise S_n"
+    ):
         initialise(component, P_0=2.0)
 
 
@@ -168,14 +175,18 @@ def test_components_do_not_share_their_messages(description):
 
 
 def test_a_wrong_binary_name_is_a_component_error(description, temporary):
-    with pytest.raises(ComponentError, match=r"component 'converter': fmi2Instantiate .*nothing.so"):
+    with pytest.raises(
+        ComponentError, match=r"component 'converter': fmi2Instantiate .*nothing.so"
+    ):
         LoadedComponent("converter", replace(description, model_identifier="nothing"))
     assert list(temporary.iterdir()) == []
 
 
 def test_a_wrong_guid_is_a_component_error(description):
     with pytest.raises(ComponentError, match=r"fmi2Instantiate.*guid"):
-        LoadedComponent("converter", replace(description, guid="{00000000-0000-0000-0000-000000000000}")).close()
+        LoadedComponent(
+            "converter", replace(description, guid="{00000000-0000-0000-0000-000000000000}")
+        ).close()
 
 
 def test_a_slave_that_cannot_start_is_reported_with_its_reason(fmu_path, tmp_path, temporary):
@@ -184,7 +195,10 @@ def test_a_slave_that_cannot_start_is_reported_with_its_reason(fmu_path, tmp_pat
         for name in good.namelist():
             if name != "resources/model.json":
                 bad.writestr(name, good.read(name))
-    with pytest.raises(ComponentError, match=r"(?s)fmi2Instantiate returned no instance: .*No such file or directory"):
+    with pytest.raises(
+        ComponentError,
+        match=r"(?s)fmi2Instantiate returned no instance: .*No such file or directory",
+    ):
         LoadedComponent("converter", read_description(path))
     assert list(temporary.iterdir()) == []
 
@@ -226,7 +240,10 @@ def test_closing_twice_is_harmless(description, temporary):
 
 def test_a_given_folder_is_used_and_kept(description, tmp_path, temporary):
     folder = Path(fmpy.extract(str(description.path), str(tmp_path / "extracted")))
-    with LoadedComponent("one", description, folder) as one, LoadedComponent("two", description, folder) as two:
+    with (
+        LoadedComponent("one", description, folder) as one,
+        LoadedComponent("two", description, folder) as two,
+    ):
         initialise(one, P_0=0.3)
         initialise(two, P_0=0.6)
         assert one.get(["p"])["p"] == pytest.approx(0.3, abs=1e-12)

@@ -116,7 +116,9 @@ def test_it_is_raised_when_the_library_has_come_back(library, ours, number, how)
 def test_it_is_raised_in_our_function_that_a_library_calls(library, ours, number):
     reached = []
     with calls.terminable(), pytest.raises(KeyboardInterrupt):
-        ours["study"](library.calls_back, reached, number, lambda: ours["study"](len, reached, "two"))
+        ours["study"](
+            library.calls_back, reached, number, lambda: ours["study"](len, reached, "two")
+        )
     assert reached == []
 
 
@@ -140,7 +142,9 @@ def test_a_wait_for_others_is_ended_at_once(ours):
     """As Python does: what is waited for may never come."""
     never = threading.Event()
     begun = time.monotonic()
-    timer = threading.Timer(0.3, signal.pthread_kill, (threading.main_thread().ident, signal.SIGINT))
+    timer = threading.Timer(
+        0.3, signal.pthread_kill, (threading.main_thread().ident, signal.SIGINT)
+    )
     with calls.terminable():
         timer.start()
         with pytest.raises(KeyboardInterrupt):
@@ -149,7 +153,9 @@ def test_a_wait_for_others_is_ended_at_once(ours):
 
 
 @SIGNALS
-@pytest.mark.parametrize("error", [TypeError("a converter"), ResultsError("a file"), OSError("a disk"), SystemError()])
+@pytest.mark.parametrize(
+    "error", [TypeError("a converter"), ResultsError("a file"), OSError("a disk"), SystemError()]
+)
 def test_at_a_command_s_end_the_signal_wins_over_any_error(gfor, ours, monkeypatch, number, error):
     """Also over one that a library made of it."""
 
@@ -160,7 +166,9 @@ def test_at_a_command_s_end_the_signal_wins_over_any_error(gfor, ours, monkeypat
             raise TypeError("incompatible function arguments") from None
 
     monkeypatch.setattr(info, "run", lambda options: ours["wraps"](library, error, number))
-    code, words = {signal.SIGINT: (130, "interrupted"), signal.SIGTERM: (143, "ended by SIGTERM")}[number]
+    code, words = {signal.SIGINT: (130, "interrupted"), signal.SIGTERM: (143, "ended by SIGTERM")}[
+        number
+    ]
     assert gfor("fmu", "info", "a.fmu") == (code, "", f"{words}\n")
 
 
@@ -202,11 +210,15 @@ with calls.terminable():
 
 
 def test_a_second_sigterm_ends_a_process_in_which_the_first_one_waits():
-    result = subprocess.run([sys.executable, "-c", _TWICE], capture_output=True, text=True, check=False)
+    result = subprocess.run(
+        [sys.executable, "-c", _TWICE], capture_output=True, text=True, check=False
+    )
     assert (result.returncode, result.stdout) == (-signal.SIGTERM, "0\n"), result.stderr
 
 
-@pytest.mark.parametrize(("waits", "event", "count"), [(True, "line", 1), (True, "call", 0), (False, "line", 0)])
+@pytest.mark.parametrize(
+    ("waits", "event", "count"), [(True, "line", 1), (True, "call", 0), (False, "line", 0)]
+)
 def test_it_is_delivered_at_a_line_while_it_waits(waits, event, count, monkeypatch):
     delivered = []
     waiting = deferral.Deferral(lambda: delivered.append(1))
@@ -219,12 +231,18 @@ def test_it_is_delivered_at_a_line_while_it_waits(waits, event, count, monkeypat
     assert len(delivered) == count
 
 
-@pytest.mark.parametrize(("waits", "asked", "comes"), [(True, 3, True), (True, 2, False), (False, 3, False)])
-def test_a_signal_comes_a_second_time_only_while_the_same_one_waits(waits, asked, comes, monkeypatch):
+@pytest.mark.parametrize(
+    ("waits", "asked", "comes"), [(True, 3, True), (True, 2, False), (False, 3, False)]
+)
+def test_a_signal_comes_a_second_time_only_while_the_same_one_waits(
+    waits, asked, comes, monkeypatch
+):
     sent = []
     monkeypatch.setattr(deferral.time, "sleep", lambda seconds: None)
     monkeypatch.setattr(deferral.sys, "platform", "linux")
-    monkeypatch.setattr(deferral.signal, "pthread_kill", lambda *what: sent.append(what), raising=False)
+    monkeypatch.setattr(
+        deferral.signal, "pthread_kill", lambda *what: sent.append(what), raising=False
+    )
     one = deferral.Deferral(lambda: None)
     one._frame, one._number = (object() if waits else None), 3
     one._ask_again(asked)

@@ -76,12 +76,19 @@ def test_an_archive_with_damaged_contents(fmu_path, tmp_path):
 
 
 def test_an_archive_without_a_model_description(rewritten):
-    refused(rewritten(keep=lambda name: name != XML), "no modelDescription.xml at its top", "export it again")
+    refused(
+        rewritten(keep=lambda name: name != XML),
+        "no modelDescription.xml at its top",
+        "export it again",
+    )
 
 
 def test_a_model_description_that_is_not_xml(rewritten):
     refused(
-        rewritten(lambda text: text[: len(text) // 2]), "modelDescription.xml is not XML", "line", "export it again"
+        rewritten(lambda text: text[: len(text) // 2]),
+        "modelDescription.xml is not XML",
+        "line",
+        "export it again",
     )
 
 
@@ -92,7 +99,12 @@ def test_a_model_description_that_is_something_else(rewritten):
 @pytest.mark.parametrize("version", ["1.0", "3.1"])
 def test_another_fmi_version(version, rewritten):
     path = rewritten(lambda text: text.replace('fmiVersion="2.0"', f'fmiVersion="{version}"'))
-    refused(path, f"FMI {re.escape(version)}", "co-simulation of FMI 2.0 and 3.0", "ask for one of these")
+    refused(
+        path,
+        f"FMI {re.escape(version)}",
+        "co-simulation of FMI 2.0 and 3.0",
+        "ask for one of these",
+    )
 
 
 def test_model_exchange_only(rewritten):
@@ -103,14 +115,18 @@ def test_model_exchange_only(rewritten):
 
 @pytest.mark.parametrize("identifier", ["watertank-c", "3_tanks", "tank.v2"])
 def test_identifiers_as_tools_write_them(identifier, rewritten):
-    path = rewritten(lambda text: text.replace('modelIdentifier="gfor"', f'modelIdentifier="{identifier}"'))
+    path = rewritten(
+        lambda text: text.replace('modelIdentifier="gfor"', f'modelIdentifier="{identifier}"')
+    )
     assert read_description(path).model_identifier == identifier
 
 
 def test_a_constant_parameter_as_tools_write_it(rewritten):
     """FMPy has no ``initial`` for it and would refuse the whole file."""
     path = rewritten(
-        lambda text: re.sub(r'(<ScalarVariable name="S_n"[^>]*variability=)"[a-z]*"', r'\1"constant"', text)
+        lambda text: re.sub(
+            r'(<ScalarVariable name="S_n"[^>]*variability=)"[a-z]*"', r'\1"constant"', text
+        )
     )
     found = read_description(path).variables["S_n"]
     assert (found.causality, found.variability) == ("parameter", "constant")
@@ -118,7 +134,11 @@ def test_a_constant_parameter_as_tools_write_it(rewritten):
 
 def test_a_derivative_of_nothing(rewritten):
     path = rewritten(lambda text: re.sub(r' derivative="\d+"', "", text, count=1))
-    refused(path, "ModelStructure/Derivatives lists 'der", "does not say which state it is the derivative of")
+    refused(
+        path,
+        "ModelStructure/Derivatives lists 'der",
+        "does not say which state it is the derivative of",
+    )
 
 
 def test_no_binary_for_this_platform(rewritten, monkeypatch):
@@ -153,7 +173,9 @@ def test_a_model_description_that_contradicts_itself(rewritten):
 )
 def test_a_malformed_start_value(rewritten, variable, start, rule):
     path = rewritten(lambda text: start_of(variable, start, text))
-    refused(path, f"'{variable}' has the start value '{start}'", rule, "correct modelDescription.xml")
+    refused(
+        path, f"'{variable}' has the start value '{start}'", rule, "correct modelDescription.xml"
+    )
 
 
 def start_of(variable, start, text):
@@ -193,8 +215,20 @@ def test_the_converter_is_read_as_it_was_declared(fmu_path):
 def test_bounds_types_and_variability_of_parameters(fmu_path):
     variables = read_description(fmu_path("gfor")).variables
     K, N_S, enabled = (variables[f"pod_p.{name}"] for name in ("K", "N_S", "enabled"))
-    assert (K.type, K.variability, K.minimum, K.maximum, K.start) == ("Real", "tunable", 0.0, 1e5, 200.0)
-    assert (N_S.type, N_S.variability, N_S.minimum, N_S.maximum, N_S.start) == ("Integer", "fixed", 0, 3, 2)
+    assert (K.type, K.variability, K.minimum, K.maximum, K.start) == (
+        "Real",
+        "tunable",
+        0.0,
+        1e5,
+        200.0,
+    )
+    assert (N_S.type, N_S.variability, N_S.minimum, N_S.maximum, N_S.start) == (
+        "Integer",
+        "fixed",
+        0,
+        3,
+        2,
+    )
     assert (enabled.type, enabled.causality, enabled.start) == ("Boolean", "parameter", False)
     assert type(N_S.start) is int
     assert variables["theta_0"].minimum is None
@@ -222,14 +256,18 @@ def test_undeclared_dependencies_mean_all_inputs(rewritten):
 
 
 def test_states_are_settable_only_where_it_is_declared(rewritten):
-    path = rewritten(lambda text: re.sub(r"<VendorAnnotations>.*</VendorAnnotations>", "", text, flags=re.DOTALL))
+    path = rewritten(
+        lambda text: re.sub(r"<VendorAnnotations>.*</VendorAnnotations>", "", text, flags=re.DOTALL)
+    )
     description = read_description(path)
     assert not description.states_are_settable
     assert description.states == read_description(path).states != ()
 
 
 def test_state_saving_is_read_from_its_capability_flag(rewritten):
-    path = rewritten(lambda text: text.replace('canGetAndSetFMUstate="true"', 'canGetAndSetFMUstate="false"'))
+    path = rewritten(
+        lambda text: text.replace('canGetAndSetFMUstate="true"', 'canGetAndSetFMUstate="false"')
+    )
     assert not read_description(path).can_save_state
 
 
@@ -237,6 +275,11 @@ def test_a_path_may_be_given_as_text(fmu_path):
     assert read_description(str(fmu_path("gfor"))) == read_description(fmu_path("gfor"))
 
 
-@pytest.mark.parametrize(("start", "number"), [(None, 0.0), ("a.json", 0.0), (True, 1.0), (False, 0.0), (2, 2.0)])
+@pytest.mark.parametrize(
+    ("start", "number"), [(None, 0.0), ("a.json", 0.0), (True, 1.0), (False, 0.0), (2, 2.0)]
+)
 def test_a_start_value_as_a_number(start, number):
-    assert VariableInfo("x", 0, "Real", "parameter", "fixed", "", start, None, None, "").start_number == number
+    assert (
+        VariableInfo("x", 0, "Real", "parameter", "fixed", "", start, None, None, "").start_number
+        == number
+    )

@@ -56,7 +56,9 @@ def ours(tmp_path_factory):
     def build(name, version):
         if (name, version) not in built:
             folder = tmp_path_factory.mktemp(f"{name}_{version}".replace(".", "_"))
-            built[name, version] = export(NativeFmu(build_model(name), version), folder, (host_platform(),))
+            built[name, version] = export(
+                NativeFmu(build_model(name), version), folder, (host_platform(),)
+            )
         return built[name, version]
 
     return build
@@ -78,7 +80,9 @@ def small(tmp_path):
             text = SMALL.format(integers=integers).replace('Token="small3"', f'Token="{token}"')
             text = text.replace("<CoSimulation", f"<CoSimulation {declares}")
             archive.writestr("modelDescription.xml", text)
-            archive.writestr("binaries/x86_64-linux/small3.so", compile_library(source, "linux64").read_bytes())
+            archive.writestr(
+                "binaries/x86_64-linux/small3.so", compile_library(source, "linux64").read_bytes()
+            )
         return read_description(path)
 
     return write
@@ -108,7 +112,11 @@ def test_both_versions_give_the_same_bits(ours, isolated):
                 c.step(k * H, H)
             state = c.save_state()
             content = c.serialize_state(state)
-            reals = [n for n, v in description.variables.items() if v.type == "Real" and v.causality != "independent"]
+            reals = [
+                n
+                for n, v in description.variables.items()
+                if v.type == "Real" and v.causality != "independent"
+            ]
             before = c.get(reals)
             c.step(100 * H, H)
             c.restore_state(c.deserialize_state(content))
@@ -140,14 +148,20 @@ def test_the_two_area_system_of_fmi_3(ours, tmp_path, directional):
     assert list(blocks) == list(others)
     for name, block in blocks.items():
         for matrix in ("A", "B", "C", "D"):
-            assert np.array_equal(getattr(block, matrix), getattr(others[name], matrix)), (name, matrix)
+            assert np.array_equal(getattr(block, matrix), getattr(others[name], matrix)), (
+                name,
+                matrix,
+            )
     assert len(modes) > 3
     assert np.allclose(modes, other_modes, rtol=0, atol=1e-7)
 
 
 def test_a_refused_value_is_told_in_words_of_fmi_3(ours):
     words = "returned fmi3Discard: c: parameter P_0 = 5; it must be at most 2"
-    with open_component("c", read_description(ours("gfor", "3.0"))) as c, pytest.raises(ComponentError, match=words):
+    with (
+        open_component("c", read_description(ours("gfor", "3.0"))) as c,
+        pytest.raises(ComponentError, match=words),
+    ):
         c.set({"P_0": 5.0})
 
 
@@ -197,7 +211,10 @@ def test_an_fmu_of_pythonfmu3(tmp_path):
 
 def test_every_numeric_type_is_set_and_read(small):
     description = small()
-    extremes = {kind.lower(): min(2 ** (bits - (kind[0] != "U")) - 1, 2**31 - 1) for kind, bits in BITS.items()}
+    extremes = {
+        kind.lower(): min(2 ** (bits - (kind[0] != "U")) - 1, 2**31 - 1)
+        for kind, bits in BITS.items()
+    }
     with open_component("c", description, isolated=False) as c:
         values = {**extremes, "choice": 1, "truth": True, "add": 0.25}
         c.set(values)
@@ -210,14 +227,19 @@ def test_every_numeric_type_is_set_and_read(small):
             c.step(k * H, H)
         assert c.get(["total", "add", "time"]) == {"total": 0.75, "add": 0.25, "time": 3 * H}
         for name, value in (("int8", 128), ("uint8", -1), ("uint64", -1)):
-            with pytest.raises(ComponentError, match=f"cannot be {value}: its type does not reach so far"):
+            with pytest.raises(
+                ComponentError, match=f"cannot be {value}: its type does not reach so far"
+            ):
                 c.set({name: value})
 
 
 @pytest.mark.parametrize(
     ("trouble", "word"),
     [
-        (1, "it ended its simulation at t = 0.0001 s by itself, which is no error; let the run stop by then"),
+        (
+            1,
+            "it ended its simulation at t = 0.0001 s by itself, which is no error; let the run stop by then",
+        ),
         (2, "returned early from its step, at t = 5e-05 s"),
         (3, "at t = 0 s: fmi3DoStep returned fmi3Error: 99 % of it is broken"),
     ],
@@ -233,13 +255,16 @@ def test_what_a_step_may_say(small, trouble, word):
 def test_what_this_master_cannot_set_is_named(small):
     with open_component("c", small(), isolated=False) as c:
         for name, kind in (("many", "Array"), ("text", "String"), ("clock", "Clock")):
-            with pytest.raises(Exception, match=f"variable '{name}' is of type {kind}, which cannot be set here"):
+            with pytest.raises(
+                Exception, match=f"variable '{name}' is of type {kind}, which cannot be set here"
+            ):
                 c.set({name: 1.0})
 
 
 def test_no_instance(small):
     with pytest.raises(
-        ComponentError, match=r"fmi3InstantiateCoSimulation returned no instance: 100% of the tokens are wrong #1"
+        ComponentError,
+        match=r"fmi3InstantiateCoSimulation returned no instance: 100% of the tokens are wrong #1",
     ):
         open_component("c", small(token="other"), isolated=False)
 
@@ -249,12 +274,14 @@ def test_a_function_that_is_missing(small):
     with open_component("c", small(whole=False), isolated=False) as c:
         initialised(c).step(0.0, H)
         with pytest.raises(
-            ComponentError, match="fmi3GetDirectionalDerivative returned nothing: its binary has no such"
+            ComponentError,
+            match="fmi3GetDirectionalDerivative returned nothing: its binary has no such",
         ):
             c.jacobian(["total"], ["add"])
     declared = small(whole=False, declares='providesDirectionalDerivatives="true"')
     with pytest.raises(
-        ComponentError, match="its binary has no function fmi3GetDirectionalDerivative, which an FMU that"
+        ComponentError,
+        match="its binary has no function fmi3GetDirectionalDerivative, which an FMU that",
     ):
         open_component("c", declared, isolated=False)
 

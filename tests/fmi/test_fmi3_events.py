@@ -10,7 +10,13 @@ import pytest
 
 from fmus.toolchain.compiler import compile_library
 from orchestrator.acceptance.runner import check_fmu
-from orchestrator.errors import ComponentError, EndedError, FmuFileError, InputError, UnsupportedFmuError
+from orchestrator.errors import (
+    ComponentError,
+    EndedError,
+    FmuFileError,
+    InputError,
+    UnsupportedFmuError,
+)
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.instance import open_component
 
@@ -205,7 +211,9 @@ def test_an_end_of_its_own_is_told_with_its_time(fmu, isolated):
     with begun(read_description(fmu()), isolated=isolated, end=0.555) as c:
         for k in range(55):
             c.step(0.01 * k, 0.01)
-        with pytest.raises(EndedError, match=r"it ended its simulation at t = 0\.555 s by itself") as e:
+        with pytest.raises(
+            EndedError, match=r"it ended its simulation at t = 0\.555 s by itself"
+        ) as e:
             c.step(0.55, 0.01)
         assert e.value.ended_at == pytest.approx(0.555)
         with pytest.raises(EndedError):
@@ -229,7 +237,9 @@ def test_what_never_gets_on_is_an_error_and_no_hang(fmu, fault, words):
 
 def test_a_clock_of_somebody_else_is_not_supported_here(fmu):
     path = fmu(old='intervalVariability="countdown"', new='intervalVariability="triggered"')
-    with pytest.raises(UnsupportedFmuError, match="its clock 'late' is triggered by another FMU's clock"):
+    with pytest.raises(
+        UnsupportedFmuError, match="its clock 'late' is triggered by another FMU's clock"
+    ):
         open_component("c", read_description(path), isolated=False)
     with pytest.raises(InputError, match="its clock 'late' is triggered by another FMU's clock"):
         open_component("c", read_description(path), isolated=True)
@@ -253,7 +263,9 @@ def test_a_clock_that_fmi_does_not_know(fmu, old, new, words):
 
 
 def test_a_fraction_is_exact(fmu):
-    path = fmu(old='intervalDecimal="0.3"', new='resolution="30" intervalCounter="10" shiftCounter="3"')
+    path = fmu(
+        old='intervalDecimal="0.3"', new='resolution="30" intervalCounter="10" shiftCounter="3"'
+    )
     (sample, *_) = read_description(path).clocks
     assert (sample.interval, sample.shift) == (10 / 30, 3 / 30)
 
@@ -276,4 +288,7 @@ def test_gfor_check_says_once_that_a_clock_is_not_supported(fmu, gfor):
 def test_gfor_check_accuses_only_the_faulty_one(fmu):
     good = check_fmu(fmu(), run_for=0.3)
     assert good.trusted, good.failures
-    assert "hidden state" in check_fmu(fmu("FAULT_HIDDEN"), run_for=0.3, only=("loads", "state")).faults
+    assert (
+        "hidden state"
+        in check_fmu(fmu("FAULT_HIDDEN"), run_for=0.3, only=("loads", "state")).faults
+    )

@@ -34,7 +34,10 @@ def test_a_hostile_file_is_refused_and_nothing_is_written(name, plain, tmp_path)
     path = make(tmp_path, plain)
     inner = tmp_path / "some" / "folder"
     for opened in (lambda: extract(path, inner), lambda: read_description(path)):
-        if name in ("entity_expansion", "external_entity", "deep_nesting") and opened.__code__.co_names[0] == "extract":
+        if (
+            name in ("entity_expansion", "external_entity", "deep_nesting")
+            and opened.__code__.co_names[0] == "extract"
+        ):
             continue  # an archive like any other, with a document that is not read here
         with pytest.raises(HostileFmuError) as caught:
             opened()
@@ -55,7 +58,9 @@ def test_what_is_unpacked_is_what_was_packed(plain, tmp_path):
     folder = extract(plain, tmp_path / "out")
     with zipfile.ZipFile(plain) as packed:
         names = packed.namelist()
-        assert sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()) == sorted(names)
+        assert sorted(
+            p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()
+        ) == sorted(names)
         for name in names:
             assert (folder / name).read_bytes() == packed.read(name)
 
@@ -72,7 +77,9 @@ def test_a_model_identifier_leads_nowhere_else(identifier, plain, tmp_path):
     path = tmp_path / "other.fmu"
     with zipfile.ZipFile(plain) as source, zipfile.ZipFile(path, "w") as target:
         for name in source.namelist():
-            content = source.read(name).replace(b'modelIdentifier="gain"', f'modelIdentifier="{identifier}"'.encode())
+            content = source.read(name).replace(
+                b'modelIdentifier="gain"', f'modelIdentifier="{identifier}"'.encode()
+            )
             target.writestr(name, content)
     with pytest.raises(FmuFileError, match="C identifier"):
         read_description(path)
@@ -92,9 +99,19 @@ def test_names_of_windows_are_refused_on_windows_alone(name, plain, tmp_path, mo
 
 def _fuzz(seed, count, folder, sources):
     """Mutate in a process that can write in one folder only, with a gigabyte of memory."""
-    command = [sys.executable, "-m", "tests.fmi.fuzz", str(seed), str(count), str(folder), *map(str, sources)]
+    command = [
+        sys.executable,
+        "-m",
+        "tests.fmi.fuzz",
+        str(seed),
+        str(count),
+        str(folder),
+        *map(str, sources),
+    ]
     environment = {**os.environ, "PYTHONPATH": os.getcwd()}
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=900, env=environment, check=False)
+    ended = subprocess.run(
+        command, capture_output=True, text=True, timeout=900, env=environment, check=False
+    )
     assert ended.returncode == 0, ended.stderr[-1500:]
     return json.loads(ended.stdout)
 
@@ -118,7 +135,10 @@ def test_mutated_files_of_fmi_3_are_read_or_refused(tmp_path):
 @pytest.mark.parametrize("count", [1_000, pytest.param(10_000, marks=pytest.mark.nightly)])
 def test_thousands_of_mutated_files_are_read_or_refused(plain, fmu_path, tmp_path, count):
     slim = tmp_path / "slim.fmu"
-    with zipfile.ZipFile(fmu_path("gfor")) as source, zipfile.ZipFile(slim, "w", zipfile.ZIP_DEFLATED) as target:
+    with (
+        zipfile.ZipFile(fmu_path("gfor")) as source,
+        zipfile.ZipFile(slim, "w", zipfile.ZIP_DEFLATED) as target,
+    ):
         for name in source.namelist():
             if not name.startswith("binaries/"):
                 target.writestr(name, source.read(name))
@@ -129,6 +149,8 @@ def test_thousands_of_mutated_files_are_read_or_refused(plain, fmu_path, tmp_pat
         folder.mkdir()
     half = count // 2
     with ThreadPoolExecutor() as pool:
-        found = list(pool.map(lambda k: _fuzz(1000 + half * k, half, folders[k], [plain, slim]), range(2)))
+        found = list(
+            pool.map(lambda k: _fuzz(1000 + half * k, half, folders[k], [plain, slim]), range(2))
+        )
     assert sum(sum(counts.values()) for counts in found) == count
     assert all(min(counts.values()) > count // 20 for counts in found)

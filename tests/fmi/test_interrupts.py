@@ -14,7 +14,9 @@ from orchestrator.fmi.interrupts import calls
 from tests.acceptance.gallery.build import build
 from tests.acceptance.gallery.members import LAG, small
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no process can send itself Ctrl-C there")
+pytestmark = pytest.mark.skipif(
+    sys.platform == "win32", reason="no process can send itself Ctrl-C there"
+)
 
 _RUNS = """
 import os, signal, threading
@@ -43,7 +45,11 @@ for delay in (0.02, 0.05, 0.09, 0.2):
 )
 def test_a_run_can_be_interrupted_at_any_time(patch):
     result = subprocess.run(
-        [sys.executable, "-c", _RUNS.format(patch=patch)], capture_output=True, text=True, check=False, timeout=120
+        [sys.executable, "-c", _RUNS.format(patch=patch)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
     )
     assert (result.returncode, result.stderr) == (0, "")
     assert result.stdout.split() == ["interrupted"] * 4
@@ -75,9 +81,12 @@ def test_a_foreign_fmu_that_hangs_does_not_hold_it_up(tmp_path):
     source = small("hangs", "LAG", LAG, step_size="1e-2", stop_time="2")
     fmu = build(replace(source, defines={**source.defines, "FAULT_HANG_AT": 0.055}), tmp_path)
     call = [sys.executable, "-c", _WAITS, str(fmu)]
-    with subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
         assert process.stdout.readline() == "stepping\n"
-        time.sleep(0.5)  # the process holds Python's lock by now: no thread of its own could send this
+        # the process holds Python's lock by now: no thread of its own could send this
+        time.sleep(0.5)
         process.send_signal(signal.SIGINT)
         output, error = process.communicate(timeout=60)
     assert (process.returncode, output, error) == (0, "interrupted\n", "")
@@ -196,7 +205,9 @@ with calls.terminable(), calls:
 
 
 def test_a_second_sigterm_ends_the_process_at_once():
-    result = subprocess.run([sys.executable, "-c", _TWICE], capture_output=True, text=True, check=False, timeout=60)
+    result = subprocess.run(
+        [sys.executable, "-c", _TWICE], capture_output=True, text=True, check=False, timeout=60
+    )
     assert (result.returncode, result.stdout) == (-signal.SIGTERM, "still here\n")
 
 

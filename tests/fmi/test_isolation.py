@@ -51,7 +51,10 @@ def initialised(component):
 
 
 def stepped(component, steps):
-    inputs, outputs = RealBatch(component, ["v_re", "v_im"]), RealBatch(component, ["i_re", "i_im", "omega"])
+    inputs, outputs = (
+        RealBatch(component, ["v_re", "v_im"]),
+        RealBatch(component, ["i_re", "i_im", "omega"]),
+    )
     rows = []
     for k in range(steps):
         inputs.values[:] = 1.0 + 0.01 * np.sin(k), 0.02 * np.cos(3 * k)
@@ -71,7 +74,9 @@ def test_answers_are_the_same_to_the_last_bit(box):
     np.testing.assert_array_equal(*answers)
 
 
-def test_python_files_of_the_users_folder_are_not_taken_for_the_librarys(box, tmp_path, monkeypatch):
+def test_python_files_of_the_users_folder_are_not_taken_for_the_librarys(
+    box, tmp_path, monkeypatch
+):
     (tmp_path / "pathlib.py").write_text("raise RuntimeError('the user's own file')\n")
     monkeypatch.chdir(tmp_path)
     with open_component("box", box(), isolated=True) as component:
@@ -96,7 +101,8 @@ def test_only_what_was_built_here_is_trusted(box, fmu_path, tmp_path):
     assert is_ours(copy)
     copy.write_bytes(content[:-1] + b"x")
     assert not is_ours(copy)
-    claims = replace(box(), generation_tool="gfor-cosim 1.0")  # what a file says of itself does not count
+    # what a file says of itself does not count
+    claims = replace(box(), generation_tool="gfor-cosim 1.0")
     with open_component("box", claims) as component:
         assert isinstance(component, IsolatedComponent)
     with open_component("own", read_description(fmu_path("gfor"))) as component:
@@ -140,10 +146,14 @@ def test_reset(box):
 @pytest.mark.skipif(sys.platform == "win32", reason="names of signals")
 def test_whatever_it_does_is_one_error_and_what_was_computed_stays(faults, words, box, monkeypatch):
     limits = Limits(seconds=1.0, output=1_000_000)
-    monkeypatch.setattr(instance, "IsolatedComponent", lambda *a: IsolatedComponent(*a, limits=limits))
+    monkeypatch.setattr(
+        instance, "IsolatedComponent", lambda *a: IsolatedComponent(*a, limits=limits)
+    )
     system = System()
     system.add("sound", box(), inputs={"v_re": 1.0, "v_im": 0.0})
-    system.add("vendor", box(next(iter(faults)).lower(), **faults), inputs={"v_re": 1.0, "v_im": 0.0})
+    system.add(
+        "vendor", box(next(iter(faults)).lower(), **faults), inputs={"v_re": 1.0, "v_im": 0.0}
+    )
     recorder = Recorder(["vendor.i_re", "sound.i_re"], every=10)
     with Master(system, jacobi(("sound", "vendor")), H) as master:
         with pytest.raises(ComponentError, match=words) as caught:
@@ -160,7 +170,11 @@ def test_after_its_end_every_call_says_so(box):
         initialised(component)
         with pytest.raises(ComponentError, match="exit code 3"):
             stepped(component, 300)
-        for again in (lambda: component.step(0.0, H), component.save_state, lambda: component.set({"R_f": 0.1})):
+        for again in (
+            lambda: component.step(0.0, H),
+            component.save_state,
+            lambda: component.set({"R_f": 0.1}),
+        ):
             with pytest.raises(ComponentError, match="exit code 3"):
                 again()
 
@@ -182,7 +196,10 @@ def test_an_instance_that_cannot_be_made(box):
     description = replace(box(), guid="{other}")
     with pytest.raises(ComponentError, match="fmi2Instantiate"):
         open_component("box", description)
-    with open_component("box", box()) as component, pytest.raises(InputError, match="no variable 'x'"):
+    with (
+        open_component("box", box()) as component,
+        pytest.raises(InputError, match="no variable 'x'"),
+    ):
         component.set({"x": 1.0})
 
 

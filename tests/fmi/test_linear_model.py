@@ -63,7 +63,9 @@ def exact(model):
     c, x = equations.initialise(p)
     u = np.array([model.inputs[i.name] for i in equations.inputs])
     assert np.array(x).ravel() == pytest.approx(list(model.states.values()), abs=1e-12)
-    assert np.array(equations.derivatives(x, u, p, c)).ravel() == pytest.approx(np.zeros(x.shape[0]), abs=1e-9)
+    assert np.array(equations.derivatives(x, u, p, c)).ravel() == pytest.approx(
+        np.zeros(x.shape[0]), abs=1e-9
+    )
     return [np.array(block) for block in jacobians(equations)(x, u, p, c)]
 
 
@@ -138,9 +140,12 @@ def test_the_fmu_is_valid_and_the_same_beside_it(fmu, fmu_path):
     assert validate_fmu(str(fmu)) == []
     with zipfile.ZipFile(fmu) as with_model, zipfile.ZipFile(fmu_path("gfor")) as without:
         plain = {name: without.read(name) for name in without.namelist()}
-        assert {n: with_model.read(n) for n in with_model.namelist() if not n.startswith("extra/")} == plain
+        assert {
+            n: with_model.read(n) for n in with_model.namelist() if not n.startswith("extra/")
+        } == plain
         assert {n for n in with_model.namelist() if n.startswith("extra/")} == {
-            f"{FOLDER}/{name}" for name in ("fmi-ls-manifest.xml", "linear_model.json", "linear_model.mat")
+            f"{FOLDER}/{name}"
+            for name in ("fmi-ls-manifest.xml", "linear_model.json", "linear_model.mat")
         }
 
 
@@ -149,7 +154,9 @@ def test_the_manifest_is_that_of_a_layered_standard(fmu):
         root = etree.fromstring(archive.read(f"{FOLDER}/fmi-ls-manifest.xml"))
     assert root.tag == "fmiLayeredStandardManifest"
     attributes = {etree.QName(key).localname: value for key, value in root.attrib.items()}
-    assert {etree.QName(key).namespace for key in root.attrib} == {"http://fmi-standard.org/fmi-ls-manifest"}
+    assert {etree.QName(key).namespace for key in root.attrib} == {
+        "http://fmi-standard.org/fmi-ls-manifest"
+    }
     assert attributes.keys() == {"fmi-ls-name", "fmi-ls-version", "fmi-ls-description"}
     assert (attributes["fmi-ls-name"], FOLDER) == (NAME, f"extra/{NAME}")
 
@@ -157,7 +164,9 @@ def test_the_manifest_is_that_of_a_layered_standard(fmu):
 def test_json_and_matlab_files_say_the_same(fmu):
     with zipfile.ZipFile(fmu) as archive:
         content = json.loads(archive.read(f"{FOLDER}/linear_model.json"))
-        matlab = scipy.io.loadmat(io.BytesIO(archive.read(f"{FOLDER}/linear_model.mat")), simplify_cells=True)
+        matlab = scipy.io.loadmat(
+            io.BytesIO(archive.read(f"{FOLDER}/linear_model.mat")), simplify_cells=True
+        )
     for key in "ABCD":
         assert np.array_equal(matlab[key], np.array(content[key]))
     for kind in ("states", "inputs", "outputs", "parameters"):
@@ -185,7 +194,16 @@ def test_equal_models_give_equal_files(fmu, tmp_path):
 
 
 def test_native_fmus_carry_it_too_and_exactly(tmp_path, fmu):
-    arguments = ["fmu", "build", "gfor", "--native", "--platform", "linux64", "--with-linear-model", "two_area"]
+    arguments = [
+        "fmu",
+        "build",
+        "gfor",
+        "--native",
+        "--platform",
+        "linux64",
+        "--with-linear-model",
+        "two_area",
+    ]
     assert main([*arguments, "--scenario", "pod_pq", "--dest", str(tmp_path)]) == 0
     path = tmp_path / "gfor.fmu"
     assert validate_fmu(str(path)) == []
@@ -198,7 +216,16 @@ def test_native_fmus_carry_it_too_and_exactly(tmp_path, fmu):
 
 @pytest.mark.slow
 def test_fmus_of_fmi_3_carry_it_too(tmp_path):
-    arguments = ["fmu", "build", "synchronous_generator_st4b", "--native", "--fmi", "3.0", "--platform", "linux64"]
+    arguments = [
+        "fmu",
+        "build",
+        "synchronous_generator_st4b",
+        "--native",
+        "--fmi",
+        "3.0",
+        "--platform",
+        "linux64",
+    ]
     arguments += ["--with-linear-model", "two_area", "--scenario", "gfor", "--component", "sg1"]
     assert main([*arguments, "--dest", str(tmp_path)]) == 0
     path = tmp_path / "synchronous_generator_st4b.fmu"
@@ -209,7 +236,10 @@ def test_fmus_of_fmi_3_carry_it_too(tmp_path):
 def test_info_tells_of_it(fmu, fmu_path, capsys):
     assert main(["fmu", "info", str(fmu)]) == 0
     said = capsys.readouterr().out
-    assert "linear model inside: 27 states, 2 inputs, 10 outputs, at the operating point of case two_area" in said
+    assert (
+        "linear model inside: 27 states, 2 inputs, 10 outputs, at the operating point of case two_area"
+        in said
+    )
     assert "scenario pod_pq, component gfor" in said
     assert main(["fmu", "info", str(fmu_path("gfor"))]) == 0
     assert "linear model" not in capsys.readouterr().out
@@ -225,8 +255,14 @@ def test_info_tells_of_it(fmu, fmu_path, capsys):
             ["gfor", "--with-linear-model", "two_area"],
             "several scenarios in the case 'two_area'; choose with --scenario",
         ),
-        (["gfor", "--with-linear-model", "two_area", "--scenario", "podp"], "there is no scenario 'podp'"),
-        (["gfor", "--with-linear-model", "two_area", "--scenario", "base"], "has no component of the model 'gfor'"),
+        (
+            ["gfor", "--with-linear-model", "two_area", "--scenario", "podp"],
+            "there is no scenario 'podp'",
+        ),
+        (
+            ["gfor", "--with-linear-model", "two_area", "--scenario", "base"],
+            "has no component of the model 'gfor'",
+        ),
         (
             ["gfor", "--with-linear-model", "two_area", "--scenario", "gfor", "--component", "sg1"],
             "no component of the model 'gfor' 'sg1'",
@@ -251,7 +287,9 @@ def test_models_that_cannot_be_read(fmu, fmu_path, tmp_path):
         "none": (b'"A":', b'"Z":', "cannot be read: 'A'"),
     }
     for name, (old, new, word) in faults.items():
-        path = rewritten(fmu, tmp_path / f"{name}.fmu", {member: lambda c, o=old, n=new: c.replace(o, n)})
+        path = rewritten(
+            fmu, tmp_path / f"{name}.fmu", {member: lambda c, o=old, n=new: c.replace(o, n)}
+        )
         with pytest.raises(FmuFileError, match=word):
             read_linear_model(path)
 
@@ -263,10 +301,21 @@ def test_models_that_cannot_be_read(fmu, fmu_path, tmp_path):
 def foreign(fmu, tmp_path_factory):
     """The system with a converter whose states cannot be set, as other people's FMUs are."""
     folder = tmp_path_factory.mktemp("foreign")
-    description = {"modelDescription.xml": lambda text: text.replace(b'settable="true"', b'settable="false"')}
+    description = {
+        "modelDescription.xml": lambda text: text.replace(b'settable="true"', b'settable="false"')
+    }
     closed = rewritten(fmu, folder / "gfor.fmu", description)
-    assert main(["export", "ssp", "two_area", "--scenario", "pod_pq", "--out", str(folder / "ours.ssp")]) == 0
-    return rewritten(folder / "ours.ssp", folder / "foreign.ssp", {"resources/gfor.fmu": lambda _: closed.read_bytes()})
+    assert (
+        main(
+            ["export", "ssp", "two_area", "--scenario", "pod_pq", "--out", str(folder / "ours.ssp")]
+        )
+        == 0
+    )
+    return rewritten(
+        folder / "ours.ssp",
+        folder / "foreign.ssp",
+        {"resources/gfor.fmu": lambda _: closed.read_bytes()},
+    )
 
 
 @pytest.mark.slow
@@ -281,8 +330,13 @@ def test_modes_of_an_fmu_that_cannot_be_perturbed(foreign):
     assert inside.model.names == perturbed.model.names
     # No system without its POD can be made of a closed FMU, so that two modes keep fitting the name.
     assert inside.electromechanical is None
-    assert "those at 0.8116 Hz and 0.3524 Hz fit it about equally" in inside.unnamed["electromechanical"]
-    assert min(abs(m.eigenvalue - perturbed.electromechanical.eigenvalue) for m in inside.modes) < 1e-6
+    assert (
+        "those at 0.8116 Hz and 0.3524 Hz fit it about equally"
+        in inside.unnamed["electromechanical"]
+    )
+    assert (
+        min(abs(m.eigenvalue - perturbed.electromechanical.eigenvalue) for m in inside.modes) < 1e-6
+    )
     # Above 1000 1/s the FMU's own Runge-Kutta steps of 100 µs tell: 10 000 1/s becomes 9808 1/s in them.
     slow = [v for v in eigenvalues(perturbed.model) if abs(v) < 500]
     found = eigenvalues(inside.model)
@@ -292,7 +346,8 @@ def test_modes_of_an_fmu_that_cannot_be_perturbed(foreign):
 
 
 @pytest.mark.parametrize(
-    ("value", "name"), [("gfor.pod_q.enabled=false", "pod_q.enabled"), ("gfor.droop.R_f=0.06", "droop.R_f")]
+    ("value", "name"),
+    [("gfor.pod_q.enabled=false", "pod_q.enabled"), ("gfor.droop.R_f=0.06", "droop.R_f")],
 )
 def test_a_model_of_another_point_is_not_used(foreign, capsys, value, name):
     assert main(["modes", str(foreign), "--set", value]) == 1
@@ -302,6 +357,14 @@ def test_a_model_of_another_point_is_not_used(foreign, capsys, value, name):
 
 
 def test_an_input_that_the_model_does_not_have(foreign, tmp_path, capsys):
-    arguments = ["export", "linear", str(foreign), "--input", "gfor.droop.delta_P_ref", "--out", str(tmp_path)]
+    arguments = [
+        "export",
+        "linear",
+        str(foreign),
+        "--input",
+        "gfor.droop.delta_P_ref",
+        "--out",
+        str(tmp_path),
+    ]
     assert main(arguments) == 1
     assert "the linear model inside its FMU has no 'droop.delta_P_ref'" in capsys.readouterr().err

@@ -19,7 +19,8 @@ LIMITS = Limits(messages=100, output=2000)
         (-getattr(signal, "SIGXFSZ", 25), "output flood", "more than 2000 bytes written"),
         (-signal.SIGSEGV, "crash", "its process died with SIGSEGV"),
         (-200, "crash", "its process died with signal 200"),
-        (0xC0000005, "crash", "its process died with code 0xc0000005"),  # access violation on Windows
+        # access violation on Windows
+        (0xC0000005, "crash", "its process died with code 0xc0000005"),
         (0x80000003, "crash", "its process died with code 0x80000003"),  # breakpoint on Windows
         (0, "exit", "it ended its process with exit code 0"),
         (255, "exit", "it ended its process with exit code 255"),

@@ -27,7 +27,15 @@ from orchestrator.fmi.description import read_description
 from orchestrator.fmi.isolation import IsolatedComponent
 from orchestrator.fmi.limits import Limits
 from orchestrator.fmi.process_tree import descendants
-from orchestrator.fmi.protection import ATTRIBUTES, NAMES, NETWORK, PROCESSES, READING, WRITING, missing
+from orchestrator.fmi.protection import (
+    ATTRIBUTES,
+    NAMES,
+    NETWORK,
+    PROCESSES,
+    READING,
+    WRITING,
+    missing,
+)
 from tests.acceptance.gallery.build import build
 from tests.fmi.evil import evil
 
@@ -74,7 +82,10 @@ def supervisor(component):
 
 def is_there(process):
     try:
-        return Path(f"/proc/{process}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0] != "Z"
+        return (
+            Path(f"/proc/{process}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0]
+            != "Z"
+        )
     except OSError:
         return False
 
@@ -129,12 +140,16 @@ def test_it_changes_nothing_of_a_file_outside(layers, act, fmu, tmp_path):
     assert refused
     after = outside.stat()
     assert outside.read_text() == "mine"
-    assert [getattr(before, name) for name in ("st_mode", "st_uid", "st_gid", "st_mtime_ns", "st_nlink")] == [
+    assert [
+        getattr(before, name) for name in ("st_mode", "st_uid", "st_gid", "st_mtime_ns", "st_nlink")
+    ] == [
         getattr(after, name) for name in ("st_mode", "st_uid", "st_gid", "st_mtime_ns", "st_nlink")
     ]
 
 
-def test_it_reads_neither_the_users_files_nor_the_environment(layers, act, fmu, tmp_path, monkeypatch):
+def test_it_reads_neither_the_users_files_nor_the_environment(
+    layers, act, fmu, tmp_path, monkeypatch
+):
     key = tmp_path / ".ssh" / "id_ed25519"
     key.parent.mkdir()
     key.write_text("PRIVATE KEY")
@@ -144,7 +159,9 @@ def test_it_reads_neither_the_users_files_nor_the_environment(layers, act, fmu, 
     assert done == 0
 
 
-def test_an_environment_variable_is_passed_on_where_the_user_names_it(act, fmu, tmp_path, monkeypatch):
+def test_an_environment_variable_is_passed_on_where_the_user_names_it(
+    act, fmu, tmp_path, monkeypatch
+):
     monkeypatch.setenv("A_PASSWORD", "secret")
     monkeypatch.setenv("GFOR_COSIM_FMU_ENVIRONMENT", "OTHER, A_PASSWORD")
     description = fmu("READ", value=f'"{tmp_path / "x"}"', FOLDER=f'"{tmp_path / "y"}"', PROCESS=1)
@@ -221,7 +238,11 @@ def test_the_filter_of_calls_protects_attributes_alone(act, fmu, tmp_path, monke
     done, _, _ = act(fmu("ATTRIBUTES", value=f'"{outside}"'), needs=[ATTRIBUTES])
     assert done == 2  # it truncates and removes the file; Landlock is left out
     after = kept.stat()
-    assert (before.st_mode, before.st_uid, before.st_gid) == (after.st_mode, after.st_uid, after.st_gid)
+    assert (before.st_mode, before.st_uid, before.st_gid) == (
+        after.st_mode,
+        after.st_uid,
+        after.st_gid,
+    )
 
 
 def test_two_hundred_daemons_end_with_it(layers, act, fmu):
@@ -255,14 +276,20 @@ def test_what_it_started_ends_with_it(layers, fmu):
 
 
 def test_memory_counts_for_all_its_processes_together(layers, act, fmu):
-    with pytest.raises(ComponentError, match="memory: its processes used more than 400000000 bytes together"):
+    with pytest.raises(
+        ComponentError, match="memory: its processes used more than 400000000 bytes together"
+    ):
         act(fmu("MEMORY", value=150_000_000), Limits(memory=400_000_000))
 
 
-@pytest.mark.parametrize("kept", [LAYERS, WITHOUT_NAMESPACES, ("namespaces",)], ids=["all", "two", "no filter"])
+@pytest.mark.parametrize(
+    "kept", [LAYERS, WITHOUT_NAMESPACES, ("namespaces",)], ids=["all", "two", "no filter"]
+)
 def test_memory_counts_where_a_process_hides_it(kept, act, fmu, monkeypatch):
     monkeypatch.setattr(confined, "LAYERS", kept)
-    with pytest.raises(ComponentError, match="memory: its processes used more than 400000000 bytes together"):
+    with pytest.raises(
+        ComponentError, match="memory: its processes used more than 400000000 bytes together"
+    ):
         act(fmu("MEMORY", value=150_000_000, HIDDEN=1), Limits(memory=400_000_000))
 
 
@@ -340,14 +367,17 @@ def initialised(component):
 
 @pytest.mark.parametrize("byte", [0x00, 0x01, 0x5B, 0x7F, 0xFF])
 def test_rubbish_in_the_whole_mailbox_is_one_error_at_most(byte, fmu):
-    with IsolatedComponent("evil", fmu("SCRIBBLE", value=byte), limits=Limits(seconds=1.0)) as component:
+    with IsolatedComponent(
+        "evil", fmu("SCRIBBLE", value=byte), limits=Limits(seconds=1.0)
+    ) as component:
         initialised(component)
         try:
             for k in range(5):
                 component.step(0.01 * k, 0.01)
                 assert component.values(["gain"]) == {"gain": 1.0}
         except ComponentError as error:
-            assert any(word in str(error) for word in ("tampering", "hang", "crash", "exit", "fmi2"))  # noqa: PT017
+            words = ("tampering", "hang", "crash", "exit", "fmi2")
+            assert any(word in str(error) for word in words)  # noqa: PT017
 
 
 ANSWERS = {
@@ -359,10 +389,25 @@ ANSWERS = {
     "a list": ("[1, 2, 3]", 0x20, 100, "in place of an answer"),
     "another kind": ('{"verdict": "pass"}', 0x20, 100, "in place of an answer"),
     "another name": ('{"result": {"other": 1}}', 0x20, 100, "in place of values of gain"),
-    "a text for a number": ('{"result": {"gain": "1"}}', 0x20, 100, "in place of a table of numbers"),
-    "a huge number": ('{"result": {"gain": 1' + "0" * 400 + "}}", 0x20, 1000, "in place of a table of numbers"),
+    "a text for a number": (
+        '{"result": {"gain": "1"}}',
+        0x20,
+        100,
+        "in place of a table of numbers",
+    ),
+    "a huge number": (
+        '{"result": {"gain": 1' + "0" * 400 + "}}",
+        0x20,
+        1000,
+        "in place of a table of numbers",
+    ),
     "digits": ('{"result": {"gain": 1', 0x31, 1 << 24, "digits|between"),
-    "an error of another form": ('{"component_error": 3}', 0x20, 100, "in place of a list of texts"),
+    "an error of another form": (
+        '{"component_error": 3}',
+        0x20,
+        100,
+        "in place of a list of texts",
+    ),
 }
 
 
@@ -382,7 +427,9 @@ def test_a_forged_answer_is_one_clear_error(kind, fmu):
 @pytest.mark.parametrize("seed", range(4))
 def test_forged_answers_reach_nothing(seed, fmu):
     """Numbers, lengths and statuses change at any moment: gfor goes on or says so, within the time of a call."""
-    with IsolatedComponent("evil", fmu("FORGE", value=seed), limits=Limits(seconds=1.0)) as component:
+    with IsolatedComponent(
+        "evil", fmu("FORGE", value=seed), limits=Limits(seconds=1.0)
+    ) as component:
         initialised(component)
         batch = RealBatch(component, ["done", "refused", "gain"])
 
@@ -439,7 +486,12 @@ def test_nothing_outlives_gfor_that_is_killed_while_an_fmu_hangs(layers, fmu):
 
 @pytest.mark.parametrize(
     ("action", "value", "fault"),
-    [("KILL", "gfor", None), ("ONE_DAEMON", 1, "hang"), ("ANSWER", '"[1, 2]"', "tampering"), ("TRUNCATE", 1, None)],
+    [
+        ("KILL", "gfor", None),
+        ("ONE_DAEMON", 1, "hang"),
+        ("ANSWER", '"[1, 2]"', "tampering"),
+        ("TRUNCATE", 1, None),
+    ],
 )
 def test_gfor_check_says_what_happened_and_goes_on(action, value, fault, layers, fmu):
     description = fmu(action, value=os.getpid() if value == "gfor" else value, BYTE=0x20, LENGTH=6)
@@ -450,13 +502,19 @@ def test_gfor_check_says_what_happened_and_goes_on(action, value, fault, layers,
     assert set(descendants(os.getpid())) <= before
 
 
-@pytest.mark.parametrize(("header", "column"), [("x86_64-linux-gnu/asm/unistd_64.h", 0), ("asm-generic/unistd.h", 1)])
+@pytest.mark.parametrize(
+    ("header", "column"), [("x86_64-linux-gnu/asm/unistd_64.h", 0), ("asm-generic/unistd.h", 1)]
+)
 def test_the_numbers_of_refused_calls_are_the_kernels(header, column):
     """As its headers have them, which come with the compiler; newer calls may be missing there."""
     text = (Path("/usr/include") / header).read_text(encoding="utf-8")
     lines = re.findall(r"#define __NR(?:3264)?_(\w+) (\d+)", text)
     kernel = {name: int(number) for name, number in lines}
-    ours = {name: numbers[column] for group in seccomp._CALLS.values() for name, numbers in group.items()}
+    ours = {
+        name: numbers[column]
+        for group in seccomp._CALLS.values()
+        for name, numbers in group.items()
+    }
     names = ("_KILL", "_TGKILL", "_SOCKETPAIR", "_CLONE", "_CLONE3", "_PRCTL")
     ours |= {name[1:].lower(): getattr(seccomp, name)[column] for name in names}
     ours["seccomp"] = list(seccomp._SECCOMP.values())[column]
@@ -468,5 +526,8 @@ def test_the_numbers_of_refused_calls_are_the_kernels(header, column):
 
 @pytest.mark.parametrize("supervised", [True, False])
 def test_what_only_a_supervisor_limits_is_said_not_to_be_without_one(supervised):
-    found = {p.name: p.in_force for p in protections(Means(namespaces="refused", supervised=supervised), ())}
+    found = {
+        p.name: p.in_force
+        for p in protections(Means(namespaces="refused", supervised=supervised), ())
+    }
     assert found[protection.TASKS] is (supervised and sys.platform == "linux")

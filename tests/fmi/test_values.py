@@ -43,6 +43,8 @@ def test_a_malformed_value_is_refused_with_the_rule(fmi_type, text, rule):
         typed(text, fmi_type)
 
 
-@pytest.mark.parametrize(("value", "text"), [(True, "true"), (False, "false"), (2, "2"), (0.1, "0.1"), ("a", "a")])
+@pytest.mark.parametrize(
+    ("value", "text"), [(True, "true"), (False, "false"), (2, "2"), (0.1, "0.1"), ("a", "a")]
+)
 def test_a_value_is_written_as_it_is_read(value, text):
     assert as_text(value) == text

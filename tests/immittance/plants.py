@@ -23,9 +23,9 @@ class Plant:
 
     def admittance(self, f):
         eye = np.eye(len(self.A))
-        return np.array([self.C @ np.linalg.solve(2j * np.pi * x * eye - self.A, self.B) for x in f]) + self.G * np.eye(
-            2
-        )
+        return np.array(
+            [self.C @ np.linalg.solve(2j * np.pi * x * eye - self.A, self.B) for x in f]
+        ) + self.G * np.eye(2)
 
 
 @dataclass
@@ -73,7 +73,10 @@ def random_plant(rng, *, unstable=False):
     pairs = rng.integers(1, 4)
     A = np.zeros((2 * pairs, 2 * pairs))
     for k in range(pairs):
-        w, z = 2 * np.pi * np.exp(rng.uniform(np.log(2), np.log(150))), np.exp(rng.uniform(np.log(0.03), np.log(0.6)))
+        w, z = (
+            2 * np.pi * np.exp(rng.uniform(np.log(2), np.log(150))),
+            np.exp(rng.uniform(np.log(0.03), np.log(0.6))),
+        )
         z = -z if unstable and k == 0 else z
         A[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = w * (np.sqrt(1 - z * z) * J - z * np.eye(2))
     size = np.repeat(np.abs(A.diagonal()[::2]), 2)
@@ -93,4 +96,6 @@ class Noise:
 
     def on(self, values, size):
         shape = values.shape
-        return values * (1 + size * (self.rng.normal(size=shape) + 1j * self.rng.normal(size=shape)))
+        return values * (
+            1 + size * (self.rng.normal(size=shape) + 1j * self.rng.normal(size=shape))
+        )

@@ -10,11 +10,15 @@ from orchestrator.immittance.belonging import _is_of, check_size
 from orchestrator.immittance.sides import Known
 
 
-@pytest.mark.parametrize(("size", "refused"), [(0.002, True), (0.004, False), (25.0, False), (40.0, True)])
+@pytest.mark.parametrize(
+    ("size", "refused"), [(0.002, True), (0.004, False), (25.0, False), (40.0, True)]
+)
 def test_a_loop_that_is_far_too_weak_or_strong_asks_for_units(size, refused):
     """As large at the middle of 1 to 100 Hz, by a reactance."""
     sides = {"device": SimpleNamespace(name="device"), "network": SimpleNamespace(name="network")}
-    loop = SimpleNamespace(values=lambda s: (size * np.abs(s) / (2 * np.pi * 10))[:, None, None] * np.eye(2), **sides)
+    loop = SimpleNamespace(
+        values=lambda s: (size * np.abs(s) / (2 * np.pi * 10))[:, None, None] * np.eye(2), **sides
+    )
     if refused:
         with pytest.raises(InputError, match=f"is {size:.2g} at most frequencies"):
             check_size(loop, 1.0, 100.0)

@@ -48,9 +48,23 @@ def test_an_unstable_plant_is_said_on_the_first_line_and_by_the_exit_code(tmp_pa
 
 def test_a_setting_of_another_form_is_told_at_its_option(tmp_path, capsys):
     with pytest.raises(SystemExit) as ended:
-        main(["fmu", "nyquist", "two_area", "--component", "gfor", "--set", "nonsense", "--out", str(tmp_path)])
+        main(
+            [
+                "fmu",
+                "nyquist",
+                "two_area",
+                "--component",
+                "gfor",
+                "--set",
+                "nonsense",
+                "--out",
+                str(tmp_path),
+            ]
+        )
     assert ended.value.code == 2
-    assert "'nonsense' is not of the form variable=value" in " ".join(capsys.readouterr().err.split())
+    assert "'nonsense' is not of the form variable=value" in " ".join(
+        capsys.readouterr().err.split()
+    )
 
 
 def test_python_gives_what_the_command_prints(tmp_path):
@@ -112,28 +126,68 @@ def test_generator_sign(tmp_path):
 
 def test_a_rated_voltage_that_is_not_that_of_the_scan(tmp_path):
     given = files(tmp_path, plant=PortPoint(100.0, 50.0, 5.0, 0.1))
-    with pytest.raises(InputError, match=r"plant.txt was scanned at 100 kV, and --voltage is 132 kV"):
+    with pytest.raises(
+        InputError, match=r"plant.txt was scanned at 100 kV, and --voltage is 132 kV"
+    ):
         gfor.nyquist(given[0], scr=1.5, rating="100 MVA", voltage="132 kV")
     assert gfor.nyquist(given[0], scr=1.5, rating="100 MVA").verdict == "stable"
 
 
 def test_scans_at_two_operating_points(tmp_path):
-    given = files(tmp_path, plant=PortPoint(100.0, 50.0, 5.0, 0.1), network=PortPoint(100.0, 80.0, 5.0, 0.1))
-    with pytest.raises(InputError, match=r"another operating point than network.txt: active power \[MW\] 50 and 80"):
+    given = files(
+        tmp_path, plant=PortPoint(100.0, 50.0, 5.0, 0.1), network=PortPoint(100.0, 80.0, 5.0, 0.1)
+    )
+    with pytest.raises(
+        InputError, match=r"another operating point than network.txt: active power \[MW\] 50 and 80"
+    ):
         gfor.nyquist(*given)
 
 
 def test_the_file_of_a_device_around_a_dll_is_a_device(tmp_path, capsys):
     """Not a case, though both are TOML; what is wrong with it is said of the device."""
     (tmp_path / "plant.toml").write_text('dll = "plant.so"\nfilter = "LC"\n')
-    assert main(["fmu", "nyquist", str(tmp_path / "plant.toml"), "--out", str(tmp_path / "out")]) == 2
+    assert (
+        main(["fmu", "nyquist", str(tmp_path / "plant.toml"), "--out", str(tmp_path / "out")]) == 2
+    )
     assert "plant.toml: give its network as well" in " ".join(capsys.readouterr().err.split())
-    assert main(["fmu", "nyquist", str(tmp_path / "plant.toml"), "--scr", "2", "--out", str(tmp_path / "out")]) == 2
+    assert (
+        main(
+            [
+                "fmu",
+                "nyquist",
+                str(tmp_path / "plant.toml"),
+                "--scr",
+                "2",
+                "--out",
+                str(tmp_path / "out"),
+            ]
+        )
+        == 2
+    )
     assert "plant.so: cannot be read" in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_scan_at_more_than_its_rating_is_asked_about(tmp_path, capsys):
     for megawatts, asked in ((200.0, True), (80.0, False)):
-        plant, _ = files(tmp_path, plant=PortPoint(kilovolt=100.0, megawatt=megawatts, megavar=0.0, angle=0.0))
-        assert main(["fmu", "nyquist", plant, "--scr", "3", "--rating", "100 MVA", "--out", str(tmp_path / "out")]) == 0
-        assert ("rated at 100 MVA; do both hold?" in " ".join(capsys.readouterr().err.split())) == asked
+        plant, _ = files(
+            tmp_path, plant=PortPoint(kilovolt=100.0, megawatt=megawatts, megavar=0.0, angle=0.0)
+        )
+        assert (
+            main(
+                [
+                    "fmu",
+                    "nyquist",
+                    plant,
+                    "--scr",
+                    "3",
+                    "--rating",
+                    "100 MVA",
+                    "--out",
+                    str(tmp_path / "out"),
+                ]
+            )
+            == 0
+        )
+        assert (
+            "rated at 100 MVA; do both hold?" in " ".join(capsys.readouterr().err.split())
+        ) == asked

@@ -20,7 +20,8 @@ from orchestrator.immittance.strength import critical
 
 
 @pytest.mark.parametrize(
-    ("scenario", "names", "stable"), [("gfor", ("gfor",), True), ("gfor", (), True), ("base", ("sg1",), False)]
+    ("scenario", "names", "stable"),
+    [("gfor", ("gfor",), True), ("gfor", (), True), ("base", ("sg1",), False)],
 )
 def test_the_verdict_at_a_cut_is_that_of_the_modes(scenario, names, stable):
     cut = cut_of(gfor.load("two_area").scenario(scenario).prepared, None, names)
@@ -45,7 +46,13 @@ def growth(cut, x):
     d, n, omega = cut.device, cut.network, 2 * np.pi * 50
     J = np.array([[0.0, -1.0], [1.0, 0.0]])
     nothing = np.zeros((len(n.A), 2))
-    A = np.block([[d.A, d.B @ n.C, -d.B], [-n.B @ d.C, n.A, nothing], [x * omega * d.C, nothing.T, -omega * J]])
+    A = np.block(
+        [
+            [d.A, d.B @ n.C, -d.B],
+            [-n.B @ d.C, n.A, nothing],
+            [x * omega * d.C, nothing.T, -omega * J],
+        ]
+    )
     modes = np.linalg.eigvals(A)
     return modes[np.abs(modes) > 1e-3].real.max()
 
@@ -76,8 +83,11 @@ def test_what_is_no_device_and_no_bus_is_refused():
 
 def test_the_rated_frequency_is_that_of_the_components_and_not_50_hz():
     case = gfor.load("infinite_bus")
-    values = {f"{name}.f_n": 60.0 for name, plan in case.scenario("load_step").prepared.system.components.items()
-              if "f_n" in plan.description.variables}  # fmt: skip
+    values = {
+        f"{name}.f_n": 60.0
+        for name, plan in case.scenario("load_step").prepared.system.components.items()
+        if "f_n" in plan.description.variables
+    }
     assert cut_of(case.scenario("load_step", values).prepared, None, ()).rated_hz == 60
     assert cut_of(case.scenario("load_step").prepared, None, ()).rated_hz == 50
 
@@ -108,7 +118,10 @@ def test_a_bus_whose_counts_differ_leaves_the_whole_open(monkeypatch):
     monkeypatch.setattr(judgement, "encirclements", odd)
     cut = cut_of(gfor.load("two_area").scenario("gfor").prepared, None, ())
     found = judge_loop(CutLoop(cut.device, cut.network))
-    assert (found.verdict, found.reasons[0][:47]) == ("not known", "at port 1 the determinant goes round 0 times an")
+    assert (found.verdict, found.reasons[0][:47]) == (
+        "not known",
+        "at port 1 the determinant goes round 0 times an",
+    )
 
 
 def test_what_a_device_does_to_the_distance_is_what_more_of_it_does():
@@ -118,7 +131,9 @@ def test_what_a_device_does_to_the_distance_is_what_more_of_it_does():
     s, h = np.array([2j * np.pi * nearest.frequency_hz]), 1e-5
     assert sum(nearest.buses.values()) == pytest.approx(1)
     for unit in cut.units:
-        grown = replace(unit, side=replace(unit.side, C=(1 + h) * unit.side.C, D=(1 + h) * unit.side.D))
+        grown = replace(
+            unit, side=replace(unit.side, C=(1 + h) * unit.side.C, D=(1 + h) * unit.side.D)
+        )
         units = tuple(grown if other is unit else other for other in cut.units)
         L = CutLoop(replace(cut.device, units=units), cut.network).values(s)[0]
         moved = np.linalg.svd(np.eye(len(L)) + L, compute_uv=False)[-1] - nearest.distance
@@ -128,7 +143,9 @@ def test_what_a_device_does_to_the_distance_is_what_more_of_it_does():
 def test_a_loop_that_is_not_of_the_system_is_seen_by_the_modes(monkeypatch):
     """With a device left out, all is stable as well, but det(1 + L) is of another system; no margin is told then."""
     sides = Together.at
-    monkeypatch.setattr(Together, "at", lambda self, s: sides(replace(self, units=self.units[1:]), s))
+    monkeypatch.setattr(
+        Together, "at", lambda self, s: sides(replace(self, units=self.units[1:]), s)
+    )
     found = gfor.nyquist("two_area", scenario="gfor").as_json()
     assert found["verdict"] == "not known"
     assert "det(1 + L) is not that of the eigenvalues and poles" in found["reasons"][0]
@@ -154,7 +171,8 @@ def test_a_device_that_measures_at_another_bus_cannot_be_cut_off(monkeypatch):
     def measured(self, rows):
         A, B, C, D = whole(self, rows)
         B = B.copy()
-        B[0, 4] = 1.0  # the first state of the first device from the voltage of the third, at another bus
+        # the first state of the first device from the voltage of the third, at another bus
+        B[0, 4] = 1.0
         return [A, B, C, D]
 
     monkeypatch.setattr(cut_module._Opened, "_open", measured)

@@ -73,9 +73,16 @@ def test_powers_of_a_source_behind_a_branch_are_their_derivatives():
     S, h, f = fed(0, 1), 1e-6, np.geomspace(1e-4, 600, 90)
     found = table_of(branch(f, points={"P": PortPoint(V, S.real, S.imag, 0.4)}), "jacobian")
     slow = {key: values[0] for key, values in found.items()}
-    by_angle, by_size = (fed(h, 1) - fed(-h, 1)) / (2 * h), (fed(0, 1 + h) - fed(0, 1 - h)) / (2 * h)
-    for key, value in (("P/theta [MW]", by_angle.real), ("Q/theta [Mvar]", by_angle.imag),
-                       ("P/V [MW]", by_size.real), ("Q/V [Mvar]", by_size.imag)):  # fmt: skip
+    by_angle, by_size = (
+        (fed(h, 1) - fed(-h, 1)) / (2 * h),
+        (fed(0, 1 + h) - fed(0, 1 - h)) / (2 * h),
+    )
+    for key, value in (
+        ("P/theta [MW]", by_angle.real),
+        ("Q/theta [Mvar]", by_angle.imag),
+        ("P/V [MW]", by_size.real),
+        ("Q/V [Mvar]", by_size.imag),
+    ):
         assert slow[key] == pytest.approx(value, rel=1e-4)
     assert found["P/omega [MW]"] == pytest.approx(found["P/theta [MW]"] * OMEGA / (2j * np.pi * f))
     with pytest.raises(InputError, match="states no operating point, and powers change with it"):
@@ -84,5 +91,7 @@ def test_powers_of_a_source_behind_a_branch_are_their_derivatives():
 
 def test_several_ports_are_refused():
     two = Scan("two", F, np.zeros((len(F), 4, 4)), ("A", "B"))
-    with pytest.raises(InputError, match="has the ports A, B; other forms are of a scan of one port"):
+    with pytest.raises(
+        InputError, match="has the ports A, B; other forms are of a scan of one port"
+    ):
         rows_in(two, "siso", 50.0)

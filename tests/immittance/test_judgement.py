@@ -67,7 +67,9 @@ def test_the_phase_and_delay_margins_are_those_of_a_dense_scan(line):
     angles = np.angle(-loci[k, order[k, j]])
     found = judged(plant, line).margins
     assert found.phase_deg.value == pytest.approx(np.rad2deg(np.abs(angles).min()), abs=0.2)
-    assert found.delay_s.value == pytest.approx((angles % (2 * np.pi) / (2 * np.pi * dense[k])).min(), rel=0.01)
+    assert found.delay_s.value == pytest.approx(
+        (angles % (2 * np.pi) / (2 * np.pi * dense[k])).min(), rel=0.01
+    )
 
 
 def test_compensation_destabilises_where_the_eigenvalues_say():
@@ -91,11 +93,15 @@ def test_no_random_plant_gets_the_wrong_verdict():
     counts = {"right": 0, "not known": 0}
     for k in range(24):
         plant, line = plants.random_plant(rng, unstable=k % 8 == 7), plants.random_line(rng)
-        f = np.geomspace(rng.choice([0.1, 1.0]), rng.choice([450.0, 2000.0]), rng.choice([25, 60, 150, 400]))
+        f = np.geomspace(
+            rng.choice([0.1, 1.0]), rng.choice([450.0, 2000.0]), rng.choice([25, 60, 150, 400])
+        )
         f = f[np.abs(f - 50) > 1e-6]
         Y = Noise(rng).on(plant.admittance(f), rng.choice([0, 1e-5, 1e-4, 1e-3]))
         capacitors = SeriesCapacitors(line.share * OMEGA * line.L, OMEGA) if line.share else None
-        found = judge_loop(CutLoop(a_side(Y, f), a_side(line.impedance(f, capacitor=False), f), capacitors))
+        found = judge_loop(
+            CutLoop(a_side(Y, f), a_side(line.impedance(f, capacitor=False), f), capacitors)
+        )
         if found.verdict == "not known":
             counts["not known"] += 1
         else:
@@ -125,7 +131,8 @@ def test_an_encirclement_beyond_the_last_frequency_is_not_ruled_out():
     plant, line = narrow(0.2, f_0=180.0, size=6.0), Line(0.02, 0.8 / OMEGA)
     assert not is_stable(plant, line)
     assert judged(plant, line).verdict == "unstable"
-    early = judged(plant, line, np.geomspace(0.1, 4, 100))  # where the loci are small, and grow again
+    # where the loci are small, and grow again
+    early = judged(plant, line, np.geomspace(0.1, 4, 100))
     assert np.abs(early.path.loci).max() < 0.95
     assert any("loci may grow again" in reason for reason in early.reasons)
     cut_short = judged(plant, line, np.geomspace(0.1, 120, 300))
@@ -139,7 +146,9 @@ def test_a_scan_that_begins_above_the_begin_of_the_loop_is_seen():
     cut_short = judged(plant, line, np.geomspace(1.0, 1000, 400))
     assert len(cut_short.reasons) == 1
     assert "at 1 Hz the loop is not yet where it begins" in cut_short.reasons[0]
-    late = judged(constant_power(g=1.2, h=0.6, T=0.003, G=0.2), STRONG, np.geomspace(2.2, 1000, 300))
+    late = judged(
+        constant_power(g=1.2, h=0.6, T=0.003, G=0.2), STRONG, np.geomspace(2.2, 1000, 300)
+    )
     assert "at 2.2 Hz the loop is not yet where it begins" in late.reasons[0]
 
 
@@ -173,7 +182,10 @@ def test_unstable_poles_of_a_model_count_for_what_encirclements_take_away():
         fed = (R * np.eye(2) + X * plants.J) * C + X / OMEGA * C * A
         closed = A - B @ np.linalg.solve(np.eye(2) + X / OMEGA * C * B, fed)
         assert (np.linalg.eigvals(closed).real > 0).sum() == truth
-        device, line = Exact("model", A, B, C * np.eye(2), np.zeros((2, 2))), SourceBehind("line", R, X, OMEGA)
+        device, line = (
+            Exact("model", A, B, C * np.eye(2), np.zeros((2, 2))),
+            SourceBehind("line", R, X, OMEGA),
+        )
         found = judge_loop(CutLoop(device, line))
         assert (found.verdict, found.growing) == ("unstable" if truth else "stable", truth)
         assert (found.encirclements, len(found.open_loop)) == (truth - 2, 2)
@@ -205,10 +217,16 @@ def test_loci_that_change_places_change_no_count_and_a_turn_too_many_is_seen(mon
     looping_followed = looping.followed
     monkeypatch.setattr(looping, "followed", swapped)
     found = judged(plant, WEAK)
-    assert (found.by_loci, found.encirclements, found.verdict) == (right.by_loci, right.encirclements, right.verdict)
+    assert (found.by_loci, found.encirclements, found.verdict) == (
+        right.by_loci,
+        right.encirclements,
+        right.verdict,
+    )
     turns = looping.LoopPath.loci_turns.func
     monkeypatch.setattr(
-        looping.LoopPath, "loci_turns", property(lambda path: turns(path) + 2 * np.pi / len(path.turns))
+        looping.LoopPath,
+        "loci_turns",
+        property(lambda path: turns(path) + 2 * np.pi / len(path.turns)),
     )
     found = judged(plant, WEAK)
     assert found.verdict == "not known"
@@ -236,7 +254,8 @@ def test_frames_that_are_not_known_leave_the_verdict_open_where_it_depends_on_th
         assert open_.verdict == "not known"
         assert "angle between the frames" in open_.reasons[0]
     assert found == {"stable", "unstable"}
-    assert judged(plant, STRONG, frames_known=False).verdict == "stable"  # a line is the same in every frame
+    # a line is the same in every frame
+    assert judged(plant, STRONG, frames_known=False).verdict == "stable"
 
 
 def test_bounds_of_a_measurement_that_reach_the_critical_point_leave_it_open():
@@ -278,7 +297,10 @@ def test_a_device_that_is_a_model_has_its_frame():
 def test_a_mode_of_a_model_that_is_narrower_than_any_grid_is_seen(monkeypatch):
     """Damped by 1e-6 of its frequency, it grows at the line as slowly."""
     plant = narrow(1e-6, f_0=20.0, size=200.0)
-    loop = CutLoop(Exact("model", plant.A, plant.B, plant.C, np.zeros((2, 2))), SourceBehind("line", 0.02, 0.8, OMEGA))
+    loop = CutLoop(
+        Exact("model", plant.A, plant.B, plant.C, np.zeros((2, 2))),
+        SourceBehind("line", 0.02, 0.8, OMEGA),
+    )
     assert (judge_loop(loop).verdict, judge_loop(loop).growing) == ("unstable", 2)
     monkeypatch.setattr("orchestrator.immittance.loop._NARROW", 0.0)
     assert judge_loop(loop).growing != 2

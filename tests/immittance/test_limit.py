@@ -45,7 +45,9 @@ def growth_in(time, values):
     def misfit(p):
         return p[0] * np.exp(p[1] * t) * np.cos(p[2] * t + p[3]) + p[4] + p[5] * t - y
 
-    found = min((least_squares(misfit, [1, 0, w, phase, 0, 0]) for phase in (0, 2, 4)), key=lambda x: x.cost)
+    found = min(
+        (least_squares(misfit, [1, 0, w, phase, 0, 0]) for phase in (0, 2, 4)), key=lambda x: x.cost
+    )
     return float(found.x[1])
 
 
@@ -62,17 +64,26 @@ def test_a_grid_following_converter_at_a_weak_infinite_bus(tmp_path):
     text = load_case("infinite_bus").path.read_text().partition("[[plots]]")[0]
     device = 'model = "gfor"\nparameters = { S_n = "1500 MVA", P_0 = 0.6, Q_0 = 0.05, v_0 = 1.0 }'
     own = 'parameters = { S_n = "1000 MVA", P_0 = 0.9, Q_0 = 0.0, v_0 = 1.0'
-    changes = {"Q_0 = 0.75": "Q_0 = 0.0", "value = 0.2": "value = 0.002", "1.15 s": "1.01 s", "1 ms": "100 us",
-               device: f'model = "gfl"\n{own}, pll.f_0 = "40 Hz" }}'}  # fmt: skip
+    changes = {
+        "Q_0 = 0.75": "Q_0 = 0.0",
+        "value = 0.2": "value = 0.002",
+        "1.15 s": "1.01 s",
+        "1 ms": "100 us",
+        device: f'model = "gfl"\n{own}, pll.f_0 = "40 Hz" }}',
+    }
     for old, new in changes.items():
         assert old in text
         text = text.replace(old, new)
     (tmp_path / "own.toml").write_text(text)
     how = Excitation(lowest_hz=1.0, highest_hz=1000.0, lines=120)
-    scan = scan_fmu(gfor.build("gfl", tmp_path, native=True), None, values, 1e-4, how).in_siemens(230.0)
+    scan = scan_fmu(gfor.build("gfl", tmp_path, native=True), None, values, 1e-4, how).in_siemens(
+        230.0
+    )
     points = {name: replace(point, kilovolt=230.0) for name, point in scan.points.items()}
     write_ztool(replace(scan, points=points), tmp_path / "plant.txt")
-    text = text.replace('model = "gfl"', 'scan = "plant.txt"\nvoltage = "230 kV"').replace(', pll.f_0 = "40 Hz"', "")
+    text = text.replace('model = "gfl"', 'scan = "plant.txt"\nvoltage = "230 kV"').replace(
+        ', pll.f_0 = "40 Hz"', ""
+    )
     (tmp_path / "scan.toml").write_text(text)
 
     def at(X):
@@ -83,13 +94,24 @@ def test_a_grid_following_converter_at_a_weak_infinite_bus(tmp_path):
     for k, verdict in ((0.999, "stable"), (1.001, "unstable")):
         found = gfor.nyquist(tmp_path / "scan.toml", scenario="dip", values=at(k * limit))
         assert (found.verdict, found.reasons) == (verdict, ())
-    run = by_runs(lambda X: case.scenario("dip", at(X), step="10 us"), lambda r: r["gfor.p"].values, limit, 2.0, 1.1)
+    run = by_runs(
+        lambda X: case.scenario("dip", at(X), step="10 us"),
+        lambda r: r["gfor.p"].values,
+        limit,
+        2.0,
+        1.1,
+    )
     assert run == pytest.approx(limit, rel=1e-3)
 
 
 def test_the_mode_between_two_areas(tmp_path):
     """A voltage regulator's integral gain takes the mode across; the converter is a scan."""
-    text = load_case("two_area").path.read_text().replace("scale = 1.01", "scale = 1.002").partition("[analysis]")[0]
+    text = (
+        load_case("two_area")
+        .path.read_text()
+        .replace("scale = 1.01", "scale = 1.002")
+        .partition("[analysis]")[0]
+    )
     (tmp_path / "own.toml").write_text(text.replace("[scenarios.base]", PULSE, 1))
     case = gfor.load(tmp_path / "own.toml")
 

@@ -12,9 +12,10 @@ def test_both_sides_are_drawn_over_their_frequency():
     lag = lambda s: (1 / (1 + s / (2 * np.pi)))[:, None, None] * np.ones((2, 2))  # noqa: E731
     coil = lambda s: s[:, None, None] * np.ones((2, 2))  # noqa: E731
     result = SimpleNamespace(
-        judgement=SimpleNamespace(range_hz=(0.1, 100.0), active={"device": [], "network": []}), unit="pu",
+        judgement=SimpleNamespace(range_hz=(0.1, 100.0), active={"device": [], "network": []}),
+        unit="pu",
         loop=SimpleNamespace(device=SimpleNamespace(at=lag), network=None, impedance=coil),
-    )  # fmt: skip
+    )
     figure = _matrices(result)
     sizes, phases = figure.axes[:2], figure.axes[2:4]
     device, network = (axis.lines[0] for axis in phases)

@@ -25,10 +25,14 @@ def plant(g=1.2, T=0.003):
 
 
 def judged(device, line):
-    sides = (Sampled("scan", F, M, np.zeros(len(F))) for M in (device.admittance(F), line.impedance(F)))
+    sides = (
+        Sampled("scan", F, M, np.zeros(len(F))) for M in (device.admittance(F), line.impedance(F))
+    )
     loop = CutLoop(*sides)
     request = SimpleNamespace(frequency=50.0, device=None)
-    return SimpleNamespace(loop=loop, judgement=(j := judge_loop(loop)), request=request, verdict=j.verdict, cut=None)
+    return SimpleNamespace(
+        loop=loop, judgement=(j := judge_loop(loop)), request=request, verdict=j.verdict, cut=None
+    )
 
 
 def followed(name, now, low, high, goal=0.2, study=None):
@@ -59,7 +63,9 @@ def test_what_is_needed_is_enough_and_was_foretold(over_g):
     exact = judged(plant(g=found.needed), WEAK).judgement.margins.distance.value
     assert exact >= 0.2
     assert found.predicted.distance == pytest.approx(exact, abs=1e-3)
-    assert all(abs(c.found - c.predicted) < max(2 * c.expected_error, 0.01) for c in found.checks[-3:])
+    assert all(
+        abs(c.found - c.predicted) < max(2 * c.expected_error, 0.01) for c in found.checks[-3:]
+    )
 
 
 def test_modes_and_the_network_s_limit_are_those_of_the_eigenvalues(over_g):
@@ -77,9 +83,14 @@ def test_modes_and_the_network_s_limit_are_those_of_the_eigenvalues(over_g):
 
 def test_a_scan_that_is_not_what_the_others_say_is_seen():
     """The device jumps at g = 0.8: no function follows it, and the error says so."""
-    found = followed("g", 1.2, 0.3, 2.4, study=lambda v: judged(plant(g=v["g"] - 0.25 * (v["g"] < 0.8)), WEAK))
+    found = followed(
+        "g", 1.2, 0.3, 2.4, study=lambda v: judged(plant(g=v["g"] - 0.25 * (v["g"] < 0.8)), WEAK)
+    )
     assert any(not abs(c.found - c.predicted) < 0.02 for c in found.checks)
-    assert found.needed is None or judged(plant(g=found.needed - 0.25 * (found.needed < 0.8)), WEAK).verdict == "stable"
+    assert (
+        found.needed is None
+        or judged(plant(g=found.needed - 0.25 * (found.needed < 0.8)), WEAK).verdict == "stable"
+    )
 
 
 def test_a_range_that_cannot_be_scanned_is_cut_and_said():
@@ -105,5 +116,7 @@ def test_a_source_of_a_short_circuit_ratio_is_the_line_of_its_impedance():
     s = 2j * np.pi * F
     assert np.allclose(source.at(s), WEAK.impedance(F))
     assert strengths_of(source, 50.0, 100.0, None, "")[0] == pytest.approx(100 / abs(0.05 + 1.2j))
-    machine = SimpleNamespace(is_exact=True, at=lambda s: source.at(s) * (1 + 9 / (1 + s))[:, None, None])
+    machine = SimpleNamespace(
+        is_exact=True, at=lambda s: source.at(s) * (1 + 9 / (1 + s))[:, None, None]
+    )
     assert strengths_of(machine, 50.0, 100.0, None, "")[0] is None

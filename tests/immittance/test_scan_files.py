@@ -12,19 +12,34 @@ from orchestrator.immittance.scan_files import read_scan, write_ztool
 from tests.immittance.plants import Line, constant_power, random_plant
 
 F = np.geomspace(1, 500, 120)
-NO_CROSS = "were dq and qd left at 0, or has one the wrong sign? They show no reactance where dd and qq do"
+NO_CROSS = (
+    "were dq and qd left at 0, or has one the wrong sign? They show no reactance where dd and qq do"
+)
 
 
 def write_imtb(scan, path, name="Zdut"):
     """The impedances of a scan of one port in siemens, in dq, as IMTB writes them."""
     elements = ("11", "12", "21", "22")
-    columns = [f"{name}_dq_{e}_{part}" for e in elements for part in ("re", "im", "abs", "dB", "pha_rad", "pha_deg")]
+    columns = [
+        f"{name}_dq_{e}_{part}"
+        for e in elements
+        for part in ("re", "im", "abs", "dB", "pha_rad", "pha_deg")
+    ]
     lines = [",".join(["f", *columns])]
-    for f, matrix in zip(scan.frequencies.tolist(), scan.impedance.reshape(-1, 4).tolist(), strict=True):
+    for f, matrix in zip(
+        scan.frequencies.tolist(), scan.impedance.reshape(-1, 4).tolist(), strict=True
+    ):
         cells = [f]
         for z in matrix:
             phase = math.atan2(z.imag, z.real)
-            cells += [z.real, z.imag, abs(z), 20 * math.log10(abs(z) or 1e-300), phase, math.degrees(phase)]
+            cells += [
+                z.real,
+                z.imag,
+                abs(z),
+                20 * math.log10(abs(z) or 1e-300),
+                phase,
+                math.degrees(phase),
+            ]
         lines.append(",".join(map(repr, cells)))
     path.write_text("\n".join(lines) + "\n")
 
@@ -48,12 +63,17 @@ def test_a_scan_comes_back_from_a_file_of_z_tool_with_its_operating_point(tmp_pa
 def test_a_circuit_tells_frequencies_in_rad_s_and_elements_that_say_nothing(tmp_path):
     Y = np.linalg.inv(Line(0.05, 0.002).impedance(F))
     alone, one_sign = Y * np.eye(2), Y * np.array([[1, 1], [-1, 1]])
-    for values, asked in ((Y, ()), (alone, (f"a.txt: {NO_CROSS}",)), (one_sign, (f"a.txt: {NO_CROSS}",))):
+    for values, asked in (
+        (Y, ()),
+        (alone, (f"a.txt: {NO_CROSS}",)),
+        (one_sign, (f"a.txt: {NO_CROSS}",)),
+    ):
         write_ztool(Scan("line", F, values, ("P",)), tmp_path / "a.txt")
         assert read_scan(tmp_path / "a.txt", 50.0).questions == asked
     write_ztool(Scan("line", 2 * np.pi * F, Y, ("P",)), tmp_path / "a.txt")
     with pytest.raises(
-        InputError, match=r"turns 6.3 times as fast as at the rated 50 Hz: are its frequencies in rad/s"
+        InputError,
+        match=r"turns 6.3 times as fast as at the rated 50 Hz: are its frequencies in rad/s",
     ):
         read_scan(tmp_path / "a.txt", 50.0)
 
@@ -72,7 +92,9 @@ def test_a_scan_comes_back_from_a_file_of_imtb_as_another_writes_it(tmp_path):
 
 def test_several_ports_keep_their_order(tmp_path):
     write_ztool(a_scan(("A-1", "B-2")), tmp_path / "x#Y_AC#A-1#B-2#.txt")
-    assert (tmp_path / "x#Y_AC#A-1#B-2#.txt").read_text().startswith("f\tA-1_d\tA-1_q\tB-2_d\tB-2_q\n")
+    assert (
+        (tmp_path / "x#Y_AC#A-1#B-2#.txt").read_text().startswith("f\tA-1_d\tA-1_q\tB-2_d\tB-2_q\n")
+    )
     back = read_scan(tmp_path / "x#Y_AC#A-1#B-2#.txt", 50.0)
     assert back.ports == ("A-1", "B-2")
     assert back.values == pytest.approx(a_scan(("A-1", "B-2")).values, rel=1e-15)
@@ -170,13 +192,19 @@ def test_alpha_beta_impedances_are_those_of_the_sequences(tmp_path):
     minus = (Z[:, 0, 0] + Z[:, 1, 1] - 1j * (Z[:, 1, 0] - Z[:, 0, 1])) / 2
     to_minus = (Z[:, 0, 0] - Z[:, 1, 1] + 1j * (Z[:, 0, 1] + Z[:, 1, 0])) / 2
     to_plus = (Z[:, 0, 0] - Z[:, 1, 1] - 1j * (Z[:, 0, 1] + Z[:, 1, 0])) / 2
-    head = ",".join(["f", *(f"Zdut_ab_{e}_{p}" for e in ("11", "12", "21", "22") for p in ("re", "im"))])
+    head = ",".join(
+        ["f", *(f"Zdut_ab_{e}_{p}" for e in ("11", "12", "21", "22") for p in ("re", "im"))]
+    )
     rows = [
         ",".join(map(repr, [x + 50, *np.array([[a.real, a.imag] for a in m]).ravel().tolist()]))
-        for x, m in zip(f.tolist(), np.stack([plus, to_minus, to_plus, minus], 1).tolist(), strict=True)
+        for x, m in zip(
+            f.tolist(), np.stack([plus, to_minus, to_plus, minus], 1).tolist(), strict=True
+        )
     ]
     (tmp_path / "IM_Zab_MIMO_x.csv").write_text("\n".join([head, *rows]) + "\n")
-    assert np.linalg.inv(read_scan(tmp_path / "IM_Zab_MIMO_x.csv", 50.0).values) == pytest.approx(Z, rel=1e-9)
+    assert np.linalg.inv(read_scan(tmp_path / "IM_Zab_MIMO_x.csv", 50.0).values) == pytest.approx(
+        Z, rel=1e-9
+    )
 
 
 def spoiled(tmp_path, change):
@@ -193,7 +221,10 @@ def spoiled(tmp_path, change):
         (lambda s: [*s[:50], s[48], *s[50:]], "do not rise"),
         (lambda s: [*s[:50], s[49], *s[50:]], "do not rise"),
         (lambda s: [*s[:9], s[9].replace("e-0", "x-0"), *s[10:]], "line 10: complex"),
-        (lambda s: [*s[:9], s[9].replace(s[9].split("\t")[1], " (nan+0j)"), *s[10:]], "not a finite number"),
+        (
+            lambda s: [*s[:9], s[9].replace(s[9].split("\t")[1], " (nan+0j)"), *s[10:]],
+            "not a finite number",
+        ),
         (lambda s: [s[0].replace("PCC-1_q", "PCC-1_dc"), *s[1:]], "PCC-1_dc are DC"),
         (lambda s: [s[0].replace("PCC-1_q", "PCC-2_q"), *s[1:]], "d and q of one port"),
         (lambda s: ["frequency;a;b", *s[1:]], "of no known form of scans"),
@@ -216,7 +247,9 @@ def test_a_generators_sign_is_told_by_the_resistance():
         check_sign(a_scan().turned_sign(), "--generator device")
 
 
-@pytest.mark.parametrize(("stated", "said"), [("0.5", "plant_angles.txt has 0.5 rad"), ("30", "at most 2π")])
+@pytest.mark.parametrize(
+    ("stated", "said"), [("0.5", "plant_angles.txt has 0.5 rad"), ("30", "at most 2π")]
+)
 def test_two_angles_of_one_bus_and_degrees_are_refused(tmp_path, stated, said):
     """The scan's power flow says 0.2 rad."""
     point = PortPoint(kilovolt=230.0, megawatt=1.0, megavar=0.0, angle=0.2)

@@ -38,7 +38,9 @@ def written(name, *changes):
 
 def studied(path=None, values=None, **wanted):
     """A study of the park, or of another case."""
-    plan = plan_interactions(load_case(path or folder() / "park.toml"), InteractionsRequest(values=values, **wanted))
+    plan = plan_interactions(
+        load_case(path or folder() / "park.toml"), InteractionsRequest(values=values, **wanted)
+    )
     return Interactions(run_interactions(plan, Work(Serial(), PointStore(folder() / "points"))))
 
 

@@ -21,7 +21,10 @@ def test_the_face_gives_what_the_command_gives(fmu_path):
     assert shares.sum(axis=1).tolist() == pytest.approx([1.0] * len(shares))
     assert repr(found) == "<Interactions of A, B, C in park>"
     assert "worst pair of 3 pairs: A + B" in found._repr_html_()
-    assert {path.name for path in found.save(folder() / "saved")} >= {"pairs.csv", "assignments.csv"}
+    assert {path.name for path in found.save(folder() / "saved")} >= {
+        "pairs.csv",
+        "assignments.csv",
+    }
 
 
 @pytest.mark.parametrize(

@@ -23,8 +23,11 @@ def test_words_files_and_what_is_kept(gfor, results):
     assert "worst pair of 3 pairs: A + B: UNSTABLE together, though stable alone" in said
     assert "static_generation stands in for the vendors" in said
     assert {path.name for path in results.iterdir() if path.is_file()} >= {
-        "modes.csv", "pairs.csv", "interactions.json", "interactions.html",
-    }  # fmt: skip
+        "modes.csv",
+        "pairs.csv",
+        "interactions.json",
+        "interactions.html",
+    }
     page = (results / "interactions.html").read_text(encoding="utf-8")
     assert page.count("<rect") == 9
     assert "A, B: UNSTABLE, -9.50 %" in page
@@ -34,7 +37,9 @@ def test_words_files_and_what_is_kept(gfor, results):
     assert found == park().as_json()
     assert found == json.loads((results / "interactions.json").read_text(encoding="utf-8"))
     assert found["worst_pair"] == ["A", "B"]
-    assert [sum(mode["groups"].values()) for mode in found["as_in_the_case"]["modes"]] == pytest.approx([1.0] * 7)
+    assert [
+        sum(mode["groups"].values()) for mode in found["as_in_the_case"]["modes"]
+    ] == pytest.approx([1.0] * 7)
     _, said, _ = gfor(*options)
     assert "0 systems computed, 8 were there already" in said
 
@@ -42,7 +47,10 @@ def test_words_files_and_what_is_kept(gfor, results):
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        (("--place", "east"), "--place says where devices are swapped; give --swap or a --device as well"),
+        (
+            ("--place", "east"),
+            "--place says where devices are swapped; give --swap or a --device as well",
+        ),
         (("--binding", "a.toml"), "--binding is of a --device"),
         (("--scenario", "a", "--scenario", "b"), "gfor interactions is for one scenario"),
         (("--device", "none.fmu"), "none.fmu"),
@@ -63,7 +71,9 @@ def rows(first):
     """Cells of the guide's table whose head begins so."""
     text = GUIDE.read_text(encoding="utf-8").translate(MINUS).replace("**", "")
     table = text[text.index(f"| {first} |") :].partition("\n\n")[0]
-    return [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()[2:]]
+    return [
+        [cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()[2:]
+    ]
 
 
 def test_the_guides_modes_are_those_that_are_computed():
@@ -72,7 +82,9 @@ def test_the_guides_modes_are_those_that_are_computed():
         mode = judged.mode
         assert row[0] == f"{mode.real:.2f} ± j{mode.imag:.2f}"
         assert row[1:3] == [f"{mode.frequency_hz:.2f}", f"{mode.damping_percent:.2f}"]
-        assert row[3:7] == [f"{100 * judged.groups.get(group, 0):.0f} %" for group in ("A", "B", "C", "grid")]
+        assert row[3:7] == [
+            f"{100 * judged.groups.get(group, 0):.0f} %" for group in ("A", "B", "C", "grid")
+        ]
         assert row[7] == (", ".join(judged.vendors) if judged.is_interaction else "")
     others = park().judgement.modes[len(table) :]
     assert len(others) == 4
@@ -90,14 +102,18 @@ def test_the_guides_pairs_are_those_that_are_computed():
         system, wanted = by_name[name]
         assert verdict == {True: "stable", False: "UNSTABLE"}[system.stable]
         assert damping == ("none" if system.critical is None else f"{system.least_damping:.2f}")
-        assert where == ("" if system.critical is None else f"{system.critical.frequency_hz:.4g} Hz")
+        assert where == (
+            "" if system.critical is None else f"{system.critical.frequency_hz:.4g} Hz"
+        )
         assert fall == ("" if wanted is None else f"{wanted:+.2f}")
 
 
 @pytest.mark.slow
 def test_the_guides_words_on_the_swap_are_right():
     text = GUIDE.read_text(encoding="utf-8")
-    assert re.search(r"27 assignments,.*Seven are unstable; the worst is B everywhere", text, re.DOTALL)
+    assert re.search(
+        r"27 assignments,.*Seven are unstable; the worst is B everywhere", text, re.DOTALL
+    )
     found = studied(swap=True).judgement.assignments
     assert (len(found), sum(one.stable is False for one in found)) == (27, 7)
     assert found[0].name.names == ("B", "B", "B")

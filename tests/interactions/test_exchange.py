@@ -40,17 +40,26 @@ def test_the_stand_in_neither_damps_nor_excites_a_swing():
 def test_a_network_of_phasors_has_a_stand_in_of_its_own():
     plan = plan_interactions(load_case("two_area_rms"), InteractionsRequest("gfor"))
     assert plan.stand_in == "static_generation_phasor"
-    assert plan.groups == {"gfor": "gfor_phasor", "sg1": GENERATORS, "sg2": GENERATORS, "grid": GRID}
+    assert plan.groups == {
+        "gfor": "gfor_phasor",
+        "sg1": GENERATORS,
+        "sg2": GENERATORS,
+        "grid": GRID,
+    }
 
 
 def test_converters_of_units_are_exchanged_as_well():
-    plan = plan_interactions(load_case("wscc9"), InteractionsRequest("gfor", {"units.alpha.3": 0.5}))
+    plan = plan_interactions(
+        load_case("wscc9"), InteractionsRequest("gfor", {"units.alpha.3": 0.5})
+    )
     assert {name: place.vendor for name, place in plan.places.items()} == {"gfor3": "gfor"}
     (prepared,) = exchanged_case(plan.case, plan.systems[NONE]).prepare(
         [plan.prepared.name], {}, None, None, plan.layers
     )
     assert prepared.system.components["gfor3"].description.model_name == "static_generation"
-    assert prepared.power_flow.voltages == pytest.approx(plan.prepared.power_flow.voltages, abs=1e-9)
+    assert prepared.power_flow.voltages == pytest.approx(
+        plan.prepared.power_flow.voltages, abs=1e-9
+    )
 
 
 def test_a_device_behind_a_binding_is_given_what_it_knows_and_damps_as_without(fmu_path, tmp_path):
@@ -59,10 +68,13 @@ def test_a_device_behind_a_binding_is_given_what_it_knows_and_damps_as_without(f
     request = InteractionsRequest(swap=True, devices=(given,), places=("east", "north"))
     plan = plan_interactions(load_case(folder() / "park.toml"), request)
     bound, own = (
-        compute_system(plan.task(plan.systems[SystemName(Kind.ASSIGNMENT, (device, "C"))])) for device in "DC"
+        compute_system(plan.task(plan.systems[SystemName(Kind.ASSIGNMENT, (device, "C"))]))
+        for device in "DC"
     )
     assert bound.error is None
-    assert [mode.real for mode in bound.modes] == pytest.approx([mode.real for mode in own.modes], rel=1e-4)
+    assert [mode.real for mode in bound.modes] == pytest.approx(
+        [mode.real for mode in own.modes], rel=1e-4
+    )
     assert bound.stable is own.stable is True
 
 
@@ -70,7 +82,10 @@ def test_a_device_without_a_rated_frequency_is_given_none():
     places = plan_interactions(load_case(folder() / "park.toml"), InteractionsRequest()).places
     plain = places["west"]
     known = {name: info for name, info in plain.plan.description.variables.items() if name != "f_n"}
-    silent = replace(plain, plan=replace(plain.plan, description=replace(plain.plan.description, variables=known)))
+    silent = replace(
+        plain,
+        plan=replace(plain.plan, description=replace(plain.plan.description, variables=known)),
+    )
     assert "f_n" in vendors_device_at(places["east"], plain).parameters
     assert "f_n" not in vendors_device_at(places["east"], silent).parameters
     assert "f_n" not in stand_in_at(silent, "static_generation").parameters

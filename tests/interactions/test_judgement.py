@@ -14,14 +14,20 @@ from orchestrator.points.failure import Failure
 from tests.interactions.park import park, studied, swapped, written
 
 STABLE = {"stable": True, "sentence": "stable: …"}
-UNKNOWN = {"stable": None, "reason": "a limit is close by", "sentence": "not known: a limit is close by"}
+UNKNOWN = {
+    "stable": None,
+    "reason": "a limit is close by",
+    "sentence": "not known: a limit is close by",
+}
 
 
 def mode(percent, hertz=10.0, **components):
     """A mode of a damping [%]."""
     imag = 62.83185307 * hertz / 10
     share = percent / 100
-    return SharedMode(-share * imag / (1 - share**2) ** 0.5, imag, components or {"west": 0.5, "east": 0.5})
+    return SharedMode(
+        -share * imag / (1 - share**2) ** 0.5, imag, components or {"west": 0.5, "east": 0.5}
+    )
 
 
 def failed(text):
@@ -37,19 +43,29 @@ def judged(**records):
 
     def name(text):
         vendors = tuple(text.split("_"))
-        return WHOLE if text == "WHOLE" else NONE if text == "NONE" else SystemName(
-            Kind.ALONE if len(vendors) == 1 else Kind.PAIR, vendors
-        )  # fmt: skip
+        return (
+            WHOLE
+            if text == "WHOLE"
+            else NONE
+            if text == "NONE"
+            else SystemName(Kind.ALONE if len(vendors) == 1 else Kind.PAIR, vendors)
+        )
 
     result = park().result
-    return Interactions(replace(result, records=result.records | {name(text): one for text, one in records.items()}))
+    return Interactions(
+        replace(result, records=result.records | {name(text): one for text, one in records.items()})
+    )
 
 
-ALL = dict.fromkeys(("A", "B", "C"), system(mode(8.0))) | dict.fromkeys(("A_B", "A_C", "B_C"), system(mode(8.0)))
+ALL = dict.fromkeys(("A", "B", "C"), system(mode(8.0))) | dict.fromkeys(
+    ("A_B", "A_C", "B_C"), system(mode(8.0))
+)
 
 
 def test_without_a_fight_the_worst_pair_is_the_one_that_falls_furthest():
-    result = judged(**ALL | {"A_C": system(mode(7.0)), "B_C": system(mode(5.5)), "B": system(mode(6.0))})
+    result = judged(
+        **ALL | {"A_C": system(mode(7.0)), "B_C": system(mode(5.5)), "B": system(mode(6.0))}
+    )
     found = result.judgement
     assert "the least damped pair is B + C, 5.50 % at 10 Hz" in " ".join(result.sentences)
     assert found.worst_pair.vendors == ("A", "C")  # by 1 point; B and C fall by 0.5
@@ -67,14 +83,19 @@ def test_a_pair_that_one_of_them_spoils_alone_is_no_fight():
     result = judged(**ALL | {"A": grows, "A_B": grows})
     found = result.judgement
     assert "UNSTABLE without the other vendors: A, -2.00 % at 10 Hz" in result.sentences
-    assert "no worst pair: none of 3 is damped less together than each alone; UNSTABLE: A + B" in result.sentences
+    assert (
+        "no worst pair: none of 3 is damped less together than each alone; UNSTABLE: A + B"
+        in result.sentences
+    )
     pair = next(one for one in found.pairs if one.vendors == ("A", "B"))
     assert pair.fights is False
     assert pair.fall == pytest.approx(0.0, abs=1e-9)
     assert "UNSTABLE together, and A alone as well" in pair.sentence()
 
 
-@pytest.mark.parametrize("lost", [system(mode(9.0), stability=UNKNOWN), failed("no steady state found")])
+@pytest.mark.parametrize(
+    "lost", [system(mode(9.0), stability=UNKNOWN), failed("no steady state found")]
+)
 def test_a_pair_without_a_verdict_is_neither_the_worst_nor_forgotten(lost):
     found = judged(**ALL | {"A_B": lost, "A_C": system(mode(7.0))})
     assert found.worst_pair == ("A", "C")
@@ -131,10 +152,14 @@ def test_a_component_that_was_identified_is_named():
 
 
 def test_different_settings_of_one_vendor_are_named():
-    assert not swapped().warnings or not any("other settings" in text for text in swapped().warnings)
+    assert not swapped().warnings or not any(
+        "other settings" in text for text in swapped().warnings
+    )
     path = written("same.toml", ('vendor = "B"', 'vendor = "A"'))
     found = studied(path, swap=True, places=("north", "east"))
-    assert any("A's converters have other settings at west than at east" in text for text in found.warnings)
+    assert any(
+        "A's converters have other settings at west than at east" in text for text in found.warnings
+    )
 
 
 def test_settings_of_a_vendor_that_differ_are_told_and_equal_ones_are_not():
@@ -148,9 +173,11 @@ def test_settings_of_a_vendor_that_differ_are_told_and_equal_ones_are_not():
         place("south", "B", k=3.0),
     ]
     plan = SimpleNamespace(
-        swapped=tuple(p.name for p in places), places={p.name: p for p in places}, stand_in="gfor",
+        swapped=tuple(p.name for p in places),
+        places={p.name: p for p in places},
+        stand_in="gfor",
         request=SimpleNamespace(black_box=False),
-    )  # fmt: skip
+    )
     result, none = SimpleNamespace(plan=plan, records={}), SimpleNamespace(stable=True)
     (told,) = doubts_of(SimpleNamespace(result=result, none=none))
     assert told.startswith("A's converters have other settings at east than at west")

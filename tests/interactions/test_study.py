@@ -33,14 +33,20 @@ def assigned(*devices):
 
 def test_the_pair_that_is_stable_alone_and_not_together_is_the_worst():
     found = park().judgement
-    assert {vendor: one.stable for vendor, one in found.alone.items()} == {"A": True, "B": True, "C": True}
+    assert {vendor: one.stable for vendor, one in found.alone.items()} == {
+        "A": True,
+        "B": True,
+        "C": True,
+    }
     worst = found.worst_pair
     assert worst is not None
     assert (worst.vendors, worst.fights, worst.joint.stable) == (("A", "B"), True, False)
     assert worst.joint.record.growing.real == pytest.approx(25.7, abs=0.5)
     assert worst.fall == pytest.approx(12.54, abs=0.05)
     assert [one.fights for one in found.pairs] == [True, False, False]
-    assert "worst pair of 3 pairs: A + B: UNSTABLE together, though stable alone" in " ".join(park().sentences)
+    assert "worst pair of 3 pairs: A + B: UNSTABLE together, though stable alone" in " ".join(
+        park().sentences
+    )
 
 
 def test_the_system_as_it_is_has_the_modes_and_the_verdict_of_gfor_modes():
@@ -48,7 +54,9 @@ def test_the_system_as_it_is_has_the_modes_and_the_verdict_of_gfor_modes():
     modes = compute_modes(prepared, (0.1, 100.0))
     whole = park().judgement.whole.record
     assert [mode.eigenvalue for mode in whole.modes] == [mode.eigenvalue for mode in modes.modes]
-    assert [mode.damping_percent for mode in whole.modes] == pytest.approx([m.damping_percent for m in modes.modes])
+    assert [mode.damping_percent for mode in whole.modes] == pytest.approx(
+        [m.damping_percent for m in modes.modes]
+    )
     assert [mode.components for mode in whole.modes] == [mode.by_component for mode in modes.modes]
     assert whole.stability == modes.stability.as_json()
 
@@ -106,7 +114,10 @@ parameters = {{ S_n = "600 MVA", P_0 = 0.5, Q_0 = 0.0, v_0 = 1.0, pll.f_0 = {pll
         + "".join(
             f'[[connections]]\nfrom = "{a}"\nto = "{b}"\n'
             for part in ("re", "im")
-            for a, b in ((f"bus_{name}.v_{part}", f"{name}.v_{part}"), (f"{name}.i_{part}", f"bus_{name}.i_{part}"))
+            for a, b in (
+                (f"bus_{name}.v_{part}", f"{name}.v_{part}"),
+                (f"{name}.i_{part}", f"bus_{name}.i_{part}"),
+            )
         )
         for name, pll in (("A", 10.0), ("B", 25.0))
     ]
@@ -156,7 +167,8 @@ def test_what_grows_outside_of_the_range_counts():
 def test_values_stay_with_the_device_that_they_were_given_to():
     values = {"east.pll.f_0": 12.0, "*.pll.xi": 0.8, "*.native": False}
     plan = plan_interactions(
-        load_case(folder() / "park.toml"), InteractionsRequest(swap=True, places=("west", "east"), values=values)
+        load_case(folder() / "park.toml"),
+        InteractionsRequest(swap=True, places=("west", "east"), values=values),
     )
     tables = plan.systems[assigned("B", "A")]
     assert tables["west"].parameters["pll.f_0"] == 12.0
@@ -174,7 +186,9 @@ def test_values_stay_with_the_device_that_they_were_given_to():
     )
     (prepared,) = load_case(changed).prepare()
     wanted = compute_modes(prepared, (0.1, 100.0))
-    assert [m.eigenvalue for m in found.modes] == pytest.approx([m.eigenvalue for m in wanted.modes], rel=1e-9)
+    assert [m.eigenvalue for m in found.modes] == pytest.approx(
+        [m.eigenvalue for m in wanted.modes], rel=1e-9
+    )
 
 
 def test_another_file_of_the_same_name_is_computed_anew(fmu_path, tmp_path):
@@ -193,7 +207,9 @@ def test_a_device_that_hides_its_states_is_refused_with_the_remedy():
     for kind in (ErrorKind.HIDDEN_STATES, ErrorKind.ANALYSIS):
         failure = Failure(kind, "component 'east': … --black-box …", lasting=True)
         lost = replace(found, records={**found.records, WHOLE: SystemRecord(failure=failure)})
-        advice.append(any("here too --black-box identifies" in text for text in Interactions(lost).warnings))
+        advice.append(
+            any("here too --black-box identifies" in text for text in Interactions(lost).warnings)
+        )
     assert advice == [True, False]
 
 
@@ -229,9 +245,18 @@ def test_what_was_kept_is_not_computed_again():
 @pytest.mark.parametrize(
     ("wanted", "text"),
     [
-        ({"stand_in": "gfro"}, "stand-in: gfro at east, gfro at north, gfro at west: .*there is no model 'gfro'"),
-        ({"swap": True, "places": ("eest",)}, "--place eest: no converter stands there; the places of converters are"),
-        ({"swap": True, "places": ("east",)}, "nothing to swap: the only device at east is of B; give others"),
+        (
+            {"stand_in": "gfro"},
+            "stand-in: gfro at east, gfro at north, gfro at west: .*there is no model 'gfro'",
+        ),
+        (
+            {"swap": True, "places": ("eest",)},
+            "--place eest: no converter stands there; the places of converters are",
+        ),
+        (
+            {"swap": True, "places": ("east",)},
+            "nothing to swap: the only device at east is of B; give others",
+        ),
     ],
 )
 def test_what_cannot_be_studied_is_refused(wanted, text):
@@ -241,7 +266,9 @@ def test_what_cannot_be_studied_is_refused(wanted, text):
 
 def test_too_many_assignments_are_refused_with_their_number(fmu_path):
     devices = tuple(Device(name, fmu_path("gfl")) for name in "DE")
-    with pytest.raises(InputError, match="5 devices at 3 places make 125 assignments, more than the 64"):
+    with pytest.raises(
+        InputError, match="5 devices at 3 places make 125 assignments, more than the 64"
+    ):
         planned(swap=True, devices=devices)
 
 
@@ -252,13 +279,17 @@ def test_a_stand_in_without_a_port_is_refused_with_its_place():
 
 def test_a_vendor_cannot_be_called_as_a_group_is():
     path = written("group.toml", ('vendor = "A"', 'vendor = "grid"'))
-    with pytest.raises(InputError, match=r"components\.west: its vendor is 'grid', which is what a group"):
+    with pytest.raises(
+        InputError, match=r"components\.west: its vendor is 'grid', which is what a group"
+    ):
         plan_interactions(load_case(path), InteractionsRequest())
 
 
 def test_a_case_without_a_converter_or_with_several_scenarios_is_refused():
     case = load_case("two_area")
-    with pytest.raises(InputError, match="several scenarios, and interactions are those of one; choose it with"):
+    with pytest.raises(
+        InputError, match="several scenarios, and interactions are those of one; choose it with"
+    ):
         plan_interactions(case, InteractionsRequest())
     with pytest.raises(InputError, match="scenario 'base' has no converter"):
         plan_interactions(case, InteractionsRequest("base"))

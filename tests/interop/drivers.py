@@ -42,15 +42,25 @@ def libcosim_execution(job):
 
     log_output_level(CosimLogLevel.WARNING)
     execution = CosimExecution.from_step_size(round(job["step_size"] * 1e9))
-    slaves = {name: execution.add_local_slave(CosimLocalSlave(path, name)) for name, path in job["fmus"].items()}
+    slaves = {
+        name: execution.add_local_slave(CosimLocalSlave(path, name))
+        for name, path in job["fmus"].items()
+    }
     references = job["references"]
     for name, values in job["parameters"].items():
         for variable, value in values.items():
-            initial = execution.boolean_initial_value if isinstance(value, bool) else execution.real_initial_value
+            initial = (
+                execution.boolean_initial_value
+                if isinstance(value, bool)
+                else execution.real_initial_value
+            )
             if not initial(slaves[name], references[name][variable], value):
                 raise RuntimeError(f"libcosim refuses {name}.{variable} = {value}")
     for source, target in job["wires"]:
-        ends = [(slaves[component], references[component][variable]) for component, variable in (source, target)]
+        ends = [
+            (slaves[component], references[component][variable])
+            for component, variable in (source, target)
+        ]
         execution.connect_real_variables(*ends[0], *ends[1])
     return execution, slaves
 
@@ -65,7 +75,10 @@ def libcosim(job):
     for k in range(steps_of(job)):
         if not execution.step(1):
             raise RuntimeError("libcosim: a step failed")
-        values = [observer.last_real_values(slaves[c], [job["references"][c][v]])[0] for c, v in job["record"]]
+        values = [
+            observer.last_real_values(slaves[c], [job["references"][c][v]])[0]
+            for c, v in job["record"]
+        ]
         rows.append([(k + 1) * job["step_size"], *values])
     return rows, None
 
@@ -76,7 +89,9 @@ def libcosim(job):
 def ecos_simulation(job):
     """An initialised simulation."""
     with suppress(OSError):  # pip's tbb lies where no loader looks; Debian's is found by itself
-        ctypes.CDLL(str(Path(sysconfig.get_path("data")) / "lib" / "libtbb.so.12"), ctypes.RTLD_GLOBAL)
+        ctypes.CDLL(
+            str(Path(sysconfig.get_path("data")) / "lib" / "libtbb.so.12"), ctypes.RTLD_GLOBAL
+        )
     from ecospy import EcosSimulation, EcosSimulationStructure  # noqa: PLC0415
 
     structure = EcosSimulationStructure()
@@ -84,7 +99,11 @@ def ecos_simulation(job):
         structure.add_model(name, path)
     for source, target in job["wires"]:
         structure.make_real_connection("::".join(source), "::".join(target))
-    start = {f"{name}::{variable}": value for name, vs in job["parameters"].items() for variable, value in vs.items()}
+    start = {
+        f"{name}::{variable}": value
+        for name, vs in job["parameters"].items()
+        for variable, value in vs.items()
+    }
     structure.add_parameter_set("start", start)
     simulation = EcosSimulation(structure=structure, step_size=job["step_size"])
     simulation.init(parameter_set="start")
@@ -120,7 +139,9 @@ def fmpy_ssp(job):
             entry = Parameter()
             entry.name, entry.value = f"{component}.{variable}", value
             values.parameters.append(entry)
-    result = simulate_ssp(job["ssp"], stop_time=job["stop_time"], step_size=job["step_size"], parameter_set=values)
+    result = simulate_ssp(
+        job["ssp"], stop_time=job["stop_time"], step_size=job["step_size"], parameter_set=values
+    )
     return recorded(result, job, ".".join), None
 
 
@@ -129,15 +150,29 @@ def fmpy_container(job):
     from fmpy import read_model_description, simulate_fmu  # noqa: PLC0415
     from fmpy.container_fmu.cli import create_container_fmu  # noqa: PLC0415
     from fmpy.container_fmu.config import Component, Configuration, Connection  # noqa: PLC0415
-    from fmpy.model_description import CoSimulation, DefaultExperiment, ModelDescription, ModelVariable  # noqa: PLC0415
+    from fmpy.model_description import (  # noqa: PLC0415
+        CoSimulation,
+        DefaultExperiment,
+        ModelDescription,
+        ModelVariable,
+    )
 
-    components = {n: Component(n, Path(p), read_model_description(p)) for n, p in job["fmus"].items()}
-    variables = {n: {v.name: v for v in c.modelDescription.modelVariables} for n, c in components.items()}
+    components = {
+        n: Component(n, Path(p), read_model_description(p)) for n, p in job["fmus"].items()
+    }
+    variables = {
+        n: {v.name: v for v in c.modelDescription.modelVariables} for n, c in components.items()
+    }
     model = ModelDescription(
-        fmiVersion="2.0", modelName="Container", instantiationToken="{container}", modelVariables=[],
-        defaultExperiment=DefaultExperiment(stopTime=str(job["stop_time"]), stepSize=str(job["step_size"])),
+        fmiVersion="2.0",
+        modelName="Container",
+        instantiationToken="{container}",
+        modelVariables=[],
+        defaultExperiment=DefaultExperiment(
+            stopTime=str(job["stop_time"]), stepSize=str(job["step_size"])
+        ),
         coSimulation=CoSimulation(fixedInternalStepSize=job["step_size"]),
-    )  # fmt: skip
+    )
     model.modelVariables.append(
         ModelVariable(name="time", type="Real", causality="independent", variability="continuous")
     )
@@ -152,7 +187,14 @@ def fmpy_container(job):
     for component, settings in job["parameters"].items():
         for name, value in settings.items():
             text = str(value).lower() if isinstance(value, bool) else repr(value)
-            expose(component, name, causality="parameter", variability="fixed", initial="exact", start=text)
+            expose(
+                component,
+                name,
+                causality="parameter",
+                variability="fixed",
+                initial="exact",
+                start=text,
+            )
     for component, name in job["record"]:
         expose(component, name, causality="output", variability="continuous", initial="calculated")
 
@@ -162,7 +204,8 @@ def fmpy_container(job):
         return [evolve(variables[component][name], type="Float64")]
 
     connections = [
-        Connection(components[a], wired(a, out), components[b], wired(b, into)) for (a, out), (b, into) in job["wires"]
+        Connection(components[a], wired(a, out), components[b], wired(b, into))
+        for (a, out), (b, into) in job["wires"]
     ]
     folder = Path(tempfile.mkdtemp(prefix="container_"))
     try:
@@ -170,9 +213,12 @@ def fmpy_container(job):
         (folder / "parts").mkdir()
         create_container_fmu(configuration, folder / "parts", folder / "Container.fmu")
         result = simulate_fmu(
-            folder / "Container.fmu", stop_time=job["stop_time"], step_size=job["step_size"],
-            output_interval=job["step_size"], validate=False,
-        )  # fmt: skip
+            folder / "Container.fmu",
+            stop_time=job["stop_time"],
+            step_size=job["step_size"],
+            output_interval=job["step_size"],
+            validate=False,
+        )
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     return recorded(result, job, ".".join), None
@@ -186,7 +232,11 @@ def container(job, folder, sequential, start=()):
     from fmu_manipulation_toolbox.assembly import AssemblyNode  # noqa: PLC0415
 
     node = AssemblyNode(
-        "container.fmu", step_size=job["step_size"], sequential=sequential, auto_link=False, auto_output=False
+        "container.fmu",
+        step_size=job["step_size"],
+        sequential=sequential,
+        auto_link=False,
+        auto_output=False,
     )
     for name, path in job["fmus"].items():
         node.add_fmu(f"{name}.fmu", path)
@@ -208,7 +258,10 @@ def fmucontainer(job, sequential=False):
     with tempfile.TemporaryDirectory(prefix="container_") as folder:
         path = container(job, folder, sequential)
         result = simulate_fmu(
-            str(path), stop_time=job["stop_time"], step_size=job["step_size"], output_interval=job["step_size"]
+            str(path),
+            stop_time=job["stop_time"],
+            step_size=job["step_size"],
+            output_interval=job["step_size"],
         )
         return recorded(result, job, lambda end: ".".join(("recorded", *end))), None
 
@@ -241,7 +294,13 @@ def mosaik(job):
         if place(a) < place(b):
             world.connect(entities[a], entities[b], (out, into))
         else:
-            world.connect(entities[a], entities[b], (out, into), time_shifted=True, initial_data={out: first[a][out]})
+            world.connect(
+                entities[a],
+                entities[b],
+                (out, into),
+                time_shifted=True,
+                initial_data={out: first[a][out]},
+            )
     for component, variable in job["record"]:
         world.connect(entities[component], collector, (variable, ".".join((component, variable))))
     world.run(until=steps_of(job), print_progress=False)
@@ -262,7 +321,9 @@ def pathsim(job):
 
     H = job["step_size"]
     blocks = {
-        name: CoSimulationFMU(path, instance_name=name, start_values=job["parameters"].get(name, {}), dt=H)
+        name: CoSimulationFMU(
+            path, instance_name=name, start_values=job["parameters"].get(name, {}), dt=H
+        )
         for name, path in job["fmus"].items()
     }
     wires = [Connection(blocks[a][out], blocks[b][into]) for (a, out), (b, into) in job["wires"]]
@@ -271,7 +332,9 @@ def pathsim(job):
     simulation = Simulation([*blocks.values(), scope], wires, dt=H, log=False)
     simulation.run(job["stop_time"])
     times, signals = scope.read()
-    return [[float(t), *map(float, values)] for t, values in zip(times, signals.T, strict=True)], None
+    return [
+        [float(t), *map(float, values)] for t, values in zip(times, signals.T, strict=True)
+    ], None
 
 
 # -- CoFMuPy -------------------------------------------------------------------------------------
@@ -282,7 +345,9 @@ def cofmupy(job, method="jacobi"):
 
     def set_by_type(self, name, value):  # 1.0.0 sets every parameter of FMI 2.0 as a Real
         variable = self.var_name2attr[name]
-        (self.fmu.setBoolean if variable.type == "Boolean" else self.fmu.setReal)([variable.valueReference], value)
+        (self.fmu.setBoolean if variable.type == "Boolean" else self.fmu.setReal)(
+            [variable.valueReference], value
+        )
 
     wrappers.Fmu2Handler._set_variable = set_by_type
     coordinator = Coordinator()
@@ -307,7 +372,9 @@ def cofmupy(job, method="jacobi"):
     results = coordinator.get_results()
     columns = [results["time"], *(results[tuple(end)] for end in job["record"])]
     order = [name for group in coordinator.master.sequence_order for name in group]
-    return [list(map(float, row)) for row in zip(*columns, strict=True)], order if method == "gauss_seidel" else None
+    return [
+        list(map(float, row)) for row in zip(*columns, strict=True)
+    ], order if method == "gauss_seidel" else None
 
 
 def cofmupy_gauss_seidel(job):
@@ -320,25 +387,50 @@ def cofmupy_gauss_seidel(job):
 def ecos_executable(job):
     """Not run in this process, but beside it: no Python of ours in it but what is preloaded."""
     with tempfile.TemporaryDirectory(prefix="ecos_") as folder:
-        options = {"--path": job["ssp"], "--parameterSet": job["parameter_set"], "--logLevel": "warn"}
+        options = {
+            "--path": job["ssp"],
+            "--parameterSet": job["parameter_set"],
+            "--logLevel": "warn",
+        }
         options |= {"--stepSize": repr(job["step_size"]), "--stopTime": repr(job["stop_time"])}
-        command = [*job["command"], "simulate", *(text for option in options.items() for text in option)]
-        done = subprocess.run(command, cwd=folder, env=job["environment"], capture_output=True, text=True, check=False)
+        command = [
+            *job["command"],
+            "simulate",
+            *(text for option in options.items() for text in option),
+        ]
+        done = subprocess.run(
+            command, cwd=folder, env=job["environment"], capture_output=True, text=True, check=False
+        )
         found = list(Path(folder).rglob("*.csv"))
         if not found:
-            raise RuntimeError(f"ecos: return code {done.returncode}: {done.stdout[-2000:]}{done.stderr[-2000:]}")
+            raise RuntimeError(
+                f"ecos: return code {done.returncode}: {done.stdout[-2000:]}{done.stderr[-2000:]}"
+            )
         with found[0].open(newline="") as file:
             lines = [[entry.strip() for entry in line] for line in csv.reader(file)]
     heads = [head.split("[")[0].strip() for head in lines[0]]
     columns = [heads.index("::".join(end)) for end in job["record"]]
-    return [[float(line[heads.index("time")]), *(float(line[c]) for c in columns)] for line in lines[1:]], None
+    return [
+        [float(line[heads.index("time")]), *(float(line[c]) for c in columns)] for line in lines[1:]
+    ], None
 
 
 MASTERS = {
     function.__name__: function
-    for function in (libcosim, ecospy, ecos_executable, fmpy_container, fmpy_ssp, fmucontainer,
-                     fmucontainer_sequential, mosaik, pathsim, cofmupy, cofmupy_gauss_seidel)
-}  # fmt: skip
+    for function in (
+        libcosim,
+        ecospy,
+        ecos_executable,
+        fmpy_container,
+        fmpy_ssp,
+        fmucontainer,
+        fmucontainer_sequential,
+        mosaik,
+        pathsim,
+        cofmupy,
+        cofmupy_gauss_seidel,
+    )
+}
 
 
 def main():

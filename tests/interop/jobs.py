@@ -17,9 +17,13 @@ def job_of(system: System, step_size: float, stop_time: float, record: list[str]
         "fmus": {name: str(plan.description.path) for name, plan in plans.items()},
         "parameters": {name: dict(plan.parameters) for name, plan in plans.items()},
         "references": {
-            name: {v.name: v.reference for v in plan.description.variables.values()} for name, plan in plans.items()
+            name: {v.name: v.reference for v in plan.description.variables.values()}
+            for name, plan in plans.items()
         },
-        "wires": [[[end.component, end.variable] for end in (wire.source, wire.target)] for wire in system.connections],
+        "wires": [
+            [[end.component, end.variable] for end in (wire.source, wire.target)]
+            for wire in system.connections
+        ],
         "step_size": step_size,
         "stop_time": stop_time,
         "record": [list(name.split(".", 1)) for name in record],

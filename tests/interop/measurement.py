@@ -36,7 +36,9 @@ PACKAGES = {
     "mosaik": (("mosaik", "mosaik_api_v3"), "mosaik"),
     "pathsim": (("pathsim", "pathsim_fmi"), "pathsim-fmi"),
 }
-COFMUPY_PYTHON = Path(os.environ.get("GFOR_COFMUPY_PYTHON", ROOT / ".venv-cofmupy" / "bin" / "python"))
+COFMUPY_PYTHON = Path(
+    os.environ.get("GFOR_COFMUPY_PYTHON", ROOT / ".venv-cofmupy" / "bin" / "python")
+)
 """CoFMuPy pins its packages hard, so it has an environment of its own."""
 
 
@@ -77,7 +79,9 @@ def why_not(master: str, kind: str = "native") -> str | None:
     return f"not installed: pip install {package} (or the extra 'interop')"
 
 
-def measure(master: str, kind: str, folder: Path, *, preload: bool | None = None) -> dict[str, Outcome]:
+def measure(
+    master: str, kind: str, folder: Path, *, preload: bool | None = None
+) -> dict[str, Outcome]:
     """Run all systems in a master, in a process of its own, and compare.
 
     Parameters
@@ -104,19 +108,27 @@ def run_probes(master: str, folder: Path) -> dict:
     return run(master, {"probes": (system, job)}, folder, preload=True)["probes"]
 
 
-def run(master: str, jobs: dict[str, tuple[System, dict]], folder: Path, *, preload: bool) -> dict[str, dict]:
+def run(
+    master: str, jobs: dict[str, tuple[System, dict]], folder: Path, *, preload: bool
+) -> dict[str, dict]:
     """Results of a master in a process of its own, which may abort when it ends."""
     command, results = [_python(master), str(DRIVERS), _driver(master)], {}
     for number, (name, (system, job)) in enumerate(jobs.items()):
-        ssp, path, results[name] = (folder / f"{number}.{ending}" for ending in ("ssp", "json", "out"))
+        ssp, path, results[name] = (
+            folder / f"{number}.{ending}" for ending in ("ssp", "json", "out")
+        )
         write_ssp(system, job, ssp)
         host = ecos_host(preload=preload) if master == "ecos_executable" else {}
         path.write_text(json.dumps(job | {"ssp": str(ssp)} | host), encoding="utf-8")
         command += [str(path), str(results[name])]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=TIMEOUT, cwd=folder)
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, timeout=TIMEOUT, cwd=folder
+    )
     said = f"return code {done.returncode}\n{done.stdout}\n{done.stderr}"[-4000:]
     assert all(result.exists() for result in results.values()), f"{master}: {said}"
-    return {name: json.loads(result.read_text(encoding="utf-8")) for name, result in results.items()}
+    return {
+        name: json.loads(result.read_text(encoding="utf-8")) for name, result in results.items()
+    }
 
 
 def compare(rules: MasterRules, system: System, record: list[str], result: dict) -> Outcome:
@@ -144,7 +156,10 @@ def _python(master: str) -> str:
 
 def ecos_host(*, preload: bool) -> dict:
     """How to start the executable of Ecos: with nothing of Python around it, or with libpython in it."""
-    environment = {"PATH": os.defpath, "LD_LIBRARY_PATH": str(Path(sysconfig.get_path("data")) / "lib")}
+    environment = {
+        "PATH": os.defpath,
+        "LD_LIBRARY_PATH": str(Path(sysconfig.get_path("data")) / "lib"),
+    }
     if preload:
         library = libpython()
         assert library, "this Python has no shared library to preload"

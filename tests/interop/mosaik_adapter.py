@@ -20,9 +20,11 @@ class Adapter(mosaik_api_v3.Simulator):
         self._variables = {v.name: v for v in description.modelVariables}
         self._folder = extract(path)
         self._fmu = FMU2Slave(
-            guid=description.guid, unzipDirectory=self._folder,
-            modelIdentifier=description.coSimulation.modelIdentifier, instanceName=name,
-        )  # fmt: skip
+            guid=description.guid,
+            unzipDirectory=self._folder,
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName=name,
+        )
         self._fmu.instantiate()
         for parameter, value in parameters.items():
             variable = self._variables[parameter]
@@ -33,7 +35,11 @@ class Adapter(mosaik_api_v3.Simulator):
         self._fmu.exitInitializationMode()
         inputs = [v.name for v in description.modelVariables if v.causality == "input"]
         self._outputs = [v.name for v in description.modelVariables if v.causality == "output"]
-        self.meta["models"]["Unit"] = {"public": True, "params": [], "attrs": [*inputs, *self._outputs]}
+        self.meta["models"]["Unit"] = {
+            "public": True,
+            "params": [],
+            "attrs": [*inputs, *self._outputs],
+        }
         return self.meta
 
     def create(self, num, model):

@@ -35,7 +35,12 @@ def two_area(kind: str) -> System:
 
 def voltage_dip(kind: str) -> System:
     """A converter on an infinite bus; no master changes anything while it runs, so the FMU's own clock does."""
-    timed = {"grid.clock.runs": True, "grid.dip.timed_depth": 0.2, "grid.dip.start": 0.01, "grid.dip.duration": 0.02}
+    timed = {
+        "grid.clock.runs": True,
+        "grid.dip.timed_depth": 0.2,
+        "grid.dip.start": 0.01,
+        "grid.dip.duration": 0.02,
+    }
     return _prepared("infinite_bus", "dip", kind, timed)
 
 
@@ -52,12 +57,22 @@ def _prepared(case: str, scenario: str, kind: str, values: dict) -> System:
 _SINGLE = ("gfor.p", "gfor.i_s", "gfor.omega", "gfor.i_re", "grid.v", "grid.p", "grid.v_re")
 SYSTEMS = {
     "two-area system": Coupled(
-        "two-area system", two_area,
-        ("sg1.omega", "sg2.omega", "sg2.p", "gfor.p", "gfor.i_re", "gfor.delta_p_pod", "grid.bus_2.v", "grid.L.p"),
+        "two-area system",
+        two_area,
+        (
+            "sg1.omega",
+            "sg2.omega",
+            "sg2.p",
+            "gfor.p",
+            "gfor.i_re",
+            "gfor.delta_p_pod",
+            "grid.bus_2.v",
+            "grid.L.p",
+        ),
     ),
     "voltage dip": Coupled("converter on an infinite bus, voltage dip", voltage_dip, _SINGLE),
     "load step": Coupled("converter on an infinite bus, load step", load_step, _SINGLE),
-}  # fmt: skip
+}
 
 
 def with_magnifier(system: System, record: tuple[str, ...], kind: str) -> tuple[System, list[str]]:
@@ -73,6 +88,11 @@ def with_magnifier(system: System, record: tuple[str, ...], kind: str) -> tuple[
 def _magnifier(size: int) -> Model:
     m = ModelBuilder(f"magnifier_{size}", "Shows its inputs larger")
     for index in range(size):
-        m.output(f"y_{index}", MAGNIFIED * m.input(f"u_{index}", "pu", "What is shown", base="any"), "pu", "Large",
-                 base="any")  # fmt: skip
+        m.output(
+            f"y_{index}",
+            MAGNIFIED * m.input(f"u_{index}", "pu", "What is shown", base="any"),
+            "pu",
+            "Large",
+            base="any",
+        )
     return m.build()

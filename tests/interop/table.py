@@ -17,7 +17,9 @@ Results = dict[tuple[str, str], dict[str, Outcome]]
 
 def missing(results: Results) -> list[str]:
     """What was not measured."""
-    return [f"{master}, {kind}" for master in MASTERS for kind in KINDS if (master, kind) not in results]
+    return [
+        f"{master}, {kind}" for master in MASTERS for kind in KINDS if (master, kind) not in results
+    ]
 
 
 def table(results: Results) -> str:
@@ -40,14 +42,24 @@ def figure(outcome: Outcome) -> str:
 
 def in_short(rules: MasterRules) -> str:
     """The schedule in a few words."""
-    first = {"consistent": "propagated", "once": "read once", "zero": "from zero", "start": "start values"}
-    words = ["Jacobi" if rules.steps == "side by side" else "Gauss-Seidel", first[rules.first_inputs]]
+    first = {
+        "consistent": "propagated",
+        "once": "read once",
+        "zero": "from zero",
+        "start": "start values",
+    }
+    words = [
+        "Jacobi" if rules.steps == "side by side" else "Gauss-Seidel",
+        first[rules.first_inputs],
+    ]
     words += ["wire by wire"] if rules.wire_by_wire else []
     words += ["read after exchange"] if rules.after_exchange else []
     words += ["labels one step early"] if rules.early_label else []
     count = rules.early_label - (rules.last_label == "before stop")
     steps = "N steps" if count == 0 else f"N{count:+d} steps"
-    return ", ".join([*words, "ends by a summed-up time" if rules.last_label.startswith("sum") else steps])
+    return ", ".join(
+        [*words, "ends by a summed-up time" if rules.last_label.startswith("sum") else steps]
+    )
 
 
 def verdicts(text: str) -> dict[str, list[str]]:
@@ -68,7 +80,9 @@ def _verdict(cell: str) -> str:
 
 def on_page() -> str | None:
     """The table that stands there."""
-    found = re.search(f"{re.escape(BEGIN)}\n(.*?)\n{re.escape(END)}", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    found = re.search(
+        f"{re.escape(BEGIN)}\n(.*?)\n{re.escape(END)}", PAGE.read_text(encoding="utf-8"), re.DOTALL
+    )
     return found.group(1) if found else None
 
 

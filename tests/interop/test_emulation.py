@@ -22,7 +22,15 @@ from tests.interop.jobs import job_of, write_ssp
 
 COFMUPY_GAUSS_SEIDEL, ECOS_EXECUTABLE, FMPY_SSP, FMUCONTAINER, LIBCOSIM, MOSAIK, PATHSIM = (
     MASTERS[name]
-    for name in ("cofmupy_gauss_seidel", "ecos_executable", "fmpy_ssp", "fmucontainer", "libcosim", "mosaik", "pathsim")
+    for name in (
+        "cofmupy_gauss_seidel",
+        "ecos_executable",
+        "fmpy_ssp",
+        "fmucontainer",
+        "libcosim",
+        "mosaik",
+        "pathsim",
+    )
 )
 
 H = 1e-4
@@ -55,14 +63,23 @@ def test_early_labels_show_the_step_after():
     early = emulate(probe_system(), PATHSIM, 0.1, 2.0, ["a.y"])
     assert len(early.times) == 21
     assert np.array_equal(early.values[:-1], on_time.values[1:])
-    assert np.array_equal(emulate(probe_system(), PATHSIM, 0.1, 2.0, ["a.y"], every=5).values, early.values[::5])
+    assert np.array_equal(
+        emulate(probe_system(), PATHSIM, 0.1, 2.0, ["a.y"], every=5).values, early.values[::5]
+    )
 
 
 def test_a_time_summed_up_step_by_step_may_need_one_row_more():
     """Ten times 0.1 is less than 1 in floating point, so that FMPy takes eleven steps."""
-    assert (FMPY_SSP.rows(0.1, 1.0), FMPY_SSP.rows(0.125, 1.0), LIBCOSIM.rows(0.1, 1.0)) == (11, 8, 11)
+    assert (FMPY_SSP.rows(0.1, 1.0), FMPY_SSP.rows(0.125, 1.0), LIBCOSIM.rows(0.1, 1.0)) == (
+        11,
+        8,
+        11,
+    )
     assert [MOSAIK.rows(H, N * H) for H, N in ((0.1, 10), (0.125, 16))] == [10, 16]
-    found = [ECOS_EXECUTABLE.rows(H, N * H) for H, N in ((0.1, 20), (0.1, 10), (0.3, 10), (0.125, 16), (1e-4, 500))]
+    found = [
+        ECOS_EXECUTABLE.rows(H, N * H)
+        for H, N in ((0.1, 20), (0.1, 10), (0.3, 10), (0.125, 16), (1e-4, 500))
+    ]
     assert found == [20, 11, 11, 17, 500]  # as the executable wrote them
     assert len(emulate(probe_system(), FMPY_SSP, 0.1, 1.0, ["a.y"]).times) == 11
     assert len(emulate(probe_system(), FMPY_SSP, 0.125, 1.0, ["a.y"]).times) == 8
@@ -93,8 +110,12 @@ def test_a_stop_between_communication_points():
 
 
 def test_events_happen_before_the_step_that_starts_at_their_time():
-    events = [ParameterChange(0.0, "a", "internal_step", 2e-4), ParameterChange(0.1, "b", "internal_step", 2e-4)]
-    with pytest.raises(Exception, match="internal_step is fixed"):  # so both are tried, also the one at t = 0
+    events = [
+        ParameterChange(0.0, "a", "internal_step", 2e-4),
+        ParameterChange(0.1, "b", "internal_step", 2e-4),
+    ]
+    # so both are tried, also the one at t = 0
+    with pytest.raises(Exception, match="internal_step is fixed"):
         emulate(probe_system(), PATHSIM, 0.1, 1.0, ["a.y"], events=events[:1])
     with pytest.raises(Exception, match="internal_step is fixed"):
         emulate(probe_system(), PATHSIM, 0.1, 1.0, ["a.y"], events=events[1:])
@@ -104,7 +125,8 @@ def test_run_like_gives_what_fmpy_gives(tmp_path, capsys):
     """The whole way, from the command line to a file, with the steady start that our own run would have."""
     command = ["run", "two_area", "--scenario", "pod_pq", "--stop", "0.02", "--like", "fmpy_ssp"]
     assert main([*command, "--out", str(tmp_path / "like")]) == 0
-    assert "5 rows" in capsys.readouterr().out  # 200 times 1e-4 is less than 0.02: FMPy takes 201 steps
+    # 200 times 1e-4 is less than 0.02: FMPy takes 201 steps
+    assert "5 rows" in capsys.readouterr().out
     ours = xr.open_dataset(tmp_path / "like" / "pod_pq" / "trajectory.nc")
     assert "simulate_ssp" in ours.attrs["like"]
     assert ours.attrs["schedule"] == "fmpy_ssp: gfor, sg1, sg2, grid"
@@ -116,12 +138,16 @@ def test_run_like_gives_what_fmpy_gives(tmp_path, capsys):
     assert np.abs(rows[:, 0] - ours["time"].values).max() < 1e-9
     assert np.array_equal(rows[:, 1:], np.column_stack([ours[name].values for name in names]))
     others = emulate(prepared.system, COFMUPY_GAUSS_SEIDEL, H, 0.02, names, every=50)
-    assert np.abs(rows[:, 2] - others.values[:, 1]).max() > 0.01  # another schedule would not have done
+    # another schedule would not have done
+    assert np.abs(rows[:, 2] - others.values[:, 1]).max() > 0.01
 
 
 def test_run_like_an_unknown_master(capsys):
     assert main(["run", "two_area", "--like", "dymola"]) == 2
-    assert "there is no master 'dymola' to run like; known are: libcosim, ecos" in capsys.readouterr().err
+    assert (
+        "there is no master 'dymola' to run like; known are: libcosim, ecos"
+        in capsys.readouterr().err
+    )
 
 
 def test_an_order_without_a_master_to_follow(capsys):

@@ -48,7 +48,8 @@ def test_which_master_recognises_it(master, tmp_path):
 
 def test_a_host_that_is_not_python_needs_a_preload_for_python_backed_fmus(tmp_path):
     skip_if_it_cannot_run("ecos_executable", "native")
-    with pytest.raises(AssertionError, match="ecos: return code"):  # native FMUs run in this very environment
+    # native FMUs run in this very environment
+    with pytest.raises(AssertionError, match="ecos: return code"):
         measure("ecos_executable", "Python-backed", tmp_path, preload=False)
 
 

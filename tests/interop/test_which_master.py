@@ -8,7 +8,13 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.errors import InputError
-from orchestrator.interop.probe_result import EXTRAPOLATIONS, SIGNALS, candidates, probe_system, read_probe_result
+from orchestrator.interop.probe_result import (
+    EXTRAPOLATIONS,
+    SIGNALS,
+    candidates,
+    probe_system,
+    read_probe_result,
+)
 from orchestrator.interop.rules import MASTERS
 from orchestrator.interop.which_master import PROPERTIES, identify
 from tests.interop import drivers
@@ -24,7 +30,10 @@ def every():
 
 
 def table(rows, heads=HEADS, separator=",", text=repr):
-    lines = [separator.join(heads), *(separator.join(text(float(value)) for value in row) for row in rows)]
+    lines = [
+        separator.join(heads),
+        *(separator.join(text(float(value)) for value in row) for row in rows),
+    ]
     return "\n".join(lines) + "\n"
 
 
@@ -48,9 +57,16 @@ def told(tmp_path):
 
 def one(**properties):
     """Rows of the schedule with these properties; the rest as our own."""
-    usual = {"order": "side by side", "first_inputs": "consistent", "extrapolation": 0.0, "early_label": 0}
+    usual = {
+        "order": "side by side",
+        "first_inputs": "consistent",
+        "extrapolation": 0.0,
+        "early_label": 0,
+    }
     wanted = usual | {"after_exchange": False, "wire_by_wire": False} | properties
-    ((candidate, rows),) = [p for p in every() if all(getattr(p[0], name) == wanted[name] for name in PROPERTIES)]
+    ((candidate, rows),) = [
+        p for p in every() if all(getattr(p[0], name) == wanted[name] for name in PROPERTIES)
+    ]
     return candidate, rows_of(rows)
 
 
@@ -122,7 +138,9 @@ def test_columns_of_any_name_are_taken_as_said(told):
 
 
 def test_semicolons_with_decimal_commas(told):
-    assert as_plain(told(table(PLAIN, separator=";", text=lambda value: f"{value:.12g}".replace(".", ","))))
+    assert as_plain(
+        told(table(PLAIN, separator=";", text=lambda value: f"{value:.12g}".replace(".", ",")))
+    )
 
 
 def test_every_third_row_is_enough(told):
@@ -148,7 +166,11 @@ def test_of_rows_with_one_time_the_last_counts(told):
 
 
 def test_another_step_and_duration(told):
-    (rows,) = [r for c, r in candidates(0.05, 30) if (c, None) == (one(first_inputs="zero", early_label=1)[0], None)]
+    (rows,) = [
+        r
+        for c, r in candidates(0.05, 30)
+        if (c, None) == (one(first_inputs="zero", early_label=1)[0], None)
+    ]
     labelled = np.column_stack([np.arange(31) * 0.05, rows])
     assert as_plain(told(table(labelled), step_size=0.05, stop_time=1.5))
 
@@ -168,15 +190,27 @@ def test_what_no_schedule_gives_fits_none(told):
     ("text", "settings", "message"),
     [
         ("", {}, "it has no heading with rows below it"),
-        (table(PLAIN[:, :3], ["when", "a.y", "b.y"]), {}, "no column is seen to be time; columns: when, a.y, b.y"),
+        (
+            table(PLAIN[:, :3], ["when", "a.y", "b.y"]),
+            {},
+            "no column is seen to be time; columns: when, a.y, b.y",
+        ),
         (table(PLAIN[:, :3], ["time", "p", "q"]), {}, "no column is seen to be a.y and b.y"),
         (
             table(PLAIN[:, :3], ["time", "1.a.y", "2.a.y"]),
             {},
             "a.y may be any of 1.a.y, 2.a.y; say which with --column",
         ),
-        (table(PLAIN[:, :3], HEADS[:3]), {"named": {"a.y": "Lag"}}, "it has no column 'Lag'; columns: time, a.y, b.y"),
-        (table(PLAIN[:, :3], HEADS[:3]), {"named": {"a.x": "a.y"}}, "there is no signal a.x; signals: time, a.y"),
+        (
+            table(PLAIN[:, :3], HEADS[:3]),
+            {"named": {"a.y": "Lag"}},
+            "it has no column 'Lag'; columns: time, a.y, b.y",
+        ),
+        (
+            table(PLAIN[:, :3], HEADS[:3]),
+            {"named": {"a.x": "a.y"}},
+            "there is no signal a.x; signals: time, a.y",
+        ),
         ("time,a.y\n0,1\n0.1,x\n", {}, "row 2, column 'a.y': 'x' is not a finite number"),
         ("time,a.y\n0,1\n0.1\n", {}, "row 2, column 'a.y': '' is not a finite number"),
         (table(PLAIN[:3]), {}, "only 3 of 3 rows are at multiples of 0.1 s up to 2 s"),
@@ -204,7 +238,9 @@ def test_a_file_that_is_not_text(tmp_path):
 # -- a master that is always there, and the command ------------------------------------------------
 
 
-@pytest.mark.parametrize(("master", "alike"), [("fmpy_ssp", {"fmpy_ssp", "cofmupy"}), ("fmpy_container", None)])
+@pytest.mark.parametrize(
+    ("master", "alike"), [("fmpy_ssp", {"fmpy_ssp", "cofmupy"}), ("fmpy_container", None)]
+)
 def test_fmpy_is_recognised(master, alike, told, tmp_path):
     system = probe_system()
     job = job_of(system, H, N * H, list(SIGNALS)) | {"ssp": str(tmp_path / "probes.ssp")}
@@ -219,7 +255,11 @@ def test_fmpy_is_recognised(master, alike, told, tmp_path):
 def test_the_command_builds_the_pair_and_reads_what_it_gave(tmp_path, capsys):
     kit = tmp_path / "kit"
     assert main(["master", "which", "--build", str(kit)]) == 0
-    assert sorted(path.name for path in kit.iterdir()) == ["INSTRUCTIONS.md", "probe_a.fmu", "probe_b.fmu"]
+    assert sorted(path.name for path in kit.iterdir()) == [
+        "INSTRUCTIONS.md",
+        "probe_a.fmu",
+        "probe_b.fmu",
+    ]
     page = (kit / "INSTRUCTIONS.md").read_text(encoding="utf-8")
     assert "`a.y` → `b.u`" in page
     assert "**0.1 s**" in page
@@ -253,7 +293,9 @@ def test_the_command_says_when_nothing_fits(tmp_path, capsys):
 @pytest.mark.parametrize("arguments", [[], ["result.csv", "--build", "kit"]])
 def test_either_a_result_or_a_folder(arguments, capsys):
     assert main(["master", "which", *arguments]) == 2
-    assert "give either the tool's RESULT.csv, or --build DIR" in " ".join(capsys.readouterr().err.split())
+    assert "give either the tool's RESULT.csv, or --build DIR" in " ".join(
+        capsys.readouterr().err.split()
+    )
 
 
 def test_a_column_without_a_heading(tmp_path, capsys):

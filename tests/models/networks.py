@@ -56,4 +56,8 @@ def phasors(rows, watched, *names):
 
 def are_the_same(one, other, model):
     """To the last bit; rows of a phasor network, which only one of two FMUs solves as data, to rounding."""
-    return np.array_equal(one, other) if model.nodal is None else one == pytest.approx(other, rel=1e-12, abs=1e-12)
+    return (
+        np.array_equal(one, other)
+        if model.nodal is None
+        else one == pytest.approx(other, rel=1e-12, abs=1e-12)
+    )

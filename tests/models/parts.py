@@ -23,7 +23,8 @@ def exciter(name, values=None):
     """An exciter between terminal voltage, field current and a stabiliser's signal."""
     m = ModelBuilder("alone", "The exciter alone")
     v_t, I_fd, v_s = (
-        m.input(name, "pu", name, base="S_n", start=start) for name, start in (("v_t", V_T), ("I_fd", E_FD), ("v_s", 0))
+        m.input(name, "pu", name, base="S_n", start=start)
+        for name, start in (("v_t", V_T), ("I_fd", E_FD), ("v_s", 0))
     )
     E_fd, _ = EXCITERS[name](m, Regulated(START, lambda E: v_t, I_fd, v_s))
     m.output("E_fd", E_fd, "pu", "Field voltage", base="E_fd")
@@ -41,7 +42,10 @@ def governor(name, values=None):
 def stabilizer(name, values=None):
     """A stabiliser behind speed deviation and power."""
     m = ModelBuilder("alone", "The stabiliser alone")
-    speed, power = m.input("speed", "pu", "w − 1", base="f_n"), m.input("power", "pu", "P_e", base="S_n", start=0.8)
+    speed, power = (
+        m.input("speed", "pu", "w − 1", base="f_n"),
+        m.input("power", "pu", "P_e", base="S_n", start=0.8),
+    )
     part = STABILIZERS[name]
     assert part is not None
     m.output("v_s", part(m, speed, power, Expr(0.8)), "pu", "Signal", base="S_n")
@@ -64,11 +68,17 @@ def integrated(model, inputs, end, step=1e-3, x=None):
         k3 = rate(x + step / 2 * k2)
         k4 = rate(x + step * k3)
         x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-        found.append(dict(zip(names, *model.model.outputs_function(x, u, model.p, model.c), strict=True)))
+        found.append(
+            dict(zip(names, *model.model.outputs_function(x, u, model.p, model.c), strict=True))
+        )
     return found, x
 
 
 def refused(model):
     """Texts of the requirements that do not hold."""
     margins = np.array(model.model.requirements(model.p, model.c)).ravel()
-    return [text for text, margin in zip(model.model.requirement_texts, margins, strict=True) if not margin > 0]
+    return [
+        text
+        for text, margin in zip(model.model.requirement_texts, margins, strict=True)
+        if not margin > 0
+    ]

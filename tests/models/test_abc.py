@@ -15,7 +15,14 @@ VOLT = V_N * 1e3 * np.sqrt(2 / 3)
 AMPERE = S_N / V_N * 1e3 * np.sqrt(2 / 3)
 STEP = 1e-4
 SIGNALS = ("omega", "delta_p_pod", "delta_q_pod", "u", "i_s")
-START = {"P_0": 0.9, "Q_0": 0.05, "v_0": 1.0, "theta_0": 0.3, "pod_p.enabled": True, "pod_q.enabled": True}
+START = {
+    "P_0": 0.9,
+    "Q_0": 0.05,
+    "v_0": 1.0,
+    "theta_0": 0.3,
+    "pod_p.enabled": True,
+    "pod_q.enabled": True,
+}
 START_VOLTAGE = np.exp(0.3j)
 
 
@@ -28,10 +35,12 @@ VOLTAGES = {
     "balanced": lambda t: 1.0,
     "dip": after(0.1, lambda t: 0.95 * np.exp(-0.01j) if t < 0.15 else 1.0),
     "frequency deviation": after(0.1, lambda t: np.exp(1j * OMEGA_B * 2e-3 * t)),
-    "load step": after(0.1, lambda t: 1 + 0.02 * np.exp(-0.5 * t) * (-np.cos(4 * t) / 2 + 1j * np.sin(4 * t))),
+    "load step": after(
+        0.1, lambda t: 1 + 0.02 * np.exp(-0.5 * t) * (-np.cos(4 * t) / 2 + 1j * np.sin(4 * t))
+    ),
     # 2 % of negative sequence: in the network frame it turns backwards at twice the frequency
     "unbalanced": after(0.1, lambda t: 1 + 0.02 * np.exp(-2j * OMEGA_B * t)),
-}  # fmt: skip
+}
 
 
 def three_phases(phasor, time, zero=0.0):
@@ -61,7 +70,12 @@ def pair(fmu_path):
         at_start = {"v_re": START_VOLTAGE.real, "v_im": START_VOLTAGE.imag}
         yield (
             start(release, fmu_path("gfor"), START, at_start),
-            start(release, fmu_path("gfor_abc"), START, of_the_phases(three_phases(START_VOLTAGE, 0.0))),
+            start(
+                release,
+                fmu_path("gfor_abc"),
+                START,
+                of_the_phases(three_phases(START_VOLTAGE, 0.0)),
+            ),
         )
 
 
@@ -109,7 +123,9 @@ def test_phase_voltages_held_as_they_are_would_err_by_half_a_step_of_the_frame(f
     parts, lag = 10, OMEGA_B * STEP / 2
     with ExitStack() as release:
         values = {"P_0": 0.9, "Q_0": 0.05, "theta_0": -lag, "internal_step": STEP / parts}
-        device = start(release, fmu_path("gfor"), values, {"v_re": np.cos(lag), "v_im": -np.sin(lag)})
+        device = start(
+            release, fmu_path("gfor"), values, {"v_re": np.cos(lag), "v_im": -np.sin(lag)}
+        )
         for k in range(3000):
             for part in range(parts):
                 v = np.exp(-1j * OMEGA_B * (part + 0.5) * STEP / parts)

@@ -44,16 +44,30 @@ def test_a_tripped_generator_runs_on_at_no_load_with_its_voltage_and_speed_gover
     model = build_model(name)
     start = {v.name: v.start for v in model.parameters}
     # Alone, the slow governor of the 118-bus case would swing for minutes: it gets the other generators' fast one.
-    fast = {"T_1": 0, "T_2": 0, "T_4": 0.3, "T_5": 7, "T_6": 0.6, "K_1": 0.3, "K_3": 0.3, "K_4": 0, "K_5": 0.4}
+    fast = {
+        "T_1": 0,
+        "T_2": 0,
+        "T_4": 0.3,
+        "T_5": 7,
+        "T_6": 0.6,
+        "K_1": 0.3,
+        "K_3": 0.3,
+        "K_4": 0,
+        "K_5": 0.4,
+    }
     fast |= {"K_6": 0, "K_7": 0, "K_8": 0, "T_7": 0}
-    values = {"P_0": 0.5, "Q_0": 0.1, "internal_step": 2e-4} | {f"governor.{k}": v for k, v in fast.items()}
+    values = {"P_0": 0.5, "Q_0": 0.1, "internal_step": 2e-4} | {
+        f"governor.{k}": v for k, v in fast.items()
+    }
     found = run(fmu_path(name), 80.0, values, (*WATCHED, "v_t", "E_fd", "P_m"), step=1e-2)
     assert all(np.isfinite(values).all() for values in found.values())
     P_m, w = found["P_m"][-1], found["omega"][-1]
     assert P_m == pytest.approx(0.0, abs=2e-3)
-    assert w == pytest.approx(1 + 0.5 / start["governor.inverse_R"], abs=5e-4)  # the droop's speed at no load
+    # the droop's speed at no load
+    assert w == pytest.approx(1 + 0.5 / start["governor.inverse_R"], abs=5e-4)
     v_t, E_fd = found["v_t"], found["E_fd"]
-    assert v_t[-1] == pytest.approx(w * E_fd[-1], abs=2e-3)  # open circuit: E_fd = 1 gives 1 pu at rated speed
+    # open circuit: E_fd = 1 gives 1 pu at rated speed
+    assert v_t[-1] == pytest.approx(w * E_fd[-1], abs=2e-3)
     K = start.get("exciter.K_A", np.inf)
     reference = v_t[0] + (E_fd[0] - E_fd[-1]) / K
     assert v_t[-1] == pytest.approx(reference, abs=2e-3)
@@ -62,6 +76,7 @@ def test_a_tripped_generator_runs_on_at_no_load_with_its_voltage_and_speed_gover
 def test_a_tripped_converter_keeps_its_voltage_and_goes_to_the_droops_frequency(fmu_path):
     found = run(fmu_path("gfor"), 2.0, {"P_0": 0.6, "Q_0": 0.0}, (*WATCHED, "u"))
     assert all(np.isfinite(values).all() for values in found.values())
-    assert found["omega"][-1] == pytest.approx(1 + 0.05 * 0.6, abs=1e-4)  # P_ref covers the transformer's losses, too
+    # P_ref covers the transformer's losses, too
+    assert found["omega"][-1] == pytest.approx(1 + 0.05 * 0.6, abs=1e-4)
     assert found["p"][-1] == pytest.approx(0, abs=1e-9)
     assert found["u"][-1] == pytest.approx(found["u"][0], abs=0.02)

@@ -21,16 +21,45 @@ from tests.support.evaluated import Evaluated
 
 DROOP = {"droop.R_f": 0.04, "droop.R_V": 0.09, "droop.tau_P": 0.03, "droop.tau_Q": 0.22}
 OTHERWISE = {
-    "P_0": 0.55, "Q_0": 0.12, "v_0": 1.03, "theta_0": 0.6, "S_n": 340.0, "S_base": 120.0, "f_n": 60.0,
-    "filter.R_c": 0.007, "filter.X_c": 0.13, "filter.B_c": 0.11, "transformer.R_t": 0.004, "transformer.X_t": 0.17,
-    **DROOP, "droop.delta_P_ref": 0.03, "droop.delta_Q_ref": -0.05, "droop.delta_U_ref": 0.02,
-    "voltage_control.tau": 0.08, "voltage_control.xi": 0.6, "voltage_control.i_q_max": 0.95,
-    "voltage_control.i_d_max": 0.7, "current_control.tau": 0.0015, "feed_forward.tau": 3e-4,
-    "pod_p.enabled": 1, "pod_p.T_W": 4.0, "pod_p.T_f": 0.07, "pod_p.T_S1": 0.21, "pod_p.T_S2": 0.33, "pod_p.N_S": 2,
-    "pod_p.K": 130.0, "pod_p.limit": 0.15,
-    "pod_q.enabled": 1, "pod_q.T_W": 6.0, "pod_q.T_f": 0.12, "pod_q.T_S1": 0.27, "pod_q.T_S2": 0.31, "pod_q.N_S": 1,
-    "pod_q.K": 170.0, "pod_q.limit": 0.25,
-}  # fmt: skip
+    "P_0": 0.55,
+    "Q_0": 0.12,
+    "v_0": 1.03,
+    "theta_0": 0.6,
+    "S_n": 340.0,
+    "S_base": 120.0,
+    "f_n": 60.0,
+    "filter.R_c": 0.007,
+    "filter.X_c": 0.13,
+    "filter.B_c": 0.11,
+    "transformer.R_t": 0.004,
+    "transformer.X_t": 0.17,
+    **DROOP,
+    "droop.delta_P_ref": 0.03,
+    "droop.delta_Q_ref": -0.05,
+    "droop.delta_U_ref": 0.02,
+    "voltage_control.tau": 0.08,
+    "voltage_control.xi": 0.6,
+    "voltage_control.i_q_max": 0.95,
+    "voltage_control.i_d_max": 0.7,
+    "current_control.tau": 0.0015,
+    "feed_forward.tau": 3e-4,
+    "pod_p.enabled": 1,
+    "pod_p.T_W": 4.0,
+    "pod_p.T_f": 0.07,
+    "pod_p.T_S1": 0.21,
+    "pod_p.T_S2": 0.33,
+    "pod_p.N_S": 2,
+    "pod_p.K": 130.0,
+    "pod_p.limit": 0.15,
+    "pod_q.enabled": 1,
+    "pod_q.T_W": 6.0,
+    "pod_q.T_f": 0.12,
+    "pod_q.T_S1": 0.27,
+    "pod_q.T_S2": 0.31,
+    "pod_q.N_S": 1,
+    "pod_q.K": 170.0,
+    "pod_q.limit": 0.25,
+}
 
 
 # -- the droops ---------------------------------------------------------------------------------
@@ -39,7 +68,9 @@ OTHERWISE = {
 def droops():
     """Both droops between the measured power, both supplementary references, and what they give."""
     m = ModelBuilder("alone", "Both droops")
-    P, Q, delta_p, delta_q = (m.input(name, "pu", name, base="S_n") for name in ("P", "Q", "delta_p", "delta_q"))
+    P, Q, delta_p, delta_q = (
+        m.input(name, "pu", name, base="S_n") for name in ("P", "Q", "delta_p", "delta_q")
+    )
     start = SteadyState(0.2, Phasor(1.02, 0), *(Phasor(0, 0),) * 3, Phasor(0.6, 0.1))
     droop = declare_droop(m, start, Phasor(P, Q))
     m.derivative(droop.theta, 0)
@@ -63,14 +94,20 @@ def test_each_droop_has_its_own_lag_and_its_own_gain(hertz):
 
 @pytest.mark.parametrize(
     ("reference", "omega", "u_q"),
-    [("delta_P_ref", 0.04 * 0.03, 0.0), ("delta_Q_ref", 0.0, 0.09 * 0.03), ("delta_U_ref", 0.0, 0.03)],
+    [
+        ("delta_P_ref", 0.04 * 0.03, 0.0),
+        ("delta_Q_ref", 0.0, 0.09 * 0.03),
+        ("delta_U_ref", 0.0, 0.03),
+    ],
 )
 def test_a_raised_reference_raises_frequency_or_voltage(reference, omega, u_q):
     at_rest = [0.6, 0.1, 0.0, 0.0]
     before = Evaluated(droops(), DROOP).outputs(at_rest)
     assert before == pytest.approx({"omega": 1.0, "u_q": 1.02}, abs=1e-15)
     after = Evaluated(droops(), DROOP | {f"droop.{reference}": 0.03}).outputs(at_rest)
-    assert {k: after[k] - before[k] for k in after} == pytest.approx({"omega": omega, "u_q": u_q}, abs=1e-14)
+    assert {k: after[k] - before[k] for k in after} == pytest.approx(
+        {"omega": omega, "u_q": u_q}, abs=1e-14
+    )
 
 
 # -- the whole converter ------------------------------------------------------------------------
@@ -96,7 +133,11 @@ def by_hand(p, x, v):
     u_ref = p["droop.U_ref"] + p["droop.delta_U_ref"]
     u_ref += p["droop.R_V"] * (p["droop.Q_ref"] + p["droop.delta_Q_ref"] + delta_q - x["droop.Q_f"])
     v_c, demand = _inner_loops(p, x, qd, rates, u, u_ref, w)
-    into_grid = u - v * exp(-1j * x["droop.theta"]) - (p["transformer.R_t"] + 1j * w * p["transformer.X_t"]) * i_g
+    into_grid = (
+        u
+        - v * exp(-1j * x["droop.theta"])
+        - (p["transformer.R_t"] + 1j * w * p["transformer.X_t"]) * i_g
+    )
     X_c, B_c = p["filter.X_c"], p["filter.B_c"]
     for name, rate in {
         "filter.i_s": omega_b / X_c * (v_c - u - (p["filter.R_c"] + 1j * w * X_c) * i_s),
@@ -106,8 +147,19 @@ def by_hand(p, x, v):
         _put(rates, name, rate)
     injected = i_g * exp(1j * x["droop.theta"])
     at_bus, scale = v * injected.conjugate(), p["S_n"] / p["S_base"]
-    outputs = {"i_re": injected.real * scale, "i_im": injected.imag * scale, "p": at_bus.real, "q": at_bus.imag}
-    outputs |= {"omega": w, "delta_p_pod": delta_p, "delta_q_pod": delta_q, "u": abs(u), "i_s": abs(i_s)}
+    outputs = {
+        "i_re": injected.real * scale,
+        "i_im": injected.imag * scale,
+        "p": at_bus.real,
+        "q": at_bus.imag,
+    }
+    outputs |= {
+        "omega": w,
+        "delta_p_pod": delta_p,
+        "delta_q_pod": delta_q,
+        "u": abs(u),
+        "i_s": abs(i_s),
+    }
     outputs["current_demand"] = demand
     return rates, outputs
 
@@ -126,15 +178,26 @@ def _inner_loops(p, x, qd, rates, u, u_ref, w):
     demanded = 200 * xi * omega_n * C * error + qd("voltage_control.x")
     demanded += 1j * w * p["filter.B_c"] * u + qd("feed_forward.i_g")
     i_q_max, i_d_max = p["voltage_control.i_q_max"], p["voltage_control.i_d_max"]
-    i_ref = complex(np.clip(demanded.real, -i_q_max, i_q_max), np.clip(demanded.imag, -i_d_max, i_d_max))
+    i_ref = complex(
+        np.clip(demanded.real, -i_q_max, i_q_max), np.clip(demanded.imag, -i_d_max, i_d_max)
+    )
     free = abs(demanded.real) < i_q_max, abs(demanded.imag) < i_d_max
-    _put(rates, "voltage_control.x", omega_n**2 * C * complex(error.real * free[0], error.imag * free[1]))
+    _put(
+        rates,
+        "voltage_control.x",
+        omega_n**2 * C * complex(error.real * free[0], error.imag * free[1]),
+    )
     tau, L = p["current_control.tau"], p["filter.X_c"] / omega_b
     _put(rates, "current_control.x", p["filter.R_c"] / tau * (i_ref - i_s))
     _put(rates, "feed_forward.u", (u - qd("feed_forward.u")) / p["feed_forward.tau"])
     _put(rates, "feed_forward.i_g", (i_g - qd("feed_forward.i_g")) / p["feed_forward.tau"])
     demand = max(abs(demanded.real) / i_q_max, abs(demanded.imag) / i_d_max)
-    v_c = L / tau * (i_ref - i_s) + qd("current_control.x") + 1j * w * p["filter.X_c"] * i_s + qd("feed_forward.u")
+    v_c = (
+        L / tau * (i_ref - i_s)
+        + qd("current_control.x")
+        + 1j * w * p["filter.X_c"] * i_s
+        + qd("feed_forward.u")
+    )
     return v_c, demand
 
 
@@ -169,7 +232,9 @@ def scattered(device, seed, size):
     """States around the operating point; the POD's small signals by less, so that some clamp and some do not."""
     rng = np.random.default_rng(seed)
     sizes = {name: size * (5e-3 if name.startswith("pod_") else 1.0) for name in device.states}
-    return {name: value + sizes[name] * rng.standard_normal() for name, value in device.states.items()}
+    return {
+        name: value + sizes[name] * rng.standard_normal() for name, value in device.states.items()
+    }
 
 
 @pytest.mark.parametrize("size", [0.003, 0.05, 0.3])
@@ -182,7 +247,9 @@ def test_every_rate_and_output_is_that_of_the_equations_written_by_hand(size):
         rates, outputs = by_hand(device.parameters, x, v)
         found = device.rates([v.real, v.imag], device.vector(x))
         assert found == pytest.approx(rates, rel=1e-9, abs=1e-9)
-        assert device.outputs([v.real, v.imag], device.vector(x)) == pytest.approx(outputs, rel=1e-9, abs=1e-9)
+        assert device.outputs([v.real, v.imag], device.vector(x)) == pytest.approx(
+            outputs, rel=1e-9, abs=1e-9
+        )
         clamped.add((rates["voltage_control.x_q"] == 0, rates["voltage_control.x_d"] == 0))
     # Neither axis is clamped, then one of them, then each without the other and both.
     assert len(clamped) == {0.003: 1, 0.05: 2, 0.3: 4}[size]
@@ -194,7 +261,9 @@ def test_an_integrator_stops_at_the_limit_of_its_own_axis(axis):
     device = Evaluated(build_model("gfor"), OTHERWISE)
     v, name = 1.03 * exp(0.6j), f"voltage_control.x_{axis}"
     # A voltage beside its reference is the error to integrate.
-    rest = device.states | {f"filter.u_c_{a}": device.states[f"filter.u_c_{a}"] + 0.03 for a in "qd"}
+    rest = device.states | {
+        f"filter.u_c_{a}": device.states[f"filter.u_c_{a}"] + 0.03 for a in "qd"
+    }
     rates = []
     for offset in np.linspace(-1.5, 1.5, 61):
         x = rest | {name: device.states[name] + offset}
@@ -210,7 +279,11 @@ def test_an_integrator_stops_at_the_limit_of_its_own_axis(axis):
 
 def dipped(path, depth, seconds, P_0, limits, after=0.0):
     """Currents and integrators of the voltage control, q and d, after every step from the dip on; then outputs."""
-    values = {"P_0": P_0, "voltage_control.i_q_max": limits[0], "voltage_control.i_d_max": limits[1]}
+    values = {
+        "P_0": P_0,
+        "voltage_control.i_q_max": limits[0],
+        "voltage_control.i_d_max": limits[1],
+    }
     step = 2e-4
     with LoadedComponent("device", read_description(path)) as device:
         device.set(values)
@@ -218,7 +291,10 @@ def dipped(path, depth, seconds, P_0, limits, after=0.0):
         device.enter_initialization_mode()
         device.set({"v_re": 1.0, "v_im": 0.0})
         device.exit_initialization_mode()
-        batch = RealBatch(device, [f"{name}_{axis}" for name in ("filter.i_s", "voltage_control.x") for axis in "qd"])
+        batch = RealBatch(
+            device,
+            [f"{name}_{axis}" for name in ("filter.i_s", "voltage_control.x") for axis in "qd"],
+        )
         dip, rows = round(seconds / step), []
         for k in range(round((seconds + after) / step)):
             if k in (0, dip):

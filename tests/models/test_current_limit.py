@@ -26,8 +26,12 @@ W_B = 100 * np.pi
 R_C, X_C, B_C, R_T, X_T, R_CAP = 0.005, 0.15, 0.15, 0.002, 0.15, 1 / (30 * 0.15)
 OMEGA_N = 4 / (0.05 * 0.707)
 K_P, K_I = 200 * 0.707 * OMEGA_N * B_C / W_B, OMEGA_N**2 * B_C / W_B
-PARAMETERS = {"current_limit.I_max": 1.15, "current_limit.threshold": 0.95, "current_limit.angle": 0.6,
-              "current_limit.X_R": 4.0}  # fmt: skip
+PARAMETERS = {
+    "current_limit.I_max": 1.15,
+    "current_limit.threshold": 0.95,
+    "current_limit.angle": 0.6,
+    "current_limit.X_R": 4.0,
+}
 """None of them the default."""
 
 
@@ -42,14 +46,17 @@ def limited(kind, demand, u_0):
     if kind == "threshold":
         if abs(demand) <= I_th:
             return demand, 0.0
-        k = u_0 / abs((I_max - I_th) * complex(1, ratio) * I_max)  # a short circuit at the capacitor gives I_max
+        # a short circuit at the capacitor gives I_max
+        k = u_0 / abs((I_max - I_th) * complex(1, ratio) * I_max)
         gain = lambda i: K_P * k * (i - I_th) * complex(1, ratio)  # noqa: E731
         size = brentq(lambda i: i * abs(1 + gain(i)) - abs(demand), I_th, abs(demand), xtol=1e-14)
         reference = demand / (1 + gain(size))
     else:
         if abs(demand) <= I_max:
             return demand, 0.0
-        z = brentq(lambda z: abs(1 + K_P * z * rect(1, phi)) - abs(demand) / I_max, 0, 100, xtol=1e-15)
+        z = brentq(
+            lambda z: abs(1 + K_P * z * rect(1, phi)) - abs(demand) / I_max, 0, 100, xtol=1e-15
+        )
         reference = demand / (1 + K_P * z * rect(1, phi))
     return reference, (demand - reference) / K_P
 
@@ -79,13 +86,19 @@ def second_computation(kind, P_0, stages, times):
             told = (u + (taken if kind == "informed" else 0)) * i_g.conjugate()
             d_x = K_I * (u_ref - u - taken)
             if kind == "box":
-                d_x = complex(d_x.real * (abs(demand.real) < 1.1), d_x.imag * (abs(demand.imag) < 1.1))
+                d_x = complex(
+                    d_x.real * (abs(demand.real) < 1.1), d_x.imag * (abs(demand.imag) < 1.1)
+                )
             v_c = X_C / W_B / 1e-3 * (i_ref - i_s) + x_c + 1j * w * X_C * i_s + u_ff
             d = [
-                W_B / X_C * (v_c - u - complex(R_C, w * X_C) * i_s), W_B / B_C * (i_s - i_g - 1j * w * B_C * u_c),
-                W_B / X_T * (u - v * exp(-1j * theta) - complex(R_T, w * X_T) * i_g), (u - u_ff) / 1e-4,
-                (i_g - i_ff) / 1e-4, d_x, R_C / 1e-3 * (i_ref - i_s),
-            ]  # fmt: skip
+                W_B / X_C * (v_c - u - complex(R_C, w * X_C) * i_s),
+                W_B / B_C * (i_s - i_g - 1j * w * B_C * u_c),
+                W_B / X_T * (u - v * exp(-1j * theta) - complex(R_T, w * X_T) * i_g),
+                (u - u_ff) / 1e-4,
+                (i_g - i_ff) / 1e-4,
+                d_x,
+                R_C / 1e-3 * (i_ref - i_s),
+            ]
             slow = [W_B * (w - 1), (told.real - P_f) / 0.1, (told.imag - Q_f) / 0.1]
             return [*np.ravel([(z.real, z.imag) for z in d]), *slow]
 
@@ -95,7 +108,9 @@ def second_computation(kind, P_0, stages, times):
     found, begin = [], 0.0
     for end, v in stages:
         inside = times[(times > begin + 1e-9) & (times < end + 1e-9)]
-        solution = solve_ivp(rates(v), (begin, end), y, "Radau", t_eval=inside, rtol=1e-6, atol=1e-8)
+        solution = solve_ivp(
+            rates(v), (begin, end), y, "Radau", t_eval=inside, rtol=1e-6, atol=1e-8
+        )
         assert solution.success
         y, begin = solution.y[:, -1], end
         found.append(solution.y)
@@ -103,7 +118,14 @@ def second_computation(kind, P_0, stages, times):
     return np.array([y[14], y[15], y[0], -y[1], y[10], -y[11]]).T
 
 
-NAMES = ["droop.theta", "droop.P_f", "filter.i_s_q", "filter.i_s_d", "voltage_control.x_q", "voltage_control.x_d"]
+NAMES = [
+    "droop.theta",
+    "droop.P_f",
+    "filter.i_s_q",
+    "filter.i_s_d",
+    "voltage_control.x_q",
+    "voltage_control.x_d",
+]
 
 
 def by_the_fmu(path, values, stages, times, names=NAMES):
@@ -125,7 +147,10 @@ def by_the_fmu(path, values, stages, times, names=NAMES):
     return np.array(rows)
 
 
-EVENTS = {"dip": [(0.005, 1.0), (0.025, 0.3), (0.05, 1.0)], "jump": [(0.005, 1.0), (0.05, exp(-0.6j))]}
+EVENTS = {
+    "dip": [(0.005, 1.0), (0.025, 0.3), (0.05, 1.0)],
+    "jump": [(0.005, 1.0), (0.05, exp(-0.6j))],
+}
 
 
 @pytest.mark.slow
@@ -160,7 +185,8 @@ def test_where_nothing_is_limited_all_linear_models_are_the_same_to_the_last_bit
 def test_where_nothing_is_limited_all_responses_are_the_same_to_the_last_bit(kind, fmu_path):
     stages, times = [(0.01, 1.0), (0.1, 0.99 * exp(0.01j))], np.arange(100)
     paper, other = (
-        by_the_fmu(fmu_path("gfor"), {"P_0": 0.6, KIND: k}, stages, times, (*NAMES, "u", "omega")) for k in (0, kind)
+        by_the_fmu(fmu_path("gfor"), {"P_0": 0.6, KIND: k}, stages, times, (*NAMES, "u", "omega"))
+        for k in (0, kind)
     )
     assert np.ptp(paper[:, 1]) > 1e-3
     assert np.array_equal(paper, other)
@@ -192,9 +218,22 @@ def test_the_integrator_does_not_wind_up(kind, fmu_path):
 @pytest.mark.parametrize("degrees", [0, 30, 60])
 def test_the_circular_limit_acts_like_an_impedance_of_the_chosen_angle(kind, degrees, fmu_path):
     """What is missing of the voltage, over the current; in steady state, at a voltage at which nothing turns."""
-    signals = ["filter.i_s_q", "filter.i_s_d", "filter.u_c_q", "filter.u_c_d", "transformer.i_g_q", "transformer.i_g_d",
-               "droop.Q_f"]  # fmt: skip
-    values = {"P_0": 0.5, KIND: kind, "current_limit.angle": np.deg2rad(degrees), "droop.R_f": 0.0, "droop.R_V": 0.0}
+    signals = [
+        "filter.i_s_q",
+        "filter.i_s_d",
+        "filter.u_c_q",
+        "filter.u_c_d",
+        "transformer.i_g_q",
+        "transformer.i_g_d",
+        "droop.Q_f",
+    ]
+    values = {
+        "P_0": 0.5,
+        KIND: kind,
+        "current_limit.angle": np.deg2rad(degrees),
+        "droop.R_f": 0.0,
+        "droop.R_V": 0.0,
+    }
     row = by_the_fmu(fmu_path("gfor"), values, [(0.3, 0.3)], np.arange(300), signals)[-1]
     i_s, u_c, i_g = (complex(row[k], -row[k + 1]) for k in (0, 2, 4))
     U_0 = abs(1 + 0.5 * complex(R_T, X_T))
@@ -203,7 +242,9 @@ def test_the_circular_limit_acts_like_an_impedance_of_the_chosen_angle(kind, deg
     assert abs(i_s) == pytest.approx(1.1, abs=2e-3)
 
 
-def test_a_threshold_impedance_gives_its_largest_current_at_a_short_circuit_of_the_capacitor(fmu_path):
+def test_a_threshold_impedance_gives_its_largest_current_at_a_short_circuit_of_the_capacitor(
+    fmu_path,
+):
     """Behind the transformer's reactance less: what is missing is U_0 less the voltage over the transformer."""
     signals = ["i_s", "u", "current_demand"]
     values = {"P_0": 0.1, KIND: 2, "droop.R_f": 0.0, "droop.R_V": 0.0, "transformer.X_t": 0.01}
@@ -218,7 +259,10 @@ def test_a_threshold_impedance_gives_its_largest_current_at_a_short_circuit_of_t
         ({KIND: 1, "P_0": 1.15}, "more current than current_limit.I_max"),
         ({KIND: 3, "current_limit.I_max": 0.8}, "more current than current_limit.I_max"),
         ({KIND: 2, "P_0": 1.05}, "more current than current_limit.threshold"),
-        ({KIND: 2, "P_0": 0.5, "current_limit.threshold": 1.2}, "threshold must be below current_limit.I_max"),
+        (
+            {KIND: 2, "P_0": 0.5, "current_limit.threshold": 1.2},
+            "threshold must be below current_limit.I_max",
+        ),
         ({KIND: 0, "P_0": 1.15}, "more active current than voltage_control.i_q_max"),
     ],
 )
@@ -234,8 +278,10 @@ def test_the_box_asks_nothing_of_a_dispatch_that_another_limit_lets_pass(fmu_pat
 
 # -- synchronism --------------------------------------------------------------------------------
 
-DIP, JUMP = ([(0.02, {}), (0.25, {"source.v": 0.2}), (2.0, {"source.v": 1.0})],
-             [(0.02, {}), (2.0, {"source.jump": 0.8})])  # fmt: skip
+DIP, JUMP = (
+    [(0.02, {}), (0.25, {"source.v": 0.2}), (2.0, {"source.v": 1.0})],
+    [(0.02, {}), (2.0, {"source.jump": 0.8})],
+)
 
 
 @pytest.mark.parametrize("stages", [DIP, JUMP], ids=["dip", "jump"])

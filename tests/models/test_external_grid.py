@@ -8,7 +8,15 @@ import pytest
 from fmus.toolchain.catalogue import build_model
 from tests.support.evaluated import Evaluated
 
-VALUES = {"S_n": 5500.0, "R_X": 0.2, "P_0": 0.3, "Q_0": -0.1, "v_0": 1.02, "theta_0": 0.4, "f_n": 60.0}
+VALUES = {
+    "S_n": 5500.0,
+    "R_X": 0.2,
+    "P_0": 0.3,
+    "Q_0": -0.1,
+    "v_0": 1.02,
+    "theta_0": 0.4,
+    "f_n": 60.0,
+}
 
 
 def test_the_source_behind_its_impedance_written_by_hand():

@@ -18,7 +18,11 @@ STIFF = 1e4
 def feeder(**more):
     """A stiff source at a, a line, and the faulted bus b with next to nothing besides."""
     loads = (Load("stiff", "a", 100 * STIFF), Load("light", "b", 1e-3))
-    fields = {"lines": (Line("ab", "a", "b", X=0.1, R=0.01),), "loads": loads, "ports": (Port("unit", "a"),)}
+    fields = {
+        "lines": (Line("ab", "a", "b", X=0.1, R=0.01),),
+        "loads": loads,
+        "ports": (Port("unit", "a"),),
+    }
     return Network("feeder", ("a", "b"), **fields | {"faults": ("b",)} | more)
 
 
@@ -27,8 +31,14 @@ def test_the_current_of_a_fault_is_that_of_r_and_l(R, X):
     """i = v/Z·(1 − e^{−(R/L + jω)t}) in the turning frame: a direct component that dies out, and no ringing."""
     names = ("b.fault.i_re", "b.fault.i_im")
     values = {"b.fault.R": R, "b.fault.X": X}
-    rows = stepped(grid(feeder()), {"unit.i_re": STIFF, "unit.i_im": 0.0}, 0.12, names, values,
-                   {100: {"b.fault.on": True}})  # fmt: skip
+    rows = stepped(
+        grid(feeder()),
+        {"unit.i_re": STIFF, "unit.i_im": 0.0},
+        0.12,
+        names,
+        values,
+        {100: {"b.fault.on": True}},
+    )
     (found,) = phasors(rows, names, "b.fault.i")
     t = np.arange(len(found) - 100) * 1e-4
     R_all, X_all = R + 0.01 + 1 / STIFF, X + 0.1
@@ -42,8 +52,14 @@ def test_it_ends_without_ringing():
     line = Line("ab", "a", "b", X=0.1, R=0.01, B=0.1)
     loads = (Load("stiff", "a", 100 * STIFF), Load("town", "b", 300.0))
     model = grid(feeder(lines=(line,), loads=loads))
-    rows = stepped(model, {"unit.i_re": STIFF, "unit.i_im": 0.05 * STIFF}, 0.3, names, None,
-                   {1000: {"b.fault.on": True}, 2000: {"b.fault.on": False}})  # fmt: skip
+    rows = stepped(
+        model,
+        {"unit.i_re": STIFF, "unit.i_im": 0.05 * STIFF},
+        0.3,
+        names,
+        None,
+        {1000: {"b.fault.on": True}, 2000: {"b.fault.on": False}},
+    )
     v, i = (np.abs(x) for x in phasors(rows, names, "b.v", "b.fault.i"))
     assert v[1010:2000].max() < 3e-4  # 1e-5 pu for each pu of current, some 20 at most
     assert i[2100:].max() < 1e-4 * i[1999]
@@ -54,16 +70,22 @@ def test_it_ends_without_ringing():
 
 def test_the_phasor_network_solves_the_same_fault():
     """Against the network solved by hand, and against the EMT network once its direct component is gone."""
-    network = feeder(faults=("b",), loads=(Load("stiff", "a", 100 * STIFF), Load("town", "b", 80.0, 20.0)))
+    network = feeder(
+        faults=("b",), loads=(Load("stiff", "a", 100 * STIFF), Load("town", "b", 80.0, 20.0))
+    )
     values = {"b.fault.R": 0.02, "b.fault.X": 0.03, "b.fault.on": 1.0}
     source = [1.0, 0.0, 0.0, -50.0]
     y = Evaluated(phasor_grid(network), values).outputs(source)
     Y_line, Y_b = 1 / (0.01 + 0.1j), 0.8 - 0.2j + 1 / (0.02 + 0.03j)
     v = np.linalg.solve([[STIFF - 50j + Y_line, -Y_line], [-Y_line, Y_b + Y_line]], [-50j, 0])
     assert complex(y["b.v_re"], y["b.v_im"]) == pytest.approx(v[1], rel=1e-12)
-    assert complex(y["b.fault.i_re"], y["b.fault.i_im"]) == pytest.approx(v[1] / (0.02 + 0.03j), rel=1e-12)
+    assert complex(y["b.fault.i_re"], y["b.fault.i_im"]) == pytest.approx(
+        v[1] / (0.02 + 0.03j), rel=1e-12
+    )
     off = Evaluated(phasor_grid(network), values | {"b.fault.on": 0.0}).outputs(source)
-    healthy = np.linalg.solve([[STIFF - 50j + Y_line, -Y_line], [-Y_line, 0.8 - 0.2j + Y_line]], [-50j, 0])
+    healthy = np.linalg.solve(
+        [[STIFF - 50j + Y_line, -Y_line], [-Y_line, 0.8 - 0.2j + Y_line]], [-50j, 0]
+    )
     assert complex(off["b.v_re"], off["b.v_im"]) == pytest.approx(healthy[1], rel=1e-12)
     assert complex(off["b.fault.i_re"], off["b.fault.i_im"]) == 0
     injected = (1 - v[0]) * -50j
@@ -71,7 +93,9 @@ def test_the_phasor_network_solves_the_same_fault():
     A, B = emt.blocks([0.0, 0.0])[:2]
     emt.x = np.linalg.solve(A, -B @ [injected.real, injected.imag])
     other = emt.outputs([injected.real, injected.imag])
-    assert complex(other["b.fault.i_re"], other["b.fault.i_im"]) == pytest.approx(v[1] / (0.02 + 0.03j), rel=1e-9)
+    assert complex(other["b.fault.i_re"], other["b.fault.i_im"]) == pytest.approx(
+        v[1] / (0.02 + 0.03j), rel=1e-9
+    )
 
 
 @pytest.mark.parametrize("make", [grid, phasor_grid])
@@ -82,7 +106,9 @@ def test_native_and_python_backed_fmus_give_the_same_bits(make):
         held = {"unit.e_re": 1.0, "unit.e_im": 0.0, "unit.y_re": 0.0, "unit.y_im": -50.0}
     names = [v.name for v in (*model.states, *model.outputs)]
     changes = {20: {"b.fault.on": True}, 60: {"b.fault.on": False}}
-    one, other = (stepped(model, held, 0.01, names, None, changes, native=native) for native in (True, False))
+    one, other = (
+        stepped(model, held, 0.01, names, None, changes, native=native) for native in (True, False)
+    )
     assert np.ptp(one, axis=0).max() > 1e-3
     assert are_the_same(one, other, model)
 

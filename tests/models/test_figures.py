@@ -45,21 +45,35 @@ SMALL = Network(
     (Port("one", "a"), Port("two", "c")),
     (Shunt("coil", "b", b_mvar=-20.0, switched=True), Shunt("bank", "d", g_mw=1.0, b_mvar=15.0)),
     faults=("b",),
-    transformers=(ThreeWinding("t", ("a", "b", "d"), (0.1, 0.12, -0.02), (0.002, 0.003, 0.001), (1.03, 1.0, 0.97)),),
+    transformers=(
+        ThreeWinding(
+            "t", ("a", "b", "d"), (0.1, 0.12, -0.02), (0.002, 0.003, 0.001), (1.03, 1.0, 0.97)
+        ),
+    ),
     injections=("c",),
 )
 KEPT = {"f_n", "S_n", "internal_step"}
 MODELS = {
-    **{f"small {name}": partial(of_catalogue, name, network=SMALL) for name in ("grid", "phasor_grid")},
+    **{
+        f"small {name}": partial(of_catalogue, name, network=SMALL)
+        for name in ("grid", "phasor_grid")
+    },
     **{
         name: partial(of_catalogue, name)
         for name in model_names()
         if entry_of(name).value.startswith(("fmus.", "gfor_fmu.")) and not needs_arguments(name)
     },
-    **{f"machine {name}": partial(of_catalogue, "synchronous_generator_phasor", machine=name) for name in MACHINES},
+    **{
+        f"machine {name}": partial(of_catalogue, "synchronous_generator_phasor", machine=name)
+        for name in MACHINES
+    },
     **{f"exciter {name}": partial(exciter, name) for name in EXCITERS},
     **{f"governor {name}": partial(governor, name) for name in GOVERNORS},
-    **{f"stabilizer {name}": partial(stabilizer, name) for name, part in STABILIZERS.items() if part is not None},
+    **{
+        f"stabilizer {name}": partial(stabilizer, name)
+        for name, part in STABILIZERS.items()
+        if part is not None
+    },
 }
 
 
@@ -74,9 +88,14 @@ def elsewhere(parameters, on):
     """Other values of all that are real numbers, within their limits; switches on, or off, and what is counted at its
     largest, or one below."""
     given = {}
-    for v, value in zip(parameters, moved(parameters, [v.start for v in parameters], 0.05), strict=True):
+    for v, value in zip(
+        parameters, moved(parameters, [v.start for v in parameters], 0.05), strict=True
+    ):
         if v.type == "Real" and v.name not in KEPT:
-            low, high = (-np.inf if v.minimum is None else v.minimum), (np.inf if v.maximum is None else v.maximum)
+            low, high = (
+                (-np.inf if v.minimum is None else v.minimum),
+                (np.inf if v.maximum is None else v.maximum),
+            )
             given[v.name] = float(np.clip(abs(value) if v.start >= 0 else value, low, high))
         elif v.type == "Boolean":
             given[v.name] = float(on)
@@ -87,7 +106,9 @@ def elsewhere(parameters, on):
 
 def figures(name):
     one = MODELS[name]()
-    found = {"defaults": {v.name: [v.start, v.unit, v.minimum, v.maximum] for v in one.model.parameters}}
+    found = {
+        "defaults": {v.name: [v.start, v.unit, v.minimum, v.maximum] for v in one.model.parameters}
+    }
     points = {
         "near": (0.02, {}),
         "far": (0.5, elsewhere(one.model.parameters, on=True)),
@@ -98,8 +119,14 @@ def figures(name):
         x = moved(one.model.states, one.x, scale)
         u = moved(one.model.inputs, [v.start for v in one.model.inputs], scale)
         calculated = {v.name: one.parameters[v.name] for v in one.model.calculated}
-        for kind, values in (("outputs", one.outputs(u, x)), ("rates", one.rates(u, x)), ("calculated", calculated)):
-            found[f"{point} {kind}"] = {key: float(f"{value:.10g}") for key, value in values.items()}
+        for kind, values in (
+            ("outputs", one.outputs(u, x)),
+            ("rates", one.rates(u, x)),
+            ("calculated", calculated),
+        ):
+            found[f"{point} {kind}"] = {
+                key: float(f"{value:.10g}") for key, value in values.items()
+            }
     return found
 
 
@@ -129,7 +156,8 @@ def test_the_norms_exciter_has_the_values_of_its_table():
 
 def written(name):
     kinds = [
-        f"  {json.dumps(kind)}: {json.dumps(values, ensure_ascii=False)}" for kind, values in figures(name).items()
+        f"  {json.dumps(kind)}: {json.dumps(values, ensure_ascii=False)}"
+        for kind, values in figures(name).items()
     ]
     return f"{json.dumps(name)}: {{\n" + ",\n".join(kinds) + "\n}"
 

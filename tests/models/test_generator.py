@@ -12,14 +12,21 @@ from fmus.toolchain.symbols import Expr
 from tests.support.jacobians import jacobians
 
 OMEGA_B = 2 * np.pi * 50
-AXES = {"SG1 d": (2.135, 0.34, 0.269, 0.234, 6.47, 0.022), "SG2 q": (1.7, 0.55, 0.25, 0.2, 0.4, 0.05)}
+AXES = {
+    "SG1 d": (2.135, 0.34, 0.269, 0.234, 6.47, 0.022),
+    "SG2 q": (1.7, 0.55, 0.25, 0.2, 0.4, 0.05),
+}
 
 
 def operational_reactance(s, X, X_l, b):
     """X(s) of the circuit: leakage, then magnetising reactance and two rotor branches side by side."""
     branches = [float(v) for v in (b.X_1, b.R_1, b.X_2, b.R_2)]
     sn = s / OMEGA_B
-    admittance = 1 / (X - X_l) + sn / (branches[1] + sn * branches[0]) + sn / (branches[3] + sn * branches[2])
+    admittance = (
+        1 / (X - X_l)
+        + sn / (branches[1] + sn * branches[0])
+        + sn / (branches[3] + sn * branches[2])
+    )
     return X_l + 1 / admittance
 
 
@@ -55,12 +62,16 @@ def test_a_damper_that_is_not_there_never_passes_for_the_field():
     assert float(b.X_1) == pytest.approx(0.8 * 0.2 / 0.6)
 
 
-MACHINES = [f"synchronous_generator_{e}{v}" for e in ("ac4a", "st1", "st4b") for v in ("", "_phasor")]
+MACHINES = [
+    f"synchronous_generator_{e}{v}" for e in ("ac4a", "st1", "st4b") for v in ("", "_phasor")
+]
 
 
 @pytest.mark.parametrize("name", [*MACHINES, "synchronous_generator_st4b_pss2a"])
 def test_every_machine_converts_its_data_in_the_same_way_unless_it_is_told(name):
-    (start,) = (v.start for v in build_model(name).parameters if v.name == "machine.exact_conversion")
+    (start,) = (
+        v.start for v in build_model(name).parameters if v.name == "machine.exact_conversion"
+    )
     assert start == 0.0
 
 
@@ -70,7 +81,11 @@ def refused_by(values):
     p = np.array([values.get(v.name, v.start) for v in model.parameters])
     c, _ = model.initialise(p)
     margins = np.array(model.requirements(p, c)).ravel()
-    return [text for text, margin in zip(model.requirement_texts, margins, strict=True) if not margin > 0]
+    return [
+        text
+        for text, margin in zip(model.requirement_texts, margins, strict=True)
+        if not margin > 0
+    ]
 
 
 @pytest.mark.parametrize("exactly", [0.0, 1.0])
@@ -132,7 +147,13 @@ def test_classical_conversion_takes_the_branches_one_after_the_other(data):
 def test_governor_is_its_block_diagram(T, K):
     m = ModelBuilder("governor", "IEEEG1 alone")
     w = m.input("w", "pu", "Speed", base="f_n", start=1.0)
-    m.output("P_m", ieeeg1(m, w, Expr(0.7), GovernorData(20.0, T, K, "")), "pu", "Mechanical power", base="S_n")
+    m.output(
+        "P_m",
+        ieeeg1(m, w, Expr(0.7), GovernorData(20.0, T, K, "")),
+        "pu",
+        "Mechanical power",
+        base="S_n",
+    )
     model = m.build()
     p = np.array([v.start for v in model.parameters])
     c, x = model.initialise(p)
@@ -148,7 +169,9 @@ def test_governor_is_its_block_diagram(T, K):
 
 
 @pytest.mark.parametrize("variant", ["", "_phasor"])
-@pytest.mark.parametrize("name", ["gfor", *(f"synchronous_generator_{e}" for e in ("ac4a", "st1", "st4b"))])
+@pytest.mark.parametrize(
+    "name", ["gfor", *(f"synchronous_generator_{e}" for e in ("ac4a", "st1", "st4b"))]
+)
 def test_any_dispatch_starts_in_steady_state(name, variant):
     model = build_model(name + variant)
     rng = np.random.default_rng(7)
@@ -159,9 +182,14 @@ def test_any_dispatch_starts_in_steady_state(name, variant):
         c, x = model.initialise(p)
         u = [start["v_0"] * np.cos(start["theta_0"]), start["v_0"] * np.sin(start["theta_0"])]
         rates = np.array(model.derivatives(x, u, p, c))
-        assert np.abs(rates).max() < 1e-8  # [1/s]; the network's own rates are near 1e4 times the rounding error
+        # [1/s]; the network's own rates are near 1e4 times the rounding error
+        assert np.abs(rates).max() < 1e-8
         y = dict(
-            zip((o.name for o in model.outputs), np.array(model.outputs_function(x, u, p, c)).ravel(), strict=True)
+            zip(
+                (o.name for o in model.outputs),
+                np.array(model.outputs_function(x, u, p, c)).ravel(),
+                strict=True,
+            )
         )
         assert (y["p"], y["q"]) == pytest.approx((start["P_0"], start["Q_0"]), abs=1e-12)
 
@@ -173,7 +201,9 @@ def test_saturation_is_that_of_the_flux_behind_the_leakage(q):
     start = {v.name: float(v.start) for v in model.parameters}
     values = start | {"v_0": 1.0, "theta_0": 0.0, "P_0": 0.6, "Q_0": q, "machine.saturation": 1.0}
     c, _ = model.initialise(np.array([values[v.name] for v in model.parameters]))
-    factor = next(k for k, v in enumerate(model.calculated) if v.name == "machine.saturation_factor")
+    factor = next(
+        k for k, v in enumerate(model.calculated) if v.name == "machine.saturation_factor"
+    )
     R = values["machine.R_s"] + values["transformer.R_t"]
     X = values["machine.X_l"] + values["transformer.X_t"]
     flux = abs(1.0 + complex(R, X) * complex(0.6, -q))
@@ -183,7 +213,9 @@ def test_saturation_is_that_of_the_flux_behind_the_leakage(q):
 
 def test_saturation_passes_through_its_two_points():
     model = build_model("synchronous_generator_st4b")
-    factor = next(k for k, v in enumerate(model.calculated) if v.name == "machine.saturation_factor")
+    factor = next(
+        k for k, v in enumerate(model.calculated) if v.name == "machine.saturation_factor"
+    )
     names = [v.name for v in model.parameters]
     for flux, s in ((1.0, 0.1275), (1.2, 0.2706)):
         values = {"v_0": flux, "P_0": 0.0, "Q_0": 0.0, "machine.saturation": 1.0}

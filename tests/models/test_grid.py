@@ -32,11 +32,18 @@ BUSES = NETWORK.buses
 
 def flow_of(opened=(), tripped=(), network=NETWORK):
     """The power flow of the network, some lines open and some loads switched off."""
-    lines = [FlowLine(*(getattr(x, n) for n in ("name", "from_bus", "to_bus", "R", "X", "B", "tap", "shift")),
-                      closed=x.name not in opened) for x in network.lines]  # fmt: skip
+    lines = [
+        FlowLine(
+            *(getattr(x, n) for n in ("name", "from_bus", "to_bus", "R", "X", "B", "tap", "shift")),
+            closed=x.name not in opened,
+        )
+        for x in network.lines
+    ]
     loads = [FlowLoad(x.bus, x.p_mw, x.q_mvar) for x in network.loads if x.name not in tripped]
     shunts = [FlowShunt(x.bus, x.g_mw / 100, x.b_mvar / 100) for x in network.shunts]
-    shunts += [FlowShunt(bus, 0, network.stray_B) for bus in network.buses if network.needs_stray(bus)]
+    shunts += [
+        FlowShunt(bus, 0, network.stray_B) for bus in network.buses if network.needs_stray(bus)
+    ]
     units = [FlowUnit("g", "a", 200, 0.5, 1.02), FlowUnit("h", "e", 100, 0.7, 1.01)]
     return solve_power_flow(network.buses, lines, loads, units, "a", shunts)
 
@@ -75,7 +82,8 @@ class Running:
         self.x = np.array(x).ravel()
         ratings = {"g": 2.0, "h": 1.0}
         feeding = {
-            p.name: (flow.powers[p.name] * ratings[p.name] / flow.voltages[p.bus]).conjugate() for p in network.ports
+            p.name: (flow.powers[p.name] * ratings[p.name] / flow.voltages[p.bus]).conjugate()
+            for p in network.ports
         }
         self.u = np.array([part for i in feeding.values() for part in (i.real, i.imag)])
 
@@ -85,14 +93,18 @@ class Running:
 
     def settle(self, seconds, step=2e-5):
         """L-stable implicit Euler steps to a steady state or, with short steps, along the way to it."""
-        A, B = (np.array(block) for block in jacobians(self.model)(self.x, self.u, self.p, self.c)[:2])
+        A, B = (
+            np.array(block) for block in jacobians(self.model)(self.x, self.u, self.p, self.c)[:2]
+        )
         advance = np.linalg.inv(np.eye(len(A)) - step * A)
         for _ in range(round(seconds / step)):
             self.x = advance @ (self.x + step * B @ self.u)
 
     def stand(self):
         """The steady state for the present parameters and inputs."""
-        A, B = (np.array(block) for block in jacobians(self.model)(self.x, self.u, self.p, self.c)[:2])
+        A, B = (
+            np.array(block) for block in jacobians(self.model)(self.x, self.u, self.p, self.c)[:2]
+        )
         self.x = np.linalg.solve(A, -B @ self.u)
 
     @property
@@ -117,8 +129,11 @@ def test_the_power_flow_is_the_steady_state_and_both_fit_the_literatures_admitta
     flow = flow_of(opened)
     assert flow.residual <= 1e-9
     running = Running(flow, **{f"{name}.connected": 0.0 for name in opened})
-    fastest = np.abs(np.array(jacobians(running.model)(running.x, running.u, running.p, running.c)[0])).max()
-    assert np.abs(running.rates).max() < 1e-12 * fastest * 10  # [pu/s]; rounding times the fastest rate
+    fastest = np.abs(
+        np.array(jacobians(running.model)(running.x, running.u, running.p, running.c)[0])
+    ).max()
+    # [pu/s]; rounding times the fastest rate
+    assert np.abs(running.rates).max() < 1e-12 * fastest * 10
     v = np.array([flow.voltages[bus] for bus in BUSES])
     injected = np.zeros(5, complex)
     injected[[0, 4]] = running.u[0::2] + 1j * running.u[1::2]
@@ -140,7 +155,8 @@ def test_a_line_trips_and_recloses():
     at_trip = running.state("cd")
     running.set(cd__connected=0)
     running.settle(1e-3, 1e-6)
-    assert running.state("cd") == pytest.approx(at_trip / np.e, rel=1e-3)  # τ = 1 ms, whatever the voltages do
+    # τ = 1 ms, whatever the voltages do
+    assert running.state("cd") == pytest.approx(at_trip / np.e, rel=1e-3)
     running.settle(0.03)
     assert abs(running.state("cd")) < 1e-10
     assert running.y["cd.p"] == pytest.approx(0, abs=1e-10)
@@ -196,45 +212,74 @@ def test_an_open_port_feeds_nothing_and_its_power_says_so():
     running.stand()
     through = complex(running.y["de.p"], running.y["de.q"])
     assert through.real == pytest.approx(0, abs=1e-12)
-    assert through.imag == pytest.approx(-0.02 * abs(running.voltage("e")) ** 2 + 0.05 * abs(running.state("de")) ** 2)
+    assert through.imag == pytest.approx(
+        -0.02 * abs(running.voltage("e")) ** 2 + 0.05 * abs(running.state("de")) ** 2
+    )
 
 
 def test_the_scale_of_a_load_that_alone_holds_a_voltage_stays_above_zero():
     network = Network(
-        "few", ("a", "b"), (Line("ab", "a", "b", X=0.1),),
-        (Load("only", "a", 50, 10), Load("one", "b", 50), Load("other", "b", 50)), (),
-    )  # fmt: skip
+        "few",
+        ("a", "b"),
+        (Line("ab", "a", "b", X=0.1),),
+        (Load("only", "a", 50, 10), Load("one", "b", 50), Load("other", "b", 50)),
+        (),
+    )
     model = grid(network)
     scales = {v.name: v for v in model.parameters if v.name.endswith(".scale")}
     assert scales["only.scale"].minimum == 1e-6
     assert "nothing else determines the voltage" in scales["only.scale"].description
     assert scales["one.scale"].minimum == scales["other.scale"].minimum == 0
     assert len(model.requirement_texts) == 2
-    p = np.array([0.0 if v.name in ("one.scale", "other.scale") else v.start for v in model.parameters])
+    p = np.array(
+        [0.0 if v.name in ("one.scale", "other.scale") else v.start for v in model.parameters]
+    )
     assert min(np.array(model.requirements(p, [])).ravel()) <= 0
-    assert "the voltage of b hangs on its loads; leave one of them switched on" in model.requirement_texts
+    assert (
+        "the voltage of b hangs on its loads; leave one of them switched on"
+        in model.requirement_texts
+    )
 
 
 def test_states_and_parameters_only_where_something_is():
     names = {v.name for v in grid(NETWORK).parameters}
-    assert {"tap_bc", "shift_bc", "tap_cd", "shift_cd", "reactor.G", "reactor.B", "bank.B", "stray_B"} <= names
+    assert {
+        "tap_bc",
+        "shift_bc",
+        "tap_cd",
+        "shift_cd",
+        "reactor.G",
+        "reactor.B",
+        "bank.B",
+        "stray_B",
+    } <= names
     assert not {"tap_ab", "shift_ab", "B_bc", "bank.G"} & names
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"lines": (Line("ab", "a", "b", X=0.0),)}, "'ab' has the reactance 0 pu between buses 'a' and 'b'"),
+        (
+            {"lines": (Line("ab", "a", "b", X=0.0),)},
+            "'ab' has the reactance 0 pu between buses 'a' and 'b'",
+        ),
         ({"lines": (Line("ab", "a", "b", X=-0.1),)}, "give a series capacitor as X_C of the line"),
         ({"lines": (Line("ab", "a", "b", X=0.1, R=-1),)}, "'ab' has the resistance -1 pu between"),
-        ({"lines": (Line("ab", "a", "b", X=0.1, tap=0),)}, "has the ratio 0 between buses 'a' and 'b'"),
+        (
+            {"lines": (Line("ab", "a", "b", X=0.1, tap=0),)},
+            "has the ratio 0 between buses 'a' and 'b'",
+        ),
         ({"loads": ()}, "bus 'b' has neither a load with P > 0 nor line charging.*stray_B = 0.05"),
         ({"shunts": (Shunt("s", "z", 1, 1),)}, "shunt 's' is at bus 'z', which does not exist"),
         ({"stray_B": -1}, "stray_B = -1 pu; it must not be negative"),
     ],
-)  # fmt: skip
+)
 def test_what_a_network_cannot_be(change, words):
-    parts = {"lines": (Line("ab", "a", "b", X=0.1),), "loads": (Load("d", "b", 10),), "shunts": (Shunt("s", "a", 1),)}
+    parts = {
+        "lines": (Line("ab", "a", "b", X=0.1),),
+        "loads": (Load("d", "b", 10),),
+        "shunts": (Shunt("s", "a", 1),),
+    }
     with pytest.raises(ValueError, match=words):
         Network("wrong", ("a", "b"), **(parts | {"ports": ()} | change))
 

@@ -16,14 +16,35 @@ from tests.support.evaluated import Evaluated
 from tests.support.weak_grid import coupled_modes, least_stable
 
 OTHERWISE = {
-    "P_0": 0.55, "Q_0": 0.12, "v_0": 1.03, "theta_0": 0.6, "S_n": 340.0, "S_base": 120.0, "f_n": 60.0,
-    "filter.R_c": 0.007, "filter.X_c": 0.13, "filter.B_c": 0.11, "transformer.R_t": 0.004, "transformer.X_t": 0.17,
-    "feed_forward.tau": 3e-4, "pll.f_0": 17.0, "pll.xi": 0.9, "measurement.tau": 0.013, "active_power.tau": 0.07,
-    "active_power.delta_P_ref": 0.03, "frequency_droop.enabled": 1, "frequency_droop.R_f": 0.04,
-    "frequency_droop.tau": 0.03, "reactive_power.tau": 0.11, "reactive_power.R_V": 0.08, "reactive_power.X_s": 0.4,
-    "reactive_power.delta_Q_ref": -0.05, "reactive_power.delta_U_ref": 0.02, "current_limit.I_max": 0.8,
+    "P_0": 0.55,
+    "Q_0": 0.12,
+    "v_0": 1.03,
+    "theta_0": 0.6,
+    "S_n": 340.0,
+    "S_base": 120.0,
+    "f_n": 60.0,
+    "filter.R_c": 0.007,
+    "filter.X_c": 0.13,
+    "filter.B_c": 0.11,
+    "transformer.R_t": 0.004,
+    "transformer.X_t": 0.17,
+    "feed_forward.tau": 3e-4,
+    "pll.f_0": 17.0,
+    "pll.xi": 0.9,
+    "measurement.tau": 0.013,
+    "active_power.tau": 0.07,
+    "active_power.delta_P_ref": 0.03,
+    "frequency_droop.enabled": 1,
+    "frequency_droop.R_f": 0.04,
+    "frequency_droop.tau": 0.03,
+    "reactive_power.tau": 0.11,
+    "reactive_power.R_V": 0.08,
+    "reactive_power.X_s": 0.4,
+    "reactive_power.delta_Q_ref": -0.05,
+    "reactive_power.delta_U_ref": 0.02,
+    "current_limit.I_max": 0.8,
     "current_control.tau": 0.0015,
-}  # fmt: skip
+}
 
 
 def by_hand(p, x, v):
@@ -34,7 +55,12 @@ def by_hand(p, x, v):
 
     omega_b, theta, closed = 2 * np.pi * p["f_n"], x["pll.theta"], p["connected"]
     R_c, X_c, B_c = (p[f"filter.{name}"] for name in ("R_c", "X_c", "B_c"))
-    i_s, u_c, i_g, seen = qd("filter.i_s"), qd("filter.u_c"), qd("transformer.i_g"), qd("feed_forward.u")
+    i_s, u_c, i_g, seen = (
+        qd("filter.i_s"),
+        qd("filter.u_c"),
+        qd("transformer.i_g"),
+        qd("feed_forward.u"),
+    )
     u, bus = u_c + (i_s - i_g) / (30 * B_c), v * exp(-1j * theta)
     omega_0 = 2 * np.pi * p["pll.f_0"]
     w = 1 + 2 * p["pll.xi"] * omega_0 / omega_b * seen.imag + x["pll.x"]
@@ -52,8 +78,18 @@ def by_hand(p, x, v):
     put(rates, "transformer.i_g", into_grid if closed else -i_g / 1e-3)
     injected = i_g * exp(1j * theta)
     at_bus, scale = v * injected.conjugate(), p["S_n"] / p["S_base"]
-    outputs = {"i_re": injected.real * scale, "i_im": injected.imag * scale, "p": at_bus.real, "q": at_bus.imag}
-    outputs |= {"omega": w, "u": abs(u), "i_s": abs(i_s), "current_demand": abs(demanded) / p["current_limit.I_max"]}
+    outputs = {
+        "i_re": injected.real * scale,
+        "i_im": injected.imag * scale,
+        "p": at_bus.real,
+        "q": at_bus.imag,
+    }
+    outputs |= {
+        "omega": w,
+        "u": abs(u),
+        "i_s": abs(i_s),
+        "current_demand": abs(demanded) / p["current_limit.I_max"],
+    }
     return rates, outputs
 
 
@@ -76,9 +112,13 @@ def outer(p, x, rates, u, i_g, w, standby):
     e_Q = {0: e_Q, 1: e_U / X_s, 2: (e_Q + e_U / R_V) / (1 + X_s / R_V)}[p["reactive_power.mode"]]
     active = lag / p["active_power.tau"] * e_P + x["active_power.x"]
     reactive = lag / p["reactive_power.tau"] * e_Q + x["reactive_power.x"]
-    allowed_P, allowed_Q = within_limit(active, reactive, p["current_limit.I_max"], p["current_limit.priority"])
+    allowed_P, allowed_Q = within_limit(
+        active, reactive, p["current_limit.I_max"], p["current_limit.priority"]
+    )
     rates["active_power.x"] = 0.0 if e_P * (active - allowed_P) > 0 else e_P / p["active_power.tau"]
-    rates["reactive_power.x"] = 0.0 if e_Q * (reactive - allowed_Q) > 0 else e_Q / p["reactive_power.tau"]
+    rates["reactive_power.x"] = (
+        0.0 if e_Q * (reactive - allowed_Q) > 0 else e_Q / p["reactive_power.tau"]
+    )
     demanded = complex(active, -reactive)
     if p["connected"]:
         return demanded, complex(allowed_P, -allowed_Q)
@@ -102,8 +142,14 @@ def within_limit(active, reactive, most, priority):
 @pytest.mark.parametrize("size", [0.003, 0.3])
 @pytest.mark.parametrize("mode", [0, 1, 2])
 @pytest.mark.parametrize("priority", [0, 1, 2])
-def test_every_rate_and_output_is_that_of_the_equations_written_by_hand(mode, priority, size, connected):
-    chosen = {"reactive_power.mode": mode, "current_limit.priority": priority, "connected": connected}
+def test_every_rate_and_output_is_that_of_the_equations_written_by_hand(
+    mode, priority, size, connected
+):
+    chosen = {
+        "reactive_power.mode": mode,
+        "current_limit.priority": priority,
+        "connected": connected,
+    }
     device = Evaluated(build_model("gfl"), OTHERWISE | chosen)
     limited = set()
     for seed in range(8):
@@ -111,15 +157,21 @@ def test_every_rate_and_output_is_that_of_the_equations_written_by_hand(mode, pr
         x = {name: value + size * rng.standard_normal() for name, value in device.states.items()}
         v = 1.03 * exp(0.6j) * (1 + 0.5 * size * exp(1j * seed))
         rates, outputs = by_hand(device.parameters, x, v)
-        assert device.rates([v.real, v.imag], device.vector(x)) == pytest.approx(rates, rel=1e-9, abs=1e-9)
-        assert device.outputs([v.real, v.imag], device.vector(x)) == pytest.approx(outputs, rel=1e-9, abs=1e-9)
+        assert device.rates([v.real, v.imag], device.vector(x)) == pytest.approx(
+            rates, rel=1e-9, abs=1e-9
+        )
+        assert device.outputs([v.real, v.imag], device.vector(x)) == pytest.approx(
+            outputs, rel=1e-9, abs=1e-9
+        )
         limited.add(outputs["current_demand"] > 1)
     assert limited == ({False} if size < 0.1 else {False, True})
 
 
 @pytest.mark.parametrize("mode", [0, 1, 2])
 @pytest.mark.parametrize("name", ["gfl", "gfl_phasor"])
-@pytest.mark.parametrize(("P", "Q", "v", "theta"), [(0.9, 0.0, 1.0, 0.0), (0.4, 0.5, 1.03, 0.7), (-0.6, -0.3, 0.95, 4)])
+@pytest.mark.parametrize(
+    ("P", "Q", "v", "theta"), [(0.9, 0.0, 1.0, 0.0), (0.4, 0.5, 1.03, 0.7), (-0.6, -0.3, 0.95, 4)]
+)
 def test_the_power_flow_is_a_steady_state(name, mode, P, Q, v, theta):
     values = {"P_0": P, "Q_0": Q, "v_0": v, "theta_0": theta, "reactive_power.mode": mode}
     device = Evaluated(build_model(name), values)
@@ -132,7 +184,9 @@ def test_the_power_flow_is_a_steady_state(name, mode, P, Q, v, theta):
 @pytest.mark.parametrize("hertz", [0.5, 5.0, 10.0, 40.0])
 def test_the_pll_has_the_textbook_transfer_function(hertz):
     m = ModelBuilder("alone", "A PLL on a voltage")
-    v = Phasor(m.input("v_re", "pu", "Voltage", base="bus"), m.input("v_im", "pu", "Voltage", base="bus"))
+    v = Phasor(
+        m.input("v_re", "pu", "Voltage", base="bus"), m.input("v_im", "pu", "Voltage", base="bus")
+    )
     theta = m.algebraic("angle")
     frame = phase_locked_loop(m, 0.0, 2 * np.pi * 50, v.rotated(-theta))
     m.close(theta, frame.theta)
@@ -180,7 +234,8 @@ class Driven:
 
 
 @pytest.mark.parametrize(
-    ("reference", "power"), [("active_power__delta_P_ref", "p"), ("reactive_power__delta_Q_ref", "q")]
+    ("reference", "power"),
+    [("active_power__delta_P_ref", "p"), ("reactive_power__delta_Q_ref", "q")],
 )
 @pytest.mark.parametrize(("name", "step"), [("gfl", 2e-4), ("gfl_phasor", 1e-3)])
 def test_power_follows_its_reference_with_the_response_time(name, step, reference, power, fmu_path):
@@ -188,29 +243,38 @@ def test_power_follows_its_reference_with_the_response_time(name, step, referenc
         d.set(**{reference: 0.1})
         found = d.run(0.21, power)[power] - (0.2 if power == "p" else 0.0)
     after = [round(t / step) - 1 for t in (0.05, 0.1, 0.2)]
-    assert found[after] / 0.1 == pytest.approx(1 - 0.9 * np.exp([-0.5, -1, -2]), abs=0.01)  # (1 + s·τ_m)/(1 + s·τ)
+    # (1 + s·τ_m)/(1 + s·τ)
+    assert found[after] / 0.1 == pytest.approx(1 - 0.9 * np.exp([-0.5, -1, -2]), abs=0.01)
 
 
 @pytest.mark.parametrize(("name", "step"), [("gfl", 2e-4), ("gfl_phasor", 1e-3)])
-def test_in_a_grid_of_another_frequency_the_droop_gives_power_and_the_pll_the_frequency(name, step, fmu_path):
+def test_in_a_grid_of_another_frequency_the_droop_gives_power_and_the_pll_the_frequency(
+    name, step, fmu_path
+):
     told = {"communication_step": step} if name == "gfl_phasor" else {}
     with Driven(fmu_path(name), step, P_0=0.5, frequency_droop__enabled=True, **told) as d:
         found = d.run(1.5, "p", "omega", turning=-2 * np.pi * 0.25)
-    assert found["omega"][-1] == pytest.approx(1 - 0.005, abs=1e-4)  # held voltages: a ripple of that size
+    # held voltages: a ripple of that size
+    assert found["omega"][-1] == pytest.approx(1 - 0.005, abs=1e-4)
     assert found["p"][-1] == pytest.approx(0.5 + 0.005 / 0.05, abs=2e-3)
 
 
 def test_in_a_dip_the_current_stays_within_the_circle_and_the_priority_decides_which(fmu_path):
     found = []
     for priority in (0, 1, 2):
-        values = {"current_limit__priority": priority, "reactive_power__mode": 1, "reactive_power__X_s": 0.15}
+        values = {
+            "current_limit__priority": priority,
+            "reactive_power__mode": 1,
+            "reactive_power__X_s": 0.15,
+        }
         with Driven(fmu_path("gfl"), 2e-4, P_0=0.9, **values) as d:
             dip = d.run(0.2, "i_s", "current_demand", "p", "q", v=0.5)
             back = d.run(0.7, "p", "q")
         assert dip["current_demand"][-1] > 1.0
         assert dip["i_s"][-1] == pytest.approx(1.1, rel=1e-3)
         assert dip["i_s"][200:].max() < 1.11
-        assert (back["p"][-1], back["q"][-1]) == pytest.approx((0.9, 0.0), abs=2e-3)  # nothing is wound up
+        # nothing is wound up
+        assert (back["p"][-1], back["q"][-1]) == pytest.approx((0.9, 0.0), abs=2e-3)
         found.append((dip["p"][-1], dip["q"][-1]))
     (p_0, q_0), (p_1, q_1), (p_2, q_2) = found
     assert p_2 < min(p_0, p_1) - 0.1
@@ -270,7 +334,11 @@ def test_its_modes_in_a_weak_grid_are_those_of_the_equations_written_by_hand(mod
 def test_the_leaflet_shows_where_stability_ends():
     """The table itself, and what its text says of it."""
     assert stability_table.section() in stability_table.PAGE.read_text(encoding="utf-8")
-    assert least_stable("gfl", 1.3, **{"reactive_power.mode": 1}).real > 0 > least_stable("gfl", 3).real
+    assert (
+        least_stable("gfl", 1.3, **{"reactive_power.mode": 1}).real
+        > 0
+        > least_stable("gfl", 3).real
+    )
     assert least_stable("gfl", 3, **{"pll.f_0": 30.0, "reactive_power.mode": 1}).real > 0
     assert all(least_stable("gfor", ratio).real < 0 for ratio in (1.1, 50))
     assert least_stable("gfor", 50, **{"droop.tau_P": 0.02}).real > 0

@@ -14,7 +14,9 @@ FASTEST = 2.0 / 0.5 * 2 * np.pi * 50
 """How fast the voltage falls when 200 MW are switched on at a bus with B = 0.5: ΔG/B·ω_b [pu/s]."""
 
 
-@pytest.mark.parametrize("values", [{}, {"v_0": 0.95, "theta_0": 0.4, "P_0": -7.0, "Q_0": 2.0, "load.P": 900.0}])
+@pytest.mark.parametrize(
+    "values", [{}, {"v_0": 0.95, "theta_0": 0.4, "P_0": -7.0, "Q_0": 2.0, "load.P": 900.0}]
+)
 def test_it_stands_still_with_the_current_it_was_told(values):
     model = build_model("infinite_bus")
     p = np.array([values.get(v.name, v.start) for v in model.parameters])
@@ -24,7 +26,13 @@ def test_it_stands_still_with_the_current_it_was_told(values):
     c, x = model.initialise(p)
     u = np.array([i.real, i.imag])
     assert np.abs(np.array(model.derivatives(x, u, p, c))).max() < 1e-10
-    y = dict(zip([o.name for o in model.outputs], np.array(model.outputs_function(x, u, p, c)).ravel(), strict=True))
+    y = dict(
+        zip(
+            [o.name for o in model.outputs],
+            np.array(model.outputs_function(x, u, p, c)).ravel(),
+            strict=True,
+        )
+    )
     assert y["v_re"] + 1j * y["v_im"] == pytest.approx(v)
     assert (y["p"], y["q"]) == pytest.approx((by_name["P_0"], by_name["Q_0"]))
 
@@ -32,7 +40,11 @@ def test_it_stands_still_with_the_current_it_was_told(values):
 def run(scenario, values, *, events, internal_step=1e-4):
     steps = {f"{name}.internal_step": internal_step for name in ("gfor", "grid")}
     (prepared,) = load_case("infinite_bus").prepare([scenario], steps | values)
-    moved = [type(e)(e.time - 0.98, e.component, e.parameter, e.value) for e in prepared.events] if events else []
+    moved = (
+        [type(e)(e.time - 0.98, e.component, e.parameter, e.value) for e in prepared.events]
+        if events
+        else []
+    )
     recorder = Recorder(["grid.v", "gfor.p", "gfor.i_s"], 1)
     with Master(prepared.system, prepared.schedule, H) as master:
         master.run(STOP, moved, [recorder])
@@ -50,7 +62,9 @@ def test_what_the_clock_does_is_what_a_master_would_do(scenario, timed):
     """A sixth of an internal step early, and so the nearer the shorter that step is."""
     gaps = []
     for internal_step in (1e-4, 2.5e-5):
-        by_clock = run(scenario, {"grid.clock.runs": True, **timed}, events=False, internal_step=internal_step)
+        by_clock = run(
+            scenario, {"grid.clock.runs": True, **timed}, events=False, internal_step=internal_step
+        )
         by_master = run(scenario, {}, events=True, internal_step=internal_step)
         assert np.ptp(by_master, axis=0).min() > 0.01
         assert np.array_equal(by_clock[:200], by_master[:200])  # until a step before the time
@@ -60,7 +74,12 @@ def test_what_the_clock_does_is_what_a_master_would_do(scenario, timed):
 
 
 def test_the_dip_ends_after_its_duration():
-    values = {"grid.clock.runs": True, "grid.dip.timed_depth": 0.2, "grid.dip.start": 0.01, "grid.dip.duration": 0.01}
+    values = {
+        "grid.clock.runs": True,
+        "grid.dip.timed_depth": 0.2,
+        "grid.dip.start": 0.01,
+        "grid.dip.duration": 0.01,
+    }
     v = run("dip", values, events=False)[:, 0]
     assert v[:100] == pytest.approx(1.0)
     assert v[150:200].max() < 0.95

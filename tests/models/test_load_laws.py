@@ -22,7 +22,9 @@ OMEGA_B = 2 * np.pi * 50
 def network(load, *others, **more):
     """A load at bus a, behind a line from bus b with a large resistive load, where a current is fed."""
     loads = (load, *others, Load("far", "b", 2000.0))
-    return Network("one_load", ("a", "b"), (Line("ab", "a", "b", X=0.05, **more),), loads, (Port("unit", "b"),))
+    return Network(
+        "one_load", ("a", "b"), (Line("ab", "a", "b", X=0.05, **more),), loads, (Port("unit", "b"),)
+    )
 
 
 def standing(model, u, values=None):
@@ -58,8 +60,11 @@ def law_of(law, v):
 @pytest.mark.parametrize(("active", "reactive", "charging"), LAWS_TRIED)
 def test_powers_follow_their_laws_in_steady_state(active, reactive, charging, p):
     more = {"B": charging} if charging else {}
-    extra = () if p > 0 or charging else (Load("weak", "a", 50.0),)  # generation alone leaves a's voltage undefined
-    model = grid(network(Load("load", "a", p, 100.0, active=active, reactive=reactive), *extra, **more))
+    # generation alone leaves a's voltage undefined
+    extra = () if p > 0 or charging else (Load("weak", "a", 50.0),)
+    model = grid(
+        network(Load("load", "a", p, 100.0, active=active, reactive=reactive), *extra, **more)
+    )
     for current in (25.0, 26.5, 28.0):
         u = np.array([current, -1.0])
         power, v = drawn(standing(model, u), u)
@@ -84,7 +89,9 @@ def test_it_starts_in_steady_state(make):
     load = Load("load", "a", -300.0, 80.0, active=MIX, reactive=POWER, k_pf=2.0)
     at = Evaluated(make(network(load, B=0.02)), {"a.v_0": 1.02, "a.theta_0": 0.3})
     u = np.zeros(len(at.model.inputs))
-    if make is phasor_grid:  # an emf behind a vanishing impedance, chosen so that a has its voltage of the power flow
+    if (
+        make is phasor_grid
+    ):  # an emf behind a vanishing impedance, chosen so that a has its voltage of the power flow
         Y = 1 / 0.05j
         v_a, load_current = 1.02 * np.exp(0.3j), np.conj((-3 + 0.8j) / (1.02 * np.exp(0.3j)))
         v_b = v_a + (load_current + 0.01j * v_a) / Y
@@ -98,7 +105,13 @@ def test_it_starts_in_steady_state(make):
 
 def test_the_lag_is_the_only_difference_to_an_impedance():
     """At the first instant after a step of the injected current the load is still the conductance."""
-    at = Evaluated(grid(Network("n", ("a",), (), (Load("load", "a", 800.0, active=CURRENT),), (Port("unit", "a"),))))
+    at = Evaluated(
+        grid(
+            Network(
+                "n", ("a",), (), (Load("load", "a", 800.0, active=CURRENT),), (Port("unit", "a"),)
+            )
+        )
+    )
     y = at.outputs([8.8, 0.0])
     assert y["load.p"] == pytest.approx(8.0 * y["a.v"] ** 2, rel=1e-12)
 
@@ -119,14 +132,17 @@ def by_hand(t_end, times, current, *, p, q, laws, k, tau, T_f, B, v_min):
         a = p * share(laws[0], abs(v_a))[0] * (1 + k[0] * turning)
         b = q * share(laws[1], abs(v_a))[0] * (1 + k[1] * turning)
         wanted = (a - 1j * b) * v_a - (p - 1j * q) * v_a
-        return np.array([
-            OMEGA_B / (B / 2) * (-i - p * v_a - i_load - c - 0.5j * B * v_a),
-            OMEGA_B / (B / 2) * (current(t) + i - 20 * v_b - 0.5j * B * v_b),
-            OMEGA_B / 0.05 * (v_a - v_b - 0.05j * i),
-            OMEGA_B * q * (v_a - 1j / q * i_load),
-            (wanted - c) / tau,
-            (v_a - z) / T_f,
-        ], complex).view(float)  # fmt: skip
+        return np.array(
+            [
+                OMEGA_B / (B / 2) * (-i - p * v_a - i_load - c - 0.5j * B * v_a),
+                OMEGA_B / (B / 2) * (current(t) + i - 20 * v_b - 0.5j * B * v_b),
+                OMEGA_B / 0.05 * (v_a - v_b - 0.05j * i),
+                OMEGA_B * q * (v_a - 1j / q * i_load),
+                (wanted - c) / tau,
+                (v_a - z) / T_f,
+            ],
+            complex,
+        ).view(float)
 
     start = np.array([1, 1, 0, -1j * q, 0, 1], complex)
     found = solve_ivp(rates, (0, t_end), start.view(float), "Radau", times, rtol=1e-8, atol=1e-10)
@@ -137,7 +153,9 @@ def by_hand(t_end, times, current, *, p, q, laws, k, tau, T_f, B, v_min):
 @pytest.mark.parametrize(("laws", "k"), [((POWER, POWER), (0, 0)), ((MIX, CURRENT), (1.5, -2.0))])
 def test_a_network_with_charging_follows_the_equations(laws, k):
     """The implicit step takes the law explicitly; the error of 100 µs steps falls with them."""
-    load = Load("load", "a", 400.0, 100.0, active=laws[0], reactive=laws[1], k_pf=k[0], k_qf=k[1], tau=2e-3)
+    load = Load(
+        "load", "a", 400.0, 100.0, active=laws[0], reactive=laws[1], k_pf=k[0], k_qf=k[1], tau=2e-3
+    )
     model = grid(network(load, B=0.4))
     assert model.integrator == "sdirk"
 
@@ -147,7 +165,9 @@ def test_a_network_with_charging_follows_the_equations(laws, k):
     names = ("a.v_re", "a.v_im", "load.p", "load.q")
     errors = []
     times = np.arange(0.02, 0.2, 0.004)
-    exact = by_hand(0.2, times, current, p=4.0, q=1.0, laws=laws, k=k, tau=2e-3, T_f=0.02, B=0.4, v_min=0.7)
+    exact = by_hand(
+        0.2, times, current, p=4.0, q=1.0, laws=laws, k=k, tau=2e-3, T_f=0.02, B=0.4, v_min=0.7
+    )
     for step in (1e-4, 2.5e-5):
 
         def held(t, step=step):
@@ -180,7 +200,9 @@ def test_the_frequency_that_a_load_feels_is_that_of_its_bus():
 def test_the_phasor_network_has_the_same_steady_state():
     load = Load("load", "a", 400.0, 100.0, active=POWER, reactive=MIX)
     emf, y = 1.03 + 0.05j, -200j
-    found = standing(phasor_grid(network(load, B=0.4)), np.array([emf.real, emf.imag, y.real, y.imag]))
+    found = standing(
+        phasor_grid(network(load, B=0.4)), np.array([emf.real, emf.imag, y.real, y.imag])
+    )
     u = found.outputs([emf.real, emf.imag, y.real, y.imag])
     current = (emf - complex(u["b.v_re"], u["b.v_im"])) * y
     emt = standing(grid(network(load, B=0.4)), np.array([current.real, current.imag]))
@@ -192,7 +214,9 @@ def test_the_phasor_network_has_the_same_steady_state():
 def test_in_a_phasor_network_a_swing_meets_the_law_and_not_its_lag():
     """A constant power draws no more at 1 Hz; a lag of first order lets 8 % of an impedance's swing through."""
     u = np.array([1.03, 0.05, 0.0, -200.0])
-    at = standing(phasor_grid(network(Load("load", "a", 400.0, 100.0, active=POWER, reactive=POWER))), u)
+    at = standing(
+        phasor_grid(network(Load("load", "a", 400.0, 100.0, active=POWER, reactive=POWER))), u
+    )
     slow, fast = at.response(2j * np.pi, u), at.response(1e6j, u)
     for power in ("load.p", "load.q"):
         assert abs(fast[power, "unit.e_re"]) > 0.5
@@ -221,9 +245,18 @@ def test_native_and_python_backed_fmus_give_the_same_bits(make):
 @pytest.mark.parametrize(
     ("load", "words"),
     [
-        (Load("odd", "a", 10.0, active=Zip(z=0.5, p=0.4)), "shares of its active power are z = 0.5.*must sum to 1"),
-        (Load("odd", "a", 10.0, active=POWER, v_min=0.1), "constant power down to v_min = 0.1 pu.*at least 0.3"),
-        (Load("odd", "a", 10.0, active=CURRENT, v_min=1.2), "has v_min = 1.2 pu; it must be from 0 to below 1"),
+        (
+            Load("odd", "a", 10.0, active=Zip(z=0.5, p=0.4)),
+            "shares of its active power are z = 0.5.*must sum to 1",
+        ),
+        (
+            Load("odd", "a", 10.0, active=POWER, v_min=0.1),
+            "constant power down to v_min = 0.1 pu.*at least 0.3",
+        ),
+        (
+            Load("odd", "a", 10.0, active=CURRENT, v_min=1.2),
+            "has v_min = 1.2 pu; it must be from 0 to below 1",
+        ),
         (Load("odd", "a", -10.0, active=POWER), "bus 'a' has neither a load with P > 0"),
     ],
 )
@@ -235,14 +268,25 @@ def test_what_a_network_cannot_be(load, words):
 def test_a_lag_shorter_than_a_step_can_follow_is_refused():
     load = Load("quick", "a", 10.0, active=POWER, tau=1e-3)
     assert grid(network(load)).states
-    with pytest.raises(ValueError, match=r"'quick' has the lag tau = 0.001 s; in this network .* from 0.004 to 1 s"):
+    with pytest.raises(
+        ValueError, match=r"'quick' has the lag tau = 0.001 s; in this network .* from 0.004 to 1 s"
+    ):
         phasor_grid(network(load))
 
 
 def test_a_voltage_below_that_of_the_impedance_is_refused():
     model = grid(network(Load("low", "a", 10.0, active=POWER)))
-    margins = dict(zip(model.requirement_texts, np.array(model.requirements(
-        [{"a.v_0": 0.6}.get(v.name, v.start) for v in model.parameters], [])).ravel(), strict=True))  # fmt: skip
+    margins = dict(
+        zip(
+            model.requirement_texts,
+            np.array(
+                model.requirements(
+                    [{"a.v_0": 0.6}.get(v.name, v.start) for v in model.parameters], []
+                )
+            ).ravel(),
+            strict=True,
+        )
+    )
     (text,) = [text for text, margin in margins.items() if margin <= 0]
     assert "lower low.v_min" in text
 

@@ -16,12 +16,31 @@ from fmus.toolchain.symbols import Expr
 from tests.support.evaluated import Evaluated
 
 UNEQUAL = {
-    "P_0": 0.7, "Q_0": 0.15, "v_0": 1.02, "theta_0": -0.4, "S_n": 560.0, "S_base": 120.0, "f_n": 60.0,
-    "transformer.R_t": 0.004, "transformer.X_t": 0.13, "machine.R_s": 0.003, "machine.H": 4.3, "machine.D": 1.7,
-    "machine.X_l": 0.16, "machine.X_d": 1.9, "machine.X_d1": 0.36, "machine.X_d2": 0.25, "machine.T_d10": 6.1,
-    "machine.T_d20": 0.031, "machine.X_q": 1.75, "machine.X_q1": 0.52, "machine.X_q2": 0.27, "machine.T_q10": 0.8,
-    "machine.T_q20": 0.052, "governor.enabled": 0,
-}  # fmt: skip
+    "P_0": 0.7,
+    "Q_0": 0.15,
+    "v_0": 1.02,
+    "theta_0": -0.4,
+    "S_n": 560.0,
+    "S_base": 120.0,
+    "f_n": 60.0,
+    "transformer.R_t": 0.004,
+    "transformer.X_t": 0.13,
+    "machine.R_s": 0.003,
+    "machine.H": 4.3,
+    "machine.D": 1.7,
+    "machine.X_l": 0.16,
+    "machine.X_d": 1.9,
+    "machine.X_d1": 0.36,
+    "machine.X_d2": 0.25,
+    "machine.T_d10": 6.1,
+    "machine.T_d20": 0.031,
+    "machine.X_q": 1.75,
+    "machine.X_q1": 0.52,
+    "machine.X_q2": 0.27,
+    "machine.T_q10": 0.8,
+    "machine.T_q20": 0.052,
+    "governor.enabled": 0,
+}
 
 
 # -- the machine --------------------------------------------------------------------------------
@@ -74,7 +93,9 @@ def test_every_rate_of_the_machine_is_that_of_the_equations_written_by_hand(exci
         scale = UNEQUAL["S_n"] / UNEQUAL["S_base"]
         assert complex(y["i_re"], y["i_im"]) == pytest.approx(current * scale, rel=1e-9)
         power = v * current.conjugate()
-        assert (y["p"], y["q"], y["T_e"]) == pytest.approx((power.real, power.imag, torque), rel=1e-9)
+        assert (y["p"], y["q"], y["T_e"]) == pytest.approx(
+            (power.real, power.imag, torque), rel=1e-9
+        )
 
 
 def swing_mode(**values):
@@ -88,7 +109,10 @@ def swing_mode(**values):
 def test_the_damping_torque_damps_the_swing():
     """D adds −D/2H to the trace: half of it to each of the pair, as far as the pair is the swing alone."""
     values = {"pss.enabled": 0}
-    without, having = swing_mode(**values, **{"machine.D": 0.0}), swing_mode(**values, **{"machine.D": 4.0})
+    without, having = (
+        swing_mode(**values, **{"machine.D": 0.0}),
+        swing_mode(**values, **{"machine.D": 4.0}),
+    )
     assert having.real - without.real == pytest.approx(-4.0 / (4 * 4.3), rel=0.1)
     assert having.imag == pytest.approx(without.imag, rel=0.01)
 
@@ -107,7 +131,8 @@ def excited(exciter, values):
     """An exciter between the terminal voltage, the field current and a stabiliser's signal, and its field voltage."""
     m = ModelBuilder("alone", "The exciter alone")
     v_t, I_fd, v_s = (
-        m.input(name, "pu", name, base="S_n", start=start) for name, start in (("v_t", 1.01), ("I_fd", 2.2), ("v_s", 0))
+        m.input(name, "pu", name, base="S_n", start=start)
+        for name, start in (("v_t", 1.01), ("I_fd", 2.2), ("v_s", 0))
     )
     E_fd, _ = exciter(m, Regulated(START, lambda E: v_t, I_fd, v_s))
     m.output("E_fd", E_fd, "pu", "Field voltage", base="E_fd")
@@ -139,7 +164,11 @@ def test_an_exciter_is_its_block_diagram_and_a_signal_raises_the_field_voltage(n
     else:
         gain = p["K_A"] * (1 + p["T_C"] * s) / (1 + p["T_B"] * s) / (1 + p.get("T_A", 0.0) * s)
     assert found.response(s, AT_REST) == pytest.approx(
-        {("E_fd", "v_s"): gain, ("E_fd", "v_t"): of_voltage - gain / (1 + p["T_R"] * s), ("E_fd", "I_fd"): of_current},
+        {
+            ("E_fd", "v_s"): gain,
+            ("E_fd", "v_t"): of_voltage - gain / (1 + p["T_R"] * s),
+            ("E_fd", "I_fd"): of_current,
+        },
         rel=1e-9,
         abs=1e-12,
     )
@@ -151,7 +180,9 @@ def test_a_raised_reference_raises_the_field_voltage(name):
     raised = excited(exciter, p | {"delta_V_ref": 0.01})
     signal = excited(exciter, p)
     x = signal.x
-    assert raised.outputs(AT_REST, x) == pytest.approx(signal.outputs([1.01, 2.2, 0.01], x), rel=1e-12)
+    assert raised.outputs(AT_REST, x) == pytest.approx(
+        signal.outputs([1.01, 2.2, 0.01], x), rel=1e-12
+    )
     assert raised.rates(AT_REST, x) == pytest.approx(signal.rates([1.01, 2.2, 0.01], x), rel=1e-12)
 
 
@@ -160,15 +191,31 @@ def test_a_raised_reference_raises_the_field_voltage(name):
 
 def stabiliser(**values):
     m = ModelBuilder("alone", "The stabiliser alone")
-    speed, power = m.input("speed", "pu", "w − 1", base="f_n"), m.input("power", "pu", "P_e", base="S_n", start=0.8)
+    speed, power = (
+        m.input("speed", "pu", "w − 1", base="f_n"),
+        m.input("power", "pu", "P_e", base="S_n", start=0.8),
+    )
     m.output("v_s", pss2a(m, speed, power, Expr(0.8)), "pu", "Signal", base="S_n")
     return Evaluated(m.build(), {f"pss.{name}": value for name, value in values.items()})
 
 
 PSS = {
-    "T_w1": 2.5, "T_w2": 3.0, "T_w3": 3.5, "T_w4": 4.0, "T_6": 0.03, "T_7": 2.2, "T_8": 0.5, "T_9": 0.11,
-    "K_s1": 13.0, "K_s2": 0.2, "K_s3": 0.9, "T_1": 0.22, "T_2": 0.05, "T_3": 0.31, "T_4": 0.14,
-}  # fmt: skip
+    "T_w1": 2.5,
+    "T_w2": 3.0,
+    "T_w3": 3.5,
+    "T_w4": 4.0,
+    "T_6": 0.03,
+    "T_7": 2.2,
+    "T_8": 0.5,
+    "T_9": 0.11,
+    "K_s1": 13.0,
+    "K_s2": 0.2,
+    "K_s3": 0.9,
+    "T_1": 0.22,
+    "T_2": 0.05,
+    "T_3": 0.31,
+    "T_4": 0.14,
+}
 
 
 @pytest.mark.parametrize("hertz", [0.08, 0.5, 1.2, 4.0])
@@ -178,7 +225,10 @@ def test_the_stabiliser_with_all_its_blocks_is_the_standards_diagram(hertz):
     power = s * 3.5 / (1 + s * 3.5) * s * 4.0 / (1 + s * 4.0) * p["K_s2"] / (1 + s * 2.2)
     ramp = (1 + s * 0.5) / (1 + s * 0.11) ** 5
     leads = (1 + s * 0.22) / (1 + s * 0.05) * (1 + s * 0.31) / (1 + s * 0.14)
-    wanted = {("v_s", "speed"): 13 * leads * ramp * speed, ("v_s", "power"): 13 * leads * (ramp * 0.9 - 1) * power}
+    wanted = {
+        ("v_s", "speed"): 13 * leads * ramp * speed,
+        ("v_s", "power"): 13 * leads * (ramp * 0.9 - 1) * power,
+    }
     assert stabiliser(**PSS).response(s, [0.0, 0.8]) == pytest.approx(wanted, rel=1e-9)
 
 
@@ -189,7 +239,9 @@ def test_the_stabilisers_signal_stays_within_its_limit(limit):
     for _ in range(40):
         x = unlimited.x + 0.01 * rng.standard_normal(len(unlimited.x))
         wanted = unlimited.outputs([0.0, 0.8], x)["v_s"]
-        assert limited.outputs([0.0, 0.8], x)["v_s"] == pytest.approx(np.clip(wanted, -limit, limit), rel=1e-12)
+        assert limited.outputs([0.0, 0.8], x)["v_s"] == pytest.approx(
+            np.clip(wanted, -limit, limit), rel=1e-12
+        )
         seen.append(wanted)
     assert min(seen) < -0.17
     assert max(seen) > 0.17

@@ -14,17 +14,64 @@ from tests.support.evaluated import Evaluated
 REST = AT_REST["exciter"]
 LINEAR = {
     "sexs": {"K": 90.0, "T_A": 0.9, "T_B": 8.0, "T_E": 0.06, "T_R": 0.012},
-    "ieeet1": {"K_A": 25.0, "T_A": 0.15, "K_E": 0.9, "T_E": 0.4, "K_F": 0.05, "T_F": 0.5, "T_R": 0.02},
-    "dc1a": {"K_A": 46.0, "T_A": 0.06, "T_C": 0.2, "T_B": 0.7, "K_E": 1.0, "T_E": 0.46, "K_F": 0.1, "T_F": 0.9,
-             "T_R": 0.01},
+    "ieeet1": {
+        "K_A": 25.0,
+        "T_A": 0.15,
+        "K_E": 0.9,
+        "T_E": 0.4,
+        "K_F": 0.05,
+        "T_F": 0.5,
+        "T_R": 0.02,
+    },
+    "dc1a": {
+        "K_A": 46.0,
+        "T_A": 0.06,
+        "T_C": 0.2,
+        "T_B": 0.7,
+        "K_E": 1.0,
+        "T_E": 0.46,
+        "K_F": 0.1,
+        "T_F": 0.9,
+        "T_R": 0.01,
+    },
     "ac4a": {"K_A": 150.0, "T_A": 0.02, "T_B": 8.0, "T_C": 0.9, "T_R": 0.012},
-    "st1a": {"K_A": 180.0, "T_A": 0.02, "T_B": 9.0, "T_C": 1.1, "T_B1": 0.3, "T_C1": 0.2, "K_F": 0.03, "T_F": 0.8,
-             "T_R": 0.015},
-    "st4b": {"K_PR": 3.5, "K_IR": 2.9, "T_A": 0.03, "K_PM": 1.3, "K_IM": 0.7, "K_G": 0.2, "K_P": 6.1, "K_C": 0.11,
-             "T_R": 0.025, "V_RMAX": 9.0},
-    "ac1a": {"K_A": 300.0, "T_A": 0.02, "T_B": 2.0, "T_C": 0.5, "T_E": 0.7, "K_F": 0.03, "T_F": 1.1, "K_C": 0.1,
-             "K_D": 0.3, "K_E": 1.0, "T_R": 0.01},
-}  # fmt: skip
+    "st1a": {
+        "K_A": 180.0,
+        "T_A": 0.02,
+        "T_B": 9.0,
+        "T_C": 1.1,
+        "T_B1": 0.3,
+        "T_C1": 0.2,
+        "K_F": 0.03,
+        "T_F": 0.8,
+        "T_R": 0.015,
+    },
+    "st4b": {
+        "K_PR": 3.5,
+        "K_IR": 2.9,
+        "T_A": 0.03,
+        "K_PM": 1.3,
+        "K_IM": 0.7,
+        "K_G": 0.2,
+        "K_P": 6.1,
+        "K_C": 0.11,
+        "T_R": 0.025,
+        "V_RMAX": 9.0,
+    },
+    "ac1a": {
+        "K_A": 300.0,
+        "T_A": 0.02,
+        "T_B": 2.0,
+        "T_C": 0.5,
+        "T_E": 0.7,
+        "K_F": 0.03,
+        "T_F": 1.1,
+        "K_C": 0.1,
+        "K_D": 0.3,
+        "K_E": 1.0,
+        "T_R": 0.01,
+    },
+}
 
 
 def saturated(E, points):
@@ -119,7 +166,8 @@ def test_an_exciter_follows_the_rectifiers_three_ranges(K_C):
 @pytest.mark.parametrize("name", EXCITERS)
 def test_a_generator_with_it_starts_in_steady_state(name, factory):
     device = Evaluated(
-        factory(exciter=name), AT_BUS | {"transformer.X_t": 0.12, "machine.s_10": 0.1, "machine.s_12": 0.4}
+        factory(exciter=name),
+        AT_BUS | {"transformer.X_t": 0.12, "machine.s_10": 0.1, "machine.s_12": 0.4},
     )
     assert not refused(device)
     at_rest = [BUS.real, BUS.imag]
@@ -136,8 +184,16 @@ CEILINGS = {
     # name: (values, upper and lower E_fd at rest of everything else)
     "sexs": ({"E_MIN": -1.0, "E_MAX": 4.0}, 4.0, -1.0),
     "ac4a": ({"V_RMAX": 5.0, "V_RMIN": -3.0, "K_C": 0.1}, 5.0 - 0.1 * E_FD, -3.0),
-    "st1a": ({"V_RMAX": 5.0, "V_RMIN": -3.0, "K_C": 0.1, "T_A": 0.02}, 5.0 * V_T - 0.1 * E_FD, -3.0 * V_T),
-    "st4b": ({"V_RMAX": 0.9, "V_RMIN": -0.5, "K_C": 0.0, "K_P": 6.0}, 0.9 * 6 * V_T, -0.5 * 6 * V_T),
+    "st1a": (
+        {"V_RMAX": 5.0, "V_RMIN": -3.0, "K_C": 0.1, "T_A": 0.02},
+        5.0 * V_T - 0.1 * E_FD,
+        -3.0 * V_T,
+    ),
+    "st4b": (
+        {"V_RMAX": 0.9, "V_RMIN": -0.5, "K_C": 0.0, "K_P": 6.0},
+        0.9 * 6 * V_T,
+        -0.5 * 6 * V_T,
+    ),
 }
 
 

@@ -11,9 +11,22 @@ from tests.support.evaluated import Evaluated
 BOTH_KINDS = [name for name in MACHINES if name != "genrou_rated_speed"]
 WOUND = ("two_axis", "gensal", "genrou")
 DATA = {
-    "R_s": 0.003, "H": 4.3, "D": 1.7, "X_l": 0.16, "X_d": 1.9, "X_d1": 0.36, "X_d2": 0.25, "T_d10": 6.1,
-    "T_d20": 0.031, "X_q": 1.75, "X_q1": 0.52, "T_q10": 0.8, "T_q20": 0.052, "s_10": 0.11, "s_12": 0.42,
-}  # fmt: skip
+    "R_s": 0.003,
+    "H": 4.3,
+    "D": 1.7,
+    "X_l": 0.16,
+    "X_d": 1.9,
+    "X_d1": 0.36,
+    "X_d2": 0.25,
+    "T_d10": 6.1,
+    "T_d20": 0.031,
+    "X_q": 1.75,
+    "X_q1": 0.52,
+    "T_q10": 0.8,
+    "T_q20": 0.052,
+    "s_10": 0.11,
+    "s_12": 0.42,
+}
 
 
 def machine(name, factory=synchronous_generator, **values):
@@ -63,7 +76,10 @@ def test_genrou_is_the_model_of_stability_programs_with_saturation(seed):
     E_fd = device.outputs([BUS.real, BUS.imag], device.vector(x))["E_fd"]
     wanted = {
         "machine.psi_f": (
-            E_fd - E_q - (p["X_d"] - p["X_d1"]) * (i_d - (d1 - d2) / d1**2 * (psi_1d + d1 * i_d - E_q)) - S_now * psi_d
+            E_fd
+            - E_q
+            - (p["X_d"] - p["X_d1"]) * (i_d - (d1 - d2) / d1**2 * (psi_1d + d1 * i_d - E_q))
+            - S_now * psi_d
         )
         / p["T_d10"]
         / to_E,
@@ -116,7 +132,9 @@ def test_the_two_axis_machine_is_sauer_and_pais(seed):
     psi_d, psi_q = x["machine.psi_d"], x["machine.psi_q"]
     assert psi_d == pytest.approx(E_q - p["X_d1"] * i_d, rel=1e-9)
     assert psi_q == pytest.approx(-E_d - p["X_q1"] * i_q, rel=1e-9)
-    motion = (y["P_m"] / x["machine.omega"] - y["T_e"] - p["D"] * (x["machine.omega"] - 1)) / (2 * p["H"])
+    motion = (y["P_m"] / x["machine.omega"] - y["T_e"] - p["D"] * (x["machine.omega"] - 1)) / (
+        2 * p["H"]
+    )
     assert found["machine.omega"] == pytest.approx(motion, rel=1e-9)
 
 
@@ -141,7 +159,8 @@ def test_the_classical_machine_swings_as_the_textbooks_formula_says(factory):
 
 @pytest.mark.parametrize(
     ("name", "factory"),
-    [(n, synchronous_generator) for n in BOTH_KINDS] + [(n, synchronous_generator_phasor) for n in MACHINES],
+    [(n, synchronous_generator) for n in BOTH_KINDS]
+    + [(n, synchronous_generator_phasor) for n in MACHINES],
 )
 def test_a_machine_starts_in_its_steady_state_with_the_power_flows_power(name, factory):
     device = machine(name, factory, **{"transformer.R_t": 0.004, "transformer.X_t": 0.13})
@@ -163,10 +182,16 @@ def test_saturation_is_that_of_the_open_circuit_curve(name, v):
 
 @pytest.mark.parametrize("name", WOUND)
 def test_without_saturation_the_steady_state_is_the_phasor_diagrams(name):
-    device = machine(name, **({"machine.s_10": 0.0, "machine.s_12": 0.0} if name != "two_axis" else {}))
+    device = machine(
+        name, **({"machine.s_10": 0.0, "machine.s_12": 0.0} if name != "two_axis" else {})
+    )
     i = np.conj(complex(AT_BUS["P_0"], AT_BUS["Q_0"]) / BUS)
     delta = np.angle(BUS + (DATA["R_s"] + 1j * DATA["X_q"]) * i)
-    v_q, i_d, i_q = (BUS * np.exp(-1j * delta)).real, -(i * np.exp(-1j * delta)).imag, (i * np.exp(-1j * delta)).real
+    v_q, i_d, i_q = (
+        (BUS * np.exp(-1j * delta)).real,
+        -(i * np.exp(-1j * delta)).imag,
+        (i * np.exp(-1j * delta)).real,
+    )
     y = device.outputs([BUS.real, BUS.imag])
     assert y["delta"] == pytest.approx(delta, rel=1e-12)
     assert y["E_fd"] == pytest.approx(v_q + DATA["R_s"] * i_q + DATA["X_d"] * i_d, rel=1e-12)
@@ -191,7 +216,9 @@ def test_data_on_another_base_are_the_same_machine(name):
     assert other.states == pytest.approx(own.states, rel=1e-12)
     x = shifted(own, 1)
     u = [BUS.real, BUS.imag]
-    assert other.rates(u, own.vector(x)) == pytest.approx(own.rates(u, own.vector(x)), rel=1e-9, abs=1e-9)
+    assert other.rates(u, own.vector(x)) == pytest.approx(
+        own.rates(u, own.vector(x)), rel=1e-9, abs=1e-9
+    )
 
 
 @pytest.mark.parametrize("name", ["two_axis", "genrou"])
@@ -233,11 +260,15 @@ def test_constant_torque_and_constant_power_differ_by_the_power_over_2H():
 
 
 @pytest.mark.parametrize(("name", "factor"), [("genrou", 1.02), ("genrou_rated_speed", 1.0)])
-def test_at_rated_speed_the_emf_behind_the_subtransient_reactance_is_without_the_speed(name, factor):
+def test_at_rated_speed_the_emf_behind_the_subtransient_reactance_is_without_the_speed(
+    name, factor
+):
     device, p = machine(name, synchronous_generator_phasor), DATA
     x = shifted(device, 3) | {"machine.omega": 1.02}
     i_d, i_q = current(device, x)
-    to_E, to_E_d = ((p[X] - p[X1]) / (p[X] - p["X_l"]) for X, X1 in (("X_d", "X_d1"), ("X_q", "X_q1")))
+    to_E, to_E_d = (
+        (p[X] - p[X1]) / (p[X] - p["X_l"]) for X, X1 in (("X_d", "X_d1"), ("X_q", "X_q1"))
+    )
     d1, d2, q1 = p["X_d1"] - p["X_l"], p["X_d2"] - p["X_l"], p["X_q1"] - p["X_l"]
     psi_d = x["machine.psi_f"] * to_E * d2 / d1 + x["machine.psi_1d"] * (d1 - d2) / d1
     psi_q = x["machine.psi_1q"] * to_E_d * d2 / q1 + x["machine.psi_2q"] * (q1 - d2) / q1

@@ -10,9 +10,22 @@ from tests.support.evaluated import Evaluated
 REST = AT_REST["pss"]
 ONE = {"K_S": 9.5, "T_5": 1.41, "T_6": 0.02, "T_1": 0.154, "T_2": 0.033, "T_3": 0.2, "T_4": 0.05}
 TWO = {
-    "T_w1": 2.5, "T_w2": 3.0, "T_w3": 3.5, "T_w4": 4.0, "T_6": 0.03, "T_7": 2.2, "T_8": 0.5, "T_9": 0.11,
-    "K_s1": 13.0, "K_s2": 0.2, "K_s3": 0.9, "T_1": 0.22, "T_2": 0.05, "T_3": 0.31, "T_4": 0.14,
-}  # fmt: skip
+    "T_w1": 2.5,
+    "T_w2": 3.0,
+    "T_w3": 3.5,
+    "T_w4": 4.0,
+    "T_6": 0.03,
+    "T_7": 2.2,
+    "T_8": 0.5,
+    "T_9": 0.11,
+    "K_s1": 13.0,
+    "K_s2": 0.2,
+    "K_s3": 0.9,
+    "T_1": 0.22,
+    "T_2": 0.05,
+    "T_3": 0.31,
+    "T_4": 0.14,
+}
 
 
 @pytest.mark.parametrize("filtered", [{}, {"A_1": 0.06}, {"A_1": 0.061, "A_2": 0.0017}])
@@ -27,7 +40,9 @@ def test_pss1a_is_the_standards_diagram(hertz, filtered):
     assert alone.response(s, REST)["v_s", "speed"] == pytest.approx(wanted, rel=1e-9)
 
 
-@pytest.mark.parametrize("left_out", [(), ("T_w2", "T_w4", "T_6"), ("T_w1", "T_w2", "T_w3", "T_w4", "T_7")])
+@pytest.mark.parametrize(
+    "left_out", [(), ("T_w2", "T_w4", "T_6"), ("T_w1", "T_w2", "T_w3", "T_w4", "T_7")]
+)
 @pytest.mark.parametrize("hertz", [0.08, 0.5, 4.0])
 @pytest.mark.parametrize("name", ["pss2a", "pss2b"])
 def test_pss2a_and_pss2b_are_the_standards_diagram(name, hertz, left_out):
@@ -58,12 +73,16 @@ def test_the_signal_stays_within_two_limits_of_its_own(name):
     for speed in (-0.5, -1e-4, 0.0, 1e-4, 0.5):
         x = free.x + speed * 0.1
         wanted = free.outputs([speed, 0.8], x)["v_s"]
-        assert limited.outputs([speed, 0.8], x)["v_s"] == pytest.approx(np.clip(wanted, -0.05, 0.08), rel=1e-12)
+        assert limited.outputs([speed, 0.8], x)["v_s"] == pytest.approx(
+            np.clip(wanted, -0.05, 0.08), rel=1e-12
+        )
         assert off.outputs([speed, 0.8], x)["v_s"] == 0.0
 
 
 def test_the_inputs_of_pss2b_are_limited():
-    alone = stabilizer("pss2b", {"V_SI1MAX": 0.01, "V_SI1MIN": -0.02, "V_SI2MAX": 0.1, "V_SI2MIN": -0.3})
+    alone = stabilizer(
+        "pss2b", {"V_SI1MAX": 0.01, "V_SI1MIN": -0.02, "V_SI2MAX": 0.1, "V_SI2MIN": -0.3}
+    )
     rates = alone.rates
     assert rates([0.5, 0.8]) == rates([0.01, 0.8])
     assert rates([-0.5, 0.8]) == rates([-0.02, 0.8])
@@ -77,7 +96,9 @@ def test_the_inputs_of_pss2b_are_limited():
 def test_a_generator_with_it_starts_in_steady_state_and_its_swing_is_damped(name, factory):
     swings = []
     for values in ({"pss.enabled": 0}, {}):
-        device = Evaluated(factory(exciter="st1a", stabilizer=name), AT_BUS | {"machine.R_s": 0.003} | values)
+        device = Evaluated(
+            factory(exciter="st1a", stabilizer=name), AT_BUS | {"machine.R_s": 0.003} | values
+        )
         assert not refused(device)
         assert max(map(abs, device.rates([BUS.real, BUS.imag]).values())) < 1e-8
         poles = np.linalg.eigvals(device.blocks([BUS.real, BUS.imag])[0])

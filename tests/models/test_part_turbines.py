@@ -11,12 +11,37 @@ from tests.support.evaluated import Evaluated
 
 LINEAR = {
     "tgov1": {"R": 0.04, "T_1": 0.4, "T_2": 2.1, "T_3": 7.0, "D_t": 0.2},
-    "hygov": {"R": 0.05, "r": 0.4, "T_r": 6.0, "T_f": 0.06, "T_g": 0.4, "T_W": 1.3, "A_t": 1.1, "D_turb": 0.4,
-              "q_NL": 0.07},
+    "hygov": {
+        "R": 0.05,
+        "r": 0.4,
+        "T_r": 6.0,
+        "T_f": 0.06,
+        "T_g": 0.4,
+        "T_W": 1.3,
+        "A_t": 1.1,
+        "D_turb": 0.4,
+        "q_NL": 0.07,
+    },
     "gast": {"R": 0.05, "T_1": 0.4, "T_2": 0.15, "T_3": 3.0, "D_turb": 0.1, "A_T": 1.0, "K_T": 2.0},
-    "ieeeg1": {"K": 18.0, "T_1": 7.0, "T_2": 2.5, "T_3": 0.12, "T_4": 0.25, "T_5": 6.0, "T_6": 0.5, "T_7": 0.4,
-               "K_1": 0.2, "K_2": 0.1, "K_3": 0.2, "K_4": 0.1, "K_5": 0.15, "K_6": 0.05, "K_7": 0.1, "K_8": 0.1},
-}  # fmt: skip
+    "ieeeg1": {
+        "K": 18.0,
+        "T_1": 7.0,
+        "T_2": 2.5,
+        "T_3": 0.12,
+        "T_4": 0.25,
+        "T_5": 6.0,
+        "T_6": 0.5,
+        "T_7": 0.4,
+        "K_1": 0.2,
+        "K_2": 0.1,
+        "K_3": 0.2,
+        "K_4": 0.1,
+        "K_5": 0.15,
+        "K_6": 0.05,
+        "K_7": 0.1,
+        "K_8": 0.1,
+    },
+}
 
 
 def by_hand(name, p, s):
@@ -47,7 +72,9 @@ def test_a_governor_is_its_block_diagram(name, hertz):
     assert alone.outputs([1.0])["P_m"] == pytest.approx(P_M, rel=1e-12)
     assert max(map(abs, alone.rates([1.0]).values())) < 1e-12
     s = 2j * np.pi * hertz
-    assert alone.response(s, [1.0])["P_m", "w"] == pytest.approx(by_hand(name, LINEAR[name], s), rel=1e-6)
+    assert alone.response(s, [1.0])["P_m", "w"] == pytest.approx(
+        by_hand(name, LINEAR[name], s), rel=1e-6
+    )
 
 
 @pytest.mark.parametrize("factory", [synchronous_generator, synchronous_generator_phasor])
@@ -66,7 +93,12 @@ SETTLED = {
     "tgov1": ({"V_MAX": 0.95, "V_MIN": 0.1, "T_3": 1.0, "T_2": 0.3}, 0.95, 0.1, 0.1),
     "gast": ({"V_MAX": 0.9, "V_MIN": 0.2, "K_T": 0.0, "A_T": 9.0}, 0.9, 0.2, 0.1),
     "ieeeg1": ({"P_MAX": 0.9, "P_MIN": 0.2, "T_5": 1.0, "U_o": 0.4, "U_c": -0.4}, 0.9, 0.2, 0.1),
-    "hygov": ({"G_MAX": 0.9, "G_MIN": 0.3, "D_turb": 0.0}, 1.2 * (0.9 - 0.08), 1.2 * (0.3 - 0.08), 0.1),
+    "hygov": (
+        {"G_MAX": 0.9, "G_MIN": 0.3, "D_turb": 0.0},
+        1.2 * (0.9 - 0.08),
+        1.2 * (0.3 - 0.08),
+        0.1,
+    ),
 }
 
 
@@ -83,7 +115,14 @@ def test_the_valve_stops_at_its_limits(name, side):
 
 @pytest.mark.parametrize(("side", "fastest"), [(1, 0.15), (-1, 0.4)])
 def test_the_valve_of_ieeeg1_moves_no_faster_than_its_rates(side, fastest):
-    values = {"U_o": 0.15, "U_c": -0.4, **{f"T_{k}": 0.0 for k in (4, 5, 6, 7)}, "K_1": 1.0, "K_3": 0.0, "K_5": 0.0}
+    values = {
+        "U_o": 0.15,
+        "U_c": -0.4,
+        **{f"T_{k}": 0.0 for k in (4, 5, 6, 7)},
+        "K_1": 1.0,
+        "K_3": 0.0,
+        "K_5": 0.0,
+    }
     found, _ = integrated(governor("ieeeg1", values), lambda t: [1 - side * 0.05], 0.6, step=1e-3)
     power = np.array([y["P_m"] for y in found])
     speed = np.diff(power) / 1e-3
@@ -101,7 +140,17 @@ def test_the_gate_of_hygov_moves_no_faster_than_velm(side):
 
 def test_hygov_is_the_integral_of_its_equations():
     """A fall of the speed by 0.4 %: flow, head and gate by SciPy, from the diagram written a second time."""
-    p = {"R": 0.05, "r": 0.3, "T_r": 5.0, "T_f": 0.05, "T_g": 0.5, "T_W": 1.0, "A_t": 1.2, "D_turb": 0.5, "q_NL": 0.08}
+    p = {
+        "R": 0.05,
+        "r": 0.3,
+        "T_r": 5.0,
+        "T_f": 0.05,
+        "T_g": 0.5,
+        "T_W": 1.0,
+        "A_t": 1.2,
+        "D_turb": 0.5,
+        "q_NL": 0.08,
+    }
     g_0 = P_M / 1.2 + 0.08
 
     def rates(t, x):

@@ -19,7 +19,9 @@ ONE_BY_ONE = [
 
 def with_part(kind, name):
     """A generator with a part, beside others that it fits."""
-    return synchronous_generator(**({"exciter": "st1a"} if kind == "stabilizer" else {}) | {kind: name})
+    return synchronous_generator(
+        **({"exciter": "st1a"} if kind == "stabilizer" else {}) | {kind: name}
+    )
 
 
 @pytest.mark.parametrize("parts", ONE_BY_ONE, ids=lambda parts: "-".join(parts.values()))
@@ -34,15 +36,23 @@ def test_a_generator_is_named_after_its_parts():
     made = synchronous_generator("genrou", "st1a", "tgov1", "pss1a")
     assert made.name == "synchronous_generator_genrou_st1a_tgov1_pss1a"
     assert synchronous_generator().name == "synchronous_generator_genrou_manual_constant_torque"
-    assert synchronous_generator_phasor("gensal", "sexs").name.endswith("gensal_sexs_constant_torque_phasor")
+    assert synchronous_generator_phasor("gensal", "sexs").name.endswith(
+        "gensal_sexs_constant_torque_phasor"
+    )
 
 
 @pytest.mark.parametrize(
     ("parts", "said"),
     [
-        ({"machine": "genru"}, "there is no machine 'genru'; did you mean 'genrou'? there are: classical, two_axis"),
+        (
+            {"machine": "genru"},
+            "there is no machine 'genru'; did you mean 'genrou'? there are: classical, two_axis",
+        ),
         ({"exciter": "EXST1"}, "there is no exciter 'EXST1'; "),
-        ({"governor": "x"}, "there is no governor 'x'; there are: constant_power, constant_torque, tgov1"),
+        (
+            {"governor": "x"},
+            "there is no governor 'x'; there are: constant_power, constant_torque, tgov1",
+        ),
         ({"stabilizer": "PSS1A"}, "there is no stabilizer 'PSS1A'; did you mean 'pss1a'?"),
         ({"machine": "classical", "exciter": "sexs"}, "the classical machine has no field winding"),
         ({"stabilizer": "pss1a"}, "manual excitation has none"),
@@ -55,7 +65,12 @@ def test_parts_that_are_not_there_or_do_not_fit_are_named(parts, said):
 
 
 def test_the_catalogue_knows_which_models_have_parts():
-    expected = {"machine": "genrou", "exciter": "manual", "governor": "constant_torque", "stabilizer": "none"}
+    expected = {
+        "machine": "genrou",
+        "exciter": "manual",
+        "governor": "constant_torque",
+        "stabilizer": "none",
+    }
     assert parts_of("synchronous_generator") == parts_of("synchronous_generator_phasor") == expected
     assert parts_of("gfor") == {}
 
@@ -77,11 +92,28 @@ def test_every_field_of_a_dyr_record_sets_a_parameter_of_its_part(name):
 @pytest.mark.parametrize(
     ("name", "count"),
     [
-        ("GENROU", 14), ("GENSAL", 12), ("GENCLS", 2), ("SEXS", 6), ("IEEET1", 14), ("IEEEX1", 16), ("EXAC1", 17),
-        ("ESAC1A", 19), ("EXAC4", 10), ("EXST1", 12), ("ESST1A", 20), ("ESST4B", 17), ("TGOV1", 7), ("HYGOV", 12),
-        ("GAST", 9), ("IEEEG1", 22), ("STAB1", 7), ("IEEEST", 19), ("PSS2A", 23), ("PSS2B", 29),
+        ("GENROU", 14),
+        ("GENSAL", 12),
+        ("GENCLS", 2),
+        ("SEXS", 6),
+        ("IEEET1", 14),
+        ("IEEEX1", 16),
+        ("EXAC1", 17),
+        ("ESAC1A", 19),
+        ("EXAC4", 10),
+        ("EXST1", 12),
+        ("ESST1A", 20),
+        ("ESST4B", 17),
+        ("TGOV1", 7),
+        ("HYGOV", 12),
+        ("GAST", 9),
+        ("IEEEG1", 22),
+        ("STAB1", 7),
+        ("IEEEST", 19),
+        ("PSS2A", 23),
+        ("PSS2B", 29),
     ],
-)  # fmt: skip
+)
 def test_a_record_has_as_many_fields_as_pss_e_has(name, count):
     """CONs and ICONs of PSS/E's model library."""
     assert len(DYR_RECORDS[name].fields) == count

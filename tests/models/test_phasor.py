@@ -52,7 +52,9 @@ def source(y):
 # -- the electrical side ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", [*DEVICES, *ALONE, "gfl_l2ep", "external_grid", "static_generation"])
+@pytest.mark.parametrize(
+    "name", [*DEVICES, *ALONE, "gfl_l2ep", "external_grid", "static_generation"]
+)
 def test_emf_and_admittance_give_the_current(name):
     device = Evaluated(f"{name}_phasor", P_0=0.7, Q_0=0.1, v_0=1.02, theta_0=0.4)
     v = 1.02 * np.exp(0.4j)
@@ -128,8 +130,12 @@ def test_the_converter_comes_to_rest_where_the_emt_variant_does(fmu_path):
 
 def test_the_current_limit_is_not_represented_and_the_model_says_when_it_would_act(fmu_path):
     watched = ("current_limit", "i_s")
-    normal = run(fmu_path("gfor_phasor"), 1.0, 5e-3, {"P_0": 0.9}, {"v_re": 1.0, "v_im": 0.0}, watched)
-    dip = run(fmu_path("gfor_phasor"), 0.05, 5e-3, {"P_0": 0.9}, {"v_re": 0.6, "v_im": 0.0}, watched)
+    normal = run(
+        fmu_path("gfor_phasor"), 1.0, 5e-3, {"P_0": 0.9}, {"v_re": 1.0, "v_im": 0.0}, watched
+    )
+    dip = run(
+        fmu_path("gfor_phasor"), 0.05, 5e-3, {"P_0": 0.9}, {"v_re": 0.6, "v_im": 0.0}, watched
+    )
     limited = run(fmu_path("gfor"), 0.05, 1e-4, {"P_0": 0.9}, {"v_re": 0.6, "v_im": 0.0}, ("i_s",))
     assert normal["current_limit"] == pytest.approx(0.9 / 1.1, abs=0.02)
     assert dip["current_limit"] > 1.5
@@ -139,12 +145,15 @@ def test_the_current_limit_is_not_represented_and_the_model_says_when_it_would_a
 @pytest.mark.parametrize(("P", "Q"), [(0.9, 0.0), (0.2, 0.6), (0.2, -0.5)])
 def test_the_current_limit_of_each_axis_is_its_own(P, Q):
     """At the operating point, from the current that the power flow asks of the converter, in the capacitor's frame."""
-    device = Evaluated("gfor_phasor", P_0=P, Q_0=Q, voltage_control__i_q_max=1.3, voltage_control__i_d_max=0.8)
+    device = Evaluated(
+        "gfor_phasor", P_0=P, Q_0=Q, voltage_control__i_q_max=1.3, voltage_control__i_d_max=0.8
+    )
     values = dict(zip((v.name for v in device.model.parameters), device.p.tolist(), strict=True))
     i_g = complex(P, -Q)
     u = 1.0 + complex(values["transformer.R_t"], values["transformer.X_t"]) * i_g
     B_c = values["filter.B_c"]
-    i_s = (i_g + 1j * B_c * u / (1 + 1j / 30)) * np.exp(-1j * np.angle(u))  # in series with the capacitor: 1/(30·B_c)
+    # in series with the capacitor: 1/(30·B_c)
+    i_s = (i_g + 1j * B_c * u / (1 + 1j / 30)) * np.exp(-1j * np.angle(u))
     wanted = max(abs(i_s.real) / 1.3, abs(i_s.imag) / 0.8)
     assert device.outputs([1.0, 0.0])["current_limit"] == pytest.approx(wanted, rel=1e-9)
 
@@ -154,7 +163,9 @@ def test_a_dispatch_beyond_the_current_limit_is_refused(fmu_path):
         device.set({"P_0": 1.3})
         device.setup(0.0, None)
         device.enter_initialization_mode()
-        with pytest.raises(ComponentError, match=r"voltage_control\.i_q_max: lower P_0 or raise S_n"):
+        with pytest.raises(
+            ComponentError, match=r"voltage_control\.i_q_max: lower P_0 or raise S_n"
+        ):
             device.exit_initialization_mode()
 
 
@@ -162,12 +173,16 @@ def test_a_dispatch_beyond_the_current_limit_is_refused(fmu_path):
 def test_behind_an_open_breaker_there_is_no_admittance_and_no_current(name):
     device = Evaluated(f"{name}_phasor", P_0=0.5, connected=0.0)
     y = device.outputs([1.0, 0.0])
-    assert [y[k] for k in ("i_re", "i_im", "p", "q", "y_re", "y_im")] == pytest.approx([0.0] * 6, abs=1e-15)
+    assert [y[k] for k in ("i_re", "i_im", "p", "q", "y_re", "y_im")] == pytest.approx(
+        [0.0] * 6, abs=1e-15
+    )
     if "v_t" in y:
         assert y["v_t"] == pytest.approx(abs(source(y)[0]), rel=1e-12)
 
 
-@pytest.mark.parametrize(("name", "time"), [("gfor", 0.05), ("regfm_a1", 0.02), *((name, 0.1) for name in GENERATORS)])
+@pytest.mark.parametrize(
+    ("name", "time"), [("gfor", 0.05), ("regfm_a1", 0.02), *((name, 0.1) for name in GENERATORS)]
+)
 def test_the_emf_is_given_for_the_middle_of_the_coming_step(name, time):
     """Against the emf itself, followed with small steps on the same held voltage, at a time when it is on its way."""
     step, values = 5e-3, {"P_0": 0.8, "Q_0": 0.05}
@@ -189,7 +204,9 @@ def test_the_emf_is_given_for_the_middle_of_the_coming_step(name, time):
     assert abs(predicted - moving[1]) < 0.05 * moved
 
 
-@pytest.mark.parametrize("name", ["gfor", "gfl", "gfl_l2ep", "regfm_a1", "static_generation", GENERATORS[0]])
+@pytest.mark.parametrize(
+    "name", ["gfor", "gfl", "gfl_l2ep", "regfm_a1", "static_generation", GENERATORS[0]]
+)
 def test_the_current_is_that_of_the_middle_of_the_last_step(name):
     """An emf that is asked for one step early is that of the last step."""
     device = Evaluated(f"{name}_phasor", communication_step=5e-3, P_0=0.7, Q_0=0.1)
@@ -236,7 +253,11 @@ def admittances(scale, ca_closed=True):
         Y[t, t] += y + 0.5j * charging
         Y[f, t] -= y / ratio.conjugate()
         Y[t, f] -= y / ratio
-    drawn = (("city", "b", 0.8 + 0.3j, 0.97), ("plant", "c", 0.5 - 0.1j, 1.03), ("village", "d", 0.05, 1.01))
+    drawn = (
+        ("city", "b", 0.8 + 0.3j, 0.97),
+        ("plant", "c", 0.5 - 0.1j, 1.03),
+        ("village", "d", 0.05, 1.01),
+    )
     for name, bus, s, v_0 in drawn:
         Y[at[bus], at[bus]] += np.conj(s) / v_0**2 * (scale if name == "city" else 1.0)
     Y[1, 1] += -0.2j
@@ -264,15 +285,21 @@ def test_the_network_solves_its_nodal_equations(closed):
     Y, current = admittances(1.2, closed)
     assert found == pytest.approx(np.linalg.solve(Y, current), rel=1e-12)
     e, admittance = SOURCES["two"]
-    assert complex(y["two.p"], y["two.q"]) == pytest.approx(found[2] * np.conj((e - found[2]) * admittance), rel=1e-12)
+    assert complex(y["two.p"], y["two.q"]) == pytest.approx(
+        found[2] * np.conj((e - found[2]) * admittance), rel=1e-12
+    )
     if not closed:
         assert (y["ca.p"], y["ca.q"]) == (0.0, 0.0)
     else:
         drawn = (found[2] / 0.97 - found[0]) / 0.12j / 0.97
-        assert complex(y["ca.p"], y["ca.q"]) == pytest.approx(found[2] * drawn.conjugate(), rel=1e-12)
+        assert complex(y["ca.p"], y["ca.q"]) == pytest.approx(
+            found[2] * drawn.conjugate(), rel=1e-12
+        )
 
 
 def test_a_load_of_any_bus_may_be_switched_off(fmu_path):
     """The devices' admittances hold the voltage where in the EMT network a load has to."""
-    assert read_description(fmu_path("two_area_phasor_grid")).variables["load_2.scale"].minimum == 0.0
+    assert (
+        read_description(fmu_path("two_area_phasor_grid")).variables["load_2.scale"].minimum == 0.0
+    )
     assert read_description(fmu_path("two_area_grid")).variables["load_2.scale"].minimum > 0.0

@@ -12,7 +12,13 @@ def controller(sign):
     """A model that is one controller between an input and an output."""
     m = ModelBuilder("alone", "One POD controller")
     u = m.input("u", "pu", "Frequency deviation", base="f_n")
-    m.output("y", pod(m, "pod", u, sign=sign, T_S1=0.2, T_S2=0.37), "pu", "Supplementary reference", base="S_n")
+    m.output(
+        "y",
+        pod(m, "pod", u, sign=sign, T_S1=0.2, T_S2=0.37),
+        "pu",
+        "Supplementary reference",
+        base="S_n",
+    )
     return m.build()
 
 
@@ -50,7 +56,8 @@ def test_output_is_clamped(state, wanted):
 
 
 @pytest.mark.parametrize(
-    ("T_S1", "T_S2", "kept"), [(0.0, 0.0, True), (0.2, 0.0, False), (0.2, 0.05, True), (0.2, 1e-6, False)]
+    ("T_S1", "T_S2", "kept"),
+    [(0.0, 0.0, True), (0.2, 0.0, False), (0.2, 0.05, True), (0.2, 1e-6, False)],
 )
 def test_a_stage_without_a_lag_has_no_lead(T_S1, T_S2, kept):
     model = controller(1)

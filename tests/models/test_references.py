@@ -27,8 +27,11 @@ def test_fmu_reproduces_its_reference_trajectory(reference, internal_step, fmu_p
     wanted = rows[:, -len(reference.outputs) :]
     scale = np.maximum(1e-3, np.ptp(wanted, axis=0))
     error = np.abs(found - wanted) / scale
-    jump = next(k for k in range(1, len(rows)) if not np.array_equal(rows[k, 1:3], rows[k - 1, 1:3]))
-    assert error[:jump].max() < 5e-8  # the steady state, and the grid's settling to its first currents
+    jump = next(
+        k for k in range(1, len(rows)) if not np.array_equal(rows[k, 1:3], rows[k - 1, 1:3])
+    )
+    # the steady state, and the grid's settling to its first currents
+    assert error[:jump].max() < 5e-8
     assert error[jump + 5 :].max() < LATER[internal_step]
 
 

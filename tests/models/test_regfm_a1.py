@@ -12,11 +12,36 @@ from tests.support.evaluated import Evaluated
 
 NAME, STEP = "regfm_a1_phasor", 1e-3
 OTHERWISE = {
-    "P_0": 0.6, "Q_0": 0.1, "v_0": 1.02, "theta_0": 0.5, "f_n": 60.0, "RL": 0.01, "XL": 0.12, "mp": 0.02, "mq": 0.07,
-    "kpv": 0.4, "kiv": 4.0, "kppmax": 0.03, "kipmax": 0.2, "kpqmax": 0.2, "kiqmax": 9.0, "TPf": 0.02, "TQf": 0.03,
-    "TVf": 0.04, "TIf": 0.005, "Pmax": 0.65, "Pmin": 0.55, "Qmax": 0.2, "Qmin": 0.05, "Emax": 1.2, "Emin": 0.9,
-    "ImaxF": 1.2, "delta_Pref": 0.02, "delta_Qref": 0.03, "delta_Vref": -0.01,
-}  # fmt: skip
+    "P_0": 0.6,
+    "Q_0": 0.1,
+    "v_0": 1.02,
+    "theta_0": 0.5,
+    "f_n": 60.0,
+    "RL": 0.01,
+    "XL": 0.12,
+    "mp": 0.02,
+    "mq": 0.07,
+    "kpv": 0.4,
+    "kiv": 4.0,
+    "kppmax": 0.03,
+    "kipmax": 0.2,
+    "kpqmax": 0.2,
+    "kiqmax": 9.0,
+    "TPf": 0.02,
+    "TQf": 0.03,
+    "TVf": 0.04,
+    "TIf": 0.005,
+    "Pmax": 0.65,
+    "Pmin": 0.55,
+    "Qmax": 0.2,
+    "Qmin": 0.05,
+    "Emax": 1.2,
+    "Emin": 0.9,
+    "ImaxF": 1.2,
+    "delta_Pref": 0.02,
+    "delta_Qref": 0.03,
+    "delta_Vref": -0.01,
+}
 
 
 def by_hand(p, x, v):
@@ -32,7 +57,11 @@ def by_hand(p, x, v):
         return min(kp * above + down, 0.0) + max(kp * below + up, 0.0)
 
     rates = {}
-    omega = 1 + p["mp"] * (p["Pref"] + p["delta_Pref"] - x["Pf"]) + beyond("P", p["kppmax"], p["kipmax"])
+    omega = (
+        1
+        + p["mp"] * (p["Pref"] + p["delta_Pref"] - x["Pf"])
+        + beyond("P", p["kppmax"], p["kipmax"])
+    )
     command = p["Vref"] + p["delta_Vref"] + p["mq"] * (p["Qref"] + p["delta_Qref"] - x["Qf"])
     command += beyond("Q", p["kpqmax"], p["kiqmax"])
     error = command - x["Vf"]
@@ -48,7 +77,12 @@ def by_hand(p, x, v):
         rates[f"{name}f"] = (now - x[f"{name}f"]) / p[f"T{name}f"]
     rates["delta_droop"] = omega_b * (omega - 1)
     rates |= {"V_seen_re": (bus - seen).real / p["TIf"], "V_seen_im": (bus - seen).imag / p["TIf"]}
-    return rates, {"omega": omega, "E_droop": E, "I": abs(i), "fault_current": abs(wanted) / p["ImaxF"]}
+    return rates, {
+        "omega": omega,
+        "E_droop": E,
+        "I": abs(i),
+        "fault_current": abs(wanted) / p["ImaxF"],
+    }
 
 
 @pytest.mark.parametrize("controlled", [1, 0])
@@ -72,7 +106,10 @@ def test_every_rate_and_output_is_that_of_the_specification_written_by_hand(size
 
 @pytest.mark.parametrize("controlled", [1, 0])
 def test_the_power_flow_is_a_steady_state(controlled):
-    device = Evaluated(build_model(NAME), {"P_0": 0.4, "Q_0": -0.2, "v_0": 1.04, "theta_0": 2.0, "VFlag": controlled})
+    device = Evaluated(
+        build_model(NAME),
+        {"P_0": 0.4, "Q_0": -0.2, "v_0": 1.04, "theta_0": 2.0, "VFlag": controlled},
+    )
     v = 1.04 * exp(2j)
     assert max(map(abs, device.rates([v.real, v.imag]).values())) < 1e-12
     found = device.outputs([v.real, v.imag])
@@ -96,18 +133,26 @@ def settled(path, seconds, *watched, turning=0.0, v=1.0, **values):
 
 @pytest.mark.parametrize("deviation", [-0.002, 0.003])
 def test_the_droop_gives_power_by_the_grids_frequency(deviation, fmu_path):
-    found = settled(fmu_path(NAME), 3.0, "p", "omega", turning=2 * np.pi * 50 * deviation, P_0=0.5, mp=0.02)
+    found = settled(
+        fmu_path(NAME), 3.0, "p", "omega", turning=2 * np.pi * 50 * deviation, P_0=0.5, mp=0.02
+    )
     assert found["p"] == pytest.approx(0.5 - deviation / 0.02, abs=1e-3)
     assert found["omega"] == pytest.approx(1 + deviation, abs=3e-6)
 
 
 @pytest.mark.parametrize(("deviation", "limit"), [(-0.004, 0.8), (0.004, 0.3)])
-def test_the_limits_of_active_power_hold_it_where_the_droop_would_leave_them(deviation, limit, fmu_path):
+def test_the_limits_of_active_power_hold_it_where_the_droop_would_leave_them(
+    deviation, limit, fmu_path
+):
     values = {"P_0": 0.5, "mp": 0.01, "Pmax": 0.8, "Pmin": 0.3}
-    found = settled(fmu_path(NAME), 6.0, "p", "x_Pmax", "x_Pmin", turning=2 * np.pi * 50 * deviation, **values)
+    found = settled(
+        fmu_path(NAME), 6.0, "p", "x_Pmax", "x_Pmin", turning=2 * np.pi * 50 * deviation, **values
+    )
     assert found["p"] == pytest.approx(limit, abs=1e-3)
     # The integrator carries what the droop would give: 1 + mp·(Pref − P) + x is the grid's frequency.
-    assert found["x_Pmax"] + found["x_Pmin"] == pytest.approx(deviation - 0.01 * (0.5 - limit), abs=2e-5)
+    assert found["x_Pmax"] + found["x_Pmin"] == pytest.approx(
+        deviation - 0.01 * (0.5 - limit), abs=2e-5
+    )
 
 
 @pytest.mark.parametrize(("v", "q"), [(0.99, 0.2), (1.01, -0.2), (0.96, 0.44), (1.04, -0.44)])
@@ -127,7 +172,11 @@ def test_in_a_fault_the_current_stays_within_its_limit_and_keeps_its_direction(v
 
 @pytest.mark.parametrize(
     ("values", "text"),
-    [({"P_0": 1.1}, "Pmax: lower P_0"), ({"Q_0": 0.5}, "Qmax: lower Q_0"), ({"P_0": 0.5, "ImaxF": 0.4}, "ImaxF")],
+    [
+        ({"P_0": 1.1}, "Pmax: lower P_0"),
+        ({"Q_0": 0.5}, "Qmax: lower Q_0"),
+        ({"P_0": 0.5, "ImaxF": 0.4}, "ImaxF"),
+    ],
 )
 def test_a_dispatch_beyond_a_limit_is_refused(values, text, fmu_path):
     with pytest.raises(Exception, match=text):

@@ -15,8 +15,13 @@ R, X, X_C = 0.01, 0.2, 0.08
 
 def network(**more):
     line = Line("ab", "a", "b", X=X, R=R, **({"X_C": X_C} | more))
-    return Network("compensated", ("a", "b"), (line,), (Load("l", "a", 200.0), Load("m", "b", 500.0)),
-                   (Port("unit", "a"),))  # fmt: skip
+    return Network(
+        "compensated",
+        ("a", "b"),
+        (line,),
+        (Load("l", "a", 200.0), Load("m", "b", 500.0)),
+        (Port("unit", "a"),),
+    )
 
 
 @pytest.mark.parametrize("frequency", [0.5, 18.4, 31.6, 70.0])
@@ -49,8 +54,14 @@ def test_it_starts_in_steady_state_and_the_phasor_network_agrees(charging):
 @pytest.mark.parametrize("charging", [0.0, 0.3])
 def test_its_voltage_fades_where_the_line_opens(charging):
     names = ("ab.v_C_re", "ab.v_C_im", "ab.i_re", "ab.i_im")
-    rows = stepped(grid(network(B=charging)), {"unit.i_re": 7.0, "unit.i_im": 0.0}, 0.3, names, None,
-                   {2000: {"ab.connected": False}})  # fmt: skip
+    rows = stepped(
+        grid(network(B=charging)),
+        {"unit.i_re": 7.0, "unit.i_im": 0.0},
+        0.3,
+        names,
+        None,
+        {2000: {"ab.connected": False}},
+    )
     v, i = (np.abs(x) for x in phasors(rows, names, "ab.v_C", "ab.i"))
     assert v[1999] == pytest.approx(X_C * i[1999], rel=1e-3)
     assert v[2010] == pytest.approx(v[2000] / np.e, rel=1e-2)
@@ -59,7 +70,10 @@ def test_its_voltage_fades_where_the_line_opens(charging):
 
 @pytest.mark.parametrize("X_C", [-0.1, 0.2, 0.3])
 def test_what_it_cannot_be(X_C):
-    with pytest.raises(ValueError, match=r"'ab' has the series capacitor X_C = .* must not be negative, and be less"):
+    with pytest.raises(
+        ValueError,
+        match=r"'ab' has the series capacitor X_C = .* must not be negative, and be less",
+    ):
         network(X_C=X_C)
 
 

@@ -13,7 +13,10 @@ from tests.support.jacobians import jacobians
 def response(frequency):
     """Gains from speed and from power to the signal, from the model's own linear equations."""
     m = ModelBuilder("alone", "The stabiliser alone")
-    speed, power = m.input("speed", "pu", "w − 1", base="f_n"), m.input("power", "pu", "P_e", base="S_n", start=0.9)
+    speed, power = (
+        m.input("speed", "pu", "w − 1", base="f_n"),
+        m.input("power", "pu", "P_e", base="S_n", start=0.9),
+    )
     m.output("v_s", pss2a(m, speed, power, Expr(0.9)), "pu", "Signal", base="S_n")
     model = m.build()
     p = np.array([float(v.start) for v in model.parameters])
@@ -48,11 +51,18 @@ def test_the_generator_stands_still_with_it_and_it_can_be_switched_off():
     p[names.index("pss.enabled")] = 0.0
     x_moved = np.array(x).ravel()
     x_moved[[s.name for s in model.states].index("machine.omega")] += 1e-3
-    own = dict(zip((s.name for s in model.states),
-                   np.array(model.derivatives(x_moved, np.array([1.0, 0.0]), p, c)).ravel(), strict=True))  # fmt: skip
+    own = dict(
+        zip(
+            (s.name for s in model.states),
+            np.array(model.derivatives(x_moved, np.array([1.0, 0.0]), p, c)).ravel(),
+            strict=True,
+        )
+    )
     p_plain = np.array([p[names.index(v.name)] for v in plain.parameters])
     c_plain, _ = plain.initialise(p_plain)
-    x_plain = np.array([x_moved[[s.name for s in model.states].index(s.name)] for s in plain.states])
+    x_plain = np.array(
+        [x_moved[[s.name for s in model.states].index(s.name)] for s in plain.states]
+    )
     rates = np.array(plain.derivatives(x_plain, np.array([1.0, 0.0]), p_plain, c_plain)).ravel()
     for state, rate in zip(plain.states, rates, strict=True):
         assert own[state.name] == pytest.approx(rate, rel=1e-12, abs=1e-12)

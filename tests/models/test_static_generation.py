@@ -20,8 +20,12 @@ def test_the_equations_written_by_hand():
     wanted = i_0 * exp(0.3j)
     states = {"i_x": i.real, "i_y": i.imag, "turning_x": r.real, "turning_y": r.imag}
     found = device.rates([v.real, v.imag], device.vector(states))
-    assert complex(found["i_x"], found["i_y"]) == pytest.approx(2 * OMEGA_0 * (wanted - i) + OMEGA_0 * r, rel=1e-12)
-    assert complex(found["turning_x"], found["turning_y"]) == pytest.approx(OMEGA_0 * (wanted - i), rel=1e-12)
+    assert complex(found["i_x"], found["i_y"]) == pytest.approx(
+        2 * OMEGA_0 * (wanted - i) + OMEGA_0 * r, rel=1e-12
+    )
+    assert complex(found["turning_x"], found["turning_y"]) == pytest.approx(
+        OMEGA_0 * (wanted - i), rel=1e-12
+    )
     assert max(map(abs, device.rates([START.real, START.imag]).values())) < 1e-12
 
 

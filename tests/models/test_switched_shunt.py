@@ -15,7 +15,14 @@ OFF, ON = 200, 1200
 def network(b_mvar):
     shunt = Shunt("bank", "b", g_mw=30.0, b_mvar=b_mvar, switched=True)
     line = Line("ab", "a", "b", X=0.1, R=0.01, B=0.1)
-    return Network("bay", ("a", "b"), (line,), (Load("town", "a", 200.0, 50.0),), (Port("unit", "a"),), (shunt,))
+    return Network(
+        "bay",
+        ("a", "b"),
+        (line,),
+        (Load("town", "a", 200.0, 50.0),),
+        (Port("unit", "a"),),
+        (shunt,),
+    )
 
 
 def admittance(b_mvar, connected):
@@ -23,7 +30,10 @@ def admittance(b_mvar, connected):
     y = 1 / complex(0.01, 0.1)
     share = 1.0 if connected else (1e-3 if b_mvar > 0 else 0.0)
     return np.array(
-        [[y + 0.05j + 2.0 - 0.5j, -y], [-y, y + 0.05j + (0.3 if connected else 0.0) + 1j * share * b_mvar / 100]]
+        [
+            [y + 0.05j + 2.0 - 0.5j, -y],
+            [-y, y + 0.05j + (0.3 if connected else 0.0) + 1j * share * b_mvar / 100],
+        ]
     )
 
 
@@ -32,9 +42,13 @@ def test_the_network_settles_on_the_admittances(b_mvar):
     names = ("b.v_re", "b.v_im")
     i = 2.5 - 0.4j
     rows = stepped(
-        grid(network(b_mvar)), {"unit.i_re": i.real, "unit.i_im": i.imag}, 0.4, names, None,
+        grid(network(b_mvar)),
+        {"unit.i_re": i.real, "unit.i_im": i.imag},
+        0.4,
+        names,
+        None,
         {OFF: {"bank.connected": False}, ON: {"bank.connected": True}},
-    )  # fmt: skip
+    )
     (v,) = phasors(rows, names, "b.v")
     for step, connected in ((ON - 1, False), (len(v) - 1, True)):
         wanted = np.linalg.solve(admittance(b_mvar, connected), [i, 0.0])[1]
@@ -48,6 +62,9 @@ def test_native_and_python_backed_fmus_give_the_same_bits(make, b_mvar):
     values = {v.name: 1.0 for v in model.inputs}
     names = [v.name for v in (*model.states, *model.outputs)]
     changes = {20: {"bank.connected": False}, 60: {"bank.connected": True}}
-    one, other = (stepped(model, values, 0.01, names, None, changes, native=native) for native in (True, False))
+    one, other = (
+        stepped(model, values, 0.01, names, None, changes, native=native)
+        for native in (True, False)
+    )
     assert are_the_same(one, other, model)
     assert not np.array_equal(one[19], one[59])

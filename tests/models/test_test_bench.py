@@ -8,7 +8,16 @@ import pytest
 from fmus.toolchain.catalogue import build_model
 from tests.support.evaluated import Evaluated
 
-VALUES = {"P_0": 0.7, "Q_0": 0.1, "X_0": 0.3, "R_0": 0.05, "B": 0.05, "load.P": 50.0, "load.Q": 20.0, "f_n": 60.0}
+VALUES = {
+    "P_0": 0.7,
+    "Q_0": 0.1,
+    "X_0": 0.3,
+    "R_0": 0.05,
+    "B": 0.05,
+    "load.P": 50.0,
+    "load.Q": 20.0,
+    "f_n": 60.0,
+}
 OMEGA = 120 * np.pi
 
 
@@ -32,7 +41,8 @@ def test_the_source_behind_its_impedance_written_by_hand(jump):
     device = bench(**{"source.jump": jump, "source.factor": 0.8, "X_factor": 2.0, "R_factor": 3.0})
     i, v = 0.3 + 0.2j, 0.9 + 0.1j
     state = device.vector(
-        device.states | {"line.i_re": i.real, "line.i_im": i.imag, "bus.v_re": v.real, "bus.v_im": v.imag}
+        device.states
+        | {"line.i_re": i.real, "line.i_im": i.imag, "bus.v_re": v.real, "bus.v_im": v.imag}
     )
     found = device.rates(injected(0j), state)
     rate = OMEGA / 0.6 * (e - v - (0.15 + 0.6j) * i)
@@ -50,7 +60,9 @@ def test_a_fault_and_the_duplicate_act_at_the_bus():
 
 def test_the_current_fades_behind_an_open_breaker():
     device = bench(**{"source.connected": 0.0})
-    found = device.rates(injected(0j), device.vector(device.states | {"line.i_re": 0.4, "line.i_im": -0.3}))
+    found = device.rates(
+        injected(0j), device.vector(device.states | {"line.i_re": 0.4, "line.i_im": -0.3})
+    )
     assert (found["line.i_re"], found["line.i_im"]) == pytest.approx((-400.0, 300.0), rel=1e-9)
 
 

@@ -18,7 +18,9 @@ G = (2.0, 3.0, 1.5)
 def network(transformer=None):
     transformer = transformer or ThreeWinding("t", ("a", "b", "c"), X, R, TAP, SHIFT)
     loads = tuple(Load(f"load_{bus}", bus, 100 * g) for bus, g in zip("abc", G, strict=True))
-    return Network("three", ("a", "b", "c"), (), loads, (Port("unit", "a"),), transformers=(transformer,))
+    return Network(
+        "three", ("a", "b", "c"), (), loads, (Port("unit", "a"),), transformers=(transformer,)
+    )
 
 
 def admittances(s=0.0):
@@ -45,7 +47,9 @@ def test_the_phasor_network_has_the_same_admittances():
     power = v * (admittances() @ v).conjugate()
     for k, bus in enumerate("abc"):
         assert complex(y[f"{bus}.v_re"], y[f"{bus}.v_im"]) == pytest.approx(v[k], rel=1e-12)
-        assert complex(y[f"t.winding_{k + 1}.p"], y[f"t.winding_{k + 1}.q"]) == pytest.approx(power[k], rel=1e-10)
+        assert complex(y[f"t.winding_{k + 1}.p"], y[f"t.winding_{k + 1}.q"]) == pytest.approx(
+            power[k], rel=1e-10
+        )
 
 
 def test_it_starts_with_the_currents_of_the_power_flow():
@@ -54,13 +58,21 @@ def test_it_starts_with_the_currents_of_the_power_flow():
     drawn = admittances() @ v
     at = Evaluated(grid(network()), start).states
     for k, t in ((0, TAP[0]), (1, TAP[1])):
-        assert complex(at[f"t.i_re_{k + 1}"], at[f"t.i_im_{k + 1}"]) == pytest.approx(drawn[k] * t, rel=1e-10)
+        assert complex(at[f"t.i_re_{k + 1}"], at[f"t.i_im_{k + 1}"]) == pytest.approx(
+            drawn[k] * t, rel=1e-10
+        )
 
 
 def test_it_opens():
     names = ("b.v_re", "b.v_im")
-    rows = stepped(grid(network()), {"unit.i_re": 3.0, "unit.i_im": 0.0}, 0.1, names, None,
-                   {500: {"t.connected": False}})  # fmt: skip
+    rows = stepped(
+        grid(network()),
+        {"unit.i_re": 3.0, "unit.i_im": 0.0},
+        0.1,
+        names,
+        None,
+        {500: {"t.connected": False}},
+    )
     (v,) = phasors(rows, names, "b.v")
     assert abs(v[499]) > 0.2
     assert abs(v[510]) < 0.5 * abs(v[499])

@@ -25,14 +25,21 @@ def source_of(case, *references, **further):
 
 def answer(case, *references, frequency=0.8, models=None, **further):
     inputs = {reference: sine(TIMES, frequency, 0.02) for reference in references}
-    found = locate(record(case, inputs, times=TIMES, **further), models or unit_models_of(model(case)))
+    found = locate(
+        record(case, inputs, times=TIMES, **further), models or unit_models_of(model(case))
+    )
     return at(found, frequency)
 
 
 @pytest.mark.parametrize("frequency", [0.3, 0.5817])
-@pytest.mark.parametrize("reference", ["sg1.exciter.delta_V_ref", "sg2.exciter.delta_V_ref", "gfor.droop.delta_U_ref"])
+@pytest.mark.parametrize(
+    "reference", ["sg1.exciter.delta_V_ref", "sg2.exciter.delta_V_ref", "gfor.droop.delta_U_ref"]
+)
 def test_where_energy_flow_fails_the_models_find_the_unit(reference, frequency):
-    assert source_of("two_area", reference, frequency=frequency, **NOISE) == reference.partition(".")[0]
+    assert (
+        source_of("two_area", reference, frequency=frequency, **NOISE)
+        == reference.partition(".")[0]
+    )
 
 
 @pytest.mark.parametrize(("case", "load"), [("two_area", "grid.load_3"), ("ieee39", "grid.load_4")])
@@ -42,8 +49,11 @@ def test_a_load_that_swings_is_no_unit(case, load):
 
 def test_a_unit_that_is_not_observed_is_named_with_what_stands_at_its_bus():
     half = sorted(set(model("ieee39").buses))[1::2]
-    assert source_of("ieee39", "sg33.governor.delta_P_ref", without=half, **NOISE) == "sg33 or gfor33"
-    assert source_of("two_area", "sg2.governor.delta_P_ref", without=("bus_3",)) is None  # one bus cannot tell
+    assert (
+        source_of("ieee39", "sg33.governor.delta_P_ref", without=half, **NOISE) == "sg33 or gfor33"
+    )
+    # one bus cannot tell
+    assert source_of("two_area", "sg2.governor.delta_P_ref", without=("bus_3",)) is None
 
 
 @pytest.mark.parametrize("without", [(), ("bus_30",), ("bus_37",)])
@@ -56,13 +66,22 @@ def test_two_sources_are_not_one(without):
 @pytest.mark.parametrize(("p", "q"), [(True, True), (True, False), (False, True)])
 def test_wrong_signs(unit, p, q):
     for reference in ("gfor.droop.delta_P_ref", "sg1.exciter.delta_V_ref"):
-        assert source_of("two_area", reference, change=turned(unit, p, q)) in (None, reference.partition(".")[0])
+        assert source_of("two_area", reference, change=turned(unit, p, q)) in (
+            None,
+            reference.partition(".")[0],
+        )
 
 
 def test_a_clock_that_is_off():
-    for seconds, signals in ((1e-3, ("v", "angle", "p", "q")), (1e-3, ("p", "q")), (0.03, ("angle",))):
+    for seconds, signals in (
+        (1e-3, ("v", "angle", "p", "q")),
+        (1e-3, ("p", "q")),
+        (0.03, ("angle",)),
+    ):
         for unit in ("sg1", "sg2"):
-            found = source_of("two_area", "sg1.exciter.delta_V_ref", change=late(unit, seconds, signals))
+            found = source_of(
+                "two_area", "sg1.exciter.delta_V_ref", change=late(unit, seconds, signals)
+            )
             assert found in ((None, "sg1") if seconds > 1e-3 else ("sg1",))
 
 
@@ -79,14 +98,20 @@ def worse(models, size, seed):
 
         return changed
 
-    units = {n: replace(u, admittance=off(u.admittance), reach=off(u.reach)) for n, u in models.units.items()}
+    units = {
+        n: replace(u, admittance=off(u.admittance), reach=off(u.reach))
+        for n, u in models.units.items()
+    }
     return UnitModels(units, models.buses, {name: off(load) for name, load in models.loads.items()})
 
 
 def test_models_that_are_a_fifth_off_name_no_other_unit():
     models = unit_models_of(model("two_area"))
     found = [
-        (answer("two_area", r, models=worse(models, 0.2, seed), **NOISE).drives, r.partition(".")[0])
+        (
+            answer("two_area", r, models=worse(models, 0.2, seed), **NOISE).drives,
+            r.partition(".")[0],
+        )
         for seed, r in enumerate(model("two_area").references)
     ]
     assert all(name in (None, unit) for name, unit in found)
@@ -95,7 +120,9 @@ def test_models_that_are_a_fifth_off_name_no_other_unit():
 
 def test_a_machine_at_another_operating_point_is_not_judged_by_its_model():
     models = unit_models_of(model("two_area"))
-    elsewhere = {name: replace(unit, current=1.2 * unit.current) for name, unit in models.units.items()}
+    elsewhere = {
+        name: replace(unit, current=1.2 * unit.current) for name, unit in models.units.items()
+    }
     measured = record("two_area", {"sg1.governor.delta_P_ref": sine(TIMES, 0.8, 0.02)}, times=TIMES)
     found = at(locate(measured, replace(models, units=elsewhere)), 0.8)
     own = next(o for o in found.opinions if o.method == OWN_MODEL)
@@ -121,7 +148,9 @@ def test_noise_of_a_load_that_explains_the_voltages_forces_nothing():
 
 def test_noise_alone_has_no_source():
     for name in ("two_area", "ieee39"):
-        found = locate(record(name, {}, loads=0.002, measuring=5e-5, times=TIMES), unit_models_of(model(name)))
+        found = locate(
+            record(name, {}, loads=0.002, measuring=5e-5, times=TIMES), unit_models_of(model(name))
+        )
         assert all(x.source is None for x in found)
 
 
@@ -142,11 +171,20 @@ def test_a_run_is_compared_with_the_models_of_its_own_case(run, gfor, tmp_path):
     other = gfor_api.source(run.dataset, scenario=gfor_api.load("two_area_rms").scenario("pod_p"))
     assert other.remarks[-1].endswith("what differs: the scenario ('gfor', not 'pod_p')")
     assert not any("what differs" in remark for remark in run.source().remarks)
-    assert not any("--case" in remark or "judge nothing" in remark for remark in run.source().remarks)
-    buses = run.dataset.rename({name: name.replace("sg", "place") for name in run.dataset if name.startswith("sg")})
+    assert not any(
+        "--case" in remark or "judge nothing" in remark for remark in run.source().remarks
+    )
+    buses = run.dataset.rename(
+        {name: name.replace("sg", "place") for name in run.dataset if name.startswith("sg")}
+    )
     scenario = gfor_api.load("two_area_rms").scenario("gfor")
-    remark = gfor_api.source(buses.drop_vars([n for n in buses if n.startswith("gfor")]), scenario=scenario).remarks[0]
-    assert remark == "the case's models judge nothing: no signal is named after its units, gfor, sg1, sg2"
+    remark = gfor_api.source(
+        buses.drop_vars([n for n in buses if n.startswith("gfor")]), scenario=scenario
+    ).remarks[0]
+    assert (
+        remark
+        == "the case's models judge nothing: no signal is named after its units, gfor, sg1, sg2"
+    )
     foreign = run.dataset.assign_attrs(case_file="name = 'mine'", inputs='{"mine.toml": "1a"}')
     first = gfor_api.source(foreign).remarks[0]
     assert first.endswith("the units' models decide: give --case mine.toml --scenario gfor")
@@ -155,7 +193,9 @@ def test_a_run_is_compared_with_the_models_of_its_own_case(run, gfor, tmp_path):
 def test_a_run_with_values_of_its_own_is_judged_by_models_with_them(tmp_path):
     """And beside models with other values, or of another case, the remark names what differs."""
     case = gfor_api.load("two_area_rms")
-    run = case.scenario("gfor", {"gfor.P_0": 0.3}, force="sg1.exciter.V_ref 0.8 Hz 2 %").run(stop=20.0)
+    run = case.scenario("gfor", {"gfor.P_0": 0.3}, force="sg1.exciter.V_ref 0.8 Hz 2 %").run(
+        stop=20.0
+    )
     run.save(tmp_path)
     (found,) = (sources := gfor_api.source(tmp_path / "gfor"))
     assert (found.source, sources.remarks) == ("sg1", ())
@@ -179,7 +219,9 @@ def test_a_table_of_phasors_is_compared_with_a_case(run, gfor, tmp_path):
     code, out, _ = gfor("signal", "source", file, *given, "--json")
     (one,) = json.loads(out)["oscillations"]
     assert (code, one["source"], one["methods"][0]["method"]) == (0, "SG1", OWN_MODEL)
-    code, out, _ = gfor("signal", "source", file, "--case", "kundur", "--scenario", "gfor", "--json")
+    code, out, _ = gfor(
+        "signal", "source", file, "--case", "kundur", "--scenario", "gfor", "--json"
+    )
     (other,) = json.loads(out)["oscillations"]
     assert "is not what the case has there" in other["reason"]
     assert other["methods"][-1]["applies"] is False

@@ -22,7 +22,10 @@ def at(found, frequency):
 
 
 def forced(name, reference, frequency, **further):
-    return at(locate(record(name, {reference: sine(TIMES, frequency, 0.02)}, times=TIMES, **further)), frequency)
+    return at(
+        locate(record(name, {reference: sine(TIMES, frequency, 0.02)}, times=TIMES, **further)),
+        frequency,
+    )
 
 
 @pytest.mark.parametrize("unit", ["gfor.droop", "sg1.governor", "sg2.governor"])
@@ -43,8 +46,10 @@ def test_where_energy_flow_names_the_machine_beside_the_converter_that_drives_it
 
 PAIRS = [
     ("sg33.governor.delta_P_ref", "sg37.governor.delta_P_ref", 0.9, 0.9),
-    ("sg39.exciter.delta_V_ref", "sg33.governor.delta_P_ref", 1.25, 1.25),  # without a case, one alone leads
-    ("gfor37.droop.delta_U_ref", "sg33.governor.delta_P_ref", 0.722, 0.722),  # both at the mode of the areas
+    # without a case, one alone leads
+    ("sg39.exciter.delta_V_ref", "sg33.governor.delta_P_ref", 1.25, 1.25),
+    # both at the mode of the areas
+    ("gfor37.droop.delta_U_ref", "sg33.governor.delta_P_ref", 0.722, 0.722),
     ("sg33.governor.delta_P_ref", "gfor37.droop.delta_P_ref", 0.722, 1.1),  # one at the mode
 ]
 
@@ -52,8 +57,13 @@ PAIRS = [
 @pytest.mark.parametrize(("one", "other", "f_one", "f_other"), PAIRS)
 def test_two_sources(one, other, f_one, f_other):
     """Of one frequency neither is the source, with the units' models or without; of two frequencies each is."""
-    measured = record("ieee39", {one: sine(TIMES, f_one, 0.02), other: sine(TIMES, f_other, 0.02)}, times=TIMES,
-                      loads=5e-4, measuring=5e-5)  # fmt: skip
+    measured = record(
+        "ieee39",
+        {one: sine(TIMES, f_one, 0.02), other: sine(TIMES, f_other, 0.02)},
+        times=TIMES,
+        loads=5e-4,
+        measuring=5e-5,
+    )
     plain, known = locate(measured), locate(measured, unit_models_of(model("ieee39")))
     units = [reference.partition(".")[0] for reference in (one, other)]
     assert all(x.source is None for x in plain)
@@ -67,7 +77,8 @@ def test_two_sources(one, other, f_one, f_other):
 
 
 @pytest.mark.parametrize(
-    "reference", ["sg35.governor.delta_P_ref", "gfor35.droop.delta_U_ref", "sg35.exciter.delta_V_ref"]
+    "reference",
+    ["sg35.governor.delta_P_ref", "gfor35.droop.delta_U_ref", "sg35.exciter.delta_V_ref"],
 )
 @pytest.mark.parametrize("frequency", [0.4, 0.722])
 def test_a_source_at_a_bus_that_is_not_observed(reference, frequency):
@@ -78,7 +89,8 @@ def test_a_source_at_a_bus_that_is_not_observed(reference, frequency):
 def turned(unit, p=True, q=True):
     def change(places):
         return [
-            replace(x, p=-x.p if p else x.p, q=-x.q if q else x.q) if unit in (x.name, "all") else x for x in places
+            replace(x, p=-x.p if p else x.p, q=-x.q if q else x.q) if unit in (x.name, "all") else x
+            for x in places
         ]
 
     return change
@@ -107,7 +119,10 @@ def late(unit, seconds, signals=("v", "angle", "p", "q")):
         def moved(x):
             return np.interp(TIMES - seconds, TIMES, x)
 
-        return [replace(x, **{s: moved(getattr(x, s)) for s in signals}) if x.name == unit else x for x in places]
+        return [
+            replace(x, **{s: moved(getattr(x, s)) for s in signals}) if x.name == unit else x
+            for x in places
+        ]
 
     return change
 
@@ -128,7 +143,10 @@ def test_a_clock_that_is_off_between_voltages_and_currents():
         return [replace(x, p=s.real, q=s.imag) for x, s in zip(places, power, strict=True)]
 
     for reference in ("sg1.governor.delta_P_ref", "sg2.governor.delta_P_ref"):
-        assert forced("two_area", reference, 0.8, change=change).drives in (None, reference.split(".")[0])
+        assert forced("two_area", reference, 0.8, change=change).drives in (
+            None,
+            reference.split(".")[0],
+        )
 
 
 def test_leakage_of_the_line_frequency():
@@ -136,7 +154,14 @@ def test_leakage_of_the_line_frequency():
         hum = 0.02 * np.sin(2 * np.pi * 49.97 * TIMES)  # aliased: samples are 30 a second
         return [replace(x, p=x.p + hum, v=x.v + 0.1 * hum) for x in places]
 
-    found = locate(record("two_area", {"sg1.governor.delta_P_ref": sine(TIMES, 0.8, 0.02)}, times=TIMES, change=change))
+    found = locate(
+        record(
+            "two_area",
+            {"sg1.governor.delta_P_ref": sine(TIMES, 0.8, 0.02)},
+            times=TIMES,
+            change=change,
+        )
+    )
     assert at(found, 0.8).drives == "sg1"
     assert {x.drives for x in found} <= {None, "sg1"}
 
@@ -148,12 +173,22 @@ def test_leakage_that_looks_like_a_swing(who):
     def change(phase, places):
         hum = [np.sin(2 * np.pi * 60.4 * TIMES + a) for a in phase]
         return [
-            replace(x, p=x.p + 0.1 * hum[0], q=x.q + 0.02 * hum[1], v=x.v + hum[2] / 500, angle=x.angle + hum[3] / 500)
-            if who in ("all", x.name) else x for x in places
-        ]  # fmt: skip
+            replace(
+                x,
+                p=x.p + 0.1 * hum[0],
+                q=x.q + 0.02 * hum[1],
+                v=x.v + hum[2] / 500,
+                angle=x.angle + hum[3] / 500,
+            )
+            if who in ("all", x.name)
+            else x
+            for x in places
+        ]
 
     for phase in ((0.0, 0.0, 0.0, 0.0), (1.0, 2.0, 3.0, 2.5), (4.0, 0.5, 5.5, 2.0)):
-        measured = record("two_area", {}, times=TIMES, loads=5e-4, measuring=5e-5, change=partial(change, phase))
+        measured = record(
+            "two_area", {}, times=TIMES, loads=5e-4, measuring=5e-5, change=partial(change, phase)
+        )
         for models in (None, unit_models_of(model("two_area"))):
             found = at(locate(measured, models), 0.4)
             assert (found.drives, found.source) == (None, None)
@@ -182,14 +217,19 @@ def missing(rows, unit=None):
 def test_missing_samples_are_bridged_or_the_place_is_left_out():
     few = np.random.default_rng(3).choice(len(TIMES), 40, replace=False)
     measured = record(
-        "two_area", {"sg1.governor.delta_P_ref": sine(TIMES, 0.8, 0.02)}, change=missing(few), times=TIMES
+        "two_area",
+        {"sg1.governor.delta_P_ref": sine(TIMES, 0.8, 0.02)},
+        change=missing(few),
+        times=TIMES,
     )
     assert at(locate(measured), 0.8).drives == "sg1"
     assert any("interpolated" in text for text in measured.remarks)
     gone = record(
-        "two_area", {"sg1.governor.delta_P_ref": sine(TIMES, 0.8, 0.02)}, change=missing(slice(600, 700), "sg1"),
+        "two_area",
+        {"sg1.governor.delta_P_ref": sine(TIMES, 0.8, 0.02)},
+        change=missing(slice(600, 700), "sg1"),
         times=TIMES,
-    )  # fmt: skip
+    )
     assert any("sg1 is left out" in text for text in gone.remarks)
     assert at(locate(gone), 0.8).drives is None
 
@@ -197,13 +237,19 @@ def test_missing_samples_are_bridged_or_the_place_is_left_out():
 def test_missing_rows_cut_the_record_and_doubled_times_count_once():
     whole = record("two_area", {"sg1.governor.delta_P_ref": sine(TIMES, 0.8, 0.02)}, times=TIMES)
     keep = np.r_[0:200, 260:1500]
-    places = [replace(x, **{s: getattr(x, s)[keep] for s in ("v", "angle", "p", "q")}) for x in whole.places]
+    places = [
+        replace(x, **{s: getattr(x, s)[keep] for s in ("v", "angle", "p", "q")})
+        for x in whole.places
+    ]
     cut = made_ready("cut", TIMES[keep], places)
     assert any("rows are missing" in text for text in cut.remarks)
     assert cut.times[0] == TIMES[260]
     assert at(locate(cut), 0.8).drives == "sg1"
     twice = np.sort(np.r_[0:1500, 300])
-    places = [replace(x, **{s: getattr(x, s)[twice] for s in ("v", "angle", "p", "q")}) for x in whole.places]
+    places = [
+        replace(x, **{s: getattr(x, s)[twice] for s in ("v", "angle", "p", "q")})
+        for x in whole.places
+    ]
     doubled = made_ready("twice", TIMES[twice], places)
     assert len(doubled.times) == 1500
     assert any("1 times are written twice" in text for text in doubled.remarks)
@@ -216,7 +262,18 @@ def test_a_load_of_constant_power_is_no_source():
 
     def change(places):
         x = places[0]
-        return [*places, Site("load", "unit", x.bus, x.v, x.angle, np.full(len(x.v), -5.0), np.full(len(x.v), -1.0))]
+        return [
+            *places,
+            Site(
+                "load",
+                "unit",
+                x.bus,
+                x.v,
+                x.angle,
+                np.full(len(x.v), -5.0),
+                np.full(len(x.v), -1.0),
+            ),
+        ]
 
     for reference in ("sg1.governor.delta_P_ref", "gfor.droop.delta_P_ref"):
         assert forced("two_area", reference, 0.8, change=change).drives == reference.split(".")[0]
@@ -266,7 +323,15 @@ def test_a_mode_without_damping_after_a_step_is_not_called_forced():
     step = 0.08 * (t >= 10)
     noise = 1e-4 * np.random.default_rng(1).standard_normal((2, len(t)))
     places = [
-        Site("sg1", "unit", "a", 1 + 0.01 * ring, 0.1 * ring, 5 + ring + step + noise[0], 1 + 0.1 * ring),
+        Site(
+            "sg1",
+            "unit",
+            "a",
+            1 + 0.01 * ring,
+            0.1 * ring,
+            5 + ring + step + noise[0],
+            1 + 0.1 * ring,
+        ),
         Site("sg2", "unit", "b", 1 - 0.01 * ring, -0.1 * ring, 5 - ring + noise[1], 1 - 0.1 * ring),
     ]
     assert at(locate(made_ready("ring", t, places)), 0.6).evidence.kind == "not known"
@@ -294,14 +359,17 @@ def test_what_swells_and_fades_again_is_no_mode():
 def test_two_forcings_at_close_frequencies_beat_and_are_no_mode():
     t = times_of(60.0)
     beat = sine(t, 0.7, 0.02) + sine(t, 0.725, 0.016)
-    measured = record("two_area", {"gfor.droop.delta_P_ref": beat}, times=t, loads=5e-4, measuring=5e-5)
+    measured = record(
+        "two_area", {"gfor.droop.delta_P_ref": beat}, times=t, loads=5e-4, measuring=5e-5
+    )
     found = at(locate(measured), 0.7)
     assert found.evidence.kind == "not known"
     assert "two steady sines" in found.reason
 
 
 @pytest.mark.parametrize(
-    "sines", [{0.7: 0.02, 0.75: 0.02}, {0.7: 0.02, 0.712: 0.012}, {0.68: 0.015, 0.7: 0.015, 0.725: 0.015}]
+    "sines",
+    [{0.7: 0.02, 0.75: 0.02}, {0.7: 0.02, 0.712: 0.012}, {0.68: 0.015, 0.7: 0.015, 0.725: 0.015}],
 )
 def test_forcings_at_close_frequencies_in_several_units_are_no_mode(sines):
     """The phase of each between the units is its own, so that no signal beats as another does."""
@@ -310,25 +378,51 @@ def test_forcings_at_close_frequencies_in_several_units_are_no_mode(sines):
     places = []
     for k, name in enumerate(("sg1", "sg2", "sg3")):
         parts = [
-            rng.uniform(0.5, 1.0) * a * np.exp(2j * np.pi * (f * t + 0.3 * rng.uniform())) for f, a in sines.items()
+            rng.uniform(0.5, 1.0) * a * np.exp(2j * np.pi * (f * t + 0.3 * rng.uniform()))
+            for f, a in sines.items()
         ]
         x = sum(parts)
         places.append(
-            Site(name, "unit", f"bus {name}", 1 + 0.01 * x.real, 0.1 * x.imag, 5 + x.real + noise[k], 1 + 0.1 * x.real)
+            Site(
+                name,
+                "unit",
+                f"bus {name}",
+                1 + 0.01 * x.real,
+                0.1 * x.imag,
+                5 + x.real + noise[k],
+                1 + 0.1 * x.real,
+            )
         )
     found = locate(made_ready("close", t, places))
     assert {one.evidence.kind for one in found} == {"not known"}
     assert all(one.source is None for one in found)
 
 
-CLOSE = {  # frequency [Hz], rate [1/s], amplitude, phase; the kind of the line at the first, and what its reason says
-    "two modes": ([(0.486, -0.0178, 0.0171, 2.47), (0.552, -0.0313, 0.006, 4.24)], 30, "0.486, 0.552 Hz"),
-    "a sine beside a mode": ([(1.1952, 0, 0.0097, 5.74), (1.2252, -0.1336, 0.0188, 3.84)], 40, "1.195, 1.225 Hz"),
-    "three sines": ([(1.2966, 0, 0.0074, 5.09), (1.2604, 0, 0.0071, 2.85), (1.2275, 0, 0.015, 1.23)], 60,
-                    "1.227, 1.260, 1.297 Hz"),
-    "two sines": ([(0.6025, 0, 0, 0), (0.6, 0, 0.02, 0), (0.605, 0, 0.02, 1.5)], 60, "(0.600, 0.605 Hz)"),
+# frequency [Hz], rate [1/s], amplitude, phase; the kind of the line at the first, and what its
+# reason says
+CLOSE = {
+    "two modes": (
+        [(0.486, -0.0178, 0.0171, 2.47), (0.552, -0.0313, 0.006, 4.24)],
+        30,
+        "0.486, 0.552 Hz",
+    ),
+    "a sine beside a mode": (
+        [(1.1952, 0, 0.0097, 5.74), (1.2252, -0.1336, 0.0188, 3.84)],
+        40,
+        "1.195, 1.225 Hz",
+    ),
+    "three sines": (
+        [(1.2966, 0, 0.0074, 5.09), (1.2604, 0, 0.0071, 2.85), (1.2275, 0, 0.015, 1.23)],
+        60,
+        "1.227, 1.260, 1.297 Hz",
+    ),
+    "two sines": (
+        [(0.6025, 0, 0, 0), (0.6, 0, 0.02, 0), (0.605, 0, 0.02, 1.5)],
+        60,
+        "(0.600, 0.605 Hz)",
+    ),
     "a sine and the mode that it excited": ([(0.8, 0, 0.02, 0), (0.745, -0.2, 0.006, 2)], 60, None),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", CLOSE)
@@ -337,9 +431,13 @@ def test_what_a_line_is_beside_its_close_neighbours(name):
     t, places = np.arange(0, length, 0.04), []
     noise = 1e-6 * np.random.default_rng(1).standard_normal((3, 4, len(t)))
     for unit, size, own in zip("ABC", (1.0, 0.5, -0.8), noise, strict=True):
-        z = size * sum(a * np.exp((rate + 2j * np.pi * f) * t + 1j * phase) for f, rate, a, phase in parts)
+        z = size * sum(
+            a * np.exp((rate + 2j * np.pi * f) * t + 1j * phase) for f, rate, a, phase in parts
+        )
         shown = own + np.array([0.2 * z.real, 0.3 * z.imag, z.real, 0.4 * (z * np.exp(1j)).real])
-        places.append(Site(unit, "unit", unit, 1 + shown[0], shown[1], 3 + shown[2], 0.5 + shown[3]))
+        places.append(
+            Site(unit, "unit", unit, 1 + shown[0], shown[1], 3 + shown[2], 0.5 + shown[3])
+        )
     evidence = at(locate(made_ready(name, t, places)), parts[0][0]).evidence
     assert evidence.kind == ("not known" if said else "forced")
     assert said is None or said in evidence.reasons[0]
@@ -353,7 +451,9 @@ def test_noise_of_loads_alone_forces_nothing():
 
 def test_a_square_has_its_odd_multiples():
     t = TIMES
-    measured = record("two_area", {"gfor.droop.delta_P_ref": sine(t, 0.4, 0.02, shape="square")}, times=t)
+    measured = record(
+        "two_area", {"gfor.droop.delta_P_ref": sine(t, 0.4, 0.02, shape="square")}, times=t
+    )
     found = at(locate(measured), 0.4)
     assert 3 in found.found.harmonics
     assert found.evidence.kind == "forced"
@@ -371,4 +471,7 @@ def test_loads_wander_with_the_deviation_that_was_asked_for():
 
 
 def test_the_two_physical_methods_have_names():
-    assert {o.method for o in forced("two_area", "sg1.governor.delta_P_ref", 0.8).opinions} >= {DEF, QV_PHASE}
+    assert {o.method for o in forced("two_area", "sg1.governor.delta_P_ref", 0.8).opinions} >= {
+        DEF,
+        QV_PHASE,
+    }

@@ -22,13 +22,21 @@ def measured():
     return record("two_area", {"sg1.governor.delta_P_ref": sine(TIMES, 0.8, 0.02)}, times=TIMES)
 
 
-def csv(path, measured, *, units=("pu", "deg", "MW", "Mvar"), scale=(1, 57.29577951308232, 100, 100)):
+def csv(
+    path, measured, *, units=("pu", "deg", "MW", "Mvar"), scale=(1, 57.29577951308232, 100, 100)
+):
     columns = {"time [s]": measured.times}
     for place in measured.places:
         signals = {"vm": "v", "va": "angle", "p": "p", "q": "q"}
         for (what, signal), unit, factor in zip(signals.items(), units, scale, strict=True):
             columns[f"{place.name}.{what} [{unit}]"] = factor * getattr(place, signal)
-    np.savetxt(path, np.column_stack(list(columns.values())), delimiter=",", header=",".join(columns), comments="")
+    np.savetxt(
+        path,
+        np.column_stack(list(columns.values())),
+        delimiter=",",
+        header=",".join(columns),
+        comments="",
+    )
     return path
 
 
@@ -41,22 +49,36 @@ def test_phasors_in_csv(gfor, tmp_path, measured):
     assert one["kind"] == "forced"
     assert one["frequency_hz"] == pytest.approx(0.8, abs=2e-3)
     assert {m["method"] for m in one["methods"]} == {
-        "dissipating energy flow", "dynamic-mode participation", "Q-V phase"
-    }  # fmt: skip
+        "dissipating energy flow",
+        "dynamic-mode participation",
+        "Q-V phase",
+    }
 
 
 def test_the_page_shows_where_energy_flows(gfor, tmp_path, measured):
     """A line is an arrow from the bus that feeds to the one beyond, whichever way it was measured."""
     fed = next(x for x in measured.places if x.name == "sg1")
-    for sign in (1, -1):  # all that sg1 feeds leaves its bus; the other way round, all comes from beyond
-        away = Site("line", "branch", fed.bus, fed.v, fed.angle, -sign * fed.p, -sign * fed.q, "<beyond>")
-        page = Sources(replaced := replace(measured, places=(*measured.places, away)), locate(replaced)).html()
+    for sign in (
+        1,
+        -1,
+    ):  # all that sg1 feeds leaves its bus; the other way round, all comes from beyond
+        away = Site(
+            "line", "branch", fed.bus, fed.v, fed.angle, -sign * fed.p, -sign * fed.q, "<beyond>"
+        )
+        page = Sources(
+            replaced := replace(measured, places=(*measured.places, away)), locate(replaced)
+        ).html()
         arrow = f"{fed.bus} → <beyond>" if sign > 0 else f"<beyond> → {fed.bus}"
         assert escape(f"{arrow}: 100%") in page
-    code, _, _ = gfor("signal", "source", csv(tmp_path / "pmu.csv", measured), "--html", tmp_path / "page.html")
+    code, _, _ = gfor(
+        "signal", "source", csv(tmp_path / "pmu.csv", measured), "--html", tmp_path / "page.html"
+    )
     text = (tmp_path / "page.html").read_text()
     assert code == 0
-    assert all(part in text for part in ("map of energy flows", "Amplitude over the time", "Mean power of all signals"))
+    assert all(
+        part in text
+        for part in ("map of energy flows", "Amplitude over the time", "Mean power of all signals")
+    )
 
 
 def test_the_first_screen_is_the_answer(gfor, tmp_path, measured):
@@ -92,7 +114,9 @@ def test_a_record_without_phasors_is_told_what_it_needs(gfor, tmp_path):
 def contest(folder, measured, *, double=True):
     """A case as the contest has it: voltages, and the current of one line at each bus; a discontinuity twice."""
     folder.mkdir(parents=True)
-    rows = np.sort(np.r_[0 : len(measured.times), 300]) if double else np.arange(len(measured.times))
+    rows = (
+        np.sort(np.r_[0 : len(measured.times), 300]) if double else np.arange(len(measured.times))
+    )
     kept = {}
     for number, place in enumerate(p for p in measured.places if p.name != "gfor"):
         bus = f"{100 + number}|{place.name.upper()}    20.0"
@@ -100,9 +124,11 @@ def contest(folder, measured, *, double=True):
         line = f"{bus}|200|HUB       400.|1"
         wrapped = np.rad2deg(np.angle(np.exp(1j * place.angle)))
         for name, column, values in (
-            ("BusVolMag", bus, place.v), ("BusVolAng", bus, wrapped),
-            ("LinCurMag", line, np.abs(current)), ("LinCurAng", line, np.rad2deg(np.angle(current))),
-        ):  # fmt: skip
+            ("BusVolMag", bus, place.v),
+            ("BusVolAng", bus, wrapped),
+            ("LinCurMag", line, np.abs(current)),
+            ("LinCurAng", line, np.rad2deg(np.angle(current))),
+        ):
             kept.setdefault(name, {})[column] = values[rows]
     for name, columns in kept.items():
         header = " ".join(f"'{column}'" for column in ("Time", *columns))

@@ -108,7 +108,9 @@ def blocks(page: Path) -> list[Block]:
         kind, rest = (mark["kind"], mark["rest"]) if mark else ("", "")
         path, _, text = ("", "", rest) if kind == "not run" else rest.partition(" | ")
         language = (opened["info"].split() or [""])[0]
-        found.append(Block(page, k + 1, language, "".join(f"{line}\n" for line in inside), kind, path, text))
+        found.append(
+            Block(page, k + 1, language, "".join(f"{line}\n" for line in inside), kind, path, text)
+        )
         k = end + 1
     return found
 

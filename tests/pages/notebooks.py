@@ -45,7 +45,9 @@ def execute(path: Path, folder: Path, more: str = "") -> NotebookNode:
     notebook = nbformat.read(path, as_version=4)
     if more:
         notebook.cells.append(nbformat.v4.new_code_cell(more))
-    client = NotebookClient(notebook, timeout=SECONDS, record_timing=False, resources={"metadata": {"path": folder}})
+    client = NotebookClient(
+        notebook, timeout=SECONDS, record_timing=False, resources={"metadata": {"path": folder}}
+    )
     client.execute(env=_environment(folder))
     for cell in notebook.cells:
         if cell.cell_type == "code":
@@ -56,8 +58,17 @@ def execute(path: Path, folder: Path, more: str = "") -> NotebookNode:
 def _environment(folder: Path) -> dict[str, str]:
     path = os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])
     paths = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
-    shown = {"NO_COLOR": "1", "COLUMNS": str(_WIDTH), "TERM": "dumb", "IPYTHONDIR": str(folder / ".ipython")}
-    return {k: v for k, v in os.environ.items() if k != "MPLBACKEND"} | {"PATH": path, "PYTHONPATH": paths} | shown
+    shown = {
+        "NO_COLOR": "1",
+        "COLUMNS": str(_WIDTH),
+        "TERM": "dumb",
+        "IPYTHONDIR": str(folder / ".ipython"),
+    }
+    return (
+        {k: v for k, v in os.environ.items() if k != "MPLBACKEND"}
+        | {"PATH": path, "PYTHONPATH": paths}
+        | shown
+    )
 
 
 def _joined(outputs: list[NotebookNode]) -> list[NotebookNode]:
@@ -65,7 +76,11 @@ def _joined(outputs: list[NotebookNode]) -> list[NotebookNode]:
     joined: list[NotebookNode] = []
     for output in outputs:
         before = joined[-1] if joined else None
-        if before and before.output_type == output.output_type == "stream" and before.name == output.name:
+        if (
+            before
+            and before.output_type == output.output_type == "stream"
+            and before.name == output.name
+        ):
             before.text += output.text
         else:
             joined.append(output)

@@ -125,6 +125,8 @@ def test_lines_that_guides_name_exist(page):
     for block in blocks(page):
         if block.kind in ("after", "replace"):
             text = (ROOT / block.path).read_text(encoding="utf-8")
-            assert block.text_of_line in text, f"{block.place}: {block.path} has no line with {block.text_of_line!r}"
+            assert block.text_of_line in text, (
+                f"{block.place}: {block.path} has no line with {block.text_of_line!r}"
+            )
         elif block.kind == "append":
             assert (ROOT / block.path).is_file(), f"{block.place}: there is no {block.path}"

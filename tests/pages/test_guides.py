@@ -12,8 +12,18 @@ import pytest
 from tests.pages.markdown import ROOT, blocks
 
 DOCS = ROOT / ".docs"
-IN_A_CHECKOUT = ("how-to/add-an-exciter", "how-to/add-an-acceptance-check", "how-to/add-a-study", "how-to/add-a-code")
-HEAVY = ("how-to/use-your-own-fmu", "how-to/black-box", "how-to/write-a-controller-dll", "how-to/several-vendors")
+IN_A_CHECKOUT = (
+    "how-to/add-an-exciter",
+    "how-to/add-an-acceptance-check",
+    "how-to/add-a-study",
+    "how-to/add-a-code",
+)
+HEAVY = (
+    "how-to/use-your-own-fmu",
+    "how-to/black-box",
+    "how-to/write-a-controller-dll",
+    "how-to/several-vendors",
+)
 """Executed by night."""
 
 ANYWHERE = (
@@ -36,7 +46,12 @@ def environment(tmp_path):
     folder = home / ("Scripts" if os.name == "nt" else "bin")
     (packages,) = home.rglob("site-packages")
     (packages / "beneath.pth").write_text(f"{sysconfig.get_path('purelib')}\n", encoding="utf-8")
-    for command, module in {"gfor": "orchestrator.cli", "pip": "pip", "pytest": "pytest", "mypy": "mypy"}.items():
+    for command, module in {
+        "gfor": "orchestrator.cli",
+        "pip": "pip",
+        "pytest": "pytest",
+        "mypy": "mypy",
+    }.items():
         script = folder / command
         script.write_text(f'#!/bin/sh\nexec {folder}/python -m {module} "$@"\n', encoding="utf-8")
         script.chmod(0o755)
@@ -61,7 +76,9 @@ def follow(page, folder, environment):
                 check=False,
                 timeout=SECONDS,
             )
-            assert done.returncode == 0, f"{block.place}\n{done.stdout[-4000:]}{done.stderr[-4000:]}"
+            assert done.returncode == 0, (
+                f"{block.place}\n{done.stdout[-4000:]}{done.stderr[-4000:]}"
+            )
 
 
 def change(block, path):

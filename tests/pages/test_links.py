@@ -16,7 +16,9 @@ def test_links_lead_somewhere(page):
         if not file.is_relative_to(ROOT) or not file.exists():
             wrong.append(f"{name_of(page)}:{line}: {target}: no such file")
         elif anchor and file.suffix in (".md", ".ipynb") and anchor not in anchors(file):
-            wrong.append(f"{name_of(page)}:{line}: {target}: no such heading; there are {sorted(anchors(file))}")
+            wrong.append(
+                f"{name_of(page)}:{line}: {target}: no such heading; there are {sorted(anchors(file))}"
+            )
     assert not wrong, "\n".join(wrong)
 
 
@@ -30,5 +32,7 @@ def test_links_and_headings_are_read():
 
 def test_a_link_over_two_lines_is_read(tmp_path):
     page = tmp_path / "page.md"
-    page.write_text("# One\n\nSee [a title\nof two lines](other.md) and [two](b.md).\n", encoding="utf-8")
+    page.write_text(
+        "# One\n\nSee [a title\nof two lines](other.md) and [two](b.md).\n", encoding="utf-8"
+    )
     assert links(page) == [(3, "other.md"), (4, "b.md")]

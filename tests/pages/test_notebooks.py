@@ -71,7 +71,9 @@ def test_a_notebook_is_kept_as_a_reader_can_use_it(path):
     outputs = [output for cell in code for output in cell.outputs]
     drawn = [cell.id for cell in code if ".plot(" in cell.source]
     assert drawn
-    assert drawn == [cell.id for cell in code if any("image/png" in o.get("data", {}) for o in cell.outputs)]
+    assert drawn == [
+        cell.id for cell in code if any("image/png" in o.get("data", {}) for o in cell.outputs)
+    ]
     assert not [o for o in outputs if o.output_type == "error" or o.get("name") == "stderr"]
     assert not re.search(r"/tmp/|/home/|/root/|/work/|site-packages|object at 0x", text)
     assert "execution" not in text.replace("execution_count", ""), "times of execution"
@@ -81,11 +83,17 @@ def test_a_notebook_is_kept_as_a_reader_can_use_it(path):
 def test_every_cell_that_draws_shows_its_picture(tmp_path):
     """Also the second one: the backend of notebooks sets itself up with the first figure."""
     path = tmp_path / "small.ipynb"
-    cells = [nbformat.v4.new_code_cell("from orchestrator.report.notebook import new_axes\nnew_axes().plot([0, 1]);")]
+    cells = [
+        nbformat.v4.new_code_cell(
+            "from orchestrator.report.notebook import new_axes\nnew_axes().plot([0, 1]);"
+        )
+    ]
     cells += [nbformat.v4.new_code_cell("new_axes().plot([1, 0]);") for _ in range(2)]
     path.write_text(nbformat.writes(nbformat.v4.new_notebook(cells=cells)), encoding="utf-8")
     executed = execute(path, tmp_path)
-    assert [["image/png" in o.get("data", {}) for o in cell.outputs] for cell in executed.cells] == 3 * [[True]]
+    assert [
+        ["image/png" in o.get("data", {}) for o in cell.outputs] for cell in executed.cells
+    ] == 3 * [[True]]
 
 
 @pytest.mark.slow
@@ -94,10 +102,14 @@ def test_every_cell_that_draws_shows_its_picture(tmp_path):
 def test_a_notebook_computes_what_it_shows_and_says(path, tmp_path):
     kept = nbformat.read(path, as_version=4)
     claims = CLAIMS[path.stem]
-    executed = execute(path, tmp_path, "print('\\n'.join(repr(claim) for claim in [" + ", ".join(claims) + "]))")
+    executed = execute(
+        path, tmp_path, "print('\\n'.join(repr(claim) for claim in [" + ", ".join(claims) + "]))"
+    )
     fresh = dict(shown_text(executed))
     for cell, shown in shown_text(kept):
-        assert alike(shown, fresh[cell]), f"{path.name}, cell {cell} showed\n{shown}\nand shows\n{fresh[cell]}"
+        assert alike(shown, fresh[cell]), (
+            f"{path.name}, cell {cell} showed\n{shown}\nand shows\n{fresh[cell]}"
+        )
     prose = "\n".join(cell.source for cell in kept.cells if cell.cell_type == "markdown")
     said = [eval(line) for line in shown_text(executed)[-1][1].splitlines()]
     assert len(said) == len(claims)

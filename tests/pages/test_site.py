@@ -19,9 +19,21 @@ def site(tmp_path_factory):
     """The folder of the built site."""
 
     def build(folder):
-        command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-f", str(ROOT / ".docs" / "mkdocs.yml")]
+        command = [
+            sys.executable,
+            "-m",
+            "mkdocs",
+            "build",
+            "--strict",
+            "-f",
+            str(ROOT / ".docs" / "mkdocs.yml"),
+        ]
         done = subprocess.run(
-            [*command, "--site-dir", str(folder)], cwd=ROOT, capture_output=True, text=True, check=False
+            [*command, "--site-dir", str(folder)],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=False,
         )
         assert done.returncode == 0, done.stdout + done.stderr
 
@@ -33,7 +45,9 @@ def test_every_page_is_there(site):
         name = name_of(page).removeprefix(".docs/")
         if name == "CHANGELOG.md":
             continue
-        folder = site / ("" if name == "README.md" else name.removesuffix(".md").removesuffix(".ipynb"))
+        folder = site / (
+            "" if name == "README.md" else name.removesuffix(".md").removesuffix(".ipynb")
+        )
         if page.stem in ("README", "index"):
             folder = site if name == "README.md" else folder.parent
         assert (folder / "index.html").is_file(), name
@@ -55,9 +69,17 @@ def test_every_page_is_an_entry_of_the_navigation(site):
     """Also the leaflets, which are called README: such a page hides behind the title of its section."""
     text = (site / "reference" / "commands" / "index.html").read_text(encoding="utf-8")
     entries = set(re.findall(r'<a href="([^"]+)" class="md-nav__link', text))
-    for page in ("orchestrator/cases", "gfor_fmu", "fmus/grid", "validation/two-area", "tutorials/paper"):
+    for page in (
+        "orchestrator/cases",
+        "gfor_fmu",
+        "fmus/grid",
+        "validation/two-area",
+        "tutorials/paper",
+    ):
         assert f"../../{page}/" in entries
-    headings = re.findall(r'<label class="md-nav__link"[^>]*>\s*<span class="md-ellipsis">\s*(\w+)', text)
+    headings = re.findall(
+        r'<label class="md-nav__link"[^>]*>\s*<span class="md-ellipsis">\s*(\w+)', text
+    )
     assert "Reference" in headings
 
 
@@ -66,11 +88,15 @@ def test_a_notebook_is_shown_with_figures_and_tables_and_can_be_downloaded(site,
     page = (site / "tutorials" / path.stem / "index.html").read_text(encoding="utf-8")
     pictures = re.findall(r'<img alt="[^"]+" src="\.\./([^"]+\.png)"', page)
     assert pictures
-    assert all((site / "tutorials" / picture).read_bytes().startswith(b"\x89PNG") for picture in pictures)
+    assert all(
+        (site / "tutorials" / picture).read_bytes().startswith(b"\x89PNG") for picture in pictures
+    )
     assert '<table border="1" class="dataframe">' in page
     assert f'<a download="{path.name}" href="../{path.name}">' in page
     assert (site / "tutorials" / path.name).read_bytes() == path.read_bytes()
     for written in re.findall(r'"%%writefile (\S+)\\n', path.read_text(encoding="utf-8")):
         assert f'<span class="filename">{written}</span>' in page
     others = page.replace(f'href="../{path.name}"', "")
-    assert not re.search(r'href="[^":]*\.(md|ipynb)[#"]', others), "a link to a file of the repository"
+    assert not re.search(r'href="[^":]*\.(md|ipynb)[#"]', others), (
+        "a link to a file of the repository"
+    )

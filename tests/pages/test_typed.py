@@ -43,8 +43,12 @@ def every_page() -> list[Page]:
     for page in pages():
         if name_of(page) in FOLLOWED or page.suffix != ".md":
             continue
-        lines = [c.removeprefix(".venv/bin/") for b in blocks(page) if b.language in ("sh", "bash") and b.kind == ""
-                 for c in commands(b)]  # fmt: skip
+        lines = [
+            c.removeprefix(".venv/bin/")
+            for b in blocks(page)
+            if b.language in ("sh", "bash") and b.kind == ""
+            for c in commands(b)
+        ]
         if typed := tuple(line for line in lines if line.startswith("gfor ")):
             files = tuple((b.path, b.text) for b in blocks(page) if b.kind == "file")
             found.append(Page(name_of(page), typed, files))
@@ -53,7 +57,11 @@ def every_page() -> list[Page]:
 
 def examples() -> list[str]:
     """The help's examples without their words."""
-    return [line.strip().partition("  ")[0].strip() for line in QUESTIONS.splitlines() if line.startswith("  gfor ")]
+    return [
+        line.strip().partition("  ")[0].strip()
+        for line in QUESTIONS.splitlines()
+        if line.startswith("  gfor ")
+    ]
 
 
 PAGES = every_page()
@@ -65,17 +73,29 @@ PAGES = every_page()
 def test_each_command_of_a_page_works_as_it_is_typed(page, tmp_path):
     scripts = os.environ.get("GFOR_SCRIPTS") or sysconfig.get_path("scripts")
     path = os.pathsep.join([scripts, os.environ["PATH"]])
-    environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTEST_CURRENT_TEST")}
+    environment = {
+        k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTEST_CURRENT_TEST")
+    }
     environment |= {"PATH": path, "MPLBACKEND": "Agg", "OPENBLAS_NUM_THREADS": "1"}
     for name, text in page.files:
         (tmp_path / name).write_text(text, encoding="utf-8")
-    for line in [*BEFORE.get(page.name, []), *(SHORTER.get(c, c) for c in page.typed if c not in NOT_TYPED)]:
+    for line in [
+        *BEFORE.get(page.name, []),
+        *(SHORTER.get(c, c) for c in page.typed if c not in NOT_TYPED),
+    ]:
         done = subprocess.run(
             ["bash", "-euo", "pipefail", "-c", line],
-            cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=SECONDS,
-        )  # fmt: skip
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=SECONDS,
+        )
         said = f"{done.stdout[-2000:]}{done.stderr[-3000:]}"
-        assert done.returncode in (0, 3), f"{page.name}: {line}: exit code {done.returncode}\n{said}"
+        assert done.returncode in (0, 3), (
+            f"{page.name}: {line}: exit code {done.returncode}\n{said}"
+        )
         assert "Traceback" not in done.stderr, f"{page.name}: {line}\n{done.stderr[-3000:]}"
 
 

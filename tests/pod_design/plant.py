@@ -49,7 +49,9 @@ class Plant:
 
     @property
     def off(self):
-        return self.place(Placed(PodSetting(0.0, NONE), Eigenpair(self.modes[0], _VECTOR, _VECTOR)), 0.0)
+        return self.place(
+            Placed(PodSetting(0.0, NONE), Eigenpair(self.modes[0], _VECTOR, _VECTOR)), 0.0
+        )
 
 
 def gain_for(mode, slope, damping):

@@ -48,12 +48,15 @@ def test_a_setting_that_was_just_linearised_is_examined_with_that_model(renewed)
         assert len(renewed) == 3
         other = loop.model(STRONGER)
         assert len(renewed) == 4
-        assert loop.examine(ON).stability == first.stability  # and not that of the setting in between
+        # and not that of the setting in between
+        assert loop.examine(ON).stability == first.stability
         np.testing.assert_array_equal(loop.model(ON).A, step_map.A)
         assert np.abs(other.A - step_map.A).max() > 1e-6
 
 
-def test_after_an_error_the_blocks_are_not_taken_for_those_of_the_setting_before(renewed, monkeypatch):
+def test_after_an_error_the_blocks_are_not_taken_for_those_of_the_setting_before(
+    renewed, monkeypatch
+):
     with pod_loop() as loop:
         right = loop.model(ON).A
 

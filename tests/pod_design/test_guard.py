@@ -10,7 +10,10 @@ LEAST = 0.05
 
 def around(*dampings, growth=0.0):
     """Surroundings with modes at 5 rad/s of these damping ratios."""
-    modes = [Mode(5 * complex(-z, (1 - z**2) ** 0.5), (("a.x", 1.0),), {"a.x": 1.0}) for z in sorted(dampings)]
+    modes = [
+        Mode(5 * complex(-z, (1 - z**2) ** 0.5), (("a.x", 1.0),), {"a.x": 1.0})
+        for z in sorted(dampings)
+    ]
     return Surroundings(tuple(modes), growth, None)
 
 
@@ -34,7 +37,8 @@ def test_no_other_mode_may_fall_below_the_least_damping(before, after, harmed):
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "harmed"), [(0.0, 0.1, True), (0.1, 0.1, False), (0.1, 0.2, True), (0.1, 0.0, False)]
+    ("before", "after", "harmed"),
+    [(0.0, 0.1, True), (0.1, 0.1, False), (0.1, 0.2, True), (0.1, 0.0, False)],
 )
 def test_the_system_may_not_become_unstable_or_more_so(before, after, harmed):
     text = breach(around(0.2, growth=before), around(0.2, growth=after), LEAST)

@@ -31,16 +31,22 @@ def test_an_interrupted_design_continues_and_gives_the_same(gfor, tmp_path, monk
     monkeypatch.undo()
     followed = []
     follow = PodLoop._followed
-    monkeypatch.setattr(PodLoop, "_followed", lambda *words: followed.append(words) or follow(*words))
+    monkeypatch.setattr(
+        PodLoop, "_followed", lambda *words: followed.append(words) or follow(*words)
+    )
     assert gfor(*WORDS, "--out", path)[0] == 0
     assert not path.with_suffix(".points").exists()
     monkeypatch.undo()
-    results = [json.loads(p.with_suffix(".json").read_text(encoding="utf-8")) for p in (whole, path)]
+    results = [
+        json.loads(p.with_suffix(".json").read_text(encoding="utf-8")) for p in (whole, path)
+    ]
     for result in results:
         del result["made"]
         del result["parameter_file"]
     assert results[0] == results[1]
     everything = []
-    monkeypatch.setattr(PodLoop, "_followed", lambda *words: everything.append(words) or follow(*words))
+    monkeypatch.setattr(
+        PodLoop, "_followed", lambda *words: everything.append(words) or follow(*words)
+    )
     assert gfor(*WORDS, "--out", tmp_path / "third.toml")[0] == 0
     assert len(followed) < len(everything)

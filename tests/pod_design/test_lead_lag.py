@@ -62,11 +62,16 @@ def test_a_sensitivity_that_already_points_left_needs_no_compensation():
 
 
 def test_too_few_stages_are_refused_with_the_number_that_would_do():
-    with pytest.raises(AnalysisError, match=r"each of 1 lead/lag stages .* by 110.0°.*ask for 2 stages with --stages"):
+    with pytest.raises(
+        AnalysisError,
+        match=r"each of 1 lead/lag stages .* by 110.0°.*ask for 2 stages with --stages",
+    ):
         lead_lag(70.0, 3.0, 1)
 
 
-@pytest.mark.parametrize(("value", "degrees"), [(-1 + 0j, 180), (complex(-1, -0.0), 180), (1j, 90), (-1j, -90)])
+@pytest.mark.parametrize(
+    ("value", "degrees"), [(-1 + 0j, 180), (complex(-1, -0.0), 180), (1j, 90), (-1j, -90)]
+)
 def test_angles_lie_above_minus_180(value, degrees):
     assert angle_deg(value) == pytest.approx(degrees)
 
@@ -91,7 +96,9 @@ def test_a_mode_that_does_not_move_cannot_be_designed_for():
 def test_the_compensation_is_taken_out_of_a_sensitivity():
     filters, mode = LeadLag(0.2, 0.4, 2), complex(-0.3, 3.0)
     bare = complex(-0.01, 0.004)
-    assert local_non_compensated(bare * filters.response(mode), mode, filters) == pytest.approx(bare)
+    assert local_non_compensated(bare * filters.response(mode), mode, filters) == pytest.approx(
+        bare
+    )
 
 
 # -- following -------------------------------------------------------------------------------------
@@ -102,7 +109,10 @@ def crossing(p):
     T = np.array([[1.0, 0.3, 0, 0.2], [0, 2.0, 0.1, 0], [0.4, 0, 1.0, 0], [0, 0.1, 0, 50.0]])
     A = np.zeros((4, 4))
     for k, value in enumerate((complex(-0.5, 3 + p), complex(-0.2, 3 - p))):
-        A[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = [[value.real, value.imag], [-value.imag, value.real]]
+        A[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = [
+            [value.real, value.imag],
+            [-value.imag, value.real],
+        ]
     return LinearModel.from_matrix(T @ A @ np.linalg.inv(T), tuple("abcd"), None)
 
 
@@ -132,6 +142,10 @@ def test_a_mode_that_meets_another_is_not_guessed():
         return LinearModel.from_matrix(np.array([[0.0, 1.0], [-1.0, -2 * p]]), ("x", "v"), None)
 
     start = pair_at(damped(0.1), 1j)
-    assert follow_along(start, damped, 0.1, 0.9).eigenvalue == pytest.approx(complex(-0.9, math.sqrt(1 - 0.81)))
-    with pytest.raises(AnalysisError, match=r"cannot be followed beyond .* merges with another mode"):
+    assert follow_along(start, damped, 0.1, 0.9).eigenvalue == pytest.approx(
+        complex(-0.9, math.sqrt(1 - 0.81))
+    )
+    with pytest.raises(
+        AnalysisError, match=r"cannot be followed beyond .* merges with another mode"
+    ):
         follow_along(start, damped, 0.1, 1.0)

@@ -12,7 +12,9 @@ from orchestrator.pod_design.margins import loop_margins
 
 
 def model(A):
-    return LinearModel.from_matrix(np.array(A, dtype=float), tuple(f"x{k}" for k in range(len(A))), None)
+    return LinearModel.from_matrix(
+        np.array(A, dtype=float), tuple(f"x{k}" for k in range(len(A))), None
+    )
 
 
 def margins(matrix, gain):

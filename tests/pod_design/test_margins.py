@@ -24,7 +24,9 @@ def test_the_gain_may_rise_until_another_mode_is_lost():
     assert found.limit == 0.03
     assert found.up <= factor <= found.up + EDGE
     assert found.lost_up.imag == pytest.approx(6.0)
-    assert (found.down, found.lost_down) == (None, None), "without the controller all modes are there"
+    assert (found.down, found.lost_down) == (None, None), (
+        "without the controller all modes are there"
+    )
 
 
 def test_a_mode_that_is_below_the_limit_already_lowers_it():
@@ -50,11 +52,16 @@ def test_errors_of_the_gain_move_the_target():
     }
 
 
-@pytest.mark.parametrize(("required", "met", "thin"), [(0.155, True, False), (0.17, True, True), (0.17, False, False)])
+@pytest.mark.parametrize(
+    ("required", "met", "thin"), [(0.155, True, False), (0.17, True, True), (0.17, False, False)]
+)
 def test_a_requirement_that_a_larger_gain_loses_has_no_margin(required, met, thin):
     """With 20 % more gain the target has 16 % of damping."""
     found = margins(Plant(), 20.0, 0.03)
     design = SimpleNamespace(margins=found, met=met, required_damping=required)
     there = PodDesign.thin_margin.fget(design)
     assert there == (pytest.approx(found.variations["K +20 %"]) if thin else None)
-    assert PodDesign.thin_margin.fget(SimpleNamespace(margins=None, met=True, required_damping=0.5)) is None
+    assert (
+        PodDesign.thin_margin.fget(SimpleNamespace(margins=None, met=True, required_damping=0.5))
+        is None
+    )

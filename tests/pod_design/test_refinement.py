@@ -15,7 +15,9 @@ def content(placed):
     return Judgement(placed.damping_ratio, None)
 
 
-def refined(plant, required=0.2, filters=NONE, bounds=(0.0, 100.0), judge=content, search=lambda: []):
+def refined(
+    plant, required=0.2, filters=NONE, bounds=(0.0, 100.0), judge=content, search=lambda: []
+):
     return refine(plant, plant.off, filters, required, bounds, judge, search)
 
 
@@ -41,7 +43,9 @@ def test_a_requirement_out_of_reach_gets_the_best_within_the_bounds():
 
 def test_the_gain_stops_where_another_mode_is_harmed():
     def judge(placed):
-        return Judgement(placed.damping_ratio, "another mode grows" if placed.setting.gain > 20 else None)
+        return Judgement(
+            placed.damping_ratio, "another mode grows" if placed.setting.gain > 20 else None
+        )
 
     found = refined(Plant(), judge=judge)
     assert not found.met
@@ -50,7 +54,9 @@ def test_the_gain_stops_where_another_mode_is_harmed():
 
 
 def test_where_every_gain_harms_nothing_is_chosen():
-    found = refined(Plant(), judge=lambda placed: Judgement(placed.damping_ratio, "another mode grows"))
+    found = refined(
+        Plant(), judge=lambda placed: Judgement(placed.damping_ratio, "another mode grows")
+    )
     assert (found.met, found.chosen) == (False, None)
     assert found.best.setting.gain > 0
 
@@ -58,7 +64,9 @@ def test_where_every_gain_harms_nothing_is_chosen():
 def test_a_mode_that_takes_the_targets_name_counts_and_is_said():
     found = refined(Plant(), judge=lambda placed: Judgement(0.05, None))
     assert (found.met, found.score) == (False, 0.05)
-    assert any("trades places with another mode" in note and "5.00 %" in note for note in found.notes)
+    assert any(
+        "trades places with another mode" in note and "5.00 %" in note for note in found.notes
+    )
 
 
 def test_a_sensitivity_that_points_aside_is_turned_by_the_lead_lag():
@@ -84,7 +92,9 @@ def test_gains_that_leave_the_system_unstable_are_listed():
     found = refined(plant, required=0.9)
     swept = found.sweeps[0]
     assert swept.unstable
-    assert swept.unstable == tuple(p.setting.gain for p in (*swept.points, swept.chosen) if p.setting.gain > 30)
+    assert swept.unstable == tuple(
+        p.setting.gain for p in (*swept.points, swept.chosen) if p.setting.gain > 30
+    )
 
 
 @pytest.mark.parametrize("evenly", [True, False])
@@ -93,10 +103,22 @@ def test_where_nothing_meets_it_the_least_of_all_modes_decides_if_no_mode_is_nam
     plant = Plant(modes=(-0.4 + 4j, -1.0 + 8j), slopes=(-0.01 + 0j, 0.004 + 0j))
 
     def judge(placed):
-        return Judgement(placed.damping_ratio, None, min(-z.real / abs(z) for z in plant.eigenvalues(placed.setting)))
+        return Judgement(
+            placed.damping_ratio,
+            None,
+            min(-z.real / abs(z) for z in plant.eigenvalues(placed.setting)),
+        )
 
-    found = refine(plant, plant.off, NONE, 0.9, (0.0, 100.0), judge,
-                   lambda: [("searched", PodSetting(8.33, NONE))], evenly=evenly)  # fmt: skip
+    found = refine(
+        plant,
+        plant.off,
+        NONE,
+        0.9,
+        (0.0, 100.0),
+        judge,
+        lambda: [("searched", PodSetting(8.33, NONE))],
+        evenly=evenly,
+    )
     assert not found.met
     assert found.chosen.setting.gain == pytest.approx(8.33 if evenly else 100.0)
     assert found.score == pytest.approx(found.chosen.damping_ratio)

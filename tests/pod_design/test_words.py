@@ -21,7 +21,16 @@ REST = "; least damped of all then 8.71 % at 1.527 Hz"
 def test_a_mode_below_what_is_asked_is_told_with_met(other, met, broken, said):
     worst = None if other is None else SimpleNamespace(damping_ratio=other, frequency_hz=1.527)
     design = SimpleNamespace(
-        achieved_damping=0.1044, required_damping=0.1, after=SimpleNamespace(other_named=None), broken=broken, met=met,
-        worst_other=worst, damping_met=True, spoilt=None, thin_margin=None, refinement=None, active_bound=None,
-    )  # fmt: skip
+        achieved_damping=0.1044,
+        required_damping=0.1,
+        after=SimpleNamespace(other_named=None),
+        broken=broken,
+        met=met,
+        worst_other=worst,
+        damping_met=True,
+        spoilt=None,
+        thin_margin=None,
+        refinement=None,
+        active_bound=None,
+    )
     assert verdict(design) == f"the target has 10.44 % of damping, 10.00 % are required{said}"

@@ -27,7 +27,9 @@ class Small:
 
 def test_every_type_of_field_comes_back():
     red, blue = Colour
-    given = Small(red, (red, blue), ("x", blue), [blue, red], {"a": blue}, None, np.arange(6.0).reshape(2, 3))
+    given = Small(
+        red, (red, blue), ("x", blue), [blue, red], {"a": blue}, None, np.arange(6.0).reshape(2, 3)
+    )
     header, arrays = packed(given)
     found = unpacked(Small, header, arrays)
     assert found.values.tolist() == given.values.tolist()

@@ -70,7 +70,9 @@ def test_without_dask_the_error_says_how_to_get_it(monkeypatch):
 @pytest.mark.slow
 def test_a_dask_cluster(tmp_path):
     distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None
+    ) as cluster:
         executor = DaskCluster(cluster.scheduler_address)
         assert sorted(executor.run(double, NUMBERS)) == [(n, 2 * n) for n in NUMBERS]
         tasks = [(n, str(tmp_path)) for n in NUMBERS]
@@ -85,11 +87,15 @@ def test_a_cluster_whose_workers_are_all_gone_ends_the_run_with_what_is_there(mo
     monkeypatch.setattr("orchestrator.points.dask_cluster._PATIENCE", 5)
     monkeypatch.setattr("orchestrator.points.dask_cluster.INTERVAL", 0.5)
     monkeypatch.setattr("orchestrator.points.dask_cluster.INTERVAL", 0.5)
-    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, dashboard_address=None
+    ) as cluster:
         results = DaskCluster(cluster.scheduler_address).run(sleepy_double, NUMBERS)
         first = next(results)
         cluster.scale(0)
-        with pytest.raises(CosimError, match=r"no usable worker is left since \d+ s.* are kept.*dask worker") as caught:
+        with pytest.raises(
+            CosimError, match=r"no usable worker is left since \d+ s.* are kept.*dask worker"
+        ) as caught:
             list(results)
     assert first == (first[0], 2 * first[0])
     assert caught.value.kind is ErrorKind.WORKER_LOST
@@ -106,13 +112,23 @@ def test_a_cluster_whose_workers_lack_the_project_is_refused_at_once(tmp_path):
         "        if name.split('.')[0] == 'orchestrator':\n            raise ModuleNotFoundError(name)\n"
         "sys.meta_path.insert(0, Hidden())\n"
     )
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(Path(__file__).parents[2])])}
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join([str(tmp_path), str(Path(__file__).parents[2])]),
+    }
     with distributed.LocalCluster(n_workers=0, dashboard_address=None) as cluster:
-        command = [sys.executable, "-m", "distributed.cli.dask_worker", cluster.scheduler_address, "--no-dashboard"]
+        command = [
+            sys.executable,
+            "-m",
+            "distributed.cli.dask_worker",
+            cluster.scheduler_address,
+            "--no-dashboard",
+        ]
         worker = subprocess.Popen(command, env=environment, cwd=tmp_path, stderr=subprocess.DEVNULL)
         try:
             with pytest.raises(
-                InputError, match=r"none of its 1 workers can import gfor-cosim \(orchestrator\); install"
+                InputError,
+                match=r"none of its 1 workers can import gfor-cosim \(orchestrator\); install",
             ):
                 list(DaskCluster(cluster.scheduler_address).run(double, NUMBERS))
         finally:
@@ -128,7 +144,9 @@ def certificates(tmp_path_factory):
 
     def folder(name):
         made, place = Security.temporary(), tmp_path_factory.mktemp(name)
-        for file, text in zip(TLS_FILES, (made.tls_ca_file, made.tls_client_cert, made.tls_client_key), strict=True):
+        for file, text in zip(
+            TLS_FILES, (made.tls_ca_file, made.tls_client_cert, made.tls_client_key), strict=True
+        ):
             (place / file).write_text(text, encoding="utf-8")
         return place, made
 
@@ -140,10 +158,14 @@ def test_a_cluster_with_tls_lets_in_who_has_its_certificate(certificates, monkey
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr("orchestrator.points.dask_cluster._PATIENCE", 10)
     (ours, security), (strangers, _) = certificates
-    with distributed.LocalCluster(n_workers=1, protocol="tls", security=security, dashboard_address=None) as cluster:
+    with distributed.LocalCluster(
+        n_workers=1, protocol="tls", security=security, dashboard_address=None
+    ) as cluster:
         address = cluster.scheduler_address
         assert address.startswith("tls://")
-        assert sorted(DaskCluster(address, ours).run(double, NUMBERS)) == [(n, 2 * n) for n in NUMBERS]
+        assert sorted(DaskCluster(address, ours).run(double, NUMBERS)) == [
+            (n, 2 * n) for n in NUMBERS
+        ]
         with pytest.raises(InputError, match="no Dask scheduler answers there"):
             list(DaskCluster(address, strangers).run(double, NUMBERS))
         with pytest.raises(InputError, match=r"no Dask scheduler answers there.*with --tls"):
@@ -151,7 +173,9 @@ def test_a_cluster_with_tls_lets_in_who_has_its_certificate(certificates, monkey
 
 
 def test_certificates_are_complete_and_used(tmp_path):
-    with pytest.raises(InputError, match=r"no ca\.pem and no cert\.pem and no key\.pem; the folder must hold"):
+    with pytest.raises(
+        InputError, match=r"no ca\.pem and no cert\.pem and no key\.pem; the folder must hold"
+    ):
         choose_executor(None, "tls://host:8786", (), tmp_path)
     with pytest.raises(InputError, match="needs an address that begins with tls://"):
         choose_executor(None, "tcp://host:8786", (), tmp_path)
@@ -160,7 +184,9 @@ def test_certificates_are_complete_and_used(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("address", "warned"), [("tcp://192.0.2.1:9", True), ("tcp://127.0.0.1:9", False)])
+@pytest.mark.parametrize(
+    ("address", "warned"), [("tcp://192.0.2.1:9", True), ("tcp://127.0.0.1:9", False)]
+)
 def test_an_open_connection_to_another_machine_is_named(address, warned, monkeypatch, caplog):
     pytest.importorskip("distributed")
     monkeypatch.setattr("orchestrator.points.dask_cluster._PATIENCE", 1)

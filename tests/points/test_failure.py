@@ -10,7 +10,10 @@ from orchestrator.points.failure import failure_kept
 
 @pytest.mark.parametrize(
     ("error", "said"),
-    [(InputError("no licence"), "no licence"), (ZeroDivisionError("division"), "ZeroDivisionError: division")],
+    [
+        (InputError("no licence"), "no licence"),
+        (ZeroDivisionError("division"), "ZeroDivisionError: division"),
+    ],
 )
 def test_an_error_becomes_the_points_failure(error, said):
     result = SimpleNamespace(failure=None, figure=0)

@@ -28,7 +28,9 @@ from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import plan_screening, run_screening
 
 ROOT = Path(__file__).parents[2]
-TEXT = "the power flow asks it for more, no steady state, parameters cannot be used: --black-box; hang"
+TEXT = (
+    "the power flow asks it for more, no steady state, parameters cannot be used: --black-box; hang"
+)
 
 
 @pytest.mark.parametrize(
@@ -38,13 +40,21 @@ TEXT = "the power flow asks it for more, no steady state, parameters cannot be u
         (StartError("c", Problem("c", TEXT, ErrorKind.FMU), "theirs"), Status.FMU, False),
         (CaseError("c", [Problem("c", TEXT, ErrorKind.POWER_FLOW)]), Status.POWER_FLOW, True),
         (CaseError("c", [Problem("c", TEXT)]), Status.VALUES, True),
-        (CaseError("c", [Problem("c", TEXT), Problem("d", TEXT, ErrorKind.POWER_FLOW)]), Status.VALUES, True),
+        (
+            CaseError("c", [Problem("c", TEXT), Problem("d", TEXT, ErrorKind.POWER_FLOW)]),
+            Status.VALUES,
+            True,
+        ),
         (PowerFlowError(TEXT), Status.POWER_FLOW, True),
         (InputError(TEXT), Status.VALUES, False),
         (AnalysisError(TEXT), Status.MODES, True),
         (AnalysisError(TEXT, kind=ErrorKind.STEADY_STATE), Status.STEADY_STATE, True),
         (ComponentError("sg1", "fmi2DoStep", "fmi2Error", TEXT), Status.FMU, False),
-        (ComponentError("sg1", "fmi2DoStep", "hang: no answer", TEXT, kind=ErrorKind.HANG), Status.FMU, False),
+        (
+            ComponentError("sg1", "fmi2DoStep", "hang: no answer", TEXT, kind=ErrorKind.HANG),
+            Status.FMU,
+            False,
+        ),
         (np.linalg.LinAlgError(TEXT), Status.MODES, True),
         (ValueError(TEXT), Status.INTERNAL, False),
     ],
@@ -60,7 +70,10 @@ def test_a_status_follows_from_the_kind_alone(error, status, lasting):
 def test_a_component_that_refuses_its_own_values_has_no_other_operating_point():
     """The operating point is to blame only where nothing else of the component was set."""
     error = StartError("c", Problem("c", TEXT, ErrorKind.START), "sg1")
-    own, others = ({"sg1.governor.T_3": 0.0, "sg1.P_0": 0.5}, {"sg2.governor.T_3": 0.0, "sg1.P_0": 0.5})
+    own, others = (
+        {"sg1.governor.T_3": 0.0, "sg1.P_0": 0.5},
+        {"sg2.governor.T_3": 0.0, "sg1.P_0": 0.5},
+    )
     assert [failure(error, Item(0, 0, values, ()))[0] for values in (own, others)] == [
         Status.VALUES,
         Status.STEADY_STATE,
@@ -71,12 +84,16 @@ def test_an_overloaded_converter_has_one_status_opened_anew_and_reset(tmp_path):
     """The first point of a file is served by new FMUs, the second by the same ones, reset."""
     case, found = load_case("two_area"), []
     over = "{},1.45\n"
-    for name, rows in (("opened", over.format("over")), ("reset", "usual,\n" + over.format("over"))):
+    for name, rows in (
+        ("opened", over.format("over")),
+        ("reset", "usual,\n" + over.format("over")),
+    ):
         path = tmp_path / f"{name}.csv"
         path.write_text("name,gfor.P_0\n" + rows)
         found.append(
             run_screening(
-                plan_screening(case, ScreeningRequest(path, None, "gfor")), Work(Serial(), PointStore(tmp_path / name))
+                plan_screening(case, ScreeningRequest(path, None, "gfor")),
+                Work(Serial(), PointStore(tmp_path / name)),
             )
         )
     opened, reset = (result.items[-1].record for result in found)
@@ -88,8 +105,30 @@ def test_an_overloaded_converter_has_one_status_opened_anew_and_reset(tmp_path):
 
 # -- no English decides ------------------------------------------------------------------------------
 
-_MESSAGES = {"text", "texts", "error", "message", "sentence", "said", "why", "reason", "words", "log", "status"}
-_CUTS = {"startswith", "endswith", "partition", "rpartition", "split", "removeprefix", "removesuffix", "find", "index"}
+_MESSAGES = {
+    "text",
+    "texts",
+    "error",
+    "message",
+    "sentence",
+    "said",
+    "why",
+    "reason",
+    "words",
+    "log",
+    "status",
+}
+_CUTS = {
+    "startswith",
+    "endswith",
+    "partition",
+    "rpartition",
+    "split",
+    "removeprefix",
+    "removesuffix",
+    "find",
+    "index",
+}
 
 ALLOWED = {
     "orchestrator/federation/helics_calls.py": 1,  # what the library of HELICS says
@@ -107,9 +146,15 @@ def looks_into_a_message(node: ast.AST) -> bool:
         )
         named = isinstance(sought, ast.Name) and sought.id.isupper()
         return (is_text or named) and any(is_message(one) for one in node.comparators)
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in _CUTS:
+    if (
+        isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Attribute)
+        and node.func.attr in _CUTS
+    ):
         given = node.args[:1]
-        literal = bool(given) and isinstance(given[0], ast.Constant) and len(str(given[0].value)) > 0
+        literal = (
+            bool(given) and isinstance(given[0], ast.Constant) and len(str(given[0].value)) > 0
+        )
         return literal and is_message(node.func.value)
     return False
 
@@ -126,7 +171,14 @@ def is_message(node: ast.AST) -> bool:
         return isinstance(node.slice, ast.Constant) and node.slice.value in _MESSAGES
     if isinstance(node, ast.Attribute):
         return node.attr in _MESSAGES and node.attr != "words"
-    return isinstance(node, ast.Name) and node.id in ("error", "message", "sentence", "verdict", "answer", "remark")
+    return isinstance(node, ast.Name) and node.id in (
+        "error",
+        "message",
+        "sentence",
+        "verdict",
+        "answer",
+        "remark",
+    )
 
 
 def is_error(node: ast.AST) -> bool:
@@ -134,7 +186,13 @@ def is_error(node: ast.AST) -> bool:
 
 
 def name_of(node: ast.AST) -> str:
-    return node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
+    return (
+        node.attr
+        if isinstance(node, ast.Attribute)
+        else node.id
+        if isinstance(node, ast.Name)
+        else ""
+    )
 
 
 def searches(tree: ast.AST) -> list[int]:
@@ -144,17 +202,24 @@ def searches(tree: ast.AST) -> list[int]:
 @pytest.mark.parametrize(
     "line",
     [
-        '"power flow" in str(error)', "_HIDES in (record.error or '')", 'error.status.startswith("hang")',
-        'verdict.sentence().partition(":")', 'str(error).rpartition("; ")', '"x" in problem.text',
+        '"power flow" in str(error)',
+        "_HIDES in (record.error or '')",
+        'error.status.startswith("hang")',
+        'verdict.sentence().partition(":")',
+        'str(error).rpartition("; ")',
+        '"x" in problem.text',
         'answer.startswith("no error")',
-        'stability["sentence"].removeprefix("UNSTABLE: ")', 'verdict_sentence(summary).partition(":")',
+        'stability["sentence"].removeprefix("UNSTABLE: ")',
+        'verdict_sentence(summary).partition(":")',
     ],
-)  # fmt: skip
+)
 def test_a_search_of_a_message_is_seen(line):
     assert searches(ast.parse(line))
 
 
-@pytest.mark.parametrize("line", ['"a" in names', 'path.name.startswith("x")', 'key.partition(".")', "kind in kinds"])
+@pytest.mark.parametrize(
+    "line", ['"a" in names', 'path.name.startswith("x")', 'key.partition(".")', "kind in kinds"]
+)
 def test_other_texts_may_be_cut(line):
     assert not searches(ast.parse(line))
 

@@ -6,7 +6,13 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.points import code
-from orchestrator.points.code import LIBRARIES, code_hash, library_versions, needed_modules, numbers_hash
+from orchestrator.points.code import (
+    LIBRARIES,
+    code_hash,
+    library_versions,
+    needed_modules,
+    numbers_hash,
+)
 from orchestrator.points.key import fingerprint, key_of
 from orchestrator.points.task import Task
 
@@ -59,8 +65,18 @@ def changed(fresh, monkeypatch, tmp_path):
 @pytest.mark.parametrize(
     ("module", "file", "old", "new"),
     [
-        (SWEEP, "analysis/modes.py", "return self.eigenvalue.imag / (2 * np.pi)", "return self.eigenvalue.imag / 6"),
-        (SWEEP, "analysis/modes.py", "ELECTROMECHANICAL_HZ = (0.1, 2.0)", "ELECTROMECHANICAL_HZ = (0.1, 2.1)"),
+        (
+            SWEEP,
+            "analysis/modes.py",
+            "return self.eigenvalue.imag / (2 * np.pi)",
+            "return self.eigenvalue.imag / 6",
+        ),
+        (
+            SWEEP,
+            "analysis/modes.py",
+            "ELECTROMECHANICAL_HZ = (0.1, 2.0)",
+            "ELECTROMECHANICAL_HZ = (0.1, 2.1)",
+        ),
         (SWEEP, "cases/power_flow.py", "complex(p, q)", "complex(q, p)"),
         (SWEEP, "binding/tables.py", '"50 Hz"', '"60 Hz"'),
         (ROW, "watch/synchronism.py", "import numpy as np\n", "import numpy as np\nimport math\n"),
@@ -77,7 +93,11 @@ def test_another_figure_is_computed_anew(changed, module, file, old, new):
         ("sweep/point.py", "its task and its result.", "task and result."),
         ("sweep/tables.py", "import", "import sys\nimport"),
         ("sweep/trajectories.py", "\n\n\n", "\n\n\nMOST = 3\n\n\n"),
-        ("analysis/steady_state.py", "no steady state found: {changes};", "no steady state found, {changes};"),
+        (
+            "analysis/steady_state.py",
+            "no steady state found: {changes};",
+            "no steady state found, {changes};",
+        ),
         ("cases/power_flow.py", "complex(p, q)", "complex(p, q)  # in pu\n"),
         ("cli/check.py", "import argparse\n", "import argparse\nimport sys\n"),
     ],
@@ -101,7 +121,9 @@ def test_no_point_is_computed_by_what_only_shows_it():
     for task in _tasks(Task):
         needed = needed_modules(task.__module__)
         assert len(needed) > 100
-        assert not [name for name in needed if name.rpartition(".")[2] in showing and name not in _READ], task
+        assert not [
+            name for name in needed if name.rpartition(".")[2] in showing and name not in _READ
+        ], task
 
 
 _READ = {"orchestrator.binding.tables", "orchestrator.cases.cgmes.files"}

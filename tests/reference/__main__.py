@@ -41,10 +41,20 @@ def two_area_rows() -> Iterable[dict[str, Any]]:
         for governor in (True, False):
             for scenario in SCENARIOS:
                 found = figures(paper_system(scenario, X_L, governor).linearised(), 0.1, 2.0)
-                yield {"X_L": X_L, "governor_on_sg1": governor, "saturation": False, "scenario": scenario} | found
+                yield {
+                    "X_L": X_L,
+                    "governor_on_sg1": governor,
+                    "saturation": False,
+                    "scenario": scenario,
+                } | found
     for scenario in SCENARIOS:
         found = figures(paper_system(scenario, 0.1, saturation=True).linearised(), 0.1, 2.0)
-        yield {"X_L": 0.1, "governor_on_sg1": True, "saturation": True, "scenario": scenario} | found
+        yield {
+            "X_L": 0.1,
+            "governor_on_sg1": True,
+            "saturation": True,
+            "scenario": scenario,
+        } | found
 
 
 def grid_code_rows(

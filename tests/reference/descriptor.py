@@ -82,7 +82,9 @@ def jacobian(function: Callable[[np.ndarray], np.ndarray], point: np.ndarray) ->
     return function(moved).imag / STEP
 
 
-def steady_state(equations: Equations, conditions: Equations, start: dict[str, float]) -> dict[str, float]:
+def steady_state(
+    equations: Equations, conditions: Equations, start: dict[str, float]
+) -> dict[str, float]:
     """Solve F(0, x) = 0 and the power flow's conditions together, by Newton's method.
 
     Parameters
@@ -106,13 +108,16 @@ def steady_state(equations: Equations, conditions: Equations, start: dict[str, f
         error = both(x)
         assert error.shape == x.shape, f"{len(error)} equations for {len(x)} unknowns"
         change = np.linalg.solve(jacobian(both, x), error)
-        x = x - change * min(1.0, 0.5 / np.abs(change).max(initial=1e-30))  # no unknown by more than 0.5 pu at once
+        # no unknown by more than 0.5 pu at once
+        x = x - change * min(1.0, 0.5 / np.abs(change).max(initial=1e-30))
         if np.abs(change).max() < 1e-13:
             return dict(zip(start, x.tolist(), strict=True))
     raise ArithmeticError(f"no steady state: the last change was {np.abs(change).max():.3g}")
 
 
-def linearise(equations: Equations, references: tuple[str, ...], values: dict[str, float]) -> Linearised:
+def linearise(
+    equations: Equations, references: tuple[str, ...], values: dict[str, float]
+) -> Linearised:
     """E and A at a steady state; references are held, everything else moves."""
     moving = [k for k, name in enumerate(values) if name not in references]
     point, rest = np.array(list(values.values())), np.zeros(len(values))

@@ -49,7 +49,9 @@ class Converter:
     pll_integral: float = 1.0
 
 
-WP1 = Converter("E", 2400.0, 1991.9, 0.12, 1.04, 0.4584, Q=-146.6, by_voltage=False, K_pv=0.0333, K_iv=10.0)
+WP1 = Converter(
+    "E", 2400.0, 1991.9, 0.12, 1.04, 0.4584, Q=-146.6, by_voltage=False, K_pv=0.0333, K_iv=10.0
+)
 WP2 = Converter("F", 2400.0, 1991.7, 0.12, 1.0, 0.4584, V=0.9997311)
 HVDC1 = Converter("A", 1200.0, -1125.2, 0.15, 1.0, 0.5730, V=1.0075727)
 HVDC2 = Converter("B", 1700.0, -1607.5, 0.15, 0.99, 0.5730, V=1.0054174)
@@ -103,10 +105,15 @@ class FourVsc:
         rows = [("A", "B", 0.51, 10.24, 48e-6)] * self.circuits_AB
         rows += [("A", "C", 1.04, 20.80, 98e-6)] * self.circuits_AC
         rows += [("B", "C", 1.12, 22.40, 105e-6)] * self.circuits_BC
-        found = [(a, b, R / Z_400, X / Z_400, self.charging * Y * Z_400, 1.0) for a, b, R, X, Y in rows]
+        found = [
+            (a, b, R / Z_400, X / Z_400, self.charging * Y * Z_400, 1.0) for a, b, R, X, Y in rows
+        ]
         B = self.charging * self.cables * 9e-3 * Z_225
         found += [(a, b, 0.42 / Z_225, 0.83 / Z_225, B, 1.0) for a, b in (("A2", "E"), ("B2", "F"))]
-        found += [("A2", "A", 0.005 / 24, 0.15 / 24, 0.0, 1.0), ("B2", "B", 0.005 / 24, 0.15 / 24, 0.0, self.tap_B)]
+        found += [
+            ("A2", "A", 0.005 / 24, 0.15 / 24, 0.0, 1.0),
+            ("B2", "B", 0.005 / 24, 0.15 / 24, 0.0, self.tap_B),
+        ]
         at = BUSES.index
         object.__setattr__(self, "branches", tuple((at(a), at(b), *rest) for a, b, *rest in found))
 
@@ -170,7 +177,18 @@ class FourVsc:
             inside = V + (u.R + 1j * u.L) * d
             controlled = abs(inside) if u.by_voltage else Q
             units.append((u, k, P, controlled))
-            x += [d.real, d.imag, np.angle(v[k]), 0.0, u.R * d.real, u.R * d.imag, P, d.real, controlled, d.imag]
+            x += [
+                d.real,
+                d.imag,
+                np.angle(v[k]),
+                0.0,
+                u.R * d.real,
+                u.R * d.imag,
+                P,
+                d.real,
+                controlled,
+                d.imag,
+            ]
             x += [V, inside.real, inside.imag]
         into = np.conj(s[C] / v[C]) + self.admittance * v[C]
         E = v[C] + self.Z_eq * into
@@ -182,7 +200,11 @@ class FourVsc:
 
     def _coils(self):
         """Inductors to earth: bus, resistance and reactance [pu]."""
-        found = [] if self.capacitors else [(BUSES.index(bus), 0.0, 1 / b) for bus, b in REACTORS.items()]
+        found = (
+            []
+            if self.capacitors
+            else [(BUSES.index(bus), 0.0, 1 / b) for bus, b in REACTORS.items()]
+        )
         if self.load == "parallel":
             found.append((C, 0.0, -1 / self.admittance.imag))
         if self.load == "series":
@@ -213,7 +235,10 @@ class FourVsc:
         def network(x, I):  # noqa: E741
             z = x[size * len(units) :: 2] + 1j * x[size * len(units) + 1 :: 2]
             v, lines, rest = np.split(z, [7, 7 + len(self.branches)])
-            I = I - B * 1j * v - (self.admittance.real * v * (np.arange(7) == C) if self.load == "parallel" else 0.0)  # noqa: E741
+            load = (
+                self.admittance.real * v * (np.arange(7) == C) if self.load == "parallel" else 0.0
+            )
+            I = I - B * 1j * v - load  # noqa: E741
             rates = []
             for (i, j, R, X, _, n), now in zip(self.branches, lines, strict=True):
                 I[i] -= now
@@ -234,8 +259,10 @@ class FourVsc:
             else:
                 I[C] += E / self.Z_eq
                 v, rest = impedances @ I, np.array([])
-            own = [self._converter(u, P, held, x[size * a : size * (a + 1)], v[k])
-                   for a, (u, k, P, held) in enumerate(units)]  # fmt: skip
+            own = [
+                self._converter(u, P, held, x[size * a : size * (a + 1)], v[k])
+                for a, (u, k, P, held) in enumerate(units)
+            ]
             return np.concatenate([*own, rest])
 
         return f, x_0
@@ -252,7 +279,13 @@ class FourVsc:
         e_d, e_q = u.K_pp * error + x_P - d, u.K_pv * deviation + x_Q - q
         fed = seen if self.fed_forward else e.real
         m_d, m_q = fed - w * u.L * q + u.K_pc * e_d + M_d, w * u.L * d + u.K_pc * e_q + M_q
-        v_d, v_q = (out_d, out_q) if self.actuated else (2 * out_d - m_d, 2 * out_q - m_q) if self.delay else (m_d, m_q)
+        v_d, v_q = (
+            (out_d, out_q)
+            if self.actuated
+            else (2 * out_d - m_d, 2 * out_q - m_q)
+            if self.delay
+            else (m_d, m_q)
+        )
         lag = self.actuated or self.delay / 2 or 1e-3
         controlled = abs(e + (u.R + 1j * u.L) * i) if u.by_voltage else s.imag
         return [

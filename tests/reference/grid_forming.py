@@ -13,14 +13,33 @@ W_B = 100 * np.pi
 """Base angular frequency [rad/s]."""
 
 GFOR: Data = {
-    "S_n": 1500.0, "filter.R_c": 0.005, "filter.X_c": 0.15, "filter.B_c": 0.15, "transformer.R_t": 0.002,
-    "transformer.X_t": 0.15, "droop.R_f": 0.05, "droop.R_V": 0.067, "droop.tau_P": 0.1, "droop.tau_Q": 0.1,
-    "feed_forward.tau": 1e-4, "voltage_control.tau": 0.05, "voltage_control.xi": 0.707, "current_control.tau": 1e-3,
-    "pod_p.enabled": False, "pod_p.K": 200.0, "pod_p.T_W": 5.0, "pod_p.T_f": 0.1,
-    "pod_p.T_S1": 0.20, "pod_p.T_S2": 0.37,
-    "pod_q.enabled": False, "pod_q.K": 200.0, "pod_q.T_W": 5.0, "pod_q.T_f": 0.1,
-    "pod_q.T_S1": 0.26, "pod_q.T_S2": 0.29,
-}  # fmt: skip
+    "S_n": 1500.0,
+    "filter.R_c": 0.005,
+    "filter.X_c": 0.15,
+    "filter.B_c": 0.15,
+    "transformer.R_t": 0.002,
+    "transformer.X_t": 0.15,
+    "droop.R_f": 0.05,
+    "droop.R_V": 0.067,
+    "droop.tau_P": 0.1,
+    "droop.tau_Q": 0.1,
+    "feed_forward.tau": 1e-4,
+    "voltage_control.tau": 0.05,
+    "voltage_control.xi": 0.707,
+    "current_control.tau": 1e-3,
+    "pod_p.enabled": False,
+    "pod_p.K": 200.0,
+    "pod_p.T_W": 5.0,
+    "pod_p.T_f": 0.1,
+    "pod_p.T_S1": 0.20,
+    "pod_p.T_S2": 0.37,
+    "pod_q.enabled": False,
+    "pod_q.K": 200.0,
+    "pod_q.T_W": 5.0,
+    "pod_q.T_f": 0.1,
+    "pod_q.T_S1": 0.26,
+    "pod_q.T_S2": 0.29,
+}
 """The paper's converter; N_S = 2 stages."""
 
 _STATES = ("i_s", "u_c", "i_g", "u_ff", "i_ff", "x_v", "x_i")
@@ -47,7 +66,11 @@ class Converter:
         u = v + 1j * self.data["transformer.X_t"] * i
         turn = u.conjugate() / abs(u)
         guess = {"u_c": u, "u_ff": u, "i_g": i, "i_ff": i, "i_s": i, "x_v": 0.0, "x_i": 0.0}
-        values = {f"{k}_{part}": getattr(complex(guess[k] * turn), part) for k in _STATES for part in ("real", "imag")}
+        values = {
+            f"{k}_{part}": getattr(complex(guess[k] * turn), part)
+            for k in _STATES
+            for part in ("real", "imag")
+        }
         values |= {"theta": float(np.angle(u)), "P_f": power.real, "Q_f": power.imag}
         values |= {f"pod_{kind}_{k}": 0.0 for kind in self.pods for k in _POD}
         values |= {"P_ref": power.real, "Q_ref": power.imag, "U_0": abs(u)}
@@ -56,19 +79,27 @@ class Converter:
     def equations(self, s: Unknowns) -> None:
         """Add all residuals of the converter."""
         n, d = self.name, self.data
-        i_s, u_c, i_g, u_ff, i_ff, x_v, x_i = (Pair(s[f"{n}.{k}_real"], s[f"{n}.{k}_imag"]) for k in _STATES)
+        i_s, u_c, i_g, u_ff, i_ff, x_v, x_i = (
+            Pair(s[f"{n}.{k}_real"], s[f"{n}.{k}_imag"]) for k in _STATES
+        )
         rate = {k: Pair(s.dot(f"{n}.{k}_real"), s.dot(f"{n}.{k}_imag")) for k in _STATES}
         X_c, B_c, X_t = d["filter.X_c"], d["filter.B_c"], d["transformer.X_t"]
         u = u_c + (i_s - i_g) * (1 / (30 * B_c))
         P, Q = _power(u, i_g)
-        w = 1 + d["droop.R_f"] * (s[f"{n}.P_ref"] - self._pod(s, "p") - lag(s, f"{n}.P_f", P, d["droop.tau_P"]))
+        w = 1 + d["droop.R_f"] * (
+            s[f"{n}.P_ref"] - self._pod(s, "p") - lag(s, f"{n}.P_f", P, d["droop.tau_P"])
+        )
         reactive = s[f"{n}.Q_ref"] + self._pod(s, "q") - lag(s, f"{n}.Q_f", Q, d["droop.tau_Q"])
         u_ref = Pair(s[f"{n}.U_0"] + d["droop.R_V"] * reactive, 0.0)
         s.equate(s.dot(f"{n}.theta"), W_B * (w - 1))
         for kind in self.pods:
             self._filter(s, kind, w - 1)
         # Cascaded control
-        tau_v, xi, tau_i = d["voltage_control.tau"], d["voltage_control.xi"], d["current_control.tau"]
+        tau_v, xi, tau_i = (
+            d["voltage_control.tau"],
+            d["voltage_control.xi"],
+            d["current_control.tau"],
+        )
         omega_n, C_c, L_c = 4 / (tau_v * xi), B_c / W_B, X_c / W_B
         error = u_ref - u
         i_ref = error * (2 * xi * omega_n * C_c * 100) + x_v + u.turned(w * B_c) + i_ff
@@ -81,7 +112,9 @@ class Converter:
         bus = self._bus_voltage(s)
         _equate(s, rate["i_s"] * (X_c / W_B), v_c - u - i_s * d["filter.R_c"] - i_s.turned(w * X_c))
         _equate(s, rate["u_c"] * (B_c / W_B), i_s - i_g - u_c.turned(w * B_c))
-        _equate(s, rate["i_g"] * (X_t / W_B), u - bus - i_g * d["transformer.R_t"] - i_g.turned(w * X_t))
+        _equate(
+            s, rate["i_g"] * (X_t / W_B), u - bus - i_g * d["transformer.R_t"] - i_g.turned(w * X_t)
+        )
 
     def _pod(self, s: Unknowns, kind: str) -> complex:
         """Output of a damping controller, K times that of its last stage; added to Q's reference, taken from P's."""

@@ -148,7 +148,9 @@ class System:
             s = v * np.conj(Y @ v) - wanted
             return np.concatenate([s.real[turned], s.imag[free]])
 
-        found = root(mismatch, np.concatenate([np.zeros(len(turned)), np.ones(len(free))]), tol=1e-13)
+        found = root(
+            mismatch, np.concatenate([np.zeros(len(turned)), np.ones(len(free))]), tol=1e-13
+        )
         assert np.abs(mismatch(found.x)).max() < 1e-9, found.message
         return voltages(found.x)
 
@@ -169,7 +171,11 @@ class System:
 
     def swings(self, low: float = 0.3, high: float = 2.5, most: float = 0.4) -> list[complex]:
         """Modes between two frequencies [Hz] below a damping ratio, slowest first [rad/s]."""
-        found = [z for z in self.eigenvalues() if low < z.imag / (2 * np.pi) < high and -z.real < most * abs(z)]
+        found = [
+            z
+            for z in self.eigenvalues()
+            if low < z.imag / (2 * np.pi) < high and -z.real < most * abs(z)
+        ]
         return sorted(found, key=lambda z: z.imag)
 
 
@@ -209,7 +215,10 @@ class _Motion:
 
         v = _newton(balance, self.v_0)
         return np.concatenate(
-            [unit.rates(own, v[unit.m.bus - 1]) for unit, own in zip(self.units, states, strict=True)]
+            [
+                unit.rates(own, v[unit.m.bus - 1])
+                for unit, own in zip(self.units, states, strict=True)
+            ]
         )
 
 
@@ -287,7 +296,10 @@ class _Unit:
         e_d = u.real + m.R_a * i_d - self.X_q2 * i_q
         self.E_fd = e_q * (1 + S) + (m.X_d - self.X_d2) * i_d
         self.T_m = e_d * i_d + e_q * i_q + (self.X_q2 - self.X_d2) * i_d * i_q
-        E_q1, E_d1 = self.E_fd - S * e_q - (m.X_d - m.X_d1) * i_d, (m.X_q - m.X_q1) * i_q - S * self.S_q_ratio * e_d
+        E_q1, E_d1 = (
+            self.E_fd - S * e_q - (m.X_d - m.X_d1) * i_d,
+            (m.X_q - m.X_q1) * i_q - S * self.S_q_ratio * e_d,
+        )
         own = [delta, 1.0, E_q1, E_d1]
         if self.sixth:
             own += [E_q1 - (m.X_d1 - m.X_l) * i_d, E_d1 + (m.X_q1 - m.X_l) * i_q]
@@ -350,7 +362,11 @@ class _Unit:
                 signal = u
             error = self.V_ref + signal - s[k]
             rate = (error - s[k + 1]) / x.T_B
-            return x.K_A * (s[k + 1] + x.T_A / x.T_B * (error - s[k + 1])), [(v_t - s[k]) / x.T_R, rate, *rates]
+            return x.K_A * (s[k + 1] + x.T_A / x.T_B * (error - s[k + 1])), [
+                (v_t - s[k]) / x.T_R,
+                rate,
+                *rates,
+            ]
         if isinstance(x, Commutator):
             E, V_R, slow = s[k : k + 3]
             measured = s[k + 3] if x.T_R else v_t

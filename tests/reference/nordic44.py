@@ -126,7 +126,9 @@ class Nordic44:
             s = v * np.conj(self.admittance @ v) - wanted
             return np.concatenate([s.real[turned], s.imag[free]])
 
-        found = root(mismatch, np.concatenate([np.zeros(len(turned)), np.ones(len(free))]), tol=1e-13)
+        found = root(
+            mismatch, np.concatenate([np.zeros(len(turned)), np.ones(len(free))]), tol=1e-13
+        )
         assert np.abs(mismatch(found.x)).max() < 1e-8, found.message
         return voltages(found.x)
 
@@ -139,7 +141,9 @@ class Nordic44:
         P = self._column("p_mw") / BASE
         slack = self.at == self._place(SLACK)
         missing = fed[self._place(SLACK)].real - P[slack].sum()
-        P[slack] += missing / slack.sum() if self.slack_shared else missing * (np.arange(slack.sum()) == 0)
+        P[slack] += (
+            missing / slack.sum() if self.slack_shared else missing * (np.arange(slack.sum()) == 0)
+        )
         return P + 1j * fed.imag[self.at] / count[self.at]
 
     # -- modes -----------------------------------------------------------------------------------------
@@ -205,7 +209,9 @@ class Nordic44:
         else:
             damper_d = (E_q - fast_q - (d["X_d1"] - self.X_l) * i_d) / d["T_d20"]
             damper_q = (E_d - fast_d + (d["X_q1"] - self.X_l) * i_q) / d["T_q20"]
-            far_d, far_q = ((d[name] - d["X_d2"]) / (d[name] - self.X_l) ** 2 for name in ("X_d1", "X_q1"))
+            far_d, far_q = (
+                (d[name] - d["X_d2"]) / (d[name] - self.X_l) ** 2 for name in ("X_d1", "X_q1")
+            )
             d_axis = (d["X_d"] - d["X_d1"]) * (k_d * i_d + far_d * (E_q - fast_q))
             q_axis = (d["X_q"] - d["X_q1"]) * (-k_q * i_q + far_q * (E_d - fast_d))
         return np.concatenate(

@@ -14,7 +14,9 @@ KUNDUR_EXCITERS = {
 }
 
 
-def kundur(scenario: str, *, active: float = 1.0, saturation: bool = True, stray_B: float = 0.0, **more) -> System:
+def kundur(
+    scenario: str, *, active: float = 1.0, saturation: bool = True, stray_B: float = 0.0, **more
+) -> System:
     """Example 12.6; active power in proportion to |v|^active (the book: constant current), reactive to |v|²."""
     short, long = (0.0025, 0.025, 0.04375), (0.001, 0.01, 0.0175)
     tie = (0.011, 0.11, 0.1925)
@@ -30,9 +32,19 @@ def kundur(scenario: str, *, active: float = 1.0, saturation: bool = True, stray
     ]
     transformers = [(1, 5), (2, 6), (3, 11), (4, 10)]
     data = {
-        "base": 900.0, "X_d": 1.8, "X_q": 1.7, "X_d1": 0.3, "X_q1": 0.55, "X_d2": 0.25, "X_l": 0.2, "R_a": 0.0025,
-        "T_d10": 8.0, "T_q10": 0.4, "T_d20": 0.03, "T_q20": 0.05,
-    }  # fmt: skip
+        "base": 900.0,
+        "X_d": 1.8,
+        "X_q": 1.7,
+        "X_d1": 0.3,
+        "X_q1": 0.55,
+        "X_d2": 0.25,
+        "X_l": 0.2,
+        "R_a": 0.0025,
+        "T_d10": 8.0,
+        "T_q10": 0.4,
+        "T_d20": 0.03,
+        "T_q20": 0.05,
+    }
     if saturation:
         data |= {"S_10": 0.0392, "S_12": 0.2227}
     return System(
@@ -81,12 +93,21 @@ def wscc9(*, exponent: float = 0.0, saturation=exponential, stray_B: float = 0.0
     return System(
         buses=9,
         branches=(
-            Branch(1, 4, 0, 0.0576), Branch(2, 7, 0, 0.0625), Branch(3, 9, 0, 0.0586),
-            Branch(4, 5, 0.01, 0.085, 0.176), Branch(4, 6, 0.017, 0.092, 0.158), Branch(5, 7, 0.032, 0.161, 0.306),
-            Branch(6, 9, 0.039, 0.17, 0.358), Branch(7, 8, 0.0085, 0.072, 0.149), Branch(8, 9, 0.0119, 0.1008, 0.209),
+            Branch(1, 4, 0, 0.0576),
+            Branch(2, 7, 0, 0.0625),
+            Branch(3, 9, 0, 0.0586),
+            Branch(4, 5, 0.01, 0.085, 0.176),
+            Branch(4, 6, 0.017, 0.092, 0.158),
+            Branch(5, 7, 0.032, 0.161, 0.306),
+            Branch(6, 9, 0.039, 0.17, 0.358),
+            Branch(7, 8, 0.0085, 0.072, 0.149),
+            Branch(8, 9, 0.0119, 0.1008, 0.209),
         ),
         shunts=dict.fromkeys((1, 2, 3), stray_B) if stray_B else {},
-        loads=tuple(Load(k, P, Q, exponent, exponent) for k, P, Q in ((5, 1.25, 0.5), (6, 0.9, 0.3), (8, 1.0, 0.35))),
+        loads=tuple(
+            Load(k, P, Q, exponent, exponent)
+            for k, P, Q in ((5, 1.25, 0.5), (6, 0.9, 0.3), (8, 1.0, 0.35))
+        ),
         machines=tuple(
             Machine(bus, 100.0, P, V, H, X_d, X_q, X_d1, X_q1, T_d10, T_q10)
             for bus, P, V, H, X_d, X_q, X_d1, X_q1, T_d10, T_q10 in data
@@ -94,10 +115,13 @@ def wscc9(*, exponent: float = 0.0, saturation=exponential, stray_B: float = 0.0
         slack=1,
         exciter=Commutator(saturation),
         **more,
-    )  # fmt: skip
+    )
 
 
 def with_subtransients(system: System) -> System:
     """The WSCC system with machines of sixth order, X'' = 0.8·X'_d and X_l = 0.5·X'_d: to compare programs with."""
-    machines = tuple(replace(m, X_d2=0.8 * m.X_d1, X_l=0.5 * m.X_d1, T_d20=0.03, T_q20=0.05) for m in system.machines)
+    machines = tuple(
+        replace(m, X_d2=0.8 * m.X_d1, X_l=0.5 * m.X_d1, T_d20=0.03, T_q20=0.05)
+        for m in system.machines
+    )
     return replace(system, machines=machines)

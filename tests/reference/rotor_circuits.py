@@ -37,7 +37,9 @@ def one_after_the_other(a: Axis, omega_b: float) -> Circuit:
     X_m, seen = a.X - a.X_l, a.X1 - a.X_l
     X_s = X_m * seen / (X_m - seen)
     X_f = seen * (a.X2 - a.X_l) / (seen - a.X2 + a.X_l)
-    return Circuit(X_m, (X_s, (X_m + X_s) / (omega_b * a.T10)), (X_f, (X_f + seen) / (omega_b * a.T20)))
+    return Circuit(
+        X_m, (X_s, (X_m + X_s) / (omega_b * a.T10)), (X_f, (X_f + seen) / (omega_b * a.T20))
+    )
 
 
 def of_short_circuit_data(a: Axis, omega_b: float) -> Circuit:

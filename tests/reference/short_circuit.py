@@ -22,7 +22,12 @@ Rotor = Literal["tops", "classical", "short-circuit"]
 _Pair = tuple[np.ndarray, np.ndarray]
 SHORT = 1e6
 """Admittance of the short circuit [pu on 100 MVA]."""
-_DELTA, _W, _FLUXES, _LEAD, _E_FD, _VALVE, _REHEAT, _WASHOUT, _STAGE_1, _STAGE_2 = 0, 1, slice(2, 6), *range(6, 13)
+_DELTA, _W, _FLUXES, _LEAD, _E_FD, _VALVE, _REHEAT, _WASHOUT, _STAGE_1, _STAGE_2 = (
+    0,
+    1,
+    slice(2, 6),
+    *range(6, 13),
+)
 
 
 @dataclass
@@ -41,7 +46,9 @@ class ShortCircuit:
         self.omega_b = 2 * np.pi * s.frequency
         self.scale = g["S_n"] / 100
         self.X2 = g["X_d_st"]
-        self.Z = {fault: self._between_machines(s.bus[0] if fault else None) for fault in (False, True)}
+        self.Z = {
+            fault: self._between_machines(s.bus[0] if fault else None) for fault in (False, True)
+        }
         u = s.v[s.bus]
         i = np.conj(s.S / self.scale / u)
         delta = np.angle(u + 1j * g["X_q"] * i)
@@ -51,7 +58,12 @@ class ShortCircuit:
         self.v_t = abs(u)
         self.E_fd = u_q + g["X_d"] * i_d
         if self.rotor == "tops":
-            fluxes = [u_q + g["X_d_t"] * i_d, u_d - g["X_q_t"] * i_q, u_q + self.X2 * i_d, u_d - self.X2 * i_q]
+            fluxes = [
+                u_q + g["X_d_t"] * i_d,
+                u_d - g["X_q_t"] * i_q,
+                u_q + self.X2 * i_d,
+                u_d - self.X2 * i_q,
+            ]
         else:
             self.d, self.q = self._circuits("d"), self._circuits("q")
             gap = u_q + self.X_l * i_d
@@ -59,7 +71,18 @@ class ShortCircuit:
             fluxes = [first, gap, -u_d + self.X_l * i_q, -u_d + self.X_l * i_q]
         zero = np.zeros_like(delta)
         self.start = np.array(
-            [delta, zero, *fluxes, self.E_fd / g["SEXS.K"], self.E_fd, self.P_m, self.P_m, zero, zero, zero]
+            [
+                delta,
+                zero,
+                *fluxes,
+                self.E_fd / g["SEXS.K"],
+                self.E_fd,
+                self.P_m,
+                self.P_m,
+                zero,
+                zero,
+                zero,
+            ]
         )
         assert np.abs(self.rates(self.start, fault=False)).max() < 1e-7
 
@@ -75,7 +98,9 @@ class ShortCircuit:
         g = self.system.data
         convert = one_after_the_other if self.rotor == "classical" else of_short_circuit_data
         found = []
-        columns = (g[key.format(axis)] for key in ("X_{}", "X_{}_t", "X_{}_st", "T_{}0_t", "T_{}0_st"))
+        columns = (
+            g[key.format(axis)] for key in ("X_{}", "X_{}_t", "X_{}_st", "T_{}0_t", "T_{}0_st")
+        )
         for X, X1, X2, T1, T2 in zip(*columns, strict=True):
             if X1 == X:  # no slow branch
                 X_m, seen = X - self.X_l, X2 - self.X_l
@@ -108,7 +133,9 @@ class ShortCircuit:
         fluxes = self._flux_rates(x, E_fd, (e_q, e_d), (i_d, i_q))
         return np.array([self.omega_b * x[_W], torque / (2 * g["H"]), *fluxes, *controls])
 
-    def _flux_rates(self, x: np.ndarray, E_fd: np.ndarray, emf: _Pair, current: _Pair) -> list[np.ndarray]:
+    def _flux_rates(
+        self, x: np.ndarray, E_fd: np.ndarray, emf: _Pair, current: _Pair
+    ) -> list[np.ndarray]:
         g, (e_q, e_d), (i_d, i_q) = self.system.data, emf, current
         a, b, c, e = x[_FLUXES]
         if self.rotor == "tops":
@@ -127,7 +154,9 @@ class ShortCircuit:
             -rate * q[4] * (e - gap_q) / q[3],
         ]
 
-    def _controls(self, x: np.ndarray, v_t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _controls(
+        self, x: np.ndarray, v_t: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """E_fd, the turbine's power on P_n, and the rates of both and of the stabiliser."""
         g, w, on = self.system.data, x[_W], self.system.data["controlled"]
         slow, shape = g["STAB1.K"] / g["STAB1.T"] * w - x[_WASHOUT], ("STAB1.T_1", "STAB1.T_3")
@@ -136,13 +165,24 @@ class ShortCircuit:
         signal = np.clip(two, -g["STAB1.H_lim"], g["STAB1.H_lim"]) * (on & self.stabilisers)
         error = self.v_t + self.E_fd / g["SEXS.K"] - v_t + signal
         led, d_led = _lead(error, x[_LEAD], g["SEXS.T_a"], g["SEXS.T_b"])
-        d_E = _stopped((g["SEXS.K"] * led - x[_E_FD]) / g["SEXS.T_e"], x[_E_FD], g["SEXS.E_min"], g["SEXS.E_max"])
+        d_E = _stopped(
+            (g["SEXS.K"] * led - x[_E_FD]) / g["SEXS.T_e"],
+            x[_E_FD],
+            g["SEXS.E_min"],
+            g["SEXS.E_max"],
+        )
         wanted = self.P_m - w / g["TGOV1.R"]
-        d_valve = _stopped((wanted - x[_VALVE]) / g["TGOV1.T_1"], x[_VALVE], g["TGOV1.V_min"], g["TGOV1.V_max"])
+        d_valve = _stopped(
+            (wanted - x[_VALVE]) / g["TGOV1.T_1"], x[_VALVE], g["TGOV1.V_min"], g["TGOV1.V_max"]
+        )
         power, d_reheat = _lead(x[_VALVE], x[_REHEAT], g["TGOV1.T_2"], g["TGOV1.T_3"])
         E_fd = np.where(on, np.clip(x[_E_FD], g["SEXS.E_min"], g["SEXS.E_max"]), self.E_fd)
         P_m = np.where(on, power - g["TGOV1.D_t"] * w, self.P_m)
-        return E_fd, P_m, on * np.array([d_led, d_E, d_valve, d_reheat, slow / g["STAB1.T"], d_one, d_two])
+        return (
+            E_fd,
+            P_m,
+            on * np.array([d_led, d_E, d_valve, d_reheat, slow / g["STAB1.T"], d_one, d_two]),
+        )
 
     def eigenvalues(self) -> np.ndarray:
         """Of the equations linearised by central differences [rad/s]; oscillations once, fastest last."""
@@ -151,7 +191,9 @@ class ShortCircuit:
         for k in range(n):
             e = np.zeros(n)
             e[k] = h
-            off = (self.rates(self.start + sign * e.reshape(shape), fault=False) for sign in (1, -1))
+            off = (
+                self.rates(self.start + sign * e.reshape(shape), fault=False) for sign in (1, -1)
+            )
             A[:, k] = np.subtract(*off).ravel() / (2 * h)
         values = np.linalg.eigvals(A)
         return np.sort_complex(values[values.imag > 0] / 1j) * 1j
@@ -181,7 +223,9 @@ def _parts(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return z.real, z.imag
 
 
-def _lead(u: np.ndarray, state: np.ndarray, T_lead: np.ndarray, T_lag: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _lead(
+    u: np.ndarray, state: np.ndarray, T_lead: np.ndarray, T_lag: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Output and rate of (1 + s·T_lead)/(1 + s·T_lag)."""
     rate = (u - state) / T_lag
     return state + T_lead * rate, rate

@@ -18,39 +18,93 @@ Data = dict[str, float]
 W_B = 100 * np.pi
 """Base angular frequency [rad/s]."""
 
-_GOVERNOR = {f"governor.{k}": 0.0 for k in ("T_1", "T_2", "T_7", "K_2", "K_4", "K_6", "K_7", "K_8")} | {
-    "governor.enabled": True, "governor.inverse_R": 20.0, "governor.T_3": 0.1, "governor.T_4": 0.3, "governor.T_5": 7.0,
-    "governor.T_6": 0.6, "governor.K_1": 0.3, "governor.K_3": 0.3, "governor.K_5": 0.4,
-}  # fmt: skip
+_GOVERNOR = {
+    f"governor.{k}": 0.0 for k in ("T_1", "T_2", "T_7", "K_2", "K_4", "K_6", "K_7", "K_8")
+} | {
+    "governor.enabled": True,
+    "governor.inverse_R": 20.0,
+    "governor.T_3": 0.1,
+    "governor.T_4": 0.3,
+    "governor.T_5": 7.0,
+    "governor.T_6": 0.6,
+    "governor.K_1": 0.3,
+    "governor.K_3": 0.3,
+    "governor.K_5": 0.4,
+}
 _COMMON = {
-    "transformer.R_t": 0.0, "transformer.X_t": 0.15, "machine.R_s": 0.0025, "machine.D": 0.0,
-    "machine.exact_conversion": False, "machine.saturation": False,
-} | _GOVERNOR  # fmt: skip
+    "transformer.R_t": 0.0,
+    "transformer.X_t": 0.15,
+    "machine.R_s": 0.0025,
+    "machine.D": 0.0,
+    "machine.exact_conversion": False,
+    "machine.saturation": False,
+} | _GOVERNOR
 
 SG1: Data = _COMMON | {
-    "S_n": 1500.0, "machine.H": 6.3, "machine.X_l": 0.234,
-    "machine.X_d": 2.135, "machine.X_d1": 0.34, "machine.X_d2": 0.269, "machine.T_d10": 6.47, "machine.T_d20": 0.022,
-    "machine.X_q": 2.046, "machine.X_q1": 0.573, "machine.X_q2": 0.269, "machine.T_q10": 0.61, "machine.T_q20": 0.034,
-    "machine.s_10": 0.1275, "machine.s_12": 0.2706,
-    "exciter.T_R": 0.02, "exciter.K_PR": 3.15, "exciter.K_IR": 3.15, "exciter.T_A": 0.02, "exciter.K_P": 6.5,
+    "S_n": 1500.0,
+    "machine.H": 6.3,
+    "machine.X_l": 0.234,
+    "machine.X_d": 2.135,
+    "machine.X_d1": 0.34,
+    "machine.X_d2": 0.269,
+    "machine.T_d10": 6.47,
+    "machine.T_d20": 0.022,
+    "machine.X_q": 2.046,
+    "machine.X_q1": 0.573,
+    "machine.X_q2": 0.269,
+    "machine.T_q10": 0.61,
+    "machine.T_q20": 0.034,
+    "machine.s_10": 0.1275,
+    "machine.s_12": 0.2706,
+    "exciter.T_R": 0.02,
+    "exciter.K_PR": 3.15,
+    "exciter.K_IR": 3.15,
+    "exciter.T_A": 0.02,
+    "exciter.K_P": 6.5,
     "exciter.K_C": -0.08,
-}  # fmt: skip
+}
 """ST4B."""
 
 SG2: Data = _COMMON | {
-    "S_n": 5000.0, "machine.H": 6.175, "machine.X_l": 0.2,
-    "machine.X_d": 1.8, "machine.X_d1": 0.3, "machine.X_d2": 0.25, "machine.T_d10": 8.0, "machine.T_d20": 0.03,
-    "machine.X_q": 1.7, "machine.X_q1": 0.55, "machine.X_q2": 0.25, "machine.T_q10": 0.4, "machine.T_q20": 0.05,
-    "machine.s_10": 0.0392, "machine.s_12": 0.2227,
-    "exciter.T_R": 0.01, "exciter.T_B": 10.0, "exciter.T_C": 1.0, "exciter.K_A": 200.0,
-}  # fmt: skip
+    "S_n": 5000.0,
+    "machine.H": 6.175,
+    "machine.X_l": 0.2,
+    "machine.X_d": 1.8,
+    "machine.X_d1": 0.3,
+    "machine.X_d2": 0.25,
+    "machine.T_d10": 8.0,
+    "machine.T_d20": 0.03,
+    "machine.X_q": 1.7,
+    "machine.X_q1": 0.55,
+    "machine.X_q2": 0.25,
+    "machine.T_q10": 0.4,
+    "machine.T_q20": 0.05,
+    "machine.s_10": 0.0392,
+    "machine.s_12": 0.2227,
+    "exciter.T_R": 0.01,
+    "exciter.T_B": 10.0,
+    "exciter.T_C": 1.0,
+    "exciter.K_A": 200.0,
+}
 """ST1."""
 
 PSS2A: Data = {
-    "pss.T_w1": 2.0, "pss.T_w2": 2.0, "pss.T_6": 0.0, "pss.T_w3": 2.0, "pss.T_w4": 0.0, "pss.T_7": 2.0,
-    "pss.K_s2": 0.158, "pss.K_s3": 1.0, "pss.T_8": 0.0, "pss.T_9": 0.1, "pss.K_s1": 17.069, "pss.T_1": 0.28,
-    "pss.T_2": 0.04, "pss.T_3": 0.28, "pss.T_4": 0.12,
-}  # fmt: skip
+    "pss.T_w1": 2.0,
+    "pss.T_w2": 2.0,
+    "pss.T_6": 0.0,
+    "pss.T_w3": 2.0,
+    "pss.T_w4": 0.0,
+    "pss.T_7": 2.0,
+    "pss.K_s2": 0.158,
+    "pss.K_s3": 1.0,
+    "pss.T_8": 0.0,
+    "pss.T_9": 0.1,
+    "pss.K_s1": 17.069,
+    "pss.T_1": 0.28,
+    "pss.T_2": 0.04,
+    "pss.T_3": 0.28,
+    "pss.T_4": 0.12,
+}
 """Of SG1 in the grid code's test; M = 5, N = 1."""
 
 
@@ -71,7 +125,9 @@ def classical(X: float, X_1: float, X_2: float, X_l: float, T_10: float, T_20: f
     first = 1 / (1 / (X_1 - X_l) - 1 / X_m)  # X_1 − X_l is the magnetising branch beside this one
     second = 1 / (1 / (X_2 - X_l) - 1 / X_m - 1 / first)
     parallel = 1 / (1 / X_m + 1 / first)
-    return Axis(X_m, first, (X_m + first) / (W_B * T_10), second, (second + parallel) / (W_B * T_20))
+    return Axis(
+        X_m, first, (X_m + first) / (W_B * T_10), second, (second + parallel) / (W_B * T_20)
+    )
 
 
 def exact(X: float, X_1: float, X_2: float, X_l: float, T_10: float, T_20: float) -> Axis:
@@ -109,7 +165,12 @@ class Machine:
         self.name, self.data, self.bus = name, data, bus
         convert = exact if data["machine.exact_conversion"] else classical
         self.d, self.q = (
-            convert(*(data[f"machine.{k}"] for k in (f"X_{a}", f"X_{a}1", f"X_{a}2", "X_l", f"T_{a}10", f"T_{a}20")))
+            convert(
+                *(
+                    data[f"machine.{k}"]
+                    for k in (f"X_{a}", f"X_{a}1", f"X_{a}2", "X_l", f"T_{a}10", f"T_{a}20")
+                )
+            )
             for a in "dq"
         )
 
@@ -127,10 +188,26 @@ class Machine:
         i_d, i_q = -turned.imag, turned.real
         E_fd = abs(at) + (X_d - X_q) * i_d
         v_t = abs(v + 1j * X_t * i)
-        values = {"i_d": i_d, "i_q": i_q, "i_f": E_fd / self.d.X_m, "i_1d": 0.0, "i_1q": 0.0, "i_2q": 0.0}
-        values |= {"w": 1.0, "delta": float(np.angle(at)), "v_td": 0.0, "v_tq": v_t, "v_t": v_t, "E_fd": E_fd}
+        values = {
+            "i_d": i_d,
+            "i_q": i_q,
+            "i_f": E_fd / self.d.X_m,
+            "i_1d": 0.0,
+            "i_1q": 0.0,
+            "i_2q": 0.0,
+        }
+        values |= {
+            "w": 1.0,
+            "delta": float(np.angle(at)),
+            "v_td": 0.0,
+            "v_tq": v_t,
+            "v_t": v_t,
+            "E_fd": E_fd,
+        }
         values |= {"v_m": v_t, "regulator": 0.5, "amplifier": 0.5, "p_m": power.real}
-        values |= dict.fromkeys(_GOVERNOR_STAGES, power.real) if self.data["governor.enabled"] else {}
+        values |= (
+            dict.fromkeys(_GOVERNOR_STAGES, power.real) if self.data["governor.enabled"] else {}
+        )
         values |= dict.fromkeys(_STABILISER, 0.0) if "pss.K_s1" in self.data else {}
         values |= {"V_ref": v_t, "P_ref": power.real, "divisor": 1.0}
         return {f"{self.name}.{key}": value for key, value in values.items()}
@@ -156,7 +233,10 @@ class Machine:
         s.equate(v_tq - v_q, R_t * i_q + w * X_t * i_d + X_t / W_B * s.dot(f"{n}.i_q"))
         # Motion
         torque = flux["d"] * i_q - flux["q"] * i_d
-        s.equate(2 * d["machine.H"] * s.dot(f"{n}.w"), s[f"{n}.p_m"] / w - torque - d["machine.D"] * (w - 1))
+        s.equate(
+            2 * d["machine.H"] * s.dot(f"{n}.w"),
+            s[f"{n}.p_m"] / w - torque - d["machine.D"] * (w - 1),
+        )
         s.equate(s.dot(f"{n}.delta"), W_B * (w - 1))
         # Control
         s.equate(s[f"{n}.v_t"] ** 2, v_td**2 + v_tq**2)
@@ -180,7 +260,9 @@ class Machine:
         divisor = s[f"{self.name}.divisor"]
         return self.d.X_m / divisor, self.q.X_m / divisor
 
-    def _fluxes(self, X_md: complex, X_mq: complex, i: Callable[[str], complex]) -> dict[str, complex]:
+    def _fluxes(
+        self, X_md: complex, X_mq: complex, i: Callable[[str], complex]
+    ) -> dict[str, complex]:
         """Flux linkages of all windings from their currents [pu]; of derivatives from derivatives."""
         mutual_d = X_md * (i("i_f") + i("i_1d") - i("i_d"))
         mutual_q = X_mq * (i("i_1q") + i("i_2q") - i("i_q"))
@@ -214,7 +296,14 @@ class Machine:
 
     def _excite(self, s: Unknowns, signal: complex, X_md: complex) -> None:
         """ST4B where there is a K_PR; otherwise a transient gain reduction, a gain and, with T_A > 0, a lag."""
-        n, e = self.name, {k.removeprefix("exciter."): v for k, v in self.data.items() if k.startswith("exciter.")}
+        n, e = (
+            self.name,
+            {
+                k.removeprefix("exciter."): v
+                for k, v in self.data.items()
+                if k.startswith("exciter.")
+            },
+        )
         error = s[f"{n}.V_ref"] + signal - lag(s, f"{n}.v_m", s[f"{n}.v_t"], e["T_R"])
         if "K_PR" not in e:
             reduced = lead_lag(s, f"{n}.regulator", error, e["T_C"], e["T_B"])
@@ -222,7 +311,8 @@ class Machine:
             return
         s.equate(s.dot(f"{n}.regulator"), e["K_IR"] * error)
         bridge = lag(s, f"{n}.amplifier", e["K_PR"] * error + s[f"{n}.regulator"], e["T_A"])
-        source = e["K_P"] * s[f"{n}.v_t"]  # rectifier: f_ex = 1 − 0.577·K_C·I_fd/source, I_fd = X_md·i_f
+        # rectifier: f_ex = 1 − 0.577·K_C·I_fd/source, I_fd = X_md·i_f
+        source = e["K_P"] * s[f"{n}.v_t"]
         s.equate(s[f"{n}.E_fd"], bridge * (source - 0.577 * e["K_C"] * X_md * s[f"{n}.i_f"]))
 
     def _stabilise(self, s: Unknowns, power: complex) -> complex:
@@ -233,7 +323,9 @@ class Machine:
         names = dict(zip(_STABILISER, (f"{self.name}.{k}" for k in _STABILISER), strict=True))
         speed = washout(s, names["washout_1"], s[f"{self.name}.w"] - 1, c["T_w1"])
         speed = lag(s, names["speed"], washout(s, names["washout_2"], speed, c["T_w2"]), c["T_6"])
-        power = washout(s, names["washout_4"], washout(s, names["washout_3"], power, c["T_w3"]), c["T_w4"])
+        power = washout(
+            s, names["washout_4"], washout(s, names["washout_3"], power, c["T_w3"]), c["T_w4"]
+        )
         integral = lag(s, names["integral"], power, c["T_7"], c["K_s2"])
         filtered = lead_lag(s, names["ramp_1"], speed + c["K_s3"] * integral, c["T_8"], c["T_9"])
         for k in range(2, 6):

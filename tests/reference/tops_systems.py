@@ -64,7 +64,9 @@ def tops_system(name: str) -> TopsSystem:
     bus = np.array([place[r["bus"]] for r in _rows(tables, "GEN")])
     v = _power_flow(Y, drawn, bus, data["P"] / BASE, data["V"], place[tables["slack_bus"]])
     S = (v * np.conj(Y @ v) + drawn)[bus]
-    return TopsSystem(float(tables["f"]), Y + np.diag(np.conj(drawn) / abs(v) ** 2), v, bus, S, data, names)
+    return TopsSystem(
+        float(tables["f"]), Y + np.diag(np.conj(drawn) / abs(v) ** 2), v, bus, S, data, names
+    )
 
 
 def _rows(tables: dict[str, Any], name: str) -> list[dict[str, Any]]:
@@ -72,7 +74,9 @@ def _rows(tables: dict[str, Any], name: str) -> list[dict[str, Any]]:
     return [dict(zip(head, row, strict=True)) for row in rows]
 
 
-def _branch(Y: np.ndarray, a: int, b: int, z: complex, of_a: float, of_b: float, at_ends: complex) -> None:
+def _branch(
+    Y: np.ndarray, a: int, b: int, z: complex, of_a: float, of_b: float, at_ends: complex
+) -> None:
     """π section; the ratios are the numbers by which TOPS multiplies the voltages of its ends."""
     Y[a, a] += of_a**2 / z + at_ends
     Y[b, b] += of_b**2 / z + at_ends
@@ -85,11 +89,15 @@ def _generators(tables: dict[str, Any]) -> tuple[dict[str, np.ndarray], tuple[st
     rows = _rows(tables, "GEN")
     names = tuple(r["name"] for r in rows)
     rows = [{"PF_n": 1.0, "N_par": 1} | r for r in rows]
-    columns: dict[str, Any] = {key: [r[key] for r in rows] for key in rows[0] if key not in ("name", "bus", "V_n")}
+    columns: dict[str, Any] = {
+        key: [r[key] for r in rows] for key in rows[0] if key not in ("name", "bus", "V_n")
+    }
     for model in ("TGOV1", "SEXS", "STAB1"):
         own = {r["gen"]: r for r in _rows(tables, model)}
         keys = next(iter(own.values())).keys() - {"name", "gen"}
-        columns |= {f"{model}.{key}": [own[n][key] if n in own else 1.0 for n in names] for key in keys}
+        columns |= {
+            f"{model}.{key}": [own[n][key] if n in own else 1.0 for n in names] for key in keys
+        }
         columns["controlled"] = [n in own for n in names]
     data = {key: np.array(values) for key, values in columns.items()}
     for key in ("S_n", "P"):

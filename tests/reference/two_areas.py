@@ -54,7 +54,10 @@ class TwoAreas:
 
     def linearised(self) -> Linearised:
         """E and A at the steady state."""
-        units: list[Machine | Converter] = [Machine("sg1", self.sg1, "bus_2"), Machine("sg2", self.sg2, "bus_3")]
+        units: list[Machine | Converter] = [
+            Machine("sg1", self.sg1, "bus_2"),
+            Machine("sg2", self.sg2, "bus_3"),
+        ]
         if self.converter is not None:
             units.append(Converter("gfor", self.converter, "bus_2"))
 
@@ -104,7 +107,9 @@ class TwoAreas:
             for k in range(2):
                 s.equate(sum(current[k] for current in fed) + sign * line[k], drawn[k])
 
-    def _load(self, s: Unknowns, name: str, v: tuple[complex, complex], power: float) -> tuple[complex, complex]:
+    def _load(
+        self, s: Unknowns, name: str, v: tuple[complex, complex], power: float
+    ) -> tuple[complex, complex]:
         """Current into a load that draws ``power`` at |v| = 1."""
         if self.loads == "impedance":
             return power * v[0], power * v[1]
@@ -114,7 +119,9 @@ class TwoAreas:
         drawn = []
         for part, voltage in zip(("re", "im"), v, strict=True):
             c = s[f"{name}.{part}"]
-            s.equate(self.lag * s.dot(f"{name}.{part}"), power * voltage / size - power * voltage - c)
+            s.equate(
+                self.lag * s.dot(f"{name}.{part}"), power * voltage / size - power * voltage - c
+            )
             drawn.append(power * voltage + c)
         return drawn[0], drawn[1]
 
@@ -153,14 +160,18 @@ DETUNED: dict[str, Data | None] = {
 """Rows of the grid code's table; a turned sign is a negative gain."""
 
 
-def paper_system(scenario: str, X_L: float, governor_on_sg1: bool = True, saturation: bool = False) -> TwoAreas:
+def paper_system(
+    scenario: str, X_L: float, governor_on_sg1: bool = True, saturation: bool = False
+) -> TwoAreas:
     """Case study 1 of the paper: constant-impedance loads, no stabiliser."""
     saturated = {"machine.saturation": saturation}
     sg1 = SG1 | {"governor.enabled": governor_on_sg1} | saturated
     return TwoAreas(X_L, SCENARIOS[scenario], sg1, SG2 | saturated)
 
 
-def grid_code_system(scenario: str, X_L: float, loads: LoadKind = "current", stabiliser: bool = True) -> TwoAreas:
+def grid_code_system(
+    scenario: str, X_L: float, loads: LoadKind = "current", stabiliser: bool = True
+) -> TwoAreas:
     """The grid code's damping test: SG1 with PSS2A and without governor, loads of constant active current."""
     sg1 = SG1 | {"governor.enabled": False} | (PSS2A if stabiliser else {})
     return TwoAreas(X_L, (SCENARIOS | DETUNED)[scenario], sg1, loads=loads)

@@ -9,7 +9,9 @@ def test_nothing_is_said_where_all_were_perturbed():
 
 
 def test_each_way_is_named_with_its_components():
-    said = exceptions_in_words({"a": DIRECTIONAL, "b": PACKED, "c": IDENTIFIED, "d": PERTURBED}, {"c": 1.23e-4})
+    said = exceptions_in_words(
+        {"a": DIRECTIONAL, "b": PACKED, "c": IDENTIFIED, "d": PERTURBED}, {"c": 1.23e-4}
+    )
     assert "a from its FMU's directional derivatives" in said
     assert "b from the model packed in its FMU" in said
     assert "c (fitting error 1.2e-04) identified from its response" in said

@@ -45,14 +45,19 @@ def test_the_browser_gets_page_and_target(page, browser, tmp_path):
 
 def test_without_a_browser_the_page_to_print_is_named(page, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(InputError, match=r"--pdf: none of chromium, .* is installed; open .*a page\.html"):
+    with pytest.raises(
+        InputError, match=r"--pdf: none of chromium, .* is installed; open .*a page\.html"
+    ):
         pdf.print_pdf(page, tmp_path / "page.pdf")
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("sys.exit('first\\nno display')", r"printed nothing \(no display\); print .*a page\.html by hand"),
+        (
+            "sys.exit('first\\nno display')",
+            r"printed nothing \(no display\); print .*a page\.html by hand",
+        ),
         ("pass", r"printed nothing \(it said nothing\)"),
         ("import time\ntime.sleep(60)", r"does not print: .*timed out"),
     ],

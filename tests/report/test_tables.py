@@ -68,7 +68,9 @@ def test_the_terminals_modes(printed, summary):
     for row in rows:
         s = summary[row["Scenario"]]
         mode, theirs = s["modes"]["electromechanical"], s["references"]["electromechanical"]
-        assert eigenvalue(row["Mode [rad/s]"]) == pytest.approx(complex(mode["real"], mode["imag"]), abs=1e-4)
+        assert eigenvalue(row["Mode [rad/s]"]) == pytest.approx(
+            complex(mode["real"], mode["imag"]), abs=1e-4
+        )
         agrees(row, "f [Hz]", mode["frequency_hz"])
         agrees(row, "Damping [%]", mode["damping_percent"])
         agrees(row, "paper: f [Hz]", theirs["frequency_hz"])
@@ -82,7 +84,9 @@ def test_the_terminals_steady_state(printed, summary):
         s = summary[row["Scenario"]]
         assert int(row["States"]) == s["states"]
         assert value(row["Residual per step"]) == pytest.approx(s["residual"], rel=0.06)
-        assert value(row["Power-flow residual [pu]"]) == pytest.approx(s["power_flow"]["residual"], rel=0.06)
+        assert value(row["Power-flow residual [pu]"]) == pytest.approx(
+            s["power_flow"]["residual"], rel=0.06
+        )
 
 
 def test_the_terminals_ring_down(printed, summary):
@@ -94,13 +98,15 @@ def test_the_terminals_ring_down(printed, summary):
         agrees(row, "Damping simulated [%]", s["ring_down"]["damping_percent"])
         agrees(row, "f mode [Hz]", s["modes"]["electromechanical"]["frequency_hz"])
         agrees(row, "Damping mode [%]", s["modes"]["electromechanical"]["damping_percent"])
-        assert abs(value(row["f simulated [Hz]"]) - value(row["f mode [Hz]"])) > 1e-4  # else they could change places
+        # else they could change places
+        assert abs(value(row["f simulated [Hz]"]) - value(row["f mode [Hz]"])) > 1e-4
 
 
 def shifts(folder):
     with (folder / "step_size.csv").open(encoding="utf-8") as file:
         return {
-            (r["scenario"], r["schedule"], f"{1e6 * float(r['step size [s]']):g} µs"): r for r in csv.DictReader(file)
+            (r["scenario"], r["schedule"], f"{1e6 * float(r['step size [s]']):g} µs"): r
+            for r in csv.DictReader(file)
         }
 
 
@@ -114,7 +120,9 @@ def test_the_shift_by_the_communication_step(where, request, studied, summary):
             if heading.endswith("µs"):
                 entry = known[name, row["Schedule"], heading]
                 there = complex(float(entry["real [1/s]"]), float(entry["imag [rad/s]"]))
-                exact = complex(float(entry["continuous real [1/s]"]), float(entry["continuous imag [rad/s]"]))
+                exact = complex(
+                    float(entry["continuous real [1/s]"]), float(entry["continuous imag [rad/s]"])
+                )
                 assert value(cell) == pytest.approx(float(entry["shift [rad/s]"]), rel=0.06)
                 assert value(cell) == pytest.approx(abs(there - exact), rel=0.06)
                 cells += 1
@@ -131,12 +139,16 @@ def test_the_terminals_table_of_all_modes(gfor):
     rows = [row for row in rows if row["f [Hz]"]]
     assert len(rows) == len(scenario["modes"]) >= 8
     for row, mode in zip(rows, scenario["modes"], strict=True):
-        assert eigenvalue(row["Mode [rad/s]"]) == pytest.approx(complex(mode["real"], mode["imag"]), abs=1e-4)
+        assert eigenvalue(row["Mode [rad/s]"]) == pytest.approx(
+            complex(mode["real"], mode["imag"]), abs=1e-4
+        )
         agrees(row, "f [Hz]", mode["frequency_hz"])
         agrees(row, "Damping [%]", mode["damping_percent"])
         assert row["Name"] == (mode["name"] or "")
         first = mode["participation"][0]
-        assert row["Most associated states (participation)"].startswith(f"{first['state']} ({first['factor']:.2f})")
+        assert row["Most associated states (participation)"].startswith(
+            f"{first['state']} ({first['factor']:.2f})"
+        )
 
 
 def test_the_terminals_mode_shapes(gfor):
@@ -164,7 +176,9 @@ def test_the_pages_modes(page, summary):
     for row in rows:
         s = summary[row["Scenario"]]
         mode, theirs = s["modes"][row["Mode"]], s["references"][row["Mode"]]
-        assert eigenvalue(row["λ [rad/s]"]) == pytest.approx(complex(mode["real"], mode["imag"]), abs=1e-3)
+        assert eigenvalue(row["λ [rad/s]"]) == pytest.approx(
+            complex(mode["real"], mode["imag"]), abs=1e-3
+        )
         agrees(row, "f [Hz]", mode["frequency_hz"])
         agrees(row, "Damping [%]", mode["damping_percent"])
         agrees(row, "paper: f [Hz]", theirs["frequency_hz"])
@@ -223,14 +237,24 @@ def test_the_file_of_modes_has_the_summarys_figures(studied, summary):
         rows = {r["scenario"]: r for r in csv.DictReader(file) if r["name"] == "electromechanical"}
     for s in summary.values():
         mode, row = s["modes"]["electromechanical"], rows[s["name"]]
-        for heading, key in {"real [1/s]": "real", "imag [rad/s]": "imag", "frequency [Hz]": "frequency_hz",
-                             "damping [%]": "damping_percent"}.items():  # fmt: skip
+        for heading, key in {
+            "real [1/s]": "real",
+            "imag [rad/s]": "imag",
+            "frequency [Hz]": "frequency_hz",
+            "damping [%]": "damping_percent",
+        }.items():
             assert float(row[heading]) == pytest.approx(mode[key], rel=1e-5), heading
 
 
 # -- README and pages of validation ----------------------------------------------------------------
 
-NAMES = {"Base (only SG)": "base", "SG + GFOR": "gfor", "POD-P": "pod_p", "POD-Q": "pod_q", "POD-PQ": "pod_pq"}
+NAMES = {
+    "Base (only SG)": "base",
+    "SG + GFOR": "gfor",
+    "POD-P": "pod_p",
+    "POD-Q": "pod_q",
+    "POD-PQ": "pod_pq",
+}
 
 
 def on_page_of(name):
@@ -240,7 +264,11 @@ def on_page_of(name):
 
 def test_the_readme_shows_the_page_of_validations_figures():
     """The paper's and our values without saturation, row by row."""
-    (short,) = [t for t in in_markdown((ROOT / "README.md").read_text(encoding="utf-8")) if "here: λ" in str(t[0])]
+    (short,) = [
+        t
+        for t in in_markdown((ROOT / "README.md").read_text(encoding="utf-8"))
+        if "here: λ" in str(t[0])
+    ]
     (rows,) = [t for t in on_page_of("two-area") if "no saturation (default)" in t[0]]
     assert short[1:] == [row[:5] for row in rows[2:]]
 
@@ -252,12 +280,16 @@ def test_the_table_of_the_paper(gfor, saturated, first):
     on = [f"--set={unit}.machine.saturation=true" for unit in ("sg1", "sg2")] if saturated else []
     code, out, _ = gfor("modes", "two_area", *on, "--json")
     assert code == 0
-    found = {s["name"]: next(m for m in s["modes"] if m["name"]) for s in json.loads(out)["scenarios"]}
+    found = {
+        s["name"]: next(m for m in s["modes"] if m["name"]) for s in json.loads(out)["scenarios"]
+    }
     assert [row[0] for row in rows[2:]] == list(NAMES)
     for name, *_ in rows[2:]:
         (row,) = [r for r in rows if r[0] == name]
         mode = found[NAMES[name]]
-        assert eigenvalue(row[first]) == pytest.approx(complex(mode["real"], mode["imag"]), abs=0.7e-3)
+        assert eigenvalue(row[first]) == pytest.approx(
+            complex(mode["real"], mode["imag"]), abs=0.7e-3
+        )
         assert value(row[first + 1]) == pytest.approx(mode["damping_percent"], abs=0.5e-2 * 1.001)
 
 
@@ -273,15 +305,29 @@ def test_the_table_of_steps(studied):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("label", ["POD-P, ΔK = 50", "POD-Q, ΔK = 50", "POD-P, ΔK = 0.1", "POD-Q, ΔK = 0.1"])
+@pytest.mark.parametrize(
+    "label", ["POD-P, ΔK = 50", "POD-Q, ΔK = 50", "POD-P, ΔK = 0.1", "POD-Q, ΔK = 0.1"]
+)
 def test_the_table_of_designs(gfor, label, tmp_path):
     (rows,) = [t for t in on_page_of("pod-design") if "K before its bounds" in t[0]]
     (row,) = [r for r in rows if r[0] == label]
     controller, gain = label.split(", ΔK = ")
     out = ("--out", tmp_path / "pod.toml")
-    arguments = ["--controller", NAMES[controller], "--delta-gain", gain, "--no-margins", "--json", *out]
+    arguments = [
+        "--controller",
+        NAMES[controller],
+        "--delta-gain",
+        gain,
+        "--no-margins",
+        "--json",
+        *out,
+    ]
     found = json.loads(gfor("design", "two_area", *arguments)[1])
-    for heading, key in {"T_S1 [s]": "T_S1", "T_S2 [s]": "T_S2", "K before its bounds": "K_unbounded"}.items():
+    for heading, key in {
+        "T_S1 [s]": "T_S1",
+        "T_S2 [s]": "T_S2",
+        "K before its bounds": "K_unbounded",
+    }.items():
         agrees(dict(zip(rows[0], row, strict=True)), heading, found[key])
 
 
@@ -295,5 +341,8 @@ def test_names_of_points_that_are_no_numbers_and_no_times_stay(names):
 
 
 def test_texts_that_differ_in_figures_only_are_one_kind_and_names_are_not_figures():
-    said = [("a", ["bus_1 feeds 70 Mvar", "bus_2 feeds 1 Mvar"]), ("b", ["bus_1 feeds -7.5e1 Mvar"])]
+    said = [
+        ("a", ["bus_1 feeds 70 Mvar", "bus_2 feeds 1 Mvar"]),
+        ("b", ["bus_1 feeds -7.5e1 Mvar"]),
+    ]
     assert kinds_of(said) == [("bus_1 feeds 70 Mvar", ["a", "b"]), ("bus_2 feeds 1 Mvar", ["a"])]

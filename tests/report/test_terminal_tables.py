@@ -17,10 +17,14 @@ def printed(table, width=160):
 
 def test_units_in_square_brackets_are_no_style():
     table = make_table("Modes [red]", "Mode [rad/s]", "f [Hz]", "[bold]")
-    assert all(text in printed(table) for text in ("Modes [red]", "Mode [rad/s]", "f [Hz]", "[bold]"))
+    assert all(
+        text in printed(table) for text in ("Modes [red]", "Mode [rad/s]", "f [Hz]", "[bold]")
+    )
 
 
-@pytest.mark.parametrize(("count", "shown"), [(5, "0, 1, 2, 3, 4"), (6, "0, 1, 2, 3, 4 … 6 in all"), (0, "")])
+@pytest.mark.parametrize(
+    ("count", "shown"), [(5, "0, 1, 2, 3, 4"), (6, "0, 1, 2, 3, 4 … 6 in all"), (0, "")]
+)
 def test_a_long_list_is_cut_and_counted(count, shown):
     assert first_few(range(count), str) == shown
 
@@ -36,7 +40,9 @@ def test_every_variable_of_an_fmu_stands_in_the_table_of_its_causality(fmu_path)
     for table in tables:
         causality = str(table.title).partition(" ")[0]
         names = {v.name for v in description.variables.values() if v.causality == causality}
-        assert {str(cell) for cell in table.columns[0].cells} == {name for name in names if not name.startswith("der(")}
+        assert {str(cell) for cell in table.columns[0].cells} == {
+            name for name in names if not name.startswith("der(")
+        }
     (inputs,) = (table for table in tables if str(table.title).startswith("input "))
     row = {str(c.header): str(next(iter(c.cells))) for c in inputs.columns}
     known = description.variables[row["Name"]]

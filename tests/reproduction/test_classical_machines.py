@@ -36,7 +36,11 @@ def reduced_swings(system):
         for b in range(len(at)):
             if a != b:
                 angle = delta[a] - delta[b]
-                slope = size[a] * size[b] * (reduced[a, b].imag * np.cos(angle) - reduced[a, b].real * np.sin(angle))
+                slope = (
+                    size[a]
+                    * size[b]
+                    * (reduced[a, b].imag * np.cos(angle) - reduced[a, b].real * np.sin(angle))
+                )
                 K[a, b], K[a, a] = -slope, K[a, a] + slope
     squares = np.linalg.eigvals(-(np.pi * system.frequency / H)[:, None] * K)
     return list(np.sqrt(sorted(-squares.real)[1:]))
@@ -66,5 +70,9 @@ def test_the_reduced_network_has_the_books_modes():
 @pytest.mark.slow
 def test_the_fmus_have_the_modes_of_the_reduced_network(tmp_path):
     (ready,) = with_classical_machines(tmp_path).prepare(["base"])
-    found = [2 * np.pi * m.frequency_hz for m in compute_modes(ready, (0.3, 3.0)).modes if m.damping_percent < 20]
+    found = [
+        2 * np.pi * m.frequency_hz
+        for m in compute_modes(ready, (0.3, 3.0)).modes
+        if m.damping_percent < 20
+    ]
     assert sorted(found) == pytest.approx(reduced_swings(wscc9(stray_B=STRAY_B)), rel=5e-4)

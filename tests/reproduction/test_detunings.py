@@ -16,7 +16,9 @@ def test_the_record_alone_tells_growth_from_decay(rate, hertz):
     """A fast mode that dies out beside it, and rounding, change nothing."""
     rng = np.random.default_rng(0)
     ringing = np.exp(rate * TIMES) * np.cos(2 * np.pi * hertz * TIMES) + 20 * np.exp(-0.5 * TIMES)
-    slope, _ = growth_of_record(TIMES, np.abs(1e-6 * ringing + 1e-12 * rng.standard_normal(len(TIMES))))
+    slope, _ = growth_of_record(
+        TIMES, np.abs(1e-6 * ringing + 1e-12 * rng.standard_normal(len(TIMES)))
+    )
     assert slope == pytest.approx(rate, abs=0.004)
 
 
@@ -30,11 +32,24 @@ def test_the_draws_are_what_they_were():
     """The table in the page is of these."""
     assert (SEED, list(FORTY)) == (631, list(range(40)))
     assert drawn(SEED, 0).values == {"sg2.governor.inverse_R": 13.9}
-    assert drawn(SEED, 1).values == {"gfor2.droop.R_f": 0.649, "gfor2.droop.R_V": 0.289, "gfor2.droop.tau_P": 0.0161}
+    assert drawn(SEED, 1).values == {
+        "gfor2.droop.R_f": 0.649,
+        "gfor2.droop.R_V": 0.289,
+        "gfor2.droop.tau_P": 0.0161,
+    }
     assert drawn(SEED, 19).jacobi
 
 
-CHOSEN = {0: "slow", 1: "fast", 3: "slow decay", 8: "fast", 19: "Jacobi", 20: "near", 26: "coupling", 33: "fast"}
+CHOSEN = {
+    0: "slow",
+    1: "fast",
+    3: "slow decay",
+    8: "fast",
+    19: "Jacobi",
+    20: "near",
+    26: "coupling",
+    33: "fast",
+}
 """Of the forty; `python -m tests.benchmarks.detunings` asks all."""
 
 

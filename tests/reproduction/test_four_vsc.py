@@ -49,7 +49,10 @@ W1 = replace(OPEN, converters=BY_VOLTAGE)
 def scaled(**factors):
     """The benchmark with gains of every converter multiplied."""
     of = [{name: by * getattr(u, name) for name, by in factors.items()} for u in OPEN.converters]
-    return replace(OPEN, converters=tuple(replace(u, **new) for u, new in zip(OPEN.converters, of, strict=True)))
+    return replace(
+        OPEN,
+        converters=tuple(replace(u, **new) for u, new in zip(OPEN.converters, of, strict=True)),
+    )
 
 
 CANDIDATES = {
@@ -70,15 +73,21 @@ CANDIDATES = {
     "a circuit between A and C opens instead": FourVsc(circuits_AC=1),
     "a circuit between B and C opens instead": FourVsc(circuits_BC=1),
     "a fifth of the load": replace(OPEN, load_share=0.2),
-    "two: PLL: integral gain 2.2 times; a fifth of the load": replace(scaled(pll_integral=2.2), load_share=0.2),
-    "two: wind park 1 holds its voltage; lag of 0.5 ms in the voltage fed forward": replace(W1, fed_forward=5e-4),
+    "two: PLL: integral gain 2.2 times; a fifth of the load": replace(
+        scaled(pll_integral=2.2), load_share=0.2
+    ),
+    "two: wind park 1 holds its voltage; lag of 0.5 ms in the voltage fed forward": replace(
+        W1, fed_forward=5e-4
+    ),
     "three: these; a fifth of the load": replace(W1, fed_forward=5e-4, load_share=0.2),
     "two: the data of 2025; a circuit between A and C opens instead": report(circuits_AC=1),
     "cables: charging twice": replace(OPEN, cables=2.0),
     "cables: half the charging": replace(OPEN, cables=0.5),
     "capacitors for reactors": replace(OPEN, capacitors=True),
     "delay of 0.1 ms in the converter's voltage": replace(OPEN, delay=1e-4),
-    "two: this delay; lag of 0.25 ms in the voltage fed forward": replace(OPEN, delay=1e-4, fed_forward=2.5e-4),
+    "two: this delay; lag of 0.25 ms in the voltage fed forward": replace(
+        OPEN, delay=1e-4, fed_forward=2.5e-4
+    ),
     "two: wind park 1 holds its voltage; capacitors for reactors": replace(W1, capacitors=True),
     "two: wind park 1 holds its voltage; cables: charging 1.35 times": replace(W1, cables=1.35),
     "three: the data of 2025; delay of 0.1 ms; lag of 0.25 ms in the voltage fed forward": report(
@@ -100,13 +109,18 @@ def test_the_candidates_beside_the_recording(label):
 
 def test_no_single_change_comes_near_the_recording():
     """What the page says: nearer than 1.2 1/s and 0.4 Hz in all three are two rows, both with a fifth of the load."""
-    theirs = np.array([cell[0] for cell in figures(PAGE, RECORDED, "**theirs, read from their pictures**")])
+    theirs = np.array(
+        [cell[0] for cell in figures(PAGE, RECORDED, "**theirs, read from their pictures**")]
+    )
     near = set()
     for label in CANDIDATES:
         apart = np.abs(np.array([cell[0] for cell in figures(PAGE, RECORDED, label)]) - theirs)
         if apart[::2].max() < 1.2 and apart[1::2].max() < 0.4:
             near.add(label)
-    assert near == {"two: PLL: integral gain 2.2 times; a fifth of the load", "three: these; a fifth of the load"}
+    assert near == {
+        "two: PLL: integral gain 2.2 times; a fifth of the load",
+        "three: these; a fifth of the load",
+    }
 
 
 def assert_limit(system, gva, hertz):
@@ -117,7 +131,9 @@ def assert_limit(system, gva, hertz):
     assert below.imag / 2 / np.pi == pytest.approx(hertz, abs=HERTZ)
 
 
-@pytest.mark.parametrize("label", [k if k in QUICK else pytest.param(k, marks=pytest.mark.slow) for k in ROWS])
+@pytest.mark.parametrize(
+    "label", [k if k in QUICK else pytest.param(k, marks=pytest.mark.slow) for k in ROWS]
+)
 @pytest.mark.parametrize("network", ["EMT", "phasors"])
 def test_each_change_has_the_limit_of_the_page(label, network):
     cells = [cell[0] if cell else None for cell in figures(PAGE, CHANGES, label)]
@@ -136,7 +152,10 @@ ENTERED = {
     "capacitors for reactors, `charging`": (emtp(capacitors=True), ("four_vsc_emtp", "charging")),
     "both, as entered: `entered`": (emtp(**SLIPS), ("four_vsc_emtp", "entered")),
     "both, lag of 0.08 ms in the voltage fed forward": (emtp(**SLIPS, fed_forward=8e-5), None),
-    "both, wind park 1 with K_p 0.0333, K_i 10: `gains`": (emtp(0.0333, 10.0, **SLIPS), ("four_vsc_emtp", "gains")),
+    "both, wind park 1 with K_p 0.0333, K_i 10: `gains`": (
+        emtp(0.0333, 10.0, **SLIPS),
+        ("four_vsc_emtp", "gains"),
+    ),
 }
 
 
@@ -172,9 +191,13 @@ def test_the_power_flow_is_that_of_the_published_files():
     """Voltages of lf_2.dat [pu, rad]: A, A2, B, B2, E and F."""
     v, _ = FourVsc().power_flow()
     published = {
-        0: (1.0075727, 0.041624702), 1: (1.0318733, 0.15892537), 2: (1.0054174, 0.036073673),
-        3: (0.9824509, 0.16556362), 5: (1.0475620, 0.18895444), 6: (0.9997311, 0.19815885),
-    }  # fmt: skip
+        0: (1.0075727, 0.041624702),
+        1: (1.0318733, 0.15892537),
+        2: (1.0054174, 0.036073673),
+        3: (0.9824509, 0.16556362),
+        5: (1.0475620, 0.18895444),
+        6: (0.9997311, 0.19815885),
+    }
     for k, (magnitude, angle) in published.items():
         assert abs(v[k]) == pytest.approx(magnitude, abs=1e-5)
         assert np.angle(v[k]) == pytest.approx(angle, abs=2e-5)
@@ -182,18 +205,24 @@ def test_the_power_flow_is_that_of_the_published_files():
 
 def test_with_the_files_gain_the_phasor_system_has_the_limit_of_the_slides():
     """5.5 GVA and 8 Hz, for a response that they call marginal."""
-    gva, hertz = (cell[0] for cell in figures(PAGE, CHANGES, "gain of the active power 33.3, as in the files")[2:])
+    gva, hertz = (
+        cell[0]
+        for cell in figures(PAGE, CHANGES, "gain of the active power 33.3, as in the files")[2:]
+    )
     assert gva == pytest.approx(5.5, rel=0.06)
     assert hertz == pytest.approx(8.0, rel=0.03)
     marginal = replace(with_all(OPEN, K_pp=33.3), dynamic=False, S_sc=5500.0).oscillation()
-    assert marginal == pytest.approx(complex(-1.03, 2 * np.pi * 7.93), abs=0.05)  # their picture: the same
+    # their picture: the same
+    assert marginal == pytest.approx(complex(-1.03, 2 * np.pi * 7.93), abs=0.05)
 
 
 # -- the FMUs -----------------------------------------------------------------------------------
 
 
 def stability(name, scenario, S_sc, step=None, **overrides):
-    (ready,) = load_case(name).prepare([scenario], {"equivalent.S_n": S_sc} | overrides, step_size=step)
+    (ready,) = load_case(name).prepare(
+        [scenario], {"equivalent.S_n": S_sc} | overrides, step_size=step
+    )
     return compute_modes(ready, (1.0, 60.0)).stability
 
 
@@ -225,7 +254,11 @@ def test_the_fmus_with_the_files_gain():
 def test_every_independent_eigenvalue_is_one_of_the_fmus(name, S_sc):
     """Without a communication step. Only the phasor FMUs have lags of the bus voltage, here of 1 ms: (s·τ)² apart."""
     emt = name == "four_vsc"
-    lags = {} if emt else {f"{unit}.bus_voltage.tau": 1e-3 for unit in ("wp1", "wp2", "hvdc1", "hvdc2")}
+    lags = (
+        {}
+        if emt
+        else {f"{unit}.bus_voltage.tau": 1e-3 for unit in ("wp1", "wp2", "hvdc1", "hvdc2")}
+    )
     (ready,) = load_case(name).prepare(["following"], {"equivalent.S_n": S_sc} | lags)
     fmus = np.linalg.eigvals(compute_modes(ready).system.A)
     exact = FourVsc(S_sc=S_sc, R_X=0.001, dynamic=emt).eigenvalues()
@@ -259,7 +292,9 @@ def test_damping_controllers_hardly_move_the_limit():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["four_vsc", "four_vsc_rms"])
-@pytest.mark.parametrize("scenario", ["forming_1", "forming_1_pod", "forming_2", "forming_3", "forming_4"])
+@pytest.mark.parametrize(
+    "scenario", ["forming_1", "forming_1_pod", "forming_2", "forming_3", "forming_4"]
+)
 def test_with_a_forming_wind_park_there_is_no_limit_above_300_mva(name, scenario):
     """The slides show it for wind park 2, with EMT and phasor models."""
     assert stability(name, scenario, 300.0).stable
@@ -269,9 +304,15 @@ def test_with_a_forming_wind_park_there_is_no_limit_above_300_mva(name, scenario
 @pytest.mark.slow
 def test_the_simulated_oscillation_grows_as_the_independent_eigenvalue_says(tmp_path):
     """One circuit opens at 0.1 s; at 9 GVA the voltage of wind park 2 grows by 3.5 1/s at 13.8 Hz."""
-    text = (BUILT_IN / "four_vsc" / "case.toml").read_text(encoding="utf-8").replace('time = "1 s"', 'time = "0.1 s"')
+    text = (
+        (BUILT_IN / "four_vsc" / "case.toml")
+        .read_text(encoding="utf-8")
+        .replace('time = "1 s"', 'time = "0.1 s"')
+    )
     (tmp_path / "case.toml").write_text(text, encoding="utf-8")
-    (ready,) = load_case(tmp_path / "case.toml").prepare(["following"], {"equivalent.S_n": 9500.0}, stop_time=0.8)
+    (ready,) = load_case(tmp_path / "case.toml").prepare(
+        ["following"], {"equivalent.S_n": 9500.0}, stop_time=0.8
+    )
     recorded = run_scenario(ready).dataset
     time, v = recorded["time"].values, recorded["grid.bus_F.v"].values
     exact = FourVsc(S_sc=9500.0, circuits_AB=1, R_X=0.001).critical()

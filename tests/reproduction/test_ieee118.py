@@ -22,8 +22,22 @@ NATIVE = {"sg*.native": True, "gfor*.native": True}
 """What is simulated for long: 56 of the FMUs. They give the numbers of those with Python, in a quarter of the time."""
 # An independent monolithic linearisation of the same data: (Hz, damping %) of the least damped modes.
 INDEPENDENT = {
-    "base": [(0.6669, 5.775), (0.8907, 6.832), (0.8287, 6.917), (1.1092, 8.359), (1.0482, 8.438), (0.9846, 8.98)],
-    "gfor": [(0.7173, 7.52), (0.9339, 7.95), (0.8743, 8.046), (1.1194, 8.434), (1.0714, 8.678), (1.0157, 9.658)],
+    "base": [
+        (0.6669, 5.775),
+        (0.8907, 6.832),
+        (0.8287, 6.917),
+        (1.1092, 8.359),
+        (1.0482, 8.438),
+        (0.9846, 8.98),
+    ],
+    "gfor": [
+        (0.7173, 7.52),
+        (0.9339, 7.95),
+        (0.8743, 8.046),
+        (1.1194, 8.434),
+        (1.0714, 8.678),
+        (1.0157, 9.658),
+    ],
 }
 
 
@@ -45,14 +59,21 @@ def test_the_three_critical_modes_are_the_papers(scenario):
     result = modes(scenario)
     assert set(result.references) == {"1-2", "3-4", "5-6"}
     for name, reference in result.references.items():
-        assert result.named[name].frequency_hz == pytest.approx(reference.frequency_hz, abs=0.02), name
-        assert result.named[name].damping_percent == pytest.approx(reference.damping_percent, abs=0.4), name
+        assert result.named[name].frequency_hz == pytest.approx(reference.frequency_hz, abs=0.02), (
+            name
+        )
+        assert result.named[name].damping_percent == pytest.approx(
+            reference.damping_percent, abs=0.4
+        ), name
     assert len({id(mode) for mode in result.named.values()}) == 3
     assert result.operating_point.residual < 1e-8
     assert result.prepared.power_flow.residual < 1e-9
     assert not result.warnings
     for frequency, damping in INDEPENDENT.get(scenario, []):
-        nearest = min(abs(m.frequency_hz - frequency) + abs(m.damping_percent - damping) / 10 for m in result.modes)
+        nearest = min(
+            abs(m.frequency_hz - frequency) + abs(m.damping_percent - damping) / 10
+            for m in result.modes
+        )
         assert nearest < 2e-3
 
 
@@ -65,7 +86,8 @@ def test_the_power_flow_gives_the_published_reactive_powers():
     for row in units:
         power = ready.power_flow.powers[f"sg{row['bus']}"] * float(row["rating_mva"])
         assert power.real == pytest.approx(float(row["p_mw"]), abs=0.01)
-        assert power.imag == pytest.approx(float(row["q_mvar"]), abs=0.3)  # its voltages are given to five digits
+        # its voltages are given to five digits
+        assert power.imag == pytest.approx(float(row["q_mvar"]), abs=0.3)
 
 
 @pytest.mark.nightly
@@ -122,7 +144,8 @@ PAPER_GOVERNOR = {
 @pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("scenario", "frequency", "damping"), [("base", 0.711, 6.06), ("gfor", 0.759, 7.52), ("pod_pq", 0.813, 13.97)]
+    ("scenario", "frequency", "damping"),
+    [("base", 0.711, 6.06), ("gfor", 0.759, 7.52), ("pod_pq", 0.813, 13.97)],
 )
 def test_the_papers_own_governor_table_does_not_give_its_frequencies(scenario, frequency, damping):
     """As the page of validation shows it; the paper has 0.67, 0.72 and 0.77 Hz."""

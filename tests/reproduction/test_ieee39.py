@@ -39,7 +39,10 @@ def test_the_voltages_are_pandapowers_but_for_the_stray_capacitances():
 
 def test_every_unit_has_its_published_inertia_and_the_frequency_is_the_networks():
     ready = prepare("base")
-    stored = {n: ready.values[f"sg{n}.machine.H"] * ready.values[f"sg{n}.S_n"] / 100 for n in range(30, 40)}
+    stored = {
+        n: ready.values[f"sg{n}.machine.H"] * ready.values[f"sg{n}.S_n"] / 100
+        for n in range(30, 40)
+    }
     published = (42.0, 30.3, 35.8, 28.6, 26.0, 34.8, 26.4, 24.3, 34.5, 500.0)  # [s] on 100 MVA
     assert tuple(stored.values()) == pytest.approx(published)
     assert {ready.values[f"{name}.f_n"] for name in ready.system.components} == {60.0}

@@ -35,9 +35,15 @@ def test_it_knows_nothing_of_the_project():
     for path in FOLDER.glob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
-            names += [f"{node.module}.{a.name}" for a in node.names] if isinstance(node, ast.ImportFrom) else []
+            names += (
+                [f"{node.module}.{a.name}" for a in node.names]
+                if isinstance(node, ast.ImportFrom)
+                else []
+            )
             for name in names:
-                assert name.startswith("tests.reference.") or name.partition(".")[0] in allowed, f"{path.name}: {name}"
+                assert name.startswith("tests.reference.") or name.partition(".")[0] in allowed, (
+                    f"{path.name}: {name}"
+                )
     assert len(list(FOLDER.glob("*.py"))) >= 6
 
 
@@ -45,7 +51,9 @@ def test_the_files_are_what_it_computes():
     kept = json.loads((FOLDER / "two_area.json").read_text(encoding="utf-8"))
     assert_rows_agree(kept["independent"], list(two_area_rows()))
     some = (0.01, 0.4)
-    assert_rows_agree([r for r in NORM["figures"] if r["X_L"] in some], list(grid_code_rows(ALL_CONVERTERS, some)))
+    assert_rows_agree(
+        [r for r in NORM["figures"] if r["X_L"] in some], list(grid_code_rows(ALL_CONVERTERS, some))
+    )
 
 
 @pytest.mark.slow
@@ -113,7 +121,14 @@ def test_every_eigenvalue_of_the_grid_codes_system(converter, X_L):
     assert_same_spectrum(system, load_case("norm631"), scenario, pods | {"grid.X_L": X_L}, 3e-6)
 
 
-LEFT_ALONE = {"S_n", "machine.exact_conversion", "machine.saturation", "governor.enabled", "pss.T_6", "pss.T_w4"}
+LEFT_ALONE = {
+    "S_n",
+    "machine.exact_conversion",
+    "machine.saturation",
+    "governor.enabled",
+    "pss.T_6",
+    "pss.T_w4",
+}
 LEFT_ALONE |= {"pod_p.enabled", "pod_q.enabled", "governor.T_1"}
 
 
@@ -121,7 +136,9 @@ def shaken(data, rng):
     """Every figure another, and none like another's."""
     moved = {}
     for key, value in data.items():
-        start = {"governor.T_2": 0.05, "governor.T_7": 0.5, "machine.D": 0.7}.get(key, value or 0.07)
+        start = {"governor.T_2": 0.05, "governor.T_7": 0.5, "machine.D": 0.7}.get(
+            key, value or 0.07
+        )
         moved[key] = value if key in LEFT_ALONE else start * rng.uniform(0.85, 1.15)
     if "machine.X_l" in moved:
         moved["machine.X_l"] *= 0.7  # stays below the subtransient reactances
@@ -133,7 +150,10 @@ def test_every_eigenvalue_where_no_two_parameters_are_equal(seed):
     """A time constant taken for its neighbour's, or a wrong sign, has nowhere to hide."""
     rng = np.random.default_rng(seed)
     choice = {"machine.exact_conversion": bool(seed % 2), "machine.saturation": seed >= 2}
-    sg1, sg2, gfor = (shaken(data | extra, rng) for data, extra in ((SG1 | PSS2A, choice), (SG2, choice), (GFOR, {})))
+    sg1, sg2, gfor = (
+        shaken(data | extra, rng)
+        for data, extra in ((SG1 | PSS2A, choice), (SG2, choice), (GFOR, {}))
+    )
     sg1 |= {"governor.T_1": 0.2, "pss.T_6": 0.03, "pss.T_w4": 3.0}  # T_1 = 0 leaves out T_2 as well
     sg2 |= {"governor.T_1": 0.3}
     gfor |= {"pod_p.enabled": True, "pod_q.enabled": True}
@@ -149,7 +169,11 @@ def test_every_eigenvalue_where_no_two_parameters_are_equal(seed):
 def test_one_percent_of_any_parameter_is_seen():
     """What the tolerance of the comparison is worth."""
     rng = np.random.default_rng(0)
-    parts = {"sg1": shaken(SG1 | PSS2A, rng), "sg2": shaken(SG2, rng), "converter": shaken(GFOR, rng)}
+    parts = {
+        "sg1": shaken(SG1 | PSS2A, rng),
+        "sg2": shaken(SG2, rng),
+        "converter": shaken(GFOR, rng),
+    }
     parts["converter"] |= {"pod_p.enabled": True, "pod_q.enabled": True}
     parts["sg1"] |= {"governor.T_1": 0.2}
     parts["sg2"] |= {"governor.T_1": 0.3}
@@ -207,7 +231,13 @@ def check_grid_code(converter, X_L):
     assert (growth_rate > 1e-3) == (row["growth"] > 1e-3)
 
 
-FAST = [("base", 0.5), ("gfor", 0.05), ("pod_p", 0.4), ("pod_q, K × 10", 0.1), ("pod_q, K × 10", 0.2)]
+FAST = [
+    ("base", 0.5),
+    ("gfor", 0.05),
+    ("pod_p", 0.4),
+    ("pod_q, K × 10", 0.1),
+    ("pod_q, K × 10", 0.2),
+]
 
 
 @pytest.mark.parametrize(("converter", "X_L"), FAST)
@@ -265,14 +295,22 @@ def test_the_table_of_the_grid_codes_test(label):
 
 def test_what_the_page_says_beside_the_table():
     def growing(converter):
-        return [r["X_L"] for r in NORM["figures"] if r["converter"] == converter and r["growth"] > 1e-3]
+        return [
+            r["X_L"] for r in NORM["figures"] if r["converter"] == converter and r["growth"] > 1e-3
+        ]
 
     assert growing("pod_q, K × 10") == [0.01, 0.05, 0.1, 0.15]
     for converter in ("base", "gfor", "pod_p", "pod_q", "pod_pq", "pod_q, sign turned"):
         assert growing(converter) == []
-    for converter in ("pod_p, sign turned, K × 10", "pod_p, sign turned", "pod_q, sign turned, K × 10"):
+    for converter in (
+        "pod_p, sign turned, K × 10",
+        "pod_p, sign turned",
+        "pod_q, sign turned, K × 10",
+    ):
         assert growing(converter) == list(REACTANCES)
-    fastest = max(r["growth"] for r in NORM["figures"] if r["converter"] == "pod_p, sign turned, K × 10")
+    fastest = max(
+        r["growth"] for r in NORM["figures"] if r["converter"] == "pod_p, sign turned, K × 10"
+    )
     assert fastest == pytest.approx(286, abs=1)
     without = {r["X_L"]: least_damped([r])[0] for r in NORM["without stabiliser"]}
     assert [X_L for X_L, damping in without.items() if damping < 0] == list(REACTANCES[2:])
@@ -284,7 +322,9 @@ def test_the_lag_of_a_constant_current_load_hardly_matters():
     """1 ms, against a load that follows at once: there |v| is a Lagrange multiplier, and the equations have index 2."""
     for converter in SCENARIOS:
         for row in (r for r in NORM["current at once"] if r["converter"] == converter):
-            (lagged,) = [r for r in NORM["figures"] if (r["converter"], r["X_L"]) == (converter, row["X_L"])]
+            (lagged,) = [
+                r for r in NORM["figures"] if (r["converter"], r["X_L"]) == (converter, row["X_L"])
+            ]
             assert least_damped([row])[0] == pytest.approx(least_damped([lagged])[0], abs=0.08)
 
 
@@ -301,15 +341,20 @@ SATURATION_TABLE = {
 @pytest.mark.parametrize("saturation", [False, True])
 def test_the_table_of_the_paper(scenario, saturation):
     section = (VALIDATION / "two-area.md").read_text(encoding="utf-8")
-    line = next(x for x in section.splitlines() if x.startswith(f"| {SATURATION_TABLE[scenario]} |"))
+    line = next(
+        x for x in section.splitlines() if x.startswith(f"| {SATURATION_TABLE[scenario]} |")
+    )
     cells = [c.replace("−", "-") for c in line.split("|")[4 + 2 * saturation : 6 + 2 * saturation]]
     real, imag = (float(x) for x in re.findall(r"-?\d+\.\d+", cells[0]))
     (row,) = [
         r
         for r in TWO_AREA
-        if (r["X_L"], r["scenario"], r["saturation"], r["governor_on_sg1"]) == (0.1, scenario, saturation, True)
+        if (r["X_L"], r["scenario"], r["saturation"], r["governor_on_sg1"])
+        == (0.1, scenario, saturation, True)
     ]
-    value = min((complex(*z) for z in row["eigenvalues"]), key=lambda z: abs(z - complex(real, imag)))
+    value = min(
+        (complex(*z) for z in row["eigenvalues"]), key=lambda z: abs(z - complex(real, imag))
+    )
     assert abs(value - complex(real, imag)) < 0.002
     assert float(cells[1]) == pytest.approx(-100 * value.real / abs(value), abs=0.03)
 

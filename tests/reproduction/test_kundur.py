@@ -70,9 +70,13 @@ ASSUMPTIONS = {
     "the book's assumptions": lambda: kundur("manual"),
     "loads of constant impedance": lambda: kundur("manual", active=2.0),
     "the emf in proportion to speed": lambda: kundur("manual", active=2.0, emf_with_speed=True),
-    "stray capacitance of 0.05 pu": lambda: kundur("manual", active=2.0, emf_with_speed=True, stray_B=0.05),
+    "stray capacitance of 0.05 pu": lambda: kundur(
+        "manual", active=2.0, emf_with_speed=True, stray_B=0.05
+    ),
     "besides: the book's assumptions, no saturation": lambda: kundur("manual", saturation=False),
-    "besides: the book's assumptions, data converted exactly": lambda: converted_exactly(kundur("manual")),
+    "besides: the book's assumptions, data converted exactly": lambda: converted_exactly(
+        kundur("manual")
+    ),
 }
 
 
@@ -138,7 +142,9 @@ def test_one_candidate_alone_has_the_books_local_modes():
         for label in CANDIDATES
         if all(
             abs(f / hertz - 1) < 5e-3 and abs(damping - percent) < 0.15
-            for (f, damping), (hertz, percent) in zip(figures(PAGE, LOCAL, label)[1:], book, strict=True)
+            for (f, damping), (hertz, percent) in zip(
+                figures(PAGE, LOCAL, label)[1:], book, strict=True
+            )
         )
     ]
     assert near == ["**T'_q0 = 0.7 s**"]
@@ -157,7 +163,10 @@ def test_with_another_time_constant_the_book_is_met(scenario):
 
 def test_what_the_page_says_of_speed():
     """With the thyristor exciter; and of the common speed."""
-    found = [hertz_and_percent(kundur("thyristor", active=2.0, emf_with_speed=w).swings()[0])[1] for w in (False, True)]
+    found = [
+        hertz_and_percent(kundur("thyristor", active=2.0, emf_with_speed=w).swings()[0])[1]
+        for w in (False, True)
+    ]
     assert found == pytest.approx([-0.82, -1.86], abs=0.006)
     for scenario, rate in (("manual", -0.0151), ("thyristor", 0.0599)):
         values = kundur(scenario, active=2.0, emf_with_speed=True).eigenvalues()
@@ -197,7 +206,9 @@ def test_the_rows_with_a_converter(scenario):
 def test_the_rows_of_fmus_with_one_change():
     assert_row(STEPS, "stator and network transients: the FMUs", of_fmus("manual"))
     assert_row(
-        STEPS, "besides: FMUs, constant power instead of torque", of_fmus("manual", {"sg*.governor": "constant_power"})
+        STEPS,
+        "besides: FMUs, constant power instead of torque",
+        of_fmus("manual", {"sg*.governor": "constant_power"}),
     )
     assert_row(STEPS, "besides: FMUs, no saturation", of_fmus("manual", UNSATURATED))
 
@@ -228,7 +239,9 @@ else from Kundur's equations."""
 @pytest.mark.parametrize(("scenario", "constant"), SOMEONE_ELSES)
 def test_the_modes_are_those_of_an_independent_emt_model(scenario, constant):
     found = of_fmus(scenario, CONSTANT_POWER if constant == "power" else UNSATURATED)
-    for (hertz, percent), (wanted_hertz, wanted_percent) in zip(found, SOMEONE_ELSES[scenario, constant], strict=True):
+    for (hertz, percent), (wanted_hertz, wanted_percent) in zip(
+        found, SOMEONE_ELSES[scenario, constant], strict=True
+    ):
         assert hertz == pytest.approx(wanted_hertz, abs=3e-4)
         assert percent == pytest.approx(wanted_percent, abs=0.02)
 

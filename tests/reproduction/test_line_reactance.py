@@ -37,7 +37,9 @@ def damping(swings, scenario):
 
 
 @pytest.mark.parametrize("scenario", ["base", "gfor"])
-def test_a_longer_line_makes_the_oscillation_slower_and_shares_it_between_the_areas(swings, scenario):
+def test_a_longer_line_makes_the_oscillation_slower_and_shares_it_between_the_areas(
+    swings, scenario
+):
     """Claimed, and so it is: from a local mode of SG1 to an inter-area one."""
     frequencies = [m.frequency_hz for m in swings[scenario].values()]
     assert frequencies == sorted(frequencies, reverse=True)
@@ -49,7 +51,9 @@ def test_a_longer_line_makes_the_oscillation_slower_and_shares_it_between_the_ar
 
 def test_the_base_case_is_unstable_for_most_reactances(swings):
     """Claimed, and so it is: from X_L = 0.08 pu on."""
-    assert {x: d < 0 for x, d in damping(swings, "base").items()} == {x: x >= 0.08 for x in REACTANCES}
+    assert {x: d < 0 for x, d in damping(swings, "base").items()} == {
+        x: x >= 0.08 for x in REACTANCES
+    }
 
 
 def test_the_converter_raises_the_damping_everywhere(swings):
@@ -66,7 +70,8 @@ def test_the_controllers_raise_it_further_up_to_a_long_line(swings, scenario):
     assert pod[0.4] < gfor[0.4]
     slow = swings[scenario][0.4]
     assert speeds(slow)[1] > 5 * speeds(slow)[0]
-    assert min(pod[x] for x in REACTANCES if x >= 0.1) > 20  # what is left is well damped all the same
+    # what is left is well damped all the same
+    assert min(pod[x] for x in REACTANCES if x >= 0.1) > 20
 
 
 def test_pod_p_damps_more_than_pod_q_where_the_oscillation_is_local(swings):

@@ -13,12 +13,24 @@ from tests.reference.published import kundur, wscc9
 
 pytestmark = pytest.mark.reproduction
 
-ANDES = json.loads((Path(__file__).parents[1] / "benchmarks" / "andes.json").read_text(encoding="utf-8"))
+ANDES = json.loads(
+    (Path(__file__).parents[1] / "benchmarks" / "andes.json").read_text(encoding="utf-8")
+)
 
 SAUER_AND_PAI = [
-    -0.7209 + 12.7486j, -0.1908 + 8.3672j, -5.4875 + 7.9487j, -5.3236 + 7.9220j, -5.2218 + 7.8161j, -5.1761, -3.3995,
-    -0.4445 + 1.2104j, -0.4394 + 0.7392j, -0.4260 + 0.4960j, -3.2258, 0.0,
-]  # fmt: skip
+    -0.7209 + 12.7486j,
+    -0.1908 + 8.3672j,
+    -5.4875 + 7.9487j,
+    -5.3236 + 7.9220j,
+    -5.2218 + 7.8161j,
+    -5.1761,
+    -3.3995,
+    -0.4445 + 1.2104j,
+    -0.4394 + 0.7392j,
+    -0.4260 + 0.4960j,
+    -3.2258,
+    0.0,
+]
 """The nominal case with loads of constant power [rad/s], from memory; of each pair one."""
 
 
@@ -65,7 +77,9 @@ def andes(tmp_path_factory):
 @pytest.mark.usefixtures("andes")
 @pytest.mark.parametrize("name", ANDES["modes"])
 def test_andes_still_has_them(name):
-    assert modes_in_andes(cases()[name]) == pytest.approx([complex(*z) for z in ANDES["modes"][name]], abs=1e-5)
+    assert modes_in_andes(cases()[name]) == pytest.approx(
+        [complex(*z) for z in ANDES["modes"][name]], abs=1e-5
+    )
 
 
 def test_two_machines_on_a_line_swing_as_the_formula_says():
@@ -81,10 +95,16 @@ def test_two_machines_on_a_line_swing_as_the_formula_says():
     i = (v[0] - v[1]) / (1j * X)
     E = np.array([v[0] + 1j * X1 * i, v[1] - 1j * X1 * i])
     K = abs(E[0] * E[1]) / (X + 2 * X1) * np.cos(np.angle(E[0] / E[1]))
-    assert z.imag == pytest.approx(np.sqrt(120 * np.pi * K * (1 / (2 * H[0]) + 1 / (2 * H[1]))), rel=1e-6)
+    assert z.imag == pytest.approx(
+        np.sqrt(120 * np.pi * K * (1 / (2 * H[0]) + 1 / (2 * H[1]))), rel=1e-6
+    )
     assert z.real == pytest.approx(0, abs=1e-6)
-    powers = replace(system, constant_torque=False, machines=tuple(replace(m, H=4.0) for m in units))
+    powers = replace(
+        system, constant_torque=False, machines=tuple(replace(m, H=4.0) for m in units)
+    )
     # Powers of ±P damp one machine and drive the other by as much; a damping D of both is felt as D/(4H).
-    damped = replace(powers, constant_torque=True, machines=tuple(replace(m, H=4.0, D=2.0) for m in units))
+    damped = replace(
+        powers, constant_torque=True, machines=tuple(replace(m, H=4.0, D=2.0) for m in units)
+    )
     assert powers.swings(0.1, 5)[0].real == pytest.approx(0, abs=1e-6)
     assert damped.swings(0.1, 5)[0].real == pytest.approx(-2.0 / 16, rel=1e-6)

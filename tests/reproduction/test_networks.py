@@ -14,7 +14,9 @@ from tests.support.tables import figures
 
 pytestmark = pytest.mark.reproduction
 
-PAGE = (Path(__file__).parents[2] / ".docs" / "validation" / "networks.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / ".docs" / "validation" / "networks.md").read_text(
+    encoding="utf-8"
+)
 CASE = """\
 name = "kinds"
 [solver]
@@ -109,7 +111,12 @@ def load_flow():
 def swing():
     """Eigenvalue [rad/s] of two constant fluxes behind X'_d, the emfs in proportion to speed, by a matrix of 4 × 4."""
     v, Y = load_flow(), admittances()
-    at, S, X1, H = np.array([0, 2]), np.array([3.0, 1.5]), np.array([0.3, 0.25]), np.array([5.0, 3.0])
+    at, S, X1, H = (
+        np.array([0, 2]),
+        np.array([3.0, 1.5]),
+        np.array([0.3, 0.25]),
+        np.array([5.0, 3.0]),
+    )
     i = (Y @ v)[at]
     E = v[at] + 1j * X1 / S * i
     for bus, drawn in ((1, 1.5 + 0.4j), (3, -0.6 - 0.1j), (4, 0.3 + 0.15j)):
@@ -144,7 +151,8 @@ def test_the_power_flow_is_that_of_the_load_flow(ready):
     difference = max(abs(ready.power_flow.voltages[bus] - wanted[bus]) for bus in "abcde")
     ((most,),) = figures(PAGE, "Every kind of branch", "Voltages of the power flow, 10⁻¹² pu")
     assert difference < 1e-12 * most
-    assert abs(wanted["c"]) != pytest.approx(1.0, abs=1e-3)  # its unit feeds Q, and holds no voltage
+    # its unit feeds Q, and holds no voltage
+    assert abs(wanted["c"]) != pytest.approx(1.0, abs=1e-3)
 
 
 def test_the_swing_is_that_of_the_matrix(ready):

@@ -17,7 +17,9 @@ pytestmark = pytest.mark.reproduction
 
 PAGE = (BUILT_IN / "nordic44" / "README.md").read_text(encoding="utf-8")
 AGAINST, CONTROLS = "Modes, against TOPS", "With controls"
-TOPS = json.loads((Path(__file__).parents[1] / "reference" / "nordic44_tops.json").read_text(encoding="utf-8"))
+TOPS = json.loads(
+    (Path(__file__).parents[1] / "reference" / "nordic44_tops.json").read_text(encoding="utf-8")
+)
 HERTZ, POINTS = 6e-5, 6e-3
 """Half of a last digit, and what rounding to it may add."""
 
@@ -35,7 +37,9 @@ ROWS = {
 
 def slow_swings(eigenvalues):
     """The four modes below 1.06 Hz that README.md names, by frequency."""
-    found = [z for z in eigenvalues if 0.3 < z.imag / (2 * np.pi) < 1.057 and -z.real < 0.25 * abs(z)]
+    found = [
+        z for z in eigenvalues if 0.3 < z.imag / (2 * np.pi) < 1.057 and -z.real < 0.25 * abs(z)
+    ]
     return sorted(found, key=lambda z: z.imag)
 
 
@@ -76,8 +80,14 @@ def test_the_independent_rows(label):
 
 def test_the_rows_of_tops():
     wanted = [complex(*z) for z in TOPS["manual"][:4]]
-    assert_row(AGAINST, "TOPS 0.3.0, its own linearisation", [complex(*z) for z in TOPS["its own linearisation"]])
-    assert assert_row(AGAINST, "TOPS' equations, differences of 1e-5", wanted)[4] == [round(TOPS["growth"], 4)]
+    assert_row(
+        AGAINST,
+        "TOPS 0.3.0, its own linearisation",
+        [complex(*z) for z in TOPS["its own linearisation"]],
+    )
+    assert assert_row(AGAINST, "TOPS' equations, differences of 1e-5", wanted)[4] == [
+        round(TOPS["growth"], 4)
+    ]
     for label, modes in TOPS["controls"].items():
         assert_row(CONTROLS, label, [complex(*z) for z in modes])
 
@@ -86,13 +96,16 @@ def test_the_growth_is_the_lost_synchronising_torque_of_northern_norway():
     """Less power there, or a field flux that does not follow, takes it away."""
     less, held = Nordic44(), Nordic44()
     less.__dict__["units"] = [
-        row | ({"p_mw": str(0.85 * float(row["p_mw"]))} if row["bus"] == "6100" else {}) for row in less.units
+        row | ({"p_mw": str(0.85 * float(row["p_mw"]))} if row["bus"] == "6100" else {})
+        for row in less.units
     ]
     times = np.where(held.at == held.buses.index("6100"), 1e4, 1.0)
     held.__dict__["data"] = held.data | {"T_d10": held.data["T_d10"] * times}
     assert growth(less.eigenvalues()) == pytest.approx(0.0132, abs=2e-4)
     assert growth(held.eigenvalues()) == pytest.approx(0.0013, abs=2e-4)
-    assert np.rad2deg(cmath.phase(less.voltages[less.buses.index("6100")])) == pytest.approx(36.6, abs=0.1)
+    assert np.rad2deg(cmath.phase(less.voltages[less.buses.index("6100")])) == pytest.approx(
+        36.6, abs=0.1
+    )
 
 
 @pytest.mark.slow
@@ -102,7 +115,11 @@ def test_the_fmus_without_controls():
     for name, v in zip(Nordic44().buses, Nordic44().voltages, strict=True):
         assert voltages[f"bus_{name}"] == pytest.approx(v, abs=2e-5)
     result = compute_modes(ready, (0.3, 1.3))
-    assert_row(AGAINST, "lag of the coupling: the FMUs at 2 ms", slow_swings(m.eigenvalue for m in result.modes))
+    assert_row(
+        AGAINST,
+        "lag of the coupling: the FMUs at 2 ms",
+        slow_swings(m.eigenvalue for m in result.modes),
+    )
     assert not result.stability.stable
     assert not result.warnings
 
@@ -118,4 +135,6 @@ def test_the_rows_with_controls(scenario):
         assert near == (pytest.approx(hertz, abs=HERTZ), pytest.approx(percent, abs=POINTS))
     assert result.stability.stable == (scenario not in ("base", "gfor"))
     # SEXS' long lead and lag are questioned, and a mode that was followed is told
-    assert all("exciter.T_" in str(text) or " is followed to " in str(text) for text in result.warnings)
+    assert all(
+        "exciter.T_" in str(text) or " is followed to " in str(text) for text in result.warnings
+    )

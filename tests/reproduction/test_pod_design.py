@@ -27,10 +27,17 @@ def design(controller, case="two_area", **wanted):
 def closed_loop(d, overrides=None):
     """The named mode with the final setting, from a system that is set up anew."""
     f = d.final.setting.filters
-    values = {"enabled": True, "K": d.final.setting.gain, "T_S1": f.T_S1, "T_S2": f.T_S2, "N_S": d.target.stages}
+    values = {
+        "enabled": True,
+        "K": d.final.setting.gain,
+        "T_S1": f.T_S1,
+        "T_S2": f.T_S2,
+        "N_S": d.target.stages,
+    }
     case = load_case(d.case)
     (ready,) = case.prepare(
-        [d.target.scenario], dict(overrides or {}) | {f"gfor.{d.request.controller}.{k}": v for k, v in values.items()}
+        [d.target.scenario],
+        dict(overrides or {}) | {f"gfor.{d.request.controller}.{k}": v for k, v in values.items()},
     )
     return compute_modes(ready).electromechanical
 
@@ -50,10 +57,14 @@ def test_the_papers_parameters(controller, overrides):
 @pytest.mark.parametrize(("controller", "gain"), [("pod_p", 18.7), ("pod_q", 145)])
 def test_gains_before_the_floor_are_those_of_the_non_compensated_sensitivity(controller, gain):
     assert design(controller).gain_non_compensated == pytest.approx(gain, rel=0.02)
-    assert design(controller, values=SATURATED).gain_non_compensated == pytest.approx(gain, rel=0.02)
+    assert design(controller, values=SATURATED).gain_non_compensated == pytest.approx(
+        gain, rel=0.02
+    )
 
 
-@pytest.mark.parametrize(("controller", "times"), [("pod_p", (0.249, 0.300)), ("pod_q", (0.267, 0.280))])
+@pytest.mark.parametrize(
+    ("controller", "times"), [("pod_p", (0.249, 0.300)), ("pod_q", (0.267, 0.280))]
+)
 def test_a_small_gain_gives_the_derivative_itself(controller, times):
     d = design(controller, delta_gain=0.1)
     assert abs(d.filters.T_S1 - times[0]) < 0.0015
@@ -64,7 +75,13 @@ def test_a_small_gain_gives_the_derivative_itself(controller, times):
 @pytest.mark.parametrize("controller", PAPER)
 def test_the_sensitivity_of_a_small_gain_predicts_a_small_step(controller):
     """With the lead/lag's own sensitivity the prediction of one point of damping comes true within a tenth of it."""
-    d = design(controller, delta_gain=0.1, gain_bounds=(0, 400), damping_increment=0.01, compensated_gain=True)
+    d = design(
+        controller,
+        delta_gain=0.1,
+        gain_bounds=(0, 400),
+        damping_increment=0.01,
+        compensated_gain=True,
+    )
     assert d.final.damping_ratio == pytest.approx(d.required_damping, abs=1e-3)
 
 
@@ -151,9 +168,15 @@ def test_margins_say_where_a_mode_is_lost():
     lost = d.margins.lost_up
     assert lost.real > 0
     assert 1 < d.margins.up < 8
-    assert set(d.margins.variations) == {f"{v} {s}20 %" for v in ("K", "T_S1", "T_S2") for s in "+-"}
-    overrides = {"grid.X_L": 0.01, "gfor.pod_q.enabled": True, "gfor.pod_q.T_S1": d.filters.T_S1,
-                 "gfor.pod_q.T_S2": d.filters.T_S2}  # fmt: skip
+    assert set(d.margins.variations) == {
+        f"{v} {s}20 %" for v in ("K", "T_S1", "T_S2") for s in "+-"
+    }
+    overrides = {
+        "grid.X_L": 0.01,
+        "gfor.pod_q.enabled": True,
+        "gfor.pod_q.T_S1": d.filters.T_S1,
+        "gfor.pod_q.T_S2": d.filters.T_S2,
+    }
     case = load_case("two_area")
     for factor, stable in ((1.0, True), (1.06, False)):
         gain = {"gfor.pod_q.K": d.gain * d.margins.up * factor}
@@ -166,7 +189,9 @@ def test_margins_say_where_a_mode_is_lost():
 def test_the_delay_margin_is_the_delay_at_which_the_system_turns_unstable(controller):
     """The same linear system with what the gain sees delayed: its history is a polynomial in 30 Chebyshev points."""
     d = design(controller, margins=True)
-    (ready,) = load_case("two_area").prepare([d.target.scenario], {f"gfor.{controller}.N_S": d.target.stages})
+    (ready,) = load_case("two_area").prepare(
+        [d.target.scenario], {f"gfor.{controller}.N_S": d.target.stages}
+    )
     with running(ready) as master:
         loop = PodLoop(master, ["gfor"], controller)
         half, full = (model.A for model in loop.continuous_models(PodSetting(d.gain, d.filters)))

@@ -42,7 +42,11 @@ def test_the_damping_against_the_delay_is_that_of_the_page_and_of_the_ring_down(
             eigenvalue = system.mode(milliseconds / 1e3)
             seen = rung_down(case, pod, milliseconds / 1e3, system, eigenvalue)
             on_page = numbers(row[column])
-            assert np.allclose([percent(eigenvalue), percent(seen)], on_page, atol=0.011), (row, eigenvalue, seen)
+            assert np.allclose([percent(eigenvalue), percent(seen)], on_page, atol=0.011), (
+                row,
+                eigenvalue,
+                seen,
+            )
             assert abs(percent(seen) - percent(eigenvalue)) < 0.3
 
 

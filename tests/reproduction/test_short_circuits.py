@@ -38,7 +38,9 @@ def errors_of_fmus(case, machine="genrou_rated_speed"):
     (ready,) = load_case(case).prepare(["pss"], {"sg*.machine": machine})
     data = run_scenario(ready).dataset
     names = tops_system(CASES[case]).bus + 1
-    speeds = np.column_stack([np.interp(np.arange(2000) * 5e-3, data["time"], data[f"sg{k}.omega"]) for k in names])
+    speeds = np.column_stack(
+        [np.interp(np.arange(2000) * 5e-3, data["time"], data[f"sg{k}.omega"]) for k in names]
+    )
     return rms_micro(speeds, recorded_speeds(CASES[case])), speeds
 
 
@@ -63,7 +65,9 @@ def test_the_recordings_begin_at_rest_and_the_power_flow_is_the_cases(case):
     assert recorded_speeds(name).shape == (2000, len(tops_system(name).names))
     assert (recorded_speeds(name)[:201] == 1).all()
     (ready,) = load_case(case).prepare(["pss"])
-    ours = np.array([ready.power_flow.voltages[f"bus_{k + 1}"] for k in range(len(tops_system(name).v))])
+    ours = np.array(
+        [ready.power_flow.voltages[f"bus_{k + 1}"] for k in range(len(tops_system(name).v))]
+    )
     assert np.abs(ours - tops_system(name).v).max() < 2e-5
 
 
@@ -74,8 +78,14 @@ def test_the_machines_data_are_converted_from_tops_tables(case):
     g, omega_b = system.data, 2 * np.pi * system.frequency
     for k, bus in enumerate(system.bus + 1):
         for axis in "dq":
-            values = [g[key.format(axis)][k] for key in ("X_{}", "X_{}_t", "X_{}_st", "T_{}0_t", "T_{}0_st")]
-            own = [ready.values[f"sg{bus}.machine.{key}"] for key in (f"X_{axis}1", f"T_{axis}10", f"T_{axis}20")]
+            values = [
+                g[key.format(axis)][k]
+                for key in ("X_{}", "X_{}_t", "X_{}_st", "T_{}0_t", "T_{}0_st")
+            ]
+            own = [
+                ready.values[f"sg{bus}.machine.{key}"]
+                for key in (f"X_{axis}1", f"T_{axis}10", f"T_{axis}20")
+            ]
             if values[0] == values[1]:  # no slow winding
                 wanted = (values[1], values[3], values[4])
             else:
@@ -88,7 +98,9 @@ def test_the_machines_data_are_converted_from_tops_tables(case):
 @pytest.mark.parametrize("label", ROWS)
 @pytest.mark.parametrize("case", CASES)
 def test_the_rows_of_the_independent_equations(case, label):
-    assert errors_of_equations(CASES[case], **ROWS[label]) == pytest.approx(row(case, CHANGES, label), abs=MICRO)
+    assert errors_of_equations(CASES[case], **ROWS[label]) == pytest.approx(
+        row(case, CHANGES, label), abs=MICRO
+    )
 
 
 @pytest.mark.slow
@@ -103,7 +115,9 @@ def test_every_machines_speed_is_nearer_to_powerfactorys_than_tops_speed_is(case
 @pytest.mark.parametrize("case", CASES)
 def test_the_fmus_follow_the_independent_equations(case):
     _, speeds = errors_of_fmus(case)
-    equations = ShortCircuit(tops_system(CASES[case]), "short-circuit", step=1e-3).speeds(DURATION[CASES[case]])
+    equations = ShortCircuit(tops_system(CASES[case]), "short-circuit", step=1e-3).speeds(
+        DURATION[CASES[case]]
+    )
     swing = np.sqrt(np.mean((equations - 1) ** 2))
     assert np.sqrt(np.mean((speeds - equations) ** 2)) < 3e-3 * swing
 
@@ -111,7 +125,9 @@ def test_the_fmus_follow_the_independent_equations(case):
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_the_row_with_the_emf_in_proportion_to_speed(case):
-    assert errors_of_fmus(case, "genrou")[0] == pytest.approx(row(case, SPEEDS, "FMUs of genrou"), abs=MICRO)
+    assert errors_of_fmus(case, "genrou")[0] == pytest.approx(
+        row(case, SPEEDS, "FMUs of genrou"), abs=MICRO
+    )
 
 
 # -- modes -----------------------------------------------------------------------------------------
@@ -144,21 +160,31 @@ OF_K2A = {"exciter.T_E": 0.5, "governor.T_1": 0.1, "governor.T_2": 0.09, "govern
 @pytest.mark.parametrize("scenario", ["pss", "no_pss"])
 def test_the_modes_of_tops_system_k2a(scenario):
     system = tops_system("k2a")
-    changed = {f"{'SEXS' if key[0] == 'e' else 'TGOV1'}.T_{key[-1].lower()}": v for key, v in OF_K2A.items()}
+    changed = {
+        f"{'SEXS' if key[0] == 'e' else 'TGOV1'}.T_{key[-1].lower()}": v
+        for key, v in OF_K2A.items()
+    }
     data = system.data | {key: np.full(4, value) for key, value in changed.items()}
     assert data.keys() == system.data.keys()
-    found = ShortCircuit(replace(system, data=data), "tops", stabilisers=scenario == "pss").eigenvalues()
+    found = ShortCircuit(
+        replace(system, data=data), "tops", stabilisers=scenario == "pss"
+    ).eigenvalues()
     assert_modes(found, wanted_modes("k2a", f"{scenario}, k2a | TOPS 0.3.0"))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scenario", ["pss", "no_pss"])
 def test_the_fmus_modes_with_the_data_of_tops_system_k2a(scenario):
-    (ready,) = load_case("k2a").prepare([scenario], {f"sg*.{key}": value for key, value in OF_K2A.items()})
+    (ready,) = load_case("k2a").prepare(
+        [scenario], {f"sg*.{key}": value for key, value in OF_K2A.items()}
+    )
     found = compute_modes(ready, (0.1, 3.0))
-    assert_modes([m.eigenvalue for m in found.modes], wanted_modes("k2a", f"{scenario}, k2a | FMUs"))
+    assert_modes(
+        [m.eigenvalue for m in found.modes], wanted_modes("k2a", f"{scenario}, k2a | FMUs")
+    )
     named = [found.named[name].eigenvalue for name in ("inter-area", "area 1", "area 2")]
-    assert_modes(named, wanted_modes("k2a", f"{scenario}, k2a | FMUs"))  # though the areas are less than 90° apart
+    # though the areas are less than 90° apart
+    assert_modes(named, wanted_modes("k2a", f"{scenario}, k2a | FMUs"))
     assert len({*named}) == 3
 
 
@@ -169,7 +195,9 @@ def test_the_fmus_modes_are_those_of_the_independent_equations(case, scenario):
     (ready,) = load_case(case).prepare([scenario])
     found = [m.eigenvalue for m in compute_modes(ready, (0.1, 3.0)).modes]
     assert_modes(found, wanted_modes(case, f"{scenario} | FMUs"))
-    equations = ShortCircuit(tops_system(CASES[case]), "short-circuit", stabilisers=scenario == "pss").eigenvalues()
+    equations = ShortCircuit(
+        tops_system(CASES[case]), "short-circuit", stabilisers=scenario == "pss"
+    ).eigenvalues()
     swings = [z for z in equations if z.imag > 2.2 and -z.real < 0.4 * abs(z)]
     for z in swings:
         assert np.abs(np.array(found) - z).min() < 2e-3
@@ -184,5 +212,7 @@ def test_the_rows_with_a_converter(case, scenario):
     cells = figures(PAGES[case], CONVERTER, scenario)
     assert len(cells) == len(named)
     for mode, (hertz, percent) in zip(named.values(), cells, strict=True):
-        assert (mode.frequency_hz, mode.damping_percent) == pytest.approx((hertz, percent), abs=POINTS)
+        assert (mode.frequency_hz, mode.damping_percent) == pytest.approx(
+            (hertz, percent), abs=POINTS
+        )
         assert mode.frequency_hz == pytest.approx(hertz, abs=HERTZ)

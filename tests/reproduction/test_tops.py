@@ -35,8 +35,12 @@ def test_tops_has_the_cases_power_flow_and_the_pages_errors_and_modes():
             "its Python in GFOR_TOPS_PYTHON"
         )
     command = [str(PYTHON), "-m", "tests.benchmarks.tops_peers", "k2a"]
-    environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"} | {"OPENBLAS_NUM_THREADS": "1"}
-    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=300, check=False)
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"} | {
+        "OPENBLAS_NUM_THREADS": "1"
+    }
+    done = subprocess.run(
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=300, check=False
+    )
     assert done.returncode == 0, done.stderr[-2000:]
     tops = json.loads(done.stdout)
     assert tops["tops"] == "0.3.0"
@@ -51,7 +55,9 @@ def test_tops_has_the_cases_power_flow_and_the_pages_errors_and_modes():
     for scenario in ("pss", "no_pss"):
         theirs = numbers(tops[scenario])
         assert_modes(theirs, wanted_modes("k2a", f"{scenario} | TOPS 0.3.0"))
-        equations = ShortCircuit(tops_system("k2a"), "tops", stabilisers=scenario == "pss").eigenvalues()
+        equations = ShortCircuit(
+            tops_system("k2a"), "tops", stabilisers=scenario == "pss"
+        ).eigenvalues()
         swings = [z for z in theirs if z.imag > 2.2 and -z.real < 0.4 * abs(z)]
         assert len(swings) >= 3
         assert max(np.abs(equations - z).min() for z in swings) < 1e-4

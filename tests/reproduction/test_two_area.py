@@ -44,7 +44,9 @@ def test_with_saturation_the_damping_is_the_papers_within_a_tenth_of_a_point(sce
 @pytest.mark.parametrize(
     "row",
     FIGURES["independent"],
-    ids=lambda r: f"{r['X_L']}-{r['scenario']}-{r['governor_on_sg1']}{'-saturated' * r['saturation']}",
+    ids=lambda r: (
+        f"{r['X_L']}-{r['scenario']}-{r['governor_on_sg1']}{'-saturated' * r['saturation']}"
+    ),
 )
 def test_every_mode_of_the_independent_linearisation_is_found(row):
     overrides = {"grid.X_L": row["X_L"], "sg1.governor.enabled": row["governor_on_sg1"]}
@@ -52,7 +54,8 @@ def test_every_mode_of_the_independent_linearisation_is_found(row):
     modes = compute_modes(prepare(row["scenario"], overrides)).modes
     for value in (complex(*parts) for parts in row["eigenvalues"]):
         error = min(abs(m.eigenvalue - value) for m in modes)
-        assert error < (0.002 if value.real > -5 else 0.02)  # the step moves fast control modes more
+        # the step moves fast control modes more
+        assert error < (0.002 if value.real > -5 else 0.02)
 
 
 @pytest.mark.parametrize(
@@ -60,14 +63,21 @@ def test_every_mode_of_the_independent_linearisation_is_found(row):
     [
         {"grid.X_L": 0.013, "gfor.pod_p.K": 350.0},
         {"grid.X_L": 0.234, "gfor.droop.R_f": 0.031, "gfor.pod_q.K": 120.0},
-        {"grid.X_L": 0.6, "gfor.S_n": 2200.0, "gfor.P_0": 0.5, "gfor.pod_p.T_S1": 0.33, "gfor.pod_q.N_S": 1},
+        {
+            "grid.X_L": 0.6,
+            "gfor.S_n": 2200.0,
+            "gfor.P_0": 0.5,
+            "gfor.pod_p.T_S1": 0.33,
+            "gfor.pod_q.N_S": 1,
+        },
     ],
 )
 def test_elsewhere_the_modes_are_those_of_the_exact_jacobians(overrides):
     ready = prepare("pod_pq", overrides)
     result = compute_modes(ready)
     exact = np.linalg.eigvals(exact_continuous(ready)[0])
-    slow = [mode for mode in result.modes if mode.eigenvalue.real > -5]  # the step moves fast control modes more
+    # the step moves fast control modes more
+    slow = [mode for mode in result.modes if mode.eigenvalue.real > -5]
     assert len(slow) >= 3
     for mode in slow:
         error = np.abs(exact - mode.eigenvalue).min()
@@ -108,5 +118,7 @@ def test_simulated_ring_down_agrees_with_the_eigenvalue(scenario):
 
 
 def test_the_base_case_is_unstable_and_the_converter_stabilises_it():
-    dampings = {s: find_modes(compute_modes(prepare(s)).model)[0].damping_percent for s in ("base", "gfor")}
+    dampings = {
+        s: find_modes(compute_modes(prepare(s)).model)[0].damping_percent for s in ("base", "gfor")
+    }
     assert dampings["base"] < 0 < dampings["gfor"]

@@ -38,7 +38,9 @@ def emt_mode(scenario, X_L):
 @cache
 def rms_mode(scenario, X_L=0.1, step_size=5e-3, overrides=()):
     values = {"grid.X_L": X_L} | dict(overrides)
-    return compute_modes(prepare("two_area_rms", scenario, values, step_size=step_size)).electromechanical
+    return compute_modes(
+        prepare("two_area_rms", scenario, values, step_size=step_size)
+    ).electromechanical
 
 
 @pytest.mark.parametrize("X_L", [0.05, 0.1])
@@ -49,7 +51,9 @@ def test_the_electromechanical_mode_is_that_of_the_emt_models(scenario, X_L):
     assert found.damping_percent == pytest.approx(wanted.damping_percent, abs=POINTS)
 
 
-@pytest.mark.parametrize(("step_size", "points"), [(1e-3, 0.15), (2e-3, 0.15), (5e-3, 0.16), (10e-3, 0.2)])
+@pytest.mark.parametrize(
+    ("step_size", "points"), [(1e-3, 0.15), (2e-3, 0.15), (5e-3, 0.16), (10e-3, 0.2)]
+)
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_the_communication_step_hardly_moves_it(scenario, step_size, points):
     """What remains at 1 ms is the models': network transients that are not there."""
@@ -64,12 +68,15 @@ def test_at_short_steps_it_is_the_continuous_models(scenario):
     ready = prepare("two_area_rms", scenario, {f"{d}.communication_step": 0.0 for d in devices})
     exact = np.linalg.eigvals(exact_continuous(ready)[0])
     for step_size, most in ((1e-3, 1e-4), (2e-3, 2e-4), (5e-3, 1e-3), (10e-3, 6e-3)):
-        assert np.abs(exact - rms_mode(scenario, step_size=step_size).eigenvalue).min() < most  # [rad/s]
+        # [rad/s]
+        assert np.abs(exact - rms_mode(scenario, step_size=step_size).eigenvalue).min() < most
 
 
 def test_without_the_emfs_lead_the_held_voltage_moves_damping_by_points():
     """Why ``communication_step`` is there; set by hand it goes before the case's own step."""
-    late = rms_mode("gfor", overrides=tuple((f"{d}.communication_step", 0.0) for d in ("sg1", "sg2", "gfor")))
+    late = rms_mode(
+        "gfor", overrides=tuple((f"{d}.communication_step", 0.0) for d in ("sg1", "sg2", "gfor"))
+    )
     assert late.damping_percent - emt_mode("gfor", 0.1).damping_percent > 3.0
 
 
@@ -96,7 +103,9 @@ def test_a_jacobi_master_needs_the_emf_a_step_further_ahead(scenario):
 def test_a_shift_is_that_of_devices_which_know_the_step():
     """The table of a run takes other steps than the run's own; the devices are told those, and the run's again."""
     ready = prepare("two_area_rms", "gfor", stop_time=0.01)
-    shifts = {s.step_size: s.shift for s in run_scenario(ready).shifts if s.schedule == "gauss-seidel"}
+    shifts = {
+        s.step_size: s.shift for s in run_scenario(ready).shifts if s.schedule == "gauss-seidel"
+    }
     assert list(shifts) == [2.5e-3, 5e-3, 10e-3, 25e-3]
     assert shifts[2.5e-3] < shifts[5e-3] < 1e-3
     at_ten = rms_mode("gfor", step_size=10e-3).eigenvalue
@@ -105,14 +114,18 @@ def test_a_shift_is_that_of_devices_which_know_the_step():
     assert shifts[10e-3] == pytest.approx(np.abs(exact - at_ten).min(), rel=1e-3)
     with running(ready) as master:
         with other_step(master, "sg1", 1e-3):
-            assert master.components["sg1"].get(["communication_step"]) == {"communication_step": 1e-3}
+            assert master.components["sg1"].get(["communication_step"]) == {
+                "communication_step": 1e-3
+            }
         assert master.components["sg1"].get(["communication_step"]) == {"communication_step": 5e-3}
 
 
 def test_blocks_that_believe_in_a_step_serve_no_continuous_model():
     """Nor the other way round: both would give numbers, and wrong ones."""
     with running(prepare("two_area_rms", "gfor")) as master:
-        with pytest.raises(ValueError, match=r"gfor, sg1, sg2 know the communication step; .* without_step=True"):
+        with pytest.raises(
+            ValueError, match=r"gfor, sg1, sg2 know the communication step; .* without_step=True"
+        ):
             continuous(Blocks(master, derivatives=True))
         with pytest.raises(ValueError, match="without_step=False for a step map"):
             compose(Blocks(master, without_step=True), master.schedule)
@@ -125,7 +138,9 @@ def test_a_continuous_model_is_that_of_emfs_without_a_lead():
     devices = {f"{d}.communication_step": 0.0 for d in ("sg1", "sg2", "gfor")}
     exact = np.linalg.eigvals(exact_continuous(prepare("two_area_rms", "gfor", devices))[0])
     mode = rms_mode("gfor").eigenvalue
-    found, wanted = (values[np.argmin(np.abs(values - mode))] for values in (np.linalg.eigvals(model.A), exact))
+    found, wanted = (
+        values[np.argmin(np.abs(values - mode))] for values in (np.linalg.eigvals(model.A), exact)
+    )
     assert abs(found - wanted) < 1e-6
     embedded = component_model(prepare("two_area_rms", "gfor"), "gfor")
     assert "communication_step" not in embedded.parameters
@@ -136,7 +151,11 @@ def test_the_master_tells_the_devices_the_step_it_takes():
     ready = prepare("two_area_rms", "gfor")
     assert {ready.values[f"{d}.communication_step"] for d in ("sg1", "sg2", "gfor")} == {5e-3}
     ready = prepare("two_area_rms", "gfor", {"sg1.communication_step": 0.0}, step_size=2e-3)
-    assert [ready.values[f"{d}.communication_step"] for d in ("sg1", "sg2", "gfor")] == [0.0, 2e-3, 2e-3]
+    assert [ready.values[f"{d}.communication_step"] for d in ("sg1", "sg2", "gfor")] == [
+        0.0,
+        2e-3,
+        2e-3,
+    ]
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)

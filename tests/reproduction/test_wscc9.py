@@ -20,7 +20,9 @@ TABLES, CONVERTER = "Against the book and ANDES", "With a converter"
 HERTZ, POINTS = 6e-5, 6e-3
 """Half of a last digit, and what rounding to it may add."""
 
-ANDES = json.loads((Path(__file__).parents[1] / "benchmarks" / "andes.json").read_text(encoding="utf-8"))["modes"]
+ANDES = json.loads(
+    (Path(__file__).parents[1] / "benchmarks" / "andes.json").read_text(encoding="utf-8")
+)["modes"]
 DAMPERS = {"sg*.machine": "genrou", "sg*.machine.T_d20": 0.03, "sg*.machine.T_q20": 0.05}
 for _bus, _X_d1 in ((1, 0.0608), (2, 0.1198), (3, 0.1813)):
     DAMPERS |= {f"sg{_bus}.machine.X_d2": 0.8 * _X_d1, f"sg{_bus}.machine.X_l": 0.5 * _X_d1}
@@ -75,8 +77,15 @@ def test_the_rows_that_stand_in_both_tables():
     """With machines of fourth order first, then with those that ANDES has."""
     before, after = PAGE.split("**ANDES** has no machine", 1)
     for text, made in ((before, wscc9), (after, lambda **more: with_subtransients(wscc9(**more)))):
-        for label, choice in (("the emf in proportion to speed", MOVING), ("stray capacitance of 0.05 pu", STRAY)):
-            cells = figures(f"# x\n{text}", "x", label) if text is after else figures(text, TABLES, label)
+        for label, choice in (
+            ("the emf in proportion to speed", MOVING),
+            ("stray capacitance of 0.05 pu", STRAY),
+        ):
+            cells = (
+                figures(f"# x\n{text}", "x", label)
+                if text is after
+                else figures(text, TABLES, label)
+            )
             for cell, z in zip(cells, made(**choice).swings(1.0), strict=True):
                 assert hertz_and_percent(z)[0] == pytest.approx(cell[0], abs=HERTZ)
                 assert hertz_and_percent(z)[1] == pytest.approx(cell[1], abs=POINTS)
@@ -104,7 +113,10 @@ def test_the_fmus_rows():
 def assert_near_andes(found, load, hertz, points):
     """Each mode beside that of ANDES: frequency within so many Hz, damping within so many points."""
     for value, kept in zip(found, ANDES[f"wscc9, {load}"], strict=False):
-        (f, damping), (f_andes, damping_andes) = hertz_and_percent(value), hertz_and_percent(complex(*kept))
+        (f, damping), (f_andes, damping_andes) = (
+            hertz_and_percent(value),
+            hertz_and_percent(complex(*kept)),
+        )
         assert f == pytest.approx(f_andes, abs=hertz)
         assert damping == pytest.approx(damping_andes, abs=points)
 
@@ -150,7 +162,10 @@ def test_the_phasor_models_are_the_independent_computation(tmp_path):
     wanted = with_subtransients(wscc9(**STRAY)).swings(1.0)
     assert np.abs(np.subtract(swings(case, overrides=DAMPERS), wanted)).max() < 6e-4
     wanted = wscc9(**STRAY).swings(1.0)
-    gaps = [abs(swings(case, overrides={"sg*.machine.T_saliency": T})[0] - wanted[0]) for T in (0.005, 0.001)]
+    gaps = [
+        abs(swings(case, overrides={"sg*.machine.T_saliency": T})[0] - wanted[0])
+        for T in (0.005, 0.001)
+    ]
     assert gaps == pytest.approx([0.0206, 0.0031], abs=3e-4)
 
 

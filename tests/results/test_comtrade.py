@@ -70,10 +70,18 @@ def test_sixteen_bits_of_1999(recording):
     check(read_comtrade(recording(CFG.replace("ASCII", "BINARY"), dat)))
 
 
-@pytest.mark.parametrize(("form", "letter", "missing"), [("BINARY32", "i", -(2**31)), ("FLOAT32", "f", np.nan)])
+@pytest.mark.parametrize(
+    ("form", "letter", "missing"), [("BINARY32", "i", -(2**31)), ("FLOAT32", "f", np.nan)]
+)
 def test_both_forms_of_2013_in_one_file(tmp_path, form, letter, missing):
     dat = b"".join(
-        struct.pack(f"<II{letter * 3}H", k + 1, 0xFFFFFFFF, *(missing if x == -32768 else x for x in row[:3]), row[3])
+        struct.pack(
+            f"<II{letter * 3}H",
+            k + 1,
+            0xFFFFFFFF,
+            *(missing if x == -32768 else x for x in row[:3]),
+            row[3],
+        )
         for k, row in enumerate(ROWS)
     )
     cfg = CFG.replace("1999", "2013").replace("ASCII", form) + "0,0\n0,0\n"
@@ -90,13 +98,18 @@ def test_the_form_of_1991(recording):
     assert dataset["UL1"].values == pytest.approx([11, 12, 7])
     assert np.isnan(dataset["F (A2)"].values[1])
     assert dataset["CB"].values.tolist() == [0, 1, 1]
-    with pytest.warns(ResultsWarning, match=r"rec.dat, line 2: 99999 is taken as a missing sample \(F \(A2\); 1 in"):
+    with pytest.warns(
+        ResultsWarning,
+        match=r"rec.dat, line 2: 99999 is taken as a missing sample \(F \(A2\); 1 in",
+    ):
         marked = read_comtrade(recording(cfg))
     assert np.isnan(marked["F (A2)"].values[1])
 
 
 def test_times_from_several_rates_and_from_stamps(recording):
-    two = read_comtrade(recording(CFG.replace("1\n50,3", "2\n100,2\n25,3"), DAT.replace("40000", "50000")))
+    two = read_comtrade(
+        recording(CFG.replace("1\n50,3", "2\n100,2\n25,3"), DAT.replace("40000", "50000"))
+    )
     assert two["time"].values == pytest.approx([0, 0.01, 0.05])
     none = CFG.replace("1\n50,3", "0\n0,3").replace("ASCII\n1", "ASCII\n2.5")
     assert read_comtrade(recording(none))["time"].values == pytest.approx([0, 0.05, 0.10])
@@ -105,7 +118,9 @@ def test_times_from_several_rates_and_from_stamps(recording):
 
 
 def test_times_that_contradict_each_other_are_said(recording):
-    with pytest.warns(ResultsWarning, match=r"time stamps span 0.04 s, the sampling rates 0.4 s; the rates count"):
+    with pytest.warns(
+        ResultsWarning, match=r"time stamps span 0.04 s, the sampling rates 0.4 s; the rates count"
+    ):
         read_comtrade(recording(CFG.replace("50,3", "5,3")))
     with pytest.warns(ResultsWarning, match=r"skewed by .*UL1 \(0.005 s\)"):
         read_comtrade(recording(CFG.replace("0.5,10,0,", "0.5,10,5000,")))
@@ -114,19 +129,55 @@ def test_times_that_contradict_each_other_are_said(recording):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        (",1999", ",1949", r"rec.cfg, line 1: the revision is '1949'; those of 1991, 1999, 2001, 2013 can be read"),
+        (
+            ",1999",
+            ",1949",
+            r"rec.cfg, line 1: the revision is '1949'; those of 1991, 1999, 2001, 2013 can be read",
+        ),
         ("5,3A,2D", "5,3,2", r"line 2: the numbers of channels are '5, 3, 2'; expected such as"),
-        ("5,3A,2D", "5,3A,99999999D", r"line 2: the number of channels of kind D is '99999999'; it must be"),
-        ("0.5,10", "half,10", r"line 3: the scale a of analog channel 1 is 'half'; it must be a number"),
-        ("400,0.1,S", "400,0,S", r"line 3: analog channel 1 holds secondary values with a ratio of 400 to 0"),
+        (
+            "5,3A,2D",
+            "5,3A,99999999D",
+            r"line 2: the number of channels of kind D is '99999999'; it must be",
+        ),
+        (
+            "0.5,10",
+            "half,10",
+            r"line 3: the scale a of analog channel 1 is 'half'; it must be a number",
+        ),
+        (
+            "400,0.1,S",
+            "400,0,S",
+            r"line 3: analog channel 1 holds secondary values with a ratio of 400 to 0",
+        ),
         ("1\n50,3", "2\n50,3\n25,3", r"line 11: 25 Hz until sample 3: .* last samples must rise"),
-        ("1\n50,3", "1\n0,3", r"line 10: a sampling rate is 0; write the number of sampling rates as 0"),
-        ("50,3", "50,4", r"rec.dat: it has 3 samples, and .*rec.cfg says 4; copy the files once more"),
-        ("5,3A,2D", "4,3A,1D", r"line 9: the number of the last sample is ''; it must be a whole number"),
-        ("ASCII", "EBCDIC", r"line 13: the form of the samples is 'EBCDIC'; known are ASCII, BINARY"),
+        (
+            "1\n50,3",
+            "1\n0,3",
+            r"line 10: a sampling rate is 0; write the number of sampling rates as 0",
+        ),
+        (
+            "50,3",
+            "50,4",
+            r"rec.dat: it has 3 samples, and .*rec.cfg says 4; copy the files once more",
+        ),
+        (
+            "5,3A,2D",
+            "4,3A,1D",
+            r"line 9: the number of the last sample is ''; it must be a whole number",
+        ),
+        (
+            "ASCII",
+            "EBCDIC",
+            r"line 13: the form of the samples is 'EBCDIC'; known are ASCII, BINARY",
+        ),
         ("ASCII\n1\n", "", r"rec.cfg: the file ends after line 12, before the form of the samples"),
         ("ASCII\n1", "ASCII\n0", r"the multiplier of time stamps is 0; it must exceed 0"),
-        ("ASCII", "BINARY", r"rec.dat: it has 58 bytes, and a sample of 3 analog and 2 status channels in BINARY has"),
+        (
+            "ASCII",
+            "BINARY",
+            r"rec.dat: it has 58 bytes, and a sample of 3 analog and 2 status channels in BINARY has",
+        ),
     ],
 )
 def test_a_configuration_that_cannot_be_used(recording, old, new, words):
@@ -137,7 +188,10 @@ def test_a_configuration_that_cannot_be_used(recording, old, new, words):
 @pytest.mark.parametrize(
     ("dat", "words"),
     [
-        (DAT.replace("2,20000,4", "2,20000"), r"rec.dat, line 2: it has 6 columns; .*rec.cfg asks for 7"),
+        (
+            DAT.replace("2,20000,4", "2,20000"),
+            r"rec.dat, line 2: it has 6 columns; .*rec.cfg asks for 7",
+        ),
         (DAT.replace("-6", "six"), r"rec.dat, line 3: a sample is no number"),
         (
             DAT.replace("3,40000", "4,40000"),
@@ -188,7 +242,11 @@ def test_what_is_written_is_read_and_rings_as_before(tmp_path, form, interval):
     assert np.abs(own["F"].values - dataset["F"].values).max() <= error * span
     assert own["time"].values == pytest.approx(dataset["time"].values, abs=1e-9)
     other = comtrade.load(str(cfg), str(dat), use_double_precision=True)
-    assert (other.analog_channel_ids, other.cfg.analog_channels[0].uu, other.frequency) == (["F"], "Hz", 50)
+    assert (other.analog_channel_ids, other.cfg.analog_channels[0].uu, other.frequency) == (
+        ["F"],
+        "Hz",
+        50,
+    )
     assert np.array(other.analog[0]) == pytest.approx(own["F"].values, abs=1e-9 * span)
     assert np.array(other.time) == pytest.approx(own["time"].values, abs=1e-9)
     first, second, *_ = strongest_modes(own["F"], 2.0)
@@ -209,14 +267,23 @@ def test_noise_above_the_range_of_swings_is_averaged_away(tmp_path):
 def test_a_gap_a_change_of_rate_and_a_wave_are_refused(recording):
     rows = [f"{k + 1},,0,{99999 if k == 40 else k % 7},{k % 5},0,0" for k in range(200)]
     path = recording(CFG.replace("50,3", "50,200"), "\n".join(rows))
-    with pytest.raises(AnalysisError, match=r"1 of 200 samples are missing, the first at t = 0.8 s; .*0.82 to 3.98 s"):
+    with pytest.raises(
+        AnalysisError,
+        match=r"1 of 200 samples are missing, the first at t = 0.8 s; .*0.82 to 3.98 s",
+    ):
         strongest_modes(read_comtrade(path)["F (A2)"], 0.0)
     path = recording(CFG.replace("1\n50,3", "2\n50,100\n25,200"), "\n".join(rows))
-    with pytest.raises(AnalysisError, match=r"the sampling rate changes at t = 1.98 s, and modes need one rate"):
+    with pytest.raises(
+        AnalysisError, match=r"the sampling rate changes at t = 1.98 s, and modes need one rate"
+    ):
         strongest_modes(read_comtrade(path)["F (A3)"], 0.0)
-    wave = [f"{k + 1},0,0,0,{10000 * np.cos(2 * np.pi * 50 * k / 1000):.0f},0,0" for k in range(2000)]
+    wave = [
+        f"{k + 1},0,0,0,{10000 * np.cos(2 * np.pi * 50 * k / 1000):.0f},0,0" for k in range(2000)
+    ]
     path = recording(CFG.replace("50,3", "1000,2000"), "\n".join(wave))
-    with pytest.raises(AnalysisError, match=r"100 % of the signal's power lies near the line's frequency of 50 Hz"):
+    with pytest.raises(
+        AnalysisError, match=r"100 % of the signal's power lies near the line's frequency of 50 Hz"
+    ):
         strongest_modes(read_comtrade(path)["F (A3)"], 0.0)
 
 
@@ -225,10 +292,15 @@ def test_the_commands(tmp_path, gfor):
     folder.mkdir()
     swing(0.02).rename({"F": "a.omega"}).to_netcdf(folder / "trajectory.nc", engine="scipy")
     code, out, _ = gfor("export", "comtrade", folder, "--frequency", 60, "--form", "float32")
-    assert (code, out.split()) == (0, [str(folder / "trajectory.cfg"), str(folder / "trajectory.dat")])
+    assert (code, out.split()) == (
+        0,
+        [str(folder / "trajectory.cfg"), str(folder / "trajectory.dat")],
+    )
     code, out, _ = gfor("signal", "identify", folder / "trajectory.cfg", "a.omega", "--json")
     assert json.loads(out)[0]["frequency_hz"] == pytest.approx(0.6, abs=1e-3)
-    code, out, _ = gfor("signal", "compare", folder, folder / "trajectory.cfg", "--signal", "a.omega", "--json")
+    code, out, _ = gfor(
+        "signal", "compare", folder, folder / "trajectory.cfg", "--signal", "a.omega", "--json"
+    )
     assert json.loads(out)[0]["largest"] < 1e-8
     code, _, error = gfor("export", "comtrade", folder, "--form", "morse")
     assert (code, "the form 'MORSE' is unknown; choose one of ASCII" in error) == (2, True)

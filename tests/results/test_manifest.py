@@ -9,7 +9,13 @@ import warnings
 import pytest
 
 from orchestrator.errors import InputError, ResultsError
-from orchestrator.results.manifest import MANIFEST, ResultsWarning, check_one_run, checked, read_manifest
+from orchestrator.results.manifest import (
+    MANIFEST,
+    ResultsWarning,
+    check_one_run,
+    checked,
+    read_manifest,
+)
 from orchestrator.results.staging import ScenarioFolder, mend, staged, unfinished
 from orchestrator.safe_files import write_text
 
@@ -40,7 +46,13 @@ def test_a_run_is_accepted_and_so_is_another_in_its_place(tmp_path):
     write(tmp_path, "r2", value="0.6")
     check(tmp_path)
     assert (tmp_path / "one" / "trajectory.nc").read_text(encoding="utf-8") == "one 0.6"
-    assert sorted(p.name for p in tmp_path.iterdir()) == [MANIFEST, "modes.csv", "one", "summary.json", "two"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        MANIFEST,
+        "modes.csv",
+        "one",
+        "summary.json",
+        "two",
+    ]
     assert {f.run for f in read_manifest(tmp_path).files.values()} == {"r2"}
 
 
@@ -48,7 +60,8 @@ def test_a_second_run_that_was_killed_is_not_mixed_with_the_first(tmp_path):
     write(tmp_path, "r1")
     write(tmp_path, "r2", scenarios=["one"], value="0.6", ends=False)
     with pytest.raises(
-        InputError, match=r"one: it is of run r2, and the summary in .* of run r1: another run into this"
+        InputError,
+        match=r"one: it is of run r2, and the summary in .* of run r1: another run into this",
     ):
         check(tmp_path)
     write(tmp_path, "r3")
@@ -86,7 +99,9 @@ def test_a_file_that_is_not_as_it_was_written_is_named(tmp_path, name, fault):
 def test_a_file_that_is_gone_is_named(tmp_path):
     write(tmp_path, "r1")
     (tmp_path / "one" / "trajectory.nc").unlink()
-    with pytest.raises(InputError, match=r"one/trajectory\.nc: this file of run r1 cannot be read: No such file"):
+    with pytest.raises(
+        InputError, match=r"one/trajectory\.nc: this file of run r1 cannot be read: No such file"
+    ):
         check(tmp_path)
 
 
@@ -101,7 +116,9 @@ def test_a_folder_that_is_gone_is_named(tmp_path):
 def test_a_damaged_manifest_is_one_error(tmp_path, text):
     write(tmp_path, "r1")
     (tmp_path / MANIFEST).write_text(text, encoding="utf-8")
-    with pytest.raises(InputError, match=r"manifest\.json: it cannot be read as the list of a run's files"):
+    with pytest.raises(
+        InputError, match=r"manifest\.json: it cannot be read as the list of a run's files"
+    ):
         check(tmp_path)
 
 

@@ -59,7 +59,11 @@ def test_a_joined_recording_is_what_memory_would_have_kept(tmp_path, prepared, c
     recording.join(tmp_path / "trajectory.nc")
     assert not (tmp_path / "recording").exists()
     expected = trajectory_dataset(rows, prepared)
-    for found in (while_it_grows, open_whole(tmp_path / "trajectory.nc"), xr.load_dataset(tmp_path / "trajectory.nc")):
+    for found in (
+        while_it_grows,
+        open_whole(tmp_path / "trajectory.nc"),
+        xr.load_dataset(tmp_path / "trajectory.nc"),
+    ):
         assert list(found.data_vars) == list(NAMES)
         assert found.attrs == expected.attrs
         for name in ("time", *NAMES):
@@ -78,7 +82,9 @@ def test_chunks_are_copied_as_they_are(tmp_path, prepared):
         assert whole["gfor.p"].compression == "gzip"
 
 
-def test_of_a_long_recording_only_the_rows_that_are_asked_for_are_read(tmp_path, prepared, monkeypatch):
+def test_of_a_long_recording_only_the_rows_that_are_asked_for_are_read(
+    tmp_path, prepared, monkeypatch
+):
     rows, recording = Rows(950), RecordingFolder(tmp_path / "recording", prepared)
     keep(recording, rows, 100)
     grows = open_recording(tmp_path / "recording")
@@ -89,7 +95,16 @@ def test_of_a_long_recording_only_the_rows_that_are_asked_for_are_read(tmp_path,
     monkeypatch.setattr(xr, "open_dataset", None)
     whole = open_whole(tmp_path / "elsewhere" / "trajectory.nc")
     assert not recorded.in_memory(whole)
-    keys = (0, -1, slice(None), slice(95, 305), slice(None, None, 7), slice(900, 3, -13), slice(5, 5), [3, 700, 101])
+    keys = (
+        0,
+        -1,
+        slice(None),
+        slice(95, 305),
+        slice(None, None, 7),
+        slice(900, 3, -13),
+        slice(5, 5),
+        [3, 700, 101],
+    )
     for found in (grows, whole):
         assert np.array_equal(found["time"], rows.times)
         for key in keys:
@@ -128,7 +143,9 @@ def test_a_part_that_is_missing_or_torn_is_named(tmp_path, prepared):
     keep(recording, Rows(300), 100)
     middle = parts_of(tmp_path / "recording")[1]
     middle.write_bytes(middle.read_bytes()[:500])
-    with pytest.raises(InputError, match=r"000000000100\.nc: it cannot be read as part of a recording"):
+    with pytest.raises(
+        InputError, match=r"000000000100\.nc: it cannot be read as part of a recording"
+    ):
         open_recording(tmp_path / "recording")
     middle.unlink()
     with pytest.raises(InputError, match="the rows from number 100 on are missing"):
@@ -140,7 +157,9 @@ def test_nan_and_infinity_stay(tmp_path, prepared):
     rows.values[2] = np.nan, np.inf, -np.inf
     keep(recording, rows, 100)
     recording.join(tmp_path / "trajectory.nc")
-    assert np.array_equal(xr.load_dataset(tmp_path / "trajectory.nc")["gfor.p"], rows.values[:, 0], equal_nan=True)
+    assert np.array_equal(
+        xr.load_dataset(tmp_path / "trajectory.nc")["gfor.p"], rows.values[:, 0], equal_nan=True
+    )
     assert xr.load_dataset(tmp_path / "trajectory.nc")["grid.v"].values[2] == -np.inf
 
 
@@ -173,7 +192,10 @@ def test_no_room_for_a_part(tmp_path, prepared, file_limit):
     rows, recording = Rows(3000), RecordingFolder(tmp_path / "recording", prepared)
     keep(recording, Rows(1000), 1000)
     file_limit(20_000)
-    with pytest.raises(ResultsError, match=r"000000001000\.nc: it cannot be written: File too large; raise the limit"):
+    with pytest.raises(
+        ResultsError,
+        match=r"000000001000\.nc: it cannot be written: File too large; raise the limit",
+    ):
         recording.keep(1000, rows.times[1000:], rows.values[1000:])
     assert open_recording(tmp_path / "recording").sizes["time"] == 1000
     assert [p.name for p in (tmp_path / "recording").iterdir()] == ["000000000000.nc"]

@@ -36,7 +36,10 @@ def five_machines(folder, highest=1.2, flow="", ratings=RATINGS, most=None):
     rates = ",".join("000")
     found = {section: [] for section in ORDER}
     kinds = dict.fromkeys(range(1, 5), 2) | {5: 3} | dict.fromkeys(range(11, 17), 1)
-    found["BUS"] = [f"{n},'BUS {n}     ',230.0,{kind},1,1,1,1.0,0.0,1.1,0.9,1.1,0.9" for n, kind in kinds.items()]
+    found["BUS"] = [
+        f"{n},'BUS {n}     ',230.0,{kind},1,1,1,1.0,0.0,1.1,0.9,1.1,0.9"
+        for n, kind in kinds.items()
+    ]
     found["LOAD"] = [f"{n},'1 ',1,1,1,{p},{0.2 * p},0,0,0,0,1,1,0" for n, p in LOADS.items()]
     found["GENERATOR"] = [
         f"{n},'1 ',{POWERS[n]},0,300,-300,1.02,0,{base},0,0.25,0,0,1,1,100,{(most or {}).get(n, 9999)},0,1,1"

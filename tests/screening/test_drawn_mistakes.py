@@ -13,15 +13,24 @@ from orchestrator.screening.summary import ModeAt
 
 
 def item(**record):
-    return SimpleNamespace(record=SimpleNamespace(**record), point=SimpleNamespace(name="p07"),
-                           outage=SimpleNamespace(name="sg2", elements=("sg2",)))  # fmt: skip
+    return SimpleNamespace(
+        record=SimpleNamespace(**record),
+        point=SimpleNamespace(name="p07"),
+        outage=SimpleNamespace(name="sg2", elements=("sg2",)),
+    )
 
 
 def test_an_outage_without_any_verdict_is_told_by_its_first_point():
     plan = SimpleNamespace(wanted=SimpleNamespace(damping=0.2), points=("p07",))
     lost = item(status=Status.POWER_FLOW)
     table = view.overview(SimpleNamespace(result=SimpleNamespace(plan=plan, items=(lost,))))
-    assert [column.cell(table.rows[0]) for column in table.columns] == ["sg2", "p07", "", "–", "1 of 1"]
+    assert [column.cell(table.rows[0]) for column in table.columns] == [
+        "sg2",
+        "p07",
+        "",
+        "–",
+        "1 of 1",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -44,10 +53,15 @@ def test_components_are_named_by_their_shares():
 
 def test_a_stretch_is_joined_by_the_modes_of_its_anchor_and_of_its_last_intact_item(monkeypatch):
     monkeypatch.setattr(point, "_as_kept", lambda modes: modes)
-    results = [SimpleNamespace(found=SimpleNamespace(modes=name), record=name) for name in ("anchor", "one", "out")]
+    results = [
+        SimpleNamespace(found=SimpleNamespace(modes=name), record=name)
+        for name in ("anchor", "one", "out")
+    ]
     items = [SimpleNamespace(intact=intact) for intact in (True, True, False)]
-    own = SimpleNamespace(_task=SimpleNamespace(anchor=items[0], items=items[1:]),
-                          _bench=SimpleNamespace(perturbed=3, reused=5))  # fmt: skip
+    own = SimpleNamespace(
+        _task=SimpleNamespace(anchor=items[0], items=items[1:]),
+        _bench=SimpleNamespace(perturbed=3, reused=5),
+    )
     made = _Worker._record(own, results)
     assert (made.first, made.last, made.last_place) == ("anchor", "one", 1)
     assert (made.items, made.perturbed, made.reused) == (("anchor", "one", "out"), 3, 5)
@@ -65,9 +79,16 @@ def test_residues_are_those_of_components_that_show_their_frequency(monkeypatch)
 
     def component(states, observed):
         inputs = ["v_re", "v_im", *point.DRIVEN]
-        driven = np.outer(np.ones(states), [0.0] * 2 + [float(k + 1) for k in range(len(point.DRIVEN))])
-        return SimpleNamespace(states=["x"] * states, observed=observed, inputs=inputs, B_c=driven,
-                               C_o=np.full((1, states), 3.0))  # fmt: skip
+        driven = np.outer(
+            np.ones(states), [0.0] * 2 + [float(k + 1) for k in range(len(point.DRIVEN))]
+        )
+        return SimpleNamespace(
+            states=["x"] * states,
+            observed=observed,
+            inputs=inputs,
+            B_c=driven,
+            C_o=np.full((1, states), 3.0),
+        )
 
     whole = {"sg1": component(1, ("sg1.v",)), "gfor": component(2, point.OBSERVED)}
     found = point._residues(SimpleNamespace(eigenvalues=[1j], names=["x"] * 3), whole)

@@ -24,9 +24,14 @@ def system(pairs, seed=0, n=DENSE + 40):
     rng = np.random.default_rng(seed)
     A = np.diag(-np.linspace(20.0, 3000.0, n))
     for k, value in enumerate(pairs):
-        A[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = [[value.real, value.imag], [-value.imag, value.real]]
+        A[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = [
+            [value.real, value.imag],
+            [-value.imag, value.real],
+        ]
     turn = np.eye(n) + 0.02 * rng.standard_normal((n, n))
-    return LinearModel.from_matrix(turn @ A @ np.linalg.inv(turn), tuple(f"c.x{k}" for k in range(n)), None)
+    return LinearModel.from_matrix(
+        turn @ A @ np.linalg.inv(turn), tuple(f"c.x{k}" for k in range(n)), None
+    )
 
 
 KNOWN = [-0.3 + 3j, -0.4 + 5j, -0.5 + 7j, -0.2 + 7.1j, -0.9 + 9j]
@@ -47,7 +52,10 @@ def columns(modes):
 
 
 def test_a_neighbours_modes_become_those_of_the_model():
-    there, here = modes_of(system(KNOWN)), system([value * (1.02 + 0.01j) for value in KNOWN], seed=1)
+    there, here = (
+        modes_of(system(KNOWN)),
+        system([value * (1.02 + 0.01j) for value in KNOWN], seed=1),
+    )
     start = columns(there)
     found = refine(here, ShiftedEquations(here), start.values, start.left, start.right)
     assert found.settled
@@ -75,7 +83,9 @@ def test_a_lost_mode_is_searched_for(lost):
 
 
 def test_nothing_is_searched_where_nothing_is_lost():
-    found = find_modes_here(system(KNOWN), np.zeros(0), REGION, modes_of(system(KNOWN)), count=False)
+    found = find_modes_here(
+        system(KNOWN), np.zeros(0), REGION, modes_of(system(KNOWN)), count=False
+    )
     assert not found.searched
     assert found.growing_elsewhere is None
 
@@ -85,7 +95,9 @@ def test_growth_at_other_frequencies_is_counted(outside, monkeypatch):
     """A full matrix of a few states takes the way of a large sparse one."""
     monkeypatch.setattr("orchestrator.screening.modes.DENSE", 0)
     here = system([*KNOWN, outside], n=40)
-    found = find_modes_here(here, -np.linspace(1.0, 900.0, len(here.names)), REGION, modes_of(here), count=True)
+    found = find_modes_here(
+        here, -np.linspace(1.0, 900.0, len(here.names)), REGION, modes_of(here), count=True
+    )
     assert found.growing_elsewhere == 2
     assert found.grows
 

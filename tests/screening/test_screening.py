@@ -55,21 +55,31 @@ def screened(plan, folder, shard=None):
 
 def test_modes_are_those_of_the_system_without_a_step(two_area, day, tmp_path):
     case, _, _ = two_area
-    result = screened(plan_screening(case, ScreeningRequest(day, None, "gfor")), tmp_path / "points")
+    result = screened(
+        plan_screening(case, ScreeningRequest(day, None, "gfor")), tmp_path / "points"
+    )
     for item, line in zip(result.items, (0.1, 0.12, 0.15, 0.2), strict=False):
         values = {"grid.X_L": line} | {
-            f"grid.{load}.scale": float(DAY.splitlines()[1 + "abcd".index(item.point.name)].split(",")[3])
+            f"grid.{load}.scale": float(
+                DAY.splitlines()[1 + "abcd".index(item.point.name)].split(",")[3]
+            )
             for load in ("load_2", "load_3")
         }
         (prepared,) = case.prepare(["gfor"], values)
-        expected = [m.eigenvalue for m in find_modes(compute_modes(prepared).system) if m.damping_ratio <= 0.2]
+        expected = [
+            m.eigenvalue
+            for m in find_modes(compute_modes(prepared).system)
+            if m.damping_ratio <= 0.2
+        ]
         found = item.record.eigenvalues[list(item.record.critical)]
         assert found == pytest.approx(expected, rel=1e-6)
         assert item.record.counted
 
 
 def test_durations_add_up(two_area, day, tmp_path):
-    result = screened(plan_screening(two_area[0], ScreeningRequest(day, None, "gfor")), tmp_path / "points")
+    result = screened(
+        plan_screening(two_area[0], ScreeningRequest(day, None, "gfor")), tmp_path / "points"
+    )
     (mode,) = Summary(result).modes
     hours, percent = duration(mode)
     assert hours[-1] == 8
@@ -78,7 +88,9 @@ def test_durations_add_up(two_area, day, tmp_path):
 
 
 def test_the_worst_mode_is_moved_by_the_converter(two_area, day, tmp_path):
-    result = screened(plan_screening(two_area[0], ScreeningRequest(day, None, "gfor")), tmp_path / "points")
+    result = screened(
+        plan_screening(two_area[0], ScreeningRequest(day, None, "gfor")), tmp_path / "points"
+    )
     (mode,) = Summary(result).modes
     ((name, through_p, _),) = mode.worst.ranking()
     assert name == "gfor"
@@ -90,7 +102,9 @@ def test_a_residue_is_the_shift_by_unit_gain(two_area, tmp_path):
     case, prepared, _ = two_area
     path = tmp_path / "one.csv"
     path.write_text("name\nonly\n")
-    result = screened(plan_screening(case, ScreeningRequest(path, None, "gfor")), tmp_path / "points")
+    result = screened(
+        plan_screening(case, ScreeningRequest(path, None, "gfor")), tmp_path / "points"
+    )
     record = result.items[0].record
     k = record.critical[0]
     with PointBench() as bench:
@@ -121,15 +135,24 @@ def test_a_residue_is_the_shift_by_unit_gain(two_area, tmp_path):
         ("time,load\na,0\n", "line 2: load = 0; it must exceed 0"),
         ("time,hours\na,-1\n", "line 2: hours = '-1'"),
         ("time,gfor.in_service\na,maybe\n", "line 2: gfor.in_service = 'maybe'"),
-        ("time,gfor.in_service,gfor.P_mw\na,0,5\n", "line 2: gfor.P_mw = 5, but gfor is out of service"),
+        (
+            "time,gfor.in_service,gfor.P_mw\na,0,5\n",
+            "line 2: gfor.P_mw = 5, but gfor is out of service",
+        ),
         ("time,gfor.P_mw,gfor.P_0\na,5,0.1\n", "both set gfor.P_0"),
         ("time,load,grid.load_2.scale\na,1,2\n", "both scale load_2"),
         ("time,load,g*.load_2.scale\na,1,2\n", "both scale load_2"),
         ("time,gfor.P_mw,gf*.P_0\na,5,0.1\n", "both set gfor.P_0"),
         ("time,sg2.in_service\na,0\n", "all units at the slack bus"),
         ("name,load,load\na,1,2\n", "line 1: the column 'load' stands twice"),
-        ("name,sg1.in_service,sg1.connected\na,1,false\n", "line 2: the columns sg1.in_service and sg1.connected both"),
-        ("name,sg*.connected,sg1.in_service\na,true,0\n", "line 2: the columns sg1.in_service and sg*.connected both"),
+        (
+            "name,sg1.in_service,sg1.connected\na,1,false\n",
+            "line 2: the columns sg1.in_service and sg1.connected both",
+        ),
+        (
+            "name,sg*.connected,sg1.in_service\na,true,0\n",
+            "line 2: the columns sg1.in_service and sg*.connected both",
+        ),
         (
             "name,L.in_service,grid.L.connected\na,1,false\n",
             "line 2: the columns L.in_service and grid.L.connected both",
@@ -142,7 +165,9 @@ def test_a_residue_is_the_shift_by_unit_gain(two_area, tmp_path):
 def test_a_mistake_is_named_with_its_line(two_area, tmp_path, gfor, text, said):
     path = tmp_path / "points.csv"
     path.write_text(text)
-    code, _, error = gfor("screen", "two_area", "--scenario", "gfor", "--points", path, "--out", tmp_path / "out")
+    code, _, error = gfor(
+        "screen", "two_area", "--scenario", "gfor", "--points", path, "--out", tmp_path / "out"
+    )
     assert code == 2
     assert said in error.replace("\n", " ")
     assert "Traceback" not in error
@@ -162,7 +187,9 @@ def test_a_pattern_sets_what_the_names_that_it_fits_would_set(two_area, tmp_path
 def test_powers_are_shared_and_loads_draw_what_is_said(two_area, tmp_path):
     _, prepared, elements = two_area
     path = tmp_path / "points.csv"
-    path.write_text("name,bus_2.P_mw,load,load_2.P_mw,sg1.in_service\nboth,1500,0.5,1000,1\none,1500,0.5,1000,0\n")
+    path.write_text(
+        "name,bus_2.P_mw,load,load_2.P_mw,sg1.in_service\nboth,1500,0.5,1000,1\none,1500,0.5,1000,0\n"
+    )
     both, one = read_points(path, prepared, elements)
     assert both.values["sg1.P_0"] == both.values["gfor.P_0"] == 0.5
     assert one.values["gfor.P_0"] == 1.0
@@ -172,7 +199,10 @@ def test_powers_are_shared_and_loads_draw_what_is_said(two_area, tmp_path):
 
 
 def questions(path, prepared, elements):
-    return [str(one) for one in questions_about(path, read_points(path, prepared, elements), prepared, elements)]
+    return [
+        str(one)
+        for one in questions_about(path, read_points(path, prepared, elements), prepared, elements)
+    ]
 
 
 @pytest.mark.parametrize(
@@ -195,7 +225,9 @@ def questions(path, prepared, elements):
         ("sg1.P_mw", "600", ""),
     ],
 )
-def test_a_load_that_only_the_slack_follows_is_asked_about(two_area, tmp_path, columns, cells, left):
+def test_a_load_that_only_the_slack_follows_is_asked_about(
+    two_area, tmp_path, columns, cells, left
+):
     _, prepared, elements = two_area
     path = tmp_path / "points.csv"
     path.write_text(f"name,{columns}\nas it is{',' * cells.count(',')},\nother,{cells}\n")
@@ -210,10 +242,14 @@ def test_powers_that_look_like_pu_are_asked_about(two_area, tmp_path):
     _, prepared, elements = two_area
     path = tmp_path / "points.csv"
     for units, asked in ((1.0, []), (0.01, ["sg1.P_mw", "load_2.P_mw"])):
-        path.write_text(f"name,sg1.P_mw,load_2.P_mw,load\na,{900 * units},{1100 * units},0.9\nb,0,,1\n")
+        path.write_text(
+            f"name,sg1.P_mw,load_2.P_mw,load\na,{900 * units},{1100 * units},0.9\nb,0,,1\n"
+        )
         found = questions(path, prepared, elements)
         assert len(found) == len(asked)
-        assert all(name in text and "in pu?" in text for name, text in zip(asked, found, strict=True))
+        assert all(
+            name in text and "in pu?" in text for name, text in zip(asked, found, strict=True)
+        )
 
 
 @pytest.mark.parametrize("column", ["sg2.P_mw", "{slack}.P_mw", "sg[2].P_0"])
@@ -221,10 +257,13 @@ def test_a_power_of_the_slacks_unit_is_asked_about(two_area, tmp_path, column):
     _, prepared, elements = two_area
     path = tmp_path / "points.csv"
     power = 0.7 if column.endswith("P_0") else 700
-    path.write_text(f"name,{column.format(slack=elements.slack)},sg1.P_mw,load\na,{power},900,1\nb,,,1\n")
+    path.write_text(
+        f"name,{column.format(slack=elements.slack)},sg1.P_mw,load\na,{power},900,1\nb,,,1\n"
+    )
     (found,) = questions(path, prepared, elements)
     assert (
-        f"cannot act on {', '.join(elements.balancing)}: {elements.slack} is the slack and feeds what is left" in found
+        f"cannot act on {', '.join(elements.balancing)}: {elements.slack} is the slack and feeds what is left"
+        in found
     )
     point, _ = read_points(path, prepared, elements)
     assert not {f"{unit}.P_0" for unit in elements.balancing} & {*point.values}, (
@@ -276,31 +315,53 @@ def test_a_unit_and_its_transformer_are_one_outage(tmp_path):
     names = [outage.name for outage in read_outages("n-1", elements)]
     assert names[-4:] == [f"sg{n}+line_{bus}_{n}" for n, bus in ((1, 5), (2, 6), (3, 11), (4, 10))]
     assert len(names) == 1 + 8 + 4
-    assert [o.name for o in read_outages("sg4, line_10_4", elements)] == ["intact", "sg4", "line_10_4"]
+    assert [o.name for o in read_outages("sg4, line_10_4", elements)] == [
+        "intact",
+        "sg4",
+        "line_10_4",
+    ]
     preparation = ItemPreparation(case, "areas", ())
     either = [("sg2",), ("line_6_2",), ("sg2", "line_6_2")]
     flows = [
-        preparation.prepared(Item(0, 1, {"grid.load_7.P": 700.0, "grid.load_9.P": 1400.0}, out, out)).scenario
+        preparation.prepared(
+            Item(0, 1, {"grid.load_7.P": 700.0, "grid.load_9.P": 1400.0}, out, out)
+        ).scenario
         for out in either
     ]
     assert flows[0].power_flow.voltages == pytest.approx(flows[2].power_flow.voltages)
     assert flows[1].power_flow.voltages == pytest.approx(flows[2].power_flow.voltages)
     assert all("sg2" not in flow.system.components for flow in flows)
-    with PointBench() as bench:  # |v| that an exciter takes at once is curved where v_im = 0, and no limit
+    # |v| that an exciter takes at once is curved where v_im = 0, and no limit
+    with PointBench() as bench:
         bench.master(case.prepare((), {"sg*.exciter.T_R": 0.0})[0])
         assert bench.linear_model().doubts == ()
 
 
-@pytest.mark.parametrize(("text", "said"), [("sg9", "'sg9'"), ("L,L", "named twice"), ("units,sg1", "named twice")])
+@pytest.mark.parametrize(
+    ("text", "said"), [("sg9", "'sg9'"), ("L,L", "named twice"), ("units,sg1", "named twice")]
+)
 def test_a_wrong_outage_is_refused(gfor, day, tmp_path, text, said):
-    code, _, error = gfor("screen", "two_area", "--points", day, "--outages", text, "--out", tmp_path / "out")
+    code, _, error = gfor(
+        "screen", "two_area", "--points", day, "--outages", text, "--out", tmp_path / "out"
+    )
     assert code == 2
     assert said in error
 
 
 def test_what_is_not_computed_is_named_and_counted(gfor, day, tmp_path):
     """The only line splits the system; without a unit, the line can carry what the others share at two points only."""
-    options = ("--scenario", "gfor", "--points", day, "--outages", "L,sg1", "--workers", "1", "--out", tmp_path / "out")
+    options = (
+        "--scenario",
+        "gfor",
+        "--points",
+        day,
+        "--outages",
+        "L,sg1",
+        "--workers",
+        "1",
+        "--out",
+        tmp_path / "out",
+    )
     code, out, _ = gfor("screen", "two_area", *options, "--json", "--fail-unstable")
     found = json.loads(out)
     assert code == 1
@@ -339,7 +400,9 @@ def test_parts_merged_are_the_whole_to_the_last_bit(gfor, day, tmp_path, monkeyp
     for k, part in enumerate(parts, start=1):
         assert gfor(*common, "--shard", f"{k}/2", "--out", part)[0] == 0
         assert not (part / "items.csv").exists()
-    code, out, _ = gfor(*common, "--out", tmp_path / "merged", "--merge", parts[0], "--merge", parts[1])
+    code, out, _ = gfor(
+        *common, "--out", tmp_path / "merged", "--merge", parts[0], "--merge", parts[1]
+    )
     assert code == 0
     assert "0 items computed, 5 were there already" in " ".join(out.split())
     for name in ("items.csv", "modes.csv", "screening.json"):
@@ -352,14 +415,18 @@ def test_a_part_without_a_stretch_is_merged(gfor, day, tmp_path):
     parts = [tmp_path / f"part{k}" for k in (1, 2)]
     for k, part in enumerate(parts, start=1):
         assert gfor(*common, "--shard", f"{k}/2", "--out", part)[0] == 0
-    code, out, _ = gfor(*common, "--out", tmp_path / "merged", "--merge", parts[0], "--merge", parts[1])
+    code, out, _ = gfor(
+        *common, "--out", tmp_path / "merged", "--merge", parts[0], "--merge", parts[1]
+    )
     assert code == 0
     assert "0 items computed, 5 were there already" in " ".join(out.split())
 
 
 def test_modes_are_followed_over_stretches(two_area, day, tmp_path, monkeypatch):
     monkeypatch.setattr(study, "STRETCH", 2)
-    result = screened(plan_screening(two_area[0], ScreeningRequest(day, None, "gfor")), tmp_path / "points")
+    result = screened(
+        plan_screening(two_area[0], ScreeningRequest(day, None, "gfor")), tmp_path / "points"
+    )
     assert len(result.plan.tasks) == 3
     assert len(Summary(result).modes) == 1
 
@@ -369,7 +436,9 @@ def test_a_unit_out_of_service_leaves_no_modes(two_area, tmp_path):
     case, _, _ = two_area
     path = tmp_path / "points.csv"
     path.write_text("name,gfor.in_service,grid.load_2.P\nout,0,1250 MW\n")
-    result = screened(plan_screening(case, ScreeningRequest(path, None, "gfor")), tmp_path / "points")
+    result = screened(
+        plan_screening(case, ScreeningRequest(path, None, "gfor")), tmp_path / "points"
+    )
     (prepared,) = case.prepare(["base"])
     expected = compute_modes(prepared)
     (item,) = result.items
@@ -412,7 +481,9 @@ def test_only_fmus_of_ours_serve_the_next_point(two_area, monkeypatch):
     with PointBench() as bench:
         first = bench.master(prepared)
         assert bench.master(prepared) is first
-        monkeypatch.setattr("orchestrator.operating_points.bench.is_ours", lambda path: "gfor" not in path.name)
+        monkeypatch.setattr(
+            "orchestrator.operating_points.bench.is_ours", lambda path: "gfor" not in path.name
+        )
         assert bench.master(prepared) is not first
 
 
@@ -439,7 +510,14 @@ def test_parts_cover_the_whole():
 
 def test_a_folder_without_points_cannot_be_merged(day, tmp_path, capsys):
     (tmp_path / "empty").mkdir()
-    options = ["--points", str(day), "--merge", str(tmp_path / "empty"), "--out", str(tmp_path / "out")]
+    options = [
+        "--points",
+        str(day),
+        "--merge",
+        str(tmp_path / "empty"),
+        "--out",
+        str(tmp_path / "out"),
+    ]
     assert main(["screen", "two_area", *options]) == 2
     assert "no points are kept there" in capsys.readouterr().err
 
@@ -447,7 +525,9 @@ def test_a_folder_without_points_cannot_be_merged(day, tmp_path, capsys):
 def test_a_one_closes_what_the_case_has_open(two_area, tmp_path, monkeypatch):
     """Line and unit; what is closed already gets no value, and a load off by its scale needs that."""
     case, prepared, elements = two_area
-    (opened,) = case.prepare(["gfor"], {"grid.gfor.connected": False, "gfor.connected": False, "grid.load_2.P": 1250.0})
+    (opened,) = case.prepare(
+        ["gfor"], {"grid.gfor.connected": False, "gfor.connected": False, "grid.load_2.P": 1250.0}
+    )
     path = tmp_path / "points.csv"
     path.write_text("name,gfor.in_service,L.in_service\na,1,1\nb,0,1\nc,,\n")
     a, b, c = read_points(path, opened, elements)
@@ -463,10 +543,14 @@ def test_a_one_closes_what_the_case_has_open(two_area, tmp_path, monkeypatch):
         read_points(path, prepared, elements)
 
 
-def test_a_stretch_whose_end_fails_is_counted_at_its_last_point(two_area, day, tmp_path, monkeypatch):
+def test_a_stretch_whose_end_fails_is_counted_at_its_last_point(
+    two_area, day, tmp_path, monkeypatch
+):
     """Growth that only the count sees must not be lost behind items without modes."""
     monkeypatch.setattr(modes, "DENSE", 0)
-    result = screened(plan_screening(two_area[0], ScreeningRequest(day, "L", "gfor")), tmp_path / "points")
+    result = screened(
+        plan_screening(two_area[0], ScreeningRequest(day, "L", "gfor")), tmp_path / "points"
+    )
     assert result.items[-1].record.status is Status.ISLANDING
     computed = [item.record for item in result.items if item.record.status is Status.COMPUTED]
     assert computed[0].counted
@@ -477,8 +561,12 @@ def test_a_stretch_whose_end_fails_is_counted_at_its_last_point(two_area, day, t
 def test_a_stretch_counts_growth_at_its_ends_alone(two_area, day, tmp_path, monkeypatch):
     """What stands between them is followed, and would take many times as long to count."""
     monkeypatch.setattr(modes, "DENSE", 0)
-    result = screened(plan_screening(two_area[0], ScreeningRequest(day, None, "gfor")), tmp_path / "points")
-    counted = [item.record.counted for item in result.items if item.record.status is Status.COMPUTED]
+    result = screened(
+        plan_screening(two_area[0], ScreeningRequest(day, None, "gfor")), tmp_path / "points"
+    )
+    counted = [
+        item.record.counted for item in result.items if item.record.status is Status.COMPUTED
+    ]
     assert counted == [True, *[False] * (len(counted) - 2), True]
 
 
@@ -488,23 +576,47 @@ def test_slow_growth_beside_zero_and_second_zeros_are_found(clocks, others):
     """Both hide from the count of what grows faster than 0.002 1/s, and must hide neither behind many clocks nor
     behind an imaginary part of rounding.
     """
-    blocks = [np.diag([0.0, 0.0, 1e-3 + 5e-4, -1.0]), *([[-w / 5, w], [-w, -w / 5]] for w in others)]
+    blocks = [
+        np.diag([0.0, 0.0, 1e-3 + 5e-4, -1.0]),
+        *([[-w / 5, w], [-w, -w / 5]] for w in others),
+    ]
     A = scipy.linalg.block_diag(*blocks, np.zeros((clocks, clocks)))
     A[:3, 3] = 0.5, 0.2, 0.5  # what nothing drives would be a clock
     model = LinearModel.from_matrix(A, tuple(f"x{k}" for k in range(len(A))), None)
-    known = ModeSet(np.zeros(0, complex), np.zeros((0, len(A)), complex), np.zeros((0, len(A)), complex), model.names)
+    known = ModeSet(
+        np.zeros(0, complex),
+        np.zeros((0, len(A)), complex),
+        np.zeros((0, len(A)), complex),
+        model.names,
+    )
     assert modes._near_zero(model, known) == (2, 1)
 
 
 def test_a_part_ends_as_the_whole_does(gfor, day, tmp_path, monkeypatch):
     monkeypatch.setattr(study, "STRETCH", 6)
-    common = ("screen", "two_area", "--scenario", "gfor", "--points", day, "--workers", "1", "--outages", "L")
+    common = (
+        "screen",
+        "two_area",
+        "--scenario",
+        "gfor",
+        "--points",
+        day,
+        "--workers",
+        "1",
+        "--outages",
+        "L",
+    )
     codes = {}
     for part in ("1/2", "3/3"):
         for option in ((), ("--fail-unstable",)):
             out = tmp_path / (part.replace("/", "_") + str(len(option)))
             codes[part, *option] = gfor(*common, "--shard", part, "--out", out, *option)[0]
-    assert codes == {("1/2",): 0, ("1/2", "--fail-unstable"): 1, ("3/3",): 0, ("3/3", "--fail-unstable"): 0}
+    assert codes == {
+        ("1/2",): 0,
+        ("1/2", "--fail-unstable"): 1,
+        ("3/3",): 0,
+        ("3/3", "--fail-unstable"): 0,
+    }
 
 
 @pytest.mark.slow
@@ -513,8 +625,12 @@ def test_a_dask_cluster_screens_what_one_process_does(two_area, day, tmp_path, m
     monkeypatch.setattr(study, "STRETCH", 2)
     plan = plan_screening(two_area[0], ScreeningRequest(day, None, "gfor"))
     alone = screened(plan, tmp_path / "alone")
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-        together = run_screening(plan, Work(DaskCluster(cluster.scheduler_address), PointStore(tmp_path / "together")))
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None
+    ) as cluster:
+        together = run_screening(
+            plan, Work(DaskCluster(cluster.scheduler_address), PointStore(tmp_path / "together"))
+        )
     assert together.computed == alone.computed == 5
     for one, other in zip(alone.items, together.items, strict=True):
         assert one.record.eigenvalues.tobytes() == other.record.eigenvalues.tobytes()

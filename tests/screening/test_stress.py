@@ -22,14 +22,26 @@ POINTS = "name,load\nnight,0.7\nmorning,0.9\nnoon,1.1\nevening,1.2\n"
 def plan(tmp_path_factory):
     folder = tmp_path_factory.mktemp("five")
     (folder / "points.csv").write_text(POINTS)
-    return plan_screening(five_machines(folder), ScreeningRequest(folder / "points.csv", "sg1,sg2,line_11_12", "base"))
+    return plan_screening(
+        five_machines(folder), ScreeningRequest(folder / "points.csv", "sg1,sg2,line_11_12", "base")
+    )
 
 
 def mode(real, who=(0.8, 0.2), number=0, hertz=1.0):
     """A computed record with one critical mode of two machines, and its trajectory."""
-    shares = {name: np.array([share], dtype=np.float32) for name, share in zip(("sg3", "sg4"), who, strict=True)}
+    shares = {
+        name: np.array([share], dtype=np.float32)
+        for name, share in zip(("sg3", "sg4"), who, strict=True)
+    }
     value = np.array([complex(real, 2 * np.pi * hertz)])
-    record = ItemRecord(Status.COMPUTED, stable=real < 0, counted=True, eigenvalues=value, critical=(0,), shares=shares)
+    record = ItemRecord(
+        Status.COMPUTED,
+        stable=real < 0,
+        counted=True,
+        eigenvalues=value,
+        critical=(0,),
+        shares=shares,
+    )
     return record, (number,)
 
 
@@ -58,9 +70,15 @@ def summary(plan, records, otherwise=None):
             [("noon", "sg1"), ("evening", "sg1")],
             "2 not judged (2 no steady state), all with sg1 out at high load (from ",
         ),
-        ([("night", "line_11_12")], "1 not judged (1 no steady state), it is with line_11_12 out at low load (up to "),
+        (
+            [("night", "line_11_12")],
+            "1 not judged (1 no steady state), it is with line_11_12 out at low load (up to ",
+        ),
         ([("night", "sg1"), ("evening", "line_11_12")], "2 not judged (2 no steady state)"),
-        ([("night", "intact"), ("evening", "intact")], "2 not judged (2 no steady state), all of the intact network"),
+        (
+            [("night", "intact"), ("evening", "intact")],
+            "2 not judged (2 no steady state), all of the intact network",
+        ),
         ([], ""),
     ],
 )
@@ -73,7 +91,9 @@ def test_what_was_not_judged_says_what_it_has_in_common(plan, where, said):
 
 
 def test_of_two_points_the_one_that_was_not_judged_is_named(plan):
-    found = summary(replace(plan, points=plan.points[:2]), {("morning", "sg1"): LOST, ("morning", "sg2"): LOST})
+    found = summary(
+        replace(plan, points=plan.points[:2]), {("morning", "sg1"): LOST, ("morning", "sg2"): LOST}
+    )
     assert not_judged(found) == "2 not judged (2 no steady state), all with a unit out at morning"
 
 
@@ -85,7 +105,14 @@ def test_what_was_not_judged_is_told_of_an_unstable_network_too(plan):
 
 def test_the_outages_come_worst_first(plan):
     """What grows, then what is not known, then by damping."""
-    found = summary(plan, {("noon", "sg2"): mode(0.1), ("evening", "sg1"): LOST, ("evening", "line_11_12"): mode(-0.2)})
+    found = summary(
+        plan,
+        {
+            ("noon", "sg2"): mode(0.1),
+            ("evening", "sg1"): LOST,
+            ("evening", "line_11_12"): mode(-0.2),
+        },
+    )
     rows = by_outage(found)
     assert [row.name for row in rows] == ["sg2", "sg1", "line_11_12", "intact"]
     assert [len(row.unjudged) for row in rows] == [0, 1, 0, 0]
@@ -103,12 +130,16 @@ def test_the_outages_come_worst_first(plan):
 def test_a_mode_whose_names_change_has_one_row(plan):
     """It was not followed over an outage; who leads is another one by little."""
     again = mode(-0.4, (0.45, 0.55), number=1)
-    found = summary(plan, {("noon", "sg1"): again, ("evening", "sg1"): again}, mode(-0.5, (0.55, 0.45)))
+    found = summary(
+        plan, {("noon", "sg1"): again, ("evening", "sg1"): again}, mode(-0.5, (0.55, 0.45))
+    )
     (row,) = found.modes
     assert len(row.at) == 16
 
 
-@pytest.mark.parametrize("other", [mode(-0.4, (0.02, 0.98), number=1), mode(-0.4, number=1, hertz=1.5)])
+@pytest.mark.parametrize(
+    "other", [mode(-0.4, (0.02, 0.98), number=1), mode(-0.4, number=1, hertz=1.5)]
+)
 def test_modes_of_others_or_of_another_frequency_stay_apart(plan, other):
     assert len(summary(plan, {("noon", "sg1"): other}).modes) == 2
 

@@ -15,7 +15,10 @@ from orchestrator.screening.summary import Summary
 
 def summary(*verdicts, complete=True):
     """Of items that are stable, unstable or without a verdict (None)."""
-    records = [SimpleNamespace(status=Status.COMPUTED, stable=v, zeros=0, critical=(), counted=True) for v in verdicts]
+    records = [
+        SimpleNamespace(status=Status.COMPUTED, stable=v, zeros=0, critical=(), counted=True)
+        for v in verdicts
+    ]
     items = [SimpleNamespace(record=record, trajectories=()) for record in records]
     return Summary(SimpleNamespace(items=items, complete=complete))
 
@@ -51,7 +54,9 @@ def test_of_a_part_the_same_holds_for_what_is_there():
 def test_units_beyond_their_reactive_power_stand_in_the_first_line():
     """What the operating point brings about: not what the base has already, nor where the case means the voltages."""
     found = summary(True, True)
-    for item, text in zip(found.result.items, ("", "'b' feeds -70 Mvar, its least being -10 Mvar"), strict=True):
+    for item, text in zip(
+        found.result.items, ("", "'b' feeds -70 Mvar, its least being -10 Mvar"), strict=True
+    ):
         item.record.beyond, item.record.reactive = {}, text
     said = "at 1 of 2 limits of reactive power are exceeded: 'b' feeds -70 Mvar, its least being -10 Mvar"
     assert found.beyond == said

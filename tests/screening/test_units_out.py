@@ -39,7 +39,11 @@ def switched_off(case, scenario, unit):
     """Critical modes of the whole spectrum where the unit is left in the model, and the slack feeds its power."""
     case = replace(case, sharing=SharingRule.SLACK)
     (prepared,) = case.prepare([scenario], {f"{unit}.connected": False})
-    return [m.eigenvalue for m in find_modes(compute_modes(prepared).system, 0.1, 2.0) if m.damping_ratio <= 0.2]
+    return [
+        m.eigenvalue
+        for m in find_modes(compute_modes(prepared).system, 0.1, 2.0)
+        if m.damping_ratio <= 0.2
+    ]
 
 
 def test_outages_of_units_have_the_modes_of_units_switched_off(case, tmp_path):
@@ -47,7 +51,9 @@ def test_outages_of_units_have_the_modes_of_units_switched_off(case, tmp_path):
     result = screened(case, tmp_path, "name\nonly\n", "sg33,sg36", sharing=SharingRule.SLACK)
     assert [item.record.status for item in result.items] == [Status.COMPUTED] * 3
     for item in result.items[1:]:
-        assert critical(item) == pytest.approx(switched_off(case, "base", item.outage.name), rel=1e-6)
+        assert critical(item) == pytest.approx(
+            switched_off(case, "base", item.outage.name), rel=1e-6
+        )
 
 
 def test_a_unit_that_returns_has_the_modes_of_the_intact_network(case, tmp_path):
@@ -81,4 +87,7 @@ def test_a_search_without_an_end_gives_way_to_all_eigenvalues(tmp_path, monkeypa
     assert critical(found) == pytest.approx(critical(expected), rel=1e-6)
     monkeypatch.setattr(modes, "_MOST_STATES", 10)
     (refused,) = screened(two_area, tmp_path / "large", "name\nonly\n").items
-    assert (refused.record.status, refused.record.text) == (Status.MODES, "the search does not converge")
+    assert (refused.record.status, refused.record.text) == (
+        Status.MODES,
+        "the search does not converge",
+    )

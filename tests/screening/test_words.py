@@ -25,17 +25,45 @@ from orchestrator.screening.words import growth_outside, verdict_sentence, what_
     ("eigenvalues", "number", "fastest", "said"),
     [
         ([-1 + 5j], 0, None, ""),
-        ([-1 + 5j], 1, (0.25, 0.0), "1 eigenvalue grows outside of the range, by 0.25 1/s without an oscillation"),
-        ([-1 + 5j], 2, (0.5, 4 * np.pi), "2 eigenvalues grow outside of the range, by 0.5 1/s at 2 Hz"),
-        ([-1 + 5j], 2, None, "2 eigenvalues grow outside of the range; `gfor modes` shows how fast"),
-        ([-1 + 5j, 0.1 + 15j], 0, None, "2 eigenvalues grow outside of the range, by 0.1 1/s at 2.39 Hz"),
-        ([-1 + 5j, 0.1 + 15j], 2, (0.5, 4 * np.pi), "4 eigenvalues grow outside of the range, the fastest by 0.5 "
-         "1/s at 2 Hz"),
+        (
+            [-1 + 5j],
+            1,
+            (0.25, 0.0),
+            "1 eigenvalue grows outside of the range, by 0.25 1/s without an oscillation",
+        ),
+        (
+            [-1 + 5j],
+            2,
+            (0.5, 4 * np.pi),
+            "2 eigenvalues grow outside of the range, by 0.5 1/s at 2 Hz",
+        ),
+        (
+            [-1 + 5j],
+            2,
+            None,
+            "2 eigenvalues grow outside of the range; `gfor modes` shows how fast",
+        ),
+        (
+            [-1 + 5j, 0.1 + 15j],
+            0,
+            None,
+            "2 eigenvalues grow outside of the range, by 0.1 1/s at 2.39 Hz",
+        ),
+        (
+            [-1 + 5j, 0.1 + 15j],
+            2,
+            (0.5, 4 * np.pi),
+            "4 eigenvalues grow outside of the range, the fastest by 0.5 1/s at 2 Hz",
+        ),
     ],
-)  # fmt: skip
+)
 def test_growth_outside_has_its_rate(eigenvalues, number, fastest, said):
     record = ItemRecord(
-        Status.COMPUTED, eigenvalues=np.array(eigenvalues), critical=(0,), growing_elsewhere=number, fastest=fastest
+        Status.COMPUTED,
+        eigenvalues=np.array(eigenvalues),
+        critical=(0,),
+        growing_elsewhere=number,
+        fastest=fastest,
     )
     assert growth_outside(record) == said
 
@@ -66,17 +94,24 @@ def test_the_scenario_is_named(screened):
 
 
 def test_a_warning_names_its_first_point(screened):
-    items = [replace(item, record=replace(item.record, warnings=("a limit is close",))) for item in screened.items]
+    items = [
+        replace(item, record=replace(item.record, warnings=("a limit is close",)))
+        for item in screened.items
+    ]
     (text,) = remarks(Summary(replace(screened, items=items)))
     assert text == "at 2 of 2, first at in, intact: a limit is close"
 
 
 def test_units_beyond_their_rating_are_in_the_verdict_and_the_report():
     """Where nothing grows, a steady state that no plant bears is no answer."""
-    found = face.load("two_area").screen({"usual": {}, "heavy": {"gfor.P_mw": 1600}}, scenario="gfor")
+    found = face.load("two_area").screen(
+        {"usual": {}, "heavy": {"gfor.P_mw": 1600}}, scenario="gfor"
+    )
     usual, heavy = (item.record for item in found.result.items)
     assert usual.beyond == {}
-    assert heavy.beyond == {"gfor": pytest.approx(1600 / found.result.plan.prepared.values["gfor.S_n"], rel=0.05)}
+    assert heavy.beyond == {
+        "gfor": pytest.approx(1600 / found.result.plan.prepared.values["gfor.S_n"], rel=0.05)
+    }
     said = f"at 1 of 2 a unit is beyond its rating, most gfor with {100 * heavy.beyond['gfor']:.3g} % (heavy, intact)"
     assert found.stable
     assert found.verdict.endswith(f"; {said}")
@@ -92,11 +127,15 @@ def test_what_was_searched_in_the_range_alone_is_not_stable(screened):
     uncounted = replace(calm, record=replace(calm.record, stable=None, counted=False))
     summary = Summary(replace(screened, items=[calm, uncounted]))
     assert summary.stable is None
-    assert "1 were searched only from 1 to 2 Hz above -30 % damping (--whole" in verdict_sentence(summary)
+    assert "1 were searched only from 1 to 2 Hz above -30 % damping (--whole" in verdict_sentence(
+        summary
+    )
 
 
 @pytest.mark.parametrize(("counted", "stable"), [(True, True), (False, None)])
-def test_an_item_is_stable_only_where_all_growth_was_counted(monkeypatch, tmp_path, counted, stable):
+def test_an_item_is_stable_only_where_all_growth_was_counted(
+    monkeypatch, tmp_path, counted, stable
+):
     monkeypatch.setattr("orchestrator.screening.modes.DENSE", 0)
     if not counted:
         monkeypatch.setattr("orchestrator.screening.modes._elsewhere", lambda *_: None)
@@ -108,8 +147,9 @@ def test_an_item_is_stable_only_where_all_growth_was_counted(monkeypatch, tmp_pa
     (item,) = result.items
     assert (item.record.stable, item.record.counted) == (stable, counted)
     if stable:
-        assert "what grows slower than 0.002 1/s outside of 0.1 to 2 Hz is seen near 0 Hz only" in verdict_sentence(
-            Summary(result)
+        assert (
+            "what grows slower than 0.002 1/s outside of 0.1 to 2 Hz is seen near 0 Hz only"
+            in verdict_sentence(Summary(result))
         )
 
 
@@ -117,7 +157,9 @@ def test_where_all_eigenvalues_are_known_nothing_is_left_out(screened):
     calm = next(item for item in screened.items if item.record.stable)
     summary = Summary(replace(screened, items=[calm, calm]))
     assert summary.slowest == 0.0
-    assert verdict_sentence(summary).startswith("stable: nothing grows at any of 2 points and outages")
+    assert verdict_sentence(summary).startswith(
+        "stable: nothing grows at any of 2 points and outages"
+    )
     assert "slower" not in verdict_sentence(summary)
     assert as_json(summary)["slowest_growth_counted"] == 0.0
 
@@ -139,7 +181,8 @@ def test_where_all_eigenvalues_are_known_nothing_is_left_out(screened):
 )
 def test_the_head_says_of_which_system_the_modes_are(screened, steps, said):
     items = tuple(
-        replace(item, record=replace(item.record, map_steps=n)) for item, n in zip(screened.items, steps, strict=True)
+        replace(item, record=replace(item.record, map_steps=n))
+        for item, n in zip(screened.items, steps, strict=True)
     )
     assert screened.plan.prepared.step_size == 1e-4
     assert said in what_was_counted(Summary(replace(screened, items=items)))

@@ -15,7 +15,9 @@ def derivative(curve, value=1.0, **bounds):
 
 
 @pytest.mark.parametrize(
-    ("bounds", "power"), [({}, 3), ({"minimum": 1.0}, 2), ({"maximum": 1.0}, 2)], ids=["both sides", "above", "below"]
+    ("bounds", "power"),
+    [({}, 3), ({"minimum": 1.0}, 2), ({"maximum": 1.0}, 2)],
+    ids=["both sides", "above", "below"],
 )
 def test_what_the_first_power_of_the_change_leaves_out_falls_out(bounds, power):
     """A cubic term on both sides, a square one on one side: the derivative is exact for either."""

@@ -29,7 +29,9 @@ def oscillator(twin=False):
     kink = m.parameter("kink", 0.0, "1", "Damps on both sides of 0", tunable=True)
     edge = m.parameter("edge", 0.0, "1", "Damps from 0 on", minimum=0.0, tunable=True)
     rough = m.parameter("rough", 1.0, "1", "Damps without order", tunable=True)
-    narrow = m.parameter("narrow", 1.0, "1", "Has one value", minimum=1.0, maximum=1.0, tunable=True)
+    narrow = m.parameter(
+        "narrow", 1.0, "1", "Has one value", minimum=1.0, maximum=1.0, tunable=True
+    )
     offset = m.parameter("offset", 1.0, "1", "Where it rests", tunable=True)
     roof = m.parameter("roof", 1.0, "1", "Moves where it rests, below 1", tunable=True)
     late = m.parameter("late", 0.2, "1", "Damps, by its value at the start", tunable=True)
@@ -37,7 +39,15 @@ def oscillator(twin=False):
     m.derivative(taken, 0 * late)
     fixed = m.parameter("fixed", 0.1, "1", "More damping")
     c_all = (
-        c + fixed + taken - 0.2 + fabs(kink) + edge + 0.02 * sin(1e5 * rough) - 0.02 * np.sin(1e5) + 0 * narrow * idle
+        c
+        + fixed
+        + taken
+        - 0.2
+        + fabs(kink)
+        + edge
+        + 0.02 * sin(1e5 * rough)
+        - 0.02 * np.sin(1e5)
+        + 0 * narrow * idle
     )
     rest = offset + fmin(roof - 1, 0)
     force = k * rest**2  # the stiffness goes with the place of rest
@@ -82,9 +92,13 @@ def test_a_formula_gives_the_same(tmp_path):
     size = abs(found.result.mode.eigenvalue)
     # ζ = c/(2·√k), |λ| = √k
     assert rows["osc.c"].damping_per_unit == pytest.approx(100 / (2 * size), rel=1e-4)
-    assert rows["osc.k"].damping_per_percent == pytest.approx(-100 * 0.7 / (4 * K**1.5) * K / 100, rel=1e-4)
+    assert rows["osc.k"].damping_per_percent == pytest.approx(
+        -100 * 0.7 / (4 * K**1.5) * K / 100, rel=1e-4
+    )
     assert rows["osc.k"].frequency_per_unit == pytest.approx(by_k.imag / (2 * np.pi), rel=1e-4)
-    assert [row.effect for row in found.result.rows] == sorted((r.effect for r in found.result.rows), reverse=True)
+    assert [row.effect for row in found.result.rows] == sorted(
+        (r.effect for r in found.result.rows), reverse=True
+    )
     assert found.warnings == ()
 
 
@@ -101,7 +115,8 @@ def test_what_a_figure_cannot_say_is_said(tmp_path):
     assert "two sizes of change disagree" in " ".join(rows["osc.rough"].doubts)
     assert rows["osc.roof"].operating_point == "moves"  # downwards only
     assert "upwards it moves the mode by" in " ".join(rows["osc.roof"].doubts)
-    assert rows["osc.late"].derivative == pytest.approx(by_c, rel=1e-3)  # while it runs nothing is seen of it
+    # while it runs nothing is seen of it
+    assert rows["osc.late"].derivative == pytest.approx(by_c, rel=1e-3)
     assert rows["osc.narrow"].derivative is None
     assert "no room" in rows["osc.narrow"].reason
     assert "osc.fixed" not in rows
@@ -127,14 +142,21 @@ def test_a_fixed_parameter_is_taken_where_it_is_asked_for(tmp_path):
 
 
 def test_a_double_eigenvalue_is_doubted_in_every_row(tmp_path):
-    found = scenario_of(tmp_path, oscillator(twin=True)).sensitivities(parameters=["osc.c", "osc.idle"])
+    found = scenario_of(tmp_path, oscillator(twin=True)).sensitivities(
+        parameters=["osc.c", "osc.idle"]
+    )
     assert "double eigenvalue" in " ".join(found.warnings)
     rows = rows_of(found)
     assert rows["osc.c"].doubts == ("double eigenvalue",)
     assert rows["osc.idle"].doubts == ()  # 0 it is, whatever the eigenvectors
 
 
-MOVED = {"gfor.pod_p.K": "stays", "gfor.droop.R_f": "stays", "grid.X_L": "moves", "gfor.P_0": "moves"}
+MOVED = {
+    "gfor.pod_p.K": "stays",
+    "gfor.droop.R_f": "stays",
+    "grid.X_L": "moves",
+    "gfor.P_0": "moves",
+}
 
 
 def test_the_two_area_system_moves_as_when_it_is_computed_anew(two_area):
@@ -146,14 +168,20 @@ def test_the_two_area_system_moves_as_when_it_is_computed_anew(two_area):
         assert row.operating_point == operating_point
         assert row.doubts == ()
         up, down = (
-            two_area.scenario("pod_p", {name: row.parameter.value * (1 + sign)}).modes().named["electromechanical"]
+            two_area.scenario("pod_p", {name: row.parameter.value * (1 + sign)})
+            .modes()
+            .named["electromechanical"]
             for sign in (0.01, -0.01)
         )
         change = (up.eigenvalue - down.eigenvalue) / (0.02 * row.parameter.value)
         assert row.derivative == pytest.approx(change, rel=1e-3)
         assert row.continuous == pytest.approx(change, rel=2e-3)
-        assert row.frequency_per_percent == pytest.approx((up.frequency_hz - down.frequency_hz) / 2, rel=2e-3, abs=1e-6)
-        assert row.damping_per_percent == pytest.approx((up.damping_percent - down.damping_percent) / 2, rel=2e-3)
+        assert row.frequency_per_percent == pytest.approx(
+            (up.frequency_hz - down.frequency_hz) / 2, rel=2e-3, abs=1e-6
+        )
+        assert row.damping_per_percent == pytest.approx(
+            (up.damping_percent - down.damping_percent) / 2, rel=2e-3
+        )
     assert rows["gfor.pod_q.K"].derivative == 0  # the controller is off
     assert rows["sg2.P_0"].derivative == 0  # the slack feeds what is left, whatever it is set to
     assert "are both set" in rows["gfor.Q_0"].reason
@@ -163,8 +191,12 @@ def test_the_two_area_system_moves_as_when_it_is_computed_anew(two_area):
 def test_the_partial_derivative_differs_where_the_operating_point_moves(two_area):
     scenario = two_area.scenario("gfor")
     names = ["grid.X_L", "gfor.droop.R_f", "gfor.droop.delta_P_ref"]
-    total, held = (rows_of(scenario.sensitivities(parameters=names, held=held)) for held in (False, True))
-    assert abs(held["grid.X_L"].derivative - total["grid.X_L"].derivative) > 5e-3 * abs(total["grid.X_L"].derivative)
+    total, held = (
+        rows_of(scenario.sensitivities(parameters=names, held=held)) for held in (False, True)
+    )
+    assert abs(held["grid.X_L"].derivative - total["grid.X_L"].derivative) > 5e-3 * abs(
+        total["grid.X_L"].derivative
+    )
     assert held["gfor.droop.R_f"].derivative == total["gfor.droop.R_f"].derivative
     assert {row.operating_point for row in held.values()} == {"held"}
     assert "no steady state" in total["gfor.droop.delta_P_ref"].reason
@@ -176,7 +208,9 @@ def test_a_controller_with_no_gain_has_the_effect_of_its_first_gain(two_area):
     values = {"gfor.pod_p.enabled": True, "gfor.pod_p.K": 0.0}
     (row,) = two_area.scenario("gfor", values).sensitivities(parameters="gfor.pod_p.K").result.rows
     assert row.doubts == ()
-    with_gain = two_area.scenario("gfor", values | {"gfor.pod_p.K": 1.0}).modes().named["electromechanical"]
+    with_gain = (
+        two_area.scenario("gfor", values | {"gfor.pod_p.K": 1.0}).modes().named["electromechanical"]
+    )
     assert row.derivative == pytest.approx(with_gain.eigenvalue - row.eigenvalue, rel=0.01)
     assert row.damping_per_percent is None
 
@@ -184,8 +218,12 @@ def test_a_controller_with_no_gain_has_the_effect_of_its_first_gain(two_area):
 @pytest.mark.slow
 def test_exact_derivatives_of_native_fmus_give_the_same(two_area):
     native = two_area.scenario("pod_p", {"*.native": True})
-    rows = rows_of(native.sensitivities(parameters=["gfor.pod_p.K", "gfor.droop.R_f"], directional=True))
-    plain = rows_of(two_area.scenario("pod_p").sensitivities(parameters=["gfor.pod_p.K", "gfor.droop.R_f"]))
+    rows = rows_of(
+        native.sensitivities(parameters=["gfor.pod_p.K", "gfor.droop.R_f"], directional=True)
+    )
+    plain = rows_of(
+        two_area.scenario("pod_p").sensitivities(parameters=["gfor.pod_p.K", "gfor.droop.R_f"])
+    )
     for name, row in rows.items():
         assert row.derivative == pytest.approx(plain[name].derivative, rel=1e-3)
 
@@ -193,11 +231,19 @@ def test_exact_derivatives_of_native_fmus_give_the_same(two_area):
 def test_a_limit_that_acts_is_doubted_in_the_rows_of_its_component(two_area):
     """Limited to 0, the controller has no effect whatever its gain; nearly so, the edge is beside every value."""
     names = ["gfor.pod_p.K", "grid.X_L"]
-    shut = rows_of(two_area.scenario("pod_p", {"gfor.pod_p.limit": 0.0}).sensitivities(parameters=names, held=True))
+    shut = rows_of(
+        two_area.scenario("pod_p", {"gfor.pod_p.limit": 0.0}).sensitivities(
+            parameters=names, held=True
+        )
+    )
     assert shut["gfor.pod_p.K"].derivative == 0
     assert "a limit acts in this component: output limit of POD-P" in shut["gfor.pod_p.K"].doubts
     assert not any("a limit acts" in text for text in shut["grid.X_L"].doubts)
-    near = rows_of(two_area.scenario("pod_p", {"gfor.pod_p.limit": 1e-8}).sensitivities(parameters=names, held=True))
+    near = rows_of(
+        two_area.scenario("pod_p", {"gfor.pod_p.limit": 1e-8}).sensitivities(
+            parameters=names, held=True
+        )
+    )
     assert "edge of a limit" in " ".join(near["gfor.pod_p.K"].doubts)
     free = rows_of(two_area.scenario("pod_p").sensitivities(parameters=names, held=True))
     assert free["gfor.pod_p.K"].doubts == ()

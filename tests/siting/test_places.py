@@ -33,7 +33,10 @@ def test_every_bus_of_ieee39_agrees_with_the_coupled_fmus(controller):
             master.components[name].set({f"{controller}.enabled": True, f"{controller}.K": 100.0})
             on = off.with_component(master, name)
             master.components[name].set({f"{controller}.enabled": False})
-            change = [response_of(master, blocks.components[name], seen.mode.eigenvalue) for blocks in (on, off)]
+            change = [
+                response_of(master, blocks.components[name], seen.mode.eigenvalue)
+                for blocks in (on, off)
+            ]
             predicted = seen.shift(bus, change[0] - change[1])
             model = compose(on, master.schedule)
             coupled = nearest(pairs_near(model, pair.eigenvalue), pair) - pair.eigenvalue
@@ -60,7 +63,8 @@ def test_an_exhaustive_search_finds_the_same_best_place():
 
 def test_outages_are_ranked_and_what_a_bus_does_not_reach_is_said():
     found = find_sites(
-        load_case("ieee39"), SiteRequest("pod_p", scenario="base", confirm=1, outages="line_16_17,sg36,line_19_20")
+        load_case("ieee39"),
+        SiteRequest("pod_p", scenario="base", confirm=1, outages="line_16_17,sg36,line_19_20"),
     )
     assert {at.name for at in found.situations} >= {"intact", "line_16_17", "sg36"}
     assert any(f"not controllable at {found.ranking[0]}" in text for text in remarks(found))
@@ -72,8 +76,11 @@ def test_outages_are_ranked_and_what_a_bus_does_not_reach_is_said():
 def test_a_foreign_fmu_is_linearised_and_confirmed(gfor, tmp_path):
     code, _, err = gfor("fmu", "build", "gfor", "--dest", str(tmp_path))
     assert code == 0, err
-    found = find_sites(load_case("two_area"), SiteRequest(str(tmp_path / "gfor.fmu"), scenario="gfor"))
+    found = find_sites(
+        load_case("two_area"), SiteRequest(str(tmp_path / "gfor.fmu"), scenario="gfor")
+    )
     assert {one.bus for one in found.confirmations} == {"bus_2", "bus_3"}
     assert all(not one.failure for one in found.confirmations)
     for one in found.confirmations:
-        assert one.coupled.real == pytest.approx(one.predicted.real, rel=0.3)  # 1500 MVA beside 1500 MVA
+        # 1500 MVA beside 1500 MVA
+        assert one.coupled.real == pytest.approx(one.predicted.real, rel=0.3)

@@ -39,7 +39,9 @@ def test_a_droop_helps_without_tuning():
 def test_phasor_and_emt_models_say_the_same():
     emt, phasor = (sites(case, "pod_p", confirm=0) for case in ("two_area", "two_area_rms"))
     for bus in ("bus_2", "bus_3"):
-        changes = [one.shifts["device"]["intact"]["electromechanical"][bus].change for one in (emt, phasor)]
+        changes = [
+            one.shifts["device"]["intact"]["electromechanical"][bus].change for one in (emt, phasor)
+        ]
         assert abs(changes[0] - changes[1]) < 0.02 * abs(changes[0])
 
 
@@ -47,7 +49,9 @@ def test_only_the_buses_asked_for_are_places():
     found = sites("two_area_rms", "pod_p", confirm=0, buses=("3",))
     assert found.ranking == ("bus_3",)
     assert answer(found).startswith("bus_3 is the best place for POD-P of those asked for: ")
-    with pytest.raises(gfor_api.CosimError, match=r"buses bus3: there is no such bus; did you mean bus_3"):
+    with pytest.raises(
+        gfor_api.CosimError, match=r"buses bus3: there is no such bus; did you mean bus_3"
+    ):
         sites("two_area_rms", "pod_p", confirm=0, buses=("2", "bus3"))
 
 
@@ -90,7 +94,10 @@ def test_a_unit_of_support_is_a_megawatt_whatever_the_bus(voltage):
     hertz = 0.01 * eigenvalue / (2 * np.pi)
     for kind in ("P", "Q"):
         response = ideal_support(kind, voltage, eigenvalue)
-        for part in (np.real, np.imag):  # of the complex amplitudes; a power is linear in the current
+        for part in (
+            np.real,
+            np.imag,
+        ):  # of the complex amplitudes; a power is linear in the current
             current = part(response @ [turn.real, turn.imag])
             power = voltage * complex(current[0], -current[1])
             wanted = part(hertz) / 100 * (-1 if kind == "P" else 1j)
@@ -108,20 +115,37 @@ def test_more_than_one_unit_scales_no_order(monkeypatch):
 def test_a_mode_outside_of_the_range_is_named():
     found = sites("two_area_rms", "pod_p", confirm=0, frequencies=(0.1, 0.4))
     assert [seen.mode.frequency_hz < 0.4 for seen in found.intact.modes] == [True]
-    assert any(text.startswith("not judged: 0.581 Hz, 10.6") for text in remarks(found)), remarks(found)
+    assert any(text.startswith("not judged: 0.581 Hz, 10.6") for text in remarks(found)), remarks(
+        found
+    )
 
 
 def test_what_is_unstable_without_the_device_is_named_first():
-    found = find_sites(load_case("kundur"), SiteRequest("pod_p", scenario="tgr", confirm=0, outages="line_5_6"))
+    found = find_sites(
+        load_case("kundur"), SiteRequest("pod_p", scenario="tgr", confirm=0, outages="line_5_6")
+    )
     assert sureness(found)[0].startswith(
         "UNSTABLE without the device: line_5_6 (inter-area, 0.643 Hz, -3.61 %), intact ("
     )
-    assert not any("UNSTABLE" in text for text in sureness(sites("two_area_rms", "pod_p", confirm=0)))
+    assert not any(
+        "UNSTABLE" in text for text in sureness(sites("two_area_rms", "pod_p", confirm=0))
+    )
 
 
 def test_the_json_has_a_shift_for_each_bus_and_mode(gfor, tmp_path):
-    code, out, _ = gfor("site", "two_area_rms", "--scenario", "gfor", "--device", "pod_q", "--json", "--confirm", "1",
-                        "--out", str(tmp_path))  # fmt: skip
+    code, out, _ = gfor(
+        "site",
+        "two_area_rms",
+        "--scenario",
+        "gfor",
+        "--device",
+        "pod_q",
+        "--json",
+        "--confirm",
+        "1",
+        "--out",
+        str(tmp_path),
+    )
     found = json.loads(out)
     assert code == 0
     assert [bus["bus"] for bus in found["buses"]] == ["bus_2", "bus_3"]
@@ -140,9 +164,18 @@ def test_the_json_has_a_shift_for_each_bus_and_mode(gfor, tmp_path):
         (["two_area_rms", "--device", "pod_x"], "give pod_p, pod_q, droop or the path of an .fmu"),
         (["two_area_rms", "--device", "no.fmu", "--scenario", "gfor"], "there is no such file"),
         (["infinite_bus"], "[power_flow]"),
-        (["two_area_rms", "--scenario", "gfor", "--range", "1.5:1.9"], "no oscillation from 1.5 to 1.9 Hz"),
-        (["two_area_rms", "--scenario", "gfor", "--outages", "line_9"], "no unit, line, load or shunt 'line_9'"),
-        (["two_area_rms", "--scenario", "gfor", "--rating", "-5"], "--rating: '-5' must be a number above 0"),
+        (
+            ["two_area_rms", "--scenario", "gfor", "--range", "1.5:1.9"],
+            "no oscillation from 1.5 to 1.9 Hz",
+        ),
+        (
+            ["two_area_rms", "--scenario", "gfor", "--outages", "line_9"],
+            "no unit, line, load or shunt 'line_9'",
+        ),
+        (
+            ["two_area_rms", "--scenario", "gfor", "--rating", "-5"],
+            "--rating: '-5' must be a number above 0",
+        ),
     ],
 )
 def test_what_cannot_be_done_is_said_in_one_sentence(gfor, words, said):
@@ -156,7 +189,8 @@ def test_a_device_at_a_bus_of_a_model_with_a_network_of_its_own(tmp_path):
     """Any component at a bus of the two-area grid gets a port."""
     text = load_case("two_area").path.read_text()
     text += (
-        '\n[components.battery]\nmodel = "gfor"\nbus = "bus_3"\nparameters = { S_n = "50 MVA", P_0 = 0.0, Q_0 = 0.0 }\n'
+        '\n[components.battery]\nmodel = "gfor"\nbus = "bus_3"\n'
+        'parameters = { S_n = "50 MVA", P_0 = 0.0, Q_0 = 0.0 }\n'
     )
     text = text.replace('groups = [["gfor", "sg1", "sg2"], ["grid"]]', "")
     (tmp_path / "case.toml").write_text(text)

@@ -32,7 +32,11 @@ def wire(source, target, inside=""):
     ends = ""
     for end, text in (("start", source), ("end", target)):
         element, dot, name = text.partition(".")
-        ends += f' {end}Element="{element}" {end}Connector="{name}"' if dot else f' {end}Connector="{text}"'
+        ends += (
+            f' {end}Element="{element}" {end}Connector="{name}"'
+            if dot
+            else f' {end}Connector="{text}"'
+        )
     return f"<ssd:Connection{ends}>{inside}</ssd:Connection>"
 
 
@@ -42,7 +46,9 @@ def values(prefix="", mapping="", **given):
         f'<ssv:Parameter name="{name.replace("__", ".")}">{_value(value)}</ssv:Parameter>'
         for name, value in given.items()
     )
-    parameters = f'<ssv:ParameterSet version="1.0" name="values"><ssv:Parameters>{entries}</ssv:Parameters>'
+    parameters = (
+        f'<ssv:ParameterSet version="1.0" name="values"><ssv:Parameters>{entries}</ssv:Parameters>'
+    )
     return (
         f'<ssd:ParameterBinding prefix="{prefix}"><ssd:ParameterValues>{parameters}</ssv:ParameterSet>'
         f"</ssd:ParameterValues>{mapping}</ssd:ParameterBinding>"
@@ -54,7 +60,11 @@ def _value(value):
         return f'<ssv:Boolean value="{str(value).lower()}"/>'
     if isinstance(value, tuple):
         return f'<ssv:Real value="{value[0]}" unit="{value[1]}"/>'
-    return f'<ssv:String value="{value}"/>' if isinstance(value, str) else f'<ssv:Real value="{value}"/>'
+    return (
+        f'<ssv:String value="{value}"/>'
+        if isinstance(value, str)
+        else f'<ssv:Real value="{value}"/>'
+    )
 
 
 def bindings(*texts):

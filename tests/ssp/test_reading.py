@@ -14,7 +14,17 @@ from orchestrator.coupling.recorder import Recorder
 from orchestrator.errors import CosimError
 from orchestrator.ssp.archive import SspArchive
 from orchestrator.ssp.names import NAMESPACES
-from tests.ssp.packages import OSP_STEP, bindings, component, connector, experiment, system, values, wire, write
+from tests.ssp.packages import (
+    OSP_STEP,
+    bindings,
+    component,
+    connector,
+    experiment,
+    system,
+    values,
+    wire,
+    write,
+)
 
 H = 1e-3
 
@@ -22,7 +32,9 @@ H = 1e-3
 @pytest.fixture(autouse=True)
 def cache(tmp_path, monkeypatch):
     """Unpacked archives go to a folder of the test; built FMUs stay where they are."""
-    monkeypatch.setattr("orchestrator.cases.case.cache_directory", lambda kind: tmp_path / "unpacked" / kind)
+    monkeypatch.setattr(
+        "orchestrator.cases.case.cache_directory", lambda kind: tmp_path / "unpacked" / kind
+    )
 
 
 def prepared(path, **options):
@@ -33,7 +45,9 @@ def prepared(path, **options):
 def response(scenario):
     """Recorded times and values by name."""
     recorder = Recorder(scenario.record, 1)
-    with Master(scenario.system, scenario.schedule, scenario.step_size, scenario.stop_time) as master:
+    with Master(
+        scenario.system, scenario.schedule, scenario.step_size, scenario.stop_time
+    ) as master:
         master.run(scenario.stop_time, scenario.events, [recorder])
     return recorder.times, dict(zip(recorder.names, recorder.values.T, strict=True))
 
@@ -83,7 +97,8 @@ def test_nested_systems_are_laid_flat(tmp_path):
         "top",
         [middle, IN_RING[1]],
         [wire("b.y", "middle.into"), wire("b.u", "middle.out")],
-        bound=bindings(values(middle__inner__x__x_0=1.0)),  # the outer system's value goes before the inner one's
+        # the outer system's value goes before the inner one's
+        bound=bindings(values(middle__inner__x__x_0=1.0)),
     )
     _, found = response(prepared(write(tmp_path / "nested.ssp", top)))
     a, b = oscillator(100)
@@ -124,7 +139,8 @@ def test_values_from_files_and_mappings(tmp_path):
         '<ssv:Parameters><ssv:Parameter name="start"><ssv:Real value="4"/></ssv:Parameter>'
         '<ssv:Parameter name="rate"><ssv:Integer value="3"/></ssv:Parameter></ssv:Parameters></ssv:ParameterSet>'
     )
-    later = values("ga", **{"in": 5.0})  # a later binding of the same component goes first; prefix + name = gain
+    # a later binding of the same component goes first; prefix + name = gain
+    later = values("ga", **{"in": 5.0})
     top = system("top", [component("a", "integrator", bindings(binding, later))])
     path = write(tmp_path / "files.ssp", top, **{"a set__ssv": ssv})
     assert prepared(path).system.components["a"].parameters == {"x_0": 4.0, "gain": 5.0}
@@ -136,7 +152,9 @@ def test_units_are_converted_where_they_differ(tmp_path):
         component("kilo", "power_source", bindings(values(P=(1500.0, "kW"), on=True))),
         component("same", "power_source", bindings(values(P=(0.1, "MW"), on=False))),
     ]
-    components = prepared(write(tmp_path / "p.ssp", system("top", powers), models=["power_source"])).system.components
+    components = prepared(
+        write(tmp_path / "p.ssp", system("top", powers), models=["power_source"])
+    ).system.components
     assert components["kilo"].parameters == {"P": 1.5, "on": True}
     assert components["same"].parameters == {"P": 0.1, "on": False}
 
@@ -162,8 +180,14 @@ def test_where_the_communication_step_comes_from(tmp_path, annotations, options,
 
 def test_names_that_a_case_cannot_have_are_made_plain(tmp_path):
     parts = [component("my integrator.1", "integrator"), component("my_integrator_1", "integrator")]
-    top = system("top", parts, ['<ssd:Connection startElement="my integrator.1" startConnector="y" '
-                                'endElement="my_integrator_1" endConnector="u"/>'])  # fmt: skip
+    top = system(
+        "top",
+        parts,
+        [
+            '<ssd:Connection startElement="my integrator.1" startConnector="y" '
+            'endElement="my_integrator_1" endConnector="u"/>'
+        ],
+    )
     scenario = prepared(write(tmp_path / "names.ssp", top))
     assert list(scenario.system.components) == ["my_integrator_1", "my_integrator_1_2"]
     assert [str(c.source) for c in scenario.system.connections] == ["my_integrator_1.y"]
@@ -176,14 +200,30 @@ def test_modes_and_linear_model_of_a_foreign_system(tmp_path, capsys):
     path = write(tmp_path / "ring.ssp", system("top", IN_RING, RING))
     path_at_rest = write(
         tmp_path / "rest.ssp",
-        system("top", (component("a", "integrator", bindings(values(gain=30.0))), IN_RING[1]), RING),
+        system(
+            "top", (component("a", "integrator", bindings(values(gain=30.0))), IN_RING[1]), RING
+        ),
     )
     assert main(["modes", str(path_at_rest), "--range", "0:10", "--json"]) == 0
     (mode,) = json.loads(capsys.readouterr().out)["scenarios"][0]["modes"]
     # μ² − 2μ + 1 + 600·H² = 0
-    assert complex(mode["real"], mode["imag"]) == pytest.approx(np.log(1 + 1j * np.sqrt(600) * H) / H, rel=1e-8)
+    assert complex(mode["real"], mode["imag"]) == pytest.approx(
+        np.log(1 + 1j * np.sqrt(600) * H) / H, rel=1e-8
+    )
     assert (
-        main(["export", "linear", str(path), "--output", "a.y", "--input", "a.gain", "--out", str(tmp_path / "linear")])
+        main(
+            [
+                "export",
+                "linear",
+                str(path),
+                "--output",
+                "a.y",
+                "--input",
+                "a.gain",
+                "--out",
+                str(tmp_path / "linear"),
+            ]
+        )
         == 0
     )
     assert (tmp_path / "linear" / "foreign" / "A.csv").exists()
@@ -221,7 +261,10 @@ def test_what_cannot_be_linearised_is_simulated_all_the_same(tmp_path, capsys):
     rows = np.genfromtxt(out / "foreign" / "trajectory.csv", delimiter=",", skip_header=1)
     a, _ = oscillator(100)
     assert rows[:, 1] == pytest.approx(a[::5], abs=1e-9)
-    assert json.loads((out / "summary.json").read_text(encoding="utf-8"))["scenarios"][0]["residual"] is None
+    assert (
+        json.loads((out / "summary.json").read_text(encoding="utf-8"))["scenarios"][0]["residual"]
+        is None
+    )
     assert main(["report", str(out)]) == 0
     assert main(["modes", str(path)]) == 1
     assert "does not let a master set its continuous states" in capsys.readouterr().err
@@ -256,14 +299,30 @@ SCALED = (
             system("top", [*IN_RING, '<ssd:SignalDictionaryReference name="r" dictionary="bus"/>']),
             ["element r", "signal dictionary"],
         ),
-        (system("top", [component("a", "integrator", attributes='implementation="ModelExchange"')]), ["element a"]),
         (
-            system("top", [component("a", "integrator", attributes='type="application/x-ssp-package"')]),
+            system(
+                "top", [component("a", "integrator", attributes='implementation="ModelExchange"')]
+            ),
+            ["element a"],
+        ),
+        (
+            system(
+                "top", [component("a", "integrator", attributes='type="application/x-ssp-package"')]
+            ),
             ["element a", "application/x-ssp-package", "only FMUs"],
         ),
-        (system("top", [component("a", "integrator", source="../a.fmu")]), ["element a", "outside the archive"]),
-        (system("top", [component("a", "integrator", source="/a.fmu")]), ["element a", "outside the archive"]),
-        (system("top", [component("a", "integrator", source="C:/a.fmu")]), ["element a", "outside the archive"]),
+        (
+            system("top", [component("a", "integrator", source="../a.fmu")]),
+            ["element a", "outside the archive"],
+        ),
+        (
+            system("top", [component("a", "integrator", source="/a.fmu")]),
+            ["element a", "outside the archive"],
+        ),
+        (
+            system("top", [component("a", "integrator", source="C:/a.fmu")]),
+            ["element a", "outside the archive"],
+        ),
         (
             system("top", [component("a", "integrator", source="resources/%2e%2e/%2e%2e/a.fmu")]),
             ["element a", "outside the archive"],
@@ -272,7 +331,10 @@ SCALED = (
             system("top", [component("a", "integrator", source="https://example.org/a.fmu")]),
             ["element a", "https://example.org/a.fmu", "outside the archive"],
         ),
-        (system("top", [component("a", "integrator", source="resources/none.fmu")]), ["no 'resources/none.fmu'"]),
+        (
+            system("top", [component("a", "integrator", source="resources/none.fmu")]),
+            ["no 'resources/none.fmu'"],
+        ),
         (system("top", IN_RING, [wire("a.z", "b.u")]), ["there is no connector a.z"]),
         (system("top", IN_RING, [wire("a.y", "b.y")]), ["output and output"]),
         (system("top", IN_RING, [*RING, wire("a.y", "a.u")]), ["a.u is already fed by b.y"]),
@@ -282,11 +344,17 @@ SCALED = (
             ["parameter binding of a", "LinearTransformation"],
         ),
         (
-            system("top", [component("a", "integrator", bindings('<ssd:ParameterBinding source="x.ssv"/>'))]),
+            system(
+                "top",
+                [component("a", "integrator", bindings('<ssd:ParameterBinding source="x.ssv"/>'))],
+            ),
             ["parameter binding of a", "no 'x.ssv'"],
         ),
         (
-            system("top", [component("a", "integrator", bindings('<ssd:ParameterBinding type="text/csv"/>'))]),
+            system(
+                "top",
+                [component("a", "integrator", bindings('<ssd:ParameterBinding type="text/csv"/>'))],
+            ),
             ["parameter binding of a", "application/x-ssp-parameter-set"],
         ),
     ],
@@ -317,7 +385,12 @@ def test_values_that_do_not_fit(tmp_path, inside, word):
 
 
 def test_all_that_is_wrong_is_told_at_once(tmp_path):
-    top = system("top", [*IN_RING, component("c", "integrator", source="../c.fmu")], [TRANSFORMED], after=DICTIONARY)
+    top = system(
+        "top",
+        [*IN_RING, component("c", "integrator", source="../c.fmu")],
+        [TRANSFORMED],
+        after=DICTIONARY,
+    )
     with pytest.raises(CosimError, match="3 problems"):
         load_case(write(tmp_path / "three.ssp", top))
 
@@ -327,7 +400,10 @@ def test_all_that_is_wrong_is_told_at_once(tmp_path):
     [
         ({"version": "2.0", "valid": False}, "version 2.0; SSP 1.0 can be read"),
         ({"after": experiment("0.1", OSP_STEP, 'startTime="5"')}, "the start time is 5 s"),
-        ({"after": experiment("soon", OSP_STEP), "valid": False}, "stopTime is 'soon', which is no number"),
+        (
+            {"after": experiment("soon", OSP_STEP), "valid": False},
+            "stopTime is 'soon', which is no number",
+        ),
     ],
 )
 def test_descriptions_that_cannot_be_read(tmp_path, options, word):
@@ -341,8 +417,15 @@ def test_files_that_are_no_ssp(tmp_path):
     zipfile.ZipFile(empty, "w").close()
     with zipfile.ZipFile(broken, "w") as archive:
         archive.writestr("SystemStructure.ssd", "<open>")
-    for path, word in ((text, "not a zip"), (empty, "no SystemStructure.ssd"), (broken, "is not XML")):
-        with pytest.raises(CosimError, match="(?i)" + word.replace("not a zip", "a zip archive and this file is not")):
+    for path, word in (
+        (text, "not a zip"),
+        (empty, "no SystemStructure.ssd"),
+        (broken, "is not XML"),
+    ):
+        with pytest.raises(
+            CosimError,
+            match="(?i)" + word.replace("not a zip", "a zip archive and this file is not"),
+        ):
             load_case(path)
     with pytest.raises(CosimError, match="there is no such file"):
         SspArchive(tmp_path / "none.ssp")
@@ -353,7 +436,11 @@ def test_files_that_are_no_ssp(tmp_path):
     [
         ("../outside.txt", "x", "out of the archive's own folder"),
         ("resources/zeros.bin", bytes(200 * 1024**2), "more than 100 times as much"),
-        ("SystemStructure.ssd", '<!DOCTYPE a [<!ENTITY b "b">]><a>&b;</a>', "defines a document type"),
+        (
+            "SystemStructure.ssd",
+            '<!DOCTYPE a [<!ENTITY b "b">]><a>&b;</a>',
+            "defines a document type",
+        ),
     ],
 )
 def test_files_that_would_do_harm(tmp_path, member, content, word):

@@ -24,7 +24,10 @@ ROLE = re.compile(
 """What LS-REF's schema allows."""
 
 BUILT = [("infinite_bus", True, "2.0"), ("probe_a", True, "3.0")]
-SLOW = [pytest.param(row, marks=pytest.mark.slow) for row in (("gfor", True, "2.0"), ("gfor", True, "3.0"))]
+SLOW = [
+    pytest.param(row, marks=pytest.mark.slow)
+    for row in (("gfor", True, "2.0"), ("gfor", True, "3.0"))
+]
 
 
 @pytest.fixture(scope="module")
@@ -40,13 +43,24 @@ def built(request, tmp_path_factory, converter):
         return converter
     name, native, fmi = request.param
     platforms = ["linux64"] if native else None
-    return build(name, tmp_path_factory.mktemp(name), native=native, fmi=fmi, platforms=platforms, reference=True)
+    return build(
+        name,
+        tmp_path_factory.mktemp(name),
+        native=native,
+        fmi=fmi,
+        platforms=platforms,
+        reference=True,
+    )
 
 
 def inside(path):
     """The files of LS-REF in an FMU, by name."""
     with zipfile.ZipFile(path) as archive:
-        return {n.rpartition("/")[2]: archive.read(n) for n in archive.namelist() if n.startswith(f"{FOLDER}/")}
+        return {
+            n.rpartition("/")[2]: archive.read(n)
+            for n in archive.namelist()
+            if n.startswith(f"{FOLDER}/")
+        }
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +76,9 @@ def table(content):
 def repeated(path, files, **other):
     """The experiment as FMPy runs it from the files: its outputs at each step."""
     (experiment,) = etree.fromstring(files["smoke-test.exp"]).findall("Experiment")
-    times = {key: float(value) for key, value in experiment.find("TransientSimulation").attrib.items()}
+    times = {
+        key: float(value) for key, value in experiment.find("TransientSimulation").attrib.items()
+    }
     sources = {child.tag: child.get("source") for child in experiment if child.get("source")}
     given = etree.fromstring(files[sources["Parameters"]])
     start = {p.get("name"): p[0].get("value") for p in given.iter("{*}Parameter")} | other
@@ -107,7 +123,14 @@ def test_the_manifest_keeps_the_rules_of_its_schema(files):
     related = {entry.get("source"): entry for entry in root}
     assert set(related) == set(files) - {"fmi-ls-manifest.xml"}
     for source, entry in related.items():
-        assert set(entry.keys()) <= {"type", "source", "role", "description", "checksum", "checksumType"}
+        assert set(entry.keys()) <= {
+            "type",
+            "source",
+            "role",
+            "description",
+            "checksum",
+            "checksumType",
+        }
         assert ROLE.fullmatch(entry.get("role"))
         assert entry.get("checksum") == hashlib.sha3_256(files[source]).hexdigest()
 
@@ -134,7 +157,9 @@ def test_the_fmu_is_the_same_but_for_these_files(converter, tmp_path):
     members = []
     for path in (build("gfor", tmp_path), converter):
         with zipfile.ZipFile(path) as archive:
-            members.append({n: archive.read(n) for n in archive.namelist() if not n.startswith(FOLDER)})
+            members.append(
+                {n: archive.read(n) for n in archive.namelist() if not n.startswith(FOLDER)}
+            )
     assert members[0] == members[1]
 
 

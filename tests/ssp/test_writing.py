@@ -72,7 +72,9 @@ value = 0.3333333333333333
 def response(scenario):
     """Everything that is recorded of a scenario, as one array."""
     recorder = Recorder(scenario.record, scenario.record_every)
-    with Master(scenario.system, scenario.schedule, scenario.step_size, scenario.stop_time) as master:
+    with Master(
+        scenario.system, scenario.schedule, scenario.step_size, scenario.stop_time
+    ) as master:
         master.run(scenario.stop_time, scenario.events, [recorder])
     return recorder.names, np.column_stack([recorder.times, recorder.values])
 
@@ -91,7 +93,10 @@ def two_area(tmp_path_factory):
     """SSPs of the two-area system, one a scenario."""
     folder = tmp_path_factory.mktemp("two_area")
     assert main(["export", "ssp", "two_area", "--out", str(folder)]) == 0
-    return {name: folder / f"two_area_{name}.ssp" for name in ("base", "gfor", "pod_p", "pod_q", "pod_pq")}
+    return {
+        name: folder / f"two_area_{name}.ssp"
+        for name in ("base", "gfor", "pod_p", "pod_q", "pod_pq")
+    }
 
 
 # -- round trip ------------------------------------------------------------------------------------
@@ -102,7 +107,16 @@ def test_a_small_case_comes_back_as_it_was(small):
     (before,), (after,) = load_case(case).prepare(), load_case(ssp).prepare()
     assert [str(e) for e in after.events] == [str(e) for e in before.events]
     assert len(after.events) == 3
-    for attribute in ("name", "title", "schedule", "step_size", "stop_time", "record", "record_every", "values"):
+    for attribute in (
+        "name",
+        "title",
+        "schedule",
+        "step_size",
+        "stop_time",
+        "record",
+        "record_every",
+        "values",
+    ):
         assert getattr(after, attribute) == getattr(before, attribute), attribute
     assert after.system.connections == before.system.connections
     (names, values), (names_again, values_again) = response(before), response(after)
@@ -147,7 +161,10 @@ def test_all_commands_take_an_ssp(two_area, tmp_path, capsys):
     ssp = str(two_area["pod_p"])
     assert main(["modes", ssp, "--set", "gfor.pod_p.K=300", "--json"]) == 0
     with_ssp = json.loads(capsys.readouterr().out)
-    assert main(["modes", "two_area", "--scenario", "pod_p", "--set", "gfor.pod_p.K=300", "--json"]) == 0
+    assert (
+        main(["modes", "two_area", "--scenario", "pod_p", "--set", "gfor.pod_p.K=300", "--json"])
+        == 0
+    )
     without = json.loads(capsys.readouterr().out)
     assert with_ssp["scenarios"][0].pop("power_flow") is None  # an SSP holds its result alone
     assert without["scenarios"][0].pop("power_flow")["machines"]
@@ -224,7 +241,9 @@ def typed_values(path):
         for binding in component.parameterBindings:
             for p in read_ssv(str(path), resource=binding.source).parameters:
                 value = p.value == "true" if p.type == "Boolean" else float(p.value)
-                given.parameters.append(Parameter(name=f"{component.name}.{p.name}", type=p.type, value=value))
+                given.parameters.append(
+                    Parameter(name=f"{component.name}.{p.name}", type=p.type, value=value)
+                )
     return given
 
 
@@ -238,7 +257,9 @@ def test_fmpy_reads_the_structure(two_area):
 @pytest.mark.interop
 def test_fmpy_runs_the_small_system_as_its_own_schedule_has_it(small):
     """fmpy holds all inputs at zero over the first step, and then steps all components side by side."""
-    result = simulate_ssp(str(small[1]), stop_time=0.0505, step_size=1e-3, parameter_set=typed_values(small[1]))
+    result = simulate_ssp(
+        str(small[1]), stop_time=0.0505, step_size=1e-3, parameter_set=typed_values(small[1])
+    )
     a, b, u_a, u_b = 0.1, 0.0, 0.0, 0.0
     for row in result:
         a, b = a + 1e-3 * 30 * u_a, b - 1e-3 * 20 * u_b
@@ -253,7 +274,10 @@ def test_fmpy_runs_the_small_system_as_its_own_schedule_has_it(small):
 def test_fmpy_runs_the_two_area_system(two_area):
     """It takes its first step at zero voltage; what is left of that kick is the difference to our run."""
     result = simulate_ssp(
-        str(two_area["pod_p"]), stop_time=0.5, step_size=1e-4, parameter_set=typed_values(two_area["pod_p"])
+        str(two_area["pod_p"]),
+        stop_time=0.5,
+        step_size=1e-4,
+        parameter_set=typed_values(two_area["pod_p"]),
     )
     (scenario,) = load_case(two_area["pod_p"]).prepare(stop_time=0.5)
     names, values = response(scenario)
@@ -273,13 +297,17 @@ def libcosim(path):
     slaves = {slave.name.decode(): slave.index for slave in execution.slave_infos()}
     while True:
         execution.step()
-        yield lambda component, info: observer.last_real_values(slaves[component], [info.reference])[0]
+        yield lambda component, info: observer.last_real_values(
+            slaves[component], [info.reference]
+        )[0]
 
 
 def ecos(path):
     """The same; it has to be told the step, and which parameter set to apply."""
     with suppress(OSError):  # pip's tbb lies where no loader looks
-        ctypes.CDLL(str(Path(sysconfig.get_path("data")) / "lib" / "libtbb.so.12"), ctypes.RTLD_GLOBAL)
+        ctypes.CDLL(
+            str(Path(sysconfig.get_path("data")) / "lib" / "libtbb.so.12"), ctypes.RTLD_GLOBAL
+        )
     module = pytest.importorskip("ecospy.EcosSimulation")
     with module.EcosSimulation(1e-3, ssp_path=str(path)) as simulation:
         simulation.init(parameter_set="initialValues")
@@ -302,5 +330,7 @@ def test_other_tools_run_it_as_our_jacobi_schedule(small, tool):
             for component, variable in (("a", "y"), ("b", "y"), ("spare", "y"), ("source", "p")):
                 info = components[component].description.variables[variable]
                 ours = master.components[component].get([variable])[variable]
-                assert read(component, info) == pytest.approx(ours, abs=1e-15), f"{component}.{variable}"
+                assert read(component, info) == pytest.approx(ours, abs=1e-15), (
+                    f"{component}.{variable}"
+                )
     steps.close()

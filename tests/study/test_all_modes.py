@@ -42,7 +42,8 @@ def test_each_scenario_gives_what_it_gives_alone_to_the_last_bit(scenarios, watc
     together = compute_all_modes(scenarios)
     assert modes_json(together) == modes_json([compute_modes(one) for one in scenarios])
     expected = ["open base", "open gfor", "close base", "open pod_p", "close gfor", "close pod_p"]
-    assert told == expected  # the next one's FMUs are there before the eigenvalues are waited for, and never three
+    # the next one's FMUs are there before the eigenvalues are waited for, and never three
+    assert told == expected
 
 
 def test_critical_modes_are_those_of_each_alone(scenarios):
@@ -55,7 +56,9 @@ def test_fmus_of_others_stand_once_at_a_time(scenarios, watched, monkeypatch):
     told, _ = watched
     monkeypatch.setattr(all_modes, "is_ours", lambda path: "gfor" not in Path(path).name)
     alone = []
-    monkeypatch.setattr(all_modes, "compute_modes", lambda prepared, *_, **__: alone.append(prepared.name))
+    monkeypatch.setattr(
+        all_modes, "compute_modes", lambda prepared, *_, **__: alone.append(prepared.name)
+    )
     compute_all_modes(scenarios[:2])
     assert (alone, told) == (["base", "gfor"], [])
 
@@ -86,17 +89,25 @@ def test_the_first_error_is_told_and_all_fmus_are_released(scenarios, watched, m
     opened = [entry.removeprefix("open ") for entry in told if entry.startswith("open")]
     assert opened == [one.name for one in scenarios[: len(opened)]]
     assert opened[-1] == faulty[0]
-    assert sorted(entry.removeprefix("close ") for entry in told if entry.startswith("close")) == sorted(opened)
+    assert sorted(
+        entry.removeprefix("close ") for entry in told if entry.startswith("close")
+    ) == sorted(opened)
 
 
-def test_an_error_in_the_eigenvalues_comes_before_the_next_scenarios(scenarios, watched, monkeypatch):
+def test_an_error_in_the_eigenvalues_comes_before_the_next_scenarios(
+    scenarios, watched, monkeypatch
+):
     _, prepare = watched
 
     def linearised(prepared, *arguments, **options):
         if prepared.name == "gfor":
             raise AnalysisError("gfor has no steady state")
         begun = prepare(prepared, *arguments, **options)
-        monkeypatch.setattr(begun, "_spectrum_of_map", lambda: (_ for _ in ()).throw(AnalysisError("no convergence")))
+        monkeypatch.setattr(
+            begun,
+            "_spectrum_of_map",
+            lambda: (_ for _ in ()).throw(AnalysisError("no convergence")),
+        )
         return begun
 
     monkeypatch.setattr(all_modes, "linearised", linearised)

@@ -33,17 +33,31 @@ def test_the_first_screen_of_modes_has_one_line_a_scenario(capsys):
 def result(findings=(), stable=True, events=(1.0,), failure=None, kind=None):
     mode = make_mode(-0.2 + 5j, np.array([1.0 + 0j]), np.array([1.0 + 0j]), ("sg1.machine.omega",))
     case = SimpleNamespace(
-        table=SimpleNamespace(analysis=SimpleNamespace(modes={}), models=kind, emt=KindTable(step_size=1e-4))
+        table=SimpleNamespace(
+            analysis=SimpleNamespace(modes={}), models=kind, emt=KindTable(step_size=1e-4)
+        )
     )
-    passing = [SimpleNamespace(time=t, changes=dict) for t in events if t < 5]  # leaves nothing changed
-    prepared = SimpleNamespace(title="S", subject="S", events=passing, stop_time=5.0, case=case,
-                               not_reached=[t for t in events if t >= 5])  # fmt: skip
+    # leaves nothing changed
+    passing = [SimpleNamespace(time=t, changes=dict) for t in events if t < 5]
+    prepared = SimpleNamespace(
+        title="S",
+        subject="S",
+        events=passing,
+        stop_time=5.0,
+        case=case,
+        not_reached=[t for t in events if t >= 5],
+    )
     prepared.system = SimpleNamespace(components={})
     modes = SimpleNamespace(
-        prepared=prepared, modes=[mode], hidden=None, named={}, unnamed={}, misfits={},
+        prepared=prepared,
+        modes=[mode],
+        hidden=None,
+        named={},
+        unnamed={},
+        misfits={},
         swing_of=lambda _: (["sg1"], ["sg2"]),
         stability=Stability(stable, mode, reason="" if stable else "not searched"),
-    )  # fmt: skip
+    )
     return RunResult(modes, None, findings=list(findings), failure=failure)
 
 
@@ -55,11 +69,17 @@ def finding(kind, **more):
     ("findings", "stable", "word", "remark"),
     [
         ([], True, "stable", "keeps synchronism and settles until 5 s"),
-        ([finding("active_limit")], True, "stable", "keeps synchronism"),  # a limit that the model has
+        # a limit that the model has
+        ([finding("active_limit")], True, "stable", "keeps synchronism"),
         ([finding("active_limit", represented=False)], True, "not known", "repeat with EMT models"),
         ([finding("not_judged")], True, "not known", "not judged"),
         ([finding("loss_of_synchronism")], True, "UNSTABLE", "gfor: loses synchronism from 1 s"),
-        ([finding("active_limit", represented=False), finding("run_away")], True, "UNSTABLE", "runs away"),
+        (
+            [finding("active_limit", represented=False), finding("run_away")],
+            True,
+            "UNSTABLE",
+            "runs away",
+        ),
         ([], None, "not known", "not searched"),
     ],
 )
@@ -68,7 +88,9 @@ def test_the_verdict_of_a_run_is_its_own(findings, stable, word, remark):
     assert (answer.verdict, answer.good) == (word, {"stable": True, "UNSTABLE": False}.get(word))
     assert remark in answer.remark
     if remark.startswith("repeat"):
-        assert of_run(result(findings, stable, kind="phasor")).remark.endswith("repeat with --set models=emt")
+        assert of_run(result(findings, stable, kind="phasor")).remark.endswith(
+            "repeat with --set models=emt"
+        )
 
 
 @pytest.mark.parametrize(
@@ -91,12 +113,17 @@ def test_a_run_that_ends_before_its_events_has_no_verdict(events, good, remark):
 
 
 def test_a_run_that_is_stopped_before_its_event_says_so(tmp_path, capsys):
-    text = lines(capsys, "run", "two_area_rms", "--scenario", "pod_p", "--stop", "0.1", "--out", tmp_path)
+    text = lines(
+        capsys, "run", "two_area_rms", "--scenario", "pod_p", "--stop", "0.1", "--out", tmp_path
+    )
     assert "not known" in text[3]
     assert "the run ends at 0.1 s, before its events (t = 1 s)" in " ".join(
         " ".join(text[3:6]).replace("│", " ").split()
     )
-    assert json.loads((tmp_path / "summary.json").read_text())["scenarios"][0]["answer"]["stable"] is None
+    assert (
+        json.loads((tmp_path / "summary.json").read_text())["scenarios"][0]["answer"]["stable"]
+        is None
+    )
 
 
 def test_stable_eigenvalues_are_no_verdict_of_a_run_with_a_fault():

@@ -74,7 +74,9 @@ def interrupted(prepared, folder, said, at, times=1):
 
 
 def resumed(prepared, folder, said):
-    return run_scenario(prepared, checkpoints=Checkpoints(prepared, folder, 1e9, resume=True, say=said.append))
+    return run_scenario(
+        prepared, checkpoints=Checkpoints(prepared, folder, 1e9, resume=True, say=said.append)
+    )
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -111,9 +113,13 @@ def disturbed(folder, values=None):
     text = (BUILT_IN / "infinite_bus" / "case.toml").read_text(encoding="utf-8")
     text = text.replace('model = "gfor"', 'model = "gfor_pod_input"')
     text = text.replace(
-        "[[connections]]", '[[connections]]\nfrom = "gfor.omega"\nto = "gfor.omega_pod"\n[[connections]]', 1
+        "[[connections]]",
+        '[[connections]]\nfrom = "gfor.omega"\nto = "gfor.omega_pod"\n[[connections]]',
+        1,
     )
-    (folder / "case.toml").write_text(text.replace("[scenarios.load_step]", DISTURBED, 1), encoding="utf-8")
+    (folder / "case.toml").write_text(
+        text.replace("[scenarios.load_step]", DISTURBED, 1), encoding="utf-8"
+    )
     values = {"gfor.pod_q.enabled": True} | (values or {})
     return load_case(folder / "case.toml").prepare(["dip"], values, None, STOP)[0]
 
@@ -145,7 +151,9 @@ def test_it_goes_on_from_the_event_and_has_it_once(tmp_path, said):
 
 def test_a_finished_run_is_not_run_again(tmp_path, said, monkeypatch):
     prepared = prepared_scenario(stop=0.3)
-    first = run_scenario(prepared, checkpoints=Checkpoints(prepared, tmp_path, 1e-3, resume=False, say=said.append))
+    first = run_scenario(
+        prepared, checkpoints=Checkpoints(prepared, tmp_path, 1e-3, resume=False, say=said.append)
+    )
     monkeypatch.setattr(Run, "_run_to", lambda *_: iter(()))
     assert told(resumed(prepared_scenario(stop=0.3), tmp_path, said)) == told(first)
 
@@ -179,7 +187,9 @@ def test_two_damaged_checkpoints_are_refused(tmp_path, said):
     interrupted(prepared, tmp_path, said, 0.4, times=2)
     for path in (tmp_path / "dip.checkpoint", previous(tmp_path / "dip.checkpoint")):
         spoil(path)
-    with pytest.raises(InputError, match=r"'dip' cannot be resumed: .*checksum.*checksum.*start it anew, without"):
+    with pytest.raises(
+        InputError, match=r"'dip' cannot be resumed: .*checksum.*checksum.*start it anew, without"
+    ):
         Checkpoints(prepared, tmp_path, 1e9, resume=True, say=said.append)
 
 
@@ -188,7 +198,9 @@ def test_two_damaged_checkpoints_are_refused(tmp_path, said):
 
 def test_another_value_is_named(tmp_path, said):
     interrupted(prepared_scenario(), tmp_path, said, 0.4)
-    with pytest.raises(InputError, match=r"'dip' cannot be resumed: gfor.P_0 was 0.6 and is 0.5; bring that back"):
+    with pytest.raises(
+        InputError, match=r"'dip' cannot be resumed: gfor.P_0 was 0.6 and is 0.5; bring that back"
+    ):
         resumed(prepared_scenario(values={"gfor.P_0": 0.5}), tmp_path, said)
 
 
@@ -197,7 +209,9 @@ def test_another_kernel_is_another_run(monkeypatch):
     before = checkpoint_mark.mark_of(prepared)
     monkeypatch.setenv("GFOR_COSIM_KERNEL", "plain")
     after = checkpoint_mark.mark_of(prepared)
-    assert {name for name in before if before[name] != after[name]} == {"the environment variable GFOR_COSIM_KERNEL"}
+    assert {name for name in before if before[name] != after[name]} == {
+        "the environment variable GFOR_COSIM_KERNEL"
+    }
 
 
 @pytest.mark.parametrize("library", ["numpy", "scipy"])
@@ -212,7 +226,9 @@ def test_another_version_of_a_library_is_named(tmp_path, said, monkeypatch, libr
 def test_another_fmu_of_the_same_name_is_named(tmp_path, said, monkeypatch):
     interrupted(prepared_scenario(), tmp_path, said, 0.4)
     before = checkpoint_mark.component_content
-    monkeypatch.setattr(checkpoint_mark, "component_content", lambda fmu: ["0" * 64, before(fmu)[1]])
+    monkeypatch.setattr(
+        checkpoint_mark, "component_content", lambda fmu: ["0" * 64, before(fmu)[1]]
+    )
     with pytest.raises(InputError, match=r"the FMU of 'gfor' \(.*\.fmu\) has changed"):
         resumed(prepared_scenario(), tmp_path, said)
 
@@ -226,7 +242,9 @@ def test_a_comment_in_the_case_changes_nothing(tmp_path, said):
     prepared = prepared_scenario()
     interrupted(prepared, tmp_path, said, 0.4)
     result = resumed(
-        with_text(prepared, 'name = "infinite_bus"', 'name   =   "infinite_bus"  # remark'), tmp_path, said
+        with_text(prepared, 'name = "infinite_bus"', 'name   =   "infinite_bus"  # remark'),
+        tmp_path,
+        said,
     )
     assert result.failure is None
     assert not said
@@ -247,10 +265,15 @@ def test_what_has_changed_in_the_case_is_named_with_both_values(tmp_path, said):
 
 
 def test_events_that_have_changed_are_named_with_their_line():
-    now = '[[events]]\ntime = "1 s"\n\n[[events]]\n# a remark\ntime = "2 s"\nscale = 0.99\nnew = 1\n'
+    now = (
+        '[[events]]\ntime = "1 s"\n\n[[events]]\n# a remark\ntime = "2 s"\nscale = 0.99\nnew = 1\n'
+    )
     was = now.replace("0.99", "0.98").replace("new", "old")
     marks = [
-        {"the case": checkpoint_mark._digest(text), "the events": f"t = {time} s: grid.load_2.scale = {scale}"}
+        {
+            "the case": checkpoint_mark._digest(text),
+            "the events": f"t = {time} s: grid.load_2.scale = {scale}",
+        }
         for text, time, scale in ((was, 2, 0.98), (now, 2, 0.99))
     ]
     text = checkpoint_mark.differences(*marks, (was, now), Path("my.toml"))
@@ -259,7 +282,10 @@ def test_events_that_have_changed_are_named_with_their_line():
         "in the case my.toml, line 8, events.1.new is new; "
         "the events were t = 2 s: grid.load_2.scale = 0.98 and are t = 2 s: grid.load_2.scale = 0.99"
     )
-    many = [{"the events": text * 3} for text in ("t = 1 s: grid.load_2.scale = 0.9; ", "t = 1 s: grid.load_2.scale; ")]
+    many = [
+        {"the events": text * 3}
+        for text in ("t = 1 s: grid.load_2.scale = 0.9; ", "t = 1 s: grid.load_2.scale; ")
+    ]
     assert checkpoint_mark.differences(*many) == "the events have changed"
 
 
@@ -274,7 +300,9 @@ def without_state(prepared):
 
 def test_without_serialised_states_it_begins_anew(tmp_path, said):
     prepared = without_state(prepared_scenario(stop=0.3))
-    result = run_scenario(prepared, checkpoints=KeptOnce(prepared, tmp_path, at=0.1, resume=False, say=said.append))
+    result = run_scenario(
+        prepared, checkpoints=KeptOnce(prepared, tmp_path, at=0.1, resume=False, say=said.append)
+    )
     assert result.failure is not None
     assert not list(tmp_path.iterdir())
     kept = Checkpoints(prepared, tmp_path, 1e9, resume=True, say=said.append)
@@ -288,14 +316,19 @@ def test_an_fmu_that_does_not_come_back_is_not_believed(tmp_path, said, monkeypa
     monkeypatch.setattr(coupled_run, "set_state", lambda component, content: None)
     result = resumed(prepared_scenario(), tmp_path, said)
     assert len(said) == 1
-    assert "'dip' is computed from its start again: component 'gfor' does not go on from its state" in said[0]
+    assert (
+        "'dip' is computed from its start again: component 'gfor' does not go on from its state"
+        in said[0]
+    )
     assert told(result) == told(run_scenario(prepared_scenario()))
 
 
 def test_a_folder_that_cannot_be_written_is_refused_before_the_run(tmp_path, said):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="checkpoints cannot be kept there"):
-        Checkpoints(prepared_scenario(), tmp_path / "file" / "x", 60.0, resume=False, say=said.append)
+        Checkpoints(
+            prepared_scenario(), tmp_path / "file" / "x", 60.0, resume=False, say=said.append
+        )
 
 
 def test_a_disk_that_is_full_ends_no_run(tmp_path, said, monkeypatch):
@@ -319,4 +352,7 @@ def test_the_same_call_goes_on(tmp_path):
         run = scenario.run(STOP, checkpoints=tmp_path)
     assert not list(tmp_path.iterdir())
     whole = scenario.run(STOP)
-    assert all(np.array_equal(run.dataset[n].values, whole.dataset[n].values) for n in whole.dataset.variables)
+    assert all(
+        np.array_equal(run.dataset[n].values, whole.dataset[n].values)
+        for n in whole.dataset.variables
+    )

@@ -13,13 +13,18 @@ LABELS = ("one", "two")
 
 
 def run_of(times, **signals):
-    data = {name.replace("__", "."): ("time", values, {"units": "pu"}) for name, values in signals.items()}
+    data = {
+        name.replace("__", "."): ("time", values, {"units": "pu"})
+        for name, values in signals.items()
+    }
     return xr.Dataset(data, coords={"time": times})
 
 
 def test_only_the_time_that_both_have_counts():
     a, b = np.linspace(0, 10, 101), np.linspace(4, 20, 33)
-    found = compare(run_of(a, g__x=0.1 * a), run_of(b, g__x=0.1 * b + 0.2 * (b >= 7)), "g.x", 0.0, LABELS)
+    found = compare(
+        run_of(a, g__x=0.1 * a), run_of(b, g__x=0.1 * b + 0.2 * (b >= 7)), "g.x", 0.0, LABELS
+    )
     assert found.largest == pytest.approx(0.2)
     assert 7 <= found.at <= 10
     assert found.deviations == pytest.approx((0.6, 0.8))
@@ -51,7 +56,10 @@ def test_one_run_recorded_at_two_intervals_does_not_differ_from_itself(ratio, tu
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_where_the_times_do_not_meet_the_shorter_interval_is_interpolated(turned):
-    runs = [run_of(t, g__x=np.sin(2 * np.pi * t)) for t in (np.linspace(0, 1, 1001), np.linspace(0, 1, 8))]
+    runs = [
+        run_of(t, g__x=np.sin(2 * np.pi * t))
+        for t in (np.linspace(0, 1, 1001), np.linspace(0, 1, 8))
+    ]
     one, two = runs[::-1] if turned else runs
     found = compare(one, two, "g.x", 0.0, LABELS)
     assert found.largest < 1e-5  # interpolation of the longer interval would give 0.1
@@ -68,7 +76,9 @@ def test_runs_with_the_same_times_need_no_remark():
 def test_the_figures_of_a_difference():
     """Each run's deviation is from its own start; the rms is that of all times."""
     t = np.linspace(0, 1, 5)
-    found = compare(run_of(t, g__x=[0, 1, 0, 0, 0]), run_of(t, g__x=[5, 5, 5, 8, 5]), "g.x", 0.0, LABELS)
+    found = compare(
+        run_of(t, g__x=[0, 1, 0, 0, 0]), run_of(t, g__x=[5, 5, 5, 8, 5]), "g.x", 0.0, LABELS
+    )
     assert found.deviations == (1.0, 3.0)
     assert (found.largest, found.at) == (8.0, 0.75)
     assert found.rms == pytest.approx(np.sqrt((25 + 16 + 25 + 64 + 25) / 5))
@@ -82,7 +92,10 @@ def test_a_difference_of_two_signals_keeps_their_unit():
 
 
 def test_runs_that_do_not_meet_are_refused():
-    one, two = run_of(np.linspace(0, 1, 11), g__x=np.zeros(11)), run_of(np.linspace(2, 3, 11), g__x=np.zeros(11))
+    one, two = (
+        run_of(np.linspace(0, 1, 11), g__x=np.zeros(11)),
+        run_of(np.linspace(2, 3, 11), g__x=np.zeros(11)),
+    )
     with pytest.raises(InputError, match="one and two have no time in common"):
         compare(one, two, "g.x", 0.0, LABELS)
 
@@ -117,9 +130,14 @@ def test_a_signal_that_is_no_number_is_one_error():
     times = np.linspace(0, 10, 101)
     broken = np.where(times < 8.95, 1.0, np.nan)
     one, two = run_of(times, g__x=np.sin(times)), run_of(times, g__x=broken)
-    with pytest.raises(InputError, match=r"^two: g.x is no finite number \(nan\) at t = 9 s, and at 11 of 101 times"):
+    with pytest.raises(
+        InputError,
+        match=r"^two: g.x is no finite number \(nan\) at t = 9 s, and at 11 of 101 times",
+    ):
         compare(one, two, "g.x", 0.0, LABELS)
-    with pytest.raises(InputError, match=r"second: g.x is no finite number .* at t = 9 s, and at 11 of 81 times"):
+    with pytest.raises(
+        InputError, match=r"second: g.x is no finite number .* at t = 9 s, and at 11 of 81 times"
+    ):
         identify(two.assign_attrs(scenario="second"), "g.x")
     with pytest.raises(AnalysisError, match="constant"):
         identify(two, "g.x", stop=8.0)  # there it is one

@@ -86,6 +86,8 @@ def one_state(rate, step_size=None):
         (20.0, 10.0, "system"),
     ],
 )
-def test_a_step_map_that_grows_by_more_than_twice_the_systems_rate_owes_that_to_the_coupling(coupled, alone, cause):
+def test_a_step_map_that_grows_by_more_than_twice_the_systems_rate_owes_that_to_the_coupling(
+    coupled, alone, cause
+):
     """By twice and another 1 1/s: of a system that grows hardly, a rate of 0.9 1/s is not yet the coupling's."""
     assert judge(one_state(coupled, H), system=one_state(alone)).cause == cause

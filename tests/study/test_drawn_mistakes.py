@@ -16,8 +16,10 @@ class TriedError(Exception):
     """It went on."""
 
 
-@pytest.mark.parametrize(("schedule", "saves", "goes_on"), [("newton", False, False), ("newton", True, True),
-                                                            ("gauss-seidel", False, True)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("schedule", "saves", "goes_on"),
+    [("newton", False, False), ("newton", True, True), ("gauss-seidel", False, True)],
+)
 def test_newton_alone_needs_components_that_save_their_state(schedule, saves, goes_on, monkeypatch):
     def go_on(*_, **__):
         raise TriedError
@@ -26,7 +28,9 @@ def test_newton_alone_needs_components_that_save_their_state(schedule, saves, go
     component = SimpleNamespace(description=SimpleNamespace(can_save_state=saves))
     prepared = SimpleNamespace(rescheduled=lambda name: SimpleNamespace(schedule=name))
     with pytest.raises(TriedError if goes_on else AnalysisError):
-        step_choice._trial(prepared, SimpleNamespace(components={"a": component}), schedule, 1e-3, np.zeros(0), 0.0)
+        step_choice._trial(
+            prepared, SimpleNamespace(components={"a": component}), schedule, 1e-3, np.zeros(0), 0.0
+        )
 
 
 @pytest.mark.parametrize(("moved", "stays"), [(0.0, True), (5e-14, True), (5e-13, False)])

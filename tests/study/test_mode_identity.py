@@ -29,20 +29,30 @@ def two_masses(hertz_a, hertz_b, spring):
     """Two masses, each on its own spring [Hz], with one between them [Hz²]."""
     A = np.zeros((4, 4))
     A[[0, 2], [1, 3]] = 1.0
-    stiff = (2 * np.pi) ** 2 * np.array([[hertz_a**2 + spring, -spring], [-spring, hertz_b**2 + spring]])
+    stiff = (2 * np.pi) ** 2 * np.array(
+        [[hertz_a**2 + spring, -spring], [-spring, hertz_b**2 + spring]]
+    )
     A[np.ix_([1, 3], [0, 2])] = -stiff
     A[[1, 3], [1, 3]] = -0.1, -0.3
     return A
 
 
-def scenario(name, A, *, modes=None, names=STATES, flow=None, states=None, others=None, measures=OF_A):
+def scenario(
+    name, A, *, modes=None, names=STATES, flow=None, states=None, others=None, measures=OF_A
+):
     """A scenario of a case with an earlier one, ``off``, as far as names need it."""
     model = LinearModel.from_matrix(A, names, None)
     found = find_modes(model, 0.1, 5.0) if modes is None else modes
     table = SimpleNamespace(scenarios={"off": ScenarioTable(), "on": ScenarioTable()})
     schedule = SimpleNamespace(name="gauss-seidel")
     prepared = SimpleNamespace(
-        system=System(), name=name, case=table, power_flow=flow, schedule=schedule, beside=others, given={}
+        system=System(),
+        name=name,
+        case=table,
+        power_flow=flow,
+        schedule=schedule,
+        beside=others,
+        given={},
     )
     point = SimpleNamespace(states=states or dict.fromkeys(names, 0.0))
     return NamedSystem(prepared, point, model, found, name_modes(found, measures))
@@ -83,13 +93,18 @@ def test_order_rotation_and_scaling_change_no_name():
             names, turned = tuple(STATES[k] for k in order), A[np.ix_(order, order)]
             values, left, right = scipy.linalg.eig(turned, left=True, right=True)
             above = random.permutation(np.flatnonzero(values.imag > 0))
-            factors = [complex(*random.normal(size=2)) * 10 ** random.uniform(-6, 6) for _ in range(2 * len(above))]
+            factors = [
+                complex(*random.normal(size=2)) * 10 ** random.uniform(-6, 6)
+                for _ in range(2 * len(above))
+            ]
             modes = [
                 make_mode(values[k], left[:, k] * factors[i], right[:, k] * factors[-1 - i], names)
                 for i, k in enumerate(above)
             ]
             systems.append(scenario(name, turned, modes=modes, names=names))
-        assert hertz_of(settled(systems[1], never, {"off": systems[0]})) == pytest.approx(wanted, rel=1e-9)
+        assert hertz_of(settled(systems[1], never, {"off": systems[0]})) == pytest.approx(
+            wanted, rel=1e-9
+        )
 
 
 def test_a_clear_shape_is_followed_from_nowhere():
@@ -101,9 +116,11 @@ def test_a_clear_shape_is_followed_from_nowhere():
 @pytest.mark.parametrize("change", ["states", "another operating point"])
 def test_where_no_way_leads_a_tie_stays_free(change):
     on = scenario("on", FAR)
-    off = scenario("off", OFF, names=("a.x", "a.v", "b.x", "b.w")) if change == "states" else scenario(
-        "off", OFF, states=dict.fromkeys(STATES, 0.01)
-    )  # fmt: skip
+    off = (
+        scenario("off", OFF, names=("a.x", "a.v", "b.x", "b.w"))
+        if change == "states"
+        else scenario("off", OFF, states=dict.fromkeys(STATES, 0.01))
+    )
     found = settled(on, never, {"off": off})
     assert found.naming.named == {}
     assert "fit it about equally" in found.naming.doubts[0]
@@ -120,7 +137,10 @@ def test_modes_that_merge_on_the_way_are_told_with_the_place():
 
     names = ("a.x", "a.v", "b.x", "b.v", "c.x", "c.v")
     measures = {"mine": lambda mode: 1.0 if mode.frequency_hz < 1.5 else 0.3}
-    off, on = (scenario(n, damped(r), names=names, measures=measures) for n, r in (("off", 0.02), ("on", 2.02)))
+    off, on = (
+        scenario(n, damped(r), names=names, measures=measures)
+        for n, r in (("off", 0.02), ("on", 2.02))
+    )
     assert hertz_of(off) == {"mine": pytest.approx(6.0 / (2 * np.pi), rel=1e-3)}
     found = settled(on, never, {"off": off})
     assert found.naming.named == {}
@@ -136,7 +156,9 @@ def test_two_names_never_go_to_one_mode():
     assert found.naming.reasons["mine"].endswith("which has another name")
 
 
-@pytest.mark.parametrize(("gain", "hertz", "percent"), [(150, 0.668, 34.59), (200, 0.726, 30.79), (250, 0.768, 27.60)])
+@pytest.mark.parametrize(
+    ("gain", "hertz", "percent"), [(150, 0.668, 34.59), (200, 0.726, 30.79), (250, 0.768, 27.60)]
+)
 def test_a_name_does_not_pass_to_another_mode_because_a_gain_grew(gain, hertz, percent):
     values = {"grid.X_L": 0.3, "gfor.pod_p.K": gain}
     (prepared,) = load_case("two_area").prepare(["pod_p"], values)
@@ -145,7 +167,8 @@ def test_a_name_does_not_pass_to_another_mode_because_a_gain_grew(gain, hertz, p
     assert (round(mode.frequency_hz, 3), round(mode.damping_percent, 2)) == (hertz, percent)
     both = "the mode of 0.350 Hz, 25.92 % without its damping controllers is followed to "
     assert all(text.startswith(f"'electromechanical': {both}") for text in found.warnings)
-    assert bool(found.warnings) is (gain < 250)  # there the other one fits as well, or is damped less
+    # there the other one fits as well, or is damped less
+    assert bool(found.warnings) is (gain < 250)
 
 
 def test_alone_and_with_all_scenarios_the_names_are_the_same():
@@ -154,17 +177,24 @@ def test_alone_and_with_all_scenarios_the_names_are_the_same():
     for result in together:
         (prepared,) = case.prepare([result.prepared.name], {"grid.X_L": 0.3})
         alone = compute_modes(prepared)
-        assert {n: m.eigenvalue for n, m in alone.named.items()} == {n: m.eigenvalue for n, m in result.named.items()}
+        assert {n: m.eigenvalue for n, m in alone.named.items()} == {
+            n: m.eigenvalue for n, m in result.named.items()
+        }
         assert alone.warnings == result.warnings
     last = together[-1]
     assert last.named == {}
     as_json = modes_json([together[0], last])["scenarios"]
-    assert as_json[0]["named"]["electromechanical"]["imag"] == together[0].named["electromechanical"].eigenvalue.imag
+    assert (
+        as_json[0]["named"]["electromechanical"]["imag"]
+        == together[0].named["electromechanical"].eigenvalue.imag
+    )
     assert as_json[1]["named"] == {"electromechanical": None}
     with pytest.raises(KeyError, match="exchanges its nature") as seen:
         Modes(last).named["electromechanical"]
     assert isinstance(seen.value, CosimError)
-    with pytest.raises(CosimError, match=r"has no mode named 'inter-area' in the range; its named modes: none"):
+    with pytest.raises(
+        CosimError, match=r"has no mode named 'inter-area' in the range; its named modes: none"
+    ):
         Modes(last).named["inter-area"]
     assert Modes(last).named.get("inter-area") is None
     assert "exchanges its nature with the one of 0.796 Hz, 29.90 %" in last.warnings[0]
@@ -195,7 +225,9 @@ def test_a_clear_shape_that_a_damping_controller_made_leaves_the_name_free(monke
     monkeypatch.setattr(mode_identity, "is_ours", lambda _: True)
     off, on = moved()
     asked = []
-    found = settled(with_part(on, 100.0), never, {}, undamped=lambda gains: asked.append(gains) or off)
+    found = settled(
+        with_part(on, 100.0), never, {}, undamped=lambda gains: asked.append(gains) or off
+    )
     assert asked == [{"dev.pod_p.K": 0.0}]
     assert found.naming.named == {}
     assert "exchanges its nature with the one of 2.6" in found.naming.reasons["mine"]
@@ -217,9 +249,13 @@ def test_a_value_of_a_foreign_fmu_is_followed_and_one_of_ours_has_its_shape(monk
     monkeypatch.setattr(mode_identity, "is_isolated", lambda *_: True)
     off, on = moved()
     with_part(off, 0.0, path="vendor", variables=("gain",))
-    found = settled(with_part(on, 40.0, path="vendor", variables=("gain",), earlier=off), lambda _: off, {})
+    found = settled(
+        with_part(on, 40.0, path="vendor", variables=("gain",), earlier=off), lambda _: off, {}
+    )
     assert hertz_of(found) == (hertz_of(on) if ours else {})
-    assert [text.endswith("which fits the name better now") for text in found.naming.doubts] == [True] * (not ours)
+    assert [text.endswith("which fits the name better now") for text in found.naming.doubts] == [
+        True
+    ] * (not ours)
 
 
 def test_scenarios_that_are_shown_together_tell_where_modes_exchanged_their_nature():
@@ -259,7 +295,9 @@ def test_fitted_models_of_other_states_are_compared_by_those_that_both_have(monk
         assert len([step for step in steps if step]) <= 7
 
 
-@pytest.mark.parametrize(("X_L", "hertz"), [(0.36, 0.308), (0.41, 0.266), (0.44, None), (0.6, 0.193)])
+@pytest.mark.parametrize(
+    ("X_L", "hertz"), [(0.36, 0.308), (0.41, 0.266), (0.44, None), (0.6, 0.193)]
+)
 def test_a_name_is_followed_along_the_reactance_from_the_value_of_the_file(X_L, hertz):
     """At 0.43 the swing meets another mode; beyond, what has its shape may be the one or the other."""
     (prepared,) = load_case("two_area").prepare(["gfor"], {"grid.X_L": X_L})
@@ -267,7 +305,9 @@ def test_a_name_is_followed_along_the_reactance_from_the_value_of_the_file(X_L, 
     mode = found.named.get("electromechanical")
     assert (None if mode is None else round(mode.frequency_hz, 3)) == hertz
     assert bool(found.warnings) is (X_L > 0.43)
-    assert all("in 'gfor' with the values of its file meets another one" in text for text in found.warnings)
+    assert all(
+        "in 'gfor' with the values of its file meets another one" in text for text in found.warnings
+    )
 
 
 def test_a_damping_controller_that_is_off_is_one_with_gain_0_on_the_way():
@@ -275,5 +315,7 @@ def test_a_damping_controller_that_is_off_is_one_with_gain_0_on_the_way():
     (off,) = case.prepare(["gfor"], {"grid.X_L": 0.1})
     (on,) = case.prepare(["pod_p"], {"grid.X_L": 0.3, "gfor.pod_p.K": 80})
     assert mode_identity._differing(off, on) == {
-        "grid.X_L": (0.1, 0.3), "gfor.pod_p.enabled": (True, True), "gfor.pod_p.K": (0.0, 80.0)
-    }  # fmt: skip
+        "grid.X_L": (0.1, 0.3),
+        "gfor.pod_p.enabled": (True, True),
+        "gfor.pod_p.K": (0.0, 80.0),
+    }

@@ -10,7 +10,12 @@ from matplotlib.figure import Figure
 
 from orchestrator.study.mode_plots import damping_rays, draw_eigenvalues, draw_mode_shape
 
-SHAPES = {"two_area": (-2.1, 1.02), "ieee118": (-1.23, 1.12), "infinite_bus": (-1.0, 1.0), "slow": (-3.3, 0.2)}
+SHAPES = {
+    "two_area": (-2.1, 1.02),
+    "ieee118": (-1.23, 1.12),
+    "infinite_bus": (-1.0, 1.0),
+    "slow": (-3.3, 0.2),
+}
 """Left edge [1/s] and upper edge [Hz] of pictures."""
 
 
@@ -23,12 +28,16 @@ def axes():
 def result(label, *eigenvalues, references=()):
     """Modes with a name, as the map takes them."""
     modes = [
-        SimpleNamespace(eigenvalue=z, frequency_hz=z.imag / 6.283185, damping_ratio=-z.real / abs(z))
+        SimpleNamespace(
+            eigenvalue=z, frequency_hz=z.imag / 6.283185, damping_ratio=-z.real / abs(z)
+        )
         for z in eigenvalues
     ]
     named = {str(k): mode for k, mode in enumerate(modes)}
     known = {str(k): reference for k, reference in enumerate(references)}
-    return SimpleNamespace(label=label, modes=modes, named=named, references=known, name_of=lambda mode: "named")
+    return SimpleNamespace(
+        label=label, modes=modes, named=named, references=known, name_of=lambda mode: "named"
+    )
 
 
 @pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
@@ -106,9 +115,15 @@ def test_another_persons_mode_is_a_circle_at_its_damping_and_frequency():
 def test_a_mode_shape_names_the_components_of_either_side():
     sides = (["sg1.omega"], ["sg2.omega", "gfor.theta"])
     mode = SimpleNamespace(
-        swing=lambda states, least: sides, shape={"sg1.omega": 2, "sg2.omega": -1, "gfor.theta": -1j}
+        swing=lambda states, least: sides,
+        shape={"sg1.omega": 2, "sg2.omega": -1, "gfor.theta": -1j},
     )
     axis = Figure().subplots(subplot_kw={"projection": "polar"})
     draw_mode_shape(axis, SimpleNamespace(named={"tie": mode}, swing=()), "tie", "k")
     assert axis.get_xlabel() == "→ sg1\n← sg2, gfor"
-    assert [tuple(np.round(line.get_data(), 6).ravel()) for line in axis.lines[::2]][1] == (3.141593, 3.141593, 0, 0.5)
+    assert [tuple(np.round(line.get_data(), 6).ravel()) for line in axis.lines[::2]][1] == (
+        3.141593,
+        3.141593,
+        0,
+        0.5,
+    )

@@ -67,7 +67,8 @@ def test_another_frequency_is_found_alike_and_nothing_slips(typed):
     ("bound", "check", "fault"),
     [
         ({"direction": "into the converter"}, "power_balance", "wrong sign"),
-        ({"i_max": 0.4}, None, "above its current limit"),  # `check` asks with dips, which take long
+        # `check` asks with dips, which take long
+        ({"i_max": 0.4}, None, "above its current limit"),
     ],
 )
 def test_sign_and_limit_are_found_alike(typed, bound, check, fault):
@@ -81,7 +82,18 @@ def test_sign_and_limit_are_found_alike(typed, bound, check, fault):
 @pytest.mark.parametrize(("i_max", "above"), [(0.65, True), (1.5, False)])
 def test_a_run_finds_a_limit_that_a_dip_exceeds(typed, i_max, above):
     """It gives 0.6 pu at rest, and its limit is at 1.5 pu."""
-    _, out, _ = typed("run", "case.toml", "--scenario", "dip", "--stop", "1.2", "--out", "r", "--json", i_max=i_max)
+    _, out, _ = typed(
+        "run",
+        "case.toml",
+        "--scenario",
+        "dip",
+        "--stop",
+        "1.2",
+        "--out",
+        "r",
+        "--json",
+        i_max=i_max,
+    )
     found = [f for f in json.loads(out)[0]["findings"] if f["kind"] == "misfit"]
     assert len(found) == above
     for finding in found:
@@ -122,7 +134,10 @@ def test_a_rating_a_little_off_is_named_and_is_the_likely_cause(typed, fmu, boun
         assert f"({bound['v_n']:g} kV, and 20 kV by itself)" in told["evidence"]
     found = typed("run", "case.toml", "--out", "r", **bound, i_max=0.4)[2]
     assert "above its current limit" in found
-    assert f"likely cause: the binding has {told['evidence'].removeprefix('the binding has ')}" in found
+    assert (
+        f"likely cause: the binding has {told['evidence'].removeprefix('the binding has ')}"
+        in found
+    )
 
 
 @pytest.mark.parametrize(("i_max", "found"), [(1.05, True), (1.5, False)])
@@ -139,12 +154,16 @@ def test_a_limit_that_is_exceeded_in_a_dip_alone_is_found_in_a_run(typed, i_max,
 
 @pytest.mark.slow
 def test_a_device_that_does_not_fit_its_binding_is_not_called_stable(typed):
-    code, shown, _ = typed("modes", "case.toml", "--black-box", "--fail-unstable", "--out", "m", i_max=0.4)
+    code, shown, _ = typed(
+        "modes", "case.toml", "--black-box", "--fail-unstable", "--out", "m", i_max=0.4
+    )
     first = shown.split("└")[0]
     assert "not known" in first
     assert "above its current limit" in first
     assert code == 1
-    stability = json.loads(Path("m/modes.json").read_text(encoding="utf-8"))["scenarios"][0]["stability"]
+    stability = json.loads(Path("m/modes.json").read_text(encoding="utf-8"))["scenarios"][0][
+        "stability"
+    ]
     assert stability["stable"] is None
     assert stability["reason"] == "gfor does not fit its binding: above its current limit"
     assert "stable" in typed("modes", "case.toml", "--black-box")[1].split("└")[0]

@@ -31,7 +31,11 @@ def test_a_ring_down_is_shown(tmp_path):
     ("events", "stop", "why"),
     [
         (STEP.format(1, 1.02), 3.0, "has fewer than 1 periods of the mode"),
-        (STEP.format(1, 1.02) + STEP.format(3, 1.0), 6.0, "falls into its window, from t = 2 s to t = 6 s"),
+        (
+            STEP.format(1, 1.02) + STEP.format(3, 1.0),
+            6.0,
+            "falls into its window, from t = 2 s to t = 6 s",
+        ),
     ],
 )
 def test_what_is_no_ring_down_of_the_mode_is_not_shown(tmp_path, events, stop, why):
@@ -43,9 +47,19 @@ def test_what_is_no_ring_down_of_the_mode_is_not_shown(tmp_path, events, stop, w
 
 @pytest.mark.parametrize("hertz", [(0.5,), (0.5, 0.9)])
 def test_how_far_two_modes_are_told_apart_is_said_of_two(hertz):
-    modes = [SimpleNamespace(eigenvalue=complex(-0.2, 2 * np.pi * f), frequency_hz=f, amplitude=1.0, doubts=(),
-                             damping_ratio=0.06) for f in hertz]  # fmt: skip
-    own = SimpleNamespace(interval=0.02, modes=modes, start=0.0, stop=20.0, line=None, is_trend=lambda m: False)
+    modes = [
+        SimpleNamespace(
+            eigenvalue=complex(-0.2, 2 * np.pi * f),
+            frequency_hz=f,
+            amplitude=1.0,
+            doubts=(),
+            damping_ratio=0.06,
+        )
+        for f in hertz
+    ]
+    own = SimpleNamespace(
+        interval=0.02, modes=modes, start=0.0, stop=20.0, line=None, is_trend=lambda m: False
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(signal_modes, "over_a_trend", lambda *_: "")
         said = signal_modes.SignalModes.remarks.fget(own)

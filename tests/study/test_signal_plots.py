@@ -20,10 +20,14 @@ def run(tmp_path, solver, stop=0.2):
     return run_scenario(ready)
 
 
-def test_a_panel_without_its_signal_says_so_and_a_plot_without_any_is_left_out(tmp_path, monkeypatch):
+def test_a_panel_without_its_signal_says_so_and_a_plot_without_any_is_left_out(
+    tmp_path, monkeypatch
+):
     result = run(tmp_path, 'record = ["sg1.omega", "sg2.omega"]')
     kept = {}
-    monkeypatch.setattr(mode_plots, "save_figure", lambda figure, path: kept.setdefault(path.stem, figure))
+    monkeypatch.setattr(
+        mode_plots, "save_figure", lambda figure, path: kept.setdefault(path.stem, figure)
+    )
     drawn, shown = {}, {}
     for table in result.modes.prepared.case.table.plots:
         drawn[table.name] = mode_plots.plot_signals(table, [result], tmp_path / f"{table.name}.png")
@@ -32,15 +36,21 @@ def test_a_panel_without_its_signal_says_so_and_a_plot_without_any_is_left_out(t
     assert set(drawn.values()) == {True, False}
     for name, figure in kept.items():
         for axis, expression in zip(figure.axes, shown[name], strict=True):
-            assert [t.get_text() for t in axis.texts] == ([] if axis.lines else [f"{expression} was not recorded"])
+            assert [t.get_text() for t in axis.texts] == (
+                [] if axis.lines else [f"{expression} was not recorded"]
+            )
         assert len(figure.legends) == 1
     said = [str(question) for question in result.modes.warnings if "is not shown" in question]
     assert said  # before the run, too
 
 
-@pytest.mark.parametrize(("chosen", "word"), [("none", "none: every row"), ("low-pass", "low-pass: symmetric FIR")])
+@pytest.mark.parametrize(
+    ("chosen", "word"), [("none", "none: every row"), ("low-pass", "low-pass: symmetric FIR")]
+)
 def test_a_recording_says_what_its_rows_are(tmp_path, chosen, word):
-    text = TEXT.replace('record_interval = "5 ms"', f'record_interval = "20 ms"\nrecord_filter = "{chosen}"')
+    text = TEXT.replace(
+        'record_interval = "5 ms"', f'record_interval = "20 ms"\nrecord_filter = "{chosen}"'
+    )
     path = tmp_path / "case.toml"
     path.write_text(text, encoding="utf-8")
     (ready,) = load_case(path).prepare(["gfor"], stop_time=0.2)
@@ -58,7 +68,9 @@ def test_a_panel_shows_the_magnitude_of_a_current_beside_its_parts(tmp_path, mon
     assert found.values == pytest.approx(expected, rel=1e-12)
     assert found.attrs["units"] == recorded["gfor.i_re"].attrs["units"]
     kept = {}
-    monkeypatch.setattr(mode_plots, "save_figure", lambda figure, path: kept.setdefault("figure", figure))
+    monkeypatch.setattr(
+        mode_plots, "save_figure", lambda figure, path: kept.setdefault("figure", figure)
+    )
     panel = {"signal": "|gfor.i|", "also": ["gfor.i_re", "gfor.i_im"], "label": "i [pu]"}
     table = PlotTable.model_validate({"name": "i", "title": "I", "panels": [panel]})
     assert mode_plots.plot_signals(table, [result], tmp_path / "i.png")

@@ -64,7 +64,9 @@ def test_a_run_diverges_where_the_step_map_is_said_to_be_unstable(choice):
 
 
 def test_growth_of_the_system_itself_is_not_laid_on_the_step():
-    grows = choose_step(load("two_area").scenario("base").prepared, ALLOWED, [1e-4], ["gauss-seidel"])
+    grows = choose_step(
+        load("two_area").scenario("base").prepared, ALLOWED, [1e-4], ["gauss-seidel"]
+    )
     assert grows.growth > 0.03
     assert grows.trials[0].stable
 
@@ -108,9 +110,13 @@ def test_a_longer_step_does_not_count_where_a_shorter_one_fails(choice):
 
 
 def test_a_step_that_no_event_falls_on_is_not_tried():
-    with pytest.raises(InputError, match=r"--try: none fits the case: .* is not a communication point"):
+    with pytest.raises(
+        InputError, match=r"--try: none fits the case: .* is not a communication point"
+    ):
         choose_step(load("two_area").scenario("base").prepared, ALLOWED, [3e-4])
-    some = choose_step(load("two_area").scenario("base").prepared, ALLOWED, [1e-4, 3e-4], ["gauss-seidel"])
+    some = choose_step(
+        load("two_area").scenario("base").prepared, ALLOWED, [1e-4, 3e-4], ["gauss-seidel"]
+    )
     assert some.left_out == (3e-4,)
     assert [trial.step_size for trial in some.trials] == [1e-4]
 
@@ -125,7 +131,16 @@ def test_phasor_devices_are_told_the_step_under_gauss_seidel_alone():
 
 
 def test_command_prints_the_table_and_json(capsys):
-    words = ["steps", "two_area", "--scenario", "pod_p", "--try", "100 us,500 us", "--schedule", "gauss-seidel"]
+    words = [
+        "steps",
+        "two_area",
+        "--scenario",
+        "pod_p",
+        "--try",
+        "100 us,500 us",
+        "--schedule",
+        "gauss-seidel",
+    ]
     assert main([*words, "--error", "0.0001:0.1"]) == 0
     assert "gauss-seidel: 100 µs" in capsys.readouterr().out
     assert main([*words, "--error", "1e-9:0.1", "--json"]) == 1

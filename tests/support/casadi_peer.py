@@ -22,14 +22,20 @@ def _column(values):
 class _Function:
     def __init__(self, name, inputs, outputs):
         self.name, self.inputs, self.outputs = name, inputs, outputs
-        self._function = ca.Function(name, [_column(v) for v in inputs], [_column(v) for v in outputs])
+        self._function = ca.Function(
+            name, [_column(v) for v in inputs], [_column(v) for v in outputs]
+        )
         self.instructions = range(self._function.n_instructions())
 
     def of(self, *arguments):
-        return [ca.vertsplit(value) for value in self._function.call([_column(a) for a in arguments])]
+        return [
+            ca.vertsplit(value) for value in self._function.call([_column(a) for a in arguments])
+        ]
 
     def __call__(self, *arguments):
-        return tuple(np.array(value).ravel() for value in self._function.call([ca.DM(a) for a in arguments]))
+        return tuple(
+            np.array(value).ravel() for value in self._function.call([ca.DM(a) for a in arguments])
+        )
 
 
 def _jacobian(values, by):
@@ -55,7 +61,9 @@ def _install():
         Function=_Function,
         symbol=ca.SX.sym,
         symbols=lambda name, count: [ca.SX.sym(f"{name}_{k}") for k in range(count)],
-        substitute=lambda values, old, new: ca.vertsplit(ca.substitute(_column(values), _column(old), _column(new))),
+        substitute=lambda values, old, new: ca.vertsplit(
+            ca.substitute(_column(values), _column(old), _column(new))
+        ),
         symbols_in=lambda values: ca.symvar(_column(values)),
         depends_on=lambda values, on: len(on) > 0 and ca.depends_on(_column(values), _column(on)),
         jacobian=_jacobian,
@@ -78,9 +86,15 @@ def made():
         Line("l1", "a", "b", X=0.1, R=0.01, B=0.02),
         Line("l2", "b", "c", X=0.2, tap=1.05, shift=0.1, B=0.04, X_C=0.05),
     )
-    loads = (Load("power", "c", 50.0, 10.0, active=Zip(p=0.5, i=0.5), k_pf=1.0), Load("plain", "b", 20.0, 5.0))
+    loads = (
+        Load("power", "c", 50.0, 10.0, active=Zip(p=0.5, i=0.5), k_pf=1.0),
+        Load("plain", "b", 20.0, 5.0),
+    )
     network = Network("chain", ("a", "b", "c"), lines, loads, (Port("unit", "a"),), faults=("b",))
-    peers = {NETWORK: grid(network), "two_area_phasor_grid": written_out(phasor_grid(TWO_AREA_PHASOR))}
+    peers = {
+        NETWORK: grid(network),
+        "two_area_phasor_grid": written_out(phasor_grid(TWO_AREA_PHASOR)),
+    }
     names = {name for name in model_names() if not needs_arguments(name)} - {*peers}
     return {name: build_model(name) for name in sorted(names)} | peers
 
@@ -91,7 +105,9 @@ def functions(model):
     from fmus.toolchain.kernel import derivative_functions, kernel_functions
 
     found = kernel_functions(model) | derivative_functions(model)
-    return found | ({"iteration": plan_elimination(model).values} if model.integrator == "sdirk" else {})
+    return found | (
+        {"iteration": plan_elimination(model).values} if model.integrator == "sdirk" else {}
+    )
 
 
 def answers(models):
@@ -100,7 +116,10 @@ def answers(models):
     for name, model in models.items():
         for of, function in functions(model).items():
             chance = np.random.default_rng(27)
-            points = [[chance.uniform(low, 2.0, len(v)) for v in function.inputs] for low in (0.1, 0.1, -2.0, -2.0)]
+            points = [
+                [chance.uniform(low, 2.0, len(v)) for v in function.inputs]
+                for low in (0.1, 0.1, -2.0, -2.0)
+            ]
             values = [np.concatenate(function(*point)) for point in points]
             found[name, of] = len(function.instructions), np.array(values)
     return found

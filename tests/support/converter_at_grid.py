@@ -32,16 +32,28 @@ def converter_at_grid() -> Model:
     rating = declare_rating(m, S_N)
     R = m.parameter("R", 0.05, "pu", "Resistance of the grid", base="S_n", minimum=0)
     X = m.parameter("X", 0.3, "pu", "Reactance of the grid", base="S_n", minimum=1e-3)
-    depth = m.parameter("source.v", 1.0, "1", "Voltage of the source, of that at the start", minimum=0, tunable=True)
-    jump = m.parameter("source.jump", 0.0, "rad", "Angle of the source, beyond that at the start", tunable=True)
+    depth = m.parameter(
+        "source.v", 1.0, "1", "Voltage of the source, of that at the start", minimum=0, tunable=True
+    )
+    jump = m.parameter(
+        "source.jump", 0.0, "rad", "Angle of the source, beyond that at the start", tunable=True
+    )
     v_re, v_im = m.algebraic("v_re"), m.algebraic("v_im")
     port = port_at(m, Phasor(v_re, v_im), P_0, rating / 100.0)
     converter = declare_converter(m, port)
     line_0 = port.i_0 - Phasor(0.0, B) * port.v_0
     source_0 = port.v_0 - Phasor(R, X) * line_0
     line, v = (
-        Phasor(*(m.state(f"{name}_{part}", getattr(start, part), "pu", text, base="S_n") for part in ("re", "im")))
-        for name, start, text in (("line", line_0, "Current into the grid"), ("bus", port.v_0, "Bus voltage"))
+        Phasor(
+            *(
+                m.state(f"{name}_{part}", getattr(start, part), "pu", text, base="S_n")
+                for part in ("re", "im")
+            )
+        )
+        for name, start, text in (
+            ("line", line_0, "Current into the grid"),
+            ("bus", port.v_0, "Bus voltage"),
+        )
     )
     m.close(v_re, v.re)
     m.close(v_im, v.im)

@@ -29,7 +29,9 @@ MEASURED = "GFOR_TEST_SECONDS"
 def read_list(path: Path = LIST) -> dict[str, float]:
     """Seconds by test."""
     lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    return {test: float(seconds) for seconds, _, test in (line.partition(" ") for line in lines if line)}
+    return {
+        test: float(seconds) for seconds, _, test in (line.partition(" ") for line in lines if line)
+    }
 
 
 def mark(items: list[pytest.Item]) -> None:

@@ -21,7 +21,9 @@ class Evaluated:
 
     @property
     def parameters(self):
-        return self._named(self.model.parameters, self.p) | self._named(self.model.calculated, self.c)
+        return self._named(self.model.parameters, self.p) | self._named(
+            self.model.calculated, self.c
+        )
 
     @property
     def states(self):

@@ -20,7 +20,9 @@ def network_of(case: Case, scenario: str, overrides: dict | None = None) -> Netw
     return preparer.draft.network
 
 
-def exact_continuous(prepared: PreparedScenario, network: Network | None = None) -> tuple[np.ndarray, list[str]]:
+def exact_continuous(
+    prepared: PreparedScenario, network: Network | None = None
+) -> tuple[np.ndarray, list[str]]:
     """Matrix A of ẋ = A·x, and the names of the states; ``network`` is that of a grid built for the case."""
     parts = _parts(prepared, network)
     inputs = _inputs(prepared, parts)
@@ -37,7 +39,11 @@ def _parts(prepared: PreparedScenario, network: Network | None) -> dict:
     parts = {}
     for name, plan in prepared.system.components.items():
         own = network is not None and plan.description.model_name == network.name
-        model = build_model("grid", network=network) if own else build_model(plan.description.model_name)
+        model = (
+            build_model("grid", network=network)
+            if own
+            else build_model(plan.description.model_name)
+        )
         model = written_out(model)  # functions of (x, u, p, c) alone
         p = np.array([float(plan.parameters.get(v.name, v.start)) for v in model.parameters])
         c, x = model.initialise(p)
@@ -48,7 +54,9 @@ def _parts(prepared: PreparedScenario, network: Network | None) -> dict:
 def _inputs(prepared: PreparedScenario, parts: dict) -> dict[str, np.ndarray]:
     """Values of all inputs in steady state, by passing outputs on until nothing changes."""
     inputs = {
-        name: np.array([prepared.system.components[name].inputs.get(i.name, i.start) for i in model.inputs])
+        name: np.array(
+            [prepared.system.components[name].inputs.get(i.name, i.start) for i in model.inputs]
+        )
         for name, (model, *_) in parts.items()
     }
     for _ in range(3):
@@ -63,16 +71,26 @@ def _inputs(prepared: PreparedScenario, parts: dict) -> dict[str, np.ndarray]:
     return inputs
 
 
-def _interconnect(prepared: PreparedScenario, parts: dict, blocks: dict) -> tuple[np.ndarray, list[str]]:
+def _interconnect(
+    prepared: PreparedScenario, parts: dict, blocks: dict
+) -> tuple[np.ndarray, list[str]]:
     """ẋ = A x + B u, y = C x + D u, u = W y, with everything stacked: A + B (I − W D)⁻¹ W C."""
     models: dict[str, Model] = {name: part[0] for name, part in parts.items()}
-    first_u = dict(zip(models, np.cumsum([0, *(len(m.inputs) for m in models.values())]), strict=False))
-    first_y = dict(zip(models, np.cumsum([0, *(len(m.outputs) for m in models.values())]), strict=False))
+    first_u = dict(
+        zip(models, np.cumsum([0, *(len(m.inputs) for m in models.values())]), strict=False)
+    )
+    first_y = dict(
+        zip(models, np.cumsum([0, *(len(m.outputs) for m in models.values())]), strict=False)
+    )
     A, B, C, D = (_block_diagonal([blocks[n][k] for n in models]) for k in range(4))
     W = np.zeros((B.shape[1], C.shape[0]))
     for wire in prepared.system.connections:
-        row = first_u[wire.target.component] + _index(models[wire.target.component].inputs, wire.target.variable)
-        column = first_y[wire.source.component] + _index(models[wire.source.component].outputs, wire.source.variable)
+        row = first_u[wire.target.component] + _index(
+            models[wire.target.component].inputs, wire.target.variable
+        )
+        column = first_y[wire.source.component] + _index(
+            models[wire.source.component].outputs, wire.source.variable
+        )
         W[row, column] = 1.0
     names = [f"{name}.{state.name}" for name, model in models.items() for state in model.states]
     return A + B @ np.linalg.solve(np.eye(len(W)) - W @ D, W @ C), names
@@ -106,9 +124,17 @@ def exact_step_map(prepared: PreparedScenario, network: Network | None = None) -
         held[:n, :n], held[:n, n:] = A, B
         over = expm(held * prepared.step_size)
         step[name] = over[:n, :n], over[:n, n:], C, D
-    first = dict(zip(parts, np.cumsum([0, *(len(part[0].states) for part in parts.values())]), strict=False))
+    first = dict(
+        zip(parts, np.cumsum([0, *(len(part[0].states) for part in parts.values())]), strict=False)
+    )
     size = sum(len(part[0].states) for part in parts.values())
-    offset = dict(zip(parts, size + np.cumsum([0, *(len(part[0].inputs) for part in parts.values())]), strict=False))
+    offset = dict(
+        zip(
+            parts,
+            size + np.cumsum([0, *(len(part[0].inputs) for part in parts.values())]),
+            strict=False,
+        )
+    )
     whole = size + sum(len(part[0].inputs) for part in parts.values())
     z, fed = np.eye(whole), set(range(size))
     for group in prepared.schedule.groups:
@@ -124,6 +150,8 @@ def exact_step_map(prepared: PreparedScenario, network: Network | None = None) -
                 source, target = parts[wire.source.component][0], parts[wire.target.component][0]
                 row = offset[wire.target.component] + _index(target.inputs, wire.target.variable)
                 fed.add(row)
-                z[row] = outputs[wire.source.component][_index(source.outputs, wire.source.variable)]
+                z[row] = outputs[wire.source.component][
+                    _index(source.outputs, wire.source.variable)
+                ]
     kept = sorted(fed)  # an input that nothing feeds is a constant, not a state
     return z[np.ix_(kept, kept)]

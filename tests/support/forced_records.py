@@ -43,9 +43,13 @@ class Model:
 
     def at(self, s):
         """Outputs, shape (current or voltage, unit, part, inputs), at a complex frequency."""
-        parts = [C / (s - values) @ B for values, B, C in (
-            (self.eigenvalues, self.B, self.C), (self.eigenvalues.conj(), self.B.conj(), self.C.conj())
-        )]  # fmt: skip
+        parts = [
+            C / (s - values) @ B
+            for values, B, C in (
+                (self.eigenvalues, self.B, self.C),
+                (self.eigenvalues.conj(), self.B.conj(), self.C.conj()),
+            )
+        ]
         return (0.5 * (parts[0] + parts[1]) + self.D).reshape(2, len(self.units), 2, -1)
 
     def response(self, inputs, times):
@@ -75,7 +79,9 @@ def make_model(case, scenario, values=None):
     }
     units = [name for name in plans if name in ports]
     references = ("delta_P_ref", "delta_V_ref", "delta_U_ref")
-    inputs = [f"{u}.{v}" for u in units for v in plans[u].description.variables if v.endswith(references)]
+    inputs = [
+        f"{u}.{v}" for u in units for v in plans[u].description.variables if v.endswith(references)
+    ]
     inputs += [f"grid.{v}" for v in plans["grid"].description.variables if v.endswith(".scale")]
     outputs = [f"{u}.{part}" for u in units for part in ("i_re", "i_im")]
     outputs += [f"grid.{ports[u]}.{part}" for u in units for part in ("v_re", "v_im")]
@@ -93,14 +99,23 @@ def make_model(case, scenario, values=None):
     v_0 = np.array([flow.voltages[ports[u]] for u in units])
     power = np.array([flow.powers[u] * plans[u].number("S_n") / 100 for u in units])
     return Model(
-        tuple(units), tuple(ports[u] for u in units), tuple(inputs), values[slow], left[slow], seen[:, slow] * twice,
-        D, v_0, np.conj(power / v_0),
-    )  # fmt: skip
+        tuple(units),
+        tuple(ports[u] for u in units),
+        tuple(inputs),
+        values[slow],
+        left[slow],
+        seen[:, slow] * twice,
+        D,
+        v_0,
+        np.conj(power / v_0),
+    )
 
 
 def save(model, name):
     small = {key: np.asarray(getattr(model, key)) for key in Model.__dataclass_fields__}
-    small |= {key: small[key].astype(np.complex64) for key in ("B", "C")} | {"D": small["D"].astype(np.float32)}
+    small |= {key: small[key].astype(np.complex64) for key in ("B", "C")} | {
+        "D": small["D"].astype(np.float32)
+    }
     MODELS.mkdir(parents=True, exist_ok=True)
     np.savez_compressed(MODELS / f"{name}.npz", **small)
 
@@ -114,19 +129,35 @@ def unit_models_of(system):
         own = np.array([name.startswith(f"{unit}.") for name in system.inputs])
         admittance = current[k][:, ~own] @ np.linalg.pinv(voltage[k][:, ~own])
         beside = current[k][:, own] - admittance @ voltage[k][:, own]
-        reach = np.concatenate([voltage[first][:, own] for first in firsts.values()]) @ np.linalg.pinv(beside)
+        reach = np.concatenate(
+            [voltage[first][:, own] for first in firsts.values()]
+        ) @ np.linalg.pinv(beside)
         return admittance, reach
 
     def load(name, s):
         voltage = outputs_at(system, s)[1][..., system.inputs.index(name)]
         return np.concatenate([voltage[first] for first in firsts.values()])[:, None]
 
-    return UnitModels({
-        unit: UnitModel(bus, complex(system.v_0[k]), complex(system.i_0[k]),
-                        *(partial(lambda unit, part, s: parts(unit, s)[part], unit, part) for part in range(2)))
-        for k, (unit, bus) in enumerate(zip(system.units, system.buses, strict=True))
-    }, tuple(firsts), {name.removesuffix(".scale"): partial(load, name)
-                       for name in system.inputs if name.startswith("grid.")})  # fmt: skip
+    return UnitModels(
+        {
+            unit: UnitModel(
+                bus,
+                complex(system.v_0[k]),
+                complex(system.i_0[k]),
+                *(
+                    partial(lambda unit, part, s: parts(unit, s)[part], unit, part)
+                    for part in range(2)
+                ),
+            )
+            for k, (unit, bus) in enumerate(zip(system.units, system.buses, strict=True))
+        },
+        tuple(firsts),
+        {
+            name.removesuffix(".scale"): partial(load, name)
+            for name in system.inputs
+            if name.startswith("grid.")
+        },
+    )
 
 
 _AT = {}
@@ -145,7 +176,11 @@ def model(name):
         found = dict(kept)
     texts = {key: tuple(map(str, found.pop(key))) for key in ("units", "buses", "inputs")}
     return Model(
-        **texts, **{key: value.astype(complex if value.dtype.kind == "c" else float) for key, value in found.items()}
+        **texts,
+        **{
+            key: value.astype(complex if value.dtype.kind == "c" else float)
+            for key, value in found.items()
+        },
     )
 
 
@@ -191,7 +226,9 @@ def record(name, forced, *, times=None, loads=0.0, measuring=0.0, seed=1, withou
         inputs[:, system.inputs.index(key)] += values
     if loads:
         columns = [k for k, key in enumerate(system.inputs) if key.startswith("grid.")]
-        inputs[:, columns] += load_noise(len(times), len(columns), 1 / (times[1] - times[0]), loads, seed)
+        inputs[:, columns] += load_noise(
+            len(times), len(columns), 1 / (times[1] - times[0]), loads, seed
+        )
     y = system.response(inputs, times).reshape(len(times), 2, len(system.units), 2)
     deviation = y[..., 0] + 1j * y[..., 1]
     # In each bus' own frame: what turns all angles changes no power and no magnitude, as in the grid.
@@ -208,7 +245,15 @@ def record(name, forced, *, times=None, loads=0.0, measuring=0.0, seed=1, withou
     current = current * (1 + noise() + 1j * noise())
     power = v * np.exp(1j * angle) * np.conj(current)
     places = [
-        Site(unit, "unit", bus, v[:, k].copy(), angle[:, k].copy(), power[:, k].real.copy(), power[:, k].imag.copy())
+        Site(
+            unit,
+            "unit",
+            bus,
+            v[:, k].copy(),
+            angle[:, k].copy(),
+            power[:, k].real.copy(),
+            power[:, k].imag.copy(),
+        )
         for k, (unit, bus) in enumerate(zip(system.units, system.buses, strict=True))
         if bus not in without
     ]

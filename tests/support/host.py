@@ -34,7 +34,10 @@ class Host:
         self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
         identifier = md.coSimulation.modelIdentifier
         self.fmu = FMU2Slave(
-            guid=md.guid, unzipDirectory=str(directory), modelIdentifier=identifier, instanceName=instance
+            guid=md.guid,
+            unzipDirectory=str(directory),
+            modelIdentifier=identifier,
+            instanceName=instance,
         )
         self.fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
 
@@ -56,7 +59,9 @@ class Host:
         return self.status(self.fmu.doStep, time, size)
 
     def set(self, **values):
-        self.fmu.setReal([self.vr[name.replace("__", ".")] for name in values], list(values.values()))
+        self.fmu.setReal(
+            [self.vr[name.replace("__", ".")] for name in values], list(values.values())
+        )
 
     def get(self, *names):
         values = self.fmu.getReal([self.vr[name] for name in names])
@@ -71,7 +76,9 @@ class Host:
         inputs = [v.name for v in self.md.modelVariables if v.causality == "input"]
         rows = []
         for k in range(first, first + steps):
-            self.fmu.setReal([self.vr[n] for n in inputs], [drive(k, j) for j in range(len(inputs))])
+            self.fmu.setReal(
+                [self.vr[n] for n in inputs], [drive(k, j) for j in range(len(inputs))]
+            )
             assert self.step(k * H) == OK, self.log
             rows.append(self.everything())
         return rows

@@ -17,4 +17,6 @@ def jacobians(model):
             blocks.append([found.get(place, Expr(0)) for place in product(*map(range, shape))])
             shapes.append(shape)
     function = Function("jacobians", known, blocks)
-    return lambda *at: [block.reshape(shape) for block, shape in zip(function(*at), shapes, strict=True)]
+    return lambda *at: [
+        block.reshape(shape) for block, shape in zip(function(*at), shapes, strict=True)
+    ]

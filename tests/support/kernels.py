@@ -39,7 +39,9 @@ def tape_library():
 
 def taped(model, content=None):
     library, tape = tape_library(), content or tape_of(model)
-    fault = library.tape_fault(tape, len(tape), len(model.value_references), len(model.requirement_texts))
+    fault = library.tape_fault(
+        tape, len(tape), len(model.value_references), len(model.requirement_texts)
+    )
     assert fault is None, fault
     workspace = (ctypes.c_double * library.workspace_size(tape))()
     library.begin(tape, workspace)
@@ -48,7 +50,9 @@ def taped(model, content=None):
 
 def in_python(model):
     kernel = Kernel(tape_of(model), len(model.value_references))
-    return SimpleNamespace(**{name: partial(getattr(kernel, name)) for name in (*_FUNCTIONS, "advance")})
+    return SimpleNamespace(
+        **{name: partial(getattr(kernel, name)) for name in (*_FUNCTIONS, "advance")}
+    )
 
 
 KERNELS = {"compiled": compiled, "tape": taped, "python": in_python}

@@ -44,70 +44,123 @@ _EXACT = {"machine.exact_conversion": 1.0}  # one generator shows the other conv
 _INFEED = {"i_re": 13.5, "i_im": 0.0}
 REFERENCES = (
     Reference(
-        "gfor", "gfor_fmu/reference.csv", {"P_0": 0.9, "Q_0": 0.05, "pod_p.enabled": 1.0, "pod_q.enabled": 1.0},
-        *_BUS, ("i_re", "i_im", "omega", "u", "delta_p_pod", "delta_q_pod"),
-    ),
-    Reference(
-        "gfl", "fmus/grid_following/reference.csv",
-        {"P_0": 0.9, "Q_0": 0.05, "frequency_droop.enabled": 1.0},
-        *_BUS, ("i_re", "i_im", "omega", "u", "i_s", "current_demand"),
-    ),
-    Reference(
-        "gfl_phasor", "fmus/grid_following/reference_phasor.csv",
-        {"P_0": 0.9, "Q_0": 0.05, "frequency_droop.enabled": 1.0},
-        *_BUS, ("i_re", "i_im", "e_re", "e_im", "omega", "u", "i_s"),
-    ),
-    Reference(
-        "gfl_l2ep", "fmus/gfl_l2ep/reference.csv", {"P_0": 0.8, "Q_0": 0.05},
-        *_BUS, ("i_re", "i_im", "omega", "u_c", "i", "current_demand"),
-    ),
-    Reference(
-        "gfl_l2ep_phasor", "fmus/gfl_l2ep/reference_phasor.csv", {"P_0": 0.8, "Q_0": 0.05},
-        *_BUS, ("i_re", "i_im", "e_re", "e_im", "omega", "u_c", "i"),
-    ),
-    Reference(
-        "external_grid", "fmus/external_grid/reference.csv", {"S_n": 17700.0}, *_BUS, ("i_re", "i_im", "p", "q"),
-    ),
-    Reference(
-        "static_generation", "fmus/static_generation/reference.csv", {"P_0": 0.9, "Q_0": 0.05},
-        *_BUS, ("i_re", "i_im", "p", "q"),
-    ),
-    Reference(
-        "static_generation_phasor", "fmus/static_generation/reference_phasor.csv", {"P_0": 0.9, "Q_0": 0.05},
-        *_BUS, ("i_re", "i_im", "e_re", "e_im"),
-    ),
-    Reference(
-        "regfm_a1_phasor", "fmus/regfm_a1/reference.csv", {"P_0": 0.9, "Q_0": 0.05},
-        *_BUS, ("i_re", "i_im", "e_re", "e_im", "omega", "E_droop"),
-    ),
-    Reference(
-        "synchronous_generator_ac4a", f"{_FOLDER}/reference_ac4a.csv", {"P_0": 0.8, **_EXACT}, *_BUS, _GENERATOR,
-    ),
-    Reference("synchronous_generator_st1", f"{_FOLDER}/reference_st1.csv", {"P_0": 0.78}, *_BUS, _GENERATOR),
-    Reference("synchronous_generator_st4b", f"{_FOLDER}/reference_st4b.csv", {"P_0": 0.9}, *_BUS, _GENERATOR),
-    Reference(
-        "gfor_phasor", "gfor_fmu/reference_phasor.csv",
+        "gfor",
+        "gfor_fmu/reference.csv",
         {"P_0": 0.9, "Q_0": 0.05, "pod_p.enabled": 1.0, "pod_q.enabled": 1.0},
-        *_BUS, ("i_re", "i_im", "e_re", "e_im", "omega", "u", "delta_p_pod", "delta_q_pod"),
+        *_BUS,
+        ("i_re", "i_im", "omega", "u", "delta_p_pod", "delta_q_pod"),
+    ),
+    Reference(
+        "gfl",
+        "fmus/grid_following/reference.csv",
+        {"P_0": 0.9, "Q_0": 0.05, "frequency_droop.enabled": 1.0},
+        *_BUS,
+        ("i_re", "i_im", "omega", "u", "i_s", "current_demand"),
+    ),
+    Reference(
+        "gfl_phasor",
+        "fmus/grid_following/reference_phasor.csv",
+        {"P_0": 0.9, "Q_0": 0.05, "frequency_droop.enabled": 1.0},
+        *_BUS,
+        ("i_re", "i_im", "e_re", "e_im", "omega", "u", "i_s"),
+    ),
+    Reference(
+        "gfl_l2ep",
+        "fmus/gfl_l2ep/reference.csv",
+        {"P_0": 0.8, "Q_0": 0.05},
+        *_BUS,
+        ("i_re", "i_im", "omega", "u_c", "i", "current_demand"),
+    ),
+    Reference(
+        "gfl_l2ep_phasor",
+        "fmus/gfl_l2ep/reference_phasor.csv",
+        {"P_0": 0.8, "Q_0": 0.05},
+        *_BUS,
+        ("i_re", "i_im", "e_re", "e_im", "omega", "u_c", "i"),
+    ),
+    Reference(
+        "external_grid",
+        "fmus/external_grid/reference.csv",
+        {"S_n": 17700.0},
+        *_BUS,
+        ("i_re", "i_im", "p", "q"),
+    ),
+    Reference(
+        "static_generation",
+        "fmus/static_generation/reference.csv",
+        {"P_0": 0.9, "Q_0": 0.05},
+        *_BUS,
+        ("i_re", "i_im", "p", "q"),
+    ),
+    Reference(
+        "static_generation_phasor",
+        "fmus/static_generation/reference_phasor.csv",
+        {"P_0": 0.9, "Q_0": 0.05},
+        *_BUS,
+        ("i_re", "i_im", "e_re", "e_im"),
+    ),
+    Reference(
+        "regfm_a1_phasor",
+        "fmus/regfm_a1/reference.csv",
+        {"P_0": 0.9, "Q_0": 0.05},
+        *_BUS,
+        ("i_re", "i_im", "e_re", "e_im", "omega", "E_droop"),
+    ),
+    Reference(
+        "synchronous_generator_ac4a",
+        f"{_FOLDER}/reference_ac4a.csv",
+        {"P_0": 0.8, **_EXACT},
+        *_BUS,
+        _GENERATOR,
+    ),
+    Reference(
+        "synchronous_generator_st1",
+        f"{_FOLDER}/reference_st1.csv",
+        {"P_0": 0.78},
+        *_BUS,
+        _GENERATOR,
+    ),
+    Reference(
+        "synchronous_generator_st4b",
+        f"{_FOLDER}/reference_st4b.csv",
+        {"P_0": 0.9},
+        *_BUS,
+        _GENERATOR,
+    ),
+    Reference(
+        "gfor_phasor",
+        "gfor_fmu/reference_phasor.csv",
+        {"P_0": 0.9, "Q_0": 0.05, "pod_p.enabled": 1.0, "pod_q.enabled": 1.0},
+        *_BUS,
+        ("i_re", "i_im", "e_re", "e_im", "omega", "u", "delta_p_pod", "delta_q_pod"),
     ),
     *(
         Reference(
-            f"synchronous_generator_{exciter}_phasor", f"{_FOLDER}/reference_{exciter}_phasor.csv",
+            f"synchronous_generator_{exciter}_phasor",
+            f"{_FOLDER}/reference_{exciter}_phasor.csv",
             {"P_0": P_0, **(_EXACT if exciter == "ac4a" else {})},
-            *_BUS, (*_GENERATOR, "e_re", "e_im"),
+            *_BUS,
+            (*_GENERATOR, "e_re", "e_im"),
         )
         for exciter, P_0 in (("ac4a", 0.8), ("st1", 0.78), ("st4b", 0.9))
     ),
     Reference(
-        "two_area_grid", "fmus/grid/reference.csv", {"X_L": 0.1},
-        {"sg1.i_re": 27.0, "sg2.i_re": 39.0}, {"sg1.i_re": 26.5, "sg1.i_im": -0.5, "sg2.i_re": 39.0},
+        "two_area_grid",
+        "fmus/grid/reference.csv",
+        {"X_L": 0.1},
+        {"sg1.i_re": 27.0, "sg2.i_re": 39.0},
+        {"sg1.i_re": 26.5, "sg1.i_im": -0.5, "sg2.i_re": 39.0},
         ("bus_2.v_re", "bus_2.v_im", "bus_3.v_re", "bus_3.v_im", "L.p"),
     ),
     Reference(
-        "infinite_bus", "fmus/infinite_bus/reference.csv", {"load.P": 600.0},
-        _INFEED, {"i_re": 13.0, "i_im": 0.5}, ("v_re", "v_im", "v", "p", "q"),
+        "infinite_bus",
+        "fmus/infinite_bus/reference.csv",
+        {"load.P": 600.0},
+        _INFEED,
+        {"i_re": 13.0, "i_im": 0.5},
+        ("v_re", "v_im", "v", "p", "q"),
     ),
-)  # fmt: skip
+)
 
 
 def integrate(reference: Reference) -> tuple[list[str], np.ndarray]:
@@ -119,12 +172,20 @@ def integrate(reference: Reference) -> tuple[list[str], np.ndarray]:
     x, rows = np.array(x).ravel(), []
     times = np.arange(round(STOP_TIME / INTERVAL) + 1) * INTERVAL
     change = round(STEP_TIME / INTERVAL)
-    for inputs, span in ((reference.before, times[: change + 1]), (reference.after, times[change:])):
+    for inputs, span in (
+        (reference.before, times[: change + 1]),
+        (reference.after, times[change:]),
+    ):
         u = np.array([inputs.get(v.name, 0.0) for v in model.inputs])
         solution = solve_ivp(
             lambda t, x, u=u: np.array(model.derivatives(x, u, p, c)).ravel(),
-            (span[0], span[-1]), x, "Radau", t_eval=span, rtol=1e-10, atol=1e-12,
-        )  # fmt: skip
+            (span[0], span[-1]),
+            x,
+            "Radau",
+            t_eval=span,
+            rtol=1e-10,
+            atol=1e-12,
+        )
         assert solution.success, solution.message
         x = solution.y[:, -1]
         for time, state in zip(span, solution.y.T, strict=True):
@@ -139,7 +200,9 @@ def main(models: list[str]) -> None:
         if models and reference.model not in models:
             continue
         columns, rows = integrate(reference)
-        np.savetxt(reference.path, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.12g")
+        np.savetxt(
+            reference.path, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.12g"
+        )
 
 
 if __name__ == "__main__":

@@ -67,7 +67,8 @@ def _cells(line: str, edge: str) -> list[str]:
 
 def _by_heading(columns: list[str], rows: list[list[str]]) -> Rows:
     names = [
-        name if name not in columns[:k] else f"{name} {columns[:k].count(name) + 1}" for k, name in enumerate(columns)
+        name if name not in columns[:k] else f"{name} {columns[:k].count(name) + 1}"
+        for k, name in enumerate(columns)
     ]
     return [dict(zip(names, row, strict=True)) for row in rows]
 

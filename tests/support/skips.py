@@ -23,7 +23,9 @@ def read_list(path: Path) -> list[tuple[str, str]]:
         if text:
             test, bar, reason = (part.strip() for part in text.partition("|"))
             if not (test and bar and reason):
-                raise pytest.UsageError(f"{path}:{number}: {text!r} is not of the form FILE::TEST | REASON")
+                raise pytest.UsageError(
+                    f"{path}:{number}: {text!r} is not of the form FILE::TEST | REASON"
+                )
             entries.append((test, reason))
     return entries
 
@@ -48,7 +50,9 @@ class Skips:
         reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else str(report.longrepr)
         reason = reason.removeprefix("Skipped: ")
         test = report.nodeid.partition("[")[0]
-        if not any(fnmatchcase(test, name) and fnmatchcase(reason, why) for name, why in self._allowed):
+        if not any(
+            fnmatchcase(test, name) and fnmatchcase(reason, why) for name, why in self._allowed
+        ):
             self.unexpected.append(f"{report.nodeid} | {reason}")
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
@@ -61,5 +65,8 @@ class Skips:
             )
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        if self.unexpected and session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
+        if self.unexpected and session.exitstatus in (
+            pytest.ExitCode.OK,
+            pytest.ExitCode.NO_TESTS_COLLECTED,
+        ):
             session.exitstatus = pytest.ExitCode.TESTS_FAILED

@@ -36,12 +36,21 @@ LEAFLETS = {
 FAMILY = ("gfor", "gfor_abc", "gfor_phasor")
 """Models with one table for all of them."""
 
-KINDS = {Input: "input", Output: "output", Parameter: "parameter", CalculatedParameter: "calculated", State: "state"}
+KINDS = {
+    Input: "input",
+    Output: "output",
+    Parameter: "parameter",
+    CalculatedParameter: "calculated",
+    State: "state",
+}
 
 
 def variable_table(model: Model) -> str:
     """All variables of a model as a Markdown table."""
-    rows = ["| Name | Kind | Unit | Start | Range | Description | Source |", "|---|---|---|---|---|---|---|"]
+    rows = [
+        "| Name | Kind | Unit | Start | Range | Description | Source |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for kind in KINDS:
         rows += [_row(v) for v in model.variables if type(v) is kind]
     return "\n".join(rows)
@@ -54,7 +63,9 @@ def _row(v: Variable) -> str:
         source = v.source
         start = str(bool(v.start)).lower() if v.type == "Boolean" else f"{v.start:g}"
         if v.minimum is not None or v.maximum is not None:
-            bounds = " … ".join("" if b is None else f"{b:g}" for b in (v.minimum, v.maximum)).strip()
+            bounds = " … ".join(
+                "" if b is None else f"{b:g}" for b in (v.minimum, v.maximum)
+            ).strip()
     elif isinstance(v, Input):
         start = f"{v.start:g}"
     return f"| `{v.name}` | {kind} | {v.unit} | {start} | {bounds} | {v.text.replace('|', 'abs ')} | {source} |"
@@ -75,15 +86,25 @@ def family_table() -> str:
         if isinstance(first[0], State | CalculatedParameter):
             states.append(f"`{key}`")
             continue
-        starts = dict.fromkeys(_row(v).split(" | ")[3] for all_of in by_model.values() for v in all_of)
-        only = "" if len(by_model) == len(FAMILY) else f"{', '.join(m.removeprefix('gfor_') for m in by_model)}: "
+        starts = dict.fromkeys(
+            _row(v).split(" | ")[3] for all_of in by_model.values() for v in all_of
+        )
+        only = (
+            ""
+            if len(by_model) == len(FAMILY)
+            else f"{', '.join(m.removeprefix('gfor_') for m in by_model)}: "
+        )
         names = ",".join(f"`{v.name}`" for v in first)
         mark = "*" if isinstance(first[0], Parameter) and first[0].tunable else ""
-        text = re.sub(r" \[.*\]| \(.*\)| of POD-[PQ]|; .*", "", first[0].text.replace("|", "abs ")).strip()
+        text = re.sub(
+            r" \[.*\]| \(.*\)| of POD-[PQ]|; .*", "", first[0].text.replace("|", "abs ")
+        ).strip()
         bounds = _row(first[0]).split(" | ")[4].replace(" ", "")
         kind = KINDS[type(first[0])]
         said = f"{only}{kind + ': ' if kind != 'parameter' else ''}{text}"
-        rows.append(f"|{names}{mark}|{first[0].unit}|{','.join(starts).replace(' ', '')}|{bounds}|{said}|")
+        rows.append(
+            f"|{names}{mark}|{first[0].unit}|{','.join(starts).replace(' ', '')}|{bounds}|{said}|"
+        )
     table = "\n".join(rows)
     return f"{table}\n\nStates and calculated values: {', '.join(states)}."
 

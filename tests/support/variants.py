@@ -30,4 +30,6 @@ def as_phasors(name, folder):
 
 def with_load_model(name, folder, keys):
     """The case with ``[network.load_model]`` and these keys."""
-    return changed(name, folder, ("[network.loads]", f"[network.load_model]\n{keys}\n\n[network.loads]"))
+    return changed(
+        name, folder, ("[network.loads]", f"[network.load_model]\n{keys}\n\n[network.loads]")
+    )

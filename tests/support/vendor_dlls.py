@@ -50,7 +50,17 @@ int32_t Model_Outputs(struct instance *s) {
 """
 
 
-def lag(name="lag", *, state="s->doubles[0]", doubles=1, sample_time=1e-4, begin="", do="", head="", calls=CALLS):
+def lag(
+    name="lag",
+    *,
+    state="s->doubles[0]",
+    doubles=1,
+    sample_time=1e-4,
+    begin="",
+    do="",
+    head="",
+    calls=CALLS,
+):
     """Source of a lag; ``do`` is run in every sample, ``begin`` in the initialisation."""
     info = INFO % {"name": name, "sample_time": sample_time, "doubles": doubles}
     body = calls.replace("STATE", state).replace("BEGIN", begin).replace("DO", do)
@@ -63,7 +73,18 @@ def compiled(source, folder, name="controller", platform="linux64"):
     text.write_text(source, encoding="utf-8")
     target = () if platform == "linux64" else ("-target", TARGETS[platform][0])
     flags = ("-O1", "-shared", "-fPIC", "-g0", "-ffp-contract=off", *OWN_LIBRARY.get(platform, ()))
-    command = [sys.executable, "-m", "ziglang", "cc", *target, *flags, str(text), "-o", str(library), "-lm"]
+    command = [
+        sys.executable,
+        "-m",
+        "ziglang",
+        "cc",
+        *target,
+        *flags,
+        str(text),
+        "-o",
+        str(library),
+        "-lm",
+    ]
     subprocess.run(command, check=True, capture_output=True, cwd=folder)
     return library
 
@@ -131,13 +152,22 @@ def _library(source, platform):
 
 
 def droop_device(
-    folder, *, sample=1e-4, delay=0, wrap="*theta = fmod(*theta, turn);", hide="", changes=(), platform="linux64"
+    folder,
+    *,
+    sample=1e-4,
+    delay=0,
+    wrap="*theta = fmod(*theta, turn);",
+    hide="",
+    changes=(),
+    platform="linux64",
 ):
     """File of a device: the droop behind an inductor and a transformer.
 
     ``changes`` replace text in it; ``hide`` may put the filtered power elsewhere.
     """
-    source = INTERFACE + DROOP.replace("SAMPLE", repr(sample)).replace("WRAP", wrap).replace("HIDE", hide)
+    source = INTERFACE + DROOP.replace("SAMPLE", repr(sample)).replace("WRAP", wrap).replace(
+        "HIDE", hide
+    )
     (folder / f"droop{ENDINGS[platform]}").write_bytes(_library(source, platform))
     text = DEVICE.format(delay=delay).replace("droop.so", f"droop{ENDINGS[platform]}")
     for old, new in changes:

@@ -22,7 +22,9 @@ def coupled_modes(model, scr, **values):
     A_g, B_i, C_v, _ = grid.blocks([P * in_pu, 0.0])
     whole = np.block([[A, B_v @ C_v[:2]], [B_i @ C_i, A_g]])
     kept = [
-        k for k, v in enumerate([*device.model.states, *grid.model.states]) if v.name not in ("source.theta", "clock.t")
+        k
+        for k, v in enumerate([*device.model.states, *grid.model.states])
+        if v.name not in ("source.theta", "clock.t")
     ]
     return np.linalg.eigvals(whole[np.ix_(kept, kept)])
 

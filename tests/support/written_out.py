@@ -27,7 +27,10 @@ def written_out(model, *, checked=False):
     def alone(function):
         return function and Function(function.name, [x, u, p, c], function.of(x, u, p, c, v))
 
-    functions = {name: alone(getattr(model, name)) for name in ("derivatives", "outputs_function", "implicit")}
+    functions = {
+        name: alone(getattr(model, name))
+        for name in ("derivatives", "outputs_function", "implicit")
+    }
     return replace(model, nodal=None, **functions)
 
 
@@ -57,10 +60,14 @@ def _solve(Y, currents):
     while waiting:
         entries, _, bus = heappop(queue)
         if bus not in waiting or entries != len(rows[bus]):
-            continue  # it has gone, or has another number of neighbours by now and stands elsewhere in the queue too
+            # it has gone, or has another number of neighbours by now and stands elsewhere in the
+            # queue too
+            continue
         waiting.remove(bus)
         order.append(bus)
-        for other in sorted((column for column in rows[bus] if column in waiting), key=place.__getitem__):
+        for other in sorted(
+            (column for column in rows[bus] if column in waiting), key=place.__getitem__
+        ):
             factor = rows[other].pop(bus) / rows[bus][bus]
             for column, value in rows[bus].items():
                 if column != bus:

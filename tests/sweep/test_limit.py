@@ -69,7 +69,9 @@ def test_damping_that_is_least_on_the_way_is_told():
         tried = [{"value": k, "kind": str(H), "damping_percent": d} for k, d in enumerate(dampings)]
         tried.append({"value": len(dampings), "kind": str(F), "damping_percent": -1.0})
         end = float(len(dampings))
-        found = ParameterLimit("x", "", "s", "S", Until(), F, end - 0.5, end, None, "", tuple(tried), (), "", end)
+        found = ParameterLimit(
+            "x", "", "s", "S", Until(), F, end - 0.5, end, None, "", tuple(tried), (), "", end
+        )
         return found.sentence
 
     assert "x = 2.5 (on the way 3.06 % at 1), " in limit(3.98, 3.06, 4.2)
@@ -137,16 +139,20 @@ def limit_of(loop, vary, damping=0.0):
 def test_the_limit_of_a_loop_is_that_of_hurwitz(gfor, loop):
     code, found, err = told(gfor, loop, "--vary", "k.gain=-5:-30", "--until", "unstable")
     assert code == 0
-    assert found["limit"] == pytest.approx(-2 / LAG, rel=0.02)  # one step of delay in the loop: 1 ms at 10 rad/s
+    # one step of delay in the loop: 1 ms at 10 rad/s
+    assert found["limit"] == pytest.approx(-2 / LAG, rel=0.02)
     assert abs(found["beyond"]) > abs(found["limit"])
     assert found["beyond"] == pytest.approx(found["limit"], rel=1e-3)
     assert found["reason"] is None
     assert found["mode"]["name"] == "swing"
     assert found["mode"]["frequency_hz"] == pytest.approx(1 / LAG / 6.2832, rel=0.02)
-    assert -0.05 < found["mode"]["damping_percent"] < 0  # the step map alone would be stable at 0.2 %
+    # the step map alone would be stable at 0.2 %
+    assert -0.05 < found["mode"]["damping_percent"] < 0
     assert sum(found["mode"]["components"].values()) == pytest.approx(1, abs=0.03)
     assert "9 values were tried before the bisection" in err
-    assert json.loads((loop.parent / "out" / "limits.json").read_text())[0]["limit"] == found["limit"]
+    assert (
+        json.loads((loop.parent / "out" / "limits.json").read_text())[0]["limit"] == found["limit"]
+    )
 
 
 def test_a_wanted_damping_is_a_limit_too(loop):
@@ -192,9 +198,17 @@ def test_a_unit_beyond_its_rating_on_the_way_is_told_in_the_answer():
 
 def test_on_the_terminal_the_answer_comes_first(gfor, loop):
     code, text, _ = gfor(
-        loop, "--workers", 1, "--out", loop.parent / "o", "--vary", "k.gain=-5:-30:2", "--until", "unstable",
+        loop,
+        "--workers",
+        1,
+        "--out",
+        loop.parent / "o",
+        "--vary",
+        "k.gain=-5:-30:2",
+        "--until",
+        "unstable",
         "--fail-unstable",
-    )  # fmt: skip
+    )
     assert code == 1
     first = text.splitlines()[0]
     assert first.startswith("Loop: stable up to k.gain = -")
@@ -237,10 +251,16 @@ def test_what_cannot_move_together_is_refused(loop, vary, said):
     ("options", "said"),
     [
         (["--vary", "one.T=0.1,0.2", "--until", "unstable"], "needs a range"),
-        (["--vary", "one.T=0.1:0.2", "--vary", "two.T=0.1:0.2", "--until", "unstable"], "searches along one range"),
+        (
+            ["--vary", "one.T=0.1:0.2", "--vary", "two.T=0.1:0.2", "--until", "unstable"],
+            "searches along one range",
+        ),
         (["--vary", "one.T=0.1:0.2", "--until", "soon"], "'unstable'"),
         (["--vary", "one.T=0.1:0.2", "--until", "120 %"], "'120 %' is not a damping"),
-        (["--vary", "one.T=0.1:0.2", "--until", "0.05"], "is read in percent; write 5 for a ratio of 0.05"),
+        (
+            ["--vary", "one.T=0.1:0.2", "--until", "0.05"],
+            "is read in percent; write 5 for a ratio of 0.05",
+        ),
     ],
 )
 def test_a_search_that_is_none_is_refused(gfor, loop, options, said):

@@ -18,7 +18,9 @@ from orchestrator.sweep.limit import Ending, ParameterLimit
     ],
 )
 def test_the_least_damping_on_the_way_is_told_where_it_is_less_than_at_both_ends(damping, said):
-    tried = [{"kind": str(Ending.HOLDS), "damping_percent": x, "value": k} for k, x in enumerate(damping)]
+    tried = [
+        {"kind": str(Ending.HOLDS), "damping_percent": x, "value": k} for k, x in enumerate(damping)
+    ]
     failed = {"kind": str(Ending.FAILS), "damping_percent": -1.0, "value": 9}
     fake = SimpleNamespace(tried=[*tried, failed], _value=str)
     assert ParameterLimit._dip(fake) == said

@@ -37,7 +37,10 @@ def test_damping_and_frequency_of_named_modes(drawn):
     damping, frequency = drawn[0].axes
     assert (damping.get_ylabel(), frequency.get_ylabel()) == ("Damping [%]", "Frequency [Hz]")
     assert frequency.get_ylim()[0] == 0
-    assert [list(line.get_ydata()) for line in damping.lines if len(line.get_ydata()) == 2] == [[40, 60], [0, 0]]
+    assert [list(line.get_ydata()) for line in damping.lines if len(line.get_ydata()) == 2] == [
+        [40, 60],
+        [0, 0],
+    ]
 
 
 @pytest.mark.parametrize("states", [["sg1.omega"], ["sg1.omega", "sg2.omega"]])
@@ -55,8 +58,13 @@ def test_failures_are_listed_up_to_a_number_and_the_rest_is_counted(monkeypatch,
     monkeypatch.setattr(tables, "warned", lambda result: [])
     sweep = SimpleNamespace(prepared=SimpleNamespace(name="base"))
     failed = [(sweep, place, "no power flow") for place in range(tables._FAILURES_SHOWN + beyond)]
-    result = SimpleNamespace(plan=SimpleNamespace(idle=(), number_of_points=99), limits=(), scenarios=(), refined=0,
-                             failures=lambda: iter(failed))  # fmt: skip
+    result = SimpleNamespace(
+        plan=SimpleNamespace(idle=(), number_of_points=99),
+        limits=(),
+        scenarios=(),
+        refined=0,
+        failures=lambda: iter(failed),
+    )
     texts = tables.remarks(SimpleNamespace(result=result))
     assert len(texts) == 1 + tables._FAILURES_SHOWN + beyond
     assert [text for text in texts if "more" in text] == ["  … and 1 more, in sweep.csv"] * beyond
@@ -77,7 +85,9 @@ def test_a_curve_stands_over_the_last_axis():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(plots, "_rows", lambda given: [given])
         plots._draw(axis, SimpleNamespace(axes=axes), curve, lambda sample: sample["damping"])
-    assert [(list(line.get_xdata()), list(line.get_ydata())) for line in axis.lines] == [([5.0, 7.0], [40.0, 60.0])] * 2
+    assert [(list(line.get_xdata()), list(line.get_ydata())) for line in axis.lines] == [
+        ([5.0, 7.0], [40.0, 60.0])
+    ] * 2
 
 
 def test_a_sweep_shows_itself_under_its_own_name(monkeypatch):

@@ -16,7 +16,9 @@ from tests.sweep.sweep_case import two_oscillators
 
 @pytest.fixture
 def task(tmp_path):
-    plan = plan_sweep(load_case(two_oscillators(tmp_path)), SweepRequest([parse_vary("a1.gain=3:4:2")]))
+    plan = plan_sweep(
+        load_case(two_oscillators(tmp_path)), SweepRequest([parse_vary("a1.gain=3:4:2")])
+    )
     return plan.task(plan.scenarios[0], (0,))
 
 
@@ -39,8 +41,12 @@ def test_a_file_of_another_form_is_computed_anew(task):
     assert PointRecord.restored({"named": {}}, {}) is None
 
 
-@pytest.mark.parametrize(("error", "words"), [(RuntimeError("of a library"), "RuntimeError: of a library")])
-def test_what_a_library_does_ends_one_point_only_and_is_tried_again(task, monkeypatch, error, words):
+@pytest.mark.parametrize(
+    ("error", "words"), [(RuntimeError("of a library"), "RuntimeError: of a library")]
+)
+def test_what_a_library_does_ends_one_point_only_and_is_tried_again(
+    task, monkeypatch, error, words
+):
     def fails(*_, **__):
         raise error
 
@@ -50,7 +56,9 @@ def test_what_a_library_does_ends_one_point_only_and_is_tried_again(task, monkey
 
 
 def test_what_an_fmu_of_ours_refuses_fails_alone_and_is_kept(tmp_path):
-    plan = plan_sweep(load_case(two_oscillators(tmp_path)), SweepRequest([parse_vary("slow.T=-1,1")]))
+    plan = plan_sweep(
+        load_case(two_oscillators(tmp_path)), SweepRequest([parse_vary("slow.T=-1,1")])
+    )
     refused, fine = (compute_point(plan.task(plan.scenarios[0], (k,))) for k in (0, 1))
     assert "T must exceed 0" in refused.error
     assert refused.failure.kind is ErrorKind.START

@@ -64,7 +64,9 @@ def gfor_in(folder, *arguments):
     """`gfor` in a process of its own: there nothing is known to be intact yet."""
     environment = {**os.environ, "GFOR_COSIM_CACHE": str(folder)}
     command = [sys.executable, "-m", "orchestrator.cli", *arguments]
-    return subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False
+    )
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +82,9 @@ def filled(tmp_path_factory):
 @pytest.mark.parametrize("damage", ["bit flipped", "empty"])
 def test_damage_anywhere_in_the_cache_changes_no_result(filled, damage, tmp_path):
     folder = shutil.copytree(filled[0], tmp_path / "cache")
-    files = [path for path in sorted(folder.rglob("*")) if path.is_file() and path.suffix != ".sha256"]
+    files = [
+        path for path in sorted(folder.rglob("*")) if path.is_file() and path.suffix != ".sha256"
+    ]
     for path in files:
         DAMAGE[damage](path)
     done = gfor_in(folder, "modes", "infinite_bus", "--json")
@@ -100,7 +104,10 @@ def test_code_added_to_a_kept_fmu_is_never_run(filled, tmp_path):
     with zipfile.ZipFile(fmu) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
     added = f"open({str(trace)!r}, 'w').close()\n".encode()
-    members = {name: added + content if name.endswith(".py") else content for name, content in members.items()}
+    members = {
+        name: added + content if name.endswith(".py") else content
+        for name, content in members.items()
+    }
     with zipfile.ZipFile(fmu, "w") as archive:
         for name, content in members.items():
             archive.writestr(name, content)
@@ -126,9 +133,12 @@ def test_an_altered_fmu_in_the_cache_is_a_stranger(own_cache):
 def test_a_cache_that_cannot_be_written_is_one_clear_error(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("not a folder", encoding="utf-8")
     monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path / "file"))
-    with pytest.raises(CacheError, match=r"cannot be written.*Not a directory.*set GFOR_COSIM_CACHE"):
+    with pytest.raises(
+        CacheError, match=r"cannot be written.*Not a directory.*set GFOR_COSIM_CACHE"
+    ):
         compile_library(SOURCE, host_platform())
-    done = gfor_in(tmp_path / "file", "modes", "infinite_bus")  # this process may have its FMUs open already
+    # this process may have its FMUs open already
+    done = gfor_in(tmp_path / "file", "modes", "infinite_bus")
     assert done.returncode == 2
     assert done.stderr.startswith("error: the cache cannot be written")
     assert done.stderr.count("\n") == 1

@@ -16,8 +16,12 @@ from orchestrator.fmi.description import parse_description
 
 def _chain(buses):
     names = tuple(f"b{k}" for k in range(buses))
-    lines = tuple(Line(f"l{k}", names[k], names[k + 1], X=0.1, R=0.01, B=0.02) for k in range(buses - 1))
-    return Network("chain", names, lines, (Load("load", names[-1], 50.0, 10.0),), (Port("unit", names[0]),))
+    lines = tuple(
+        Line(f"l{k}", names[k], names[k + 1], X=0.1, R=0.01, B=0.02) for k in range(buses - 1)
+    )
+    return Network(
+        "chain", names, lines, (Load("load", names[-1], 50.0, 10.0),), (Port("unit", names[0]),)
+    )
 
 
 def _full(function, output, input_):
@@ -27,7 +31,9 @@ def _full(function, output, input_):
     return np.array(found, dtype=bool).reshape(len(depends), len(function.inputs[input_]))
 
 
-@pytest.mark.parametrize("name", ["gfor", "synchronous_generator_ac4a", "infinite_bus", "chain of 12 buses"])
+@pytest.mark.parametrize(
+    "name", ["gfor", "synchronous_generator_ac4a", "infinite_bus", "chain of 12 buses"]
+)
 def test_initial_unknowns_follow_full_matrices(name):
     """An initial output or derivative depends on a parameter directly, by a calculated value or by an initial state."""
     model = grid(_chain(12)) if name.startswith("chain") else build_model(name)
@@ -40,7 +46,9 @@ def test_initial_unknowns_follow_full_matrices(name):
     ):
         x, u, p, c = (_full(function, 0, k) for k in range(4))
         by_parameter = p | (
-            x.astype(int) @ _full(model.initialise, 1, 0) + c.astype(int) @ _full(model.initialise, 0, 0) > 0
+            x.astype(int) @ _full(model.initialise, 1, 0)
+            + c.astype(int) @ _full(model.initialise, 0, 0)
+            > 0
         )
         for row in range(len(u)):
             wanted = (*np.flatnonzero(by_parameter[row]), *(first_input + np.flatnonzero(u[row])))
@@ -56,9 +64,13 @@ def test_long_lists_are_left_out_and_short_ones_stay(monkeypatch, tmp_path):
     assert len(sparse.outputs) * len(sparse.parameters) > dependencies.MOST
     assert structure(sparse) == whole
     found = structure(meshed)
-    assert [unknown.reference for unknown in found.outputs] == [u.reference for u in unlisted(meshed).outputs]
+    assert [unknown.reference for unknown in found.outputs] == [
+        u.reference for u in unlisted(meshed).outputs
+    ]
     assert all(unknown.known is None for unknown in found.initial[-len(meshed.outputs) :])
     monkeypatch.setattr(dependencies, "MOST", 10)
     text = model_description(meshed, "guid", "meshed", "tool")
     described = parse_description(tmp_path / "meshed.fmu", text)
-    assert described.feedthrough("b3.v_re") == described.inputs == tuple(v.name for v in meshed.inputs)
+    assert (
+        described.feedthrough("b3.v_re") == described.inputs == tuple(v.name for v in meshed.inputs)
+    )

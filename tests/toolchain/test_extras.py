@@ -36,9 +36,14 @@ def test_the_table_of_extras_is_that_of_the_distribution():
 def test_a_missing_library_is_named_with_its_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "ziglang", None)
     monkeypatch.setitem(sys.modules, "pandapower", None)
-    with pytest.raises(MissingLibraryError, match=r"trial needs ziglang, which is not installed.*gfor-cosim\[build\]"):
+    with pytest.raises(
+        MissingLibraryError,
+        match=r"trial needs ziglang, which is not installed.*gfor-cosim\[build\]",
+    ):
         require("a trial", "ziglang", "skrf")
-    with pytest.raises(MissingLibraryError, match=r"ziglang, pandapower, which are .*gfor-cosim\[build,networks\]"):
+    with pytest.raises(
+        MissingLibraryError, match=r"ziglang, pandapower, which are .*gfor-cosim\[build,networks\]"
+    ):
         require("a trial", "ziglang", "pandapower")
 
 
@@ -57,7 +62,9 @@ sys.exit(main({arguments}))
 def gfor_without_extras(*arguments):
     """Run the command line where no library of an extra can be imported, after importing every command."""
     script = WITHOUT_EXTRAS.format(libraries=list(EXTRAS), arguments=list(arguments))
-    return subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, cwd=ROOT)
+    return subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False, cwd=ROOT
+    )
 
 
 def test_every_command_can_be_imported_without_extras():

@@ -99,7 +99,14 @@ def test_outputs_are_fresh_after_setting_inputs_without_a_step(host):
 
 def test_initialisation_meets_the_power_flow(host):
     h = host()
-    h.set(P_0=0.6, Q_0=0.1, v_0=1.02, theta_0=0.3, v_re=1.02 * math.cos(0.3), v_im=1.02 * math.sin(0.3))
+    h.set(
+        P_0=0.6,
+        Q_0=0.1,
+        v_0=1.02,
+        theta_0=0.3,
+        v_re=1.02 * math.cos(0.3),
+        v_im=1.02 * math.sin(0.3),
+    )
     h.initialise()
     assert h.get("p", "q") == pytest.approx([0.6, 0.1], abs=1e-13)
     derivatives = [n for n in h.reals if n.startswith("der(")]

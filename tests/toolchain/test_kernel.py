@@ -204,14 +204,25 @@ def test_a_model_may_have_a_single_calculated_parameter():
 
 def test_jacobians_are_exact():
     model = lag()
-    A, B, C, D = (block.item() for block in jacobians(model)([0.3], [0.1], [1e-4, 3.0, 0.05], [1.5, 0.75]))
+    A, B, C, D = (
+        block.item() for block in jacobians(model)([0.3], [0.1], [1e-4, 3.0, 0.05], [1.5, 0.75])
+    )
     assert (A, B, C, D) == (-1 / 0.05, 3.0 / 0.05, 1.0, 1.0)
 
 
 # -- operations of the Python kernel -----------------------------------------------------------
 
 # 0.25, −0.75 and so on: both signs, both orders, equal arguments, and zero.
-POINTS = [(0.25, 0.5), (0.5, 0.25), (-0.75, 0.5), (0.75, -0.5), (-0.75, -0.5), (0.5, 0.5), (0.0, 0.5), (0.0, -0.0)]
+POINTS = [
+    (0.25, 0.5),
+    (0.5, 0.25),
+    (-0.75, 0.5),
+    (0.75, -0.5),
+    (-0.75, -0.5),
+    (0.5, 0.5),
+    (0.0, 0.5),
+    (0.0, -0.0),
+]
 OPERATIONS = {
     "add": lambda f, a, b: a + b,
     "sub": lambda f, a, b: a - b,
@@ -272,7 +283,9 @@ def test_python_kernel_computes_what_casadi_computes(name):
     for a, b in POINTS:
         z = vector(model, a=a, b=b)
         code.outputs(z)
-        assert z[model.value_references[name]] == pytest.approx(in_casadi(name, a, b), rel=1e-15, abs=0.0), (a, b)
+        assert z[model.value_references[name]] == pytest.approx(
+            in_casadi(name, a, b), rel=1e-15, abs=0.0
+        ), (a, b)
 
 
 @pytest.mark.parametrize("kernel", ["compiled", "tape"])
@@ -296,12 +309,16 @@ def test_the_branch_not_taken_may_be_undefined(kernel):
 
 
 def test_an_operation_without_a_code_is_refused_by_number():
-    with pytest.raises(ValueError, match=f"outputs: operation {symbols.Op.ATAN} has no code of a tape yet"):
+    with pytest.raises(
+        ValueError, match=f"outputs: operation {symbols.Op.ATAN} has no code of a tape yet"
+    ):
         tape_of(algebra({"y": lambda f, a, b: f.atan(a)}))
 
 
 def test_an_unknown_platform_is_refused_with_those_there_are():
-    with pytest.raises(ValueError, match=r"no target for platform 'amiga'.*linux64, win64, darwin64"):
+    with pytest.raises(
+        ValueError, match=r"no target for platform 'amiga'.*linux64, win64, darwin64"
+    ):
         compile_library("", "amiga")
 
 
@@ -429,9 +446,13 @@ def test_only_a_state_has_a_derivative():
 
 def test_units_are_declared_ones_and_pu_names_its_base():
     m, _ = builder()
-    with pytest.raises(ValueError, match=r"'P' has the unit 'kW', which is not declared; use one of .*MW"):
+    with pytest.raises(
+        ValueError, match=r"'P' has the unit 'kW', which is not declared; use one of .*MW"
+    ):
         m.parameter("P", 1.0, "kW", "Power")
-    with pytest.raises(ValueError, match="'P' is in pu and names no base; add base='S_n' or '100 MVA'"):
+    with pytest.raises(
+        ValueError, match="'P' is in pu and names no base; add base='S_n' or '100 MVA'"
+    ):
         m.parameter("P", 1.0, "pu", "Power")
 
 
@@ -461,9 +482,12 @@ def test_a_stepwise_state_stands_still_during_a_step_and_moves_at_its_end(kernel
     assert z[at["angle"]] == pytest.approx(0.5 + 0.05 * 30.0, rel=1e-15)
     assert z[at["seen"]] == 2.0 * math.cos(z[at["angle"]])
     assert code.advance(z, 1e-3, 50) == 0
-    assert z[at["angle"]] == pytest.approx(2.0 + 0.05 * (30.0 + x), rel=1e-12)  # its rate where the step began
+    # its rate where the step began
+    assert z[at["angle"]] == pytest.approx(2.0 + 0.05 * (30.0 + x), rel=1e-12)
 
 
 def test_the_implicit_method_refuses_stepwise_states():
-    with pytest.raises(ValueError, match="turning_frame: the implicit integrator knows no stepwise states"):
+    with pytest.raises(
+        ValueError, match="turning_frame: the implicit integrator knows no stepwise states"
+    ):
         turning_frame().build(integrator="sdirk")

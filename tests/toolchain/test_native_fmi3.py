@@ -29,7 +29,11 @@ class Host3:
     def __init__(self, directory, instance="one", token=None):
         self.md = md = fmpy.read_model_description(str(directory), validate=False)
         self.vr = {v.name: v.valueReference for v in md.modelVariables}
-        self.floats = [v.name for v in md.modelVariables if v.type == "Float64" and v.causality != "independent"]
+        self.floats = [
+            v.name
+            for v in md.modelVariables
+            if v.type == "Float64" and v.causality != "independent"
+        ]
         self.log = []
         self._logger = fmi3LogMessageCallback(lambda *a: self.log.append((a[1], a[-1].decode())))
         self.fmu = FMU3Slave(
@@ -72,7 +76,9 @@ class Host3:
 
     @property
     def states(self):
-        return [v.derivative.valueReference for v in self.md.modelVariables if v.derivative is not None]
+        return [
+            v.derivative.valueReference for v in self.md.modelVariables if v.derivative is not None
+        ]
 
     @property
     def rates(self):
@@ -82,7 +88,9 @@ class Host3:
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fmi3")
-    return {name: export(NativeFmu(build_model(name), "3.0"), folder, ("linux64",)) for name in MODELS}
+    return {
+        name: export(NativeFmu(build_model(name), "3.0"), folder, ("linux64",)) for name in MODELS
+    }
 
 
 @pytest.fixture(scope="module")
@@ -131,7 +139,9 @@ def test_the_terminal_of_a_device_follows_its_schema_and_names_real_variables(na
 
 
 def test_fmpy_simulates_it(files):
-    result = fmpy.simulate_fmu(str(files["gfor"]), stop_time=0.01, step_size=H, start_values={"P_0": 0.6})
+    result = fmpy.simulate_fmu(
+        str(files["gfor"]), stop_time=0.01, step_size=H, start_values={"P_0": 0.6}
+    )
     assert result["p"][0] == pytest.approx(0.6, abs=1e-12)
     assert np.ptp(result["p"]) < 1e-9
 
@@ -183,25 +193,40 @@ def test_the_adjoint_is_the_transpose(name, host3):
     knowns, unknowns = h.role("input") + h.states, h.role("output") + h.rates
     J = matrix(directional(h), unknowns, knowns)
     assert np.abs(J).max() > 1
-    np.testing.assert_allclose(matrix(adjoint(h), knowns, unknowns), J.T, rtol=1e-12, atol=1e-12 * np.abs(J).max())
+    np.testing.assert_allclose(
+        matrix(adjoint(h), knowns, unknowns), J.T, rtol=1e-12, atol=1e-12 * np.abs(J).max()
+    )
 
 
 def test_the_adjoint_is_the_transpose_in_initialisation_too(host3):
     h = host3()
     h.fmu.enterInitializationMode(startTime=0.0)
-    calculated = [v.valueReference for v in h.md.modelVariables if v.causality == "calculatedParameter"]
-    parameters = [v.valueReference for v in h.md.modelVariables if v.causality == "parameter" and v.type == "Float64"]
+    calculated = [
+        v.valueReference for v in h.md.modelVariables if v.causality == "calculatedParameter"
+    ]
+    parameters = [
+        v.valueReference
+        for v in h.md.modelVariables
+        if v.causality == "parameter" and v.type == "Float64"
+    ]
     knowns, unknowns = parameters + h.role("input"), h.role("output") + h.states + calculated
     J = matrix(directional(h), unknowns, knowns)
     assert np.abs(J[:, : len(parameters)]).max() > 0.1
-    np.testing.assert_allclose(matrix(adjoint(h), knowns, unknowns), J.T, rtol=1e-12, atol=1e-12 * np.abs(J).max())
+    np.testing.assert_allclose(
+        matrix(adjoint(h), knowns, unknowns), J.T, rtol=1e-12, atol=1e-12 * np.abs(J).max()
+    )
 
 
 def test_derivatives_equal_the_exact_jacobians(host3):
     h, model = host3().initialise(), build_model("gfor")
     h.run(20)
-    z = [h.fmu.getFloat64([v.valueReference])[0] if v.type == "Float64" else None for v in h.md.modelVariables]
-    np_, nc, nu, nx = (len(g) for g in (model.parameters, model.calculated, model.inputs, model.states))
+    z = [
+        h.fmu.getFloat64([v.valueReference])[0] if v.type == "Float64" else None
+        for v in h.md.modelVariables
+    ]
+    np_, nc, nu, nx = (
+        len(g) for g in (model.parameters, model.calculated, model.inputs, model.states)
+    )
     p = [p.start if value is None else value for p, value in zip(model.parameters, z, strict=False)]
     c, u, x = z[np_ : np_ + nc], z[np_ + nc : np_ + nc + nu], z[np_ + nc + nu : np_ + nc + nu + nx]
     A, B, C, D = (np.array(block) for block in jacobians(model)(x, u, p, c))
@@ -223,17 +248,35 @@ def test_a_saved_state_continues_in_another_instance(host3):
 
 
 BAD = {
-    "a wrong reference": (lambda h: h.fmu.getFloat64([9999]), ERROR, "no variable with value reference 9999"),
+    "a wrong reference": (
+        lambda h: h.fmu.getFloat64([9999]),
+        ERROR,
+        "no variable with value reference 9999",
+    ),
     "NaN at an input": (lambda h: h.set(v_re=math.nan), DISCARD, "v_re = "),
-    "out of range": (lambda h: h.set(pod_p__K=-1.0), DISCARD, "pod_p.K = -1; it must be at least 0"),
+    "out of range": (
+        lambda h: h.set(pod_p__K=-1.0),
+        DISCARD,
+        "pod_p.K = -1; it must be at least 0",
+    ),
     "set an output": (lambda h: h.set(p=1.0), ERROR, "p is computed"),
     "a step of zero": (lambda h: h.fmu.doStep(0.0, 0.0), ERROR, "it must exceed 0"),
-    "event mode": (lambda h: h.fmu.enterEventMode(), ERROR, "fmi3EnterEventMode is not for this FMU"),
+    "event mode": (
+        lambda h: h.fmu.enterEventMode(),
+        ERROR,
+        "fmi3EnterEventMode is not for this FMU",
+    ),
     "another type": (lambda h: h.fmu.getInt32([h.vr["p"]]), ERROR, "p is no Integer variable"),
     "no such type": (lambda h: h.fmu.getInt64([0]), ERROR, "no Int64 variables"),
-    "initialise twice": (lambda h: h.fmu.exitInitializationMode(), ERROR, "not allowed after initialisation"),
+    "initialise twice": (
+        lambda h: h.fmu.exitInitializationMode(),
+        ERROR,
+        "not allowed after initialisation",
+    ),
     "sizes differ": (
-        lambda h: h.fmu.fmi3GetFloat64(h.fmu.component, (ctypes.c_uint * 2)(0, 1), 2, (ctypes.c_double * 1)(), 1),
+        lambda h: h.fmu.fmi3GetFloat64(
+            h.fmu.component, (ctypes.c_uint * 2)(0, 1), 2, (ctypes.c_double * 1)(), 1
+        ),
         ERROR,
         "2 value references with 1 values",
     ),

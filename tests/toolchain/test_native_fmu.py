@@ -35,7 +35,9 @@ def test_a_native_fmu_is_valid_and_carries_no_python(name, fmu_path, extracted):
     assert not md.coSimulation.needsExecutionTool
     assert read_description(path).states_are_settable
     with zipfile.ZipFile(path) as archive:
-        others = [n for n in archive.namelist() if n.startswith("resources") or "python" in n.lower()]
+        others = [
+            n for n in archive.namelist() if n.startswith("resources") or "python" in n.lower()
+        ]
     assert others == (["resources/model.bin"] if build_model(name).kind == "network" else [])
 
 
@@ -49,7 +51,8 @@ def test_a_wrong_guid_gives_no_instance_and_says_why(extracted):
     description = read_description(cached(NativeFmu(build_model("gfor"))))
     with LoadedComponent("good", description) as component:
         assert component.get(["S_n"]) == {"S_n": 1500.0}
-    object.__setattr__(description, "guid", description.guid[:-3])  # a part of the right one passes our own check
+    # a part of the right one passes our own check
+    object.__setattr__(description, "guid", description.guid[:-3])
     with pytest.raises(ComponentError, match=r"the guid \S+ is not this FMU's, which is \{"):
         LoadedComponent("wrong", description)
 
@@ -91,7 +94,11 @@ def variables(h):
         "states": [v.valueReference for v in states],
         "outputs": [v.valueReference for v in md.modelVariables if v.causality == "output"],
         "rates": [d.variable.valueReference for d in md.derivatives],
-        "tunable": [v.valueReference for v in md.modelVariables if v.variability == "tunable" and v.type == "Real"],
+        "tunable": [
+            v.valueReference
+            for v in md.modelVariables
+            if v.variability == "tunable" and v.type == "Real"
+        ],
         "fixed": [
             v.valueReference
             for v in md.modelVariables
@@ -103,7 +110,11 @@ def variables(h):
 def test_a_derivative_that_is_not_finite_is_refused_by_name(open_host):
     """The magnitude of a voltage has none at zero."""
     h = open_host("two_area_grid", native=True).initialise()
-    h.set(**dict.fromkeys(("sg1__i_re", "sg1__i_im", "gfor__i_re", "gfor__i_im", "sg2__i_re", "sg2__i_im"), 0.0))
+    h.set(
+        **dict.fromkeys(
+            ("sg1__i_re", "sg1__i_im", "gfor__i_re", "gfor__i_im", "sg2__i_re", "sg2__i_im"), 0.0
+        )
+    )
     h.set(**{"L.i_re": 0.0, "L.i_im": 0.0})
     assert h.status(derivative_of("bus_2.v", "sg1.i_re"), h) == DISCARD
     assert "bus_2.v is not finite" in h.log[-1]
@@ -127,7 +138,10 @@ def central(read, write, reference, size):
 def inside(h, references):
     """Those whose values lie well within their bounds, so that they can be moved both ways."""
     values = dict(zip(references, h.fmu.getReal(references), strict=True))
-    bounds = {r: (float(v.min or -math.inf), float(v.max or math.inf)) for r, v in enumerate(h.md.modelVariables)}
+    bounds = {
+        r: (float(v.min or -math.inf), float(v.max or math.inf))
+        for r, v in enumerate(h.md.modelVariables)
+    }
     return [r for r, value in values.items() if bounds[r][0] + 1e-3 < value < bounds[r][1] - 1e-3]
 
 
@@ -196,42 +210,157 @@ def derivative_of(unknown, known):
 
 # name: (initialised first, call, status that the standard asks for, words of the log)
 BAD = {
-    "read an unknown reference": (True, lambda h: h.fmu.getReal([UNKNOWN]), ERROR, "no variable with value reference"),
-    "set an unknown reference": (True, lambda h: h.fmu.setReal([999], [1.0]), ERROR, "value reference 999"),
-    "read an output as Integer": (True, lambda h: h.fmu.getInteger([h.vr["p"]]), ERROR, "p is no Integer variable"),
-    "read a Boolean as Real": (True, lambda h: h.fmu.getReal([h.vr["connected"]]), ERROR, "connected is no Real"),
+    "read an unknown reference": (
+        True,
+        lambda h: h.fmu.getReal([UNKNOWN]),
+        ERROR,
+        "no variable with value reference",
+    ),
+    "set an unknown reference": (
+        True,
+        lambda h: h.fmu.setReal([999], [1.0]),
+        ERROR,
+        "value reference 999",
+    ),
+    "read an output as Integer": (
+        True,
+        lambda h: h.fmu.getInteger([h.vr["p"]]),
+        ERROR,
+        "p is no Integer variable",
+    ),
+    "read a Boolean as Real": (
+        True,
+        lambda h: h.fmu.getReal([h.vr["connected"]]),
+        ERROR,
+        "connected is no Real",
+    ),
     "read a string": (True, lambda h: h.fmu.getString([0]), ERROR, "no String variables"),
     "set a string": (True, lambda h: h.fmu.setString([0], ["a"]), ERROR, "no String variables"),
-    "NaN at an input": (True, lambda h: h.set(v_im=math.nan), DISCARD, r"v_im = -?nan; it must be a finite number"),
+    "NaN at an input": (
+        True,
+        lambda h: h.set(v_im=math.nan),
+        DISCARD,
+        r"v_im = -?nan; it must be a finite number",
+    ),
     "infinity at an input": (True, lambda h: h.set(v_re=math.inf), DISCARD, "v_re = inf"),
     "NaN as a state": (True, lambda h: h.set(droop__P_f=math.nan), DISCARD, "droop.P_f"),
-    "parameter NaN": (True, lambda h: h.set(pod_p__K=math.nan), DISCARD, r"pod_p.K = -?nan; it must be a finite"),
-    "parameter too low": (True, lambda h: h.set(pod_p__K=-1.0), DISCARD, "pod_p.K = -1; it must be at least 0"),
-    "parameter too high": (True, lambda h: h.set(pod_p__K=1e6), DISCARD, r"pod_p.K = 1e\+06; it must be at most 1"),
-    "Integer too high": (False, lambda h: h.fmu.setInteger([h.vr["pod_p.N_S"]], [4]), DISCARD, "at most 3"),
-    "step of zero": (True, lambda h: h.fmu.doStep(0.0, 0.0), ERROR, "step size 0 s; it must exceed 0"),
-    "negative step": (True, lambda h: h.fmu.doStep(0.0, -H), ERROR, "step size -0.0001 s; it must exceed 0"),
+    "parameter NaN": (
+        True,
+        lambda h: h.set(pod_p__K=math.nan),
+        DISCARD,
+        r"pod_p.K = -?nan; it must be a finite",
+    ),
+    "parameter too low": (
+        True,
+        lambda h: h.set(pod_p__K=-1.0),
+        DISCARD,
+        "pod_p.K = -1; it must be at least 0",
+    ),
+    "parameter too high": (
+        True,
+        lambda h: h.set(pod_p__K=1e6),
+        DISCARD,
+        r"pod_p.K = 1e\+06; it must be at most 1",
+    ),
+    "Integer too high": (
+        False,
+        lambda h: h.fmu.setInteger([h.vr["pod_p.N_S"]], [4]),
+        DISCARD,
+        "at most 3",
+    ),
+    "step of zero": (
+        True,
+        lambda h: h.fmu.doStep(0.0, 0.0),
+        ERROR,
+        "step size 0 s; it must exceed 0",
+    ),
+    "negative step": (
+        True,
+        lambda h: h.fmu.doStep(0.0, -H),
+        ERROR,
+        "step size -0.0001 s; it must exceed 0",
+    ),
     "step of NaN": (True, lambda h: h.fmu.doStep(0.0, math.nan), ERROR, "it must exceed 0"),
     "endless step": (True, lambda h: h.fmu.doStep(0.0, 1e9), DISCARD, "it must be at most 100 s"),
-    "step before initialisation": (False, lambda h: h.fmu.doStep(0.0, H), ERROR, "fmi2DoStep is not allowed before"),
-    "initialise twice": (True, lambda h: h.fmu.enterInitializationMode(), ERROR, "not allowed after initialisation"),
-    "leave initialisation first": (False, lambda h: h.fmu.exitInitializationMode(), ERROR, "before initialisation"),
-    "terminate first": (False, lambda h: h.fmu.terminate(), ERROR, "fmi2Terminate is not allowed before"),
-    "fixed parameter while running": (True, lambda h: h.set(S_n=1.0), ERROR, "parameter S_n is fixed"),
-    "set an output": (True, lambda h: h.set(p=1.0), ERROR, "p is computed by the FMU and cannot be set"),
-    "set a calculated parameter": (True, lambda h: h.set(droop__P_ref=1.0), ERROR, "droop.P_ref is computed"),
-    "set a state too early": (False, lambda h: h.set(droop__P_f=0.5), ERROR, "only after initialisation"),
-    "Real as Integer": (True, lambda h: h.fmu.setInteger([h.vr["pod_p.K"]], [1]), ERROR, "pod_p.K is no Integer"),
-    "a rule broken": (False, lambda h: (h.set(P_0=2.0), h.initialise()), ERROR, "lower P_0 or raise S_n"),
+    "step before initialisation": (
+        False,
+        lambda h: h.fmu.doStep(0.0, H),
+        ERROR,
+        "fmi2DoStep is not allowed before",
+    ),
+    "initialise twice": (
+        True,
+        lambda h: h.fmu.enterInitializationMode(),
+        ERROR,
+        "not allowed after initialisation",
+    ),
+    "leave initialisation first": (
+        False,
+        lambda h: h.fmu.exitInitializationMode(),
+        ERROR,
+        "before initialisation",
+    ),
+    "terminate first": (
+        False,
+        lambda h: h.fmu.terminate(),
+        ERROR,
+        "fmi2Terminate is not allowed before",
+    ),
+    "fixed parameter while running": (
+        True,
+        lambda h: h.set(S_n=1.0),
+        ERROR,
+        "parameter S_n is fixed",
+    ),
+    "set an output": (
+        True,
+        lambda h: h.set(p=1.0),
+        ERROR,
+        "p is computed by the FMU and cannot be set",
+    ),
+    "set a calculated parameter": (
+        True,
+        lambda h: h.set(droop__P_ref=1.0),
+        ERROR,
+        "droop.P_ref is computed",
+    ),
+    "set a state too early": (
+        False,
+        lambda h: h.set(droop__P_f=0.5),
+        ERROR,
+        "only after initialisation",
+    ),
+    "Real as Integer": (
+        True,
+        lambda h: h.fmu.setInteger([h.vr["pod_p.K"]], [1]),
+        ERROR,
+        "pod_p.K is no Integer",
+    ),
+    "a rule broken": (
+        False,
+        lambda h: (h.set(P_0=2.0), h.initialise()),
+        ERROR,
+        "lower P_0 or raise S_n",
+    ),
     "a rule broken while running": (
         True,
         lambda h: (h.set(pod_p__T_S2=0.0), h.fmu.doStep(0.0, H)),
         ERROR,
         "pod_p.T_S2 = 0 needs",
     ),
-    "derivative of an input": (True, derivative_of("v_re", "v_re"), ERROR, "v_re is no unknown here"),
+    "derivative of an input": (
+        True,
+        derivative_of("v_re", "v_re"),
+        ERROR,
+        "v_re is no unknown here",
+    ),
     "derivative by an output": (True, derivative_of("p", "q"), ERROR, "q is not known here"),
-    "derivative too early": (False, derivative_of("p", "v_re"), ERROR, "only from initialisation on"),
+    "derivative too early": (
+        False,
+        derivative_of("p", "v_re"),
+        ERROR,
+        "only from initialisation on",
+    ),
     "input derivatives": (
         True,
         lambda h: h.fmu.fmi2SetRealInputDerivatives(h.fmu.component, None, 1, None, None),
@@ -280,7 +409,9 @@ def test_a_step_that_diverges_is_discarded_and_leaves_the_instance_where_it_was(
     before = h.everything()
     h.set(v_re=1e200)
     assert h.step() == DISCARD
-    assert re.search(r"state \S+ is no longer finite after t = 0 s: the solution diverges", h.log[-1])
+    assert re.search(
+        r"state \S+ is no longer finite after t = 0 s: the solution diverges", h.log[-1]
+    )
     h.set(v_re=np.frombuffer(before)[h.reals.index("v_re")])
     assert h.everything() == before
     assert h.step() == OK
@@ -291,11 +422,25 @@ number = st.one_of(st.floats(width=64), st.sampled_from([0.0, 1.0, math.nan, mat
 CALLS = st.one_of(
     st.tuples(st.sampled_from(["getReal", "getInteger", "getBoolean"]), references),
     st.tuples(st.just("setReal"), st.lists(st.tuples(st.integers(0, 130), number), max_size=4)),
-    st.tuples(st.just("setInteger"), st.lists(st.tuples(st.integers(0, 130), st.integers(-9, 9)), max_size=2)),
-    st.tuples(st.just("setBoolean"), st.lists(st.tuples(st.integers(0, 130), st.booleans()), max_size=2)),
+    st.tuples(
+        st.just("setInteger"),
+        st.lists(st.tuples(st.integers(0, 130), st.integers(-9, 9)), max_size=2),
+    ),
+    st.tuples(
+        st.just("setBoolean"), st.lists(st.tuples(st.integers(0, 130), st.booleans()), max_size=2)
+    ),
     st.tuples(st.just("doStep"), st.sampled_from([H, 5e-4, 1e-5, 0.0, -H, math.nan, math.inf])),
     st.tuples(
-        st.sampled_from(["enterInitializationMode", "exitInitializationMode", "terminate", "reset", "save", "restore"]),
+        st.sampled_from(
+            [
+                "enterInitializationMode",
+                "exitInitializationMode",
+                "terminate",
+                "reset",
+                "save",
+                "restore",
+            ]
+        ),
         st.none(),
     ),
     st.tuples(st.just("derivative"), st.tuples(references, references)),
@@ -318,7 +463,9 @@ def perform(h, call, argument, saved):
     return h.status(getattr(h.fmu, call), *([argument] if call.startswith("get") else []))
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(initialised=st.booleans(), calls=st.lists(CALLS, max_size=25))
 def test_any_sequence_of_calls_keeps_to_the_state_machine(open_host, initialised, calls):
     h = open_host("gfor", native=True)

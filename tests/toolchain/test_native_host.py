@@ -17,13 +17,26 @@ from fmus.toolchain.native_fmu import NativeFmu
 from tests.support.host import OK, H
 
 HOST = Path(__file__).with_name("host") / "host.c"
-CALLS = ("Instantiate", "DoStep", "GetReal", "SetReal", "GetFMUstate", "SerializeFMUstate", "GetDirectionalDerivative")
+CALLS = (
+    "Instantiate",
+    "DoStep",
+    "GetReal",
+    "SetReal",
+    "GetFMUstate",
+    "SerializeFMUstate",
+    "GetDirectionalDerivative",
+)
 
 
 def compile_host(folder, target, ending=""):
     program = folder / f"host{ending}"
     compiler = [sys.executable, "-m", "ziglang", "cc", "-target", target]
-    subprocess.run([*compiler, "-O1", str(HOST), "-o", str(program)], check=True, cwd=folder, capture_output=True)
+    subprocess.run(
+        [*compiler, "-O1", str(HOST), "-o", str(program)],
+        check=True,
+        cwd=folder,
+        capture_output=True,
+    )
     return program
 
 
@@ -38,7 +51,15 @@ def arguments(directory, platform, ending, count, threads, steps):
     md = fmpy.read_model_description(str(directory), validate=False)
     references = {v.name: str(v.valueReference) for v in md.modelVariables}
     library = Path(directory) / "binaries" / platform / f"{md.modelName}{ending}"
-    return [str(library), md.guid, str(count), str(threads), str(steps), references["v_re"], references["i_re"]]
+    return [
+        str(library),
+        md.guid,
+        str(count),
+        str(threads),
+        str(steps),
+        references["v_re"],
+        references["i_re"],
+    ]
 
 
 def expected(open_host, steps):
@@ -53,7 +74,10 @@ def expected(open_host, steps):
 def test_a_thousand_instances_on_many_threads_give_what_one_gives(linux_host, extracted, open_host):
     call = [str(linux_host), *arguments(extracted("gfor", True), "linux64", ".so", 1000, 16, 40)]
     result = subprocess.run(call, env={}, capture_output=True, text=True, check=False, timeout=120)
-    assert (result.returncode, result.stderr) == (0, ("guid" in result.stderr and result.stderr) or "")
+    assert (result.returncode, result.stderr) == (
+        0,
+        ("guid" in result.stderr and result.stderr) or "",
+    )
     assert float(result.stdout) == expected(open_host, 40)
 
 
@@ -61,8 +85,18 @@ def test_a_thousand_instances_on_many_threads_give_what_one_gives(linux_host, ex
 def test_valgrind_finds_no_leak_and_no_invalid_access(linux_host, extracted):
     if shutil.which("valgrind") is None:
         pytest.skip("valgrind is not installed")
-    memcheck = ["valgrind", "--leak-check=full", "--show-leak-kinds=all", "--error-exitcode=99", "-q"]
-    call = [*memcheck, str(linux_host), *arguments(extracted("gfor", True), "linux64", ".so", 1000, 4, 4)]
+    memcheck = [
+        "valgrind",
+        "--leak-check=full",
+        "--show-leak-kinds=all",
+        "--error-exitcode=99",
+        "-q",
+    ]
+    call = [
+        *memcheck,
+        str(linux_host),
+        *arguments(extracted("gfor", True), "linux64", ".so", 1000, 4, 4),
+    ]
     result = subprocess.run(call, env={}, capture_output=True, text=True, check=False, timeout=300)
     assert result.returncode == 0, result.stderr[-3000:]
 
@@ -97,7 +131,9 @@ def test_the_windows_library_exports_fmi_and_needs_only_what_windows_has(everywh
     assert {f"fmi2{call}" for call in CALLS} <= exported
     assert not [name for name in exported if not name.startswith("fmi2")]
     imported = {entry.name.lower() for entry in library.imports}
-    assert all(name == "kernel32.dll" or name.startswith("api-ms-win-crt-") for name in imported), imported
+    assert all(name == "kernel32.dll" or name.startswith("api-ms-win-crt-") for name in imported), (
+        imported
+    )
 
 
 @pytest.mark.slow
@@ -108,7 +144,10 @@ def test_the_mac_library_holds_code_for_both_processors(everywhere):
     for part in universal:
         exported = {symbol.name for symbol in part.exported_symbols}
         assert {f"_fmi2{call}" for call in CALLS} <= exported
-        assert {library.name for library in part.libraries} == {"@rpath/library.dylib", "/usr/lib/libSystem.B.dylib"}
+        assert {library.name for library in part.libraries} == {
+            "@rpath/library.dylib",
+            "/usr/lib/libSystem.B.dylib",
+        }
         if part.header.cpu_type == lief.MachO.Header.CPU_TYPE.ARM64:
             assert part.has_code_signature  # these processors load nothing unsigned
 
@@ -119,8 +158,14 @@ def test_the_windows_library_gives_the_same_bits_under_wine(everywhere, tmp_path
     if wine is None:
         pytest.skip("wine is not installed")
     program = compile_host(tmp_path, TARGETS["win64"][0], ".exe")
-    environment = {"PATH": os.environ["PATH"], "WINEPREFIX": str(tmp_path / "wine"), "WINEDEBUG": "-all"}
+    environment = {
+        "PATH": os.environ["PATH"],
+        "WINEPREFIX": str(tmp_path / "wine"),
+        "WINEDEBUG": "-all",
+    }
     call = [wine, str(program), *arguments(everywhere, "win64", ".dll", 3, 1, 40)]
-    result = subprocess.run(call, env=environment, capture_output=True, text=True, check=False, timeout=300)
+    result = subprocess.run(
+        call, env=environment, capture_output=True, text=True, check=False, timeout=300
+    )
     assert result.returncode == 0, result.stderr[-2000:]
     assert float(result.stdout) == pytest.approx(expected(open_host, 40), rel=1e-12)

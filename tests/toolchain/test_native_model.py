@@ -51,11 +51,15 @@ def without_a_compiler(monkeypatch):
 
 
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_a_generator_that_is_data_has_the_bits_and_derivatives_of_compiled_code(version, tmp_path, monkeypatch):
+def test_a_generator_that_is_data_has_the_bits_and_derivatives_of_compiled_code(
+    version, tmp_path, monkeypatch
+):
     """In both directions, in and after initialisation."""
     model, found = build_model("synchronous_generator_ac4a"), []
     at = model.value_references
-    parameters = [at[p.name] for p in model.parameters if p.type == "Real" and p.name != "internal_step"]
+    parameters = [
+        at[p.name] for p in model.parameters if p.type == "Real" and p.name != "internal_step"
+    ]
     inputs, states = ([at[v.name] for v in group] for group in (model.inputs, model.states))
     follows = [*(at[v.name] for v in model.outputs), *(at[f"der({s.name})"] for s in model.states)]
     calculated = [at[c.name] for c in model.calculated]
@@ -71,11 +75,17 @@ def test_a_generator_that_is_data_has_the_bits_and_derivatives_of_compiled_code(
         rows = [get([*calculated, *states, *follows])]
 
         def derivatives(unknowns, knowns, fmu=fmu, rng=rng):
-            forward = fmu.getDirectionalDerivative(unknowns, knowns, rng.standard_normal(len(knowns)).tolist())
+            forward = fmu.getDirectionalDerivative(
+                unknowns, knowns, rng.standard_normal(len(knowns)).tolist()
+            )
             seeds = rng.standard_normal(len(unknowns)).tolist()
             return [
                 forward,
-                *([fmu.getAdjointDerivative(unknowns, knowns, seeds, len(knowns))] if version == "3.0" else []),
+                *(
+                    [fmu.getAdjointDerivative(unknowns, knowns, seeds, len(knowns))]
+                    if version == "3.0"
+                    else []
+                ),
             ]
 
         rows += derivatives([*calculated, *states, *follows], [*parameters, *inputs])
@@ -119,7 +129,9 @@ DAMAGED = {
     "there is no file model.bin": lambda data, other: None,
     "is no model": lambda data, other: data[:40],
     "is not whole": lambda data, other: data[:-8],
-    "the checksum of model.bin differs": lambda data, other: data[:-9] + bytes([data[-9] ^ 1]) + data[-8:],
+    "the checksum of model.bin differs": lambda data, other: (
+        data[:-9] + bytes([data[-9] ^ 1]) + data[-8:]
+    ),
     "is of another version": lambda data, other: data[:8] + struct.pack("<I", 7) + data[12:],
     "the guid .* is not this FMU's": lambda data, other: other,
 }
@@ -127,13 +139,22 @@ DAMAGED = {
 
 def test_a_model_that_is_damaged_or_anothers_gives_no_instance_and_says_why(tmp_path):
     folder, other = (unpacked(tmp_path, name) for name in NETWORKS[:2])
-    file, foreign = folder / "resources" / "model.bin", (other / "resources" / "model.bin").read_bytes()
-    whole, described = file.read_bytes(), read_description(tmp_path / "packed" / "2.0" / f"{NETWORKS[0]}.fmu")
+    file, foreign = (
+        folder / "resources" / "model.bin",
+        (other / "resources" / "model.bin").read_bytes(),
+    )
+    whole, described = (
+        file.read_bytes(),
+        read_description(tmp_path / "packed" / "2.0" / f"{NETWORKS[0]}.fmu"),
+    )
     for why, damage in DAMAGED.items():
         file.unlink(missing_ok=True)
         if (content := damage(whole, foreign)) is not None:
             file.write_bytes(content)
-        with pytest.raises(ComponentError, match=f"(?s){why}"), LoadedComponent("one", described, folder):
+        with (
+            pytest.raises(ComponentError, match=f"(?s){why}"),
+            LoadedComponent("one", described, folder),
+        ):
             pass
     file.write_bytes(whole)
     assert Host(folder).initialise().step() == OK
@@ -151,8 +172,20 @@ def test_a_source_has_its_model_within(tmp_path):
         (alone / name).write_bytes(members[name])
     library = alone / "binaries" / "linux64" / "infinite_bus.so"
     library.parent.mkdir(parents=True)
-    command = ["gcc", "-O1", "-std=c11", "-ffp-contract=off", "-shared", "-fPIC", "infinite_bus.c", "-lm", "-o"]
-    done = subprocess.run([*command, str(library)], cwd=alone / "sources", capture_output=True, text=True, check=False)
+    command = [
+        "gcc",
+        "-O1",
+        "-std=c11",
+        "-ffp-contract=off",
+        "-shared",
+        "-fPIC",
+        "infinite_bus.c",
+        "-lm",
+        "-o",
+    ]
+    done = subprocess.run(
+        [*command, str(library)], cwd=alone / "sources", capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     ours, theirs = stepped([Host(folder).initialise() for folder in (plain, alone)])
     np.testing.assert_allclose(theirs, ours, rtol=1e-12, atol=1e-12)
@@ -160,6 +193,8 @@ def test_a_source_has_its_model_within(tmp_path):
 
 def test_networks_are_not_compiled(monkeypatch):
     """Nor written as C, and their solution is not written out."""
-    monkeypatch.setattr(native_fmu, "c_source", lambda *given: pytest.fail("a network was written as C"))
+    monkeypatch.setattr(
+        native_fmu, "c_source", lambda *given: pytest.fail("a network was written as C")
+    )
     for name in NETWORKS:
         assert NativeFmu(build_model(name)).digest

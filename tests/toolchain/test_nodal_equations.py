@@ -20,10 +20,18 @@ def meshed() -> Network:
     """A ring with a chord and a phase shifter, a load that follows a law of its own, static generation, and a fault."""
     names = [f"b{k}" for k in range(BUSES)]
     lines = [
-        Line(f"l{k}", names[k], names[(k + 1) % BUSES], X=0.1 + 0.01 * k, R=0.01, B=0.02, tap=1.0 + 0.01 * (k % 3),
-             shift=0.1 * (k == 4))
+        Line(
+            f"l{k}",
+            names[k],
+            names[(k + 1) % BUSES],
+            X=0.1 + 0.01 * k,
+            R=0.01,
+            B=0.02,
+            tap=1.0 + 0.01 * (k % 3),
+            shift=0.1 * (k == 4),
+        )
         for k in range(BUSES)
-    ]  # fmt: skip
+    ]
     lines.append(Line("chord", "b1", "b8", X=0.3, R=0.02))
     loads = (
         Load("d1", "b3", 50.0, 20.0),
@@ -31,7 +39,16 @@ def meshed() -> Network:
         Load("d3", "b9", -30.0, 5.0, active=Zip(p=1.0), k_pf=1.5),
     )
     ports = (Port("g1", "b0"), Port("g2", "b5"), Port("g3", "b10"))
-    return Network("meshed", tuple(names), tuple(lines), loads, ports, stray_B=0.001, faults=("b7",), phasors=True)
+    return Network(
+        "meshed",
+        tuple(names),
+        tuple(lines),
+        loads,
+        ports,
+        stray_B=0.001,
+        faults=("b7",),
+        phasors=True,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +71,12 @@ def kernels(models):
 def started(model, kernel):
     z = vector(model)
     for k, name in enumerate(("g1", "g2", "g3")):
-        for variable, value in (("e_re", 1.0), ("e_im", 0.1 * k), ("y_re", 0.1), ("y_im", -3.0 - k)):
+        for variable, value in (
+            ("e_re", 1.0),
+            ("e_im", 0.1 * k),
+            ("y_re", 0.1),
+            ("y_im", -3.0 - k),
+        ):
             z[model.value_references[f"{name}.{variable}"]] = value
     kernel.initialise(z)
     return z
@@ -106,7 +128,9 @@ def test_both_have_one_description(models):
     assert models["code"].nodal is None is not models["data"].nodal
     assert structure(models["data"]) == structure(models["code"])
     lines = Line("ab", "a", "b", X=0.1), Line("cd", "c", "d", X=0.1)
-    islands = Network("two", tuple("abcd"), lines, (), (Port("g", "a"), Port("h", "d")), phasors=True)
+    islands = Network(
+        "two", tuple("abcd"), lines, (), (Port("g", "a"), Port("h", "d")), phasors=True
+    )
     model = phasor_grid.phasor_grid(islands)
     reached = {u.reference: u.known for u in structure(model).outputs}
     at = model.value_references
@@ -126,7 +150,10 @@ def test_a_matrix_that_is_singular_gives_no_finite_voltage(models, kernels):
 def test_the_plan_holds_the_matrix_and_its_fill():
     """An arrow: eliminated from its tip it fills, from its shaft it does not."""
     n = 30
-    rows, columns = [*range(n), *[0] * (n - 1), *range(1, n)], [*range(n), *range(1, n), *[0] * (n - 1)]
+    rows, columns = (
+        [*range(n), *[0] * (n - 1), *range(1, n)],
+        [*range(n), *range(1, n), *[0] * (n - 1)],
+    )
     plan = plan_pattern(n, rows, columns)
     assert sorted(plan.entries) == sorted(zip(rows, columns, strict=True))
     assert len(plan.column) == len(rows)
@@ -139,7 +166,9 @@ def test_an_implicit_integrator_has_no_nodal_equations():
     x = m.state("x", 0.0, "1", "State")
     m.derivative(x, -x)
     m.nodes({(0, 0): (1.0, 0.0)}, [(1.0, 0.0)])
-    with pytest.raises(ValueError, match="the implicit integrator solves no nodal equations; take runge_kutta"):
+    with pytest.raises(
+        ValueError, match="the implicit integrator solves no nodal equations; take runge_kutta"
+    ):
         m.build(integrator="sdirk")
 
 

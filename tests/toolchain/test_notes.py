@@ -34,7 +34,9 @@ def test_what_is_asked_and_of_which_code_names_the_note():
 def test_another_version_of_a_library_names_another_note(monkeypatch, library):
     before = note_of(OURS, "a")
     installed = notes.installed_version
-    monkeypatch.setattr(notes, "installed_version", lambda name: "0.0.1" if name == library else installed(name))
+    monkeypatch.setattr(
+        notes, "installed_version", lambda name: "0.0.1" if name == library else installed(name)
+    )
     assert note_of(OURS, "a") != before
 
 
@@ -47,7 +49,11 @@ def test_another_machine_or_other_code_names_another_note(monkeypatch, part):
 
 def test_every_file_of_the_models_counts(tmp_path, monkeypatch):
     names = set(notes.code_files())
-    assert {"fmus/toolchain/slave.py", "fmus/toolchain/c/instance.c", "fmus/grid/elements.py"} <= names
+    assert {
+        "fmus/toolchain/slave.py",
+        "fmus/toolchain/c/instance.c",
+        "fmus/grid/elements.py",
+    } <= names
     assert {"gfor_fmu/droop.py", "fmus/toolchain/c/clock.h"} <= names
     file = tmp_path / "model.py"
     monkeypatch.setattr(notes, "code_files", lambda: {"fmus/model.py": file})

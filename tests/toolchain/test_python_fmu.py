@@ -25,12 +25,18 @@ NAMES = [name for name in model_names() if not needs_arguments(name)]
 STEP = 1e-4
 
 EXCITERS = ("ac4a", "st1", "st4b")
-_PODS_OPEN = {f"pod_{x}.{k}": v for x in "pq" for k, v in (("enabled", True), ("N_S", 3), ("limit", 1e9))}
+_PODS_OPEN = {
+    f"pod_{x}.{k}": v for x in "pq" for k, v in (("enabled", True), ("N_S", 3), ("limit", 1e9))
+}
 _BOX_OPEN = {"voltage_control.i_q_max": 1e9, "voltage_control.i_d_max": 1e9}
 # The demand beside a box shows the larger component alone.
 _CONVERTER_OPEN = _PODS_OPEN | {"current_limit.kind": 1, "current_limit.I_max": 1e9}
 _FOLLOWING_OPEN = {"reactive_power.mode": 2, "frequency_droop.enabled": True}
-_L2EP_OPEN = {"reactive_power.mode": 1, "reactive_power.support.V_1": 1.2, "current_limit.I_max": 0.85}
+_L2EP_OPEN = {
+    "reactive_power.mode": 1,
+    "reactive_power.support.V_1": 1.2,
+    "current_limit.I_max": 0.85,
+}
 # Settings under which every declared path of a model carries a signal.
 ALL_PATHS_OPEN = {
     "gfor": _CONVERTER_OPEN,
@@ -44,11 +50,22 @@ ALL_PATHS_OPEN = {
     "gfl_l2ep": _L2EP_OPEN,
     "gfl_l2ep_phasor": _L2EP_OPEN | {"communication_step": 5e-3},
     "static_generation_phasor": {"communication_step": 5e-3, "R": 0.01},
-    "regfm_a1_phasor": {"communication_step": 5e-3, "RL": 0.01, "kpv": 0.5, "kpqmax": 0.01, "ImaxF": 1.0},
-} | {f"synchronous_generator_{e}_phasor": {"communication_step": 5e-3, "machine.X_q2": 0.3} for e in EXCITERS}
+    "regfm_a1_phasor": {
+        "communication_step": 5e-3,
+        "RL": 0.01,
+        "kpv": 0.5,
+        "kpqmax": 0.01,
+        "ImaxF": 1.0,
+    },
+} | {
+    f"synchronous_generator_{e}_phasor": {"communication_step": 5e-3, "machine.X_q2": 0.3}
+    for e in EXCITERS
+}
 # Inputs without which nothing in a model moves.
 FED = {
-    "two_area_phasor_grid": {f"sg1.{k}": v for k, v in (("e_re", 1.0), ("e_im", 0.2), ("y_re", 1.0), ("y_im", -50.0))}
+    "two_area_phasor_grid": {
+        f"sg1.{k}": v for k, v in (("e_re", 1.0), ("e_im", 0.2), ("y_re", 1.0), ("y_im", -50.0))
+    }
 }
 # Outputs that reach some listed states only where a block is left out (time constant 0).
 BEHIND_LEFT_OUT_BLOCKS = {"P_m"}
@@ -57,7 +74,12 @@ BEHIND_THRESHOLDS = {name: {"pll.freezing.awake"} for name in ("gfl_l2ep", "gfl_
 # Blocks of the generators and the POD that the literature lets one leave out with a time constant of zero.
 LEFT_OUT = {
     "gfor": {"pod_p.enabled": True, "pod_p.T_S1": 0.0, "pod_p.T_S2": 0.0, "pod_p.N_S": 1},
-    "synchronous_generator_st1": {"exciter.T_C": 0.0, "exciter.T_B": 0.0, "governor.T_1": 0.0, "governor.T_2": 0.0},
+    "synchronous_generator_st1": {
+        "exciter.T_C": 0.0,
+        "exciter.T_B": 0.0,
+        "governor.T_1": 0.0,
+        "governor.T_2": 0.0,
+    },
 }
 
 
@@ -110,8 +132,13 @@ CHANGES = [{"gain": 2.5}, {"text": "Another gain"}, {"slope": 3.0}, {"rule": "ra
 
 @pytest.mark.parametrize("change", CHANGES, ids=str)
 def test_a_changed_model_has_another_guid(change, tmp_path):
-    same = [description_of(export(PythonFmu(small()), tmp_path / n, platforms=())).get("guid") for n in "ab"]
-    changed = description_of(export(PythonFmu(small(**change)), tmp_path / "c", platforms=())).get("guid")
+    same = [
+        description_of(export(PythonFmu(small()), tmp_path / n, platforms=())).get("guid")
+        for n in "ab"
+    ]
+    changed = description_of(export(PythonFmu(small(**change)), tmp_path / "c", platforms=())).get(
+        "guid"
+    )
     assert same[0] == same[1] != changed
 
 
@@ -126,7 +153,9 @@ def test_every_real_variable_has_a_declared_unit_and_the_bounds_of_the_model(nam
         (kind,) = variables[parameter.name]
         assert kind.tag == parameter.type
         if parameter.type != "Boolean":
-            bounds = [None if text is None else float(text) for text in (kind.get("min"), kind.get("max"))]
+            bounds = [
+                None if text is None else float(text) for text in (kind.get("min"), kind.get("max"))
+            ]
             assert bounds == [parameter.minimum, parameter.maximum]
 
 
@@ -144,7 +173,9 @@ def test_initial_unknowns_are_complete_and_list_every_parameter_that_moves_them(
     model = build_model(name)
     known = unknowns(description_of(fmu_path(name)), "InitialUnknowns")
     states = [s.name for s in model.states]
-    computed = [v.name for v in (*model.calculated, *model.states, *model.outputs)] + [f"der({s})" for s in states]
+    computed = [v.name for v in (*model.calculated, *model.states, *model.outputs)] + [
+        f"der({s})" for s in states
+    ]
     assert list(known) == sorted(computed, key=list(model.value_references).index)
     moved = 0
     with LoadedComponent(
@@ -198,7 +229,10 @@ def test_outputs_and_derivatives_depend_on_what_they_list_and_on_nothing_else(na
 
 
 def test_no_two_fmus_bundle_modules_of_the_same_name(fmu_path):
-    own = [{n for n in member_names(fmu_path(name)) if re.fullmatch(r"resources/[^/]+\.py", n)} for name in NAMES]
+    own = [
+        {n for n in member_names(fmu_path(name)) if re.fullmatch(r"resources/[^/]+\.py", n)}
+        for name in NAMES
+    ]
     assert all(len(modules) == 3 for modules in own)
     assert len(set.union(*own)) == 3 * len(NAMES)
 
@@ -207,9 +241,15 @@ def test_no_two_fmus_bundle_modules_of_the_same_name(fmu_path):
 def test_the_archive_needs_nothing_but_python(name, fmu_path):
     allowed = set(sys.stdlib_module_names) | {"pythonfmu"}
     with zipfile.ZipFile(fmu_path(name)) as archive:
-        own = {n: archive.read(n).decode() for n in archive.namelist() if re.fullmatch(r"resources/[^/]+\.py", n)}
+        own = {
+            n: archive.read(n).decode()
+            for n in archive.namelist()
+            if re.fullmatch(r"resources/[^/]+\.py", n)
+        }
         assert not [n for n in archive.namelist() if "numpy" in n]
-        binaries = [archive.read(n) for n in archive.namelist() if n.startswith("resources/kernel/")]
+        binaries = [
+            archive.read(n) for n in archive.namelist() if n.startswith("resources/kernel/")
+        ]
     for text in own.values():
         imported = set(re.findall(r"^\s*(?:import|from)\s+(\w+)", text, re.MULTILINE))
         assert imported
@@ -272,7 +312,10 @@ def stiff_fmu():
 
 
 def drive_stiff(component, steps=100):
-    u, y = RealBatch(component, ["one.i_re", "one.i_im"]), RealBatch(component, component.description.outputs)
+    u, y = (
+        RealBatch(component, ["one.i_re", "one.i_im"]),
+        RealBatch(component, component.description.outputs),
+    )
     rows = []
     for k in range(steps):
         u.values[:] = 1.3 + 0.2 * np.sin(0.1 * k), 0.1 * np.cos(0.3 * k)
@@ -296,7 +339,9 @@ def test_a_stiff_network_is_valid_and_both_kernels_agree(stiff_fmu, monkeypatch)
 
 
 @pytest.mark.parametrize("kernel", ["compiled", "python"])
-def test_a_restored_stiff_network_forgets_the_factors_of_other_parameters(stiff_fmu, kernel, monkeypatch):
+def test_a_restored_stiff_network_forgets_the_factors_of_other_parameters(
+    stiff_fmu, kernel, monkeypatch
+):
     monkeypatch.setenv("GFOR_COSIM_KERNEL", kernel)
     with initialised(stiff_fmu) as component, initialised(stiff_fmu) as other:
         drive_stiff(component)

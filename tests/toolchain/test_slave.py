@@ -40,15 +40,30 @@ def _terminated_step(h, _):
 
 # name: (initialised first, what is done, words of the log, status of a proper step afterwards)
 MISUSES = {
-    "read an unknown reference": (True, lambda h, _: h.fmu.getReal([999]), r"reading value references \[999\]", ERROR),
-    "read the largest reference": (True, lambda h, _: h.fmu.getReal([UNKNOWN]), "reading value references", ERROR),
+    "read an unknown reference": (
+        True,
+        lambda h, _: h.fmu.getReal([999]),
+        r"reading value references \[999\]",
+        ERROR,
+    ),
+    "read the largest reference": (
+        True,
+        lambda h, _: h.fmu.getReal([UNKNOWN]),
+        "reading value references",
+        ERROR,
+    ),
     "set an unknown reference": (
         True,
         lambda h, _: h.fmu.setReal([999], [1.0]),
         "no variable with value reference 999",
         ERROR,
     ),
-    "set the largest reference": (True, lambda h, _: h.fmu.setReal([UNKNOWN], [1.0]), "value reference", ERROR),
+    "set the largest reference": (
+        True,
+        lambda h, _: h.fmu.setReal([UNKNOWN], [1.0]),
+        "value reference",
+        ERROR,
+    ),
     "read an output as Integer": (
         True,
         lambda h, _: h.fmu.getInteger([h.vr["p"]]),
@@ -69,7 +84,12 @@ MISUSES = {
         r"state \S+ is no longer finite after t = 0 s: input v_im is not a finite number",
         ERROR,
     ),
-    "infinity at an input": (True, lambda h, _: h.set(v_re=math.inf), "input v_re is not a finite number", ERROR),
+    "infinity at an input": (
+        True,
+        lambda h, _: h.set(v_re=math.inf),
+        "input v_re is not a finite number",
+        ERROR,
+    ),
     "NaN at an input before initialisation": (
         False,
         lambda h, _: (h.set(v_re=math.nan), h.status(h.fmu.exitInitializationMode)),
@@ -77,11 +97,31 @@ MISUSES = {
         ERROR,
     ),
     "NaN as a state": (True, lambda h, _: h.set(droop__P_f=math.nan), "no longer finite", ERROR),
-    "negative step": (True, lambda h, _: h.step(0.0, -H), "step size -0.0001 s; it must exceed 0", OK),
-    "step of NaN": (True, lambda h, _: h.step(0.0, math.nan), "step size nan s; it must exceed 0", OK),
+    "negative step": (
+        True,
+        lambda h, _: h.step(0.0, -H),
+        "step size -0.0001 s; it must exceed 0",
+        OK,
+    ),
+    "step of NaN": (
+        True,
+        lambda h, _: h.step(0.0, math.nan),
+        "step size nan s; it must exceed 0",
+        OK,
+    ),
     "endless step": (True, lambda h, _: h.step(0.0, math.inf), "step size inf s", OK),
-    "step of zero": (True, lambda h, _: (h.step(), h.step(0.0, 0.0)), "step size 0.0 s; it must exceed 0", OK),
-    "first step of zero": (True, lambda h, _: h.step(0.0, 0.0), "step size 0.0 s; it must exceed 0", OK),
+    "step of zero": (
+        True,
+        lambda h, _: (h.step(), h.step(0.0, 0.0)),
+        "step size 0.0 s; it must exceed 0",
+        OK,
+    ),
+    "first step of zero": (
+        True,
+        lambda h, _: h.step(0.0, 0.0),
+        "step size 0.0 s; it must exceed 0",
+        OK,
+    ),
     "step before initialisation": (
         False,
         lambda h, _: None,
@@ -107,14 +147,24 @@ MISUSES = {
         r"parameter pod_p\.N_S is fixed",
         ERROR,
     ),
-    "parameter below its minimum": (True, lambda h, _: h.set(pod_p__K=-1.0), r"pod_p\.K = -1; .* at least 0", ERROR),
+    "parameter below its minimum": (
+        True,
+        lambda h, _: h.set(pod_p__K=-1.0),
+        r"pod_p\.K = -1; .* at least 0",
+        ERROR,
+    ),
     "parameter above its maximum": (
         True,
         lambda h, _: h.set(pod_p__K=1e6),
         r"pod_p\.K = 1e\+06; it must be at most 100000",
         ERROR,
     ),
-    "parameter NaN": (True, lambda h, _: h.set(pod_p__K=math.nan), r"pod_p\.K = nan; .* a finite number", ERROR),
+    "parameter NaN": (
+        True,
+        lambda h, _: h.set(pod_p__K=math.nan),
+        r"pod_p\.K = nan; .* a finite number",
+        ERROR,
+    ),
     "Integer above its maximum": (
         False,
         lambda h, _: (h.fmu.setInteger([h.vr["pod_p.N_S"]], [4]), h.initialise()),
@@ -133,7 +183,12 @@ MISUSES = {
         r"pod_p\.enabled is of type Boolean, not Integer",
         ERROR,
     ),
-    "set an output": (True, lambda h, _: h.set(p=1.0), "p is computed by the FMU and cannot be set", ERROR),
+    "set an output": (
+        True,
+        lambda h, _: h.set(p=1.0),
+        "p is computed by the FMU and cannot be set",
+        ERROR,
+    ),
     "set a derivative": (
         True,
         lambda h, _: h.fmu.setReal([h.vr["der(droop.P_f)"]], [1.0]),
@@ -183,7 +238,12 @@ MISUSES = {
         "not saved by this FMU",
         ERROR,
     ),
-    "garbage as a serialised state": (True, lambda h, _: _deserialise(h, b"garbage"), "not saved by this FMU", ERROR),
+    "garbage as a serialised state": (
+        True,
+        lambda h, _: _deserialise(h, b"garbage"),
+        "not saved by this FMU",
+        ERROR,
+    ),
 }
 
 
@@ -199,7 +259,9 @@ def run_misuses(directory, other_directory):
         steps = [h.step(k * H) for k in range(3)]
         values = h.get("p", "der(droop.P_f)")
         h.close()
-        print(json.dumps([name, {"steps": steps, "log": h.log, "values": repr(values)}]), flush=True)
+        print(
+            json.dumps([name, {"steps": steps, "log": h.log, "values": repr(values)}]), flush=True
+        )
     other.close()
     print('["end", {}]', flush=True)
 
@@ -209,7 +271,13 @@ def misuse_report(directory, other_directory, kernel):
     code = f"from tests.toolchain.test_slave import run_misuses; run_misuses({directory!r}, {other_directory!r})"
     environment = {**os.environ, "GFOR_COSIM_KERNEL": kernel}
     result = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, env=environment, capture_output=True, text=True, check=False, timeout=60
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
     )
     lines = [json.loads(line) for line in result.stdout.splitlines() if line.startswith("[")]
     return result.returncode, dict(lines), result.stderr
@@ -236,7 +304,9 @@ def test_the_process_outlives_all_misuse(kernel, extracted):
 
 
 @pytest.mark.parametrize("kernel", ["compiled", "python"])
-def test_a_broken_rule_is_named_even_where_initialisation_divides_by_zero(kernel, open_host, monkeypatch):
+def test_a_broken_rule_is_named_even_where_initialisation_divides_by_zero(
+    kernel, open_host, monkeypatch
+):
     monkeypatch.setenv("GFOR_COSIM_KERNEL", kernel)
     h = open_host(GENERATOR)
     h.set(machine__X_d=0.2)
@@ -317,7 +387,9 @@ def on_a_bare_interpreter(directory, name, kernel):
 
 @pytest.mark.parametrize("name", ["gfor", GENERATOR, "two_area_grid"])
 @pytest.mark.parametrize("kernel", ["", "python"], ids=["compiled", "python"])
-def test_the_slave_runs_where_there_is_neither_numpy_nor_this_package(name, kernel, open_host, extracted):
+def test_the_slave_runs_where_there_is_neither_numpy_nor_this_package(
+    name, kernel, open_host, extracted
+):
     compiled, bare = on_a_bare_interpreter(extracted(name), name, kernel)
     here = np.array([np.frombuffer(row) for row in open_host(name).initialise().run(50)])
     assert compiled is (kernel == "")
@@ -365,19 +437,28 @@ def slave_class(extracted):
 
 reference = st.one_of(st.integers(-3, 125), st.sampled_from([2**31, UNKNOWN]))
 references = st.lists(reference, max_size=4)
-number = st.one_of(st.floats(width=64), st.sampled_from([0.0, 1.0, math.nan, math.inf, -math.inf, 1e308]))
+number = st.one_of(
+    st.floats(width=64), st.sampled_from([0.0, 1.0, math.nan, math.inf, -math.inf, 1e308])
+)
 pairs = st.lists(st.tuples(reference, number), max_size=4)
 integer_pairs = st.lists(st.tuples(reference, st.integers(-(2**31), 2**31 - 1)), max_size=4)
 boolean_pairs = st.lists(st.tuples(reference, st.booleans()), max_size=4)
 CALLS = st.one_of(
-    st.tuples(st.sampled_from(["get_real", "get_integer", "get_boolean", "get_string"]), references),
+    st.tuples(
+        st.sampled_from(["get_real", "get_integer", "get_boolean", "get_string"]), references
+    ),
     st.tuples(st.just("set_real"), pairs),
     st.tuples(st.just("set_integer"), integer_pairs),
     st.tuples(st.just("set_boolean"), boolean_pairs),
-    st.tuples(st.just("set_string"), st.lists(st.tuples(reference, st.text(max_size=3)), max_size=2)),
+    st.tuples(
+        st.just("set_string"), st.lists(st.tuples(reference, st.text(max_size=3)), max_size=2)
+    ),
     st.tuples(st.just("do_step"), st.sampled_from([H, 5e-4, 1e-5, 0.0, -H, math.nan, math.inf])),
     st.tuples(
-        st.sampled_from(["enter_initialization_mode", "exit_initialization_mode", "terminate", "save"]), st.none()
+        st.sampled_from(
+            ["enter_initialization_mode", "exit_initialization_mode", "terminate", "save"]
+        ),
+        st.none(),
     ),
     st.tuples(st.just("restore"), st.one_of(st.none(), st.binary(max_size=40))),
 )
@@ -397,14 +478,18 @@ def perform(slave, calls):
             assert isinstance(done, bool)
             assert done or len(slave.log_queue) > before  # what is discarded is explained
         elif call == "save":
-            saved.append(slave._fmu_state_from_bytes(slave._fmu_state_to_bytes(slave._get_fmu_state())))
+            saved.append(
+                slave._fmu_state_from_bytes(slave._fmu_state_to_bytes(slave._get_fmu_state()))
+            )
         elif call == "restore":
             slave._set_fmu_state(saved[-1] if argument is None else argument)
         else:
             getattr(slave, call)()
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(initialised=st.booleans(), calls=st.lists(CALLS, max_size=20))
 def test_no_sequence_of_calls_raises(slave_class, initialised, calls):
     slave = slave_class()
@@ -414,7 +499,9 @@ def test_no_sequence_of_calls_raises(slave_class, initialised, calls):
     perform(slave, calls)
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(initialised=st.booleans(), calls=st.lists(CALLS, max_size=10))
 def test_no_sequence_of_calls_raises_in_the_python_kernel(slave_class, initialised, calls):
     with pytest.MonkeyPatch.context() as patch:

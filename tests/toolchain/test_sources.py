@@ -21,7 +21,9 @@ pytestmark = pytest.mark.slow
 
 def simulated(path):
     change = {"droop.delta_P_ref": 0.05}
-    found = fmpy.simulate_fmu(str(path), stop_time=0.02, step_size=1e-4, output_interval=1e-3, start_values=change)
+    found = fmpy.simulate_fmu(
+        str(path), stop_time=0.02, step_size=1e-4, output_interval=1e-3, start_values=change
+    )
     return np.array([list(row) for row in found])
 
 
@@ -29,7 +31,8 @@ def source_of(members):
     """The file that the FMU's own description names."""
     root = ElementTree.fromstring(members["modelDescription.xml"])
     (name,) = [e.get("name") for e in root.iter("File")] or [
-        e.get("name") for e in ElementTree.fromstring(members["sources/buildDescription.xml"]).iter("SourceFile")
+        e.get("name")
+        for e in ElementTree.fromstring(members["sources/buildDescription.xml"]).iter("SourceFile")
     ]
     return members[f"sources/{name}"]
 
@@ -43,11 +46,25 @@ def test_gcc_makes_the_same_fmu_of_it(version, folder, tmp_path):
     with zipfile.ZipFile(path) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
     (tmp_path / "gfor.c").write_bytes(source_of(members))
-    command = ["gcc", "-O2", "-std=c11", "-ffp-contract=off", "-shared", "-fPIC", "gfor.c", "-o", "gfor.so", "-lm"]
+    command = [
+        "gcc",
+        "-O2",
+        "-std=c11",
+        "-ffp-contract=off",
+        "-shared",
+        "-fPIC",
+        "gfor.c",
+        "-o",
+        "gfor.so",
+        "-lm",
+    ]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     members[f"binaries/{folder}/gfor.so"] = (tmp_path / "gfor.so").read_bytes()
-    ours, theirs = simulated(path), simulated(write_archive(tmp_path / "theirs" / "gfor.fmu", members))
+    ours, theirs = (
+        simulated(path),
+        simulated(write_archive(tmp_path / "theirs" / "gfor.fmu", members)),
+    )
     assert len(ours) == 21
     assert np.ptp(ours, axis=0)[1:].max() > 1e-4
     np.testing.assert_allclose(theirs, ours, rtol=1e-12, atol=1e-12)

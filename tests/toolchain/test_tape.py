@@ -39,7 +39,11 @@ def test_a_tape_has_the_bits_of_compiled_code(name):
     """At random parameters, inputs and states, through steps, with parameters that change between them."""
     model = written_out(build_model(name))
     by_code, by_tape, random = compiled(model), taped(model), np.random.default_rng(3)
-    first, nu, nx = len(model.parameters) + len(model.calculated), len(model.inputs), len(model.states)
+    first, nu, nx = (
+        len(model.parameters) + len(model.calculated),
+        len(model.inputs),
+        len(model.states),
+    )
     step = model.parameters[0].start
     moved, finite = set(), 0
     for _ in range(6):
@@ -134,8 +138,13 @@ def test_instances_with_other_parameters_take_turns():
         z = started(kernel, alone)
         courses.append([step(kernel, z, k) for k in range(20)])
     kernels = [taped(model, content) for _ in range(3)]
-    instances = [started(kernel, factor) for kernel, factor in zip(kernels, (0.5, 1.0, 2.0), strict=True)]
-    by_turns = [[step(kernel, z, k) for kernel, z in zip(kernels, instances, strict=True)] for k in range(20)]
+    instances = [
+        started(kernel, factor) for kernel, factor in zip(kernels, (0.5, 1.0, 2.0), strict=True)
+    ]
+    by_turns = [
+        [step(kernel, z, k) for kernel, z in zip(kernels, instances, strict=True)]
+        for k in range(20)
+    ]
     assert [list(course) for course in zip(*by_turns, strict=True)] == courses
     assert courses[0] != courses[1] != courses[2]
 
@@ -144,13 +153,17 @@ def test_instances_with_other_parameters_take_turns():
 
 
 def fault(content, model):
-    found = tape_library().tape_fault(content, len(content), len(model.value_references), len(model.requirement_texts))
+    found = tape_library().tape_fault(
+        content, len(content), len(model.value_references), len(model.requirement_texts)
+    )
     return found and found.decode()
 
 
 def sealed(content):
     """With the checksum and the length of what it holds."""
-    head = struct.pack("<8s4I", *struct.unpack_from("<8sI", content), len(content), zlib.crc32(content[_HEAD:]), 0)
+    head = struct.pack(
+        "<8s4I", *struct.unpack_from("<8sI", content), len(content), zlib.crc32(content[_HEAD:]), 0
+    )
     return head + content[_HEAD:]
 
 
@@ -181,7 +194,10 @@ def test_an_older_version_and_another_model_are_named(stiff):
     older = content[:8] + struct.pack("<I", 0) + content[12:]
     assert fault(older, model) == "it is of another version"
     assert fault(content, ratio()) == "it is of another model"
-    for damaged, of, why in ((older, model, "another version"), (content, ratio(), "another model")):
+    for damaged, of, why in (
+        (older, model, "another version"),
+        (content, ratio(), "another model"),
+    ):
         with pytest.raises(ValueError, match=why):
             Kernel(damaged, len(of.value_references))
 
@@ -193,7 +209,9 @@ def test_a_tape_with_a_right_checksum_and_wrong_contents_reads_nothing_beyond_it
     content, library = tape_of(model), tape_library()
     for place in random.integers(_HEAD // 4 + 2, len(content) // 4, 1500).tolist():
         words = np.frombuffer(content, dtype=np.int32).copy()
-        words[place] = random.choice([-1, 0, 1, words[place] + 1, words[place] - 1, 2**27, 2**31 - 1, len(content)])
+        words[place] = random.choice(
+            [-1, 0, 1, words[place] + 1, words[place] - 1, 2**27, 2**31 - 1, len(content)]
+        )
         damaged = sealed(words.tobytes())
         if fault(damaged, model) is not None:
             refused += 1
@@ -216,7 +234,9 @@ def test_a_tape_with_a_right_checksum_and_wrong_contents_reads_nothing_beyond_it
 
 
 @pytest.mark.parametrize("kernel", ["", "python"], ids=["compiled", "python"])
-def test_an_fmu_with_a_damaged_tape_is_not_instantiated_and_says_why(kernel, fmu_path, tmp_path, monkeypatch, capfd):
+def test_an_fmu_with_a_damaged_tape_is_not_instantiated_and_says_why(
+    kernel, fmu_path, tmp_path, monkeypatch, capfd
+):
     monkeypatch.setenv("GFOR_COSIM_KERNEL", kernel)
     hurt = tmp_path / "hurt.fmu"
     with zipfile.ZipFile(fmu_path("two_area_grid")) as archive, zipfile.ZipFile(hurt, "w") as copy:
@@ -224,12 +244,20 @@ def test_an_fmu_with_a_damaged_tape_is_not_instantiated_and_says_why(kernel, fmu
             content = bytearray(archive.read(name))
             if name == "resources/tape.bin":
                 content[200] ^= 4
-            if name.endswith((".py", ".txt", ".json")):  # modules of another name than those that run already
+            if name.endswith(
+                (".py", ".txt", ".json")
+            ):  # modules of another name than those that run already
                 content = content.replace(b"gfor_cosim_", b"hurt_")
             copy.writestr(name.replace("gfor_cosim_", "hurt_"), bytes(content))
-    with pytest.raises(ComponentError) as refused, LoadedComponent("device", read_description(hurt)):
+    with (
+        pytest.raises(ComponentError) as refused,
+        LoadedComponent("device", read_description(hurt)),
+    ):
         pass
-    assert "resources/tape.bin is damaged (its checksum differs)" in str(refused.value) + capfd.readouterr().err
+    assert (
+        "resources/tape.bin is damaged (its checksum differs)"
+        in str(refused.value) + capfd.readouterr().err
+    )
 
 
 def test_without_a_compiler_a_device_runs_as_a_tape_with_the_same_bits(tmp_path, monkeypatch):
@@ -277,7 +305,9 @@ def test_without_a_compiler_a_device_runs_as_a_tape_with_the_same_bits(tmp_path,
             monkeypatch.setattr(python_fmu, "installed_version", lambda library: "")
         path = export(PythonFmu(model), tmp_path / str(missing))
         with zipfile.ZipFile(path) as archive:
-            members = [member for member in archive.namelist() if member.startswith("resources/kernel/")]
+            members = [
+                member for member in archive.namelist() if member.startswith("resources/kernel/")
+            ]
         assert [("tape" in member) for member in members] == [missing]
         courses.append(course(path))
     assert courses[0] == courses[1]
@@ -287,4 +317,6 @@ def test_without_a_compiler_a_device_runs_as_a_tape_with_the_same_bits(tmp_path,
 def test_a_network_brings_no_code_of_its_own(name, fmu_path):
     with zipfile.ZipFile(fmu_path(name)) as archive:
         members = archive.namelist()
-    assert [m for m in members if m.startswith("resources/kernel/")] == ["resources/kernel/linux64/tape.so"]
+    assert [m for m in members if m.startswith("resources/kernel/")] == [
+        "resources/kernel/linux64/tape.so"
+    ]

@@ -14,7 +14,9 @@ import pytest
 from fmus.toolchain import temporary
 from fmus.toolchain.temporary import own_folder, remove, sweep, sweep_partial_files
 
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no locks there: folders go after a week")
+pytestmark = pytest.mark.skipif(
+    sys.platform == "win32", reason="no locks there: folders go after a week"
+)
 
 _OWNER = """
 import sys, tempfile, time
@@ -28,7 +30,9 @@ time.sleep(60)
 @pytest.fixture
 def owner(tmp_path):
     """A process with a folder of its own."""
-    with subprocess.Popen([sys.executable, "-c", _OWNER, str(tmp_path)], stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        [sys.executable, "-c", _OWNER, str(tmp_path)], stdout=subprocess.PIPE, text=True
+    ) as process:
         process.folder = tmp_path / process.stdout.readline().strip()
         (process.folder / "file").write_text("content")
         yield process
@@ -68,7 +72,11 @@ def test_folders_of_others_are_left_alone(owner, tmp_path, monkeypatch):
         other_user.setattr(os, "getuid", lambda: -1)
         assert sweep(tmp_path) == []
     assert sweep(tmp_path) == [owner.folder]
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["gfor_like", "gfor_locked_link", "gfor_new_test_1"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "gfor_like",
+        "gfor_locked_link",
+        "gfor_new_test_1",
+    ]
     long_ago = time.time() - 1000.0
     os.utime(tmp_path / "gfor_new_test_1", (long_ago, long_ago))
     assert sweep(tmp_path) == [tmp_path / "gfor_new_test_1"]
@@ -123,7 +131,9 @@ def _pipe(folder):
     (folder / "none").symlink_to("nowhere")
 
 
-@pytest.mark.parametrize("make", [pytest.param(_deep, marks=pytest.mark.slow), _closed, _strange, _many, _pipe])
+@pytest.mark.parametrize(
+    "make", [pytest.param(_deep, marks=pytest.mark.slow), _closed, _strange, _many, _pipe]
+)
 def test_whatever_an_fmu_left_goes(make, tmp_path, monkeypatch):
     monkeypatch.setattr(temporary.tempfile, "tempdir", str(tmp_path))
     make(tmp_path / "gfor_locked_evil")
@@ -147,7 +157,9 @@ def test_what_links_lead_to_stays(tmp_path):
     assert (tmp_path / "users").stat().st_mode & 0o777 == 0o750
 
 
-@pytest.mark.parametrize("error", [RecursionError, OSError, UnicodeEncodeError("x", "", 0, 0, "x"), MemoryError])
+@pytest.mark.parametrize(
+    "error", [RecursionError, OSError, UnicodeEncodeError("x", "", 0, 0, "x"), MemoryError]
+)
 def test_a_folder_that_cannot_go_keeps_no_other(error, tmp_path, monkeypatch):
     def remove_tree(folder):
         if folder.name.endswith("_bad"):
@@ -188,7 +200,9 @@ if __name__ == "__main__":
 @pytest.mark.skipif(sys.platform != "linux", reason="workers have sockets on Linux")
 def test_a_killed_study_leaves_nothing_for_long():
     tmp_path = Path(tempfile.mkdtemp(prefix="t"))  # the path of a socket must be short
-    subprocess.run([sys.executable, "-c", _SWEEP, str(tmp_path)], check=False, capture_output=True, text=True)
+    subprocess.run(
+        [sys.executable, "-c", _SWEEP, str(tmp_path)], check=False, capture_output=True, text=True
+    )
     left = {path.name.split("_")[2] for path in tmp_path.iterdir()}
     assert left == {"sockets"}
     end = time.monotonic() + 60.0
@@ -213,7 +227,11 @@ def test_threads_may_make_folders_while_others_disappear(tmp_path, monkeypatch):
 
 def test_an_interrupt_leaves_no_folder_that_is_only_half_made(tmp_path, monkeypatch):
     monkeypatch.setattr(temporary.tempfile, "tempdir", str(tmp_path))
-    for planted, name in ((temporary.os, "open"), (temporary.Path, "rename"), (temporary.fcntl, "flock")):
+    for planted, name in (
+        (temporary.os, "open"),
+        (temporary.Path, "rename"),
+        (temporary.fcntl, "flock"),
+    ):
         with monkeypatch.context() as context:
 
             def interrupts(*_, context=context):
@@ -240,6 +258,8 @@ raise KeyboardInterrupt
 
 
 def test_a_process_removes_its_folders_at_its_end(tmp_path):
-    done = subprocess.run([sys.executable, "-c", _ENDS, str(tmp_path)], check=False, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", _ENDS, str(tmp_path)], check=False, capture_output=True, text=True
+    )
     assert done.stdout.startswith("['gfor_locked_test_")
     assert not list(tmp_path.iterdir())

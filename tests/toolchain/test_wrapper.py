@@ -34,7 +34,9 @@ def fault(library, guid, resources):
     """Whether the host's end touches memory that was freed by then."""
     python = [sys.executable, "-c", HOST, str(library), guid, resources.as_uri()]
     environment = {"PYTHONMALLOC": "malloc"}  # so that valgrind sees every block
-    done = subprocess.run(["valgrind", *python], env=environment, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        ["valgrind", *python], env=environment, capture_output=True, text=True, check=False
+    )
     assert (done.returncode, done.stdout) == (0, "end\n"), done.stderr
     return "finalizePythonInterpreter" in done.stderr
 
@@ -45,7 +47,13 @@ def test_the_end_of_a_process_frees_nothing_twice(fmu_path, tmp_path):
     fmu = fmu_path("infinite_bus")
     folder = Path(fmpy.extract(str(fmu), str(tmp_path)))
     guid, resources = fmpy.read_model_description(str(fmu)).guid, folder / "resources"
-    given = Path(pythonfmu.__file__).parent / "resources" / "binaries" / "linux64" / "libpythonfmu-export.so"
+    given = (
+        Path(pythonfmu.__file__).parent
+        / "resources"
+        / "binaries"
+        / "linux64"
+        / "libpythonfmu-export.so"
+    )
     assert fault(given, guid, resources), "pythonfmu has mended it itself: ours can go"
     assert not fault(folder / "binaries" / "linux64" / "infinite_bus.so", guid, resources)
 
@@ -54,9 +62,15 @@ def test_nothing_else_is_changed():
     root = Path(pythonfmu.__file__).parent / "resources" / "binaries"
     for name, mended in wrapper_binaries().items():
         given = (root / name).read_bytes()
-        changed = [at for at, (old, new) in enumerate(zip(given, mended, strict=True)) if old != new]
+        changed = [
+            at for at, (old, new) in enumerate(zip(given, mended, strict=True)) if old != new
+        ]
         # failing steps are errors: 2; one release: 1; no "%20": 3; a symbol and a segment: 2 to 16 each
-        assert len(changed) == 2 if name.suffix == ".dll" else 500 < len(changed) < 1 + 2 + 3 + 32 + 541
+        assert (
+            len(changed) == 2
+            if name.suffix == ".dll"
+            else 500 < len(changed) < 1 + 2 + 3 + 32 + 541
+        )
 
 
 def started(fmu_path, folder, uri=None):
@@ -70,14 +84,24 @@ def started(fmu_path, folder, uri=None):
     return done.returncode, done.stdout + done.stderr
 
 
-@pytest.mark.parametrize("name", ["plain", "w ü", "a (1) #+&", "50%", "%20", "%C3%BC", "日本", "a" * 200])
+@pytest.mark.parametrize(
+    "name", ["plain", "w ü", "a (1) #+&", "50%", "%20", "%C3%BC", "日本", "a" * 200]
+)
 def test_the_folder_may_have_any_name(name, fmu_path, tmp_path):
     """In a folder of a user called Müller it ended the process in fmi2Instantiate."""
     assert started(fmu_path, tmp_path / name) == (0, "end\n")
 
 
 @pytest.mark.parametrize(
-    "uri", ["file:///nowhere/resources", "", "file:///" + 5000 * "a", "file:///%", "file:///%C3", "file:///tmp/%zz"]
+    "uri",
+    [
+        "file:///nowhere/resources",
+        "",
+        "file:///" + 5000 * "a",
+        "file:///%",
+        "file:///%C3",
+        "file:///tmp/%zz",
+    ],
 )
 def test_resources_that_are_not_there_are_refused(uri, fmu_path, tmp_path):
     code, said = started(fmu_path, tmp_path, uri or "file:")
@@ -116,7 +140,14 @@ def test_an_instance_gives_its_memory_back(fmu_path, tmp_path):
     """Each kept a class, 51 kB of the converter."""
     fmu = fmu_path("infinite_bus")
     guid = fmpy.read_model_description(str(fmu)).guid
-    call = [sys.executable, "-c", KEEPS, fmpy.extract(str(fmu), str(tmp_path)), "infinite_bus", guid]
+    call = [
+        sys.executable,
+        "-c",
+        KEEPS,
+        fmpy.extract(str(fmu), str(tmp_path)),
+        "infinite_bus",
+        guid,
+    ]
     kept = float(subprocess.run(call, capture_output=True, text=True, check=True).stdout)
     assert kept < 2500
 

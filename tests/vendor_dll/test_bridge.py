@@ -20,7 +20,9 @@ def bridge(kind, demanded):
 
 
 @pytest.mark.parametrize("kind", ["modulation", "voltage"])
-@pytest.mark.parametrize("demanded", [(1.1, -0.4, -0.7), (3.0, -1.5, -1.5), (-3.0, 1.5, 1.5), (0.2, -2.0, 1.8)])
+@pytest.mark.parametrize(
+    "demanded", [(1.1, -0.4, -0.7), (3.0, -1.5, -1.5), (-3.0, 1.5, 1.5), (0.2, -2.0, 1.8)]
+)
 def test_each_phase_is_held_at_the_limit_of_the_modulation_on_both_sides(kind, demanded):
     """With the amplitude-invariant transformation by hand, without its zero sequence."""
     half = V_DC / 2

@@ -16,7 +16,7 @@ from tests.vendor_dll.test_device import LAG, P_0, Q_0, W_B, device_master, swin
 
 Z_S, Z_T, Z_2, B, R_D = 0.01 + 0.15j, 0.005 + 0.1j, 0.002 + 0.08j, 0.3, 0.1
 MP, TAU = 0.02, 0.05
-CIRCUIT = 'filter.X = 0.15\nfilter.B = 0.3\nfilter.R_d = 0.1'  # fmt: skip
+CIRCUIT = "filter.X = 0.15\nfilter.B = 0.3\nfilter.R_d = 0.1"
 SECOND = "\ngrid_inductor.R = 0.002\ngrid_inductor.X = 0.08"
 
 FILTERS = {
@@ -47,7 +47,9 @@ def by_hand(z_g, B=B):
         flat = [y for part in parts for y in (part.real, part.imag)]
         return np.array([*flat, (power - x[6]) / TAU, W_B * MP * (p_ref - x[6])])
 
-    x = np.array([i_s.real, i_s.imag, u_c.real, u_c.imag, i_g.real, i_g.imag, p_ref, cmath.phase(e)])
+    x = np.array(
+        [i_s.real, i_s.imag, u_c.real, u_c.imag, i_g.real, i_g.imag, p_ref, cmath.phase(e)]
+    )
     assert np.abs(rates(x)).max() < 1e-9
     return eigvals(approx_fprime(x, rates, 1e-7))
 
@@ -69,7 +71,8 @@ def test_the_swing_behind_a_filter_is_that_of_the_equations(tmp_path, kind):
     )
     assert abs(here.imag - expected.imag) / (2 * np.pi) < 0.005
     assert abs(here.real / abs(here) - expected.real / abs(expected)) < 0.005
-    assert abs(without.imag - expected.imag) / (2 * np.pi) > 0.01  # a capacitor of other data would be seen
+    # a capacitor of other data would be seen
+    assert abs(without.imag - expected.imag) / (2 * np.pi) > 0.01
 
 
 def test_a_state_that_the_controller_hides_is_in_the_modes(tmp_path):

@@ -69,10 +69,12 @@ def test_the_start_delivers_the_power_flows_power(tmp_path):
     with device_master(droop_device(tmp_path)) as master:
         found = master.components["ibr"].values(["p", "q", "u", "controller.p"])
         e = 1 + (R + 1j * X) * complex(P_0, -Q_0)
-        assert found["p"] == pytest.approx(P_0, abs=2e-4)  # at an instant; the held voltage makes a ripple
+        # at an instant; the held voltage makes a ripple
+        assert found["p"] == pytest.approx(P_0, abs=2e-4)
         assert found["q"] == pytest.approx(Q_0, abs=1e-3)
         seen = e * cmath.exp(1j * LAG) * complex(P_0, Q_0)
-        assert found["controller.p"] == pytest.approx(seen.real, abs=5e-5)  # a staircase has harmonics: LAG²/6
+        # a staircase has harmonics: LAG²/6
+        assert found["controller.p"] == pytest.approx(seen.real, abs=5e-5)
 
 
 @pytest.mark.slow
@@ -134,7 +136,9 @@ def test_modes_of_slow_samples_are_those_of_the_ring_down(tmp_path, sample, dela
 def test_the_map_of_one_step_is_refused(tmp_path):
     with device_master(droop_device(tmp_path)) as master:
         blocks = Blocks(master)
-        with pytest.raises(AnalysisError, match=r"repeat only after 200 communication steps of 0\.0001 s"):
+        with pytest.raises(
+            AnalysisError, match=r"repeat only after 200 communication steps of 0\.0001 s"
+        ):
             compose(blocks, master.schedule)
 
 
@@ -144,7 +148,9 @@ def test_samples_that_never_meet_the_step_are_refused(tmp_path):
     system.components["lag"].inputs["u"] = 1.0
     with (
         Master(system, gauss_seidel([["lag"]]), 1e-4) as master,
-        pytest.raises(AnalysisError, match=r"repeat together after .* take a step that divides these times"),
+        pytest.raises(
+            AnalysisError, match=r"repeat together after .* take a step that divides these times"
+        ),
     ):
         steps_of_period(master, 1e-4)
 
@@ -204,12 +210,24 @@ def test_a_wrong_binding_finds_no_start(tmp_path, old, new):
     [
         ('"i[1]" = "i_s_a"', '"i[4]" = "i_s_a"', r"\[inputs\] i\[4\]: the DLL has no such input"),
         ('"i_s_a"', '"i_x_a"', r"the circuit has no quantity 'i_x_a'"),
-        ('p_ref = "P_ref"', 'p_ref = { from = "P_ref", unit = "MHz" }', r"the unit 'MHz' is none of a power"),
-        ('v_ref = "V_ref"', 'v_ref = { from = "V_ref", unit = "kV" }', r"V_ref is given in pu alone"),
+        (
+            'p_ref = "P_ref"',
+            'p_ref = { from = "P_ref", unit = "MHz" }',
+            r"the unit 'MHz' is none of a power",
+        ),
+        (
+            'v_ref = "V_ref"',
+            'v_ref = { from = "V_ref", unit = "kV" }',
+            r"V_ref is given in pu alone",
+        ),
         ('filter = "L"', 'filter = "CL"', r"filter = 'CL'; it must be one of: L, LC, LCL"),
         ('"e[3]"]', '"e[2]"]', r"three different outputs of the DLL are needed"),
         ("S_n = 2.0\nV_n", "V_n", r"\[unit\] needs S_n \[MVA\] and V_n \[kV\]"),
-        ("filter.X = 0.15", "filter.X = 0.0", r"\[circuit\] filter\.X = 0\.0; allowed is 0\.001 to None"),
+        (
+            "filter.X = 0.15",
+            "filter.X = 0.0",
+            r"\[circuit\] filter\.X = 0\.0; allowed is 0\.001 to None",
+        ),
         ("delay = 0", "delay = 2", r"delay = 2; it must be 0 or 1"),
         ("[inputs]", "[start]\ntrims = ['Q']\n[inputs]", r"Q_ref goes to no input of the DLL"),
         ('"droop.so"', '"none.so"', r"none\.so: cannot be read"),
@@ -240,5 +258,8 @@ def test_no_frequency_is_blamed_where_phases_are_exchanged(tmp_path):
 
 
 def test_a_frequency_is_given_to_what_has_one(tmp_path):
-    with pytest.raises(InputError, match=r"frequency = 60: controller.so has no parameter f_n; a binding's \[rating\]"):
+    with pytest.raises(
+        InputError,
+        match=r"frequency = 60: controller.so has no parameter f_n; a binding's \[rating\]",
+    ):
         gfor.check(compiled(lag(), tmp_path), frequency=60)

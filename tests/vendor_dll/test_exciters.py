@@ -58,7 +58,9 @@ CASE += '[scenarios.base]\ntitle = "Base"\n'
 def warned(folder, start, reference):
     """Warnings of the case with these numbers."""
     path = folder / "case.toml"
-    path.write_text(CASE.replace("START", repr(start)).replace("REFERENCE", repr(reference)), encoding="utf-8")
+    path.write_text(
+        CASE.replace("START", repr(start)).replace("REFERENCE", repr(reference)), encoding="utf-8"
+    )
     (prepared,) = load_case(path).prepare()
     return compute_modes(prepared).warnings
 
@@ -73,6 +75,8 @@ def test_what_to_type_is_told_and_then_nothing_more(tmp_path):
     field = float(start.split("initial.E = ")[1].split()[0])
     voltage = float(held.split("started for ")[1].split()[0])
     assert "the modes are those of another operating point" in held
-    assert not [words for words in warned(tmp_path, field, voltage + field / 50) if "exciter." in words]
+    assert not [
+        words for words in warned(tmp_path, field, voltage + field / 50) if "exciter." in words
+    ]
     (one,) = [words for words in warned(tmp_path, field, 1.05) if "exciter." in words]
     assert one == held

@@ -33,7 +33,9 @@ def described(tmp_path):
     """Description of the FMU of a DLL's source."""
 
     def make(source, name="controller"):
-        return read_description(dll_fmu(read_dll(compiled(source, tmp_path, name)), tmp_path / name))
+        return read_description(
+            dll_fmu(read_dll(compiled(source, tmp_path, name)), tmp_path / name)
+        )
 
     return make
 
@@ -52,7 +54,8 @@ def steps(component, step, count, start=0.0):
 
 
 @pytest.mark.parametrize(
-    ("step", "count", "samples"), [(1e-4, 30, 30), (1e-3, 3, 30), (3.3e-4, 10, 33), (2.5e-5, 41, 11)]
+    ("step", "count", "samples"),
+    [(1e-4, 30, 30), (1e-3, 3, 30), (3.3e-4, 10, 33), (2.5e-5, 41, 11)],
 )
 def test_samples_are_counted_in_integers_under_any_step(described, step, count, samples):
     """A sample at each multiple of 100 µs from 0 on that lies before the end."""
@@ -63,7 +66,9 @@ def test_samples_are_counted_in_integers_under_any_step(described, step, count, 
 
 def test_a_long_search_path_does_not_keep_a_dll_from_being_read(tmp_path, monkeypatch):
     """Hosts of Python-backed FMUs lengthen sys.path; Linux takes no variable of more than 128 KiB."""
-    monkeypatch.setattr("sys.path", [*sys.path, *(f"/somewhere/{'x' * 60}/{k}" for k in range(3000))])
+    monkeypatch.setattr(
+        "sys.path", [*sys.path, *(f"/somewhere/{'x' * 60}/{k}" for k in range(3000))]
+    )
     assert read_dll(compiled(lag(), tmp_path, "controller")).interface.sample_time == 1e-4
 
 
@@ -88,7 +93,12 @@ def test_the_initial_output_reaches_the_dll_before_it_initialises(described):
 
 def test_a_compiler_agrees_where_each_value_lies():
     rows = [
-        *(Signal("a", "", "", 2, 1), Signal("b", "", "", 9, 1), Signal("c", "", "", 4, 3), Signal("d", "", "", 8, 1)),
+        *(
+            Signal("a", "", "", 2, 1),
+            Signal("b", "", "", 9, 1),
+            Signal("c", "", "", 4, 3),
+            Signal("d", "", "", 8, 1),
+        ),
         *(Signal("e", "", "", 1, 5), Signal("f", "", "", 10, 1), Signal("g", "", "", 3, 1)),
     ]
     found = layout(rows)
@@ -96,7 +106,12 @@ def test_a_compiler_agrees_where_each_value_lies():
 
     class Structure(ctypes.Structure):
         _fields_ = [
-            *(("a", ctypes.c_int8), ("b", ctypes.c_double), ("c", ctypes.c_int16 * 3), ("d", ctypes.c_float)),
+            *(
+                ("a", ctypes.c_int8),
+                ("b", ctypes.c_double),
+                ("c", ctypes.c_int16 * 3),
+                ("d", ctypes.c_float),
+            ),
             *(("e", ctypes.c_char * 5), ("f", ctypes.c_char_p), ("g", ctypes.c_uint8)),
         ]
 
@@ -136,8 +151,17 @@ def test_every_type_and_width_arrives_where_the_compiler_looks(described):
     with started(description, **inputs, mode=4) as component:
         component.step(0.0, 1e-3)
         total = 1.5 * (200 + 0.25 - 1 + 20 - 300 + 0.5 + 3e9) + 4 + 3000
-        assert component.values(["sum", "most[1]", "most[2]", "half", "IntStates[1]", "FloatStates[1]"]) == {
-            **{"sum": total, "most[1]": 200, "most[2]": 60000, "half": 0.25, "IntStates[1]": 1, "FloatStates[1]": 0.5}
+        assert component.values(
+            ["sum", "most[1]", "most[2]", "half", "IntStates[1]", "FloatStates[1]"]
+        ) == {
+            **{
+                "sum": total,
+                "most[1]": 200,
+                "most[2]": 60000,
+                "half": 0.25,
+                "IntStates[1]": 1,
+                "FloatStates[1]": 0.5,
+            }
         }
 
 
@@ -158,7 +182,10 @@ PLACES = {
     "arrays": lag(),
     "library": lag(state="own", doubles=0, head="static double own; "),
     "hidden": lag(
-        state="own[0]", doubles=0, head=HEAP, calls=CALLS.replace("{ STATE =", "{ own = malloc(8 + s->mode); STATE =")
+        state="own[0]",
+        doubles=0,
+        head=HEAP,
+        calls=CALLS.replace("{ STATE =", "{ own = malloc(8 + s->mode); STATE ="),
     ),
 }
 
@@ -182,14 +209,20 @@ def test_a_restored_state_repeats_bit_for_bit(described, place):
         component.free_state(saved)
 
 
-BLOCKED = lag(do="static double w; if (((double *)s->in)[0] > 0.7) w += 0.01; ((double *)s->out)[0] += w;")
+BLOCKED = lag(
+    do="static double w; if (((double *)s->in)[0] > 0.7) w += 0.01; ((double *)s->out)[0] += w;"
+)
 SINGLE = lag(
-    state="own", doubles=0, head="static float own; ",
+    state="own",
+    doubles=0,
+    head="static float own; ",
     calls=CALLS.replace("((double *)s->in)[0]", "((float *)s->in)[0]"),
-).replace('"pu", 9, 1}}, OUT', '"pu", 8, 1}}, OUT')  # fmt: skip
+).replace('"pu", 9, 1}}, OUT', '"pu", 8, 1}}, OUT')
 
 
-@pytest.mark.parametrize("source", [BLOCKED, SINGLE], ids=["blocked below 0.7 pu", "single precision"])
+@pytest.mark.parametrize(
+    "source", [BLOCKED, SINGLE], ids=["blocked below 0.7 pu", "single precision"]
+)
 def test_a_variable_of_its_own_is_found_where_it_hides(described, tmp_path, source):
     assert read_dll(compiled(source, tmp_path)).trial.state == "library"
     with started(described(source, "again"), u=1.0) as component:
@@ -216,12 +249,16 @@ def test_instances_share_no_variables_of_the_library(described):
         for k in range(40):
             one.step(k * 1e-4, 1e-4)
             other.step(k * 1e-4, 1e-4)
-        assert [c.values(["y"])["y"] for c in (one, other)] == [recursion(0.7, 40), recursion(-0.2, 40)]
+        assert [c.values(["y"])["y"] for c in (one, other)] == [
+            recursion(0.7, 40),
+            recursion(-0.2, 40),
+        ]
 
 
 def test_a_reset_begins_anew_with_the_librarys_own_variables(described):
     with started(
-        described(lag(do="((double *)s->out)[0] += 100 * calls++;", head="static int calls; ")), u=0.7
+        described(lag(do="((double *)s->out)[0] += 100 * calls++;", head="static int calls; ")),
+        u=0.7,
     ) as component:
         first = steps(component, 1e-4, 3)
         component.reset()
@@ -269,7 +306,10 @@ FAULTS = {
         {"do": "if (s->time > 0.01) ((double *)s->out)[-1] = 1;"},
         "Model_Outputs wrote outside of its outputs (8 bytes): before the first",
     ),
-    "an answer that nobody knows": ({"do": "if (s->time > 0.01) return 7;"}, "Model_Outputs returns 7"),
+    "an answer that nobody knows": (
+        {"do": "if (s->time > 0.01) return 7;"},
+        "Model_Outputs returns 7",
+    ),
 }
 
 
@@ -283,25 +323,50 @@ def test_a_planted_fault_is_named(described, fault):
 
 
 ABORT, LOOP = (
-    f"__attribute__((constructor)) static void begin(void) {{ {words} }} " for words in ("abort();", "for (;;) {}")
+    f"__attribute__((constructor)) static void begin(void) {{ {words} }} "
+    for words in ("abort();", "for (;;) {}")
 )
 TWICE = '"y", "", "", 9, 1}, {"y", "Lagged'
 BROKEN = {
     "no IEEE/CIGRE DLL": ("int x;", "it has no function Model_GetInfo, so it is no IEEE/CIGRE DLL"),
-    "a missing function": (lag(calls=CALLS.replace("Model_Outputs", "Model_Output")), "no function Model_Outputs"),
-    "two of one name": (lag().replace('"y", "Lagged', TWICE).replace("1, OUT", "2, OUT"), "has the name of output 1"),
-    "an unknown type": (lag().replace('"pu", 9, 1}}, OUT', '"pu", 11, 1}}, OUT'), "input 1 ('u') has data type 11"),
-    "no width": (lag().replace('"pu", 9, 1}}, OUT', '"pu", 9, 0}}, OUT'), "input 1 ('u') has width 0"),
+    "a missing function": (
+        lag(calls=CALLS.replace("Model_Outputs", "Model_Output")),
+        "no function Model_Outputs",
+    ),
+    "two of one name": (
+        lag().replace('"y", "Lagged', TWICE).replace("1, OUT", "2, OUT"),
+        "has the name of output 1",
+    ),
+    "an unknown type": (
+        lag().replace('"pu", 9, 1}}, OUT', '"pu", 11, 1}}, OUT'),
+        "input 1 ('u') has data type 11",
+    ),
+    "no width": (
+        lag().replace('"pu", 9, 1}}, OUT', '"pu", 9, 0}}, OUT'),
+        "input 1 ('u') has width 0",
+    ),
     "another layout": (
         lag().replace("int32_t n_in;", "__attribute__((aligned(256))) int32_t n_in;"),
         "is of another layout",
     ),
     "a crash on loading": (lag(head=ABORT), "ends with SIGABRT"),
     "no sample time": (lag(sample_time="NAN"), "its sample time is nan s"),
-    "too short a sample time": (lag(sample_time=1e-15), "its sample time is 1e-15 s; at least 1e-09 s"),
-    "bounds the wrong way": (lag().replace("{.d = 0.001}, {.d = 10}", "{.d = 10}, {.d = 0.001}"), "10.0 to 0.001"),
-    "a name that cannot be written": (lag().replace('"y", "Lag', '"y\\001", "Lag'), "a name that cannot be written"),
-    "a name that is taken": (lag().replace('"y", "Lag', '"DoubleStates[1]", "Lag'), "would stand for two variables"),
+    "too short a sample time": (
+        lag(sample_time=1e-15),
+        "its sample time is 1e-15 s; at least 1e-09 s",
+    ),
+    "bounds the wrong way": (
+        lag().replace("{.d = 0.001}, {.d = 10}", "{.d = 10}, {.d = 0.001}"),
+        "10.0 to 0.001",
+    ),
+    "a name that cannot be written": (
+        lag().replace('"y", "Lag', '"y\\001", "Lag'),
+        "a name that cannot be written",
+    ),
+    "a name that is taken": (
+        lag().replace('"y", "Lag', '"DoubleStates[1]", "Lag'),
+        "would stand for two variables",
+    ),
 }
 
 
@@ -356,7 +421,9 @@ def test_the_command_tells_what_was_found_out(tmp_path, capsys):
 
 
 def test_a_parameter_that_the_dll_changes_is_told(described):
-    source = lag(head="int32_t Model_CheckParameters(struct instance *s) { ((double *)s->par)[0] = 0.02; return 0; } ")
+    source = lag(
+        head="int32_t Model_CheckParameters(struct instance *s) { ((double *)s->par)[0] = 0.02; return 0; } "
+    )
     with started(described(source), u=0.7) as component:
         assert steps(component, 1e-4, 10) == recursion(0.7, 10, T=0.02)
         assert component.values(["T"])["T"] == 0.02

@@ -15,35 +15,70 @@ LATE = "if (s->time > 0.005) "
 
 CAUGHT = {
     # what is planted: (source, what the message says)
-    "an error code": (lag(do=LATE + '{ s->error = "IGBT fault"; return 2; }'), "error of the DLL: IGBT fault"),
+    "an error code": (
+        lag(do=LATE + '{ s->error = "IGBT fault"; return 2; }'),
+        "error of the DLL: IGBT fault",
+    ),
     "an unknown code": (lag(do=LATE + "return 9;"), "Model_Outputs returns 9; the interface knows"),
     "not a number": (lag(do=LATE + "((double *)s->out)[0] = NAN;"), "y is no longer finite"),
-    "a state that is infinite": (lag(do=LATE + "s->doubles[0] = INFINITY;"), "DoubleStates[1] is no longer finite"),
-    "a write behind its states": (lag(do=LATE + "s->doubles[1] = 1;"), "wrote outside of its double states"),
-    "a write behind its outputs": (lag(do="((double *)s->out)[1] = 1;"), "wrote outside of its outputs"),
-    "a write before its parameters": (lag(do="((double *)s->par)[-1] = 1;"), "wrote outside of its parameters"),
-    "more inputs than declared, written": (lag(do="((double *)s->in)[1] = 1;"), "wrote outside of its inputs"),
+    "a state that is infinite": (
+        lag(do=LATE + "s->doubles[0] = INFINITY;"),
+        "DoubleStates[1] is no longer finite",
+    ),
+    "a write behind its states": (
+        lag(do=LATE + "s->doubles[1] = 1;"),
+        "wrote outside of its double states",
+    ),
+    "a write behind its outputs": (
+        lag(do="((double *)s->out)[1] = 1;"),
+        "wrote outside of its outputs",
+    ),
+    "a write before its parameters": (
+        lag(do="((double *)s->par)[-1] = 1;"),
+        "wrote outside of its parameters",
+    ),
+    "more inputs than declared, written": (
+        lag(do="((double *)s->in)[1] = 1;"),
+        "wrote outside of its inputs",
+    ),
     "a crash in a sample": (lag(do=LATE + "abort();"), "SIGABRT"),
     "a crash in initialise": (lag(begin="*(volatile int *)0 = 1;"), "SIGSEGV"),
-    "an error in initialise": (lag(begin='{ s->error = "no licence"; return 2; }'), "error of the DLL: no licence"),
-    "an initial value that is none": (
-        lag(begin="((double *)s->out)[0] = NAN;"), "Model_Initialize gives no finite value for y",
+    "an error in initialise": (
+        lag(begin='{ s->error = "no licence"; return 2; }'),
+        "error of the DLL: no licence",
     ),
-}  # fmt: skip
+    "an initial value that is none": (
+        lag(begin="((double *)s->out)[0] = NAN;"),
+        "Model_Initialize gives no finite value for y",
+    ),
+}
 
 REFUSED = {
-    "a missing function": (lag(calls=CALLS.replace("Model_Initialize", "Model_Init")), "no function Model_Initialize"),
+    "a missing function": (
+        lag(calls=CALLS.replace("Model_Initialize", "Model_Init")),
+        "no function Model_Initialize",
+    ),
     "no functions at all": ("int answer;", "it has no function Model_GetInfo"),
     "another alignment": (
-        INTERFACE.replace("int32_t n_in;", "__attribute__((aligned(64))) int32_t n_in;") + lag()[len(INTERFACE) :],
+        INTERFACE.replace("int32_t n_in;", "__attribute__((aligned(64))) int32_t n_in;")
+        + lag()[len(INTERFACE) :],
         "its structures are of another layout",
     ),
     "packed structures": ("#pragma pack(1)\n" + lag(), "layout"),
-    "a sample time below 0 that is no number": (lag(sample_time="-NAN"), "its sample time is nan s"),
+    "a sample time below 0 that is no number": (
+        lag(sample_time="-NAN"),
+        "its sample time is nan s",
+    ),
     "an endless sample time": (lag(sample_time="INFINITY"), "its sample time is inf s"),
     "negative states": (lag(doubles=-1), "none may be negative"),
-    "bounds turned": (lag().replace("{.d = 0.001}, {.d = 10}", "{.d = 10}, {.d = 0.001}"), "between which nothing is"),
-    "another version of the interface": (lag().replace("{1, 1, 0, 0}", "{3, 0, 0, 0}"), "version 3.0.0.0"),
+    "bounds turned": (
+        lag().replace("{.d = 0.001}, {.d = 10}", "{.d = 10}, {.d = 0.001}"),
+        "between which nothing is",
+    ),
+    "another version of the interface": (
+        lag().replace("{1, 1, 0, 0}", "{3, 0, 0, 0}"),
+        "version 3.0.0.0",
+    ),
 }
 
 
@@ -80,14 +115,23 @@ def test_a_defect_in_what_it_declares_is_refused(tmp_path, planted):
 KEEPING = {
     "a hidden global": (lag(state="own", doubles=0, head="static double own; "), "library"),
     "memory that it allocates": (
-        lag(state="(*own)", doubles=0, head="static double *volatile own; "
-            "int32_t Model_FirstCall(struct instance *s) { own = malloc(8); *own = 0; return 0; } "), "hidden"),
+        lag(
+            state="(*own)",
+            doubles=0,
+            head="static double *volatile own; "
+            "int32_t Model_FirstCall(struct instance *s) { own = malloc(8); *own = 0; return 0; } ",
+        ),
+        "hidden",
+    ),
     "a file": (
-        lag(head="#include <stdio.h>\nstatic int n; ",
-            do='FILE *f = fopen("n", "a+"); if (f) { fputc(1, f); ((double *)s->out)[0] += ftell(f); fclose(f); }'),
-        "hidden"),
+        lag(
+            head="#include <stdio.h>\nstatic int n; ",
+            do='FILE *f = fopen("n", "a+"); if (f) { fputc(1, f); ((double *)s->out)[0] += ftell(f); fclose(f); }',
+        ),
+        "hidden",
+    ),
     "an honest one": (lag(), "arrays"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("planted", KEEPING)

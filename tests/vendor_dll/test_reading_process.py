@@ -26,13 +26,17 @@ def empty_cache(tmp_path, monkeypatch):
     monkeypatch.setattr(vendor_files, "_tried_now", {})
 
 
-def test_a_trial_that_lacked_time_is_told_not_kept_and_tried_anew(empty_cache, tmp_path, monkeypatch, caplog):
+def test_a_trial_that_lacked_time_is_told_not_kept_and_tried_anew(
+    empty_cache, tmp_path, monkeypatch, caplog
+):
     library = compiled(SLOW, tmp_path)
     monkeypatch.setattr(dll_module, "_LONGEST", 1.0)
     first = as_fmu(library)
     description = read_description(first)
     assert description.kept_in == "not tried"
-    assert "does not end within 1 s while Model_Initialize runs: time ran out" in description.kept_why
+    assert (
+        "does not end within 1 s while Model_Initialize runs: time ran out" in description.kept_why
+    )
     assert "the next call tries it anew" in caplog.text
     assert as_fmu(library) == first  # not twice in one process
     vendor_files._tried_now.clear()
@@ -55,7 +59,9 @@ def test_a_dll_that_never_comes_back_is_told_as_such_every_time(empty_cache, tmp
 
 
 def test_a_trial_that_was_killed_from_outside_is_no_lasting_verdict(tmp_path):
-    trial = read_dll(compiled(lag(do="raise(SIGKILL);", head="\n#include <signal.h>\n"), tmp_path)).trial
+    trial = read_dll(
+        compiled(lag(do="raise(SIGKILL);", head="\n#include <signal.h>\n"), tmp_path)
+    ).trial
     assert trial.passing
     assert "ends with SIGKILL while Model_Outputs runs: something else ended it" in trial.why
     trial = read_dll(compiled(lag(do="abort();"), tmp_path)).trial
@@ -66,12 +72,19 @@ def test_a_start_that_takes_too_long_is_not_laid_on_the_dll(tmp_path, monkeypatc
     monkeypatch.setattr(asking, "BEFORE_IT_STARTS", 0.0)
     monkeypatch.setattr(asking, "note_beside", lambda answer: answer.with_name("not there yet"))
     with pytest.raises(DllError, match=r"time ran out before the DLL was loaded.*try again"):
-        read_dll(compiled(lag(head="__attribute__((constructor)) static void b(void) { for (;;) {} } "), tmp_path))
+        read_dll(
+            compiled(
+                lag(head="__attribute__((constructor)) static void b(void) { for (;;) {} } "),
+                tmp_path,
+            )
+        )
 
 
 def test_a_crash_names_the_function_that_was_called(tmp_path):
     source = lag().replace("{ return &INFO; }", "{ abort(); return &INFO; }")
-    with pytest.raises(DllError, match="ends with SIGABRT while Model_GetInfo runs: it crashes there"):
+    with pytest.raises(
+        DllError, match="ends with SIGABRT while Model_GetInfo runs: it crashes there"
+    ):
         read_dll(compiled(source, tmp_path))
 
 
@@ -119,14 +132,38 @@ def test_an_answer_that_the_dll_wrote_is_refused_in_words(what, tmp_path):
 def honest():
     text = dict.fromkeys(answer_file.TEXTS, "a")
     signal = {"name": "u", "description": "", "unit": "", "data_type": 9, "width": 1}
-    parameter = {"name": "K", "group": "", "description": "", "unit": "", "data_type": 9, "fixed": False,
-                 "default": 1.0, "minimum": None, "maximum": None}  # fmt: skip
+    parameter = {
+        "name": "K",
+        "group": "",
+        "description": "",
+        "unit": "",
+        "data_type": 9,
+        "fixed": False,
+        "default": 1.0,
+        "minimum": None,
+        "maximum": None,
+    }
     return {
-        "interface": {"texts": text, "interface_version": [1, 0, 0, 0], "sample_time": 1e-4, "mode": 1,
-                      "inputs": [signal], "outputs": [signal], "parameters": [parameter], "states": [0, 0, 1],
-                      "calls": ["Initialize"]},
-        "trial": {"state": "library", "doubles": [8], "floats": [], "regions": [[0, 64]], "why": "", "passing": False},
-    }  # fmt: skip
+        "interface": {
+            "texts": text,
+            "interface_version": [1, 0, 0, 0],
+            "sample_time": 1e-4,
+            "mode": 1,
+            "inputs": [signal],
+            "outputs": [signal],
+            "parameters": [parameter],
+            "states": [0, 0, 1],
+            "calls": ["Initialize"],
+        },
+        "trial": {
+            "state": "library",
+            "doubles": [8],
+            "floats": [],
+            "regions": [[0, 64]],
+            "why": "",
+            "passing": False,
+        },
+    }
 
 
 def test_an_honest_answer_is_taken_as_it_is(tmp_path):
@@ -140,7 +177,13 @@ def test_an_honest_answer_is_taken_as_it_is(tmp_path):
 
 def places(value, path=()):
     yield path
-    entries = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    entries = (
+        value.items()
+        if isinstance(value, dict)
+        else enumerate(value)
+        if isinstance(value, list)
+        else ()
+    )
     for key, inner in entries:
         yield from places(inner, (*path, key))
 

@@ -86,7 +86,9 @@ def folder(tmp_path_factory):
 def modes_with(folder, **values):
     """The swing [rad/s] with other values of the controller."""
     case = load_case(str(folder / "one.toml"))
-    (prepared,) = case.prepare((), {f"ibr.controller.{name}": value for name, value in values.items()})
+    (prepared,) = case.prepare(
+        (), {f"ibr.controller.{name}": value for name, value in values.items()}
+    )
     return swing([m.eigenvalue for m in compute_modes(prepared, (0.1, 100.0)).modes])
 
 
@@ -95,7 +97,9 @@ def said(capsys):
     return " ".join((printed.out + printed.err).split())
 
 
-@pytest.mark.parametrize("command", [["fmu", "admittance"], ["certify"], ["certify", "--code", "aemo"]], ids=" ".join)
+@pytest.mark.parametrize(
+    "command", [["fmu", "admittance"], ["certify"], ["certify", "--code", "aemo"]], ids=" ".join
+)
 def test_a_controller_alone_is_refused_with_the_remedy(folder, capsys, command):
     assert main([*command, str(folder / "droop.so")]) == 2
     printed = said(capsys)
@@ -116,7 +120,10 @@ def test_a_binding_is_drafted_of_a_device_and_a_controller_is_warned_about(folde
 @pytest.mark.parametrize("file", ["droop.so", "droop.toml"])
 def test_the_acceptance_tests_run_it(folder, capsys, file):
     wanted = ["archive", "loads", "state", "settable_states", "power_balance"]
-    assert main(["fmu", "check", str(folder / file), "--json", *(f"--only={name}" for name in wanted)]) == 0
+    assert (
+        main(["fmu", "check", str(folder / file), "--json", *(f"--only={name}" for name in wanted)])
+        == 0
+    )
     verdicts = {c["check"]: c["verdict"] for c in json.loads(capsys.readouterr().out)["checks"]}
     alone = {"power_balance": "not applicable"} if file == "droop.so" else {}
     assert verdicts == dict.fromkeys(wanted, "pass") | alone
@@ -125,7 +132,10 @@ def test_the_acceptance_tests_run_it(folder, capsys, file):
 def test_its_measured_admittance_gives_its_modes(folder, capsys):
     """Through its port alone, though its phase quantities ripple within a period."""
     options = ["--from-hz", "0.5", "--to-hz", "200", "--json", "--out", str(folder / "box")]
-    assert main(["modes", "--black-box", str(folder / "one.toml"), "--component", "ibr", *options]) == 0
+    assert (
+        main(["modes", "--black-box", str(folder / "one.toml"), "--component", "ibr", *options])
+        == 0
+    )
     (found,) = json.loads(capsys.readouterr().out)
     (measured,), (perturbed,) = found["modes"], found["white_box_modes"]
     assert abs(measured["frequency_hz"] - perturbed["frequency_hz"]) < 0.005
@@ -134,9 +144,22 @@ def test_its_measured_admittance_gives_its_modes(folder, capsys):
 
 def test_a_sampled_component_beside_the_box_is_named(folder, capsys):
     assert (
-        main(["modes", "--black-box", str(folder / "one.toml"), "--component", "bus", "--out", str(folder / "no")]) == 1
+        main(
+            [
+                "modes",
+                "--black-box",
+                str(folder / "one.toml"),
+                "--component",
+                "bus",
+                "--out",
+                str(folder / "no"),
+            ]
+        )
+        == 1
     )
-    assert "ibr is sampled beside the communication step, or works on phase quantities" in said(capsys)
+    assert "ibr is sampled beside the communication step, or works on phase quantities" in said(
+        capsys
+    )
 
 
 def test_other_codes_take_the_device_as_an_fmu(folder, monkeypatch):
@@ -147,7 +170,17 @@ def test_other_codes_take_the_device_as_an_fmu(folder, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(kinds, "certify_code", watch)
-    main(["certify", str(folder / "droop.toml"), "--code", "aemo", "--no-check", "--out", str(folder / "aemo")])
+    main(
+        [
+            "certify",
+            str(folder / "droop.toml"),
+            "--code",
+            "aemo",
+            "--no-check",
+            "--out",
+            str(folder / "aemo"),
+        ]
+    )
     assert [path.suffix for path in seen] == [".fmu"]
 
 
@@ -166,7 +199,19 @@ def test_a_sensitivity_is_the_difference_of_modes_over_the_period(folder, capsys
     """By the power filter's time, which leaves the point where it is, and by the rated voltage, which moves it."""
     names = ["ibr.controller.tau", "ibr.controller.V"]
     options = [f"--parameter={name}" for name in names]
-    assert main(["sensitivities", str(folder / "one.toml"), *options, "--json", "--out", str(folder / "sens")]) == 0
+    assert (
+        main(
+            [
+                "sensitivities",
+                str(folder / "one.toml"),
+                *options,
+                "--json",
+                "--out",
+                str(folder / "sens"),
+            ]
+        )
+        == 0
+    )
     rows = json.loads(capsys.readouterr().out)[0]["sensitivities"]
     found = {row["parameter"]: row for row in rows}
     change = 5e-4
@@ -180,7 +225,21 @@ def test_a_sensitivity_is_the_difference_of_modes_over_the_period(folder, capsys
 def test_a_sweep_has_the_modes_of_each_value(folder):
     out = folder / "sweep"
     values = "ibr.controller.tau=0.05:0.051:2"
-    assert main(["sweep", str(folder / "one.toml"), "--vary", values, "--workers", "1", "--out", str(out)]) == 0
+    assert (
+        main(
+            [
+                "sweep",
+                str(folder / "one.toml"),
+                "--vary",
+                values,
+                "--workers",
+                "1",
+                "--out",
+                str(out),
+            ]
+        )
+        == 0
+    )
     with (out / "sweep.csv").open(encoding="utf-8") as file:
         rows = {float(row["ibr.controller.tau [s]"]): row for row in csv.DictReader(file)}
     expected = modes_with(folder, tau=0.051)

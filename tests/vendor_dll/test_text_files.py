@@ -33,7 +33,12 @@ int32_t Model_Outputs(struct instance *s) { *(double *)s->out = s->doubles[0] * 
 def needs_a_file(folder, default="gains.txt", otherwise=""):
     """The library, which crashes where its file is not there; ``otherwise`` comes before."""
     info = INFO % {"name": "filed", "sample_time": 1e-3, "doubles": 1}
-    source = INTERFACE + SIGNALS.replace("DEFAULT", default) + info + CALLS.replace("OTHERWISE", otherwise)
+    source = (
+        INTERFACE
+        + SIGNALS.replace("DEFAULT", default)
+        + info
+        + CALLS.replace("OTHERWISE", otherwise)
+    )
     return compiled(source, folder, "filed")
 
 
@@ -66,7 +71,9 @@ def test_a_file_that_is_given_goes_into_the_fmu(tmp_path, monkeypatch):
     assert "its state is in the host's arrays" in built.told[1]
     file.unlink()
     monkeypatch.chdir(elsewhere)
-    found = fmpy.simulate_fmu(str(built.path), stop_time=0.01, step_size=1e-3, start_values={"u": 1.0}, output=["y"])
+    found = fmpy.simulate_fmu(
+        str(built.path), stop_time=0.01, step_size=1e-3, start_values={"u": 1.0}, output=["y"]
+    )
     assert found["y"][-1] == 5
 
 
@@ -87,7 +94,10 @@ def test_a_crash_for_want_of_a_file_is_told_as_that(given, tmp_path):
 
 def test_a_dll_that_says_that_it_has_no_file_is_helped_out(tmp_path):
     library = needs_a_file(tmp_path, otherwise='if (!f) { s->error = "no gains"; return 2; }')
-    with pytest.raises(ComponentError, match=r"error of the DLL: no gains.*parameter gains names the file gains.txt"):
+    with pytest.raises(
+        ComponentError,
+        match=r"error of the DLL: no gains.*parameter gains names the file gains.txt",
+    ):
         gain(library)
     (tmp_path / "gains.txt").write_text("7", encoding="utf-8")
     assert gain(library) == 7  # what was built without it is not taken again
@@ -99,5 +109,7 @@ def test_a_dll_does_not_choose_which_file_it_reads(tmp_path):
         place = tmp_path / str(n)
         place.mkdir()
         (place / "link.txt").symlink_to(tmp_path / "secret.txt")
-        with pytest.raises(InputError, match=r"it sees no files but those that its text parameters name"):
+        with pytest.raises(
+            InputError, match=r"it sees no files but those that its text parameters name"
+        ):
             as_fmu(needs_a_file(place, default))

@@ -110,7 +110,10 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_dll_that_fails_under_wine_is_named(under_wine, tmp_path, fault):
-    source = lag(do=f"if (s->time > 2.5e-4 && s->time < 3.5e-4) {{ {fault} }}", head="\n#include <stdlib.h>\n")
+    source = lag(
+        do=f"if (s->time > 2.5e-4 && s->time < 3.5e-4) {{ {fault} }}",
+        head="\n#include <stdlib.h>\n",
+    )
     with opened(compiled(source, tmp_path, platform="win64")) as component:
         with pytest.raises(ComponentError) as error:
             answers(component)
@@ -133,7 +136,9 @@ def test_a_hang_under_wine_is_ended_with_all_its_processes(under_wine, tmp_path)
 
 def _in_group(stat, group):
     try:
-        return stat.read_text(encoding="ascii", errors="replace").rpartition(")")[2].split()[2] == str(group)
+        return stat.read_text(encoding="ascii", errors="replace").rpartition(")")[2].split()[
+            2
+        ] == str(group)
     except OSError:  # it has ended since
         return False
 
@@ -146,7 +151,9 @@ def test_a_dll_that_crashes_while_it_is_loaded_is_refused(under_wine, tmp_path):
 
 def test_a_crash_under_wine_names_the_function_that_was_called(under_wine, tmp_path):
     source = lag().replace("{ return &INFO; }", "{ *(volatile int *)16 = 0; return &INFO; }")
-    with pytest.raises(DllError, match=r"while Model_GetInfo runs, .* under Wine ends: crash .* memory that is not"):
+    with pytest.raises(
+        DllError, match=r"while Model_GetInfo runs, .* under Wine ends: crash .* memory that is not"
+    ):
         read(compiled(source, tmp_path, platform="win64"))
 
 
@@ -166,19 +173,24 @@ static int attempted(void) {
 """
 
 
-def test_under_wine_a_dll_neither_reads_nor_writes_the_users_files_nor_opens_sockets(under_wine, tmp_path):
+def test_under_wine_a_dll_neither_reads_nor_writes_the_users_files_nor_opens_sockets(
+    under_wine, tmp_path
+):
     """It asks Wine's server, which opens files in its place, and the kernel itself."""
     secret, written = tmp_path / "secret", tmp_path / "written"
     secret.write_text("a key", encoding="ascii")
     head = (
-        ESCAPE.replace("SECRET", f"Z:{secret}").replace("WRITTEN", f"Z:{written}").replace("OWN", "C:/windows/temp/x")
+        ESCAPE.replace("SECRET", f"Z:{secret}")
+        .replace("WRITTEN", f"Z:{written}")
+        .replace("OWN", "C:/windows/temp/x")
     )
     source = lag(head=head, begin="((double *)s->out)[0] = s->doubles[0] = 100 + attempted();")
     library = compiled(source, tmp_path, platform="win64")
     with opened(library) as component:
         assert component.values(["y"])["y"] == 108
     assert not written.exists()
-    trusted = opened(library, isolated=False)  # the same attempts succeed where nothing is closed off
+    # the same attempts succeed where nothing is closed off
+    trusted = opened(library, isolated=False)
     with trusted:
         assert trusted.values(["y"])["y"] == 115
     assert written.exists()
@@ -189,14 +201,20 @@ def test_without_wine_a_windows_dll_is_refused_with_the_remedy(tmp_path, monkeyp
         raise wine.NoWineError(wine.MISSING)
 
     library = tmp_path / "vendor.dll"
-    library.write_bytes(b"MZ" + bytes(58) + (64).to_bytes(4, "little") + b"PE\0\0\x64\x86" + bytes(64))
+    library.write_bytes(
+        b"MZ" + bytes(58) + (64).to_bytes(4, "little") + b"PE\0\0\x64\x86" + bytes(64)
+    )
     monkeypatch.setattr(wine, "find_wine", missing)
-    with pytest.raises(InputError, match=r"vendor\.dll: .*install it .*or ask its author for a build for Linux"):
+    with pytest.raises(
+        InputError, match=r"vendor\.dll: .*install it .*or ask its author for a build for Linux"
+    ):
         info(library)
 
 
 def test_a_windows_dll_of_32_bits_is_refused_by_name(under_wine, tmp_path):
     library = tmp_path / "vendor.dll"
-    library.write_bytes(b"MZ" + bytes(58) + (64).to_bytes(4, "little") + b"PE\0\0\x4c\x01" + bytes(64))
+    library.write_bytes(
+        b"MZ" + bytes(58) + (64).to_bytes(4, "little") + b"PE\0\0\x4c\x01" + bytes(64)
+    )
     with pytest.raises(InputError, match="a Windows DLL of 32 bits"):
         info(library)

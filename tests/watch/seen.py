@@ -38,7 +38,14 @@ def seen_of(signals, stop):
         parts["low"][name] = np.concatenate([[y[0]], np.minimum(inner.min(axis=1), y[:-1:every])])
         parts["high"][name] = np.concatenate([[y[0]], np.maximum(inner.max(axis=1), y[:-1:every])])
         parts["turns"][name] = np.concatenate([[0.0], turned[1:].reshape(-1, every).sum(axis=1)])
-    return Seen(times[::every], dict(parts["last"]), parts["last"], parts["low"], parts["high"], parts["turns"])
+    return Seen(
+        times[::every],
+        dict(parts["last"]),
+        parts["last"],
+        parts["low"],
+        parts["high"],
+        parts["turns"],
+    )
 
 
 @cache

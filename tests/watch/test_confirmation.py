@@ -16,14 +16,20 @@ EVENT = 1.0
 def found(course, lasts, event=EVENT):
     """``course`` of the time since the event."""
     y = lambda t: 0.9 + (t > event) * course(np.maximum(t - event, 0.0))  # noqa: E731
-    return judged(seen_of({"a.y": y}, event + lasts), system("a"), [ParameterChange(event, "a", "offset", 1.0)])
+    return judged(
+        seen_of({"a.y": y}, event + lasts),
+        system("a"),
+        [ParameterChange(event, "a", "offset", 1.0)],
+    )
 
 
 def beat(other, phases, size, square):
     """1 Hz and another frequency, both decaying, with the square of their sum, as a magnitude has it."""
 
     def course(t):
-        one, two = (np.cos(2 * np.pi * f * t + p) for f, p in zip((1.0, other), phases, strict=True))
+        one, two = (
+            np.cos(2 * np.pi * f * t + p) for f, p in zip((1.0, other), phases, strict=True)
+        )
         w = size * (np.exp(-0.2 * t) * one + np.exp(-0.5 * t) * two)
         return w + square * w * w
 
@@ -49,7 +55,12 @@ def test_a_short_beat_is_not_judged(course):
 @pytest.mark.parametrize("seed", range(12))
 def test_longer_beats_are_never_growth(seed):
     draw = np.random.default_rng(seed)
-    course = beat(draw.uniform(1.15, 2.1), draw.uniform(0, 6.3, 2), draw.uniform(0.02, 0.1), draw.uniform(2, 6))
+    course = beat(
+        draw.uniform(1.15, 2.1),
+        draw.uniform(0, 6.3, 2),
+        draw.uniform(0.02, 0.1),
+        draw.uniform(2, 6),
+    )
     for lasts in (3.0, 4.0, 6.0):
         assert {f.kind for f in found(course, lasts)} <= {"not_judged"}
 
@@ -84,7 +95,11 @@ def test_a_growth_that_goes_far_needs_no_periods():
         (0.2, Oscillation(1.0, 0.09, 0.01), "over the whole response its rate is +0.2 1/s"),
         (0.2, Oscillation(1.0, 0.41, 0.01), "over the whole response its rate is +0.2 1/s"),
         (-0.2, Oscillation(1.0, 0.15, 0.01), "over the whole response its rate is -0.2 1/s"),
-        (0.2, Oscillation(1.1, 0.2, 0.01), "the whole response does not show that oscillation as the strongest"),
+        (
+            0.2,
+            Oscillation(1.1, 0.2, 0.01),
+            "the whole response does not show that oscillation as the strongest",
+        ),
         (0.0, Oscillation(1.0, 0.0, 0.01), ""),
         (-0.2, Oscillation(1.0, 0.0, 0.01), "over the whole response it decays at -0.2 1/s"),
     ],
@@ -150,7 +165,9 @@ def test_a_slow_irregular_swing_is_told_by_how_often_it_passes_its_middle(lasts,
     assert {f.kind for f in told} & {"sustained_oscillation"} == kinds
 
 
-@pytest.mark.parametrize(("early", "late", "why"), [(-0.05, 0.25, "in one half of its end it decays"), (0.3, 0.1, "")])
+@pytest.mark.parametrize(
+    ("early", "late", "why"), [(-0.05, 0.25, "in one half of its end it decays"), (0.3, 0.1, "")]
+)
 def test_one_half_that_decays_is_enough_for_a_doubt(early, late, why):
     """The rate changes in the middle of the end; over the whole of it the strongest oscillation grows either way."""
     t = np.arange(0, 24, 5e-3)

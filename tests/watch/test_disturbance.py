@@ -40,9 +40,15 @@ def test_noise_alone_is_not_judged(size):
     noise = rough(size)
     made = pair(Noise(size, 1))
     (finding,) = found(lambda t: 0.9 + noise(t), made)
-    assert (finding.kind, finding.component, finding.time, finding.until) == ("not_judged", "b", 0.0, None)
+    assert (finding.kind, finding.component, finding.time, finding.until) == (
+        "not_judged",
+        "b",
+        0.0,
+        None,
+    )
     assert "noise on a.y -> b.u" in finding.message
-    kinds = {f.kind for f in found(lambda t: 0.9 + noise(t), pair())}  # the same motion where no noise explains it
+    # the same motion where no noise explains it
+    kinds = {f.kind for f in found(lambda t: 0.9 + noise(t), pair())}
     assert "sustained_oscillation" in kinds
 
 
@@ -60,11 +66,15 @@ def test_a_wandering_swing_that_noise_excites_is_not_judged():
     assert [f.kind for f in found(y, pair(Noise(1e-3, 1)))] == ["not_judged"]
 
 
-@pytest.mark.parametrize(("rate", "hertz", "size"), [(0.15, 0.6, 0.02), (1.0, 5.0, 1e-4), (1.0, 60.0, 1e-3)])
+@pytest.mark.parametrize(
+    ("rate", "hertz", "size"), [(0.15, 0.6, 0.02), (1.0, 5.0, 1e-4), (1.0, 60.0, 1e-3)]
+)
 def test_a_growth_beneath_noise_is_reported(rate, hertz, size):
     noise = rough(1e-4)
-    (finding, *_) = found(lambda t: 0.9 + noise(t) + size * np.exp(rate * t) * np.sin(2 * PI * hertz * t),
-                          pair(Noise(1e-4, 1)))  # fmt: skip
+    (finding, *_) = found(
+        lambda t: 0.9 + noise(t) + size * np.exp(rate * t) * np.sin(2 * PI * hertz * t),
+        pair(Noise(1e-4, 1)),
+    )
     assert finding.kind == "growing_oscillation"
     assert finding.figures["growth_rate"] == pytest.approx(rate, rel=0.15)
 
@@ -75,7 +85,9 @@ def test_when_it_is_in_force():
     assert [(d.begin, d.end) for d in disturbances(pair(), [begun], 5.0)] == [(2.0, 5.0)]
     ended = WireRecovery(3.0, "b", WIRE, noise)
     assert [(d.begin, d.end) for d in disturbances(pair(), [begun, ended], 5.0)] == [(2.0, 3.0)]
-    assert [(d.begin, d.end) for d in disturbances(pair(noise), [begun, ended], 5.0)] == [(0.0, 5.0)]
+    assert [(d.begin, d.end) for d in disturbances(pair(noise), [begun, ended], 5.0)] == [
+        (0.0, 5.0)
+    ]
     assert [d.kind for d in disturbances(pair(steps), [], 5.0)] == ["quantisation"]
     assert disturbances(pair(Noise(0.0, 1)), [], 5.0) == []
     silenced = WireFault(1.0, "b", WIRE, Noise(0.0, 1))
@@ -86,7 +98,10 @@ def two_area(tmp_path, scenario, stop, deviation, to):
     case = load_case("two_area_rms")
     file = tmp_path / "case.toml"
     table = f'connection = "grid.*.v_* -> {to}.v_*"\ndeviation = {deviation}\nseed = 1\nbandwidth = "80 Hz"\n'
-    file.write_text(f'{case.path.read_text(encoding="utf-8")}\n[imperfections.n]\ntype = "noise"\n{table}', "utf-8")
+    file.write_text(
+        f'{case.path.read_text(encoding="utf-8")}\n[imperfections.n]\ntype = "noise"\n{table}',
+        "utf-8",
+    )
     (ready,) = load_case(file).prepare([scenario], stop_time=stop)
     return run_scenario(ready)
 

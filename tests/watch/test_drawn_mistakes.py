@@ -31,7 +31,9 @@ class PartsError(Exception):
     """The stretches in which something that runs away is looked for."""
 
 
-@pytest.mark.parametrize(("events", "begins"), [([0.5], [0.0, 0.5]), ([0.0, 0.5], [0.0, 0.5]), ([], [0.0])])
+@pytest.mark.parametrize(
+    ("events", "begins"), [([0.5], [0.0, 0.5]), ([0.0, 0.5], [0.0, 0.5]), ([], [0.0])]
+)
 def test_what_runs_away_is_looked_for_from_the_start_on(events, begins, monkeypatch):
     def stop(seen, system, settings, parts, **_):
         raise PartsError([part.begin for part in parts])
@@ -39,8 +41,12 @@ def test_what_runs_away_is_looked_for_from_the_start_on(events, begins, monkeypa
     for name in ("undisturbed_motion", "lost_synchronism", "above_declared", "active_limits"):
         monkeypatch.setattr(watch, name, lambda *_: ())
     monkeypatch.setattr(watch, "resting_signals", lambda *_: ())
-    monkeypatch.setattr(watch, "stretches", lambda seen, names, times: [watch.Stretch(t, 2.0) for t in times])
-    monkeypatch.setattr(watch, "Settings", lambda *_: SimpleNamespace(effective_times=lambda: events))
+    monkeypatch.setattr(
+        watch, "stretches", lambda seen, names, times: [watch.Stretch(t, 2.0) for t in times]
+    )
+    monkeypatch.setattr(
+        watch, "Settings", lambda *_: SimpleNamespace(effective_times=lambda: events)
+    )
     monkeypatch.setattr(watch, "run_away", stop)
     with pytest.raises(PartsError) as found:
         watch.judged(SimpleNamespace(times=np.arange(3.0)), None, ())
@@ -57,5 +63,7 @@ def test_a_long_run_is_not_looked_at_more_often_than_can_be_kept():
     ("hertz", "explained"), [(1.0, True), (2.004, True), (1.5, False), (0.02, False), (0.4, False)]
 )
 def test_a_forcing_explains_its_frequency_and_multiples_alone(hertz, explained):
-    swings = Finding("sustained_oscillation", 0.0, "a", "x", "swings", None, {"frequency_hz": hertz})
+    swings = Finding(
+        "sustained_oscillation", 0.0, "a", "x", "swings", None, {"frequency_hz": hertz}
+    )
     assert Unrest(0.0, 9.0, "a.x", "forcing", 1.0).explains(swings) is explained

@@ -31,7 +31,10 @@ def step(size, since, settling=0.05):
 def events(*times, values=None):
     """Each sets another offset; the first is what the response answers to."""
     offsets = values or range(1, len(times) + 1)
-    return [ParameterChange(time, "a", "offset", float(offset)) for time, offset in zip(times, offsets, strict=True)]
+    return [
+        ParameterChange(time, "a", "offset", float(offset))
+        for time, offset in zip(times, offsets, strict=True)
+    ]
 
 
 def found(y, happened, stop=15.0):
@@ -43,7 +46,10 @@ GROWING = both(step(0.05, EVENT), swing(0.12))
 
 @pytest.mark.parametrize("late", [8.0, 11.0, 14.0, 14.8, 14.99])
 def test_an_event_that_changes_nothing_noticeable_does_not_part_a_growth(late):
-    for values in ([1.0, 1.0], [1.0, 2.0]):  # the same value once more; another one that does nothing
+    for values in (
+        [1.0, 1.0],
+        [1.0, 2.0],
+    ):  # the same value once more; another one that does nothing
         (finding,) = found(GROWING, events(EVENT, late, values=values))
         assert (finding.kind, finding.time, finding.until) == ("growing_oscillation", EVENT, None)
         assert finding.figures["growth_rate"] == pytest.approx(0.12, rel=0.05)
@@ -95,7 +101,13 @@ def test_a_change_without_a_kink_that_ends_the_decay_is_no_growth_from_the_first
 
 
 def test_decays_that_events_excite_anew_are_silent():
-    y = both(step(0.05, 1.0), swing(-0.3), step(0.05, 6.0), swing(-0.3, since=6.0), swing(-0.3, size=2e-3, since=11.0))
+    y = both(
+        step(0.05, 1.0),
+        swing(-0.3),
+        step(0.05, 6.0),
+        swing(-0.3, since=6.0),
+        swing(-0.3, size=2e-3, since=11.0),
+    )
     assert found(y, events(1.0, 6.0, 11.0), stop=16.0) == []
     for size in (1e-3, 3e-4):  # too small to be noticed at once beside the first
         y = both(step(0.05, 1.0), swing(-0.2, size=0.01), swing(-0.2, size=size, since=8.0))
@@ -103,7 +115,9 @@ def test_decays_that_events_excite_anew_are_silent():
 
 
 def test_an_event_that_sets_what_holds_does_not_end_the_undisturbed_state():
-    (finding,) = found(lambda t: 0.7 + 1e-9 * np.exp(9 * np.minimum(t, 1.5)), events(0.1, values=[0.0]), stop=1.5)
+    (finding,) = found(
+        lambda t: 0.7 + 1e-9 * np.exp(9 * np.minimum(t, 1.5)), events(0.1, values=[0.0]), stop=1.5
+    )
     assert finding.kind == "growth"
     assert finding.figures["growth_rate"] == pytest.approx(9.0, rel=0.05)
 

@@ -13,15 +13,23 @@ from tests.coupling.small_fmus import small_fmu
 from tests.watch.seen import seen_of, system
 
 EVENT = 1.0
-OFFSETS = [complex(rate, 2 * np.pi * hertz) for rate, hertz in ((-0.05, 50.0), (-0.12, 50.03), (-0.2, 50.05))]
+OFFSETS = [
+    complex(rate, 2 * np.pi * hertz)
+    for rate, hertz in ((-0.05, 50.0), (-0.12, 50.03), (-0.2, 50.05))
+]
 GROWS = [complex(0.3, 2 * np.pi * 50.6)]
 
 
 def found(course, lasts, eigenvalues=(), *, passes=True):
     """``course`` of the time since a pulse of one step, after which the system is the one of the start again."""
-    events = [ParameterChange(EVENT - 0.1, "a", "offset", 1.0), ParameterChange(EVENT, "a", "offset", 0.0)]
+    events = [
+        ParameterChange(EVENT - 0.1, "a", "offset", 1.0),
+        ParameterChange(EVENT, "a", "offset", 0.0),
+    ]
     y = lambda t: 0.9 + (t > EVENT) * course(np.maximum(t - EVENT, 0.0))  # noqa: E731
-    return judged(seen_of({"a.y": y}, EVENT + lasts), system("a"), events[: 1 + passes], eigenvalues)
+    return judged(
+        seen_of({"a.y": y}, EVENT + lasts), system("a"), events[: 1 + passes], eigenvalues
+    )
 
 
 def sum_of(modes, sizes, phases):
@@ -32,14 +40,16 @@ def sum_of(modes, sizes, phases):
     return course
 
 
-BEATS = sum_of(OFFSETS, (0.06, 0.03, 0.03), (0.0, 2.6, 2.4))  # grows for some seconds before it decays
+# grows for some seconds before it decays
+BEATS = sum_of(OFFSETS, (0.06, 0.03, 0.03), (0.0, 2.6, 2.4))
 KINDS = {"not_judged"}
 V, START = small_fmu("gain").variables["K"], {"on": 0.0, "R": 0.0, "X": 1.0}
 
 
 @pytest.mark.parametrize("lasts", [2.0, 4.0, 5.0, 7.0, 9.0, 14.0])
 def test_offsets_that_beat_are_never_unstable_however_long_the_run_is(lasts):
-    assert {f.kind for f in found(BEATS, lasts, OFFSETS)} <= (KINDS if 5 < lasts < 10 else set())  # more than twofold
+    # more than twofold
+    assert {f.kind for f in found(BEATS, lasts, OFFSETS)} <= (KINDS if 5 < lasts < 10 else set())
     assert {f.kind for f in found(BEATS, lasts)} <= KINDS
     assert {f.kind for f in found(BEATS, lasts, OFFSETS, passes=False)} <= KINDS
 
@@ -59,7 +69,9 @@ def test_a_growth_that_the_model_has_is_told_at_once(lasts):
 @pytest.mark.parametrize("eigenvalues", [(), OFFSETS])
 @pytest.mark.parametrize(("rate", "lasts"), [(0.2, 8.0), (1.0, 4.0), (3.0, 2.0)])
 def test_a_growth_that_no_model_has_is_told_once_it_is_more_than_a_beat(eigenvalues, rate, lasts):
-    (finding,) = found(sum_of([complex(rate, 2 * np.pi * 50.3)], (1e-3,), (0.0,)), lasts, eigenvalues)
+    (finding,) = found(
+        sum_of([complex(rate, 2 * np.pi * 50.3)], (1e-3,), (0.0,)), lasts, eigenvalues
+    )
     assert finding.kind == "growing_oscillation"
 
 
@@ -72,7 +84,9 @@ def test_what_lasts_longer_than_every_mode_there_is_told():
 def test_begin_and_end_of_one_fault_are_one_event():
     """Its R and X stay set, and act no more."""
     made = System()
-    variables = {f"bus_1.fault.{name}": replace(V, name=name, start=start) for name, start in START.items()}
+    variables = {
+        f"bus_1.fault.{name}": replace(V, name=name, start=start) for name, start in START.items()
+    }
     made.add("grid", replace(small_fmu("gain"), variables=small_fmu("gain").variables | variables))
     fault = [BusFault(t, "grid", "bus_1", on=t < 1.2, R=0.1, X=0.1) for t in (1.0, 1.45)]
     settings = Settings(made, fault, np.zeros(1))

@@ -19,8 +19,12 @@ from tests.watch.seen import seen_of
 def limited():
     """What the watch looks at in a grid-forming converter, and nothing else."""
     m = ModelBuilder("small_limited", "A current behind a box")
-    for name, value in (("voltage_control.i_q_max", 1.1), ("current_control.tau", 1e-3), ("filter.R_c", 0.005),
-                        ("current_limit.kind", 0.0)):  # fmt: skip
+    for name, value in (
+        ("voltage_control.i_q_max", 1.1),
+        ("current_control.tau", 1e-3),
+        ("filter.R_c", 0.005),
+        ("current_limit.kind", 0.0),
+    ):
         m.parameter(name, value, "1", name)
     u = m.input("u", "1", "Input")
     integrator = m.state("current_control.x_q", 0.0, "1", "Integrator")
@@ -31,13 +35,23 @@ def limited():
 
 @pytest.mark.parametrize(
     ("kind", "current", "acts"),
-    [(0, 1.1, True), (0, 1.1 * (1 - 1e-12), True), (0, 1.0, False), (1, 1.1, False), (3, 1.1, False)],
+    [
+        (0, 1.1, True),
+        (0, 1.1 * (1 - 1e-12), True),
+        (0, 1.0, False),
+        (1, 1.1, False),
+        (3, 1.1, False),
+    ],
 )
 def test_the_box_is_watched_for_kind_0_alone(kind, current, acts):
     system = System()
     system.add("gfor", limited(), {"current_limit.kind": float(kind)})
     seen = seen_of(
-        {"gfor.filter.i_s_q": lambda t: np.full_like(t, current), "gfor.der(current_control.x_q)": np.zeros_like}, 1.0
+        {
+            "gfor.filter.i_s_q": lambda t: np.full_like(t, current),
+            "gfor.der(current_control.x_q)": np.zeros_like,
+        },
+        1.0,
     )
     found = list(active_limits(seen, system, Settings(system, [], seen.times)))
     assert [f.variable for f in found] == (["filter.i_s_q"] if acts else [])

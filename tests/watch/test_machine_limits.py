@@ -6,7 +6,10 @@ import pytest
 from orchestrator.cases.case import load_case
 from orchestrator.study.run import run_scenario
 
-PARTS = {"exciter": ("st1a", "st4b", "ac4a", "dc1a"), "governor": ("hygov", "gast", "ieeeg1", "tgov1")}
+PARTS = {
+    "exciter": ("st1a", "st4b", "ac4a", "dc1a"),
+    "governor": ("hygov", "gast", "ieeeg1", "tgov1"),
+}
 
 
 def run(tmp_path=None, scenario="pss", stop=4.0, **overrides):
@@ -16,22 +19,32 @@ def run(tmp_path=None, scenario="pss", stop=4.0, **overrides):
         text = case.path.read_text(encoding="utf-8")
         for part in ("exciter", "governor", "pss"):
             text = "\n".join(line for line in text.splitlines() if not line.startswith(f"{part}."))
-        text = text.replace('stabilizer = "pss1a"', 'stabilizer = "pss2b"').replace("meant = ", "# meant = ", 1)
+        text = text.replace('stabilizer = "pss1a"', 'stabilizer = "pss2b"').replace(
+            "meant = ", "# meant = ", 1
+        )
         text = text.replace("record = [", 'record = ["sg*.E_fd", "sg*.v_t", ')
         (tmp_path / "units.csv").write_bytes((case.path.parent / "units.csv").read_bytes())
         file = tmp_path / "case.toml"
         file.write_text(text, encoding="utf-8")
-        overrides |= {f"sg{k}__{part}": name for part, names in PARTS.items() for k, name in enumerate(names, 1)}
+        overrides |= {
+            f"sg{k}__{part}": name
+            for part, names in PARTS.items()
+            for k, name in enumerate(names, 1)
+        }
     changed = {name.replace("__", "."): value for name, value in overrides.items()}
     (ready,) = load_case(file).prepare([scenario], changed, stop_time=stop)
     result = run_scenario(ready)
-    return {(f.component, f.variable): f for f in result.findings if f.kind == "active_limit"}, result.dataset
+    return {
+        (f.component, f.variable): f for f in result.findings if f.kind == "active_limit"
+    }, result.dataset
 
 
 def test_a_ceiling_and_a_valve_are_told_as_they_act():
     found, data = run(scenario="no_pss", sg1__governor__V_MAX=0.79, sg2__exciter__E_MAX=2.3)
     ceiling = found["sg2", "exciter.amplifier"]
-    assert ceiling.message.startswith("the ceiling of the exciter of sg2 (exciter.E_MAX) acts from t = 1.0")
+    assert ceiling.message.startswith(
+        "the ceiling of the exciter of sg2 (exciter.E_MAX) acts from t = 1.0"
+    )
     assert 1.0 < ceiling.figures["duration_s"] <= 3.0
     valve = found["sg1", "governor.valve"]
     assert (valve.until, "(governor.V_MAX)" in valve.message) == (None, True)
@@ -49,7 +62,9 @@ def test_both_limits_of_a_stabiliser_are_one_finding():
 
 @pytest.mark.parametrize(("limit", "acts"), [(3.0, True), (30.0, False)])
 def test_a_ceiling_that_is_far_off_is_silent(limit, acts):
-    found, _ = run(scenario="no_pss", stop=2.0, **{f"sg{k}__exciter__E_MAX": limit for k in range(1, 5)})
+    found, _ = run(
+        scenario="no_pss", stop=2.0, **{f"sg{k}__exciter__E_MAX": limit for k in range(1, 5)}
+    )
     assert any(variable.startswith("exciter") for _, variable in found) is acts
 
 
@@ -57,9 +72,22 @@ def test_a_ceiling_that_is_far_off_is_silent(limit, acts):
 def test_every_part_has_its_limits(tmp_path):
     """Durations are those of the recorded signals; with limits far off nothing is told."""
     tight = {"sg1__exciter__V_RMAX": 2.5, "sg2__exciter__V_RMAX": 0.45, "sg3__exciter__V_RMAX": 2.5}
-    tight |= {"sg4__exciter__V_RMAX": 3.0, "sg1__governor__VELM": 1e-4, "sg2__governor__V_MIN": 0.775}
-    found, data = run(tmp_path, **tight, sg3__governor__U_o=1e-4, sg3__governor__U_c=-1e-4, sg4__governor__V_MAX=0.79)
-    names = {component: {v for c, v in found if c == component} for component in ("sg1", "sg2", "sg3", "sg4")}
+    tight |= {
+        "sg4__exciter__V_RMAX": 3.0,
+        "sg1__governor__VELM": 1e-4,
+        "sg2__governor__V_MIN": 0.775,
+    }
+    found, data = run(
+        tmp_path,
+        **tight,
+        sg3__governor__U_o=1e-4,
+        sg3__governor__U_c=-1e-4,
+        sg4__governor__V_MAX=0.79,
+    )
+    names = {
+        component: {v for c, v in found if c == component}
+        for component in ("sg1", "sg2", "sg3", "sg4")
+    }
     assert {"E_fd", "der(governor.gate)"} <= names["sg1"]
     assert {"exciter.bridge", "governor.valve"} <= names["sg2"]
     assert {"E_fd", "der(governor.gate)"} <= names["sg3"]
@@ -67,6 +95,10 @@ def test_every_part_has_its_limits(tmp_path):
     assert {"pss.lead_lag_3"} <= set.union(*names.values())
     E_fd, v_t = (data[f"sg1.{name}"].values for name in ("E_fd", "v_t"))
     at = E_fd >= 2.5 * v_t * (1 - 1e-3)
-    assert found["sg1", "E_fd"].figures["duration_s"] == pytest.approx(0.005 * np.count_nonzero(at), abs=0.011)
+    assert found["sg1", "E_fd"].figures["duration_s"] == pytest.approx(
+        0.005 * np.count_nonzero(at), abs=0.011
+    )
     at = data["sg3.E_fd"].values >= 2.5 * (1 - 1e-9)
-    assert found["sg3", "E_fd"].figures["duration_s"] == pytest.approx(0.005 * np.count_nonzero(at), abs=0.011)
+    assert found["sg3", "E_fd"].figures["duration_s"] == pytest.approx(
+        0.005 * np.count_nonzero(at), abs=0.011
+    )

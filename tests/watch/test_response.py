@@ -17,8 +17,10 @@ def response(rate, hertz, size=0.02, settling=0.05):
 
     def y(t):
         since = np.maximum(t - EVENT, 0.0)
-        return 0.9 + (t > EVENT) * (settling * (1 - np.exp(-since / 2)) + size * np.exp(rate * since)
-                                    * np.sin(2 * PI * hertz * since))  # fmt: skip
+        return 0.9 + (t > EVENT) * (
+            settling * (1 - np.exp(-since / 2))
+            + size * np.exp(rate * since) * np.sin(2 * PI * hertz * since)
+        )
 
     return y
 
@@ -26,7 +28,11 @@ def response(rate, hertz, size=0.02, settling=0.05):
 def found(stop=STOP, **signals):
     named = {f"{name}.y": y for name, y in signals.items()}
     return unsettled_response(
-        seen_of(named, stop), system(*signals), Stretch(EVENT, stop, last=True), ("a",), KnownModes()
+        seen_of(named, stop),
+        system(*signals),
+        Stretch(EVENT, stop, last=True),
+        ("a",),
+        KnownModes(),
     )
 
 
@@ -39,7 +45,9 @@ def test_growth(rate, hertz):
     assert (finding.component, finding.time) == ("a", EVENT)
     assert finding.figures["growth_rate"] == pytest.approx(rate, rel=0.1)
     assert finding.figures["frequency_hz"] == pytest.approx(hertz, rel=0.02)
-    assert finding.figures["amplitude"] == pytest.approx(1e-3 * np.exp(rate * (STOP - EVENT)), rel=0.2)
+    assert finding.figures["amplitude"] == pytest.approx(
+        1e-3 * np.exp(rate * (STOP - EVENT)), rel=0.2
+    )
 
 
 @pytest.mark.parametrize("hertz", [0.3, 1.1, 37.3, 60.0, 200.0, 433.0])

@@ -22,7 +22,11 @@ def since(t, event=EVENT):
 def found(speed=None, voltage=None, events=(), stop=STOP, event=EVENT, **others):
     """Of two units that turn together; ``others`` is the speed of the second, if it has another one."""
     speed = speed or (lambda t: 1.0 + 0 * t)
-    signals = {"a.omega": speed, "b.omega": others.get("b", speed), "a.v_re": voltage or (lambda t: 1.0 + 0 * t)}
+    signals = {
+        "a.omega": speed,
+        "b.omega": others.get("b", speed),
+        "a.v_re": voltage or (lambda t: 1.0 + 0 * t),
+    }
     signals |= {"a.v_im": lambda t: 0 * t, "a.delta": lambda t: 0 * t, "b.delta": lambda t: 0 * t}
     happened = [ParameterChange(event, "a", "S_n", 99.0), *events]
     return judged(seen_of(signals, stop), units(a=100, b=100), happened)
@@ -35,14 +39,21 @@ def found(speed=None, voltage=None, events=(), stop=STOP, event=EVENT, **others)
         lambda t: 1 - 1e-4 * since(t),
         lambda t: 1 + 1e-4 * since(t),
         lambda t: 1 - 1e-4 * np.expm1(0.2 * since(t)),
-        lambda t: 1 - 0.01 * since(t) + 0.003 * (t > EVENT) * np.exp(-since(t)) * np.sin(4 * since(t)),
+        lambda t: (
+            1 - 0.01 * since(t) + 0.003 * (t > EVENT) * np.exp(-since(t)) * np.sin(4 * since(t))
+        ),
         lambda t: 1 - 0.6 * (1 - np.exp(-since(t) / 60)),
     ],
     ids=["fast", "slow", "up", "grows", "with a swing", "towards 0.4"],
 )
 def test_a_drift_without_end_is_told_with_its_value_and_rate(y):
     (finding,) = found(y)
-    assert (finding.kind, finding.variable, finding.time, finding.until) == ("run_away", "omega", EVENT, None)
+    assert (finding.kind, finding.variable, finding.time, finding.until) == (
+        "run_away",
+        "omega",
+        EVENT,
+        None,
+    )
     end = y(np.array([STOP - 1, STOP]))
     assert finding.figures["value"] == pytest.approx(end[1])
     assert finding.figures["rate"] == pytest.approx(end[1] - end[0], rel=0.2)
@@ -61,7 +72,8 @@ def test_a_speed_that_comes_to_rest_far_away_is_told():
 @pytest.mark.parametrize("late", [15.0, 19.8])
 def test_a_drift_before_a_late_event_is_told(late):
     trip = ParameterChange(late, "a", "S_n", 98.0)
-    (finding,) = found(lambda t: 1 - 1e-3 * since(t), events=[trip])  # it changes nothing noticeable
+    # it changes nothing noticeable
+    (finding,) = found(lambda t: 1 - 1e-3 * since(t), events=[trip])
     assert (finding.time, finding.until) == (EVENT, None)
     (finding,) = found(lambda t: np.where(t <= late, 1 - 1e-3 * since(t), 1.0), events=[trip])
     assert (finding.time, finding.until) == (EVENT, late)
@@ -101,7 +113,10 @@ def test_a_frequency_that_still_falls_at_the_end_of_a_short_run_is_not_judged(la
     assert (finding.kind, finding.variable, finding.until) == ("not_judged", "omega", None)
     assert "the mean of all speeds is" in finding.message
     assert finding.message.endswith("let the run go on to t = 11 s")
-    assert finding.figures == {"value": pytest.approx(1 - 4e-3 * lasts), "rate": pytest.approx(-4e-3)}
+    assert finding.figures == {
+        "value": pytest.approx(1 - 4e-3 * lasts),
+        "rate": pytest.approx(-4e-3),
+    }
 
 
 def slowing(rest, time_constant):
@@ -132,12 +147,15 @@ def test_a_frequency_whose_rest_is_farther_off_than_its_way_is_not_judged():
     assert found(slowing(0.96, 5.0), stop=EVENT + 9) == []
 
 
-@pytest.mark.parametrize(("acts", "until", "share", "told"), [
-    ("governor.valve", None, 100, True),
-    ("governor.valve", 5.0, 100, False),
-    ("exciter.amplifier", None, 100, False),
-    ("governor.valve", None, 20, False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("acts", "until", "share", "told"),
+    [
+        ("governor.valve", None, 100, True),
+        ("governor.valve", 5.0, 100, False),
+        ("exciter.amplifier", None, 100, False),
+        ("governor.valve", None, 20, False),
+    ],
+)
 def test_a_governor_at_its_limit_leaves_nothing_that_stops_a_frequency(acts, until, share, told):
     """It slows down towards 0.98 pu, within the band, by the loads alone."""
     y = slowing(0.98, 3.0)
@@ -152,7 +170,9 @@ def test_a_governor_at_its_limit_leaves_nothing_that_stops_a_frequency(acts, unt
 def test_swings_of_units_against_each_other_hide_no_falling_frequency():
     swing = lambda t: 0.01 * np.sin(6 * since(t)) * np.exp(-0.1 * since(t))  # noqa: E731
     falling = lambda t: 1 - 2e-3 * since(t)  # noqa: E731
-    found_here = found(lambda t: falling(t) + swing(t), b=lambda t: falling(t) - swing(t), stop=EVENT + 8)
+    found_here = found(
+        lambda t: falling(t) + swing(t), b=lambda t: falling(t) - swing(t), stop=EVENT + 8
+    )
     assert [f.kind for f in found_here] == ["not_judged"]
     assert "whether the frequency settles" in found_here[0].message
 
@@ -180,9 +200,13 @@ def test_a_frequency_below_what_grid_codes_allow_is_told_in_a_short_run():
     assert "it leaves 0.95 to 1.03 pu" in finding.message
 
 
-@pytest.mark.parametrize(("level", "told"), [(0.945, True), (0.955, False), (1.025, False), (1.035, True)])
+@pytest.mark.parametrize(
+    ("level", "told"), [(0.945, True), (0.955, False), (1.025, False), (1.035, True)]
+)
 def test_the_band_of_grid_codes_on_both_sides(level, told):
-    kinds = [f.kind for f in found(lambda t: 1 + (level - 1) * -np.expm1(-since(t) / 0.5), stop=9.0)]
+    kinds = [
+        f.kind for f in found(lambda t: 1 + (level - 1) * -np.expm1(-since(t) / 0.5), stop=9.0)
+    ]
     assert kinds == (["run_away"] if told else [])
 
 

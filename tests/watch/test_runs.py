@@ -58,7 +58,9 @@ panels = [{ signal = "gfor.p", label = "P [pu]" }]
 
 def findings(case, scenario, stop=None, **overrides):
     loaded = load_case(case)
-    (ready,) = loaded.prepare([scenario], {k.replace("__", "."): v for k, v in overrides.items()}, stop_time=stop)
+    (ready,) = loaded.prepare(
+        [scenario], {k.replace("__", "."): v for k, v in overrides.items()}, stop_time=stop
+    )
     return run_scenario(ready).findings
 
 
@@ -79,7 +81,8 @@ def test_the_papers_scenarios_are_silent(scenario):
 
 
 @pytest.mark.parametrize(
-    ("case", "rate"), [("two_area_rms", 0.033), pytest.param("two_area", 0.0285, marks=pytest.mark.slow)]
+    ("case", "rate"),
+    [("two_area_rms", 0.033), pytest.param("two_area", 0.0285, marks=pytest.mark.slow)],
 )
 def test_the_papers_base_case_grows_after_its_load_step(case, rate):
     (finding,) = findings(case, "base")
@@ -117,7 +120,13 @@ def test_speeds_without_governors_run_away():
 def test_an_undisturbed_state_that_grows():
     """λ = 68.85 ± j215.8 (34.35 Hz) with that droop; the reference moves it off its exact rest by 1e-9 pu."""
     found = findings("two_area", "gfor", 0.9, gfor__droop__R_f=5.0, gfor__droop__delta_P_ref=1e-9)
-    assert [f.kind for f in found] == ["growth", "active_limit", "run_away", "active_limit", "loss_of_synchronism"]
+    assert [f.kind for f in found] == [
+        "growth",
+        "active_limit",
+        "run_away",
+        "active_limit",
+        "loss_of_synchronism",
+    ]
     growth, lost = found[0], found[-1]
     assert growth.figures["growth_rate"] == pytest.approx(68.85, rel=0.01)
     assert growth.figures["frequency_hz"] == pytest.approx(34.35, rel=0.01)
@@ -181,7 +190,9 @@ def test_a_pod_at_its_limit_is_told_with_its_duration():
 
 def test_a_limit_that_acts_without_a_break_is_told_for_its_whole_interval():
     """0.105 s were told between 1.04 s and 1.14 s."""
-    (ready,) = load_case("two_area_rms").prepare(["pod_p"], {"gfor.pod_p.limit": 1e-4}, stop_time=3.0)
+    (ready,) = load_case("two_area_rms").prepare(
+        ["pod_p"], {"gfor.pod_p.limit": 1e-4}, stop_time=3.0
+    )
     trip = UnitSwitching(1.2, "grid", "gfor", False)
     result = run_scenario(replace(ready, events=[*ready.events, trip]))
     (limit,) = [f for f in result.findings if f.kind == "active_limit"]
@@ -192,8 +203,12 @@ def test_a_limit_that_acts_without_a_break_is_told_for_its_whole_interval():
 @pytest.mark.parametrize(("limit", "trip"), [(0.1, 1.0), (1e-4, 3.0)])
 def test_no_limit_of_a_tripped_converter_is_told(limit, trip):
     """Its frequency goes its own way, so its POD is at its limit; what acted before the trip is told until then."""
-    (ready,) = load_case("two_area_rms").prepare(["pod_p"], {"gfor.pod_p.limit": limit}, stop_time=6.0)
-    result = run_scenario(replace(ready, events=[*ready.events, UnitSwitching(trip, "grid", "gfor", False)]))
+    (ready,) = load_case("two_area_rms").prepare(
+        ["pod_p"], {"gfor.pod_p.limit": limit}, stop_time=6.0
+    )
+    result = run_scenario(
+        replace(ready, events=[*ready.events, UnitSwitching(trip, "grid", "gfor", False)])
+    )
     last = np.abs(result.dataset["gfor.delta_p_pod"].sel(time=slice(5, None)).values)
     assert last.min() > 0.999 * limit
     found = [f for f in result.findings if f.kind == "active_limit"]

@@ -18,7 +18,9 @@ def system(start):
     description = small_fmu("gain")
     breaker = replace(description.variables["K"], name="connected", type="Boolean", start=start)
     made = System()
-    made.add("unit", replace(description, variables={**description.variables, "connected": breaker}))
+    made.add(
+        "unit", replace(description, variables={**description.variables, "connected": breaker})
+    )
     return made
 
 

@@ -41,7 +41,9 @@ def test_what_goes_on_for_long_enough_is_one():
     assert kinds == ["sustained_oscillation"]
 
 
-@pytest.mark.parametrize("course", [many(6.0), lambda t: 1e-3 * np.exp(3.0 * t) * np.sin(2 * np.pi * 9.0 * t)])
+@pytest.mark.parametrize(
+    "course", [many(6.0), lambda t: 1e-3 * np.exp(3.0 * t) * np.sin(2 * np.pi * 9.0 * t)]
+)
 def test_growth_in_a_short_stretch_is_told(course):
     (finding,) = found(STOP - 1.0, course)
     assert (finding.kind, finding.time) == ("growing_oscillation", STOP - 1.0)
@@ -68,7 +70,10 @@ def test_a_trip_half_a_second_before_the_end(tmp_path):
     trip = '[[events]]\ntype = "component_trip"\ncomponent = "gfor"\ntime = "1 s"\n\n[scenarios.'
     text = case.path.read_text(encoding="utf-8").replace("[scenarios.", trip, 1)
     file = tmp_path / "case.toml"
-    file.write_text(text.replace('time = "1 s"\ncomponent = "grid"', 'time = "0.1 s"\ncomponent = "grid"'), "utf-8")
+    file.write_text(
+        text.replace('time = "1 s"\ncomponent = "grid"', 'time = "0.1 s"\ncomponent = "grid"'),
+        "utf-8",
+    )
     (ready,) = load_case(file).prepare(["gfor"], stop_time=1.5)
     result = run_scenario(ready)
     assert [f.kind for f in result.findings] == ["not_judged"]
@@ -83,10 +88,17 @@ def grows(rate, angular):
     return lambda t: 0.05 * np.expm1(rate * t) * np.cos(angular * t)
 
 
-@pytest.mark.parametrize(("rate", "angular", "lasts"), [(5.0, 1.0, 2.5), (1.5, 3.0, 3.0), (1.0, 0.0, 4.0)])
+@pytest.mark.parametrize(
+    ("rate", "angular", "lasts"), [(5.0, 1.0, 2.5), (1.5, 3.0, 3.0), (1.0, 0.0, 4.0)]
+)
 def test_growth_of_less_than_two_periods_is_not_judged_and_not_healthy(rate, angular, lasts):
     (finding,) = found(STOP - lasts, grows(rate, angular))
-    assert (finding.kind, finding.component, finding.variable, finding.until) == ("not_judged", "a", "y", None)
+    assert (finding.kind, finding.component, finding.variable, finding.until) == (
+        "not_judged",
+        "a",
+        "y",
+        None,
+    )
     assert "a.y moves more than before" in finding.message
 
 
@@ -97,10 +109,15 @@ def test_growth_that_an_event_ends_is_not_healthy():
     assert (finding.kind, finding.time, finding.until) == ("not_judged", 8.0, 9.8)
 
 
-@pytest.mark.parametrize("course", [
-    lambda t: 0.05 * np.exp(-0.3 * t) * np.cos(3.6 * t), lambda t: 0.05 * -np.expm1(-t / 7), lambda t: 0.01 * t,
-    lambda t: 0.05 * -np.expm1(-t / 1.0) * np.exp(-t / 9),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "course",
+    [
+        lambda t: 0.05 * np.exp(-0.3 * t) * np.cos(3.6 * t),
+        lambda t: 0.05 * -np.expm1(-t / 7),
+        lambda t: 0.01 * t,
+        lambda t: 0.05 * -np.expm1(-t / 1.0) * np.exp(-t / 9),
+    ],
+)
 @pytest.mark.parametrize("lasts", [3.0, 5.0, 10.0])
 def test_what_settles_or_runs_steadily_departs_from_nothing(course, lasts):
     assert found(STOP - lasts, course) == []

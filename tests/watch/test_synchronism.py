@@ -33,7 +33,10 @@ def found(ratings, events=(), **angles):
 def test_three_units_that_part_are_told_pair_by_pair_with_their_own_turns():
     """Their mean belongs to none of them: 36.46 turns where g1 moved by 5.97 and 66.95."""
     gfor, g1 = found(
-        {"g1": 400, "gfor": 150, "g2": 600}, g1=slip(66.95, until=8), gfor=slip(60.98, until=8), g2=slip(0.0)
+        {"g1": 400, "gfor": 150, "g2": 600},
+        g1=slip(66.95, until=8),
+        gfor=slip(60.98, until=8),
+        g2=slip(0.0),
     )
     assert gfor.component == "gfor"
     assert gfor.figures["turns_against_g1"] == pytest.approx(5.97)
@@ -46,7 +49,9 @@ def test_three_units_that_part_are_told_pair_by_pair_with_their_own_turns():
 
 
 def test_units_that_stay_together_are_one_group_and_are_told_once():
-    (finding,) = found({"a": 100, "b": 100, "c": 900}, a=slip(6.0), b=slip(6.0, start=2.5), c=slip(0.0))
+    (finding,) = found(
+        {"a": 100, "b": 100, "c": 900}, a=slip(6.0), b=slip(6.0, start=2.5), c=slip(0.0)
+    )
     assert finding.message.startswith("a, b lose synchronism with c: from t = ")
     assert finding.figures == {"turns": pytest.approx(6.0), "slips_at_the_end": 1.0}
 
@@ -87,7 +92,10 @@ def test_the_angle_of_a_foreign_unit_is_the_integral_of_its_frequency():
     """At 60 Hz and 0.5 % too fast from 2 to 6 s it turns 1.2 times; it starts a quarter of a turn ahead."""
     system = units(grid=900)
     system.add("theirs", foreign_fmu(), {"theta_0": TURN / 4})
-    fast = {"theirs.omega": lambda t: 1.0 + 0.005 * ((t >= 2.0) & (t < 6.0)), "grid.delta": slip(0.0)}
+    fast = {
+        "theirs.omega": lambda t: 1.0 + 0.005 * ((t >= 2.0) & (t < 6.0)),
+        "grid.delta": slip(0.0),
+    }
     seen = seen_of(fast, STOP)
     (finding,) = lost_synchronism(seen, system, Settings(system, [], seen.times))
     assert finding.figures["turns"] == pytest.approx(1.2, abs=0.002)
@@ -108,7 +116,14 @@ def test_turns_are_the_integral_of_the_frequency_that_was_recorded(f_n, tmp_path
 def test_a_frequency_of_another_scale_is_no_slip_and_a_slip_from_the_start_stays_one():
     misfits = {"plant": [Misfit("wrong rated frequency", "", {"omega": 5 / 6})]}
     still, turning = (
-        seen_of({"plant.omega": lambda t: 5 / 6 + 0 * t, "plant.i_re": re, "plant.i_im": lambda t: 0 * t}, 1.0)
+        seen_of(
+            {
+                "plant.omega": lambda t: 5 / 6 + 0 * t,
+                "plant.i_re": re,
+                "plant.i_im": lambda t: 0 * t,
+            },
+            1.0,
+        )
         for re in (lambda t: 1.0 + 0 * t, lambda t: 1 + np.cos(TURN * 10 * t))
     )
     assert rescaled(still, misfits).values["plant.omega"] == pytest.approx(1.0)
@@ -123,18 +138,26 @@ def test_a_meter_that_settles_is_no_slip_and_what_follows_is_seen(begins):
     def omega(t):
         return 1 + (begins - 1) * np.exp(-t / 0.05) + np.where(t > 1.5, 0.3, 0.0)
 
-    resting = {"plant.omega": omega, "plant.i_re": lambda t: np.where(t > 1.5, np.cos(9 * t), 1.0),
-               "plant.i_im": lambda t: 0 * t}  # fmt: skip
+    resting = {
+        "plant.omega": omega,
+        "plant.i_re": lambda t: np.where(t > 1.5, np.cos(9 * t), 1.0),
+        "plant.i_im": lambda t: 0 * t,
+    }
     seen = seen_of(resting, 2.0)
     found = rescaled(seen, {}).values["plant.omega"]
     assert found[seen.times < 1.5] == pytest.approx(1.0, abs=2e-4)
     assert found[seen.times > 1.51] == pytest.approx(1.3)
     turning = seen_of({**resting, "plant.i_re": lambda t: np.cos(60 * t)}, 2.0)
-    assert rescaled(turning, {}).values["plant.omega"] == pytest.approx(turning.values["plant.omega"])
+    assert rescaled(turning, {}).values["plant.omega"] == pytest.approx(
+        turning.values["plant.omega"]
+    )
 
 
 @pytest.mark.parametrize(("known", "value"), [({"S_n": None}, 500.0), ({}, 100.0)])
 def test_a_unit_counts_with_its_rating_at_the_start(known, value):
     plan = SimpleNamespace(description=SimpleNamespace(variables=known))
     settings = SimpleNamespace(values=lambda name, parameter: [500.0, 700.0])
-    assert synchronism._start(SimpleNamespace(components={"a": plan}), settings, "a", "S_n", 100.0) == value
+    assert (
+        synchronism._start(SimpleNamespace(components={"a": plan}), settings, "a", "S_n", 100.0)
+        == value
+    )

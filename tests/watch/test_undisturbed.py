@@ -54,7 +54,8 @@ def test_a_jump_without_an_event_is_no_growth():
 
 
 @pytest.mark.parametrize(
-    "y", [lambda t: 0.5 + 0 * t, lambda t: 0.5 + 1e-9 * np.sin(9 * t), lambda t: 1e-5 * np.tanh(9 * t)]
+    "y",
+    [lambda t: 0.5 + 0 * t, lambda t: 0.5 + 1e-9 * np.sin(9 * t), lambda t: 1e-5 * np.tanh(9 * t)],
 )
 def test_what_stands_still_is_not_told(y):
     assert found({"a.y": y}) == []
@@ -67,11 +68,19 @@ def test_what_moves_after_the_event_is_not_undisturbed():
 def test_fmus_whose_coupling_makes_them_grow():
     """Two integrators side by side: μ = 1 ± jωH, so that they grow at ln|μ|/H and swing at arg μ/2πH."""
     H, omega = 1e-4, 2 * PI * 90.0
-    plan = system_of(ring("a", "b"), a=("integrator", {"gain": omega, "x_0": 1e-9}), b=("integrator", {"gain": -omega}))
+    plan = system_of(
+        ring("a", "b"),
+        a=("integrator", {"gain": omega, "x_0": 1e-9}),
+        b=("integrator", {"gain": -omega}),
+    )
     recorder, watcher = Recorder(["a.y", "b.y"], 50), Watcher([], 50)
     with Master(plan, jacobi(("a", "b")), H) as master:
         master.run(0.8, (), [recorder, watcher])
     (finding,) = undisturbed_motion(watcher.seen(recorder), plan, 0.8)
     assert finding.kind == "growth"
-    assert finding.figures["growth_rate"] == pytest.approx(np.log(abs(1 + 1j * omega * H)) / H, rel=0.02)
-    assert finding.figures["frequency_hz"] == pytest.approx(np.arctan(omega * H) / (2 * PI * H), rel=0.02)
+    assert finding.figures["growth_rate"] == pytest.approx(
+        np.log(abs(1 + 1j * omega * H)) / H, rel=0.02
+    )
+    assert finding.figures["frequency_hz"] == pytest.approx(
+        np.arctan(omega * H) / (2 * PI * H), rel=0.02
+    )

@@ -30,7 +30,8 @@ class Regulated:
     v_s: Scalar = 0.0  # added to the voltage reference [pu, S_n]
 
 
-Exciter = Callable[[ModelBuilder, Regulated], tuple[Expr, Expr]]  # an excitation system; gives (E_fd, |v_t|) [pu]
+# an excitation system; gives (E_fd, |v_t|) [pu]
+Exciter = Callable[[ModelBuilder, Regulated], tuple[Expr, Expr]]
 
 
 gain = partial(declarations.per_unit, base=E_FD, source=SOURCE)
@@ -54,8 +55,12 @@ class Measurement:
     def error(self, at_start: Scalar) -> Expr:
         """Reference and stabiliser's signal less the measured voltage [pu, S_n]; ``at_start`` in steady state."""
         m, v_t_0 = self._m, self._seen.start.v_t
-        V_ref = m.calculated("V_ref", v_t_0 + at_start, "pu", "Voltage reference of the operating point", base="S_n")
-        delta = m.parameter("delta_V_ref", 0.0, "pu", "Change of the voltage reference", base="S_n", tunable=True)
+        V_ref = m.calculated(
+            "V_ref", v_t_0 + at_start, "pu", "Voltage reference of the operating point", base="S_n"
+        )
+        delta = m.parameter(
+            "delta_V_ref", 0.0, "pu", "Change of the voltage reference", base="S_n", tunable=True
+        )
         return V_ref + delta + self._seen.v_s - if_else(self._left_out, self.nearly, self._state)
 
     def close(self, E_fd: Expr) -> tuple[Expr, Expr]:
@@ -65,7 +70,9 @@ class Measurement:
         return E_fd, v_t
 
 
-def lead_lag_stage(m: ModelBuilder, u: Expr, initial: Scalar, mark: str = "", lead: float = 0.0) -> Expr:
+def lead_lag_stage(
+    m: ModelBuilder, u: Expr, initial: Scalar, mark: str = "", lead: float = 0.0
+) -> Expr:
     """(1 + s·T_C)/(1 + s·T_B), passed through where T_B = 0, which needs T_C = 0.
 
     ``u``, ``initial``: what goes in, and its value in steady state; ``mark``: follows C and B in the parameters' names;
@@ -73,13 +80,19 @@ def lead_lag_stage(m: ModelBuilder, u: Expr, initial: Scalar, mark: str = "", le
     T_C = time(m, f"T_C{mark}", lead, f"Lead T_C{mark}")
     T_B = time(m, f"T_B{mark}", 10.0 if lead else 0.0, f"Lag T_B{mark}; 0 leaves the stage out")
     m.require(
-        if_else(logic_and(T_B <= 0, T_C > 0), -1, 1), f"exciter.T_B{mark} = 0 needs exciter.T_C{mark} = 0 as well"
+        if_else(logic_and(T_B <= 0, T_C > 0), -1, 1),
+        f"exciter.T_B{mark} = 0 needs exciter.T_C{mark} = 0 as well",
     )
     return lead_lag(m, f"lead_lag{mark}", u, T_C, T_B, initial)
 
 
 def rate_feedback(
-    m: ModelBuilder, u: Expr, initial: Scalar, K_F: float = 0.0, T_F: float = 1.0, name: str = "feedback"
+    m: ModelBuilder,
+    u: Expr,
+    initial: Scalar,
+    K_F: float = 0.0,
+    T_F: float = 1.0,
+    name: str = "feedback",
 ) -> tuple[Expr, Expr]:
     """s·K_F/(1 + s·T_F) of a signal, and K_F."""
     gain_F = gain(m, "K_F", K_F, "Rate feedback; 0 leaves it out", 0)
@@ -96,14 +109,26 @@ require_within = partial(
 )
 
 
-def exciter_saturation(m: ModelBuilder, E_1: float, S_E1: float, E_2: float, S_E2: float) -> "ExciterSaturation":
+def exciter_saturation(
+    m: ModelBuilder, E_1: float, S_E1: float, E_2: float, S_E2: float
+) -> "ExciterSaturation":
     """Declare two points (E, S_E(E)) of the exciter's saturation curve."""
     E = [
-        m.parameter(f"E_{k}", value, "pu", f"Point {k} of the saturation curve", base=E_FD, minimum=0, source=SOURCE)
+        m.parameter(
+            f"E_{k}",
+            value,
+            "pu",
+            f"Point {k} of the saturation curve",
+            base=E_FD,
+            minimum=0,
+            source=SOURCE,
+        )
         for k, value in ((1, E_1), (2, E_2))
     ]
     S = [
-        m.parameter(f"S_E{k}", value, "1", f"Saturation S_E(E_{k}); both 0: none", minimum=0, source=SOURCE)
+        m.parameter(
+            f"S_E{k}", value, "1", f"Saturation S_E(E_{k}); both 0: none", minimum=0, source=SOURCE
+        )
         for k, value in ((1, S_E1), (2, S_E2))
     ]
     points = ((E[0], S[0]), (E[1], S[1]))

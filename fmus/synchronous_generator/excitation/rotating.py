@@ -44,8 +44,14 @@ def dc1a(m: ModelBuilder, seen: Regulated, *, compensated: bool = True) -> tuple
 
     ``compensated``: whether it has the stage (1+sT_C)/(1+sT_B)."""
     with m.scope("exciter"):
-        K_A, T_A = gain(m, "K_A", 20.0, "Gain", 1e-3), time(m, "T_A", 0.2, "Amplifier; 0 leaves the lag out")
-        high, low = gain(m, "V_RMAX", 5.0, "Upper limit of V_R"), gain(m, "V_RMIN", -5.0, "Lower limit of V_R")
+        K_A, T_A = (
+            gain(m, "K_A", 20.0, "Gain", 1e-3),
+            time(m, "T_A", 0.2, "Amplifier; 0 leaves the lag out"),
+        )
+        high, low = (
+            gain(m, "V_RMAX", 5.0, "Upper limit of V_R"),
+            gain(m, "V_RMIN", -5.0, "Lower limit of V_R"),
+        )
         K_E = gain(m, "K_E", 1.0, "Field resistance, separately excited")
         T_E = time(m, "T_E", 0.314, "Exciter's field", 1e-3)
         curve = exciter_saturation(m, 3.0, 0.41, 4.0, 1.96)
@@ -68,10 +74,22 @@ ieeet1 = partial(dc1a, compensated=False)  # DC1A without its lead and lag
 def ac1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
-        K_A, T_A = gain(m, "K_A", 400.0, "Gain", 1e-3), time(m, "T_A", 0.02, "Amplifier; 0 leaves the lag out")
-        A_high, A_low = gain(m, "V_AMAX", 14.5, "Upper limit of V_A"), gain(m, "V_AMIN", -14.5, "Lower limit of V_A")
-        R_high, R_low = gain(m, "V_RMAX", 6.03, "Upper limit of V_R"), gain(m, "V_RMIN", -5.43, "Lower limit of V_R")
-        K_E, T_E = gain(m, "K_E", 1.0, "Exciter constant"), time(m, "T_E", 0.8, "Exciter's field", 1e-3)
+        K_A, T_A = (
+            gain(m, "K_A", 400.0, "Gain", 1e-3),
+            time(m, "T_A", 0.02, "Amplifier; 0 leaves the lag out"),
+        )
+        A_high, A_low = (
+            gain(m, "V_AMAX", 14.5, "Upper limit of V_A"),
+            gain(m, "V_AMIN", -14.5, "Lower limit of V_A"),
+        )
+        R_high, R_low = (
+            gain(m, "V_RMAX", 6.03, "Upper limit of V_R"),
+            gain(m, "V_RMIN", -5.43, "Lower limit of V_R"),
+        )
+        K_E, T_E = (
+            gain(m, "K_E", 1.0, "Exciter constant"),
+            time(m, "T_E", 0.8, "Exciter's field", 1e-3),
+        )
         K_C = gain(m, "K_C", 0.2, "Rectifier loading factor", 0)
         K_D = gain(m, "K_D", 0.38, "Demagnetising factor", 0)
         curve = exciter_saturation(m, 4.18, 0.1, 3.14, 0.03)
@@ -93,15 +111,32 @@ def ac1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
 def ac4a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
-        K_A, T_A = gain(m, "K_A", 200.0, "Gain", 1e-3), time(m, "T_A", 0.015, "Amplifier; 0 leaves the lag out")
-        I_high, I_low = gain(m, "V_IMAX", 10.0, "Upper limit of the error"), gain(m, "V_IMIN", -10.0, "Lower one")
-        high, low = gain(m, "V_RMAX", 5.64, "Upper ceiling of E_fd"), gain(m, "V_RMIN", -4.53, "Lower ceiling of E_fd")
+        K_A, T_A = (
+            gain(m, "K_A", 200.0, "Gain", 1e-3),
+            time(m, "T_A", 0.015, "Amplifier; 0 leaves the lag out"),
+        )
+        I_high, I_low = (
+            gain(m, "V_IMAX", 10.0, "Upper limit of the error"),
+            gain(m, "V_IMIN", -10.0, "Lower one"),
+        )
+        high, low = (
+            gain(m, "V_RMAX", 5.64, "Upper ceiling of E_fd"),
+            gain(m, "V_RMIN", -4.53, "Lower ceiling of E_fd"),
+        )
         K_C = gain(m, "K_C", 0.0, "Rectifier loading factor", 0)
         V_I0 = seen.start.E_fd / K_A
         require_within(m, V_I0, I_low, I_high, ("exciter.V_IMIN", "exciter.V_IMAX"))
-        require_within(m, seen.start.E_fd, low, high - K_C * seen.start.E_fd, ("exciter.V_RMIN", "exciter.V_RMAX"))
+        require_within(
+            m,
+            seen.start.E_fd,
+            low,
+            high - K_C * seen.start.E_fd,
+            ("exciter.V_RMIN", "exciter.V_RMAX"),
+        )
         measured = Measurement(m, seen)
         error = clamp(measured.error(V_I0), I_low, I_high)
         compensated = lead_lag_stage(m, error, V_I0, lead=1.0)
         ceiling = fmax(high - K_C * seen.I_fd, low)
-        return measured.close(limited_low_pass(m, "amplifier", K_A * compensated, T_A, low, ceiling, seen.start.E_fd))
+        return measured.close(
+            limited_low_pass(m, "amplifier", K_A * compensated, T_A, low, ceiling, seen.start.E_fd)
+        )

@@ -48,9 +48,18 @@ from fmus.toolchain.symbols import Expr, fmax, fmin, if_else, logic_and, logic_o
 def st1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
-        K_A, T_A = gain(m, "K_A", 200.0, "Gain", 1e-3), time(m, "T_A", 0.0, "Amplifier; 0 leaves the lag out")
-        I_high, I_low = gain(m, "V_IMAX", 999.0, "Upper limit of the error"), gain(m, "V_IMIN", -999.0, "Lower one")
-        A_high, A_low = gain(m, "V_AMAX", 999.0, "Upper limit of V_A"), gain(m, "V_AMIN", -999.0, "Lower limit of V_A")
+        K_A, T_A = (
+            gain(m, "K_A", 200.0, "Gain", 1e-3),
+            time(m, "T_A", 0.0, "Amplifier; 0 leaves the lag out"),
+        )
+        I_high, I_low = (
+            gain(m, "V_IMAX", 999.0, "Upper limit of the error"),
+            gain(m, "V_IMIN", -999.0, "Lower one"),
+        )
+        A_high, A_low = (
+            gain(m, "V_AMAX", 999.0, "Upper limit of V_A"),
+            gain(m, "V_AMIN", -999.0, "Lower limit of V_A"),
+        )
         high = gain(m, "V_RMAX", 6.43, "Upper ceiling of E_fd at v_t = 1")
         low = gain(m, "V_RMIN", -6.0, "Lower ceiling of E_fd at v_t = 1")
         K_C = gain(m, "K_C", 0.0, "Rectifier loading factor", 0)
@@ -62,18 +71,26 @@ def st1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
 
         def held(signal: Expr, v_t: Expr) -> Expr:
             floor = v_t * low
-            return clamp(signal - relieved(seen.I_fd), floor, fmax(v_t * high - K_C * seen.I_fd, floor))
+            return clamp(
+                signal - relieved(seen.I_fd), floor, fmax(v_t * high - K_C * seen.I_fd, floor)
+            )
 
         V_A0 = seen.start.E_fd + relieved(seen.start.E_fd)
         V_I0 = V_A0 / K_A
         require_within(m, V_I0, I_low, I_high, ("exciter.V_IMIN", "exciter.V_IMAX"))
         require_within(m, V_A0, A_low, A_high, ("exciter.V_AMIN", "exciter.V_AMAX"))
         ceiling = seen.start.v_t * high - K_C * seen.start.E_fd
-        require_within(m, seen.start.E_fd, seen.start.v_t * low, ceiling, ("exciter.V_RMIN", "exciter.V_RMAX"))
+        require_within(
+            m, seen.start.E_fd, seen.start.v_t * low, ceiling, ("exciter.V_RMIN", "exciter.V_RMAX")
+        )
         measured = Measurement(m, seen)
         amplifier = m.state("amplifier", V_A0, "pu", "first-order lag with limits", base="E_fd")
-        V_F, K_F = rate_feedback(m, held(clamp(amplifier, A_low, A_high), measured.nearly), seen.start.E_fd)
-        m.require(if_else(logic_and(K_F > 0, T_A <= 0), -1, 1), "exciter.K_F > 0 needs exciter.T_A > 0")
+        V_F, K_F = rate_feedback(
+            m, held(clamp(amplifier, A_low, A_high), measured.nearly), seen.start.E_fd
+        )
+        m.require(
+            if_else(logic_and(K_F > 0, T_A <= 0), -1, 1), "exciter.K_F > 0 needs exciter.T_A > 0"
+        )
         error = clamp(measured.error(V_I0) - V_F, I_low, I_high)
         error = lead_lag_stage(m, error, V_I0)
         error = lead_lag_stage(m, error, V_I0, mark="1")
@@ -99,17 +116,29 @@ def st4b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
     with m.scope("exciter"):
         K_PR = gain(m, "K_PR", 3.15, "Proportional gain", 0)
         K_IR = m.parameter("K_IR", 3.15, "1/s", "Integral gain", minimum=1e-6)
-        high, low = gain(m, "V_RMAX", 1.0, "Upper limit of V_R"), gain(m, "V_RMIN", -0.87, "Lower limit of V_R")
+        high, low = (
+            gain(m, "V_RMAX", 1.0, "Upper limit of V_R"),
+            gain(m, "V_RMIN", -0.87, "Lower limit of V_R"),
+        )
         T_A = time(m, "T_A", 0.02, "Bridge; 0 leaves the lag out")
         source = _source(m)
         inner = _inner(m, seen.start.E_fd / source(seen.start.v_t, seen.start.E_fd))
-        V_A0 = if_else(inner.K_IM > 0, 0, inner.at_start / fmax(inner.K_PM, 1e-9)) + inner.K_G * seen.start.E_fd
+        V_A0 = (
+            if_else(inner.K_IM > 0, 0, inner.at_start / fmax(inner.K_PM, 1e-9))
+            + inner.K_G * seen.start.E_fd
+        )
         require_within(m, V_A0, low, high, ("exciter.V_RMIN", "exciter.V_RMAX"))
         measured = Measurement(m, seen)
         error = measured.error(0.0)
         V_R = limited_proportional_integral(m, "regulator", error, K_PR, K_IR, low, high, V_A0)
         V_A = low_pass_or_nothing(m, "bridge", V_R, T_A, V_A0)
-        x = m.state("inner", if_else(inner.K_IM > 0, inner.at_start, 0), "pu", "integrator with limits", base="E_fd")
+        x = m.state(
+            "inner",
+            if_else(inner.K_IM > 0, inner.at_start, 0),
+            "pu",
+            "integrator with limits",
+            base="E_fd",
+        )
 
         def field_voltage(v_t: Expr) -> Expr:
             V_B = source(v_t, seen.I_fd)
@@ -119,7 +148,9 @@ def st4b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         E_fd = field_voltage(seen.terminal_voltage(field_voltage(measured.nearly)))
         rest = V_A - inner.K_G * E_fd
         free = inner.K_PM * rest + x
-        outward = logic_or(logic_and(free > inner.high, rest > 0), logic_and(free < inner.low, rest < 0))
+        outward = logic_or(
+            logic_and(free > inner.high, rest > 0), logic_and(free < inner.low, rest < 0)
+        )
         without = -x / BYPASS_TIME  # no integrator, and no eigenvalue of 0
         m.derivative(x, if_else(inner.K_IM > 0, if_else(outward, 0, inner.K_IM * rest), without))
         return measured.close(E_fd)
@@ -159,10 +190,18 @@ def sexs(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         T_A = time(m, "T_A", 1.0, "Lead")
         T_B = time(m, "T_B", 10.0, "Lag; 0 leaves the stage out")
         T_E = time(m, "T_E", 0.05, "Exciter; 0 leaves the lag out")
-        low, high = gain(m, "E_MIN", 0.0, "Lower ceiling of E_fd"), gain(m, "E_MAX", 5.0, "Upper ceiling of E_fd")
-        m.require(if_else(logic_and(T_B <= 0, T_A > 0), -1, 1), "exciter.T_B = 0 needs exciter.T_A = 0 as well")
+        low, high = (
+            gain(m, "E_MIN", 0.0, "Lower ceiling of E_fd"),
+            gain(m, "E_MAX", 5.0, "Upper ceiling of E_fd"),
+        )
+        m.require(
+            if_else(logic_and(T_B <= 0, T_A > 0), -1, 1),
+            "exciter.T_B = 0 needs exciter.T_A = 0 as well",
+        )
         require_within(m, seen.start.E_fd, low, high, ("exciter.E_MIN", "exciter.E_MAX"))
         measured = Measurement(m, seen)
         error = measured.error(seen.start.E_fd / K)
         compensated = lead_lag(m, "lead_lag", error, T_A, T_B, seen.start.E_fd / K)
-        return measured.close(limited_low_pass(m, "amplifier", K * compensated, T_E, low, high, seen.start.E_fd))
+        return measured.close(
+            limited_low_pass(m, "amplifier", K * compensated, T_E, low, high, seen.start.E_fd)
+        )

@@ -30,15 +30,34 @@ def declare_common(m: ModelBuilder, S_n: Expr, H: float = 6.5) -> Common:
     ``S_n``: rating [MVA]; ``H``: default of the inertia constant [s]."""
     with m.scope("transformer"):
         R_t = m.parameter("R_t", 0.0, "pu", "Resistance", base=SN, minimum=0)
-        X_t = m.parameter("X_t", 0.0, "pu", "Reactance; 0 where the network has the transformer", base=SN, minimum=0)
+        X_t = m.parameter(
+            "X_t",
+            0.0,
+            "pu",
+            "Reactance; 0 where the network has the transformer",
+            base=SN,
+            minimum=0,
+        )
     with m.scope("machine"):
         S_data = m.parameter(
-            "S_data", 0.0, "MVA", "Base of the machine's data (X, R_s, H, D); 0: they are on S_n", minimum=0
+            "S_data",
+            0.0,
+            "MVA",
+            "Base of the machine's data (X, R_s, H, D); 0: they are on S_n",
+            minimum=0,
         )
-        scale = m.calculated("scale", if_else(S_data > 0, S_n / S_data, 1), "1", "S_n over the data's base")
-        R_s = m.parameter("R_s", 0.0025, "pu", "Stator resistance", base="S_data", minimum=0, source=SOURCE)
-        inertia = m.parameter("H", H, "s", "Inertia constant, on S_data", minimum=0.01, source=SOURCE)
-        D = m.parameter("D", 0.0, "pu", "Damping torque per speed deviation", base="S_data", minimum=0)
+        scale = m.calculated(
+            "scale", if_else(S_data > 0, S_n / S_data, 1), "1", "S_n over the data's base"
+        )
+        R_s = m.parameter(
+            "R_s", 0.0025, "pu", "Stator resistance", base="S_data", minimum=0, source=SOURCE
+        )
+        inertia = m.parameter(
+            "H", H, "s", "Inertia constant, on S_data", minimum=0.01, source=SOURCE
+        )
+        D = m.parameter(
+            "D", 0.0, "pu", "Damping torque per speed deviation", base="S_data", minimum=0
+        )
         return Common(R_t, X_t, scale * R_s, inertia / scale, D / scale, scale)
 
 

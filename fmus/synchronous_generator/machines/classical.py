@@ -14,7 +14,9 @@ from fmus.toolchain.port import DevicePort
 from fmus.toolchain.symbols import Expr
 
 
-def classical(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclaration) -> Machine:
+def classical(
+    m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclaration
+) -> Machine:
     """Declare the machine."""
     common = declare_common(m, S_n)
     with m.scope("machine"):
@@ -33,4 +35,6 @@ def classical(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDec
         delta = m.state("delta", delta_0, "rad", "Angle of the emf in the network frame")
     v_t = port.v_0 + Phasor(common.R_t, common.X_t) * port.i_0
     start = Start(v_t.magnitude(), emf, psi_d * i.re + psi_q * i.im, v, i)
-    return Machine(R, common.R_t, common.X_t, common.H, common.D, d, q, w, delta, start, salient=False)
+    return Machine(
+        R, common.R_t, common.X_t, common.H, common.D, d, q, w, delta, start, salient=False
+    )

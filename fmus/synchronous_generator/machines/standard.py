@@ -58,23 +58,34 @@ class _Circuit:
 
 
 def declare_wound_machine(
-    m: ModelBuilder, port: DevicePort, common: Common, d: WoundAxis, q: WoundAxis, stator_flux: FluxDeclaration,
-    saturation: Saturation | None = None, *, salient: bool = False,
-) -> Machine:  # fmt: skip
+    m: ModelBuilder,
+    port: DevicePort,
+    common: Common,
+    d: WoundAxis,
+    q: WoundAxis,
+    stator_flux: FluxDeclaration,
+    saturation: Saturation | None = None,
+    *,
+    salient: bool = False,
+) -> Machine:
     """Declare windings, speed and angle in the steady state of the operating point.
 
     ``port``: gives the operating point; ``common``: transformer, stator resistance and motion; ``d``, ``q``: data of
     the axes. With saturation of both axes X''_d = X''_q; ``saturation``: of the iron; None for none; ``salient``:
     whether the last reactances of the axes, X'' or X', may differ."""
     with m.scope("machine"):
-        circuits = {name: _circuit(m, port, name, axis, common.X_t) for name, axis in (("d", d), ("q", q))}
+        circuits = {
+            name: _circuit(m, port, name, axis, common.X_t) for name, axis in (("d", d), ("q", q))
+        }
         dc, qc = circuits["d"], circuits["q"]
         R, X_l = common.R_s + common.R_t, d.data.X_l
         has_slow_q = if_else(q.data.X - q.data.X1 > 1e-9, 1, 0)
         S_q = Expr(0)  # saturation of the q axis, S
         if saturation and saturation.both_axes:
             flux = (port.v_0 + Phasor(R, dc.X_between) * port.i_0).magnitude()
-            S = m.calculated("saturation_0", saturation.part(flux) / flux, "1", "S(ψ'') at the operating point")
+            S = m.calculated(
+                "saturation_0", saturation.part(flux) / flux, "1", "S(ψ'') at the operating point"
+            )
             S_q = S * has_slow_q
         X_q = qc.X_between + (q.data.X - X_l - qc.X_sub) / (1 + S_q * qc.X_m / dc.X_m)
         delta_0 = (port.v_0 + Phasor(R, X_q) * port.i_0).angle()
@@ -100,30 +111,43 @@ def declare_wound_machine(
         delta = m.state("delta", delta_0, "rad", "Rotor angle in the network frame")
     v_t = port.v_0 + Phasor(common.R_t, common.X_t) * port.i_0
     start = Start(v_t.magnitude(), E_fd, psi_d * i_q - psi_q * i_d, v, i)
-    return Machine(R, common.R_t, common.X_t, common.H, common.D, axis_d, axis_q, w, delta, start, salient)
+    return Machine(
+        R, common.R_t, common.X_t, common.H, common.D, axis_d, axis_q, w, delta, start, salient
+    )
 
 
 def _circuit(m: ModelBuilder, port: DevicePort, name: str, axis: WoundAxis, X_t: Expr) -> _Circuit:
     data = axis.data
-    X_m = m.calculated(f"X_m{name}", data.X - data.X_l, "pu", f"Magnetising reactance, {name} axis", "S_n")
+    X_m = m.calculated(
+        f"X_m{name}", data.X - data.X_l, "pu", f"Magnetising reactance, {name} axis", "S_n"
+    )
     b: RotorBranches = classical_branches(data, port.omega_b)
     branches = []
     for number, (X, R) in enumerate(((b.X_1, b.R_1), (b.X_2, b.R_2))[: len(axis.fluxes)], start=1):
         text = f"Rotor winding {number} of the {name} axis"
-        declared_X = m.calculated(f"{name}_X_{number}", X, "pu", f"{text}: leakage reactance", "S_n")
+        declared_X = m.calculated(
+            f"{name}_X_{number}", X, "pu", f"{text}: leakage reactance", "S_n"
+        )
         declared_R = m.calculated(f"{name}_R_{number}", R, "pu", f"{text}: resistance", "S_n")
         branches.append((declared_X, declared_R))
     total = 1 / X_m
     for X, _ in branches:
         total += 1 / X
-    X_sub = m.calculated(f"X_m{name}2", 1 / total, "pu", f"Last reactance of the {name} axis, less X_l", "S_n")
+    X_sub = m.calculated(
+        f"X_m{name}2", 1 / total, "pu", f"Last reactance of the {name} axis, less X_l", "S_n"
+    )
     return _Circuit(X_m, tuple(branches), X_sub, X_sub + data.X_l + X_t)
 
 
 def _axis(
-    m: ModelBuilder, axis: WoundAxis, circuit: _Circuit, stator_flux: FluxDeclaration, stator: tuple[str, Expr],
-    gap: Expr, i: Expr,
-) -> Axis:  # fmt: skip
+    m: ModelBuilder,
+    axis: WoundAxis,
+    circuit: _Circuit,
+    stator_flux: FluxDeclaration,
+    stator: tuple[str, Expr],
+    gap: Expr,
+    i: Expr,
+) -> Axis:
     """Declare the fluxes of an axis; in steady state its slowest winding alone has a current."""
     name, psi = stator
     stator_psi = stator_flux(m, name, psi, f"Flux of stator and transformer, {name[-1]} axis")
@@ -152,7 +176,10 @@ def two_axis(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDecl
     common = declare_common(m, S_n)
     with m.scope("machine"):
         d, q = (
-            WoundAxis(_one_winding(common, _synchronous(m, axis), _transient(m, axis), _time_1(m, axis)), (winding,))
+            WoundAxis(
+                _one_winding(common, _synchronous(m, axis), _transient(m, axis), _time_1(m, axis)),
+                (winding,),
+            )
             for axis, winding in (("d", _FIELD), ("q", _FIRST_Q))
         )
         _require_order(m, d.data, q.data, "X_q1")
@@ -170,7 +197,13 @@ def gensal(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclar
         _require_order(m, d, q, "X_d2")
         saturation = _saturation(m, both_axes=False)
     return declare_wound_machine(
-        m, port, common, WoundAxis(d, (_FIELD, _DAMPER)), WoundAxis(q, (_FIRST_Q,)), stator_flux, saturation
+        m,
+        port,
+        common,
+        WoundAxis(d, (_FIELD, _DAMPER)),
+        WoundAxis(q, (_FIRST_Q,)),
+        stator_flux,
+        saturation,
     )
 
 
@@ -184,21 +217,34 @@ def genrou(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclar
         k = common.scale
         q = AxisData(k * X_q, k * X_q1, k * X_2, k * X_l, T_q10, T_q20)
         _require_order(m, d, q, "X_q1")
-        m.require(if_else(q.X2 <= q.X1, 1, -1), "machine.X_d2, which is X''_q too, must not exceed machine.X_q1")
+        m.require(
+            if_else(q.X2 <= q.X1, 1, -1),
+            "machine.X_d2, which is X''_q too, must not exceed machine.X_q1",
+        )
         m.require(T_q10 - T_q20, "machine.T_q10 must exceed machine.T_q20")
         saturation = _saturation(m, both_axes=True)
     return declare_wound_machine(
-        m, port, common, WoundAxis(d, (_FIELD, _DAMPER)), WoundAxis(q, (_FIRST_Q, _SECOND_Q)), stator_flux, saturation
+        m,
+        port,
+        common,
+        WoundAxis(d, (_FIELD, _DAMPER)),
+        WoundAxis(q, (_FIRST_Q, _SECOND_Q)),
+        stator_flux,
+        saturation,
     )
 
 
-def genrou_rated_speed(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclaration) -> Machine:
+def genrou_rated_speed(
+    m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclaration
+) -> Machine:
     """Declare `genrou` with the emf e'' instead of w·e'', as most stability programs have it."""
     return replace(genrou(m, port, S_n, stator_flux), at_rated_speed=True)
 
 
 def _synchronous(m: ModelBuilder, axis: str) -> Expr:
-    return reactance(m, f"X_{axis}", {"d": 1.8, "q": 1.7}[axis], f"Synchronous reactance, {axis} axis")
+    return reactance(
+        m, f"X_{axis}", {"d": 1.8, "q": 1.7}[axis], f"Synchronous reactance, {axis} axis"
+    )
 
 
 def _transient(m: ModelBuilder, axis: str) -> Expr:
@@ -237,7 +283,9 @@ def _require_order(m: ModelBuilder, d: AxisData, q: AxisData, lower: str) -> Non
 
 def _saturation(m: ModelBuilder, *, both_axes: bool) -> Saturation:
     s_10, s_12 = (
-        m.parameter(name, 0.0, "1", f"Saturation S({x}) of the open-circuit curve; both 0: none", minimum=0)
+        m.parameter(
+            name, 0.0, "1", f"Saturation S({x}) of the open-circuit curve; both 0: none", minimum=0
+        )
         for name, x in (("s_10", "1.0"), ("s_12", "1.2"))
     )
     points = (1.0, s_10), (1.2, s_12)

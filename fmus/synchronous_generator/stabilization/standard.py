@@ -19,7 +19,14 @@ from functools import partial
 
 from fmus.synchronous_generator.declarations import per_unit, time_constant
 from fmus.synchronous_generator.stabilization.norm631 import RAMP_LAGS
-from fmus.toolchain.blocks import BYPASS_TIME, clamp, lead_lag, low_pass_or_nothing, washout, washout_or_nothing
+from fmus.toolchain.blocks import (
+    BYPASS_TIME,
+    clamp,
+    lead_lag,
+    low_pass_or_nothing,
+    washout,
+    washout_or_nothing,
+)
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, fmax, if_else, logic_and, logic_or, sqrt
 
@@ -30,7 +37,9 @@ gain = partial(per_unit, base="S_n", source=SOURCE)
 time = partial(time_constant, source=SOURCE)
 
 
-def stage(m: ModelBuilder, u: Expr, number: int, names: tuple[str, str], values: tuple[float, float]) -> Expr:
+def stage(
+    m: ModelBuilder, u: Expr, number: int, names: tuple[str, str], values: tuple[float, float]
+) -> Expr:
     """(1 + s·T_lead)/(1 + s·T_lag), passed through where T_lag = 0, which needs T_lead = 0.
 
     ``u``: what goes in; 0 in steady state; ``number``: of the stage; ``names``, ``values``: of lead and lag, and their
@@ -39,15 +48,22 @@ def stage(m: ModelBuilder, u: Expr, number: int, names: tuple[str, str], values:
         time(m, names[0], values[0], f"Lead of stage {number}"),
         time(m, names[1], values[1], f"Lag of stage {number}; 0 leaves the stage out"),
     )
-    m.require(if_else(logic_and(T_lag <= 0, T_lead > 0), -1, 1), f"pss.{names[1]} = 0 needs pss.{names[0]} = 0 as well")
+    m.require(
+        if_else(logic_and(T_lag <= 0, T_lead > 0), -1, 1),
+        f"pss.{names[1]} = 0 needs pss.{names[0]} = 0 as well",
+    )
     return lead_lag(m, f"lead_lag_{number}", u, T_lead, T_lag)
 
 
 def limited_output(m: ModelBuilder, signal: Expr) -> Expr:
     """The signal within V_STMIN and V_STMAX, switched by ``enabled``."""
-    enabled = m.switch("enabled", True, "Adds the stabiliser's signal to the voltage reference", tunable=True)
+    enabled = m.switch(
+        "enabled", True, "Adds the stabiliser's signal to the voltage reference", tunable=True
+    )
     high = gain(m, "V_STMAX", 0.1, "Upper limit of the signal", 0)
-    low = m.parameter("V_STMIN", -0.1, "pu", "Lower limit of the signal", base="S_n", maximum=0, source=SOURCE)
+    low = m.parameter(
+        "V_STMIN", -0.1, "pu", "Lower limit of the signal", base="S_n", maximum=0, source=SOURCE
+    )
     return enabled * clamp(signal, low, high)
 
 
@@ -55,7 +71,9 @@ def pss1a(m: ModelBuilder, delta_omega: Expr, P_e: Expr, P_e_0: Expr) -> Expr:
     """Declare the stabiliser and return its signal to the voltage regulator [pu]."""
     with m.scope("pss"):
         K_S = gain(m, "K_S", 20.0, "Gain")
-        signal = low_pass_or_nothing(m, "transducer", delta_omega, time(m, "T_6", 0.0, "Transducer; 0 leaves it out"))
+        signal = low_pass_or_nothing(
+            m, "transducer", delta_omega, time(m, "T_6", 0.0, "Transducer; 0 leaves it out")
+        )
         T_5 = m.parameter("T_5", 10.0, "s", "Washout", minimum=1e-3, source=SOURCE)
         signal = K_S * washout(m, "washout", signal, T_5)
         signal = _filter(m, signal)
@@ -67,24 +85,34 @@ def pss1a(m: ModelBuilder, delta_omega: Expr, P_e: Expr, P_e_0: Expr) -> Expr:
 def _filter(m: ModelBuilder, u: Expr) -> Expr:
     """1/(1 + A_1·s + A_2·s²); A_2 = 0 leaves one lag, A_1 = 0 as well none."""
     A_1 = m.parameter("A_1", 0.0, "s", "Filter, first order", minimum=0, source=SOURCE)
-    A_2 = m.parameter("A_2", 0.0, "1", "Filter, second order [s²]; 0: first order alone", minimum=0, source=SOURCE)
+    A_2 = m.parameter(
+        "A_2", 0.0, "1", "Filter, second order [s²]; 0: first order alone", minimum=0, source=SOURCE
+    )
     m.require(if_else(logic_and(A_2 > 0, A_1 <= 0), -1, 1), "pss.A_2 > 0 needs pss.A_1 > 0")
     shortest = m.internal_step / 2
     m.require(
-        if_else(logic_or(A_2 > 0, A_1 <= 0), 1, A_1 - shortest), "pss.A_1 must be 0 or exceed half of internal_step"
+        if_else(logic_or(A_2 > 0, A_1 <= 0), 1, A_1 - shortest),
+        "pss.A_1 must be 0 or exceed half of internal_step",
     )
-    m.require(if_else(A_2 <= 0, 1, A_2 / fmax(A_1, 1e-9) - shortest), "pss.A_2/A_1 must exceed half of internal_step")
+    m.require(
+        if_else(A_2 <= 0, 1, A_2 / fmax(A_1, 1e-9) - shortest),
+        "pss.A_2/A_1 must exceed half of internal_step",
+    )
     second = A_2 > 0
     root = sqrt(if_else(second, A_2, 1))
     x = m.state("filter", 0.0, "pu", "filter", base="S_n")
-    y = m.state("filter_rate", 0.0, "pu", "filter, its rate times the square root of A_2", base="S_n")
+    y = m.state(
+        "filter_rate", 0.0, "pu", "filter, its rate times the square root of A_2", base="S_n"
+    )
     first = (u - x) / if_else(A_1 > 0, A_1, BYPASS_TIME)
     m.derivative(x, if_else(second, y / root, first))
     m.derivative(y, if_else(second, (u - x - A_1 * y / root) / root, -y / BYPASS_TIME))
     return if_else(logic_or(second, A_1 > 0), x, u)
 
 
-def pss2a(m: ModelBuilder, delta_omega: Expr, P_e: Expr, P_e_0: Expr, *, newer: bool = False) -> Expr:
+def pss2a(
+    m: ModelBuilder, delta_omega: Expr, P_e: Expr, P_e_0: Expr, *, newer: bool = False
+) -> Expr:
     """Declare the stabiliser and return its signal to the voltage regulator [pu].
 
     ``newer``: whether it has what PSS2B has beyond PSS2A."""
@@ -93,11 +121,19 @@ def pss2a(m: ModelBuilder, delta_omega: Expr, P_e: Expr, P_e_0: Expr, *, newer: 
         if newer:
             speed = clamp(speed, *_input_limits(m, "1", "speed"))
             power = clamp(power, *_input_limits(m, "2", "power, as its change"))
-        speed = washout_or_nothing(m, "washout_1", speed, time(m, "T_w1", 2.0, "First washout of the speed"))
-        speed = washout_or_nothing(m, "washout_2", speed, time(m, "T_w2", 2.0, "Second washout of the speed"))
+        speed = washout_or_nothing(
+            m, "washout_1", speed, time(m, "T_w1", 2.0, "First washout of the speed")
+        )
+        speed = washout_or_nothing(
+            m, "washout_2", speed, time(m, "T_w2", 2.0, "Second washout of the speed")
+        )
         speed = low_pass_or_nothing(m, "speed", speed, time(m, "T_6", 0.0, "Lag of the speed"))
-        power = washout_or_nothing(m, "washout_3", power, time(m, "T_w3", 2.0, "First washout of the power"))
-        power = washout_or_nothing(m, "washout_4", power, time(m, "T_w4", 0.0, "Second washout of the power"))
+        power = washout_or_nothing(
+            m, "washout_3", power, time(m, "T_w3", 2.0, "First washout of the power")
+        )
+        power = washout_or_nothing(
+            m, "washout_4", power, time(m, "T_w4", 0.0, "Second washout of the power")
+        )
         power = gain(m, "K_s2", 0.2, "Gain of the power, T_7/2H") * low_pass_or_nothing(
             m, "integrator", power, time(m, "T_7", 2.0, "Lag of the power, which integrates it")
         )
@@ -115,8 +151,12 @@ pss2b = partial(pss2a, newer=True)  # PSS2A with limited inputs and a third stag
 
 
 def _input_limits(m: ModelBuilder, number: str, text: str) -> tuple[Expr, Expr]:
-    low = m.parameter(f"V_SI{number}MIN", -2.0, "pu", f"Lower limit of the {text}", base="S_n", maximum=0)
-    high = m.parameter(f"V_SI{number}MAX", 2.0, "pu", f"Upper limit of the {text}", base="S_n", minimum=0)
+    low = m.parameter(
+        f"V_SI{number}MIN", -2.0, "pu", f"Lower limit of the {text}", base="S_n", maximum=0
+    )
+    high = m.parameter(
+        f"V_SI{number}MAX", 2.0, "pu", f"Upper limit of the {text}", base="S_n", minimum=0
+    )
     return low, high
 
 

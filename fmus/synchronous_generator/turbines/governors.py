@@ -46,8 +46,12 @@ time = partial(time_constant, source=SOURCE)
 
 def power_reference(m: ModelBuilder, P_ref_0: Scalar) -> Expr:
     """Declare the power reference of the operating point and its change; return their sum [pu, S_n]."""
-    P_ref = m.calculated("P_ref", P_ref_0, "pu", "Power reference of the operating point", base="S_n")
-    return P_ref + m.parameter("delta_P_ref", 0.0, "pu", "Change of the power reference", base="S_n", tunable=True)
+    P_ref = m.calculated(
+        "P_ref", P_ref_0, "pu", "Power reference of the operating point", base="S_n"
+    )
+    return P_ref + m.parameter(
+        "delta_P_ref", 0.0, "pu", "Change of the power reference", base="S_n", tunable=True
+    )
 
 
 def read_either_way(governor: Callable[[ModelBuilder, Expr, Expr], Expr]) -> Callable[..., Expr]:
@@ -56,7 +60,9 @@ def read_either_way(governor: Callable[[ModelBuilder, Expr, Expr], Expr]) -> Cal
     def declare(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
         output = governor(m, w, P_m_0)
         with m.scope("governor"):
-            is_torque = m.switch("output_is_torque", False, "The output is the mechanical torque, not the power")
+            is_torque = m.switch(
+                "output_is_torque", False, "The output is the mechanical torque, not the power"
+            )
         return output * if_else(is_torque, w, 1)
 
     return declare
@@ -91,8 +97,13 @@ def hygov(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
         T_r = time(m, "T_r", 5.0, "Reset of the transient droop", 1e-2)
         T_f = time(m, "T_f", 0.05, "Filter", 1e-3)
         T_g = time(m, "T_g", 0.5, "Gate's servo", 1e-3)
-        VELM = m.parameter("VELM", 0.2, "pu/s", "Fastest movement of the gate", minimum=1e-6, source=SOURCE)
-        high, low = power(m, "G_MAX", 1.0, "Gate, fully open"), power(m, "G_MIN", 0.0, "Gate, closed", 0)
+        VELM = m.parameter(
+            "VELM", 0.2, "pu/s", "Fastest movement of the gate", minimum=1e-6, source=SOURCE
+        )
+        high, low = (
+            power(m, "G_MAX", 1.0, "Gate, fully open"),
+            power(m, "G_MIN", 0.0, "Gate, closed", 0),
+        )
         T_W = time(m, "T_W", 1.0, "Water's inertia", 1e-2)
         A_t = m.parameter("A_t", 1.2, "1", "Gain of the turbine", minimum=0.1, source=SOURCE)
         D_turb = power(m, "D_turb", 0.5, "Damping of the turbine", 0)
@@ -107,7 +118,12 @@ def hygov(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
         c = m.algebraic("c")
         filtered = m.state("filtered", 0.0, "pu", "Error through the filter", base="S_n")
         m.derivative(filtered, (R * (wanted - c) - (w - 1) - filtered) / T_f)
-        m.close(c, blocks.limited_proportional_integral(m, "c_slow", filtered, 1 / r, 1 / (r * T_r), low, high, g_0))
+        m.close(
+            c,
+            blocks.limited_proportional_integral(
+                m, "c_slow", filtered, 1 / r, 1 / (r * T_r), low, high, g_0
+            ),
+        )
         x = m.state("gate", g_0, "pu", "Gate", base="S_n")
         m.derivative(x, blocks.clamp((c - x) / T_g, -VELM, VELM))
         gate = fmax(x, _LEAST_GATE)
@@ -125,8 +141,13 @@ def gast(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
         T_2 = time(m, "T_2", 0.1, "Combustion", 1e-3)
         T_3 = time(m, "T_3", 3.0, "Measurement of the exhaust's temperature", 1e-3)
         A_T = power(m, "A_T", 1.0, "Load limit at the ambient temperature")
-        K_T = m.parameter("K_T", 2.0, "1", "Gain of the temperature's limiter", minimum=0, source=SOURCE)
-        high, low = power(m, "V_MAX", 1.0, "Valve, fully open"), power(m, "V_MIN", -0.05, "Valve, closed")
+        K_T = m.parameter(
+            "K_T", 2.0, "1", "Gain of the temperature's limiter", minimum=0, source=SOURCE
+        )
+        high, low = (
+            power(m, "V_MAX", 1.0, "Valve, fully open"),
+            power(m, "V_MIN", -0.05, "Valve, closed"),
+        )
         D_turb = power(m, "D_turb", 0.0, "Damping of the turbine", 0)
         require_within(m, P_m_0, low, high, ("governor.V_MIN", "governor.V_MAX"))
         m.require(
@@ -149,13 +170,21 @@ def tgov1(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
     with m.scope("governor"):
         R = power(m, "R", 0.05, "Droop", 1e-4)
         T_1 = time(m, "T_1", 0.5, "Valve; 0 leaves the lag out")
-        high, low = power(m, "V_MAX", 1.0, "Valve, fully open"), power(m, "V_MIN", 0.0, "Valve, closed")
+        high, low = (
+            power(m, "V_MAX", 1.0, "Valve, fully open"),
+            power(m, "V_MIN", 0.0, "Valve, closed"),
+        )
         T_2 = time(m, "T_2", 3.0, "Reheater, lead: T_3 times the high-pressure part")
         T_3 = time(m, "T_3", 10.0, "Reheater; 0 leaves the stage out")
         D_t = power(m, "D_t", 0.0, "Damping of the turbine", 0)
-        m.require(if_else(logic_and(T_3 <= 0, T_2 > 0), -1, 1), "governor.T_3 = 0 needs governor.T_2 = 0 as well")
+        m.require(
+            if_else(logic_and(T_3 <= 0, T_2 > 0), -1, 1),
+            "governor.T_3 = 0 needs governor.T_2 = 0 as well",
+        )
         require_within(m, P_m_0, low, high, ("governor.V_MIN", "governor.V_MAX"))
-        valve = blocks.limited_low_pass(m, "valve", power_reference(m, P_m_0) - (w - 1) / R, T_1, low, high, P_m_0)
+        valve = blocks.limited_low_pass(
+            m, "valve", power_reference(m, P_m_0) - (w - 1) / R, T_1, low, high, P_m_0
+        )
         return blocks.lead_lag(m, "reheater", valve, T_2, T_3, P_m_0) - D_t * (w - 1)
 
 
@@ -168,22 +197,39 @@ def ieeeg1(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
     """Declare governor and turbine and return the mechanical power [pu, S_n]."""
     with m.scope("governor"):
         K = power(m, "K", 20.0, "Gain, 1/droop", 0)
-        T_1, T_2 = time(m, "T_1", 0.0, "Controller, lag; 0 leaves it out"), time(m, "T_2", 0.0, "Controller, lead")
+        T_1, T_2 = (
+            time(m, "T_1", 0.0, "Controller, lag; 0 leaves it out"),
+            time(m, "T_2", 0.0, "Controller, lead"),
+        )
         T_3 = time(m, "T_3", 0.1, "Valve's servo", 1e-3)
-        U_o = m.parameter("U_o", 1.0, "pu/s", "Fastest opening of the valve", minimum=1e-6, source=SOURCE)
-        U_c = m.parameter("U_c", -10.0, "pu/s", "Fastest closing of the valve", maximum=-1e-6, source=SOURCE)
-        high, low = power(m, "P_MAX", 1.0, "Valve, fully open"), power(m, "P_MIN", 0.0, "Valve, closed")
+        U_o = m.parameter(
+            "U_o", 1.0, "pu/s", "Fastest opening of the valve", minimum=1e-6, source=SOURCE
+        )
+        U_c = m.parameter(
+            "U_c", -10.0, "pu/s", "Fastest closing of the valve", maximum=-1e-6, source=SOURCE
+        )
+        high, low = (
+            power(m, "P_MAX", 1.0, "Valve, fully open"),
+            power(m, "P_MIN", 0.0, "Valve, closed"),
+        )
         T = [
             time(m, f"T_{k}", value, f"Stage {k - 3} of the turbine; 0 leaves it out")
             for k, value in enumerate(_TIMES, 4)
         ]
         part = [
-            m.parameter(f"K_{k}", value, "1", f"Turbine fraction K_{k}", minimum=0, maximum=1, source=SOURCE)
+            m.parameter(
+                f"K_{k}", value, "1", f"Turbine fraction K_{k}", minimum=0, maximum=1, source=SOURCE
+            )
             for k, value in enumerate(_FRACTIONS, 1)
         ]
-        m.require(if_else(logic_and(T_1 <= 0, T_2 > 0), -1, 1), "governor.T_1 = 0 needs governor.T_2 = 0 as well")
+        m.require(
+            if_else(logic_and(T_1 <= 0, T_2 > 0), -1, 1),
+            "governor.T_1 = 0 needs governor.T_2 = 0 as well",
+        )
         fractions = sum(part, Expr(0))
-        m.require(fractions - 1e-3, "governor: at least one turbine fraction K_1 to K_8 must exceed 0")
+        m.require(
+            fractions - 1e-3, "governor: at least one turbine fraction K_1 to K_8 must exceed 0"
+        )
         valve_0 = P_m_0 / fmax(fractions, 1e-3)
         require_within(m, valve_0, low, high, ("governor.P_MIN", "governor.P_MAX"))
         control = blocks.lead_lag(m, "controller", K * (w - 1), T_2, T_1)

@@ -15,23 +15,49 @@ def ieeeg1(m: ModelBuilder, w: Expr, P_m_0: Expr, data: GovernorData) -> Expr:
     ``w``: rotor speed [pu, f_n]; ``P_m_0``: mechanical power at the operating point [pu, S_n]; ``data``: defaults of
     the parameters."""
     with m.scope("governor"):
-        enabled = m.switch("enabled", True, "Governor in service; otherwise the mechanical power is constant")
-        gain = m.parameter("inverse_R", data.inverse_droop, "pu", "1/R", base="S_n", minimum=0, source=data.source)
+        enabled = m.switch(
+            "enabled", True, "Governor in service; otherwise the mechanical power is constant"
+        )
+        gain = m.parameter(
+            "inverse_R", data.inverse_droop, "pu", "1/R", base="S_n", minimum=0, source=data.source
+        )
         T = [
             m.parameter(
-                f"T_{k}", value, "s", f"Time constant T_{k}; 0 leaves its block out", minimum=0, source=data.source
+                f"T_{k}",
+                value,
+                "s",
+                f"Time constant T_{k}; 0 leaves its block out",
+                minimum=0,
+                source=data.source,
             )
             for k, value in enumerate(data.T, start=1)
         ]
         K = [
-            m.parameter(f"K_{k}", value, "1", f"Turbine fraction K_{k}", minimum=0, maximum=1, source=data.source)
+            m.parameter(
+                f"K_{k}",
+                value,
+                "1",
+                f"Turbine fraction K_{k}",
+                minimum=0,
+                maximum=1,
+                source=data.source,
+            )
             for k, value in enumerate(data.K, start=1)
         ]
-        delta = m.parameter("delta_P_ref", 0.0, "pu", "Change of the power reference", base="S_n", tunable=True)
-        m.require(if_else(logic_and(T[0] <= 0, T[1] > 0), -1, 1), "governor.T_1 = 0 needs governor.T_2 = 0 as well")
+        delta = m.parameter(
+            "delta_P_ref", 0.0, "pu", "Change of the power reference", base="S_n", tunable=True
+        )
+        m.require(
+            if_else(logic_and(T[0] <= 0, T[1] > 0), -1, 1),
+            "governor.T_1 = 0 needs governor.T_2 = 0 as well",
+        )
         fractions = sum(K, Expr(0))
-        m.require(fractions - 1e-3, "governor: at least one turbine fraction K_1 to K_8 must exceed 0")
-        P_ref = m.calculated("P_ref", P_m_0 / fractions, "pu", "Power reference of the operating point", base="S_n")
+        m.require(
+            fractions - 1e-3, "governor: at least one turbine fraction K_1 to K_8 must exceed 0"
+        )
+        P_ref = m.calculated(
+            "P_ref", P_m_0 / fractions, "pu", "Power reference of the operating point", base="S_n"
+        )
 
         signal = lead_lag(m, "controller", -gain * (w - 1), T[0 + 1], T[0])
         signal = low_pass_or_nothing(m, "gate", P_ref + delta + signal, T[2], P_ref)
@@ -40,7 +66,8 @@ def ieeeg1(m: ModelBuilder, w: Expr, P_m_0: Expr, data: GovernorData) -> Expr:
             signal = low_pass_or_nothing(m, name, signal, T[3 + stage], P_ref)
             power += (K[2 * stage] + K[2 * stage + 1]) * signal
         m.require(
-            _positive_or_zero(T, m.internal_step), "governor: a time constant must be 0 or longer than internal_step"
+            _positive_or_zero(T, m.internal_step),
+            "governor: a time constant must be 0 or longer than internal_step",
         )
         return if_else(enabled, power, P_m_0)
 

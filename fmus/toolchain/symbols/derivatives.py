@@ -29,7 +29,9 @@ def jtimes_transposed(values: Vector, by: Vector, seeds: Sequence[Scalar]) -> li
     """The transposed Jacobian of values by symbols, times a seed for each value."""
     nodes, ends = sorted_nodes(values)
     total = dict.fromkeys([*nodes, *by], ZERO)
-    for value, seed, first, end in reversed(list(zip(values, map(Expr, seeds), [0, *ends], ends, strict=False))):
+    for value, seed, first, end in reversed(
+        list(zip(values, map(Expr, seeds), [0, *ends], ends, strict=False))
+    ):
         total[value] = total[value] + seed
         for node in reversed(nodes[first:end]):
             own = total[node]
@@ -87,13 +89,28 @@ def _of_angle(_: Expr, x: Expr, y: Expr) -> _Partials:
 
 
 _BY_ONE: dict[int, Callable[[Expr, Expr], Expr]] = {
-    Op.NEG: lambda f, x: MINUS_ONE, Op.TWICE: lambda f, x: TWO, Op.SQ: lambda f, x: x + x,
-    Op.INV: lambda f, x: -f * f, Op.SQRT: lambda f, x: 1 / (f + f), Op.EXP: lambda f, x: f,
-    Op.LOG: lambda f, x: 1 / x, Op.SIN: lambda f, x: cos(x), Op.COS: lambda f, x: -sin(x),
-    Op.TAN: lambda f, x: 1 / sq(cos(x)), Op.ATAN: lambda f, x: 1 / (1 + x * x), Op.FABS: lambda f, x: sign(x),
-}  # fmt: skip
+    Op.NEG: lambda f, x: MINUS_ONE,
+    Op.TWICE: lambda f, x: TWO,
+    Op.SQ: lambda f, x: x + x,
+    Op.INV: lambda f, x: -f * f,
+    Op.SQRT: lambda f, x: 1 / (f + f),
+    Op.EXP: lambda f, x: f,
+    Op.LOG: lambda f, x: 1 / x,
+    Op.SIN: lambda f, x: cos(x),
+    Op.COS: lambda f, x: -sin(x),
+    Op.TAN: lambda f, x: 1 / sq(cos(x)),
+    Op.ATAN: lambda f, x: 1 / (1 + x * x),
+    Op.FABS: lambda f, x: sign(x),
+}
 _BY_TWO: dict[int, Callable[[Expr, Expr, Expr], _Partials]] = {
-    Op.ADD: lambda f, x, y: (ONE, ONE), Op.SUB: lambda f, x, y: (ONE, MINUS_ONE), Op.MUL: lambda f, x, y: (y, x),
-    Op.DIV: lambda f, x, y: (1 / y, -f / y), Op.POW: _of_power, Op.CONSTPOW: _of_power, Op.FMIN: _of_extreme,
-    Op.FMAX: _of_extreme, Op.ATAN2: _of_angle, Op.COPYSIGN: lambda f, x, y: (sign(x) * copysign(1, y), ZERO),
-}  # fmt: skip
+    Op.ADD: lambda f, x, y: (ONE, ONE),
+    Op.SUB: lambda f, x, y: (ONE, MINUS_ONE),
+    Op.MUL: lambda f, x, y: (y, x),
+    Op.DIV: lambda f, x, y: (1 / y, -f / y),
+    Op.POW: _of_power,
+    Op.CONSTPOW: _of_power,
+    Op.FMIN: _of_extreme,
+    Op.FMAX: _of_extreme,
+    Op.ATAN2: _of_angle,
+    Op.COPYSIGN: lambda f, x, y: (sign(x) * copysign(1, y), ZERO),
+}

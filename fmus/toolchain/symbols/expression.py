@@ -65,7 +65,9 @@ class Expr:
 
     def __float__(self) -> float:
         if self.op != Op.CONST:
-            raise TypeError("an expression with symbols is no number, neither true nor false; choose with if_else")
+            raise TypeError(
+                "an expression with symbols is no number, neither true nor false; choose with if_else"
+            )
         return self.value
 
 

@@ -25,8 +25,14 @@ class Function:
     ``room``: length of the work array that its instructions need."""
 
     def __init__(self, name: str, inputs: Sequence[Vector], outputs: Sequence[Vector]) -> None:
-        self.name, self.inputs, self.outputs = name, [list(v) for v in inputs], [list(v) for v in outputs]
-        self.nodes, self._ends = sorted_nodes([value for vector in self.outputs for value in vector])
+        self.name, self.inputs, self.outputs = (
+            name,
+            [list(v) for v in inputs],
+            [list(v) for v in outputs],
+        )
+        self.nodes, self._ends = sorted_nodes(
+            [value for vector in self.outputs for value in vector]
+        )
         for node in {node for node in self.nodes if node.op == Op.SYMBOL}.difference(*self.inputs):
             raise ValueError(f"{self.name}: {node.label!r} is none of its arguments")
 
@@ -42,8 +48,14 @@ class Function:
     def _written(self) -> tuple[list[Instruction], int]:
         """The instructions and their room; a place is free again once nobody needs what is there."""
         instructions, room = list[Instruction](), 0
-        given = {symbol: (i, k) for i, vector in enumerate(self.inputs) for k, symbol in enumerate(vector)}
-        roots = [(value, i, k) for i, vector in enumerate(self.outputs) for k, value in enumerate(vector)]
+        given = {
+            symbol: (i, k)
+            for i, vector in enumerate(self.inputs)
+            for k, symbol in enumerate(vector)
+        }
+        roots = [
+            (value, i, k) for i, vector in enumerate(self.outputs) for k, value in enumerate(vector)
+        ]
         uses = dict.fromkeys(self.nodes, 0)
         for root, _, _ in roots:
             uses[root] += 1

@@ -18,34 +18,69 @@ class Op:
 
 
 _SAME = {
-    Op.ADD: "{0} + {1}", Op.SUB: "{0} - {1}", Op.MUL: "{0} * {1}", Op.NEG: "-{0}", Op.TWICE: "2.0 * {0}",
-    Op.SQRT: "sqrt({0})", Op.SIN: "sin({0})", Op.COS: "cos({0})", Op.TAN: "tan({0})", Op.ATAN: "atan({0})",
-    Op.EXP: "exp({0})", Op.LOG: "log({0})", Op.FABS: "fabs({0})", Op.FLOOR: "floor({0})",
-    Op.ATAN2: "atan2({0}, {1})", Op.COPYSIGN: "copysign({0}, {1})",
-}  # fmt: skip
+    Op.ADD: "{0} + {1}",
+    Op.SUB: "{0} - {1}",
+    Op.MUL: "{0} * {1}",
+    Op.NEG: "-{0}",
+    Op.TWICE: "2.0 * {0}",
+    Op.SQRT: "sqrt({0})",
+    Op.SIN: "sin({0})",
+    Op.COS: "cos({0})",
+    Op.TAN: "tan({0})",
+    Op.ATAN: "atan({0})",
+    Op.EXP: "exp({0})",
+    Op.LOG: "log({0})",
+    Op.FABS: "fabs({0})",
+    Op.FLOOR: "floor({0})",
+    Op.ATAN2: "atan2({0}, {1})",
+    Op.COPYSIGN: "copysign({0}, {1})",
+}
 
 PYTHON = _SAME | {
-    Op.DIV: "divide({0}, {1})", Op.INV: "divide(1.0, {0})", Op.SQ: "{0} * {0}", Op.POW: "power({0}, {1})",
-    Op.CONSTPOW: "power({0}, {1})", Op.FMIN: "min({0}, {1})", Op.FMAX: "max({0}, {1})",
-    Op.LT: "1.0 if {0} < {1} else 0.0", Op.LE: "1.0 if {0} <= {1} else 0.0", Op.EQ: "1.0 if {0} == {1} else 0.0",
-    Op.NE: "1.0 if {0} != {1} else 0.0", Op.AND: "1.0 if {0} and {1} else 0.0", Op.OR: "1.0 if {0} or {1} else 0.0",
-    Op.NOT: "0.0 if {0} else 1.0", Op.IF_ELSE_ZERO: "{1} if {0} else 0.0",
+    Op.DIV: "divide({0}, {1})",
+    Op.INV: "divide(1.0, {0})",
+    Op.SQ: "{0} * {0}",
+    Op.POW: "power({0}, {1})",
+    Op.CONSTPOW: "power({0}, {1})",
+    Op.FMIN: "min({0}, {1})",
+    Op.FMAX: "max({0}, {1})",
+    Op.LT: "1.0 if {0} < {1} else 0.0",
+    Op.LE: "1.0 if {0} <= {1} else 0.0",
+    Op.EQ: "1.0 if {0} == {1} else 0.0",
+    Op.NE: "1.0 if {0} != {1} else 0.0",
+    Op.AND: "1.0 if {0} and {1} else 0.0",
+    Op.OR: "1.0 if {0} or {1} else 0.0",
+    Op.NOT: "0.0 if {0} else 1.0",
+    Op.IF_ELSE_ZERO: "{1} if {0} else 0.0",
     Op.SIGN: "(0.0 < {0}) - (0.0 > {0}) + 0.0 * {0}",
-}  # fmt: skip
+}
 """An operation in Python; what it calls is in the `NAMES` of a tape's kernel."""
 
 C = _SAME | {
-    Op.DIV: "{0} / {1}", Op.INV: "1. / {0}", Op.SQ: "{0} * {0}", Op.POW: "pow({0}, {1})",
-    Op.CONSTPOW: "pow({0}, {1})", Op.FMIN: "fmin({0}, {1})", Op.FMAX: "fmax({0}, {1})", Op.LT: "{0} < {1}",
-    Op.LE: "{0} <= {1}", Op.EQ: "{0} == {1}", Op.NE: "{0} != {1}", Op.AND: "{0} && {1}", Op.OR: "{0} || {1}",
-    Op.NOT: "!{0}", Op.IF_ELSE_ZERO: "{0} ? {1} : 0", Op.SIGN: "({0} > 0) - ({0} < 0) + 0 * {0}",
-}  # fmt: skip
+    Op.DIV: "{0} / {1}",
+    Op.INV: "1. / {0}",
+    Op.SQ: "{0} * {0}",
+    Op.POW: "pow({0}, {1})",
+    Op.CONSTPOW: "pow({0}, {1})",
+    Op.FMIN: "fmin({0}, {1})",
+    Op.FMAX: "fmax({0}, {1})",
+    Op.LT: "{0} < {1}",
+    Op.LE: "{0} <= {1}",
+    Op.EQ: "{0} == {1}",
+    Op.NE: "{0} != {1}",
+    Op.AND: "{0} && {1}",
+    Op.OR: "{0} || {1}",
+    Op.NOT: "!{0}",
+    Op.IF_ELSE_ZERO: "{0} ? {1} : 0",
+    Op.SIGN: "({0} > 0) - ({0} < 0) + 0 * {0}",
+}
 """The same in C."""
 
 UNARY = {op for op, form in PYTHON.items() if "{1}" not in form}  # operations of one operand
 
 _scope: dict[str, Any] = {**NAMES, "atan": math.atan}
 VALUE: dict[int, Callable[[float, float], float]] = {
-    operation: eval(f"lambda a, b: {form.format('a', 'b')}", _scope) for operation, form in PYTHON.items()
+    operation: eval(f"lambda a, b: {form.format('a', 'b')}", _scope)
+    for operation, form in PYTHON.items()
 }
 """Value of an operation; one of one argument does not read its second."""

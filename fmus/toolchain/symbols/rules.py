@@ -5,7 +5,17 @@ models of this package come upon; a test holds each model against CasADi."""
 
 from collections.abc import Callable
 
-from fmus.toolchain.symbols.expression import MINUS_ONE, ONE, RULES, TWO, ZERO, Expr, Scalar, node, operation
+from fmus.toolchain.symbols.expression import (
+    MINUS_ONE,
+    ONE,
+    RULES,
+    TWO,
+    ZERO,
+    Expr,
+    Scalar,
+    node,
+    operation,
+)
 from fmus.toolchain.symbols.operations import Op
 
 _COMMUTATIVE = {Op.ADD, Op.MUL, Op.EQ, Op.NE, Op.AND, Op.OR}
@@ -23,77 +33,116 @@ def _same(x: Expr, y: Expr) -> bool:
     return (x.a is y.a and x.b is y.b) or (op in _COMMUTATIVE and x.a is y.b and x.b is y.a)
 
 
-# fmt: off
 def _add(x: Expr, y: Expr) -> Expr:
     return (
-        _if_else_zero(y.a, x.b + y.b) if x.op == Op.IF_ELSE_ZERO == y.op and x.a is y.a else
-        y if x is ZERO else
-        x if y is ZERO else
-        _sub(x, y.a) if y.op == Op.NEG else
-        _sub(y, x.a) if x.op == Op.NEG else
-        _mul(TWO, x) if _same(x, y) else
-        x.a if x.op == Op.SUB and _same(x.b, y) else
-        node(Op.ADD, x, y)
+        _if_else_zero(y.a, x.b + y.b)
+        if x.op == Op.IF_ELSE_ZERO == y.op and x.a is y.a
+        else y
+        if x is ZERO
+        else x
+        if y is ZERO
+        else _sub(x, y.a)
+        if y.op == Op.NEG
+        else _sub(y, x.a)
+        if x.op == Op.NEG
+        else _mul(TWO, x)
+        if _same(x, y)
+        else x.a
+        if x.op == Op.SUB and _same(x.b, y)
+        else node(Op.ADD, x, y)
     )
 
 
 def _sub(x: Expr, y: Expr) -> Expr:
     return (
-        x if y is ZERO else
-        -y if x is ZERO else
-        ZERO if _same(x, y) else
-        _add(x, y.a) if y.op == Op.NEG else
-        x.a if x.op == Op.ADD and _same(x.b, y) else
-        x.b if x.op == Op.ADD and _same(x.a, y) else
-        -_add(x.a, y) if x.op == Op.NEG else
-        node(Op.SUB, x, y)
+        x
+        if y is ZERO
+        else -y
+        if x is ZERO
+        else ZERO
+        if _same(x, y)
+        else _add(x, y.a)
+        if y.op == Op.NEG
+        else x.a
+        if x.op == Op.ADD and _same(x.b, y)
+        else x.b
+        if x.op == Op.ADD and _same(x.a, y)
+        else -_add(x.a, y)
+        if x.op == Op.NEG
+        else node(Op.SUB, x, y)
     )
 
 
 def _mul(x: Expr, y: Expr) -> Expr:
     p, q = x.op, y.op
     return (
-        _if_else_zero(y.a, _mul(x, y.b)) if q == Op.IF_ELSE_ZERO else
-        _if_else_zero(x.a, _mul(x.b, y)) if p == Op.IF_ELSE_ZERO else
-        sq(x) if _same(x, y) else
-        _scaled(x, y) if p == Op.CONST else
-        _scaled(y, x) if q == Op.CONST else
-        _div(x, y.a) if q == Op.INV else
-        _div(y, x.a) if p == Op.INV else
-        x.a if p == Op.DIV and _same(x.b, y) else
-        y.a if q == Op.DIV and _same(y.b, x) else
-        -_mul(x.a, y) if p == Op.NEG else
-        -_mul(x, y.a) if q == Op.NEG else
-        node(Op.MUL, x, y)
+        _if_else_zero(y.a, _mul(x, y.b))
+        if q == Op.IF_ELSE_ZERO
+        else _if_else_zero(x.a, _mul(x.b, y))
+        if p == Op.IF_ELSE_ZERO
+        else sq(x)
+        if _same(x, y)
+        else _scaled(x, y)
+        if p == Op.CONST
+        else _scaled(y, x)
+        if q == Op.CONST
+        else _div(x, y.a)
+        if q == Op.INV
+        else _div(y, x.a)
+        if p == Op.INV
+        else x.a
+        if p == Op.DIV and _same(x.b, y)
+        else y.a
+        if q == Op.DIV and _same(y.b, x)
+        else -_mul(x.a, y)
+        if p == Op.NEG
+        else -_mul(x, y.a)
+        if q == Op.NEG
+        else node(Op.MUL, x, y)
     )
 
 
 def _scaled(x: Expr, y: Expr) -> Expr:
     """A constant times an expression."""
     return (
-        ZERO if x is ZERO or y is ZERO else
-        y if x is ONE else
-        -y if x is MINUS_ONE else
-        _div(x, y.a) if y.op == Op.INV else
-        _twice(y, y) if x is TWO else
-        -_scaled(x, y.a) if y.op == Op.NEG else
-        _mul(_mul(x, y.a), y.b) if y.op == Op.MUL and y.a.op == Op.CONST else
-        node(Op.MUL, x, y)
+        ZERO
+        if x is ZERO or y is ZERO
+        else y
+        if x is ONE
+        else -y
+        if x is MINUS_ONE
+        else _div(x, y.a)
+        if y.op == Op.INV
+        else _twice(y, y)
+        if x is TWO
+        else -_scaled(x, y.a)
+        if y.op == Op.NEG
+        else _mul(_mul(x, y.a), y.b)
+        if y.op == Op.MUL and y.a.op == Op.CONST
+        else node(Op.MUL, x, y)
     )
 
 
 def _div(x: Expr, y: Expr) -> Expr:
     p, q = x.op, y.op
     return (
-        x if x is ZERO or y is ONE else
-        x.b if p == Op.MUL and _same(y, x.a) else
-        x.a if p == Op.MUL and _same(y, x.b) else
-        operation(Op.INV, y, y) if x is ONE else
-        _mul(x, y.a) if q == Op.INV else
-        _div(x.a, y.a) if p == Op.TWICE == q else
-        _div(ONE, y.a) if q == Op.MUL and _same(y.b, x) else
-        -_div(x.a, y) if p == Op.NEG else
-        node(Op.DIV, x, y)
+        x
+        if x is ZERO or y is ONE
+        else x.b
+        if p == Op.MUL and _same(y, x.a)
+        else x.a
+        if p == Op.MUL and _same(y, x.b)
+        else operation(Op.INV, y, y)
+        if x is ONE
+        else _mul(x, y.a)
+        if q == Op.INV
+        else _div(x.a, y.a)
+        if p == Op.TWICE == q
+        else _div(ONE, y.a)
+        if q == Op.MUL and _same(y.b, x)
+        else -_div(x.a, y)
+        if p == Op.NEG
+        else node(Op.DIV, x, y)
     )
 
 
@@ -102,22 +151,28 @@ def _pow(x: Expr, y: Expr) -> Expr:
         return node(Op.POW, x, y)
     n = y.value
     return (
-        sqrt(x) if n == 0.5 else
-        node(Op.CONSTPOW, x, y) if not n.is_integer() or abs(n) > _LARGEST_POWER else
-        ONE if n == 0 else
-        _div(ONE, x**-n) if n < 0 else
-        _mul(x, x ** (n - 1)) if n % 2 else
-        sq(x ** (n / 2))
+        sqrt(x)
+        if n == 0.5
+        else node(Op.CONSTPOW, x, y)
+        if not n.is_integer() or abs(n) > _LARGEST_POWER
+        else ONE
+        if n == 0
+        else _div(ONE, x**-n)
+        if n < 0
+        else _mul(x, x ** (n - 1))
+        if n % 2
+        else sq(x ** (n / 2))
     )
 
 
 def _if_else_zero(condition: Expr, y: Expr) -> Expr:
     return (
-        ZERO if y is ZERO or condition is ZERO else
-        y if condition.op == Op.CONST else
-        node(Op.IF_ELSE_ZERO, condition, y)
+        ZERO
+        if y is ZERO or condition is ZERO
+        else y
+        if condition.op == Op.CONST
+        else node(Op.IF_ELSE_ZERO, condition, y)
     )
-# fmt: on
 
 
 def _twice(x: Expr, _: Expr) -> Expr:
@@ -154,9 +209,18 @@ logic_not, logic_and, logic_or = _of_one(Op.NOT), _of_two(Op.AND), _of_two(Op.OR
 
 
 RULES |= {
-    Op.ADD: _add, Op.SUB: _sub, Op.MUL: _mul, Op.DIV: _div, Op.POW: _pow, Op.TWICE: _twice, Op.SQ: _squared,
-    Op.IF_ELSE_ZERO: _if_else_zero, Op.NEG: lambda x, _: -x, Op.INV: _undone(Op.INV, Op.INV),
-    Op.LOG: _undone(Op.LOG, Op.EXP), Op.NOT: _undone(Op.NOT, Op.NOT),
+    Op.ADD: _add,
+    Op.SUB: _sub,
+    Op.MUL: _mul,
+    Op.DIV: _div,
+    Op.POW: _pow,
+    Op.TWICE: _twice,
+    Op.SQ: _squared,
+    Op.IF_ELSE_ZERO: _if_else_zero,
+    Op.NEG: lambda x, _: -x,
+    Op.INV: _undone(Op.INV, Op.INV),
+    Op.LOG: _undone(Op.LOG, Op.EXP),
+    Op.NOT: _undone(Op.NOT, Op.NOT),
     Op.LT: lambda x, y: ZERO if _nonnegative(_sub(x, y)) else node(Op.LT, x, y),
     Op.LE: lambda x, y: ONE if _nonnegative(_sub(y, x)) else node(Op.LE, x, y),
     Op.EQ: lambda x, y: ONE if _same(x, y) else node(Op.EQ, x, y),
@@ -164,9 +228,11 @@ RULES |= {
     Op.FABS: lambda x, _: fabs(x.a) if x.op == Op.NEG else node(Op.FABS, x, x),
     Op.SQRT: lambda x, _: fabs(x.a) if x.op == Op.SQ else node(Op.SQRT, x, x),
     Op.COS: lambda x, _: cos(x.a) if x.op in (Op.NEG, Op.FABS) else node(Op.COS, x, x),
-}  # fmt: skip
+}
 
 
 def if_else(condition: Scalar, if_true: Scalar, if_false: Scalar) -> Expr:
     """One of two values; the other one may be undefined."""
-    return _if_else_zero(Expr(condition), Expr(if_true)) + _if_else_zero(logic_not(condition), Expr(if_false))
+    return _if_else_zero(Expr(condition), Expr(if_true)) + _if_else_zero(
+        logic_not(condition), Expr(if_false)
+    )

@@ -11,7 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import (
+    SAME,
+    CheckResult,
+    check,
+    failed,
+    not_applicable,
+    passed,
+    remarked,
+)
 from orchestrator.acceptance.checks.events import Segment, factor, in_words, scale, series
 from orchestrator.acceptance.checks.port import WHY, current_limit, currents, followed, voltage_rows
 from orchestrator.acceptance.checks.running import RUN_FOR, spent_since
@@ -19,20 +27,26 @@ from orchestrator.acceptance.checks.subject import OperatingAt, Running, Subject
 from orchestrator.arrays import Complex
 from orchestrator.errors import ComponentError
 
-_POINT = OperatingAt(1.0, 0.0, 0.4, 0.05)  # with so little power that a converter comes back from most disturbances
-_PROBE = 0.3  # duration [s] of small changes at once: 1.5 % less voltage, a jump of 1.5°, 0.1 % less frequency
+# with so little power that a converter comes back from most disturbances
+_POINT = OperatingAt(1.0, 0.0, 0.4, 0.05)
+# duration [s] of small changes at once: 1.5 % less voltage, a jump of 1.5°, 0.1 % less frequency
+_PROBE = 0.3
 _CHANGED = 0.05  # part of an answer to a small change by which it may differ after a disturbance
 _BACK = 5e-4  # distance of the current from where it was [pu, S_n] at which it has come back
 
-_WINDOW, _WINDOWS = 0.1, 60  # time [s] from one look to the next, and how often it is looked whether it has come back
+# time [s] from one look to the next, and how often it is looked whether it has come back
+_WINDOW, _WINDOWS = 0.1, 60
 
 _LOST, _GIVEN_UP = 0.3, 20  # distance [pu, S_n] at which no more is looked after so many windows
 
 _STILL, _ELSEWHERE, _NOTHING = 1e-4, 0.01, 0.01
 """Movement in a window [pu, S_n] of a device at rest; distance that is another rest; current of one that gives none."""
 
-_LATCHED = 0.9  # part of the current limit, or of the rating, from which a device at rest may be held by its limit
-_LEAST = 32.0  # bytes kept by each step of a dip that are a leak; a new page of the heap is up to 12 in some hundred
+# part of the current limit, or of the rating, from which a device at rest may be held by its limit
+_LATCHED = 0.9
+# bytes kept by each step of a dip that are a leak; a new page of the heap is up to 12 in some
+# hundred
+_LEAST = 32.0
 _BLOCKS = 5  # parts of a disturbance, between which the memory is read
 _SOON = (0, 2, 4)  # numbers of those soon after which it is asked as well
 _PART = 0.75  # time to spend, in parts of the time for which an FMU is made to run
@@ -89,7 +103,11 @@ def after_dips(subject: Subject) -> CheckResult:
             break
         found.append(look.after(segments, number in _SOON))
         if found[-1].end is not _End.BACK and found[-1].end is not _End.ELSEWHERE:
-            found.append(look.after([(1 + (voltage - 1) / 3, lasts / 2) for voltage, lasts in segments], False))
+            found.append(
+                look.after(
+                    [(1 + (voltage - 1) / 3, lasts / 2) for voltage, lasts in segments], False
+                )
+            )
         if result := _wrong(found[-1]):
             return result
     return _judged(found)
@@ -125,7 +143,9 @@ def _judged(found: list[_After]) -> CheckResult:
     figures: dict[str, Any] = {"compared": len(back), "not_compared": len(lost)}
     if not back:
         figures["not_judged"] = "what dips leave behind"
-        return remarked("after_dips", f"not judged: {unknown}", "ask how it rides through", **figures)
+        return remarked(
+            "after_dips", f"not judged: {unknown}", "ask how it rides through", **figures
+        )
     figures |= {"not_judged": "what some dips leave behind"} if lost else {}
     return passed("after_dips", f"{says}; not judged: {unknown}" if lost else says, **figures)
 
@@ -152,7 +172,9 @@ class _Look:
         for voltage, lasts in segments:
             steps = max(1, self._steps(lasts) // _BLOCKS)
             for _ in range(_BLOCKS):
-                running.hold(voltage_rows(running, np.array([voltage])), steps, self._subject.step_size)
+                running.hold(
+                    voltage_rows(running, np.array([voltage])), steps, self._subject.step_size
+                )
                 yield steps
 
     def _course(self, segments: Sequence[Segment], wait: int, factors: Complex) -> Complex:
@@ -176,10 +198,16 @@ class _Look:
         ``soon``: whether small changes are made before it has come back as well."""
         lasts = f"{self._times * sum(lasts for _, lasts in segments):.2g} s"
         one = f"{in_words(segments[0][0])} for {lasts}"
-        words = one if len(segments) == 1 else f"{len(segments) // 2} dips, overvoltages and jumps in {lasts}"
+        words = (
+            one
+            if len(segments) == 1
+            else f"{len(segments) // 2} dips, overvoltages and jumps in {lasts}"
+        )
         try:
-            with (self._subject.while_doing(f"in the {words} and after it"),
-                  self._subject.running(point=self._point) as running):  # fmt: skip
+            with (
+                self._subject.while_doing(f"in the {words} and after it"),
+                self._subject.running(point=self._point) as running,
+            ):
                 end, away, kept, answers = self._seen(running, segments, soon)
             for steps, small, here in answers:
                 if changed := self._changed(segments, steps, small, here):
@@ -202,21 +230,34 @@ class _Look:
                 sizes.append((self._subject.memory_in_use(), steps))
         kept = max(0.0, min((b - a) / steps for (a, _), (b, steps) in pairwise(sizes)))
         begun, restores = running.time, self._subject.memory.get("restores", False)
-        waits = sorted(self._steps(self._draw.uniform(*bounds)) for bounds in (_LATER if soon else ()))
+        waits = sorted(
+            self._steps(self._draw.uniform(*bounds)) for bounds in (_LATER if soon else ())
+        )
         with unmoved(running) if restores else nullcontext():
             end, away = self._came_back(running, self._rest)
-            back = [round((running.time - begun) / self._subject.step_size)] if end is _End.BACK else []
+            back = (
+                [round((running.time - begun) / self._subject.step_size)]
+                if end is _End.BACK
+                else []
+            )
             last = [(wait, *self._answers(running)) for wait in back if restores]
         if not restores:
             course = partial(self._course, segments)
-            return end, away, kept, ((w, course(w, self._small), course(w, self._still)) for w in [*waits, *back])
+            return (
+                end,
+                away,
+                kept,
+                ((w, course(w, self._small), course(w, self._still)) for w in [*waits, *back]),
+            )
         found = []
         for before, wait in pairwise([0, *waits]):
             followed(running, np.ones(wait - before, complex))
             found.append((wait, *self._answers(running)))
         return end, away, kept, [*found, *last]
 
-    def _changed(self, segments: Sequence[Segment], wait: int, small: Complex, here: Complex) -> float:
+    def _changed(
+        self, segments: Sequence[Segment], wait: int, small: Complex, here: Complex
+    ) -> float:
         """By which part of it the answer to small changes differs, beside the same run without them; 0 where alike."""
         away = float(np.abs(here - self._rest).max())
         if not away < _NEAR:
@@ -236,7 +277,10 @@ class _Look:
             current = currents(running, 0j, steps)
             if not np.isfinite(current).all():
                 return _End.REFUSED, np.inf
-            away, moves = float(np.abs(current - rest).max()), float(np.abs(current - current[-1]).max())
+            away, moves = (
+                float(np.abs(current - rest).max()),
+                float(np.abs(current - current[-1]).max()),
+            )
             if away < _BACK:
                 return _End.BACK, away
             quiet = quiet + 1 if moves < min(_STILL, away / 1000) and away > _ELSEWHERE else 0
@@ -247,7 +291,11 @@ class _Look:
         size = abs(current[-1])
         if size < _NOTHING:
             return _End.NOTHING, away
-        return (_End.HELD if size > _LATCHED * min(1.0, current_limit(self._subject) or 1.0) else _End.ELSEWHERE), away
+        return (
+            _End.HELD
+            if size > _LATCHED * min(1.0, current_limit(self._subject) or 1.0)
+            else _End.ELSEWHERE
+        ), away
 
 
 def _in_frame(running: Running, factors: Complex) -> Complex:

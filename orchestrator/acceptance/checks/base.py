@@ -12,7 +12,9 @@ from orchestrator.acceptance.checks.subject import Subject
 from orchestrator.binding import misfits
 from orchestrator.errors import UnsupportedFmuError
 
-_OWN: dict[str, str] = tomllib.loads(Path(__file__).with_name("remedies.toml").read_text(encoding="utf-8"))
+_OWN: dict[str, str] = tomllib.loads(
+    Path(__file__).with_name("remedies.toml").read_text(encoding="utf-8")
+)
 
 REMEDIES = _OWN | misfits.REMEDIES
 
@@ -51,7 +53,13 @@ class CheckResult:
 
     @classmethod
     def of_dict(cls, values: dict[str, Any]) -> "CheckResult":
-        return cls(**{**values, "verdict": Verdict(values["verdict"]), "whose": Whose(values.get("whose", ""))})
+        return cls(
+            **{
+                **values,
+                "verdict": Verdict(values["verdict"]),
+                "whose": Whose(values.get("whose", "")),
+            }
+        )
 
 
 def _plain(value: Any) -> Any:
@@ -111,12 +119,19 @@ def not_applicable(name: str, because: str) -> CheckResult:
 
 def not_supported(name: str, error: UnsupportedFmuError) -> CheckResult:
     """What this program or this machine cannot do, which says nothing about the FMU."""
-    return CheckResult(name, Verdict.NOT_SUPPORTED, error.evidence, error.fault, error.remedy, whose=Whose.HERE)
+    return CheckResult(
+        name, Verdict.NOT_SUPPORTED, error.evidence, error.fault, error.remedy, whose=Whose.HERE
+    )
 
 
 def provoked(name: str, evidence: str) -> CheckResult:
     """What an FMU does after a call that FMI forbids."""
     remedy = "only this check makes such a call, and our master never does; an FMU should refuse it, tell the author"
     return CheckResult(
-        name, Verdict.REMARK, f"a call that FMI forbids provoked it: {evidence}", "", remedy, whose=Whose.CALL
+        name,
+        Verdict.REMARK,
+        f"a call that FMI forbids provoked it: {evidence}",
+        "",
+        remedy,
+        whose=Whose.CALL,
     )

@@ -15,11 +15,19 @@ ABSORBING = OperatingAt(1.0, 3.0, 0.7, -0.3)
 """As `POINT`, while it takes reactive power, also behind an impedance of 0.25 pu; angles turn beyond half a turn."""
 
 VOLTAGE = 0.02
-FREQUENCY = 0.001  # changes [pu], up and down; half the difference of both answers has no terms of second order
+# changes [pu], up and down; half the difference of both answers has no terms of second order
+FREQUENCY = 0.001
 CHARGING = OperatingAt(1.0, 0.0, -0.6, 0.1)  # while it takes active power
-_FURTHER = (OperatingAt(1.0, 0.0, 0.2, 0.02), OperatingAt(1.0, 0.0, 0.2, 0.3), OperatingAt(1.0, 0.0, -0.5, 0.1))
-_FURTHER_ABSORBING = (OperatingAt(1.0, 0.0, 0.2, -0.25), OperatingAt(1.0, 0.0, 0.2, -0.4),
-                      OperatingAt(1.0, 0.0, -0.5, -0.3))  # fmt: skip
+_FURTHER = (
+    OperatingAt(1.0, 0.0, 0.2, 0.02),
+    OperatingAt(1.0, 0.0, 0.2, 0.3),
+    OperatingAt(1.0, 0.0, -0.5, 0.1),
+)
+_FURTHER_ABSORBING = (
+    OperatingAt(1.0, 0.0, 0.2, -0.25),
+    OperatingAt(1.0, 0.0, 0.2, -0.4),
+    OperatingAt(1.0, 0.0, -0.5, -0.3),
+)
 
 SETTLED = 1e-3  # power [pu, S_n] by which an answer may still move
 _GOOD = 0.2  # largest error of the law, in parts of what the droop does where the frequency changes
@@ -71,7 +79,9 @@ def droop(found: Sequence[tuple[OperatingAt, DroopAnswer, DroopAnswer]]) -> floa
 
     fits = []
     for inside in (False, True):
-        best = least_squares(_errors, (0.02, 0.2, 0.0), args=(found, inside), x_scale=(0.01, 0.1, 0.05))
+        best = least_squares(
+            _errors, (0.02, 0.2, 0.0), args=(found, inside), x_scale=(0.01, 0.1, 0.05)
+        )
         fits.append((float(np.abs(best.fun).max()), *map(float, best.x)))
     error, resistance, reactance, slope = min(fits)
     moved = min(abs(frequency.power.imag) for _, _, frequency in found[:1])
@@ -81,7 +91,9 @@ def droop(found: Sequence[tuple[OperatingAt, DroopAnswer, DroopAnswer]]) -> floa
 
 
 def _errors(
-    x: NDArray[np.float64], found: Sequence[tuple[OperatingAt, DroopAnswer, DroopAnswer]], inside: bool
+    x: NDArray[np.float64],
+    found: Sequence[tuple[OperatingAt, DroopAnswer, DroopAnswer]],
+    inside: bool,
 ) -> NDArray[np.float64]:
     """ΔE + n·ΔQ for every answer."""
     resistance, reactance, slope = x
@@ -92,6 +104,9 @@ def _errors(
         for answer, fall, slower in zip(answers, (VOLTAGE, 0.0), (0.0, FREQUENCY), strict=True):
             v, i = point.v * (1 - fall), i_0 + answer.i
             e = v + (resistance + 1j * reactance * (1 - slower)) * i
-            q_0, q = ((e_0 if inside else point.v) * i_0.conjugate()).imag, ((e if inside else v) * i.conjugate()).imag
+            q_0, q = (
+                ((e_0 if inside else point.v) * i_0.conjugate()).imag,
+                ((e if inside else v) * i.conjugate()).imag,
+            )
             errors.append(abs(e) - abs(e_0) + slope * (q - q_0))
     return np.array(errors)

@@ -5,7 +5,15 @@ from math import pi
 
 import numpy as np
 
-from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import (
+    SAME,
+    CheckResult,
+    check,
+    failed,
+    not_applicable,
+    passed,
+    remarked,
+)
 from orchestrator.acceptance.checks.droop import FREQUENCY
 from orchestrator.acceptance.checks.events import scale
 from orchestrator.acceptance.checks.port import WHY, cannot_import, followed
@@ -24,25 +32,45 @@ _LATE, _MORE = 0.05, 5.0
 
 _MUCH = 0.9  # power [pu, S_n] from which it is asked for less of it
 
-_ANSWERS, _PARTS, _RESTS = 0.5, 10, 2.0  # time [s] of an answer along a line, its parts, the time before it [s]
-_JUMP = 0.08  # what an answer changes by from one place to the next, in parts of the largest and beyond its slope
-_LINES = (("v_0", 0.87, 1.1, 9), ("P_0", -0.85, 1.0, 11), ("Q_0", -0.55, 0.55, 9), ("frequency", -0.008, 0.008, 7))
+# time [s] of an answer along a line, its parts, the time before it [s]
+_ANSWERS, _PARTS, _RESTS = 0.5, 10, 2.0
+# what an answer changes by from one place to the next, in parts of the largest and beyond its slope
+_JUMP = 0.08
+_LINES = (
+    ("v_0", 0.87, 1.1, 9),
+    ("P_0", -0.85, 1.0, 11),
+    ("Q_0", -0.55, 0.55, 9),
+    ("frequency", -0.008, 0.008, 7),
+)
 """What differs along a line of places, from where to where [pu], and at how many."""
 
-_LARGER, _MILD = 5, OperatingAt(1.0, 0.0, 0.3, 0.05)  # how much more of the frequency changes, and where
+# how much more of the frequency changes, and where
+_LARGER, _MILD = 5, OperatingAt(1.0, 0.0, 0.3, 0.05)
 _GIVES, _TAKES = OperatingAt(1.0, 0.0, 0.6, 0.1), OperatingAt(1.0, 0.0, -0.6, 0.1)
 
 
 def _points(subject: Subject) -> list[OperatingAt]:
     draw = subject.random("evenness")
-    wide = ((1.07, 1.1, 0.3, 0.6), (0.9, 0.93, 0.3, 0.6), (1.0, 1.0, 0.75, 0.85), (1.0, 1.0, 0.05, 0.2),
-            (1.0, 1.0, 0.93, 0.99), (1.0, 1.0, -0.99, -0.93))  # fmt: skip
-    more = [OperatingAt(*draw.uniform((v, 0.0, P, Q), (w, 0.0, R, Q + 0.1)).round(3))
-            for (v, w, P, R), Q in zip(wide, (0.0, 0.0, -0.1, -0.25, 0.0, 0.0), strict=True)]  # fmt: skip
+    wide = (
+        (1.07, 1.1, 0.3, 0.6),
+        (0.9, 0.93, 0.3, 0.6),
+        (1.0, 1.0, 0.75, 0.85),
+        (1.0, 1.0, 0.05, 0.2),
+        (1.0, 1.0, 0.93, 0.99),
+        (1.0, 1.0, -0.99, -0.93),
+    )
+    more = [
+        OperatingAt(*draw.uniform((v, 0.0, P, Q), (w, 0.0, R, Q + 0.1)).round(3))
+        for (v, w, P, R), Q in zip(wide, (0.0, 0.0, -0.1, -0.25, 0.0, 0.0), strict=True)
+    ]
     return [_GIVES, *(p for p in (_TAKES, *more) if not cannot_import(subject, p))]
 
 
-@check("evenness", "Does it answer alike at other points?", needs=(*SAME, "steady_state", "power_balance"))
+@check(
+    "evenness",
+    "Does it answer alike at other points?",
+    needs=(*SAME, "steady_state", "power_balance"),
+)
 def evenness(subject: Subject) -> CheckResult:
     """The course of its active power after a small change, at several points, and with each of its switches at two."""
     if not subject.starts:
@@ -60,25 +88,39 @@ def evenness(subject: Subject) -> CheckResult:
             says = f"{fault[1]} from P_0 = {point.P:g}, Q_0 = {point.Q:g}, v_0 = {point.v:g}"
             return failed("evenness", fault[0], f"{says}, and not from P_0 = {_GIVES.P:g}")
     for larger, word in ((_LARGER, "less"), (-_LARGER, "more")):
-        end = np.sign(larger) * _course(subject, _MILD, {}, larger).real[-len(found[_GIVES]) // 10 :]
+        end = (
+            np.sign(larger) * _course(subject, _MILD, {}, larger).real[-len(found[_GIVES]) // 10 :]
+        )
         if end.mean() < -_SOME and np.ptp(end) < 0.1 * abs(end.mean()):
             says = f"with {100 * _LARGER * FREQUENCY:g} % {word} frequency its active power goes the wrong way, "
             says += f"by {abs(end.mean()):.2g} pu, and not after a smaller change"
             return failed("evenness", "wrong sign", says)
     if jump := _jump(subject):
-        return remarked("evenness", jump, "ask what it switches there: what holds at one place does not at the other")
+        return remarked(
+            "evenness",
+            jump,
+            "ask what it switches there: what holds at one place does not at the other",
+        )
     if _TAKES not in found:
-        return passed("evenness", f"its answers at {len(found)} points are alike; it was not tried with imported power")
+        return passed(
+            "evenness",
+            f"its answers at {len(found)} points are alike; it was not tried with imported power",
+        )
     for (gives, takes), words in with_each_setting(subject, lambda s: _effects(subject, s, found)):
         size, power, one, other = max(
             (max(np.abs(a).max(), np.abs(b).max()), kind, a, b)
-            for kind, a, b in (("active", gives.real, takes.real), ("reactive", gives.imag, takes.imag))
+            for kind, a, b in (
+                ("active", gives.real, takes.real),
+                ("reactive", gives.imag, takes.imag),
+            )
         )
         if _SOME < size < _MOST and np.abs(one - other).max() > _ACTS * size:
             sizes = " and ".join(f"{np.abs(course).max():.2g} pu" for course in (one, other))
             says = f"after less frequency{words} its {power} power differs by {sizes} while it gives and takes power"
             return failed("evenness", "uneven damping", says)
-    return passed("evenness", f"its answers at {len(found)} points, giving and taking power, are alike")
+    return passed(
+        "evenness", f"its answers at {len(found)} points, giving and taking power, are alike"
+    )
 
 
 def _course(subject: Subject, point: OperatingAt, setting: Setting, times: float = 1.0) -> Complex:
@@ -87,7 +129,9 @@ def _course(subject: Subject, point: OperatingAt, setting: Setting, times: float
     steps = max(2, round(scale(subject, 3 * _LASTS) * _LASTS / h))
     with subject.running(point=point, parameters=setting) as running:
         turned = np.exp(-100j * pi * times * FREQUENCY * h * np.arange(steps))
-        power: Complex = point.voltage * turned * followed(running, turned).conj() - complex(point.P, point.Q)
+        power: Complex = point.voltage * turned * followed(running, turned).conj() - complex(
+            point.P, point.Q
+        )
     return power
 
 
@@ -95,19 +139,37 @@ def _jump(subject: Subject) -> str:
     """Where its answer to a small change is another one from one place to the next; "" where it is nowhere."""
     draw, times = subject.random("lines"), scale(subject, 30 * _ANSWERS)
     for name, least, most, number in _LINES:
-        at = np.linspace(least, most, number) + draw.uniform(-0.25, 0.25, number) * (most - least) / (number - 1)
+        at = np.linspace(least, most, number) + draw.uniform(-0.25, 0.25, number) * (
+            most - least
+        ) / (number - 1)
         places, answers = [], []
         for place in at:
-            v, P, Q = (place if name == n else usual for n, usual in (("v_0", 1.0), ("P_0", 0.3), ("Q_0", 0.05)))
+            v, P, Q = (
+                place if name == n else usual
+                for n, usual in (("v_0", 1.0), ("P_0", 0.3), ("Q_0", 0.05))
+            )
             with suppress(ComponentError):  # which 'operating_points' tells
-                answers.append(_small(subject, OperatingAt(v, 0, P, Q), place if name == "frequency" else 0.0, times))
+                answers.append(
+                    _small(
+                        subject,
+                        OperatingAt(v, 0, P, Q),
+                        place if name == "frequency" else 0.0,
+                        times,
+                    )
+                )
                 places.append(place)
         if len(places) < 4:
             continue
         size, gaps = np.abs(answers).max(initial=_SOME), np.diff(places)
         slopes = np.diff(answers, axis=0) / gaps[:, None] / size
         usual = (np.vstack([slopes[1], slopes[:-1]]) + np.vstack([slopes[1:], slopes[-2]])) / 2
-        k = int(np.argmax(np.abs(slopes).max(axis=1) * gaps * (np.abs(slopes - usual).max(axis=1) * gaps > _JUMP)))
+        k = int(
+            np.argmax(
+                np.abs(slopes).max(axis=1)
+                * gaps
+                * (np.abs(slopes - usual).max(axis=1) * gaps > _JUMP)
+            )
+        )
         if (beyond := np.abs(slopes[k] - usual[k]).max() * gaps[k]) > _JUMP:
             ends = f"{name} = {places[k]:.3g} and {places[k + 1]:.3g}"
             return f"its answer to a small change jumps by {100 * beyond:.2g} % between {ends}"
@@ -117,18 +179,27 @@ def _jump(subject: Subject) -> str:
 def _small(subject: Subject, point: OperatingAt, offset: float, times: float) -> Numbers:
     """Change of the current in its voltage's frame after a little less voltage and more frequency, as means."""
     h = subject.step_size
-    before, steps = (max(_PARTS, round(times * lasts / h)) for lasts in (_RESTS if offset else h, _ANSWERS))
+    before, steps = (
+        max(_PARTS, round(times * lasts / h)) for lasts in (_RESTS if offset else h, _ANSWERS)
+    )
     time = h * np.arange(1, before + steps + 1)
     more = np.maximum(0.0, time - time[before - 1])
     turned = np.where(more > 0, 0.99, 1.0) * np.exp(100j * pi * (offset * time + FREQUENCY * more))
     with subject.running(point=point) as running:
         seen = followed(running, turned) * np.abs(turned) / turned
-    means = np.array([part.mean() for part in np.array_split(seen[before:] - seen[before - 1], _PARTS)])
+    means = np.array(
+        [part.mean() for part in np.array_split(seen[before:] - seen[before - 1], _PARTS)]
+    )
     return np.concatenate([means.real, means.imag])
 
 
-def _effects(subject: Subject, setting: Setting, found: dict[OperatingAt, Complex]) -> tuple[Complex, Complex]:
-    gives, takes = (_course(subject, p, setting) - found[p] if setting else 0 * found[p] for p in (_GIVES, _TAKES))
+def _effects(
+    subject: Subject, setting: Setting, found: dict[OperatingAt, Complex]
+) -> tuple[Complex, Complex]:
+    gives, takes = (
+        _course(subject, p, setting) - found[p] if setting else 0 * found[p]
+        for p in (_GIVES, _TAKES)
+    )
     return gives, takes
 
 
@@ -140,8 +211,18 @@ def _other(usual: Numbers, here: Numbers, machine: bool) -> tuple[str, str] | No
     if not np.isfinite(size) or size < _SOME:
         return None
     late, before = np.ptp(here[len(here) // 2 :]), np.ptp(usual[len(usual) // 2 :])
-    if not machine and max(late, before) > _LATE * size and max(late, before) > _MORE * min(late, before):
-        return "uneven damping", f"its power still moves by {late:.2g} pu, not {before:.2g} pu, after a small change"
+    if (
+        not machine
+        and max(late, before) > _LATE * size
+        and max(late, before) > _MORE * min(late, before)
+    ):
+        return (
+            "uneven damping",
+            f"its power still moves by {late:.2g} pu, not {before:.2g} pu, after a small change",
+        )
     if np.abs(here - usual).max() > _EVEN * size:
-        return "uneven droop", f"its active power answers the frequency by {np.abs(here).max():.2g} pu"
+        return (
+            "uneven droop",
+            f"its active power answers the frequency by {np.abs(here).max():.2g} pu",
+        )
     return None

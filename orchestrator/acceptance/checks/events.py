@@ -10,18 +10,26 @@ from orchestrator.acceptance.checks.running import EQUAL
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.arrays import Numbers
 
-EPISODE = 1.2  # duration of an episode [s]: time for a deep dip of 0.45 s; a slow FMU gets a shorter one
-_HOLD, _WIGGLE = 10, 0.3  # small steps beside the events: how many they stay for, and height in parts of the usual
+# duration of an episode [s]: time for a deep dip of 0.45 s; a slow FMU gets a shorter one
+EPISODE = 1.2
+# small steps beside the events: how many they stay for, and height in parts of the usual
+_HOLD, _WIGGLE = 10, 0.3
 _SPENT = 1.0  # time [s] that events may take
-_FAINT = 1e-3  # relative difference of two runs with events that counts where they differ slightly without
+# relative difference of two runs with events that counts where they differ slightly without
+_FAINT = 1e-3
 
 RANGES = {
-    "shallow": (0.76, 0.95), "middle": (0.56, 0.74), "low": (0.36, 0.54), "deep": (0.06, 0.34), "swell": (1.06, 1.28),
+    "shallow": (0.76, 0.95),
+    "middle": (0.56, 0.74),
+    "low": (0.36, 0.54),
+    "deep": (0.06, 0.34),
+    "swell": (1.06, 1.28),
     "high": (1.13, 1.28),
-}  # fmt: skip
+}
 """Bounds of the voltage [pu] by kind."""
 
-JUMPS = {"jump": (26.0, 70.0), "small jump": (10.0, 24.0)}  # bounds of a phase jump's size [°], of either sign, by kind
+# bounds of a phase jump's size [°], of either sign, by kind
+JUMPS = {"jump": (26.0, 70.0), "small jump": (10.0, 24.0)}
 Segment = tuple[complex, float]  # A factor on the voltage, and for how long [s]
 
 
@@ -34,14 +42,22 @@ def factor(draw: np.random.Generator, kind: str) -> complex:
 def series(draw: np.random.Generator) -> list[Segment]:
     """More short dips, overvoltages and jumps than a counter may wait for, with a rest after each."""
     kinds = draw.permutation(["deep", "middle", "swell", "jump"] * 4)
-    return [part for kind in kinds for part in ((factor(draw, kind), 0.06), (1 + 0j, round(draw.uniform(0.3, 0.6), 3)))]
+    return [
+        part
+        for kind in kinds
+        for part in ((factor(draw, kind), 0.06), (1 + 0j, round(draw.uniform(0.3, 0.6), 3)))
+    ]
 
 
 def in_words(voltage: complex) -> str:
     angle = np.angle(voltage, deg=True)
     if abs(angle) > 1e-6:
         return f"phase jump of {angle:.3g}°"
-    return f"dip to {voltage.real:.3g} pu" if voltage.real < 1 else f"overvoltage of {voltage.real:.3g} pu"
+    return (
+        f"dip to {voltage.real:.3g} pu"
+        if voltage.real < 1
+        else f"overvoltage of {voltage.real:.3g} pu"
+    )
 
 
 def scale(subject: Subject, seconds: float) -> float:
@@ -55,7 +71,11 @@ def scale(subject: Subject, seconds: float) -> float:
 
 
 def rows(
-    subject: Subject, segments: Sequence[Segment], purpose: str, times: float = 1.0, point: OperatingAt | None = None
+    subject: Subject,
+    segments: Sequence[Segment],
+    purpose: str,
+    times: float = 1.0,
+    point: OperatingAt | None = None,
 ) -> Numbers:
     """Deviations of the inputs, one row a step, with small random steps of every input beside the events.
 
@@ -64,7 +84,11 @@ def rows(
     ``point``: where it starts; the subject's own point where None."""
     counts = [max(1, round(times * lasts / subject.step_size)) for _, lasts in segments]
     total, wide = sum(counts), len(subject.inputs)
-    heights = subject.random(purpose).uniform(-1, 1, (total // _HOLD + 1, wide)) * _WIGGLE * subject.amplitudes
+    heights = (
+        subject.random(purpose).uniform(-1, 1, (total // _HOLD + 1, wide))
+        * _WIGGLE
+        * subject.amplitudes
+    )
     found: Numbers = np.repeat(heights, _HOLD, axis=0)[:total]
     change = np.repeat([(f - 1) * (point or subject.point).voltage for f, _ in segments], counts)
     found[:, subject.inputs.index("v_re")] += change.real

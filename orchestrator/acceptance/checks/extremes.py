@@ -2,7 +2,15 @@
 
 import numpy as np
 
-from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import (
+    SAME,
+    CheckResult,
+    check,
+    failed,
+    not_applicable,
+    passed,
+    remarked,
+)
 from orchestrator.acceptance.checks.comparing import difference
 from orchestrator.acceptance.checks.running import EQUAL, affordable
 from orchestrator.acceptance.checks.subject import Subject
@@ -19,7 +27,9 @@ def nan_input(subject: Subject) -> CheckResult:
         return not_applicable("nan_input", "because there are no Real inputs")
     steps, h = affordable(subject, 200), subject.step_size
     clean = subject.trajectory(steps, h, subject.one_step())
-    answers = {str(bad): _answer(subject, np.full(len(subject.inputs), bad)) for bad in (np.nan, np.inf)}
+    answers = {
+        str(bad): _answer(subject, np.full(len(subject.inputs), bad)) for bad in (np.nan, np.inf)
+    }
     after = subject.trajectory(steps, h, subject.one_step())
     apart, place = difference(clean, after)
     if apart > EQUAL:
@@ -27,7 +37,11 @@ def nan_input(subject: Subject) -> CheckResult:
         return failed("nan_input", "not a number stays", says, difference=apart)
     seen = "; ".join(f"{bad}: {answer}" for bad, (answer, _) in answers.items())
     if not all(told for _, told in answers.values()):
-        return remarked("nan_input", seen, "a master learns of it late; ask for fmi2Error where an input is not finite")
+        return remarked(
+            "nan_input",
+            seen,
+            "a master learns of it late; ask for fmi2Error where an input is not finite",
+        )
     return passed("nan_input", seen)
 
 
@@ -44,7 +58,10 @@ def _answer(subject: Subject, deviation: Numbers) -> tuple[str, bool]:
     except EndedError:
         return "it ends its simulation", True
     finite = np.isfinite(values).all()
-    return "no error, and finite outputs" if finite else "no error, and outputs that are no numbers", False
+    return (
+        "no error, and finite outputs" if finite else "no error, and outputs that are no numbers",
+        False,
+    )
 
 
 @check("extreme_inputs", "Does it give numbers, or an error, where its inputs are extreme?")

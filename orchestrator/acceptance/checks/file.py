@@ -4,7 +4,14 @@ from math import isfinite
 from pathlib import Path
 from xml.etree import ElementTree
 
-from orchestrator.acceptance.checks.base import CheckResult, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import (
+    CheckResult,
+    check,
+    failed,
+    not_applicable,
+    passed,
+    remarked,
+)
 from orchestrator.acceptance.checks.subject import Subject
 from orchestrator.errors import few
 from orchestrator.fmi.archive import MODEL_DESCRIPTION
@@ -15,8 +22,11 @@ from orchestrator.units import base_exponents
 
 _SOME = 3
 _PORT_UNITS = {
-    "v_re": ("pu", "V", "kV"), "v_im": ("pu", "V", "kV"), "i_re": ("pu", "A", "kA"), "i_im": ("pu", "A", "kA"),
-}  # fmt: skip
+    "v_re": ("pu", "V", "kV"),
+    "v_im": ("pu", "V", "kV"),
+    "i_re": ("pu", "A", "kA"),
+    "i_im": ("pu", "A", "kA"),
+}
 _PLAIN = ("", "1", "-", "%", "pu", "p.u.", "p.u", "per unit", "per_unit")
 _BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
@@ -28,7 +38,9 @@ def fmi_validity(subject: Subject) -> CheckResult:
     if not identifier.isidentifier():
         harmless.append(f"modelIdentifier {identifier!r} is not a C identifier")
     if grave:
-        return failed("fmi_validity", "invalid FMI", few(grave, _SOME, "; "), problems=grave + harmless)
+        return failed(
+            "fmi_validity", "invalid FMI", few(grave, _SOME, "; "), problems=grave + harmless
+        )
     if harmless:
         remedy = "breaks the standard without changing an answer here; tell the author"
         return remarked("fmi_validity", few(harmless, _SOME, "; "), remedy, problems=harmless)
@@ -48,7 +60,9 @@ def units(subject: Subject) -> CheckResult:
     ]
     if open_ends:
         return remarked(
-            "units", f"no unit is declared for {few(open_ends, _SOME, '; ')}", "say the unit in the binding"
+            "units",
+            f"no unit is declared for {few(open_ends, _SOME, '; ')}",
+            "say the unit in the binding",
         )
     return passed("units", "every Real input and output has a unit that fits its definition")
 
@@ -56,7 +70,9 @@ def units(subject: Subject) -> CheckResult:
 def _wrong_definitions(directory: Path) -> list[str]:
     """Units whose name says one thing and whose BaseUnit another."""
     wrong = []
-    for unit in ElementTree.parse(directory / MODEL_DESCRIPTION).getroot().iterfind("UnitDefinitions/Unit"):
+    for unit in (
+        ElementTree.parse(directory / MODEL_DESCRIPTION).getroot().iterfind("UnitDefinitions/Unit")
+    ):
         name, base = unit.get("name", ""), unit.find("BaseUnit")
         known = None if base is None or name in _PLAIN else base_exponents(name)
         if known is None or base is None:
@@ -97,7 +113,9 @@ def _wrong_port_units(described: FmuDescription, *, bound: bool) -> list[str]:
 def declared_starts(subject: Subject) -> CheckResult:
     missing, wrong = [], []
     for info in without_binding(subject.description).variables.values():
-        if info.causality not in ("input", "parameter") or info.type == "Clock":  # a clock ticks, and starts at nothing
+        if (
+            info.causality not in ("input", "parameter") or info.type == "Clock"
+        ):  # a clock ticks, and starts at nothing
             continue
         if info.start is None:
             missing.append(info.name)
@@ -115,7 +133,11 @@ def _out_of_bounds(info: VariableInfo) -> str | None:
         return f"{info.name} starts at {value}"
     low = -float("inf") if info.minimum is None else info.minimum
     high = float("inf") if info.maximum is None else info.maximum
-    return None if low <= value <= high else f"{info.name} starts at {value:g}, outside of {low:g} to {high:g}"
+    return (
+        None
+        if low <= value <= high
+        else f"{info.name} starts at {value:g}, outside of {low:g} to {high:g}"
+    )
 
 
 @check("declared_dependencies", "Does the file say what its outputs depend on?")
@@ -126,5 +148,11 @@ def declared_dependencies(subject: Subject) -> CheckResult:
     silent = [name for name in described.outputs if described.output_dependencies.get(name) is None]
     if silent and described.inputs:
         says = f"nothing is said of {few(silent, _SOME, '; ')}, so all inputs are assumed to act at once"
-        return remarked("declared_dependencies", says, "ask for the dependencies, so that a master can order its calls")
-    return passed("declared_dependencies", f"all {len(described.outputs)} outputs say what they depend on")
+        return remarked(
+            "declared_dependencies",
+            says,
+            "ask for the dependencies, so that a master can order its calls",
+        )
+    return passed(
+        "declared_dependencies", f"all {len(described.outputs)} outputs say what they depend on"
+    )

@@ -5,7 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed
+from orchestrator.acceptance.checks.base import (
+    SAME,
+    CheckResult,
+    check,
+    failed,
+    not_applicable,
+    passed,
+)
 from orchestrator.acceptance.checks.comparing import difference
 from orchestrator.acceptance.checks.events import allowed, episode
 from orchestrator.acceptance.checks.running import EQUAL, affordable
@@ -16,10 +23,15 @@ from orchestrator.errors import ComponentError, EndedError
 
 _OTHER = OperatingAt(v=1.03, theta=0.4, P=0.7, Q=-0.1)
 _CHUNK = 50  # steps that one instance does before the other one's turn comes
-IN_EVENTS, NOT_IN_EVENTS = ", in dips and jumps as well", "; not judged in dips and jumps, which it refuses"
+IN_EVENTS, NOT_IN_EVENTS = (
+    ", in dips and jumps as well",
+    "; not judged in dips and jumps, which it refuses",
+)
 
 
-def _in_events(subject: Subject, runs: Callable[[], tuple[Numbers, Numbers]], usual: float) -> tuple[float, str]:
+def _in_events(
+    subject: Subject, runs: Callable[[], tuple[Numbers, Numbers]], usual: float
+) -> tuple[float, str]:
     """How far two runs with dips and jumps are apart, and the output that shows it.
 
     Where they are equal, 0 and what to add to the evidence; an FMU may refuse such inputs with an error."""
@@ -36,7 +48,9 @@ def _in_events(subject: Subject, runs: Callable[[], tuple[Numbers, Numbers]], us
 def independence(subject: Subject) -> CheckResult:
     """Leave an instance idle beside another one that runs; then run both, with different inputs."""
     if subject.description.one_instance:
-        return not_applicable("independence", "because the FMU declares canBeInstantiatedOnlyOncePerProcess")
+        return not_applicable(
+            "independence", "because the FMU declares canBeInstantiatedOnlyOncePerProcess"
+        )
     return _first_fault(subject, _independent)
 
 
@@ -62,7 +76,9 @@ def _independent(subject: Subject, setting: Setting) -> CheckResult:
     stimulus = subject.steps(hold=10 * h)
     alone, again = (subject.trajectory(steps, h, stimulus, parameters=setting) for _ in range(2))
     if difference(alone, again)[0] > EQUAL:
-        return passed("independence", "an instance that stands still does not move while another one runs")
+        return passed(
+            "independence", "an instance that stands still does not move while another one runs"
+        )
     apart, place = difference(alone, _beside(subject, steps, stimulus, setting))
     if apart > EQUAL:
         says = f"{subject.watched[place]} differs by {apart:.3g} of its range as soon as a second one runs beside it"
@@ -142,13 +158,19 @@ def repeatability(subject: Subject) -> CheckResult:
     if not subject.port:
         return passed("repeatability", says, difference=apart)
     rows = episode(subject, "repeatability")
-    large, output = _in_events(subject, lambda: (subject.through(rows), subject.through(rows)), apart)
+    large, output = _in_events(
+        subject, lambda: (subject.through(rows), subject.through(rows)), apart
+    )
     if not large:
         return passed("repeatability", f"{says}{output}", difference=apart)
-    says = f"{output} differs by {large:.3g} of its range between two equal runs with dips and jumps"
+    says = (
+        f"{output} differs by {large:.3g} of its range between two equal runs with dips and jumps"
+    )
     if _in_events(subject, lambda: (_first(subject, rows), _first(subject, rows)), apart)[0]:
         return failed("repeatability", "not repeatable", says, difference=large)
-    says += ", and not between the first runs of two processes: the first one leaves something behind"
+    says += (
+        ", and not between the first runs of two processes: the first one leaves something behind"
+    )
     return failed("repeatability", "instances differ", says, difference=large)
 
 
@@ -185,7 +207,9 @@ def _like_new(subject: Subject, setting: Setting) -> CheckResult:
         return failed("reset", "reset leaves something", says)
     apart, place = difference(fresh, again)
     if apart > EQUAL:
-        says = f"{subject.watched[place]} differs by {apart:.3g} of its range in a run after fmi2Reset"
+        says = (
+            f"{subject.watched[place]} differs by {apart:.3g} of its range in a run after fmi2Reset"
+        )
         return failed("reset", "reset leaves something", says, difference=apart)
     says = f"a run after fmi2Reset differs by {apart:.1g} from one of a new instance"
     if not subject.port:
@@ -239,7 +263,10 @@ def reinstantiation(subject: Subject) -> CheckResult:
 
 def _after_a_life(subject: Subject) -> tuple[Numbers, Numbers]:
     """A run, and the same one after another instance's dips and jumps; that one still lives where there may be two."""
-    rows, life = episode(subject, "reinstantiation"), episode(subject, "reinstantiation, life", _OTHER)
+    rows, life = (
+        episode(subject, "reinstantiation"),
+        episode(subject, "reinstantiation, life", _OTHER),
+    )
     fresh = subject.through(rows)
     with subject.running("second", point=_OTHER) as second:
         second.hold(life, len(life), subject.step_size)

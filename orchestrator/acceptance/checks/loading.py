@@ -5,7 +5,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from orchestrator.acceptance.checks.base import CheckResult, check, failed, not_applicable, passed, provoked, remarked
+from orchestrator.acceptance.checks.base import (
+    CheckResult,
+    check,
+    failed,
+    not_applicable,
+    passed,
+    provoked,
+    remarked,
+)
 from orchestrator.acceptance.checks.port import POINTS
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
@@ -49,9 +57,10 @@ def call_order(subject: Subject) -> CheckResult:
     """Make three calls that FMI forbids, each in an instance of its own; what an FMU does then is provoked."""
     h = subject.step_size
     steps: dict[str, tuple[Callable[[Subject], HostedComponent], float, float]] = {
-        "before initialisation": (Subject.open, 0.0, h), "of size 0": (_stepped, h, 0.0),
+        "before initialisation": (Subject.open, 0.0, h),
+        "of size 0": (_stepped, h, 0.0),
         "backwards": (lambda subject: subject.running().component, 0.0, -h),
-    }  # fmt: skip
+    }
     accepted, ended = [], []
     for words, (begin, time, step_size) in steps.items():
         component = begin(subject)  # until here all is allowed
@@ -85,9 +94,11 @@ def _accepts(component: HostedComponent, time: float, step_size: float) -> bool:
     return True
 
 
-_LATE = 1e-3  # part of an output's size by which it may change as initialisation ends; 1e-6 is worth a remark
+# part of an output's size by which it may change as initialisation ends; 1e-6 is worth a remark
+_LATE = 1e-3
 _CLEAR = 1e-6
-_ELSEWHERE = POINTS[1]  # another operating point: at its own, an FMU may start from what it declares
+# another operating point: at its own, an FMU may start from what it declares
+_ELSEWHERE = POINTS[1]
 
 
 @check("initial_outputs", "Are its outputs there before initialisation ends?")
@@ -117,16 +128,25 @@ def initial_outputs(subject: Subject) -> CheckResult:
     if worst > _CLEAR:
         remedy = "its partners are initialised with the first value: ask what changes it as initialisation ends"
         return remarked("initial_outputs", seen, remedy, difference=worst)
-    return passed("initial_outputs", f"the end of initialisation changes no output ({worst:.1g})", difference=worst)
+    return passed(
+        "initial_outputs",
+        f"the end of initialisation changes no output ({worst:.1g})",
+        difference=worst,
+    )
 
 
-def _around_the_end(subject: Subject, point: OperatingAt | None) -> tuple[Numbers, Numbers, Numbers]:
+def _around_the_end(
+    subject: Subject, point: OperatingAt | None
+) -> tuple[Numbers, Numbers, Numbers]:
     """Outputs before and after the end of initialisation, and the size that they have in a short run."""
     component = subject.open()
     try:
         subject.prepare(component, point)
         component.enter_initialization_mode()
-        inputs, outputs = RealBatch(component, subject.inputs), RealBatch(component, subject.outputs)
+        inputs, outputs = (
+            RealBatch(component, subject.inputs),
+            RealBatch(component, subject.outputs),
+        )
         inputs.values[:] = subject.start_inputs(point)
         inputs.write()
         before = outputs.read().copy()

@@ -7,11 +7,27 @@ from itertools import pairwise
 import numpy as np
 
 from orchestrator.acceptance.checks import port
-from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import (
+    SAME,
+    CheckResult,
+    check,
+    failed,
+    not_applicable,
+    passed,
+    remarked,
+)
 from orchestrator.acceptance.checks.comparing import difference
 from orchestrator.acceptance.checks.droop import FREQUENCY, VOLTAGE
 from orchestrator.acceptance.checks.events import scale
-from orchestrator.acceptance.checks.port import ANSWER, IMPORTING, POINTS, WHY, followed, present_current, rating_of
+from orchestrator.acceptance.checks.port import (
+    ANSWER,
+    IMPORTING,
+    POINTS,
+    WHY,
+    followed,
+    present_current,
+    rating_of,
+)
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.arrays import Numbers
@@ -23,7 +39,8 @@ from orchestrator.units import to_unit
 _IDLE = OperatingAt(1.0, 0.1, 0.0, 0.0)
 _FULL = (OperatingAt(1.02, 0.2, 1.0, 0.0), OperatingAt(1.02, -0.3, -1.0, 0.0))
 
-_APART = 0.0037  # difference of the power of two points [pu, S_n], which no setting in steps of 1 % can show
+# difference of the power of two points [pu, S_n], which no setting in steps of 1 % can show
+_APART = 0.0037
 _RESTS = 2000  # steps for which it is watched at each point
 
 _SMALLER, _LARGER = (0.3, 0.42), (2.2, 3.5)  # bounds of other ratings, in parts of its own
@@ -34,7 +51,8 @@ _DIP, _DIP_LASTS, _CYCLE = 0.05, 0.15, 0.02
 _ANSWERS = 1.0  # time [s] after which its answer at another rating is taken
 _SEEN = 0.01  # least answer [pu, S_n] that is compared
 _OTHERWISE = 0.1  # part of an answer by which it may differ at another rating
-_STAYS = 0.25  # part by which a current in a dip may miss the limit of another rating, and be that limit
+# part by which a current in a dip may miss the limit of another rating, and be that limit
+_STAYS = 0.25
 
 
 def _points(subject: Subject) -> Iterator[tuple[str, OperatingAt]]:
@@ -45,7 +63,9 @@ def _points(subject: Subject) -> Iterator[tuple[str, OperatingAt]]:
     for sign in (1, -1):
         v, theta, P, Q = draw.uniform((0.96, -3.1, 0.15, -0.2), (1.04, 3.1, 0.8, 0.2))
         for more in (0.0, _APART):
-            point = OperatingAt(round(v, 3), round(theta, 3), round(sign * P + more, 5), round(Q, 3))
+            point = OperatingAt(
+                round(v, 3), round(theta, 3), round(sign * P + more, 5), round(Q, 3)
+            )
             yield f"at P_0 = {point.P:.5g}, Q_0 = {point.Q:.3g}, v_0 = {point.v:.4g}", point
 
 
@@ -56,7 +76,9 @@ def _points(subject: Subject) -> Iterator[tuple[str, OperatingAt]]:
 )
 def operating_points(subject: Subject) -> CheckResult:
     if not subject.starts:
-        return not_applicable("operating_points", port.WHY["no start" if subject.port else "no port"])
+        return not_applicable(
+            "operating_points", port.WHY["no start" if subject.port else "no port"]
+        )
     tried, left_out, found = 0, [], []
     for words, point in _points(subject):
         if reason := port.cannot_import(subject, point):
@@ -65,7 +87,9 @@ def operating_points(subject: Subject) -> CheckResult:
         try:
             with subject.running(point=point) as running:
                 begin = port.present_current(running)
-                moved = np.abs(port.currents(running, 0j, affordable(subject, _RESTS)) - begin).max()
+                moved = np.abs(
+                    port.currents(running, 0j, affordable(subject, _RESTS)) - begin
+                ).max()
         except ComponentError as error:
             left_out.append(f"{words} it refuses to work: {error.log or error.status}")
             continue
@@ -76,17 +100,29 @@ def operating_points(subject: Subject) -> CheckResult:
         if not np.isfinite([abs(power), moved]).all():
             return failed("operating_points", "not a number", f"{words} its current is no number")
         if abs(power - complex(point.P, point.Q)) > BALANCE:
-            return failed("operating_points", "power not as asked", f"{says}, and is as asked at other points")
+            return failed(
+                "operating_points", "power not as asked", f"{says}, and is as asked at other points"
+            )
         if moved > port.DRIFT and point not in _FULL:
-            return failed("operating_points", "no steady state", f"{words} its current moves by {moved:.3g} pu")
+            return failed(
+                "operating_points",
+                "no steady state",
+                f"{words} its current moves by {moved:.3g} pu",
+            )
         if moved > port.DRIFT:
             left_out.append(f"{words} its current moves by {moved:.3g} pu")
     seen = f"it starts and rests at {tried} points, among them {'none' if not tried else 'no power and full power'}"
     if coarse := _coarse(found):
-        return remarked("operating_points", f"{coarse}; {seen}", "ask in which steps it takes its power")
+        return remarked(
+            "operating_points", f"{coarse}; {seen}", "ask in which steps it takes its power"
+        )
     if left_out:
         remedy = "do not use it so, or ask how it works there"
-        return remarked("operating_points", f"it starts and rests at {tried} points; {'; '.join(left_out)}", remedy)
+        return remarked(
+            "operating_points",
+            f"it starts and rests at {tried} points; {'; '.join(left_out)}",
+            remedy,
+        )
     return passed("operating_points", seen)
 
 
@@ -99,13 +135,21 @@ def _coarse(found: list[tuple[OperatingAt, complex]]) -> str:
     return ""
 
 
-@check("ratings", "Is it the same in per unit at another rating?", needs=(*SAME, "steady_state", "power_balance"))
+@check(
+    "ratings",
+    "Is it the same in per unit at another rating?",
+    needs=(*SAME, "steady_state", "power_balance"),
+)
 def ratings(subject: Subject) -> CheckResult:
     """Start it with other values of S_n, and look at its power, its answer and its current in a deep dip."""
     described = subject.description
-    takes = "S_n" in (described.port.start if isinstance(described, BoundDescription) else described.variables)
+    takes = "S_n" in (
+        described.port.start if isinstance(described, BoundDescription) else described.variables
+    )
     if not subject.starts or not takes:
-        return not_applicable("ratings", "because it takes no rating (the binding has no [start.S_n])")
+        return not_applicable(
+            "ratings", "because it takes no rating (the binding has no [start.S_n])"
+        )
     draw, seen, refused, otherwise = subject.random("ratings"), [], [], []
     with subject.running() as running:
         own = port.rating_of(running)
@@ -130,7 +174,12 @@ def ratings(subject: Subject) -> CheckResult:
         if abs(current * part - usual) < _STAYS * usual < _STAYS * NO_LIMIT:
             return failed("ratings", "limit of another rating", says, current=current)
         if limit is not None and current > 1.05 * limit >= usual:
-            return failed("ratings", "above its current limit", f"{says}; {limit:g} pu is declared", current=current)
+            return failed(
+                "ratings",
+                "above its current limit",
+                f"{says}; {limit:g} pu is declared",
+                current=current,
+            )
         seen.append(says)
         if apart > _OTHERWISE * max(abs(answer), _SEEN):
             says = f"its answer to less voltage and frequency is {apart:.2g} pu away from the {abs(answer):.2g} pu"
@@ -150,7 +199,9 @@ def _in_a_dip(subject: Subject, rating: float) -> tuple[complex, float]:
     with subject.running(parameters={"S_n": rating}) as running:
         power = subject.start_voltage * port.present_current(running).conjugate()
         port.currents(running, 0j, max(1, round(_CYCLE / h)))
-        during = port.currents(running, (_DIP - 1) * subject.start_voltage, max(1, round(_DIP_LASTS / h)))
+        during = port.currents(
+            running, (_DIP - 1) * subject.start_voltage, max(1, round(_DIP_LASTS / h))
+        )
     return power, float(np.abs(during[-max(1, round(_CYCLE / h)) :]).mean())
 
 
@@ -165,14 +216,19 @@ def _answer(subject: Subject, rating: float) -> complex:
     return complex((current * np.abs(change) / change)[-max(1, round(_CYCLE / h)) :].mean() - begin)
 
 
-_LATE = 20_000.0  # A start [s] at which single precision has no milliseconds left; a day has more seconds
+# A start [s] at which single precision has no milliseconds left; a day has more seconds
+_LATE = 20_000.0
 
 _SAME, _STILL = 1e-4, 100.0
 """Difference of two answers, in parts of their range, up to which they are alike; and in parts of a rest's motion."""
 
-_ROUNDED = 1e-8  # part of an output's size by which an angle of six million radians, short of digits, changes it
-_FASTER, _LASTS = 0.012, 9.0  # frequency [pu] by which it is turned forth, and back for twice as long; in all [s]
-_TURNED = 5e-5  # difference of the currents that two angles bring [pu, S_n]: a jump of some hundredths of a milliradian
+# part of an output's size by which an angle of six million radians, short of digits, changes it
+_ROUNDED = 1e-8
+# frequency [pu] by which it is turned forth, and back for twice as long; in all [s]
+_FASTER, _LASTS = 0.012, 9.0
+# difference of the currents that two angles bring [pu, S_n]: a jump of some hundredths of a
+# milliradian
+_TURNED = 5e-5
 
 _POWER = re.compile(r"^[pq](?![a-z])|power", re.IGNORECASE)
 _NEAR = 0.02
@@ -192,7 +248,11 @@ def later_times(subject: Subject) -> CheckResult:
     first = subject.trajectory(steps, h, subject.one_step())
     try:
         subject.start_time = _LATE
-        apart = _differs(first, subject.trajectory(steps, h, subject.one_step()), _ROUNDED * np.abs(first).max(axis=0))
+        apart = _differs(
+            first,
+            subject.trajectory(steps, h, subject.one_step()),
+            _ROUNDED * np.abs(first).max(axis=0),
+        )
         said.append(f"started at {_LATE:g} s it is {apart:.2g} of its range away")
         found = max(found, apart)
     except (ComponentError, EndedError) as error:
@@ -200,8 +260,11 @@ def later_times(subject: Subject) -> CheckResult:
     finally:
         subject.start_time = 0.0
     says = f"the answer to a small step: {', '.join(said)}"
-    return (failed("later_times", "counts time", says, apart=found) if found > _SAME
-            else passed("later_times", says, apart=found))  # fmt: skip
+    return (
+        failed("later_times", "counts time", says, apart=found)
+        if found > _SAME
+        else passed("later_times", says, apart=found)
+    )
 
 
 def _differs(first: Numbers, late: Numbers, least: Numbers | float) -> float:
@@ -235,29 +298,49 @@ def angles(subject: Subject) -> CheckResult:
 def shown_power(subject: Subject) -> CheckResult:
     """Only factors that a wrong unit or base brings are told: what is measured elsewhere differs by losses."""
     variables = subject.description.variables
-    units = {n: unit for n in subject.outputs if (unit := _megawatts(n, variables[n].unit)) is not None}
+    units = {
+        n: unit for n in subject.outputs if (unit := _megawatts(n, variables[n].unit)) is not None
+    }
     if not subject.starts or not units:
         return not_applicable("shown_power", "because it shows no power besides its current")
     powers, shown = [], []
     for point in (*POINTS[:3], IMPORTING[0]):
         try:
             with subject.running(point=point) as running:
-                rating, values = rating_of(running), dict(zip(subject.watched, running.read(), strict=True))
+                rating, values = (
+                    rating_of(running),
+                    dict(zip(subject.watched, running.read(), strict=True)),
+                )
                 powers.append(point.voltage * present_current(running).conjugate())
         except ComponentError:
             continue
         shown.append([values[n] * (unit or rating) / rating for n, unit in units.items()])
     if len(powers) < 3:
         return not_applicable("shown_power", f"because it starts at {len(powers)} points only")
-    known = {1e3: "1000", 1e-3: "1/1000", rating: "S_n", 1 / rating: "1/S_n", 1e3 * rating: "1000·S_n"}
+    known = {
+        1e3: "1000",
+        1e-3: "1/1000",
+        rating: "S_n",
+        1 / rating: "1/S_n",
+        1e3 * rating: "1000·S_n",
+    }
     for name, row in zip(units, np.array(shown).T, strict=True):
         for word, flows in (("P", np.real(powers)), ("Q", np.imag(powers))):
             ratio = float(row @ flows / (flows @ flows))
             fits = np.abs(row - ratio * flows).max() <= _NEAR * np.abs(row).max()
-            factor = next((t for f, t in known.items() if abs(abs(ratio) / f - 1) < _NEAR and abs(f - 1) > 0.5), "")
+            factor = next(
+                (
+                    t
+                    for f, t in known.items()
+                    if abs(abs(ratio) / f - 1) < _NEAR and abs(f - 1) > 0.5
+                ),
+                "",
+            )
             if fits and factor:
                 says = f"{name} is declared in {variables[name].unit} and shows {abs(ratio):.4g} times the {word}"
-                return failed("shown_power", "wrong units", f"{says} that flows ({factor})", ratio=ratio)
+                return failed(
+                    "shown_power", "wrong units", f"{says} that flows ({factor})", ratio=ratio
+                )
     return passed("shown_power", f"{', '.join(units)}: no wrong unit is seen")
 
 

@@ -9,7 +9,15 @@ from time import perf_counter
 import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import (
+    SAME,
+    CheckResult,
+    check,
+    failed,
+    not_applicable,
+    passed,
+    remarked,
+)
 from orchestrator.acceptance.checks.running import LONGEST, RUN_FOR, affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Running, Subject
 from orchestrator.arrays import Complex, Numbers
@@ -19,15 +27,22 @@ from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.port import BoundDescription
 
 POINTS = (
-    OperatingAt(1.0, 0.0, 0.5, 0.1), OperatingAt(1.03, 0.4, 0.7, -0.1), OperatingAt(0.97, -0.5, 0.3, 0.2),
-    OperatingAt(1.0, 2.0, 0.6, 0.0), OperatingAt(1.01, -2.5, 0.4, -0.2),
-)  # fmt: skip
-IMPORTING = (OperatingAt(1.0, 0.3, -0.5, 0.15), OperatingAt(1.02, -0.4, -0.3, -0.1))  # points at which it takes power
-DRIFT = 1e-3  # movement of the current in steady state [pu, S_n] that is a fault; 1e-6 is worth a remark
+    OperatingAt(1.0, 0.0, 0.5, 0.1),
+    OperatingAt(1.03, 0.4, 0.7, -0.1),
+    OperatingAt(0.97, -0.5, 0.3, 0.2),
+    OperatingAt(1.0, 2.0, 0.6, 0.0),
+    OperatingAt(1.01, -2.5, 0.4, -0.2),
+)
+# points at which it takes power
+IMPORTING = (OperatingAt(1.0, 0.3, -0.5, 0.15), OperatingAt(1.02, -0.4, -0.3, -0.1))
+# movement of the current in steady state [pu, S_n] that is a fault; 1e-6 is worth a remark
+DRIFT = 1e-3
 ANSWER = 400  # steps of the answer that is compared at several times
-_PART = 0.75  # wall-clock time to spend on a long rest, in parts of the time for which an FMU is made to run
+# wall-clock time to spend on a long rest, in parts of the time for which an FMU is made to run
+_PART = 0.75
 _LATER = 10.0  # time [s] for which it is left at rest after the time at which it wandered in 'runs'
-_GOES_ON = 0.4  # part of a movement that its second half has where it goes on; of a ramp it is a half
+# part of a movement that its second half has where it goes on; of a ramp it is a half
+_GOES_ON = 0.4
 
 WHY = {
     "no port": "because it has no port: give a binding with --binding (`gfor fmu bind` drafts one), or, around a "
@@ -75,7 +90,10 @@ def currents(running: Running, deviation: complex, steps: int) -> Complex:
 
 def followed(running: Running, factors: Complex) -> Complex:
     """Step with the voltage at the start multiplied by one factor after another; the injected current [pu, S_n]."""
-    return of_current(running, running.hold(voltage_rows(running, factors), len(factors), running.subject.step_size))
+    return of_current(
+        running,
+        running.hold(voltage_rows(running, factors), len(factors), running.subject.step_size),
+    )
 
 
 def of_current(running: Running, values: Numbers) -> Complex:
@@ -125,16 +143,24 @@ def steady_state(subject: Subject) -> CheckResult:
                 if rest is None and worst <= DRIFT:
                     rest = _rest(subject, running, begin, steps)
                     with suppress(ComponentError, EndedError):
-                        late = running.record(affordable(subject, ANSWER), subject.step_size, subject.one_step())
+                        late = running.record(
+                            affordable(subject, ANSWER), subject.step_size, subject.one_step()
+                        )
                         subject.memory["rested"] = point, rest, late
         except ComponentError as error:
             refused.append(str(error))
     if len(refused) == 3:
-        return failed("steady_state", "error in a step" if "fmi2DoStep" in refused[0] else "does not start", refused[0])
+        return failed(
+            "steady_state",
+            "error in a step" if "fmi2DoStep" in refused[0] else "does not start",
+            refused[0],
+        )
     seen = f"the current moves by {worst:.3g} pu of its rating in {steps * subject.step_size:.3g} s at constant voltage"
     subject.memory["drift"] = worst
     if isinf(worst):
-        return failed("steady_state", "not a number", "its current is no number at constant voltage")
+        return failed(
+            "steady_state", "not a number", "its current is no number at constant voltage"
+        )
     if worst > DRIFT:
         return failed("steady_state", "no steady state", seen, drift=worst)
     if rest is not None:
@@ -146,7 +172,9 @@ def steady_state(subject: Subject) -> CheckResult:
     if worst > DRIFT:
         return failed("steady_state", "leaves its steady state", seen, drift=worst)
     if worst > 1e-6 and rest is not None and rest.goes_on:
-        return remarked("steady_state", seen, "it does not settle: ask what goes on in it at rest", drift=worst)
+        return remarked(
+            "steady_state", seen, "it does not settle: ask what goes on in it at rest", drift=worst
+        )
     if worst > 1e-6:
         return remarked("steady_state", seen, "let it settle before linearising", drift=worst)
     return passed("steady_state", seen, drift=worst)
@@ -182,7 +210,10 @@ def _rest(subject: Subject, running: Running, begin: complex, steps: int) -> _Re
     return _Rest(moved, ends[-1][0], goes_on)
 
 
-@check("power_balance", "Are sign, base and frame such that the power at its port is the power asked of it?")
+@check(
+    "power_balance",
+    "Are sign, base and frame such that the power at its port is the power asked of it?",
+)
 def power_balance(subject: Subject) -> CheckResult:
     """Fit x = a·x_0 + b·conj(x_0) + c over several operating points, for powers and for currents."""
     if not subject.starts:
@@ -199,14 +230,18 @@ def power_balance(subject: Subject) -> CheckResult:
         result = _judged(asked, found, voltages, steps * subject.step_size)
         if left_out and not result.fault:
             remedy = "nothing is known of it as a load or a charging store: do not use it so, or ask how it starts"
-            result = remarked("power_balance", f"{result.evidence}; {left_out}", remedy, **result.figures)
+            result = remarked(
+                "power_balance", f"{result.evidence}; {left_out}", remedy, **result.figures
+            )
         if best is None or not result.fault:
             best = result
     assert best is not None
     return best
 
 
-def _powers(subject: Subject, steps: int) -> tuple[list[complex], list[complex], list[complex], str]:
+def _powers(
+    subject: Subject, steps: int
+) -> tuple[list[complex], list[complex], list[complex], str]:
     """Powers asked for, found, the voltages at which it starts; why it was not tried with imported power."""
     asked, found, voltages, left_out = [], [], [], ""
     for point in (*_points(subject), *IMPORTING):
@@ -241,10 +276,17 @@ def _judged(
     # What is wrong with an axis shows in the currents, what is wrong with P or Q in the powers.
     v = np.array(voltages)
     in_power, in_current = _fit(s_0, s), _fit((s_0 / v).conj(), (s / v).conj())
-    of, (a, b, c, rest) = ("S", in_power) if in_power[3] <= 1.01 * in_current[3] else ("i", in_current)
+    of, (a, b, c, rest) = (
+        ("S", in_power) if in_power[3] <= 1.01 * in_current[3] else ("i", in_current)
+    )
     figures = {
-        "of": of, "a": [a.real, a.imag], "b": [b.real, b.imag], "c": [c.real, c.imag], "rest": rest, "worst": worst,
-    }  # fmt: skip
+        "of": of,
+        "a": [a.real, a.imag],
+        "b": [b.real, b.imag],
+        "c": [c.real, c.imag],
+        "rest": rest,
+        "worst": worst,
+    }
     if worst <= BALANCE:
         says = f"S is what is asked within {worst:.2g} pu of the rating at {len(s)} points"
         return passed("power_balance", says, **figures)
@@ -258,5 +300,12 @@ def _judged(
 
 def _fit(asked: Complex, found: Complex) -> tuple[complex, complex, complex, float]:
     """The coefficients a, b, c of found = a·asked + b·conj(asked) + c, and the largest rest."""
-    (a, b, c), *_ = np.linalg.lstsq(np.column_stack([asked, asked.conj(), np.ones(len(asked))]), found, rcond=None)
-    return complex(a), complex(b), complex(c), float(np.abs(found - (a * asked + b * asked.conj() + c)).max())
+    (a, b, c), *_ = np.linalg.lstsq(
+        np.column_stack([asked, asked.conj(), np.ones(len(asked))]), found, rcond=None
+    )
+    return (
+        complex(a),
+        complex(b),
+        complex(c),
+        float(np.abs(found - (a * asked + b * asked.conj() + c)).max()),
+    )

@@ -6,7 +6,14 @@ from itertools import pairwise
 from statistics import median_low
 from time import perf_counter
 
-from orchestrator.acceptance.checks.base import CheckResult, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import (
+    CheckResult,
+    check,
+    failed,
+    not_applicable,
+    passed,
+    remarked,
+)
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import Subject, unmoved
 from orchestrator.errors import ComponentError
@@ -16,7 +23,8 @@ _BLOCKS, _BLOCK = 8, 0.2  # parts of a measurement, and the longest time of one 
 _LEAST = 4.0  # bytes kept by each step that count as a leak
 _RESETS, _FEW = 5, 4  # resets in a block, and instances between two counts of open files
 _INSTANCE = 120.0  # bytes kept by each instance, or each saved state
-_SLIGHT = 4096.0  # bytes kept by each instance that no study notices: some tools never free its name or log
+# bytes kept by each instance that no study notices: some tools never free its name or log
+_SLIGHT = 4096.0
 
 
 @dataclass(frozen=True)
@@ -30,7 +38,9 @@ class _Unknown:
 @check("memory", "Does it give back the memory that it takes?")
 def memory(subject: Subject) -> CheckResult:
     if not subject.memory_in_use():
-        return not_applicable("memory", "because this platform does not tell how much memory is in use")
+        return not_applicable(
+            "memory", "because this platform does not tell how much memory is in use"
+        )
     steps = affordable(subject, 1500)
     texts, figures, slight, unknown = [], {}, "", dict[str, _Unknown]()
     for what, growth, least in (
@@ -55,10 +65,17 @@ def memory(subject: Subject) -> CheckResult:
         unknown["open files"] = files
     elif files:
         figures["open files"] = files
-        return failed("memory", "files stay open", f"{files:.2g} files stay open with every instance", **figures)
+        return failed(
+            "memory",
+            "files stay open",
+            f"{files:.2g} files stay open with every instance",
+            **figures,
+        )
     left_out = "".join(f"; not measured: {what}, because {u.why}" for what, u in unknown.items())
     if texts:
-        return failed("memory", "memory leak", f"it keeps {' and '.join(texts)}{left_out}", **figures)
+        return failed(
+            "memory", "memory leak", f"it keeps {' and '.join(texts)}{left_out}", **figures
+        )
     if slight:
         remedy = "a million instances in one process would be noticed; tell the author"
         return remarked("memory", f"{slight}{left_out}", remedy, **figures)

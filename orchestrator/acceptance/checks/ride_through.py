@@ -8,23 +8,40 @@ from time import perf_counter
 
 import numpy as np
 
-from orchestrator.acceptance.checks.base import CheckResult, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import (
+    CheckResult,
+    check,
+    failed,
+    not_applicable,
+    passed,
+    remarked,
+)
 from orchestrator.acceptance.checks.events import Segment, scale, series
-from orchestrator.acceptance.checks.port import IMPORTING, WHY, cannot_import, current_limit, currents
+from orchestrator.acceptance.checks.port import (
+    IMPORTING,
+    WHY,
+    cannot_import,
+    current_limit,
+    currents,
+)
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.arrays import Complex
 from orchestrator.binding.misfits import NO_LIMIT
 from orchestrator.errors import ComponentError
 
-_TIMES = (0.1, 1.0, 2.5, 3.0, 5.0)  # of events [s]: a timer or a counter in an FMU may run out between two
+# of events [s]: a timer or a counter in an FMU may run out between two
+_TIMES = (0.1, 1.0, 2.5, 3.0, 5.0)
 _LASTS = 0.15  # duration of a disturbance [s]; a fault is cleared within it
 _RIDDEN, _OVERLOAD = 2.0, 10.0
 """Longest dip [s] after which it is asked to be back; one in which a limit that dies with time has died."""
 
 _STAY = (
-    ((0.8, 0.9), 1.0, _RIDDEN, None), ((0.17, 0.21), 1.0, 0.5, None), ((0.2, 0.35), 0.1, _OVERLOAD, None),
-    ((0.42, 0.55), 0.1, _OVERLOAD, None), ((0.1, 0.25), 0.1, _OVERLOAD, replace(IMPORTING[0], Q=-0.3)),
-)  # fmt: skip
+    ((0.8, 0.9), 1.0, _RIDDEN, None),
+    ((0.17, 0.21), 1.0, 0.5, None),
+    ((0.2, 0.35), 0.1, _OVERLOAD, None),
+    ((0.42, 0.55), 0.1, _OVERLOAD, None),
+    ((0.1, 0.25), 0.1, _OVERLOAD, replace(IMPORTING[0], Q=-0.3)),
+)
 """Dips that stay: to what voltage [pu], when [s], how long [s], from which point."""
 
 _BLOCKED, _GIVES = 0.02, 0.1  # current [pu, S_n] of a device that blocks, and of one that gives any
@@ -33,15 +50,20 @@ _BLOCKS_FOR = 0.06
 """Time [s] without current at a healthy voltage from which a device blocks: zero crossings of its power are shorter."""
 
 _HEALTHY = 0.9  # voltage [pu] at which a device has to stay on
-_CYCLE = 0.02  # time [s] over which a current is averaged: what heats the semiconductors and what protection sees
+# time [s] over which a current is averaged: what heats the semiconductors and what protection sees
+_CYCLE = 0.02
 
 _UNEVEN, _MUCH = 1.6, 2.2
 """Current in a dip, in parts of that in a dip to no voltage and in pu, from which a limit acts in some dips only."""
 
-_IN_VOLTAGE = 1.4  # the same of a jump in a voltage that lasts, in parts of that without; 1.2 where nothing limits both
+# the same of a jump in a voltage that lasts, in parts of that without; 1.2 where nothing limits
+# both
+_IN_VOLTAGE = 1.4
 
-_BACK = 0.3  # distance of the current from where it was [pu, S_n] from which the next one hits a new instance
-_AT_LEAST = 14  # runs, however long they take: at all times, dips that stay, after what lasts, with imported power
+# distance of the current from where it was [pu, S_n] from which the next one hits a new instance
+_BACK = 0.3
+# runs, however long they take: at all times, dips that stay, after what lasts, with imported power
+_AT_LEAST = 14
 _PART = 1.5  # wall-clock time to spend, in parts of the time for which an FMU is made to run
 
 
@@ -67,9 +89,12 @@ class Answer:
     event: Disturbance
     peak: float  # the largest current
     early: float  # over the third cycle
-    mean: float  # over the last cycle; where it lasts longer than `_LASTS`, the largest over any cycle after that
+    # over the last cycle; where it lasts longer than `_LASTS`, the largest over any cycle after
+    # that
+    mean: float
     away: float  # distance of the current from where it was, afterwards
-    blocked: float  # time [s] without current at a healthy voltage, where it gives current before and after
+    # time [s] without current at a healthy voltage, where it gives current before and after
+    blocked: float
     gone: bool  # whether it gives no current in the end
 
 
@@ -86,8 +111,18 @@ def _runs(draw: np.random.Generator, longest: float) -> Iterator[list[Disturbanc
         angle = round(draw.uniform(least, most), 1)
         return f"phase jump of {angle:g}°", rect(1, angle * pi / 180)
 
-    kinds = [jump(50, 70), dip(0.6, 0.75), dip(1.2, 1.3), dip(0.8, 0.95), dip(0.1, 0.35),
-             jump(-70, -50), dip(0.36, 0.6), dip(1.05, 1.2), dip(0, 0), jump(15, 35)]  # fmt: skip
+    kinds = [
+        jump(50, 70),
+        dip(0.6, 0.75),
+        dip(1.2, 1.3),
+        dip(0.8, 0.95),
+        dip(0.1, 0.35),
+        jump(-70, -50),
+        dip(0.36, 0.6),
+        dip(1.05, 1.2),
+        dip(0, 0),
+        jump(15, 35),
+    ]
     jitter = draw.uniform(0, 0.12, len(_TIMES))
     times = [round(float(at), 3) for at in np.array(_TIMES) + jitter * np.minimum(1, _TIMES)]
     for k in range(len(kinds)):
@@ -95,20 +130,33 @@ def _runs(draw: np.random.Generator, longest: float) -> Iterator[list[Disturbanc
             for bounds, at, lasts, point in _STAY:
                 (words, to), lasting = dip(*bounds), min(lasts, longest)
                 yield [Disturbance(f"{words} for {lasting:.3g} s", to, at, lasting, point)]
-            for bounds, least, most in (((1.12, 1.2), 0.6, 1.0), ((1.12, 1.16), 2.2, 3.5), ((0.8, 0.9), 1.0, 2.5)):
+            for bounds, least, most in (
+                ((1.12, 1.2), 0.6, 1.0),
+                ((1.12, 1.16), 2.2, 3.5),
+                ((0.8, 0.9), 1.0, 2.5),
+            ):
                 (words, voltage), lasts = dip(*bounds), round(draw.uniform(least, most), 3)
                 before, long = ((voltage, lasts),), f"{words} for {lasts:g} s"
                 (words, to), (turned, by) = dip(0.1, 0.35), kinds[0]
                 yield [Disturbance(f"{words} after the {long}", to, 0.1, before=before)]
                 yield [Disturbance(f"{turned} in the {long}", voltage * by, 0.1, before=before)]
             words, to = dip(0.1, 0.35)
-            yield [Disturbance(f"{words} after a series of events", to, 0.1, before=tuple(series(draw)))]
+            yield [
+                Disturbance(
+                    f"{words} after a series of events", to, 0.1, before=tuple(series(draw))
+                )
+            ]
             some = zip((kinds[8], kinds[6], kinds[5]), times, strict=False)
             yield [Disturbance(*kind, at, point=IMPORTING[0]) for kind, at in some]
-        yield [Disturbance(*kinds[(k + 2 * place) % len(kinds)], at) for place, at in enumerate(times)]
+        yield [
+            Disturbance(*kinds[(k + 2 * place) % len(kinds)], at) for place, at in enumerate(times)
+        ]
 
 
-@check("limits", "Does it limit its current, and come back from voltage dips, overvoltages and phase jumps?")
+@check(
+    "limits",
+    "Does it limit its current, and come back from voltage dips, overvoltages and phase jumps?",
+)
 def limits(subject: Subject) -> CheckResult:
     """Disturb it at several times; a run goes on while it comes back, and begins anew where it does not."""
     if not subject.port:
@@ -153,7 +201,9 @@ def _disturbed(
                     before = currents(running, 0j, max(1, round((event.at - running.time) / h)))
                     for voltage, lasts in event.before:
                         currents(running, (voltage - 1) * normal, max(1, round(lasts / h)))
-                    during = currents(running, (event.factor - 1) * normal, max(1, round(event.lasts / h)))
+                    during = currents(
+                        running, (event.factor - 1) * normal, max(1, round(event.lasts / h))
+                    )
                 with subject.while_doing(f"after {event}"):
                     following = rest[0].at if rest else running.time + _BACK
                     after = currents(running, 0j, max(1, round((following - running.time) / h)) - 1)
@@ -166,13 +216,19 @@ def _disturbed(
             cycle = max(1, round(_CYCLE / h))
             away = abs(after[-1] - before[-1]) if len(after) else 0.0
             late = np.abs(during[max(0, min(len(during), round(_LASTS / h)) - cycle) :])
-            means = np.convolve(late, np.full(min(cycle, len(late)), 1 / min(cycle, len(late))), "valid")
+            means = np.convolve(
+                late, np.full(min(cycle, len(late)), 1 / min(cycle, len(late))), "valid"
+            )
             healthy = during if abs(event.factor) >= _HEALTHY else during[:0]
             blocked, gone = _blocked(before[-1], np.concatenate([healthy, after]), h)
             if event.lasts > _RIDDEN:  # nobody asks it to ride that through
                 away, blocked, gone = 0.0, 0.0, False
             early = float(np.abs(during[2 * cycle : 3 * cycle]).mean())
-            answers.append(Answer(event, float(size.max()), early, float(means.max()), float(away), blocked, gone))
+            answers.append(
+                Answer(
+                    event, float(size.max()), early, float(means.max()), float(away), blocked, gone
+                )
+            )
             if away > _BACK:
                 return None
     return None
@@ -188,10 +244,14 @@ def _blocked(before: complex, current: Complex, h: float) -> tuple[float, bool]:
     if abs(before) < _GIVES or not len(current):
         return 0.0, False
     pauses = np.diff(np.concatenate([[-1], some])) - 1
-    return float(pauses.max(initial=0)) * h, not len(some) or len(current) - 1 - some[-1] > _BLOCKS_FOR / h
+    return float(pauses.max(initial=0)) * h, not len(some) or len(current) - 1 - some[
+        -1
+    ] > _BLOCKS_FOR / h
 
 
-def _judged(subject: Subject, answers: list[Answer], refused: list[str], left_out: int) -> CheckResult:
+def _judged(
+    subject: Subject, answers: list[Answer], refused: list[str], left_out: int
+) -> CheckResult:
     if not answers:
         return remarked("limits", "; ".join(refused[:2]), "ask how it rides through")
     worst, highest = max(answers, key=lambda a: a.mean), max(answers, key=lambda a: a.peak)
@@ -204,26 +264,47 @@ def _judged(subject: Subject, answers: list[Answer], refused: list[str], left_ou
     )
     seen += f"; {left_out} more were left out for time" if left_out else ""
     figures = {
-        "peak": highest.peak, "mean": worst.mean, "declared": declared, "tried": len(answers), "left_out": left_out,
-    }  # fmt: skip
+        "peak": highest.peak,
+        "mean": worst.mean,
+        "declared": declared,
+        "tried": len(answers),
+        "left_out": left_out,
+    }
     if declared is not None and worst.mean > 1.05 * declared:
-        return failed("limits", "above its current limit", f"{seen}; {declared:g} pu is declared", **figures)
+        return failed(
+            "limits", "above its current limit", f"{seen}; {declared:g} pu is declared", **figures
+        )
     machine = subject.is_machine
     unsaid = declared is None and not machine
-    seen += "; it is a machine, whose current nothing limits" if machine and declared is None else ""
+    seen += (
+        "; it is a machine, whose current nothing limits" if machine and declared is None else ""
+    )
     if unsaid and worst.mean > NO_LIMIT:
         return failed("limits", "no current limit", seen, **figures)
     turned = [a for a in answers if a.event.factor.imag]
     late = max((a for a in turned if a.event.before), key=lambda a: a.early, default=None)
-    alike = [a.early for a in turned if late and not a.event.before and _is_turned_alike(a.event, late.event)]
+    alike = [
+        a.early
+        for a in turned
+        if late and not a.event.before and _is_turned_alike(a.event, late.event)
+    ]
     if not machine and late and alike and late.early > _IN_VOLTAGE * max(alike):
         says = f"{late.early:.3g} pu in a phase jump's third cycle in a voltage that lasts, {max(alike):.3g} pu without"
         return failed("limits", "no current limit", f"{says}; {seen}", **figures)
     bolted = max((a.mean for a in answers if a.event.factor == 0), default=worst.mean)
-    deep = max((a for a in answers if 0 < abs(a.event.factor) < _HEALTHY), key=lambda a: a.mean, default=worst)
+    deep = max(
+        (a for a in answers if 0 < abs(a.event.factor) < _HEALTHY),
+        key=lambda a: a.mean,
+        default=worst,
+    )
     if unsaid and deep.mean > max(_UNEVEN * bolted, _MUCH):
         says = f"{deep.mean:.3g} pu in {deep.event}, and no more than {bolted:.3g} pu in a dip to no voltage"
-        return failed("limits", "no current limit", f"a limit that acts in some dips only: {says}; {seen}", **figures)
+        return failed(
+            "limits",
+            "no current limit",
+            f"a limit that acts in some dips only: {says}; {seen}",
+            **figures,
+        )
     longest = max(answers, key=lambda a: a.blocked)
     if longest.blocked > _BLOCKS_FOR:
         says = f"it gives no current for {1000 * longest.blocked:.0f} ms at a healthy voltage around {longest.event}"
@@ -237,5 +318,7 @@ def _judged(subject: Subject, answers: list[Answer], refused: list[str], left_ou
             f", and after {len(lost) - 1} more" if len(lost) > 1 else ""
         )
     if lost or refused or gone or highest.peak > 10:
-        return remarked("limits", seen, "ask how it limits its current and rides through", **figures)
+        return remarked(
+            "limits", seen, "ask how it limits its current and rides through", **figures
+        )
     return passed("limits", seen, **figures)

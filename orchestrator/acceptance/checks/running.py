@@ -6,7 +6,15 @@ from time import perf_counter, process_time
 
 import numpy as np
 
-from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import (
+    SAME,
+    CheckResult,
+    check,
+    failed,
+    not_applicable,
+    passed,
+    remarked,
+)
 from orchestrator.acceptance.checks.comparing import difference
 from orchestrator.acceptance.checks.settings import elsewhere
 from orchestrator.acceptance.checks.subject import STEPS_IN_A_ROUND, Subject
@@ -16,8 +24,10 @@ from orchestrator.fmi.component import RealBatch
 
 RUN_FOR = 2.0  # time [s] for which an FMU is made to run
 _PATIENCE = 10.0  # how many times as long it may take to come to its experiment's end
-_LOADED = 4.0  # how many times as long a run may take as it computes, on a machine that is busy with other things
-_HELD, _ROUNDS = 50, 4  # steps for which inputs stay; how often they change before it is looked at the clock
+# how many times as long a run may take as it computes, on a machine that is busy with other things
+_LOADED = 4.0
+# steps for which inputs stay; how often they change before it is looked at the clock
+_HELD, _ROUNDS = 50, 4
 
 _WANDERS = 0.5  # part of its current's range by which that may differ a round of inputs later
 _LOOK = 2.5  # simulated time [s] from one look at its memory to the next
@@ -35,17 +45,27 @@ def runs(subject: Subject) -> CheckResult:
         spent, k = spent_since(), 0
         sizes = subject.memory["bytes"] = []
         seen, taken = list[Numbers](), list[float]()
-        while k * h < max(ends, LONGEST) and spent() < (least if k * h >= min(ends, LONGEST) else _PATIENCE * least):
+        while k * h < max(ends, LONGEST) and spent() < (
+            least if k * h >= min(ends, LONGEST) else _PATIENCE * least
+        ):
             steps, running.time, looked = _HELD * _ROUNDS, k * h, perf_counter()
             try:
                 values = running.record(steps, h, stimulus)
             except EndedError as error:
                 return _ended(subject, error)
             except ComponentError as error:
-                if error.time is None or error.time < ends - 0.5 * h or subject.description.stop_time is None:
+                if (
+                    error.time is None
+                    or error.time < ends - 0.5 * h
+                    or subject.description.stop_time is None
+                ):
                     return failed("runs", "error in a step", str(error), time=error.time)
                 subject.memory["stops_at"] = error.time
-                return remarked("runs", f"it stops after its experiment's end: {error}", "do not run it for longer")
+                return remarked(
+                    "runs",
+                    f"it stops after its experiment's end: {error}",
+                    "do not run it for longer",
+                )
             if not np.isfinite(values).all():
                 row = int(np.argmin(np.isfinite(values).all(axis=1)))
                 return _not_finite(subject, values[row], (k + row) * h)
@@ -54,7 +74,8 @@ def runs(subject: Subject) -> CheckResult:
             taken.append((perf_counter() - looked) / steps)
             if k * h >= _LOOK * (len(sizes) + 1):
                 sizes.append((k, subject.memory_in_use()))
-    seconds = subject.memory["seconds_per_step"] = float(np.percentile(taken, 25))  # not what else the machine did
+    # not what else the machine did
+    seconds = subject.memory["seconds_per_step"] = float(np.percentile(taken, 25))
     subject.memory["wanders_at"] = _wanders(subject, np.array(seen)) * _HELD * _ROUNDS * h
     if k * h < min(ends, LONGEST) - 0.5 * h:
         says = f"not judged from t = {k * h:.4g} s on: {_PATIENCE * least:g} s were up, at {1e6 * seconds:.1f} µs a "
@@ -62,7 +83,11 @@ def runs(subject: Subject) -> CheckResult:
         remedy = "run the check for longer, or declare a longer step or a shorter experiment (DefaultExperiment)"
         return remarked("runs", says, remedy, steps=k)
     says = f"{k} steps of {h:g} s, {k * h:.3g} s in all, at {1e6 * seconds:.1f} µs a step; outputs were read at each"
-    says += "" if k * h >= ends - 0.5 * h else f"; its experiment's rest, to t = {ends:g} s, was not run"
+    says += (
+        ""
+        if k * h >= ends - 0.5 * h
+        else f"; its experiment's rest, to t = {ends:g} s, was not run"
+    )
     return passed("runs", says, steps=k, step_size=h, microseconds_per_step=1e6 * seconds)
 
 
@@ -72,7 +97,10 @@ def _wanders(subject: Subject, seen: Numbers) -> int:
     if not subject.port or len(seen) <= begun:
         return 0
     current = seen[:, [subject.outputs.index(n) for n in ("i_re", "i_im")]]
-    apart = np.abs(current[begun:] - current[:-begun]).max(axis=1) > _WANDERS * np.ptp(current[:begun], axis=0).max()
+    apart = (
+        np.abs(current[begun:] - current[:-begun]).max(axis=1)
+        > _WANDERS * np.ptp(current[:begun], axis=0).max()
+    )
     return begun + int(np.argmax(apart)) if apart.any() else 0
 
 
@@ -104,7 +132,9 @@ def _ended(subject: Subject, error: EndedError) -> CheckResult:
         row = int(np.argmin(np.isfinite(values).all(axis=1)))
         return _not_finite(subject, values[row], row * h)
     subject.memory["ended_at"] = ended
-    return remarked("runs", text, f"an orderly end, no error: let a run stop by t = {ended:.6g} s", time=ended)
+    return remarked(
+        "runs", text, f"an orderly end, no error: let a run stop by t = {ended:.6g} s", time=ended
+    )
 
 
 def _not_finite(subject: Subject, values: Numbers, time: float) -> CheckResult:
@@ -118,7 +148,13 @@ def affordable(subject: Subject, steps: int, step_size: float | None = None) -> 
     """As many steps, or as many as fit into half a second and into half of the experiment that the file declares."""
     fit = max(40, 0.5 / subject.memory.get("seconds_per_step", 1e-6))
     ends = subject.ends
-    return int(min(steps, fit, steps if ends is None else max(10, 0.5 * ends / (step_size or subject.step_size))))
+    return int(
+        min(
+            steps,
+            fit,
+            steps if ends is None else max(10, 0.5 * ends / (step_size or subject.step_size)),
+        )
+    )
 
 
 @check("reading", "Does reading leave it as it was?", needs=SAME)
@@ -130,7 +166,9 @@ def reading(subject: Subject) -> CheckResult:
     rows = [plain[0]]
     with subject.running() as running:
         everything = [
-            n for n, v in subject.description.variables.items() if v.type == "Real" and v.reference < 2**32 - 1
+            n
+            for n, v in subject.description.variables.items()
+            if v.type == "Real" and v.reference < 2**32 - 1
         ]
         backwards = RealBatch(running.component, everything[::-1])
         for k in range(steps):
@@ -147,7 +185,9 @@ def reading(subject: Subject) -> CheckResult:
     if apart > EQUAL:
         says = f"{subject.watched[place]} differs by {apart:.3g} of its range where everything was read in between"
         return failed("reading", "reading changes it", says, difference=apart)
-    return passed("reading", f"{len(everything)} variables read backwards at every step change nothing")
+    return passed(
+        "reading", f"{len(everything)} variables read backwards at every step change nothing"
+    )
 
 
 @check("start_values", "Do its variables start where the file says?")
@@ -163,14 +203,18 @@ def start_values(subject: Subject) -> CheckResult:
         and not (subject.port and n in ("v_re", "v_im"))
     ]
     if not names:
-        return not_applicable("start_values", "because no Real parameter or input of its own has a start value")
+        return not_applicable(
+            "start_values", "because no Real parameter or input of its own has a start value"
+        )
     component = subject.open()
     try:
         component.setup(0.0, None)
         component.enter_initialization_mode()
         values = component.get(names)
     except ComponentError as error:
-        return not_applicable("start_values", f"because it cannot be read while it is initialised: {error}")
+        return not_applicable(
+            "start_values", f"because it cannot be read while it is initialised: {error}"
+        )
     finally:
         component.close()
     wrong = [
@@ -197,4 +241,6 @@ def _not_taken(subject: Subject) -> str | None:
     except ComponentError:
         return None  # it may refuse values that do not go together
     lost = [n for n, v in found.items() if v == start[n].start_number != wanted[n]]
-    return f"{lost[0]} was set to {wanted[lost[0]]:g} and stays {found[lost[0]]:g}" if lost else None
+    return (
+        f"{lost[0]} was set to {wanted[lost[0]]:g} and stays {found[lost[0]]:g}" if lost else None
+    )

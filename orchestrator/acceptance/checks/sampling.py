@@ -3,21 +3,37 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import (
+    SAME,
+    CheckResult,
+    check,
+    failed,
+    not_applicable,
+    passed,
+    remarked,
+)
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import Subject
 from orchestrator.errors import ComponentError
 
 _FINER = 8  # it is also looked at with steps so many times smaller
 _IDLE = 2.01  # steps from one change to the next above which more than half of all steps do nothing
-_LENGTHS = (200, 2000, 20000)  # steps of a run; the next longer one where the last one saw too few changes
+# steps of a run; the next longer one where the last one saw too few changes
+_LENGTHS = (200, 2000, 20000)
 _SINGLE = 400  # steps of a run in which every input is set, and every output read, by itself
 _CHANGES = 4  # times from change to change that a sample time takes to be seen
-_MOST_MOVE = 0.7  # part of all steps that must move the outputs for a step that does not to be a step that was skipped
-_MOST_STEPS = 1.05  # mean steps from change to change that are every step: it may rest where a number is rounded
+# part of all steps that must move the outputs for a step that does not to be a step that was
+# skipped
+_MOST_MOVE = 0.7
+# mean steps from change to change that are every step: it may rest where a number is rounded
+_MOST_STEPS = 1.05
 
 
-@check("sample_time", "Do its outputs change with every step, or at times of its own?", needs=(*SAME, "reading"))
+@check(
+    "sample_time",
+    "Do its outputs change with every step, or at times of its own?",
+    needs=(*SAME, "reading"),
+)
 def sample_time(subject: Subject) -> CheckResult:
     """Move all inputs before every step and see in which steps the outputs move."""
     h = subject.step_size
@@ -34,7 +50,9 @@ def sample_time(subject: Subject) -> CheckResult:
         except ComponentError:
             finer = None  # it has steps of its own size only, which is no fault
         if finer is None or finer <= h / _FINER * 1.001:
-            return passed("sample_time", f"its outputs change with every step of {h:g} s", sample_time=None)
+            return passed(
+                "sample_time", f"its outputs change with every step of {h:g} s", sample_time=None
+            )
         said = f"its outputs change every {_seconds(finer)} only; with steps of {_seconds(h)} that is every step"
         return passed("sample_time", said, sample_time=finer)
     idle = f"its outputs change every {_seconds(own)} only: {1 - h / own:.0%} of all steps of {_seconds(h)} do nothing"
@@ -51,7 +69,9 @@ def _sample_time(subject: Subject, step_size: float) -> float | None:
         steps = affordable(subject, length, step_size)
         gaps = [_gap(column) for column in _changes(subject, steps, step_size).T]
         found = min((gap for gap in gaps if gap is not None), default=found)
-        if steps < length or (found is not None and (length > _LENGTHS[0] or found == round(found))):
+        if steps < length or (
+            found is not None and (length > _LENGTHS[0] or found == round(found))
+        ):
             break  # what is no multiple of the step is known better after more of them
     if found is None:
         return None
@@ -60,7 +80,9 @@ def _sample_time(subject: Subject, step_size: float) -> float | None:
 
 def _skipped(subject: Subject, step_size: float) -> float | None:
     """Time of a single step in which no output moves although outputs move before and after it; else None."""
-    moved = np.asarray(_changes(subject, affordable(subject, _LENGTHS[1], step_size), step_size).any(axis=1))
+    moved = np.asarray(
+        _changes(subject, affordable(subject, _LENGTHS[1], step_size), step_size).any(axis=1)
+    )
     idle = np.flatnonzero(~moved[1:-1] & moved[:-2] & moved[2:]) + 1
     if not len(idle) or moved.mean() < _MOST_MOVE:
         return None
@@ -103,7 +125,11 @@ def _gap(changed: NDArray[np.bool_]) -> float | None:
 
 
 def _seconds(time: float) -> str:
-    unit, size = next((u, s) for u, s in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)) if time >= 0.0999 * s or u == "µs")
+    unit, size = next(
+        (u, s)
+        for u, s in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6))
+        if time >= 0.0999 * s or u == "µs"
+    )
     if unit == "ms" and time < 0.999e-3:
         unit, size = "µs", 1e-6
     return f"{time / size:.3g} {unit}"

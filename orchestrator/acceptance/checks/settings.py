@@ -19,9 +19,17 @@ def elsewhere(subject: Subject, *, switches: bool = True) -> dict[str, float | b
             continue
         value, low, high = info.start_number, info.minimum, info.maximum
         # A whole number without a unit may stand for a flag, a mode or a count, which has no values between.
-        flag = info.type == "Real" and value == round(value) and (info.unit or "").strip().lower() in _NO_UNIT
+        flag = (
+            info.type == "Real"
+            and value == round(value)
+            and (info.unit or "").strip().lower() in _NO_UNIT
+        )
         if flag or info.type == "Integer":
-            others = [] if low is None or high is None else [n for n in (value - 1, value + 1) if low <= n <= high]
+            others = (
+                []
+                if low is None or high is None
+                else [n for n in (value - 1, value + 1) if low <= n <= high]
+            )
             if others and (flag or switches):
                 found[name] = others[-1]
         elif info.type == "Real":
@@ -41,7 +49,9 @@ def _settings(subject: Subject) -> list[dict[str, float | bool]]:
     """Parameters to look at it with: as they are, and with its tunable Booleans the other way."""
     variables = subject.description.variables.values()
     names = [
-        v.name for v in variables if v.causality == "parameter" and v.variability == "tunable" and v.type == "Boolean"
+        v.name
+        for v in variables
+        if v.causality == "parameter" and v.variability == "tunable" and v.type == "Boolean"
     ]
     toggled: dict[str, float | bool] = {n: not _switched_on(subject, n) for n in names}
     found = [{}, *({n: toggled[n]} for n in names[:_MOST_SWITCHES])]
@@ -49,10 +59,16 @@ def _settings(subject: Subject) -> list[dict[str, float | bool]]:
 
 
 def _in_words(setting: Setting) -> str:
-    return f", with {', '.join(f'{n} = {str(v).lower()}' for n, v in setting.items())}" if setting else ""
+    return (
+        f", with {', '.join(f'{n} = {str(v).lower()}' for n, v in setting.items())}"
+        if setting
+        else ""
+    )
 
 
-def with_each_setting(subject: Subject, look: Callable[[Setting], Look]) -> Iterator[tuple[Look, str]]:
+def with_each_setting(
+    subject: Subject, look: Callable[[Setting], Look]
+) -> Iterator[tuple[Look, str]]:
     """What a look gives with one setting after another, and the setting in words.
 
     A setting with which the FMU does not work is passed over."""

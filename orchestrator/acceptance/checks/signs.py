@@ -8,7 +8,15 @@ from typing import Any
 import numpy as np
 
 from orchestrator.acceptance.checks import droop as droops
-from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import (
+    SAME,
+    CheckResult,
+    check,
+    failed,
+    not_applicable,
+    passed,
+    remarked,
+)
 from orchestrator.acceptance.checks.port import WHY, cannot_import, of_current
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
@@ -17,29 +25,36 @@ from orchestrator.binding.misfits import SLIGHT, Misfit, at_rest, made_for, of_f
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.port import BoundDescription
 
-_LASTS, _SHORTER = 3.0, 0.67  # time [s] in which an answer settles, and the part of it at other voltages
+# time [s] in which an answer settles, and the part of it at other voltages
+_LASTS, _SHORTER = 3.0, 0.67
 
 _EARLY = (0.005, 0.025)
 """Cycle in which a converter is still the source behind its impedance that it was; oscillations of the network's
 frequency have no mean over it."""
 
-_MORE = 0.97  # late reactive power, in parts of the first cycle's, from which to look closer: a droop leaves less
+# late reactive power, in parts of the first cycle's, from which to look closer: a droop leaves less
+_MORE = 0.97
 _SOME = 1e-3  # change of power [pu, S_n] that is an answer
 _SETTLED = 0.05  # part of an answer by which it may still move
 _AWAY = 0.5  # power [pu, S_n] by which it may differ after such small changes, and be stable
-_LOST = 0.02  # power [pu, S_n] that still moves where an angle runs; an answer that settles slowly moves less
-_EACH = 5e-3  # power [pu, S_n] of the wrong sign after a change in one direction, which has terms of second order
-_TURNED = 0.1  # part of the first cycle's reactive power by which its droop lowers the answer, or raises it
+# power [pu, S_n] that still moves where an angle runs; an answer that settles slowly moves less
+_LOST = 0.02
+# power [pu, S_n] of the wrong sign after a change in one direction, which has terms of second order
+_EACH = 5e-3
+# part of the first cycle's reactive power by which its droop lowers the answer, or raises it
+_TURNED = 0.1
 _RINGS, _DAMPED, _TOLD = 1e-3, 0.8, 0.5
 """Swing [pu, S_n] in the end that counts; parts of the swing before from which it is not damped, and is told."""
 
-_CROSSINGS = 6  # changes of sign in a third of the time, from which a swing is fast enough to be judged in it
+# changes of sign in a third of the time, from which a swing is fast enough to be judged in it
+_CROSSINGS = 6
 _OMEGA_APART = 2e-4
 """Deviation of a settled omega from the network's [pu]: a fifth of the change; a wrong sign or base leaves 0.6 or more
 of the change, a frequency meter's own error far less."""
 
 _OTHER_F_N = 0.02  # by which the part of 50 or 60 Hz in the other may be missed
-_HIGH, _LOW = (1.095, 1.105), (0.895, 0.905)  # voltages [pu] of which one is drawn: the ends of what is usual
+# voltages [pu] of which one is drawn: the ends of what is usual
+_HIGH, _LOW = (1.095, 1.105), (0.895, 0.905)
 _DROOP_OF_Q = "the sign of its droop of reactive power"
 _SIGNS, _WORDS = (1.0, -1.0), ("less", "more")  # of the changes of voltage and frequency
 
@@ -52,7 +67,8 @@ def rated_frequency(subject: Subject) -> CheckResult:
     """An FMU for 60 Hz that is bound as one of 50 Hz has omega = 1.2."""
     if not subject.port or not _shows_omega(subject):
         return not_applicable(
-            "rated_frequency", "because it has no output 'omega' in pu (a binding's [signals] may name one)"
+            "rated_frequency",
+            "because it has no output 'omega' in pu (a binding's [signals] may name one)",
         )
     steps = affordable(subject, 2000)
     with subject.running() as running:
@@ -89,13 +105,20 @@ def signs(subject: Subject) -> CheckResult:
     steps = int(min(_LASTS / subject.step_size, fit))
     if steps * subject.step_size < 0.5:
         return not_applicable(
-            "signs", f"because {steps} steps of {subject.step_size:g} s show too little of its answer"
+            "signs",
+            f"because {steps} steps of {subject.step_size:g} s show too little of its answer",
         )
     places = [droops.POINT]
     if subject.starts:
         draw = subject.random("signs")
-        high, low = (OperatingAt(round(draw.uniform(*bounds), 3), 0.0, 0.6, 0.1) for bounds in (_HIGH, _LOW))
-        places += [p for p in (subject.use.point, droops.ABSORBING, droops.CHARGING, high, low) if p is not None]
+        high, low = (
+            OperatingAt(round(draw.uniform(*bounds), 3), 0.0, 0.6, 0.1) for bounds in (_HIGH, _LOW)
+        )
+        places += [
+            p
+            for p in (subject.use.point, droops.ABSORBING, droops.CHARGING, high, low)
+            if p is not None
+        ]
     seen, refused = list[CheckResult](), []
     for point in places:
         if point is droops.CHARGING and cannot_import(subject, point):
@@ -107,7 +130,9 @@ def signs(subject: Subject) -> CheckResult:
         except ComponentError as error:
             if point is droops.CHARGING:
                 continue
-            refused.append(f"small changes of voltage or frequency at {_named(point)} end with an error: {error}")
+            refused.append(
+                f"small changes of voltage or frequency at {_named(point)} end with an error: {error}"
+            )
             continue
         if result.fault:
             return result
@@ -132,29 +157,43 @@ def _evenly(giving: CheckResult, taking: CheckResult) -> CheckResult:
 
     It lowers the answer to the voltage from the first cycle on, or raises it: not by turns."""
     settled = all(result.figures["moving"][0] < droops.SETTLED for result in (giving, taking))
-    kept, kept_now = (result.figures["Q_in_parts_of_the_first_cycle"] for result in (giving, taking))
+    kept, kept_now = (
+        result.figures["Q_in_parts_of_the_first_cycle"] for result in (giving, taking)
+    )
     if settled and min(kept, kept_now) < 1 - _TURNED and max(kept, kept_now) > 1 + _TURNED:
         says = f"of the reactive power that less voltage brings in the first cycle {kept_now:.0%} are left in the end "
-        return failed("signs", "uneven droop", f"{says}while it takes power, and {kept:.0%} while it gives some",
-                      **taking.figures)  # fmt: skip
+        return failed(
+            "signs",
+            "uneven droop",
+            f"{says}while it takes power, and {kept:.0%} while it gives some",
+            **taking.figures,
+        )
     return taking
 
 
 def _named(point: OperatingAt) -> str:
     turned = f", theta_0 = {point.theta:g} rad" if point.theta else ""
-    return f"P_0 = {point.P:.3g}, Q_0 = {point.Q:.3g}{turned}" + (f", v_0 = {point.v:g}" if point.v != 1 else "")
+    return f"P_0 = {point.P:.3g}, Q_0 = {point.Q:.3g}{turned}" + (
+        f", v_0 = {point.v:g}" if point.v != 1 else ""
+    )
 
 
 def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
     voltage, frequency = _answers(subject, steps, point)
     figures: dict[str, Any] = {
-        "Q_of_lower_voltage": voltage.power.imag, "P_of_lower_frequency": frequency.power.real,
+        "Q_of_lower_voltage": voltage.power.imag,
+        "P_of_lower_frequency": frequency.power.real,
         "moving": [voltage.moving, frequency.moving],
         "Q_in_parts_of_the_first_cycle": voltage.power.imag / voltage.early_power.imag
-        if voltage.early_power.imag > _SOME else 1.0,
-    }  # fmt: skip
+        if voltage.early_power.imag > _SOME
+        else 1.0,
+    }
     if not np.isfinite([voltage.far, frequency.far]).all():
-        return failed("signs", "not a number", "its power is no number after small changes, and fmi2DoStep returned OK")
+        return failed(
+            "signs",
+            "not a number",
+            "its power is no number after small changes, and fmi2DoStep returned OK",
+        )
     wrong, unknown = _wrong(point, voltage, frequency), ""
     if not wrong and (misfit := _wrong_omega(frequency, _rated(subject))):
         wrong = misfit.fault, misfit.evidence
@@ -177,17 +216,26 @@ def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
     late = max((late for before, late, _ in swings if late > _TOLD * before), default=0.0)
     if late > _RINGS:
         says = f"its power still swings by {late:.2g} pu about its course ({said})"
-        return remarked("signs", says, "ask how it is damped, and at which network impedance", **figures)
+        return remarked(
+            "signs", says, "ask how it is damped, and at which network impedance", **figures
+        )
     if lag := _lag(frequency):
         remedy = "ask for its time constant: what is controlled or judged by omega comes so late"
         return remarked("signs", f"{lag} ({said})", remedy, **figures)
     return passed("signs", said, **figures)
 
 
-def _answers(subject: Subject, steps: int, point: OperatingAt) -> tuple[droops.DroopAnswer, droops.DroopAnswer]:
+def _answers(
+    subject: Subject, steps: int, point: OperatingAt
+) -> tuple[droops.DroopAnswer, droops.DroopAnswer]:
     omega = 2 * pi * _rated(subject) * droops.FREQUENCY
     return (
-        _answer(subject, steps, point, lambda sign, time: np.full(len(time), 1 - sign * droops.VOLTAGE, complex)),
+        _answer(
+            subject,
+            steps,
+            point,
+            lambda sign, time: np.full(len(time), 1 - sign * droops.VOLTAGE, complex),
+        ),
         _answer(subject, steps, point, lambda sign, time: np.exp(-1j * sign * omega * time)),
     )
 
@@ -221,7 +269,9 @@ def _answer(
     half = [(a - b) / 2 for a, b in zip(*found, strict=True)]
     i, s = ([part[window].mean() for window in windows] for part in half)
     moving, far = float(_apart(s[1], s[2])), max(way.far for way in ways)
-    return droops.DroopAnswer(complex(i[2]), complex(s[0]), complex(s[2]), moving, far, (ways[0], ways[1]))
+    return droops.DroopAnswer(
+        complex(i[2]), complex(s[0]), complex(s[2]), moving, far, (ways[0], ways[1])
+    )
 
 
 def _way(power: Complex, omega: Numbers | None, windows: list[slice]) -> droops.Way:
@@ -233,7 +283,14 @@ def _way(power: Complex, omega: Numbers | None, windows: list[slice]) -> droops.
     if omega is None:
         return droops.Way(later, _apart(late, later), far, None, 0.0, ringing)
     tail = omega[windows[1].start :]
-    return droops.Way(later, _apart(late, later), far, float(omega[windows[2]].mean()), float(np.ptp(tail)), ringing)
+    return droops.Way(
+        later,
+        _apart(late, later),
+        far,
+        float(omega[windows[2]].mean()),
+        float(np.ptp(tail)),
+        ringing,
+    )
 
 
 def _swing(power: Complex) -> tuple[float, int]:
@@ -249,16 +306,19 @@ def _apart(a: complex, b: complex) -> float:
     return max(abs(b.real - a.real), abs(b.imag - a.imag))
 
 
-def _wrong(point: OperatingAt, voltage: droops.DroopAnswer, frequency: droops.DroopAnswer) -> tuple[str, str] | None:
+def _wrong(
+    point: OperatingAt, voltage: droops.DroopAnswer, frequency: droops.DroopAnswer
+) -> tuple[str, str] | None:
     if frequency.far > _AWAY and voltage.far > _AWAY:
-        return "unstable", "small changes of voltage and of frequency at a stiff bus make its power run away"
+        return (
+            "unstable",
+            "small changes of voltage and of frequency at a stiff bus make its power run away",
+        )
     for answer, kind in zip((voltage, frequency), ("voltage", "frequency"), strict=True):
         for way in answer.ways:
             before, late, crossings = way.ringing
             if way.far < _AWAY and crossings >= _CROSSINGS and late > max(_RINGS, _DAMPED * before):
-                says = (
-                    f"after a small change of {kind} its power swings by {before:.2g} pu, and by {late:.2g} pu later on"
-                )
+                says = f"after a small change of {kind} its power swings by {before:.2g} pu, and by {late:.2g} pu later"
                 return "keeps moving", says
     if lost := _lost(voltage, frequency):
         return "loses synchronism", lost
@@ -266,13 +326,23 @@ def _wrong(point: OperatingAt, voltage: droops.DroopAnswer, frequency: droops.Dr
     least = _least(point)
     if steady[0] and voltage.power.imag < -least:
         return "wrong sign", "its reactive power falls with the voltage, and should rise"
-    if steady[1] and frequency.power.real < -_SOME - 3 * droops.FREQUENCY * abs(point.P):  # a constant torque's
+    if steady[1] and frequency.power.real < -_SOME - 3 * droops.FREQUENCY * abs(
+        point.P
+    ):  # a constant torque's
         return "wrong sign", "its active power falls with the frequency, and should rise"
-    for sign, word, by_voltage, by_frequency in zip(_SIGNS, _WORDS, voltage.ways, frequency.ways, strict=True):
+    for sign, word, by_voltage, by_frequency in zip(
+        _SIGNS, _WORDS, voltage.ways, frequency.ways, strict=True
+    ):
         if _rests(by_voltage) and sign * by_voltage.power.imag < -least - _EACH:
-            return "wrong sign", f"its reactive power changes by {by_voltage.power.imag:+.3g} pu with {word} voltage"
+            return (
+                "wrong sign",
+                f"its reactive power changes by {by_voltage.power.imag:+.3g} pu with {word} voltage",
+            )
         if _rests(by_frequency) and sign * by_frequency.power.real < -_EACH:
-            return "wrong sign", f"its active power changes by {by_frequency.power.real:+.3g} pu with {word} frequency"
+            return (
+                "wrong sign",
+                f"its active power changes by {by_frequency.power.real:+.3g} pu with {word} frequency",
+            )
     return None
 
 
@@ -287,7 +357,9 @@ def _rests(way: droops.Way) -> bool:
 
 def _lost(*answers: droops.DroopAnswer) -> str:
     """Which change makes it run away, where the opposite one does not; "" where there is none."""
-    for answer, kind, size in zip(answers, ("voltage", "frequency"), (droops.VOLTAGE, droops.FREQUENCY), strict=True):
+    for answer, kind, size in zip(
+        answers, ("voltage", "frequency"), (droops.VOLTAGE, droops.FREQUENCY), strict=True
+    ):
         for here, there, word in zip(answer.ways, answer.ways[::-1], _WORDS, strict=True):
             if here.far > _AWAY and here.moving > _LOST and there.far < _AWAY / 2:
                 return (
@@ -308,7 +380,9 @@ def _wrong_omega(frequency: droops.DroopAnswer, f_n: float) -> Misfit | None:
             says = f"omega moves by {part:.4g} times what the network's frequency does"
             return made_for(says, 1 / part, f_n, {})
         if abs(way.omega - network) > _OMEGA_APART:
-            says = f"omega settles at {way.omega:.6g} where the network's frequency is {network:.6g}"
+            says = (
+                f"omega settles at {way.omega:.6g} where the network's frequency is {network:.6g}"
+            )
             return Misfit("wrong frequency", says)
     return None
 
@@ -317,13 +391,21 @@ def _lag(frequency: droops.DroopAnswer) -> str:
     """How far an omega is behind that still moves where the power rests: where its angle rests, it has arrived."""
     for sign, way in zip(_SIGNS, frequency.ways, strict=True):
         network = 1 - sign * droops.FREQUENCY
-        if way.omega is not None and way.moving < droops.SETTLED and abs(way.omega - network) > _OMEGA_APART:
+        if (
+            way.omega is not None
+            and way.moving < droops.SETTLED
+            and abs(way.omega - network) > _OMEGA_APART
+        ):
             return f"omega is {way.omega:.6g} and still on its way to the network's {network:.6g}, and its power rests"
     return ""
 
 
 def _wrong_droop(
-    subject: Subject, steps: int, point: OperatingAt, voltage: droops.DroopAnswer, frequency: droops.DroopAnswer
+    subject: Subject,
+    steps: int,
+    point: OperatingAt,
+    voltage: droops.DroopAnswer,
+    frequency: droops.DroopAnswer,
 ) -> tuple[tuple[str, str] | None, str]:
     """Look closer where lower voltage brings more reactive power in the end than in the first cycle.
 
@@ -335,7 +417,11 @@ def _wrong_droop(
         return None, f"{not_judged}it takes no start values, or gives no reactive power at first"
     if max(voltage.moving, frequency.moving) > droops.SETTLED:
         steps *= 3
-    found = [] if max(voltage.moving, frequency.moving) > droops.SETTLED else [(point, voltage, frequency)]
+    found = (
+        []
+        if max(voltage.moving, frequency.moving) > droops.SETTLED
+        else [(point, voltage, frequency)]
+    )
     for other in (point, *droops.further(point))[len(found) :]:
         try:
             answers = _answers(subject, steps, other)

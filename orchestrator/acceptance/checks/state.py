@@ -3,7 +3,15 @@
 from contextlib import ExitStack
 from time import perf_counter
 
-from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import (
+    SAME,
+    CheckResult,
+    check,
+    failed,
+    not_applicable,
+    passed,
+    remarked,
+)
 from orchestrator.acceptance.checks.comparing import difference
 from orchestrator.acceptance.checks.events import Segment, factor, rows, scale
 from orchestrator.acceptance.checks.instances import IN_EVENTS, NOT_IN_EVENTS
@@ -13,10 +21,12 @@ from orchestrator.acceptance.checks.subject import Running, Stimulus, Subject, s
 from orchestrator.errors import ComponentError, EndedError
 from orchestrator.fmi.component import RealBatch
 
-_CLEAR = 1e-6  # relative difference above which something was not restored; an integrator may begin anew below it
+# relative difference above which something was not restored; an integrator may begin anew below it
+_CLEAR = 1e-6
 
 _EXACT = 1e-12
-_RESTARTED = 1e-2  # the same with dips and jumps, which amplify what an integrator leaves that begins anew
+# the same with dips and jumps, which amplify what an integrator leaves that begins anew
+_RESTARTED = 1e-2
 _STEPS = 600
 _READ = 1e-9  # relative difference of a state or parameter that is read just after it was restored
 
@@ -44,11 +54,15 @@ def state(subject: Subject) -> CheckResult:
     steps = affordable(subject, _STEPS)
     if worst > _CLEAR:
         says = f"{subject.watched[place]} differs by {worst:.3g} of its range after fmi2SetFMUstate and {steps} "
-        return failed("state", "hidden state", f"{says}equal steps{where}{_which(subject)}", difference=worst)
+        return failed(
+            "state", "hidden state", f"{says}equal steps{where}{_which(subject)}", difference=worst
+        )
     least = _CLEAR if worst <= _EXACT else _RESTARTED
     in_events = ""
     if subject.port:
-        for (apart, text), said in with_each_setting(subject, lambda setting: _in_events(subject, setting)):
+        for (apart, text), said in with_each_setting(
+            subject, lambda setting: _in_events(subject, setting)
+        ):
             if apart > least:
                 return failed("state", "hidden state", f"{text}{said}", difference=apart)
             in_events = in_events or (text if apart == 0 else IN_EVENTS)
@@ -95,11 +109,15 @@ def _in_events(subject: Subject, setting: Setting) -> tuple[float, str]:
     all_of_it = (before, in_dip, later, elsewhere, in_dip, elsewhere, later)
     times = scale(subject, sum(lasts for part in all_of_it for _, lasts in part))
     begin, dip, after, away = (
-        rows(subject, part, f"state {k}", times) for k, part in enumerate((before, in_dip, later, elsewhere))
+        rows(subject, part, f"state {k}", times)
+        for k, part in enumerate((before, in_dip, later, elsewhere))
     )
     h, found = subject.step_size, []
     try:
-        with subject.while_doing("in dips and jumps"), subject.running(parameters=setting) as running:
+        with (
+            subject.while_doing("in dips and jumps"),
+            subject.running(parameters=setting) as running,
+        ):
             running.hold(begin, len(begin), h)
             parts = (("within a dip", dip), ("after a dip", after))
             with ExitStack() as kept:
@@ -126,7 +144,9 @@ def settable_states(subject: Subject) -> CheckResult:
     """Set one state after another and read it back."""
     names = subject.description.states
     if not (subject.description.states_are_settable and names):
-        return not_applicable("settable_states", "because the FMU does not declare that its states can be set")
+        return not_applicable(
+            "settable_states", "because the FMU does not declare that its states can be set"
+        )
     h = subject.step_size
     with subject.running() as running:
         running.record(3, h, subject.steps(hold=h))
@@ -136,13 +156,17 @@ def settable_states(subject: Subject) -> CheckResult:
             running.component.set({name: wanted})
             found = float(running.component.values([name])[name])
             if not abs(found - wanted) <= 1e-6 * abs(wanted - before):
-                says = f"state {name} was {before:.9g}, was set to {wanted:.9g}, and reads {found:.9g}"
+                says = (
+                    f"state {name} was {before:.9g}, was set to {wanted:.9g}, and reads {found:.9g}"
+                )
                 return failed("settable_states", "state not taken", says)
             running.component.set({name: before})
     return passed("settable_states", f"{len(names)} states read as they were set")
 
 
-@check("state_size", "How large is the state, and does it stay so?", needs=(*SAME, "reading", "state"))
+@check(
+    "state_size", "How large is the state, and does it stay so?", needs=(*SAME, "reading", "state")
+)
 def state_size(subject: Subject) -> CheckResult:
     if not (subject.description.can_save_state and subject.description.can_serialize_state):
         return not_applicable("state_size", "because the FMU does not declare canSerializeFMUstate")
@@ -180,7 +204,8 @@ def _brought_back(subject: Subject, setting: Setting, moved: Setting) -> tuple[s
     with subject.running(parameters=setting) as running:
         states = RealBatch(running.component, subject.description.states)
         before = running.component.values(moved)
-        running.record(steps // 2 | 1, h, stimulus)  # odd: a control may be between two of its samples
+        # odd: a control may be between two of its samples
+        running.record(steps // 2 | 1, h, stimulus)
         tune(running, {n: not before[n] if isinstance(v, bool) else v for n, v in moved.items()})
         tuned, at, size = running.component.values(moved), running.time, states.read().copy()
         with saved(running) as kept:
@@ -194,8 +219,14 @@ def _brought_back(subject: Subject, setting: Setting, moved: Setting) -> tuple[s
                     running.restore(kept, at)
                     now = states.read().copy()
                     for k, name in enumerate(states.names):
-                        if abs(now[k] - size[k]) > _READ * max(abs(size[k]), abs(far[k] - size[k]), 1e-6):
-                            return f"state {name} was {size[k]:.9g} and reads {now[k]:.9g} after it", 0.0, 0
+                        if abs(now[k] - size[k]) > _READ * max(
+                            abs(size[k]), abs(far[k] - size[k]), 1e-6
+                        ):
+                            return (
+                                f"state {name} was {size[k]:.9g} and reads {now[k]:.9g} after it",
+                                0.0,
+                                0,
+                            )
                     found = running.component.values(moved)
                     if stays := [n for n in moved if found[n] != tuned[n]]:
                         says = f"{stays[0]} was {tuned[stays[0]]:g} and is {found[stays[0]]:g} after it"
@@ -231,4 +262,6 @@ def _serialised(running: Running, h: float, stimulus: Stimulus) -> str | None:
     if here is not None or subject.description.one_instance:
         return here
     with subject.running("another") as another:
-        return wrong(another, "in another instance, ", "in another instance that takes the state's bytes")
+        return wrong(
+            another, "in another instance, ", "in another instance that takes the state's bytes"
+        )

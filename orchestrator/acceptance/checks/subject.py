@@ -60,7 +60,9 @@ class Subject:
     # gives the process in which it runs, a new one after its end; whoever runs checks sets it.
     process: Callable[[], FmuProcess]
 
-    def __init__(self, description: FmuDescription, directory: Path, use: Use | None = None, seed: int = 1) -> None:
+    def __init__(
+        self, description: FmuDescription, directory: Path, use: Use | None = None, seed: int = 1
+    ) -> None:
         self.description, self.directory, self.doing, self.seed = description, directory, "", seed
         self.use, self.start_time = use or Use(), 0.0
         self.memory: dict[str, Any] = {}
@@ -69,12 +71,20 @@ class Subject:
         self.outputs = tuple(n for n in description.outputs if variables[n].type == "Real")
         self.port = {"v_re", "v_im"} <= set(self.inputs) and {"i_re", "i_im"} <= set(self.outputs)
         self.port &= (
-            all(variables[n].unit in ("pu", "p.u.") for n in ("v_re", "v_im", "i_re", "i_im")) if self.port else False
+            all(variables[n].unit in ("pu", "p.u.") for n in ("v_re", "v_im", "i_re", "i_im"))
+            if self.port
+            else False
         )
-        bound = description.port.start if isinstance(description, BoundDescription) else dict.fromkeys(START)
+        bound = (
+            description.port.start
+            if isinstance(description, BoundDescription)
+            else dict.fromkeys(START)
+        )
         wanted = ("P_0", "Q_0", "v_0", "theta_0")
         self.starts = self.port and all(n in bound and n in variables for n in wanted)
-        self.step_is_given = self.use.step_size is not None or description.default_step_size is not None
+        self.step_is_given = (
+            self.use.step_size is not None or description.default_step_size is not None
+        )
         self.step_size = self.use.step_size or self._step_size()
 
     def _step_size(self) -> float:
@@ -96,7 +106,10 @@ class Subject:
         self.doing = ""
 
     def running(
-        self, name: str = "fmu", point: OperatingAt | None = None, parameters: Mapping[str, float | bool] | None = None
+        self,
+        name: str = "fmu",
+        point: OperatingAt | None = None,
+        parameters: Mapping[str, float | bool] | None = None,
     ) -> "Running":
         """A new instance, initialised; use it as a context manager."""
         component = self.open(name)
@@ -129,7 +142,9 @@ class Subject:
     @property
     def ends(self) -> float | None:
         """When its experiment ends [s]: as declared, or where it was seen to end by itself; None where not known."""
-        known = [t for t in (self.description.stop_time, self.memory.get("ended_at")) if t is not None]
+        known = [
+            t for t in (self.description.stop_time, self.memory.get("ended_at")) if t is not None
+        ]
         return min(known, default=None)
 
     @property
@@ -157,8 +172,12 @@ class Subject:
     def start_inputs(self, point: OperatingAt | None) -> Numbers:
         """The inputs' values at an operating point; where they are not the port's, what the FMU declares."""
         voltage = (point or self.point).voltage
-        known = dict(self.use.inputs) | ({"v_re": voltage.real, "v_im": voltage.imag} if self.port else {})
-        return np.array([known.get(n, self.description.variables[n].start_number) for n in self.inputs])
+        known = dict(self.use.inputs) | (
+            {"v_re": voltage.real, "v_im": voltage.imag} if self.port else {}
+        )
+        return np.array(
+            [known.get(n, self.description.variables[n].start_number) for n in self.inputs]
+        )
 
     def random(self, purpose: str) -> np.random.Generator:
         """Random numbers for one purpose: equal ones whenever they are asked for."""
@@ -172,13 +191,18 @@ class Subject:
             info = self.description.variables[name]
             start = info.start_number
             size = 0.02 if self.port and name in ("v_re", "v_im") else max(0.05 * abs(start), 0.05)
-            room = [abs(limit - start) for limit in (info.minimum, info.maximum) if limit is not None]
+            room = [
+                abs(limit - start) for limit in (info.minimum, info.maximum) if limit is not None
+            ]
             sizes.append(min([size, *[0.5 * r for r in room if r > 0]]))
         return np.array(sizes)
 
     def steps(self, hold: float, seed: int = 1) -> Stimulus:
         """Steps of random height that are held for ``hold`` seconds; equal seeds give equal steps."""
-        heights = np.random.default_rng(seed).uniform(-1, 1, (STEPS_IN_A_ROUND, len(self.inputs))) * self.amplitudes
+        heights = (
+            np.random.default_rng(seed).uniform(-1, 1, (STEPS_IN_A_ROUND, len(self.inputs)))
+            * self.amplitudes
+        )
         return lambda time: heights[int(time / hold + 1e-6) % len(heights)]
 
     def one_step(self) -> Stimulus:
@@ -187,7 +211,9 @@ class Subject:
     def motion(self, step_size: float) -> Stimulus:
         return lambda time: self.amplitudes * np.sin(1.0 + 0.86 * time / step_size)
 
-    def trajectory(self, steps: int, step_size: float, stimulus: Stimulus, **options: Any) -> Numbers:
+    def trajectory(
+        self, steps: int, step_size: float, stimulus: Stimulus, **options: Any
+    ) -> Numbers:
         """Outputs at each communication point of a new instance, shape (steps + 1, number of outputs).
 
         ``step_size``: their length [s].
@@ -204,8 +230,13 @@ class Subject:
 class Running(Closing):
     """An initialised instance that knows its time."""
 
-    def __init__(self, subject: Subject, component: HostedComponent, point: OperatingAt | None = None,
-                 parameters: Mapping[str, float | bool] | None = None) -> None:  # fmt: skip
+    def __init__(
+        self,
+        subject: Subject,
+        component: HostedComponent,
+        point: OperatingAt | None = None,
+        parameters: Mapping[str, float | bool] | None = None,
+    ) -> None:
         self.subject, self.component, self.point = subject, component, point
         self.parameters = dict(parameters or {})
         self.begin()
@@ -237,8 +268,11 @@ class Running(Closing):
         """Step and read, shape (steps + 1, n); the first row is before the stimulus."""
         begin = self.time
         before = self.read()
-        rows = [stimulus(begin + k * step_size) for k in range(steps)]  # not accumulated: equal runs have equal times
-        return np.vstack([before, self.hold(np.array(rows).reshape(steps, len(self.rest)), steps, step_size)])
+        # not accumulated: equal runs have equal times
+        rows = [stimulus(begin + k * step_size) for k in range(steps)]
+        return np.vstack(
+            [before, self.hold(np.array(rows).reshape(steps, len(self.rest)), steps, step_size)]
+        )
 
     def hold(self, deviations: Numbers, steps: int, step_size: float) -> Numbers:
         """Step many times at once, shape (steps, n): what was read after each.

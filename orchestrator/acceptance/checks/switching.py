@@ -13,13 +13,17 @@ from orchestrator.acceptance.checks.comparing import scales
 from orchestrator.arrays import Numbers
 
 _LEVELS = 4  # A signal with more values than that does not switch
-_ALIKE = 0.05  # difference of all else at the moments of switching, of its range, beyond what one step moves it
+# difference of all else at the moments of switching, of its range, beyond what one step moves it
+_ALIKE = 0.05
 _DWELL = 0.1  # relative difference of the times between two switchings
 _STEPS = 2.0  # how many of the longer steps a time between two switchings may differ by
-Interval = tuple[Numbers, float]  # what was read after every step, from the start on, and the step [s]
+# what was read after every step, from the start on, and the step [s]
+Interval = tuple[Numbers, float]
 
 
-def switches_elsewhere(names: Sequence[str], pairs: Sequence[tuple[Interval, Interval]]) -> list[str]:
+def switches_elsewhere(
+    names: Sequence[str], pairs: Sequence[tuple[Interval, Interval]]
+) -> list[str]:
     """Names of signals that switch at other moments in runs that are otherwise alike; empty where more differs."""
     found: dict[str, None] = {}
     for first, second in pairs:
@@ -71,7 +75,10 @@ def _moments(
 
 
 def _alike(
-    a: NDArray[np.float64], b: NDArray[np.float64], moments: tuple[NDArray[np.intp], NDArray[np.intp]], size: float
+    a: NDArray[np.float64],
+    b: NDArray[np.float64],
+    moments: tuple[NDArray[np.intp], NDArray[np.intp]],
+    size: float,
 ) -> bool:
     """Whether a signal is the same at the moments of switching, as far as these may be a step late."""
     first, second = moments

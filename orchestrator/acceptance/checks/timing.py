@@ -5,7 +5,15 @@ from contextlib import suppress
 
 import numpy as np
 
-from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.base import (
+    SAME,
+    CheckResult,
+    check,
+    failed,
+    not_applicable,
+    passed,
+    remarked,
+)
 from orchestrator.acceptance.checks.comparing import scales
 from orchestrator.acceptance.checks.port import voltage_rows
 from orchestrator.acceptance.checks.running import affordable
@@ -14,7 +22,8 @@ from orchestrator.acceptance.checks.switching import switches_elsewhere
 from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError
 
-_BEYOND = 32.0  # times as much that twice the step may differ: a method of fourth order is 16 times as far off
+# times as much that twice the step may differ: a method of fourth order is 16 times as far off
+_BEYOND = 32.0
 _LARGE = 0.1
 _CLEARLY = 0.15  # part of a difference that a shift may leave, and be its cause
 _RATIOS = ((7, 10), (13, 10), (17, 12), (7, 4))
@@ -23,10 +32,15 @@ _RATIOS = ((7, 10), (13, 10), (17, 12), (7, 4))
 _DELAYS = 5  # communication steps of delay that are looked for
 
 
-_VOLTAGES = (1.08, 0.6)  # at which it is looked as well [pu]: a limit or an arrester may act there only
+# at which it is looked as well [pu]: a limit or an arrester may act there only
+_VOLTAGES = (1.08, 0.6)
 
 
-@check("feedthrough", "Does what its outputs depend on at once agree with what it declares?", needs=("reading",))
+@check(
+    "feedthrough",
+    "Does what its outputs depend on at once agree with what it declares?",
+    needs=("reading",),
+)
 def feedthrough(subject: Subject) -> CheckResult:
     """Change one input after another, without a step, and see which outputs follow."""
     if not subject.inputs or not subject.outputs:
@@ -34,10 +48,14 @@ def feedthrough(subject: Subject) -> CheckResult:
     seen = _observed(subject)
     subject.memory["feedthrough"] = seen
     declared = {n: subject.description.feedthrough(n) for n in subject.outputs}
-    hidden = {n: sorted(seen[n] - set(declared[n])) for n in subject.outputs if seen[n] - set(declared[n])}
+    hidden = {
+        n: sorted(seen[n] - set(declared[n])) for n in subject.outputs if seen[n] - set(declared[n])
+    }
     observed = {n: sorted(v) for n, v in seen.items()}
     if hidden:
-        text = "; ".join(f"{n} follows {', '.join(names[:4])} at once" for n, names in list(hidden.items())[:3])
+        text = "; ".join(
+            f"{n} follows {', '.join(names[:4])} at once" for n, names in list(hidden.items())[:3]
+        )
         says = f"{text}, and the file says it does not"
         return failed("feedthrough", "undeclared feed-through", says, observed=observed)
     says = f"{sum(map(len, seen.values()))} direct dependencies seen, all of them declared"
@@ -89,7 +107,9 @@ def delay(subject: Subject) -> CheckResult:
     if stale := _stale(subject, declared=True):
         return failed("delay", "delayed output", stale, steps=1)
     if stale := _stale(subject, declared=False):
-        return remarked("delay", stale, "its partners see it one step late; ask for outputs that follow at once")
+        return remarked(
+            "delay", stale, "its partners see it one step late; ask for outputs that follow at once"
+        )
     says = f"no shift by communication steps is seen from {subject.step_size:g} s to {4 * subject.step_size:g} s"
     return passed("delay", says)
 
@@ -120,10 +140,14 @@ def _in_a_dip(subject: Subject) -> Iterator[tuple[str, tuple[Numbers, Numbers, N
         yield " in a dip to half of the voltage", runs
 
 
-def _runs_from(subject: Subject, base: float, stimulus: Stimulus) -> tuple[Numbers, Numbers, Numbers] | str:
+def _runs_from(
+    subject: Subject, base: float, stimulus: Stimulus
+) -> tuple[Numbers, Numbers, Numbers] | str:
     steps = 4 * (affordable(subject, 400) // 4)
     try:
-        one, two, four = (subject.trajectory(steps // many, many * base, stimulus) for many in (1, 2, 4))
+        one, two, four = (
+            subject.trajectory(steps // many, many * base, stimulus) for many in (1, 2, 4)
+        )
     except ComponentError as error:
         return str(error)
     return one, two, four
@@ -133,7 +157,9 @@ def _stays(runs: tuple[Numbers, Numbers, Numbers]) -> bool:
     """Whether the longer steps lead to numbers of the same order."""
     fine, *coarse = runs
     size = np.abs(fine).max(initial=1e-9)
-    return all(bool(np.isfinite(run).all()) and np.abs(run).max(initial=0.0) < 100 * size for run in coarse)
+    return all(
+        bool(np.isfinite(run).all()) and np.abs(run).max(initial=0.0) < 100 * size for run in coarse
+    )
 
 
 def _shift(fine: Numbers, coarse: Numbers, many: int) -> int:
@@ -169,7 +195,11 @@ def _stale(subject: Subject, *, declared: bool) -> str | None:
         return None
     for output in subject.outputs:
         said = known.get(output)
-        claimed = [n for n in subject.inputs if (said is None and not declared) or (declared and n in (said or ()))]
+        claimed = [
+            n
+            for n in subject.inputs
+            if (said is None and not declared) or (declared and n in (said or ()))
+        ]
         for name in claimed:
             if name in seen[output]:
                 continue
@@ -196,7 +226,11 @@ def _jump(subject: Subject, output: str, name: str, step_size: float) -> tuple[f
     return abs(ends[1] - ends[0]), abs(ends[0])
 
 
-@check("step_invariance", "Is its answer the same with other communication steps?", needs=(*SAME, "reading", "delay"))
+@check(
+    "step_invariance",
+    "Is its answer the same with other communication steps?",
+    needs=(*SAME, "reading", "delay"),
+)
 def step_invariance(subject: Subject) -> CheckResult:
     runs = _at_step_sizes(subject)
     if isinstance(runs, str):
@@ -207,27 +241,47 @@ def step_invariance(subject: Subject) -> CheckResult:
     h = subject.memory["base step"]
     figures = {"difference_H_2H": first, "difference_2H_4H": second}
     seen = (
-        f"steps of {h:g} and {2 * h:g} s differ by {first:.3g} of the range, {2 * h:g} and {4 * h:g} s by {second:.3g}"
+        f"steps of {h:g} and {2 * h:g} s differ by {first:.3g} of the range, "
+        f"{2 * h:g} and {4 * h:g} s by {second:.3g}"
     )
     converges = first < 0.75 * second
     breaks = second > _LARGE or second > max(1e-3, _BEYOND * first)
-    if first > _LARGE and (elsewhere := switches_elsewhere(subject.watched, [((fine, h), (double, 2 * h))])):
+    if first > _LARGE and (
+        elsewhere := switches_elsewhere(subject.watched, [((fine, h), (double, 2 * h))])
+    ):
         subject.memory["switching"] = True
         return _switching("step_invariance", elsewhere, seen, **figures)
     if first > _LARGE or (first > 1e-3 and not converges):
         return failed("step_invariance", "step-dependent answer", seen, **figures)
     if first > 1e-3:
-        return remarked("step_invariance", seen, "it converges, but needs a smaller communication step", **figures)
-    breaks = breaks and not switches_elsewhere(subject.watched, [((double, 2 * h), (fourfold, 4 * h))])
+        return remarked(
+            "step_invariance",
+            seen,
+            "it converges, but needs a smaller communication step",
+            **figures,
+        )
+    breaks = breaks and not switches_elsewhere(
+        subject.watched, [((double, 2 * h), (fourfold, 4 * h))]
+    )
     named = max(subject.description.default_step_size or 0.0, subject.use.step_size or 0.0)
     if breaks and h == subject.step_size and 4 * h <= named * (1 + 1e-9):
-        return failed("step_invariance", "step-dependent answer", f"{seen}, which it declares to bear", **figures)
+        return failed(
+            "step_invariance",
+            "step-dependent answer",
+            f"{seen}, which it declares to bear",
+            **figures,
+        )
     if breaks and h == subject.step_size:
         remedy = f"keep to steps of {2 * h:g} s or smaller ones"
         return remarked("step_invariance", f"{seen}: no method converges so", remedy, **figures)
     if h < subject.step_size:
         seen += f"; with {4 * subject.step_size:g} s it leads nowhere"
-        return remarked("step_invariance", seen, "keep to its own communication step, or a smaller one", **figures)
+        return remarked(
+            "step_invariance",
+            seen,
+            "keep to its own communication step, or a smaller one",
+            **figures,
+        )
     return passed("step_invariance", seen, **figures)
 
 
@@ -255,12 +309,16 @@ def internal_step(subject: Subject) -> CheckResult:
     h = subject.memory.get("base step", subject.step_size)
     evens = subject.memory.get("step sizes")
     if isinstance(evens, str):
-        return not_applicable("internal_step", f"because it runs with one communication step only: {evens}")
+        return not_applicable(
+            "internal_step", f"because it runs with one communication step only: {evens}"
+        )
     total = max(20, 7 * affordable(subject, 400) // 10)
     try:
         plain = subject.trajectory(total, h, subject.one_step())
         odd = {
-            (span, many): subject.trajectory(many * (total // span), span / many * h, subject.one_step())
+            (span, many): subject.trajectory(
+                many * (total // span), span / many * h, subject.one_step()
+            )
             for span, many in _RATIOS
         }
     except ComponentError as error:
@@ -277,9 +335,16 @@ def internal_step(subject: Subject) -> CheckResult:
         pairs = [((plain, h), (run, span / many * h)) for (span, many), run in odd.items()]
         if elsewhere := switches_elsewhere(subject.watched, pairs):
             if subject.memory.get("switching"):
-                return not_applicable("internal_step", "because only moments of switching differ, as was said above")
+                return not_applicable(
+                    "internal_step", "because only moments of switching differ, as was said above"
+                )
             return _switching("internal_step", elsewhere, seen, **figures)
-        return failed("internal_step", "internal step leaks", f"{seen}; one step moves it by {one_step:.3g}", **figures)
+        return failed(
+            "internal_step",
+            "internal step leaks",
+            f"{seen}; one step moves it by {one_step:.3g}",
+            **figures,
+        )
     if worst > 1e-3:
         return remarked("internal_step", seen, "prefer multiples of its internal step", **figures)
     return passed("internal_step", seen, **figures)

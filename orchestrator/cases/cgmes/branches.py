@@ -18,20 +18,31 @@ class Branch:
     start: str
     end: str
     z: complex  # series impedance [pu]
-    to_earth: tuple[complex, complex]  # admittances behind the ratio at the first side, and at the second side [pu]
+    # admittances behind the ratio at the first side, and at the second side [pu]
+    to_earth: tuple[complex, complex]
     # tap, shift: MATPOWER's ratio, and its angle [degrees]
     tap: float
     shift: float
 
 
 def branch(
-    name: str, ends: tuple[str, str], nominal: tuple[float, float], z: complex,
-    to_earth: tuple[complex, complex] = (0j, 0j), rho: float = 1.0, alpha: float = 0.0,
-) -> Branch:  # fmt: skip
+    name: str,
+    ends: tuple[str, str],
+    nominal: tuple[float, float],
+    z: complex,
+    to_earth: tuple[complex, complex] = (0j, 0j),
+    rho: float = 1.0,
+    alpha: float = 0.0,
+) -> Branch:
     first, second = nominal
     base = second**2 / BASE_MVA
     return Branch(
-        name, *ends, z / base, (to_earth[0] * base, to_earth[1] * base), second / first / rho, -alpha if alpha else 0.0
+        name,
+        *ends,
+        z / base,
+        (to_earth[0] * base, to_earth[1] * base),
+        second / first / rho,
+        -alpha if alpha else 0.0,
     )
 
 
@@ -40,7 +51,11 @@ def lines(network: Any, nominal: dict[str, float]) -> Iterator[Branch]:
         ends = row.bus1_id, row.bus2_id
         if row.connected1 and row.connected2 and all(end in nominal for end in ends):
             y = complex(row.g1, row.b1), complex(row.g2, row.b2)
-            yield _shorter(branch(row.Index, ends, (nominal[ends[0]], nominal[ends[1]]), complex(row.r, row.x), y))
+            yield _shorter(
+                branch(
+                    row.Index, ends, (nominal[ends[0]], nominal[ends[1]]), complex(row.r, row.x), y
+                )
+            )
 
 
 def _shorter(line: Branch) -> Branch:
@@ -61,7 +76,9 @@ def transformers(network: Any, nominal: dict[str, float]) -> Iterator[Branch]:
         if row.connected1 and row.connected2 and all(end in nominal for end in ends):
             z = complex(row.r_at_current_tap, row.x_at_current_tap)
             y = complex(row.g_at_current_tap, row.b_at_current_tap), 0j
-            yield branch(row.Index, ends, (nominal[ends[0]], nominal[ends[1]]), z, y, row.rho, row.alpha)
+            yield branch(
+                row.Index, ends, (nominal[ends[0]], nominal[ends[1]]), z, y, row.rho, row.alpha
+            )
 
 
 def stars(network: Any, nominal: dict[str, float]) -> Iterator[tuple[str, list[Branch]]]:
@@ -72,10 +89,21 @@ def stars(network: Any, nominal: dict[str, float]) -> Iterator[tuple[str, list[B
             end = row[f"bus{k}_id"]
             if row[f"connected{k}"] and end in nominal:
                 z, y = (
-                    complex(row[f"{re}{k}_at_current_tap"], row[f"{im}{k}_at_current_tap"]) for re, im in ("rx", "gb")
+                    complex(row[f"{re}{k}_at_current_tap"], row[f"{im}{k}_at_current_tap"])
+                    for re, im in ("rx", "gb")
                 )
                 volts = nominal[end], float(row.rated_u0)
-                legs.append(branch(str(row.name), (end, bus), volts, z, (y, 0j), row[f"rho{k}"], row[f"alpha{k}"]))
+                legs.append(
+                    branch(
+                        str(row.name),
+                        (end, bus),
+                        volts,
+                        z,
+                        (y, 0j),
+                        row[f"rho{k}"],
+                        row[f"alpha{k}"],
+                    )
+                )
         if len(legs) > 1:
             yield bus, legs
 

@@ -10,8 +10,14 @@ from typing import Any
 from fmus.toolchain.extras import require
 from orchestrator.errors import InputError, few
 
-MOST_BYTES = 2_000_000_000  # of all profiles together, unpacked: twenty times a national grid of 10,000 buses
-_NEEDED = {"EQ": "EquipmentCore", "SSH": "SteadyStateHypothesis", "TP": "Topology", "SV": "StateVariables"}
+# of all profiles together, unpacked: twenty times a national grid of 10,000 buses
+MOST_BYTES = 2_000_000_000
+_NEEDED = {
+    "EQ": "EquipmentCore",
+    "SSH": "SteadyStateHypothesis",
+    "TP": "Topology",
+    "SV": "StateVariables",
+}
 """Profile → word in the address of its version, in the file's head."""
 
 _HEAD = 64 * 1024  # bytes of a file in which its profile is looked for
@@ -19,7 +25,9 @@ _HEAD = 64 * 1024  # bytes of a file in which its profile is looked for
 
 def load_cgmes(path: Path) -> Any:
     if not path.exists():
-        raise InputError(f"{path}: there is no such file; give a zip or a folder with the profiles EQ, SSH, TP and SV")
+        raise InputError(
+            f"{path}: there is no such file; give a zip or a folder with the profiles EQ, SSH, TP and SV"
+        )
     profiles = _profiles(path)
     require(f"reading the CGMES model {path.name}", "pypowsybl")
     logging.getLogger("powsybl").setLevel(logging.CRITICAL)
@@ -33,7 +41,9 @@ def load_cgmes(path: Path) -> Any:
         return powsybl.load_from_binary_buffers([packed])
     except Exception as error:  # whatever comes through from Java
         said = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-        raise InputError(f"{path}: pypowsybl cannot read it as CGMES: {said}; check the export") from error
+        raise InputError(
+            f"{path}: pypowsybl cannot read it as CGMES: {said}; check the export"
+        ) from error
 
 
 def _profiles(path: Path) -> dict[str, bytes]:
@@ -50,11 +60,16 @@ def _profiles(path: Path) -> dict[str, bytes]:
             f"{file}: it is no zip archive that can be read: {error}; export the model once more"
         ) from error
     if not found:
-        raise InputError(f"{path}: it holds no .xml files; give a zip or a folder with the profiles EQ, SSH, TP and SV")
+        raise InputError(
+            f"{path}: it holds no .xml files; give a zip or a folder with the profiles EQ, SSH, TP and SV"
+        )
     heads = [content[:_HEAD].decode("utf-8", errors="replace") for content in found.values()]
-    missing = [profile for profile, word in _NEEDED.items()
-               if not any(word in head or f"/{profile}/" in head for head in heads)
-               and not any(f"_{profile}" in name.upper() for name in found)]  # fmt: skip
+    missing = [
+        profile
+        for profile, word in _NEEDED.items()
+        if not any(word in head or f"/{profile}/" in head for head in heads)
+        and not any(f"_{profile}" in name.upper() for name in found)
+    ]
     if missing:
         raise InputError(
             f"{path}: the {'profiles' if len(missing) > 1 else 'profile'} {', '.join(missing)} "
@@ -70,7 +85,9 @@ def _unpack(path: Path, content: bytes, found: dict[str, bytes], depth: int = 0)
         for entry in archive.infolist():
             suffix = Path(entry.filename).suffix.lower()
             if sum(map(len, found.values())) + entry.file_size > MOST_BYTES:
-                raise InputError(f"{path}: its profiles have more than {MOST_BYTES} bytes; no larger model is read")
+                raise InputError(
+                    f"{path}: its profiles have more than {MOST_BYTES} bytes; no larger model is read"
+                )
             if suffix == ".xml":
                 found[Path(entry.filename).name] = archive.read(entry)
             elif suffix == ".zip" and depth == 0:

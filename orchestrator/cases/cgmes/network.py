@@ -11,7 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cases.cgmes.branches import BASE_MVA, Branch, branch, finite, lines, stars, transformers
+from orchestrator.cases.cgmes.branches import (
+    BASE_MVA,
+    Branch,
+    branch,
+    finite,
+    lines,
+    stars,
+    transformers,
+)
 from orchestrator.cases.cgmes.files import load_cgmes
 from orchestrator.cases.network_sources import SourceTables
 from orchestrator.cases.source_changes import Changes
@@ -29,7 +37,8 @@ names those that may go."""
 
 _NO_LIMIT = 9998.0  # mvar and MW by which exports say that there is no limit
 _ONE_LEVEL = 1.05  # nominal voltages with a larger ratio are two levels of voltage
-_MOST_RATING = 9998.0  # MVA; an unknown rating is 9999 in exports, and pypowsybl's is the largest number there is
+# MVA; an unknown rating is 9999 in exports, and pypowsybl's is the largest number there is
+_MOST_RATING = 9998.0
 
 
 @dataclass(frozen=True)
@@ -43,13 +52,19 @@ class CgmesNetwork:
 
 def read_cgmes(path: Path, leaving_out: Sequence[str] = ()) -> CgmesNetwork:
     if unknown := [kind for kind in leaving_out if kind not in LEFT_OUT]:
-        raise InputError(f"leave_out: {unknown[0]!r} is unknown for CGMES; choose from {', '.join(LEFT_OUT)}")
+        raise InputError(
+            f"leave_out: {unknown[0]!r} is unknown for CGMES; choose from {', '.join(LEFT_OUT)}"
+        )
     files = sorted(path.iterdir()) if path.is_dir() else [path] if path.exists() else []
-    return _read(path, tuple((str(f.resolve()), f.stat().st_mtime_ns) for f in files), tuple(leaving_out))
+    return _read(
+        path, tuple((str(f.resolve()), f.stat().st_mtime_ns) for f in files), tuple(leaving_out)
+    )
 
 
 @lru_cache(maxsize=4)
-def _read(path: Path, versions: tuple[tuple[str, int], ...], leaving_out: tuple[str, ...]) -> CgmesNetwork:
+def _read(
+    path: Path, versions: tuple[tuple[str, int], ...], leaving_out: tuple[str, ...]
+) -> CgmesNetwork:
     """The network; ``versions`` keep newer contents apart. Every scenario of a case asks."""
     return convert(str(path), load_cgmes(path), leaving_out)
 
@@ -87,16 +102,22 @@ class _Reading:
             for b in self._branches
         ]
         tables = SourceTables(
-            self._place, BASE_MVA, np.array(self._rows), np.array(rows, dtype=float).reshape(-1, 11), gen,
+            self._place,
+            BASE_MVA,
+            np.array(self._rows),
+            np.array(rows, dtype=float).reshape(-1, 11),
+            gen,
             np.array([b.to_earth for b in self._branches], dtype=complex).reshape(-1, 2),
             {number: self._labels[bus] for bus, number in numbers.items()},
-        )  # fmt: skip
+        )
         ratings: dict[str, float] = {}
         for row in gen:
             label = tables.labels[int(row[0])]
             ratings[label] = ratings.get(label, 0.0) + row[6]
         return CgmesNetwork(
-            tables, tuple(self._changes.listed()), {n: r for n, r in ratings.items() if r < _MOST_RATING}
+            tables,
+            tuple(self._changes.listed()),
+            {n: r for n, r in ratings.items() if r < _MOST_RATING},
         )
 
     def _refuse(self, leaving_out: Sequence[str]) -> None:
@@ -124,7 +145,9 @@ class _Reading:
             islands.setdefault(int(row.synchronous_component), []).append(row.Index)
         live = [members for members in islands.values() if fed & {*members}]
         if not live:
-            raise InputError(f"{self._place}: no generator in service feeds a bus; export the solved model")
+            raise InputError(
+                f"{self._place}: no generator in service feeds a bus; export the solved model"
+            )
         live.sort(key=len, reverse=True)
         if len(live) > 1 and "island" not in leaving_out:
             sizes = ", ".join(str(len(members)) for members in live)
@@ -136,8 +159,11 @@ class _Reading:
         named = self._bus_names(buses)
         for row in buses.itertuples():
             if row.Index not in kept:
-                text = "bus: left out, as leave_out says" if any(row.Index in x for x in live[1:]) else (
-                    "bus without a generator on its part of the network: left out")  # fmt: skip
+                text = (
+                    "bus: left out, as leave_out says"
+                    if any(row.Index in x for x in live[1:])
+                    else ("bus without a generator on its part of the network: left out")
+                )
                 self._changes.note(named[row.Index], text)
                 continue
             nominal = float(levels[row.voltage_level_id])
@@ -162,14 +188,22 @@ class _Reading:
             of_bus.setdefault(row.bus_id, []).append(row.name or row.Index)
         found = {}
         for candidates in (
-            {bus: of_bus[bus][0] if len(of_bus.get(bus, ())) == 1 else buses.name[bus] for bus in buses.index},
+            {
+                bus: of_bus[bus][0] if len(of_bus.get(bus, ())) == 1 else buses.name[bus]
+                for bus in buses.index
+            },
             dict(buses.name),
             {bus: bus for bus in buses.index},
         ):
-            found = {bus: re.sub(r"\W+", "_", str(name)).strip("_") for bus, name in candidates.items()}
+            found = {
+                bus: re.sub(r"\W+", "_", str(name)).strip("_") for bus, name in candidates.items()
+            }
             if all(found.values()) and max(Counter(found.values()).values(), default=0) <= 1:
                 break
-        return {bus: re.sub(r"^bus_+(?=\w)", "", name, flags=re.IGNORECASE) for bus, name in found.items()}
+        return {
+            bus: re.sub(r"^bus_+(?=\w)", "", name, flags=re.IGNORECASE)
+            for bus, name in found.items()
+        }
 
     def _add_bus(self, bus: str, label: str) -> None:
         self._numbers[bus] = number = len(self._numbers)
@@ -190,9 +224,10 @@ class _Reading:
             one, two = sorted((self._nominal[line.start], self._nominal[line.end]))
             if two > _ONE_LEVEL * one and any(line.to_earth):
                 self._changes.note(
-                    line.name, "line between two nominal voltages: taken as it is; CGMES has one charging for both of "
-                    "its ends, so an export that wrote a transformer as a line has lost a part of it"
-                )  # fmt: skip
+                    line.name,
+                    "line between two nominal voltages: taken as it is; CGMES has one charging for both of "
+                    "its ends, so an export that wrote a transformer as a line has lost a part of it",
+                )
 
     def _injections(self) -> None:
         for row in self._source.get_loads(all_attributes=True).itertuples():
@@ -208,7 +243,11 @@ class _Reading:
         """Lines to a boundary: a pair meets at one bus; at the open end of another its exchange is a load."""
         table = self._source.get_boundary_lines(all_attributes=True)
         ties = self._source.get_tie_lines()
-        meeting = {half: tie for tie, row in ties.iterrows() for half in (row.boundary_line1_id, row.boundary_line2_id)}
+        meeting = {
+            half: tie
+            for tie, row in ties.iterrows()
+            for half in (row.boundary_line1_id, row.boundary_line2_id)
+        }
         made: set[str] = set()
         for row in table.itertuples():
             if not row.connected or row.bus_id not in self._nominal:
@@ -221,11 +260,21 @@ class _Reading:
             ends = row.bus_id, bus
             # the admittance stands at the model's side
             self._branches.append(
-                branch(row.Index, ends, (nominal, nominal), complex(row.r, row.x), (complex(row.g, row.b), 0j))
+                branch(
+                    row.Index,
+                    ends,
+                    (nominal, nominal),
+                    complex(row.r, row.x),
+                    (complex(row.g, row.b), 0j),
+                )
             )
             if row.Index not in meeting:
-                fed = complex(getattr(row, "target_p", 0.0) or 0.0, getattr(row, "target_q", 0.0) or 0.0)
-                self._changes.note(row.Index, "line to a boundary: what it exchanges there is a load")
+                fed = complex(
+                    getattr(row, "target_p", 0.0) or 0.0, getattr(row, "target_q", 0.0) or 0.0
+                )
+                self._changes.note(
+                    row.Index, "line to a boundary: what it exchanges there is a load"
+                )
                 self._add(bus, 2, complex(row.p0, row.q0) - fed)
 
     def _taps(self) -> None:
@@ -236,10 +285,13 @@ class _Reading:
             for row in table.itertuples():
                 name = row.Index[0] if isinstance(row.Index, tuple) else row.Index
                 if row.regulating:
-                    self._changes.note(name, f"control of a {kind} tap changer: held at its position")
+                    self._changes.note(
+                        name, f"control of a {kind} tap changer: held at its position"
+                    )
                 if math.isfinite(row.solved_tap_position) and row.solved_tap_position != row.tap:
                     self._changes.note(
-                        name, f"{kind} tap changer: at SSH's position, which is not that of SV's solution"
+                        name,
+                        f"{kind} tap changer: at SSH's position, which is not that of SV's solution",
                     )
 
     def _generators(self) -> Any:
@@ -248,10 +300,26 @@ class _Reading:
             if not row.connected or row.bus_id not in self._numbers:
                 continue
             held = self._held(row)
-            least, most = (finite(float(q), _NO_LIMIT) for q in (row.min_q_at_target_p, row.max_q_at_target_p))
-            rating = float(row.rated_s) if 0 < row.rated_s < _MOST_RATING else _MOST_RATING  # unknown
+            least, most = (
+                finite(float(q), _NO_LIMIT) for q in (row.min_q_at_target_p, row.max_q_at_target_p)
+            )
+            # unknown
+            rating = float(row.rated_s) if 0 < row.rated_s < _MOST_RATING else _MOST_RATING
             largest = float(row.max_p) if 0 < row.max_p < _NO_LIMIT else 0.0
-            rows.append([self._numbers[row.bus_id], row.target_p, 0, most, least, held, rating, 1, largest, 0])
+            rows.append(
+                [
+                    self._numbers[row.bus_id],
+                    row.target_p,
+                    0,
+                    most,
+                    least,
+                    held,
+                    rating,
+                    1,
+                    largest,
+                    0,
+                ]
+            )
         return np.array(rows, dtype=float).reshape(-1, 10)
 
     def _held(self, row: Any) -> float:

@@ -35,9 +35,14 @@ class MachineModel:
 
 
 def machine_models(
-    records: Sequence[DynamicRecord], machines: Sequence[Machine], leaving_out: Sequence[str] = (),
-    replaced: Collection[tuple[int, str]] = (), idle: Collection[tuple[int, str]] = (), *, approximate: bool = False,
-) -> dict[tuple[int, str], MachineModel]:  # fmt: skip
+    records: Sequence[DynamicRecord],
+    machines: Sequence[Machine],
+    leaving_out: Sequence[str] = (),
+    replaced: Collection[tuple[int, str]] = (),
+    idle: Collection[tuple[int, str]] = (),
+    *,
+    approximate: bool = False,
+) -> dict[tuple[int, str], MachineModel]:
     """Models of the machines in service, by bus and identifier.
 
     ``leaving_out``: models whose records may be left out; their generators keep what the case says of that part.
@@ -61,10 +66,14 @@ def machine_models(
             continue
         known = _KNOWN.get(record.name)
         if known is None:
-            problems.append(f"{record.place}: no part of ours stands for {record.name} (bus {record.bus})")
+            problems.append(
+                f"{record.place}: no part of ours stands for {record.name} (bus {record.bus})"
+            )
             problems[-1] += remedy_for(record.name, approximate=approximate)
         elif known.kind in parts[key]:
-            problems.append(f"{record.place}: a second {known.kind} of machine {record.machine!r} at bus {record.bus}")
+            problems.append(
+                f"{record.place}: a second {known.kind} of machine {record.machine!r} at bus {record.bus}"
+            )
         else:
             parts[key][known.kind] = known.part
             try:
@@ -94,7 +103,9 @@ def machine_models(
     }
 
 
-def _unfit(parts: Mapping[tuple[int, str], Mapping[str, str]], replaced: Collection[tuple[int, str]]) -> Iterator[str]:
+def _unfit(
+    parts: Mapping[tuple[int, str], Mapping[str, str]], replaced: Collection[tuple[int, str]]
+) -> Iterator[str]:
     """Machines whose records are too many or too few."""
     for (bus, name), own in parts.items():
         if "converter" in own and len(own) > 1:
@@ -106,7 +117,11 @@ def _unfit(parts: Mapping[tuple[int, str], Mapping[str, str]], replaced: Collect
 
 def _of_nobody(record: DynamicRecord, machines: Collection[tuple[int, str]]) -> str:
     ids = sorted(name for bus, name in machines if bus == record.bus)
-    there = f"which has {', '.join(map(repr, ids))}" if ids else "which has no generator in the RAW file"
+    there = (
+        f"which has {', '.join(map(repr, ids))}"
+        if ids
+        else "which has no generator in the RAW file"
+    )
     return (
         f"{record.place}: {record.name} is of machine {record.machine!r} at bus {record.bus}, {there}; correct its bus "
         "or identifier, or remove the record"
@@ -114,7 +129,9 @@ def _of_nobody(record: DynamicRecord, machines: Collection[tuple[int, str]]) -> 
 
 
 def _followed(
-    of: Mapping[tuple[int, str], Sequence[DynamicRecord]], left: Collection[str], problems: list[str]
+    of: Mapping[tuple[int, str], Sequence[DynamicRecord]],
+    left: Collection[str],
+    problems: list[str],
 ) -> dict[tuple[int, str], MachineModel]:
     """Models of the machines that are grid-following converters; ``problems`` takes what speaks against one."""
     found = {}
@@ -145,10 +162,14 @@ def _doubts(
 
 
 def _sets(name: str) -> set[str]:
-    return {p for field in (_KNOWN[name].fields if name in _KNOWN else ()) for p in field.parameters}
+    return {
+        p for field in (_KNOWN[name].fields if name in _KNOWN else ()) for p in field.parameters
+    }
 
 
-def _model(machine: Machine, parts: Mapping[str, str], values: Mapping[str, float], partial: bool) -> MachineModel:
+def _model(
+    machine: Machine, parts: Mapping[str, str], values: Mapping[str, float], partial: bool
+) -> MachineModel:
     if "converter" in parts:
         coupling = {"RL": machine.source.real, "XL": machine.source.imag}
         return MachineModel({}, {**coupling, **values}, parts["converter"])
@@ -178,7 +199,9 @@ def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
             raise InputError(
                 f"{record.place}: {record.name} has {field.name} = 0, which PSS/E replaces; give its value"
             )
-        product = bool(value) if field.switch else value * given[field.times] if field.times else value
+        product = (
+            bool(value) if field.switch else value * given[field.times] if field.times else value
+        )
         found |= dict.fromkeys(field.parameters, product) | dict.fromkeys(field.negated, -product)
     return found
 
@@ -235,5 +258,7 @@ def followed(
         ) from None
     replaced = [(own[0].line, text) for text in texts]
     for record in (record for record in records if record.name == PLANT and PLANT in left):
-        replaced.append((record.line, f"{PLANT} left out, as dyr_leave_out says: the references are constant"))
+        replaced.append(
+            (record.line, f"{PLANT} left out, as dyr_leave_out says: the references are constant")
+        )
     return parameters, replaced

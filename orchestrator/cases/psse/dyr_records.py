@@ -36,7 +36,9 @@ def read_dyr(path: Path) -> list[DynamicRecord]:
     records: list[DynamicRecord] = []
     tokens: list[str] = []
     begin = 0
-    for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
+    for number, line in enumerate(
+        path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1
+    ):
         if line.lstrip().startswith(("//", "@!")):
             continue
         for quoted, plain, slash, _ in _TOKEN.findall(line):
@@ -48,7 +50,9 @@ def read_dyr(path: Path) -> list[DynamicRecord]:
                 begin = begin if tokens else number
                 tokens.append(quoted.strip() or plain)
     if tokens:
-        raise InputError(f"{path}, line {begin}: the record does not end with a slash; the file is cut short")
+        raise InputError(
+            f"{path}, line {begin}: the record does not end with a slash; the file is cut short"
+        )
     return records
 
 
@@ -57,10 +61,14 @@ def _record(file: str, line: int, tokens: Sequence[str]) -> DynamicRecord:
         raise InputError(
             f"{file}, line {line}: {' '.join(tokens[:4])!r} is no record; one is bus 'MODEL' id values … /"
         )
-    return DynamicRecord(file, line, int(tokens[0]), tokens[1].upper(), tokens[2].strip(), tuple(tokens[3:]))
+    return DynamicRecord(
+        file, line, int(tokens[0]), tokens[1].upper(), tokens[2].strip(), tuple(tokens[3:])
+    )
 
 
-def given_values(record: DynamicRecord, fields: Sequence[DyrField], known: Collection[str]) -> dict[str, float]:
+def given_values(
+    record: DynamicRecord, fields: Sequence[DyrField], known: Collection[str]
+) -> dict[str, float]:
     if following := next((text for text in record.values[2:] if text.upper() in known), None):
         raise InputError(
             f"{record.place}: the record {record.name} has no slash at its end, and runs into the next, {following}"
@@ -70,7 +78,10 @@ def given_values(record: DynamicRecord, fields: Sequence[DyrField], known: Colle
             f"{record.place}: {record.name} has {len(record.values)} values, and needs {len(fields)}: "
             f"{', '.join(field.name for field in fields)}"
         )
-    return {field.name: _number(record, field, text) for field, text in zip(fields, record.values, strict=True)}
+    return {
+        field.name: _number(record, field, text)
+        for field, text in zip(fields, record.values, strict=True)
+    }
 
 
 def _number(record: DynamicRecord, field: DyrField, text: str) -> float:
@@ -79,5 +90,7 @@ def _number(record: DynamicRecord, field: DyrField, text: str) -> float:
     except ValueError:
         value = math.nan
     if not abs(value) < LARGEST:
-        raise InputError(f"{record.place}: {record.name} has {field.name} = {text!r}; it must be a number")
+        raise InputError(
+            f"{record.place}: {record.name} has {field.name} = {text!r}; it must be a number"
+        )
     return value

@@ -19,21 +19,30 @@ from orchestrator.errors import InputError
 _WITHOUT = {"exciter": "manual", "governor": "constant_power", "stabilizer": "none"}
 """What PSS/E assumes where there is no record."""
 
-_CONSTANT = {"exciter": "field voltage", "governor": "mechanical power"}  # what is constant without the part
+# what is constant without the part
+_CONSTANT = {"exciter": "field voltage", "governor": "mechanical power"}
 _OTHERS = 2  # machines with a record from which on a machine without one is questioned
 _CONDENSER = 0.01  # active power [pu of the rating] below which a machine needs no governor
 
 
-def with_choices(rows: Sequence[UnitRow], replaced: Collection[str], chosen: Mapping[str, str]) -> list[UnitRow]:
+def with_choices(
+    rows: Sequence[UnitRow], replaced: Collection[str], chosen: Mapping[str, str]
+) -> list[UnitRow]:
     """The units with the parts that ``[units]`` chooses: the machine's variant, and what has no record."""
     found, acted = [], set[str]()
     for row in rows:
-        own = {} if row.label in replaced or row.converter else {k: n for k, n in chosen.items() if _fits(k, n, row)}
+        own = (
+            {}
+            if row.label in replaced or row.converter
+            else {k: n for k, n in chosen.items() if _fits(k, n, row)}
+        )
         acted |= {*own}
         found.append(replace(row, parts={**row.parts, **own}) if own else row)
     machines = [row for row in rows if row.label not in replaced and not row.converter]
     for kind in (kind for kind in chosen if kind not in acted and machines):
-        raise InputError(f"{kind} = {chosen[kind]!r} in [units] acts on no machine: {_reason(kind, machines)}")
+        raise InputError(
+            f"{kind} = {chosen[kind]!r} in [units] acts on no machine: {_reason(kind, machines)}"
+        )
     return found
 
 
@@ -50,10 +59,13 @@ def _reason(kind: str, machines: Sequence[UnitRow]) -> str:
         return "the DYR file has a record of it for every machine that can have one; remove the key"
     names = sorted({row.parts["machine"] for row in machines})
     variants = [variant for variant, of in MACHINE_VARIANTS.items() if of in names]
-    there = f"; beside its own name a record may become {', '.join(map(repr, variants))}" if variants else ""
-    return (
-        f"the records of the DYR file say what each machine is ({', '.join(names)}){there}; correct or remove the key"
+    there = (
+        f"; beside its own name a record may become {', '.join(map(repr, variants))}"
+        if variants
+        else ""
     )
+    known = ", ".join(names)
+    return f"the records of the DYR file say what each machine is ({known}){there}; correct or remove the key"
 
 
 def missing_records(rows: Sequence[UnitRow], place: str) -> Iterator[UnusualValue]:
@@ -62,11 +74,20 @@ def missing_records(rows: Sequence[UnitRow], place: str) -> Iterator[UnusualValu
         able = [row for row in rows if _can_have(kind, row)]
         without = [row for row in able if kind not in row.parts and not row.partial]
         having = len(able) - len(without)
-        all_other = kind == "governor" and len(able) >= _OTHERS and all(other in row.parts for row in able)
+        all_other = (
+            kind == "governor" and len(able) >= _OTHERS and all(other in row.parts for row in able)
+        )
         if not without or not (having >= _OTHERS or (not having and all_other)):
             continue
-        where = f"{having} of {len(able)} machines have one" if having else f"every machine has its {other}'s"
-        chosen = next((row.parts[kind] for row in able if kind in row.parts), {"governor": "tgov1"}.get(kind, "sexs"))
+        where = (
+            f"{having} of {len(able)} machines have one"
+            if having
+            else f"every machine has its {other}'s"
+        )
+        chosen = next(
+            (row.parts[kind] for row in able if kind in row.parts),
+            {"governor": "tgov1"}.get(kind, "sexs"),
+        )
         text = (
             f"no record of {'an' if kind == 'exciter' else 'a'} {kind}, where {where}: the {quantity} is constant; add "
             f"the record, or choose a part in [units], such as {kind} = {chosen!r}"
@@ -83,7 +104,9 @@ def _can_have(kind: str, row: UnitRow) -> bool:
 def completed(rows: Sequence[UnitRow], replaced: Collection[str]) -> list[UnitRow]:
     """The units with what PSS/E assumes for every part that nothing says; a record that is left out stays open."""
     return [
-        row if row.converter or row.partial or row.label in replaced else replace(row, parts={**_WITHOUT, **row.parts})
+        row
+        if row.converter or row.partial or row.label in replaced
+        else replace(row, parts={**_WITHOUT, **row.parts})
         for row in rows
     ]
 
@@ -99,22 +122,36 @@ def rows_of_machines(machines: Sequence[Machine], place: str) -> list[UnitRow]:
         name = re.sub(r"\W", "_", machine.name.strip())
         row = UnitRow(
             str(machine.bus) if len(here) == 1 else f"{machine.bus}_{name}",
-            bus_name(str(machine.bus)), machine.rating_mva, machine.p_mw, machine.v_pu, place=place,
-            q_min_mvar=sum(m.q_min_mvar for m in here), q_max_mvar=sum(m.q_max_mvar for m in here),
-            p_min_mw=machine.p_min_mw, p_max_mw=machine.p_max_mw,
-        )  # fmt: skip
+            bus_name(str(machine.bus)),
+            machine.rating_mva,
+            machine.p_mw,
+            machine.v_pu,
+            place=place,
+            q_min_mvar=sum(m.q_min_mvar for m in here),
+            q_max_mvar=sum(m.q_max_mvar for m in here),
+            p_min_mw=machine.p_min_mw,
+            p_max_mw=machine.p_max_mw,
+        )
         rows.append(checked(row, place))
     return rows
 
 
 def with_records(
-    rows: Sequence[UnitRow], machines: Sequence[Machine], path: Path, leaving_out: Sequence[str],
-    without: Collection[str], idle: Collection[tuple[int, str]] = (), *, approximate: bool = False,
-) -> list[UnitRow]:  # fmt: skip
+    rows: Sequence[UnitRow],
+    machines: Sequence[Machine],
+    path: Path,
+    leaving_out: Sequence[str],
+    without: Collection[str],
+    idle: Collection[tuple[int, str]] = (),
+    *,
+    approximate: bool = False,
+) -> list[UnitRow]:
     """The units with what the records say of them."""
     keys = [(machine.bus, machine.name.strip()) for machine in machines]
     replaced = {key for key, row in zip(keys, rows, strict=True) if row.label in without}
-    models = machine_models(read_dyr(path), machines, leaving_out, replaced, idle, approximate=approximate)
+    models = machine_models(
+        read_dyr(path), machines, leaving_out, replaced, idle, approximate=approximate
+    )
     found = []
     for key, row in zip(keys, rows, strict=True):
         model = models.get(key)
@@ -127,6 +164,12 @@ def with_records(
         else:
             own = {"gfor": model.parameters}
             found.append(
-                replace(row, parameters=own, converter=model.converter, replaced=model.replaced, lines=model.lines)
+                replace(
+                    row,
+                    parameters=own,
+                    converter=model.converter,
+                    replaced=model.replaced,
+                    lines=model.lines,
+                )
             )
     return found

@@ -16,19 +16,38 @@ REVISIONS = (33, 34, 35, 36)  # revisions whose records are known
 MOST_BYTES = 200_000_000  # of a file: ten times the largest interconnections
 
 _TAIL = (
-    "area", "two-terminal dc", "vsc dc line", "impedance correction", "multi-terminal dc", "multi-section line", "zone",
-    "inter-area transfer", "owner", "facts device", "switched shunt", "gne", "induction machine",
-)  # fmt: skip
+    "area",
+    "two-terminal dc",
+    "vsc dc line",
+    "impedance correction",
+    "multi-terminal dc",
+    "multi-section line",
+    "zone",
+    "inter-area transfer",
+    "owner",
+    "facts device",
+    "switched shunt",
+    "gne",
+    "induction machine",
+)
 _HEAD = ("bus", "load", "fixed shunt", "generator", "branch")
 _ORDER: dict[int, tuple[str, ...]] = {33: (*_HEAD, "transformer", *_TAIL)}
 _ORDER[34] = ("system-wide", *_HEAD, "system switching device", "transformer", *_TAIL, "substation")
 _ORDER[35] = _ORDER[34]
 
-_ALIASES = {"two-terminal dc line": "two-terminal dc", "vsc dc": "vsc dc line", "facts": "facts device",
-            "multi-terminal dc line": "multi-terminal dc", "facts control device": "facts device",
-            "gne device": "gne", "multi-section line group": "multi-section line",
-            "transformer impedance correction": "impedance correction", "interarea transfer": "inter-area transfer",
-            "inter-area": "inter-area transfer", "switching device": "system switching device"}  # fmt: skip
+_ALIASES = {
+    "two-terminal dc line": "two-terminal dc",
+    "vsc dc": "vsc dc line",
+    "facts": "facts device",
+    "multi-terminal dc line": "multi-terminal dc",
+    "facts control device": "facts device",
+    "gne device": "gne",
+    "multi-section line group": "multi-section line",
+    "transformer impedance correction": "impedance correction",
+    "interarea transfer": "inter-area transfer",
+    "inter-area": "inter-area transfer",
+    "switching device": "system switching device",
+}
 _TOKEN = re.compile(r"""'([^']*)'?|"([^"]*)"?|(,)|(/)|([^\s,'"/]+)""")
 _BEGIN = re.compile(r"BEGIN\s+(.*?)\s+DATA", re.IGNORECASE)
 _END = re.compile(r"END OF\s+(.*?)\s+DATA", re.IGNORECASE)
@@ -102,9 +121,13 @@ def read_records(path: Path) -> RawFile:
     revision = head.whole(2, "the revision REV", 0)
     if revision not in REVISIONS:
         known = ", ".join(map(str, REVISIONS))
-        raise head.error(f"the revision REV is {revision}; {known} are read: export the case from PSS/E as one of them")
+        raise head.error(
+            f"the revision REV is {revision}; {known} are read: export the case from PSS/E as one of them"
+        )
     if head.whole(0, "IC", 0) != 0:
-        raise head.error(f"IC is {head.text(0)}: the file changes another case; export the whole case (IC = 0)")
+        raise head.error(
+            f"IC is {head.text(0)}: the file changes another case; export the whole case (IC = 0)"
+        )
     base = head.number(1, "the system base SBASE [MVA]", 100.0)
     if not base > 0:
         raise head.error(f"the system base SBASE is {base:g} MVA; it must exceed 0")
@@ -121,15 +144,21 @@ def _text_of(path: Path) -> str:
         raise InputError(f"{path}: it has {size} bytes; at most {MOST_BYTES} are read")
     content = path.read_bytes()
     if b"\x00" in content[:4096]:
-        raise InputError(f"{path}: it is no text, perhaps a saved case (.sav); export it from PSS/E as RAW")
+        raise InputError(
+            f"{path}: it is no text, perhaps a saved case (.sav); export it from PSS/E as RAW"
+        )
     if content.lstrip()[:1] == b"{":
-        raise InputError(f"{path}: it is JSON, perhaps RAWX; export the case from PSS/E as RAW, revision 33 to 36")
+        raise InputError(
+            f"{path}: it is JSON, perhaps RAWX; export the case from PSS/E as RAW, revision 33 to 36"
+        )
     return content.decode("utf-8-sig", errors="replace")
 
 
 def _numbered(text: str) -> Iterator[tuple[int, str]]:
     """Lines with their numbers, without those that only comment."""
-    yield from ((n, line) for n, line in enumerate(text.splitlines(), start=1) if not line.startswith("@!"))
+    yield from (
+        (n, line) for n, line in enumerate(text.splitlines(), start=1) if not line.startswith("@!")
+    )
 
 
 def _sections(
@@ -153,7 +182,9 @@ def _sections(
             if not (_BEGIN.search(stripped) or _END.search(stripped)) and name != "end":
                 guessed[number] = name
         elif name == "end":
-            raise InputError(f"{path}, line {number}: the line before these data does not say which begin {_REMEDY}")
+            raise InputError(
+                f"{path}, line {number}: the line before these data does not say which begin {_REMEDY}"
+            )
         else:
             sections.setdefault(name, []).append(Record(str(path), number, _fields(line)))
     if not {"bus", "branch"} <= {*sections} or name in _HEAD:
@@ -199,16 +230,33 @@ def _fields(line: str) -> list[str]:
     return fields
 
 
-_LINES = {"two-terminal dc": 3, "vsc dc line": 3, "facts device": 1, "induction machine": 1}  # lines of a record
+# lines of a record
+_LINES = {"two-terminal dc": 3, "vsc dc line": 3, "facts device": 1, "induction machine": 1}
 LEFT_OUT = (*_LINES, "multi-terminal dc", "gne")
 """Elements that our network does not have; `leave_out` of the case names those that may go."""
 
 _WITHOUT_EFFECT = {
-    "area", "zone", "owner", "inter-area transfer", "multi-section line", "impedance correction", "system-wide",
-    "substation", "voltage droop control", "switching device rating set",
-}  # fmt: skip
-_KNOWN = {"bus", "load", "fixed shunt", "generator", "branch", "system switching device", "transformer",
-          "switched shunt"}  # fmt: skip
+    "area",
+    "zone",
+    "owner",
+    "inter-area transfer",
+    "multi-section line",
+    "impedance correction",
+    "system-wide",
+    "substation",
+    "voltage droop control",
+    "switching device rating set",
+}
+_KNOWN = {
+    "bus",
+    "load",
+    "fixed shunt",
+    "generator",
+    "branch",
+    "system switching device",
+    "transformer",
+    "switched shunt",
+}
 
 
 def leave_out(raw: RawFile, allowed: Sequence[str], changes: Changes) -> None:

@@ -45,7 +45,9 @@ def transformers(raw: RawFile, voltages: Mapping[int, float]) -> Iterator[Transf
         count = 3 if first.whole(2, "K", 0) else 2
         rest = [line for _, line in zip(range(count + 1), lines, strict=False)]
         if len(rest) < count + 1:
-            raise first.error("the transformer's record is cut short: it needs four lines, or five with three windings")
+            raise first.error(
+                "the transformer's record is cut short: it needs four lines, or five with three windings"
+            )
         yield _transformer(raw, first, rest, voltages, count)
 
 
@@ -63,25 +65,37 @@ def _transformer(
     for bus in buses:
         if bus not in voltages:
             raise first.error(f"there is no bus {bus}")
-    windings = tuple(_winding(line, bus, voltages[bus], codes["CW"]) for line, bus in zip(rest[1:], buses, strict=True))
+    windings = tuple(
+        _winding(line, bus, voltages[bus], codes["CW"])
+        for line, bus in zip(rest[1:], buses, strict=True)
+    )
     pairs = ((0, 1), (1, 2), (2, 0))[: 1 if count == 2 else 3]
     impedances = tuple(
-        _impedance(raw, rest[0], 3 * k, codes["CZ"], windings[a].nominal) for k, (a, _) in enumerate(pairs)
+        _impedance(raw, rest[0], 3 * k, codes["CZ"], windings[a].nominal)
+        for k, (a, _) in enumerate(pairs)
     )
-    control, table = (_CONTROL[33], _TABLE[33]) if raw.revision == 33 else (15, _TABLE[34] + (raw.revision > 34))
+    control, table = (
+        (_CONTROL[33], _TABLE[33]) if raw.revision == 33 else (15, _TABLE[34] + (raw.revision > 34))
+    )
     return Transformer(
-        first, first.text(3, "1"), windings, impedances, _magnetisation(raw, first, rest[0], codes["CM"], windings[0]),
+        first,
+        first.text(3, "1"),
+        windings,
+        impedances,
+        _magnetisation(raw, first, rest[0], codes["CM"], windings[0]),
         _OPEN[state],
         any(line.whole(control, "COD", 0) for line in rest[1:] if len(line.fields) > 3),
         any(line.whole(table, "TAB", 0) for line in rest[1:] if len(line.fields) > 3),
-    )  # fmt: skip
+    )
 
 
 def _winding(line: Record, bus: int, base: float, code: int) -> Winding:
     nominal = line.number(1, "NOMV [kV]", 0.0)
     ratio = line.number(0, "WINDV", base if code == 2 else 1.0)
     if code != 1 and not base > 0 and (code == 2 or nominal):
-        raise line.error(f"WINDV is given by voltages (CW = {code}), and bus {bus} has no base voltage")
+        raise line.error(
+            f"WINDV is given by voltages (CW = {code}), and bus {bus} has no base voltage"
+        )
     by_base = nominal / base if nominal and base else 1.0
     ratio = {1: ratio, 2: ratio / base if base else 0.0, 3: ratio * by_base}[code]
     if not ratio > 0:
@@ -100,15 +114,21 @@ def _impedance(raw: RawFile, line: Record, index: int, code: int, nominal: float
         raise line.error(f"a winding's SBASE is {base:g} MVA; it must exceed 0")
     if code == 3:  # load loss [W], and the magnitude of the impedance
         if 0 < resistance < 1:
-            raise line.error(f"R = {resistance:g} is a load loss in W by CZ = 3; write 0, or CZ = 2 if it is in pu")
+            raise line.error(
+                f"R = {resistance:g} is a load loss in W by CZ = 3; write 0, or CZ = 2 if it is in pu"
+            )
         resistance *= 1e-6 / base
         if abs(resistance) > abs(reactance):
-            raise line.error(f"the load loss gives R = {resistance:g} pu, more than the impedance of {reactance:g} pu")
+            raise line.error(
+                f"the load loss gives R = {resistance:g} pu, more than the impedance of {reactance:g} pu"
+            )
         reactance = math.copysign(math.sqrt(reactance**2 - resistance**2), reactance)
     return complex(resistance, reactance) * raw.base_mva / base * nominal**2
 
 
-def _magnetisation(raw: RawFile, first: Record, second: Record, code: int, winding: Winding) -> complex:
+def _magnetisation(
+    raw: RawFile, first: Record, second: Record, code: int, winding: Winding
+) -> complex:
     """Admittance at the bus of winding 1 [pu of the system]."""
     g, b = first.number(7, "MAG1", 0.0), first.number(8, "MAG2", 0.0)
     if code == 1:

@@ -28,7 +28,8 @@ from orchestrator.watch.watch import Watch
 
 PLANT, DUPLICATE, BENCH = "converter", "duplicate", "bench"
 
-CAPACITANCE = 0.05  # at the connection point [pu of the plant's rating]: no voltage may jump between FMUs
+# at the connection point [pu of the plant's rating]: no voltage may jump between FMUs
+CAPACITANCE = 0.05
 
 RECORDED = ("v_re", "v_im", "v", "p", "q", "duplicate.p", "duplicate.q", "source.p", "source.q")
 
@@ -40,38 +41,83 @@ def case_name(row: str) -> str:
 
 
 def write_row(
-    request: CertificationRequest, row: str, title: str, programme: BenchProgramme, f_n: float, folder: Path
+    request: CertificationRequest,
+    row: str,
+    title: str,
+    programme: BenchProgramme,
+    f_n: float,
+    folder: Path,
 ) -> Path:
     description = bound_fmu(request.fmu, request.binding)
     own = dict(request.values)
-    components: dict[str, Any] = {PLANT: _plant(request, description, own, RATING_MVA, programme.power, f_n)}
+    components: dict[str, Any] = {
+        PLANT: _plant(request, description, own, RATING_MVA, programme.power, f_n)
+    }
     if programme.duplicate is not None:
-        components[DUPLICATE] = _plant(request, description, own, RATING_MVA / 2, programme.duplicate, f_n)
+        components[DUPLICATE] = _plant(
+            request, description, own, RATING_MVA / 2, programme.duplicate, f_n
+        )
     components[BENCH] = _bench(programme, f_n)
     ports = [(PLANT, "")] + ([(DUPLICATE, "duplicate.")] if programme.duplicate is not None else [])
     connections = []
     for name, prefix in ports:
-        connections += [{"from": f"{BENCH}.v_{part}", "to": f"{name}.v_{part}"} for part in ("re", "im")]
-        connections += [{"from": f"{name}.i_{part}", "to": f"{BENCH}.{prefix}i_{part}"} for part in ("re", "im")]
+        connections += [
+            {"from": f"{BENCH}.v_{part}", "to": f"{name}.v_{part}"} for part in ("re", "im")
+        ]
+        connections += [
+            {"from": f"{name}.i_{part}", "to": f"{BENCH}.{prefix}i_{part}"} for part in ("re", "im")
+        ]
     table = {
-        "name": row, "title": title, "source": "written by gfor certify",
-        "solver": {"step_size": f"{STEP:g} s", "stop_time": f"{programme.stop:g} s",
-                   "record_interval": f"{INTERVAL:g} s", "record": [f"{BENCH}.{name}" for name in RECORDED],
-                   "groups": [[name for name, _ in ports], [BENCH]]},
-        "components": components, "connections": connections,
-        "events": [{"type": "parameter_change", "time": f"{c.time!r} s", "component": BENCH,
-                    "parameter": c.parameter, "value": c.value} for c in programme.changes],
-    }  # fmt: skip
+        "name": row,
+        "title": title,
+        "source": "written by gfor certify",
+        "solver": {
+            "step_size": f"{STEP:g} s",
+            "stop_time": f"{programme.stop:g} s",
+            "record_interval": f"{INTERVAL:g} s",
+            "record": [f"{BENCH}.{name}" for name in RECORDED],
+            "groups": [[name for name, _ in ports], [BENCH]],
+        },
+        "components": components,
+        "connections": connections,
+        "events": [
+            {
+                "type": "parameter_change",
+                "time": f"{c.time!r} s",
+                "component": BENCH,
+                "parameter": c.parameter,
+                "value": c.value,
+            }
+            for c in programme.changes
+        ],
+    }
     path = folder / case_name(row)
     write_text(path, tomli_w.dumps(table))
     return path
 
 
-def _plant(request: CertificationRequest, description: FmuDescription, own: Mapping[str, Value], rating: float,
-           power: float, f_n: float) -> dict[str, Any]:  # fmt: skip
-    values: dict[str, Any] = {"S_n": rating, "P_0": power, "Q_0": 0.0, "v_0": 1.0, "theta_0": 0.0, "f_n": f_n}
+def _plant(
+    request: CertificationRequest,
+    description: FmuDescription,
+    own: Mapping[str, Value],
+    rating: float,
+    power: float,
+    f_n: float,
+) -> dict[str, Any]:
+    values: dict[str, Any] = {
+        "S_n": rating,
+        "P_0": power,
+        "Q_0": 0.0,
+        "v_0": 1.0,
+        "theta_0": 0.0,
+        "f_n": f_n,
+    }
     bound = description.port.start if isinstance(description, BoundDescription) else {}
-    known = {name: value for name, value in values.items() if name in description.variables or name in bound}
+    known = {
+        name: value
+        for name, value in values.items()
+        if name in description.variables or name in bound
+    }
     made: dict[str, Any] = {"fmu": FMU, "parameters": known | dict(own)}
     return made | ({"binding": BINDING} if request.binding else {})
 
@@ -80,10 +126,18 @@ def _bench(programme: BenchProgramme, f_n: float) -> dict[str, Any]:
     Z = programme.impedance
     power = programme.power + (programme.duplicate or 0.0) / 2
     made: dict[str, Any] = {
-        "model": "test_bench", "native": True,
-        "parameters": {"P_0": power, "f_n": f_n, "X_0": Z.imag, "R_0": Z.real, "B": CAPACITANCE,
-                       "load.P": RATING_MVA * programme.load[0], "load.Q": programme.load_mvar},
-    }  # fmt: skip
+        "model": "test_bench",
+        "native": True,
+        "parameters": {
+            "P_0": power,
+            "f_n": f_n,
+            "X_0": Z.imag,
+            "R_0": Z.real,
+            "B": CAPACITANCE,
+            "load.P": RATING_MVA * programme.load[0],
+            "load.Q": programme.load_mvar,
+        },
+    }
     if programme.duplicate is None:
         made["inputs"] = {"duplicate.i_re": 0.0, "duplicate.i_im": 0.0}
     return made
@@ -93,9 +147,12 @@ def _bench(programme: BenchProgramme, f_n: float) -> dict[str, Any]:
 class BenchResult(Kept):
     row: str
     times: Numbers = field(default_factory=lambda: np.empty(0))
-    signals: dict[str, Numbers] = field(default_factory=dict)  # by the bench's names, each of the shape of ``times``
-    findings: list[dict[str, Any]] = field(default_factory=list)  # of the watch, in the form of `Finding.as_json`
-    seconds: float = 0.0  # processor time of the run, that of FMUs in processes of their own included [s]
+    # by the bench's names, each of the shape of ``times``
+    signals: dict[str, Numbers] = field(default_factory=dict)
+    # of the watch, in the form of `Finding.as_json`
+    findings: list[dict[str, Any]] = field(default_factory=list)
+    # processor time of the run, that of FMUs in processes of their own included [s]
+    seconds: float = 0.0
     failure: Failure | None = None
 
     keeps_failures = False
@@ -105,7 +162,8 @@ class BenchResult(Kept):
 class BenchTask(Task):
     record: ClassVar[Any] = BenchResult
     row: str
-    changes: tuple[tuple[str, Value], ...] = ()  # values by ``component.variable`` that are others than the case file's
+    # values by ``component.variable`` that are others than the case file's
+    changes: tuple[tuple[str, Value], ...] = ()
 
     def failed(self, failure: Failure) -> Any:
         return BenchResult(self.row, failure=failure)
@@ -127,8 +185,10 @@ def row_result(task: BenchTask, case: Case) -> BenchResult:
                 master.run(prepared.stop_time, prepared.events, watch.observers)
             except ComponentError as error:
                 if error.kind is ErrorKind.HANG:
-                    raise  # a machine that is too busy looks the same: no verdict, and nothing is kept
-                ended = error  # the converter gave up, or its values were no numbers: the row is not met
+                    # a machine that is too busy looks the same: no verdict, and nothing is kept
+                    raise
+                # the converter gave up, or its values were no numbers: the row is not met
+                ended = error
         _keep(result, watch)
         result.findings = [finding.as_json() for finding in watch.findings(ended, misfits=misfits)]
         result.seconds = _processor_time() - begin

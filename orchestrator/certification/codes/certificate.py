@@ -18,9 +18,13 @@ from orchestrator.points.task import StudyCase
 
 
 def certify_code(
-    request: CertificationRequest, code: GridCode[CodeRow], executor: Executor, folder: Path, rows: Sequence[str] = (),
+    request: CertificationRequest,
+    code: GridCode[CodeRow],
+    executor: Executor,
+    folder: Path,
+    rows: Sequence[str] = (),
     report: CountReport = nobody,
-) -> Certificate:  # fmt: skip
+) -> Certificate:
     request.check()
     f_n = rated_frequency(request, code.f_n)
     try_criteria(code, f_n)
@@ -29,18 +33,31 @@ def certify_code(
         _laid(request, chosen[:1], f_n, trial)
     report(0, len(chosen))
     prepared = _laid(request, chosen, f_n, folder)
-    tasks = [BenchTask(StudyCase.of(one), row.name) for one, row in zip(prepared, chosen, strict=True)]
+    tasks = [
+        BenchTask(StudyCase.of(one), row.name) for one, row in zip(prepared, chosen, strict=True)
+    ]
     work = Work.into(folder, executor, report)
     found = work.all(compute_row, tasks)
     results = {row.name: result for row, result in zip(chosen, found, strict=True)}
     verdicts = [judge_row(row, results[row.name], f_n) for row in chosen]
     return Certificate(
-        request, bound_fmu(request.fmu, request.binding), code, f_n, verdicts, results, prepared[0].case.path,
-        values=prepared[0].values, stored=work.stored,
-    )  # fmt: skip
+        request,
+        bound_fmu(request.fmu, request.binding),
+        code,
+        f_n,
+        verdicts,
+        results,
+        prepared[0].case.path,
+        values=prepared[0].values,
+        stored=work.stored,
+    )
 
 
-def _laid(request: CertificationRequest, rows: Sequence[CodeRow], f_n: float, folder: Path) -> list[PreparedScenario]:
+def _laid(
+    request: CertificationRequest, rows: Sequence[CodeRow], f_n: float, folder: Path
+) -> list[PreparedScenario]:
     lay_files(request, folder)
-    written = [write_row(request, row.name, row.title, row.programme(f_n), f_n, folder) for row in rows]
+    written = [
+        write_row(request, row.name, row.title, row.programme(f_n), f_n, folder) for row in rows
+    ]
     return [load_case(path).prepare()[0] for path in written]

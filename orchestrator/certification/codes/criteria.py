@@ -21,14 +21,16 @@ SETTLED = 0.02
 
 BACK = 0.05  # largest distance from the power before an event at which it counts as returned [pu]
 MOVED = 0.01  # least change of a settled power that counts as a response of the droop [pu]
-CALM = 0.05  # largest movement of the frequency, peak to peak in a hold's last half second, that is settled [Hz]
+# largest movement of the frequency, peak to peak in a hold's last half second, that is settled [Hz]
+CALM = 0.05
 
 OPPOSED = 0.2
 """Least change of the power against a jump of 10° or more where the code gives no number [pu]: what MISO and ERCOT ask
 for 10°."""
 
 FIRST_SWING = 0.1  # time after a jump in which its first response is looked for [s]
-SPIKE = 5e-3  # width of the median for a response's speed [s]: what is shorter than half of it is the filter's
+# width of the median for a response's speed [s]: what is shorter than half of it is the filter's
+SPIKE = 5e-3
 SIDE = 0.01  # largest deviation of a settled frequency to the wrong side of rated [Hz]
 
 POWER_SHOWN, VOLTAGE_SHOWN = "Active power [pu]", "Voltage [pu]"  # how pictures call what is judged
@@ -37,7 +39,14 @@ LOOK = 0.5  # end of a hold in which it has to be settled [s]
 
 
 def _finding(
-    name: str, rule: str, origin: str, value: float, limit: float, text: str, *, at_most: bool = True
+    name: str,
+    rule: str,
+    origin: str,
+    value: float,
+    limit: float,
+    text: str,
+    *,
+    at_most: bool = True,
 ) -> RowFinding:
     """A comparison; a value that is no number is not accepted."""
     good = bool(value <= limit) if at_most else bool(value >= limit)
@@ -58,8 +67,16 @@ def holds_together() -> Judge:
     def judge(row: MeasuredRow) -> RowFinding:
         faults = row.faults
         text = "; ".join(faults or ["nothing was found", *row.undecided])
-        return RowFinding("stable", "no loss of synchronism, growth, lasting oscillation or trip", READING,
-                          float(len(faults)), 0.0, None, not faults, text)  # fmt: skip
+        return RowFinding(
+            "stable",
+            "no loss of synchronism, growth, lasting oscillation or trip",
+            READING,
+            float(len(faults)),
+            0.0,
+            None,
+            not faults,
+            text,
+        )
 
     return judge
 
@@ -70,7 +87,9 @@ def carries() -> Judge:
     def judge(row: MeasuredRow) -> RowFinding:
         rule = f"for no more than {1e3 * LASTS:g} ms is the current over a period above its limit"
         if told := told_of(row.findings, PLANT):
-            return _finding(CURRENT, rule, READING, told["mean"], ABOVE * told["declared"], str(told["message"]))
+            return _finding(
+                CURRENT, rule, READING, told["mean"], ABOVE * told["declared"], str(told["message"])
+            )
         size = np.hypot(row.p, row.signals["q"]) / np.maximum(row.signals["v"], 1e-3)
         mean = over_a_period(size, row.times, row.f_n)[row.within(row.event(0), np.inf)]
         lasts = min(len(mean), round(LASTS / float(row.times[1] - row.times[0])))
@@ -99,8 +118,14 @@ def settles(events: tuple[int, ...] = (), name: str = "settles") -> Judge:
     return judge
 
 
-def returns(name: str = "returns", within: float | None = None, tolerance: float = BACK, *,
-            of_code: bool = False, events: tuple[int, ...] = ()) -> Judge:  # fmt: skip
+def returns(
+    name: str = "returns",
+    within: float | None = None,
+    tolerance: float = BACK,
+    *,
+    of_code: bool = False,
+    events: tuple[int, ...] = (),
+) -> Judge:
     """The power comes back to what it was before the first event.
 
     ``within``: Time after the event in which it has to be back for good [s]; None for the end of its hold.
@@ -125,7 +150,11 @@ def returns(name: str = "returns", within: float | None = None, tolerance: float
         asked = row.before(row.event(0))
         ends = [(time, row.until(time)) for time in _chosen(row, events)]
         spans = [(end - LOOK if within is None else time + within, end) for time, end in ends]
-        return [_power_band(name, *span, asked - tolerance, asked + tolerance) for span in spans if span[0] < span[1]]
+        return [
+            _power_band(name, *span, asked - tolerance, asked + tolerance)
+            for span in spans
+            if span[0] < span[1]
+        ]
 
     return Bounded(judge, bands)
 
@@ -141,7 +170,15 @@ def opposes_jump(event: int, sign: int, least: float, *, of_code: bool = True) -
         peak = float(change.max(initial=-np.inf))
         rule = f"the power {'rises' if sign > 0 else 'falls'} by at least {least:g} pu (mean over a period)"
         origin = CODE if of_code else READING
-        return _finding(f"opposes the jump at {time:g} s", rule, origin, peak, least, f"{peak:.3f} pu", at_most=False)
+        return _finding(
+            f"opposes the jump at {time:g} s",
+            rule,
+            origin,
+            peak,
+            least,
+            f"{peak:.3f} pu",
+            at_most=False,
+        )
 
     def bands(row: MeasuredRow) -> list[Band]:
         time = row.event(event)
@@ -163,8 +200,14 @@ def responds_within(event: int, sign: int, longest: float, share: float = 0.9) -
         change = sign * (_without_spikes(row)[part] - row.before(time))
         peak = float(change.max(initial=-np.inf))
         reached = np.flatnonzero(change >= share * peak)
-        taken = float(row.times[part][reached[0]] - time) if peak > 0 and len(reached) else float("nan")
-        text = f"{1e3 * taken:.1f} ms" if np.isfinite(taken) else "it does not respond against the jump"
+        taken = (
+            float(row.times[part][reached[0]] - time) if peak > 0 and len(reached) else float("nan")
+        )
+        text = (
+            f"{1e3 * taken:.1f} ms"
+            if np.isfinite(taken)
+            else "it does not respond against the jump"
+        )
         rule = f"{share:.0%} of the first change within {1e3 * longest:g} ms"
         return _finding(f"speed at {time:g} s", rule, CODE, taken, longest, text)
 
@@ -177,9 +220,19 @@ def follows_droop(event: int, sign: int) -> Judge:
     def judge(row: MeasuredRow) -> RowFinding:
         time = row.event(event)
         end = row.until(time)
-        change = sign * (float(np.mean(row.mean_p[row.within(end - LOOK, end)])) - row.before(row.event(0)))
+        change = sign * (
+            float(np.mean(row.mean_p[row.within(end - LOOK, end)])) - row.before(row.event(0))
+        )
         rule = f"the settled power is {'higher' if sign > 0 else 'lower'} than at the start by {MOVED:g} pu or more"
-        return _finding(f"droop after {time:g} s", rule, READING, change, MOVED, f"{change:.3f} pu", at_most=False)
+        return _finding(
+            f"droop after {time:g} s",
+            rule,
+            READING,
+            change,
+            MOVED,
+            f"{change:.3f} pu",
+            at_most=False,
+        )
 
     def bands(row: MeasuredRow) -> list[Band]:
         end, level = row.until(row.event(event)), row.before(row.event(0)) + sign * MOVED
@@ -201,7 +254,16 @@ def stays_within(low: float, high: float, longest: float) -> Judge:
 
     def bands(row: MeasuredRow) -> list[Band]:
         ends = row.times[[0, -1]]
-        return [Band("voltage", VOLTAGE_SHOWN, lambda r: r.mean_v, ends, np.full(2, low), np.full(2, high))]
+        return [
+            Band(
+                "voltage",
+                VOLTAGE_SHOWN,
+                lambda r: r.mean_v,
+                ends,
+                np.full(2, low),
+                np.full(2, high),
+            )
+        ]
 
     return Bounded(judge, bands)
 
@@ -212,8 +274,14 @@ def frequency_settles() -> Judge:
         part = row.frequency[row.within(end - LOOK, end - 0.05)]
         moved = float(np.ptp(part))
         rule = f"the frequency moves by at most {CALM:g} Hz in the last {LOOK:g} s"
-        return _finding("frequency settles", rule, READING, moved, CALM,
-                        f"{moved:.3g} Hz, at {float(np.mean(part)):.3f} Hz")  # fmt: skip
+        return _finding(
+            "frequency settles",
+            rule,
+            READING,
+            moved,
+            CALM,
+            f"{moved:.3g} Hz, at {float(np.mean(part)):.3f} Hz",
+        )
 
     return judge
 
@@ -226,9 +294,17 @@ def frequency_against_power() -> Judge:
         last = row.within(end - LOOK, end - 0.05)
         more = float(np.mean(row.mean_p[last])) - row.before(row.event(0))
         away = float(np.mean(row.frequency[last])) - row.f_n
-        rule = f"the final frequency lies by at most {SIDE:g} Hz on the side to which the power moved"
-        return _finding("frequency against power", rule, READING, float(np.sign(more)) * away, SIDE,
-                        f"{away:+.3f} Hz at {more:+.3f} pu")  # fmt: skip
+        rule = (
+            f"the final frequency lies by at most {SIDE:g} Hz on the side to which the power moved"
+        )
+        return _finding(
+            "frequency against power",
+            rule,
+            READING,
+            float(np.sign(more)) * away,
+            SIDE,
+            f"{away:+.3f} Hz at {more:+.3f} pu",
+        )
 
     return judge
 
@@ -287,7 +363,9 @@ def _without_spikes(row: MeasuredRow) -> Numbers:
     """Active power of the plant, as its median over `SPIKE` around each instant [pu]."""
     half = max(1, round(SPIKE / 2 / float(row.times[1] - row.times[0])))
     padded = np.pad(row.p, half, mode="edge")
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1), axis=1))
+    return np.asarray(
+        np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1), axis=1)
+    )
 
 
 def _longest(mask: np.ndarray) -> int:

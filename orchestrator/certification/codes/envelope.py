@@ -21,7 +21,8 @@ import numpy as np
 from orchestrator.arrays import Complex, Numbers
 
 LAG = 0.01  # lag with which the damping follows the frequency of the grid [s]
-LATE = 0.02  # what the bounds come later by for waveforms [s]: the mean over a period of 50 Hz takes as long
+# what the bounds come later by for waveforms [s]: the mean over a period of 50 Hz takes as long
+LATE = 0.02
 SLACK = 0.01  # by how much later a bound that asks for something begins [s]
 TUNNEL, TUNNEL_SHARE = 0.02, 0.05
 """Distance of the bounds in the end: the larger one of these, of the rating and of the peak [pu, 1]."""
@@ -97,7 +98,9 @@ class Swinging:
 
     def ramping(self, t: Numbers) -> Numbers:
         """Power per rate of the grid's frequency [pu·s] after a ramp begins: from 0 to 2H + D·LAG."""
-        return np.asarray(2 * self.H * _step(self.roots, t) + self.D * LAG * _step((*self.roots, 1 / LAG), t))
+        return np.asarray(
+            2 * self.H * _step(self.roots, t) + self.D * LAG * _step((*self.roots, 1 / LAG), t)
+        )
 
     def ramp_peak(self, *, rising: bool) -> float:
         """Size of `ramping` by which the tunnel is measured [pu·s].
@@ -135,7 +138,11 @@ def jump_bounds(plant: Swinging, angle: float) -> Callable[[Numbers], Bounds]:
         asked = np.where(t < SLACK, 0.0, asked)
         curves = [ideal, asked, most, *(plant.varied(r).dying_of_source(t) for r in spread)]
         tunnel = _tunnel(peak) * (1 - np.exp((0.02 - t) / 0.3))
-        return Bounds(peak * ideal, peak * np.min(curves, axis=0) - tunnel, peak * np.max(curves, axis=0) + tunnel)
+        return Bounds(
+            peak * ideal,
+            peak * np.min(curves, axis=0) - tunnel,
+            peak * np.max(curves, axis=0) + tunnel,
+        )
 
     return bounds
 
@@ -164,7 +171,9 @@ def strength_bounds(plant: Swinging, change: float) -> Callable[[Numbers], Bound
     def bounds(t: Numbers) -> Bounds:
         ideal = change * plant.dying(t)
         curves = [change * p.dying(t) for p in plants]
-        fading = [change * p.natural / p.swing * np.exp(-p.decay * t) for p in plants if p.ratio < 1]
+        fading = [
+            change * p.natural / p.swing * np.exp(-p.decay * t) for p in plants if p.ratio < 1
+        ]
         least = np.min([*curves, *(-f for f in fading)], axis=0)
         most = np.max([*curves, *fading], axis=0)
         asked = np.minimum((1 - np.sign(least) * margin) * least - tunnel, ideal / 2)
@@ -194,13 +203,21 @@ def ramp_bounds(plant: Swinging, rate: float, lasts: float) -> Callable[[Numbers
         allowed = (1 + more) * np.max(curves, axis=0) + tunnel
         level = float(curve(plant, np.array([settled]))[0])
         still = (t >= settled) & (t < lasts)
-        return Bounds(curves[0], np.where(still, level - tunnel, asked), np.where(still, level + tunnel, allowed))
+        return Bounds(
+            curves[0],
+            np.where(still, level - tunnel, asked),
+            np.where(still, level + tunnel, allowed),
+        )
 
     last = float(unlimited(np.array([lasts * (1 - 1e-9)])).allowed[0])
 
     def bounds(t: Numbers) -> Bounds:
         found = unlimited(t)
-        return Bounds(found.ideal, found.asked, np.where(t >= lasts, np.minimum(found.allowed, last), found.allowed))
+        return Bounds(
+            found.ideal,
+            found.asked,
+            np.where(t >= lasts, np.minimum(found.allowed, last), found.allowed),
+        )
 
     return bounds
 

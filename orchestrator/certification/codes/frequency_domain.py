@@ -41,7 +41,8 @@ def stiffness(response: FrequencyResponse, voltage: complex, f_n: float) -> Stif
 
 FIGURES_CSV, FIGURES_JSON, FIGURES_PNG = "frequency.csv", "frequency.json", "frequency.png"
 POWER = 0.5  # active power at which it is measured [pu]
-BAND = (5.0, 40.0)  # band in which the least stiffness is told [Hz]: between the droops and the period of the grid
+# band in which the least stiffness is told [Hz]: between the droops and the period of the grid
+BAND = (5.0, 40.0)
 EXCITATION = Excitation()  # how it is excited: from 0.05 to 1000 Hz
 
 NO_VERDICT = (
@@ -90,7 +91,9 @@ def asked_stiffness(found: Stiffness, f_n: float) -> AskedStiffness:
     return AskedStiffness(float(asked), band, *found.least("P/theta", *band))
 
 
-def measure_stiffness(request: CertificationRequest, f_n: float, report: Callable[[str], None]) -> Stiffness:
+def measure_stiffness(
+    request: CertificationRequest, f_n: float, report: Callable[[str], None]
+) -> Stiffness:
     """Measure a converter at an ideal bus, at half of its rating and 1 pu."""
     description = bound_fmu(request.fmu, request.binding)
     given = {"S_n": RATING_MVA, "P_0": POWER, "Q_0": 0.0, "v_0": 1.0, "theta_0": 0.0, "f_n": f_n}
@@ -106,17 +109,36 @@ def figures_of_stiffness(found: Stiffness, model: str, f_n: float) -> dict[str, 
     }
     slow, asked = found.powers["P/omega"][0], asked_stiffness(found, f_n)
     return {
-        "code": "gb", "model": model, "verdict": None, "sentence": NO_VERDICT, "band_hz": list(BAND), "least": least,
-        "slow": {"name": "P/omega [pu/pu]", "real": float(slow.real), "imag": float(slow.imag),
-                                                    "at_hz": float(found.frequencies[0])},
-        "phase_jump": {"name": "P/theta [pu/rad]", "asked": asked.value, "band_hz": list(asked.band),
-                       "found": asked.found, "at_hz": asked.at, "met": asked.met, "sentence": asked.sentence()},
-    }  # fmt: skip
+        "code": "gb",
+        "model": model,
+        "verdict": None,
+        "sentence": NO_VERDICT,
+        "band_hz": list(BAND),
+        "least": least,
+        "slow": {
+            "name": "P/omega [pu/pu]",
+            "real": float(slow.real),
+            "imag": float(slow.imag),
+            "at_hz": float(found.frequencies[0]),
+        },
+        "phase_jump": {
+            "name": "P/theta [pu/rad]",
+            "asked": asked.value,
+            "band_hz": list(asked.band),
+            "found": asked.found,
+            "at_hz": asked.at,
+            "met": asked.met,
+            "sentence": asked.sentence(),
+        },
+    }
 
 
 def stiffness_in_words(figures: dict[str, Any]) -> list[str]:
     slow = figures["slow"]
-    least = [f"least |{name}|: {one['value']:.4g} at {one['at_hz']:.4g} Hz" for name, one in figures["least"].items()]
+    least = [
+        f"least |{name}|: {one['value']:.4g} at {one['at_hz']:.4g} Hz"
+        for name, one in figures["least"].items()
+    ]
     return [*least, f"P/ω at {slow['at_hz']:g} Hz: {slow['real']:.4g} {slow['imag']:+.4g}j pu/pu"]
 
 
@@ -138,12 +160,31 @@ def _plot(found: Stiffness, asked: AskedStiffness, path: Path) -> None:
         size.plot(found.frequencies, np.abs(found.powers["P/omega"]), ".-", ms=3, color=colour(0))
         size.set(xscale="log", yscale="log", ylabel="|P/ω| [pu/pu]")
         size.set_title("Network frequency perturbation, no verdict", loc="left")
-        phase.plot(found.frequencies, np.rad2deg(np.angle(found.powers["P/omega"])), ".-", ms=3, color=colour(0))
+        phase.plot(
+            found.frequencies,
+            np.rad2deg(np.angle(found.powers["P/omega"])),
+            ".-",
+            ms=3,
+            color=colour(0),
+        )
         phase.set_ylabel("Phase of P/ω [°]")
         for k, (name, key) in enumerate((("|P/θ| [pu/rad]", "P/theta"), ("|Q/V| [pu/pu]", "Q/V"))):
-            stiff.plot(found.frequencies, np.abs(found.powers[key]), ".-", ms=3, color=colour(k), label=name)
+            stiff.plot(
+                found.frequencies,
+                np.abs(found.powers[key]),
+                ".-",
+                ms=3,
+                color=colour(k),
+                label=name,
+            )
         stiff.axvspan(*BAND, color="0.9", zorder=0)
-        stiff.plot(asked.band, [asked.value] * 2, color="0.3", ls="--", label="asked by 0.2 pu for 10° at SCR 3")
+        stiff.plot(
+            asked.band,
+            [asked.value] * 2,
+            color="0.3",
+            ls="--",
+            label="asked by 0.2 pu for 10° at SCR 3",
+        )
         stiff.set(yscale="log", ylabel="Stiffness", xlabel="Frequency of the change [Hz]")
         stiff.legend()
         save_figure(figure, path)

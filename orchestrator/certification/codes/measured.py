@@ -27,12 +27,18 @@ long that end is [s]. From 0.75 to 2 pu the same of 92 rows of four converters s
 slip whose current is limited is not seen at a strong grid.
 """
 
-HALF_TURN = np.pi  # what counts as a slip [rad]: on the rows of ERCOT ours moves by 0.10 turns at most
+# what counts as a slip [rad]: on the rows of ERCOT ours moves by 0.10 turns at most
+HALF_TURN = np.pi
 FED_IN = 0.05  # active power before the first event from which on a trip can be told [pu]
 
-_IN_WORDS = {"loss_of_synchronism": "it slips", "growth": "it grows", "growing_oscillation": "it swings ever more",
-             "sustained_oscillation": "it swings for ever", "run_away": "it runs away",
-             "not_finite": "it gives no numbers"}  # fmt: skip
+_IN_WORDS = {
+    "loss_of_synchronism": "it slips",
+    "growth": "it grows",
+    "growing_oscillation": "it swings ever more",
+    "sustained_oscillation": "it swings for ever",
+    "run_away": "it runs away",
+    "not_finite": "it gives no numbers",
+}
 
 
 @dataclass(frozen=True)
@@ -43,7 +49,8 @@ class MeasuredRow:
     signals: Mapping[str, Numbers]  # by the bench's names, each of shape (n,)
     f_n: float
     events: tuple[float, ...]  # when something changed [s]
-    findings: tuple[Mapping[str, Any], ...] = ()  # of the watch over the run, in the form of `Finding.as_json`
+    # of the watch over the run, in the form of `Finding.as_json`
+    findings: tuple[Mapping[str, Any], ...] = ()
     declared: Mapping[str, float] = field(default_factory=dict)
     # of the source against one that turns at the rated frequency [rad], shape (n,); None where there is no source.
     source_angle: Numbers | None = None
@@ -82,12 +89,16 @@ class MeasuredRow:
 
         Raises an `InputError` if there is none."""
         if not -len(self.events) <= number < len(self.events):
-            raise InputError(f"a criterion asks for event {number}, and there are {len(self.events)}, numbered from 0")
+            raise InputError(
+                f"a criterion asks for event {number}, and there are {len(self.events)}, numbered from 0"
+            )
         return self.events[number]
 
     def until(self, time: float) -> float:
         """When the next change after a time comes, or the end of the run [s]."""
-        return min((event for event in self.events if event > time + 1e-9), default=float(self.times[-1]))
+        return min(
+            (event for event in self.events if event > time + 1e-9), default=float(self.times[-1])
+        )
 
     @property
     def faults(self) -> list[str]:
@@ -137,7 +148,12 @@ class MeasuredRow:
         the first event it may be so far from where it stands at it. An X that is larger than the plant's own counts
         the same turns, also those of a limited current: the voltage then encloses the origin all the more."""
         needed = {"p", "q", "v_re", "v_im"}
-        if self.source_angle is None or not needed <= set(self.signals) or not self.finite or not self._begun:
+        if (
+            self.source_angle is None
+            or not needed <= set(self.signals)
+            or not self.finite
+            or not self._begun
+        ):
             return None
         v = self.signals["v_re"] + 1j * self.signals["v_im"]
         power = self.p + 1j * self.signals["q"]
@@ -170,7 +186,11 @@ class MeasuredRow:
     @property
     def broken(self) -> str:
         """Why criteria beside that of holding together have no meaning, in words; empty where they have."""
-        first = min((f for f in self.findings if f["kind"] in UNSTABLE), key=lambda f: float(f["time"]), default=None)
+        first = min(
+            (f for f in self.findings if f["kind"] in UNSTABLE),
+            key=lambda f: float(f["time"]),
+            default=None,
+        )
         if first is not None:
             return f"{_IN_WORDS.get(first['kind'], 'the run fails')} from t = {float(first['time']):g} s on"
         if not self.finite:

@@ -8,7 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.certification.codes.sensitivity import MarginSensitivity
-from orchestrator.certification.codes.what_it_takes import ChangePlan, ConfirmedChange, CriterionNeeds
+from orchestrator.certification.codes.what_it_takes import (
+    ChangePlan,
+    ConfirmedChange,
+    CriterionNeeds,
+)
 from orchestrator.certification.margins import margin_text
 from orchestrator.certification.texts import TEXTS
 from orchestrator.report.html.elements import document, table
@@ -33,31 +37,52 @@ def save_needs(plan: ChangePlan, needs: Sequence[CriterionNeeds], folder: Path) 
 
 def needs_json(plan: ChangePlan, needs: Sequence[CriterionNeeds]) -> dict[str, Any]:
     return {
-        "format": FORMAT, "code": plan.certificate.code.key, "change": plan.change,
+        "format": FORMAT,
+        "code": plan.certificate.code.key,
+        "change": plan.change,
         "failed": [
-            {"row": n.row, **asdict(n.criterion), "sensitivities": [_row_json(s) for s in n.sensitivities],
-             "confirmed": None if n.confirmed is None else _confirmed_json(n.confirmed)} for n in needs
+            {
+                "row": n.row,
+                **asdict(n.criterion),
+                "sensitivities": [_row_json(s) for s in n.sensitivities],
+                "confirmed": None if n.confirmed is None else _confirmed_json(n.confirmed),
+            }
+            for n in needs
         ],
         "left_out": dict(plan.left_out),
-    }  # fmt: skip
+    }
 
 
 def _row_json(s: MarginSensitivity) -> dict[str, Any]:
     p = s.parameter
     return {
-        "parameter": p.variable, "value": p.value, "unit": p.unit, "variability": "tunable" if p.tunable else "fixed",
-        "margin_below": s.below, "margin_above": s.above, "met_below": s.met[0], "met_above": s.met[1],
-        "margin_per_relative_change": s.slope, "points_per_percent": _points(s.per_percent),
-        "relative_to": p.scale, "doubts": "; ".join(s.doubts), "reason": s.reason,
-    }  # fmt: skip
+        "parameter": p.variable,
+        "value": p.value,
+        "unit": p.unit,
+        "variability": "tunable" if p.tunable else "fixed",
+        "margin_below": s.below,
+        "margin_above": s.above,
+        "met_below": s.met[0],
+        "met_above": s.met[1],
+        "margin_per_relative_change": s.slope,
+        "points_per_percent": _points(s.per_percent),
+        "relative_to": p.scale,
+        "doubts": "; ".join(s.doubts),
+        "reason": s.reason,
+    }
 
 
 def _confirmed_json(c: ConfirmedChange) -> dict[str, Any]:
     return {
-        "parameter": c.parameter.variable, "value": c.value, "relative_change": c.change,
-        "margin_by_straight_line": c.straight_line, "margin": c.margin, "met": c.met, "row_fails": list(c.failing),
+        "parameter": c.parameter.variable,
+        "value": c.value,
+        "relative_change": c.change,
+        "margin_by_straight_line": c.straight_line,
+        "margin": c.margin,
+        "met": c.met,
+        "row_fails": list(c.failing),
         "reason": c.reason,
-    }  # fmt: skip
+    }
 
 
 def needs_table(need: CriterionNeeds, *, whole: bool = False) -> PlainTable:
@@ -68,9 +93,15 @@ def needs_table(need: CriterionNeeds, *, whole: bool = False) -> PlainTable:
 def remarks_of(need: CriterionNeeds) -> list[str]:
     """What else is to be said of a criterion, as sentences: parameters without effect, and runs that meet it."""
     idle = [s.parameter.variable for s in need.sensitivities if s.idle]
-    said = [f"No effect at all, to the last bit of the response: {', '.join(idle)}."] if idle else []
+    said = (
+        [f"No effect at all, to the last bit of the response: {', '.join(idle)}."] if idle else []
+    )
     met = [_setting(s.parameter, value) for s in need.sensitivities for value in s.values_that_meet]
-    return [*said, f"Met, as it was run, with {' or '.join(met)}; other rows were not run."] if met else said
+    return (
+        [*said, f"Met, as it was run, with {' or '.join(met)}; other rows were not run."]
+        if met
+        else said
+    )
 
 
 def _setting(parameter: Parameter, value: float) -> str:
@@ -95,8 +126,10 @@ def confirmed_text(need: CriterionNeeds) -> str:
 def plan_text(plan: ChangePlan) -> str:
     rows = ", ".join(v.row.name for v in plan.rows)
     long = f"{plan.seconds / 60:.1f} minutes" if plan.seconds >= 90 else f"{plan.seconds:.0f} s"
-    return (f"{len(plan.tasks)} runs of {rows}: {len(plan.parameters)} parameters by ±{100 * plan.change:g} %, about "
-            f"{long} of one processor by what the rows took; runs that are kept are not repeated.")  # fmt: skip
+    return (
+        f"{len(plan.tasks)} runs of {rows}: {len(plan.parameters)} parameters by ±{100 * plan.change:g} %, about "
+        f"{long} of one processor by what the rows took; runs that are kept are not repeated."
+    )
 
 
 def left_out_text(plan: ChangePlan) -> str:
@@ -132,15 +165,19 @@ def _page(plan: ChangePlan, needs: Sequence[CriterionNeeds], made: datetime) -> 
     sections = []
     for need in needs:
         rows = [[escape(cell) for cell in _cells(s)] for s in need.sensitivities]
-        texts = [*remarks_of(need), *([confirmed_text(need)] if any(n.confirmed for n in needs) else [])]
+        texts = [
+            *remarks_of(need),
+            *([confirmed_text(need)] if any(n.confirmed for n in needs) else []),
+        ]
         said = "".join(f"<p>{escape(text)}</p>" for text in texts)
         heading = f"{need.row}: {need.criterion.criterion}"
         sections.append((heading, table(_title(need), [*_COLUMNS, "Remark"], rows) + said))
     left = [[escape(name), escape(why)] for name, why in plan.left_out.items()]
-    sections.append(("Parameters that were not changed", table("Left out", ["Parameter", "Why"], left, left=2)))
-    model = plan.certificate.description.model_name
-    findings = (
-        f"<p>Each parameter was changed by ±{100 * plan.change:g} % of itself. {escape(TEXTS['sensitivities'])}</p>"
+    sections.append(
+        ("Parameters that were not changed", table("Left out", ["Parameter", "Why"], left, left=2))
     )
+    model = plan.certificate.description.model_name
+    change = f"Each parameter was changed by ±{100 * plan.change:g} % of itself."
+    findings = f"<p>{change} {escape(TEXTS['sensitivities'])}</p>"
     title = f"What {model!r} lacks for {plan.certificate.code.key.upper()}"
     return document(title, plan.certificate.code.title, findings, sections, made)

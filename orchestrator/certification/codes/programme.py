@@ -8,7 +8,8 @@ import numpy as np
 from orchestrator.arrays import Numbers
 from orchestrator.cases.schema import Value
 
-RATING_MVA = 100.0  # rating that the plant under test is given [MVA], so that its per unit are the bench's
+# rating that the plant under test is given [MVA], so that its per unit are the bench's
+RATING_MVA = 100.0
 FIRST = 1.0  # when the first thing happens [s]
 
 
@@ -21,7 +22,8 @@ class BenchChange:
 
 @dataclass(frozen=True)
 class BenchProgramme:
-    scr: float  # short-circuit ratio at the connection point: 1/|R + jX| in per unit of the plant's rating
+    # short-circuit ratio at the connection point: 1/|R + jX| in per unit of the plant's rating
+    scr: float
     power: float  # active power of the plant at the start [pu of its rating]
     changes: tuple[BenchChange, ...]
     stop: float
@@ -51,7 +53,9 @@ class BenchProgramme:
             for change in (c for c in self.changes if c.parameter == parameter):
                 since = np.maximum(times - change.time, 0)
                 by = float(change.value) - before
-                angle += by * (times >= change.time) if power == 0 else np.pi * f_n * by * since**power
+                angle += (
+                    by * (times >= change.time) if power == 0 else np.pi * f_n * by * since**power
+                )
                 before = float(change.value)
         return angle
 
@@ -76,7 +80,9 @@ class _Ramps:
         self.changes.append(BenchChange(self.time, "source.rise", 0.0))
 
 
-def jumps(scr: float, power: float, degrees: tuple[float, ...], hold: float = 5.0) -> BenchProgramme:
+def jumps(
+    scr: float, power: float, degrees: tuple[float, ...], hold: float = 5.0
+) -> BenchProgramme:
     """The source's angle jumps by each of the angles in turn [°]; they add up, and each holds so long [s]."""
     total, changes = 0.0, []
     for k, angle in enumerate(degrees):
@@ -96,8 +102,14 @@ def ramps(
     return BenchProgramme(scr, power, tuple(made.changes), made.time)
 
 
-def weakening(start: float, power: float, ratios: tuple[float, ...], conductance: float, lasts: float,
-              hold: float = 3.0) -> BenchProgramme:  # fmt: skip
+def weakening(
+    start: float,
+    power: float,
+    ratios: tuple[float, ...],
+    conductance: float,
+    lasts: float,
+    hold: float = 3.0,
+) -> BenchProgramme:
     """The short-circuit ratio steps down, each time as a balanced fault at the bus is cleared.
 
     ``conductance``: Of the fault, in parts of the source's admittance before it, so that its depth is the same each
@@ -113,16 +125,28 @@ def weakening(start: float, power: float, ratios: tuple[float, ...], conductance
     return BenchProgramme(start, power, tuple(changes), FIRST + len(ratios) * hold)
 
 
-def voltage(scr: float, power: float, factors: tuple[tuple[float, float], ...], stop: float) -> BenchProgramme:
+def voltage(
+    scr: float, power: float, factors: tuple[tuple[float, float], ...], stop: float
+) -> BenchProgramme:
     """The source's voltage takes one factor after the other, each from a time after the first event on [s]."""
-    changes = tuple(BenchChange(round(FIRST + after, 6), "source.factor", factor) for after, factor in factors)
+    changes = tuple(
+        BenchChange(round(FIRST + after, 6), "source.factor", factor) for after, factor in factors
+    )
     return BenchProgramme(scr, power, changes, stop)
 
 
-def last_machine(plant: float, duplicate: float, load: float, factor: float = 0.95) -> BenchProgramme:
+def last_machine(
+    plant: float, duplicate: float, load: float, factor: float = 0.95
+) -> BenchProgramme:
     """The source is disconnected; the plant and a duplicate of half its rating are left with the load.
 
     ``plant``, ``duplicate``: Active power of each at the start [pu of its own rating].
     ``load``: Active power of the load [pu of the plant's rating]."""
-    return BenchProgramme(10.0, plant, (BenchChange(FIRST, "source.connected", False),), 11.0,
-                          load=(load, factor), duplicate=duplicate)  # fmt: skip
+    return BenchProgramme(
+        10.0,
+        plant,
+        (BenchChange(FIRST, "source.connected", False),),
+        11.0,
+        load=(load, factor),
+        duplicate=duplicate,
+    )

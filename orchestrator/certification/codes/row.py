@@ -26,7 +26,9 @@ class Declaration:
     most: float
 
 
-def checked(wanted: Sequence[Declaration], given: Mapping[str, object], code: str) -> dict[str, float]:
+def checked(
+    wanted: Sequence[Declaration], given: Mapping[str, object], code: str
+) -> dict[str, float]:
     names = [declaration.name for declaration in wanted]
     if unknown := [name for name in given if name not in names]:
         takes = f"it takes {', '.join(names)}" if names else "it takes none; leave it out"
@@ -34,12 +36,18 @@ def checked(wanted: Sequence[Declaration], given: Mapping[str, object], code: st
     if missing := [d for d in wanted if d.name not in given]:
         said = "; ".join(f"{d.name} ({d.meaning}) [{d.unit}]" for d in missing)
         example = " ".join(f"--declare {d.name}=…" for d in missing)
-        raise InputError(f"--code {code} compares the converter with what is declared of it; missing: {said}. "
-                         f"Add {example}")  # fmt: skip
+        raise InputError(
+            f"--code {code} compares the converter with what is declared of it; missing: {said}. "
+            f"Add {example}"
+        )
     values = {}
     for declaration in wanted:
         value = given[declaration.name]
-        number = value if isinstance(value, int | float) and not isinstance(value, bool) else float("nan")
+        number = (
+            value
+            if isinstance(value, int | float) and not isinstance(value, bool)
+            else float("nan")
+        )
         if not declaration.least <= number <= declaration.most:
             raise InputError(
                 f"--declare {declaration.name}={value}: the {declaration.meaning} is a number from "
@@ -68,7 +76,8 @@ class RowFinding:
     text: str
 
 
-Judge = Callable[[MeasuredRow], RowFinding]  # A criterion: the response of a row → whether it is met
+# A criterion: the response of a row → whether it is met
+Judge = Callable[[MeasuredRow], RowFinding]
 
 
 @dataclass(frozen=True)
@@ -127,12 +136,19 @@ class CodeRow(Row):
 AnyRow = TypeVar("AnyRow", bound=Row)
 
 _FILE = "codes.toml"
-_WORDS: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name(_FILE).read_text(encoding="utf-8"))
+_WORDS: dict[str, dict[str, Any]] = tomllib.loads(
+    Path(__file__).with_name(_FILE).read_text(encoding="utf-8")
+)
 _TEXT, _TEXTS = (str, "a text"), (list, "a list of texts")
 _KINDS: dict[str, tuple[Any, str]] = {
-    "title": _TEXT, "source": _TEXT, "date": _TEXT, "where": _TEXT, "f_n": (float, "the rated frequency [Hz], as 50.0"),
-    "left_out": _TEXTS, "readings": _TEXTS,
-}  # fmt: skip
+    "title": _TEXT,
+    "source": _TEXT,
+    "date": _TEXT,
+    "where": _TEXT,
+    "f_n": (float, "the rated frequency [Hz], as 50.0"),
+    "left_out": _TEXTS,
+    "readings": _TEXTS,
+}
 
 
 def in_words(key: str) -> str:
@@ -146,7 +162,9 @@ def like(text: str, keys: Iterable[str]) -> list[str]:
     known, wanted = list(keys), _plain(text)
     near = [key for key in known if wanted and (wanted in key or key in wanted)]
     for name in ("where", "title") if len(wanted) > 3 else ():
-        near = near or [key for key in known if wanted in _plain(str(_WORDS.get(key, {}).get(name)))]
+        near = near or [
+            key for key in known if wanted in _plain(str(_WORDS.get(key, {}).get(name)))
+        ]
     return near or get_close_matches(wanted, known, 3)
 
 
@@ -203,16 +221,23 @@ class GridCode(Generic[AnyRow]):
 
     @classmethod
     def of(
-        cls, key: str, rows: tuple[AnyRow, ...], declared: Mapping[str, float] = MappingProxyType({})
+        cls,
+        key: str,
+        rows: tuple[AnyRow, ...],
+        declared: Mapping[str, float] = MappingProxyType({}),
     ) -> "GridCode[AnyRow]":
         if fault := _fault_of_words(key) or _fault_of_rows(key, rows):
             return cls(key, rows, fault=fault)
-        texts: dict[str, Any] = {n: tuple(text) if isinstance(text, list) else text for n, text in _WORDS[key].items()}
+        texts: dict[str, Any] = {
+            n: tuple(text) if isinstance(text, list) else text for n, text in _WORDS[key].items()
+        }
         return cls(key, rows, declared=dict(declared), **texts)
 
     def later(self, version: str) -> tuple[str, ...]:
         """Rows that the table of that version of this program had not."""
-        return tuple(row.name for row in self.rows if version and _number(row.since) > _number(version))
+        return tuple(
+            row.name for row in self.rows if version and _number(row.since) > _number(version)
+        )
 
     def of_version(self, version: str) -> "GridCode[AnyRow]":
         later = self.later(version)

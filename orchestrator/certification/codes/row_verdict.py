@@ -42,7 +42,10 @@ class RowVerdict:
 
     def margins(self) -> list[CriterionMargin]:
         known = [(f, f.accepted) for f in self.findings if f.accepted is not None]
-        return [CriterionMargin(self.name, f.criterion, f.margin, accepted, f.text) for f, accepted in known]
+        return [
+            CriterionMargin(self.name, f.criterion, f.margin, accepted, f.text)
+            for f, accepted in known
+        ]
 
     def word(self, finding: RowFinding) -> str:
         if self.row.shown_only:
@@ -56,9 +59,15 @@ def try_criteria(code: GridCode[CodeRow], f_n: float) -> None:
         times = np.arange(0, row.programme(f_n).stop + INTERVAL, INTERVAL)
         try:
             with np.errstate(all="ignore"):
-                judge_row(row, BenchResult(row.name, times, dict.fromkeys(RECORDED, np.ones(times.shape))), f_n)
+                judge_row(
+                    row,
+                    BenchResult(row.name, times, dict.fromkeys(RECORDED, np.ones(times.shape))),
+                    f_n,
+                )
         except InputError as error:
-            raise InputError(f"all_codes.py, code {code.key!r}, row {row.name!r}: {error}") from error
+            raise InputError(
+                f"all_codes.py, code {code.key!r}, row {row.name!r}: {error}"
+            ) from error
 
 
 def judge_row(
@@ -74,22 +83,33 @@ def judge_row(
     if result.failure:
         return RowVerdict(row, unknown=str(result.failure))
     programme = row.programme(f_n)
-    measured = MeasuredRow(result.times, result.signals, f_n, programme.times, tuple(result.findings),
-                           source_angle=programme.source_angle(result.times, f_n))  # fmt: skip
+    measured = MeasuredRow(
+        result.times,
+        result.signals,
+        f_n,
+        programme.times,
+        tuple(result.findings),
+        source_angle=programme.source_angle(result.times, f_n),
+    )
     if len(result.times) < 2 or result.times[-1] < programme.stop - 2e-3:
         ended = float(result.times[-1]) if len(result.times) else 0.0
         text = "; ".join(measured.faults) or f"the run ended at {ended:g} s"
         rule = "the converter runs to the end"
-        found: Sequence[RowFinding] = [RowFinding("runs", rule, "reading", ended, programme.stop, None, False, text)]
+        found: Sequence[RowFinding] = [
+            RowFinding("runs", rule, "reading", ended, programme.stop, None, False, text)
+        ]
     else:
         found = [judge(measured) for judge in row.criteria]
         current = carries()(measured) if {"q", "v"} <= set(result.signals) else None
-        if current and (not current.accepted or stated is None or any(c["criterion"] == CURRENT for c in stated)):
+        if current and (
+            not current.accepted or stated is None or any(c["criterion"] == CURRENT for c in stated)
+        ):
             found.append(current)
         if reason := measured.broken:
             why = f"{NOT_JUDGED}, {reason}"  # what a broken response meets has no meaning
             found = [
-                replace(f, accepted=None, margin=None, text=f"{f.text}; {why}") if f.accepted else f for f in found
+                replace(f, accepted=None, margin=None, text=f"{f.text}; {why}") if f.accepted else f
+                for f in found
             ]
             if all(f.accepted is None for f in found):  # no criterion of the row asks for it
                 found.append(holds_together()(measured))

@@ -60,14 +60,21 @@ class MarginSensitivity:
         return wanted
 
 
-def sensitivity_of(parameter: Parameter, criterion: ChangedCriterion, mark: str, sides: Mapping[int, ChangeResult],
-                   change: float) -> MarginSensitivity:  # fmt: skip
+def sensitivity_of(
+    parameter: Parameter,
+    criterion: ChangedCriterion,
+    mark: str,
+    sides: Mapping[int, ChangeResult],
+    change: float,
+) -> MarginSensitivity:
     """The effect of one parameter, from the row as it is and as it is on either side.
 
     ``sides``: The changed rows by −1 and +1; a side that the declared bounds do not allow is missing.
     ``change``: Relative to `Parameter.scale`."""
     if not sides:
-        return MarginSensitivity(parameter, criterion.margin, reason="its declared bounds leave no room on either side")
+        return MarginSensitivity(
+            parameter, criterion.margin, reason="its declared bounds leave no room on either side"
+        )
     doubts, margins, met = [], {}, {}
     for sign, word in ((-1, "below"), (1, "above")):
         result = sides.get(sign)
@@ -75,7 +82,9 @@ def sensitivity_of(parameter: Parameter, criterion: ChangedCriterion, mark: str,
             doubts.append(f"{word}, its declared bound leaves no room")
         elif result.failure is not None:
             doubts.append(f"{word}, it is refused: {result.failure}")
-        elif (again := next((c for c in result.criteria if c.criterion == criterion.criterion), None)) is None:
+        elif (
+            again := next((c for c in result.criteria if c.criterion == criterion.criterion), None)
+        ) is None:
             why = next((c.text for c in result.criteria if not c.accepted), "nothing was judged")
             doubts.append(f"{word}, {why}")
         else:
@@ -91,17 +100,22 @@ def sensitivity_of(parameter: Parameter, criterion: ChangedCriterion, mark: str,
     idle = len(sides) == 2 and all(result.mark == mark for result in sides.values())
     if criterion.margin is None or not margins:
         reason = "the criterion has no figure" if criterion.margin is None else "; ".join(doubts)
-        return MarginSensitivity(parameter, criterion.margin, met=sides_met, reason=reason, idle=idle, values=values)
+        return MarginSensitivity(
+            parameter, criterion.margin, met=sides_met, reason=reason, idle=idle, values=values
+        )
     slopes = {sign: sign * (margin - criterion.margin) / change for sign, margin in margins.items()}
     doubts += _of_slopes(slopes, _ROUNDING / change)
     if not any(slopes.values()):
-        doubts.append("no effect: the response is the same to the last bit" if idle else
-                      "no effect on this margin; the response does change")  # fmt: skip
+        doubts.append(
+            "no effect: the response is the same to the last bit"
+            if idle
+            else "no effect on this margin; the response does change"
+        )
     slope = sum(slopes.values()) / len(slopes)
     below, above = margins.get(-1), margins.get(1)
     return MarginSensitivity(
         parameter, criterion.margin, below, above, slope, sides_met, tuple(doubts), "", idle, values
-    )  # fmt: skip
+    )
 
 
 def _of_slopes(slopes: Mapping[int, float], rounding: float) -> list[str]:

@@ -25,7 +25,8 @@ from orchestrator.points.points import CountReport, Work, nobody
 from orchestrator.points.task import StudyCase
 from orchestrator.sensitivities.parameters import Parameter, parameters_in
 
-CHANGE = 0.05  # by which part of itself a parameter is changed to either side; of 1 of its unit where it is 0
+# by which part of itself a parameter is changed to either side; of 1 of its unit where it is 0
+CHANGE = 0.05
 
 
 @dataclass(frozen=True)
@@ -67,8 +68,14 @@ class ChangePlan:
         return float(sum(self.certificate.results[row].seconds for row, *_ in self.tasks))
 
 
-def plan_changes(certificate: Certificate, folder: Path, patterns: Sequence[str] = (), *, fixed: bool = False,
-                 change: float = CHANGE) -> ChangePlan:  # fmt: skip
+def plan_changes(
+    certificate: Certificate,
+    folder: Path,
+    patterns: Sequence[str] = (),
+    *,
+    fixed: bool = False,
+    change: float = CHANGE,
+) -> ChangePlan:
     """Find what is to be run; nothing is run yet.
 
     ``patterns``: Names of the converter's parameters, also with ``*``; fixed ones that fit are taken too. Without
@@ -80,24 +87,35 @@ def plan_changes(certificate: Certificate, folder: Path, patterns: Sequence[str]
     given = (*GIVEN, STEP_PARAMETER, INTERNAL_STEP)
     described = {PLANT: plan.description}
 
-    def value_of(_: str, variable: str) -> float:  # an FMU need not answer for all of its parameters: it is not asked
+    # an FMU need not answer for all of its parameters: it is not asked
+    def value_of(_: str, variable: str) -> float:
         return plan.number(variable)
 
-    asked = parameters_in(described, value_of, [f"{PLANT}.{pattern}" for pattern in patterns], fixed=fixed)
+    asked = parameters_in(
+        described, value_of, [f"{PLANT}.{pattern}" for pattern in patterns], fixed=fixed
+    )
     unknown = [p.variable for p in asked if plan.value(p.variable) is None]
     chosen = [p for p in asked if p.variable not in (*given, *unknown)]
     if not chosen:
-        raise InputError(f"--sensitivities: {certificate.request.fmu} has no {'such' if patterns else 'tunable'} "
-                         "parameter that the rows do not give it themselves; name one by --parameter, or take the "
-                         "fixed ones too by --fixed")  # fmt: skip
+        raise InputError(
+            f"--sensitivities: {certificate.request.fmu} has no {'such' if patterns else 'tunable'} "
+            "parameter that the rows do not give it themselves; name one by --parameter, or take the "
+            "fixed ones too by --fixed"
+        )
     every = [info for info in plan.description.variables.values() if info.causality == "parameter"]
     names = {p.variable for p in chosen}
-    left_out = {info.name: _why_not(info, unknown, bool(patterns))
-                for info in every if info.name not in (*names, *given)}  # fmt: skip
+    left_out = {
+        info.name: _why_not(info, unknown, bool(patterns))
+        for info in every
+        if info.name not in (*names, *given)
+    }
     tasks = {
         (v.row.name, p.name, sign): _task(certificate, folder, v.row.name, p, sign * change)
-        for v in rows for p in chosen for sign in (-1, 1) if p.allows(sign * change * p.scale)
-    }  # fmt: skip
+        for v in rows
+        for p in chosen
+        for sign in (-1, 1)
+        if p.allows(sign * change * p.scale)
+    }
     return ChangePlan(certificate, folder, rows, chosen, left_out, change, tasks)
 
 
@@ -109,7 +127,9 @@ def _why_not(info: VariableInfo, unknown: Sequence[str], named: bool) -> str:
     return "not asked for" if named or info.variability == "tunable" else "fixed: --fixed takes it"
 
 
-def run_changes(plan: ChangePlan, executor: Executor, report: CountReport = nobody) -> list[CriterionNeeds]:
+def run_changes(
+    plan: ChangePlan, executor: Executor, report: CountReport = nobody
+) -> list[CriterionNeeds]:
     results = _computed(plan, plan.tasks, executor, report)
     found = []
     for v in plan.rows:
@@ -118,18 +138,30 @@ def run_changes(plan: ChangePlan, executor: Executor, report: CountReport = nobo
         for criterion in change_point.margins_with_time(v, base.findings, plan.certificate.f_n):
             if not criterion.accepted:
                 rows = [
-                    sensitivity_of(p, criterion, mark,
-                                   {s: results[k] for s in (-1, 1) if (k := (v.row.name, p.name, s)) in results},
-                                   plan.change)
+                    sensitivity_of(
+                        p,
+                        criterion,
+                        mark,
+                        {
+                            s: results[k]
+                            for s in (-1, 1)
+                            if (k := (v.row.name, p.name, s)) in results
+                        },
+                        plan.change,
+                    )
                     for p in plan.parameters
-                ]  # fmt: skip
+                ]
                 rows.sort(key=lambda s: (-s.effect, s.parameter.name))
                 found.append(CriterionNeeds(v.row.name, criterion, rows))
     return found
 
 
-def confirm_changes(plan: ChangePlan, needs: Sequence[CriterionNeeds], executor: Executor,
-                    report: CountReport = nobody) -> None:  # fmt: skip
+def confirm_changes(
+    plan: ChangePlan,
+    needs: Sequence[CriterionNeeds],
+    executor: Executor,
+    report: CountReport = nobody,
+) -> None:
     """Run for each failed criterion the change of one parameter that the straight line asks for.
 
     Taken is the parameter whose line reaches the limit, or comes nearest to it, and of several the one that has to
@@ -137,7 +169,9 @@ def confirm_changes(plan: ChangePlan, needs: Sequence[CriterionNeeds], executor:
     wanted: dict[int, tuple[MarginSensitivity, float]] = {}
     tasks: dict[int, change_point.ChangeTask] = {}
     for k, need in enumerate(needs):
-        if tried := [(s, change) for s in need.sensitivities if (change := s.change_to_meet()) is not None]:
+        if tried := [
+            (s, change) for s in need.sensitivities if (change := s.change_to_meet()) is not None
+        ]:
             best = max(tried, key=lambda entry: (min(_expected(*entry), 0.0), -abs(entry[1])))
             wanted[k] = best
             tasks[k] = _task(plan.certificate, plan.folder, need.row, best[0].parameter, best[1])
@@ -151,24 +185,41 @@ def _expected(sensitivity: MarginSensitivity, change: float) -> float:
 
 
 def _confirmed(
-    need: CriterionNeeds, sensitivity: MarginSensitivity, change: float, result: change_point.ChangeResult
+    need: CriterionNeeds,
+    sensitivity: MarginSensitivity,
+    change: float,
+    result: change_point.ChangeResult,
 ) -> ConfirmedChange:
     again = next((c for c in result.criteria if c.criterion == need.criterion.criterion), None)
-    reason = str(result.failure) if result.failure else ("" if again else "; ".join(c.text for c in result.criteria))
+    reason = (
+        str(result.failure)
+        if result.failure
+        else ("" if again else "; ".join(c.text for c in result.criteria))
+    )
     return ConfirmedChange(
-        sensitivity.parameter, change, _expected(sensitivity, change), again.margin if again else None,
-        again.accepted if again else None, tuple(c.criterion for c in result.criteria if not c.accepted), reason,
-    )  # fmt: skip
+        sensitivity.parameter,
+        change,
+        _expected(sensitivity, change),
+        again.margin if again else None,
+        again.accepted if again else None,
+        tuple(c.criterion for c in result.criteria if not c.accepted),
+        reason,
+    )
 
 
 Place = TypeVar("Place")
 
 
 def _computed(
-    plan: ChangePlan, tasks: Mapping[Place, change_point.ChangeTask], executor: Executor, report: CountReport
+    plan: ChangePlan,
+    tasks: Mapping[Place, change_point.ChangeTask],
+    executor: Executor,
+    report: CountReport,
 ) -> dict[Place, change_point.ChangeResult]:
     work = Work.into(plan.folder, executor, report)
-    return dict(zip(tasks, work.all(change_point.compute_change, list(tasks.values())), strict=True))
+    return dict(
+        zip(tasks, work.all(change_point.compute_change, list(tasks.values())), strict=True)
+    )
 
 
 def _task(
@@ -180,7 +231,9 @@ def _task(
     changes = tuple((f"{name}.{parameter.variable}", value) for name in places)
     declared = tuple(sorted(certificate.code.declared.items()))
     code = certificate.code.key
-    return change_point.ChangeTask(StudyCase.of(prepared), row, changes, code, certificate.f_n, declared)
+    return change_point.ChangeTask(
+        StudyCase.of(prepared), row, changes, code, certificate.f_n, declared
+    )
 
 
 @lru_cache(maxsize=32)

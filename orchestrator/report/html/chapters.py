@@ -25,7 +25,11 @@ from orchestrator.results.manifest import read_manifest
 
 _FEW, _LONGEST, _FASTEST = 4, 300, -5.0  # of a list; of a text; real part [1/s] of modes on a map
 _DESIGNED = {"without": "target", "predicted": "predicted", "with": "achieved"}
-_STABLE: Mapping[bool | None, str] = {True: "stable", False: "UNSTABLE", None: "not known whether stable"}
+_STABLE: Mapping[bool | None, str] = {
+    True: "stable",
+    False: "UNSTABLE",
+    None: "not known whether stable",
+}
 
 
 @dataclass(frozen=True)
@@ -65,12 +69,22 @@ def chapters_of(place: Path) -> list[Chapter]:
             content = json.loads(file.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             if file == place:
-                raise InputError(f"{file}: it is no study's result; give a study's folder or .json") from error
+                raise InputError(
+                    f"{file}: it is no study's result; give a study's folder or .json"
+                ) from error
             continue  # somebody else's
-        keys = set(content) if isinstance(content, dict) else set(content[0]) if content and content[0] else set()
+        keys = (
+            set(content)
+            if isinstance(content, dict)
+            else set(content[0])
+            if content and content[0]
+            else set()
+        )
         for wanted, make in _KINDS:
             if wanted <= keys:
-                each = content if isinstance(content, list) and make is _sensitivities else [content]
+                each = (
+                    content if isinstance(content, list) and make is _sensitivities else [content]
+                )
                 try:
                     found += [_with_models(make(file, one), one) for one in each]
                 except (KeyError, TypeError, IndexError, AttributeError, ValueError) as error:
@@ -81,7 +95,9 @@ def chapters_of(place: Path) -> list[Chapter]:
     return found
 
 
-def of_run(folder: Path, scenarios: Sequence[Content], content: str = "", beside: Sequence[str] = ()) -> Chapter:
+def of_run(
+    folder: Path, scenarios: Sequence[Content], content: str = "", beside: Sequence[str] = ()
+) -> Chapter:
     """Of a run's summary, or the same of `gfor modes`; ``beside``: what devices bring."""
     said, open_, sure = [], [], []
     for s in scenarios:
@@ -92,42 +108,69 @@ def of_run(folder: Path, scenarios: Sequence[Content], content: str = "", beside
         word = answer.get("verdict") or _STABLE[stable]
         title = s.get("subject") or s.get("title", s["name"])
         modes = [m for m in (listed if isinstance(listed, list) else [answer]) if m]
-        least = min((m for m in modes if m.get("damping_percent") is not None), key=lambda m: m["damping_percent"],
-                    default=None)  # fmt: skip
-        figures = f", least damped {least['frequency_hz']:.3f} Hz, {least['damping_percent']:.2f} %" if least else ""
+        least = min(
+            (m for m in modes if m.get("damping_percent") is not None),
+            key=lambda m: m["damping_percent"],
+            default=None,
+        )
+        figures = (
+            f", least damped {least['frequency_hz']:.3f} Hz, {least['damping_percent']:.2f} %"
+            if least
+            else ""
+        )
         if later := answer.get("after_events"):
             figures += f", after the events {later['frequency_hz']:.3f} Hz, {later['damping_percent']:.2f} %"
         remark = f" ({answer['remark']})" if answer.get("remark") else ""
         said.append((stable, f"{title}: {word}{figures}{remark}"))
-        open_ += [f"{title}: {f['message']}" for f in s.get("findings", []) if f["kind"] == "not_judged"]
+        open_ += [
+            f"{title}: {f['message']}" for f in s.get("findings", []) if f["kind"] == "not_judged"
+        ]
         open_ += [f"{title}: {s['failure']}"] if s.get("failure") else []
         open_ += [f"{title}: {stability.get('reason') or 'stability'}"] if stable is None else []
         if ring := s.get("ring_down"):
-            sure.append(f"{title} rings with {ring['frequency_hz']:.3f} Hz, {ring['damping_percent']:.2f} % in time")
+            sure.append(
+                f"{title} rings with {ring['frequency_hz']:.3f} Hz, {ring['damping_percent']:.2f} % in time"
+            )
     open_ += dict.fromkeys(text for s in scenarios for text in s.get("warnings", []))
     verdicts = [stable for stable, _ in said]
     good = False if False in verdicts else None if None in verdicts else True
-    basis = "modes of the FMUs that were simulated" if any("step_size_s" in s for s in scenarios) else (
-        "linear model of the FMUs at the operating point; nothing was run")  # fmt: skip
+    basis = (
+        "modes of the FMUs that were simulated"
+        if any("step_size_s" in s for s in scenarios)
+        else ("linear model of the FMUs at the operating point; nothing was run")
+    )
     asked = "Is the fault survived" if any(map(has_fault, scenarios)) else "Is the network stable"
     return Chapter(
-        folder, f"{asked}, and which swing is damped least?",
-        "; ".join([*(text for _, text in said), *beside]), good,
-        "; ".join([*_kinds(scenarios), basis, *sure]), open_, content, bases=_bases(scenarios),
-    )  # fmt: skip
+        folder,
+        f"{asked}, and which swing is damped least?",
+        "; ".join([*(text for _, text in said), *beside]),
+        good,
+        "; ".join([*_kinds(scenarios), basis, *sure]),
+        open_,
+        content,
+        bases=_bases(scenarios),
+    )
 
 
 def _modes(file: Path, content: Content) -> Chapter:
     rows = [
-        [escape(s["name"]), f"{m['frequency_hz']:.4f}", damping(m["damping_percent"]), escape(m["name"] or ""),
-         escape(", ".join(f"{c} {share:.0%}" for c, share in list(m["components"].items())[:3]))]
-        for s in content["scenarios"] for m in s["modes"]
-    ]  # fmt: skip
+        [
+            escape(s["name"]),
+            f"{m['frequency_hz']:.4f}",
+            damping(m["damping_percent"]),
+            escape(m["name"] or ""),
+            escape(", ".join(f"{c} {share:.0%}" for c, share in list(m["components"].items())[:3])),
+        ]
+        for s in content["scenarios"]
+        for m in s["modes"]
+    ]
     columns = ["Scenario", "f [Hz]", "Damping [%]", "Name", "Who"]
     groups = {s["name"]: s["modes"] for s in content["scenarios"]}
     shown = _map("Modes", groups) + table("Modes", columns, rows)
     made = of_run(file, content["scenarios"], shown, beside=content.get("beside", []))
-    sure = "; ".join(filter(None, (made.sure, content["facts"], f"steps of {1e3 * content['step_size_s']:g} ms")))
+    sure = "; ".join(
+        filter(None, (made.sure, content["facts"], f"steps of {1e3 * content['step_size_s']:g} ms"))
+    )
     return replace(made, sure=sure)
 
 
@@ -135,7 +178,12 @@ def _map(name: str, groups: Mapping[str, Sequence[Content]]) -> str:
     """The eigenvalues of each group, without those that are over at once, where there are any."""
     shades = {label: colour(k) for k, label in enumerate(groups)}
     marks = [
-        Mark(z["real"], (hz := abs(z["imag"]) / (2 * pi)), shades[label], f"{label}: {hz:.3f} Hz, {z['real']:.3f} 1/s")
+        Mark(
+            z["real"],
+            (hz := abs(z["imag"]) / (2 * pi)),
+            shades[label],
+            f"{label}: {hz:.3f} Hz, {z['real']:.3f} 1/s",
+        )
         for label, found in groups.items()
         for z in found
         if z["real"] > _FASTEST
@@ -144,12 +192,21 @@ def _map(name: str, groups: Mapping[str, Sequence[Content]]) -> str:
 
 
 def _with_models(chapter: Chapter, content: Any) -> Chapter:
-    records = [one for one in (content if isinstance(content, list) else [content]) if isinstance(one, dict)]
+    records = [
+        one
+        for one in (content if isinstance(content, list) else [content])
+        if isinstance(one, dict)
+    ]
     told = (one.get(key) for one in records for key in ("warnings", "questions"))
     more = chain(*(texts for texts in told if isinstance(texts, list)))
     sure = "; ".join(filter(None, (*_kinds(records), chapter.sure)))
     bases = [*chapter.bases, *_bases(records)]
-    return replace(chapter, sure=sure, not_judged=list(dict.fromkeys([*chapter.not_judged, *more])), bases=bases)
+    return replace(
+        chapter,
+        sure=sure,
+        not_judged=list(dict.fromkeys([*chapter.not_judged, *more])),
+        bases=bases,
+    )
 
 
 def _bases(records: Sequence[Content]) -> list[Content]:
@@ -159,8 +216,13 @@ def _bases(records: Sequence[Content]) -> list[Content]:
 def _kinds(records: Sequence[Content]) -> list[str]:
     """Models of each kind, with what they take loads for."""
     loads = (one.get("basis", {}).get("loads") for one in records)
-    return list(dict.fromkeys(f"{one['models']} models" + (f", loads {law}" if law else "")
-                              for one, law in zip(records, loads, strict=True) if one.get("models")))  # fmt: skip
+    return list(
+        dict.fromkeys(
+            f"{one['models']} models" + (f", loads {law}" if law else "")
+            for one, law in zip(records, loads, strict=True)
+            if one.get("models")
+        )
+    )
 
 
 def has_fault(scenario: Content) -> bool:
@@ -171,24 +233,40 @@ def _screening(file: Path, c: Content) -> Chapter:
     where = "somewhere" if c["stable"] is False else "everywhere"
     points, outages = counted(c["points"], "operating point"), counted(c["outages"], "outage")
     answer = f"{_STABLE[c['stable']]} {where}: {points}, {outages}"
-    if worst := min((m["worst"] for m in c["modes"]), key=lambda w: w["damping_percent"], default=None):
-        answer += (f"; least damped {worst['frequency_hz']:.3f} Hz, {worst['damping_percent']:.2f} %, "
-                   f"{'' if c['points'] == 1 else worst['point'] + ', '}outage {worst['outage']}")  # fmt: skip
+    if worst := min(
+        (m["worst"] for m in c["modes"]), key=lambda w: w["damping_percent"], default=None
+    ):
+        answer += (
+            f"; least damped {worst['frequency_hz']:.3f} Hz, {worst['damping_percent']:.2f} %, "
+            f"{'' if c['points'] == 1 else worst['point'] + ', '}outage {worst['outage']}"
+        )
     lost = [c["beyond_rating"]] if c.get("beyond_rating") else []
     lost += [f"{f['point']}, {f['outage']}: {f['status']}: {f['why']}" for f in c["failures"]]
-    growth = "growth was counted at all frequencies" if c["counted_at_all_frequencies"] else (
-        "growth outside of the range was counted at some points only")  # fmt: skip
+    growth = (
+        "growth was counted at all frequencies"
+        if c["counted_at_all_frequencies"]
+        else ("growth outside of the range was counted at some points only")
+    )
     return Chapter(
-        file, "Which operating point and which outage is worst?", answer, c["stable"],
-        f"{counted(c['items'], 'case')} computed, {growth}", lost, page="screening.html",
-    )  # fmt: skip
+        file,
+        "Which operating point and which outage is worst?",
+        answer,
+        c["stable"],
+        f"{counted(c['items'], 'case')} computed, {growth}",
+        lost,
+        page="screening.html",
+    )
 
 
 def _site(file: Path, c: Content) -> Chapter:
-    open_ = [text.removeprefix("not judged: ") for text in c["remarks"] if text.startswith("not judged")]
+    open_ = [
+        text.removeprefix("not judged: ") for text in c["remarks"] if text.startswith("not judged")
+    ]
     sure = "; ".join(c["sure"])
     good = True if c["agrees"] and c["confirmed"] else None if c["agrees"] else False
-    return Chapter(file, "Where does a converter help most?", c["answer"], good, sure, open_, page="site.html")
+    return Chapter(
+        file, "Where does a converter help most?", c["answer"], good, sure, open_, page="site.html"
+    )
 
 
 def _design(file: Path, c: Content) -> Chapter:
@@ -205,35 +283,66 @@ def _design(file: Path, c: Content) -> Chapter:
     sure = f"closed loop of the coupled FMUs: {c['verdict']}"
     modes = {word: [c[f"{which}_mode"]] for word, which in _DESIGNED.items()}
     content = _map("The mode that was designed for", modes) + studies.design(dict(c))
-    return Chapter(file, f"Does {c['controller']} damp the {c['mode']} mode?", answer, bool(c["met"]), sure,
-                   content=content, title=f"Design of {c['controller']}")  # fmt: skip
+    return Chapter(
+        file,
+        f"Does {c['controller']} damp the {c['mode']} mode?",
+        answer,
+        bool(c["met"]),
+        sure,
+        content=content,
+        title=f"Design of {c['controller']}",
+    )
 
 
 def _coordinated(file: Path, c: Content) -> Chapter:
     lost = [f"{f['point']}, {f['outage']}: {f['why']}" for f in c["failed"]]
     return Chapter(
-        file, "Do damping controllers help at all operating points?", c["verdict"], bool(c["met"]),
-        f"checked at {c['items']} points and outages", lost,
-    )  # fmt: skip
+        file,
+        "Do damping controllers help at all operating points?",
+        c["verdict"],
+        bool(c["met"]),
+        f"checked at {c['items']} points and outages",
+        lost,
+    )
 
 
 def _certificate(file: Path, c: Content) -> Chapter:
-    open_ = [text if isinstance(text, str) else f"X_L = {text:g} pu" for text in (*c["departures"], *c["missing"])]
-    warned = [texts for point in c.get("points", []) for texts in point.get("warnings", {}).values()]
+    open_ = [
+        text if isinstance(text, str) else f"X_L = {text:g} pu"
+        for text in (*c["departures"], *c["missing"])
+    ]
+    warned = [
+        texts for point in c.get("points", []) for texts in point.get("warnings", {}).values()
+    ]
     check: Content = c.get("acceptance") or {}
     open_ += dict.fromkeys([*chain(*warned), *_unjudged(check.get("checks", []))])
     trusted = check.get("trusted") is not False
     good = {"passes": trusted, "fails": False}.get(c["verdict"])
-    sure = f"judged: {c['judged']}" if c.get("judged") else counted(len(c["rows"]), "test") if "rows" in c else ""
+    sure = (
+        f"judged: {c['judged']}"
+        if c.get("judged")
+        else counted(len(c["rows"]), "test")
+        if "rows" in c
+        else ""
+    )
     question = f"Does the converter pass the tests of {c['code'].upper() if 'code' in c else 'the grid code'}?"
     return Chapter(file, question, c["sentence"], good, sure, open_, page="certificate.html")
 
 
 def _matrix(file: Path, c: Content) -> Chapter:
-    open_ = ((x, x["failure"] or (x["missing"] and f"{x['missing']} not tested")) for x in c["cells"])
+    open_ = (
+        (x, x["failure"] or (x["missing"] and f"{x['missing']} not tested")) for x in c["cells"]
+    )
     lost = [f"{x['device']}, {x['code']}: {text}" for x, text in open_ if text]
-    return Chapter(file, "Which converter passes which grid code?", c["sentence"], c["exit_code"] == 0,
-                   f"{counted(len(c['cells']), 'pair')} of a device and a code", lost, page="matrix.html")  # fmt: skip
+    return Chapter(
+        file,
+        "Which converter passes which grid code?",
+        c["sentence"],
+        c["exit_code"] == 0,
+        f"{counted(len(c['cells']), 'pair')} of a device and a code",
+        lost,
+        page="matrix.html",
+    )
 
 
 def _unjudged(checks: Sequence[Content]) -> list[str]:
@@ -244,17 +353,29 @@ def _check(file: Path, c: Content) -> Chapter:
     bad = [check for check in c["checks"] if check["verdict"] == "fail"]
     remarks = sum(check["verdict"] == "remark" for check in c["checks"])
     name = Path(c["fmu"]).name
-    answer = f"{name}: " + ("no check failed" if c["trusted"] else ", ".join(c["faults"]) or "not to be judged here")
+    answer = f"{name}: " + (
+        "no check failed" if c["trusted"] else ", ".join(c["faults"]) or "not to be judged here"
+    )
     shade = {"fail": "bad", "pass": "good"}
-    rows = [[escape(x["question"]), f'<span class="{shade.get(x["verdict"], "soft")}">{escape(x["verdict"])}</span>',
-             escape(x["evidence"]), escape(x["remedy"])] for x in c["checks"]]  # fmt: skip
+    rows = [
+        [
+            escape(x["question"]),
+            f'<span class="{shade.get(x["verdict"], "soft")}">{escape(x["verdict"])}</span>',
+            escape(x["evidence"]),
+            escape(x["remedy"]),
+        ]
+        for x in c["checks"]
+    ]
     good = True if c["trusted"] else False if bad else None
     return Chapter(
-        file, "Can this FMU be trusted in a co-simulation?", answer, good,
+        file,
+        "Can this FMU be trusted in a co-simulation?",
+        answer,
+        good,
         f"{counted(len(c['checks']), 'check')}, {remarks} with a remark",
         [*c["not_supported"], *_unjudged(c["checks"])],
         table("Checks", ["Question", "Verdict", "Evidence", "Remedy"], rows, left=4),
-    )  # fmt: skip
+    )
 
 
 def _limits(file: Path, found: Any) -> Chapter:
@@ -264,25 +385,58 @@ def _limits(file: Path, found: Any) -> Chapter:
 
 
 def _comparison(file: Path, signals: Any) -> Chapter:
-    rows = [[escape(s["expression"]), escape(s["unit"]), f"{s['largest']:.4g}", f"{s['at']:.3f}", f"{s['rms']:.4g}"]
-            for s in signals]  # fmt: skip
+    rows = [
+        [
+            escape(s["expression"]),
+            escape(s["unit"]),
+            f"{s['largest']:.4g}",
+            f"{s['at']:.3f}",
+            f"{s['rms']:.4g}",
+        ]
+        for s in signals
+    ]
     first = signals[0]
     answer = f"{first['expression']} differs most, by {first['largest']:.4g} {first['unit']} at {first['at']:.3f} s"
     columns = ["Signal", "Unit", "Largest difference", "at [s]", "RMS"]
-    return Chapter(file, "How do two runs differ?", answer, None, counted(len(signals), "signal"), (),
-                   table("Differences", columns, rows, left=2))  # fmt: skip
+    return Chapter(
+        file,
+        "How do two runs differ?",
+        answer,
+        None,
+        counted(len(signals), "signal"),
+        (),
+        table("Differences", columns, rows, left=2),
+    )
 
 
 def _identified(file: Path, modes: Any) -> Chapter:
-    rows = [[f"{m['frequency_hz']:.4f}", damping(m["damping_percent"]), f"{m['amplitude']:.3g}",
-             escape("; ".join(m["doubts"]))] for m in modes]  # fmt: skip
+    rows = [
+        [
+            f"{m['frequency_hz']:.4f}",
+            damping(m["damping_percent"]),
+            f"{m['amplitude']:.3g}",
+            escape("; ".join(m["doubts"])),
+        ]
+        for m in modes
+    ]
     swing = next((m for m in modes if m["frequency_hz"]), None)
-    figures = f"{swing['frequency_hz']:.3f} Hz, {swing['damping_percent']:.2f} %" if swing else "no oscillation"
+    figures = (
+        f"{swing['frequency_hz']:.3f} Hz, {swing['damping_percent']:.2f} %"
+        if swing
+        else "no oscillation"
+    )
     sure = f"{sum(not m['doubts'] for m in modes)} of {counted(len(modes), 'mode')} without a doubt"
     doubts = [f"{m['frequency_hz']:.3f} Hz: {text}" for m in modes for text in m["doubts"]]
-    return Chapter(file, "With which modes does a record ring?", f"strongest: {figures}", None, sure, doubts,
-                   _map("Modes", {"record": modes})
-                   + table("Modes", ["f [Hz]", "Damping [%]", "Amplitude", "Doubts"], rows, left=0))  # fmt: skip
+    return Chapter(
+        file,
+        "With which modes does a record ring?",
+        f"strongest: {figures}",
+        None,
+        sure,
+        doubts,
+        _map("Modes", {"record": modes})
+        + table("Modes", ["f [Hz]", "Damping [%]", "Amplitude", "Doubts"], rows, left=0),
+    )
 
 
 def _interactions(file: Path, c: Content) -> Chapter:
@@ -294,43 +448,87 @@ def _interactions(file: Path, c: Content) -> Chapter:
     answer += f"; {worst['sentence']}" if worst else ""
     sure = f"each of {len(c['vendors'])} vendors alone and each pair, the others as {c['stand_in']}"
     lost = [f"pair {' and '.join(pair)}" for pair in c["unknown_pairs"]]
-    return Chapter(file, "Do several vendors' converters agree?", answer, good, sure, lost, page="interactions.html")
+    return Chapter(
+        file,
+        "Do several vendors' converters agree?",
+        answer,
+        good,
+        sure,
+        lost,
+        page="interactions.html",
+    )
 
 
 def _sensitivities(file: Path, c: Content) -> Chapter:
     key, mode = "damping_points_per_percent", c["mode"]
     found = sorted((r for r in c["sensitivities"] if r[key]), key=lambda r: -abs(r[key]))
     first = found[:_FEW]
-    rows = [[escape(r["parameter"]), f"{r['value']:.5g} {escape(r['unit'])}", f"{r[key]:+.3g}",
-             f"{r['frequency_hz_per_percent']:+.3g}", escape(r["doubts"])] for r in found]  # fmt: skip
+    rows = [
+        [
+            escape(r["parameter"]),
+            f"{r['value']:.5g} {escape(r['unit'])}",
+            f"{r[key]:+.3g}",
+            f"{r['frequency_hz_per_percent']:+.3g}",
+            escape(r["doubts"]),
+        ]
+        for r in found
+    ]
     said = ", ".join(f"{r['parameter']} ({r[key]:+.2g})" for r in first) or "no parameter"
     answer = f"{mode['frequency_hz']:.3f} Hz, {mode['damping_percent']:.2f} %: most by {said} points for 1 % more"
     answer = f"UNSTABLE; {answer}" if c["stable"] is False else answer
     size = "Points by 1 %, without sign"
-    bars = bar_chart("Points of damping", [r["parameter"] for r in first],
-                     [("1 % more", colour(1), [abs(r[key]) for r in first])], size) if first else ""  # fmt: skip
+    bars = (
+        bar_chart(
+            "Points of damping",
+            [r["parameter"] for r in first],
+            [("1 % more", colour(1), [abs(r[key]) for r in first])],
+            size,
+        )
+        if first
+        else ""
+    )
     columns = ["Parameter", "Value", "Points by 1 %", "Hz by 1 %", "Doubts"]
     return Chapter(
-        file, f"What moves the {mode['name'] or 'critical'} mode of {c['scenario']}?", answer, None,
+        file,
+        f"What moves the {mode['name'] or 'critical'} mode of {c['scenario']}?",
+        answer,
+        None,
         f"{c['derivative']} derivatives by {counted(len(found), 'parameter')}",
         [f"{r['parameter']}: {r['reason']}" for r in c["sensitivities"] if r["reason"]],
         bars + table("By the size of their effect", columns, rows),
-    )  # fmt: skip
+    )
 
 
 def _sources(file: Path, records: Any) -> Chapter:
     records = records if isinstance(records, list) else [records]
-    found = [(f"{x['frequency_hz']:.3f} Hz", x, c["record"]) for c in records for x in c["oscillations"]]
-    said = [f"{at}: {x['kind']}" + (f", from {x['source']}" if x["source"] else "") for at, x, _ in found]
-    unnamed = [f"{at}: {x['reason']}" for at, x, _ in found if not x["source"] and x["kind"] != "mode"]
-    rows = [[record, at, x["kind"], x["source"] or "not named", x["reason"], x["advice"]] for at, x, record in found]
+    found = [
+        (f"{x['frequency_hz']:.3f} Hz", x, c["record"]) for c in records for x in c["oscillations"]
+    ]
+    said = [
+        f"{at}: {x['kind']}" + (f", from {x['source']}" if x["source"] else "")
+        for at, x, _ in found
+    ]
+    unnamed = [
+        f"{at}: {x['reason']}" for at, x, _ in found if not x["source"] and x["kind"] != "mode"
+    ]
+    rows = [
+        [record, at, x["kind"], x["source"] or "not named", x["reason"], x["advice"]]
+        for at, x, record in found
+    ]
     return Chapter(
-        file, "Where does the oscillation come from?", "; ".join(said) or "nothing oscillates", None,
+        file,
+        "Where does the oscillation come from?",
+        "; ".join(said) or "nothing oscillates",
+        None,
         f"power and voltage of {sum(len(c['places']) for c in records)} places",
         [*unnamed, *(text for c in records for text in c["remarks"])],
-        table("Oscillations", ["Record", "Oscillation", "Kind", "Source", "Why", "Next"],
-              [[escape(cell) for cell in row] for row in rows], left=6),
-    )  # fmt: skip
+        table(
+            "Oscillations",
+            ["Record", "Oscillation", "Kind", "Source", "Why", "Next"],
+            [[escape(cell) for cell in row] for row in rows],
+            left=6,
+        ),
+    )
 
 
 def _strengths(file: Path, c: Content) -> Chapter:
@@ -341,45 +539,87 @@ def _strengths(file: Path, c: Content) -> Chapter:
         text = "".join(f", SCR {scr} at {bus}" for bus, scr in ratios.items() if scr != "–")
         text = f"weakest is {weakest['bus']} with {weakest['s_sc_mva']:.0f} MVA{text}"
         said.setdefault(short(text, _LONGEST), []).append(scenario["name"])
-        rows += [[escape(scenario["name"]), escape(b["bus"]), f"{b['s_sc_mva']:.0f}", ratios[b["bus"]]] for b in buses]
+        rows += [
+            [escape(scenario["name"]), escape(b["bus"]), f"{b['s_sc_mva']:.0f}", ratios[b["bus"]]]
+            for b in buses
+        ]
     answer = "; ".join(f"{', '.join(names)}: {text}" for text, names in said.items())
-    return Chapter(file, "How strong is the network?", answer, None, c["convention"], (),
-                   table("Short-circuit power", ["Scenario", "Bus", "S_sc [MVA]", "SCR"], rows, left=2))  # fmt: skip
+    return Chapter(
+        file,
+        "How strong is the network?",
+        answer,
+        None,
+        c["convention"],
+        (),
+        table("Short-circuit power", ["Scenario", "Bus", "S_sc [MVA]", "SCR"], rows, left=2),
+    )
 
 
 def _nyquist(file: Path, c: Content) -> Chapter:
-    rows = [[name, f"{m['value']:.4g}", f"{m['frequency_hz']:.4g}"] for name, m in c["margins"].items() if m]
+    rows = [
+        [name, f"{m['value']:.4g}", f"{m['frequency_hz']:.4g}"]
+        for name, m in c["margins"].items()
+        if m
+    ]
     content = table("Margins", ["Margin", "Value", "at [Hz]"], rows)
     if found := c.get("retune"):
-        made = [[escape(x["name"]), f"{x['now']:.4g}", "" if x["needed"] is None else f"{x['needed']:.4g}",
-                 "" if (said := x["confirmed"]) is None else f"{said['verdict']}, {said['distance']:.4f}",
-                 escape(x["remark"])] for x in found["parameters"]]  # fmt: skip
+        made = [
+            [
+                escape(x["name"]),
+                f"{x['now']:.4g}",
+                "" if x["needed"] is None else f"{x['needed']:.4g}",
+                ""
+                if (said := x["confirmed"]) is None
+                else f"{said['verdict']}, {said['distance']:.4f}",
+                escape(x["remark"]),
+            ]
+            for x in found["parameters"]
+        ]
         wanted = f"What to retune for a distance of {found['distance_wanted']:g} from −1"
         content += table(wanted, ["Parameter", "Now", "Needed", "Confirmed", "Remark"], made)
-    for picture in (file.with_name(name) for name in ("eigenloci.png", "matrices.png", "retune.png")):
+    for picture in (
+        file.with_name(name) for name in ("eigenloci.png", "matrices.png", "retune.png")
+    ):
         if picture.is_file():
             data = b64encode(picture.read_bytes()).decode()
             content += f'<p><img alt="{picture.stem}" style="max-width: 100%" src="data:image/png;base64,{data}"></p>'
     good = {"stable": True, "unstable": False}.get(c["verdict"])
-    modes = "no modes asked" if c["modes_stable"] is None else "modes agree" if c["modes_stable"] == good else (
-        "the modes do NOT agree")  # fmt: skip
+    modes = (
+        "no modes asked"
+        if c["modes_stable"] is None
+        else "modes agree"
+        if c["modes_stable"] == good
+        else ("the modes do NOT agree")
+    )
     return Chapter(
-        file, f"Is {c['device']} stable at {c['network']}?", c["sentence"], good, f"encirclements; {modes}",
-        c["reasons"], content,
-    )  # fmt: skip
+        file,
+        f"Is {c['device']} stable at {c['network']}?",
+        c["sentence"],
+        good,
+        f"encirclements; {modes}",
+        c["reasons"],
+        content,
+    )
 
 
 _KINDS: tuple[tuple[set[str], Callable[[Path, Any], Chapter]], ...] = (
-    ({"device", "buses", "confirmed", "answer"}, _site), ({"holds_at", "beyond", "sentence"}, _limits),
+    ({"device", "buses", "confirmed", "answer"}, _site),
+    ({"holds_at", "beyond", "sentence"}, _limits),
     ({"counted_at_all_frequencies", "failures", "modes"}, _screening),
     ({"controller", "target_mode", "T_S1", "verdict"}, _design),
-    ({"settings", "verdict", "met", "ranking"}, _coordinated), ({"cells", "codes", "sentence"}, _matrix),
-    ({"sentence", "verdict", "files", "seal"}, _certificate), ({"trusted", "checks", "faults"}, _check),
-    ({"scenarios", "facts", "step_size_s"}, _modes), ({"expression", "deviations", "rms"}, _comparison),
-    ({"interaction_modes", "pairs", "worst_pair"}, _interactions), ({"derivative", "sensitivities"}, _sensitivities),
-    ({"record", "places", "oscillations"}, _sources), ({"convention", "scenarios"}, _strengths),
-    ({"amplitude", "doubts"}, _identified), ({"crossings", "margins", "sentence"}, _nyquist),
-)  # fmt: skip
+    ({"settings", "verdict", "met", "ranking"}, _coordinated),
+    ({"cells", "codes", "sentence"}, _matrix),
+    ({"sentence", "verdict", "files", "seal"}, _certificate),
+    ({"trusted", "checks", "faults"}, _check),
+    ({"scenarios", "facts", "step_size_s"}, _modes),
+    ({"expression", "deviations", "rms"}, _comparison),
+    ({"interaction_modes", "pairs", "worst_pair"}, _interactions),
+    ({"derivative", "sensitivities"}, _sensitivities),
+    ({"record", "places", "oscillations"}, _sources),
+    ({"convention", "scenarios"}, _strengths),
+    ({"amplitude", "doubts"}, _identified),
+    ({"crossings", "margins", "sentence"}, _nyquist),
+)
 """What the JSON of each study has, the first that fits."""
 
 
@@ -387,7 +627,9 @@ def sections(chapter: Chapter, number: int) -> str:
     place = chapter.source if chapter.source.is_dir() else chapter.source.parent
     if not chapter.page or not (place / chapter.page).is_file():
         return chapter.content
-    found = re.search(r"</nav>(.*)</main>", (place / chapter.page).read_text(encoding="utf-8"), re.DOTALL)
+    found = re.search(
+        r"</nav>(.*)</main>", (place / chapter.page).read_text(encoding="utf-8"), re.DOTALL
+    )
     text = found[1] if found else ""
     text = re.sub(r'(id="|href="#)(section|figure)-', rf"\1chapter-{number}-\2-", text)
     text = re.sub(r"(clip-)(\d+)", rf"\g<1>{number}-\2", text)
@@ -409,20 +651,32 @@ def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:
     unknown = 0 if stable is None else int((~stable.isin([0, 1])).sum())
     open_ = [f"stability at {counted(unknown, 'point')}"] if unknown else []
     open_ += json.loads(sweep.attrs.get("warned", "[]"))
-    about = {"models": sweep.attrs.get("models"), "basis": json.loads(sweep.attrs.get("basis", "{}"))}
+    about = {
+        "models": sweep.attrs.get("models"),
+        "basis": json.loads(sweep.attrs.get("basis", "{}")),
+    }
     models, bases = "".join(f"{kind}; " for kind in _kinds([about])), _bases([about])
     if limits := limits_of(place):
         said = "; ".join(f"{one['scenario']}: {one['sentence']}" for one in limits)
         holds = all(one["ends_with"] == "holds" for one in limits)
         return Chapter(
-            place, f"How far may {limits[0]['parameter']} go?", said, holds or None,
+            place,
+            f"How far may {limits[0]['parameter']} go?",
+            said,
+            holds or None,
             f"{models}coarse values, then bisection; each is of the coupled FMUs at an operating point of its own",
-            [*open_, "narrow pieces between the values that were tried"], bases=bases,
-        )  # fmt: skip
+            [*open_, "narrow pieces between the values that were tried"],
+            bases=bases,
+        )
     answer = f"least damping {float(least.min()):.2f} % at {where}" + (
         f"; UNSTABLE at {counted(lost, 'point')}" if lost else ""
     )
     return Chapter(
-        place, f"How do the modes move along {studies.axis_of(sweep)}?", answer, False if lost else None,
-        f"{models}each point is a linear model of the coupled FMUs there", open_, bases=bases,
-    )  # fmt: skip
+        place,
+        f"How do the modes move along {studies.axis_of(sweep)}?",
+        answer,
+        False if lost else None,
+        f"{models}each point is a linear model of the coupled FMUs there",
+        open_,
+        bases=bases,
+    )

@@ -51,7 +51,9 @@ class Frame:
         """Place of a point on the page [px]."""
         (x0, x1), (y0, y1) = self.x_range, self.y_range
         across, up = (x - x0) / (x1 - x0), (y - y0) / (y1 - y0)
-        return _LEFT + across * (_WIDTH - _LEFT - _RIGHT), self.height - _BOTTOM - up * (self.height - _TOP - _BOTTOM)
+        return _LEFT + across * (_WIDTH - _LEFT - _RIGHT), self.height - _BOTTOM - up * (
+            self.height - _TOP - _BOTTOM
+        )
 
     def svg(self, name: str, extra: str = "") -> str:
         right, bottom = _WIDTH - _RIGHT, self.height - _BOTTOM
@@ -82,13 +84,17 @@ class Frame:
         )
 
 
-def line_chart(name: str, x_label: str, y_label: str, curves: Sequence[ChartCurve], height: int = 210) -> str:
+def line_chart(
+    name: str, x_label: str, y_label: str, curves: Sequence[ChartCurve], height: int = 210
+) -> str:
     x_all = np.concatenate([c.x for c in curves])
     y_all = np.concatenate([c.y for c in curves])
     frame = Frame(_span(x_all, 0.0), _span(y_all, 0.06), x_label, y_label, height)
     for curve in curves:
         x, y = thinned(curve.x, curve.y)
-        points = " ".join(f"{px:.1f},{py:.1f}" for px, py in (frame.at(a, b) for a, b in zip(x, y, strict=True)))
+        points = " ".join(
+            f"{px:.1f},{py:.1f}" for px, py in (frame.at(a, b) for a, b in zip(x, y, strict=True))
+        )
         dash = ' stroke-dasharray="5 4" class="curve dashed"' if curve.dashed else ' class="curve"'
         values = " ".join(f"{v:.5g}" for v in y)
         abscissa = " ".join(f"{v:.5g}" for v in x)
@@ -103,7 +109,10 @@ def line_chart(name: str, x_label: str, y_label: str, curves: Sequence[ChartCurv
 
 
 def complex_plane(
-    name: str, marks: Sequence[Mark], trajectories: Sequence[ChartCurve] = (), highest_hz: float | None = None
+    name: str,
+    marks: Sequence[Mark],
+    trajectories: Sequence[ChartCurve] = (),
+    highest_hz: float | None = None,
 ) -> str:
     """Eigenvalues as real part [1/s] against frequency [Hz], with rays of equal damping.
 
@@ -114,24 +123,39 @@ def complex_plane(
     ys = [m.y for m in marks] + [v for t in trajectories for v in t.y.tolist()]
     top = 1.08 * (highest_hz or max(ys, default=1.0))
     left = min([-0.5, *xs]) * 1.06
-    frame = Frame((left, max(0.15, 1.3 * max(xs, default=0.0))), (0.0, top), "Real part [1/s]", "Frequency [Hz]", 430)
+    frame = Frame(
+        (left, max(0.15, 1.3 * max(xs, default=0.0))),
+        (0.0, top),
+        "Real part [1/s]",
+        "Frequency [Hz]",
+        430,
+    )
     for percent in (5, 10, 15, 20, 30):
         slope = percent / 100 / math.sqrt(1 - (percent / 100) ** 2) * 2 * math.pi
         end = min(top, -left / slope)
         (x0, y0), (x1, y1) = frame.at(0, 0), frame.at(-slope * end, end)
         frame.parts.append(f'<path class="ray" d="M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}"/>')
-        frame.parts.append(f'<text class="faint" x="{x1 + 4:.1f}" y="{y1 + 12:.1f}">{percent} %</text>')
+        frame.parts.append(
+            f'<text class="faint" x="{x1 + 4:.1f}" y="{y1 + 12:.1f}">{percent} %</text>'
+        )
     (x0, y0), (_, y1) = frame.at(0, 0), frame.at(0, top)
     frame.parts.append(f'<path class="axis" d="M{x0:.1f} {y0:.1f}V{y1:.1f}"/>')
     for t in trajectories:
-        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in (frame.at(*v) for v in zip(t.x, t.y, strict=True)))
-        frame.parts.append(f'<polyline points="{points}" fill="none" stroke="{t.colour}" class="curve thin"/>')
+        points = " ".join(
+            f"{a:.1f},{b:.1f}" for a, b in (frame.at(*v) for v in zip(t.x, t.y, strict=True))
+        )
+        frame.parts.append(
+            f'<polyline points="{points}" fill="none" stroke="{t.colour}" class="curve thin"/>'
+        )
     frame.parts += [_mark(m, *frame.at(m.x, m.y)) for m in marks]
     return frame.svg(name)
 
 
 def bar_chart(
-    name: str, groups: Sequence[str], bars: Sequence[tuple[str, str, Sequence[float]]], unit: str = "Participation [%]"
+    name: str,
+    groups: Sequence[str],
+    bars: Sequence[tuple[str, str, Sequence[float]]],
+    unit: str = "Participation [%]",
 ) -> str:
     """Groups of bars: each entry of ``bars`` is a label, a colour and one height a group."""
     top = max((h for *_, heights in bars for h in heights), default=0.0) or 1.0
@@ -155,14 +179,22 @@ def thinned(x: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:
         return x, y
     keep: list[int] = []
     for stretch in np.array_split(np.arange(len(x)), _POINTS // 3):
-        keep += sorted({int(stretch[0]), int(stretch[np.argmin(y[stretch])]), int(stretch[np.argmax(y[stretch])])})
+        keep += sorted(
+            {
+                int(stretch[0]),
+                int(stretch[np.argmin(y[stretch])]),
+                int(stretch[np.argmax(y[stretch])]),
+            }
+        )
     keep.append(len(x) - 1)
     chosen = np.unique(keep)
     return x[chosen], y[chosen]
 
 
 def legend(entries: Iterable[tuple[str, str]]) -> str:
-    items = "".join(f'<li><i style="background:{colour}"></i>{escape(label)}</li>' for label, colour in entries)
+    items = "".join(
+        f'<li><i style="background:{colour}"></i>{escape(label)}</li>' for label, colour in entries
+    )
     return f'<ul class="legend">{items}</ul>'
 
 
@@ -193,7 +225,13 @@ def _ticks(limits: tuple[float, float]) -> list[tuple[float, str]]:
     from matplotlib.ticker import MaxNLocator  # noqa: PLC0415 - half a second to import
 
     low, high = limits
-    values = [v for v in MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high) if low <= v <= high]
+    values = [
+        v
+        for v in MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
+        if low <= v <= high
+    ]
     step = abs(values[1] - values[0]) if len(values) > 1 else abs(high - low) or 1.0
-    digits = max(0, -math.floor(math.log10(step) + 1e-9) + (1 if f"{step:e}".startswith("2.5") else 0))
+    digits = max(
+        0, -math.floor(math.log10(step) + 1e-9) + (1 if f"{step:e}".startswith("2.5") else 0)
+    )
     return [(float(v), f"{v + 0.0:.{digits}f}".replace("-", "−")) for v in values]

@@ -16,9 +16,13 @@ def colour(index: int) -> str:
     return COLOURS[index % len(COLOURS)]
 
 
-def table(caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> str:
+def table(
+    caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1
+) -> str:
     def cells(tag: str, values: Sequence[str]) -> str:
-        return "".join(f"<{tag}{' class=text' if k < left else ''}>{v}</{tag}>" for k, v in enumerate(values))
+        return "".join(
+            f"<{tag}{' class=text' if k < left else ''}>{v}</{tag}>" for k, v in enumerate(values)
+        )
 
     head = cells("th", [escape(c) for c in columns])
     body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
@@ -70,18 +74,27 @@ def paragraphs(good: bool | None, texts: Sequence[str]) -> str:
     """Sentences; the first one is the verdict, in the colour of what is good, bad or not known."""
     shade = {True: "good", False: "bad", None: "soft"}[good]
     first, *rest = texts
-    return f'<p class="{shade}">{escape(first)}</p>' + "".join(f"<p>{escape(text)}</p>" for text in rest)
+    return f'<p class="{shade}">{escape(first)}</p>' + "".join(
+        f"<p>{escape(text)}</p>" for text in rest
+    )
 
 
 _HERE = Path(__file__).parent
 
 
 def document(
-    title: str, kind: str, findings: str, content: Sequence[tuple[str, str]], moment: datetime | None = None
+    title: str,
+    kind: str,
+    findings: str,
+    content: Sequence[tuple[str, str]],
+    moment: datetime | None = None,
 ) -> str:
-    links = "".join(f'<a href="#section-{k}">{escape(name)}</a>' for k, (name, _) in enumerate(content))
+    links = "".join(
+        f'<a href="#section-{k}">{escape(name)}</a>' for k, (name, _) in enumerate(content)
+    )
     body = "".join(
-        f'<section id="section-{k}"><h2>{escape(name)}</h2>{text}</section>' for k, (name, text) in enumerate(content)
+        f'<section id="section-{k}"><h2>{escape(name)}</h2>{text}</section>'
+        for k, (name, text) in enumerate(content)
     )
     made = f"gfor-cosim {version('gfor-cosim')}, {moment or datetime.now(UTC):%Y-%m-%d %H:%M} UTC"
     return f"""<!DOCTYPE html>

@@ -43,13 +43,21 @@ def read_results(folder: Path) -> Results:
         scenarios = content["scenarios"]
         names = [s["name"] for s in scenarios]
         return Results(
-            folder, case, scenarios, _rows(folder / "modes.csv"), _rows(folder / "participation.csv"),
-            _rows(folder / "step_size.csv"), dict(_datasets(folder, names, "trajectory.nc")),
-            dict(_datasets(folder, names, "linear.nc")), ended_early=content.get("ended_early"),
+            folder,
+            case,
+            scenarios,
+            _rows(folder / "modes.csv"),
+            _rows(folder / "participation.csv"),
+            _rows(folder / "step_size.csv"),
+            dict(_datasets(folder, names, "trajectory.nc")),
+            dict(_datasets(folder, names, "linear.nc")),
+            ended_early=content.get("ended_early"),
             beside=content.get("beside", []),
-        )  # fmt: skip
+        )
     except (OSError, ValueError, KeyError) as error:
-        raise InputError(f"{folder}: a result file cannot be read: {error}; run the study again") from error
+        raise InputError(
+            f"{folder}: a result file cannot be read: {error}; run the study again"
+        ) from error
 
 
 def sweeps_of(place: Path) -> list[xr.Dataset]:

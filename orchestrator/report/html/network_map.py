@@ -15,21 +15,32 @@ _LABELS = 60  # so many buses at most have their names beside them; the pointer 
 
 
 def network_map(
-    name: str, branches: Sequence[tuple[str, str]], heat: Mapping[str, float], texts: Mapping[str, str],
+    name: str,
+    branches: Sequence[tuple[str, str]],
+    heat: Mapping[str, float],
+    texts: Mapping[str, str],
     flows: Mapping[tuple[str, str], float] = {},
-) -> str:  # fmt: skip
+) -> str:
     """The picture as SVG: branches by their two buses; by bus its heat from 0 (pale) to 1 (red), and what the pointer
     shows; by branch what flows along it, from 0 to 1, as an arrow as wide."""
     buses = list(heat)
     at = dict(zip(buses, places(buses, branches).tolist(), strict=True))
     parts = [
-        f'<path stroke="#999" d="M{at[a][0]:.1f} {at[a][1]:.1f}L{at[b][0]:.1f} {at[b][1]:.1f}"/>' for a, b in branches
+        f'<path stroke="#999" d="M{at[a][0]:.1f} {at[a][1]:.1f}L{at[b][0]:.1f} {at[b][1]:.1f}"/>'
+        for a, b in branches
     ]
     for (a, b), part in flows.items():
         (xa, ya), (xb, yb) = at[a], at[b]
-        mid, along = np.array([xa + xb, ya + yb]) / 2, np.array([xb - xa, yb - ya]) / (np.hypot(xb - xa, yb - ya) or 1)
+        mid, along = (
+            np.array([xa + xb, ya + yb]) / 2,
+            np.array([xb - xa, yb - ya]) / (np.hypot(xb - xa, yb - ya) or 1),
+        )
         size, across = 5 + 7 * part, np.array([-along[1], along[0]])
-        corners = (mid + size * along, mid - size * (along - 0.6 * across), mid - size * (along + 0.6 * across))
+        corners = (
+            mid + size * along,
+            mid - size * (along - 0.6 * across),
+            mid - size * (along + 0.6 * across),
+        )
         points = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners)
         parts.append(
             f'<path stroke="#c33" stroke-width="{1 + 5 * part:.1f}" d="M{xa:.1f} {ya:.1f}L{xb:.1f} {yb:.1f}"/>'

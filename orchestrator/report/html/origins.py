@@ -22,8 +22,13 @@ def origin_of(source: Path) -> dict[str, Any]:
             return said
         case str(date):  # a certificate's
             made_by = own.get("environment", {})
-            return {"date": date, "made_by": made_by, "sealed": own.get("files", {}),
-                    "code": made_by.get("Commit", ""), "command": f"gfor verify {folder}"}  # fmt: skip
+            return {
+                "date": date,
+                "made_by": made_by,
+                "sealed": own.get("files", {}),
+                "code": made_by.get("Commit", ""),
+                "command": f"gfor verify {folder}",
+            }
     content = _content(folder / MANIFEST)
     listed = content.get("files", {}).get(source.name)
     return {} if listed and listed["run"] != content["run"] else content
@@ -49,6 +54,13 @@ def made_of(source: Path, origin: Mapping[str, Any]) -> list[str]:
     listed = origin.get("inputs", origin.get("sealed", {}))
     versions = origin.get("made_by", {}).get("gfor-cosim")
     inputs = ", ".join(f"{name} {str(of)[:8]}" for name, of in listed.items() if of)
-    date = origin.get("date") or f"{datetime.fromtimestamp(source.stat().st_mtime, UTC):%Y-%m-%d %H:%M} (the file's)"
+    date = (
+        origin.get("date")
+        or f"{datetime.fromtimestamp(source.stat().st_mtime, UTC):%Y-%m-%d %H:%M} (the file's)"
+    )
     figures = f"gfor-cosim {versions}" if versions else "", str(origin.get("code", ""))[:12], inputs
-    return [str(source), date, *(text or "not recorded" for text in (*figures, origin.get("command")))]
+    return [
+        str(source),
+        date,
+        *(text or "not recorded" for text in (*figures, origin.get("command"))),
+    ]

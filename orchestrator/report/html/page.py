@@ -31,9 +31,14 @@ _PICTURE = r'(?:<ul class="legend">[^\n]*?</ul>)?<svg class="chart".*?</svg>|<im
 
 
 def write_report(
-    folder: Path, others: Sequence[Path] = (), path: Path | None = None, against: Path | None = None,
-    title: str | None = None, *, short: bool = False,
-) -> Path:  # fmt: skip
+    folder: Path,
+    others: Sequence[Path] = (),
+    path: Path | None = None,
+    against: Path | None = None,
+    title: str | None = None,
+    *,
+    short: bool = False,
+) -> Path:
     """One file that needs no other, by default in the first folder.
 
     ``against``: an older page, or an older folder of results, of which it says what changed since.
@@ -43,7 +48,13 @@ def write_report(
     return target
 
 
-def page(places: Sequence[Path], against: Path | None = None, title: str | None = None, *, short: bool = False) -> str:
+def page(
+    places: Sequence[Path],
+    against: Path | None = None,
+    title: str | None = None,
+    *,
+    short: bool = False,
+) -> str:
     told, runs = _told(places, Figures())
     chapters = [chapter for chapter, _ in told]
     if differ := _of_several_studies(chapters):
@@ -53,30 +64,51 @@ def page(places: Sequence[Path], against: Path | None = None, title: str | None 
     headings = [heading for _, content in told for heading, _ in content]
     content = [
         (heading if headings.count(heading) == 1 else f"{heading} ({_name(chapter.source)})", text)
-        for chapter, found in told for heading, text in found
-    ]  # fmt: skip
+        for chapter, found in told
+        for heading, text in found
+    ]
     charts = (re.search(_PICTURE, text, re.DOTALL) for _, text in content)
     picture = next((found[0] for found in charts if found), "")
     first = "<p>Its picture stands on the first page.</p>"
-    content = [] if short else [(h, text.replace(picture, first) if picture else text) for h, text in content]
+    content = (
+        []
+        if short
+        else [(h, text.replace(picture, first) if picture else text) for h, text in content]
+    )
     if against is not None:
-        before = [chapter for chapter, _ in _told([against], Figures())[0]] if against.is_dir() else None
+        before = (
+            [chapter for chapter, _ in _told([against], Figures())[0]] if against.is_dir() else None
+        )
         content.insert(0, ("What changed since", changes(against, before, chapters)))
     content.append(("Provenance", origins(chapters) + "".join(map(sections.provenance, runs))))
     case = runs[0].case if runs else None
-    title = title or (case.table.title or case.name if case else f"Report on {', '.join(map(_name, places))}")
+    title = title or (
+        case.table.title or case.name if case else f"Report on {', '.join(map(_name, places))}"
+    )
     kind = "Small-signal and time-domain study by co-simulation of FMUs"
     found = "".join(map(sections.findings, runs))
-    of_all = {"question": "Are these results of one study?", "source": "", "answer": f"NO: {differ}"}
-    answers = held_data("answers", [*[of_all] * bool(differ), *_answers(chapters)])  # for `changes` of a later page
+    of_all = {
+        "question": "Are these results of one study?",
+        "source": "",
+        "answer": f"NO: {differ}",
+    }
+    # for `changes` of a later page
+    answers = held_data("answers", [*[of_all] * bool(differ), *_answers(chapters)])
     above = "".join(paragraphs(False, [text]) for text in (differ, changed) if text)
     return document(title, kind, above + first_page(chapters) + picture + found + answers, content)
 
 
-def _told(places: Sequence[Path], figures: Figures) -> tuple[list[tuple[Chapter, Sections]], list[Results]]:
+def _told(
+    places: Sequence[Path], figures: Figures
+) -> tuple[list[tuple[Chapter, Sections]], list[Results]]:
     """The chapters of all places with their sections, and the runs among them."""
     parts = {place: list(_parts(place)) for place in places}
-    runs = {part: read_results(part) for found in parts.values() for part in found if (part / SUMMARY).is_file()}
+    runs = {
+        part: read_results(part)
+        for found in parts.values()
+        for part in found
+        if (part / SUMMARY).is_file()
+    }
     scenarios = [s for run in runs.values() for s in run.scenarios]
     told: list[tuple[Chapter, Sections]] = []
     for place, within in parts.items():
@@ -84,21 +116,37 @@ def _told(places: Sequence[Path], figures: Figures) -> tuple[list[tuple[Chapter,
         for part in within:
             count = len(told)
             if (run := runs.get(part)) is not None:
-                split = ([s for s in run.scenarios if has_fault(s) is faulted] for faulted in (False, True))
+                split = (
+                    [s for s in run.scenarios if has_fault(s) is faulted]
+                    for faulted in (False, True)
+                )
                 chapters = [of_run(part, some, beside=run.beside) for some in split if some]
                 told += zip(chapters, [_of_run(run, figures), *[[]] * len(chapters)], strict=False)
             for sweep in sweeps_of(part):
                 shown = studies.sweep(sweep, scenarios, figures)
-                told.append((of_sweep(part, sweep), [(f"Trajectories along {studies.axis_of(sweep)}", shown)]))
+                told.append(
+                    (
+                        of_sweep(part, sweep),
+                        [(f"Trajectories along {studies.axis_of(sweep)}", shown)],
+                    )
+                )
             for chapter in chapters_of(part):
                 text = sections_of(chapter, len(told) + 1)
                 told.append((chapter, [(chapter.title or chapter.question, text)]))
             if part != place and len(told) == count and (part / MANIFEST).is_file():
-                warnings.warn(f"{part}: nothing in it can be used for a report", ResultsWarning, stacklevel=2)
+                warnings.warn(
+                    f"{part}: nothing in it can be used for a report", ResultsWarning, stacklevel=2
+                )
         if len(told) == before:
-            pages = ", ".join(file.name for file in sorted(place.glob("*.html"))) if place.is_dir() else ""
+            pages = (
+                ", ".join(file.name for file in sorted(place.glob("*.html")))
+                if place.is_dir()
+                else ""
+            )
             own = f"it has a page of its own: {pages}; " if pages else ""
-            raise InputError(f"{place}: nothing in it can be used for a report; {own}a report takes results of {USED}")
+            raise InputError(
+                f"{place}: nothing in it can be used for a report; {own}a report takes results of {USED}"
+            )
     return told, [*runs.values()]
 
 
@@ -119,17 +167,27 @@ def _of_several_studies(chapters: Sequence[Chapter]) -> str:
     files, models = dict[str, list[tuple[str, str]]](), dict[str, list[tuple[str, str]]]()
     for one in chapters:
         inputs = one.origin.get("inputs", {})
-        shown = {name: name if Path(name).suffix in _RECORDS else Path(name).name for name in inputs}
+        shown = {
+            name: name if Path(name).suffix in _RECORDS else Path(name).name for name in inputs
+        }
         files[str(one.source)] = [(shown[name], str(content)) for name, content in inputs.items()]
         found = models.setdefault(str(one.source), [])
         for basis in one.bases:
             of = f" of {basis['network']}"
-            found += [("network", basis["network"]), *[(f"load model{of}", basis["loads"])] * bool(basis["loads"])]
+            found += [
+                ("network", basis["network"]),
+                *[(f"load model{of}", basis["loads"])] * bool(basis["loads"]),
+            ]
             found += [(f"model of {unit}{of}", kind) for unit, kind in basis["machines"].items()]
-    said = [f"{name} differs between {' and '.join(few(at, 2) for at in by.values())}" for name, by in _unlike(files)]
+    said = [
+        f"{name} differs between {' and '.join(few(at, 2) for at in by.values())}"
+        for name, by in _unlike(files)
+    ]
     alike: dict[str, list[str]] = {}  # most machines differ in one way
     for what, by in _unlike(models):
-        alike.setdefault(", and ".join(f"{kind} in {few(at, 2)}" for kind, at in by.items()), []).append(what)
+        alike.setdefault(
+            ", and ".join(f"{kind} in {few(at, 2)}" for kind, at in by.items()), []
+        ).append(what)
     said += [f"{few(names, 1)}: {text}" for text, names in alike.items()]
     return f"{'; '.join(said)}; figures are not comparable as one study" if said else ""
 
@@ -139,16 +197,26 @@ def _changed_since(chapters: Sequence[Chapter]) -> str:
     found = {}
     for source, origin in _origins(chapters).items():
         inputs, home = origin.get("inputs", {}), Path(origin.get("directory", ""))
-        homes = [home, *(home / Path(name).parent for name in inputs if name.endswith(".toml"))] if home.name else []
+        homes = (
+            [home, *(home / Path(name).parent for name in inputs if name.endswith(".toml"))]
+            if home.name
+            else []
+        )
         for name, content in inputs.items():
             there = [file for one in homes if (file := one / name).is_file()]
             if there and all(file_hash(file) != content for file in there):
                 found[name] = source
     names = few((f"{name} (of {source})" for name, source in found.items()), 3)
-    return f"not as they were when results were made of them: {names}; make the results again" if names else ""
+    return (
+        f"not as they were when results were made of them: {names}; make the results again"
+        if names
+        else ""
+    )
 
 
-def _unlike(told: Mapping[str, Sequence[tuple[str, str]]]) -> Iterator[tuple[str, dict[str, list[str]]]]:
+def _unlike(
+    told: Mapping[str, Sequence[tuple[str, str]]],
+) -> Iterator[tuple[str, dict[str, list[str]]]]:
     """Of what sources tell of one thing each, what differs: the thing, and the sources of every value."""
     seen: dict[str, dict[str, list[str]]] = {}
     for source, pairs in told.items():
@@ -183,17 +251,29 @@ _OPEN, _LONGEST = 4, 240  # what was not judged on the first page, and the chara
 
 def first_page(chapters: Sequence[Chapter]) -> str:
     rows, open_ = [], Counter(text for one in chapters for text in dict.fromkeys(one.not_judged))
-    notes = {text: f"note {k}" for k, text in enumerate((t for t, n in open_.items() if n > 1), start=1)}
+    notes = {
+        text: f"note {k}" for k, text in enumerate((t for t, n in open_.items() if n > 1), start=1)
+    }
     for one in chapters:
         shade = {True: "good", False: "bad", None: "soft"}[one.good]
         lost = [escape(notes.get(text) or short(text, _LONGEST)) for text in one.not_judged[:_OPEN]]
         more = f"<br>and {len(one.not_judged) - _OPEN} more" if len(one.not_judged) > _OPEN else ""
         answer = f'<span class="{shade}">{escape(one.answer)}</span>'
-        given = "".join(f"<br>{escape(text)}" for text in (str(one.source), given_in(one.origin)) if text)
+        given = "".join(
+            f"<br>{escape(text)}" for text in (str(one.source), given_in(one.origin)) if text
+        )
         asked = f'{escape(one.question)}<span class="soft">{given}</span>'
-        rows.append([asked, answer, escape(short(one.sure, 2 * _LONGEST)), "<br>".join(lost or [_NOTHING]) + more])
+        rows.append(
+            [
+                asked,
+                answer,
+                escape(short(one.sure, 2 * _LONGEST)),
+                "<br>".join(lost or [_NOTHING]) + more,
+            ]
+        )
     said = "".join(
-        f"<p>{name[0].upper()}{name[1:]}: {escape(short(text, _LONGEST))}</p>" for text, name in notes.items()
+        f"<p>{name[0].upper()}{name[1:]}: {escape(short(text, _LONGEST))}</p>"
+        for text, name in notes.items()
     )
     return table("In short", ["Question", "Answer", "How sure", "Not judged"], rows, left=4) + said
 
@@ -204,8 +284,18 @@ def _origins(chapters: Sequence[Chapter]) -> dict[Path, dict[str, Any]]:
 
 def origins(chapters: Sequence[Chapter]) -> str:
     """Of each result when it was made, by which version and code, from what, and the command that makes it again."""
-    rows = [[escape(cell) for cell in made_of(source, origin)] for source, origin in _origins(chapters).items()]
-    columns = ["Results", "Made", "Version", "Code", "Inputs (SHA-256)", "Command that makes them again"]
+    rows = [
+        [escape(cell) for cell in made_of(source, origin)]
+        for source, origin in _origins(chapters).items()
+    ]
+    columns = [
+        "Results",
+        "Made",
+        "Version",
+        "Code",
+        "Inputs (SHA-256)",
+        "Command that makes them again",
+    ]
     return table("Where every chapter comes from", columns, rows, left=6)
 
 
@@ -217,7 +307,12 @@ def changes(old: Path, before: Sequence[Chapter] | None, chapters: Sequence[Chap
     for key in dict.fromkeys([*then, *now]):
         was, is_now = then.get(key), now.get(key)
         if was != is_now:
-            cells = (key[0], key[1] or "its folder", was or "not there", is_now or "not there any more")
+            cells = (
+                key[0],
+                key[1] or "its folder",
+                was or "not there",
+                is_now or "not there any more",
+            )
             rows.append([escape(cell) for cell in (*cells, _moved(was or "", is_now or ""))])
     if not rows:
         return f"<p>No answer differs from {escape(old.name)}.</p>"
@@ -231,32 +326,45 @@ def _moved(before: str, now: str) -> str:
     if re.sub(number, "#", before) != re.sub(number, "#", now):
         return ""
     pairs = zip(re.findall(number, before), re.findall(number, now), strict=True)
-    moved = [(a, b, float(b.replace("−", "-")) - float(a.replace("−", "-"))) for a, b in pairs if a != b]
+    moved = [
+        (a, b, float(b.replace("−", "-")) - float(a.replace("−", "-"))) for a, b in pairs if a != b
+    ]
     return ", ".join(f"{a} to {b} ({by:+.4g})" for a, b, by in moved)
 
 
 def _kept(page: Path) -> list[dict[str, str]]:
     try:
-        found = re.search(r'id="answers">(.*?)</script>', page.read_text(encoding="utf-8"), re.DOTALL)
+        found = re.search(
+            r'id="answers">(.*?)</script>', page.read_text(encoding="utf-8"), re.DOTALL
+        )
         kept: list[dict[str, str]] | None = json.loads(found[1]) if found else None
     except (OSError, ValueError) as error:
-        raise InputError(f"--against {page}: it cannot be read: {error}; give a page of `gfor report`") from error
+        raise InputError(
+            f"--against {page}: it cannot be read: {error}; give a page of `gfor report`"
+        ) from error
     if kept is None:
-        raise InputError(f"--against {page}: it is no page of `gfor report`; give one that an earlier call wrote")
+        raise InputError(
+            f"--against {page}: it is no page of `gfor report`; give one that an earlier call wrote"
+        )
     return kept
 
 
 def _answers(chapters: Sequence[Chapter]) -> list[dict[str, str]]:
     return [
-        {"question": one.question, "source": "" if one.source.is_dir() else one.source.name,
-         "answer": one.answer + "".join(f"; not judged: {text}" for text in one.not_judged),
-         "given": given_in(one.origin),
-         "folder": (one.source if one.source.is_dir() else one.source.absolute().parent).name}
+        {
+            "question": one.question,
+            "source": "" if one.source.is_dir() else one.source.name,
+            "answer": one.answer + "".join(f"; not judged: {text}" for text in one.not_judged),
+            "given": given_in(one.origin),
+            "folder": (one.source if one.source.is_dir() else one.source.absolute().parent).name,
+        }
         for one in chapters
-    ]  # fmt: skip
+    ]
 
 
-def _by_name(answers: Sequence[dict[str, str]], others: Sequence[dict[str, str]]) -> dict[tuple[str, str, int], str]:
+def _by_name(
+    answers: Sequence[dict[str, str]], others: Sequence[dict[str, str]]
+) -> dict[tuple[str, str, int], str]:
     """Answers by question, file and place: first those of folders that the others have as well, at the same place."""
     found: dict[tuple[str, str, int], str] = {}
     known = [(x["question"], x["source"], x.get("folder")) for x in others]

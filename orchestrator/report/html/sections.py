@@ -6,7 +6,14 @@ from html import escape
 import numpy as np
 
 from orchestrator.errors import counted
-from orchestrator.report.html.charts import ChartCurve, Mark, bar_chart, complex_plane, legend, line_chart
+from orchestrator.report.html.charts import (
+    ChartCurve,
+    Mark,
+    bar_chart,
+    complex_plane,
+    legend,
+    line_chart,
+)
 from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, number, table
 from orchestrator.report.html.folder import Results
 from orchestrator.report.linearised import exceptions_in_words
@@ -17,11 +24,16 @@ from orchestrator.watch.finding import NOT_JUDGED
 _BARS = 8
 
 _KINDS = {
-    "growth": "the undisturbed state grows", "undisturbed_motion": "the undisturbed state moves",
-    "growing_oscillation": "growing oscillation", "sustained_oscillation": "sustained oscillation",
-    "run_away": "run-away", "active_limit": "active limit", "loss_of_synchronism": "loss of synchronism",
-    "not_judged": "not judged", "not_finite": "not a number",
-}  # fmt: skip
+    "growth": "the undisturbed state grows",
+    "undisturbed_motion": "the undisturbed state moves",
+    "growing_oscillation": "growing oscillation",
+    "sustained_oscillation": "sustained oscillation",
+    "run_away": "run-away",
+    "active_limit": "active limit",
+    "loss_of_synchronism": "loss of synchronism",
+    "not_judged": "not judged",
+    "not_finite": "not a number",
+}
 
 
 _NOTHING = (
@@ -46,9 +58,13 @@ def findings(results: Results) -> str:
         items.append(f'<b class="{shade}">{escape(early["word"])}</b> {escape(early["place"])}')
     for s in results.scenarios:
         if s.get("interrupted"):
-            items.append(f'{escape(s["title"])}: <span class="soft">the run was {escape(s["failure"])}</span>')
+            items.append(
+                f'{escape(s["title"])}: <span class="soft">the run was {escape(s["failure"])}</span>'
+            )
         elif s["failure"]:
-            items.append(f'{escape(s["title"])}: <span class="bad">the run failed</span>: {escape(s["failure"])}')
+            items.append(
+                f'{escape(s["title"])}: <span class="bad">the run failed</span>: {escape(s["failure"])}'
+            )
         items += [
             f'{escape(s["title"])}: <span class="{"soft" if f["kind"] == NOT_JUDGED else "bad"}">'
             f"{escape(_KINDS.get(f['kind'], f['kind']))}</span>: "
@@ -81,14 +97,23 @@ def _answers(results: Results) -> str:
     for s in results.scenarios:
         answer = s.get("answer") or {**s.get("stability", {"stable": None}), "remark": ""}
         row = least.get(s["title"])
-        figures = ["–", "–"] if row is None else [
-            f"{float(row['frequency [Hz]']):.3f}", damping(float(row["damping [%]"]))
-        ]  # fmt: skip
-        word = answer.get("verdict") or {True: "stable", False: "UNSTABLE"}.get(answer["stable"], "not known")
+        figures = (
+            ["–", "–"]
+            if row is None
+            else [f"{float(row['frequency [Hz]']):.3f}", damping(float(row["damping [%]"]))]
+        )
+        word = answer.get("verdict") or {True: "stable", False: "UNSTABLE"}.get(
+            answer["stable"], "not known"
+        )
         shade = _verdict_shade(answer["stable"])
         told = [escape(s.get("subject", s["title"])), f'<b class="{shade}">{escape(word)}</b>']
         rows.append([*told, escape(answer["remark"]), *figures])
-    return table("Verdicts", ["Scenario", "Verdict", "Remark", "Least damped: f [Hz]", "Damping [%]"], rows, left=3)
+    return table(
+        "Verdicts",
+        ["Scenario", "Verdict", "Remark", "Least damped: f [Hz]", "Damping [%]"],
+        rows,
+        left=3,
+    )
 
 
 def _least_damped(results: Results) -> list[tuple[str, dict[str, str]]]:
@@ -106,8 +131,14 @@ def studied(results: Results) -> str:
         scenario = case.scenarios.get(s["name"])
         differs = ", ".join(f"{k} = {v}" for k, v in scenario.set.items()) if scenario else ""
         removed = f"without {', '.join(scenario.remove)}" if scenario and scenario.remove else ""
-        rows.append([escape(s["title"]), escape("; ".join(x for x in (removed, differs) if x) or "as the case"),
-                     escape("; ".join(s.get("events", [])) or "none"), str(s["states"])])  # fmt: skip
+        rows.append(
+            [
+                escape(s["title"]),
+                escape("; ".join(x for x in (removed, differs) if x) or "as the case"),
+                escape("; ".join(s.get("events", [])) or "none"),
+                str(s["states"]),
+            ]
+        )
     first = results.scenarios[0]
     solver = (
         f"Coupled as FMUs with a communication step of {1e6 * first['step_size_s']:g} µs "
@@ -120,8 +151,11 @@ def studied(results: Results) -> str:
 
 
 def _isolated(results: Results) -> str:
-    found = {name: tuple(p["name"] for p in listed if p["in_force"])
-             for s in results.scenarios for name, listed in s.get("isolated", {}).items()}  # fmt: skip
+    found = {
+        name: tuple(p["name"] for p in listed if p["in_force"])
+        for s in results.scenarios
+        for name, listed in s.get("isolated", {}).items()
+    }
     sentences = [
         f"{', '.join(name for name, has in found.items() if has == names)} ran in a process of its own, with: "
         f"{', '.join(names)}."
@@ -154,13 +188,24 @@ def operating_point(results: Results) -> str:
         low = high = "–"
         if flow:
             low, high = (f"{pick(v[0] for v in flow['buses'].values()):.4f}" for pick in (min, max))
-            buses = [{"name": bus, "v_pu": v, "angle_deg": angle} for bus, (v, angle) in flow["buses"].items()]
-            found = {"machines": flow.get("machines", []), "buses": buses, "branches": flow.get("branches", [])}
+            buses = [
+                {"name": bus, "v_pu": v, "angle_deg": angle}
+                for bus, (v, angle) in flow["buses"].items()
+            ]
+            found = {
+                "machines": flow.get("machines", []),
+                "buses": buses,
+                "branches": flow.get("branches", []),
+            }
             shown = [
-                table("Units" if kind == "machines" else kind.capitalize(), list(COLUMNS[kind].values()),
-                      [[escape(cell) for cell in row] for row in cells(found[kind], kind)], left=TEXTS[kind])
+                table(
+                    "Units" if kind == "machines" else kind.capitalize(),
+                    list(COLUMNS[kind].values()),
+                    [[escape(cell) for cell in row] for row in cells(found[kind], kind)],
+                    left=TEXTS[kind],
+                )
                 for kind in found
-            ]  # fmt: skip
+            ]
             details.append(
                 f"<details><summary>{escape(s['title'])}: {counted(len(found['machines']), 'unit')}, "
                 f"{counted(len(buses), 'bus')}</summary>"
@@ -169,7 +214,13 @@ def operating_point(results: Results) -> str:
         residual = f"{flow['residual']:.1e}" if flow else "–"
         change = "–" if s["residual"] is None else f"{s['residual']:.1e}"
         rows.append([escape(s["title"]), change, residual, low, high])
-    columns = ["Scenario", "Change in one step [pu]", "Power-flow mismatch [pu]", "Lowest voltage [pu]", "Highest [pu]"]
+    columns = [
+        "Scenario",
+        "Change in one step [pu]",
+        "Power-flow mismatch [pu]",
+        "Lowest voltage [pu]",
+        "Highest [pu]",
+    ]
     return table("Coupled steady state", columns, rows) + "".join(details)
 
 
@@ -179,21 +230,34 @@ def modes(results: Results, figures: Figures) -> str:
     columns = ["Mode", "Scenario", "λ [rad/s]", "f [Hz]", "Damping [%]"]
     columns += [f"{reference.title}: f [Hz]", "Damping [%]"] if reference and compared else []
     rows = []
-    for name in dict.fromkeys(n for s in results.scenarios for n in [*s["modes"], *s["references"]]):
+    for name in dict.fromkeys(
+        n for s in results.scenarios for n in [*s["modes"], *s["references"]]
+    ):
         for s in results.scenarios:
             mode, theirs = s["modes"].get(name), s["references"].get(name)
             row = [escape(name), escape(s["title"])]
-            row += ["none in range", "", ""] if not mode else [
-                eigenvalue(mode["real"], mode["imag"]), f"{mode['frequency_hz']:.3f}", damping(mode["damping_percent"])
-            ]  # fmt: skip
+            row += (
+                ["none in range", "", ""]
+                if not mode
+                else [
+                    eigenvalue(mode["real"], mode["imag"]),
+                    f"{mode['frequency_hz']:.3f}",
+                    damping(mode["damping_percent"]),
+                ]
+            )
             if compared:
-                row += [f"{theirs['frequency_hz']:.2f}", number(theirs["damping_percent"], 2)] if theirs else ["", ""]
+                row += (
+                    [f"{theirs['frequency_hz']:.2f}", number(theirs["damping_percent"], 2)]
+                    if theirs
+                    else ["", ""]
+                )
             rows.append(row)
     parts = [table("Electromechanical modes", columns, rows, left=2)]
     if reference and compared:
         parts.append(f'<p class="soft">{escape(reference.title)}: {escape(reference.source)}</p>')
     picture, link = figures.add(
-        scenario_legend(results) + complex_plane("Eigenvalue map", _marks(results), highest_hz=_highest(results)),
+        scenario_legend(results)
+        + complex_plane("Eigenvalue map", _marks(results), highest_hz=_highest(results)),
         "Modes from 0.1 Hz up with rays of equal damping; modes with a name are large"
         + (f", circles are the figures of: {reference.title}." if reference and compared else "."),
     )
@@ -215,8 +279,9 @@ def _marks(results: Results) -> list[Mark]:
         if real < -3 or hz > highest:
             continue
         name = f"{row['name']} mode, " if row["name"] else ""
-        text = f"{name}{title[row['scenario']]}\n{hz:.3f} Hz, damping {float(row['damping [%]']):.2f} %\n" + "\n".join(
-            row["participation"].split("; ")[:4]
+        text = (
+            f"{name}{title[row['scenario']]}\n{hz:.3f} Hz, damping {float(row['damping [%]']):.2f} %\n"
+            + "\n".join(row["participation"].split("; ")[:4])
         )
         marks.append(Mark(real, hz, colour(order[row["scenario"]]), text, large=bool(row["name"])))
     for k, s in enumerate(results.scenarios):
@@ -225,7 +290,9 @@ def _marks(results: Results) -> list[Mark]:
             default = -ratio / np.sqrt(1 - ratio**2) * 2 * np.pi * theirs["frequency_hz"]
             at = f"{theirs['frequency_hz']:.2f} Hz, {theirs['damping_percent']:.2f} %"
             text = f"{name}, {s['title']}: reference\n{at}"
-            marks.append(Mark(theirs.get("real", default), theirs["frequency_hz"], colour(k), text, "circle"))
+            marks.append(
+                Mark(theirs.get("real", default), theirs["frequency_hz"], colour(k), text, "circle")
+            )
     return marks
 
 
@@ -235,12 +302,17 @@ def _participation(results: Results, figures: Figures) -> str:
         shares: dict[str, dict[str, float]] = {}
         for row in results.participation:
             if row["name"] == name and row["of"] == "component":
-                shares.setdefault(row["scenario"], {})[row["element"]] = 100 * float(row["participation"])
+                shares.setdefault(row["scenario"], {})[row["element"]] = 100 * float(
+                    row["participation"]
+                )
         most = {c: max(s.get(c, 0.0) for s in shares.values()) for s in shares.values() for c in s}
         components = sorted(most, key=lambda c: -most[c])[:_BARS]
         if not components:
             continue
-        bars = [(title[s], colour(k), [shares.get(s, {}).get(c, 0.0) for c in components]) for k, s in enumerate(title)]
+        bars = [
+            (title[s], colour(k), [shares.get(s, {}).get(c, 0.0) for c in components])
+            for k, s in enumerate(title)
+        ]
         picture, link = figures.add(
             bar_chart(f"Participation in the {name} mode", components, bars),
             f"Participation of whole components in the {name} mode: the sum over their states.",
@@ -260,15 +332,21 @@ def _participation(results: Results, figures: Figures) -> str:
 def responses(results: Results, figures: Figures) -> str:
     parts = [scenario_legend(results)]
     if not results.case.table.plots:
-        parts = ["<p>The case has no [[plots]], so no curve is drawn; `gfor new` writes such tables.</p>"]
+        parts = [
+            "<p>The case has no [[plots]], so no curve is drawn; `gfor new` writes such tables.</p>"
+        ]
     for plot in results.case.table.plots:
         charts, columns = [], []
         for panel in plot.panels:
-            curves, deviations = _curves(results, panel.signal, panel.scale, 0 if panel.also else None)
+            curves, deviations = _curves(
+                results, panel.signal, panel.scale, 0 if panel.also else None
+            )
             for k, further in enumerate(panel.also, start=1):
                 curves += _curves(results, further, panel.scale, k)[0]
             if curves:
-                charts.append(line_chart(f"{plot.title}: {panel.label}", "Time [s]", panel.label, curves))
+                charts.append(
+                    line_chart(f"{plot.title}: {panel.label}", "Time [s]", panel.label, curves)
+                )
                 columns.append((panel.label, deviations))
         if charts:
             dashed = " Dashed: response of the linear model." if results.linear else ""
@@ -277,21 +355,33 @@ def responses(results: Results, figures: Figures) -> str:
                 [escape(title), *(deviations.get(name, "–") for _, deviations in columns)]
                 for name, title in titles(results).items()
             ]
-            linear = " (largest difference of the linear model, as a share of it)" if results.linear else ""
+            linear = (
+                " (largest difference of the linear model, as a share of it)"
+                if results.linear
+                else ""
+            )
             caption = f"Largest deviation from the start{linear}"
             figures_of_it = table(caption, ["Scenario", *(label for label, _ in columns)], rows)
-            heading = f"<h3>{escape(plot.title)}</h3><p>{link} shows the responses to the events.</p>"
+            heading = (
+                f"<h3>{escape(plot.title)}</h3><p>{link} shows the responses to the events.</p>"
+            )
             parts.append(f"{heading}{picture}{figures_of_it}")
     return "".join(parts) + _ring_downs(results) + _watched(results)
 
 
 def _watched(results: Results) -> str:
     rows = [
-        [escape(s["title"]), escape(_KINDS.get(f["kind"], f["kind"])), escape(f["component"]), escape(f["variable"]),
-         f"{f['time']:.4g}", "the end" if f["until"] is None else f"{f['until']:.4g}"]
+        [
+            escape(s["title"]),
+            escape(_KINDS.get(f["kind"], f["kind"])),
+            escape(f["component"]),
+            escape(f["variable"]),
+            f"{f['time']:.4g}",
+            "the end" if f["until"] is None else f"{f['until']:.4g}",
+        ]
         for s in results.scenarios
         for f in s.get("findings", [])
-    ]  # fmt: skip
+    ]
     columns = ["Scenario", "Found", "Component", "Variable", "From [s]", "To [s]"]
     if rows:
         return table("What was found in the runs", columns, rows, left=4)
@@ -310,7 +400,9 @@ def _curves(
             continue
         x, y = seen["time"].values, scale * seen.values
         alone = place is not None and len(results.scenarios) == 1
-        name = s["title"] if place is None else expression if alone else f"{s['title']}: {expression}"
+        name = (
+            s["title"] if place is None else expression if alone else f"{s['title']}: {expression}"
+        )
         curves.append(ChartCurve(name, colour(place if alone and place is not None else k), x, y))
         text = f"{np.abs(y - y[0]).max():.3g}"
         if linear is not None and (answer := signal(linear, expression)) is not None:
@@ -328,11 +420,26 @@ def _ring_downs(results: Results) -> str:
         mode, seen = next(iter(s["modes"].values()), None), s["ring_down"]
         if mode and seen:
             rows.append(
-                [escape(s["title"]), f"{seen['frequency_hz']:.4f}", f"{mode['frequency_hz']:.4f}",
-                 damping(seen["damping_percent"]), damping(mode["damping_percent"])]
-            )  # fmt: skip
-    columns = ["Scenario", "f seen [Hz]", "f of the mode [Hz]", "Damping seen [%]", "Damping of the mode [%]"]
-    return table("Ring-down of the simulated response against the eigenvalue", columns, rows) if rows else ""
+                [
+                    escape(s["title"]),
+                    f"{seen['frequency_hz']:.4f}",
+                    f"{mode['frequency_hz']:.4f}",
+                    damping(seen["damping_percent"]),
+                    damping(mode["damping_percent"]),
+                ]
+            )
+    columns = [
+        "Scenario",
+        "f seen [Hz]",
+        "f of the mode [Hz]",
+        "Damping seen [%]",
+        "Damping of the mode [%]",
+    ]
+    return (
+        table("Ring-down of the simulated response against the eigenvalue", columns, rows)
+        if rows
+        else ""
+    )
 
 
 def step_sizes(results: Results) -> str:
@@ -340,12 +447,20 @@ def step_sizes(results: Results) -> str:
     title, rows = titles(results), []
     for name in title:
         for schedule in sorted({r["schedule"] for r in results.step_sizes}):
-            found = {float(r["step size [s]"]): float(r["shift [rad/s]"]) for r in results.step_sizes
-                     if (r["scenario"], r["schedule"]) == (name, schedule)}  # fmt: skip
+            found = {
+                float(r["step size [s]"]): float(r["shift [rad/s]"])
+                for r in results.step_sizes
+                if (r["scenario"], r["schedule"]) == (name, schedule)
+            }
             if found:
                 rows.append([escape(title[name]), schedule, *(f"{found[h]:.1e}" for h in steps)])
     columns = ["Scenario", "Schedule", *(f"{1e6 * h:g} µs" for h in steps)]
-    return table("Shift of the electromechanical mode from the continuous system's [rad/s]", columns, rows, left=2)
+    return table(
+        "Shift of the electromechanical mode from the continuous system's [rad/s]",
+        columns,
+        rows,
+        left=2,
+    )
 
 
 def provenance(results: Results) -> str:
@@ -355,10 +470,17 @@ def provenance(results: Results) -> str:
         parts.append(f"<p>{escape(', '.join(f'{name} {v}' for name, v in versions.items()))}</p>")
     fmus: dict[str, tuple[str, str, str]] = {}
     for dataset in results.trajectories.values():
-        fmus |= {n: (f["model"], f["guid"], f["tool"]) for n, f in json.loads(dataset.attrs["fmus"]).items()}
+        fmus |= {
+            n: (f["model"], f["guid"], f["tool"])
+            for n, f in json.loads(dataset.attrs["fmus"]).items()
+        }
     if rows := [[escape(name), *map(escape, content)] for name, content in fmus.items()]:
         listed = table("FMUs", ["Component", "Model", "Guid", "Made by"], rows, left=4)
-        parts.append(f"<details><summary>{len(rows)} FMUs with their guids</summary>{listed}</details>")
+        parts.append(
+            f"<details><summary>{len(rows)} FMUs with their guids</summary>{listed}</details>"
+        )
     text = f"<pre>{escape(results.case.text)}</pre>"
-    parts.append(f"<details><summary>Case file {escape(results.case.name)}</summary>{text}</details>")
+    parts.append(
+        f"<details><summary>Case file {escape(results.case.name)}</summary>{text}</details>"
+    )
     return "".join(parts)

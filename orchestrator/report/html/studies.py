@@ -34,7 +34,8 @@ def sweep(sweep: xr.Dataset, scenarios: Sequence[Mapping[str, Any]], figures: Fi
         "Each is followed by its eigenvector, so that it keeps its name where modes cross.",
     )
     fixed = "".join(
-        f"<p>At {escape(str(d))} = {float(sweep[d].values[0]):g}, the first of its values.</p>" for d in others
+        f"<p>At {escape(str(d))} = {float(sweep[d].values[0]):g}, the first of its values.</p>"
+        for d in others
     )
     parts = [
         f"{fixed}{_unstable(shown, axis, title)}<p>{link} shows how the modes move with {escape(label)}.</p>{picture}"
@@ -68,8 +69,10 @@ def _unstable(shown: xr.Dataset, axis: str, title: dict[str, str]) -> str:
             rates = shown["largest_growth_rate"].sel(scenario=s).values[bad]
             where = ", ".join(f"{value:.4g}" for value in shown[axis].values[bad][:8])
             more = " …" if bad.sum() > 8 else ""
-            lines.append(f'<p class="bad">{escape(title.get(s, s))}: unstable at {axis} = {where}{more} '
-                         f"({int(bad.sum())} of {bad.size} points, up to {rates.max():+.3g} 1/s)</p>")  # fmt: skip
+            lines.append(
+                f'<p class="bad">{escape(title.get(s, s))}: unstable at {axis} = {where}{more} '
+                f"({int(bad.sum())} of {bad.size} points, up to {rates.max():+.3g} 1/s)</p>"
+            )
     return "".join(lines)
 
 
@@ -80,7 +83,10 @@ def _trajectories(
     for s, shade in shades.items():
         one = shown.sel(scenario=s)
         for t in range(one.sizes["trajectory"]):
-            real, hz, percent = (one[q].isel(trajectory=t).values for q in ("eigenvalue_real", "frequency", "damping"))
+            real, hz, percent = (
+                one[q].isel(trajectory=t).values
+                for q in ("eigenvalue_real", "frequency", "damping")
+            )
             there = np.isfinite(real) & (real > -3)
             if not there.any():
                 continue
@@ -91,7 +97,16 @@ def _trajectories(
                     f"{name}, {title.get(s, s)}\n{axis} = {shown[axis].values[k]:.4g}\n"
                     f"{hz[k]:.3f} Hz, damping {percent[k]:.2f} %\n{_shares(one, t, k)}"
                 )
-                marks.append(Mark(float(real[k]), float(hz[k]), shade, text, "dot" if n else "cross", large=True))
+                marks.append(
+                    Mark(
+                        float(real[k]),
+                        float(hz[k]),
+                        shade,
+                        text,
+                        "dot" if n else "cross",
+                        large=True,
+                    )
+                )
     return lines, marks
 
 
@@ -104,17 +119,24 @@ def _shares(one: xr.Dataset, trajectory: int, k: int) -> str:
 
 def _highest(shown: xr.Dataset) -> float:
     named = shown["frequency"].where(shown["named"] == 1)
-    found = float(named.max()) if bool(np.isfinite(named).any()) else float(shown["frequency"].max())
+    found = (
+        float(named.max()) if bool(np.isfinite(named).any()) else float(shown["frequency"].max())
+    )
     return min(1.25 * found, float(shown["frequency"].max()))
 
 
-def _named(shown: xr.Dataset, scenario: str, axis: str, quantity: str) -> dict[str, tuple[Any, Any]]:
+def _named(
+    shown: xr.Dataset, scenario: str, axis: str, quantity: str
+) -> dict[str, tuple[Any, Any]]:
     one, found = shown.sel(scenario=scenario), {}
     for t in np.flatnonzero((one["named"] == 1).any(axis).values).tolist():
         values = one[quantity].isel(trajectory=t).values
         there = np.isfinite(values)
         if there.sum() > 1:
-            found[str(one["trajectory_name"].values[t])] = (shown[axis].values[there], values[there])
+            found[str(one["trajectory_name"].values[t])] = (
+                shown[axis].values[there],
+                values[there],
+            )
     return found
 
 
@@ -127,38 +149,72 @@ def _extremes(curves: list[ChartCurve], unit: str) -> str:
     return f"{escape(unit)}: {'; '.join(said)}."
 
 
-def _states(shown: xr.Dataset, axis: str, label: str, names: list[str], title: dict[str, str], figures: Figures) -> str:
+def _states(
+    shown: xr.Dataset,
+    axis: str,
+    label: str,
+    names: list[str],
+    title: dict[str, str],
+    figures: Figures,
+) -> str:
     states = [str(s) for s in shown["state"].values]
     if not 0 < len(states) <= 6:
         return ""
     charts = []
     for s in names:
-        shares = {state: _named(shown.assign(share=shown["participation"].sel(state=state)), s, axis, "share")
-                  for state in states}  # fmt: skip
+        shares = {
+            state: _named(
+                shown.assign(share=shown["participation"].sel(state=state)), s, axis, "share"
+            )
+            for state in states
+        }
         for name in next(iter(shares.values())):
-            curves = [ChartCurve(x, colour(k + 1), *shares[x][name]) for k, x in enumerate(states) if name in shares[x]]
-            charts.append(f"<h3>{escape(title.get(s, s))}: {escape(name)}</h3>" + line_chart(
-                f"Participation along {axis}, {s}, {name}", label, "Participation", curves, 170))  # fmt: skip
+            curves = [
+                ChartCurve(x, colour(k + 1), *shares[x][name])
+                for k, x in enumerate(states)
+                if name in shares[x]
+            ]
+            charts.append(
+                f"<h3>{escape(title.get(s, s))}: {escape(name)}</h3>"
+                + line_chart(
+                    f"Participation along {axis}, {s}, {name}", label, "Participation", curves, 170
+                )
+            )
     if not charts:
         return ""
     key = legend((state, colour(k + 1)) for k, state in enumerate(states))
     picture, link = figures.add(
-        key + "".join(charts), f"Participation of the swing states in the modes with a name along {label}."
+        key + "".join(charts),
+        f"Participation of the swing states in the modes with a name along {label}.",
     )
     return f"<p>{link}: who carries the mode along the sweep.</p>{picture}"
 
 
 def design(sheet: dict[str, Any]) -> str:
     sensitivity, target = sheet["sensitivity"], sheet["target_mode"]
-    modes = {"Target, POD off": target, "Predicted": sheet["predicted_mode"], "Achieved": sheet["achieved_mode"]}
+    modes = {
+        "Target, POD off": target,
+        "Predicted": sheet["predicted_mode"],
+        "Achieved": sheet["achieved_mode"],
+    }
     settings = [
-        ["T_S1 [s]", f"{sheet['T_S1']:.4f}"], ["T_S2 [s]", f"{sheet['T_S2']:.4f}"], ["N_S", str(sheet["N_S"])],
-        ["K", f"{sheet['K']:.1f}"], ["K before its bounds", f"{sheet['K_unbounded']:.1f}"],
-    ]  # fmt: skip
+        ["T_S1 [s]", f"{sheet['T_S1']:.4f}"],
+        ["T_S2 [s]", f"{sheet['T_S2']:.4f}"],
+        ["N_S", str(sheet["N_S"])],
+        ["K", f"{sheet['K']:.1f}"],
+        ["K before its bounds", f"{sheet['K_unbounded']:.1f}"],
+    ]
     rows = []
     for name, mode in modes.items():
         percent = -100 * mode["real"] / np.hypot(mode["real"], mode["imag"])
-        rows.append([name, eigenvalue(mode["real"], mode["imag"]), f"{mode['imag'] / 2 / np.pi:.3f}", damping(percent)])
+        rows.append(
+            [
+                name,
+                eigenvalue(mode["real"], mode["imag"]),
+                f"{mode['imag'] / 2 / np.pi:.3f}",
+                damping(percent),
+            ]
+        )
     kind = "lead" if sensitivity["phase_deg"] >= 0 else "lag"
     extra = []
     if "stability" in sheet:
@@ -189,7 +245,10 @@ def _margins(margins: dict[str, Any]) -> str:
         return ""
     up, down = margins["gain_up"], margins["gain_down"]
     rows = [
-        ["Gain, upwards", f"more than × {margins['largest_factor_tried']:g}" if up is None else f"× {up:.3g}"],
+        [
+            "Gain, upwards",
+            f"more than × {margins['largest_factor_tried']:g}" if up is None else f"× {up:.3g}",
+        ],
         ["Gain, downwards", "down to 0" if down is None else f"× {down:.3g}"],
     ]
     for name, key, unit in (("Phase", "phase_margin_deg", "°"), ("Delay", "delay_margin_s", "s")):

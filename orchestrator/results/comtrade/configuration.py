@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 from orchestrator.errors import InputError
 
 FORMS = ("ASCII", "BINARY", "BINARY32", "FLOAT32")  # forms of the samples
-REVISIONS = ("1991", "1999", "2001", "2013")  # 2001 is IEC's edition of 1999; a file of 1991 names none
+# 2001 is IEC's edition of 1999; a file of 1991 names none
+REVISIONS = ("1991", "1999", "2001", "2013")
 MOST_CHANNELS = 10_000  # of one recording; large stations record some hundred
 
 
@@ -52,13 +53,17 @@ class _Lines:
     """Lines of a configuration, each split at its commas."""
 
     def __init__(self, text: str, place: str) -> None:
-        self._lines: Iterator[tuple[int, str]] = enumerate(text.replace("\x1a", "").splitlines(), start=1)
+        self._lines: Iterator[tuple[int, str]] = enumerate(
+            text.replace("\x1a", "").splitlines(), start=1
+        )
         self.place, self.number = place, 0
 
     def next(self, what: str) -> list[str]:
         found = next(self._lines, None)
         if found is None:
-            raise InputError(f"{self.place}: the file ends after line {self.number}, before {what}; copy it once more")
+            raise InputError(
+                f"{self.place}: the file ends after line {self.number}, before {what}; copy it once more"
+            )
         self.number = found[0]
         return [field.strip() for field in found[1].split(",")]
 
@@ -70,7 +75,9 @@ class _Lines:
     def error(self, text: str) -> InputError:
         return InputError(f"{self.place}, line {self.number}: {text}")
 
-    def number_of(self, fields: list[str], index: int, what: str, default: float | None = None) -> float:
+    def number_of(
+        self, fields: list[str], index: int, what: str, default: float | None = None
+    ) -> float:
         """A finite number in a field; an empty field gives the default."""
         text = fields[index] if index < len(fields) else ""
         if not text and default is not None:
@@ -98,33 +105,58 @@ def read_configuration(text: str, place: str) -> Configuration:
     station, device, revision = (*lines.next("the station's name"), "", "", "")[:3]
     revision = revision or "1991"
     if revision not in REVISIONS:
-        raise lines.error(f"the revision is {revision!r}; those of {', '.join(REVISIONS)} can be read")
+        raise lines.error(
+            f"the revision is {revision!r}; those of {', '.join(REVISIONS)} can be read"
+        )
     counts = lines.next("the number of channels")
     analog_count, status_count = (_channel_count(lines, counts, letter) for letter in "AD")
     analog = [_analog(lines, k) for k in range(1, analog_count + 1)]
-    status = [Channel((*lines.next(f"status channel {k}"), "")[1]) for k in range(1, status_count + 1)]
-    frequency = lines.number_of(lines.next("the line's frequency"), 0, "the line's frequency [Hz]", 0.0)
+    status = [
+        Channel((*lines.next(f"status channel {k}"), "")[1]) for k in range(1, status_count + 1)
+    ]
+    frequency = lines.number_of(
+        lines.next("the line's frequency"), 0, "the line's frequency [Hz]", 0.0
+    )
     rates = _rates(lines)
-    start, trigger = ("  ".join(lines.next("the time of the first sample and of the trigger")[:2]) for _ in range(2))
+    start, trigger = (
+        "  ".join(lines.next("the time of the first sample and of the trigger")[:2])
+        for _ in range(2)
+    )
     form = lines.next("the form of the samples")[0].upper()
     if form not in FORMS:
         raise lines.error(f"the form of the samples is {form!r}; known are {', '.join(FORMS)}")
     multiplier = lines.number_of(lines.optional(), 0, "the multiplier of time stamps", 1.0)
     if not multiplier > 0:
         raise lines.error(f"the multiplier of time stamps is {multiplier:g}; it must exceed 0")
-    nanoseconds = revision == "2013" and any(re.search(r"\.\d{7,}$", time) for time in (start, trigger))
+    nanoseconds = revision == "2013" and any(
+        re.search(r"\.\d{7,}$", time) for time in (start, trigger)
+    )
     names = _distinct([*analog, *status], analog_count)
-    channels = [replace(channel, name=name) for channel, name in zip([*analog, *status], names, strict=True)]
+    channels = [
+        replace(channel, name=name) for channel, name in zip([*analog, *status], names, strict=True)
+    ]
     return Configuration(
-        place, station, device, revision, tuple(channels[:analog_count]), tuple(channels[analog_count:]), frequency,
-        rates, start, trigger, form, multiplier * (1e-9 if nanoseconds else 1e-6),
-    )  # fmt: skip
+        place,
+        station,
+        device,
+        revision,
+        tuple(channels[:analog_count]),
+        tuple(channels[analog_count:]),
+        frequency,
+        rates,
+        start,
+        trigger,
+        form,
+        multiplier * (1e-9 if nanoseconds else 1e-6),
+    )
 
 
 def _channel_count(lines: _Lines, fields: list[str], letter: str) -> int:
     found = next((f[:-1] for f in fields[1:] if f[-1:].upper() == letter), None)
     if found is None:
-        raise lines.error(f"the numbers of channels are {', '.join(fields)!r}; expected such as '12,8A,4D'")
+        raise lines.error(
+            f"the numbers of channels are {', '.join(fields)!r}; expected such as '12,8A,4D'"
+        )
     return lines.count_of(found.strip(), f"the number of channels of kind {letter}", MOST_CHANNELS)
 
 
@@ -148,16 +180,24 @@ def _analog(lines: _Lines, k: int) -> Channel:
 
 
 def _rates(lines: _Lines) -> tuple[tuple[float, int], ...]:
-    count = lines.count_of(lines.next("the number of sampling rates")[0], "the number of sampling rates", 999)
+    count = lines.count_of(
+        lines.next("the number of sampling rates")[0], "the number of sampling rates", 999
+    )
     rates: list[tuple[float, int]] = []
     for _ in range(max(1, count)):
         fields = lines.next("a sampling rate")
         rate = lines.number_of(fields, 0, "the sampling rate [Hz]")
-        last = lines.count_of(fields[1] if len(fields) > 1 else "", "the number of the last sample", 10**10 - 1)
+        last = lines.count_of(
+            fields[1] if len(fields) > 1 else "", "the number of the last sample", 10**10 - 1
+        )
         if rate < 0 or last <= (rates[-1][1] if rates else 0):
-            raise lines.error(f"{rate:g} Hz until sample {last}: a rate is 0 or more, and last samples must rise")
+            raise lines.error(
+                f"{rate:g} Hz until sample {last}: a rate is 0 or more, and last samples must rise"
+            )
         if count and rate == 0:
-            raise lines.error("a sampling rate is 0; write the number of sampling rates as 0 where samples carry times")
+            raise lines.error(
+                "a sampling rate is 0; write the number of sampling rates as 0 where samples carry times"
+            )
         rates.append((rate if count else 0.0, last))
     return tuple(rates)
 
@@ -169,5 +209,7 @@ def _distinct(channels: list[Channel], analog_count: int) -> list[str]:
     for k, channel in enumerate(channels):
         number = f"A{k + 1}" if k < analog_count else f"D{k - analog_count + 1}"
         alone = channel.name and seen[channel.name] == 1 and channel.name != "time"
-        names.append(channel.name if alone else f"{channel.name} ({number})" if channel.name else number)
+        names.append(
+            channel.name if alone else f"{channel.name} ({number})" if channel.name else number
+        )
     return names

@@ -27,7 +27,9 @@ _MISSING_TEXT = 99999.0
 _NO_FLOAT = 3.4e38  # beyond it a sample in single precision is none: its type ends there
 
 
-def read_samples(content: bytes, configuration: Configuration, place: str) -> tuple[Numbers, Matrix]:
+def read_samples(
+    content: bytes, configuration: Configuration, place: str
+) -> tuple[Numbers, Matrix]:
     """Time stamps and values of all channels.
 
     Returns time stamps [s], shape (n,), NaN where missing; values, shape (n, channels), the analog ones first and
@@ -42,7 +44,9 @@ def read_samples(content: bytes, configuration: Configuration, place: str) -> tu
     return stamps * configuration.time_unit, values
 
 
-def _text(content: bytes, configuration: Configuration, place: str) -> tuple[Numbers, Numbers, Matrix]:
+def _text(
+    content: bytes, configuration: Configuration, place: str
+) -> tuple[Numbers, Numbers, Matrix]:
     lines = content.decode("latin-1").replace("\x1a", "").splitlines()
     while lines and not lines[-1].strip():
         lines.pop()
@@ -54,9 +58,13 @@ def _text(content: bytes, configuration: Configuration, place: str) -> tuple[Num
                 "number, time and one for each channel"
             )
     try:
-        table = pd.read_csv(io.StringIO("\n".join(lines)), header=None, dtype=float, skipinitialspace=True).to_numpy()
+        table = pd.read_csv(
+            io.StringIO("\n".join(lines)), header=None, dtype=float, skipinitialspace=True
+        ).to_numpy()
     except (ValueError, OverflowError) as error:
-        raise InputError(f"{place}{_first_bad(lines)}: a sample is no number ({error}); correct it") from error
+        raise InputError(
+            f"{place}{_first_bad(lines)}: a sample is no number ({error}); correct it"
+        ) from error
     analog = table[:, 2 : 2 + len(configuration.analog)]
     marked = analog == _MISSING_TEXT
     if configuration.revision == "1991" and marked.any():
@@ -82,11 +90,20 @@ def _first_bad(lines: list[str]) -> str:
     return ""
 
 
-def _binary(content: bytes, configuration: Configuration, place: str) -> tuple[Numbers, Numbers, Matrix]:
+def _binary(
+    content: bytes, configuration: Configuration, place: str
+) -> tuple[Numbers, Numbers, Matrix]:
     kind, missing = _TYPES[configuration.form]
     analog, status = len(configuration.analog), len(configuration.status)
     words = -(-status // 16)
-    row = np.dtype([("number", "<u4"), ("stamp", "<u4"), ("analog", kind, (analog,)), ("status", "<u2", (words,))])
+    row = np.dtype(
+        [
+            ("number", "<u4"),
+            ("stamp", "<u4"),
+            ("analog", kind, (analog,)),
+            ("status", "<u2", (words,)),
+        ]
+    )
     rows, rest = divmod(len(content), row.itemsize)
     if rest:
         raise InputError(
@@ -129,8 +146,12 @@ LINE_FREQUENCY = "line_frequency_hz"
 
 MOST_BYTES = 2_000_000_000  # of a file of samples: an hour of forty channels at 5 kHz
 _MOST_TEXT = 20_000_000
-_SECTION = re.compile(rb"^--- *file type: *(\w+)(?: +(\w+))?(?: *: *(\d+))? *---\s*?\r?$", re.IGNORECASE | re.MULTILINE)
-_TIMES_DIFFER = 0.01  # part of the whole time by which time stamps may differ from the sampling rates before it is said
+_SECTION = re.compile(
+    rb"^--- *file type: *(\w+)(?: +(\w+))?(?: *: *(\d+))? *---\s*?\r?$",
+    re.IGNORECASE | re.MULTILINE,
+)
+# part of the whole time by which time stamps may differ from the sampling rates before it is said
+_TIMES_DIFFER = 0.01
 
 
 def is_comtrade(path: Path) -> bool:
@@ -157,15 +178,22 @@ def read_comtrade(path: Path) -> xr.Dataset:
     _warn_of_skew(configuration, times)
     channels = (*configuration.analog, *configuration.status)
     data = {
-        channel.name: ("time", np.ascontiguousarray(values[:, k]), {"units": channel.unit, "long_name": channel.name})
+        channel.name: (
+            "time",
+            np.ascontiguousarray(values[:, k]),
+            {"units": channel.unit, "long_name": channel.name},
+        )
         for k, channel in enumerate(channels)
     }
     attributes = {
-        "scenario": str(path), "station": configuration.station, "device": configuration.device,
-        "comtrade_revision": configuration.revision, "first_sample": configuration.start,
+        "scenario": str(path),
+        "station": configuration.station,
+        "device": configuration.device,
+        "comtrade_revision": configuration.revision,
+        "first_sample": configuration.start,
         "trigger": configuration.trigger,
         "referred_to_primary": ", ".join(channel.name for channel in channels if channel.secondary),
-    }  # fmt: skip
+    }
     coordinates = {"time": ("time", times, {"units": "s"}), LINE_FREQUENCY: configuration.frequency}
     return xr.Dataset(data, coords=coordinates, attrs=attributes)
 
@@ -173,10 +201,14 @@ def read_comtrade(path: Path) -> xr.Dataset:
 def _apart(path: Path) -> tuple[str, bytes, tuple[str, str]]:
     found = []
     for suffix in (".cfg", ".dat"):
-        same = [p for p in path.parent.glob(f"{glob.escape(path.stem)}.*") if p.suffix.lower() == suffix]
+        same = [
+            p for p in path.parent.glob(f"{glob.escape(path.stem)}.*") if p.suffix.lower() == suffix
+        ]
         if not same:
             missing = path.with_suffix(suffix)
-            raise InputError(f"{missing}: there is no such file; a recording needs both its .cfg and its .dat")
+            raise InputError(
+                f"{missing}: there is no such file; a recording needs both its .cfg and its .dat"
+            )
         found.append(path if path in same else same[0])
     configuration, samples = found
     text = _content(configuration, _MOST_TEXT)
@@ -193,21 +225,29 @@ def _joint(path: Path) -> tuple[str, bytes, tuple[str, str]]:
         if kind == "DAT" and heading[3]:  # binary: a heading's text could stand among the samples
             position = begin + int(heading[3])
             if position > len(content):
-                raise InputError(f"{path}: its samples have fewer bytes than the {int(heading[3])} that it names")
+                raise InputError(
+                    f"{path}: its samples have fewer bytes than the {int(heading[3])} that it names"
+                )
         else:
             following = _SECTION.search(content, begin)
             position = following.start() if following else len(content)
         sections[kind] = content[begin:position]
     if missing := [kind for kind in ("CFG", "DAT") if kind not in sections]:
-        raise InputError(f"{path}: it has no part '--- file type: {missing[0]} ---', so it is no recording in one file")
+        raise InputError(
+            f"{path}: it has no part '--- file type: {missing[0]} ---', so it is no recording in one file"
+        )
     return _decoded(sections["CFG"]), sections["DAT"], (f"{path} (CFG)", f"{path} (DAT)")
 
 
 def _content(path: Path, most: int) -> bytes:
     if not path.is_file():
-        raise InputError(f"{path}: there is no such file; give the .cfg or .cff of a COMTRADE recording")
+        raise InputError(
+            f"{path}: there is no such file; give the .cfg or .cff of a COMTRADE recording"
+        )
     if (size := path.stat().st_size) > most:
-        raise InputError(f"{path}: it has {size} bytes; at most {most} are read; cut the recording into parts")
+        raise InputError(
+            f"{path}: it has {size} bytes; at most {most} are read; cut the recording into parts"
+        )
     return path.read_bytes()
 
 
@@ -234,7 +274,11 @@ def _times(configuration: Configuration, stamps: Numbers, place: str) -> Numbers
         lengths.append(np.full(end - last, 1 / rate))
         last = end
     steps = np.concatenate(lengths)
-    times = np.concatenate([[0.0], np.cumsum(steps[1:])]) if len(configuration.rates) > 1 else np.arange(last) * steps
+    times = (
+        np.concatenate([[0.0], np.cumsum(steps[1:])])
+        if len(configuration.rates) > 1
+        else np.arange(last) * steps
+    )
     known = np.isfinite(stamps)
     if known.all() and len(stamps) > 1 and stamps[-1] > stamps[0]:
         stamped = stamps[-1] - stamps[0]

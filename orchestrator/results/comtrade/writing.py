@@ -22,7 +22,11 @@ _START = "01/01/2000,00:00:00.000000"  # date and time of t = 0: a simulation ha
 
 
 def write_comtrade(
-    dataset: xr.Dataset, names: Sequence[str], path: Path, form: str = "BINARY32", frequency: float = 50.0
+    dataset: xr.Dataset,
+    names: Sequence[str],
+    path: Path,
+    form: str = "BINARY32",
+    frequency: float = 50.0,
 ) -> tuple[Path, Path]:
     """Write signals over the time.
 
@@ -40,12 +44,18 @@ def write_comtrade(
     for k, name in enumerate(names, start=1):
         values = np.asarray(dataset[name].values, dtype=float)
         if not np.isfinite(values).all():
-            raise InputError(f"signal {name}: it is no finite number at t = {times[~np.isfinite(values)][0]:g} s")
+            raise InputError(
+                f"signal {name}: it is no finite number at t = {times[~np.isfinite(values)][0]:g} s"
+            )
         scale, offset, stored = _stored(values, form)
         columns.append(stored)
-        least, largest = (stored.min(), stored.max()) if form == "FLOAT32" else (-_LARGEST[form], _LARGEST[form])
+        least, largest = (
+            (stored.min(), stored.max()) if form == "FLOAT32" else (-_LARGEST[form], _LARGEST[form])
+        )
         unit = _plain(dataset[name].attrs.get("units", ""))
-        lines.append(f"{k},{_plain(name)},,,{unit},{scale!r},{offset!r},0,{least:g},{largest:g},1,1,P")
+        lines.append(
+            f"{k},{_plain(name)},,,{unit},{scale!r},{offset!r},0,{least:g},{largest:g},1,1,P"
+        )
     multiplier = max(1, math.ceil((times[-1] - times[0]) * 1e6 / _MOST_STAMP))
     stamps = np.round((times - times[0]) * 1e6 / multiplier).astype(np.int64)
     revision = "2013" if form in ("BINARY32", "FLOAT32") else "1999"
@@ -53,7 +63,15 @@ def write_comtrade(
         f"{_plain(dataset.attrs.get('case', ''))},gfor-cosim {_plain(dataset.attrs.get('scenario', ''))},{revision}",
         f"{len(names)},{len(names)}A,0D",
     ]
-    tail = [f"{frequency:g}", "1", f"{1 / interval!r},{len(times)}", _START, _START, form, str(multiplier)]
+    tail = [
+        f"{frequency:g}",
+        "1",
+        f"{1 / interval!r},{len(times)}",
+        _START,
+        _START,
+        form,
+        str(multiplier),
+    ]
     tail += ["0,0", "0,0"] if revision == "2013" else []
     configuration, samples = path.with_suffix(".cfg"), path.with_suffix(".dat")
     write_bytes(samples, _samples(form, stamps, columns))
@@ -84,12 +102,18 @@ def _stored(values: Numbers, form: str) -> tuple[float, float, Numbers]:
     return scale, offset, np.round((values - offset) / scale)
 
 
-def _samples(form: str, stamps: np.ndarray[tuple[int], np.dtype[np.int64]], columns: Sequence[Numbers]) -> bytes:
+def _samples(
+    form: str, stamps: np.ndarray[tuple[int], np.dtype[np.int64]], columns: Sequence[Numbers]
+) -> bytes:
     count = len(stamps)
     if form == "ASCII":
         rows = np.column_stack([np.arange(1, count + 1), stamps, *columns]).astype(np.int64)
-        return ("\r\n".join(",".join(map(str, row)) for row in rows.tolist()) + "\r\n").encode("ascii")
-    table = np.empty(count, [("number", "<u4"), ("stamp", "<u4"), ("analog", _TYPES[form], (len(columns),))])
+        return ("\r\n".join(",".join(map(str, row)) for row in rows.tolist()) + "\r\n").encode(
+            "ascii"
+        )
+    table = np.empty(
+        count, [("number", "<u4"), ("stamp", "<u4"), ("analog", _TYPES[form], (len(columns),))]
+    )
     table["number"], table["stamp"] = np.arange(1, count + 1), stamps
     table["analog"] = np.column_stack(columns)
     return table.tobytes()

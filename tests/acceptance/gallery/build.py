@@ -74,12 +74,24 @@ def identity(source: Source) -> str:
 
 
 def description(source: Source) -> bytes:
-    root = Element("fmiModelDescription", fmiVersion="2.0", modelName=source.name, guid=identity(source),
-                   generationTool="gallery of gfor-cosim", variableNamingConvention="structured",
-                   numberOfEventIndicators="0")  # fmt: skip
+    root = Element(
+        "fmiModelDescription",
+        fmiVersion="2.0",
+        modelName=source.name,
+        guid=identity(source),
+        generationTool="gallery of gfor-cosim",
+        variableNamingConvention="structured",
+        numberOfEventIndicators="0",
+    )
     state = "true" if source.state else "false"
-    SubElement(root, "CoSimulation", modelIdentifier=source.name, canHandleVariableCommunicationStepSize="true",
-               canGetAndSetFMUstate=state, canSerializeFMUstate=state)  # fmt: skip
+    SubElement(
+        root,
+        "CoSimulation",
+        modelIdentifier=source.name,
+        canHandleVariableCommunicationStepSize="true",
+        canGetAndSetFMUstate=state,
+        canSerializeFMUstate=state,
+    )
     units = SubElement(root, "UnitDefinitions")
     for unit in sorted({v.unit for v in source.variables if v.unit}):
         element = SubElement(units, "Unit", name=unit)
@@ -128,7 +140,11 @@ def _structure(root, source):
     outputs = [v for v in source.variables if v.causality == "output"]
     rates = [v for v in source.variables if v.rate_of]
     locals_ = [v for v in source.variables if v.causality == "local"]
-    for tag, listed in (("Outputs", outputs), ("Derivatives", rates), ("InitialUnknowns", [*outputs, *locals_])):
+    for tag, listed in (
+        ("Outputs", outputs),
+        ("Derivatives", rates),
+        ("InitialUnknowns", [*outputs, *locals_]),
+    ):
         if not listed:
             continue
         parent = SubElement(structure, tag)
@@ -156,7 +172,9 @@ def check_macros(source: Source) -> None:
     unread = [name for name in source.defines if not re.search(rf"\b{name}\b", code)]
     if unread:
         named = ", ".join(unread)
-        raise ValueError(f"{source.name}: neither {source.file} nor fmi2.c reads the macro {named}; plant it")
+        raise ValueError(
+            f"{source.name}: neither {source.file} nor fmi2.c reads the macro {named}; plant it"
+        )
 
 
 def library(source: Source) -> Path:

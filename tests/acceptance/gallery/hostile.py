@@ -9,7 +9,10 @@ XML = "modelDescription.xml"
 def _copy(good, folder, name, change=None, extra=()):
     """A copy of a good FMU with another description, and with further entries."""
     path = folder / f"{name}.fmu"
-    with zipfile.ZipFile(good) as source, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as target:
+    with (
+        zipfile.ZipFile(good) as source,
+        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as target,
+    ):
         for entry in source.namelist():
             content = source.read(entry)
             target.writestr(entry, change(content) if change and entry == XML else content)
@@ -37,7 +40,9 @@ def link(folder, good):
 
 
 def bomb(folder, good):
-    return _copy(good, folder, "zip_bomb", extra=[(f"resources/{k}", bytes(50 * 1024**2)) for k in range(4)])
+    return _copy(
+        good, folder, "zip_bomb", extra=[(f"resources/{k}", bytes(50 * 1024**2)) for k in range(4)]
+    )
 
 
 def liar(folder, good):
@@ -51,35 +56,56 @@ def liar(folder, good):
 
 
 def twice(folder, good):
-    return _copy(good, folder, "same_file_twice", extra=[("resources/a.txt", b"1"), ("resources/A.TXT", b"2")])
+    return _copy(
+        good,
+        folder,
+        "same_file_twice",
+        extra=[("resources/a.txt", b"1"), ("resources/A.TXT", b"2")],
+    )
 
 
 def other_bytes(folder, good):
     """One name twice, with different bytes: what is unpacked depends on who unpacks it."""
-    return _copy(good, folder, "other_bytes_twice", extra=[("extra/a.txt", b"1"), ("extra/a.txt", b"2")])
+    return _copy(
+        good, folder, "other_bytes_twice", extra=[("extra/a.txt", b"1"), ("extra/a.txt", b"2")]
+    )
 
 
 def same_bytes(folder, good):
     """One name twice with the same bytes, as CMake lists it; harmless."""
-    return _copy(good, folder, "same_bytes_twice", extra=[("extra/a.txt", b"1"), ("extra/a.txt", b"1")])
+    return _copy(
+        good, folder, "same_bytes_twice", extra=[("extra/a.txt", b"1"), ("extra/a.txt", b"1")]
+    )
 
 
 def entities(folder, good):
     laughs = "".join(f'<!ENTITY l{k} "{f"&l{k - 1};" * 10}">' for k in range(1, 10))
     head = f'<!DOCTYPE x [<!ENTITY l0 "lol">{laughs}]>'.encode()
-    return _copy(good, folder, "entity_expansion", lambda text: text.replace(b"<fmiModel", head + b"<fmiModel", 1))
+    return _copy(
+        good,
+        folder,
+        "entity_expansion",
+        lambda text: text.replace(b"<fmiModel", head + b"<fmiModel", 1),
+    )
 
 
 def external(folder, good):
     head = b'<!DOCTYPE x [<!ENTITY file SYSTEM "file:///etc/passwd">]>'
-    return _copy(good, folder, "external_entity", lambda text: text.replace(b"<fmiModel", head + b"<fmiModel", 1))
+    return _copy(
+        good,
+        folder,
+        "external_entity",
+        lambda text: text.replace(b"<fmiModel", head + b"<fmiModel", 1),
+    )
 
 
 def deep(folder, good):
     nest = b"<Tool name='x'>" + b"<a>" * 200_000 + b"</a>" * 200_000 + b"</Tool>"
     place = b"<ModelVariables>"
     annotations = b"<VendorAnnotations>" + nest + b"</VendorAnnotations>"
-    return _copy(good, folder, "deep_nesting", lambda text: text.replace(place, annotations + place, 1))
+    return _copy(
+        good, folder, "deep_nesting", lambda text: text.replace(place, annotations + place, 1)
+    )
 
 
 HOSTILE = {

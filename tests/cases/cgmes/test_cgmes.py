@@ -38,12 +38,17 @@ def flows(powsybl, network, slack):
     """pypowsybl's voltages [pu] of its own load flow, without any control but generators' voltages."""
     loadflow = powsybl.loadflow
     parameters = loadflow.Parameters(
-        distributed_slack=False, use_reactive_limits=False, transformer_voltage_control_on=False,
-        phase_shifter_regulation_on=False, shunt_compensator_voltage_control_on=False,
+        distributed_slack=False,
+        use_reactive_limits=False,
+        transformer_voltage_control_on=False,
+        phase_shifter_regulation_on=False,
+        shunt_compensator_voltage_control_on=False,
         provider_parameters={
-            "newtonRaphsonConvEpsPerEq": "1e-10", "slackBusSelectionMode": "NAME", "slackBusesIds": slack,
+            "newtonRaphsonConvEpsPerEq": "1e-10",
+            "slackBusSelectionMode": "NAME",
+            "slackBusesIds": slack,
         },
-    )  # fmt: skip
+    )
     (result,) = loadflow.run_ac(network, parameters)
     assert result.status == loadflow.ComponentStatus.CONVERGED
     nominal = network.get_voltage_levels().nominal_v
@@ -94,8 +99,12 @@ def test_factory_networks_as_cgmes_have_pypowsybls_voltages(name, powsybl, tmp_p
     compare(powsybl, network, ids, strongest(network, ids))
 
 
-@pytest.mark.parametrize(("name", "lines"), [("ieee30", 3), ("ieee57", 0), ("ieee118", 2), ("ieee300", 22)])
-def test_factory_networks_as_cgmes_have_the_voltages_from_before_the_export(name, lines, powsybl, tmp_path):
+@pytest.mark.parametrize(
+    ("name", "lines"), [("ieee30", 3), ("ieee57", 0), ("ieee118", 2), ("ieee300", 22)]
+)
+def test_factory_networks_as_cgmes_have_the_voltages_from_before_the_export(
+    name, lines, powsybl, tmp_path
+):
     """But for the charging of lines between two nominal voltages, which differs between their ends, and CGMES has one
     for both: it is put back here. Without, pypowsybl finds no solution of its own export of 30, 118 and 300 buses.
     """
@@ -108,16 +117,23 @@ def test_factory_networks_as_cgmes_have_the_voltages_from_before_the_export(name
     voltage = network.get_voltage_levels().nominal_v
     table = network.get_lines(all_attributes=True).loc[lost.index]
     assert len(lost) == lines
-    assert (voltage[table.voltage_level1_id].values != voltage[table.voltage_level2_id].values).all()
+    assert (
+        voltage[table.voltage_level1_id].values != voltage[table.voltage_level2_id].values
+    ).all()
     read.update_lines(lost)
     data = import_network(convert("model", read).tables)
     ids = bus_ids(network)
-    ids = ids if len(ids) == len(data.buses) else {f"bus_{bus}": bus for bus in network.get_buses().index}
+    ids = (
+        ids
+        if len(ids) == len(data.buses)
+        else {f"bus_{bus}": bus for bus in network.get_buses().index}
+    )
     (slack_id,) = network.get_extensions("slackTerminal").bus_id
     slack = next(bus for bus, bus_id in ids.items() if bus_id == slack_id)
     ours, theirs = solved(with_slack(data, slack)).voltages, flows(powsybl, network, slack_id)
     turn = cmath.phase(theirs[slack_id]) - cmath.phase(ours[slack])
-    assert {*ids} - {*ours} <= {"bus_VL1201_0"}  # a star point with a negative reactance, which is merged
+    # a star point with a negative reactance, which is merged
+    assert {*ids} - {*ours} <= {"bus_VL1201_0"}
     assert max(abs(v * cmath.exp(1j * turn) - theirs[ids[bus]]) for bus, v in ours.items()) < 1e-9
 
 
@@ -130,16 +146,28 @@ def test_a_line_between_two_nominal_voltages_is_said(powsybl, tmp_path):
     assert said[text].endswith("elements L9-11-1, L9-10-1, L12-13-1")
 
 
-@pytest.mark.parametrize(("name", "misfit"), [("ieee14", r"Mvar at bus_9_LV, .* Mvar at bus_7_ZV; look at"),
-                                              ("ieee57", "^$"), ("micro_grid_nl_network", "^$")])  # fmt: skip
-def test_voltages_of_sv_that_the_data_do_not_have_are_questioned(name, misfit, powsybl, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("name", "misfit"),
+    [
+        ("ieee14", r"Mvar at bus_9_LV, .* Mvar at bus_7_ZV; look at"),
+        ("ieee57", "^$"),
+        ("micro_grid_nl_network", "^$"),
+    ],
+)
+def test_voltages_of_sv_that_the_data_do_not_have_are_questioned(
+    name, misfit, powsybl, tmp_path, monkeypatch
+):
     """pypowsybl's export of 14 buses has lost charging at 7 and 9; that of 57 has all; boundaries have loads."""
     network = getattr(powsybl.network, f"create_{name}")()
-    powsybl.loadflow.run_ac(network, powsybl.loadflow.Parameters(distributed_slack=False, use_reactive_limits=False))
+    powsybl.loadflow.run_ac(
+        network, powsybl.loadflow.Parameters(distributed_slack=False, use_reactive_limits=False)
+    )
     if name.startswith("ieee"):
         network.save(str(tmp_path / "model.zip"), format="CGMES")
         network = powsybl.network.load(str(tmp_path / "model.zip"))
-    monkeypatch.setattr("orchestrator.cases.network_data.read_cgmes", lambda *_: convert("model", network))
+    monkeypatch.setattr(
+        "orchestrator.cases.network_data.read_cgmes", lambda *_: convert("model", network)
+    )
     assert re.search(misfit, network_data(NetworkTable(cgmes="model.zip"), tmp_path).misfit)
 
 
@@ -155,8 +183,10 @@ def generation(network):
 def bus_ids(network):
     """Our name of a bus → pypowsybl's id, where a bus is one topological node."""
     nodes = network.get_bus_breaker_view_buses()
-    return {f"bus_{re.sub('^bus_', '', re.sub(r'[^A-Za-z0-9]+', '_', row['name'] or node), flags=re.I)}": row.bus_id
-            for node, row in nodes.iterrows()}  # fmt: skip
+    return {
+        f"bus_{re.sub('^bus_', '', re.sub(r'[^A-Za-z0-9]+', '_', row['name'] or node), flags=re.I)}": row.bus_id
+        for node, row in nodes.iterrows()
+    }
 
 
 def test_three_windings_phase_shifter_and_boundaries(powsybl):
@@ -164,8 +194,11 @@ def test_three_windings_phase_shifter_and_boundaries(powsybl):
     lines to a boundary. Its remote voltage control is made a local one, as ours holds SV's voltage there.
     """
     network = powsybl.network.create_micro_grid_be_network()
-    remote = next(name for name, row in network.get_generators(all_attributes=True).iterrows()
-                  if row.regulated_element_id != name)  # fmt: skip
+    remote = next(
+        name
+        for name, row in network.get_generators(all_attributes=True).iterrows()
+        if row.regulated_element_id != name
+    )
     bus = network.get_generators().bus_id[remote]
     nominal = network.get_voltage_levels().nominal_v[network.get_buses().voltage_level_id[bus]]
     network.update_generators(id=remote, regulated_element_id=remote, target_v=1.02 * nominal)
@@ -178,18 +211,24 @@ def test_three_windings_phase_shifter_and_boundaries(powsybl):
 
 
 def test_remote_voltage_control_is_said(powsybl):
-    said = [change.text for change in convert("m", powsybl.network.create_micro_grid_be_network()).changes]
+    said = [
+        change.text
+        for change in convert("m", powsybl.network.create_micro_grid_be_network()).changes
+    ]
     assert "voltage control of another bus: its own is held at SV's voltage" in said
 
 
 def test_what_the_network_does_not_have_is_refused_by_name(powsybl):
     network = powsybl.network.create_four_substations_node_breaker_network()
     with pytest.raises(
-        InputError, match=r"model: .*static var compensator \(SVC\); hvdc line \(HVDC1, HVDC2\); .*leave_out"
+        InputError,
+        match=r"model: .*static var compensator \(SVC\); hvdc line \(HVDC1, HVDC2\); .*leave_out",
     ):
         convert("model", network)
     allowed = ("static var compensator", "hvdc line")
-    with pytest.raises(InputError, match=r"2 parts of the network with generators .* leave_out = \['island'\]"):
+    with pytest.raises(
+        InputError, match=r"2 parts of the network with generators .* leave_out = \['island'\]"
+    ):
         convert("model", network, allowed)
     found = convert("model", network, (*allowed, "island"))
     said = {change.text: change.place for change in found.changes}
@@ -214,7 +253,10 @@ def test_a_folder_and_a_zip_of_zips_are_the_same_model(ieee14, tmp_path):
 
 @pytest.mark.parametrize(
     ("profile", "words"),
-    [("_SV", r"the profile SV is missing among .*_EQ.xml.*; export the solved model"), ("_SSH", "the profile SSH is")],
+    [
+        ("_SV", r"the profile SV is missing among .*_EQ.xml.*; export the solved model"),
+        ("_SSH", "the profile SSH is"),
+    ],
 )
 def test_a_missing_profile_is_named(profile, words, ieee14, tmp_path):
     with zipfile.ZipFile(ieee14) as archive:
@@ -249,7 +291,9 @@ def test_xml_that_is_broken_is_one_error(ieee14, tmp_path):
         archive.extractall(tmp_path)
     equipment = next(tmp_path.glob("*_EQ.xml"))
     equipment.write_text(equipment.read_text()[:20000])
-    with pytest.raises(InputError, match=r"pypowsybl cannot read it as CGMES: .*; check the export"):
+    with pytest.raises(
+        InputError, match=r"pypowsybl cannot read it as CGMES: .*; check the export"
+    ):
         load_cgmes(tmp_path)
 
 
@@ -259,10 +303,14 @@ def test_without_pypowsybl_the_extra_is_named(tmp_path, monkeypatch):
         for profile in ("EQ", "SSH", "TP", "SV"):
             archive.writestr(f"model_{profile}.xml", "<rdf/>")
     monkeypatch.setattr("fmus.toolchain.extras.find_spec", lambda name: None)
-    with pytest.raises(MissingLibraryError, match=r"reading the CGMES model model.zip needs .*gfor-cosim\[cgmes\]"):
+    with pytest.raises(
+        MissingLibraryError, match=r"reading the CGMES model model.zip needs .*gfor-cosim\[cgmes\]"
+    ):
         load_cgmes(path)
 
 
 def test_names_to_leave_out_are_those_of_cgmes(tmp_path):
-    with pytest.raises(InputError, match=r"leave_out: 'facts device' is unknown for CGMES; choose from static var"):
+    with pytest.raises(
+        InputError, match=r"leave_out: 'facts device' is unknown for CGMES; choose from static var"
+    ):
         read_cgmes(tmp_path, ["facts device"])

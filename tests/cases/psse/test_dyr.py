@@ -55,21 +55,30 @@ def tables(tmp_path):
 def test_records_become_parts_and_parameters(tables):
     found = tables()
     first, second, third = (found[f"sg{n}"] for n in (1, 2, 3))
-    assert (first.machine, first.exciter, first.governor, first.stabilizer) == ("genrou", "sexs", "tgov1", "none")
+    assert (first.machine, first.exciter, first.governor, first.stabilizer) == (
+        "genrou",
+        "sexs",
+        "tgov1",
+        "none",
+    )
     assert (second.exciter, second.governor) == ("manual", "constant_power")
     assert third.machine == "classical"
     assert first.parameters["machine.H"] == 9.55
     assert first.parameters["machine.X_d"] == 0.3614
-    assert first.parameters["exciter.T_A"] == pytest.approx(0.1 * 10.0)  # PSS/E gives the lead as T_A/T_B
+    # PSS/E gives the lead as T_A/T_B
+    assert first.parameters["exciter.T_A"] == pytest.approx(0.1 * 10.0)
     assert first.parameters["S_n"] == 247.5
     assert third.parameters["machine.X_d1"] == 0.2  # ZX of the RAW file
     assert first.parameters["transformer.X_t"] == 0
-    assert first.parameters["machine.R_s"] == 0  # ZR of the RAW file, and not what the part has by itself
+    # ZR of the RAW file, and not what the part has by itself
+    assert first.parameters["machine.R_s"] == 0
 
 
 def test_a_machine_out_of_service_may_have_records(tables, tmp_path):
     found = records(33)
-    found["GENERATOR"].append(found["GENERATOR"][0].replace("1,'1 '", "1,'2 '").replace(",1,1,100,", ",1,0,100,"))
+    found["GENERATOR"].append(
+        found["GENERATOR"][0].replace("1,'1 '", "1,'2 '").replace(",1,1,100,", ",1,0,100,")
+    )
     dyr = DYR + "1 'GENCLS' 2  1.0 0.0 /\n"
     assert set(tables(dyr, network=raw(33, found))) == set(tables())
 
@@ -78,8 +87,12 @@ def test_records_over_lines_with_commas_or_blanks(tmp_path):
     (tmp_path / "grid.dyr").write_text(DYR)
     records = read_dyr(tmp_path / "grid.dyr")
     assert [(r.bus, r.name, len(r.values)) for r in records] == [
-        (1, "GENROU", 14), (2, "GENROU", 14), (3, "GENCLS", 2), (1, "SEXS", 6), (1, "TGOV1", 7)
-    ]  # fmt: skip
+        (1, "GENROU", 14),
+        (2, "GENROU", 14),
+        (3, "GENCLS", 2),
+        (1, "SEXS", 6),
+        (1, "TGOV1", 7),
+    ]
     assert records[0].place.endswith("grid.dyr, line 2")
 
 
@@ -93,9 +106,21 @@ def test_records_over_lines_with_commas_or_blanks(tmp_path):
         ("7.0 0.0 /", "7.0 0.0", r"grid.dyr, line 7: the record does not end with a slash"),
         ("3 'GENCLS'", "three 'GENCLS'", r"line 5: .* is no record; one is bus 'MODEL' id values"),
         ("2.35 0.0 /", "2.35 0.0 1.0 /", r"line 5: GENCLS has 3 values, and needs 2: H, D"),
-        ("2.35 0.0 /", "2.35 0.0", r"line 5: the record GENCLS has no slash at its end, and runs into the next, SEXS"),
-        ("1 'SEXS' 1", "1 'SEXS' 2", r"line 6: SEXS is of machine '2' at bus 1, which has '1'; correct"),
-        ("1 'SEXS'", "4 'SEXS'", r"SEXS is of machine '1' at bus 4, which has no generator in the RAW file"),
+        (
+            "2.35 0.0 /",
+            "2.35 0.0",
+            r"line 5: the record GENCLS has no slash at its end, and runs into the next, SEXS",
+        ),
+        (
+            "1 'SEXS' 1",
+            "1 'SEXS' 2",
+            r"line 6: SEXS is of machine '2' at bus 1, which has '1'; correct",
+        ),
+        (
+            "1 'SEXS'",
+            "4 'SEXS'",
+            r"SEXS is of machine '1' at bus 4, which has no generator in the RAW file",
+        ),
         ("1 'TGOV1'", "1 'SEXS'", r"line 7: a second exciter of machine '1' at bus 1"),
     ],
 )
@@ -126,5 +151,9 @@ def test_only_the_switches_that_are_modelled_are_taken():
     """Of a stabilizer: IC1 = 1 is speed, IC2 = 3 power, M = 5 and N = 1 the ramp-tracking filter."""
     switches = {f.name: f.only for record in DYR_RECORDS.values() for f in record.fields if f.only}
     assert {name: switches[name] for name in ("IC1", "IC2", "M", "N", "Switch")} == {
-        "IC1": (1.0,), "IC2": (3.0,), "M": (5.0,), "N": (1.0,), "Switch": (0.0,),
-    }  # fmt: skip
+        "IC1": (1.0,),
+        "IC2": (3.0,),
+        "M": (5.0,),
+        "N": (1.0,),
+        "Switch": (0.0,),
+    }

@@ -65,7 +65,9 @@ def test_several_loads_at_a_bus_and_distributed_generation(revision, written):
     data = written(*records, revision=revision, keep_load_parts=True, **POWER)
     (load,) = [x for x in data.loads if x.bus == "bus_4"]
     for v in (0.9, 1.1):
-        assert drawn(load, v) == pytest.approx((10 - 6 + 20 * v + 7 * v**2, 4 - 1 + 8 * v - 2 * v**2))
+        assert drawn(load, v) == pytest.approx(
+            (10 - 6 + 20 * v + 7 * v**2, 4 - 1 + 8 * v - 2 * v**2)
+        )
 
 
 def test_both_ways_have_the_same_voltages_where_the_file_holds_the_solution(written, monkeypatch):
@@ -79,14 +81,19 @@ def test_both_ways_have_the_same_voltages_where_the_file_holds_the_solution(writ
         assert v == pytest.approx(found[-1][bus], abs=1e-9)
 
 
-@pytest.mark.parametrize("record", ["4,'2 ',1,1,1,-10,0,9.26,0,0,0", "4,'2 ',1,1,1,-10,0,9.2592592592592595,0,0,0"])
+@pytest.mark.parametrize(
+    "record", ["4,'2 ',1,1,1,-10,0,9.26,0,0,0", "4,'2 ',1,1,1,-10,0,9.2592592592592595,0,0,0"]
+)
 def test_a_load_that_cancels_itself_is_refused(record, written):
     with pytest.raises(
-        InputError, match=r"load_4 at bus_4: its P is .* -10, .* of constant current .* keep_load_parts"
+        InputError,
+        match=r"load_4 at bus_4: its P is .* -10, .* of constant current .* keep_load_parts",
     ):
         written(record, keep_load_parts=True)
 
 
 def test_the_key_is_for_psse(tmp_path):
-    with pytest.raises(InputError, match="keep_load_parts is for networks of PSS/E; remove the key"):
+    with pytest.raises(
+        InputError, match="keep_load_parts is for networks of PSS/E; remove the key"
+    ):
         network_data(NetworkTable(pandapower="case9", keep_load_parts=True), tmp_path)

@@ -60,7 +60,9 @@ def changed(text, *pairs):
 
 
 def without(kind, *buses):
-    return "\n".join(x for x in DYR.splitlines() if not any(x.startswith(f"{b} '{kind}'") for b in buses))
+    return "\n".join(
+        x for x in DYR.splitlines() if not any(x.startswith(f"{b} '{kind}'") for b in buses)
+    )
 
 
 SEXS = "3 'SEXS'   1  0.1 10.0 100.0 0.05 -5.0 5.0 /"
@@ -71,17 +73,50 @@ HYGOV = "3 'HYGOV'  1  0.05 0.3 5.0 0.05 0.5 0.2 1.0 0.0 1.0 1.2 0.5 0.08 /"
 GAST = "3 'GAST'   1  0.05 0.4 0.1 3.0 1.2 2.0 1.0 -0.05 0.0 /"
 STAB1 = "2 'STAB1' 1  1.0 10.0  2.5 0.02  0.5555556 5.4  0.1 /"
 DYRS = {
-    "no exciter": (without("EXST1", 3), "sg3: no record of an exciter, where 3 of 4 machines have one"),
-    "no governor at two": (without("TGOV1", 3, 4), "sg3, sg4: no record of a governor, where 2 of 4"),
-    "droop in percent": (changed(DYR, (TGOV1, TGOV1.replace("0.05", "5"))), "governor.R = 5 pu is outside"),
-    "droop of HYGOV in percent": (changed(DYR, (TGOV1, HYGOV.replace("0.05", "5", 1))), "governor.R = 5 pu"),
-    "droop of GAST in percent": (changed(DYR, (TGOV1, GAST.replace("0.05", "5", 1))), "governor.R = 5 pu"),
-    "droop for its inverse": (changed(DYR, (TGOV1, IEEEG1.replace(" 20 ", " 0.05 "))), "governor.K = 0.05 pu"),
-    "temporary droop in percent": (changed(DYR, (TGOV1, HYGOV.replace(" 0.3 ", " 30 "))), "governor.r = 30 pu"),
-    "gain of an exciter": (changed(DYR, (EXST1, SEXS.replace(" 100.0 ", " 0.01 "))), "exciter.K = 0.01 pu"),
-    "gain of a stabiliser": (changed(DYR, (STAB1, STAB1.replace("  1.0 ", "  1000 "))), "pss.K_S = 1000 pu"),
-    "least droop of a governor": (changed(DYR, (TGOV1, TGOV1.replace("0.05", "0.005"))), "governor.R = 0.005 pu is"),
-    "field's time constant": (changed(DYR, ("8.0 0.03", "0.8 0.03")), "machine.T_d10 = 0.8 s is outside"),
+    "no exciter": (
+        without("EXST1", 3),
+        "sg3: no record of an exciter, where 3 of 4 machines have one",
+    ),
+    "no governor at two": (
+        without("TGOV1", 3, 4),
+        "sg3, sg4: no record of a governor, where 2 of 4",
+    ),
+    "droop in percent": (
+        changed(DYR, (TGOV1, TGOV1.replace("0.05", "5"))),
+        "governor.R = 5 pu is outside",
+    ),
+    "droop of HYGOV in percent": (
+        changed(DYR, (TGOV1, HYGOV.replace("0.05", "5", 1))),
+        "governor.R = 5 pu",
+    ),
+    "droop of GAST in percent": (
+        changed(DYR, (TGOV1, GAST.replace("0.05", "5", 1))),
+        "governor.R = 5 pu",
+    ),
+    "droop for its inverse": (
+        changed(DYR, (TGOV1, IEEEG1.replace(" 20 ", " 0.05 "))),
+        "governor.K = 0.05 pu",
+    ),
+    "temporary droop in percent": (
+        changed(DYR, (TGOV1, HYGOV.replace(" 0.3 ", " 30 "))),
+        "governor.r = 30 pu",
+    ),
+    "gain of an exciter": (
+        changed(DYR, (EXST1, SEXS.replace(" 100.0 ", " 0.01 "))),
+        "exciter.K = 0.01 pu",
+    ),
+    "gain of a stabiliser": (
+        changed(DYR, (STAB1, STAB1.replace("  1.0 ", "  1000 "))),
+        "pss.K_S = 1000 pu",
+    ),
+    "least droop of a governor": (
+        changed(DYR, (TGOV1, TGOV1.replace("0.05", "0.005"))),
+        "governor.R = 0.005 pu is",
+    ),
+    "field's time constant": (
+        changed(DYR, ("8.0 0.03", "0.8 0.03")),
+        "machine.T_d10 = 0.8 s is outside",
+    ),
     "gain of a tenth": (
         changed(DYR, (EXST1, EXST1.replace("200.0", "20.0"))),
         "exciter.K_A = 20, where the 3 other machines have 200 to 200: is it so?",
@@ -90,11 +125,26 @@ DYRS = {
         changed(DYR, (" 6.5 ", " 0.65 ")),
         "machine.H = 0.65, where the 3 other machines have 6.175 to",
     ),
-    "lead for lag of a governor": (changed(DYR, (TGOV1, TGOV1.replace("2.1 7.0", "7.0 2.1"))), "are the two swapped?"),
-    "time constant of an exciter": (changed(DYR, (EXST1, SEXS.replace("0.05", "50"))), "exciter.T_E = 50 s is outside"),
-    "lead for lag": (changed(DYR, (EXST1, SEXS.replace("0.1 10.0", "10.0 0.1"))), "are the two swapped?"),
-    "no saturation": (changed(DYR, ("0.0392 0.2227", "0.0 0.0")), "sg1: the saturation is 0, where 3 of 4 machines"),
-    "saturation in percent": (changed(DYR, ("0.0392 0.2227", "3.92 22.27")), "machine.s_10 = 3.92 is outside"),
+    "lead for lag of a governor": (
+        changed(DYR, (TGOV1, TGOV1.replace("2.1 7.0", "7.0 2.1"))),
+        "are the two swapped?",
+    ),
+    "time constant of an exciter": (
+        changed(DYR, (EXST1, SEXS.replace("0.05", "50"))),
+        "exciter.T_E = 50 s is outside",
+    ),
+    "lead for lag": (
+        changed(DYR, (EXST1, SEXS.replace("0.1 10.0", "10.0 0.1"))),
+        "are the two swapped?",
+    ),
+    "no saturation": (
+        changed(DYR, ("0.0392 0.2227", "0.0 0.0")),
+        "sg1: the saturation is 0, where 3 of 4 machines",
+    ),
+    "saturation in percent": (
+        changed(DYR, ("0.0392 0.2227", "3.92 22.27")),
+        "machine.s_10 = 3.92 is outside",
+    ),
 }
 
 
@@ -119,7 +169,9 @@ def test_parts_that_no_machine_has_are_a_choice(questions, kind):
     assert len(asked) == (
         kind == "TGOV1"
     )  # a study may leave out exciters; nothing holds the frequency without governors
-    assert all("no record of a governor, where every machine has its exciter's" in text for text in asked)
+    assert all(
+        "no record of a governor, where every machine has its exciter's" in text for text in asked
+    )
 
 
 FLAT = "\n".join(
@@ -168,13 +220,17 @@ RAWS = {
     ),
     "load loss in pu": (
         changed(
-            RAW, ("5,  1, 0, '1 ', 1, 2, 1", "5,  1, 0, '1 ', 1, 3, 1"), ("0.0, 0.15, 900.0", "0.003, 0.15, 900.0")
+            RAW,
+            ("5,  1, 0, '1 ', 1, 2, 1", "5,  1, 0, '1 ', 1, 3, 1"),
+            ("0.0, 0.15, 900.0", "0.003, 0.15, 900.0"),
         ),
         "R = 0.003 is a load loss in W by CZ = 3",
     ),
     "angles in radians": (
         "\n".join(
-            ",".join([*line.split(",")[:8], f" {float(line.split(',')[8]) * 0.0174533:.4f}"]) if 3 < n < 15 else line
+            ",".join([*line.split(",")[:8], f" {float(line.split(',')[8]) * 0.0174533:.4f}"])
+            if 3 < n < 15
+            else line
             for n, line in enumerate(RAW.splitlines(), start=1)
         ),
         "look at voltages of another case, or angles that are not in degrees",
@@ -187,7 +243,10 @@ RAWS = {
         changed(RAW, ("719.000, 0.0, 500.0, -300.0, 1.03", "719.000, 0.0, 500.0, -300.0, 0.83")),
         "line 24: VS is 0.83 pu, where the solved file has VM = 1.03 pu",
     ),
-    "load of the wrong sign": (changed(RAW, ("967.000, 100.000", "-96.7, 10.000")), "load at bus_7 is -96.7 MW"),
+    "load of the wrong sign": (
+        changed(RAW, ("967.000, 100.000", "-96.7, 10.000")),
+        "load at bus_7 is -96.7 MW",
+    ),
     "rating": (
         changed(RAW, ("1.03, 0, 900.0, 0.0025", "1.03, 0, 9000.0, 0.0025")),
         "1.5 pu on the 9000 MVA behind it, and step-up transformers have 0.03 to 0.35 pu there; is the machine",
@@ -208,13 +267,22 @@ RAWS = {
         changed(RAW, ("7,  8, '2 ', 0.011, 0.11, 0.1925", "7,  8, '2 ', 0.011, 0.11, 0.0")),
         "B_line_7_8_2 = 0 pu, and the parallel line_7_8 has 0.1925 pu",
     ),
-    "load in pu": (changed(RAW, ("967.000, 100.000", "9.67, 1.0")), "load at bus_7 has 9.67 MW, where the others have"),
-    "power in pu": (changed(RAW, (" 2, '1 ', 700.000", " 2, '1 ', 7.00")), "more than the rating of the machine"),
+    "load in pu": (
+        changed(RAW, ("967.000, 100.000", "9.67, 1.0")),
+        "load at bus_7 has 9.67 MW, where the others have",
+    ),
+    "power in pu": (
+        changed(RAW, (" 2, '1 ', 700.000", " 2, '1 ', 7.00")),
+        "more than the rating of the machine",
+    ),
     "conductance for a capacitor": (
         changed(RAW, ("0.0, 200.0", "200.0, 0.0")),
         "line 20: shunt that draws GL = 200 MW",
     ),
-    "small shunt": (changed(RAW, ("7, '1 ', 1, 0.0, 200.0", "7, '1 ', 1, 0.0, 3.5")), "shunt at bus_7 has 3.5 Mvar"),
+    "small shunt": (
+        changed(RAW, ("7, '1 ', 1, 0.0, 200.0", "7, '1 ', 1, 0.0, 3.5")),
+        "shunt at bus_7 has 3.5 Mvar",
+    ),
 }
 
 
@@ -237,18 +305,31 @@ def test_an_answer_is_taken(questions):
     assert questions(dyr=without("EXST1", 3), case=meant + CASE) == []
 
 
-@pytest.mark.parametrize("head", ["0,   100.00, 33, 0, 1, 0.0", "0,   100.00, 33, 0, 1", "0,   100.00, 33"])
+@pytest.mark.parametrize(
+    "head", ["0,   100.00, 33, 0, 1, 0.0", "0,   100.00, 33, 0, 1", "0,   100.00, 33"]
+)
 def test_a_frequency_that_the_file_does_not_have_is_the_cases(questions, head):
     raw = changed(RAW, ("0,   100.00, 33, 0, 1, 60.00", head))
     with pytest.raises(CaseError, match=r'BASFRQ.* is missing or 0.*frequency = "60 Hz"'):
         questions(raw=raw)
-    assert questions(raw=raw, case=CASE.replace("[network]", '[network]\nfrequency = "60 Hz"')) == []
+    assert (
+        questions(raw=raw, case=CASE.replace("[network]", '[network]\nfrequency = "60 Hz"')) == []
+    )
 
 
 SWAPPED = {
-    "exciter.E_MIN = 5 pu must be less than exciter.E_MAX = -5 pu": (EXST1, SEXS.replace("-5.0 5.0", "5.0 -5.0")),
-    "exciter.V_RMIN = 5 pu must be less than exciter.V_RMAX = -5 pu": (EXST1, EXST1.replace("5.0 -5.0", "-5.0 5.0")),
-    "governor.V_MIN = 1 pu must be less than governor.V_MAX = 0 pu": (TGOV1, TGOV1.replace("1.0 0.0", "0.0 1.0")),
+    "exciter.E_MIN = 5 pu must be less than exciter.E_MAX = -5 pu": (
+        EXST1,
+        SEXS.replace("-5.0 5.0", "5.0 -5.0"),
+    ),
+    "exciter.V_RMIN = 5 pu must be less than exciter.V_RMAX = -5 pu": (
+        EXST1,
+        EXST1.replace("5.0 -5.0", "-5.0 5.0"),
+    ),
+    "governor.V_MIN = 1 pu must be less than governor.V_MAX = 0 pu": (
+        TGOV1,
+        TGOV1.replace("1.0 0.0", "0.0 1.0"),
+    ),
 }
 
 
@@ -271,9 +352,17 @@ def test_the_table_of_units_chooses_the_machines_variant(tmp_path, questions):
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [
-        ("machine", "nonsense", "machine = 'nonsense' in .units. acts on no machine: the records .*genrou_rated_speed"),
+        (
+            "machine",
+            "nonsense",
+            "machine = 'nonsense' in .units. acts on no machine: the records .*genrou_rated_speed",
+        ),
         ("machine", "gensal", "machine = 'gensal' in .units. acts on no machine"),
-        ("exciter", "dc1a", "exciter = 'dc1a' in .units. acts on no machine: the DYR file has a record of it"),
+        (
+            "exciter",
+            "dc1a",
+            "exciter = 'dc1a' in .units. acts on no machine: the DYR file has a record of it",
+        ),
         ("governor", "hygov", "governor = 'hygov' in .units. acts on no machine"),
     ],
 )
@@ -287,7 +376,11 @@ def test_a_choice_fills_a_missing_record(questions, tmp_path):
     dyr = "\n".join(x for x in DYR.splitlines() if not x.startswith(("3 'EXST1", "3 'TGOV1")))
     assert questions(dyr=dyr, case=case) == []
     tables = load_case(tmp_path / "case.toml")._preparer("areas", None, ())._everything
-    assert (tables["sg3"].exciter, tables["sg3"].governor, tables["sg1"].exciter) == ("sexs", "hygov", "st1a")
+    assert (tables["sg3"].exciter, tables["sg3"].governor, tables["sg1"].exciter) == (
+        "sexs",
+        "hygov",
+        "st1a",
+    )
     with pytest.raises(CaseError, match="there is no exciter 'nonsense'"):
         questions(dyr=dyr, case=case.replace("sexs", "nonsense"))
 
@@ -298,8 +391,14 @@ EVENT = '[[events]]\ntype = "bus_fault"\ntime = "1 s"\nbus = "bus_8"\ncleared_by
 @pytest.mark.parametrize(
     ("duration", "words"),
     [
-        ("100", "the fault is not cleared before the run stops at 15 s; if 100 ms is meant, write '100 ms'"),
-        ("12", "duration = 12 s, without a unit: a fault is cleared within a second; if 12 ms is meant"),
+        (
+            "100",
+            "the fault is not cleared before the run stops at 15 s; if 100 ms is meant, write '100 ms'",
+        ),
+        (
+            "12",
+            "duration = 12 s, without a unit: a fault is cleared within a second; if 12 ms is meant",
+        ),
         ('"20 s"', "duration = 20 s: the fault is not cleared before the run stops at 15 s"),
         ('"12 s"', None),
         ('"100 ms"', None),
@@ -335,7 +434,9 @@ def test_a_load_model_that_the_case_says_is_not_asked_about(questions, law):
     assert questions(case=CASE.replace('"power"', f'"{law}"')) == []
 
 
-def test_the_question_tells_what_the_load_model_moves_and_facts_come_first(questions, tmp_path, gfor):
+def test_the_question_tells_what_the_load_model_moves_and_facts_come_first(
+    questions, tmp_path, gfor
+):
     questions(case=OPEN)
     code, out, err = gfor("modes", tmp_path / "case.toml")
     assert code == 0, err
@@ -359,12 +460,16 @@ def test_the_weight_is_that_of_the_case_that_says_so(questions, tmp_path, gfor):
     figures = {}
     for law in ("impedance", "power"):
         questions(case=CASE.replace('"power"', f'"{law}"'))
-        modes = json.loads(gfor("modes", tmp_path / "case.toml", "--json")[1])["scenarios"][0]["modes"]
+        modes = json.loads(gfor("modes", tmp_path / "case.toml", "--json")[1])["scenarios"][0][
+            "modes"
+        ]
         figures[law] = min(m["damping_percent"] for m in modes if m["frequency_hz"] > 0)
     questions(case=OPEN)
     asked = json.loads(gfor("modes", tmp_path / "case.toml", "--json")[1])["questions"]
     assert any(
-        f"impedance {figures['impedance']:.2f} % at" in q and f"power {figures['power']:.2f} % at" in q for q in asked
+        f"impedance {figures['impedance']:.2f} % at" in q
+        and f"power {figures['power']:.2f} % at" in q
+        for q in asked
     )
 
 
@@ -373,7 +478,14 @@ def test_a_unit_that_is_out_is_not_asked_to_start(questions, tmp_path, gfor, swi
     questions()
     lighter = ["--set", "grid.load_9.P=700"]
     code, out, err = gfor(
-        "modes", tmp_path / "case.toml", *lighter, "--set", f"{switch}=false", "--sharing", "slack", "--json"
+        "modes",
+        tmp_path / "case.toml",
+        *lighter,
+        "--set",
+        f"{switch}=false",
+        "--sharing",
+        "slack",
+        "--json",
     )
     assert code == 0, err
     assert json.loads(out)["scenarios"][0]["stable"] is True
@@ -383,7 +495,10 @@ def test_a_unit_that_is_out_is_not_asked_to_start(questions, tmp_path, gfor, swi
     (tmp_path / "case.toml").write_text(CASE + back)
     values = {"grid.load_9.P": 700.0, switch: False}
     alone = CASE.replace("[power_flow]\n", '[power_flow]\nsharing = "slack"\n')
-    for text, least in ((alone, -0.1), (alone + back, 0.0)):  # of a unit that comes back, the limit stays
+    for text, least in (
+        (alone, -0.1),
+        (alone + back, 0.0),
+    ):  # of a unit that comes back, the limit stays
         (tmp_path / "case.toml").write_text(text)
         (prepared,) = load_case(tmp_path / "case.toml").prepare((), values)
         assert prepared.system.components["sg4"].value("governor.V_MIN") == least
@@ -397,9 +512,14 @@ def test_a_solution_is_compared_with_all_kinds_of_elements(tmp_path):
     assert misfit_of(network, rounded, tables.labels) == ""
     most = max(network.shunts, key=lambda x: abs(x.b_mvar))
     wrong = replace(
-        network, shunts=tuple(replace(x, b_mvar=-x.b_mvar if x is most else x.b_mvar) for x in network.shunts)
+        network,
+        shunts=tuple(
+            replace(x, b_mvar=-x.b_mvar if x is most else x.b_mvar) for x in network.shunts
+        ),
     )
-    assert f"Mvar at {most.bus}; look at its load, its shunt" in misfit_of(wrong, rounded, tables.labels)
+    assert f"Mvar at {most.bus}; look at its load, its shunt" in misfit_of(
+        wrong, rounded, tables.labels
+    )
 
 
 def test_a_load_that_feeds_beside_a_machine_counts(questions, tmp_path):
@@ -429,9 +549,17 @@ set = { "sg3.P_0" = 0.576667 }
     [
         ("0.666667", "0.666667", None),
         ("0.576667", "0.798889", None),  # the slack feeds less
-        ("0.576667", "0.687778", "the case's converters feed 200 MW, and the file's units 100 MW less"),
+        (
+            "0.576667",
+            "0.687778",
+            "the case's converters feed 200 MW, and the file's units 100 MW less",
+        ),
         ("0.666667", "-0.666667", "P_0 = -0.666667 pu: it draws 200 MW; is it so?"),
-        ("300 MVA", "150 MVA", "the case's converters feed 100 MW, and the file's units 200 MW less than in the file"),
+        (
+            "300 MVA",
+            "150 MVA",
+            "the case's converters feed 100 MW, and the file's units 200 MW less than in the file",
+        ),
         ("0.666667", "0.0067", "it feeds 2.01 MW with S_n = 300 MVA; is it so?"),
         ("0.666667", "0.0", "converters feed 0 MW, and the file's units 200 MW less"),
         ("0.666667", "1.2", "more than the rating of the converter"),

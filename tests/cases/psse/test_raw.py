@@ -32,7 +32,10 @@ def pandapowers(net):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         pp.runpp(net, calculate_voltage_angles=True, numba=False, tolerance_mva=1e-10)
-    return {f"bus_{k + 1}": cmath.rect(v.vm_pu, np.deg2rad(v.va_degree)) for k, v in net.res_bus.iterrows()}
+    return {
+        f"bus_{k + 1}": cmath.rect(v.vm_pu, np.deg2rad(v.va_degree))
+        for k, v in net.res_bus.iterrows()
+    }
 
 
 def wscc():
@@ -41,7 +44,9 @@ def wscc():
     for n in sorted(BUSES):
         pp.create_bus(net, 100.0, name=str(n))
     for i, j, r, x, b in (*LINES, *((i, j, 0.0, x, 0.0) for i, j, x in TRANSFORMERS)):
-        pp.create_line_from_parameters(net, i - 1, j - 1, 1, r * 100, x * 100, b / 100 / (2 * np.pi * 60) * 1e9, 1)
+        pp.create_line_from_parameters(
+            net, i - 1, j - 1, 1, r * 100, x * 100, b / 100 / (2 * np.pi * 60) * 1e9, 1
+        )
     for n, (p, q) in LOADS.items():
         pp.create_load(net, n - 1, p, q)
     pp.create_ext_grid(net, 0, MACHINES[1][1])
@@ -50,13 +55,17 @@ def wscc():
     return net
 
 
-@pytest.mark.parametrize(("revision", "named"), [(33, True), (33, False), (34, True), (35, False), (36, True)])
+@pytest.mark.parametrize(
+    ("revision", "named"), [(33, True), (33, False), (34, True), (35, False), (36, True)]
+)
 def test_the_voltages_are_pandapowers_in_every_revision(revision, named, written):
     data = written(raw(revision, named=named))
     assert (data.frequency, data.slack, data.changes) == (60.0, "bus_1", ())
     assert {bus: g.rating_mva for bus, g in data.generation.items()} == {
-        "bus_1": 247.5, "bus_2": 192.0, "bus_3": 128.0
-    }  # fmt: skip
+        "bus_1": 247.5,
+        "bus_2": 192.0,
+        "bus_3": 128.0,
+    }
     wanted = pandapowers(wscc())
     flow = solved(data)
     for bus, v in flow.voltages.items():
@@ -79,16 +88,26 @@ def test_a_matpower_case_written_as_raw(written):
     ppc = net._ppc["internal"] if "bus" not in net._ppc else net._ppc
     for row in ppc["bus"].real:
         found["BUS"].append(f"{row[0] + 1:.0f},'B',{row[9]},{row[1]:.0f},1,1,1,1,0")
-        found["LOAD"].append(f"{row[0] + 1:.0f},'1',1,1,1,{row[2]:.12g},{row[3]:.12g},0,0,0,0,1,1,0")
+        found["LOAD"].append(
+            f"{row[0] + 1:.0f},'1',1,1,1,{row[2]:.12g},{row[3]:.12g},0,0,0,0,1,1,0"
+        )
     for row in ppc["gen"].real:
-        found["GENERATOR"].append(f"{row[0] + 1:.0f},'1',{row[1]:.12g},0,9999,-9999,{row[5]:.12g},0,2000,0,1,0,0,1,1")
+        found["GENERATOR"].append(
+            f"{row[0] + 1:.0f},'1',{row[1]:.12g},0,9999,-9999,{row[5]:.12g},0,2000,0,1,0,0,1,1"
+        )
     for row in ppc["branch"].real:
         i, j, r, x, b, tap, shift = row[0] + 1, row[1] + 1, *row[2:5], row[8] or 1.0, row[9]
         if tap == 1 and shift == 0:
-            found["BRANCH"].append(f"{i:.0f} {j:.0f} '1' {r:.12g} {x:.12g} {b:.12g} 0 0 0 0 0 0 0 1")
+            found["BRANCH"].append(
+                f"{i:.0f} {j:.0f} '1' {r:.12g} {x:.12g} {b:.12g} 0 0 0 0 0 0 0 1"
+            )
             continue
-        found["TRANSFORMER"] += [f"{i:.0f},{j:.0f},0,'1',1,1,1,0,0,2,'',1", f"{r:.12g},{x:.12g},100",
-                                 f"{tap:.12g},0,{shift:.12g}", "1.0,0"]  # fmt: skip
+        found["TRANSFORMER"] += [
+            f"{i:.0f},{j:.0f},0,'1',1,1,1,0,0,2,'',1",
+            f"{r:.12g},{x:.12g},100",
+            f"{tap:.12g},0,{shift:.12g}",
+            "1.0,0",
+        ]
     flow = solved(written(raw(33, found)))
     wanted = pandapowers(net)
     assert len(flow.voltages) == 39
@@ -111,13 +130,33 @@ def with_transformer(*lines):
     ("codes", "impedance", "first", "second", "z", "tap"),
     [
         ("1,1,1", "0.002,0.0576,100", "1.05,0,-30", "1.0,0", 0.002 + 0.0576j, 1.05),
-        ("1,1,1", "0.002,0.0576,100", "1.05,0,-30", "0.98,0", (0.002 + 0.0576j) * 0.98**2, 1.05 / 0.98),
+        (
+            "1,1,1",
+            "0.002,0.0576,100",
+            "1.05,0,-30",
+            "0.98,0",
+            (0.002 + 0.0576j) * 0.98**2,
+            1.05 / 0.98,
+        ),
         ("2,1,1", "0.002,0.0576,100", "241.5,230,-30", "16.5,16.5", 0.002 + 0.0576j, 1.05),
-        ("3,2,1", "0.005,0.144,250", "1.05,220,-30", "1.0,16.5", (0.005 + 0.144j) * 0.4 * (220 / 230) ** 2,
-         1.05 * 220 / 230),
-        ("1,3,1", "500000,0.15,250", "1.0,0,-30", "1.0,0", complex(0.002, np.sqrt(0.15**2 - 0.002**2)) * 0.4, 1.0),
+        (
+            "3,2,1",
+            "0.005,0.144,250",
+            "1.05,220,-30",
+            "1.0,16.5",
+            (0.005 + 0.144j) * 0.4 * (220 / 230) ** 2,
+            1.05 * 220 / 230,
+        ),
+        (
+            "1,3,1",
+            "500000,0.15,250",
+            "1.0,0,-30",
+            "1.0,0",
+            complex(0.002, np.sqrt(0.15**2 - 0.002**2)) * 0.4,
+            1.0,
+        ),
     ],
-)  # fmt: skip
+)
 def test_codes_of_ratio_and_impedance(codes, impedance, first, second, z, tap, written):
     head = f"4,1,0,'1 ',{codes},0,0,2,'T',1,1,1"
     data = written(with_transformer(head, impedance, first, second))
@@ -138,7 +177,12 @@ def test_an_angle_of_the_second_winding_turns_the_other_way(written):
     [
         ("1,1,1", "0.002,-0.01", 0, (0.2, -1.0)),
         ("1,1,2", "100000,0.004", 0, (0.1, -np.sqrt(1.0**2 - 0.1**2))),
-        ("1,1,2", "100000,0.004", 220, (0.1 * (230 / 220) ** 2, -np.sqrt(1.0**2 - 0.1**2) * (230 / 220) ** 2)),
+        (
+            "1,1,2",
+            "100000,0.004",
+            220,
+            (0.1 * (230 / 220) ** 2, -np.sqrt(1.0**2 - 0.1**2) * (230 / 220) ** 2),
+        ),
     ],
 )
 def test_codes_of_magnetisation(codes, magnetisation, nominal, wanted, written):
@@ -146,15 +190,23 @@ def test_codes_of_magnetisation(codes, magnetisation, nominal, wanted, written):
     head = f"4,1,0,'1 ',{codes},{magnetisation},2,'T',1,1,1"
     data = written(with_transformer(head, "0,0.0576,250", f"1.0,{nominal},0", "1.0,0"))
     (shunt,) = data.shunts
-    assert (shunt.bus, shunt.g_mw, shunt.b_mvar) == ("bus_4", pytest.approx(wanted[0]), pytest.approx(wanted[1]))
+    assert (shunt.bus, shunt.g_mw, shunt.b_mvar) == (
+        "bus_4",
+        pytest.approx(wanted[0]),
+        pytest.approx(wanted[1]),
+    )
 
 
 def test_three_windings_are_a_star(written):
     """Z12 = 0.10, Z23 = 0.14, Z31 = 0.16 on 50 MVA: 0.06, 0.04 and 0.10 to the star point, twice that on 100 MVA."""
     found = records(33)
     found["TRANSFORMER"] += [
-        "4,8,6,'A ',1,2,1,0,0,2,'T',1,1,1", "0,0.10,50,0,0.14,50,0,0.16,50,1,0", "1.02,0,0", "1.0,0,0", "1.0,0,-30"
-    ]  # fmt: skip
+        "4,8,6,'A ',1,2,1,0,0,2,'T',1,1,1",
+        "0,0.10,50,0,0.14,50,0,0.16,50,1,0",
+        "1.02,0,0",
+        "1.0,0,0",
+        "1.0,0,-30",
+    ]
     data = written(raw(33, found))
     at = {x.from_bus: x for x in data.lines if x.to_bus == "bus_4_8_6_A_star"}
     assert [at[f"bus_{n}"].X for n in (4, 8, 6)] == pytest.approx([0.12, 0.08, 0.20])
@@ -169,13 +221,21 @@ def test_a_star_with_a_negative_reactance_is_a_transformer_of_three_windings(wri
     """Z12 = 0.10, Z23 = 0.04, Z31 = 0.16 on 100 MVA: 0.11, -0.01 and 0.05."""
     found = records(33)
     found["TRANSFORMER"] += [
-        "4,8,6,'A ',1,1,1,0,0,2,'T',1,1,1", "0,0.10,50,0,0.04,50,0,0.16,50,1,0", "1.02,0,0", "1.0,0,0", "1.0,0,0"
-    ]  # fmt: skip
+        "4,8,6,'A ',1,1,1,0,0,2,'T',1,1,1",
+        "0,0.10,50,0,0.04,50,0,0.16,50,1,0",
+        "1.02,0,0",
+        "1.0,0,0",
+        "1.0,0,0",
+    ]
     data = written(raw(33, found))
     (transformer,) = data.transformers
     assert "bus_4_8_6_A_star" not in data.buses
     by_bus = dict(zip(transformer.buses, transformer.X, strict=True))
-    assert by_bus == {"bus_4": pytest.approx(0.11), "bus_8": pytest.approx(-0.01), "bus_6": pytest.approx(0.05)}
+    assert by_bus == {
+        "bus_4": pytest.approx(0.11),
+        "bus_8": pytest.approx(-0.01),
+        "bus_6": pytest.approx(0.05),
+    }
 
 
 # -- elements that change form ---------------------------------------------------------------------
@@ -185,7 +245,10 @@ def test_loads_shunts_and_machines(written):
     found = records(33)
     found["LOAD"] += ["4,'2 ',1,1,1,10,4,20,8,5,-3,1,1,0", "4,'3 ',0,1,1,500,0"]
     found["FIXED SHUNT"] += ["5,'1 ',1,2.0,30.0", "5,'2 ',0,0,900"]
-    found["SWITCHED SHUNT"] += ["6,1,0,1,1.05,0.95,0,100,'',40.0,4,10.0", "6,0,0,1,1,1,0,100,'',-5.0"]
+    found["SWITCHED SHUNT"] += [
+        "6,1,0,1,1.05,0.95,0,100,'',40.0,4,10.0",
+        "6,0,0,1,1,1,0,100,'',-5.0",
+    ]
     found["GENERATOR"] += ["2,'2 ',20,0,9,-9,1.025,0,50", "3,'9 ',20,0,9,-9,1.025,0,50,0,1,0,0,1,0"]
     found["BUS"][3] = found["BUS"][3].replace(",1.0,0.0", ",1.1,0.0")
     data = written(raw(33, found))
@@ -193,12 +256,16 @@ def test_loads_shunts_and_machines(written):
     assert (load.p_mw, load.q_mvar) == (pytest.approx(10 + 20 * 1.1), pytest.approx(4 + 8 * 1.1))
     shunts = {s.bus: (s.g_mw, s.b_mvar) for s in data.shunts}
     assert shunts == {
-        "bus_4": (5, pytest.approx(-3)), "bus_5": (pytest.approx(2), pytest.approx(30)), "bus_6": (0, pytest.approx(35))
-    }  # fmt: skip
+        "bus_4": (5, pytest.approx(-3)),
+        "bus_5": (pytest.approx(2), pytest.approx(30)),
+        "bus_6": (0, pytest.approx(35)),
+    }
     assert (data.generation["bus_2"].p_mw, data.generation["bus_2"].rating_mva) == (183, 242)
     assert (data.generation["bus_2"].q_min_mvar, data.generation["bus_2"].q_max_mvar) == (-309, 309)
     lines = raw(33, found).splitlines()
-    listed = {text: place for place, text in ((p.place.rpartition(" ")[2], p.text) for p in data.changes)}
+    listed = {
+        text: place for place, text in ((p.place.rpartition(" ")[2], p.text) for p in data.changes)
+    }
     (current,) = (n for text, n in listed.items() if text.startswith("load of constant current"))
     assert lines[int(current) - 1].startswith("4,'2 '")
     (held,) = (n for text, n in listed.items() if text.startswith("switched shunt: held"))
@@ -207,12 +274,20 @@ def test_loads_shunts_and_machines(written):
 
 def test_what_the_network_does_not_have_is_refused_unless_the_user_lets_it_go(written, tmp_path):
     found = records(33)
-    found["TWO-TERMINAL DC"] += ["'DC 1',1,5,100,500", "5,2,15", "8,2,15", "'DC 2',1,5,100,500", "5,2,15", "8,2,15"]
+    found["TWO-TERMINAL DC"] += [
+        "'DC 1',1,5,100,500",
+        "5,2,15",
+        "8,2,15",
+        "'DC 2',1,5,100,500",
+        "5,2,15",
+        "8,2,15",
+    ]
     found["FACTS DEVICE"] += ["'F',5,0,1"]
     text = raw(33, found)
     first = text.splitlines().index("'DC 1',1,5,100,500") + 1
     with pytest.raises(
-        InputError, match=rf"two-terminal dc \(line {first}, {first + 3}\); facts device .*leave_out = \['two-ter"
+        InputError,
+        match=rf"two-terminal dc \(line {first}, {first + 3}\); facts device .*leave_out = \['two-ter",
     ):
         written(text)
     data = written(text, leave_out=["two-terminal dc", "facts device"])
@@ -235,7 +310,9 @@ def test_a_case_says_what_was_changed_and_has_modes(tmp_path, gfor):
     code, out, error = gfor("modes", tmp_path / "case.toml", "--json")
     assert code == 0, error
     assert "switched shunt: held at BINIT" in error
-    said = [text for text in json.loads(out)["scenarios"][0]["warnings"] if "grid.raw, line" in text]
+    said = [
+        text for text in json.loads(out)["scenarios"][0]["warnings"] if "grid.raw, line" in text
+    ]
     assert len(said) == 1
     assert "switched shunt: held at BINIT" in said[0]
 
@@ -246,15 +323,35 @@ def test_a_case_says_what_was_changed_and_has_modes(tmp_path, gfor):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("0,100.0,33", "0,100.0,29", r"grid.raw, line 1: the revision REV is 29; 33, 34, 35, 36 are read: export"),
-        ("0,100.0,33", "1,100.0,33", r"line 1: IC is 1: the file changes another case; export the whole case"),
+        (
+            "0,100.0,33",
+            "0,100.0,29",
+            r"grid.raw, line 1: the revision REV is 29; 33, 34, 35, 36 are read: export",
+        ),
+        (
+            "0,100.0,33",
+            "1,100.0,33",
+            r"line 1: IC is 1: the file changes another case; export the whole case",
+        ),
         ("0,100.0,33", "0,0,33", r"line 1: the system base SBASE is 0 MVA; it must exceed 0"),
         ("0.01,0.085", "0.01,x", r"line \d+: X is 'x'; it must be a number"),
         ("4,5,'1 '", "4,55,'1 '", r"line \d+: there is no bus 55"),
-        ("2,'BUS 2     ',18.0,2", "1,'BUS 2     ',18.0,2", r"line 5: the bus 1 stands in line 4 as well"),
-        ("300,-300,1.04", "-400,-300,1.04", r"the limit QB is -300 Mvar, more than QT of -400 Mvar; swap them"),
+        (
+            "2,'BUS 2     ',18.0,2",
+            "1,'BUS 2     ',18.0,2",
+            r"line 5: the bus 1 stands in line 4 as well",
+        ),
+        (
+            "300,-300,1.04",
+            "-400,-300,1.04",
+            r"the limit QB is -300 Mvar, more than QT of -400 Mvar; swap them",
+        ),
         ("1,1,1,0,0,2", "1,4,1,0,0,2", r"line \d+: CZ is 4; known are 1 to 3"),
-        ("BEGIN BRANCH DATA", "BEGIN RELAY DATA", r"grid.raw: the network has no such elements: relay \(line"),
+        (
+            "BEGIN BRANCH DATA",
+            "BEGIN RELAY DATA",
+            r"grid.raw: the network has no such elements: relay \(line",
+        ),
     ],
 )
 def test_a_file_that_cannot_be_used(old, new, words, written):
@@ -270,7 +367,10 @@ def test_a_file_that_cannot_be_used(old, new, words, written):
         (b"", "it is empty; export the case from PSS/E as RAW"),
         (b"\x00\x01saved", r"it is no text, perhaps a saved case \(.sav\)"),
         (b'{"network": {}}', "it is JSON, perhaps RAWX; export the case"),
-        (b"0,100,33,0,0,60\n\n\n1,'A',16,3\n", "grid.raw: it ends within its bus data; export the case once more"),
+        (
+            b"0,100,33,0,0,60\n\n\n1,'A',16,3\n",
+            "grid.raw: it ends within its bus data; export the case once more",
+        ),
         (b"hello\nworld\n", "line 1: the first record has no revision"),
         (b"0,100,36,0,0,60\na\nb\n1,2\n0\n2\n", "line 5: the line does not say which data begin"),
     ],
@@ -283,9 +383,17 @@ def test_a_file_of_another_kind(content, words, tmp_path):
         read_raw(tmp_path / "none.raw")
 
 
-@pytest.mark.parametrize(("winding", "held"), [("1.05,0,-30,100", False), ("1.05,0,-30,100,100,100,0", False),
-                                               ("1.05,0,-30,100,100,100,1", True)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("winding", "held"),
+    [
+        ("1.05,0,-30,100", False),
+        ("1.05,0,-30,100,100,100,0", False),
+        ("1.05,0,-30,100,100,100,1", True),
+    ],
+)
 def test_only_a_transformer_that_is_controlled_is_held(winding, held, written):
     """A record that ends before COD has none."""
-    data = written(with_transformer("4,1,0,'1 ',1,1,1,0,0,2,'T',1,1,1", "0.002,0.0576,100", winding, "1.0,0"))
+    data = written(
+        with_transformer("4,1,0,'1 ',1,1,1,0,0,2,'T',1,1,1", "0.002,0.0576,100", winding, "1.0,0")
+    )
     assert any("tap changer" in str(change) for change in data.changes) is held

@@ -33,13 +33,38 @@ def texts(tmp_path, network=None, dynamics=DYR, case=CASE):
 
 
 RAWS = [
-    ("BUS", "2,'BUS 2     ',18.0,2", "1,'BUS 2     ',18.0,2", "line 5: the bus 1 stands in line 4 as well"),
-    ("BUS", "1,1,1,1.04,0.0", "1,1,1,104,0.0", "line 4: VM is 104 pu; it must exceed 0 and be at most 2"),
-    ("GENERATOR", "1,1,100,192.0,0", "1,1,100,0,192", "line 20: the limit PB is 192 MW, more than PT of 0"),
-    ("GENERATOR", "1,1,100,192.0,0", "1,1,100,150,0", "line 20: PG is 163 MW, beyond the machine's limits"),
+    (
+        "BUS",
+        "2,'BUS 2     ',18.0,2",
+        "1,'BUS 2     ',18.0,2",
+        "line 5: the bus 1 stands in line 4 as well",
+    ),
+    (
+        "BUS",
+        "1,1,1,1.04,0.0",
+        "1,1,1,104,0.0",
+        "line 4: VM is 104 pu; it must exceed 0 and be at most 2",
+    ),
+    (
+        "GENERATOR",
+        "1,1,100,192.0,0",
+        "1,1,100,0,192",
+        "line 20: the limit PB is 192 MW, more than PT of 0",
+    ),
+    (
+        "GENERATOR",
+        "1,1,100,192.0,0",
+        "1,1,100,150,0",
+        "line 20: PG is 163 MW, beyond the machine's limits",
+    ),
     ("BRANCH", "0.0085,0.072", "4.5,38.1", "is it in ohms? On 230 kV these are 0.072 pu"),
-    ("BUS", "7,'BUS 7     ',230.0", "7,'BUS 7     ',23.0", "line between buses of BASKV = 230 and 23 kV"),
-]  # fmt: skip
+    (
+        "BUS",
+        "7,'BUS 7     ',230.0",
+        "7,'BUS 7     ',23.0",
+        "line between buses of BASKV = 230 and 23 kV",
+    ),
+]
 DYRS = [
     ("9.55 0.0", "-9.55 0.0", "grid.dyr, line 2, sg1.machine.H: machine.H = -9.55 s"),
     ("0.08 0.0 0.0 /", "0.08 0.3 0.1 /", "saturation rises with the flux; are the two swapped?"),
@@ -48,19 +73,47 @@ DYRS = [
     ("100.0 0.05", "0.01 0.05", "is it the inverse? 100 pu would be usual"),
     ("9.55 0.0", "9.55 40.0", "machine.D = 40 pu is outside of"),
     ("0.5 1.0 0.0 2.1", "0.5 95 0.0 2.1", "governor.V_MAX = 95 pu is outside of 0.1 to 3 pu"),
-]  # fmt: skip
+]
 CASES = [
-    ('[units]', '[units]\nalpha = 30', "alpha: it must be less than or equal to 1 (value seen: 30); it is a part"),
-    ('name = "wscc"', 'name = "wscc"\n[solver]\nstep_size = 5', "must be less than or equal to 0.1 s (value seen: 5"),
-    ("stray_B", "frequency = 50\nstray_B", "line 1: BASFRQ is 60 Hz, and the case's frequency = 50 Hz counts"),
+    (
+        "[units]",
+        "[units]\nalpha = 30",
+        "alpha: it must be less than or equal to 1 (value seen: 30); it is a part",
+    ),
+    (
+        'name = "wscc"',
+        'name = "wscc"\n[solver]\nstep_size = 5',
+        "must be less than or equal to 0.1 s (value seen: 5",
+    ),
+    (
+        "stray_B",
+        "frequency = 50\nstray_B",
+        "line 1: BASFRQ is 60 Hz, and the case's frequency = 50 Hz counts",
+    ),
     ("[power_flow]", "[powerflow]", "powerflow: this key is unknown; did you mean power_flow?"),
     ('grid = "grid"', 'grid = "grid"\nslack = 3', ""),
-    ('grid = "grid"', 'grid = "grid"\nslack = 7', "'7' is neither a unit of this scenario nor a bus with one"),
-    ("[scenarios.plain]", f"[scenarios.plain]\n{LATE}", "scenario 'late', which was not asked for: the event at 60 s"),
-    ("[scenarios.plain]", f"[scenarios.plain]\n{UNKNOWN}", "'other', which was not asked for: component 'grid'"),
+    (
+        'grid = "grid"',
+        'grid = "grid"\nslack = 7',
+        "'7' is neither a unit of this scenario nor a bus with one",
+    ),
+    (
+        "[scenarios.plain]",
+        f"[scenarios.plain]\n{LATE}",
+        "scenario 'late', which was not asked for: the event at 60 s",
+    ),
+    (
+        "[scenarios.plain]",
+        f"[scenarios.plain]\n{UNKNOWN}",
+        "'other', which was not asked for: component 'grid'",
+    ),
     ("[scenarios.plain]", f"[scenarios.plain]\n{FAULT}", "has no bus '7'; did you mean bus_7?"),
-    ("stray_B", 'load_model = { active = "constant" }\nstray_B', "it must be 'impedance', 'current' or 'power'"),
-]  # fmt: skip
+    (
+        "stray_B",
+        'load_model = { active = "constant" }\nstray_B',
+        "it must be 'impedance', 'current' or 'power'",
+    ),
+]
 
 
 @pytest.mark.parametrize(("section", "old", "new", "words"), RAWS)
@@ -98,11 +151,14 @@ def test_a_scenario_that_is_asked_for_is_not_told_of_as_another(tmp_path):
 
 def test_the_reference_may_be_named_in_the_case(tmp_path):
     network = with_records("BUS", "16.5,3", "16.5,2")
-    assert "no bus of grid.raw is the reference (IDE = 3)" in "\n".join(texts(tmp_path, network=network))
+    assert "no bus of grid.raw is the reference (IDE = 3)" in "\n".join(
+        texts(tmp_path, network=network)
+    )
     case = CASE.replace('grid = "grid"\n', 'grid = "grid"\nslack = "bus_1"\n')
     assert "IDE" not in "\n".join(texts(tmp_path, network=network, case=case))
     solved = with_records("BUS", "16.5,3,1,1,1,1.04,0.0", "16.5,2,1,1,1,1.04,1.5")
-    assert "not solved" not in "\n".join(texts(tmp_path, network=solved))  # that nobody can tell without a reference
+    # that nobody can tell without a reference
+    assert "not solved" not in "\n".join(texts(tmp_path, network=solved))
 
 
 def test_a_slack_that_values_bring_beyond_its_limits_is_questioned(tmp_path):
@@ -110,13 +166,21 @@ def test_a_slack_that_values_bring_beyond_its_limits_is_questioned(tmp_path):
         (tmp_path / name).write_text(text)
     case = load_case(tmp_path / "case.toml")
     less, none = ({f"sg{n}.P_0": 0.0 for n in units} for units in ((3,), (2, 3)))
-    within, beyond = ("\n".join(map(str, case.prepare(["plain"], v)[0].questions)) for v in (less, none))
+    within, beyond = (
+        "\n".join(map(str, case.prepare(["plain"], v)[0].questions)) for v in (less, none)
+    )
     assert "sg1 is the slack and feeds 324.5 MW" in beyond
     assert "beyond its limits, 0 to 247.5 MW" in beyond
     assert "beyond its limits" not in within
-    for most, asked in (("71.64", False), ("70", True)):  # PG is 60 MW, and the slack feeds what is left
-        record = with_records("GENERATOR", "1,'1 ',71.64,0,300,-300,1.04,0,247.5,0,0.12,0,0,1,1,100,247.5",
-                              f"1,'1 ',60,0,300,-300,1.04,0,247.5,0,0.12,0,0,1,1,100,{most}")  # fmt: skip
+    for most, asked in (
+        ("71.64", False),
+        ("70", True),
+    ):  # PG is 60 MW, and the slack feeds what is left
+        record = with_records(
+            "GENERATOR",
+            "1,'1 ',71.64,0,300,-300,1.04,0,247.5,0,0.12,0,0,1,1,100,247.5",
+            f"1,'1 ',60,0,300,-300,1.04,0,247.5,0,0.12,0,0,1,1,100,{most}",
+        )
         said = "\n".join(texts(tmp_path, network=record))
         assert (f"feeds 71.64 MW, beyond its limits, 0 to {most} MW" in said) is asked
 
@@ -128,5 +192,7 @@ def test_a_misspelt_model_of_the_grid_is_one_error(tmp_path):
 
 def test_an_unusual_system_base_is_asked_about(tmp_path):
     asked = "SBASE is 1000 MVA, on which all impedances count; nearly all files have 100 MVA: is it meant?"
-    assert any(asked in text for text in texts(tmp_path, raw(33).replace("0,100.0,33", "0,1000.0,33")))
+    assert any(
+        asked in text for text in texts(tmp_path, raw(33).replace("0,100.0,33", "0,1000.0,33"))
+    )
     assert not any("SBASE" in text for text in texts(tmp_path))

@@ -24,7 +24,9 @@ def reactance_source() -> Model:
     m = ModelBuilder("reactance_source", "A voltage source behind a reactance")
     port = device_port(m, 100.0, 0.5)
     X = m.parameter("X", 0.15, "pu", "Reactance", base="S_n", minimum=0.01)
-    follow = m.parameter("follow", 0.0, "1/s", "Rate at which the angle follows the bus; 0: never", minimum=0)
+    follow = m.parameter(
+        "follow", 0.0, "1/s", "Rate at which the angle follows the bus; 0: never", minimum=0
+    )
     Z = Phasor(X / 10, X)
     inside = port.v_0 + Z * port.i_0
     phi = m.state("phi", 0.0, "rad", "Angle by which the source has moved")
@@ -32,7 +34,9 @@ def reactance_source() -> Model:
         t = m.state("t", 0.0, "s", "Time")
         at = m.parameter("at", 1e9, "s", "When it begins")
         turns = m.parameter("turns", 0.0, "1", "Turns in the second after")
-        trips, holds, nan, lies = (m.switch(name, False, name) for name in ("trips", "holds", "nan", "lies"))
+        trips, holds, nan, lies = (
+            m.switch(name, False, name) for name in ("trips", "holds", "nan", "lies")
+        )
     m.derivative(t, Expr(1.0))
     begun = t >= at
     away = 2 * pi * turns * fmin(fmax(t - at, 0), 1)
@@ -46,7 +50,9 @@ def reactance_source() -> Model:
     gone, held = begun * trips, 1 - begun * holds
     broken = if_else(begun * nan, sqrt(at - t), 1)
     for current, change in ((i.re, rate.re), (i.im, rate.im)):
-        m.derivative(Expr(current), ((1 - gone) * change - gone * current / BREAKER_TIME) * held * broken)
+        m.derivative(
+            Expr(current), ((1 - gone) * change - gone * current / BREAKER_TIME) * held * broken
+        )
     shown = power(port.v, i)
     said = power(port.v_0, port.i_0)
     m.declare_output(port_variables.I_RE, i.re * port.current_scale)
@@ -58,4 +64,6 @@ def reactance_source() -> Model:
 
 def write_source(folder: Path) -> Path:
     """The FMU, in a folder."""
-    return Path(shutil.copyfile(cached(NativeFmu(reactance_source())), folder / "reactance_source.fmu"))
+    return Path(
+        shutil.copyfile(cached(NativeFmu(reactance_source())), folder / "reactance_source.fmu")
+    )

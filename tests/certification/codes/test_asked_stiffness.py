@@ -2,7 +2,13 @@
 
 import pytest
 
-from orchestrator.certification.codes.frequency_domain import JUMP, OPPOSED, POWER, SCR, asked_stiffness
+from orchestrator.certification.codes.frequency_domain import (
+    JUMP,
+    OPPOSED,
+    POWER,
+    SCR,
+    asked_stiffness,
+)
 from orchestrator.certification.codes.programme import jumps
 
 

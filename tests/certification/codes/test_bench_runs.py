@@ -47,12 +47,16 @@ def test_what_only_the_damping_test_has_is_refused(converter, gfor_command):
 
 
 @pytest.mark.parametrize("code", ["ercot", "nts631"])
-def test_a_value_that_cannot_be_is_told_at_its_option_with_its_choices(converter, tmp_path, gfor_command, code):
+def test_a_value_that_cannot_be_is_told_at_its_option_with_its_choices(
+    converter, tmp_path, gfor_command, code
+):
     """And at no line of a file that the user did not write."""
     words = ["--code", code, "--no-check", "--reactances", "0.1"][: 3 if code == "ercot" else 5]
     out = ["--out", tmp_path / "out"]
     for value, rule in (("two", "it must be one of its numbers"), ("7", "it must be at most 3")):
-        ended, _, said = gfor_command("certify", converter, *words, *out, "--set", f"current_limit.kind={value}")
+        ended, _, said = gfor_command(
+            "certify", converter, *words, *out, "--set", f"current_limit.kind={value}"
+        )
         said = " ".join(said.split())
         assert ended == 2
         assert f"--set current_limit.kind={value}: current_limit.kind = " in said
@@ -60,7 +64,9 @@ def test_a_value_that_cannot_be_is_told_at_its_option_with_its_choices(converter
         assert "line " not in said
 
 
-def test_ours_meets_the_jump_is_kept_and_its_certificate_verifies(converter, tmp_path, one_row, gfor_command):
+def test_ours_meets_the_jump_is_kept_and_its_certificate_verifies(
+    converter, tmp_path, one_row, gfor_command
+):
     def certified():
         return certify_code(CertificationRequest(converter), one_row, Serial(), tmp_path)
 
@@ -81,9 +87,13 @@ def test_ours_meets_the_jump_is_kept_and_its_certificate_verifies(converter, tmp
     other = deepcopy(content)
     other["rows"][0]["findings"] = [{"kind": "loss_of_synchronism", "time": 2.0, "message": ""}]
     (fault,) = ROWS.verify(folder, other, ["phase_jumps"], Serial()).faults
-    assert fault == "row phase_jumps: the watch finds nothing, and loss of synchronism was certified"
+    assert (
+        fault == "row phase_jumps: the watch finds nothing, and loss of synchronism was certified"
+    )
     other["values"] = {"droop.R_f": 0.1}
-    assert "not what the table of ercot and the certified values give" in " ".join(verify_files(folder, other).faults)
+    assert "not what the table of ercot and the certified values give" in " ".join(
+        verify_files(folder, other).faults
+    )
     other["values"], other["f_n"] = {"S_n": 50.0}, 50.0
     assert "'departures' is" in " ".join(verify_files(folder, other).faults)
     content["rows"][0]["criteria"][1]["value"] += 0.1
@@ -94,7 +104,9 @@ def test_ours_meets_the_jump_is_kept_and_its_certificate_verifies(converter, tmp
     assert '\'verdict\' is "passes", and "incomplete" comes out' in faults
 
 
-def test_a_row_of_another_converter_is_seen_when_it_is_computed_anew(converter, tmp_path, one_row, gfor_command):
+def test_a_row_of_another_converter_is_seen_when_it_is_computed_anew(
+    converter, tmp_path, one_row, gfor_command
+):
     """All hashes fit, and every verdict follows from the responses; these are those of ours."""
     folders = [tmp_path / "ours", tmp_path / "theirs"]
     found = []
@@ -113,8 +125,18 @@ def test_a_row_of_another_converter_is_seen_when_it_is_computed_anew(converter, 
 
 def test_rows_are_drawn_by_their_margin_and_by_chance():
     rows = [
-        {"row": name, "unknown": "", "accepted": accepted, "criteria": [{"margin": margin}, {"margin": None}]}
-        for name, margin, accepted in (("a", 0.5, True), ("b", 0.1, True), ("c", -3.0, False), ("d", 0.9, True))
+        {
+            "row": name,
+            "unknown": "",
+            "accepted": accepted,
+            "criteria": [{"margin": margin}, {"margin": None}],
+        }
+        for name, margin, accepted in (
+            ("a", 0.5, True),
+            ("b", 0.1, True),
+            ("c", -3.0, False),
+            ("d", 0.9, True),
+        )
     ]
     rows.append({"row": "e", "unknown": "no licence", "accepted": None, "criteria": []})
     drawn = [choose({"rows": rows}) for _ in range(60)]
@@ -134,10 +156,12 @@ def test_a_converter_without_damping_does_not_settle(converter, tmp_path):
 
 @pytest.mark.parametrize(
     ("values", "rows", "accepted"),
-    [({"droop.R_f": 0.01}, ("dip_20", "dips_in_10_s", "rocof"), [True, True, False]),
-     ({}, ("dip_20", "dip_45", "rocof", "phase_jumps"), [False, True, True, False]),
-     ({"current_limit.kind": 2.0}, ("dip_65", "phase_jumps"), [False, True])],
-)  # fmt: skip
+    [
+        ({"droop.R_f": 0.01}, ("dip_20", "dips_in_10_s", "rocof"), [True, True, False]),
+        ({}, ("dip_20", "dip_45", "rocof", "phase_jumps"), [False, True, True, False]),
+        ({"current_limit.kind": 2.0}, ("dip_65", "phase_jumps"), [False, True]),
+    ],
+)
 def test_rows_of_ride_through_tell_settings_apart(converter, tmp_path, values, rows, accepted):
     """A weak droop keeps its angle in a dip and slips on a ramp; which limit of the current holds, the row decides."""
     request = CertificationRequest(converter, None, values)
@@ -145,10 +169,14 @@ def test_rows_of_ride_through_tell_settings_apart(converter, tmp_path, values, r
     assert [(v.row.name, v.accepted) for v in found] == list(zip(rows, accepted, strict=True))
 
 
-def test_the_limit_of_the_current_decides_whether_a_dip_to_nothing_is_ridden_through(converter, tmp_path):
+def test_the_limit_of_the_current_decides_whether_a_dip_to_nothing_is_ridden_through(
+    converter, tmp_path
+):
     for kind, accepted in ((0.0, False), (3.0, True)):
         request = CertificationRequest(converter, None, {"current_limit.kind": kind})
-        (row,) = certify_code(request, CODES["nogrr245"], Serial(), tmp_path / f"{kind}", ("dip_0",)).verdicts
+        (row,) = certify_code(
+            request, CODES["nogrr245"], Serial(), tmp_path / f"{kind}", ("dip_0",)
+        ).verdicts
         assert row.accepted == accepted
 
 
@@ -156,8 +184,12 @@ def test_the_limit_of_the_current_decides_whether_a_dip_to_nothing_is_ridden_thr
 def test_a_grid_following_converter_does_not_oppose_jumps(tmp_path, code, row):
     """It rides through them, settles and returns; nothing else tells it from a grid-forming one."""
     follower = gfor.build("gfl", tmp_path / "fmu")
-    (verdict,) = certify_code(CertificationRequest(follower), CODES[code], Serial(), tmp_path, (row,)).verdicts
-    assert {finding.criterion.split(" at ")[0] for finding in verdict.failed} == {"opposes the jump"}
+    (verdict,) = certify_code(
+        CertificationRequest(follower), CODES[code], Serial(), tmp_path, (row,)
+    ).verdicts
+    assert {finding.criterion.split(" at ")[0] for finding in verdict.failed} == {
+        "opposes the jump"
+    }
 
 
 def test_ours_and_its_duplicate_feed_the_load_without_the_source(converter, tmp_path):
@@ -168,7 +200,9 @@ def test_ours_and_its_duplicate_feed_the_load_without_the_source(converter, tmp_
     assert not row.failed
 
 
-def test_a_row_that_fails_in_an_unexpected_way_leaves_the_others_standing(converter, tmp_path, monkeypatch):
+def test_a_row_that_fails_in_an_unexpected_way_leaves_the_others_standing(
+    converter, tmp_path, monkeypatch
+):
     """And it is not kept: the next start computes it."""
     whole = bench_point.running
 
@@ -179,13 +213,20 @@ def test_a_row_that_fails_in_an_unexpected_way_leaves_the_others_standing(conver
         return master
 
     def certified():
-        return certify_code(CertificationRequest(converter), ERCOT, Serial(), tmp_path, ("inertia_up", "phase_jumps"))
+        return certify_code(
+            CertificationRequest(converter),
+            ERCOT,
+            Serial(),
+            tmp_path,
+            ("inertia_up", "phase_jumps"),
+        )
 
     monkeypatch.setattr(bench_point, "running", breaking)
     found = certified()
     assert [(v.row.name, v.judged, v.unknown) for v in found.verdicts] == [
-        ("inertia_up", False, "KeyError: 'licence'"), ("phase_jumps", True, "")
-    ]  # fmt: skip
+        ("inertia_up", False, "KeyError: 'licence'"),
+        ("phase_jumps", True, ""),
+    ]
     assert found.verdict == "incomplete"
     assert "row inertia_up" in found.missing
     monkeypatch.setattr(bench_point, "running", whole)

@@ -22,8 +22,9 @@ def jumped(tmp_path_factory):
 
     def run(**values):
         given = {"follow": 5.0} | {name.replace("__", "."): value for name, value in values.items()}
-        (verdict,) = certify_code(CertificationRequest(fmu, None, given), ERCOT, Serial(), folder, ("phase_jumps",)
-                                  ).verdicts  # fmt: skip
+        (verdict,) = certify_code(
+            CertificationRequest(fmu, None, given), ERCOT, Serial(), folder, ("phase_jumps",)
+        ).verdicts
         return verdict
 
     return run
@@ -46,7 +47,9 @@ def test_powers_that_are_outputs_of_the_device_count_for_nothing(jumped):
     ],
     ids=["trips", "turns five times", "turns back once", "gives no numbers"],
 )
-def test_what_goes_wrong_without_a_word_is_told_and_nothing_reads_as_accepted(jumped, values, words):
+def test_what_goes_wrong_without_a_word_is_told_and_nothing_reads_as_accepted(
+    jumped, values, words
+):
     """No output shows its angle, and power and voltage are settled again where criteria look."""
     verdict = jumped(**values)
     assert verdict.accepted is False
@@ -56,11 +59,15 @@ def test_what_goes_wrong_without_a_word_is_told_and_nothing_reads_as_accepted(ju
 
 def test_a_current_that_is_held_opposes_no_jump(jumped):
     assert [f.criterion for f in jumped(cheat__holds=True, cheat__at=0.5).failed] == [
-        "opposes the jump at 1 s", "opposes the jump at 6 s"]  # fmt: skip
+        "opposes the jump at 1 s",
+        "opposes the jump at 6 s",
+    ]
 
 
 def test_a_row_is_compared_with_its_own_entry():
-    content = {"rows": [{"row": "b", "findings": [{"kind": "growth"}]}, {"row": "a", "findings": []}]}
+    content = {
+        "rows": [{"row": "b", "findings": [{"kind": "growth"}]}, {"row": "a", "findings": []}]
+    }
     again = SimpleNamespace(failure="", findings=[{"kind": "growth"}])
     row = SimpleNamespace(name="a")
     with pytest.MonkeyPatch.context() as patch:

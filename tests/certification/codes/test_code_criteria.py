@@ -20,9 +20,11 @@ def response(p, v=1.0, frequency=60.0, events=(1.0, 6.0), findings=(), times=TIM
     angle = 2 * np.pi * np.cumsum(f - 60) * 1e-3
     v = np.broadcast_to(np.asarray(v, dtype=float), times.shape)
     signals = {
-        "p": np.broadcast_to(np.asarray(p, dtype=float), times.shape), "v": v,
-        "v_re": v * np.cos(angle), "v_im": v * np.sin(angle),
-    }  # fmt: skip
+        "p": np.broadcast_to(np.asarray(p, dtype=float), times.shape),
+        "v": v,
+        "v_re": v * np.cos(angle),
+        "v_im": v * np.sin(angle),
+    }
     return MeasuredRow(times, signals, 60.0, events, findings)
 
 
@@ -74,7 +76,9 @@ def test_a_spike_of_the_filter_does_not_make_a_slow_response_fast():
     slow = 0.5 + 0.3 * (1 - np.exp(-after(1.0) / 0.04))
     spike = slow + np.where((TIMES >= 1.001) & (TIMES < 1.003), 0.6, 0.0)
     found = c.responds_within(0, 1, 0.015)(response(spike))
-    assert found.value == pytest.approx(-0.04 * np.log(1 - 0.9 * (1 - np.exp(-0.099 / 0.04))), abs=1.1e-3)
+    assert found.value == pytest.approx(
+        -0.04 * np.log(1 - 0.9 * (1 - np.exp(-0.099 / 0.04))), abs=1.1e-3
+    )
     assert not found.accepted
 
 
@@ -86,8 +90,12 @@ def test_a_source_of_current_that_rides_through_the_jumps_is_not_accepted(key):
     for row in rows:
         made = row.programme(60.0)
         times = np.arange(0, made.stop + 1e-3, 1e-3)
-        p = 0.5 + sum(0.2 * np.exp(-np.clip(times - t, 0, None) / 1e-3) * (times > t) for t in made.times)
-        found = judge_row(row, BenchResult(row.name, times, dict(response(p, times=times).signals)), 60.0)
+        p = 0.5 + sum(
+            0.2 * np.exp(-np.clip(times - t, 0, None) / 1e-3) * (times > t) for t in made.times
+        )
+        found = judge_row(
+            row, BenchResult(row.name, times, dict(response(p, times=times).signals)), 60.0
+        )
         assert {f.criterion.split(" at ")[0] for f in found.failed} <= {"opposes the jump", "speed"}
         assert not found.accepted
 
@@ -106,7 +114,9 @@ def test_the_inertia_of_a_machine_comes_out(rate, sign):
 def test_a_swing_that_lasts_does_not_settle_and_one_that_decays_does():
     swing = np.sin(2 * np.pi * 2 * TIMES)
     assert not c.settles()(response(0.5 + 0.05 * swing)).accepted
-    assert c.settles()(response(0.5 + 0.3 * swing * np.exp(-after(1.0) / 0.5) * (TIMES < 6))).accepted
+    assert c.settles()(
+        response(0.5 + 0.3 * swing * np.exp(-after(1.0) / 0.5) * (TIMES < 6))
+    ).accepted
 
 
 def test_a_swing_in_the_voltage_alone_does_not_settle():
@@ -127,7 +137,9 @@ def test_the_power_is_asked_for_after_the_faults_and_not_in_them():
     in_fault = np.any([(times >= begin) & (times < end) for begin, end in faults], axis=0)
 
     def judged(power):
-        return judge_row(row, BenchResult(row.name, times, dict(response(power, times=times).signals)), 60.0)
+        return judge_row(
+            row, BenchResult(row.name, times, dict(response(power, times=times).signals)), 60.0
+        )
 
     assert judged(np.where(in_fault, 0.2, 1.0)).accepted
     tripped = judged(np.where(in_fault, 0.2, np.where(times > made.times[-1], 0.5, 1.0)))
@@ -137,7 +149,9 @@ def test_the_power_is_asked_for_after_the_faults_and_not_in_them():
 def test_a_return_in_time_is_asked_for_good():
     """A power that is back at 3 s and leaves again is not back."""
     judge = c.returns(within=3.0, events=(0,))
-    assert not judge(response(0.5 - 0.4 * (TIMES > 1) * np.exp(-after(1.0) / 2), events=(1.0,))).accepted
+    assert not judge(
+        response(0.5 - 0.4 * (TIMES > 1) * np.exp(-after(1.0) / 2), events=(1.0,))
+    ).accepted
     leaves = np.where((TIMES > 5) & (TIMES < 5.5), 0.3, 0.5)
     assert not judge(response(leaves, events=(1.0,))).accepted
     assert judge(response(np.where((TIMES > 1) & (TIMES < 3.9), 0.1, 0.5), events=(1.0,))).accepted
@@ -196,7 +210,9 @@ def test_the_impedance_of_the_bench_has_the_ratios_that_are_asked():
     assert abs(Z) == pytest.approx(1 / 3)
     assert Z.imag / Z.real == pytest.approx(6.0)
     steps = [
-        change for change in weakening(20.0, 1.0, (10.0, 1.25), 4.0, 0.1).changes if change.parameter == "X_factor"
+        change
+        for change in weakening(20.0, 1.0, (10.0, 1.25), 4.0, 0.1).changes
+        if change.parameter == "X_factor"
     ]
     assert [change.value for change in steps] == [2.0, 16.0]
 
@@ -209,7 +225,9 @@ def test_the_jumps_add_up_and_end_where_they_began():
 def test_the_ramps_reach_the_frequencies_of_the_code():
     """∫ rise·f_n dt over each ramp; 4 Hz/s takes 0.25 s for 1 Hz."""
     changes = ramps(10.0, 0.5, 60.0, 4.0, (1.0, -1.0, -1.0, 1.0)).changes
-    moved = [60 * a.value * (b.time - a.time) for a, b in zip(changes[::2], changes[1::2], strict=True)]
+    moved = [
+        60 * a.value * (b.time - a.time) for a, b in zip(changes[::2], changes[1::2], strict=True)
+    ]
     assert moved == pytest.approx([1, -1, -1, 1])
     assert changes[1].time - changes[0].time == pytest.approx(0.25)
     assert changes[2].time - changes[1].time == pytest.approx(5.0)
@@ -226,7 +244,9 @@ def test_the_profiles_of_ride_through_are_their_lines():
     for row in (row for row in CODES["tr331"].rows if row.name.startswith("dip")):
         end = AREAS[row.name.removeprefix("dip_")]
         changes = row.programme(50.0).changes[1:-1]
-        assert [c.value for c in changes] == pytest.approx([end * (c.time - 1.0 - 0.15) / 1.35 for c in changes])
+        assert [c.value for c in changes] == pytest.approx(
+            [end * (c.time - 1.0 - 0.15) / 1.35 for c in changes]
+        )
 
 
 @pytest.mark.parametrize("code", CODES.values(), ids=lambda code: code.key)
@@ -245,9 +265,14 @@ def test_every_code_names_its_source_and_its_events_fall_on_steps(code):
 
 @pytest.mark.parametrize(
     ("accepted", "missing", "wanted"),
-    [([True], 0, "passes"), ([True], 1, "incomplete"), ([True, False], 0, "fails"), ([False], 3, "fails"),
-     ([], 0, "incomplete")],
-)  # fmt: skip
+    [
+        ([True], 0, "passes"),
+        ([True], 1, "incomplete"),
+        ([True, False], 0, "fails"),
+        ([False], 3, "fails"),
+        ([], 0, "incomplete"),
+    ],
+)
 def test_the_verdict_of_rows(accepted, missing, wanted):
     assert verdict_of(accepted, missing) == wanted
 
@@ -275,7 +300,9 @@ def test_the_droop_is_measured_from_before_the_ramp_and_not_from_its_end():
     assert not c.follows_droop(1, -1)(response(power)).accepted
 
 
-@pytest.mark.parametrize(("voltage", "exponent", "accepted"), [(0.9, 2, True), (0.9, 1, False), (0.9, 0, False)])
+@pytest.mark.parametrize(
+    ("voltage", "exponent", "accepted"), [(0.9, 2, True), (0.9, 1, False), (0.9, 0, False)]
+)
 def test_the_load_after_the_last_machine_is_an_impedance(voltage, exponent, accepted):
     """0.4 pu of the plants and 0.6 of the source before; after it the plants feed v² of that."""
     gone = TIMES > 1.0

@@ -28,14 +28,21 @@ def without(name):
     ("words", "said"),
     [
         (None, "codes.toml has no section [cei]; a code has its words there: title, source"),
-        (WORDS | {"reading": []}, "codes.toml, [cei]: 'reading' is no word of a code; its words are title"),
+        (
+            WORDS | {"reading": []},
+            "codes.toml, [cei]: 'reading' is no word of a code; its words are title",
+        ),
         (without("f_n"), "codes.toml, [cei]: f_n is missing; give the rated frequency [Hz]"),
-        (WORDS | {"left_out": "much"}, "codes.toml, [cei]: left_out = 'much'; give a list of texts"),
+        (
+            WORDS | {"left_out": "much"},
+            "codes.toml, [cei]: left_out = 'much'; give a list of texts",
+        ),
     ],
 )
 def test_words_that_are_not_as_they_should_be_are_told_and_help_lives(monkeypatch, words, said):
     monkeypatch.setattr(row, "_WORDS", {**row._WORDS, **({"cei": words} if words else {})})
-    monkeypatch.setitem(CODES, "cei", GridCode.of("cei", MISO.rows))  # no error yet: help and other codes live on
+    # no error yet: help and other codes live on
+    monkeypatch.setitem(CODES, "cei", GridCode.of("cei", MISO.rows))
     with pytest.raises(InputError, match=re.escape(said)):
         code_for("cei", {})
     assert "cei" in row.in_words("cei")
@@ -45,9 +52,18 @@ def test_words_that_are_not_as_they_should_be_are_told_and_help_lives(monkeypatc
     ("rows", "said"),
     [
         ((), "code 'miso' has no row; give it one at least"),
-        ((*MISO.rows, MISO.rows[0]), "two rows are named 'llsm_charging', and would be judged as one"),
-        ((replace(MISO.rows[0], name="a/b"),), "row 'a/b': a file is named so; take letters, digits and _"),
-        ((replace(MISO.rows[0], criteria=()),), "row 'llsm_charging' asks for nothing; give it a criterion"),
+        (
+            (*MISO.rows, MISO.rows[0]),
+            "two rows are named 'llsm_charging', and would be judged as one",
+        ),
+        (
+            (replace(MISO.rows[0], name="a/b"),),
+            "row 'a/b': a file is named so; take letters, digits and _",
+        ),
+        (
+            (replace(MISO.rows[0], criteria=()),),
+            "row 'llsm_charging' asks for nothing; give it a criterion",
+        ),
     ],
 )
 def test_rows_that_cannot_be_are_told(monkeypatch, rows, said):
@@ -56,18 +72,27 @@ def test_rows_that_cannot_be_are_told(monkeypatch, rows, said):
         code_for("miso", {})
 
 
-@pytest.mark.parametrize("judge", [c.opposes_jump(4, 1, 0.2), c.settles(events=(-5,)), c.inertia(9, 1, 1, 1)])
+@pytest.mark.parametrize(
+    "judge", [c.opposes_jump(4, 1, 0.2), c.settles(events=(-5,)), c.inertia(9, 1, 1, 1)]
+)
 def test_an_event_that_a_row_lacks_is_told_before_the_run(judge):
     jumps = next(one for one in MISO.rows if one.name == "phase_jumps")
     bad = replace(jumps, criteria=(*jumps.criteria, judge))
-    with pytest.raises(InputError, match=r"code 'miso', row 'phase_jumps': a criterion asks for event -?\d, and "
-                                         "there are 4, numbered from 0"):  # fmt: skip
+    with pytest.raises(
+        InputError,
+        match=r"code 'miso', row 'phase_jumps': a criterion asks for event -?\d, and "
+        "there are 4, numbered from 0",
+    ):
         try_criteria(GridCode.of("miso", (*MISO.rows[:2], bad)), 60.0)
 
 
 def test_a_row_in_which_nothing_happens_is_told():
-    still = replace(MISO.rows[3], programme=lambda f: replace(MISO.rows[3].programme(f), changes=()))
-    with pytest.raises(InputError, match="row 'rocof': a criterion asks for event 1, and there are 0"):
+    still = replace(
+        MISO.rows[3], programme=lambda f: replace(MISO.rows[3].programme(f), changes=())
+    )
+    with pytest.raises(
+        InputError, match="row 'rocof': a criterion asks for event 1, and there are 0"
+    ):
         try_criteria(GridCode.of("miso", (still,)), 60.0)
 
 
@@ -83,12 +108,26 @@ def broken(one, times, kind):
     turned = 0.0 if angle is None else angle
     p = np.full(times.shape, 0.5 if kind != "trip" else 0.0)
     p[times < 0.9] = 0.5
-    v, q = np.ones(times.shape), np.full(times.shape, 9.0 if kind == "current" else 0.1 if kind != "trip" else 0.0)
+    v, q = (
+        np.ones(times.shape),
+        np.full(times.shape, 9.0 if kind == "current" else 0.1 if kind != "trip" else 0.0),
+    )
     if kind == "nan":
         p[-1] = np.nan
-    signals = {"p": p, "q": q, "v": v, "v_re": np.cos(turned) * v, "v_im": np.sin(turned) * v, "duplicate.p": p,
-               "source.p": v}  # fmt: skip
-    found = [{"kind": "loss_of_synchronism", "time": 1.3, "message": "it slips"}] if kind == "slip" else []
+    signals = {
+        "p": p,
+        "q": q,
+        "v": v,
+        "v_re": np.cos(turned) * v,
+        "v_im": np.sin(turned) * v,
+        "duplicate.p": p,
+        "source.p": v,
+    }
+    found = (
+        [{"kind": "loss_of_synchronism", "time": 1.3, "message": "it slips"}]
+        if kind == "slip"
+        else []
+    )
     cut = slice(None, -400 if kind == "early" else None)
     return BenchResult(one.name, times[cut], {n: s[cut] for n, s in signals.items()}, found)
 
@@ -96,7 +135,11 @@ def broken(one, times, kind):
 @pytest.mark.parametrize("kind", ["slip", "trip", "nan", "early", "current"])
 def test_a_row_that_fails_has_a_reason_in_words(kind):
     """Of all codes, with each criterion alone and with all, so also where none asks for holding together."""
-    rows = {(type(one), one.name[:5], len(one.criteria)): one for code in (*CODES.values(), RTE) for one in code.rows}
+    rows = {
+        (type(one), one.name[:5], len(one.criteria)): one
+        for code in (*CODES.values(), RTE)
+        for one in code.rows
+    }
     for one in rows.values():
         times = np.arange(0, one.programme(50.0).stop + INTERVAL, INTERVAL)
         for criteria in (one.criteria, *((judge,) for judge in one.criteria)):
@@ -108,19 +151,34 @@ def test_a_row_that_fails_has_a_reason_in_words(kind):
 
 
 def test_the_page_has_the_codes_that_there_are():
-    table = [[cell.strip() for cell in line.split("|")[1:]] for line in PAGE.read_text("utf-8").splitlines()
-             if line.startswith("| `")]  # fmt: skip
-    said = {cells[0].split("`")[1]: (cells[1], cells[2]) for cells in table if cells[2] in ("50", "60")}
-    assert said == {key: (row._WORDS[key]["where"], f"{row._WORDS[key]['f_n']:g}") for key in row._WORDS}
+    table = [
+        [cell.strip() for cell in line.split("|")[1:]]
+        for line in PAGE.read_text("utf-8").splitlines()
+        if line.startswith("| `")
+    ]
+    said = {
+        cells[0].split("`")[1]: (cells[1], cells[2]) for cells in table if cells[2] in ("50", "60")
+    }
+    assert said == {
+        key: (row._WORDS[key]["where"], f"{row._WORDS[key]['f_n']:g}") for key in row._WORDS
+    }
     assert set(row._WORDS) == {*CODES, *all_codes.BY_DECLARATION, NTS.key, "gb"}
 
 
 @pytest.mark.parametrize(
     ("typed", "meant"),
-    [("NTS-631", "nts631"), ("spain", "nts631"), ("NERC PRC-029-1", "prc029"), ("texas", "ercot or nogrr245"),
-     ("misa", "miso"), ("italy", "")],
-)  # fmt: skip
+    [
+        ("NTS-631", "nts631"),
+        ("spain", "nts631"),
+        ("NERC PRC-029-1", "prc029"),
+        ("texas", "ercot or nogrr245"),
+        ("misa", "miso"),
+        ("italy", ""),
+    ],
+)
 def test_a_code_that_there_is_not_has_near_ones(gfor, typed, meant):
     code, _, said = gfor("certify", "x.fmu", "--code", typed)
     assert code == 2
-    assert (f"did you mean {meant}?" if meant else "tr331 (Denmark, 50 Hz)") in " ".join(said.split())
+    assert (f"did you mean {meant}?" if meant else "tr331 (Denmark, 50 Hz)") in " ".join(
+        said.split()
+    )

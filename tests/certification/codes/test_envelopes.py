@@ -104,14 +104,38 @@ def plant(values, X):
 
 
 PUBLISHED = {
-    "jump, overdamped": (JUMP_OVERDAMPED, 11 * SAMPLE_1, 1, e.jump_bounds(plant(SLOW, STRONG_GRID), 0.3 * STRONG_GRID)),
+    "jump, overdamped": (
+        JUMP_OVERDAMPED,
+        11 * SAMPLE_1,
+        1,
+        e.jump_bounds(plant(SLOW, STRONG_GRID), 0.3 * STRONG_GRID),
+    ),
     "jump, underdamped": (
-        JUMP_UNDERDAMPED, 11 * SAMPLE_1, 1, e.jump_bounds(plant(QUICK, STRONG_GRID), 0.3 * STRONG_GRID)),
+        JUMP_UNDERDAMPED,
+        11 * SAMPLE_1,
+        1,
+        e.jump_bounds(plant(QUICK, STRONG_GRID), 0.3 * STRONG_GRID),
+    ),
     "amplitude": (AMPLITUDE, 11 * SAMPLE_1, 1, e.amplitude_bounds(0.15)),
-    "strength": (STRENGTH, 9 * SAMPLE_2, -1, e.strength_bounds(plant(SLOW, WEAK_GRID), 0.5 * 0.4 / WEAK_GRID)),
-    "ramp, overdamped": (RAMP_OVERDAMPED, 9 * SAMPLE_2, 1, e.ramp_bounds(plant(SLOW, WEAK_GRID), -0.04, 0.5)),
-    "ramp, underdamped": (RAMP_UNDERDAMPED, 9 * SAMPLE_2, 1, e.ramp_bounds(plant(QUICK, STRONG_GRID), -0.04, 0.5)),
-}  # fmt: skip
+    "strength": (
+        STRENGTH,
+        9 * SAMPLE_2,
+        -1,
+        e.strength_bounds(plant(SLOW, WEAK_GRID), 0.5 * 0.4 / WEAK_GRID),
+    ),
+    "ramp, overdamped": (
+        RAMP_OVERDAMPED,
+        9 * SAMPLE_2,
+        1,
+        e.ramp_bounds(plant(SLOW, WEAK_GRID), -0.04, 0.5),
+    ),
+    "ramp, underdamped": (
+        RAMP_UNDERDAMPED,
+        9 * SAMPLE_2,
+        1,
+        e.ramp_bounds(plant(QUICK, STRONG_GRID), -0.04, 0.5),
+    ),
+}
 
 
 @pytest.mark.parametrize("case", PUBLISHED)
@@ -119,11 +143,17 @@ def test_the_bounds_are_the_published_ones(case, monkeypatch):
     """Within 2e-4 pu; the curves are printed to 1e-4 pu, above 1 pu to 1e-3 pu."""
     text, delay, sign, bounds = PUBLISHED[case]
     monkeypatch.setattr(e, "SLACK", 5 * SAMPLE_1)
-    t, response, lower, upper = np.array([line.split() for line in text.split("\n") if line], dtype=float).T
+    t, response, lower, upper = np.array(
+        [line.split() for line in text.split("\n") if line], dtype=float
+    ).T
     found = bounds(np.maximum(t - delay, 0))
     before = 0.0 if case == "amplitude" else 0.5
     edges = np.sort([before + sign * found.asked, before + sign * found.allowed], axis=0)
-    for ours, theirs in ((before + sign * found.ideal, response), (edges[0], lower), (edges[1], upper)):
+    for ours, theirs in (
+        (before + sign * found.ideal, response),
+        (edges[0], lower),
+        (edges[1], upper),
+    ):
         known = np.isfinite(theirs)
         tolerance = np.where(theirs[known] > 1, 6e-4, 2e-4)
         assert (np.abs(ours[known] - theirs[known]) < tolerance).all()
@@ -141,7 +171,9 @@ def test_the_curves_between_oscillating_and_not_are_continuous():
     t = np.linspace(0, 2, 200)
     D = 2 * math.sqrt(2 * 5 * OMEGA_PUBLISHED / WEAK_GRID)
     for of in (e.Swinging.dying, e.Swinging.ramping):
-        below, at, above = (of(plant((D * factor, 5.0), WEAK_GRID), t) for factor in (0.9999, 1.0, 1.0001))
+        below, at, above = (
+            of(plant((D * factor, 5.0), WEAK_GRID), t) for factor in (0.9999, 1.0, 1.0001)
+        )
         assert np.abs(at - (below + above) / 2).max() < 1e-4
 
 
@@ -155,23 +187,33 @@ def integrated(row, declared, actual, power):
     made = row.programme(50.0)
     X_eff, D, H = (actual[name] for name in ("X_eff", "D", "H"))
     state = {"X": 1 / made.scr, "jump": 0.0, "factor": 1.0, "rise": 0.0}
-    x = [math.asin(power * (X_eff + 1 / made.scr)), 0.0, 0.0, 0.0, 0.0]  # δ, ω, grid's angle, its ω, ω behind the lag
+    # δ, ω, grid's angle, its ω, ω behind the lag
+    x = [math.asin(power * (X_eff + 1 / made.scr)), 0.0, 0.0, 0.0, 0.0]
     times, p, v, q = [], [], [], []
     X_start = 1 / made.scr
     for begin, end in zip((0.0, *made.times), (*made.times, made.stop), strict=True):
         for change in made.changes:
             if change.time == begin:
                 name = change.parameter.removeprefix("source.")
-                state["X" if name == "X_factor" else name] = change.value * (X_start if name == "X_factor" else 1)
+                state["X" if name == "X_factor" else name] = change.value * (
+                    X_start if name == "X_factor" else 1
+                )
         t = TIMES[(begin - 1e-9 < TIMES) & (end - 1e-9 > TIMES)]
         s = dict(state)
 
         def rates(_, y, s=s):
             P = s["factor"] * np.sin(y[0] - y[2] - s["jump"]) / (X_eff + s["X"])
-            return [2 * np.pi * 50 * y[1], (power - P + D * (y[4] - y[1])) / (2 * H), 2 * np.pi * 50 * y[3], s["rise"],
-                    (y[3] - y[4]) / 0.01]  # fmt: skip
+            return [
+                2 * np.pi * 50 * y[1],
+                (power - P + D * (y[4] - y[1])) / (2 * H),
+                2 * np.pi * 50 * y[3],
+                s["rise"],
+                (y[3] - y[4]) / 0.01,
+            ]
 
-        found = solve_ivp(rates, (begin, end), x, t_eval=[*t, end], rtol=1e-8, atol=1e-10, max_step=0.02)
+        found = solve_ivp(
+            rates, (begin, end), x, t_eval=[*t, end], rtol=1e-8, atol=1e-10, max_step=0.02
+        )
         x = found.y[:, -1].tolist()
         inner = np.exp(1j * found.y[0, :-1])
         outer = s["factor"] * np.exp(1j * (found.y[2, :-1] + s["jump"]))
@@ -180,13 +222,21 @@ def integrated(row, declared, actual, power):
         apparent = bus * np.conj(current)
         times.append(t), p.append(apparent.real), q.append(apparent.imag), v.append(np.abs(bus))
     series = {"p": p, "q": q, "v": v}
-    return BenchResult(row.name, np.concatenate(times), {n: np.concatenate(x) for n, x in series.items()})
+    return BenchResult(
+        row.name, np.concatenate(times), {n: np.concatenate(x) for n, x in series.items()}
+    )
 
 
 DAMPED = {"X_eff": 0.27, "D": 200.0, "H": 5.0}
 SWINGING = {"X_eff": 0.27, "D": 95.0, "H": 5.0}
-ROWS = ("igfm1_scr10_p50", "igfm1_scr2_pm50", "igfm2_scr10_p0", "igfm3_scr10_p50_scr2", "igfm4_scr10_p0_0_5",
-        "igfm4_scr2_p0_2")  # fmt: skip
+ROWS = (
+    "igfm1_scr10_p50",
+    "igfm1_scr2_pm50",
+    "igfm2_scr10_p0",
+    "igfm3_scr10_p50_scr2",
+    "igfm4_scr10_p0_0_5",
+    "igfm4_scr2_p0_2",
+)
 
 
 def judged(declared, actual, name):
@@ -204,10 +254,17 @@ def test_an_ideal_source_stays_within_its_envelope(values, name):
 
 @pytest.mark.parametrize(
     ("wrong", "name"),
-    [({"H": 20.0}, "igfm1_scr10_p50"), ({"H": 20.0}, "igfm4_scr10_p0_0_5"), ({"H": 1.0}, "igfm4_scr10_p0_0_5"),
-     ({"D": 5.0}, "igfm1_scr10_p50"), ({"D": 5.0}, "igfm3_scr10_p50_scr2"), ({"X_eff": 1.5}, "igfm1_scr10_p50"),
-     ({"X_eff": 0.6}, "igfm2_scr10_p0"), ({"X_eff": 0.1}, "igfm2_scr10_p0")],
-)  # fmt: skip
+    [
+        ({"H": 20.0}, "igfm1_scr10_p50"),
+        ({"H": 20.0}, "igfm4_scr10_p0_0_5"),
+        ({"H": 1.0}, "igfm4_scr10_p0_0_5"),
+        ({"D": 5.0}, "igfm1_scr10_p50"),
+        ({"D": 5.0}, "igfm3_scr10_p50_scr2"),
+        ({"X_eff": 1.5}, "igfm1_scr10_p50"),
+        ({"X_eff": 0.6}, "igfm2_scr10_p0"),
+        ({"X_eff": 0.1}, "igfm2_scr10_p0"),
+    ],
+)
 def test_another_inertia_damping_or_reactance_than_declared_falls_out(wrong, name):
     assert not judged(DAMPED, DAMPED | wrong, name).accepted
 
@@ -234,10 +291,13 @@ def changed(name, change, values=DAMPED):
 
 @pytest.mark.parametrize(
     ("name", "time", "criterion"),
-    [("igfm1_scr10_p50", 4.0, "power after the jump ahead"), ("igfm1_scr10_p50", 9.0, "power after the jump back"),
-     ("igfm4_scr2_p0_2", 10.0, "power while the frequency rises"),
-     ("igfm4_scr2_p0_2", 15.0, "power while the frequency falls")],
-)  # fmt: skip
+    [
+        ("igfm1_scr10_p50", 4.0, "power after the jump ahead"),
+        ("igfm1_scr10_p50", 9.0, "power after the jump back"),
+        ("igfm4_scr2_p0_2", 10.0, "power while the frequency rises"),
+        ("igfm4_scr2_p0_2", 15.0, "power while the frequency falls"),
+    ],
+)
 def test_a_late_excursion_is_seen(name, time, criterion):
     """Seconds after the jump, and long after the end of the ramp; each by the criterion of its own event."""
     assert not changed(name, lambda times, p: p)
@@ -246,21 +306,29 @@ def test_a_late_excursion_is_seen(name, time, criterion):
 
 def test_more_is_allowed_while_the_frequency_rises_than_while_it_falls():
     """1.5 and 1.3 times the largest variation."""
-    assert changed("igfm4_scr2_p0_2", lambda times, p: 1.68 * p) == ["power while the frequency falls"]
+    assert changed("igfm4_scr2_p0_2", lambda times, p: 1.68 * p) == [
+        "power while the frequency falls"
+    ]
 
 
 @pytest.mark.parametrize(("late", "accepted"), [(0.015, True), (0.026, False)])
 def test_after_a_step_of_the_grid_half_of_the_power_is_asked_for_from_30_ms_on(late, accepted):
     shift = round(late / 1e-3)
-    failed = changed("igfm3_scr10_p50_scr2", lambda times, p: np.concatenate([np.full(shift, 0.5), p[:-shift]]))
+    failed = changed(
+        "igfm3_scr10_p50_scr2", lambda times, p: np.concatenate([np.full(shift, 0.5), p[:-shift]])
+    )
     assert (failed == []) == accepted
 
 
 def test_power_is_limited_and_current_is_not():
     wide = e.Bounds(*(np.full(2, distance) for distance in (2.0, 1.5, 3.0)))
     times = np.array([1.0, 2.0])
-    assert np.allclose(Envelope(lambda t: wide, -1).between(times, 0.5), [[-1.2, -1.2], [-0.98, -0.98]])
-    assert np.allclose(Envelope(lambda t: wide, 1, limited=False).between(times, 0.5), [[2.0, 2.0], [3.5, 3.5]])
+    assert np.allclose(
+        Envelope(lambda t: wide, -1).between(times, 0.5), [[-1.2, -1.2], [-0.98, -0.98]]
+    )
+    assert np.allclose(
+        Envelope(lambda t: wide, 1, limited=False).between(times, 0.5), [[2.0, 2.0], [3.5, 3.5]]
+    )
 
 
 def test_nothing_is_asked_for_before_a_mean_over_a_period_can_respond():
@@ -289,13 +357,22 @@ def test_the_worst_instant_is_told():
 
 @pytest.mark.parametrize(
     ("given", "said"),
-    [({}, "missing: X_eff (effective reactance"), ({"X_eff": 0.2, "D": 20.0}, "Add --declare H=…"),
-     ({"X_eff": 0.2, "D": 20.0, "H": 1.0, "K": 3.0}, "--declare K: --code rte knows no such value"),
-     ({"X_eff": -0.2, "D": 20.0, "H": 1.0}, "--declare X_eff=-0.2: the effective reactance"),
-     ({"X_eff": 0.2, "D": 20.0, "H": "big"}, "--declare H=big: the inertia constant is a number"),
-     ({"X_eff": 0.2, "D": True, "H": 1.0}, "--declare D=True"),
-     ({"X_eff": 0.2, "D": float("nan"), "H": 1.0}, "--declare D=nan")],
-)  # fmt: skip
+    [
+        ({}, "missing: X_eff (effective reactance"),
+        ({"X_eff": 0.2, "D": 20.0}, "Add --declare H=…"),
+        (
+            {"X_eff": 0.2, "D": 20.0, "H": 1.0, "K": 3.0},
+            "--declare K: --code rte knows no such value",
+        ),
+        ({"X_eff": -0.2, "D": 20.0, "H": 1.0}, "--declare X_eff=-0.2: the effective reactance"),
+        (
+            {"X_eff": 0.2, "D": 20.0, "H": "big"},
+            "--declare H=big: the inertia constant is a number",
+        ),
+        ({"X_eff": 0.2, "D": True, "H": 1.0}, "--declare D=True"),
+        ({"X_eff": 0.2, "D": float("nan"), "H": 1.0}, "--declare D=nan"),
+    ],
+)
 def test_a_declaration_that_cannot_be_used_is_one_error(given, said):
     with pytest.raises(InputError) as error:
         code_for("rte", given)
@@ -317,10 +394,33 @@ def test_every_row_of_rte_is_named_for_a_file_and_told_in_words():
 
 @pytest.mark.parametrize(
     ("declare", "codes", "answer"),
-    [([], ["nts631", "miso", "aemo", "ercot", "nogrr245", "fingrid", "prc029", "tr331", "gb"], 3),
-     (["D=2.0"], ["nts631", "miso", "aemo", "ercot", "nogrr245", "fingrid", "prc029", "tr331", "rte", "gb"], 0)],
-)  # fmt: skip
-def test_all_codes_leave_out_what_nothing_is_declared_for(declare, codes, answer, monkeypatch, gfor, tmp_path):
+    [
+        (
+            [],
+            ["nts631", "miso", "aemo", "ercot", "nogrr245", "fingrid", "prc029", "tr331", "gb"],
+            3,
+        ),
+        (
+            ["D=2.0"],
+            [
+                "nts631",
+                "miso",
+                "aemo",
+                "ercot",
+                "nogrr245",
+                "fingrid",
+                "prc029",
+                "tr331",
+                "rte",
+                "gb",
+            ],
+            0,
+        ),
+    ],
+)
+def test_all_codes_leave_out_what_nothing_is_declared_for(
+    declare, codes, answer, monkeypatch, gfor, tmp_path
+):
     """It is said, and the test is incomplete; only the code that asks for declarations gets them."""
     asked = []
 
@@ -338,15 +438,25 @@ def test_all_codes_leave_out_what_nothing_is_declared_for(declare, codes, answer
 
 
 def test_json_lists_the_cells_of_all_devices(monkeypatch, gfor, tmp_path):
-    monkeypatch.setattr(certify_matrix, "_tested", lambda options, device, key, folder, place, console, *, several:
-                        MatrixCell(device.name, key, place, verdict=PASSES))  # fmt: skip
+    monkeypatch.setattr(
+        certify_matrix,
+        "_tested",
+        lambda options, device, key, folder, place, console, *, several: MatrixCell(
+            device.name, key, place, verdict=PASSES
+        ),
+    )
     files = tmp_path / "x.fmu", tmp_path / "y.fmu"
     code, text, said = gfor("certify", *files, "--code", "miso", "--out", tmp_path, "--json")
     assert code == 0, said
-    assert [(cell["device"], cell["code"]) for cell in json.loads(text)["cells"]] == [("x", "miso"), ("y", "miso")]
+    assert [(cell["device"], cell["code"]) for cell in json.loads(text)["cells"]] == [
+        ("x", "miso"),
+        ("y", "miso"),
+    ]
 
 
-@pytest.mark.parametrize("words", [("--pdf",), ("--check", "report.json"), ("--details", "mine.toml", "--pdf")])
+@pytest.mark.parametrize(
+    "words", [("--pdf",), ("--check", "report.json"), ("--details", "mine.toml", "--pdf")]
+)
 def test_figures_without_a_certificate_refuse_what_a_certificate_has(words, gfor, tmp_path):
     code, _, said = gfor("certify", tmp_path / "x.fmu", "--code", "gb", *words)
     assert code == 2
@@ -357,7 +467,14 @@ def test_figures_without_a_certificate_refuse_what_a_certificate_has(words, gfor
 
 
 def test_after_a_step_of_the_grids_strength_an_underdamped_plant_comes_to_rest():
-    bounds = e.strength_bounds(e.Swinging(20.0, 4.0, 0.5, 100 * math.pi), 0.3)(np.array([0.1, 0.5, 30.0]))
-    assert bounds.allowed[0] > bounds.allowed[1] > bounds.allowed[2] == pytest.approx(e.TUNNEL, abs=1e-3)
+    bounds = e.strength_bounds(e.Swinging(20.0, 4.0, 0.5, 100 * math.pi), 0.3)(
+        np.array([0.1, 0.5, 30.0])
+    )
+    assert (
+        bounds.allowed[0]
+        > bounds.allowed[1]
+        > bounds.allowed[2]
+        == pytest.approx(e.TUNNEL, abs=1e-3)
+    )
     assert (bounds.asked <= bounds.ideal).all()
     assert (bounds.ideal <= bounds.allowed).all()

@@ -34,7 +34,13 @@ def fails(tmp_path, fmu_path):
         programme = row.programme(50.0)
         times = np.arange(0, programme.stop + 1e-3, 1e-3)
         one, angle = np.ones(times.shape), programme.source_angle(times, 50.0)
-        signals = {"p": 0.5 * one, "q": 0.1 * one, "v": one, "v_re": np.cos(angle), "v_im": np.sin(angle)}
+        signals = {
+            "p": 0.5 * one,
+            "q": 0.1 * one,
+            "v": one,
+            "v_re": np.cos(angle),
+            "v_im": np.sin(angle),
+        }
         results[row.name] = BenchResult(row.name, times, signals)
         write_row(request, row.name, row.title, programme, 50.0, tmp_path)
     verdicts = [judge_row(row, results[row.name], 50.0) for row in CODE.rows]
@@ -48,7 +54,9 @@ def sealed(folder, content):
     """Make the page's mark and all hashes fit."""
     page = folder / HTML
     old = json.loads((folder / JSON).read_text(encoding="utf-8"))
-    text = page.read_text(encoding="utf-8").replace(escape(old["sentence"]), escape(content["sentence"]))
+    text = page.read_text(encoding="utf-8").replace(
+        escape(old["sentence"]), escape(content["sentence"])
+    )
     page.write_text(text.replace(figures_hash(old), figures_hash(content)), encoding="utf-8")
     content["files"] = {name: file_hash(folder / name) for name in content["files"]}
     content["seal"] = seal_of(content)
@@ -93,7 +101,10 @@ def without_jumps(fails):
         rest = data.load().drop_vars([n for n in data.variables if "jumps" in str(n)])
     save_netcdf(rest, fails / RESPONSES)
     content = without(content, "jumps")
-    content["missing"], rows = list(CODE.left_out), "The converter 'gfor': 3 of 3 judged rows are accepted."
+    content["missing"], rows = (
+        list(CODE.left_out),
+        "The converter 'gfor': 3 of 3 judged rows are accepted.",
+    )
     content["sentence"] = f"The test is incomplete: 1 parts of {CODE.title} were not tested. {rows}"
     return fails, content
 
@@ -105,10 +116,18 @@ def since(monkeypatch, version):
 
 @pytest.mark.parametrize(
     ("first", "issued", "holds"),
-    [("0.4.0", "0.3.0", True), ("0.10.0", "0.9.2", True), ("0.3.0", "0.3.0", False), ("", "0.2.0", False),
-     ("0.3.0", "0.10.0", False), ("0.4.0", "", False)],
-)  # fmt: skip
-def test_a_row_that_came_later_is_no_row_that_was_taken_out(without_jumps, monkeypatch, gfor, first, issued, holds):
+    [
+        ("0.4.0", "0.3.0", True),
+        ("0.10.0", "0.9.2", True),
+        ("0.3.0", "0.3.0", False),
+        ("", "0.2.0", False),
+        ("0.3.0", "0.10.0", False),
+        ("0.4.0", "", False),
+    ],
+)
+def test_a_row_that_came_later_is_no_row_that_was_taken_out(
+    without_jumps, monkeypatch, gfor, first, issued, holds
+):
     """Only a row that the table has since a later version than that of the record may be absent."""
     folder, content = without_jumps
     since(monkeypatch, first)
@@ -126,14 +145,20 @@ def test_what_passed_before_a_row_came_is_incomplete(without_jumps, monkeypatch,
     since(monkeypatch, "0.4.0")
     monkeypatch.setitem(CODES, "fingrid", replace(CODES["fingrid"], left_out=()))
     content |= {"left_out": [], "missing": [], "verdict": "passes"}
-    content["sentence"] = f"The converter 'gfor' passes {CODE.title}: 3 of 3 judged rows are accepted."
+    content["sentence"] = (
+        f"The converter 'gfor' passes {CODE.title}: 3 of 3 judged rows are accepted."
+    )
     assert sealed(folder, issued_by(content, "0.3.0")) == ""
     code, said, _ = gfor("verify", folder, "--files-only")
     assert (code, "Its verdict: incomplete; jumps was not in its table" in said) == (3, True)
 
 
 @pytest.mark.parametrize(
-    ("name", "words"), [("more", "that do not come out anew: row more"), ("dip", "that the record has twice: row dip")]
+    ("name", "words"),
+    [
+        ("more", "that do not come out anew: row more"),
+        ("dip", "that the record has twice: row dip"),
+    ],
 )
 def test_a_row_that_is_too_much_is_named(fails, name, words):
     _, content = read_certificate(fails)
@@ -145,9 +170,16 @@ def test_a_row_that_is_too_much_is_named(fails, name, words):
 
 @pytest.mark.parametrize(
     ("key", "value", "words"),
-    [("sentence", "The converter 'gfor' fails: 9 of 9 judged rows are accepted.", "'sentence' is"),
-     ("missing", [], "'missing' is"), ("left_out", [], "'left_out' is")],
-)  # fmt: skip
+    [
+        (
+            "sentence",
+            "The converter 'gfor' fails: 9 of 9 judged rows are accepted.",
+            "'sentence' is",
+        ),
+        ("missing", [], "'missing' is"),
+        ("left_out", [], "'left_out' is"),
+    ],
+)
 def test_a_count_or_a_part_that_is_not_of_the_rows_is_named(fails, key, value, words):
     _, content = read_certificate(fails)
     content[key] = value
@@ -158,7 +190,9 @@ def test_a_key_that_stands_twice_is_refused(fails):
     """Readers that take the first of two verdicts read a pass."""
     path = fails / JSON
     text = path.read_text(encoding="utf-8")
-    path.write_text(text.replace('"verdict":', '"verdict": "passes",\n "verdict":', 1), encoding="utf-8")
+    path.write_text(
+        text.replace('"verdict":', '"verdict": "passes",\n "verdict":', 1), encoding="utf-8"
+    )
     with pytest.raises(InputError, match="'verdict' stands twice"):
         read_certificate(fails)
 

@@ -102,8 +102,13 @@ def test_a_power_that_a_droop_takes_to_nothing_is_no_trip():
     at_51_hz = np.where((TIMES > 2) & (TIMES < 5), 2 * np.pi * (TIMES - 2), 0.0)
     gone = (TIMES >= 2.5) & (TIMES < 4.5)
     for angle, tripped in ((at_51_hz, None), (0 * TIMES, pytest.approx(2.5))):
-        signals = {"p": np.where(gone, 1e-3, 0.5), "q": np.where(gone, 1e-4, 0.1), "v": np.ones(TIMES.shape),
-                   "v_re": np.cos(angle), "v_im": np.sin(angle)}  # fmt: skip
+        signals = {
+            "p": np.where(gone, 1e-3, 0.5),
+            "q": np.where(gone, 1e-4, 0.1),
+            "v": np.ones(TIMES.shape),
+            "v_re": np.cos(angle),
+            "v_im": np.sin(angle),
+        }
         assert MeasuredRow(TIMES, signals, 50.0, (1.0,)).tripped == tripped
 
 
@@ -125,7 +130,9 @@ def slipping(angle):
 @pytest.mark.parametrize(("begin", "told"), [(1.6, 1), (7.0, 6), (0.2, 0), (5.7, 1)])
 def test_a_turn_out_and_back_within_a_hold_or_before_the_first_event_is_a_slip(turns, begin, told):
     """In 0.2 s each; the ends of all holds are where they were, but for the one in whose end it turns."""
-    found = slipping(lambda t: 2 * np.pi * turns * np.interp(t - begin, [0, 0.2, 0.3, 0.5], [0, 1, 1, 0]))
+    found = slipping(
+        lambda t: 2 * np.pi * turns * np.interp(t - begin, [0, 0.2, 0.3, 0.5], [0, 1, 1, 0])
+    )
     assert not found.accepted
     assert f"it slips after t = {told} s" in found.text
 
@@ -138,7 +145,9 @@ def test_a_turn_that_is_done_before_the_first_event_is_a_slip():
 @pytest.mark.parametrize("degrees", [60, -60, 120])
 def test_a_swing_that_turns_back_is_no_slip(degrees):
     """One second long, as after a jump."""
-    assert slipping(lambda t: np.radians(degrees) * np.exp(-np.clip(t - 1, 0, None) / 0.3) * (t > 1)).accepted
+    assert slipping(
+        lambda t: np.radians(degrees) * np.exp(-np.clip(t - 1, 0, None) / 0.3) * (t > 1)
+    ).accepted
 
 
 def test_a_plant_at_rest_without_power_has_not_tripped():
@@ -147,7 +156,9 @@ def test_a_plant_at_rest_without_power_has_not_tripped():
 
 def test_the_angle_of_the_source_is_that_of_its_programme():
     """After 1 Hz for a second it has turned once; jumps are given as sums."""
-    jumped = jumps(3.0, 0.5, (-10.0, 10.0, -25.0)).source_angle(np.array([0.5, 1.0, 6.0, 11.0]), 60.0)
+    jumped = jumps(3.0, 0.5, (-10.0, 10.0, -25.0)).source_angle(
+        np.array([0.5, 1.0, 6.0, 11.0]), 60.0
+    )
     assert np.degrees(jumped) == pytest.approx([0, -10, 0, -25])
     moved = ramps(10.0, 0.5, 60.0, 4.0, (1.0, -1.0), hold=1.0)
     angle = moved.source_angle(np.array([1.0, 1.25, 2.25, 2.5, 3.5]), 60.0)
@@ -157,14 +168,21 @@ def test_the_angle_of_the_source_is_that_of_its_programme():
 
 def test_a_fault_that_leaves_no_voltage_is_no_trip():
     dip = (TIMES >= 3) & (TIMES < 3.2)
-    found = judged(np.where(dip, 0.0, opposing()), q=np.where(dip, 0.0, 0.1), v=np.where(dip, 0.0, 1.0))
+    found = judged(
+        np.where(dip, 0.0, opposing()), q=np.where(dip, 0.0, 0.1), v=np.where(dip, 0.0, 1.0)
+    )
     assert found.findings[0].accepted
 
 
-@pytest.mark.parametrize(("words", "accepted"), [((True, True), True), ((True, None), False), ((True, False), False)])
+@pytest.mark.parametrize(
+    ("words", "accepted"), [((True, True), True), ((True, None), False), ((True, False), False)]
+)
 def test_a_row_with_a_criterion_that_is_not_judged_is_not_accepted(words, accepted):
     row = CODES["aemo"].rows[0]
-    findings = tuple(RowFinding(f"c{k}", "rule", "code", 1.0, 1.0, None, word, "") for k, word in enumerate(words))
+    findings = tuple(
+        RowFinding(f"c{k}", "rule", "code", 1.0, 1.0, None, word, "")
+        for k, word in enumerate(words)
+    )
     assert RowVerdict(row, findings).accepted is accepted
 
 
@@ -209,9 +227,18 @@ def test_a_certificate_without_that_criterion_holds_where_it_is_met():
 def test_a_row_that_does_not_ask_whether_it_holds_together_says_why_it_fails():
     row = next(row for row in CODES["aemo"].rows if row.name == "jump_30")
     bare = replace(
-        row, criteria=tuple(c for c in row.criteria if not getattr(c, "__qualname__", "").startswith("holds_together"))
+        row,
+        criteria=tuple(
+            c
+            for c in row.criteria
+            if not getattr(c, "__qualname__", "").startswith("holds_together")
+        ),
     )
-    result = BenchResult("jump_30", TIMES, {"p": opposing(), "q": np.full(TIMES.shape, 0.1), "v": np.ones(TIMES.shape)},
-                         [{"kind": "loss_of_synchronism", "time": 1.3, "message": "found"}])  # fmt: skip
+    result = BenchResult(
+        "jump_30",
+        TIMES,
+        {"p": opposing(), "q": np.full(TIMES.shape, 0.1), "v": np.ones(TIMES.shape)},
+        [{"kind": "loss_of_synchronism", "time": 1.3, "message": "found"}],
+    )
     assert len(bare.criteria) < len(row.criteria)
     assert [f.text for f in judge_row(bare, result, 50.0).failed] == ["found"]

@@ -47,7 +47,9 @@ def failed(fmu, folder, row, values=None, declared=TRUE):
 
 
 def test_ours_meets_what_its_parameters_declare_and_the_certificate_verifies(converter, tmp_path):
-    found = certified(converter, tmp_path, ("igfm1_scr10_pm50", "igfm2_scr2_p0", "igfm3_scr10_p50_scr2"))
+    found = certified(
+        converter, tmp_path, ("igfm1_scr10_pm50", "igfm2_scr2_p0", "igfm3_scr10_p50_scr2")
+    )
     assert all(verdict.accepted for verdict in found.verdicts)
     assert found.verdict == "incomplete"
     save(found, tmp_path)
@@ -62,17 +64,23 @@ def test_ours_meets_what_its_parameters_declare_and_the_certificate_verifies(con
 
 @pytest.mark.parametrize("wrong", [{"H": 4.0}, {"D": 80.0}, {"X_eff": 0.6}])
 def test_a_wrong_declaration_is_seen(converter, tmp_path, wrong):
-    assert "power after the jump ahead" in failed(converter, tmp_path, "igfm1_scr10_pm50", declared=TRUE | wrong)
+    assert "power after the jump ahead" in failed(
+        converter, tmp_path, "igfm1_scr10_pm50", declared=TRUE | wrong
+    )
 
 
 def test_a_converter_without_damping_swings_out_of_its_envelope(converter, tmp_path):
     """A lag of 5 s in the droop's measurement: H = 50 s with the same D."""
     values = {"droop.tau_P": 5.0}
     assert failed(converter, tmp_path, "igfm1_scr10_pm50", values) == [
-        "power after the jump ahead", "power after the jump back"]  # fmt: skip
+        "power after the jump ahead",
+        "power after the jump back",
+    ]
 
 
-@pytest.mark.parametrize("row", ["igfm1_scr10_p50", "igfm2_scr10_p0", "igfm3_scr10_p50_scr2", "igfm4_scr10_p0_2"])
+@pytest.mark.parametrize(
+    "row", ["igfm1_scr10_p50", "igfm2_scr10_p0", "igfm3_scr10_p50_scr2", "igfm4_scr10_p0_2"]
+)
 def test_a_grid_following_converter_fails_every_kind_of_row(tmp_path, row):
     follower = gfor.build("gfl", tmp_path / "fmu")
     assert any(name != "stable" for name in failed(follower, tmp_path, row))
@@ -89,12 +97,16 @@ def test_a_voltage_droop_of_the_wrong_sign_is_seen(converter, tmp_path):
 
 
 def test_a_frequency_droop_of_the_wrong_sign_is_seen(tmp_path):
-    assert "power after the jump ahead" in failed(write_wrong("R_f", tmp_path), tmp_path, "igfm1_scr10_p0")
+    assert "power after the jump ahead" in failed(
+        write_wrong("R_f", tmp_path), tmp_path, "igfm1_scr10_p0"
+    )
 
 
 def test_a_hang_of_a_busy_machine_is_no_verdict_and_is_not_kept(converter, tmp_path, monkeypatch):
     def hanging(prepared):
-        raise ComponentError("converter", "fmi2DoStep", "hang: no answer within 30 s; its process was ended", "", 1.0)
+        raise ComponentError(
+            "converter", "fmi2DoStep", "hang: no answer within 30 s; its process was ended", "", 1.0
+        )
 
     with monkeypatch.context() as patched:
         patched.setattr(bench_point, "running", hanging)
@@ -108,10 +120,15 @@ def test_a_hang_of_a_busy_machine_is_no_verdict_and_is_not_kept(converter, tmp_p
 
 
 def test_the_command_asks_for_what_is_to_be_declared(converter, gfor_command):
-    code, _, said = gfor_command("certify", converter, "--code", "rte", "--declare", "D=20", "--declare", "H=1")
+    code, _, said = gfor_command(
+        "certify", converter, "--code", "rte", "--declare", "D=20", "--declare", "H=1"
+    )
     assert code == 2
     assert "missing: X_eff" in " ".join(said.split())
-    for name, words in (("gb", "--code gb knows no such value"), ("nts631", "takes no declared value")):
+    for name, words in (
+        ("gb", "--code gb knows no such value"),
+        ("nts631", "takes no declared value"),
+    ):
         code, _, said = gfor_command("certify", converter, "--code", name, "--declare", "D=20")
         assert code == 2
         assert words in " ".join(said.split())
@@ -120,7 +137,9 @@ def test_the_command_asks_for_what_is_to_be_declared(converter, gfor_command):
 @pytest.mark.parametrize(("X", "stiff"), [(0.3, True), (0.8, False)])
 def test_the_stiffness_that_a_jump_asks_for_agrees_with_the_jump(tmp_path, monkeypatch, X, stiff):
     """A source behind a reactance: 1/X to 1/X/(1 − (f/f_n)²) against 1/(10°/0.2 pu − |Z|²/X_g) = 1.87 pu/rad."""
-    monkeypatch.setattr(frequency_domain, "EXCITATION", Excitation(lowest_hz=5.0, highest_hz=40.0, lines=8))
+    monkeypatch.setattr(
+        frequency_domain, "EXCITATION", Excitation(lowest_hz=5.0, highest_hz=40.0, lines=8)
+    )
     request = CertificationRequest(write_source(tmp_path), None, {"X": X})
     asked = asked_stiffness(measure_stiffness(request, 60.0, lambda text: None), 60.0)
     assert asked.value == pytest.approx(1 / (math.radians(10) / 0.2 - 1 / 9 / 0.3288), rel=1e-3)
@@ -128,7 +147,9 @@ def test_the_stiffness_that_a_jump_asks_for_agrees_with_the_jump(tmp_path, monke
     assert 0.98 / X < asked.found < 1.02 / X / (1 - (24.43 / 60) ** 2)
     assert asked.met is stiff
     (verdict,) = certify_code(request, ERCOT, Serial(), tmp_path, ("phase_jumps",)).verdicts
-    opposed = [finding.accepted for finding in verdict.findings if finding.criterion.startswith("opposes")]
+    opposed = [
+        finding.accepted for finding in verdict.findings if finding.criterion.startswith("opposes")
+    ]
     assert opposed == [stiff, stiff]
 
 
@@ -146,9 +167,15 @@ def test_gb_gives_figures_and_no_verdict(converter, tmp_path, gfor_command, monk
     assert "no verdict" in figures["sentence"]
     s = 2j * math.pi * 0.5
     droop = -1 / (0.05 / (1 + 0.1 * s) + s * 0.15 / (2 * math.pi * 50))
-    assert abs(complex(figures["slow"]["real"], figures["slow"]["imag"]) - droop) < 0.05 * abs(droop)
+    assert abs(complex(figures["slow"]["real"], figures["slow"]["imag"]) - droop) < 0.05 * abs(
+        droop
+    )
     assert figures["phase_jump"]["met"]
     assert "no code says so" in figures["phase_jump"]["sentence"]
     stiff = figures["least"]["Q/V [pu/pu]"]
     assert stiff["value"] == pytest.approx(1 / 0.15 / (1 - (stiff["at_hz"] / 50) ** 2), rel=0.05)
-    assert {path.name for path in out.glob("frequency.*")} == {"frequency.csv", "frequency.json", "frequency.png"}
+    assert {path.name for path in out.glob("frequency.*")} == {
+        "frequency.csv",
+        "frequency.json",
+        "frequency.png",
+    }

@@ -5,7 +5,12 @@ import pytest
 
 from orchestrator.certification.codes.all_codes import ERCOT
 from orchestrator.certification.codes.bench_point import BenchResult
-from orchestrator.certification.codes.change_point import ChangedCriterion, ChangeResult, margins_with_time, mark_of
+from orchestrator.certification.codes.change_point import (
+    ChangedCriterion,
+    ChangeResult,
+    margins_with_time,
+    mark_of,
+)
 from orchestrator.certification.codes.row_verdict import RowVerdict, judge_row
 from orchestrator.certification.codes.sensitivity import MOST, sensitivity_of
 from orchestrator.sensitivities.parameters import Parameter
@@ -23,8 +28,9 @@ def found(margin_at, value=2.0, base="base", marks=("below", "above"), **bounds)
     p = Parameter("converter", "K", "pu", value, True, **bounds)
     sides = {
         sign: ChangeResult((criterion(margin_at(value + sign * STEP * p.scale)),), mark)
-        for sign, mark in zip((-1, 1), marks, strict=True) if p.allows(sign * STEP * p.scale)
-    }  # fmt: skip
+        for sign, mark in zip((-1, 1), marks, strict=True)
+        if p.allows(sign * STEP * p.scale)
+    }
     return sensitivity_of(p, criterion(margin_at(value)), base, sides, STEP)
 
 
@@ -57,7 +63,8 @@ def test_a_margin_that_stays_is_told_from_a_response_that_stays():
     moves = found(lambda p: -0.5)
     assert not moves.idle
     assert moves.doubts == ("no effect on this margin; the response does change",)
-    assert not found(lambda p: -0.5, marks=("base", "above")).idle  # as a limit that acts on one side alone
+    # as a limit that acts on one side alone
+    assert not found(lambda p: -0.5, marks=("base", "above")).idle
     assert stays.change_to_meet() is moves.change_to_meet() is None
 
 
@@ -65,7 +72,10 @@ def test_a_bound_leaves_one_side_and_a_doubt():
     s = found(lambda p: 0.3 * p - 1.0, maximum=2.0)
     assert s.slope == pytest.approx(0.6)
     assert s.doubts == ("above, its declared bound leaves no room",)
-    assert found(lambda p: p, minimum=2.0, maximum=2.0).reason == "its declared bounds leave no room on either side"
+    assert (
+        found(lambda p: p, minimum=2.0, maximum=2.0).reason
+        == "its declared bounds leave no room on either side"
+    )
 
 
 def test_a_value_that_the_fmu_refuses_is_told_with_its_reason():
@@ -113,9 +123,13 @@ def judged(findings=(), times=TIMES):
 
 
 def test_a_loss_of_synchronism_is_the_worse_the_earlier_it_comes():
-    slips = [{"kind": "loss_of_synchronism", "time": time, "message": "slips"} for time in (8.0, 2.2)]
+    slips = [
+        {"kind": "loss_of_synchronism", "time": time, "message": "slips"} for time in (8.0, 2.2)
+    ]
     verdict, result = judged([{"kind": "active_limit", "time": 1.0, "message": "acts"}, *slips])
-    stable = next(c for c in margins_with_time(verdict, result.findings, 60.0) if c.criterion == "stable")
+    stable = next(
+        c for c in margins_with_time(verdict, result.findings, 60.0) if c.criterion == "stable"
+    )
     assert stable.margin == pytest.approx(2.2 / 11 - 1)
     assert stable.timed
     verdict, result = judged()

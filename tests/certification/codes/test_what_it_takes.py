@@ -8,7 +8,12 @@ import orchestrator as gfor_api
 from orchestrator.certification.codes import what_it_takes as w
 from orchestrator.certification.codes.all_codes import CODES, ERCOT
 from orchestrator.certification.codes.certificate import certify_code
-from orchestrator.certification.codes.needs_record import confirmed_text, plan_text, remarks_of, save_needs
+from orchestrator.certification.codes.needs_record import (
+    confirmed_text,
+    plan_text,
+    remarks_of,
+    save_needs,
+)
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.errors import InputError
 from orchestrator.points.executor import Serial
@@ -20,7 +25,9 @@ def converter(tmp_path_factory):
 
 
 def certified(converter, folder, values, code=ERCOT, row="inertia_down"):
-    return certify_code(CertificationRequest(converter, None, values), code, Serial(), folder, (row,))
+    return certify_code(
+        CertificationRequest(converter, None, values), code, Serial(), folder, (row,)
+    )
 
 
 @pytest.mark.slow
@@ -50,7 +57,10 @@ def test_the_inertia_that_is_missing_lies_in_the_droop_and_its_lag(converter, tm
     (tmp_path / "alone").mkdir()
     alone = certified(converter, tmp_path / "alone", {"droop.R_f": confirmed.value}).verdicts[0]
     assert alone.accepted is (confirmed.met and not confirmed.failing)
-    assert next(f.margin for f in alone.findings if f.criterion == "inertia at 1 s") == confirmed.margin
+    assert (
+        next(f.margin for f in alone.findings if f.criterion == "inertia at 1 s")
+        == confirmed.margin
+    )
     assert f"droop.R_f = {confirmed.value:.5g}" in confirmed_text(need)
     assert "Other rows were not run" in confirmed_text(need)
     written = json.loads(save_needs(plan, [need], tmp_path)[1].read_text(encoding="utf-8"))
@@ -76,7 +86,10 @@ def test_the_duplicate_is_changed_with_its_plant(converter, tmp_path):
     certificate = certified(converter, tmp_path, {}, CODES["miso"], "llsm_limit")
     plan = w.plan_changes(certificate, tmp_path, ["droop.R_f"])
     changes = plan.tasks["llsm_limit", "converter.droop.R_f", 1].changes
-    assert changes == (("converter.droop.R_f", pytest.approx(0.0525)), ("duplicate.droop.R_f", pytest.approx(0.0525)))
+    assert changes == (
+        ("converter.droop.R_f", pytest.approx(0.0525)),
+        ("duplicate.droop.R_f", pytest.approx(0.0525)),
+    )
     below, above = (plan.tasks["llsm_limit", "converter.droop.R_f", sign].key for sign in (-1, 1))
     assert below != above
     with pytest.raises(InputError, match="no component of the scenario has such a parameter"):
@@ -93,12 +106,17 @@ def test_a_certificate_without_a_failed_row_needs_nothing(converter, tmp_path):
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [(["--code", "miso", "--confirm"], "--confirm: it belongs to --sensitivities"),
-     (["--code", "miso", "--parameter", "K"], "--parameter: it belongs to --sensitivities"),
-     (["--sensitivities"], "has no rows that can be run again"),
-     (["--code", "miso", "--sensitivities", "--change", "0"], "not a change in percent from 0.01 to 50"),
-     (["--code", "miso", "--sensitivities", "--change", "nan"], "not a change in percent")],
-)  # fmt: skip
+    [
+        (["--code", "miso", "--confirm"], "--confirm: it belongs to --sensitivities"),
+        (["--code", "miso", "--parameter", "K"], "--parameter: it belongs to --sensitivities"),
+        (["--sensitivities"], "has no rows that can be run again"),
+        (
+            ["--code", "miso", "--sensitivities", "--change", "0"],
+            "not a change in percent from 0.01 to 50",
+        ),
+        (["--code", "miso", "--sensitivities", "--change", "nan"], "not a change in percent"),
+    ],
+)
 def test_options_that_would_do_nothing_are_refused(gfor, words, said):
     code, out, error = gfor("certify", "a.fmu", *words)
     assert (code, out) == (2, "")
@@ -106,10 +124,14 @@ def test_options_that_would_do_nothing_are_refused(gfor, words, said):
 
 
 @pytest.mark.slow
-def test_a_foreign_fmu_that_does_not_answer_for_its_parameters_is_changed_by_their_own_names(gallery, tmp_path):
+def test_a_foreign_fmu_that_does_not_answer_for_its_parameters_is_changed_by_their_own_names(
+    gallery, tmp_path
+):
     """Its droop of 2 % asks for more than its rating at 51 Hz; with 2.1 % it keeps step with the source."""
     fmu, binding = gallery("converter_power_si")
-    certificate = certify_code(CertificationRequest(fmu, binding), CODES["miso"], Serial(), tmp_path, ("rocof",))
+    certificate = certify_code(
+        CertificationRequest(fmu, binding), CODES["miso"], Serial(), tmp_path, ("rocof",)
+    )
     plan = w.plan_changes(certificate, tmp_path, ["R_f"])
     need = next(n for n in w.run_changes(plan, Serial()) if n.criterion.criterion == "stable")
     (slope,) = need.sensitivities

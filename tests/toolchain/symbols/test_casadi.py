@@ -22,7 +22,8 @@ def ours():
 @pytest.fixture(scope="module")
 def theirs(tmp_path_factory):
     file = tmp_path_factory.mktemp("peer") / "answers"
-    command = [sys.executable, "-m", casadi_peer.__name__, str(file)]  # apart, from which it finds the tests' support
+    # apart, from which it finds the tests' support
+    command = [sys.executable, "-m", casadi_peer.__name__, str(file)]
     subprocess.run(command, check=True, cwd=Path(__file__).parents[3])
     return pickle.loads(file.read_bytes())
 
@@ -31,7 +32,9 @@ def test_every_function_gives_the_same_bits(ours, theirs):
     assert len(ours) > 8 * 25
     assert (casadi_peer.NETWORK, "iteration") in ours
     assert ours.keys() == theirs.keys()
-    wrong = [key for key in ours if not np.array_equal(ours[key][1], theirs[key][1], equal_nan=True)]
+    wrong = [
+        key for key in ours if not np.array_equal(ours[key][1], theirs[key][1], equal_nan=True)
+    ]
     assert not wrong
     finite = [np.isfinite(values).mean() for _, values in ours.values() if values.size]
     assert np.mean(finite) > 0.9
@@ -42,7 +45,9 @@ def test_no_function_has_more_instructions(ours, theirs):
 
     Sums of sensitivities share choices in another way: 2 % more or less of them."""
     adjoint = {key for key in ours if key[1].endswith("adjoint")}
-    more = {key: (count, theirs[key][0]) for key, (count, _) in ours.items() if count > theirs[key][0]}
+    more = {
+        key: (count, theirs[key][0]) for key, (count, _) in ours.items() if count > theirs[key][0]
+    }
     assert more.keys() <= adjoint
     assert all(our <= 1.02 * their + 16 for our, their in more.values())
 
