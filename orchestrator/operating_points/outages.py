@@ -1,5 +1,6 @@
 """Outages: which elements leave the network, and what remains of it."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -15,6 +16,8 @@ from orchestrator.operating_points.columns import Elements
 INTACT = "intact"  # name of the network without an outage
 _KINDS = ("n-1", "lines", "units")
 _SHOWN = 4
+# the name of the outage of a unit with its own transformer, ``sg3 (line_6_1)``
+_WITH_TRANSFORMER = re.compile(r"^(\S+)\s*\((\S+)\)$")
 _AUXILIARY = 0.05
 """Load of a plant's own, in parts of its rating: cut off with so little, its units are lost; with more, an island is
 left.
@@ -33,13 +36,14 @@ def read_outages(text: str | None, elements: Elements) -> list[Outage]:
     """The intact network, and the outages that a text names.
 
     ``text``: ``n-1`` (each line, transformer and unit; a unit with its own transformer is one outage), ``lines``,
-    ``units``, or names with commas between them, where ``line_1_2+sg3`` loses two elements together; None for none."""
+    ``units``, or names with commas between them; None for none. ``line_1_2+sg3`` loses two elements together, and so
+    does ``sg3 (line_6_1)``, as a unit with its own transformer is called."""
     names: list[str] = []
     for part in (part.strip() for part in (text or "").split(",") if part.strip()):
         names += _of_kind(part.lower(), elements) if part.lower() in _KINDS else [part]
     found = [Outage(INTACT)]
     for name in names:
-        lost = tuple(one.strip() for one in name.split("+"))
+        lost = tuple(one.strip() for one in _WITH_TRANSFORMER.sub(r"\1+\2", name).split("+"))
         for one in lost:
             if one not in elements.names:
                 hint = close_names(
@@ -59,7 +63,7 @@ def _of_kind(kind: str, elements: Elements) -> list[str]:
         return list(elements.lines if kind == "lines" else elements.units)
     own = {unit: branch for branch, unit in elements.step_ups.items() if branch in elements.lines}
     lines = [name for name in elements.lines if name not in elements.step_ups]
-    return lines + [f"{name}+{own[name]}" if name in own else name for name in elements.units]
+    return lines + [f"{name} ({own[name]})" if name in own else name for name in elements.units]
 
 
 @dataclass(frozen=True)

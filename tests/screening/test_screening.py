@@ -301,7 +301,8 @@ def test_outages_are_elements(two_area):
 
 
 def test_a_unit_and_its_transformer_are_one_outage(tmp_path):
-    """The loss of either has the modes of the other's, and one item of N-1 has both names."""
+    """The loss of either has the modes of the other's; N-1 names the unit, its transformer in brackets, and takes
+    what it names."""
     files = Path(__file__).parents[2] / ".docs" / "tutorials" / "psse"
     for name in ("areas.raw", "areas.dyr"):
         shutil.copy(files / name, tmp_path)
@@ -313,7 +314,13 @@ def test_a_unit_and_its_transformer_are_one_outage(tmp_path):
     case = load_case(tmp_path / "case.toml")
     elements = Elements.of(case.prepare()[0])
     names = [outage.name for outage in read_outages("n-1", elements)]
-    assert names[-4:] == [f"sg{n}+line_{bus}_{n}" for n, bus in ((1, 5), (2, 6), (3, 11), (4, 10))]
+    assert names[-4:] == [
+        f"sg{n} (line_{bus}_{n})" for n, bus in ((1, 5), (2, 6), (3, 11), (4, 10))
+    ]
+    typed = [read_outages(text, elements)[1] for text in (names[-4], "sg1+line_5_1")]
+    assert [one.elements for one in typed] == [("sg1", "line_5_1")] * 2
+    with pytest.raises(InputError, match="is named twice"):
+        read_outages(f"n-1,{names[-4]}", elements)
     assert len(names) == 1 + 8 + 4
     assert [o.name for o in read_outages("sg4, line_10_4", elements)] == [
         "intact",
