@@ -27,6 +27,10 @@ UNMOVED = 0.02
 """Loops hardly move a mode that all of them together move by less than this part of its size, by their largest gains.
 It counts as others do; beside it a search raises the least damping of the rest."""
 
+APART = 1e-3
+"""Modes that all loops together move by less than this part of their size, a tenth of a point of damping, by their
+largest gains stand apart: a search neither damps them nor lets them lose as much, and a verdict names them."""
+
 _HELD = 1e-5
 """No loop moves a mode that all of them move by less than this part of its size, with the most lead on top: where the
 converter is out of service. A search leaves it as it is."""
@@ -94,6 +98,21 @@ def split(
     return found
 
 
+def kept_as_they_are(watched: Sequence[Watched], values: Iterable[complex]) -> list[Watched]:
+    """The modes, of which those that are next to some values [rad/s] are not damped, and keep what these have."""
+    found = list(watched)
+    for value in values:
+        if (k := nearest(found, value)) is not None:
+            found[k] = replace(found[k], floor=damping_ratio(value) - ALLOWED)
+    return found
+
+
+def nearest(watched: Sequence[Watched], value: complex) -> int | None:
+    """Which of the modes is that of a value [rad/s] that hardly moves; None if none is near."""
+    k = min(range(len(watched)), key=lambda k: abs(watched[k].value - value), default=None)
+    return k if k is not None and abs(watched[k].value - value) < UNMOVED * abs(value) else None
+
+
 def growth(values: Complex) -> float:
     """The largest real part [1/s] of a spectrum; 0 where nothing grows."""
     values = values[grows(values) & (np.abs(values) > ZERO)]
@@ -134,12 +153,20 @@ class RatedPoint:
     """One operating point of the search: its loops, and what its modes may not fall below.
 
     ``largest``: the largest gain of every loop that may be closed [pu]; None where all modes count, also those that no
-    loop moves."""
+    loop moves, save those that are ``apart``.
+    ``apart``: eigenvalues of the open loops [rad/s] that stand apart. With ``largest`` they are found: all loops are in
+    service here and move another mode, and no mode is named, since one that is asked for always counts."""
 
     def __init__(
-        self, number: int, loops: OpenLoops, aim: Aim, largest: Mapping[PodPlace, float] | None
+        self,
+        number: int,
+        loops: OpenLoops,
+        aim: Aim,
+        largest: Mapping[PodPlace, float] | None,
+        apart: Sequence[complex] = (),
     ) -> None:
         self.number, self.loops, self._aim = number, loops, aim
+        self.apart = tuple(apart)
         self._held: tuple[complex, ...] = ()
         self._hardly: tuple[complex, ...] = ()
         values, targets, left, right = self._spectrum({})
@@ -156,9 +183,13 @@ class RatedPoint:
         parts = [
             (mode.value, size / abs(mode.value)) for mode, size in zip(damped, reach, strict=True)
         ]
-        self._held = tuple(value for value, part in parts if LEAD * part < _HELD)
+        in_service = all(place in loops.places for place in largest)
+        if targets is None and in_service and any(part >= APART for _, part in parts):
+            self.apart = tuple(value for value, part in parts if part < APART)
+        counting = [(value, part) for value, part in parts if value not in self.apart]
+        self._held = tuple(value for value, part in counting if LEAD * part < _HELD)
         self._hardly = tuple(
-            value for value, part in parts if LEAD * part >= _HELD and part < UNMOVED
+            value for value, part in counting if LEAD * part >= _HELD and part < UNMOVED
         )
 
     def _residues(self, place: int, left: Complex, right: Complex) -> Complex:
@@ -169,17 +200,11 @@ class RatedPoint:
         )
 
     def _split(self, values: Complex, targets: Iterable[int] | None) -> list[Watched]:
-        """The modes; those that no loop moves are not damped but kept as they are."""
-        found = split(values, targets, self._floors)
-        for value in (*self._held, *self._hardly):
-            k = min(range(len(found)), key=lambda k: abs(found[k].value - value), default=None)
-            if k is not None and abs(found[k].value - value) < UNMOVED * abs(value):
-                held = (
-                    {"floor": damping_ratio(value) - ALLOWED}
-                    if value in self._held
-                    else {"hardly_moved": True}
-                )
-                found[k] = replace(found[k], **held)
+        """The modes; those that no loop moves, or hardly any gain, are not damped but kept as they are."""
+        found = kept_as_they_are(split(values, targets, self._floors), (*self._held, *self.apart))
+        for value in self._hardly:
+            if (k := nearest(found, value)) is not None:
+                found[k] = replace(found[k], hardly_moved=True)
         return found
 
     def _spectrum(self, setting: Setting) -> tuple[Complex, list[int] | None, Complex, Complex]:
@@ -246,6 +271,9 @@ def together(worths: Iterable[Worth]) -> Worth:
     return Worth(worst.worst, max(worth.breach for worth in found), worst.point, rest)
 
 
-def worth_of_all(loops: OpenLoops, setting: Setting, aim: Aim) -> Worth:
-    """What a setting is worth at a point, where all modes to be damped count, also those that no loop moves."""
-    return RatedPoint(0, loops, aim, None).worth(setting)
+def worth_of_all(
+    loops: OpenLoops, setting: Setting, aim: Aim, apart: Sequence[complex] = ()
+) -> Worth:
+    """What a setting is worth at a point, where all modes to be damped count, also those that no loop moves; those that
+    stand apart do not."""
+    return RatedPoint(0, loops, aim, None, apart).worth(setting)

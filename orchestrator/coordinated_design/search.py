@@ -285,6 +285,8 @@ class RankedConverter:
     setting: PodSetting | None = None
     # least damping ratio with that setting, of all points and all modes to be damped; None where it is not known
     worst: float | None = None
+    # least damping ratio with it of all modes from 0.1 to 2 Hz; None where it is not known
+    least: float | None = None
     stages: int = 0  # N_S of its lead/lag
 
 

@@ -257,7 +257,12 @@ class PointsDesign:
     def verdict(self) -> PointsVerdict:
         request = self.plan.request
         return PointsVerdict(
-            self.points, request.damping, request.gain_bounds[1], self.compared, self.thin
+            self.points,
+            request.damping,
+            request.gain_bounds[1],
+            self.compared,
+            self.thin,
+            names=request.modes,
         )
 
 
@@ -312,13 +317,17 @@ def design_over_points(
     known = {designed[0]: after} if designed else {}
     quietly = replace(work, report=nobody)
     ranking = best_first(
-        [_confirmed(plan, one, before, known.get(one.place), quietly) for one in alone]
+        [
+            _confirmed(plan, one, before, known.get(one.place), _apart(alike), quietly)
+            for one in alone
+        ]
     )
     predicted = {
-        point.number: worth_of_all(point.loops, space.setting(found.x), plan.aim) for point in rated
+        point.number: worth_of_all(point.loops, space.setting(found.x), plan.aim, point.apart)
+        for point in rated
     }
     where = [plan.read.of(item) for item in plan.read.items]
-    points = tuple(judged(where, before, after, plan.aim, predicted))
+    points = tuple(judged(where, before, after, plan.aim, predicted, _apart(rated)))
     return PointsDesign(
         plan, frequency, settings, found, points, ranking, search.evaluations, compared, thin
     )
@@ -329,6 +338,7 @@ def _confirmed(
     one: RankedConverter,
     before: Sequence[PointModes],
     known: Sequence[PointModes] | None,
+    apart: Mapping[int, Sequence[complex]],
     work: Work,
 ) -> RankedConverter:
     """A ranked converter with the least damping that its setting gives where all modes are computed anew."""
@@ -342,7 +352,13 @@ def _confirmed(
     points = known or with_followed_names(
         plan.aim.names, before, modes_at(plan, values, (), work), made
     )
-    return replace(one, worst=least_of(points, plan.aim))
+    all_modes = Aim((), plan.aim.least)
+    return replace(one, worst=least_of(points, plan.aim, apart), least=least_of(points, all_modes))
+
+
+def _apart(points: Sequence[RatedPoint]) -> dict[int, tuple[complex, ...]]:
+    """The modes that no loop moves, by number of the point."""
+    return {point.number: point.apart for point in points if point.apart}
 
 
 def _stages(plan: PointsDesignPlan) -> dict[PodPlace, int]:

@@ -1,7 +1,8 @@
 """The verdict on a design over operating points, from modes that were computed anew at every point."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -13,6 +14,8 @@ from orchestrator.coordinated_design.objective import (
     Worth,
     floors_of,
     growth,
+    kept_as_they_are,
+    nearest,
     split,
     worth_of,
 )
@@ -64,6 +67,11 @@ class JudgedPoint:
     predicted: Worth | None = None
     # whether a name that is asked for is borne by no mode here, so that all electromechanical ones count
     unnamed: bool = False
+    # least_before, least: the least damped of all modes from 0.1 to 2 Hz, whatever the design damps
+    least_before: PlacedMode | None = None
+    least: PlacedMode | None = None
+    # modes from 0.1 to 2 Hz with the controllers that these do not move, and that the design leaves as they are
+    apart: tuple[PlacedMode, ...] = ()
 
     @property
     def computed(self) -> bool:
@@ -119,9 +127,15 @@ def judged(
     after: Sequence[PointModes],
     aim: Aim,
     predicted: Mapping[int, Worth],
+    apart: Mapping[int, Sequence[complex]] = MappingProxyType({}),
 ) -> Iterator[JudgedPoint]:
+    """The points with their modes anew.
+
+    ``predicted``, ``apart``: by number of the point, the search's worth, and the modes without the controllers [rad/s]
+    that stand apart."""
     for k, here in enumerate(where):
-        yield _judged(here, before[k], after[k], aim, predicted.get(k))
+        point = _judged(here, before[k], after[k], aim, apart.get(k, ()))
+        yield replace(point, predicted=predicted.get(k))
 
 
 def _judged(
@@ -129,39 +143,54 @@ def _judged(
     before: PointModes,
     after: PointModes,
     aim: Aim,
-    predicted: Worth | None,
+    apart: Sequence[complex],
 ) -> JudgedPoint:
     if not (before.computed and after.computed):
-        return JudgedPoint(*where, before, after, predicted=predicted)
-    first = split(before.values, _targets(before, aim), floors_of((), 0.0))
+        return JudgedPoint(*where, before, after)
+    first = _watched(before, aim, floors_of((), 0.0), apart)
     floors = floors_of((mode.value for mode in first if mode.floor is not None), aim.least)
-    second = split(after.values, _targets(after, aim), floors)
+    second = _watched(after, aim, floors, apart)
     others = [mode for mode in second if mode.floor is not None]
-    nearest = min(others, key=lambda mode: mode.damping - (mode.floor or 0.0), default=None)
-    worth = worth_of(second, growth(after.values), growth(before.values))
-    unnamed = any(name not in point.named for point in (before, after) for name in aim.names)
+    closest = min(others, key=lambda mode: mode.damping - (mode.floor or 0.0), default=None)
+    beside = [k for value in apart if (k := nearest(second, value)) is not None]
     return JudgedPoint(
         *where,
         before,
         after,
-        _least(first, before),
-        _least(second, after),
-        None if nearest is None else _placed(nearest, after),
-        worth,
-        predicted,
-        unnamed,
+        target_before=_least(first, before),
+        target=_least(second, after),
+        other=None if closest is None else _placed(closest, after),
+        worth=worth_of(second, growth(after.values), growth(before.values)),
+        unnamed=any(name not in point.named for point in (before, after) for name in aim.names),
+        least_before=_least_of_all(before),
+        least=_least_of_all(after),
+        apart=tuple(_placed(second[k], after) for k in dict.fromkeys(beside)),
     )
 
 
-def least_of(points: Sequence[PointModes], aim: Aim) -> float | None:
+def _watched(
+    point: PointModes, aim: Aim, floors: Mapping[int, float], apart: Sequence[complex]
+) -> list[Watched]:
+    return kept_as_they_are(split(point.values, _targets(point, aim), floors), apart)
+
+
+def least_of(
+    points: Sequence[PointModes],
+    aim: Aim,
+    apart: Mapping[int, Sequence[complex]] = MappingProxyType({}),
+) -> float | None:
     """Least damping ratio of all modes that a design damps at all points; None where a point has no modes or grows."""
     if not all(point.computed and growth(point.values) == 0 for point in points):
         return None
     every = (
-        _least(split(point.values, _targets(point, aim), floors_of((), 0.0)), point)
-        for point in points
+        _least(_watched(point, aim, floors_of((), 0.0), apart.get(k, ())), point)
+        for k, point in enumerate(points)
     )
     return min((mode.damping_ratio for mode in every if mode is not None), default=None)
+
+
+def _least_of_all(point: PointModes) -> PlacedMode | None:
+    return _least(split(point.values, None, floors_of((), 0.0)), point)
 
 
 def _targets(point: PointModes, aim: Aim) -> list[int] | None:
@@ -191,7 +220,8 @@ class PointsVerdict:
     ``wanted``: damping ratio that is wanted everywhere; None for the best that there is.
     ``largest``: the largest gain that the search was allowed [pu].
     ``compared``: number of settings of an exhaustive grid none of which was better; 0 without one.
-    ``thin``: least damping ratio with `MORE` of the gains, where that is too much for it or other modes; else None."""
+    ``thin``: least damping ratio with `MORE` of the gains, where that is too much for it or other modes; else None.
+    ``names``: the modes that were asked for; none where all count."""
 
     def __init__(
         self,
@@ -200,8 +230,11 @@ class PointsVerdict:
         largest: float = 0.0,
         compared: int = 0,
         thin: float | None = None,
+        *,
+        names: Sequence[str] = (),
     ) -> None:
         self.points, self.wanted, self.largest = tuple(points), wanted, largest
+        self.names = tuple(names)
         self.compared, self.thin = compared, thin
         self.known = [point for point in points if point.computed]
         self.failed = [point for point in points if not point.computed]
@@ -216,6 +249,26 @@ class PointsVerdict:
         """The point with the least damping; None where no point has a mode to be damped."""
         having = [point for point in self.known if point.target is not None]
         return min(having, key=lambda point: _damping(point.target), default=None)
+
+    @property
+    def least_before(self) -> JudgedPoint | None:
+        """The point with the least damped of all modes from 0.1 to 2 Hz without the controllers."""
+        having = [point for point in self.known if point.least_before is not None]
+        return min(having, key=lambda point: _damping(point.least_before), default=None)
+
+    @property
+    def least(self) -> JudgedPoint | None:
+        """The point with the least damped of all modes from 0.1 to 2 Hz, whatever the design damps."""
+        having = [point for point in self.known if point.least is not None]
+        return min(having, key=lambda point: _damping(point.least), default=None)
+
+    @property
+    def apart(self) -> list[tuple[JudgedPoint, PlacedMode]]:
+        """The modes that stand apart with less damping than is wanted, or than the design's own; least damped first."""
+        limit = self.wanted if self.wanted is not None else _or_one(self.worst)
+        every = ((point, mode) for point in self.known for mode in point.apart)
+        below = [one for one in every if one[1].damping_ratio < limit]
+        return sorted(below, key=lambda one: one[1].damping_ratio)
 
     @property
     def worst(self) -> float | None:
@@ -256,6 +309,10 @@ class PointsVerdict:
     @property
     def unforeseen(self) -> list[JudgedPoint]:
         return [point for point in self.known if point.unforeseen]
+
+
+def _or_one(damping: float | None) -> float:
+    return 1.0 if damping is None else damping
 
 
 def _damping(mode: PlacedMode | None) -> float:

@@ -104,6 +104,11 @@ def as_json(design: PointsDesign) -> dict[str, Any]:
         "least_damping_of_others": request.least_damping,
         "gain_bounds": list(request.gain_bounds),
         "worst_damping_ratio": {"before": verdict.worst_before, "after": verdict.worst},
+        "least_of_all": {
+            "before": _least_json(verdict.least_before, "least_before"),
+            "after": _least_json(verdict.least, "least"),
+        },
+        "apart": [_where(point) | {"mode": _mode(mode)} for point, mode in verdict.apart],
         "thin_margin_damping_ratio": verdict.thin,
         "limiting": None
         if limiting is None
@@ -134,6 +139,8 @@ def as_json(design: PointsDesign) -> dict[str, Any]:
                 "stable": point.stable,
                 "before": _mode(point.target_before),
                 "after": _mode(point.target),
+                "least_of_all_before": _mode(point.least_before),
+                "least_of_all_after": _mode(point.least),
                 "allowed": None if point.worth is None else point.worth.allowed,
                 "why": point.why_not,
             }
@@ -150,6 +157,10 @@ def as_json(design: PointsDesign) -> dict[str, Any]:
 
 def _where(point: JudgedPoint) -> dict[str, Any]:
     return {"point": point.point.name, "outage": point.outage.name, "place": point.point.place}
+
+
+def _least_json(point: JudgedPoint | None, name: str) -> dict[str, Any] | None:
+    return None if point is None else _where(point) | {"mode": _mode(getattr(point, name))}
 
 
 def _mode(mode: PlacedMode | None) -> dict[str, Any] | None:
@@ -169,6 +180,7 @@ def _ranked(one: RankedConverter) -> dict[str, Any]:
         "component": one.place.component,
         "controller": one.place.controller,
         "worst_damping_ratio": one.worst,
+        "worst_damping_ratio_of_all_modes": one.least,
         "K": None if setting is None else setting.gain,
         "T_S1": None if setting is None else setting.filters.T_S1,
         "T_S2": None if setting is None else setting.filters.T_S2,
@@ -209,6 +221,7 @@ def points_table(verdict: PointsVerdict) -> ColumnTable[JudgedPoint]:
             else mode.frequency_hz
         )
 
+    of_all = "all modes [%]" if verdict.names or verdict.apart else ""
     return ColumnTable(
         "Points and outages",
         (
@@ -230,6 +243,13 @@ def points_table(verdict: PointsVerdict) -> ColumnTable[JudgedPoint]:
             Column("", lambda p: of(p.target_before, "frequency"), name="frequency_before_hz"),
             Column("with it [%]", lambda p: of(p.target, "damping"), _two, "damping_percent"),
             Column("f [Hz]", lambda p: of(p.target, "frequency"), ".3f", "frequency_hz"),
+            Column(
+                "",
+                lambda p: of(p.least_before, "damping"),
+                _two,
+                "least_of_all_before_percent",
+            ),
+            Column(of_all, lambda p: of(p.least, "damping"), _two, "least_of_all_percent"),
             Column("Who", lambda p: "" if p.target is None else p.target.who, name="who"),
             Column(
                 "", lambda p: "" if p.worth is None else _lower(p.worth.allowed), name="allowed"
@@ -272,10 +292,20 @@ def ranking_table(design: PointsDesign) -> ColumnTable[RankedConverter]:
     def shown(form: str) -> Callable[[Any], str]:
         return lambda figure: "–" if figure == "" else f"{figure:{form}}"
 
-    def damping(one: RankedConverter) -> str:
-        if one.setting is None:
-            return "–"
-        return "unstable or not known" if one.worst is None else f"{100 * one.worst:.2f}"
+    def damping(figure: Callable[[RankedConverter], float | None]) -> Callable[[Any], str]:
+        def cell(one: RankedConverter) -> str:
+            if one.setting is None:
+                return "–"
+            found = figure(one)
+            return "unstable or not known" if found is None else f"{100 * found:.2f}"
+
+        return cell
+
+    names = design.plan.request.modes
+    several = names or any(one.worst != one.least for one in design.ranking)
+    of_those = "of the modes that any moves [%]"
+    if names:
+        of_those = f"of {', '.join(names)} [%]"
 
     title = "Converters by what a controller there alone gives: the least damping of all points, computed anew"
     return ColumnTable(
@@ -283,11 +313,25 @@ def ranking_table(design: PointsDesign) -> ColumnTable[RankedConverter]:
         (
             Column("Converter", lambda one: one.place.component, name="converter"),
             Column("Controller", lambda one: one.place.controller, name="controller"),
-            Column("least damping [%]", lambda one: one, damping),
+            Column(
+                of_those if several else "least damping [%]",
+                lambda one: one,
+                damping(lambda one: one.worst),
+            ),
+            Column(
+                "of all modes [%]" if several else "",
+                lambda one: one,
+                damping(lambda one: one.least),
+            ),
             Column(
                 "",
                 lambda one: "" if one.worst is None else 100 * one.worst,
                 name="least_damping_percent",
+            ),
+            Column(
+                "",
+                lambda one: "" if one.least is None else 100 * one.least,
+                name="least_damping_of_all_percent",
             ),
             Column("K [pu]", setting("K"), shown(".4g"), "K"),
             Column("T_S1 [s]", setting("T_S1"), shown(".4f"), "T_S1"),

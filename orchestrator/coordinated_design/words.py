@@ -3,8 +3,10 @@
 from collections import Counter
 
 from orchestrator.analysis.stability import zeros_in_words
+from orchestrator.coordinated_design.objective import APART
 from orchestrator.coordinated_design.study import PointsDesign
 from orchestrator.coordinated_design.verdict import MORE, PointsVerdict
+from orchestrator.errors import few
 from orchestrator.report.tables import VerdictSentence, kinds_of
 
 _SHOWN = 4
@@ -22,8 +24,12 @@ def verdict_of(verdict: PointsVerdict) -> VerdictSentence:
         tail = "; no mode to be damped is left from 0.1 to 2 Hz" if verdict.known else ""
     else:
         unmoved = ", which these controllers hardly move" if limiting.unmoved else ""
-        tail = f"; least damped: {limiting.where}: {limiting.target.words}{unmoved}"
+        which = f" of {few(verdict.names, _SHOWN)}" if verdict.names else ""
+        tail = f"; least damped{which}: {limiting.where}: {limiting.target.words}{unmoved}"
+    tail += _of_all_modes(verdict) + _standing_apart(verdict)
     aim = "" if wanted is None else f"{100 * wanted:g} % at all {total} points and outages"
+    if aim and verdict.apart:
+        aim += ", of the modes that these controllers move"
     if verdict.met:
         if wanted is not None:
             return VerdictSentence(
@@ -41,6 +47,30 @@ def verdict_of(verdict: PointsVerdict) -> VerdictSentence:
         else ""
     )
     return VerdictSentence(False, word, f"{', '.join([aim] * bool(aim) + reasons)}{beyond}{tail}")
+
+
+def _of_all_modes(verdict: PointsVerdict) -> str:
+    """The least damped of all modes, beside the named ones."""
+    before, after = verdict.least_before, verdict.least
+    if not verdict.names or after is None or after.least is None:
+        return ""
+    without = ""
+    if before is not None and before.least_before is not None:
+        without = f"; without the controllers: {before.where}: {before.least_before.words}"
+    return f"; of all modes: {after.where}: {after.least.words}{without}"
+
+
+def _standing_apart(verdict: PointsVerdict) -> str:
+    """The modes below the aim that these controllers do not move."""
+    if not verdict.apart:
+        return ""
+    point, mode = verdict.apart[0]
+    places = len({id(one) for one, _ in verdict.apart})
+    bound = f"less than {100 * APART:.1g} points with K ≤ {verdict.largest:g} pu"
+    return (
+        f"; apart, at {places} of {len(verdict.points)} points and outages, stand modes that these controllers move by "
+        f"{bound}; the least damped: {point.where}: {mode.words}"
+    )
 
 
 def _no_margin(thin: float | None, wanted: float) -> str:
@@ -95,6 +125,7 @@ def what_it_rests_on(design: PointsDesign) -> str:
         if not request.modes
         else "the modes " + ", ".join(request.modes)
     )
+    modes += "" if request.modes else ", save those that the controllers do not move"
     return (
         f"Damped: {modes}. No other mode may fall below {100 * request.least_damping:g} % or, where the least of its "
         f"band of frequencies is there already, below that less 0.1 points. Gains from {request.gain_bounds[0]:g} to "

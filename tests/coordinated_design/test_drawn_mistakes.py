@@ -91,10 +91,12 @@ def test_the_table_of_points_says_what_is_allowed_and_why_not():
         stable=True,
         target_before=None,
         target=None,
+        least_before=None,
+        least=None,
         worth=SimpleNamespace(allowed=False),
         why_not="n",
     )
-    table = view.points_table(SimpleNamespace(points=[point]))
+    table = view.points_table(SimpleNamespace(points=[point], names=(), apart=[]))
     assert {
         c.name: c.cell(point)
         for c in table.columns
