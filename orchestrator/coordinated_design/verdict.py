@@ -251,6 +251,11 @@ class PointsVerdict:
         return min(having, key=lambda point: _damping(point.target), default=None)
 
     @property
+    def some_apart(self) -> bool:
+        """Whether modes stand apart anywhere, however well they are damped."""
+        return any(point.apart for point in self.known)
+
+    @property
     def least_before(self) -> JudgedPoint | None:
         """The point with the least damped of all modes from 0.1 to 2 Hz without the controllers."""
         having = [point for point in self.known if point.least_before is not None]

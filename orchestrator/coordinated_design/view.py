@@ -221,7 +221,7 @@ def points_table(verdict: PointsVerdict) -> ColumnTable[JudgedPoint]:
             else mode.frequency_hz
         )
 
-    of_all = "all modes [%]" if verdict.names or verdict.apart else ""
+    of_all = "all modes [%]" if verdict.names or verdict.some_apart else ""
     return ColumnTable(
         "Points and outages",
         (

@@ -24,12 +24,12 @@ def verdict_of(verdict: PointsVerdict) -> VerdictSentence:
         tail = "; no mode to be damped is left from 0.1 to 2 Hz" if verdict.known else ""
     else:
         unmoved = ", which these controllers hardly move" if limiting.unmoved else ""
-        which = f" of {few(verdict.names, _SHOWN)}" if verdict.names else ""
+        which = " of the modes that these controllers move" if verdict.some_apart else ""
+        if verdict.names:
+            which = f" of {few(verdict.names, _SHOWN)}"
         tail = f"; least damped{which}: {limiting.where}: {limiting.target.words}{unmoved}"
     tail += _of_all_modes(verdict) + _standing_apart(verdict)
     aim = "" if wanted is None else f"{100 * wanted:g} % at all {total} points and outages"
-    if aim and verdict.apart:
-        aim += ", of the modes that these controllers move"
     if verdict.met:
         if wanted is not None:
             return VerdictSentence(
@@ -50,9 +50,9 @@ def verdict_of(verdict: PointsVerdict) -> VerdictSentence:
 
 
 def _of_all_modes(verdict: PointsVerdict) -> str:
-    """The least damped of all modes, beside the named ones."""
+    """The least damped of all modes, beside those that the design damps where these are not all."""
     before, after = verdict.least_before, verdict.least
-    if not verdict.names or after is None or after.least is None:
+    if not (verdict.names or verdict.some_apart) or after is None or after.least is None:
         return ""
     without = ""
     if before is not None and before.least_before is not None:

@@ -96,7 +96,7 @@ def test_the_table_of_points_says_what_is_allowed_and_why_not():
         worth=SimpleNamespace(allowed=False),
         why_not="n",
     )
-    table = view.points_table(SimpleNamespace(points=[point], names=(), apart=[]))
+    table = view.points_table(SimpleNamespace(points=[point], names=(), some_apart=False))
     assert {
         c.name: c.cell(point)
         for c in table.columns
