@@ -1,0 +1,207 @@
+"""The form of code, counted: what makes a statement hard to read at once, and the size in syntax nodes.
+
+A rule finds places in the syntax tree of one file. Its limit stands in ``tests/form.toml``.
+"""
+
+import ast
+import io
+import re
+import tokenize
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+PRODUCT = ("fmus", "gfor_fmu", "orchestrator")
+
+MOST_IN_A_STATEMENT = 2
+"""Comprehensions, conditional expressions and lambdas that a statement may hold."""
+
+MOST_POSITIONAL = 6
+"""Arguments that a call may pass by their place; a reader cannot tell the seventh from the sixth."""
+
+MANY_FIELDS = 4
+"""Arguments from which on a constructor is looked at for comprehensions in most of them."""
+
+_NESTED = (ast.GeneratorExp, ast.ListComp, ast.SetComp, ast.DictComp, ast.IfExp, ast.Lambda)
+_COMPREHENSIONS = (ast.GeneratorExp, ast.ListComp, ast.SetComp, ast.DictComp)
+
+
+@dataclass(frozen=True)
+class SourceFile:
+    """One file of Python with its syntax tree."""
+
+    path: Path
+    text: str
+    tree: ast.Module
+
+    @classmethod
+    def read(cls, path: Path) -> "SourceFile":
+        text = path.read_text(encoding="utf-8")
+        return cls(path, text, ast.parse(text))
+
+    @property
+    def room(self) -> str:
+        """The package and its folder, such as ``orchestrator/sweep``."""
+        parts = self.path.relative_to(ROOT).parts
+        return "/".join(parts[: min(2, len(parts) - 1)])
+
+    @property
+    def nodes(self) -> int:
+        """Expressions and statements, which no layout changes."""
+        return sum(isinstance(node, ast.expr | ast.stmt) for node in ast.walk(self.tree))
+
+
+Finder = Callable[[SourceFile], Iterator[int]]
+
+
+def marks_for_the_formatter(source: SourceFile) -> Iterator[int]:
+    """Lines that keep code from the formatter."""
+    for token in tokenize.generate_tokens(io.StringIO(source.text).readline):
+        if token.type == tokenize.COMMENT and re.match(r"# fmt: (skip|off)", token.string):
+            yield token.start[0]
+
+
+def nested_conditionals(source: SourceFile) -> Iterator[int]:
+    """Conditional expressions that hold another."""
+    for node in ast.walk(source.tree):
+        if isinstance(node, ast.IfExp):
+            parts = [*ast.iter_child_nodes(node)]
+            if any(isinstance(inner, ast.IfExp) for part in parts for inner in ast.walk(part)):
+                yield node.lineno
+
+
+def crowded_statements(source: SourceFile) -> Iterator[int]:
+    """Statements with more comprehensions, conditionals and lambdas than one reads at once."""
+    for node in ast.walk(source.tree):
+        if isinstance(node, ast.stmt):
+            held = sum(isinstance(inner, _NESTED) for inner in _own_expressions(node))
+            if held > MOST_IN_A_STATEMENT:
+                yield node.lineno
+
+
+def _own_expressions(statement: ast.stmt) -> Iterator[ast.AST]:
+    """What a statement holds, without the statements inside it."""
+    waiting: list[ast.AST] = [*ast.iter_child_nodes(statement)]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.stmt | ast.ExceptHandler | ast.match_case):
+            continue
+        yield node
+        waiting.extend(ast.iter_child_nodes(node))
+
+
+def long_calls(source: SourceFile) -> Iterator[int]:
+    """Calls with more arguments by place than one can tell apart."""
+    for node in ast.walk(source.tree):
+        if not isinstance(node, ast.Call) or len(node.args) <= MOST_POSITIONAL:
+            continue
+        if not any(isinstance(argument, ast.Starred) for argument in node.args):
+            yield node.lineno
+
+
+def packs_of_constants(source: SourceFile) -> Iterator[int]:
+    """Assignments of several constants at once, which have no place for a reason each."""
+    for node in ast.walk(source.tree):
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Tuple):
+            values = node.value.elts if isinstance(node.value, ast.Tuple) else []
+            if len(values) > 1 and all(isinstance(value, ast.Constant) for value in values):
+                yield node.lineno
+
+
+def walruses_outside_conditions(source: SourceFile) -> Iterator[int]:
+    """Assignments inside expressions, but for the conditions of if, while and comprehensions."""
+    conditions: list[ast.expr] = []
+    for node in ast.walk(source.tree):
+        if isinstance(node, ast.If | ast.While):
+            conditions.append(node.test)
+        elif isinstance(node, ast.comprehension):
+            conditions.extend(node.ifs)
+    allowed = {
+        id(inner)
+        for condition in conditions
+        for inner in ast.walk(condition)
+        if isinstance(inner, ast.NamedExpr)
+    }
+    for node in ast.walk(source.tree):
+        if isinstance(node, ast.NamedExpr) and id(node) not in allowed:
+            yield node.lineno
+
+
+def walruses(source: SourceFile) -> Iterator[int]:
+    """Assignments inside expressions, wherever they stand."""
+    for node in ast.walk(source.tree):
+        if isinstance(node, ast.NamedExpr):
+            yield node.lineno
+
+
+def crowded_constructors(source: SourceFile) -> Iterator[int]:
+    """Calls of a class with a comprehension in most of their arguments."""
+    for node in ast.walk(source.tree):
+        if isinstance(node, ast.Call) and _names_a_class(node.func):
+            values = [*node.args, *(keyword.value for keyword in node.keywords)]
+            crowded = sum(isinstance(value, _COMPREHENSIONS) for value in values)
+            if len(values) >= MANY_FIELDS and 2 * crowded > len(values):
+                yield node.lineno
+
+
+def _names_a_class(function: ast.expr) -> bool:
+    name = getattr(function, "attr", getattr(function, "id", ""))
+    return name[:1].isupper()
+
+
+def fragments_as_docstrings(source: SourceFile) -> Iterator[int]:
+    """Docstrings that begin as half a sentence."""
+    for node in ast.walk(source.tree):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module | ast.AsyncFunctionDef):
+            text = ast.get_docstring(node) or ""
+            if re.match(r"(What|Whether|Of|As)\b", text):
+                yield getattr(node, "lineno", 1)
+
+
+PARTICIPLES = re.compile(
+    r"_?(told|said|named|judged|settled|kept|found|given|taken|made|left|held|meant|shown|asked|gone|put|done|counted|"
+    r"listed|sorted|placed|moved|spoilt|spoiled|proven|proved|missed|wanted)$"
+)
+"""Names that say that something was done, and neither what it is nor what the function does."""
+
+
+def participles_as_functions(source: SourceFile) -> Iterator[int]:
+    """Functions whose name is a bare participle."""
+    for node in ast.walk(source.tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and PARTICIPLES.match(
+            node.name
+        ):
+            yield node.lineno
+
+
+RULES: dict[str, Finder] = {
+    "marks for the formatter": marks_for_the_formatter,
+    "conditionals inside conditionals": nested_conditionals,
+    "crowded statements": crowded_statements,
+    "calls with more than six positional arguments": long_calls,
+    "packs of constants": packs_of_constants,
+    "walruses outside of conditions": walruses_outside_conditions,
+    "walruses": walruses,
+    "constructors full of comprehensions": crowded_constructors,
+    "docstrings that begin with What, Whether, Of or As": fragments_as_docstrings,
+    "functions named by a bare participle": participles_as_functions,
+}
+
+
+def product_files() -> list[SourceFile]:
+    """The files of the three packages, in the order of their paths."""
+    return [
+        SourceFile.read(path)
+        for package in PRODUCT
+        for path in sorted((ROOT / package).rglob("*.py"))
+    ]
+
+
+def count_places(files: list[SourceFile]) -> dict[str, Counter[str]]:
+    """Rule → room → number of places."""
+    return {
+        rule: Counter(source.room for source in files for _ in finder(source))
+        for rule, finder in RULES.items()
+    }
