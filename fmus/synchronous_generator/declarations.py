@@ -1,11 +1,12 @@
 """Declarations that exciters, governors and stabilisers share, and the saturation that exciters share with machines.
 
 Saturation goes through two points of a curve, S(x)·x = B·(x − A)² above A and 0 below, as stability programs have it.
-A machine's data sheet gives S(1.0) and S(1.2), an exciter's S_E(E_1) and S_E(E_2)."""
+A machine's data sheet gives S(1.0) and S(1.2), an exciter's S_E(E_1) and S_E(E_2). Some machines have an exponential
+curve instead, S(x) = S(1.0)·xⁿ through both points."""
 
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port_variables import TRANSFORMER
-from fmus.toolchain.symbols import Expr, Scalar, fmax, if_else, logic_and, logic_or, sqrt
+from fmus.toolchain.symbols import Expr, Scalar, exp, fmax, if_else, log, logic_and, logic_or, sqrt
 from fmus.toolchain.variables import usual_beside
 
 MACHINE = TRANSFORMER | usual_beside(__file__)
@@ -59,6 +60,18 @@ def saturated_part(x: Expr, one: tuple[Scalar, Scalar], other: tuple[Scalar, Sca
     A = (first[0] - ratio * last[0]) / (1 - ratio)
     B = high / (last[0] - A) ** 2
     return B * fmax(x - A, 0) ** 2
+
+
+_NO_FLUX = 1e-6  # flux or voltage [pu] below which a power of it is 0
+
+
+def exponential_part(x: Expr, s_10: Expr, s_12: Expr) -> Expr:
+    """S(x)·x with S(x) = S(1.0)·xⁿ through S(1.0) and S(1.2); S = 0 at both for no saturation.
+
+    ``x``: flux [pu]."""
+    exists = logic_and(s_10 > 0, s_12 > 0)
+    n = log(if_else(exists, s_12, 1) / if_else(exists, s_10, 1)) / log(Expr(1.2))
+    return if_else(exists, s_10 * exp((n + 1) * log(fmax(x, _NO_FLUX))), 0)
 
 
 def require_rising(

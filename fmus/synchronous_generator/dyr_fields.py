@@ -22,7 +22,8 @@ class DyrField:
     of the record; the parameters take the product of both. PSS/E gives some leads as T_A/T_B; ``only``: the only values
     that our part can stand for; empty where it takes every one; ``same_as``: name of another field that must have the
     same value, because our part has one parameter for both; ``not_zero``: whether 0, by which PSS/E means that it
-    chooses a value itself, must be refused; ``switch``: whether the parameters are truth values; 0 is false."""
+    chooses a value itself, must be refused; ``switch``: whether the parameters are truth values; 0 is false;
+    ``nothing_without``: name of another field; where that one is 0, PSS/E reads 0 here too, whatever stands here."""
 
     name: str
     parameters: tuple[str, ...] = ()
@@ -32,6 +33,7 @@ class DyrField:
     same_as: str = ""
     not_zero: bool = False
     switch: bool = False
+    nothing_without: str = ""
 
 
 @dataclass(frozen=True)
@@ -49,8 +51,8 @@ class DyrRecord:
 
 
 _WORD = re.compile(
-    r"(?P<name>[^:=!]+)(:(?P<sets>[\w+]+))?(-(?P<negated>\w+))?(\*(?P<times>[^=!]+))?(==(?P<same>\w+))?(=(?P<only>[\d|]+))?"
-    r"(?P<not_zero>!?)(?P<switch>\??)"
+    r"(?P<name>[^:=!&]+)(:(?P<sets>[\w+]+))?(-(?P<negated>\w+))?(\*(?P<times>[^=!&]+))?(==(?P<same>\w+))?(=(?P<only>[\d|]+))?"
+    r"(?P<not_zero>!?)(?P<switch>\??)(&(?P<without>\S+))?"
 )
 """A field as the table has it."""
 
@@ -75,7 +77,8 @@ def _record(table: Mapping[str, Any]) -> DyrRecord:
         only = tuple(map(float, found["only"].split("|"))) if found["only"] else ()
         times, same = found["times"] or "", found["same"] or ""
         marks = found["not_zero"] != "", found["switch"] != ""
-        fields.append(DyrField(found["name"], sets, negated, times, only, same, *marks))
+        without = found["without"] or ""
+        fields.append(DyrField(found["name"], sets, negated, times, only, same, *marks, without))
     return DyrRecord(
         table["kind"],
         table["part"],

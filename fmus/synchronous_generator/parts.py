@@ -12,8 +12,10 @@ from fmus.synchronous_generator.excitation.without_regulator import external, ma
 from fmus.synchronous_generator.machine import FluxDeclaration, Machine
 from fmus.synchronous_generator.machines.classical import classical
 from fmus.synchronous_generator.machines.standard import (
+    genroe,
     genrou,
     genrou_rated_speed,
+    gensae,
     gensal,
     two_axis,
 )
@@ -42,7 +44,9 @@ MACHINES: dict[str, MachinePart] = {
     "classical": classical,
     "two_axis": two_axis,
     "gensal": gensal,
+    "gensae": gensae,
     "genrou": genrou,
+    "genroe": genroe,
     "genrou_rated_speed": genrou_rated_speed,
 }
 EXCITERS: dict[str, Exciter] = {

@@ -24,14 +24,17 @@ class Convention:
     speed_in_emf: bool  # the emf is w times the subtransient flux
     # the governor's output is the torque; else the power, and the torque is output/w
     output_is_torque: bool
+    torque_of_classical: bool  # the same of a classical machine
 
+
+CLASSICAL = "classical"  # the machine of second order, by its part's name
 
 LIKE = {
-    "exact": Convention(True, False),
-    "psse": Convention(False, False),
-    "andes": Convention(False, True),
+    "exact": Convention(True, False, False),
+    "psse": Convention(False, False, True),
+    "powerfactory": Convention(False, False, False),
+    "andes": Convention(False, True, True),
 }
-LIKE["powerfactory"] = LIKE["psse"]
 
 
 def assign_conventions(draft: Draft) -> None:
@@ -49,7 +52,10 @@ def assign_conventions(draft: Draft) -> None:
                 'it; take `models = "phasor"` and the parts of a DYR file, or speed_in_emf = true',
             )
             return
-        for variable, value in ((EMF, chosen.speed_in_emf), (TORQUE, chosen.output_is_torque)):
+        table_of = draft.tables.get(name)
+        is_classical = table_of is not None and table_of.machine == CLASSICAL
+        is_torque = chosen.torque_of_classical if is_classical else chosen.output_is_torque
+        for variable, value in ((EMF, chosen.speed_in_emf), (TORQUE, is_torque)):
             if variable in own:
                 plan.parameters[variable] = value
                 draft.places[f"{name}.{variable}"] = draft.given.place("conventions")
@@ -57,11 +63,11 @@ def assign_conventions(draft: Draft) -> None:
 
 def _chosen(table: ConventionsTable) -> Convention:
     usual = LIKE[table.like]
+    gives = {"torque": True, "power": False}.get(table.governor_gives or "")
     return Convention(
         usual.speed_in_emf if table.speed_in_emf is None else table.speed_in_emf,
-        usual.output_is_torque
-        if table.governor_gives is None
-        else table.governor_gives == "torque",
+        usual.output_is_torque if gives is None else gives,
+        usual.torque_of_classical if gives is None else gives,
     )
 
 

@@ -1,9 +1,13 @@
 """``[conventions]``: the same RAW and DYR files as other programs read them, against ANDES' eigenvalues."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import orchestrator as gfor
+from orchestrator.cases.assignment import EMF, TORQUE, assign_conventions
+from orchestrator.cases.schema import ConventionsTable
 from orchestrator.errors import CaseError
 from tests.screening.five_machines import five_machines
 
@@ -49,6 +53,38 @@ def test_like_andes_is_andes(folder):
     ours = swings(folder, 'like = "andes"')
     np.testing.assert_allclose(damping(ours), damping(np.array(IN_ANDES)), atol=0.02)
     np.testing.assert_allclose(ours.imag, np.imag(IN_ANDES), rtol=3e-4)
+
+
+@pytest.mark.parametrize(
+    ("convention", "classical", "wound"),
+    [
+        ({"like": "psse"}, True, False),
+        ({"like": "andes"}, True, True),
+        ({"like": "exact"}, False, False),
+        ({"like": "psse", "governor_gives": "power"}, False, False),
+    ],
+)
+def test_the_classical_machine_has_a_constant_torque_in_pss_e(convention, classical, wound):
+    machines = {"one": "classical", "other": "genrou"}
+    own = {TORQUE: None, EMF: None}
+    draft = SimpleNamespace(
+        given=SimpleNamespace(
+            case=SimpleNamespace(conventions=ConventionsTable(**convention)), place=lambda key: key
+        ),
+        tables={name: SimpleNamespace(machine=machine) for name, machine in machines.items()},
+        system=SimpleNamespace(
+            components={
+                name: SimpleNamespace(
+                    description=SimpleNamespace(parameters=own, kind="machine"), parameters={}
+                )
+                for name in machines
+            }
+        ),
+        places={},
+    )
+    assign_conventions(draft)
+    given = {name: plan.parameters[TORQUE] for name, plan in draft.system.components.items()}
+    assert given == {"one": classical, "other": wound}
 
 
 def test_each_assumption_alone_and_an_override_by_name(folder):

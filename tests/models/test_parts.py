@@ -94,6 +94,8 @@ def test_every_field_of_a_dyr_record_sets_a_parameter_of_its_part(name):
     [
         ("GENROU", 14),
         ("GENSAL", 12),
+        ("GENROE", 14),
+        ("GENSAE", 12),
         ("GENCLS", 2),
         ("SEXS", 6),
         ("IEEET1", 14),

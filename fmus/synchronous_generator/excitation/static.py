@@ -7,8 +7,10 @@ SEXS is a lead/lag and a lag that stops at its limits:
 ST1A is controlled, with a limiter of the field current:
 
     V_IMIN ≤ V_ref + V_S − v_m − V_F ≤ V_IMAX → (1+sT_C)/(1+sT_B) → (1+sT_C1)/(1+sT_B1)
-    → K_A/(1+sT_A) = V_A, held within V_AMIN and V_AMAX → V_A − K_LR·(I_FD − I_LR), only above I_LR = E_fd,
-    v_t·V_RMIN ≤ E_fd ≤ v_t·V_RMAX − K_C·I_FD,   V_F = s·K_F/(1+sT_F)·E_fd
+    → K_A/(1+sT_A) = V_A, held within V_AMIN and V_AMAX → V_A − K_LR·(I_FD − I_LR), only above I_LR = V_X,
+    v_t·V_RMIN ≤ E_fd = V_X ≤ v_t·V_RMAX − K_C·I_FD,   V_F = s·K_F/(1+sT_F)·V_X
+
+The rate feedback starts before the ceilings, so it goes on while E_fd stands at one.
 
 ST4B has two PI controllers; the standard's source from the stator current (K_I, X_L, θ_P) is left out, and an
 integrator stops while its output is at a limit:
@@ -71,9 +73,7 @@ def st1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
 
         def held(signal: Expr, v_t: Expr) -> Expr:
             floor = v_t * low
-            return clamp(
-                signal - relieved(seen.I_fd), floor, fmax(v_t * high - K_C * seen.I_fd, floor)
-            )
+            return clamp(signal, floor, fmax(v_t * high - K_C * seen.I_fd, floor))
 
         V_A0 = seen.start.E_fd + relieved(seen.start.E_fd)
         V_I0 = V_A0 / K_A
@@ -85,9 +85,8 @@ def st1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         )
         measured = Measurement(m, seen)
         amplifier = m.state("amplifier", V_A0, "pu", "first-order lag with limits", base="E_fd")
-        V_F, K_F = rate_feedback(
-            m, held(clamp(amplifier, A_low, A_high), measured.nearly), seen.start.E_fd
-        )
+        before_ceilings = clamp(amplifier, A_low, A_high) - relieved(seen.I_fd)
+        V_F, K_F = rate_feedback(m, before_ceilings, seen.start.E_fd)
         m.require(
             if_else(logic_and(K_F > 0, T_A <= 0), -1, 1), "exciter.K_F > 0 needs exciter.T_A > 0"
         )
@@ -95,7 +94,8 @@ def st1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         error = lead_lag_stage(m, error, V_I0)
         error = lead_lag_stage(m, error, V_I0, mark="1")
         V_A = close_limited_low_pass(m, amplifier, K_A * error, T_A, A_low, A_high)
-        E_fd = held(V_A, seen.terminal_voltage(held(V_A, measured.nearly)))
+        V_X = V_A - relieved(seen.I_fd)
+        E_fd = held(V_X, seen.terminal_voltage(held(V_X, measured.nearly)))
         return measured.close(E_fd)
 
 

@@ -1,9 +1,11 @@
-"""Machines GENROU, GENSAL and two-axis, each from the standard data of its data sheet.
+"""Machines GENROU, GENSAL, GENROE, GENSAE and two-axis, each from the standard data of its data sheet.
 
     two_axis  4th order: field, one winding on the q axis          X_d, X'_d, T'_d0; X_q, X'_q, T'_q0
     gensal    5th order: field and damper, one damper on the q axis  X_d, X'_d, X'', T'_d0, T''_d0; X_q, T''_q0
     genrou    6th order: field and damper, two windings on the q axis
-    genrou_rated_speed  the same with the emf at rated speed, for phasors alone: RMS simulation of stability programs
+    genroe    genrou with another curve of saturation, S(x) = S(1.0)·xⁿ
+    gensae    gensal with that curve, of the subtransient flux, on both axes
+    genrou_rated_speed  genrou with the emf at rated speed, for phasors alone: RMS simulation of stability programs
 
 Their stator is that of `machine`: with stator transients EMT-type, algebraic in the phasor model. As in stability
 programs' models of these names X''_q = X''_d, and saturation adds a current of the iron, S·ψ/X_md, beside the slowest
@@ -13,17 +15,18 @@ winding of an axis. X'_q = X_q (genrou, two_axis) says that the slow winding of 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 from fmus.synchronous_generator.axis import Axis, Winding
 from fmus.synchronous_generator.conversion import AxisData, RotorBranches
 from fmus.synchronous_generator.conversion import classical as classical_branches
-from fmus.synchronous_generator.declarations import require_rising, saturated_part
+from fmus.synchronous_generator.declarations import exponential_part, require_rising, saturated_part
 from fmus.synchronous_generator.machine import FluxDeclaration, Machine, Start, flux_state
 from fmus.synchronous_generator.machines.base import Common, declare_common, reactance, time
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort
-from fmus.toolchain.symbols import Expr, fmax, if_else
+from fmus.toolchain.symbols import Expr, fmax, if_else, logic_and
 
 
 @dataclass(frozen=True)
@@ -40,8 +43,8 @@ class WoundAxis:
 class Saturation:
     """S(x)·x as a function of x [pu].
 
-    ``both_axes``: of the subtransient flux, on both axes by its parts (GENROU); otherwise of E'_q on the d axis
-    (GENSAL)."""
+    ``both_axes``: of the subtransient flux, on both axes by its parts (GENROU, GENROE, GENSAE); otherwise of E'_q on
+    the d axis (GENSAL)."""
 
     part: Callable[[Expr], Expr]
     both_axes: bool
@@ -186,8 +189,17 @@ def two_axis(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDecl
     return declare_wound_machine(m, port, common, d, q, stator_flux, salient=True)
 
 
-def gensal(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclaration) -> Machine:
-    """Declare the machine of fifth order, one with salient poles. E'_q saturates the d axis."""
+def gensal(
+    m: ModelBuilder,
+    port: DevicePort,
+    S_n: Expr,
+    stator_flux: FluxDeclaration,
+    *,
+    exponential: bool = False,
+) -> Machine:
+    """Declare the machine of fifth order, one with salient poles. E'_q saturates the d axis.
+
+    ``exponential``: the subtransient flux saturates both axes, with the exponential curve."""
     common = declare_common(m, S_n)
     with m.scope("machine"):
         X_l, X_2, d = _d_axis(m, common)
@@ -195,7 +207,7 @@ def gensal(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclar
         fast = time(m, "T_q20", 0.05, "Open-circuit subtransient time constant T''_q0")
         q = _one_winding(common, X_q, X_2, fast, X_l)
         _require_order(m, d, q, "X_d2")
-        saturation = _saturation(m, both_axes=False)
+        saturation = _saturation(m, both_axes=exponential, exponential=exponential)
     return declare_wound_machine(
         m,
         port,
@@ -207,8 +219,20 @@ def gensal(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclar
     )
 
 
-def genrou(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclaration) -> Machine:
-    """Declare the machine of sixth order, one with a round rotor. Its subtransient flux saturates both axes."""
+gensae = partial(gensal, exponential=True)  # PSS/E's GENSAE
+
+
+def genrou(
+    m: ModelBuilder,
+    port: DevicePort,
+    S_n: Expr,
+    stator_flux: FluxDeclaration,
+    *,
+    exponential: bool = False,
+) -> Machine:
+    """Declare the machine of sixth order, one with a round rotor. Its subtransient flux saturates both axes.
+
+    ``exponential``: with the exponential curve."""
     common = declare_common(m, S_n)
     with m.scope("machine"):
         X_l, X_2, d = _d_axis(m, common)
@@ -222,7 +246,7 @@ def genrou(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclar
             "machine.X_d2, which is X''_q too, must not exceed machine.X_q1",
         )
         m.require(T_q10 - T_q20, "machine.T_q10 must exceed machine.T_q20")
-        saturation = _saturation(m, both_axes=True)
+        saturation = _saturation(m, both_axes=True, exponential=exponential)
     return declare_wound_machine(
         m,
         port,
@@ -232,6 +256,9 @@ def genrou(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclar
         stator_flux,
         saturation,
     )
+
+
+genroe = partial(genrou, exponential=True)  # PSS/E's GENROE
 
 
 def genrou_rated_speed(
@@ -281,7 +308,7 @@ def _require_order(m: ModelBuilder, d: AxisData, q: AxisData, lower: str) -> Non
     m.require(if_else(q.X1 <= q.X, 1, -1), f"machine.{lower} must not exceed machine.X_q")
 
 
-def _saturation(m: ModelBuilder, *, both_axes: bool) -> Saturation:
+def _saturation(m: ModelBuilder, *, both_axes: bool, exponential: bool) -> Saturation:
     s_10, s_12 = (
         m.parameter(
             name, 0.0, "1", f"Saturation S({x}) of the open-circuit curve; both 0: none", minimum=0
@@ -290,4 +317,10 @@ def _saturation(m: ModelBuilder, *, both_axes: bool) -> Saturation:
     )
     points = (1.0, s_10), (1.2, s_12)
     require_rising(m, *points, "machine.s_10, machine.s_12")
+    if exponential:
+        m.require(
+            if_else(logic_and(s_12 > 0, s_10 <= 0), -1, 1),
+            "machine.s_10 = 0: no power of the flux goes through 0 and machine.s_12; give 0 at both for none",
+        )
+        return Saturation(lambda x: exponential_part(x, s_10, s_12), both_axes)
     return Saturation(lambda x: saturated_part(x, *points), both_axes)

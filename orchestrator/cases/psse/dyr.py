@@ -185,6 +185,8 @@ def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
     found = dict.fromkeys(known.lacks, 0.0)
     for field in known.fields:
         value = given[field.name]
+        if field.nothing_without and given[field.nothing_without] == 0:
+            value = 0.0
         if field.only and value not in field.only:
             allowed = " or ".join(f"{x:g}" for x in field.only)
             raise InputError(

@@ -1,0 +1,171 @@
+"""A machine of DYR records beside an infinite bus, whose network changes at an instant: small enough for a test."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import fsolve
+
+from fmus.synchronous_generator.composed import synchronous_generator_phasor
+from orchestrator.cases.psse.dyr import machine_models
+from orchestrator.cases.psse.dyr_records import read_dyr
+from orchestrator.cases.psse.raw import Machine
+from tests.support.evaluated import Evaluated
+
+S_BASE = 100.0  # of networks here [MVA]
+STEP = 2e-3  # of the integration [s]
+
+
+@dataclass(frozen=True)
+class Network:
+    """Buses by number; impedances between them and powers that stay constant impedances [pu on 100 MVA].
+
+    ``lines``: (from, to, Z), of a transformer (from, to, Z, ratio, ratio); ``loads``: P + jQ at the bus' voltage of the
+    power flow; ``infinite``: its bus; ``machine``: the bus of the one machine."""
+
+    voltages: dict[int, complex]
+    lines: tuple[tuple[int, int, complex], ...]
+    infinite: int
+    machine: int
+    loads: dict[int, complex] = field(default_factory=dict)
+    behind: complex = 1e-5j  # what the infinite emf lies behind
+
+    def injected(self) -> complex:
+        """P + jQ of the machine in the power flow [pu]."""
+        Y, at = self._admittances(self.lines)
+        v = np.array([self.voltages[bus] for bus in at])
+        here = list(at).index(self.machine)
+        return complex(v[here] * np.conj(Y[here] @ v))
+
+    def seen(self, lines) -> tuple[complex, complex, dict[int, tuple[complex, complex]]]:
+        """Open-circuit voltage and impedance at the machine's bus; and every bus' voltage as a + b·i of the machine."""
+        Y, at = self._admittances(lines)
+        rows = list(at)
+        slack, here = rows.index(self.infinite), rows.index(self.machine)
+        v0 = np.array([self.voltages[bus] for bus in at])
+        emf = v0[slack] + self.behind * (self._admittances(self.lines)[0] @ v0)[slack]
+        Y[slack, slack] += 1 / self.behind
+        source = np.zeros(len(rows), complex)
+        source[slack] = emf / self.behind
+        unit = np.zeros(len(rows), complex)
+        unit[here] = 1.0
+        constant, slope = np.linalg.solve(Y, source), np.linalg.solve(Y, unit)
+        buses = {bus: (constant[k], slope[k]) for k, bus in enumerate(rows)}
+        return constant[here], slope[here], buses
+
+    def _admittances(self, lines):
+        at = {bus: k for k, bus in enumerate(self.voltages)}
+        Y = np.zeros((len(at), len(at)), complex)
+        for start, end, Z, *ratios in lines:
+            turns = np.zeros(len(at))
+            turns[at[start]], turns[at[end]] = 1 / (ratios or [1.0])[0], -1 / (ratios or [1.0])[-1]
+            Y += np.outer(turns, turns) / Z
+        for bus, load in self.loads.items():
+            Y[at[bus], at[bus]] += np.conj(load) / abs(self.voltages[bus]) ** 2
+        return Y, at
+
+
+def four_buses():
+    """The buses of PowerSimulationsDynamics.jl's TVC_System_32.raw, and what is left after the trip of a line 1-4."""
+    angles = {1: (1.08, 0.0), 2: (1.01, -14.7847), 3: (1.02393, -20.8224), 4: (1.02001, -17.5621)}
+    line = (1, 4, 0.0554j)
+    step_up, step_down = (2, 4, 0.016j, 1.0, 1.04), (4, 3, 0.004j, 0.99, 1.0)
+    voltages = {bus: v * np.exp(1j * np.radians(angle)) for bus, (v, angle) in angles.items()}
+    lines = (line, line, step_up, step_down)
+    load = 15.0 + 7.5j - 6j * abs(voltages[3]) ** 2
+    return Network(voltages, lines, infinite=1, machine=2, loads={3: load}, behind=0.01j), lines[1:]
+
+
+def three_buses(tripped=((101, 102),)):
+    """The three buses of PowerSimulationsDynamics.jl's ThreeBusMulti.raw, and the lines that stay after the trip."""
+    Z = 0.01 + 0.12j
+    lines = ((101, 102, Z), (101, 103, Z), (102, 103, Z))
+    voltages = _solved(lines)
+    network = Network(voltages, lines, infinite=101, machine=102, loads={103: 2.5 + 0.3j})
+    return network, tuple(line for line in lines if line[:2] not in tripped)
+
+
+def _solved(lines):
+    """Power flow: 1.05 at bus 101, 100 MW and 1.02 at bus 102, 250 MW and 30 Mvar at bus 103."""
+
+    def misfit(x):
+        v = {101: 1.05 + 0j, 102: 1.02 * np.exp(1j * x[0]), 103: x[1] * np.exp(1j * x[2])}
+        flow = dict.fromkeys(v, 0j)
+        for start, end, Z in lines:
+            current = (v[start] - v[end]) / Z
+            flow[start] += v[start] * np.conj(current)
+            flow[end] -= v[end] * np.conj(current)
+        return [flow[102].real - 1.0, flow[103].real + 2.5, flow[103].imag + 0.3]
+
+    x = fsolve(misfit, [0.0, 1.0, -0.1], xtol=1e-13)
+    return {101: 1.05 + 0j, 102: 1.02 * np.exp(1j * x[0]), 103: x[1] * np.exp(1j * x[2])}
+
+
+class OneMachine:
+    """A generator of DYR records at a network."""
+
+    def __init__(self, dyr, folder, network, *, rating=S_BASE, source=0.0, f_n=60.0, torque=False):
+        place = folder / "one.dyr"
+        place.write_text(dyr, encoding="utf-8")
+        power = network.injected()
+        v = network.voltages[network.machine]
+        machine = Machine(
+            network.machine, "1", 1, power.real * S_BASE, abs(v), rating, source, -9e3, 9e3
+        )
+        model = machine_models(read_dyr(place), [machine])[network.machine, "1"]
+        parts = {
+            "exciter": "manual",
+            "governor": "constant_power",
+            "stabilizer": "none",
+            **model.parts,
+        }
+        self.network = network
+        self.device = Evaluated(
+            synchronous_generator_phasor(**parts),
+            {
+                "S_n": rating,
+                "S_base": S_BASE,
+                "f_n": f_n,
+                "v_0": abs(v),
+                "theta_0": float(np.angle(v)),
+                "P_0": power.real * S_BASE / rating,
+                "Q_0": power.imag * S_BASE / rating,
+                "machine.speed_in_emf": 0,
+                "governor.output_is_torque": torque,
+                **model.parameters,
+            },
+        )
+
+    def run(self, lines, until, event=1.0, every=0.02):
+        """Outputs and voltages at every so many seconds; the network is ``lines`` alone after the event [s]."""
+        model, p, c = self.device.model, self.device.p, self.device.c
+        names = [v.name for v in model.outputs]
+        i_at, y_at = (
+            [names.index(n) for n in pair] for pair in (("i_re", "i_im"), ("y_re", "y_im"))
+        )
+        before, after = self.network.seen(self.network.lines), self.network.seen(lines)
+        x = np.array(self.device.x, dtype=float)
+        rows = []
+
+        def voltage(x, seen):
+            still = np.array(model.outputs_function(x, [0.0, 0.0], p, c)).ravel()
+            current, y = complex(*still[i_at]), complex(*still[y_at])
+            v = (seen[0] + seen[1] * current) / (1 + seen[1] * y)
+            return v, current - y * v
+
+        def rate(x, seen):
+            v, _ = voltage(x, seen)
+            return np.array(model.derivatives(x, [v.real, v.imag], p, c)[0], dtype=float).ravel()
+
+        for k in range(round(until / STEP) + 1):
+            seen = before if k < round(event / STEP) else after
+            if k % round(every / STEP) == 0:
+                v, current = voltage(x, seen)
+                out = np.array(model.outputs_function(x, [v.real, v.imag], p, c)).ravel()
+                buses = {bus: a + b * current for bus, (a, b) in seen[2].items()}
+                rows.append((k * STEP, dict(zip(names, out, strict=True)), buses))
+            k1 = rate(x, seen)
+            k2 = rate(x + STEP / 2 * k1, seen)
+            k3 = rate(x + STEP / 2 * k2, seen)
+            k4 = rate(x + STEP * k3, seen)
+            x = x + STEP / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        return rows
