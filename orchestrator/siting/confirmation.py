@@ -61,6 +61,11 @@ class Confirmation:
         return not self.failure and self.error <= AGREES
 
     @property
+    def damping_alone(self) -> float:
+        """Of the mode with the device, without its POD [%]."""
+        return damping_percent(self.with_device)
+
+    @property
     def damping(self) -> float:
         """Of the mode with the device, tuned where it has a POD [%]."""
         return damping_percent(self.tuned if self.tuned is not None else self.with_device)

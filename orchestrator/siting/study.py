@@ -1,7 +1,6 @@
 """Where a device helps: its effect at every bus, intact and after outages, and the best places confirmed."""
 
 import cmath
-import fnmatch
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
@@ -24,15 +23,15 @@ from orchestrator.asked import (
 )
 from orchestrator.asked import positive as above_zero
 from orchestrator.cases.case import Case
-from orchestrator.cases.names import close_names
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ComponentTable
-from orchestrator.errors import CosimError, InputError, few
+from orchestrator.errors import CosimError, InputError
 from orchestrator.operating_points.item import Item
 from orchestrator.operating_points.outages import INTACT, read_outages
 from orchestrator.operating_points.preparation import ItemPreparation, failure
 from orchestrator.points.request import OfCase, of_frequencies, of_scenario, of_values
 from orchestrator.siting import placing
+from orchestrator.siting.candidates import candidates, question_about, unit_terminals
 from orchestrator.siting.confirmation import Confirmation, confirmed
 from orchestrator.siting.residues import SeenMode, Situation, situation_of
 from orchestrator.study.modes import running
@@ -86,7 +85,9 @@ class SiteRequest(OfCase):
         OUTAGES, None, "rank for these as well: n-1, lines, units, or names (repeatable)"
     )
     buses: Sequence[str] = asked(
-        NAMES, (), "only these may be the place, such as 9, bus_9 or 'bus_1*' (repeatable)"
+        NAMES,
+        (),
+        "only these may be the place, such as 9, bus_9 or 'bus_1*' (default: all but units' terminals)",
     )
     confirm: int = asked(
         RANKED,
@@ -143,7 +144,7 @@ Shift = Callable[[Situation, str, SeenMode], complex]
 @dataclass(frozen=True)
 class SiteResult:
     """Shifts of `DEVICE`, of 1 MW/Hz (`ACTIVE`) and of 1 Mvar/Hz (`REACTIVE`), by name of the situation, label of the
-    mode, and bus; all buses, best first; and the outages without modes, with the reason."""
+    mode, and bus; the buses that may be the place, best first; and the outages without modes, with the reason."""
 
     case: Case
     request: SiteRequest
@@ -152,6 +153,7 @@ class SiteResult:
     ranking: tuple[str, ...]
     not_judged: Mapping[str, str]
     confirmations: tuple[Confirmation, ...] = ()
+    terminals: tuple[str, ...] = ()  # buses of units that were left out, as nobody asked for them
 
     @property
     def intact(self) -> Situation:
@@ -159,7 +161,19 @@ class SiteResult:
 
     @property
     def prepared(self) -> PreparedScenario:
-        return self.intact.found.prepared
+        """The scenario without the device, with what is to be asked about the device beside its own questions."""
+        prepared = self.intact.found.prepared
+        question = question_about(self.request.rating, prepared)
+        asked = prepared.questions if question is None else (question, *prepared.questions)
+        return replace(prepared, questions=asked)
+
+    @property
+    def by_coupled(self) -> bool:
+        """Whether the places that are confirmed come first, by the damping that coupled FMUs give: without outages,
+        for which nothing is confirmed, and of at least two places."""
+        return (
+            len(self.situations) == 1 and len([x for x in self.confirmations if not x.failure]) > 1
+        )
 
     @property
     def worst_first(self) -> list[Situation]:
@@ -195,7 +209,7 @@ def find_sites(
     scenario = request.scenario or next(iter(case.scenarios))
     open_case = replace(case, injections=True)
     preparation = ItemPreparation(open_case, scenario, request.layers, request.step_size)
-    buses = _candidates(request.buses, preparation.base)
+    buses = candidates(request.buses, preparation.base)
     outages = read_outages(cast("str | None", request.outages), preparation.elements)
     total = len(outages) + request.confirm
     situations, not_judged = [], dict[str, str]()
@@ -220,23 +234,16 @@ def find_sites(
             f"scenario {scenario!r} has no oscillation from {low:g} to {high:g} Hz; give another --range"
         )
     result = _shifted(case, request, situations, not_judged, scenario)
-    result = replace(result, ranking=tuple(bus for bus in result.ranking if bus in buses))
+    result = replace(
+        result,
+        ranking=tuple(bus for bus in result.ranking if bus in buses),
+        terminals=() if request.buses else tuple(unit_terminals(preparation.base)),
+    )
     if not result.ranking:
         raise InputError(
             f"--buses: {', '.join(request.buses)}: an outage cuts them off; give others"
         )
     return _with_confirmations(result, scenario, lambda done: report(len(outages) + done, total))
-
-
-def _candidates(wanted: Sequence[str], prepared: PreparedScenario) -> list[str]:
-    known = list(prepared.network.buses) if prepared.network is not None else []
-    found = {
-        name: fnmatch.filter(known, name) or fnmatch.filter(known, f"bus_{name}") for name in wanted
-    }
-    if unknown := [name for name, there in found.items() if not there]:
-        hint = close_names(unknown[0], known, f"the buses are {few(known, 8)}")
-        raise InputError(f"--buses {unknown[0]}: there is no such bus; {hint}")
-    return [bus for there in found.values() for bus in there] or known
 
 
 def _shifted(
@@ -339,4 +346,17 @@ def _with_confirmations(
             confirmed(prepared, bus, seen, request.frequencies, request.controller, request.gain)
         )
         report(k + 1)
-    return replace(result, confirmations=tuple(found))
+    result = replace(result, confirmations=tuple(found))
+    return _by_coupled(result) if result.by_coupled else result
+
+
+def _by_coupled(result: SiteResult) -> SiteResult:
+    """The confirmed places first, by the damping with the device there as it is shown; behind them those that break
+    the system, and those without a figure."""
+    ordered = sorted(
+        result.confirmations,
+        key=lambda one: (bool(one.failure), one in result.breaking, -round(one.damping, 2)),
+    )
+    first = [one.bus for one in ordered]
+    rest = [bus for bus in result.ranking if bus not in first]
+    return replace(result, confirmations=tuple(ordered), ranking=(*first, *rest))

@@ -116,14 +116,33 @@ def answer(result: SiteResult) -> str:
     most, at = result.least(best[0])
     mode = next(one for one in result.situations if one.name == at).modes[0]
     after = f" after the outage {at}" if at != result.intact.name else ""
-    if most < (0 if result.request.is_foreign else _NONE):
+    if max(result.least(bus)[0] for bus in result.ranking) < (
+        0 if result.request.is_foreign else _NONE
+    ):
         return f"no bus is a place for {device_title(result)}: it does not help the mode {_called(mode)}{after}"
     among = " of those asked for" if result.request.buses else ""
+    if result.by_coupled:
+        return _best_confirmed(result, among)
     others = ", ".join(f"{bus} {100 * result.least(bus)[0] / most:.0f} %" for bus in best[1:])
     return (
         f"{best[0]} is the best place for {device_title(result)}{among}: {shown(result, most)} "
         f"{unit(result, '100')}, for the least damped mode{after} ({_called(mode)})"
         + (f"; of that {others}" if others else "")
+    )
+
+
+def _best_confirmed(result: SiteResult, among: str) -> str:
+    """The best of the places that coupled FMUs confirm, by the damping of the least damped mode there."""
+    first, *others = [one for one in result.confirmations if not one.failure]
+    mode = _called(result.intact.modes[0])
+    pod = "" if result.request.controller is None else " and its POD"
+    then = ", ".join(f"{one.bus} {one.damping:.2f} %" for one in others)
+    by_support = sorted(result.ranking, key=lambda bus: -result.least(bus)[0])
+    small = ", ".join(f"{bus} {shown(result, result.least(bus)[0])}" for bus in by_support[:3])
+    order = f"the order of the {len(result.confirmations)} places that coupled FMUs computed"
+    return (
+        f"{first.bus} is the best place for {device_title(result)}{among}: {first.damping:.2f} % for the least damped "
+        f"mode ({mode}) with {_rated(result)}{pod}; then {then}: {order}. By {unit(result, '100')} it is {small}"
     )
 
 
@@ -148,9 +167,7 @@ def _confirmed(result: SiteResult, one: Confirmation, before: float) -> str:
     if one.failure:
         return f"{one.bus}: NOT CONFIRMED: {one.failure}"
     word = "confirmed" if one.agrees else "NOT CONFIRMED"
-    given = result.request.rating or (None if result.request.is_foreign else OURS_MVA)
-    rating = " of its own rating" if given is None else f" of {given:g} MVA"
-    steps = f"{before:.2f} % → {damping_percent(one.with_device):.2f} % with the device{rating}"
+    steps = f"{before:.2f} % → {one.damping_alone:.2f} % with {_rated(result)}"
     if one.setting is not None:
         steps += f" → {one.damping:.2f} % with its POD (K {one.setting.gain:g})"
     if one in result.breaking:
@@ -159,6 +176,11 @@ def _confirmed(result: SiteResult, one: Confirmation, before: float) -> str:
         f"{one.bus}: {word} by coupled FMUs: {steps}; least damped then {one.least or 0.0:.2f} %; predicted and "
         f"coupled shift differ by {100 * one.error:.2g} %"
     )
+
+
+def _rated(result: SiteResult) -> str:
+    given = result.request.rating or (None if result.request.is_foreign else OURS_MVA)
+    return f"the device of {'its own rating' if given is None else f'{given:g} MVA'}"
 
 
 def remarks(result: SiteResult) -> list[str]:
@@ -184,6 +206,9 @@ def remarks(result: SiteResult) -> list[str]:
             f"not judged: {value.imag / math.tau:.3f} Hz, {damping_percent(value):.2f} %, outside of --range"
         )
     said += [f"not judged: outage {name}: {why}" for name, why in result.not_judged.items()]
+    if result.terminals:
+        there = few(result.terminals, _NAMED)
+        said.append(f"left out: the terminals of units, {there}; --buses 'bus_*' takes all buses")
     return said
 
 
@@ -202,6 +227,10 @@ def as_json(result: SiteResult) -> dict[str, Any]:
         "sure": sureness(result),
         "remarks": remarks(result),
         "agrees": result.agrees,
+        "ranked_by": "damping with the device, by coupled FMUs"
+        if result.by_coupled
+        else unit(result),
+        "terminals_left_out": list(result.terminals),
         "stable": False if False in stable else None if None in stable else True,
         "warnings": list(result.intact.found.warnings),
         "code": code_hash(),
@@ -281,6 +310,7 @@ def _confirmation(one: Confirmation) -> dict[str, Any]:
         "predicted": {"real": one.predicted.real, "imag": one.predicted.imag},
         "coupled": {"real": one.coupled.real, "imag": one.coupled.imag},
         "with_device": device,
+        "damping_percent_of_device_alone": one.damping_alone,
         "damping_percent": one.damping,
         "least_damping_percent": one.least,
         "stable": one.stable,
@@ -300,8 +330,31 @@ def rows(result: SiteResult) -> list[dict[str, Any]]:
 
 def ranking_table(result: SiteResult) -> Table:
     modes = [f"{seen.label}, {seen.mode.damping_percent:.2f} %" for seen in result.intact.modes]
-    rows = [[bus, *_cells(result, bus)] for bus in result.ranking[:_SHOWN]]
-    return make_table(f"{unit(result, '100')}; best first", "Bus", *modes, rows=rows)
+    rows = [
+        [bus, *_cells(result, bus), *_confirmed_cells(result, bus)]
+        for bus in result.ranking[:_SHOWN]
+    ]
+    columns = ("Bus", *modes, *_confirmed_headings(result))
+    return make_table(f"{unit(result, '100')}; best first", *columns, rows=rows)
+
+
+def _confirmed_headings(result: SiteResult) -> list[str]:
+    """Of the damping by coupled FMUs; none where nothing is confirmed."""
+    if not result.confirmations:
+        return []
+    label = result.intact.modes[0].label
+    pod = [] if result.request.controller is None else ["with its POD [%]"]
+    return [f"{label} with the device alone [%]", *pod, "least damped then [%]"]
+
+
+def _confirmed_cells(result: SiteResult, bus: str) -> list[str]:
+    headings = _confirmed_headings(result)
+    one = next((x for x in result.confirmations if x.bus == bus and not x.failure), None)
+    if one is None:
+        return ["–" for _ in headings]
+    pod = [] if result.request.controller is None else [f"{one.damping:.2f}"]
+    least = "–" if one.least is None else f"{one.least:.2f}"
+    return [f"{one.damping_alone:.2f}", *pod, least]
 
 
 def _cells(result: SiteResult, bus: str) -> list[str]:
@@ -321,8 +374,12 @@ def _page(result: SiteResult) -> str:
     findings = f'<div class="findings"><p class="{shade}">{escape(answer(result))}</p><ul>{lines}</ul></div>'
     content = [("Map", "".join(_map(result, seen, figures) for seen in result.intact.modes[:3]))]
     modes = [f"{seen.label}, {seen.mode.damping_percent:.2f} %" for seen in result.intact.modes]
-    cells = [[escape(bus), *_cells(result, bus)] for bus in result.ranking]
-    content.append(("All buses", table(unit(result, "100"), ["Bus", *modes], cells)))
+    cells = [
+        [escape(bus), *_cells(result, bus), *_confirmed_cells(result, bus)]
+        for bus in result.ranking
+    ]
+    headings = ["Bus", *modes, *_confirmed_headings(result)]
+    content.append(("All buses", table(unit(result, "100"), headings, cells)))
     if outages := [at for at in result.worst_first if at.name != result.intact.name]:
         best = []
         for at in outages:
