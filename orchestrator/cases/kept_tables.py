@@ -41,7 +41,8 @@ class SourceTables:
 LIBRARIES = ("pandapower", "numpy", "scipy", "pandas", "lightsim2grid")
 """What the tables depend on beside our code; pandapower takes the last where it is installed."""
 
-_FILES = [Path(__file__).with_name(name) for name in ("kept_tables.py", "network_sources.py")]
+_NAMES = ("kept_tables.py", "network_sources.py", "pandapower_json.py")
+_FILES = [Path(__file__).with_name(name) for name in _NAMES]
 _CODE = "".join(file.read_text(encoding="utf-8") for file in _FILES)
 """What is loaded, if it is the same when tables are kept."""
 

@@ -17,6 +17,7 @@ from fmus.toolchain.extras import require
 from orchestrator.cases.csv_rows import seen_from_here
 from orchestrator.cases.kept_tables import SourceTables, kept_tables, tables_beside
 from orchestrator.cases.names import close_names
+from orchestrator.cases.pandapower_json import network_text
 from orchestrator.errors import InputError
 
 __all__ = ["SourceTables", "read_matpower", "read_pandapower"]
@@ -155,9 +156,11 @@ def _pandapower_file(pp: Any, path: Path) -> Any:
             f"{path}: there is no such file; save a network with pandapower.to_json(net, {path.name!r})"
         )
     try:
-        net = pp.from_json(str(path))
+        net = pp.from_json_string(network_text(path, path.read_bytes()), convert=True)
         if not hasattr(net, "bus"):
             raise ValueError("it holds no network")
+    except InputError:
+        raise
     except Exception as error:  # whatever the decoder raises
         raise InputError(
             f"{path}: it is no network saved with pandapower.to_json: {error}"
