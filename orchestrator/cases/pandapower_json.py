@@ -12,7 +12,16 @@ from typing import Any
 
 from orchestrator.errors import InputError
 
-_NUMPY = ("array", "bool", "bool_", "complex64", "complex128", "float16", "float32", "float64")
+_NUMPY: tuple[str, ...] = (
+    "array",
+    "bool",
+    "bool_",
+    "complex64",
+    "complex128",
+    "float16",
+    "float32",
+    "float64",
+)
 _NUMPY += tuple(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))
 _INDICES = {"base": "Index", "range": "RangeIndex", "multi": "MultiIndex"}
 _CURVES = ("Characteristic", "SplineCharacteristic", "LogSplineCharacteristic")
@@ -41,7 +50,7 @@ UNUSED = ("controller", "protection", "bus_geodata", "line_geodata")
 """Tables that no power flow reads; they are left out if they hold objects of other classes."""
 
 
-class _ForeignClass(ValueError):
+class _ForeignClassError(ValueError):
     pass
 
 
@@ -51,7 +60,7 @@ def network_text(path: Path, content: bytes) -> str:
     Raises an `InputError` if the file is no JSON, or names a class that is none of a network's values."""
     try:
         return json.dumps(_plain(json.loads(content)))
-    except _ForeignClass as error:
+    except _ForeignClassError as error:
         raise InputError(
             f"{path}: it names {error}, which pandapower would import and call; gfor reads the tables of a network and "
             "runs no code of a file: remove that object, and save the network again"
@@ -80,7 +89,7 @@ def _plain_object(value: Mapping[str, Any]) -> dict[str, Any]:
     module, name = value.get("_module"), value.get("_class")
     named = (module, name)
     if not (isinstance(module, str) and isinstance(name, str)) or named not in _CLASSES:
-        raise _ForeignClass(f"the class {name!r} of the module {module!r}")
+        raise _ForeignClassError(f"the class {name!r} of the module {module!r}")
     inner = value.get("_object")
     if named == _NETWORK and isinstance(inner, dict):
         inner = _without_unused(inner)
@@ -88,8 +97,10 @@ def _plain_object(value: Mapping[str, Any]) -> dict[str, Any]:
         raise ValueError(f"a table has the key {more[0]!r}")
     plain = {key: _plain(one) for key, one in value.items() if key != "_object"}
     if "_object" in value:
-        inside = isinstance(inner, str) and (named == _NETWORK or named in _TABLES | _OBJECTS)
-        plain["_object"] = json.dumps(_plain(json.loads(inner))) if inside else _plain(inner)
+        if isinstance(inner, str) and (named == _NETWORK or named in _TABLES | _OBJECTS):
+            plain["_object"] = json.dumps(_plain(json.loads(inner)))
+        else:
+            plain["_object"] = _plain(inner)
     return plain
 
 
@@ -98,6 +109,6 @@ def _without_unused(tables: dict[str, Any]) -> dict[str, Any]:
     for name in UNUSED:
         try:
             _plain(kept.get(name))
-        except _ForeignClass:
+        except _ForeignClassError:
             del kept[name]
     return kept
