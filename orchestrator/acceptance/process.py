@@ -28,6 +28,8 @@ from orchestrator.fmi.refusal import FATAL, refusal
 from orchestrator.fmi.remote_calls import Form, RemoteCalls
 
 _STAGES = {SET: "fmi2SetReal", STEP: "fmi2DoStep", GET: "fmi2GetReal"}
+_GRACE = 1.0  # time [s] in which what an instance started may end after it
+_SHOWN = 3  # processes that an error names
 _LOOK = 0.05  # time [s] after which it is looked whether the process is still there
 
 
@@ -52,7 +54,7 @@ class FmuProcess:
         self.protections: tuple[Protection, ...] = ()
         self._ended: ProcessEndedError | None = None
         self._interrupted: BaseException | None = None
-        self._number, self._patience = 0, TO_BEGIN
+        self._number, self._patience, self._instances = 0, TO_BEGIN, 0
         self._library = unlocked_library()
         fmu = description.path.resolve()
         port = asdict(description.port) if isinstance(description, BoundDescription) else None
@@ -222,6 +224,26 @@ class FmuProcess:
         self._ended = ProcessEndedError(fault, how)
         return self._ended
 
+    def opened(self, name: str) -> int:
+        """The number of a new instance."""
+        number = self.number("fmi2Instantiate", -1, "open", name)
+        self._instances += 1
+        return number
+
+    def freed(self) -> None:
+        """Look what instances leave behind, once none is open; what still runs then is the FMU's fault.
+
+        Under Wine it is not looked: Windows's own programs stay."""
+        self._instances -= 1
+        if self._instances or not self.alive or runs_under_wine(self.description):
+            return
+        if left := self._process.left_behind(_GRACE):
+            more = f" and {len(left) - _SHOWN} more" if len(left) > _SHOWN else ""
+            raise self._end(
+                ProcessFault.LEFT,
+                f"after its last instance was freed, {', '.join(left[:_SHOWN])}{more} went on",
+            )
+
     def close(self) -> None:
         self._process.close()
         self._ended = self._ended or ProcessEndedError(ProcessFault.EXIT, "its process was closed")
@@ -234,7 +256,7 @@ class HostedComponent(RemoteCalls):
         self.name, self.description, self._process = name, process.description, process
         self._open, self._lost = False, False
         self._box = process.box
-        self.pointer = self.number = process.number("fmi2Instantiate", -1, "open", name)
+        self.pointer = self.number = process.opened(name)
         self._open = True
         functions: Any = (self._set_real, self._get_real, self._do_step)
         self.set_real, self.get_real, self.do_step = functions
@@ -306,6 +328,8 @@ class HostedComponent(RemoteCalls):
         if self._open and self._process.alive:
             self._open = False
             self._remote("fmi2FreeInstance", "close", self._lost)
+            if not self._lost:
+                self._process.freed()
 
 
 _NONE = np.empty(0, np.uint32)

@@ -31,6 +31,7 @@ from orchestrator.errors import (
     UnsupportedFmuError,
 )
 from orchestrator.fmi.archive import extract, listed_twice
+from orchestrator.fmi.confined import ProcessFault
 from orchestrator.fmi.description import FmuDescription, read_description
 from orchestrator.fmi.instance import compile_adapters
 from orchestrator.fmi.limits import Limits, crowded
@@ -266,7 +267,9 @@ class _Runner:
                 )
             results.append(self._with_whom(result))
             self._asked.append(name)
-            if name == "runs" and (because := self._too_bad(result)):
+            if (because := self._harmful(result)) or (
+                name == "runs" and (because := self._too_bad(result))
+            ):
                 results += [base.not_applicable(later, because) for later in names[place + 1 :]]
                 return
 
@@ -282,6 +285,12 @@ class _Runner:
             return result
         says = f"not so in a new process: what came before it, {', '.join(before[-_LAST:])}, damaged the FMU's memory"
         return replace(result, evidence=f"{result.evidence}; {says}")
+
+    def _harmful(self, result: base.CheckResult) -> str:
+        """Why nothing else is asked of an FMU that would fill the machine with its processes."""
+        if result.fault != ProcessFault.LEFT:
+            return ""
+        return f"because it left a process behind in {result.check!r}, and would again"
 
     def _too_bad(self, result: base.CheckResult) -> str:
         """Why nothing else is asked of an FMU that ran so; "" where there is more to learn."""

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from enum import StrEnum
@@ -18,7 +19,7 @@ from orchestrator.fmi.confinement import LAYERS
 from orchestrator.fmi.limits import TOO_MANY_TASKS, TOO_MUCH_DISK, TOO_MUCH_MEMORY, Limits
 from orchestrator.fmi.mailbox import Mailbox, mailbox_library, shared_memory
 from orchestrator.fmi.messages import FLOODED
-from orchestrator.fmi.process_tree import MOST_FILES
+from orchestrator.fmi.process_tree import MOST_FILES, running, started_by_fmu
 from orchestrator.fmi.protection import Protection
 
 # on Windows, a process that dies of a fault ends with its status, at least this
@@ -34,6 +35,7 @@ class ProcessFault(StrEnum):
     CPU = "processor time"
     MEMORY = "memory"
     TASKS = "too many processes"
+    LEFT = "process left behind"
     DISK = "disk"
 
 
@@ -134,6 +136,7 @@ def environment(of: Mapping[str, str] | None = None) -> dict[str, str]:
 
 # time in which a supervisor ends all that it watches over [s]; then it is ended itself
 _PATIENCE = 5.0
+_LOOK = 0.01  # time [s] after which it is looked whether a process has ended
 
 
 class ConfinedProcess:
@@ -197,6 +200,13 @@ class ConfinedProcess:
     @property
     def group(self) -> int:
         return self._process.pid
+
+    def left_behind(self, seconds: float) -> list[str]:
+        """Programs that still run beside keeper and worker after some time, each with its process's number."""
+        end = time.monotonic() + seconds
+        while (left := running(started_by_fmu(self.group))) and time.monotonic() < end:
+            time.sleep(_LOOK)
+        return left
 
     def wait(self, seconds: float) -> bool:
         """Give it some time to end; whether it did."""

@@ -12,6 +12,8 @@ from pathlib import Path
 from orchestrator.fmi.protection import CPU, DISK, MEMORY, TASKS
 
 _OUR_TASKS = 3  # processes of ours around an FMU that count as its own
+# timers and queued signals, which the kernel counts for the whole user
+_TIMERS = 1024
 # wall-clock time for a process to begin [s], before the FMU: a busy machine is not its fault
 TO_BEGIN = 60.0
 # with less [MB] the worker itself cannot load an FMU and answer; another unit was meant
@@ -59,6 +61,8 @@ def apply_limits(limits: Limits, folder: Path, *, own_users: bool) -> list[str]:
     lacking = []
     if own_users:
         _lower(resource.RLIMIT_NPROC, limits.tasks + _OUR_TASKS)
+        if sys.platform == "linux":
+            _lower(resource.RLIMIT_SIGPENDING, _TIMERS)
     if not _lower(resource.RLIMIT_CPU, int(limits.cpu)):
         lacking.append(CPU)
     if not _lower(resource.RLIMIT_FSIZE, limits.output):

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 _PROC = Path("/proc")
+_ENDED = ("Z", "X")  # states of a process that only waits for its parent's question
 MOST_FILES = 20_000  # files and folders below a folder beyond which it counts as too large
 
 
@@ -33,6 +34,11 @@ def descendants(process: int) -> list[int]:
     return found
 
 
+def started_by_fmu(supervisor: int) -> list[int]:
+    """Numbers of the processes that an FMU started: those after keeper and worker, which come first."""
+    return descendants(supervisor)[2:]
+
+
 def _children(process: int) -> list[int]:
     children: list[int] = []
     with contextlib.suppress(OSError):
@@ -40,6 +46,18 @@ def _children(process: int) -> list[int]:
             listed = (_PROC / str(process) / "task" / task / "children").read_text(encoding="ascii")
             children += map(int, listed.split())
     return children
+
+
+def running(processes: list[int]) -> list[str]:
+    """Those of some processes that have not ended: the name of the program, and the number in brackets."""
+    found = []
+    for process in processes:
+        with contextlib.suppress(OSError):
+            text = (_PROC / str(process) / "stat").read_text(encoding="utf-8", errors="replace")
+            begin, _, rest = text.rpartition(")")
+            if rest.split()[0] not in _ENDED:
+                found.append(f"{begin.partition('(')[2]} ({process})")
+    return found
 
 
 def usage(processes: list[int], enough: int) -> Usage:

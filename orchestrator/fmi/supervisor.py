@@ -29,6 +29,7 @@ from orchestrator.fmi.process_tree import (
     end_descendants,
     size_of,
     size_of_removed,
+    started_by_fmu,
     usage,
 )
 
@@ -154,9 +155,21 @@ def _supervise(request: dict[str, Any], told: int, work: Path, means: Means) -> 
             if not _LINUX:
                 os.killpg(os.getpgrp(), signal.SIGKILL)
             _end_as(-signal.SIGKILL)
+        if _LINUX and not request["windows"]:
+            _make_idle(started_by_fmu(me))
         if excess := _excess(limits, me, work):
             end_descendants(me)
             _exit(excess)
+
+
+def _make_idle(processes: Iterable[int]) -> None:
+    """Let processes that an FMU started run only while nobody else wants to; what they start inherits it.
+
+    The worker keeps its priority: gfor waits for each of its answers, and no longer than its limit."""
+    for process in processes:
+        with contextlib.suppress(OSError):
+            if os.sched_getscheduler(process) != os.SCHED_IDLE:
+                os.sched_setscheduler(process, os.SCHED_IDLE, os.sched_param(0))
 
 
 def _excess(limits: Limits, process: int, work: Path) -> int:

@@ -26,7 +26,7 @@ from orchestrator.fmi.confinement import LAYERS, Means, protections
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.isolation import IsolatedComponent
 from orchestrator.fmi.limits import Limits
-from orchestrator.fmi.process_tree import descendants
+from orchestrator.fmi.process_tree import descendants, started_by_fmu
 from orchestrator.fmi.protection import (
     ATTRIBUTES,
     NAMES,
@@ -272,6 +272,23 @@ def test_what_it_started_ends_with_it(layers, fmu):
         assert all_end(seen)
 
 
+def test_what_it_starts_runs_only_while_nobody_else_wants_to(layers, act, fmu):
+    done, _, component = act(fmu("LEFT_CHILD"))
+    assert done == 1
+    (child,) = started_by_fmu(supervisor(component))
+    end = time.monotonic() + 60.0
+    while os.sched_getscheduler(child) != os.SCHED_IDLE and time.monotonic() < end:
+        time.sleep(0.02)
+    assert os.sched_getscheduler(child) == os.SCHED_IDLE
+    worker = descendants(supervisor(component))[1]
+    assert os.sched_getscheduler(worker) == os.sched_getscheduler(0)  # gfor waits for it
+
+
+def test_it_takes_nothing_that_is_counted_for_all(layers, act, fmu):
+    """64,512 contexts of `io_setup` were all of a machine's; inotify told names in folders that it must not list."""
+    assert act(fmu("OTHERS_RESOURCES"), needs=[NETWORK])[0] == 0
+
+
 # -- how much ------------------------------------------------------------------------------------------
 
 
@@ -491,6 +508,7 @@ def test_nothing_outlives_gfor_that_is_killed_while_an_fmu_hangs(layers, fmu):
         ("ONE_DAEMON", 1, "hang"),
         ("ANSWER", '"[1, 2]"', "tampering"),
         ("TRUNCATE", 1, None),
+        ("LEFT_CHILD", 1, "process left behind"),
     ],
 )
 def test_gfor_check_says_what_happened_and_goes_on(action, value, fault, layers, fmu):
