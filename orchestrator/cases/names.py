@@ -19,6 +19,9 @@ STATES |= dict.fromkeys(("0", "0.0", "false", "no", "off", "out", "open"), False
 """What others call the switch of an element."""
 
 _RESERVED = re.compile(r"(?:con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
+_RESULTS = re.compile(r".*\.(?:csv|html?|json|nc|pdf|png|svg|toml)", re.IGNORECASE | re.DOTALL)
+"""Files that lie in a folder of results, beside one folder for each scenario."""
+
 _FORBIDDEN = re.compile(r'[\x00-\x1f\x7f/\\:*?"<>|]')
 
 
@@ -41,6 +44,10 @@ def file_name(name: str) -> str:
         raise ValueError(f"the name {name!r} holds half a character; {rule}")
     if _RESERVED.fullmatch(name):
         raise ValueError(f"the name {name!r} is that of a device on Windows; choose another")
+    if _RESULTS.fullmatch(name):
+        raise ValueError(
+            f"the name {name!r} is like those of files among the results, as manifest.json; choose another"
+        )
     if ".part-" in name or ".old-" in name:
         raise ValueError(f"the name {name!r} is like those of unfinished results; choose another")
     return name

@@ -2,8 +2,10 @@
 
 import argparse
 import webbrowser
+from pathlib import Path
 from warnings import catch_warnings, simplefilter
 
+from fmus.toolchain.temporary import own_folder, remove
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.scenario import UnusualDataWarning
@@ -16,6 +18,7 @@ from orchestrator.explore.opened import opened
 from orchestrator.explore.saved import save_page
 from orchestrator.explore.server import Explorer
 from orchestrator.explore.worker import Desk
+from orchestrator.safe_files import write_text
 from orchestrator.study.comparison import open_trajectory
 from orchestrator.sweep.axes import parse_vary
 
@@ -63,7 +66,21 @@ def run(options: argparse.Namespace) -> int:
         f"{explorer.address}  (ends by Ctrl-C, or a minute after its last page was closed)",
         flush=True,
     )
-    if not options.no_browser:
-        webbrowser.open(explorer.address)
-    explorer.serve()
+    if options.no_browser:
+        explorer.serve()
+        return 0
+    folder = own_folder("explore")
+    try:
+        webbrowser.open(way_to(explorer.address, folder).as_uri())
+        explorer.serve()
+    finally:
+        remove(folder)
     return 0
+
+
+def way_to(address: str, folder: Path) -> Path:
+    """A page that leads to an address: others of this machine read a browser's command line, and not this file."""
+    page = folder / "explore.html"
+    silent = '<meta name="referrer" content="no-referrer">'
+    write_text(page, f'{silent}<meta http-equiv="refresh" content="0; url={address}">')
+    return page

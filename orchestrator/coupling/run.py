@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.coupling.events import Event, NotANumber, Silence, WireFault, WireRecovery
+from orchestrator.coupling.kept_form import check_form, of_this_run
 from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.run_state import (
     Keeper,
@@ -60,6 +61,7 @@ class Run:
         kept = keeper.latest()
         first, start, before = stepper.index, perf_counter(), np.array(stepper.seconds())
         if kept is not None:
+            check_form(stepper, kept, stop)
             start, before = start - kept.seconds, before - kept.spent
 
         def state(components: Mapping[str, bytes] | None = None) -> RunState:
@@ -95,12 +97,14 @@ class Run:
         if kept is not None:
             resume_observers(self._observers, kept)
         for observer in self._observers:
-            observer.begin(self._stepper, stop)
+            with of_this_run(kept):
+                observer.begin(self._stepper, stop)
             begun.append(observer)
             if kept is None:
                 observer.observe(self._stepper)
         if kept is not None:
-            take_up(self._stepper, kept)
+            with of_this_run(kept):
+                take_up(self._stepper, kept)
             self._applied = kept.index if kept.applied else -1
         self._require_finite(self._stepper.components)
 

@@ -77,7 +77,7 @@ class RunState:
                 if name.startswith(head)
             }
 
-        index, applied, handed_over = arrays["place"].tolist()
+        index, applied, handed_over = map(int, arrays["place"].tolist())
         seconds, *spent = arrays["seconds"].tolist()
         return cls(
             index=index,

@@ -132,7 +132,7 @@ def _handler(explorer: Explorer) -> type[BaseHTTPRequestHandler]:
             try:
                 question = json.loads(self.rfile.read(int(length)))
                 page, question["number"] = str(question["page"]), float(question["number"])
-            except (ValueError, KeyError, TypeError):
+            except (ValueError, KeyError, TypeError, RecursionError):
                 self._refuse(HTTPStatus.BAD_REQUEST)
                 return
             found = explorer.answer(page, question)

@@ -4,6 +4,7 @@ import secrets
 import socket
 import struct
 from contextlib import suppress
+from time import monotonic
 from typing import Self
 
 _HEAD = struct.Struct("<cI")
@@ -14,6 +15,8 @@ JOIN, COMMAND, FIRST, STEP, END, FAULT = b"J", b"C", b"1", b"S", b"E", b"F"
 
 # for who has called to say the word [s]: the hub may wait for a processor meanwhile
 _TO_SPEAK = 10.0
+# of one frame [bytes]: a hundred times the outputs of the largest component, or the text of an error
+_LARGEST = 64 * 1024**2
 
 
 class Frames:
@@ -24,19 +27,25 @@ class Frames:
     def send(self, kind: bytes, content: bytes = b"") -> None:
         self._socket.sendall(_HEAD.pack(kind, len(content)) + content)
 
-    def receive(self, seconds: float | None = None) -> tuple[bytes, bytes]:
+    def receive(self, seconds: float | None = None, most: int = _LARGEST) -> tuple[bytes, bytes]:
         """Receive a frame; after a TimeoutError the same call can be made again.
 
+        ``seconds``: within which the whole frame must come, however many parts it comes in; None for no limit.
+        ``most``: bytes that it may have.
+
         Raises a `TimeoutError` if no whole frame came within the time [s].
-        Raises an `EOFError` if the other side is gone."""
-        self._socket.settimeout(seconds)
+        Raises an `EOFError` if the other side is gone, or announces a longer frame."""
+        end_of_wait = None if seconds is None else monotonic() + seconds
         while True:
             if len(self._rest) >= _HEAD.size:
                 kind, length = _HEAD.unpack_from(self._rest)
+                if length > most:
+                    raise EOFError(f"a frame of {length} bytes, where {most} are the most")
                 end = _HEAD.size + length
                 if len(self._rest) >= end:
                     content, self._rest = self._rest[_HEAD.size : end], self._rest[end:]
                     return kind, content
+            self._socket.settimeout(_left(end_of_wait))
             try:
                 more = self._socket.recv(1 << 16)
             except ConnectionError:
@@ -47,6 +56,15 @@ class Frames:
 
     def close(self) -> None:
         self._socket.close()
+
+
+def _left(end: float | None) -> float | None:
+    """Time until then [s], for a socket's timeout."""
+    if end is None:
+        return None
+    if (left := end - monotonic()) <= 0:
+        raise TimeoutError("timed out")
+    return left
 
 
 class Door:
@@ -62,7 +80,7 @@ class Door:
         while True:
             frames = Frames(self._server.accept()[0])
             with suppress(TimeoutError, EOFError):  # a stranger that says nothing
-                if frames.receive(_TO_SPEAK) == (JOIN, self.word.encode()):
+                if frames.receive(_TO_SPEAK, len(self.word)) == (JOIN, self.word.encode()):
                     return frames
             frames.close()
 

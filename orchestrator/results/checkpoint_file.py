@@ -57,6 +57,16 @@ def read_checkpoint(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]
     try:
         with np.load(io.BytesIO(body), allow_pickle=False) as data:
             arrays = {name: data[name] for name in data}
-        return json.loads(arrays.pop(_HEADER).tobytes()), arrays
-    except (EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+        header = json.loads(arrays.pop(_HEADER).tobytes())
+        if not isinstance(header, dict) or not isinstance(header.get("mark", {}), dict):
+            raise ValueError("its header is no table of names and values")
+        return header, arrays
+    except (
+        EOFError,
+        ValueError,
+        KeyError,
+        RecursionError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ) as error:
         raise DamagedCheckpointError(f"{path}: {error}") from error

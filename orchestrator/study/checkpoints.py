@@ -200,7 +200,13 @@ class Checkpoints:
                 state = RunState.of_arrays(arrays)
             except FileNotFoundError:
                 continue
-            except (checkpoint_file.DamagedCheckpointError, KeyError, ValueError) as error:
+            except (
+                checkpoint_file.DamagedCheckpointError,
+                KeyError,
+                ValueError,
+                TypeError,
+                OverflowError,
+            ) as error:
                 damaged.append(str(error))
                 continue
             self._compare(header.get("mark", {}))

@@ -35,6 +35,10 @@ BAD = [
     '"=1+1"',
     '"a."',
     '"x.part-1"',
+    '"manifest.json"',
+    '"summary.json"',
+    '"modes.CSV"',
+    '"report.html"',
 ]
 
 

@@ -19,7 +19,9 @@ import orchestrator as gfor
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.exporter import cached
 from fmus.toolchain.python_fmu import PythonFmu
+from fmus.toolchain.temporary import own_folder, remove
 from orchestrator.cli import main
+from orchestrator.cli.explore import way_to
 from orchestrator.explore.computing import Computing
 from orchestrator.explore.files import FILES, SCRIPTS, content_of
 from orchestrator.explore.server import Explorer
@@ -43,6 +45,24 @@ def asked(explorer, path, method="GET", body=None, **headers):
     connection.request(method, path, body, headers)
     response = connection.getresponse()
     return response.status, response.read(), response.headers
+
+
+def test_a_question_that_nests_too_deeply_is_refused(explorer, capfd):
+    path = f"/{explorer.token}/ask"
+    assert asked(explorer, path, "POST", "[" * 200_000)[0] == 400
+    assert asked(explorer, f"/{explorer.token}/")[0] == 200
+    assert capfd.readouterr().err == ""
+
+
+def test_the_browser_is_led_to_the_token_by_a_file_of_ours(tmp_path):
+    """Its command line can be read by every user of the machine."""
+    page = way_to("http://127.0.0.1:5/secret/", own_folder("explore"))
+    try:
+        assert page.parent.stat().st_mode & 0o077 == 0
+        assert "url=http://127.0.0.1:5/secret/" in page.read_text(encoding="utf-8")
+        assert "secret" not in page.as_uri()
+    finally:
+        remove(page.parent)
 
 
 # -- who may ask -----------------------------------------------------------------------------------

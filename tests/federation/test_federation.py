@@ -10,6 +10,7 @@ import sys
 import tempfile
 import threading
 import time
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.schedule import jacobi
 from orchestrator.errors import ComponentError, InputError, NotFiniteError, RunInterruptedError
 from orchestrator.federation import federation as processes
+from orchestrator.federation import frames
 from orchestrator.federation.choice import Federates
 from orchestrator.federation.component import FederatedComponent
 from orchestrator.federation.frames import JOIN, Door, Frames, call
@@ -480,6 +482,30 @@ def test_only_who_knows_the_word_comes_in():
         with pytest.raises(EOFError):
             stranger.receive(60.0)
         for end in (stranger, hub, taken):
+            end.close()
+
+
+def test_a_stranger_holds_the_door_neither_with_a_long_frame_nor_byte_by_byte(monkeypatch):
+    """Ten seconds began anew with each byte, and a frame could announce four gigabytes."""
+    monkeypatch.setattr(frames, "_TO_SPEAK", 0.5)
+    with Door() as door:
+        long = socket.create_connection(("127.0.0.1", door.port), timeout=60.0)
+        long.sendall(b"J" + (2**32 - 1).to_bytes(4, "little") + b"x" * 1000)
+        slow = socket.create_connection(("127.0.0.1", door.port), timeout=60.0)
+        over = threading.Event()
+
+        def trickle():
+            with suppress(OSError):
+                while not over.wait(0.05):
+                    slow.sendall(b"J")
+
+        threading.Thread(target=trickle, daemon=True).start()
+        hub = call(door.port, door.word)
+        taken = door.accept(60.0)
+        over.set()
+        hub.send(JOIN, b"here")
+        assert taken.receive(60.0) == (JOIN, b"here")
+        for end in (long, slow, hub, taken):
             end.close()
 
 

@@ -13,7 +13,7 @@ from orchestrator.cases.case import BUILT_IN, load_case
 from orchestrator.coupling import run as coupled_run
 from orchestrator.coupling.run import Run
 from orchestrator.errors import InputError
-from orchestrator.results.checkpoint_file import previous
+from orchestrator.results.checkpoint_file import previous, read_checkpoint, write_checkpoint
 from orchestrator.study import checkpoint_mark
 from orchestrator.study.checkpoints import Checkpoints
 from orchestrator.study.files import summary_of
@@ -191,6 +191,48 @@ def test_two_damaged_checkpoints_are_refused(tmp_path, said):
         InputError, match=r"'dip' cannot be resumed: .*checksum.*checksum.*start it anew, without"
     ):
         Checkpoints(prepared, tmp_path, 1e9, resume=True, say=said.append)
+
+
+def forged(folder, change):
+    """The checkpoint with some of its arrays changed, behind a checksum that fits."""
+    path = folder / "dip.checkpoint"
+    header, arrays = read_checkpoint(path)
+    write_checkpoint(path, header, arrays | change(arrays))
+    previous(path).unlink()
+
+
+FORGERIES = {
+    "y of another length": lambda a: {"y": a["y"][:-1]},
+    "y no number": lambda a: {"y": np.full_like(a["y"], np.nan)},
+    "y a text": lambda a: {"y": np.array(["x"] * len(a["y"]))},
+    "tracks of another shape": lambda a: {"tracks": a["tracks"].ravel()},
+    "tracks infinite": lambda a: {"tracks": np.full_like(a["tracks"], np.inf)},
+    "other times spent": lambda a: {"seconds": a["seconds"][:-1]},
+    "a place before the start": lambda a: {"place": np.array([-5, 0, 0])},
+    "a place after the end": lambda a: {"place": np.array([10**12, 0, 0])},
+}
+
+
+@pytest.mark.parametrize("change", FORGERIES.values(), ids=FORGERIES)
+def test_arrays_of_another_form_are_not_gone_on_from(tmp_path, said, change):
+    """A place far behind the end gave a finished run at once, and a shape a traceback."""
+    stop = 0.1
+    prepared = prepared_scenario(stop=stop)
+    interrupted(prepared, tmp_path, said, 0.05)
+    forged(tmp_path, change)
+    result = resumed(prepared_scenario(stop=stop), tmp_path, said)
+    assert len(said) == 1
+    assert "'dip' is computed from its start again: " in said[0]
+    assert result.failure is None
+    assert result.dataset.time.values[-1] == pytest.approx(stop)
+
+
+@pytest.mark.parametrize("header", [[], {"mark": []}])
+def test_a_header_of_another_form_is_a_damaged_checkpoint(tmp_path, said, header):
+    path = tmp_path / "dip.checkpoint"
+    write_checkpoint(path, header, {"y": np.zeros(2)})
+    with pytest.raises(InputError, match=r"cannot be resumed: .*its header is no table of names"):
+        Checkpoints(prepared_scenario(), tmp_path, 1e9, resume=True, say=said.append)
 
 
 # -- what has changed ----------------------------------------------------------------------------------
