@@ -89,13 +89,24 @@ class Case(CaseDefinition):
         stop_time: float | None = None,
         parameters: Sequence[ParameterFile] = (),
         dispatch: Dispatch | None = None,
+        voltages_before: Mapping[str, complex] | None = None,
     ) -> list[PreparedScenario]:
         """Check everything and make the chosen scenarios, or all, ready to run.
 
         ``parameters``: Their values have priority over the scenario's, and ``overrides`` have priority over theirs.
-        ``dispatch``: What the units fed before an outage that they share; None where each feeds its own ``P_0``."""
+        ``dispatch``: What the units fed before an outage that they share; None where each feeds its own ``P_0``.
+        ``voltages_before``: Bus voltages before an outage [pu], from which loads follow the voltage whose source tells
+        their constant currents and impedances."""
         if (other := self._of_kind(overrides, parameters)) is not self:
-            return other.prepare(scenarios, overrides, step_size, stop_time, parameters, dispatch)
+            return other.prepare(
+                scenarios,
+                overrides,
+                step_size,
+                stop_time,
+                parameters,
+                dispatch=dispatch,
+                voltages_before=voltages_before,
+            )
         problems = list(self.problems)
         unknown = [name for name in scenarios if name not in self.scenarios]
         has = f"the case has: {', '.join(self.scenarios)}"
@@ -116,6 +127,7 @@ class Case(CaseDefinition):
                 else ((), dispatch)
             )
             preparer.draft.dispatch = shared
+            preparer.draft.voltages_before = voltages_before or {}
             prepared.append(_told(preparer.prepare(step_size, stop_time), lost, shared))
             named.add(preparer.draft)
             problems += [p for p in preparer.problems if p not in problems]

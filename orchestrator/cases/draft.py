@@ -92,6 +92,8 @@ class Draft:
     active_limits: dict[str, tuple[float, float]] = field(default_factory=dict)
     # what the units fed before an outage that they share; None without one
     dispatch: Dispatch | None = None
+    # voltages before an outage [pu], at which loads that follow the voltage draw what is set
+    voltages_before: Mapping[str, complex] = field(default_factory=dict)
 
     def note(self, place: str, text: str, kind: ErrorKind = ErrorKind.VALUES) -> None:
         problem = Problem(place, text, kind)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fmus.grid.element_data import ThreeWinding
+from fmus.grid.element_data import LAWS, ThreeWinding, Zip
 from fmus.grid.network import OPEN_CHARGING
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.errors import InputError
@@ -49,9 +49,36 @@ class FlowLine:
 
 @dataclass(frozen=True, slots=True)
 class FlowLoad:
+    """A load that draws P + jQ [MW, Mvar] at the voltage ``reference`` [pu], and follows the voltage by its laws."""
+
     bus: str
     p_mw: float
     q_mvar: float
+    active: Zip = LAWS["power"]
+    reactive: Zip = LAWS["power"]
+    reference: float = 1.0
+
+    @property
+    def follows(self) -> bool:
+        """Whether the load draws another power at another voltage."""
+        return self.active != LAWS["power"] or self.reactive != LAWS["power"]
+
+    def parts(self) -> tuple[complex, complex, complex]:
+        """P + jQ [MW, Mvar] at 1 pu of the constant impedance, the constant current and the constant power in it."""
+
+        def part(share: str, power: int) -> complex:
+            p = getattr(self.active, share) * self.p_mw
+            q = getattr(self.reactive, share) * self.q_mvar
+            return complex(p, q) / self.reference**power
+
+        return part("z", 2), part("i", 1), part("p", 0)
+
+    def drawn(self, magnitude: float) -> complex:
+        """P + jQ [MW, Mvar] at a voltage [pu]."""
+        if not self.follows:
+            return complex(self.p_mw, self.q_mvar)
+        impedance, current, power = self.parts()
+        return impedance * magnitude**2 + current * magnitude + power
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +104,7 @@ def nodal_powers(
         needed[line.from_bus] += into
         needed[line.to_bus] += out
     for load in loads:
-        needed[load.bus] += complex(load.p_mw, load.q_mvar) / SYSTEM_BASE_MVA
+        needed[load.bus] += load.drawn(abs(voltages[load.bus])) / SYSTEM_BASE_MVA
     for shunt in shunts:
         needed[shunt.bus] += complex(shunt.g, -shunt.b) * abs(voltages[shunt.bus]) ** 2
     return needed

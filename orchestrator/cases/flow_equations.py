@@ -31,6 +31,9 @@ class FlowEquations:
     held: NDArray[np.bool_]  # whether a bus has a voltage of given magnitude
     magnitudes: NDArray[np.float64]  # the given magnitudes [pu]; 1 elsewhere
     lines: tuple[FlowLine, ...]
+    # P + jQ that loads draw from every bus at 1 pu as constant currents and as constant impedances [pu]
+    drawn_as_current: NDArray[np.complex128]
+    drawn_as_impedance: NDArray[np.complex128]
 
     @classmethod
     def of(
@@ -65,8 +68,13 @@ class FlowEquations:
                 ]
         triplets += [(position[s.bus], position[s.bus], complex(s.g, s.b)) for s in shunts]
         fed = np.zeros(len(buses), dtype=complex)
+        current = np.zeros(len(buses), dtype=complex)
+        impedance = np.zeros(len(buses), dtype=complex)
         for load in loads:
-            fed[position[load.bus]] -= complex(load.p_mw, load.q_mvar) / SYSTEM_BASE_MVA
+            of_impedance, of_current, of_power = load.parts()
+            fed[position[load.bus]] -= of_power / SYSTEM_BASE_MVA
+            current[position[load.bus]] += of_current / SYSTEM_BASE_MVA
+            impedance[position[load.bus]] += of_impedance / SYSTEM_BASE_MVA
         for bus, power in active.items():
             fed[position[bus]] += power
         return cls(
@@ -79,6 +87,8 @@ class FlowEquations:
             np.array([bus in held for bus in buses]),
             np.array([held.get(bus, 1.0) for bus in buses]),
             tuple(lines),
+            current,
+            impedance,
         )
 
     @cached_property
@@ -103,9 +113,23 @@ class FlowEquations:
         product: np.ndarray = voltages * currents.conj()
         return product
 
+    @cached_property
+    def loads_follow(self) -> bool:
+        """Whether some load draws another power at another voltage."""
+        return bool(self.drawn_as_current.any() or self.drawn_as_impedance.any())
+
+    def missing(self, voltages: np.ndarray) -> np.ndarray:
+        """P + jQ that every bus lacks to give these voltages [pu]."""
+        left = self.powers(voltages) - self.fed
+        if self.loads_follow:
+            magnitude = np.abs(voltages)
+            left += self.drawn_as_current * magnitude + self.drawn_as_impedance * magnitude**2
+        product: np.ndarray = left
+        return product
+
     def mismatch(self, voltages: np.ndarray) -> np.ndarray:
         """What is left of the unknowns' equations [pu]: active powers, then reactive powers."""
-        left = self.powers(voltages) - self.fed
+        left = self.missing(voltages)
         return np.concatenate([left.real[self.angle_buses], left.imag[self.free_buses]])
 
     def worst(self, mismatch: np.ndarray) -> tuple[str, float]:
@@ -123,6 +147,10 @@ class FlowEquations:
         )
         by_angle = 1j * (v @ (current - matrix @ v).conj())
         by_magnitude = v @ (matrix @ direction).conj() + current.conj() @ direction
+        if self.loads_follow:
+            by_magnitude += diags_array(
+                self.drawn_as_current + 2 * self.drawn_as_impedance * np.abs(voltages)
+            )
         a, m = by_angle.tocsr(), by_magnitude.tocsr()
         p, q = self.angle_buses, self.free_buses
         return vstack(
@@ -141,7 +169,7 @@ class FlowEquations:
         j = np.array([position[line.to_bus] for line in closed], dtype=np.int64)
         b = np.array([1 / (line.X * line.tap) for line in closed])
         turned = b * np.array([line.shift for line in closed])
-        power = self.fed.real.copy()
+        power = (self.fed - self.drawn_as_current - self.drawn_as_impedance).real.copy()
         np.add.at(power, i, turned)
         np.add.at(power, j, -turned)
         where = np.concatenate([i, j, i, j]), np.concatenate([i, j, j, i])

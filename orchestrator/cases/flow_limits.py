@@ -39,7 +39,7 @@ class Excess:
 
 def exceeded(equations: FlowEquations, voltages: np.ndarray, limits: Limits) -> list[Excess]:
     """The buses that hold their voltage with more or less reactive power than their units have."""
-    q = (equations.powers(voltages) - equations.fed).imag
+    q = equations.missing(voltages).imag
     found = []
     for k, bus in enumerate(equations.buses):
         if equations.held[k] and bus in limits:

@@ -67,7 +67,12 @@ def grow(equations: FlowEquations) -> tuple[float, NewtonResult | None]:
 
 
 def scaled(equations: FlowEquations, share: float) -> FlowEquations:
-    return replace(equations, fed=share * equations.fed)
+    return replace(
+        equations,
+        fed=share * equations.fed,
+        drawn_as_current=share * equations.drawn_as_current,
+        drawn_as_impedance=share * equations.drawn_as_impedance,
+    )
 
 
 def _start(equations: FlowEquations, angles: NDArray[np.float64]) -> NDArray[np.complex128]:

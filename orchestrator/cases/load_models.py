@@ -2,7 +2,7 @@
 constant impedance and current that a source tells apart."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from fmus.grid.element_data import LAWS, Load, Zip
 from orchestrator.cases.schema import LoadLaw, LoadModelTable, NetworkTable
@@ -97,6 +97,25 @@ def with_laws(
 
 def _law(law: LoadLaw) -> Zip:
     return LAWS[law] if isinstance(law, str) else Zip(law.z, law.i, law.p)
+
+
+@dataclass(frozen=True)
+class FlowLaws:
+    """How the powers of a load follow the voltage in a power flow, as its source tells them apart."""
+
+    active: Zip
+    reactive: Zip
+
+
+def flow_laws(load: Load, parts: tuple[complex, complex]) -> FlowLaws:
+    """The laws of a load of which constant impedances and currents are known [MW, Mvar]; the rest is a constant power.
+
+    A power flow takes the rest as PSS/E does: a conversion of constant powers is for the dynamics alone."""
+    rest = LAWS["power"]
+    return FlowLaws(
+        _mixed(load, "P", rest, load.p_mw, (parts[0].real, parts[1].real)),
+        _mixed(load, "Q", rest, load.q_mvar, (parts[0].imag, parts[1].imag)),
+    )
 
 
 def _mixed(load: Load, quantity: str, rest: Zip, total: float, parts: tuple[float, float]) -> Zip:

@@ -22,7 +22,7 @@ from orchestrator.cases.csv_rows import (
 )
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt, inner_buses, legs_of
 from orchestrator.cases.flow_equations import FlowEquations
-from orchestrator.cases.load_models import with_laws
+from orchestrator.cases.load_models import FlowLaws, flow_laws, with_laws
 from orchestrator.cases.network_import import Generation, ImportedNetwork, bus_of, import_network
 from orchestrator.cases.network_sources import read_matpower, read_pandapower
 from orchestrator.cases.psse.raw import Machine, read_raw
@@ -66,6 +66,9 @@ class NetworkData:
     feeding: dict[str, float] = field(default_factory=dict)
     capacitors: dict[str, float] = field(default_factory=dict)
     misfit: str = ""  # what is wrong with the voltages that the source has as its solution
+    # loads of which the source tells constant impedances and currents, by name: they follow the
+    # voltage in a power flow that starts from another, as that of an outage does
+    flow_laws: Mapping[str, FlowLaws] = field(default_factory=dict)
 
 
 def network_data(table: NetworkTable, directory: Path) -> NetworkData:
@@ -121,6 +124,11 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
         source.feeding,
         source.capacitors,
         found.misfit,
+        {
+            load.name: flow_laws(load, source.load_parts[load.name])
+            for load in source.loads
+            if load.name in source.load_parts
+        },
     )
 
 

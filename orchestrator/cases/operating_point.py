@@ -9,7 +9,7 @@ from orchestrator.cases.names import close_names
 from orchestrator.cases.plausibility import question
 from orchestrator.cases.power_flow import PowerFlow
 from orchestrator.cases.schema import UnitReconnectionTable
-from orchestrator.cases.start_values import is_connected, start_from_power_flow
+from orchestrator.cases.start_values import FollowingLoad, is_connected, start_from_power_flow
 from orchestrator.errors import ErrorKind, InputError, Problem, few
 
 _USUAL_VOLTAGES = (0.8, 1.2)  # magnitudes [pu] of bus voltages that are not questioned
@@ -61,6 +61,7 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
             returning=returning,
             dispatch=draft.dispatch,
             active=draft.active_limits,
+            following=_following(draft),
         )
     except InputError as error:
         kind = ErrorKind.VALUES if error.kind is ErrorKind.INPUT else error.kind
@@ -71,6 +72,18 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
     # else what it fed before is shared
     draft.found.questions += _leftover(draft, flow) if slack == intact else []
     return flow
+
+
+def _following(draft: Draft) -> dict[str, FollowingLoad]:
+    """Loads that draw what is set at their voltage before an outage, and another power at another voltage."""
+    if draft.data is None or draft.network is None or not draft.voltages_before:
+        return {}
+    buses = {load.name: load.bus for load in draft.network.loads}
+    return {
+        name: FollowingLoad(laws, abs(draft.voltages_before[buses[name]]))
+        for name, laws in draft.data.flow_laws.items()
+        if name in buses
+    }
 
 
 def _leftover(draft: Draft, flow: PowerFlow) -> Iterator[Problem]:

@@ -103,7 +103,10 @@ def solve_power_flow(
     held = {bus: members[0].v_0 for bus, members in at_bus.items()}
     drawn = [
         *loads,
-        *(FlowLoad(b, *(-SYSTEM_BASE_MVA * x for x in (s.real, s.imag))) for b, s in fixed.items()),
+        *(
+            FlowLoad(b, -SYSTEM_BASE_MVA * s.real, -SYSTEM_BASE_MVA * s.imag)
+            for b, s in fixed.items()
+        ),
     ]
     equations = FlowEquations.of(buses, lines, drawn, shunts, active, held, slack_bus)
     known = _left(limits or {}, fixed)

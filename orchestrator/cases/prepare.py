@@ -82,6 +82,7 @@ class PreparedScenario:
     # behind the grid component of the power flow; None if there is none
     network: Network | None = None
     source_slack: str | None = None  # reference bus of the network's source
+    following_loads: tuple[str, ...] = ()  # loads that follow the voltage in an outage's power flow
     # prepares another scenario of the case with the same values, or with those of its file alone where that is asked
     # for; None where nothing but the file gave values.
     beside: "Callable[..., PreparedScenario | None] | None" = field(
@@ -273,6 +274,7 @@ class Preparer:
             places={name: draft.place_of_component(name) for name in plans},
             not_reached=tuple(sorted(draft.found.not_reached)),
             source_slack=draft.data.slack if draft.data else None,
+            following_loads=tuple(draft.data.flow_laws) if draft.data else (),
             idle=idle_values(
                 draft.system, draft.given.from_outside, draft.places, events, draft.found.absent
             ),

@@ -2,13 +2,14 @@
 
 import cmath
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from fmus.grid.network import OPEN_CHARGING, Network, Shunt, ThreeWinding
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt, inner_buses, legs_of
 from orchestrator.cases.flow_limits import Limits
 from orchestrator.cases.flow_units import flow_unit
+from orchestrator.cases.load_models import FlowLaws
 from orchestrator.cases.power_flow import FlowUnit, PowerFlow, solve_power_flow
 from orchestrator.cases.sharing import Dispatch, shared_flow
 from orchestrator.coupling.system import ComponentPlan, System
@@ -18,6 +19,14 @@ from orchestrator.errors import ErrorKind, InputError
 _LEAST_POWER = ("governor.V_MIN", "governor.P_MIN")
 # such a limit of a unit that is out of service [pu]: not at its edge while it turns idle
 _IDLE = -0.1
+
+
+@dataclass(frozen=True)
+class FollowingLoad:
+    """How a load follows the voltage in the power flow, and the voltage [pu] at which it draws what is set."""
+
+    laws: FlowLaws
+    reference: float
 
 
 def start_from_power_flow(
@@ -32,6 +41,7 @@ def start_from_power_flow(
     returning: Collection[str] = (),
     dispatch: Dispatch | None = None,
     active: Mapping[str, tuple[float, float]] | None = None,
+    following: Mapping[str, FollowingLoad] | None = None,
 ) -> PowerFlow:
     """Solve the power flow and set the start values of the grid and of all units.
 
@@ -41,7 +51,9 @@ def start_from_power_flow(
     ``limits``: least and most reactive power of all units of a bus together [Mvar], by bus. Where some of them are
     disconnected, the limits shrink with the rating.
     ``returning``: units that an event connects; a limit of theirs must stay.
-    ``active``: least and most active power of units that share [MW], beside their models' own limits."""
+    ``active``: least and most active power of units that share [MW], beside their models' own limits.
+    ``following``: loads that follow the voltage, by name; they are set to what they draw in the solution."""
+    loads = _loads(network, system.components[grid], following or {})
     feeding = [
         _unit(name, bus, system.components[name], system.components[grid])
         for name, bus in units.items()
@@ -51,7 +63,7 @@ def start_from_power_flow(
         return solve_power_flow(
             (*network.buses, *(bus for x in network.transformers for bus in inner_buses(x))),
             [*_lines(network, system.components[grid]), *_legs(network, system.components[grid])],
-            _loads(network, system.components[grid]),
+            [*loads.values()],
             fed,
             slack,
             _shunts(network, system.components[grid]),
@@ -68,6 +80,7 @@ def start_from_power_flow(
             f"{bus}.v_0": abs(voltage),
             f"{bus}.theta_0": cmath.phase(voltage),
         }
+    _set_following(system.components[grid], loads, flow.voltages)
     for name, bus in units.items():
         _start_unit(name, system.components[name], flow.voltages[bus], flow.powers[name])
     for name in (
@@ -124,17 +137,35 @@ def _as_set(x: ThreeWinding, grid: ComponentPlan) -> ThreeWinding:
     )
 
 
-def _loads(network: Network, grid: ComponentPlan) -> list[FlowLoad]:
-    return [
-        FlowLoad(
-            load.bus,
-            p_mw=grid.number(f"{load.name}.scale") * grid.number(f"{load.name}.P"),
-            q_mvar=grid.number(f"{load.name}.scale") * grid.number(f"{load.name}.Q")
-            if load.q_mvar
-            else 0.0,
-        )
-        for load in network.loads
-    ]
+def _loads(
+    network: Network, grid: ComponentPlan, following: Mapping[str, FollowingLoad]
+) -> dict[str, FlowLoad]:
+    """The loads by name, as they are set."""
+    loads = {}
+    for load in network.loads:
+        scale = grid.number(f"{load.name}.scale")
+        p_mw = scale * grid.number(f"{load.name}.P")
+        q_mvar = scale * grid.number(f"{load.name}.Q") if load.q_mvar else 0.0
+        loads[load.name] = FlowLoad(load.bus, p_mw, q_mvar)
+        if (own := following.get(load.name)) is not None:
+            loads[load.name] = FlowLoad(
+                load.bus, p_mw, q_mvar, own.laws.active, own.laws.reactive, own.reference
+            )
+    return loads
+
+
+def _set_following(
+    grid: ComponentPlan, loads: Mapping[str, FlowLoad], voltages: Mapping[str, complex]
+) -> None:
+    """Set loads that follow the voltage to what they draw in the solution."""
+    for name, load in loads.items():
+        scale = grid.number(f"{name}.scale")
+        if not load.follows or not scale:
+            continue
+        drawn = load.drawn(abs(voltages[load.bus])) / scale
+        grid.parameters[f"{name}.P"] = drawn.real
+        if load.q_mvar:
+            grid.parameters[f"{name}.Q"] = drawn.imag
 
 
 def _shunts(network: Network, grid: ComponentPlan) -> list[FlowShunt]:

@@ -78,7 +78,11 @@ class ItemPreparation:
         own = tuple(name for name in item.out if name not in item.lost)
         without = what_remains(valued, self.elements, own)
         units, loads = ({*getattr(remains, k)} - {*getattr(without, k)} for k in ("units", "loads"))
-        dispatch, text = None, ""
+        dispatch, text, voltages_before = None, "", {}
+        if item.lost and self.base.following_loads:
+            flow_before = self._before_outage(item, own, without).power_flow
+            assert flow_before is not None
+            voltages_before = flow_before.voltages
         if units or loads:
             before = self._before_outage(item, own, without)
             assert before.power_flow is not None
@@ -90,7 +94,7 @@ class ItemPreparation:
         elif new := [bus for bus in remains.dead if bus not in without.dead]:
             text = f"{few(new, _SHOWN)} cut off, with neither load nor unit"
         values = {**item.values, **switched_off(item.out, remains, valued, self.elements.grid)}
-        found = self._prepare(values, dispatch)
+        found = self._prepare(values, dispatch, voltages_before)
         if dispatch is not None:
             assert found.power_flow is not None
             plans, load = (
@@ -115,7 +119,20 @@ class ItemPreparation:
             found |= {
                 f"{x}.P_0": powers[x].real for x in scenario.system.components if powers.get(x)
             }
+        if item.lost:
+            found |= self._as_followed(scenario)
         return found
+
+    def _as_followed(self, scenario: PreparedScenario) -> dict[str, Value]:
+        """What loads draw that have followed the voltage after an outage [MW, Mvar]."""
+        grid = self.elements.grid
+        plan = scenario.system.components[grid]
+        return {
+            f"{grid}.{load}.{power}": plan.number(f"{load}.{power}")
+            for load in scenario.following_loads
+            for power in ("P", "Q")
+            if f"{load}.{power}" in plan.parameters
+        }
 
     def _before_outage(
         self, item: Item, own: tuple[str, ...], without: Remains
@@ -151,12 +168,21 @@ class ItemPreparation:
         return max(found, key=lambda x: abs(x.q - x.limit)).text(kept=False) if found else ""
 
     def _prepare(
-        self, values: Mapping[str, Value], dispatch: Dispatch | None = None
+        self,
+        values: Mapping[str, Value],
+        dispatch: Dispatch | None = None,
+        voltages_before: Mapping[str, complex] | None = None,
     ) -> PreparedScenario:
         # what a point has out of service is in its generation
         case = replace(self._case, sharing=SharingRule.SLACK)
         (prepared,) = case.prepare(
-            [self._scenario], dict(values), self._step_size, None, self._layers, dispatch
+            [self._scenario],
+            dict(values),
+            self._step_size,
+            None,
+            self._layers,
+            dispatch=dispatch,
+            voltages_before=voltages_before,
         )
         return prepared
 
