@@ -123,6 +123,10 @@ def plain_value(value: Any) -> Value:
     own: Value = (
         value.item() if hasattr(value, "item") and getattr(value, "size", 1) == 1 else value
     )
+    if type(own).__name__ == "NAType":
+        raise InputError(
+            "pandas' NA, which is no value, was given as a value; give a number, or leave it out"
+        )
     if isinstance(own, int) and abs(own) > _LARGEST:
         raise InputError(
             "a whole number beyond 1e308 was given as a value; give a number that a float can hold"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from orchestrator.spelling import spelled
+from orchestrator.spelling import for_python, spelled
 
 NOT_MET = 3  # exit code where a requirement is not met, or is not known to be
 INTERRUPTED = 130  # exit code after Ctrl-C
@@ -92,6 +92,10 @@ class CosimError(Exception):
         # not that of another base, such as KeyError, which quotes
         return spelled(Exception.__str__(self))
 
+    def _render_traceback_(self) -> list[str]:
+        """What a notebook shows of an uncaught error: the sentence, without the calls inside of this package."""
+        return [f"{type(self).__name__}: {self}"]
+
 
 class InputError(CosimError):
     """Something given to the program cannot be used; nothing was run."""
@@ -151,6 +155,12 @@ class CaseError(InputError):
         count = f"{len(problems)} problem" + ("s" if len(problems) != 1 else "")
         message = f"{source}: {count}\n" + "\n".join(f"  - {problem}" for problem in problems)
         super().__init__(message, kind=kinds.pop() if len(kinds) == 1 else ErrorKind.VALUES)
+
+    def __str__(self) -> str:
+        """As always; where what Python gave as ``values`` is all that is wrong, the file is not blamed."""
+        if for_python() and all(one.place.startswith("--set ") for one in self.problems):
+            return "\n".join(f"values: {str(one).removeprefix('values ')}" for one in self.problems)
+        return super().__str__()
 
 
 class StartError(CaseError):

@@ -46,6 +46,8 @@ _KEPT = re.compile(
     r"[^\s'\"]*given[/\\][0-9a-f]{16}[/\\](case|binding|points)\.(?:toml|csv)(?:, line (\d+))?"
 )
 _COMMAND_ONLY = {"json", "with-linear-model"}
+_TYPED = {"modes": {"component", "set", "out"}, "design": {"points"}}
+"""Options that the call of the same name lacks: the command stays as it is typed at a terminal."""
 _QUOTED = re.compile(r"`[^`]*`|(?<![\w-])--(engine helics|[a-z][a-z-]*)")
 _commanded = list[None]()  # one for each that asks for options
 
@@ -58,6 +60,11 @@ def as_options() -> Iterator[None]:
         yield
     finally:
         _commanded.pop()
+
+
+def for_python() -> bool:
+    """Whether errors are for somebody who writes Python."""
+    return not _commanded
 
 
 def keyword(option: str) -> str:
@@ -80,9 +87,11 @@ def _in_python(found: re.Match[str]) -> str:
         return f"`{spelled(found[0][1:-1])}`"
     command, *options = found[0][1:-1].split(" --")
     words = command.split()
-    if not options or words[0] != "gfor":
+    if not options or len(words) < 2 or words[0] != "gfor":
         return found[0]
     given = [option.partition(" ") for option in options]
+    if any(name in _TYPED.get(words[1], ()) for name, _, _ in given):
+        return found[0]
     if words[1] in _CALLS and not any(name in _COMMAND_ONLY for name, _, _ in given):
         values = [
             f"{keyword(name)}={value!r}" if value else f"{keyword(name)}=True"

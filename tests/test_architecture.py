@@ -18,7 +18,12 @@ FLOORS = (
     ("orchestrator.added", "orchestrator.spelling"),
     ("orchestrator.arrays", "orchestrator.closing", "orchestrator.cores"),
     ("orchestrator.errors", "orchestrator.late", "orchestrator.units"),
-    ("orchestrator.asked", "orchestrator.safe_files", "orchestrator.toml_files"),
+    (
+        "orchestrator.asked",
+        "orchestrator.safe_files",
+        "orchestrator.toml_files",
+        "orchestrator.truth",
+    ),
     ("orchestrator.fmi",),
     ("orchestrator.coupling", "orchestrator.binding"),
     ("orchestrator.ssp", "orchestrator.acceptance"),

@@ -27,6 +27,7 @@ from orchestrator.analysis.modes import (
     oscillations,
 )
 from orchestrator.errors import few
+from orchestrator.truth import NoTruth
 
 # up to so many states, all eigenvalues are computed; in larger systems growing ones are searched
 # for
@@ -112,7 +113,38 @@ class Hidden:
 
 
 @dataclass(frozen=True)
-class Stability:
+class Stability(NoTruth):
+    """The verdict on a system, and what it rests on.
+
+    Attributes
+    ----------
+    stable
+        Whether no mode grows; None if this is not known.
+    mode
+        The mode of the largest real part.
+    growing
+        Number of growing modes; a conjugate pair counts once.
+    zeros
+        Eigenvalues taken for zero, such as that of the free angle.
+    eigenvalues
+        Number of all eigenvalues.
+    cause
+        Why a mode grows: the system, the coupling, or not known; None if no mode grows.
+    continuous_growth_rate
+        Largest real part of the system without a communication step [1/s]; None where a component gives no derivatives.
+    step_size
+        Communication step [s]; None of a continuous model.
+    reason
+        Why the verdict is not known, or which region was not searched.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> verdict = gfor.load("two_area").scenario("base").modes().stability
+    >>> verdict.stable, verdict.growing
+    (False, 1)
+    """
+
     stable: bool | None  # whether no mode grows; None if this is not known
     # the mode of the largest real part: of the step map, or of the continuous system if only this one grows
     mode: Mode | None = None

@@ -16,12 +16,13 @@ from orchestrator.errors import InputError
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.limits import LEAST_MEMORY, Limits
 from orchestrator.fmi.vendor_files import as_fmu
+from orchestrator.truth import NoTruth
 
 DataFrame = Any
 """``pandas.DataFrame``; importing the class takes 0.3 s, which ``gfor fmu check`` saves."""
 
 
-class Acceptance:
+class Acceptance(NoTruth, ask=".trusted"):
     """What the acceptance tests of an FMU found. `check` makes it.
 
     Attributes

@@ -17,6 +17,8 @@ from orchestrator.cases.case import built_in_cases as names_of_cases
 from orchestrator.cases.case import load_case
 from orchestrator.cases.given import keep, kept
 from orchestrator.cases.locate import FROM_TEXT
+from orchestrator.cases.names import close_names
+from orchestrator.cases.schema import CaseTable
 from orchestrator.errors import InputError
 from orchestrator.late import pd
 from orchestrator.report.notebook import page
@@ -140,13 +142,21 @@ class Case:
         """Names of the scenarios."""
         return tuple(self.file.scenarios)
 
-    def with_(self, **tables: Any) -> "Case":
+    def with_(self, *wrong: object, **tables: Any) -> "Case":
         """The case with other tables, such as ``events``, ``solver`` or ``network``; this one stays as it is.
 
         Parameters
         ----------
         tables
-            As in a case file. Tables in tables are joined, lists replaced, and what is None is removed.
+            As in a case file. Tables in tables are joined, lists replaced, and what is None is removed. A path in them
+            is relative to where the program runs, or to the case's folder where the file is there alone.
+        wrong
+            Nothing: tables are given by name.
+
+        Raises
+        ------
+        InputError
+            If a case file has no such table.
 
         Examples
         --------
@@ -155,9 +165,21 @@ class Case:
         >>> shorter.scenarios, shorter.scenario().prepared.stop_time
         (('load_step',), 3.0)
         """
+        if wrong:
+            raise InputError(
+                f"with_({wrong[0]!r}): give tables by name, such as with_(solver={{'stop_time': '3 s'}}), or "
+                "with_(**tables)"
+            )
+        known = {field.alias or name for name, field in CaseTable.model_fields.items()}
+        if unknown := [name for name in tables if name not in known]:
+            hint = close_names(unknown[0], known)
+            raise InputError(
+                f"with_({unknown[0]}=…): a case file has no table {unknown[0]!r}; "
+                f"{hint or 'it has ' + ', '.join(sorted(known))}"
+            )
+        given = {key: _from_here(table, self.file.directory) for key, table in tables.items()}
         return load(
-            {"directory": str(self.file.directory)}
-            | _joined(tomllib.loads(self.file.text), tables),
+            {"directory": str(self.file.directory)} | _joined(tomllib.loads(self.file.text), given),
             trust_fmus=self.file.trust_fmus,
         )
 
@@ -207,6 +229,37 @@ class Case:
         titles = [table.title or name for name, table in self.file.scenarios.items()]
         table = pd.DataFrame({"scenario": self.scenarios, "title": titles})
         return page(f"{self.name}: {self.file.table.title or self.name}", table=table)
+
+
+_PATHS = frozenset(
+    (
+        "fmu",
+        "dll",
+        "binding",
+        "scan",
+        "raw",
+        "dyr",
+        "matpower",
+        "pandapower",
+        "cgmes",
+        "file",
+        "lines_file",
+        "loads_file",
+    )
+)
+"""Entries of a case file that are paths."""
+
+
+def _from_here(table: Any, directory: Path, key: str = "") -> Any:
+    """A table with paths from where the program runs; those of files that only the case's folder has stay."""
+    if isinstance(table, Mapping):
+        return {name: _from_here(one, directory, name) for name, one in table.items()}
+    if isinstance(table, list | tuple):
+        return [_from_here(one, directory, key) for one in table]
+    if key not in _PATHS or not isinstance(table, str | Path) or Path(table).is_absolute():
+        return table
+    here = Path.cwd() / table
+    return str(table if not here.exists() and (directory / table).exists() else here)
 
 
 def _joined(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

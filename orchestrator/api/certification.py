@@ -17,9 +17,10 @@ from orchestrator.certification.verification import verified
 from orchestrator.points.study import choose_executor
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
+from orchestrator.truth import NoTruth
 
 
-class IssuedCertificate:
+class IssuedCertificate(NoTruth, ask=".verdict"):
     """A certificate in its folder. `certify` makes it.
 
     Attributes

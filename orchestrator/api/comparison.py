@@ -2,13 +2,11 @@
 
 import json
 import warnings
-from pathlib import Path
 
 import xarray as xr
 
 from orchestrator.analysis.threads import side_by_side
-from orchestrator.api.identification import opened
-from orchestrator.api.results import Run
+from orchestrator.api.identification import Recorded, opened
 from orchestrator.asked import Names, names
 from orchestrator.cases.given import Time, moment
 from orchestrator.errors import InputError, few
@@ -24,8 +22,8 @@ RINGS_FROM = 2.0
 
 
 def compare(
-    a: Run | xr.Dataset | str | Path,
-    b: Run | xr.Dataset | str | Path,
+    a: Recorded,
+    b: Recorded,
     signals: Names = (),
     start: Time | None = None,
 ) -> RunComparison:
@@ -34,7 +32,8 @@ def compare(
     Parameters
     ----------
     a, b
-        Runs, their datasets, or folders of a scenario's results.
+        Runs, their datasets, folders of a scenario's results, recordings' files, or DataFrames and DataArrays over the
+        time [s].
     signals
         ``"a.b"`` or ``"a.b - c.d"``; by default those that differ most.
     start

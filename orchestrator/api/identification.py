@@ -3,8 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from orchestrator.analysis.ambient import ambient_modes
@@ -25,20 +27,25 @@ from orchestrator.study.comparison import (
 )
 from orchestrator.study.signal_modes import SignalModes
 
+Recorded = Any
+"""`Run`, `xarray.Dataset`, `xarray.DataArray`, `pandas.DataFrame`, or a path; pandas is imported late."""
+
+_SHOWN = 60  # characters of a wrong argument that an error shows
 _ONE_SIGNAL = "give one signal, 'a.b' or the difference 'a.b - c.d' of two"
 
 
 def identify(
-    run: Run | xr.Dataset | str | Path, signal: str, start: Time = 2.0, stop: Time | None = None
+    run: Recorded, signal: str | None = None, start: Time = 2.0, stop: Time | None = None
 ) -> SignalModes:
     """Find the modes in a signal of a run by the matrix pencil method.
 
     Parameters
     ----------
     run
-        A run, its dataset, or the folder of a scenario's results.
+        A run, its dataset, a recording's file, or the folder of a scenario's results; or a DataFrame or DataArray over
+        the time [s].
     signal
-        ``"a.b"`` or ``"a.b - c.d"``.
+        ``"a.b"`` or ``"a.b - c.d"``; may be left out where there is one alone.
     start
         Beginning of the free response [s].
     stop
@@ -59,9 +66,12 @@ def identify(
     >>> print(f"{modes.table()['frequency_hz'][0]:.2f} Hz")
     2.83 Hz
     """
-    if text_or_none(signal, "signal", _ONE_SIGNAL) is None:
-        raise InputError(f"signal = None; {_ONE_SIGNAL}")
+    text_or_none(signal, "signal", _ONE_SIGNAL)
     dataset, label = opened(run, "run")
+    if signal is None:
+        if len(dataset.data_vars) != 1:
+            raise InputError(f"signal = None; {_ONE_SIGNAL}")
+        (signal,) = map(str, dataset.data_vars)
     curve = recorded(dataset, signal, label)
     begin, end = part_of_record(curve["time"].values, start, stop, label)
     window = curve.sel(time=slice(begin, end))
@@ -72,7 +82,7 @@ def identify(
 
 
 def ambient(
-    run: Run | xr.Dataset | str | Path,
+    run: Recorded,
     signals: str | Sequence[str],
     start: Time = 0.0,
     stop: Time | None = None,
@@ -140,7 +150,54 @@ def ambient(
     return AmbientModes(label, names, found, level)
 
 
-def opened(run: Run | xr.Dataset | str | Path, otherwise: str) -> tuple[xr.Dataset, str]:
+def as_dataset(given: Any, otherwise: str) -> Any:
+    """A table or an array over the time [s] as a dataset; anything else as it is.
+
+    Raises an `InputError` where the index or the dimension is no time that ascends."""
+    if isinstance(given, pd.Series):
+        given = given.to_frame(str(given.name or otherwise))
+    if isinstance(given, pd.DataFrame):
+        frame = given.set_index("time") if "time" in given.columns else given
+        data = xr.Dataset(
+            {str(name): ("time", frame[name].to_numpy()) for name in frame},
+            {"time": _seconds(frame.index, otherwise)},
+        )
+    elif isinstance(given, xr.DataArray):
+        if given.dims != ("time",) or "time" not in given.coords:
+            raise InputError(
+                f"{otherwise} is an array over {', '.join(map(str, given.dims)) or 'nothing'}; its one dimension must "
+                "be 'time', with a coordinate in seconds"
+            )
+        data = given.to_dataset(name=str(given.name or otherwise))
+        data = data.assign_coords(time=_seconds(given["time"].to_index(), otherwise))
+    else:
+        return given
+    if wrong := [name for name in data if data[name].dtype.kind not in "fiub"]:
+        raise InputError(f"{otherwise}: column {wrong[0]!r} holds no numbers; leave it out")
+    return data
+
+
+def _seconds(index: Any, otherwise: str) -> Any:
+    """An index as times [s]: numbers, or dates from the first on."""
+    if isinstance(index, pd.DatetimeIndex):
+        index = index - index[0]
+    if isinstance(index, pd.TimedeltaIndex):
+        index = index.total_seconds()
+    rule = "give numbers in seconds, dates, or time differences that ascend"
+    if index.dtype.kind not in "fiu":
+        raise InputError(f"{otherwise}: its index is no time; {rule}")
+    if not index.is_monotonic_increasing or not index.is_unique:
+        raise InputError(f"{otherwise}: the times of its index do not ascend; {rule}")
+    return index.to_numpy(dtype=float)
+
+
+def _kind(given: Any) -> str:
+    """What was given, in few words."""
+    text = repr(given)
+    return text if len(text) <= _SHOWN and "\n" not in text else f"of type {type(given).__name__}"
+
+
+def opened(run: Recorded, otherwise: str) -> tuple[xr.Dataset, str]:
     """A run's dataset and its name; ``otherwise`` names a dataset without a scenario's name.
 
     Warns
@@ -151,10 +208,11 @@ def opened(run: Run | xr.Dataset | str | Path, otherwise: str) -> tuple[xr.Datas
     if isinstance(run, str | Path):
         dataset, label = open_trajectory(Path(run)), str(run)
     else:
-        dataset = run.dataset if isinstance(run, Run) else run
+        dataset = run.dataset if isinstance(run, Run) else as_dataset(run, otherwise)
         if not isinstance(dataset, xr.Dataset):
             raise InputError(
-                f"{otherwise} = {run!r}; give a run, its dataset, or the folder of a scenario's results"
+                f"{otherwise} is {_kind(run)}; give a run, its dataset, a DataFrame or DataArray over the time, the "
+                "folder of a scenario's results, or the file of a recording (COMTRADE, CSV, Excel)"
             )
         label = str(dataset.attrs.get("scenario", otherwise))
     if not dataset.sizes.get("time"):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from orchestrator.analysis.stability import Stability
 from orchestrator.analysis.state_space import StateSpace
 from orchestrator.analysis.state_space import read_linear_model as read_state_space
 from orchestrator.analysis.steady_state import OperatingPoint
+from orchestrator.asked import flag
 from orchestrator.asked import path as path_of
 from orchestrator.errors import InputError
 from orchestrator.late import pd, signal
@@ -36,11 +38,14 @@ class LinearSystem(StateSpace):
         The verdict on the model.
     warnings
         What is to be borne in mind of it.
+    continuous_form
+        Of a step map, what makes the continuous model of the same system; None if there is none.
     """
 
     operating_point: OperatingPoint = UNKNOWN
     stability: Stability = NOT_JUDGED
     warnings: tuple[str, ...] = ()
+    continuous_form: Callable[[], LinearSystem] | None = field(default=None, compare=False)
 
     def table(self, matrix: str) -> pd.DataFrame:
         """One of the matrices ``"A"``, ``"B"``, ``"C"``, ``"D"`` with the names of its rows and columns.
@@ -64,17 +69,55 @@ class LinearSystem(StateSpace):
         rows, columns = rows_and_columns[matrix]
         return pd.DataFrame(getattr(self, matrix), index=list(rows), columns=list(columns))
 
-    def to_scipy(self) -> signal.StateSpace:
-        """The model as `scipy.signal.StateSpace`; of a step map with its step ``dt`` [s].
+    def continuous(self) -> LinearSystem:
+        """ẋ = A·x + B·u of the same system: what a controller is designed for.
 
-        For the design of a controller linearise with ``continuous=True``."""
-        step = {} if self.step_size is None else {"dt": self.step_size}
-        return signal.StateSpace(self.A, self.B, self.C, self.D, **step)
+        Raises
+        ------
+        InputError
+            If there is the step map alone, as with components that were identified.
+        """
+        if self.step_size is None:
+            return self
+        if self.continuous_form is None:
+            raise InputError(
+                "there is the step map alone, as with components that were identified; give step_map=True"
+            )
+        return self.continuous_form()
 
-    def to_control(self) -> Any:
-        """The model as a `StateSpace` of python-control, with the names of states, inputs and outputs.
+    def to_scipy(self, *, step_map: bool = False) -> signal.StateSpace:
+        """The continuous model as `scipy.signal.StateSpace`.
 
-        What that package does not take in a name becomes ``_``: ``gfor.omega`` is ``gfor_omega``."""
+        Parameters
+        ----------
+        step_map
+            The map over one communication step in its place, with the step ``dt`` [s].
+
+        Raises
+        ------
+        InputError
+            If the other of the two models was linearised alone.
+        """
+        model = self._of_kind(step_map)
+        step = {} if model.step_size is None else {"dt": model.step_size}
+        return signal.StateSpace(model.A, model.B, model.C, model.D, **step)
+
+    def to_control(self, *, step_map: bool = False) -> Any:
+        """The continuous model as a `StateSpace` of python-control, with the names of states, inputs and outputs.
+
+        What that package does not take in a name becomes ``_``: ``gfor.omega`` is ``gfor_omega``.
+
+        Parameters
+        ----------
+        step_map
+            The map over one communication step in its place, with the step ``dt`` [s].
+
+        Raises
+        ------
+        InputError
+            If the package control is missing, or the other of the two models was linearised alone.
+        """
+        model = self._of_kind(step_map)
         try:
             control = import_module("control")
         except ImportError as error:
@@ -83,9 +126,18 @@ class LinearSystem(StateSpace):
             ) from error
         kinds = ("states", "inputs", "outputs")
         names = {
-            kind: [re.sub(r"\W+", "_", name) for name in getattr(self, kind)] for kind in kinds
+            kind: [re.sub(r"\W+", "_", name) for name in getattr(model, kind)] for kind in kinds
         }
-        return control.ss(self.A, self.B, self.C, self.D, self.step_size or 0, **names)
+        return control.ss(model.A, model.B, model.C, model.D, model.step_size or 0, **names)
+
+    def _of_kind(self, step_map: bool) -> LinearSystem:
+        if not flag(step_map, "step_map"):
+            return self.continuous()
+        if self.step_size is None:
+            raise InputError(
+                "the model is continuous; linearise without continuous=True for the step map"
+            )
+        return self
 
     def __repr__(self) -> str:
         kind = "continuous" if self.step_size is None else f"step map of {self.step_size:g} s"
@@ -95,7 +147,10 @@ class LinearSystem(StateSpace):
     def _repr_html_(self) -> str:
         lines = [self.stability.sentence(), *(f"warning: {text}" for text in self.warnings)]
         lines += [f"inputs: {', '.join(self.inputs)}", f"outputs: {', '.join(self.outputs)}"]
-        return page(repr(self).strip("<>"), lines, self.table("A"))
+        if self.states:
+            lines.append("table('A') … table('D') have the matrices, eigenvalues of A the modes")
+        small = self.table("D") if self.outputs and self.inputs else None
+        return page(repr(self).strip("<>"), [*lines, "D, outputs by inputs:"], small)
 
 
 def read_linear_model(fmu: str | Path) -> LinearSystem:

@@ -3,11 +3,13 @@
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import MISSING, fields
+from functools import wraps
 from inspect import Parameter, Signature, cleandoc, get_annotations
 from textwrap import indent
 from typing import Any, Concatenate, ParamSpec, TypeVar, cast
 
 from orchestrator.asked import Asked, asked_of, checked, require_known
+from orchestrator.fmi.turn import turn
 
 Asks = ParamSpec("Asks")
 Shown = TypeVar("Shown")
@@ -37,11 +39,23 @@ def _made(request: Any, before: list[Parameter], call: Callable[..., Any], who: 
     def studied(*given: Any, **wanted: Any) -> Any:
         require_known(wanted, asked_of(request), who)
         bound = signature.bind(*given, **wanted).arguments
-        return call(*given[: len(before)], request(**checked(request, bound)))
+        with turn:
+            return call(*given[: len(before)], request(**checked(request, bound)))
 
     studied.__signature__ = signature  # type: ignore[attr-defined] # what `help` and notebooks show
     studied.__doc__ = _documentation(request)
     return studied
+
+
+def in_turn(function: Callable[Asks, Shown]) -> Callable[Asks, Shown]:
+    """A function that computes with FMUs: one thread at a time, as a method of a request."""
+
+    @wraps(function)
+    def waiting(*given: Asks.args, **wanted: Asks.kwargs) -> Shown:
+        with turn:
+            return function(*given, **wanted)
+
+    return waiting
 
 
 def _named(made: Any, name: str, module: str) -> Any:

@@ -19,7 +19,10 @@ from orchestrator.report.notebook import Axes, axes_or_new, curves_on, page
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import ScenarioFolder, new_run_id, staged
 from orchestrator.safe_files import made_folder
+from orchestrator.spelling import spelled
+from orchestrator.study.answers import of_run
 from orchestrator.study.comparison import recorded
+from orchestrator.truth import NoTruth
 
 if TYPE_CHECKING:
     from orchestrator.analysis.stability import Stability
@@ -31,7 +34,7 @@ _STATES = 3
 """States with the largest participation that stand in a table."""
 
 
-class Modes:
+class Modes(NoTruth, ask=".stability.stable, or len() for the number of modes in range"):
     """Steady state and modes of one scenario. `Scenario.modes` makes it.
 
     Attributes
@@ -75,7 +78,14 @@ class Modes:
         return len(self.result.modes)
 
     def __getitem__(self, index: int | str) -> Mode:
-        return self.named[index] if isinstance(index, str) else self.result.modes[index]
+        if isinstance(index, str):
+            return self.named[index]
+        try:
+            return self.result.modes[index]
+        except IndexError:
+            raise NoSuchIndexError(
+                f"there is no modes[{index!r}]: {len(self)} modes are in the range, the first is modes[0]"
+            ) from None
 
     def table(self) -> pd.DataFrame:
         """All modes in the range, least damped first: eigenvalue [1/s, rad/s], frequency, damping, name, states. Row 1
@@ -181,6 +191,41 @@ class Modes:
         axes.legend(loc="best", fontsize="small")
         return axes
 
+    def plot_shape(self, mode: str | int = 0, ax: Axes = None) -> Axes:
+        r"""A mode's shape: an arrow for each state that shows who swings against whom, the longest of length 1.
+
+        Parameters
+        ----------
+        mode
+            A name, as `named` has it, or the place in the range: 0 is row 1 of `table`.
+        ax
+            Polar Matplotlib Axes; by default those of a new figure.
+
+        Raises
+        ------
+        InputError
+            If there is no such mode, or no state of the case shows who swings.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> axes = gfor.load("two_area").scenario("gfor").modes().plot_shape("electromechanical")
+        >>> axes.get_xlabel()
+        '→ sg1\n← sg2'
+        """
+        from orchestrator.study.mode_plots import draw_shape  # noqa: PLC0415 - a second to import
+
+        shown = self[mode]
+        if not self.result.swing:
+            raise InputError(
+                "the case names no states that show who swings ([analysis] swing), and none stands out; "
+                f"modes[{mode!r}].shape has all states"
+            )
+        axes = axes_or_new(ax, 4.0, 4.2, polar=True)
+        draw_shape(axes, shown, self.result.swing, None)
+        axes.set_title(f"{shown.frequency_hz:.3f} Hz, {shown.damping_percent:.2f} %")
+        return axes
+
     def __repr__(self) -> str:
         prepared = self.result.prepared
         head = f"Modes of {prepared.case.name}, {prepared.name}"
@@ -196,6 +241,10 @@ class Modes:
             *(f"warning: {text}" for text in self.warnings),
         ]
         return page(f"Modes of {r.prepared.case.name}: {r.prepared.title}", lines, self.table())
+
+
+class NoSuchIndexError(InputError, IndexError):
+    """Fewer modes are in the range."""
 
 
 class NoSuchModeError(InputError, KeyError):
@@ -220,7 +269,7 @@ class NamedModes(dict[str, Mode]):
         )
 
 
-class Run:
+class Run(NoTruth):
     """A scenario's modes and its response in time. `Scenario.run` makes it.
 
     Attributes
@@ -252,6 +301,17 @@ class Run:
             if isinstance(variable.data, np.ndarray):
                 variable.data.flags.writeable = False
         return shown
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether the run and the modes before and after its events show no growth; None where that is not known."""
+        return of_run(self.result).good
+
+    @property
+    def verdict(self) -> str:
+        """The verdict in one sentence, as ``gfor run`` has it."""
+        answer = of_run(self.result)
+        return spelled(f"{answer.verdict}: {answer.remark}" if answer.remark else answer.verdict)
 
     @property
     def linear(self) -> xr.Dataset | None:
@@ -371,10 +431,13 @@ class Run:
         prepared, times = self.result.modes.prepared, self.dataset["time"].values
         end = float(times[-1]) if len(times) else 0.0
         failed = f"; ended early: {self.failure}" if self.failure else ""
-        return f"<Run of {prepared.case.name}, {prepared.name}: {end:g} s, {len(self.dataset)} signals{failed}>"
+        what = (
+            f"Run of {prepared.case.name}, {prepared.name}: {end:g} s, {len(self.dataset)} signals"
+        )
+        return f"<{what}; {self.verdict}{failed}>"
 
     def _repr_html_(self) -> str:
-        lines = [self.modes.stability.sentence()]
+        lines = [self.verdict, f"modes before the events: {self.modes.stability.sentence()}"]
         lines += [f"ended early: {self.failure}"] if self.failure else []
         lines += [f"found: {finding.message}" for finding in self.findings]
         prepared = self.result.modes.prepared

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, cast
 
 from orchestrator.api.linear import LinearSystem
-from orchestrator.api.methods import method
+from orchestrator.api.methods import in_turn, method
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.results import Modes, Run
 from orchestrator.asked import Names, flag, number_between
@@ -26,7 +27,7 @@ from orchestrator.cases.sharing import SharingRule
 from orchestrator.cases.short_circuit import BusStrength, ShortCircuit
 from orchestrator.coupling.observers import Progress
 from orchestrator.coupling.schedule import ScheduleName
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, Problem
 from orchestrator.late import pd, xr
 from orchestrator.report.notebook import page
 from orchestrator.results.lock import held
@@ -69,10 +70,16 @@ def modes_of(scenario: Scenario, request: ModesRequest) -> ModesResult:
         return modes_with_boxes(prepared, master, seen, critical, report=request.report)
 
 
+def _new(questions: Iterable[Problem], known: Collection[str]) -> tuple[Problem, ...]:
+    return tuple(one for one in questions if str(one) not in known)
+
+
 def _run(scenario: Scenario, request: RunRequest) -> Run:
     from orchestrator.study.run import run_scenario  # noqa: PLC0415 - only runs need it
 
     prepared, recording = scenario._until(cast("float | None", request.stop)), request.recording
+    known = set(scenario.questions)
+    question([replace(prepared, questions=_new(prepared.questions, known))], above=1)
     if request.checkpoints is not None and request.federates is not None:
         raise InputError(
             "a run with federates keeps no checkpoints; leave out federates or checkpoints"
@@ -112,7 +119,7 @@ def sensitivities_of(scenario: Scenario, request: SensitivitiesRequest) -> Sensi
     """The mode's derivatives by the parameters that are asked for."""
     from orchestrator.sensitivities.sensitivities import find_sensitivities  # noqa: PLC0415 - as above
 
-    return Sensitivities(find_sensitivities(scenario.prepared, scenario.again, request))
+    return Sensitivities(find_sensitivities(scenario.prepared, scenario._prepared_with, request))
 
 
 def steps_of(scenario: Scenario, request: StepsRequest) -> StepChoice:
@@ -210,6 +217,7 @@ class Scenario:
 
     run = method("Scenario.run", RunRequest, _run)
 
+    @in_turn
     def response(self, stop: Time | None = None) -> xr.Dataset:
         """The linear model's response to the scenario's events, over the time [s]; no FMU is stepped for it.
 
@@ -236,8 +244,7 @@ class Scenario:
 
         return response_at_steady_state(self._until(in_seconds(stop, "stop")))
 
-    def again(self, changed: Mapping[str, float]) -> PreparedScenario:
-        """The scenario with other values by ``component.variable``, prepared anew from the case."""
+    def _prepared_with(self, changed: Mapping[str, float]) -> PreparedScenario:
         (prepared,) = self._file.prepare(
             [self.name], dict(changed), self._asked.step_size, None, self._asked.layers
         )
@@ -289,6 +296,7 @@ class Scenario:
         rated = None if rating is None else number_between(rating, "MVA", "rating", 1e-6, 1e6, rule)
         return ShortCircuit.of(self.prepared).strengths(current, rated)
 
+    @in_turn
     def linearize(
         self,
         inputs: Names = (),
@@ -306,7 +314,8 @@ class Scenario:
         outputs
             Observed outputs; by default what the case plots.
         continuous
-            ẋ = A·x + B·u instead of the map over one communication step.
+            ẋ = A·x + B·u instead of the map over one communication step, which a simulation runs;
+            `LinearSystem.to_control` gives the continuous model of either.
         black_box
             Identify the components that hide their states; of those there is the step map alone.
 
@@ -341,14 +350,25 @@ class Scenario:
             operating_point=point,
             stability=examined.stability,
             warnings=examined.warnings,
+            continuous_form=None
+            if continuous or black_box
+            else partial(self.linearize, inputs, outputs, continuous=True),
         )
 
     def __repr__(self) -> str:
         return f"<Scenario {self.name} of {self.prepared.case.name}: {self.title}>"
 
     def _repr_html_(self) -> str:
-        table = pd.DataFrame({"value": self.values})
+        units = [self._unit(name) for name in self.values]
+        columns = {"name": [*self.values], "value": [*self.values.values()], "unit": units}
+        table = pd.DataFrame(columns, dtype=object)
         return page(f"{self.prepared.case.name}, {self.name}: {self.title}", self.questions, table)
+
+    def _unit(self, name: str) -> str:
+        component, _, variable = name.partition(".")
+        plan = self.prepared.system.components.get(component)
+        info = None if plan is None else plan.description.variables.get(variable)
+        return "" if info is None else info.unit or "1"
 
 
 def _boxes(name: str, wanted: bool) -> Any:

@@ -13,6 +13,7 @@ import numpy as np
 from orchestrator.arrays import Numbers
 from orchestrator.certification.case_file import BINDING, FMU
 from orchestrator.certification.request import CertificationRequest
+from orchestrator.truth import NoTruth
 
 TOLERANCE = 1e-5
 """Largest difference of a recomputed eigenvalue relative to its size, and of a signal relative to its range. Different
@@ -29,7 +30,7 @@ Compared = Iterator[tuple[str, str]]
 
 
 @dataclass
-class Verification:
+class Verification(NoTruth, ask=".holds"):
     faults: list[str] = field(default_factory=list)
     agreed: list[str] = field(default_factory=list)
 

@@ -21,11 +21,12 @@ from orchestrator.report.tables import PlainTable, make_table
 from orchestrator.results.manifest import made_now
 from orchestrator.results.storage import save_json
 from orchestrator.safe_files import write_text
+from orchestrator.truth import NoTruth
 
 _ROWS = 12
 
 
-class CoordinatedDesign:
+class CoordinatedDesign(NoTruth, ask=".met, which is True, False, or None where it is not known"):
     """POD controllers for many operating points and outages. `Case.design_over_points` makes it.
 
     Attributes

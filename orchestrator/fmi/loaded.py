@@ -29,6 +29,7 @@ from orchestrator.fmi.fmi3 import Fmi3Library, adapter_path
 from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.messages import Messages, callbacks_for, texts
 from orchestrator.fmi.refusal import FATAL, check_log, in_its_words, refusal
+from orchestrator.fmi.turn import turn
 from orchestrator.fmi.wine import NoWineError
 from orchestrator.fmi.wine_program import WineProgram, proxy_path
 
@@ -63,7 +64,7 @@ class LoadedComponent(Derived):
         calls.watch()
         try:
             self._fmu = self._loaded(Path(directory or self._own_directory or ""))
-            with calls, self._brought.loading():
+            with turn, calls, self._brought.loading():
                 self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
         except UnsupportedFmuError:
             self.close()
@@ -219,14 +220,15 @@ class LoadedComponent(Derived):
     def close(self) -> None:
         fmu, self._fmu = self._fmu, None
         if fmu is not None and fmu.component is not None and not self.lost:
-            with calls:
+            with turn, calls:
                 try:
                     if self._initialised:
                         fmu.terminate()
                 except FMICallException:
                     pass  # an FMU that failed may refuse to terminate; it is freed all the same
                 fmu.freeInstance()
-            self._brought.close()
+            with turn:
+                self._brought.close()
         if self._wine is not None:
             self._wine.close()
             self._wine = None

@@ -15,6 +15,7 @@ from orchestrator.immittance.sides import named
 from orchestrator.immittance.study import CutResult
 from orchestrator.report.tables import VerdictSentence, make_table
 from orchestrator.results.storage import save_json
+from orchestrator.truth import NoTruth
 
 GOAL = 0.3  # distance from −1 that a retuning is to reach: all of L may be off by so much of 1
 
@@ -33,7 +34,7 @@ _NAMED, _LITTLE = 4, 5e-3
 Report = Callable[[str], None]
 
 
-class Nyquist:
+class Nyquist(NoTruth, ask=".verdict"):
     """What `nyquist` found at a cut: ``result`` has loop, judgement and scans, ``retuned`` what `retune` found."""
 
     def __init__(

@@ -36,6 +36,7 @@ from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.results.storage import save_json, save_table
 from orchestrator.safe_files import made_folder, write_text
+from orchestrator.truth import NoTruth
 
 MODES, PAIRS, ASSIGNMENTS = "modes.csv", "pairs.csv", "assignments.csv"
 SUMMARY, PAGE = "interactions.json", "interactions.html"
@@ -50,7 +51,7 @@ _FULL = 20.0  # damping [%] with the full colour of good ones; −20 % has that 
 Row = TypeVar("Row")
 
 
-class Interactions:
+class Interactions(NoTruth):
     """Who takes part in which mode, and which vendors' converters do not agree. `Case.interactions` makes it.
 
     Attributes

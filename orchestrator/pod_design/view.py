@@ -21,11 +21,12 @@ from orchestrator.report.notebook import page
 from orchestrator.results.manifest import made_now
 from orchestrator.results.storage import save_json
 from orchestrator.safe_files import write_text
+from orchestrator.truth import NoTruth
 
 _OPTION = re.compile(r"--([a-z][a-z-]+)")  # Python's keyword is spelt like it
 
 
-class ControllerDesign:
+class ControllerDesign(NoTruth, ask=".met"):
     """A POD controller, and the closed loop with it. `Case.design` makes it.
 
     Attributes

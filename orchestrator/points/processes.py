@@ -20,6 +20,7 @@ from typing import Any
 from fmus.toolchain.temporary import leave, own_folder, remove
 from orchestrator.fmi.interrupts import calls
 from orchestrator.points.executor import ATTEMPTS, Result, Task, WorkerLostError
+from orchestrator.points.main_guard import require_main_guard
 
 _QUEUE_PER_WORKER = 2
 """Number of tasks that each worker is given at once. The second task is ready when the first one ends, which keeps the
@@ -39,6 +40,7 @@ class Processes:
     once for all workers. Importing takes seconds, and the caller can prepare the tasks meanwhile."""
 
     def __init__(self, workers: int, imports: Sequence[str] = ()) -> None:
+        require_main_guard()
         self.workers = workers
         self._context = _context(imports)
         self._pool: ProcessPoolExecutor | None = None  # starting a worker takes time

@@ -15,7 +15,7 @@ Axes = Any
 _ROWS = 40
 
 
-def new_axes(width: float = 7.2, height: float = 4.4) -> Axes:
+def new_axes(width: float = 7.2, height: float = 4.4, *, polar: bool = False) -> Axes:
     """Axes of a new figure of pyplot, in the look of all plots."""
     import matplotlib as mpl  # noqa: PLC0415 - a second to import
     import matplotlib.pyplot as plt  # noqa: PLC0415 - as above
@@ -26,15 +26,19 @@ def new_axes(width: float = 7.2, height: float = 4.4) -> Axes:
     # around that would take its settings back, so that no later figure is shown.
     figure = plt.figure(figsize=(width, height), layout="constrained")
     with mpl.rc_context(STYLE):
-        return figure.subplots()
+        return figure.subplots(subplot_kw={"projection": "polar"} if polar else None)
 
 
-def axes_or_new(given: Axes, width: float, height: float) -> Axes:
+def axes_or_new(given: Axes, width: float, height: float, *, polar: bool = False) -> Axes:
     if given is None:
-        return new_axes(width, height)
+        return new_axes(width, height, polar=polar)
     if not hasattr(given, "get_legend_handles_labels"):
         raise InputError(
             f"ax = {given!r}; give Matplotlib Axes, such as those that another plot returned"
+        )
+    if polar and getattr(given, "name", "") != "polar":
+        raise InputError(
+            "ax: a mode's shape is drawn on polar Axes; make them by plt.subplots(subplot_kw={'projection': 'polar'})"
         )
     return given
 

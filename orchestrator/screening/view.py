@@ -31,6 +31,7 @@ from orchestrator.screening.words import (
     what_was_counted,
     where,
 )
+from orchestrator.truth import NoTruth
 
 ITEMS, MODES, SUMMARY, PAGE = "items.csv", "modes.csv", "screening.json", "screening.html"
 
@@ -39,7 +40,7 @@ _CURVES = 6
 _MOST_MARKS = 4000
 
 
-class Screening:
+class Screening(NoTruth):
     """Critical modes of operating points and outages. `Case.screen` makes it.
 
     Attributes

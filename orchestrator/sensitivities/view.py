@@ -63,9 +63,28 @@ class Sensitivities:
         )
 
     def _repr_html_(self) -> str:
-        return page(
-            repr(self).strip("<>"), [f"warning: {text}" for text in self.warnings], self.table()
-        )
+        table, lines = self.table(), [f"warning: {text}" for text in self.warnings]
+        for name, text in _long_texts(table).items():
+            lines.append(f"{name}: {text}")
+        return page(repr(self).strip("<>"), lines, table.map(_short_text))
+
+
+_LONGEST = 40
+"""Characters of a text in a table that a notebook shows; a longer one makes rows of many lines, and stands above."""
+
+
+def _long_texts(table: pd.DataFrame) -> dict[str, str]:
+    """Of each parameter, its texts that are too long for a table."""
+    found = {}
+    for name, row in table.iterrows():
+        texts = [one for one in row if isinstance(one, str) and len(one) > _LONGEST]
+        if texts:
+            found[str(name)] = "; ".join(texts)
+    return found
+
+
+def _short_text(value: Any) -> Any:
+    return "see above" if isinstance(value, str) and len(value) > _LONGEST else value
 
 
 def sensitivity_table(result: SensitivityResult) -> ColumnTable[Sensitivity]:

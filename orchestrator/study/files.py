@@ -221,7 +221,7 @@ def summary_of(result: RunResult) -> dict[str, Any]:
         if math.isnan(modes.operating_point.residual)
         else modes.operating_point.residual,
         "states": modes.model.number_of_states,
-        "stable": modes.stability.stable,
+        "stable": None if result.before_its_events else modes.stability.stable,
         "largest_growth_rate": modes.stability.largest_growth_rate,
         "stability": modes.stability.as_json(),
         "outside_range": None if modes.hidden is None else modes.hidden.as_json(),

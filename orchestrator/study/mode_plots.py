@@ -8,6 +8,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from orchestrator.analysis.modes import Mode
 from orchestrator.cases.schema import PlotTable, ReferenceModeTable
 from orchestrator.report.plot_style import STYLE, add_legend, colour, save_figure
 from orchestrator.results.signals import outline, signal
@@ -287,14 +288,19 @@ def plot_mode_shapes(results: Sequence[ModesResult], path: Path) -> bool:
 
 def draw_mode_shape(axis: Any, result: ModesResult, name: str, shade: str) -> None:
     """Arrows of the states that swing in a named mode, on polar Matplotlib Axes."""
+    draw_shape(axis, result.named.get(name), result.swing, shade)
+
+
+def draw_shape(axis: Any, mode: Mode | None, swing: Sequence[str], shade: str | None) -> None:
+    """Arrows of those states that swing in a mode, on polar Matplotlib Axes; ``shade`` is their colour."""
     axis.set_ylim(0, 1.08)
     axis.spines["polar"].set_visible(False)
     axis.set_yticks([0.5, 1.0], [])
     axis.set_xticks(np.deg2rad([0, 90, 180, 270]), [])
-    mode = result.named.get(name)
     if mode is None:
         return
-    together, against = mode.swing(result.swing, least=0.0)
+    together, against = mode.swing(swing, least=0.0)
+    shade = colour(0) if shade is None else shade
     if not together:
         return
     leader = mode.shape[together[0]]

@@ -14,9 +14,10 @@ from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder
 from orchestrator.sweep.dataset import Samples, save_sweep, sweep_dataset, sweep_json
 from orchestrator.sweep.sweep import SweepResult
+from orchestrator.truth import NoTruth
 
 
-class ParameterSweep:
+class ParameterSweep(NoTruth):
     """The modes of scenarios over a grid of parameters. `Case.sweep` makes it.
 
     Attributes
@@ -33,6 +34,12 @@ class ParameterSweep:
         self.result = result
         self.samples = Samples(result)
         self.limits = tuple(result.limits)
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether nothing grows at any point of any scenario; None where a point has no verdict and none grows."""
+        verdicts = [scenario.stable for scenario in self.result.scenarios]
+        return False if False in verdicts else None if None in verdicts else True
 
     @property
     def remarks(self) -> list[str]:

@@ -154,9 +154,9 @@ def test_a_file_is_named_by_its_path(nothing):
 
 def test_what_is_compared_must_be_runs(run):
     for other in (None, run.modes, 3):
-        with pytest.raises(InputError, match="give a run, its dataset, or the folder"):
+        with pytest.raises(InputError, match="give a run, its dataset, a DataFrame"):
             gfor.compare(run, other)
-    with pytest.raises(InputError, match="give a run, its dataset, or the folder"):
+    with pytest.raises(InputError, match="give a run, its dataset, a DataFrame"):
         gfor.identify(None, "gfor.omega")
 
 

@@ -1,7 +1,5 @@
 """Linear models as other programs take them."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -13,7 +11,9 @@ def test_scipys_state_space_has_the_same_matrices(step):
     A, B, C, D = (
         np.arange(n * m, dtype=float).reshape(n, m) + n for n, m in ((3, 3), (3, 2), (1, 3), (1, 2))
     )
-    made = LinearSystem.to_scipy(SimpleNamespace(A=A, B=B, C=C, D=D, step_size=step))
+    made = LinearSystem(A, B, C, D, ("x", "y", "z"), ("u", "v"), ("w",), step).to_scipy(
+        step_map=step is not None
+    )
     for mine, theirs in zip((A, B, C, D), (made.A, made.B, made.C, made.D), strict=True):
         np.testing.assert_array_equal(mine, theirs)
     assert made.dt == step
