@@ -40,7 +40,7 @@ def synchronous_generator(
     m = ModelBuilder(parts.model_name(), parts.title("EMT-type"), kind="machine", usual=MACHINE)
     S_n = declare_rating(m, S_N)
     port = device_port_of(m, S_n, P_0)
-    g = parts.machine(m, port, S_n, flux_state)
+    g = replace(parts.machine(m, port, S_n, flux_state), S_n=S_n)
     if g.at_rated_speed:
         raise ValueError(
             f"machine = {machine!r}: its emf is that of rated speed, which stator transients contradict; take "
@@ -79,6 +79,6 @@ def synchronous_generator_phasor(
         with_speed = m.switch(
             "speed_in_emf", not g.at_rated_speed, "Emf is w·e''; else e'', as of rated speed"
         )
-    g = replace(g, emf_speed=if_else(with_speed, g.w, 1))
+    g = replace(g, S_n=S_n, emf_speed=if_else(with_speed, g.w, 1))
     made = phasor_with_controls(m, port, g, parts.exciter, parts.governor, parts.stabilizer)
     return replace(made, of_parts=True)

@@ -22,7 +22,8 @@ class DyrField:
     of the record; the parameters take the product of both. PSS/E gives some leads as T_A/T_B; ``only``: the only values
     that our part can stand for; empty where it takes every one; ``same_as``: name of another field that must have the
     same value, because our part has one parameter for both; ``not_zero``: whether 0, by which PSS/E means that it
-    chooses a value itself, must be refused; ``switch``: whether the parameters are truth values; 0 is false;
+    chooses a value itself, must be refused; ``zero_sets``: parameter that is true at 0, by which the part chooses the
+    value as PSS/E does; ``switch``: whether the parameters are truth values; 0 is false;
     ``nothing_without``: name of another field; where that one is 0, PSS/E reads 0 here too, whatever stands here."""
 
     name: str
@@ -32,6 +33,7 @@ class DyrField:
     only: tuple[float, ...] = ()
     same_as: str = ""
     not_zero: bool = False
+    zero_sets: str = ""
     switch: bool = False
     nothing_without: str = ""
 
@@ -51,8 +53,8 @@ class DyrRecord:
 
 
 _WORD = re.compile(
-    r"(?P<name>[^:=!&]+)(:(?P<sets>[\w+]+))?(-(?P<negated>\w+))?(\*(?P<times>[^=!&]+))?(==(?P<same>\w+))?(=(?P<only>[\d|]+))?"
-    r"(?P<not_zero>!?)(?P<switch>\??)(&(?P<without>\S+))?"
+    r"(?P<name>[^:=!&]+)(:(?P<sets>[\w+]+))?(-(?P<negated>[A-Za-z]\w*))?(\*(?P<times>[^=!&]+))?(==(?P<same>\w+))?(=(?P<only>[-\d|]+))?"
+    r"(!(?P<chooser>\w*))?(?P<switch>\??)(&(?P<without>\S+))?"
 )
 """A field as the table has it."""
 
@@ -76,9 +78,20 @@ def _record(table: Mapping[str, Any]) -> DyrRecord:
         )
         only = tuple(map(float, found["only"].split("|"))) if found["only"] else ()
         times, same = found["times"] or "", found["same"] or ""
-        marks = found["not_zero"] != "", found["switch"] != ""
-        without = found["without"] or ""
-        fields.append(DyrField(found["name"], sets, negated, times, only, same, *marks, without))
+        chooser = f"{scope}{found['chooser']}" if found["chooser"] else ""
+        field = DyrField(
+            found["name"],
+            sets,
+            negated,
+            times,
+            only,
+            same,
+            not_zero=found["chooser"] == "",
+            zero_sets=chooser,
+            switch=found["switch"] != "",
+            nothing_without=found["without"] or "",
+        )
+        fields.append(field)
     return DyrRecord(
         table["kind"],
         table["part"],

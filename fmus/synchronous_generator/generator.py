@@ -18,9 +18,12 @@ from fmus.synchronous_generator.variants import (
     ST1,
     ST4B,
     Governor,
+    Shaft,
     Stabilizer,
     Variant,
     declare_machine_outputs,
+    of_power,
+    of_speed,
 )
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
@@ -52,8 +55,9 @@ def _generator(variant: Variant, stabilizer: str = "") -> Model:
     m = ModelBuilder(variant.model_name(stabilizer), title, kind="machine", usual=MACHINE)
     port = device_port(m, variant.data.S_n, variant.data.P_0)
     machine = declare_machine(m, port, variant.data)
-    governor = partial(ieeeg1, data=variant.governor)
-    return with_controls(m, port, machine, variant.exciter, governor, pss2a if stabilizer else None)
+    governor = of_speed(partial(ieeeg1, data=variant.governor))
+    pss = of_power(pss2a) if stabilizer else None
+    return with_controls(m, port, machine, variant.exciter, governor, pss)
 
 
 def with_controls(
@@ -65,11 +69,13 @@ def with_controls(
     stabilizer: Stabilizer | None,
 ) -> Model:
     """A machine with stator transients and its controls."""
-    v_s = 0.0 if stabilizer is None else stabilizer(m, g.w - 1, *terminal_power(g, port))
+    v_nearly = terminal_voltage(g, port, g.field_current)
+    shaft = Shaft(g.w, g.start.T_e, *terminal_power(g, port), v_nearly, g.start.v_t, g.S_n)
+    v_s = 0.0 if stabilizer is None else stabilizer(m, shaft)
     E_fd, v_t = exciter(
         m, Regulated(g.start, lambda E: terminal_voltage(g, port, E), g.field_current, v_s)
     )
-    P_m = governor(m, g.w, g.start.T_e)
+    P_m = governor(m, shaft)
     machine_equations(m, g, port, E_fd, P_m)
     declare_port_outputs(m, port, g.current.rotated(g.delta))
     declare_machine_outputs(m, g, v_t, E_fd, P_m)

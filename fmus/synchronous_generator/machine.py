@@ -41,7 +41,7 @@ class Machine:
 
     ``salient`` where its last reactances may differ; ``at_rated_speed`` where the emf is e'' instead of w·e'' unless
     a parameter says otherwise, which only a phasor model can have; ``emf_speed``: what e'' is multiplied by there, w
-    where it is None."""
+    where it is None; ``S_n``: the rating [MVA], which only parts that are chosen by name ask for."""
 
     R: Expr
     R_t: Expr
@@ -56,6 +56,7 @@ class Machine:
     salient: bool = True
     at_rated_speed: bool = False
     emf_speed: Expr | None = None
+    S_n: Expr | None = None
 
     @property
     def current(self) -> Phasor:

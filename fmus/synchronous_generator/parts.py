@@ -5,9 +5,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from fmus.synchronous_generator.excitation.alternator import ac8b, esac6a, exac2
 from fmus.synchronous_generator.excitation.common import Exciter
-from fmus.synchronous_generator.excitation.rotating import ac1a, ac4a, dc1a, ieeet1
-from fmus.synchronous_generator.excitation.static import sexs, st1a, st4b
+from fmus.synchronous_generator.excitation.rotating import (
+    ac1a,
+    ac4a,
+    dc1a,
+    dc2a,
+    ieeet1,
+    ieeet2,
+)
+from fmus.synchronous_generator.excitation.static import scrx, sexs, st1a, st4b
 from fmus.synchronous_generator.excitation.without_regulator import external, manual
 from fmus.synchronous_generator.machine import FluxDeclaration, Machine
 from fmus.synchronous_generator.machines.classical import classical
@@ -19,7 +27,9 @@ from fmus.synchronous_generator.machines.standard import (
     gensal,
     two_axis,
 )
+from fmus.synchronous_generator.stabilization.legacy import ieeest, st2cut, stab2a
 from fmus.synchronous_generator.stabilization.standard import pss1a, pss2a, pss2b
+from fmus.synchronous_generator.turbines.ggov1 import ggov1
 from fmus.synchronous_generator.turbines.governors import (
     constant_power,
     constant_torque,
@@ -29,7 +39,8 @@ from fmus.synchronous_generator.turbines.governors import (
     read_either_way,
     tgov1,
 )
-from fmus.synchronous_generator.variants import Governor, Stabilizer
+from fmus.synchronous_generator.turbines.steam import ieesgo
+from fmus.synchronous_generator.variants import Governor, Stabilizer, of_power, of_speed
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort
 from fmus.toolchain.symbols import Expr
@@ -52,27 +63,38 @@ MACHINES: dict[str, MachinePart] = {
 EXCITERS: dict[str, Exciter] = {
     "manual": manual,
     "sexs": sexs,
+    "scrx": scrx,
     "ieeet1": ieeet1,
+    "ieeet2": ieeet2,
     "dc1a": dc1a,
+    "dc2a": dc2a,
     "ac1a": ac1a,
+    "exac2": exac2,
+    "esac6a": esac6a,
+    "ac8b": ac8b,
     "ac4a": ac4a,
     "st1a": st1a,
     "st4b": st4b,
     "external": external,
 }
 GOVERNORS: dict[str, Governor] = {
-    "constant_power": read_either_way(constant_power),
-    "constant_torque": constant_torque,
-    "tgov1": read_either_way(tgov1),
-    "hygov": read_either_way(hygov),
-    "gast": read_either_way(gast),
-    "ieeeg1": read_either_way(ieeeg1),
+    "constant_power": read_either_way(of_speed(constant_power)),
+    "constant_torque": of_speed(constant_torque),
+    "tgov1": read_either_way(of_speed(tgov1)),
+    "hygov": read_either_way(of_speed(hygov)),
+    "gast": read_either_way(of_speed(gast)),
+    "ieeeg1": read_either_way(of_speed(ieeeg1)),
+    "ggov1": read_either_way(ggov1),
+    "ieesgo": read_either_way(ieesgo),
 }
 STABILIZERS: dict[str, Stabilizer | None] = {
     NONE: None,
-    "pss1a": pss1a,
-    "pss2a": pss2a,
-    "pss2b": pss2b,
+    "pss1a": of_power(pss1a),
+    "pss2a": of_power(pss2a),
+    "pss2b": of_power(pss2b),
+    "ieeest": ieeest,
+    "st2cut": st2cut,
+    "stab2a": stab2a,
 }
 
 

@@ -27,9 +27,11 @@ from fmus.synchronous_generator.variants import (
     ST1,
     ST4B,
     Governor,
+    Shaft,
     Stabilizer,
     Variant,
     declare_machine_outputs,
+    of_speed,
 )
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
@@ -61,7 +63,8 @@ def _generator(variant: Variant) -> Model:
     g = declare_machine(
         m, port, variant.data, stator_flux=lambda m, name, start, text: m.algebraic(name)
     )
-    return with_controls(m, port, g, variant.exciter, partial(ieeeg1, data=variant.governor), None)
+    governor = of_speed(partial(ieeeg1, data=variant.governor))
+    return with_controls(m, port, g, variant.exciter, governor, None)
 
 
 def with_controls(
@@ -77,9 +80,10 @@ def with_controls(
     close_stator(m, g, port, emf)
     at_port = port.through_breaker(port.v.rotated(-g.delta), emf)  # the emf behind an open breaker
     v_t = (at_port + Phasor(g.R_t, g.X_t) * g.current).magnitude()
-    v_s = 0.0 if stabilizer is None else stabilizer(m, g.w - 1, *terminal_power(g, port))
+    shaft = Shaft(g.w, g.start.T_e, *terminal_power(g, port), v_t, g.start.v_t, g.S_n)
+    v_s = 0.0 if stabilizer is None else stabilizer(m, shaft)
     E_fd, _ = exciter(m, Regulated(g.start, lambda E: v_t, g.field_current, v_s))
-    P_m = governor(m, g.w, g.start.T_e)
+    P_m = governor(m, shaft)
     rotor_equations(m, g, port, E_fd, P_m)
     declare_phasor_port(m, g, port, emf)
     declare_machine_outputs(m, g, v_t, E_fd, P_m)

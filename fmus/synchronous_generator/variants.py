@@ -18,11 +18,38 @@ from fmus.synchronous_generator.machine import Machine
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr
 
-# mechanical power [pu, S_n] from speed and that at the start
-Governor = Callable[[ModelBuilder, Expr, Expr], Expr]
 
-Stabilizer = Callable[[ModelBuilder, Expr, Expr, Expr], Expr]
-"""Signal [pu] from w − 1, electrical power and the power of the operating point."""
+@dataclass(frozen=True)
+class Shaft:
+    """What a governor and a stabiliser see of their machine: speed, power, voltage, and the same at the start.
+
+    ``w``: speed [pu]; ``P_m_0``: mechanical power [pu, S_n]; ``P_e``, ``P_e_0``: electrical power at the terminal [pu,
+    S_n]; ``v_t``, ``v_t_0``: voltage magnitude there [pu, S_n]; ``S_n``: the rating [MVA], of parts chosen by name."""
+
+    w: Expr
+    P_m_0: Expr
+    P_e: Expr
+    P_e_0: Expr
+    v_t: Expr
+    v_t_0: Expr
+    S_n: Expr | None
+
+
+Governor = Callable[[ModelBuilder, Shaft], Expr]
+"""Mechanical power [pu, S_n]."""
+
+Stabilizer = Callable[[ModelBuilder, Shaft], Expr]
+"""Signal to the voltage regulator [pu, S_n]."""
+
+
+def of_speed(governor: Callable[[ModelBuilder, Expr, Expr], Expr]) -> Governor:
+    """A governor of speed and mechanical power at the start alone."""
+    return lambda m, shaft: governor(m, shaft.w, shaft.P_m_0)
+
+
+def of_power(stabilizer: Callable[[ModelBuilder, Expr, Expr, Expr], Expr]) -> Stabilizer:
+    """A stabiliser of w − 1 and of electrical power, now and at the start."""
+    return lambda m, shaft: stabilizer(m, shaft.w - 1, shaft.P_e, shaft.P_e_0)
 
 
 @dataclass(frozen=True)

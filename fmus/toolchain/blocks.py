@@ -7,7 +7,7 @@ literature mean it, it passes its input through; its state then follows the inpu
 and is seen by nobody."""
 
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and, logic_or
+from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and, logic_or, sqrt
 
 # time constant [s] with which the unused state of a left-out block follows its input
 BYPASS_TIME = 0.01
@@ -68,6 +68,28 @@ def lead_lag(
     T = if_else(left_out, BYPASS_TIME, T_lag)
     m.derivative(x, (u - x) / T)
     return if_else(left_out, u, x + (T_lead / T) * (u - x))
+
+
+def second_order(
+    m: ModelBuilder, name: str, u: Expr, lags: tuple[Expr, Expr], leads: tuple[Expr, Expr]
+) -> Expr:
+    """(1 + b_1·s + b_2·s²)/(1 + a_1·s + a_2·s²); a_2 = 0 leaves one lag, a_1 = 0 as well passes the input through.
+
+    ``u``: what goes in; 0 in steady state; ``lags``: a_1 [s] and a_2 [s²]; ``leads``: b_1, which needs a_1, and b_2,
+    which needs a_2."""
+    (a_1, a_2), (b_1, b_2) = lags, leads
+    second = a_2 > 0
+    root = sqrt(if_else(second, a_2, 1))
+    x = m.state(name, 0.0, "pu", "filter", base="S_n")
+    y = m.state(
+        f"{name}_rate", 0.0, "pu", "filter, its rate times the square root of a_2", base="S_n"
+    )
+    lag = if_else(a_1 > 0, a_1, BYPASS_TIME)
+    first, rest = (u - x) / lag, u - x - a_1 * y / root
+    m.derivative(x, if_else(second, y / root, first))
+    m.derivative(y, if_else(second, rest / root, -y / BYPASS_TIME))
+    of_second = x + b_1 * y / root + b_2 * rest / root**2
+    return if_else(second, of_second, if_else(a_1 > 0, x + b_1 * first, u))
 
 
 def proportional_integral(

@@ -5,6 +5,7 @@ import numpy as np
 from fmus.synchronous_generator.excitation.common import Regulated
 from fmus.synchronous_generator.machine import Start
 from fmus.synchronous_generator.parts import EXCITERS, GOVERNORS, STABILIZERS
+from fmus.synchronous_generator.variants import Shaft
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr
@@ -15,6 +16,9 @@ V_T, E_FD, P_M = 1.01, 2.2, 0.7
 
 START = Start(Expr(V_T), Expr(E_FD), Expr(P_M), Phasor(1.0, 0.0), Phasor(0.7, -0.1))
 AT_REST = {"exciter": [V_T, E_FD, 0.0], "governor": [1.0], "pss": [0.0, 0.8]}
+OF_POWER, OF_VOLTAGE = ("ggov1", "degov1", "pidgov", "wpidhy"), ("ieeest", "st2cut")
+"""Governors that see the electrical power too, an input more; and stabilisers that see the voltage."""
+
 BUS = 1.02 * np.exp(-0.4j)
 AT_BUS = {"P_0": 0.7, "Q_0": 0.15, "v_0": 1.02, "theta_0": -0.4}
 
@@ -35,7 +39,9 @@ def governor(name, values=None):
     """A governor and turbine behind the speed."""
     m = ModelBuilder("alone", "The governor alone")
     w = m.input("w", "pu", "Speed", base="f_n", start=1.0)
-    m.output("P_m", GOVERNORS[name](m, w, Expr(P_M)), "pu", "Power", base="S_n")
+    P_e = m.input("P_e", "pu", "P_e", base="S_n", start=P_M) if name in OF_POWER else Expr(P_M)
+    shaft = Shaft(w, Expr(P_M), P_e, Expr(P_M), Expr(V_T), Expr(V_T), Expr(100))
+    m.output("P_m", GOVERNORS[name](m, shaft), "pu", "Power", base="S_n")
     return Evaluated(m.build(), {f"governor.{key}": value for key, value in (values or {}).items()})
 
 
@@ -46,9 +52,11 @@ def stabilizer(name, values=None):
         m.input("speed", "pu", "w − 1", base="f_n"),
         m.input("power", "pu", "P_e", base="S_n", start=0.8),
     )
+    v_t = m.input("v_t", "pu", "|v|", base="S_n", start=V_T) if name in OF_VOLTAGE else Expr(V_T)
     part = STABILIZERS[name]
     assert part is not None
-    m.output("v_s", part(m, speed, power, Expr(0.8)), "pu", "Signal", base="S_n")
+    shaft = Shaft(1 + speed, Expr(0.8), power, Expr(0.8), v_t, Expr(V_T), Expr(100))
+    m.output("v_s", part(m, shaft), "pu", "Signal", base="S_n")
     return Evaluated(m.build(), {f"pss.{key}": value for key, value in (values or {}).items()})
 
 

@@ -85,6 +85,8 @@ def test_every_field_of_a_dyr_record_sets_a_parameter_of_its_part(name):
         assert {*field.parameters, *field.negated} <= known, field.name
         assert not field.times or field.times in names
         assert not field.same_as or field.same_as in names
+        assert not field.nothing_without or field.nothing_without in names
+        assert not field.zero_sets or field.zero_sets in known
     given = {p for field in record.fields for p in (*field.parameters, *field.negated)}
     assert len(given) == sum(len(field.parameters) + len(field.negated) for field in record.fields)
 
@@ -100,6 +102,18 @@ def test_every_field_of_a_dyr_record_sets_a_parameter_of_its_part(name):
         ("SEXS", 6),
         ("IEEET1", 14),
         ("IEEEX1", 16),
+        ("SCRX", 8),
+        ("IEEET2", 14),
+        ("ESDC2A", 16),
+        ("EXDC2", 16),
+        ("EXAC2", 23),
+        ("ESAC6A", 23),
+        ("AC8B", 21),
+        ("ESAC8B", 15),
+        ("GGOV1", 35),
+        ("IEESGO", 11),
+        ("ST2CUT", 20),
+        ("STAB2A", 8),
         ("EXAC1", 17),
         ("ESAC1A", 19),
         ("EXAC4", 10),

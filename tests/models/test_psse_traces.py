@@ -63,6 +63,14 @@ RECORDED = {
         f"102 GENROU 1 {ROUND} 0.1 0.8 /\n102 ESAC1A 1 {SATURATED_AC1A} /"
     ),
     "sexs": Recorded(f"102 GENROU 1 {ROUND} 0.1 0.8 /\n{SEXS}"),
+    "ieeest": Recorded(
+        f"102 GENROU 1 {ROUND} 0.1 0.8 /\n{SEXS}\n"
+        "102 IEEEST 1 1 0 0 0 0 0 0 0 0 0 0 0.02 1.65 1.65 100 0.1 -0.1 0 0 /"
+    ),
+    "ieeest, filtered": Recorded(
+        f"102 GENROU 1 {ROUND} 0.1 0.8 /\n{SEXS}\n"
+        "102 IEEEST 1 1 0 1.013 0.013 0 0 1.013 0.113 0 0.02 0 0 1.65 1.65 3 0.1 -0.1 0 0 /"
+    ),
     "gast": Recorded(
         f"102 GENROU 1 {ROUND} 0 1 /\n102 ESAC1A 1 {PLAIN_AC1A} /\n102 GAST 1 0.05 0.2 0.2 2 1 2.5 1.1 0.01 0 /"
     ),

@@ -1,10 +1,15 @@
-"""DC1A, IEEE type 1 (IEEET1), AC1A and AC4A: exciters on the machine's shaft.
+"""DC1A, DC2A, IEEE types 1 and 2 (IEEET1, IEEET2), AC1A and AC4A: exciters on the machine's shaft.
 
-DC1A is a regulated commutator exciter with saturation and rate feedback; IEEET1 has no stage (1+sT_C)/(1+sT_B):
+DC1A is a regulated commutator exciter with saturation and rate feedback; IEEET1 has no stage (1+sT_C)/(1+sT_B), and
+DC2A, fed from the machine's terminal, the limits v_t·V_RMIN and v_t·V_RMAX:
 
     V_ref + V_S − v_m − V_F → (1+sT_C)/(1+sT_B) → K_A/(1+sT_A) = V_R, held within V_RMIN and V_RMAX
     T_E·dE_fd/dt = V_R − K_E·E_fd − S_E(E_fd)·E_fd
     V_F = s·K_F/(1+sT_F)·E_fd
+
+IEEET2 has no such stage either, and its rate feedback is of the regulator's voltage:
+
+    V_F = s·K_F/((1+sT_F)·(1+sT_F2))·V_R
 
 AC1A is an alternator, field-controlled, with a rotating rectifier, uncontrolled, and rate feedback:
 
@@ -20,6 +25,7 @@ AC4A is an alternator with a controlled rectifier:
 from functools import partial
 
 from fmus.synchronous_generator.excitation.common import (
+    ExciterSaturation,
     Measurement,
     Regulated,
     exciter_saturation,
@@ -31,18 +37,26 @@ from fmus.synchronous_generator.excitation.common import (
     time,
     voltage_before_rectifier,
 )
-from fmus.toolchain.blocks import clamp, held_at_limits, limited_low_pass
+from fmus.toolchain.blocks import (
+    clamp,
+    close_limited_low_pass,
+    held_at_limits,
+    limited_low_pass,
+    low_pass_or_nothing,
+)
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.symbols import Expr, fmax
+from fmus.toolchain.symbols import Expr, fmax, if_else
 
 _MOST = 1e9  # no upper limit of V_E [pu]
 _LEAST = 1e-3  # smallest V_E [pu] that the rectifier's loading is divided by
 
 
-def dc1a(m: ModelBuilder, seen: Regulated, *, compensated: bool = True) -> tuple[Expr, Expr]:
+def dc1a(
+    m: ModelBuilder, seen: Regulated, *, compensated: bool = True, bus_fed: bool = False
+) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu].
 
-    ``compensated``: whether it has the stage (1+sT_C)/(1+sT_B)."""
+    ``compensated``: whether it has the stage (1+sT_C)/(1+sT_B); ``bus_fed``: whether its limits are times v_t."""
     with m.scope("exciter"):
         K_A, T_A = (
             gain(m, "K_A", 20.0, "Gain", 1e-3),
@@ -52,23 +66,69 @@ def dc1a(m: ModelBuilder, seen: Regulated, *, compensated: bool = True) -> tuple
             gain(m, "V_RMAX", 5.0, "Upper limit of V_R"),
             gain(m, "V_RMIN", -5.0, "Lower limit of V_R"),
         )
-        K_E = gain(m, "K_E", 1.0, "Field resistance, separately excited")
+        given_K_E = gain(m, "K_E", 1.0, "Field resistance, separately excited")
         T_E = time(m, "T_E", 0.314, "Exciter's field", 1e-3)
         curve = exciter_saturation(m, 3.0, 0.41, 4.0, 1.96)
+        K_E = _constant(m, given_K_E, high, curve, seen.start.E_fd)
         V_R0 = K_E * seen.start.E_fd + curve.part(seen.start.E_fd)
-        require_within(m, V_R0, low, high, ("exciter.V_RMIN", "exciter.V_RMAX"))
+        v_0 = seen.start.v_t if bus_fed else Expr(1)
+        require_within(m, V_R0, v_0 * low, v_0 * high, ("exciter.V_RMIN", "exciter.V_RMAX"))
         E_fd = m.state("E", seen.start.E_fd, "pu", "Field voltage", base="E_fd")
         V_F, _ = rate_feedback(m, E_fd, seen.start.E_fd, 0.063, 0.35)
         measured = Measurement(m, seen)
         error = measured.error(V_R0 / K_A) - V_F
         if compensated:
             error = lead_lag_stage(m, error, V_R0 / K_A)
-        V_R = limited_low_pass(m, "amplifier", K_A * error, T_A, low, high, V_R0)
+        v = seen.terminal_voltage(E_fd) if bus_fed else Expr(1)
+        V_R = limited_low_pass(m, "amplifier", K_A * error, T_A, v * low, v * high, V_R0)
         m.derivative(E_fd, (V_R - K_E * E_fd - curve.part(E_fd)) / T_E)
         return measured.close(E_fd)
 
 
 ieeet1 = partial(dc1a, compensated=False)  # DC1A without its lead and lag
+dc2a = partial(dc1a, bus_fed=True)  # DC1A fed from the machine's terminal
+
+
+def ieeet2(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
+    """Declare it and return (E_fd, |v_t|) [pu]."""
+    with m.scope("exciter"):
+        K_A, T_A = gain(m, "K_A", 200.0, "Gain", 1e-3), time(m, "T_A", 0.02, "Amplifier", 1e-3)
+        high = gain(m, "V_RMAX", 6.08, "Upper limit of V_R")
+        low = gain(m, "V_RMIN", -6.08, "Lower limit of V_R")
+        given_K_E = gain(m, "K_E", 1.0, "Field resistance, separately excited")
+        T_E = time(m, "T_E", 0.55, "Exciter's field", 1e-3)
+        curve = exciter_saturation(m, 2.85, 0.3, 3.8, 0.6)
+        K_E = _constant(m, given_K_E, high, curve, seen.start.E_fd)
+        V_R0 = K_E * seen.start.E_fd + curve.part(seen.start.E_fd)
+        require_within(m, V_R0, low, high, ("exciter.V_RMIN", "exciter.V_RMAX"))
+        E_fd = m.state("E", seen.start.E_fd, "pu", "Field voltage", base="E_fd")
+        amplifier = m.state("amplifier", V_R0, "pu", "first-order lag with limits", base="E_fd")
+        V_R = clamp(amplifier, low, high)
+        fast, _ = rate_feedback(m, V_R, V_R0, 0.06, 0.3)
+        T_F2 = time(m, "T_F2", 0.6, "Second lag of the rate feedback; 0 leaves it out")
+        V_F = low_pass_or_nothing(m, "feedback_2", fast, T_F2)
+        measured = Measurement(m, seen)
+        error = measured.error(V_R0 / K_A) - V_F
+        close_limited_low_pass(m, amplifier, K_A * error, T_A, low, high)
+        m.derivative(E_fd, (V_R - K_E * E_fd - curve.part(E_fd)) / T_E)
+        return measured.close(E_fd)
+
+
+_SHARE_AT_START = 0.1
+"""V_R of the start over V_RMAX, for which a program chooses K_E where the data have none."""
+
+
+def _constant(m: ModelBuilder, K_E: Expr, high: Expr, curve: ExciterSaturation, E_0: Expr) -> Expr:
+    """K_E as it is given, or so that V_R of the operating point is a tenth of its upper limit.
+
+    ``K_E``: as it is given [pu]; ``high``: upper limit of V_R; ``E_0``: field voltage of the operating point."""
+    chosen = m.switch(
+        "K_E_of_start",
+        False,
+        "K_E is such that V_R starts at a tenth of V_RMAX, as PSS/E has it for K_E = 0",
+    )
+    of_start = (_SHARE_AT_START * high - curve.part(E_0)) / E_0
+    return if_else(chosen, of_start, K_E)
 
 
 def ac1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:

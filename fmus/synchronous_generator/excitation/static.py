@@ -1,8 +1,11 @@
-"""ST1A and ST4B, rectifiers fed from the machine's terminal, and SEXS, the simplified exciter of stability programs.
+"""ST1A and ST4B, rectifiers fed from the machine's terminal, and SEXS and SCRX, simplified exciters.
 
 SEXS is a lead/lag and a lag that stops at its limits:
 
     V_ref + V_S − v_m → (1+sT_A)/(1+sT_B) → K/(1+sT_E) = E_fd, held within E_MIN and E_MAX
+
+SCRX is SEXS with E_fd = v_t times that lag unless it is fed from a supply of its own; with r_C/r_FD > 0 a negative
+field current goes through that resistance instead, E_fd = −r_C/r_FD·I_FD.
 
 ST1A is controlled, with a limiter of the field current:
 
@@ -24,7 +27,9 @@ Two fixed-point passes take the ceilings' v_t, because it depends, behind the tr
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from fmus.synchronous_generator.data_lines import declared, number, pu, seconds
 from fmus.synchronous_generator.excitation.common import (
+    SOURCE,
     Measurement,
     Regulated,
     gain,
@@ -45,6 +50,18 @@ from fmus.toolchain.blocks import (
 )
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, fmax, fmin, if_else, logic_and, logic_or
+
+SCRX = (
+    pu("K", 100.0, "Gain", 1e-3),
+    seconds("T_A", 1.0, "Lead"),
+    seconds("T_B", 10.0, "Lag; 0 leaves the stage out"),
+    seconds("T_E", 0.05, "Exciter; 0 leaves the lag out"),
+    pu("E_MIN", 0.0, "Lower ceiling, of E_fd at v_t = 1"),
+    pu("E_MAX", 5.0, "Upper ceiling, of E_fd at v_t = 1"),
+    number(
+        "r_C_over_r_FD", 0.0, "Resistance for negative field currents over the field's; 0: none", 0
+    ),
+)
 
 
 def st1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
@@ -205,3 +222,26 @@ def sexs(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         return measured.close(
             limited_low_pass(m, "amplifier", K * compensated, T_E, low, high, seen.start.E_fd)
         )
+
+
+def scrx(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
+    """Declare it and return (E_fd, |v_t|) [pu]."""
+    with m.scope("exciter"):
+        p = declared(m, SCRX, SOURCE)
+        own_supply = m.switch("own_supply", False, "It has a supply of its own, not the terminal")
+        m.require(
+            if_else(logic_and(p.T_B <= 0, p.T_A > 0), -1, 1),
+            "exciter.T_B = 0 needs exciter.T_A = 0 as well",
+        )
+
+        def times_supply(signal: Expr, v_t: Expr) -> Expr:
+            return signal * if_else(own_supply, 1, v_t)
+
+        x_0 = seen.start.E_fd / if_else(own_supply, 1, seen.start.v_t)
+        require_within(m, x_0, p.E_MIN, p.E_MAX, ("exciter.E_MIN", "exciter.E_MAX"))
+        measured = Measurement(m, seen)
+        compensated = lead_lag(m, "lead_lag", measured.error(x_0 / p.K), p.T_A, p.T_B, x_0 / p.K)
+        x = limited_low_pass(m, "amplifier", p.K * compensated, p.T_E, p.E_MIN, p.E_MAX, x_0)
+        E = times_supply(x, seen.terminal_voltage(times_supply(x, measured.nearly)))
+        through_resistance = logic_and(p.r_C_over_r_FD > 0, seen.I_fd < 0)
+        return measured.close(if_else(through_resistance, -p.r_C_over_r_FD * seen.I_fd, E))

@@ -1,6 +1,6 @@
 """PSS1A, PSS2A and PSS2B.
 
-PSS1A takes the speed; it is STAB1 too, and IEEEST with a speed signal and a filter of second order:
+PSS1A takes the speed; it is STAB1 too:
 
     w − 1 → 1/(1+sT_6) → K_S·s·T_5/(1+sT_5) → 1/(1 + A_1·s + A_2·s²)
     → (1+sT_1)/(1+sT_2) → (1+sT_3)/(1+sT_4) → V_STMIN ≤ V_S ≤ V_STMAX
@@ -20,15 +20,15 @@ from functools import partial
 from fmus.synchronous_generator.declarations import per_unit, time_constant
 from fmus.synchronous_generator.stabilization.norm631 import RAMP_LAGS
 from fmus.toolchain.blocks import (
-    BYPASS_TIME,
     clamp,
     lead_lag,
     low_pass_or_nothing,
+    second_order,
     washout,
     washout_or_nothing,
 )
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.symbols import Expr, fmax, if_else, logic_and, logic_or, sqrt
+from fmus.toolchain.symbols import Expr, fmax, if_else, logic_and, logic_or
 
 SOURCE = "typical data, IEEE 421.5"
 
@@ -98,16 +98,7 @@ def _filter(m: ModelBuilder, u: Expr) -> Expr:
         if_else(A_2 <= 0, 1, A_2 / fmax(A_1, 1e-9) - shortest),
         "pss.A_2/A_1 must exceed half of internal_step",
     )
-    second = A_2 > 0
-    root = sqrt(if_else(second, A_2, 1))
-    x = m.state("filter", 0.0, "pu", "filter", base="S_n")
-    y = m.state(
-        "filter_rate", 0.0, "pu", "filter, its rate times the square root of A_2", base="S_n"
-    )
-    first = (u - x) / if_else(A_1 > 0, A_1, BYPASS_TIME)
-    m.derivative(x, if_else(second, y / root, first))
-    m.derivative(y, if_else(second, (u - x - A_1 * y / root) / root, -y / BYPASS_TIME))
-    return if_else(logic_or(second, A_1 > 0), x, u)
+    return second_order(m, "filter", u, (A_1, A_2), (Expr(0), Expr(0)))
 
 
 def pss2a(

@@ -29,10 +29,10 @@ HYGOV has a transient droop, and a penstock with inelastic water; in steady stat
     T_g·dg/dt = c − g, at most VELM per second
     h = (q/g)²,  T_W·dq/dt = 1 − h,  P_m = A_t·h·(q − q_NL) − D_turb·g·(w − 1)"""
 
-from collections.abc import Callable
 from functools import partial
 
 from fmus.synchronous_generator.declarations import per_unit, require_between, time_constant
+from fmus.synchronous_generator.variants import Governor, Shaft
 from fmus.toolchain import blocks
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and
@@ -54,16 +54,16 @@ def power_reference(m: ModelBuilder, P_ref_0: Scalar) -> Expr:
     )
 
 
-def read_either_way(governor: Callable[[ModelBuilder, Expr, Expr], Expr]) -> Callable[..., Expr]:
+def read_either_way(governor: Governor) -> Governor:
     """The same governor whose output is the mechanical power, or, by a parameter, the mechanical torque."""
 
-    def declare(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
-        output = governor(m, w, P_m_0)
+    def declare(m: ModelBuilder, shaft: Shaft) -> Expr:
+        output = governor(m, shaft)
         with m.scope("governor"):
             is_torque = m.switch(
                 "output_is_torque", False, "The output is the mechanical torque, not the power"
             )
-        return output * if_else(is_torque, w, 1)
+        return output * if_else(is_torque, shaft.w, 1)
 
     return declare
 

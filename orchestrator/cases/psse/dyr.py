@@ -201,6 +201,8 @@ def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
             raise InputError(
                 f"{record.place}: {record.name} has {field.name} = 0, which PSS/E replaces; give its value"
             )
+        if field.zero_sets:
+            found[field.zero_sets] = value == 0
         product = (
             bool(value) if field.switch else value * given[field.times] if field.times else value
         )
