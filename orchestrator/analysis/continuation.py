@@ -94,11 +94,13 @@ def follow_along(
     end: float,
     strides: Strides = USUAL,
     common: Sequence[str] = (),
+    *,
+    near: Callable[[LinearModel, complex], Sequence[Eigenpair]] = pairs_near,
 ) -> Eigenpair:
     """Follow a mode along a path from ``begin`` to ``end``, in strides short enough to recognise it.
 
     ``common``: states by which modes are recognised, where not all models have the same; the start's vectors hold these
-    alone."""
+    alone. ``near``: gives a model's pairs near a point, as `pairs_near`."""
     shortest = abs(end - begin) * strides.shortest
     here, pair, stride = begin, start, end - begin
     while here != end:
@@ -107,7 +109,7 @@ def follow_along(
         states = [model.names.index(name) for name in common]
         found = _recognise(
             pair,
-            [p.within(states) if states else p for p in pairs_near(model, pair.eigenvalue)],
+            [p.within(states) if states else p for p in near(model, pair.eigenvalue)],
             strides,
         )
         if found is not None:

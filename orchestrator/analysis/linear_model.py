@@ -56,6 +56,9 @@ class LinearModel:
     sources: Mapping[str, str] = field(default_factory=dict)
     # communication steps over which the map's power is that of the system; more than 1 with sampled controllers
     period: int = 1
+    # what each element of w is: ``component.output``, several times where it is computed several times; empty where the
+    # model was not composed from components
+    wires: tuple[str, ...] = ()
 
     @classmethod
     def from_matrix(
@@ -195,9 +198,13 @@ class Equations:
         step_size: float | None,
         disagreement: float,
         sources: Mapping[str, str],
+        *,
+        wires: Iterable[str] = (),
     ) -> LinearModel:
         F, G, H, K = (self._matrix(name) for name in self._shapes)
-        return LinearModel(F, G, H, K, tuple(names), step_size, disagreement, sources)
+        return LinearModel(
+            F, G, H, K, tuple(names), step_size, disagreement, sources, wires=tuple(wires)
+        )
 
     def _matrix(self, name: str) -> sp.csr_array:
         rows, columns, values = (

@@ -94,7 +94,14 @@ def compose(blocks: Blocks, schedule: Schedule, *, within_period: bool = False) 
         *(f"{blocks.output_names[i]}{HELD}" for i in memory),
         *_line_names(blocks, lines),
     )
-    return equations.model(all_names, blocks.step_size, blocks.disagreement, blocks.how)
+    wired = [*blocks.output_names] * 2 + [link.name for link in blocks.links.values()] * 2
+    return equations.model(
+        all_names,
+        blocks.step_size,
+        blocks.disagreement,
+        blocks.how,
+        wires=[*wired, *blocks.inputs],
+    )
 
 
 def _delay_lines(
@@ -148,8 +155,13 @@ def continuous(blocks: Blocks) -> LinearModel:
                 (line, where), sent = lines[k], newest[blocks.sources[name][place : place + 1]]
                 equations.output(arriving[k : k + 1], where, line.C, sent, np.zeros((1, 1)))
                 equations.next_state(where, where, line.A, sent, line.B)
+    wired = [*blocks.output_names, *(link.name for link in blocks.links.values())]
     return equations.model(
-        [*names, *_line_names(blocks, lines)], None, blocks.disagreement, blocks.how
+        [*names, *_line_names(blocks, lines)],
+        None,
+        blocks.disagreement,
+        blocks.how,
+        wires=[*wired, *blocks.inputs],
     )
 
 
@@ -245,7 +257,10 @@ def line_model(blocks: Blocks, schedule: Schedule) -> LinearModel:
             )
             newest[blocks.window[name]] = rows
     all_names = (*names, *(f"{blocks.output_names[i]}{HELD}" for i in guessed))
-    return equations.model(all_names, blocks.step_size, blocks.disagreement, blocks.how)
+    wired = [*blocks.output_names] * 3 + [*blocks.inputs]
+    return equations.model(
+        all_names, blocks.step_size, blocks.disagreement, blocks.how, wires=wired
+    )
 
 
 def _guessed(blocks: Blocks, schedule: Schedule) -> list[int]:

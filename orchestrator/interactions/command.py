@@ -12,6 +12,7 @@ from orchestrator.interactions.view import (
     Interactions,
     assignments_table,
     modes_table,
+    pairs_table,
     systems_table,
 )
 from orchestrator.interactions.words import verdict_of
@@ -22,7 +23,10 @@ def _parts(found: Interactions) -> Iterator[RenderableType]:
     judgement = found.judgement
     yield verdict_of(judgement).markup()
     yield from map(escape, found.sentences[1:])
-    yield from ("", modes_table(judgement), "", systems_table(judgement), "")
+    yield from ("", modes_table(judgement), "")
+    if judgement.pairs:
+        yield from (pairs_table(judgement), "")
+    yield from (systems_table(judgement), "")
     if found.result.plan.swapped:
         yield from (assignments_table(judgement), "")
 

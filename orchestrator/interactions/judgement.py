@@ -3,13 +3,19 @@
 A mode is one of interaction between two subsystems where both take part in it by more than a threshold: J. Beerten,
 S. D'Arco and J. A. Suul, "Identification and small-signal analysis of interaction modes in VSC MTDC systems", IEEE
 Trans. Power Delivery 31(2), 2016. The participation of a subsystem is the sum of its states' factors, and all of them
-sum to 1."""
+sum to 1.
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+What a pair does is told by one mode, followed from the system with both vendors to those with one and with none
+(`orchestrator.interactions.following`). Whether any mode falls does not depend on the threshold: all modes that are
+not well damped are looked at."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from orchestrator.errors import ErrorKind
 from orchestrator.interactions.exchange import settings_of
+from orchestrator.interactions.following import Follow, FollowedMode, Ways, followed
 from orchestrator.interactions.places import NOT_VENDORS, by_group, first_of
 from orchestrator.interactions.point import SharedMode, SystemRecord
 from orchestrator.interactions.study import InteractionsResult
@@ -17,6 +23,11 @@ from orchestrator.interactions.systems import NONE, WHOLE, Kind, SystemName
 
 # A damping that falls by no more than this [points] is the same: what a perturbation leaves open
 SAME = 0.01
+
+WELL_DAMPED = 20.0
+"""A mode that a pair leaves damped by more than this [%] is not watched for a fall: twice what is asked of a swing."""
+
+_AT_ONE_PLACE = 1e-6  # two eigenvalues are one if they differ by less than this part of their size
 
 
 @dataclass(frozen=True)
@@ -35,12 +46,13 @@ class JudgedSystem:
     """A system with the modes that count for its converters.
 
     A mode of the network or of a machine in which none of them takes part says nothing of them, however little it is
-    damped. A mode that grows counts in any case."""
+    damped. A mode that grows counts in any case, and so does one that counts in a pair and was followed to here."""
 
     name: SystemName
     record: SystemRecord
     converters: frozenset[str]
     threshold: float
+    followed: tuple[complex, ...] = ()  # modes of pairs, as they are here [rad/s]
 
     @property
     def stable(self) -> bool | None:
@@ -49,7 +61,7 @@ class JudgedSystem:
     @property
     def critical(self) -> SharedMode | None:
         """The least damped of the modes that count; None where none does. Without any converter all modes count."""
-        counting = [mode for mode in self.record.modes if self._share(mode) >= self.threshold]
+        counting = [mode for mode in self.record.modes if self.counts(mode)]
         growing = [] if self.record.growing is None else [self.record.growing]
         return min([*counting, *growing], key=lambda mode: mode.damping_percent, default=None)
 
@@ -68,6 +80,12 @@ class JudgedSystem:
     def why_unknown(self) -> str:
         return self.record.error or str(self.record.stability.get("reason") or "no verdict")
 
+    def counts(self, mode: SharedMode) -> bool:
+        here = mode.eigenvalue
+        return self._share(mode) >= self.threshold or any(
+            abs(here - value) <= _AT_ONE_PLACE * abs(value) for value in self.followed
+        )
+
     def _share(self, mode: SharedMode) -> float:
         if not self.converters:
             return 1.0
@@ -79,14 +97,25 @@ class JudgedPair:
     vendors: tuple[str, str]
     joint: JudgedSystem
     alone: tuple[JudgedSystem, JudgedSystem]
+    modes: tuple[FollowedMode, ...] = ()  # of both: those that count or are not well damped
+
+    @property
+    def mode(self) -> FollowedMode | None:
+        """The mode that tells what the pair does: the one that falls furthest, else the least damped that counts."""
+        falling = [one for one in self.modes if one.fall is not None and one.fall > SAME]
+        critical = self.joint.critical
+        if falling and self.joint.stable is not False:
+            return max(falling, key=lambda one: one.fall or 0.0)
+        return next((one for one in self.modes if one.together == critical), None)
 
     @property
     def fall(self) -> float | None:
-        """How far [points] the least damping of both lies below the lesser one of each alone; None if not known."""
-        joint, each = self.joint.least_damping, [one.least_damping for one in self.alone]
-        if joint is None or each[0] is None or each[1] is None:
-            return None
-        return min(each[0], each[1]) - joint
+        """How far [points] the damping of `mode` lies below the lesser one with a vendor alone; None if not known."""
+        return None if self.mode is None else self.mode.fall
+
+    @property
+    def unfollowed(self) -> list[FollowedMode]:
+        return [one for one in self.modes if one.unknown]
 
     @property
     def fights(self) -> bool | None:
@@ -105,19 +134,31 @@ class JudgedPair:
         return " + ".join(self.vendors)
 
     def sentence(self) -> str:
-        if self.fall is None or not self.is_known:
+        if not self.is_known:
             return f"{self.text}: not known: {self._missing()}"
-        joint, least = self.joint.least_damping, min(one.least_damping or 0.0 for one in self.alone)
-        figures = f"least damping {joint:.2f} % together, {least:.2f} % alone at worst"
+        figures = self._figures()
         if self.fights:
-            return f"{self.text}: UNSTABLE together, though stable alone; {figures}{_where(self.joint)}"
+            return f"{self.text}: UNSTABLE together, though stable alone{figures}"
         if self.joint.stable is False:
             those = " and ".join(
                 v for v, one in zip(self.vendors, self.alone, strict=True) if one.stable is False
             )
-            return f"{self.text}: UNSTABLE together, and {those} alone as well; {figures}{_where(self.joint)}"
+            return f"{self.text}: UNSTABLE together, and {those} alone as well{figures}"
+        if self.fall is None:
+            return f"{self.text}: stable{figures}"
         word = "lower together" if self.fall > SAME else "no lower together"
-        return f"{self.text}: stable, {word}: {figures}{_where(self.joint)}"
+        return f"{self.text}: stable, {word}{figures}"
+
+    def _figures(self) -> str:
+        mode = self.mode
+        if mode is None:
+            return ""
+        head = f": {place_of(mode.together)} has {mode.together.damping_percent:.2f} % together"
+        if mode.unknown:
+            return f"{head}; without one of them it cannot be followed: {mode.unknown}"
+        with_one = zip(self.vendors, mode.alone_percent, strict=True)
+        each = ", ".join(f"{_percent_text(x)} with {vendor} alone" for vendor, x in with_one)
+        return f"{head}, {each}, {_percent_text(mode.neither_percent)} with neither"
 
     def _missing(self) -> str:
         systems = zip(
@@ -128,9 +169,8 @@ class JudgedPair:
         return "; ".join(f"{name}: {one.why_unknown}" for name, one in systems if not one.is_known)
 
 
-def _where(system: JudgedSystem) -> str:
-    critical = system.critical
-    return "" if critical is None else f", at {place_of(critical)}"
+def _percent_text(percent: float | None) -> str:
+    return "none" if percent is None else f"{percent:.2f} %"
 
 
 def place_of(mode: SharedMode) -> str:
@@ -138,22 +178,36 @@ def place_of(mode: SharedMode) -> str:
 
 
 class JudgedInteractions:
-    def __init__(self, result: InteractionsResult) -> None:
+    """``follow``: follows modes from one system to another; along the systems' linear models by default."""
+
+    def __init__(self, result: InteractionsResult, follow: Follow | None = None) -> None:
         self.result = result
+        self._follow = follow or Ways(result).follow
         plan = result.plan
-        self.systems = {
+        plain = {
             name: JudgedSystem(name, record, plan.converters(name), plan.request.threshold)
             for name, record in result.records.items()
         }
+        pairs = {name: self._modes(one) for name, one in plain.items() if name.kind is Kind.PAIR}
+        self.systems = {name: _with_followed(one, plain, pairs) for name, one in plain.items()}
         self.modes = [self._judged(mode) for mode in self.whole.record.modes]
         alone = self.alone
         found = [
-            JudgedPair((a, b), system, (alone[a], alone[b]))
-            for name, system in self.systems.items()
-            if name.kind is Kind.PAIR
+            JudgedPair((a, b), self.systems[name], (alone[a], alone[b]), modes)
+            for name, modes in pairs.items()
             for a, b in [name.names]
         ]
         self.pairs = sorted(found, key=_rank)
+
+    def _modes(self, joint: JudgedSystem) -> tuple[FollowedMode, ...]:
+        """The modes of a pair that count or are not well damped, followed."""
+        first, second = joint.name.names
+        watched = [mode for mode in joint.record.modes if mode.damping_percent <= WELL_DAMPED]
+        wanted = dict.fromkeys(mode.eigenvalue for mode in watched)
+        critical = joint.critical
+        if critical is not None and critical.eigenvalue not in wanted:
+            watched.append(critical)
+        return tuple(followed(mode, (first, second), self._follow) for mode in watched)
 
     @property
     def whole(self) -> JudgedSystem:
@@ -180,9 +234,9 @@ class JudgedInteractions:
 
         None where none falls by more than `SAME`."""
         first = next((pair for pair in self.pairs if pair.is_known), None)
-        if first is None or first.fall is None:
+        if first is None:
             return None
-        return first if first.fights or first.fall > SAME else None
+        return first if first.fights or (first.fall or 0.0) > SAME else None
 
     @property
     def least_damped_pair(self) -> JudgedPair | None:
@@ -226,9 +280,29 @@ class JudgedInteractions:
         return JudgedMode(mode, groups, vendors)
 
 
+def _with_followed(
+    system: JudgedSystem,
+    plain: Mapping[SystemName, JudgedSystem],
+    pairs: Mapping[SystemName, Sequence[FollowedMode]],
+) -> JudgedSystem:
+    """A vendor's system in which also those modes count that do so in a pair of it."""
+    if system.name.kind is not Kind.ALONE:
+        return system
+    (vendor,) = system.name.names
+    found = [
+        mode.alone[name.names.index(vendor)]
+        for name, modes in pairs.items()
+        if vendor in name.names
+        for mode in modes
+        if plain[name].counts(mode.together)
+    ]
+    return replace(system, followed=tuple(value for value in found if value is not None))
+
+
 def _rank(pair: JudgedPair) -> tuple[bool, bool, float]:
-    known = pair.is_known and pair.fall is not None
-    return not known, not (known and pair.fights), -(pair.fall or 0.0) if known else 0.0
+    known = pair.is_known
+    fall = -math.inf if pair.fall is None else pair.fall
+    return not known, not (known and pair.fights), -fall if known else 0.0
 
 
 def doubts_of(judgement: JudgedInteractions) -> Sequence[str]:
@@ -261,6 +335,13 @@ def doubts_of(judgement: JudgedInteractions) -> Sequence[str]:
             for name, place in plan.places.items()
             if place.vendor == vendor and settings_of(place) != settings_of(first)
         ]
+    found += [
+        f"{pair.text}: how {place_of(one.together)}, {one.together.damping_percent:.2f} % together, is damped with one "
+        f"of them alone is not known: {one.unknown}"
+        for pair in judgement.pairs
+        for one in pair.unfollowed
+        if pair.is_known
+    ]
     none = judgement.none
     if none.stable is not True:
         why = "is UNSTABLE" if none.stable is False else f"has no verdict ({none.why_unknown})"

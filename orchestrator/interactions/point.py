@@ -4,7 +4,11 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, Self
 
-from orchestrator.analysis.linear_model import IDENTIFIED
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.modes import Mode, damping_percent
 from orchestrator.black_box.coupled_modes import modes_with_boxes
 from orchestrator.cases.case import Case
@@ -40,6 +44,50 @@ class SharedMode:
 
 
 @dataclass(frozen=True)
+class KeptMatrix:
+    """A sparse matrix by its entries."""
+
+    shape: tuple[int, int]
+    rows: NDArray[np.int32]
+    columns: NDArray[np.int32]
+    values: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, matrix: sp.csr_array) -> Self:
+        entries = sp.coo_array(matrix)
+        rows, columns = (places.astype(np.int32) for places in (entries.row, entries.col))
+        return cls((matrix.shape[0], matrix.shape[1]), rows, columns, entries.data.astype(float))
+
+    def matrix(self) -> sp.csr_array:
+        return sp.csr_array((self.values, (self.rows, self.columns)), shape=self.shape)
+
+
+@dataclass(frozen=True)
+class KeptModel:
+    """A linear model as it is kept, so that modes can be followed from one system to another."""
+
+    F: KeptMatrix
+    G: KeptMatrix
+    H: KeptMatrix
+    K: KeptMatrix
+    names: tuple[str, ...]
+    wires: tuple[str, ...]
+    step_size: float | None
+    period: int
+
+    @classmethod
+    def of(cls, model: LinearModel) -> Self:
+        matrices = (KeptMatrix.of(matrix) for matrix in (model.F, model.G, model.H, model.K))
+        return cls(*matrices, model.names, model.wires, model.step_size, model.period)
+
+    def model(self) -> LinearModel:
+        F, G, H, K = (kept.matrix() for kept in (self.F, self.G, self.H, self.K))
+        return LinearModel(
+            F, G, H, K, self.names, self.step_size, 0.0, period=self.period, wires=self.wires
+        )
+
+
+@dataclass(frozen=True)
 class SystemRecord(Kept):
     modes: tuple[SharedMode, ...] = ()  # oscillations of the range, least damped first
     # the mode that grows fastest, at any frequency; None where nothing is known to grow
@@ -53,6 +101,7 @@ class SystemRecord(Kept):
     states: int = 0
     residual: float = float("nan")  # of the steady state, as in `OperatingPoint`
     failure: Failure | None = None  # why there are no modes; None where there are
+    model: KeptModel | None = field(default=None, compare=False)  # whose modes these are
 
     @property
     def stable(self) -> bool | None:
@@ -102,4 +151,5 @@ def _record(result: ModesResult) -> SystemRecord:
         ),
         states=result.model.number_of_states,
         residual=result.operating_point.residual,
+        model=KeptModel.of(result.model),
     )

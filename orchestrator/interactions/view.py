@@ -7,12 +7,14 @@ from html import escape
 from pathlib import Path
 from typing import Any, TypeVar
 
+from orchestrator.interactions.following import Follow, FollowedMode
 from orchestrator.interactions.judgement import (
     JudgedInteractions,
     JudgedMode,
     JudgedPair,
     JudgedSystem,
     doubts_of,
+    place_of,
     plan_text,
 )
 from orchestrator.interactions.places import by_group
@@ -62,9 +64,9 @@ class Interactions(NoTruth):
         What they come to.
     """
 
-    def __init__(self, result: InteractionsResult) -> None:
+    def __init__(self, result: InteractionsResult, follow: Follow | None = None) -> None:
         self.result = result
-        self.judgement = JudgedInteractions(result)
+        self.judgement = JudgedInteractions(result, follow)
 
     @property
     def stable(self) -> bool | None:
@@ -212,19 +214,39 @@ def _figures(of: Callable[[Row], JudgedSystem]) -> list[Column[Row]]:
     ]
 
 
-def systems_table(judgement: JudgedInteractions) -> ColumnTable[tuple[str, JudgedSystem, str]]:
-    rows = [("no vendor", judgement.none, "")]
-    rows += [(f"{vendor} alone", system, "") for vendor, system in judgement.alone.items()]
-    rows += [
-        (pair.text, pair.joint, "–" if pair.fall is None else f"{pair.fall:+.2f}")
-        for pair in judgement.pairs
-    ]
-    name, fall = (
-        Column[tuple[str, JudgedSystem, str]]("System", lambda r: r[0]),
-        "Falls by [points]",
-    )
-    columns = (name, *_figures(lambda r: r[1]), Column(fall, lambda r: r[2]))
+def systems_table(judgement: JudgedInteractions) -> ColumnTable[tuple[str, JudgedSystem]]:
+    rows = [("no vendor", judgement.none)]
+    rows += [(f"{vendor} alone", system) for vendor, system in judgement.alone.items()]
+    rows += [(pair.text, pair.joint) for pair in judgement.pairs]
+    name = Column[tuple[str, JudgedSystem]]("System", lambda r: r[0])
+    columns = (name, *_figures(lambda r: r[1]))
     return ColumnTable("Vendors alone and in pairs", columns, rows, left=2)
+
+
+def pairs_table(judgement: JudgedInteractions) -> ColumnTable[JudgedPair]:
+    """One mode of each pair, followed: its damping with neither vendor, with each alone, and together."""
+
+    def column(title: str, of: Callable[[FollowedMode], float | None]) -> Column[JudgedPair]:
+        def text(pair: JudgedPair) -> str:
+            percent = None if pair.mode is None else of(pair.mode)
+            return "none" if percent is None else f"{percent:.2f}"
+
+        return Column(title, text)
+
+    columns = (
+        Column[JudgedPair]("Pair", lambda pair: pair.text),
+        Column[JudgedPair](
+            "Mode", lambda pair: "" if pair.mode is None else place_of(pair.mode.together)
+        ),
+        column("Neither [%]", lambda mode: mode.neither_percent),
+        column("First alone [%]", lambda mode: mode.alone_percent[0]),
+        column("Second alone [%]", lambda mode: mode.alone_percent[1]),
+        column("Together [%]", lambda mode: mode.together.damping_percent),
+        Column[JudgedPair](
+            "Falls by [points]", lambda pair: "–" if pair.fall is None else f"{pair.fall:+.2f}"
+        ),
+    )
+    return ColumnTable("One mode of each pair, followed", columns, judgement.pairs)
 
 
 def assignments_table(judgement: JudgedInteractions) -> ColumnTable[JudgedSystem]:
@@ -256,11 +278,19 @@ def warnings_of(judgement: JudgedInteractions) -> list[str]:
 
 def _pair(pair: JudgedPair) -> dict[str, Any]:
     each = zip(("first", "second"), pair.vendors, pair.alone, strict=True)
+    mode = pair.mode
+    first, second = (None, None) if mode is None else mode.alone_percent
     return {
         "vendors": pair.text,
         "stable": pair.joint.stable,
         "least_damping_percent": pair.joint.least_damping,
         "frequency_hz": None if pair.joint.critical is None else pair.joint.critical.frequency_hz,
+        "mode_hz": None if mode is None else mode.together.frequency_hz,
+        "mode_together_percent": None if mode is None else mode.together.damping_percent,
+        "mode_first_alone_percent": first,
+        "mode_second_alone_percent": second,
+        "mode_neither_percent": None if mode is None else mode.neither_percent,
+        "mode_not_followed": None if mode is None else mode.unknown or None,
         "falls_by_points": pair.fall,
         "unstable_though_stable_alone": pair.fights,
         **{
@@ -364,7 +394,11 @@ def _pairs(judgement: JudgedInteractions, figures: Figures) -> str:
     )
     cells = [[_together(judgement, row, column) for column in vendors] for row in vendors]
     picture = _heat_picture("Least damping of vendors alone and in pairs", vendors, cells)
-    return figures.add(picture, text)[0] + systems_table(judgement).html()
+    return (
+        figures.add(picture, text)[0]
+        + pairs_table(judgement).html()
+        + systems_table(judgement).html()
+    )
 
 
 def _together(judgement: JudgedInteractions, a: str, b: str) -> JudgedSystem:

@@ -82,7 +82,11 @@ def pairs_sentence(judgement: JudgedInteractions) -> str:
         return f"worst pair{among}: {worst.sentence()}{rest}"
     if not known:
         return f"worst pair: not known: {'; '.join(pair.sentence() for pair in unknown)}"
-    return f"no worst pair: none of {known} is damped less together than each alone{rest}"
+    if len(judgement.pairs) == 1:
+        return f"no worst pair: {judgement.pairs[0].sentence()}{rest}"
+    return (
+        f"no worst pair: no mode of {known} pairs is damped less together than with one alone{rest}"
+    )
 
 
 def swap_sentence(judgement: JudgedInteractions) -> str:
@@ -107,7 +111,8 @@ def stand_in_sentence(judgement: JudgedInteractions) -> str:
     plan = judgement.result.plan
     return (
         f"{plan.stand_in} stands in for the vendors that a system does without, at the same power flow; a mode counts "
-        f"if vendors' converters hold {100 * plan.request.threshold:g} % of it, or if it grows"
+        f"if vendors' converters hold {100 * plan.request.threshold:g} % of it, or if it grows; that of a pair is "
+        "followed to the systems with one vendor and with none, whatever share these hold there"
     )
 
 

@@ -93,19 +93,29 @@ def test_the_guides_modes_are_those_that_are_computed():
 
 def test_the_guides_pairs_are_those_that_are_computed():
     judgement = park().judgement
-    by_name = {"no vendor": (judgement.none, None)}
-    by_name |= {f"{vendor} alone": (system, None) for vendor, system in judgement.alone.items()}
-    by_name |= {pair.text: (pair.joint, pair.fall) for pair in judgement.pairs}
+    by_name = {"no vendor": judgement.none}
+    by_name |= {f"{vendor} alone": system for vendor, system in judgement.alone.items()}
+    by_name |= {pair.text: pair.joint for pair in judgement.pairs}
     table = rows("System")
     assert [row[0] for row in table] == [*by_name]
-    for name, verdict, damping, where, fall in table:
-        system, wanted = by_name[name]
+    for name, verdict, damping, where in table:
+        system = by_name[name]
         assert verdict == {True: "stable", False: "UNSTABLE"}[system.stable]
         assert damping == ("none" if system.critical is None else f"{system.least_damping:.2f}")
         assert where == (
             "" if system.critical is None else f"{system.critical.frequency_hz:.4g} Hz"
         )
-        assert fall == ("" if wanted is None else f"{wanted:+.2f}")
+
+
+def test_the_guides_followed_modes_are_those_that_are_computed():
+    pairs, table = park().judgement.pairs, rows("Pair")
+    assert [row[0] for row in table] == [pair.text for pair in pairs]
+    for pair, row in zip(pairs, table, strict=True):
+        mode = pair.mode
+        assert row[1] == f"{mode.together.frequency_hz:.4g} Hz"
+        dampings = (mode.neither_percent, *mode.alone_percent, mode.together.damping_percent)
+        assert row[2:6] == ["none" if x is None else f"{x:.2f}" for x in dampings]
+        assert row[6] == f"{pair.fall:+.2f}"
 
 
 @pytest.mark.slow
