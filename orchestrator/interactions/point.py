@@ -77,8 +77,8 @@ class KeptModel:
 
     @classmethod
     def of(cls, model: LinearModel) -> Self:
-        matrices = (KeptMatrix.of(matrix) for matrix in (model.F, model.G, model.H, model.K))
-        return cls(*matrices, model.names, model.wires, model.step_size, model.period)
+        F, G, H, K = (KeptMatrix.of(matrix) for matrix in (model.F, model.G, model.H, model.K))
+        return cls(F, G, H, K, model.names, model.wires, model.step_size, model.period)
 
     def model(self) -> LinearModel:
         F, G, H, K = (kept.matrix() for kept in (self.F, self.G, self.H, self.K))
