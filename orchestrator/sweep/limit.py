@@ -14,12 +14,10 @@ import numpy as np
 
 from orchestrator.analysis.modes import Mode, damping_percent, make_mode
 from orchestrator.errors import ErrorKind, few
-from orchestrator.report.tables import short
 from orchestrator.sweep.point import PointRecord
 
 COARSE = 9  # values of the coarse grid where none are asked for
 HALVINGS = 8  # of the stretch between two values of the grid
-_LONGEST = 150  # characters of a failure that a sentence shows
 _PARTS = 3  # components that are named where nothing swings against something
 # the growing mode is one of those in the range where both differ by less than this part of its size
 _SAME = 0.02
@@ -115,24 +113,39 @@ class ParameterLimit:
 
     @property
     def sentence(self) -> str:
-        start, stop = (self._value(self.tried[k]["value"]) for k in (0, -1))
-        mode, why = (
-            f": {self._mode(self.mode)}" if self.mode else "",
-            f": {short(self.why, _LONGEST)}" if self.why else "",
-        )
-        at, holding, strained = self._value(self.beyond), self.until.holding, ""
+        """The first limit on the way."""
+        return self.lines[0]
+
+    @property
+    def lines(self) -> list[str]:
+        """Every limit on the way, a line each, in the order in which they are met."""
+        found = []
         if self.strained:
-            strained = f" (beyond its rating from {self._value(self.strained[0])} on: {', '.join(self.strained[1])})"
+            value, units = self.strained
+            verb = "is" if len(units) == 1 else "are"
+            at = self._value(value)
+            found.append(f"{', '.join(units)} {verb} beyond rating from {self.key} = {at} on")
+        return [*found, *self._ending()]
+
+    def _ending(self) -> list[str]:
+        start, stop = (self._value(self.tried[k]["value"]) for k in (0, -1))
+        mode = f": {self._mode(self.mode)}" if self.mode else ""
+        why = f": {' '.join(self.why.split())}" if self.why else ""
+        at, holding = self._value(self.beyond), self.until.holding
         if self.kind is Ending.HOLDS:
             worst = f"; least damped at {self._value(self.worst_at)}{mode}"
-            return f"{holding} over the whole range, {self.key} from {start} to {stop}{strained}{worst}"
+            return [f"{holding} over the whole range, {self.key} from {start} to {stop}{worst}"]
         what = self.until.failing if self.kind is Ending.FAILS else str(self.kind)
         if self.holds_at is None:
-            return f"{what} already at the start, {self.key} = {at}{self._again('at')}{mode}{why}"
-        up_to = f"{holding} up to {self.key} = {self._value(self.holds_at)}{self._dip()}{strained}"
+            return [f"{what} already at the start, {self.key} = {at}{self._again('at')}{mode}{why}"]
+        up_to = f"{holding} up to {self.key} = {self._value(self.holds_at)}{self._dip()}"
         if self.kind is Ending.FAILS:
-            return f"{up_to}, {what} at {at}{self._again()}{mode}"
-        return f"{what} from {self.key} = {at} on, which is no limit of stability; {up_to}{self._again()}{why}"
+            return [f"{up_to}, {what} at {at}{self._again()}{mode}"]
+        no_limit = "which is no limit of stability"
+        return [
+            f"{what} from {self.key} = {at} on, {no_limit}{why}",
+            f"{up_to}{self._again()}",
+        ]
 
     def _dip(self) -> str:
         """The least damping on the way, where it is less than at both ends."""
@@ -180,7 +193,7 @@ class ParameterLimit:
             "unit": self.unit,
             "until": f"{self.until.damping:g} %" if self.until.damping else "unstable",
             "limit": self.limit,
-            "reason": None if self.limit is not None else self.sentence,
+            "reason": None if self.limit is not None else "; ".join(self.lines),
             "holds_at": self.holds_at,
             "beyond": self.beyond,
             "ends_with": str(self.kind),
@@ -191,6 +204,7 @@ class ParameterLimit:
             "holds_again_at": list(self.again),
             "tried": list(self.tried),
             "sentence": self.sentence,
+            "lines": self.lines,
         }
 
 

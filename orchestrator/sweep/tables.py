@@ -85,12 +85,14 @@ def stability(samples: Samples) -> list[str]:
 
 
 def limits(samples: Samples) -> list[str]:
-    """How far the parameter may go, a line each scenario, as rich markup."""
+    """How far the parameter may go, as rich markup: of each scenario the first limit, and what follows, a line each."""
     colours = {Ending.HOLDS: "green", Ending.FAILS: "red"}
-    return [
-        f"[bold {colours.get(limit.kind, 'yellow')}]{escape(limit.title)}[/]: {escape(limit.sentence)}"
-        for limit in samples.result.limits
-    ]
+    found = []
+    for limit in samples.result.limits:
+        colour = "yellow" if limit.strained else colours.get(limit.kind, "yellow")
+        found.append(f"[bold {colour}]{escape(limit.title)}[/]: {escape(limit.lines[0])}")
+        found += [f"  then: {escape(line)}" for line in limit.lines[1:]]
+    return found
 
 
 def _turns(samples: Samples, sweep: ScenarioSweep) -> str:

@@ -106,7 +106,7 @@ def test_a_pair_that_one_of_them_spoils_alone_is_no_fight():
 
 
 @pytest.mark.parametrize(
-    "lost", [system(mode(9.0), stability=UNKNOWN), failed("no steady state found")]
+    "lost", [system(mode(5.0), stability=UNKNOWN), failed("no steady state found")]
 )
 def test_a_pair_without_a_verdict_is_neither_the_worst_nor_forgotten(lost):
     found = judged(**ALL | {"A_B": lost, "A_C": system(mode(7.0))})

@@ -185,6 +185,8 @@ def test_a_value_that_cannot_start_is_no_limit_of_stability(loop):
     assert found["reason"].startswith("no operating point from two.T = ")
     assert "no limit of stability" in found["reason"]
     assert "T must exceed 0" in found["reason"]
+    assert "…" not in found["reason"]
+    assert found["why"].split()[-1] in found["lines"][0]  # the cause is there to its end
 
 
 def test_a_unit_beyond_its_rating_on_the_way_is_told_in_the_answer():
@@ -192,7 +194,10 @@ def test_a_unit_beyond_its_rating_on_the_way_is_told_in_the_answer():
         ["gfor.P_0=0.9:1.1:3"], scenarios=["dip"], until="unstable", workers=1
     )
     (limit,) = found.as_json()["limits"]
-    assert "P_0 from 0.9 pu to 1.1 pu (beyond its rating from 1.1 pu on: gfor)" in limit["sentence"]
+    assert limit["sentence"] == "gfor is beyond rating from gfor.P_0 = 1.1 pu on"
+    (_, then) = limit["lines"]
+    assert then.startswith("stable over the whole range, gfor.P_0 from 0.9 pu to 1.1 pu; least")
+    assert limit["reason"] == "; ".join(limit["lines"])
     assert limit["beyond_rating"] == {"value": 1.1, "units": ("gfor",)}
 
 

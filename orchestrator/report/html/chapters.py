@@ -378,8 +378,15 @@ def _check(file: Path, c: Content) -> Chapter:
     )
 
 
+def _limits_text(found: Any) -> str:
+    """Every limit of every scenario; an older result has the first alone."""
+    return "; ".join(
+        f"{x['scenario']}: {'; '.join(x.get('lines') or [x['sentence']])}" for x in found
+    )
+
+
 def _limits(file: Path, found: Any) -> Chapter:
-    answer = "; ".join(f"{x['scenario']}: {x['sentence']}" for x in found)
+    answer = _limits_text(found)
     sure = f"{sum(len(x['tried']) for x in found)} values tried, then bisected"
     return Chapter(file, f"How far may {found[0]['parameter']} go?", answer, None, sure)
 
@@ -657,7 +664,7 @@ def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:
     }
     models, bases = "".join(f"{kind}; " for kind in _kinds([about])), _bases([about])
     if limits := limits_of(place):
-        said = "; ".join(f"{one['scenario']}: {one['sentence']}" for one in limits)
+        said = _limits_text(limits)
         holds = all(one["ends_with"] == "holds" for one in limits)
         return Chapter(
             place,
