@@ -322,7 +322,6 @@ def test_there_is_no_cycle():
             },
         ),
         ("pandapower", {"orchestrator.cases.network_sources"}),
-        ("matpowercaseframes", {"orchestrator.cases.network_sources"}),
         ("skrf", {"orchestrator.black_box.fitting"}),
         ("pint", {"orchestrator.units"}),
         ("helics", {"orchestrator.federation.helics_calls"}),

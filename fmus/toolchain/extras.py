@@ -6,7 +6,6 @@ from importlib.util import find_spec
 
 EXTRAS = {
     "ziglang": "build",
-    "matpowercaseframes": "networks",
     "pandapower": "networks",
     "pypowsybl": "cgmes",
     "skrf": "black-box",

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from fmus.toolchain.extras import require
 from orchestrator.cases.csv_rows import seen_from_here
 from orchestrator.cases.kept_tables import SourceTables, kept_tables, tables_beside
+from orchestrator.cases.matpower.program import case_tables
 from orchestrator.cases.names import close_names
 from orchestrator.cases.pandapower_json import network_text
 from orchestrator.errors import InputError
@@ -23,6 +24,10 @@ from orchestrator.errors import InputError
 __all__ = ["SourceTables", "read_matpower", "read_pandapower"]
 
 _COLUMNS = {"bus": 9, "branch": 11, "gen": 10}
+_LIMITS = {"bus": [], "branch": [5, 6, 7], "gen": [3, 4, 8, 9]}
+"""Columns of limits, which MATPOWER lets be ``Inf``."""
+
+_PMAX = 8
 
 
 def read_matpower(path: Path) -> SourceTables:
@@ -34,11 +39,11 @@ def read_matpower(path: Path) -> SourceTables:
         raise InputError(
             f"{path}: a MATPOWER case ends in .m or .mat, and this file in {path.suffix!r}"
         )
-    if path.suffix == ".m":
-        require(f"reading the MATPOWER case {path.name}", "matpowercaseframes")
     try:
-        tables = _m_file(path) if path.suffix == ".m" else _mat_file(path)
-    except Exception as error:  # both libraries let all kinds of errors through
+        tables = case_tables(path) if path.suffix == ".m" else _mat_file(path)
+    except InputError:
+        raise
+    except Exception as error:  # scipy lets all kinds of errors through
         raise InputError(
             f"{path}: it cannot be read as a MATPOWER case: {error or type(error).__name__}"
         ) from error
@@ -47,22 +52,31 @@ def read_matpower(path: Path) -> SourceTables:
             f"{path}: it is not a MATPOWER case, because mpc.{', mpc.'.join(missing)} is missing"
         )
     for name, columns in _COLUMNS.items():
-        if (
-            tables[name].ndim != 2
-            or tables[name].shape[1] < columns
-            or not np.isfinite(tables[name][:, :columns]).all()
-        ):
+        table = tables[name]
+        if not isinstance(table, np.ndarray) or table.ndim != 2 or table.shape[1] < columns:
             raise InputError(
                 f"{path}: mpc.{name} must be a table of numbers with {columns} columns or more"
             )
+        used = np.delete(table[:, :columns], _LIMITS[name], axis=1)
+        for row in np.flatnonzero(
+            ~np.isfinite(used).all(axis=1) | np.isnan(table[:, :columns]).any(axis=1)
+        ):
+            raise InputError(
+                f"{path}: row {row + 1} of mpc.{name} holds Inf or NaN where only a limit may be Inf, which means none"
+            )
+    base = np.asarray(tables["baseMVA"], dtype=float)
+    if base.size != 1 or not 0 < base.item() < np.inf:
+        raise InputError(f"{path}: mpc.baseMVA must be one number above 0")
+    gen = tables["gen"].astype(float)
+    gen[np.isinf(gen[:, _PMAX]), _PMAX] = 0.0  # no limit; what follows takes 0 for not known
     branch = tables["branch"]
     numbers = tables["bus"][:, 0].astype(int)
     return SourceTables(
         path.name,
-        float(tables["baseMVA"]),
+        base.item(),
         tables["bus"],
         branch,
-        tables["gen"],
+        gen,
         np.repeat(0.5j * branch[:, [4]], 2, axis=1),
         {int(n): str(n) for n in numbers},
     )
@@ -104,16 +118,6 @@ def _made_by_pandapower(name: str, path: Path) -> SourceTables:
                 f"pandapower network {name!r}: its power flow has no solution: {error}"
             ) from error
     return _pandapower_tables(name, net)
-
-
-def _m_file(path: Path) -> dict[str, Any]:
-    from matpowercaseframes import CaseFrames  # noqa: PLC0415
-
-    frames = CaseFrames(str(path))
-    found = {name: getattr(frames, name, None) for name in ("baseMVA", *_COLUMNS)}
-    return {
-        n: t if n == "baseMVA" or t is None else t.to_numpy(dtype=float) for n, t in found.items()
-    }
 
 
 def _mat_file(path: Path) -> dict[str, Any]:
