@@ -18,9 +18,12 @@ MOST = 640  # largest number of vectors; 48,000 states take 0.5 GB for them
 # of ν: what the rest may be of what is found; left and right vectors together give ν to its square
 TOLERANCE = 1e-7
 
-ROUGH, _BEYOND = 1e-2, 8
-"""What lies beyond a limit is known where so many values there, the largest, have settled to this part of themselves or
-to half their distance from the limit."""
+ROUGH = 1e-2
+"""A value beyond a limit has settled if it moves by less than this part of itself, or of half its distance from the
+limit: its place need not be known better."""
+
+# the largest values beyond a limit that have to have settled before the search there may end
+_BEYOND = 8
 
 # values are looked at where the vectors are more by this factor; there are many operations in it
 _GROWTH = 1.25

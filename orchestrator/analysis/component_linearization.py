@@ -242,9 +242,10 @@ accuracy."""
 AGREES = 1e-4
 # smaller sizes, which are tried if a limit lies within the first ones
 _NEARBY = (1e-7, 1e-9, 1e-11)
-_BENT, _FITS = 0.1, 0.01
-"""A difference quotient that changes by more than the first part depends on the size. A quotient that differs by less
-than the second part confirms the derivative."""
+# a difference quotient that changes by more than this part of itself depends on the size
+_BENT = 0.1
+# a difference quotient that differs by less than this part confirms the derivative
+_FITS = 0.01
 
 _ROUNDING = 1e-8
 """Accepted difference relative to the largest element of the row, caused by rounding in the row's terms, divided by the

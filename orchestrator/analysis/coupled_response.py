@@ -38,16 +38,18 @@ _CURVATURE = 0.05
 """Difference between the departures at the two larger sizes, each divided by the cube of its size, up to which they
 are smooth curvature. A limit or a dead band has no such law."""
 
-_SECONDS, _WALL, _LEAST, _SHORT = 5.0, 8.0, 0.1, 1.0
-"""Longest simulated time for which a response is followed [s], longest computing time for it [s], least simulated time
-[s], and the simulated time below which the verdict states how short it was [s]."""
+_SECONDS = 5.0  # longest simulated time for which a response is followed [s]
+_WALL = 8.0  # longest computing time for it [s]
+_LEAST = 0.1  # least simulated time, however long it takes [s]
+_SHORT = 1.0  # simulated time below which the verdict states how short it was [s]
 
-# between compared points [s], and windows in which errors are relative to the response
-_SAMPLE, _WINDOWS = 5e-3, 10
+_SAMPLE = 5e-3  # between compared points [s]
+_WINDOWS = 10  # windows of the response, each with an error relative to its own size
 _DENSE = 500  # up to this number of states, a power of the step map costs less than single steps
-_STANDS, _MOVES = 1e-10, 1e-7
-"""A state stands still if its elements of the step map differ from those of a constant by less than the first figure,
-which is rounding. It should move if its declared derivatives, times the step, exceed the second figure."""
+# a state stands still if its elements of the step map differ from a constant's by less: rounding
+_STANDS = 1e-10
+# a state should move if its declared derivatives, times the step, exceed this
+_MOVES = 1e-7
 
 
 @dataclass(frozen=True)

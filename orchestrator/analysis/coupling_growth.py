@@ -23,8 +23,8 @@ _STEPS = 20
 # factor in a communication step: what grows less is left to the run, where it can be seen growing
 _GROWS = 1.1
 _MOVED = 1e-3  # by how much an input is moved, of 1 or of its value
-# steps of the linear model, and those at the end over which growth is measured
-_TURNS, _LATE = 300, 100
+_TURNS = 300  # steps of the linear model
+_LATE = 100  # steps at the end over which growth is measured
 
 
 def coupling_growth(master: Master, boxes: Sequence[str]) -> list[str]:

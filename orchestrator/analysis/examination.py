@@ -38,9 +38,8 @@ from orchestrator.analysis.stability import WHOLE, Cause, Stability, judge, whol
 from orchestrator.coupling.master import Master
 from orchestrator.errors import CosimError, InputError
 
-MOVED, LOST = 0.01, 0.1
-"""A step that moves a mode by the first part of its size gives a warning. A mode that moves by the second part is
-lost."""
+MOVED = 0.01  # part of its size by which a step may move a mode before a warning
+LOST = 0.1  # part of its size from which on a moved mode is lost
 
 SWINGING = 0.5  # largest damping ratio of a compared mode; a mode with more damping does not swing
 SLOW_HZ = 5.0

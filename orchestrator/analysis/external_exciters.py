@@ -8,7 +8,11 @@ from typing import NamedTuple
 
 from orchestrator.coupling.master import Master
 
-_NEEDED, _HELD, _VOLTAGE, _FIELD = "exciter.E_fd_0", "exciter.v_t_0", "v_t", "exciter.E_fd"
+# variables of a machine whose exciter is another FMU
+_NEEDED = "exciter.E_fd_0"  # field voltage at the start [pu]
+_HELD = "exciter.v_t_0"  # terminal voltage at the start [pu]
+_VOLTAGE = "v_t"  # terminal voltage [pu]
+_FIELD = "exciter.E_fd"  # field voltage that comes from outside [pu]
 _APART = 1e-4  # difference that is said [pu]
 
 

@@ -13,7 +13,8 @@ from orchestrator.analysis.modes import OfEigenvalue
 from orchestrator.errors import AnalysisError
 
 TOLERANCE = 1e-6  # singular values below this fraction of the largest are taken for noise
-_MIN_SAMPLES, _MAX_SAMPLES = 20, 1200
+_MIN_SAMPLES = 20  # fewer hold no swing with its damping
+_MAX_SAMPLES = 1200  # more are thinned out: the singular values of their Hankel matrix take seconds
 # rows of the triangle below this part of the tolerance change modes by its square, and most are
 _DROPPED = 1e-3
 # part of a signal's power that is too fast for the samples used, from which on they are averages

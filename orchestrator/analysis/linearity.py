@@ -36,9 +36,8 @@ _WHY = (
 )
 """The meaning of a difference in each of `ComponentLinearization.variants`, in their order."""
 
-_EDGE, _SMALL_ONLY = 1, 2
-"""Indices of two variants. At an edge there is no linear model at all; in the last variant the model is right for small
-changes."""
+_EDGE = 1  # index of the variant at an edge, where there is no linear model at all
+_SMALL_ONLY = 2  # index of the variant in which the model is right for small changes
 
 _EDGE_SHIFT = 1e-2
 """Shift from which an edge leaves open whether the system is stable, as a part of |λ|. The shift belongs to a

@@ -108,9 +108,10 @@ AGREE = 0.05
 STEEP = 10.0
 # Two modes d Hz apart need 0.75/d s: with 3 % of noise the damping is right to 0.8 points then
 TOLD_APART = 0.75
-SHORTER, COARSER = 0.1, 30.0
-"""The other identification leaves out this part of the window at its beginning, and takes singular values for noise
-that are this factor larger, so that its order is lower where noise made modes."""
+# the other identification leaves out this part of the window at its beginning
+SHORTER = 0.1
+# it takes singular values for noise that are this factor larger: its order is lower if noise made modes
+COARSER = 30.0
 
 
 def with_doubts(

@@ -27,9 +27,10 @@ _LOOKS = 40
 _ALIVE = 1e-4  # multipliers over a period below this belong to what decays within it
 # largest imaginary part of the map that is put together from its modes again, relative to the map
 _REAL = 1e-6
-_MOVING, _SAME = 1e-4, 1e-9
-"""A state that changes by more than the first in a period may count; then a period from the changed value must be the
-same, to the second, in all states."""
+# a state that changes by more than this part of its scale in a period may count
+_MOVING = 1e-4
+# part of its scale to which a period from the changed value must then be the same, in all states
+_SAME = 1e-9
 
 _SHIFT = 1e-7  # above the rounding in an eigenvalue 1, as in `orchestrator.analysis.steady_state`
 

@@ -16,9 +16,12 @@ PERTURBATIONS = (1e-5, 1e-6, 1e-7, 1e-8)
 """Central differences are taken with the first and with twice of it, relative to max(1, |value|), and should agree. A
 column where they do not, as a limit or a dead band is close by, is taken anew with the next size."""
 
-_AGREE, _SMALL = 5e-3, 1e-2
-"""Two sizes agree where every element differs by less than this part of its size, and of this rate [1/s]. In smooth
-systems, up to the IEEE 118-bus one, the part is at most 3e-4; where a signal runs into its limit it is a half."""
+_AGREE = 5e-3
+"""Two sizes agree if every element differs by less than this part of its size. In smooth systems, up to IEEE 118-bus
+systems, the part is at most 3e-4; if a signal runs into its limit it is a half."""
+
+_SMALL = 1e-2
+"""Rate [1/s] of which an element may differ by the same part as well: smaller elements are rounding."""
 
 _EVEN = 0.1
 """An element whose answers up and down differ by more than this part belongs to a limit on one side; in smooth systems

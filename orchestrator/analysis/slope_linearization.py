@@ -18,16 +18,19 @@ from orchestrator.coupling.turns import Exchange
 from orchestrator.fmi.component import Component, RealBatch
 
 _SIZE = 1e-5  # of a perturbation, relative to max(1, |value|)
-_EVEN, _FLOOR = 0.1, 1e-2
-"""An element's answers up and down may differ by this part of it, and of this rate [1/s]: beyond, a limit is near."""
+# an element's answers up and down may differ by this part of it; beyond, a limit is near
+_EVEN = 0.1
+_FLOOR = 1e-2  # rate [1/s] of which they may differ by the same part as well
 
 # part of an answer's largest slope that counts as this rate: |v| is curved, and a gain makes it
 # large
 _OF_ROW = 1e-3
 _MANY = 100  # from this number of states and inputs on, variables are perturbed together
-_HOLDS, _ROUNDING = 1e-3, 1e-9
-"""A perturbation in all directions at once may differ by the first part of its answer from the sum of the single
-ones, and by the second part of the answer at rest: more is an effect that the pattern does not have."""
+_HOLDS = 1e-3
+"""Part of its answer by which a perturbation in all directions at once may differ from the sum of the single ones: more
+is an effect that the pattern does not have."""
+
+_ROUNDING = 1e-9  # part of the answer at rest by which it may differ as well
 
 
 def gives_slopes(exchange: Exchange) -> bool:

@@ -40,9 +40,10 @@ SLOW = 0.05
 moves them. The step map has larger errors here: an error of the perturbation is divided by the step, and a double zero
 splits by the root of the error."""
 
-_COUPLING_FACTOR, _COUPLING_RATE = 2.0, 1.0
-"""The coupling is the cause of growth if the step map's growth rate exceeds the continuous system's rate times the
-first figure plus the second [1/s]."""
+# the coupling is the cause of growth if the step map's rate exceeds the continuous system's rate
+# times this factor, plus the rate below
+_COUPLING_FACTOR = 2.0
+_COUPLING_RATE = 1.0  # [1/s]
 
 # up to this number of states, all eigenvectors cost less than a search for one
 _DENSE_VECTORS = 200

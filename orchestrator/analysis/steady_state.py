@@ -51,7 +51,8 @@ def find_operating_point(
     change = state.step_from(x) - x
     first = residual = _largest(change)
     # one size of perturbation, unless its direction is worth little: a limit is close
-    iterations, once = 0, True
+    once = True
+    iterations = 0
     while residual > accept and iterations < max_iterations:
         candidate = x + _newton_correction(master, len(x), change, once=once)
         state.write(candidate)

@@ -218,7 +218,8 @@ class CompiledLoop:
         call.tracks = self._tracks.address(exchange.window.start or 0)
 
     def advance(self, index: int, count: int, step_size: float) -> None:
-        status, self.completed = 0, 0
+        status = 0
+        self.completed = 0
         with calls:
             while self.completed < count and not status:
                 part, team = self._next(count - self.completed)

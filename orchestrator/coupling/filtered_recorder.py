@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from orchestrator.coupling.observers import ObservedRun
 from orchestrator.coupling.recorder import Recorder, RowSink
 
-# in parts of 1/interval: what is below passes, what is above is taken away
-PASS_BAND, STOP_BAND = 0.4, 0.5
+PASS_BAND = 0.4  # frequency up to which the filter lets all pass [1/interval]
+STOP_BAND = 0.5  # frequency from which on it takes all away [1/interval]: half the sampling rate
 _HALF = 25  # the filter reaches so many intervals to both sides
 _BETA = 7.857  # of the Kaiser window: 80 dB
 

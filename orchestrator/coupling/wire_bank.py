@@ -27,7 +27,10 @@ from orchestrator.coupling.imperfections import (
 from orchestrator.errors import InputError
 
 STRETCH = 1000  # communication steps for which the noise is made at once
-_PASS, _HOLD, _SUBSTITUTE = 0, 1, 2
+# what a wire gives on: as the numbers of the compiled loop
+_PASS = 0  # the value
+_HOLD = 1  # the last value, while it is lost
+_SUBSTITUTE = 2  # a given value, while it is lost
 _REALS = ("bias", "deviation", "keep", "fresh", "quantum", "substitute", "coloured", "last")
 _INTEGERS = ("mode", "delay", "capacity", "head", "started")
 _WIRE = np.dtype(
@@ -88,7 +91,8 @@ class WireBank:
     Raises an `InputError` if a delay is no multiple of the communication step, or a noise's bandwidth is beyond what
     the step shows."""
 
-    name, one_thread = "connections", "no FMU"
+    name = "connections"
+    one_thread = "no FMU"
 
     def __init__(
         self,

@@ -140,7 +140,8 @@ class _Opened:
         """A, B, C and D from some outputs that are given to those that are computed in their place."""
         F, G, H, K = self._matrices
         H_0, K_0 = H.copy(), K.copy()
-        H_0[rows], K_0[rows] = 0.0, 0.0
+        H_0[rows] = 0.0
+        K_0[rows] = 0.0
         whole = np.linalg.inv(np.eye(len(K)) - K_0)
         through = K[rows] @ whole
         return [

@@ -16,9 +16,14 @@ _TURN = np.deg2rad(4.0)  # turn of det(1 + L) between two of the frequencies tha
 # relative error of a loop that was scanned below which no further one is gone through
 _FITTED = 1e-6
 _EVERYWHERE = 2 * np.pi * np.geomspace(0.1, 1000, 15)
-_WINDOW, _WITHIN, _LEAST, _SAME_MODE, _DIRECT = 0.5, 60, 12, 0.02, 0.02
-"""Frequencies around which modes are sought [rad/s]; the reach to both sides by their logarithm; points in it, and at
-least; relative distance of two findings of one mode, and of a direct current from the rated frequency."""
+"""Frequencies around which modes are sought [rad/s]."""
+
+_WINDOW = 0.5  # reach to both sides of such a frequency, in its natural logarithm
+_WITHIN = 60  # points that are fitted within the reach
+_LEAST = 12  # points without which nothing is fitted
+_SAME_MODE = 0.02  # relative distance up to which two findings are one mode
+# relative distance from the rated frequency up to which a mode is a direct current of the network
+_DIRECT = 0.02
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,10 @@ EXACT_RANGE = (NEAR_ZERO / (2 * np.pi), 20e3)
 """In which two linear models are followed at least [Hz]; beyond, so far as `_BEYOND` times the size of their poles."""
 
 _BEYOND = 30.0
-_END, _SMALL = 1.5, 0.95
-"""Part of the range's end over which both sides must be passive, or the loci smaller than the second figure."""
+# at the end of the range, from the highest frequency divided by this on, both sides must be passive
+_END = 1.5
+# or the loci must be smaller than this there: they cannot reach −1
+_SMALL = 0.95
 
 # most that det(1 + L) at the lowest frequency is off the real axis, where it begins
 _BEGIN = np.deg2rad(60.0)
@@ -25,7 +27,9 @@ _BEGIN = np.deg2rad(60.0)
 _RANGE = (2.0, 400.0)
 # growth of det(1 + L) over the last half of the range of models from which on it does not end there
 _SETTLED = 1.5
-_INVARIANT, _FRAMES = 1e-3, 16
+# part of a matrix that a turn of the frame may change if the scan is the same in all frames
+_INVARIANT = 1e-3
+_FRAMES = 16  # frames that are tried, over half a turn
 
 
 class NyquistVerdict(StrEnum):

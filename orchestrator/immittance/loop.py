@@ -15,11 +15,13 @@ _AT_A_BUS = np.deg2rad(60.0)  # the same of the loop at one bus of several
 # turns of the determinant and of the loci, added up, differ by less [rad] where loci are followed
 # rightly
 _ALIKE = 0.1
-_ROUNDS, _MOST, _AT_ONCE = 14, 60_000, 500
+_ROUNDS = 14  # halvings between two frequencies, at most
+_MOST = 60_000  # frequencies at which no more are put in between
+_AT_ONCE = 500  # frequencies whose matrices are inverted at a time: bounds the memory
 _ROUND = 1e-6  # radius of the way round an undamped pole of a model, relative to it
 _NARROW = 0.5  # poles damped by less than this part have points of their own
-# points between two frequencies at first, unless there are enough of them
-_WITHIN, _ENOUGH = 6, 1000
+_WITHIN = 6  # points between two frequencies at first
+_ENOUGH = 1000  # frequencies from which on none is put in between at first
 _FALLS = 0.3  # part to which det(1 + L) of a free angle falls at least from 1e-3 to 1e-4 rad/s
 _ARC = 1e-4  # radius of the way round a pole on the axis, relative to the pole
 

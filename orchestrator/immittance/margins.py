@@ -10,10 +10,11 @@ from orchestrator.arrays import Numbers
 from orchestrator.immittance.loop import LoopPath
 
 _LEAST = 1e-4  # loci that cross the axis nearer to 0 tell nothing
-# parts by which a locus that begins on the real axis may leave it, and change up to thrice f
-_LEVEL, _FLAT = 0.05, 0.5
-# distances from −1 of an undamped mode, and of the locus of a free angle near 0 Hz
-_TOUCHES, _FREE = 1e-9, 0.01
+# part of its size by which a locus that begins on the real axis may leave it
+_LEVEL = 0.05
+_FLAT = 0.5  # part by which such a locus may change up to three times its first frequency
+_TOUCHES = 1e-9  # distance from −1 of an undamped mode: rounding
+_FREE = 0.01  # distance from −1 of the locus of a free angle near 0 Hz
 _NEAR = 0.3  # distance from −1 up to which a locus may come from there
 _SLOWEST = 0.05  # least frequency of a distance [Hz]: below, a free angle moves as far as one likes
 

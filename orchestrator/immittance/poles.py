@@ -10,7 +10,8 @@ _TOLERANCES = (3e-2, 1e-2, 3e-3)
 """Relative errors at which the fit stops. A pole of the system is found at two of them in one place; one that stands
 for noise moves."""
 
-_MOST, _ENOUGH = 20, 500
+_MOST = 20  # support points of the fit, at most
+_ENOUGH = 500  # frequencies that are fitted; of more, each second, third, …
 _SAME = 0.2  # distance of two findings of one pole, in its real part plus a thousandth of its size
 _STRONG = 0.05  # least size of what a pole adds at its frequency, relative to the whole there
 

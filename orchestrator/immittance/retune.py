@@ -17,13 +17,16 @@ from orchestrator.immittance.study import CutResult
 
 # a parameter is followed from its value divided by this to its value times this, within its bounds
 REACH = 4.0
-# values at which it is told; scans before the first check, and at most
-GRID, _FIRST, _MOST = 41, 4, 10
+GRID = 41  # values at which the distance from −1 is given
+_FIRST = 4  # scans before the first check
+_MOST = 10  # scans at most
 _CLOSE = 0.01  # error of the distance from −1 below which two checks in a row end the scanning
 # relative change of the loop over the whole range below which a parameter does nothing
 _SAME = 1e-7
-# part by which a needed value goes beyond the goal; scans that may confirm it
-_INSIDE, _TRIES = 0.01, 3
+_INSIDE = (
+    0.01  # part by which a needed value goes beyond the goal, so that rounding does not miss it
+)
+_TRIES = 3  # scans that may confirm a needed value
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,10 @@ from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.arrays import Complex, Numbers, Vector
 from orchestrator.errors import InputError
 
-SIEMENS, PER_UNIT = "S", "pu"
+# units of an admittance
+SIEMENS = "S"
+PER_UNIT = "pu"
+
 # frequencies down to this part of the highest tell signs: there a device's filter answers, not its
 # control
 _TOP = 5.0
@@ -32,8 +35,9 @@ _CLEAR = 0.35
 _SURE = 0.2
 _TOPS = (_TOP, 2.5, np.inf)  # parts of the highest frequency from which on such a one is looked for
 
-_HOLE, _BESIDE = 3.0, 8
-"""A step of the frequency this many times as long as each of so many to either side may be a hole."""
+# a step of the frequency this many times as long as each of those beside it may be a hole
+_HOLE = 3.0
+_BESIDE = 8  # steps to either side with which it is compared
 
 
 @dataclass(frozen=True)

@@ -17,10 +17,14 @@ ON_AXIS = 1e-7
 """Poles of models whose damping is less than this are on the axis, as of coils and capacitors without losses; the path
 goes round them to the right, too."""
 
-_RESOLVED, _SHARE, _NOISE, _UNRESOLVED = 0.3, 0.5, 1e-3, 6.0
-"""Where a cubic through its neighbours predicts a left-out value by 0.3 times the error of a straight line or better,
-half of its error is the interpolation's with room to spare. Elsewhere what is seen is noise up to 1e-3 of the value;
-larger, it may be the flank of something that is far larger between the frequencies."""
+_RESOLVED = 0.3
+"""A curve is resolved if a cubic through its neighbours predicts a left-out value with at most this part of a straight
+line's error."""
+
+_SHARE = 0.5  # part of the cubic's error that bounds the interpolation's, with room to spare
+_NOISE = 1e-3  # part of the value up to which the error of an unresolved curve is noise
+# a larger error may be the flank of something between the frequencies that is larger by this factor
+_UNRESOLVED = 6.0
 
 _AT_ONCE = 200  # points whose matrices are held at a time
 

@@ -14,8 +14,9 @@ from orchestrator.immittance.loop import NO_MODES, CutLoop
 from orchestrator.immittance.margins import told
 from orchestrator.immittance.sides import Known, Side
 
-# critical frequencies told, least ratio of two, largest distance
-_MOST, _APART, _NEAR = 3, 1.15, 0.9
+_MOST = 3  # critical frequencies that are named
+_APART = 1.15  # least ratio of two of them
+_NEAR = 0.9  # largest distance from −1 of a critical frequency
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,8 @@ _MARGINS = (
     ("disk", "disk", "{:.3f}"),
 )
 
-# buses and devices that take part, in a line, and what is too little for it
-_NAMED, _LITTLE = 4, 5e-3
+_NAMED = 4  # buses and devices in a line that take part in a mode
+_LITTLE = 5e-3  # share of a mode that is too little to be named
 
 Report = Callable[[str], None]
 

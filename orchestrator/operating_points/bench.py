@@ -57,7 +57,8 @@ class PointBench(Closing):
                 if found is not None:
                     raise found from error
                 raise
-            self._master.index, self._master.handed_over = 0, False
+            self._master.index = 0
+            self._master.handed_over = False
             return self._master
         self.close()
         self._master = running(prepared)

@@ -13,7 +13,10 @@ from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import InputError, few
 from orchestrator.units import read_value
 
-IN_SERVICE, ACTIVE, REACTIVE = "in_service", "P_mw", "Q_mvar"
+# ends of the names of columns
+IN_SERVICE = "in_service"  # 1 or 0
+ACTIVE = "P_mw"  # [MW]
+REACTIVE = "Q_mvar"  # [Mvar]
 
 
 @dataclass(frozen=True)

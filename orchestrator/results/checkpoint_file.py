@@ -18,8 +18,8 @@ from orchestrator.safe_files import replacing
 Arrays = Mapping[str, NDArray[Any]]
 
 CHECKPOINTS = ".checkpoints"  # folder for them among the results of a run
-# ends of their names: of the newest one, and of the one before it
-CHECKPOINT, PREVIOUS = ".checkpoint", ".previous"
+CHECKPOINT = ".checkpoint"  # end of the newest one's name
+PREVIOUS = ".previous"  # end of the name of the one before it
 _MARK = b"gfor-cosim checkpoint 1\n"
 _DIGEST = hashlib.sha256().digest_size
 _HEADER = "header"

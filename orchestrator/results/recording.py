@@ -29,8 +29,8 @@ from orchestrator.safe_files import flush, not_written, write_bytes
 if TYPE_CHECKING:
     from orchestrator.cases.prepare import PreparedScenario
 
-# bytes of a value: compressed parts with the joined file; digits in the table
-_NUMBER, _CSV_NUMBER = 8, 13
+_NUMBER = 8  # bytes of a value in the compressed parts together with the joined file
+_CSV_NUMBER = 13  # bytes of a value in the table: its digits
 
 
 def recorded_size(prepared: PreparedScenario, *, csv: bool) -> float:

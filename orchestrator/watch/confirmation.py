@@ -71,19 +71,19 @@ those that seemed to grow in every part of the response had 4 at most."""
 # largest relative difference of frequency between the judged part and the whole response
 SAME = 0.05
 AGREE = 2.0  # largest factor between the growth rates of the judged part and of the whole response
-# time constants of a mode until it is gone, and factor by which a beat grows between thirds
-_GONE, _FAR = 3.0, 2.0
-# least true growth over fifths, as a logarithm, and its mean by its least: a beat bends more
-_GROWN, _EVEN = 0.7, 1.3
+_GONE = 3.0  # time constants of a mode until it is gone
+_FAR = 2.0  # factor by which a beat may grow between thirds
+_GROWN = 0.7  # least growth of a true swing over fifths, as a logarithm
+_EVEN = 1.3  # its mean growth by its least, at most: a beat bends more
 
-FAR_ABOVE, RISING = 10.0, 1.3
-"""A swing of any shape grows if it rises by the first factor from the first to the last quarter, and by the second one
-at least from each quarter to the next."""
+# a swing of any shape grows if it rises by this factor from the first to the last quarter
+FAR_ABOVE = 10.0
+RISING = 1.3  # and at least by this factor from each quarter to the next
 
 
-_PIECES, _CERTAIN = 8, 3.0
-"""Number of pieces of the judged part whose sizes tell whether a swing of any shape decays, and least number of its
-standard errors that the slope of their logarithms has if it does."""
+_PIECES = 8  # pieces of the judged part whose sizes tell whether a swing of any shape decays
+# standard errors that the slope of their logarithms is from 0, at least, if it decays
+_CERTAIN = 3.0
 
 
 def change(swing: Swing, rate: float) -> float:

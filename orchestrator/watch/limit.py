@@ -60,7 +60,10 @@ class Limit:
         )
 
 
-_EXCITER, _GOVERNOR, _PSS = "exciter", "governor", "pss"
+# scopes of a machine's parts
+_EXCITER = "exciter"
+_GOVERNOR = "governor"
+_PSS = "pss"
 
 
 def _part(part: str, what: str, signal: str, high: str, low: str, **further: object) -> Limit:

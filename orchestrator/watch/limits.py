@@ -189,8 +189,8 @@ def _finding(
     )
 
 
-_CYCLE, LASTS = 0.02, 0.08
-"""Time [s] over which a current is averaged, and for which it is above its limit; what is shorter, a limit may need."""
+_CYCLE = 0.02  # time over which a current is averaged [s]: a period of 50 Hz
+LASTS = 0.08  # time for which a current is above its limit [s]; a limit may need what is shorter
 
 ABOVE = 1.05  # part of the declared current from which one is above it, as in `gfor fmu check`
 

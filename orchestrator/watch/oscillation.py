@@ -17,9 +17,8 @@ _PER_PERIOD = 5  # least number of samples in a period of an oscillation that ca
 
 # A long stretch of a fast oscillation is judged by this number of samples at its end
 _MOST_SAMPLES = 600
-_ENOUGH_SAMPLES, _BEYOND = 300, 3
-"""A slow oscillation is thinned to the first number of samples, but must keep frequencies up to the second number times
-its own."""
+_ENOUGH_SAMPLES = 300  # samples to which a slow oscillation is thinned
+_BEYOND = 3  # frequencies up to this number times its own are kept all the same
 
 
 @dataclass(frozen=True)

@@ -50,9 +50,8 @@ _RESOLVED = 4.0
 """An output is judged by its looks, however often it turns, if it moves by this factor more over several turns than
 between two looks: a small ripple makes the turns, and a swing that the looks resolve makes the motion."""
 
-_TURNS, _FEWEST_GROUPS = 6, 12
-"""Number of turns that are combined to one figure for the extent of an output's swing, and least number of such
-figures."""
+_TURNS = 6  # turns that are combined to one figure for the extent of an output's swing
+_FEWEST_GROUPS = 12  # such figures without which a growth is not told from chance
 
 CLEAN = 0.15
 """In a stretch with noise, the largest part of a swing that a reported oscillation leaves unexplained. An oscillation

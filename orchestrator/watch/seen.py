@@ -19,8 +19,8 @@ LOOK_INTERVAL = 5e-3
 MOST_LOOKS = 20_000  # largest number of looks; in longer runs the looks are farther apart
 
 
-_AT_REST, _STILL = 0.05, 0.2
-"""Time at the start in which a slip moves the current [s], and the part of it by which it moves it at least."""
+_AT_REST = 0.05  # time at the start in which a slip moves the current [s]
+_STILL = 0.2  # part of the current by which a slip moves it at least
 
 _SETTLED = 1e-4  # distance of omega from its rest [pu] at which a meter has settled
 

@@ -12,9 +12,8 @@ from orchestrator.watch.seen import Seen
 # an event is noticed if it bends a signal by this part of its range since the last noticed one
 NOTICED = 0.01
 _KINK_LOOKS = 4  # number of looks after an event that show its immediate effect
-_USUAL_LOOKS, _USUAL = 20, 2.0
-"""A bend counts if it exceeds the first number times the signal's own motion in the second number of looks before the
-event."""
+_USUAL_LOOKS = 20  # looks before an event that show the signal's own motion
+_USUAL = 2.0  # a bend counts if it exceeds that motion by this factor
 
 _ROUNDING = 1e-12  # rounding, as a part of 1 or of the signal
 

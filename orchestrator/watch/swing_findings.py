@@ -8,8 +8,8 @@ from orchestrator.watch.oscillation import Oscillation, too_fast
 from orchestrator.watch.seen import shown
 from orchestrator.watch.stretches import Stretch
 
-# most pieces, and their least length [s]; the oscillation is searched in the first
-_PARTS, _SHORT = 40, 0.1
+_PARTS = 40  # pieces in which an oscillation is searched, at most
+_SHORT = 0.1  # their least length [s]
 
 
 def swing_rises(swing: Swing) -> bool:

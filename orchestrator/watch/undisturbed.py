@@ -123,8 +123,9 @@ LEAST_MOTION = 1e-4
 # A motion grows by itself if it had less than this part of its extent after half the time
 _STEEP = 0.2
 FEWEST_LOOKS = 3  # least number of looks over which a growth rises; a faster rise is a jump
-# range in which a growth is measured, as parts of 1 or of the start
-_ROUNDING, _LARGE = 1e-13, 0.03
+# a growth is measured between these sizes, in parts of 1 or of the start
+_ROUNDING = 1e-13  # above rounding
+_LARGE = 0.03  # below what limits bend
 _AGREE = 0.2  # largest relative difference between two measurements of a growth that agree
 
 

@@ -46,8 +46,8 @@ the network, such as a current's offset, which takes up to a second to decay; gr
 # shortest stretch of which a departure is told [s]: a fault that is cleared is shorter
 SHORTEST_BETWEEN = 1.0
 
-LEAST_DEPARTURE, LEAST_SHARE = 1e-3, 0.1
-"""Least motion that is told, as a part of 1 or of the signal's start, and as a part of all its motion."""
+LEAST_DEPARTURE = 1e-3  # least motion that is reported, in parts of 1 or of the signal's start
+LEAST_SHARE = 0.1  # the same as a part of all its motion
 
 # A signal departs if it moves by this factor more in the last quarter than in each quarter before
 MORE = 1.2

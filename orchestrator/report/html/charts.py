@@ -9,8 +9,13 @@ import numpy as np
 
 from orchestrator.arrays import Numbers
 
-_WIDTH, _HEIGHT = 720, 300
-_LEFT, _RIGHT, _TOP, _BOTTOM = 64, 14, 12, 42
+# the size of a chart, and the margins around its axes [units of the view box: pixels at full width]
+_WIDTH = 720
+_HEIGHT = 300
+_LEFT = 64
+_RIGHT = 14
+_TOP = 12
+_BOTTOM = 42
 _POINTS = 500  # A curve is drawn with about so many points: more than the page has pixels to show
 
 

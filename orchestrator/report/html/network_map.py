@@ -9,7 +9,10 @@ from scipy.sparse.csgraph import shortest_path
 
 from orchestrator.arrays import Matrix
 
-WIDTH, HEIGHT, _MARGIN = 720, 480, 46
+# the size of the map, and the margin in which labels have room [units of the view box]
+WIDTH = 720
+HEIGHT = 480
+_MARGIN = 46
 _ROUNDS = 300
 _LABELS = 60  # so many buses at most have their names beside them; the pointer shows all
 

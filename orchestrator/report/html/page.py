@@ -246,7 +246,8 @@ def _of_run(run: Results, figures: Figures) -> Sections:
 
 _RECORDS = {".nc", ".csv", ".cfg", ".dat"}  # of which each folder has one of the same name
 _NOTHING = "nothing that is known of"
-_OPEN, _LONGEST = 4, 240  # what was not judged on the first page, and the characters of each
+_OPEN = 4  # sentences on the first page about what was not judged
+_LONGEST = 240  # characters of each of them
 
 
 def first_page(chapters: Sequence[Chapter]) -> str:
