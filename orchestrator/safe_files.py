@@ -8,6 +8,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from orchestrator.errors import InputError, ResultsError
+from orchestrator.foreign_files import read_bytes
 
 inputs: set[Path] = set()  # real paths of the files that the command in force reads
 # begins the names of files that are not finished, and stands in those of folders that are not
@@ -16,7 +17,7 @@ PARTIAL = ".part-"
 
 def file_hash(path: Path | None) -> str | None:
     """SHA-256 of a file; None for none."""
-    return None if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
+    return None if path is None else hashlib.sha256(read_bytes(path)).hexdigest()
 
 
 def made_folder(

@@ -8,6 +8,13 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 from orchestrator.errors import InputError
+from orchestrator.foreign_files import (
+    check_regular,
+    may_steer,
+    steering_in,
+    visible,
+    why_refused,
+)
 
 MOST_BYTES = 16 * 1024**2  # of one file: a case with 100,000 events has about 12 MB
 
@@ -19,21 +26,24 @@ class Table(BaseModel):
 
 
 def read_toml(
-    path: Path, subject: str, remedy: str, option: str = ""
+    path: Path, subject: str, remedy: str, option: str = "", *, steering: bool = False
 ) -> tuple[str, dict[str, Any]]:
     """Read a TOML file; its text, and what the text says.
+
+    ``steering``: whether characters that steer a terminal pass, because the caller names each at its place.
 
     Raises an `InputError` if there is no such file, it cannot be read, it is larger than `MOST_BYTES`, or it is not
     TOML."""
     source = f"{option} {path}".lstrip()
     try:
+        check_regular(path, option)
         if (size := path.stat().st_size) > MOST_BYTES:
             raise InputError(
                 f"{source}: {subject} has {size} bytes; at most {MOST_BYTES} are read, so move tables of numbers into "
                 "files of their own"
             )
         text = path.read_text(encoding="utf-8")
-        return text, parsed(text)
+        found = parsed(text)
     except OSError as error:
         raise InputError(
             f"{source}: {subject} cannot be read: {error.strerror}; {remedy}"
@@ -55,6 +65,15 @@ def read_toml(
         raise InputError(
             f"{source}: its brackets nest too deeply to be read; {subject} nests at most five"
         ) from error
+    if not steering and may_steer(text):
+        _check_characters(source, found)
+    return text, found
+
+
+def _check_characters(source: str, table: dict[str, Any]) -> None:
+    for place, character in steering_in(table):
+        where = ".".join(map(str, place))
+        raise InputError(f"{source}: {visible(where)}: {why_refused(character)}")
 
 
 def parsed(text: str) -> dict[str, Any]:

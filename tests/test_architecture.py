@@ -18,6 +18,7 @@ FLOORS = (
     ("orchestrator.added", "orchestrator.spelling"),
     ("orchestrator.arrays", "orchestrator.closing", "orchestrator.cores"),
     ("orchestrator.errors", "orchestrator.late", "orchestrator.units"),
+    ("orchestrator.foreign_files",),
     (
         "orchestrator.asked",
         "orchestrator.safe_files",

@@ -27,6 +27,7 @@ from orchestrator.cases.parameter_files import ParameterFile, read_parameter_fil
 from orchestrator.cases.schema import CaseTable, ComponentTable, Value
 from orchestrator.cases.values import TWICE, flatten, given_twice
 from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputError, Problem, few
+from orchestrator.foreign_files import check_name, cleaned, steering_in, why_refused
 from orchestrator.late import Late
 from orchestrator.toml_files import Table, fault_of, read_toml
 
@@ -359,6 +360,7 @@ def load_case(name_or_path: str | Path, *, trust_fmus: bool = False) -> Case:
     path = Path(name_or_path)
     if str(name_or_path) in built_in_cases():
         path = BUILT_IN / str(name_or_path) / "case.toml"
+    check_name(path.absolute())
     if path.is_dir():
         inside = sorted(p.name for p in path.glob("*.toml"))
         hint = f"such as {path / inside[0]}" if inside else "of a case file (.toml) or an SSP"
@@ -376,7 +378,7 @@ def load_case(name_or_path: str | Path, *, trust_fmus: bool = False) -> Case:
             f"{name_or_path}: this is {what}, not a case; `gfor new` writes one (.toml), whose [{section}] has "
             f'{key} = "{path.name}"; give that'
         )
-    text, raw = read_toml(path, "the case file", "make it readable for you")
+    text, raw = read_toml(path, "the case file", "make it readable for you", steering=True)
     return case_of_text(text, raw, path, trust_fmus=trust_fmus)
 
 
@@ -423,6 +425,14 @@ def _case(
 def _validate(raw: dict[str, Any], text: str, path: Path) -> tuple[CaseTable, list[Problem]]:
     """Validate the tables: note each wrong entry, remove it, and continue with the rest."""
     problems = [
+        Problem(place_in(text, where), f"{where[-1]}: {why_refused(character)}")
+        for where, character in steering_in(raw)
+    ]
+    if problems:
+        if len(problems) > MOST_PROBLEMS:
+            raise CaseError(str(path), [*problems[:MOST_PROBLEMS], TOO_MANY])
+        raw = cleaned(raw)
+    problems += [
         Problem(place_in(text, where), f"{where[-1]}: {TWICE}") for where in _join_names(raw)
     ]
     for _ in range(_SCHEMA_PASSES):

@@ -1,17 +1,20 @@
 """Rows of a CSV file, each with its place for errors, and paths as messages write them."""
 
 import csv
+import io
 import math
 from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
 
 from orchestrator.errors import InputError
+from orchestrator.foreign_files import check_regular, read_text, visible
 from orchestrator.units import LARGEST
 
 
 def seen_from_here(path: Path) -> Path:
     """The path as a user in the working directory writes it; places in messages are read there."""
+    check_regular(path)
     try:
         path.exists()  # false where there is none; it fails where nobody could tell
     except OSError as error:
@@ -40,18 +43,18 @@ def rows_of(path: Path, columns: Sequence[str]) -> list[Row]:
         )
         raise InputError(f"{path}: there is no such file; {wanted}")
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:  # spreadsheets write the mark
-            reader = csv.DictReader(file, restval="")
-            names = reader.fieldnames or ()
-            _check_names(path, names)
-            if missing := [c for c in columns if c not in names]:
-                raise InputError(
-                    f"{path}: column {', '.join(missing)} is missing; it should hold {', '.join(columns)}"
-                )
-            rows = [
-                row | {PLACE: f"{path}, line {n}"}
-                for n, row in enumerate(islice(reader, MOST_ROWS + 1), start=2)
-            ]
+        text = visible(read_text(path, encoding="utf-8-sig"))  # spreadsheets write the mark
+        reader = csv.DictReader(io.StringIO(text), restval="")
+        names = reader.fieldnames or ()
+        _check_names(path, names)
+        if missing := [c for c in columns if c not in names]:
+            raise InputError(
+                f"{path}: column {', '.join(missing)} is missing; it should hold {', '.join(columns)}"
+            )
+        rows = [
+            row | {PLACE: f"{path}, line {n}"}
+            for n, row in enumerate(islice(reader, MOST_ROWS + 1), start=2)
+        ]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(
             f"{path}: it cannot be read as a table: {error}; save it as CSV in UTF-8"

@@ -20,6 +20,7 @@ from orchestrator.cases.matpower.program import case_tables
 from orchestrator.cases.names import close_names
 from orchestrator.cases.pandapower_json import network_text
 from orchestrator.errors import InputError
+from orchestrator.foreign_files import read_bytes
 
 __all__ = ["SourceTables", "read_matpower", "read_pandapower"]
 
@@ -91,7 +92,7 @@ def read_pandapower(name: str, directory: Path) -> SourceTables:
 @cache
 def _solved_pandapower(name: str, path: Path, changed: int) -> SourceTables:
     """The tables of a network; ``changed`` keeps a file's newer contents apart. Every scenario of a case asks."""
-    content = path.read_bytes() if changed else b""
+    content = read_bytes(path) if changed else b""
     return tables_beside(path) or kept_tables(
         name, content, lambda: _made_by_pandapower(name, path)
     )
@@ -160,7 +161,7 @@ def _pandapower_file(pp: Any, path: Path) -> Any:
             f"{path}: there is no such file; save a network with pandapower.to_json(net, {path.name!r})"
         )
     try:
-        net = pp.from_json_string(network_text(path, path.read_bytes()), convert=True)
+        net = pp.from_json_string(network_text(path, read_bytes(path)), convert=True)
         if not hasattr(net, "bus"):
             raise ValueError("it holds no network")
     except InputError:

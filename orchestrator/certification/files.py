@@ -17,6 +17,7 @@ from orchestrator.certification.figures import damping_json, damping_responses
 from orchestrator.certification.form import NORM, case_files
 from orchestrator.certification.report import page
 from orchestrator.errors import InputError
+from orchestrator.foreign_files import read_text
 from orchestrator.points.store import POINTS, holds_points_alone
 from orchestrator.report.pdf import print_pdf
 from orchestrator.results.staging import check_free
@@ -90,7 +91,7 @@ def read_record(file: Path) -> Any:
             raise ValueError(f"{next(n for n in names if names.count(n) > 1)!r} stands twice in it")
         return content
 
-    return json.loads(file.read_text(encoding="utf-8"), object_pairs_hook=once)
+    return json.loads(read_text(file), object_pairs_hook=once)
 
 
 def seal_of(content: Mapping[str, Any]) -> str:

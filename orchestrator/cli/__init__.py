@@ -91,6 +91,7 @@ def _done(words: Sequence[str]) -> int:
         with calls:  # libraries take an interrupt in their import for an error of their own
             parser = _parser(_command_in(words))
         options = parser.parse_args(words)
+        origin.check_named(vars(options))
         files = origin.files_read(vars(options))
         origin.said[:] = [lambda: _origin(words, files)]
         inputs.update(path.resolve() for path in files.values())

@@ -11,6 +11,7 @@ from fmus.toolchain.cache import cache_directory, intact, keep
 from fmus.toolchain.extras import require
 from orchestrator.errors import InputError
 from orchestrator.fmi import wine
+from orchestrator.foreign_files import check_regular
 from orchestrator.safe_files import file_hash
 
 DLL_ENDINGS = (".so", ".dll", ".dylib")
@@ -55,11 +56,13 @@ def as_fmu(path: Path) -> Path:
     from fmus.vendor_dll.device import DeviceFileError, device_of, read_device_file  # noqa: PLC0415 - needs `build`
     from fmus.vendor_dll.fmu import DllError, dll_members, read_dll  # noqa: PLC0415 - as above
 
+    check_regular(path)
     table = None
     try:
         library = path
         if path.suffix.lower() == DEVICE_ENDING:
             library, table = read_device_file(path)
+            check_regular(library)
         kept = cache_directory(_KEPT) / _digest(path, library) / f"{path.stem}.fmu"
         if intact(kept) and _unchanged(kept, path):
             return kept

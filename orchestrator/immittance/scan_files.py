@@ -19,6 +19,7 @@ import numpy as np
 
 from orchestrator.arrays import Complex, Numbers
 from orchestrator.errors import InputError
+from orchestrator.foreign_files import read_text, visible
 from orchestrator.immittance.forms import from_sequences
 from orchestrator.immittance.scan import (
     SIEMENS,
@@ -92,7 +93,7 @@ def _points(path: Path, ports: tuple[str, ...]) -> dict[str, PortPoint]:
         beside = path.with_name(root + ending)
         if not beside.is_file():
             continue
-        head, *rows = beside.read_text(encoding="utf-8-sig").splitlines()
+        head, *rows = read_text(beside, _LARGEST, encoding="utf-8-sig").splitlines()
         names = [name.strip().split(" ")[0] for name in head.split("\t")]
         for number, row in enumerate(rows, start=2):
             cells = row.split("\t")
@@ -216,7 +217,7 @@ def _numbers(path: Path, rows: list[dict[str, str]], name: str) -> tuple[Numbers
 
 
 ENDINGS = (".txt", ".csv")
-_LARGEST = 200e6
+_LARGEST = 200_000_000  # bytes of a scan
 
 
 def read_scan(path: Path, rated_hz: float, *, network: bool = False) -> Scan:
@@ -224,9 +225,7 @@ def read_scan(path: Path, rated_hz: float, *, network: bool = False) -> Scan:
 
     ``network``: Which part of a file is meant that holds a device and a network."""
     try:
-        if path.stat().st_size > _LARGEST:
-            raise InputError(f"{path}: a scan of more than 200 MB is not read")
-        text = path.read_text(encoding="utf-8-sig")
+        text = visible(read_text(path, _LARGEST, encoding="utf-8-sig"))
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}; give the path of a scan") from error
     except UnicodeDecodeError as error:

@@ -20,6 +20,7 @@ from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.schedule import FirstInputs, Schedule
 from orchestrator.coupling.system import System
 from orchestrator.errors import InputError
+from orchestrator.foreign_files import read_text
 
 ORDERS = {
     "side by side": (("a", "b"),),
@@ -131,7 +132,7 @@ def read_probe_result(path: Path, named: Mapping[str, str] | None = None) -> Pro
 
 def _table(path: Path) -> tuple[list[str], list[list[str]]]:
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text(path, encoding="utf-8-sig")
     except OSError as error:
         raise InputError(
             f"{path}: it cannot be read: {error.strerror}; give the tool's output as CSV"

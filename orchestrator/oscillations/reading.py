@@ -12,6 +12,7 @@ import numpy as np
 
 from orchestrator.arrays import Numbers
 from orchestrator.errors import InputError
+from orchestrator.foreign_files import check_regular
 from orchestrator.oscillations.measurements import Kind, Measurements, Site, made_ready
 from orchestrator.units import to_unit
 
@@ -192,6 +193,7 @@ def read_contest(folder: Path) -> Measurements:
 def _table(path: Path) -> tuple[Numbers, dict[str, Numbers]]:
     """Times and columns of a text file whose first line has the names in single quotes."""
     try:
+        check_regular(path)
         with path.open(encoding="utf-8", errors="replace") as file:
             names = re.findall(r"'([^']*)'", file.readline())
             values = np.atleast_2d(np.loadtxt(file, dtype=np.float64))

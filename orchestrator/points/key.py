@@ -15,6 +15,7 @@ from orchestrator.coupling.imperfections import described
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.port import BoundDescription
+from orchestrator.foreign_files import check_regular
 from orchestrator.points.code import code_hash, numbers_hash
 
 
@@ -85,6 +86,7 @@ def same_case(reference: str, wanted: str, trust_fmus: bool = False) -> Case:
 
 
 def sha256_of(path: Path) -> str:
+    check_regular(path)
     status = path.stat()
     return _file_hash(path, status.st_mtime_ns, status.st_size)
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from orchestrator.arrays import Numbers
 from orchestrator.errors import InputError
+from orchestrator.foreign_files import MOST_TEXT, read_bytes
 from orchestrator.late import pd, xr
 from orchestrator.results.comtrade.reading import LINE_FREQUENCY
 
@@ -85,7 +86,7 @@ def _table(path: Path) -> pd.DataFrame:
         mark, (names, rows) = "", _parted(_sheet(path))
     else:
         try:
-            text = _text(path.read_bytes())
+            text = _text(read_bytes(path, MOST_TEXT))
             for mark in [*(mark for mark in ";\t" if mark in text), ","]:
                 names, rows = _parted(list(csv.reader(io.StringIO(text), delimiter=mark)))
                 if rows:

@@ -6,6 +6,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from orchestrator.foreign_files import check_name, check_regular, read_text
+
 WRITTEN = ("out", "into", "html", "save", "scan", "junit")  # options that name what is written
 # endings of what is written beside a file
 _BESIDE = {".toml": (".csv", ".json"), ".cfg": (".dat",)}
@@ -24,21 +26,35 @@ def written(options: Mapping[str, Any]) -> Iterator[Path]:
         yield from (path, *(path.with_suffix(end) for end in _BESIDE.get(path.suffix, ())))
 
 
+def check_named(options: Mapping[str, Any]) -> None:
+    """Raise an `InputError` if an option names what is neither a file nor a folder, as a named pipe, or a name that no
+    file of ours could hold."""
+    check_name(Path.cwd(), "the folder")
+    for value in options.values():
+        for text in value if isinstance(value, list | tuple) else [value]:
+            check_name(str(text))
+    for text in _texts(options):
+        for name in dict.fromkeys((text, text.rpartition("=")[2])):
+            check_regular(name)
+
+
+def _texts(options: Mapping[str, Any]) -> Iterator[str]:
+    """Values of the options that are read, as texts."""
+    for name, value in options.items():
+        if name not in WRITTEN:
+            yield from map(str, value if isinstance(value, list | tuple) else [value])
+
+
 def files_read(options: Mapping[str, Any]) -> dict[str, Path]:
     """Files that options name to be read, and those that the TOML files among them name."""
     found = {}
-    given = (value for name, value in options.items() if name not in WRITTEN)
-    for text in (
-        str(one) for value in given for one in (value if isinstance(value, list) else [value])
-    ):
+    for text in _texts(options):
         for path in (Path(text), Path(text.rpartition("=")[2])):
             with suppress(OSError, ValueError):
                 if path.is_file():
                     found[str(path)] = path
                     if path.suffix == ".toml":
-                        found |= files_named(
-                            path.read_text(encoding="utf-8", errors="replace"), path.parent
-                        )
+                        found |= files_named(read_text(path, errors="replace"), path.parent)
     return found
 
 

@@ -10,6 +10,7 @@ from xml.etree.ElementTree import Element
 from fmus.toolchain.cache import intact, keep
 from orchestrator.errors import InputError
 from orchestrator.fmi.archive import check_xml, names_in, read_member
+from orchestrator.foreign_files import read_bytes
 from orchestrator.ssp.names import SYSTEM_FILE
 
 _KIND = "SSP"
@@ -19,7 +20,7 @@ class SspArchive:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._members = set(names_in(path, _KIND))
-        self.digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        self.digest = hashlib.sha256(read_bytes(path)).hexdigest()
         if SYSTEM_FILE not in self._members:
             raise InputError(
                 f"{path}: the archive has no {SYSTEM_FILE} at its top; an SSP must, so export it again"

@@ -9,6 +9,7 @@ from typing import Any
 
 from fmus.toolchain.extras import require
 from orchestrator.errors import InputError, few
+from orchestrator.foreign_files import read_bytes
 
 # of all profiles together, unpacked: twenty times a national grid of 10,000 buses
 MOST_BYTES = 2_000_000_000
@@ -52,9 +53,9 @@ def _profiles(path: Path) -> dict[str, bytes]:
     try:
         for file in files:
             if file.suffix.lower() == ".zip":
-                _unpack(path, file.read_bytes(), found)
+                _unpack(path, read_bytes(file), found)
             elif file.suffix.lower() == ".xml":
-                found[file.name] = file.read_bytes()
+                found[file.name] = read_bytes(file)
     except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError) as error:
         raise InputError(
             f"{file}: it is no zip archive that can be read: {error}; export the model once more"

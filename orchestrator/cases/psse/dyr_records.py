@@ -8,6 +8,7 @@ from pathlib import Path
 
 from fmus.synchronous_generator.dyr_fields import DyrField
 from orchestrator.errors import InputError
+from orchestrator.foreign_files import read_text, visible
 from orchestrator.units import LARGEST
 
 MOST_BYTES = 100_000_000  # of a file
@@ -37,7 +38,7 @@ def read_dyr(path: Path) -> list[DynamicRecord]:
     tokens: list[str] = []
     begin = 0
     for number, line in enumerate(
-        path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1
+        visible(read_text(path, MOST_BYTES, errors="replace")).splitlines(), start=1
     ):
         if line.lstrip().startswith(("//", "@!")):
             continue

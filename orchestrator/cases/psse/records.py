@@ -10,6 +10,7 @@ from pathlib import Path
 
 from orchestrator.cases.source_changes import Changes
 from orchestrator.errors import InputError
+from orchestrator.foreign_files import read_bytes, visible
 from orchestrator.units import LARGEST
 
 REVISIONS = (33, 34, 35, 36)  # revisions whose records are known
@@ -142,7 +143,7 @@ def _text_of(path: Path) -> str:
         raise InputError(f"{path}: there is no such file; give the path of a PSS/E RAW file")
     if (size := path.stat().st_size) > MOST_BYTES:
         raise InputError(f"{path}: it has {size} bytes; at most {MOST_BYTES} are read")
-    content = path.read_bytes()
+    content = read_bytes(path, MOST_BYTES)
     if b"\x00" in content[:4096]:
         raise InputError(
             f"{path}: it is no text, perhaps a saved case (.sav); export it from PSS/E as RAW"
@@ -151,7 +152,7 @@ def _text_of(path: Path) -> str:
         raise InputError(
             f"{path}: it is JSON, perhaps RAWX; export the case from PSS/E as RAW, revision 33 to 36"
         )
-    return content.decode("utf-8-sig", errors="replace")
+    return visible(content.decode("utf-8-sig", errors="replace"))
 
 
 def _numbered(text: str) -> Iterator[tuple[int, str]]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from orchestrator.arrays import Matrix, Numbers
 from orchestrator.errors import InputError
+from orchestrator.foreign_files import read_bytes
 from orchestrator.late import pd, xr
 from orchestrator.results.comtrade.configuration import Configuration, read_configuration
 from orchestrator.results.manifest import ResultsWarning
@@ -248,7 +249,7 @@ def _content(path: Path, most: int) -> bytes:
         raise InputError(
             f"{path}: it has {size} bytes; at most {most} are read; cut the recording into parts"
         )
-    return path.read_bytes()
+    return read_bytes(path, most)
 
 
 def _decoded(content: bytes) -> str:

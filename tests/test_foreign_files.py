@@ -1,0 +1,252 @@
+"""What a case, an option or a caller names: no pipe hangs a command, no device fills the memory, no text steers."""
+
+import ast
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from orchestrator import foreign_files
+from orchestrator.cases.case import load_case
+from orchestrator.cases.csv_rows import rows_of
+from orchestrator.cases.psse.dyr_records import read_dyr
+from orchestrator.cases.psse.records import read_records
+from orchestrator.errors import CaseError, InputError
+from orchestrator.fmi.vendor_files import as_fmu
+from orchestrator.foreign_files import check_regular, read_bytes, read_text, visible
+from orchestrator.immittance.scan_files import read_scan
+from orchestrator.interop.probe_result import read_probe_result
+from orchestrator.results.comtrade.reading import read_comtrade
+from orchestrator.results.csv_recording import read_table
+from orchestrator.safe_files import file_hash
+from orchestrator.toml_files import read_toml
+
+ROOT = Path(__file__).parents[1]
+unix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no named pipes among files")
+
+CASE = """name = "small"
+[components.gfor]
+model = "infinite_bus"
+{component}
+[scenarios.base]
+title = {title}
+{scenario}
+[[plots]]
+name = "power"
+title = {plot}
+panels = [{{ signal = "gfor.p", label = {label} }}]
+"""
+PLAIN = {"component": "", "title": '"one"', "scenario": "", "plot": '"P"', "label": '"P"'}
+
+
+@pytest.fixture
+def pipe(tmp_path):
+    def make(name):
+        os.mkfifo(tmp_path / name)
+        return tmp_path / name
+
+    return make
+
+
+def case(folder, **parts):
+    path = folder / "case.toml"
+    path.write_text(CASE.format(**PLAIN | parts), encoding="utf-8")
+    return path
+
+
+# -- regular files -----------------------------------------------------------------------------------
+
+
+@unix
+@pytest.mark.parametrize(
+    ("name", "read"),
+    [
+        ("a.toml", lambda path: read_toml(path, "it", "")),
+        ("a.csv", lambda path: rows_of(path, ())),
+        ("a.raw", read_records),
+        ("a.dyr", read_dyr),
+        ("a.txt", lambda path: read_scan(path, 50.0)),
+        ("a.csv", read_table),
+        ("a.cfg", read_comtrade),
+        ("a.csv", read_probe_result),
+        ("a.dll", as_fmu),
+        ("a.fmu", file_hash),
+        ("a.toml", load_case),
+    ],
+)
+def test_no_reader_waits_for_a_pipe(pipe, name, read):
+    with pytest.raises(InputError, match=r"a named pipe|no such file"):
+        read(pipe(name))
+
+
+@unix
+@pytest.mark.parametrize("words", [("verify",), ("modes", "infinite_bus", "--parameters")])
+@pytest.mark.parametrize("device", ["a pipe", "/dev/zero"])
+def test_no_option_names_a_pipe_or_a_device(gfor, pipe, words, device):
+    path = pipe("p") if device == "a pipe" else Path(device)
+    code, _, error = gfor(*words, path)
+    assert code == 2
+    kind = "a named pipe" if device == "a pipe" else "a device"
+    assert f"{path}: it is {kind}, and no file; write its content into a file" in error
+
+
+@unix
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"scenario": 'parameters = ["/dev/zero"]'},
+        {"component": 'binding = "/dev/zero"'},
+        {"component": 'scan = "/dev/zero"\\nvoltage = "1 kV"'},
+        {"component": 'fmu = "/dev/zero"'},
+        {"component": 'dll = "/dev/zero"'},
+    ],
+)
+def test_no_key_of_a_case_names_a_device(tmp_path, parts):
+    """A list of parameters that named /dev/zero filled the memory."""
+    with pytest.raises((InputError, CaseError)):
+        load_case(case(tmp_path, **parts)).prepare()
+
+
+def test_a_text_has_a_size_that_is_read(tmp_path):
+    path = tmp_path / "text"
+    path.write_bytes(b"12345")
+    assert read_bytes(path, 5) == b"12345"
+    with pytest.raises(InputError, match="it has 5 bytes; at most 4 are read"):
+        read_bytes(path, 4)
+    path.write_bytes(b"a\r\nb\rc")
+    assert read_text(path) == "a\nb\nc"
+    check_regular(tmp_path)
+    check_regular(tmp_path / "absent")
+
+
+OWN = {
+    "acceptance.runner": "is_file before it",
+    "acceptance.worker": "/proc",
+    "api.saved": "results",
+    "cases.definition": "is_file before it",
+    "cases.kept_tables": "the cache and our own tables",
+    "certification.acceptance": "is_file before it",
+    "certification.files": "what was read before",
+    "certification.inside": "a copy in a folder of ours",
+    "certification.points_again": "a copy in a folder of ours",
+    "certification.codes.rows_again": "a copy in a folder of ours",
+    "certification.kinds": "results",
+    "certification.report": "a copy in the certificate's folder",
+    "certification.case_file": "our own case",
+    "certification.study": "our own case",
+    "certification.verification": "is_file before it",
+    "cli.certificate": "results",
+    "cli.design": "is_file before it",
+    "cli.run_request": "results",
+    "explore.files": "our own pages",
+    "explore.opened": "results",
+    "fmi.brought_modules": "what an FMU's archive held",
+    "fmi.dll_reading": "is_file before it",
+    "fmi.vendor_files": "is_file before it",
+    "points.code": "our own code",
+    "points.key": "check_regular before it",
+    "report.cells": "results",
+    "report.html.chapters": "results",
+    "report.html.elements": "our own pages",
+    "report.html.folder": "results",
+    "report.html.origins": "results",
+    "report.html.page": "results",
+    "results.checkpoint_file": "results",
+    "results.manifest": "results",
+    "ssp.writing": "FMUs that were read before",
+    "study.ambient": "a picture that it has drawn",
+    "study.checkpoints": "results",
+    "toml_files": "check_regular before it",
+    "fmi.limits": "/proc",
+    "fmi.process_tree": "/proc",
+}
+"""Modules that read files by themselves, and why no pipe or device can be there."""
+
+
+def reads_by_itself(tree):
+    """Calls that read a file which does not lie beside the code; a mailbox is memory."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            whose = ast.unparse(node.func.value)
+            ours = "__file__" in whose or whose.endswith("box")
+            if node.func.attr in ("read_text", "read_bytes") and not ours:
+                yield node.lineno
+
+
+def test_whoever_reads_a_named_file_asks_here():
+    """A reader that opens what a user names by itself hangs at a pipe."""
+    found = {}
+    for path in sorted((ROOT / "orchestrator").rglob("*.py")):
+        name = ".".join(path.relative_to(ROOT / "orchestrator").with_suffix("").parts)
+        if lines := list(reads_by_itself(ast.parse(path.read_text(encoding="utf-8")))):
+            found[name.removesuffix(".__init__")] = lines
+    new = {name: lines for name, lines in found.items() if name not in OWN}
+    assert not new, "use orchestrator.foreign_files, or say in OWN why it need not"
+    assert not set(OWN) - set(found), "these read nothing any more"
+
+
+# -- characters that steer ---------------------------------------------------------------------------
+
+HOSTILE = '"UNSTABLE\\u001b[2K\\rstable"'
+
+
+def test_the_case_is_sound_without_them(tmp_path):
+    assert not load_case(case(tmp_path)).problems
+
+
+@pytest.mark.parametrize(
+    ("part", "line"),
+    [("title", "line 6"), ("plot", "line 10"), ("label", "line 11")],
+)
+@pytest.mark.parametrize("text", [HOSTILE, '"\\u202Eelbats"', '"\\u009b2K"'])
+def test_a_text_of_a_case_steers_no_terminal(tmp_path, part, line, text):
+    """A title erased the row of the verdict and wrote another one in its place."""
+    (problem,) = load_case(case(tmp_path, **{part: text})).problems
+    assert problem.place.startswith(line)
+    assert "which steers the terminal or browser that shows it" in problem.text
+    assert problem.text.isprintable()
+
+
+def test_nor_does_one_of_another_table(tmp_path):
+    path = tmp_path / "binding.toml"
+    path.write_text(f"[source]\ntext = {HOSTILE}\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"source\.text: the text holds the character '\\x1b'"):
+        read_toml(path, "it", "")
+
+
+def test_names_in_tables_of_others_are_written_out(tmp_path):
+    path = tmp_path / "units.csv"
+    path.write_text("bus\n1\x1b[2K\n", encoding="utf-8")
+    assert rows_of(path, ("bus",))[0]["bus"] == "1\\x1b[2K"
+    assert visible("a\tb\n\u202e\x9b\x1a") == "a\tb\n\\u202e\\x9b\\x1a".replace("\\x1a", "\x1a")
+
+
+# -- names ------------------------------------------------------------------------------------------
+
+
+@unix
+def test_a_folder_whose_name_is_no_utf_8_is_named_before_anything_is_computed(
+    gfor, tmp_path, monkeypatch
+):
+    """Two scenarios were computed, and then the manifest could not be written."""
+    folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/caf\xe9"))
+    try:
+        folder.mkdir()
+    except OSError:
+        pytest.skip("this file system takes UTF-8 alone")
+    path = case(folder)
+    said = "its name has the byte 0xe9, which is no UTF-8"
+    with pytest.raises(InputError, match=said):
+        load_case(path)
+    code, _, error = gfor("run", path, "--out", tmp_path / "out")
+    assert (code, said in error, error.count("\n")) == (2, True, 1)
+    assert not (tmp_path / "out").exists()
+    monkeypatch.chdir(folder)
+    code, _, error = gfor("run", "case.toml", "--out", tmp_path / "out")
+    assert (code, said in error, error.count("\n")) == (2, True, 1)
+
+
+def test_the_characters_are_named_once():
+    assert foreign_files.may_steer("\x1b")
+    assert not foreign_files.may_steer("plain, with ä and\ttabs\n")
