@@ -23,7 +23,8 @@ class PodGroup:
     controller: str  # ``pod_p`` or ``pod_q``
     components: tuple[str, ...]
     key: tuple[str, ...]  # their names in a parameter file
-    stages: int  # N_S of the lead/lag
+    stages: int  # of the lead/lag
+    neutral: float | None = None  # as `Target` has it
 
     @property
     def name(self) -> str:

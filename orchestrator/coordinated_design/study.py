@@ -36,8 +36,10 @@ from orchestrator.coordinated_design.verdict import (
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.operating_points.plan import OperatingPoints, read_operating_points
 from orchestrator.pod_design.closed_loop import PodSetting, check_tunable
+from orchestrator.pod_design.stages import count_stages, neutral_time
 from orchestrator.pod_design.target import (
     check_range,
+    find_scenario,
     find_target,
     require_controllers,
     with_controller,
@@ -146,13 +148,18 @@ def plan_points_design(case: Case, request: PointsDesignRequest) -> PointsDesign
     scenario = _scenario(case, request)
     candidates = _candidates(case, request, scenario, groups)
     off: dict[str, Value] = {}
+    plan = case.components_of(scenario, request.overrides, request.files)
     for place in candidates:
+        time = neutral_time(plan[place.component], place.controller) or 0.0
         off |= {
             f"{place.name}.enabled": False,
-            f"{place.name}.T_S1": 0.0,
-            f"{place.name}.T_S2": 0.0,
+            f"{place.name}.T_S1": time,
+            f"{place.name}.T_S2": time,
         }
-    off |= {f"{place.name}.N_S": float(group.stages) for group in groups for place in group.places}
+    settable = [group for group in groups if group.neutral is None]
+    off |= {
+        f"{place.name}.N_S": float(group.stages) for group in settable for place in group.places
+    }
     read = read_operating_points(case, request, request.points, request.outages, scenario, off)
     plans = read.prepared.system.components
     for group in groups:
@@ -198,7 +205,9 @@ def _groups(case: Case, request: PointsDesignRequest) -> tuple[PodGroup, ...]:
                 overrides=request.overrides,
                 parameters=request.files,
             )
-            group = PodGroup(controller, target.components, target.key, target.stages)
+            group = PodGroup(
+                controller, target.components, target.key, target.stages, target.neutral
+            )
             for other in found:
                 if shared := set(other.places) & set(group.places):
                     raise InputError(
@@ -210,16 +219,13 @@ def _groups(case: Case, request: PointsDesignRequest) -> tuple[PodGroup, ...]:
 
 
 def _scenario(case: Case, request: PointsDesignRequest) -> str:
-    target = find_target(
+    return find_scenario(
         case,
         request.controllers[0],
         scenario=request.scenario,
-        pattern=None,
-        stages=0,
         overrides=request.overrides,
         parameters=request.files,
     )
-    return target.scenario
 
 
 def _candidates(
@@ -344,9 +350,9 @@ def _confirmed(
     """A ranked converter with the least damping that its setting gives where all modes are computed anew."""
     if one.setting is None:
         return one
-    group = PodGroup(
-        one.place.controller, (one.place.component,), (one.place.component,), one.stages
-    )
+    name, controller = one.place.component, one.place.controller
+    neutral = neutral_time(plan.prepared.system.components[name], controller)
+    group = PodGroup(controller, (name,), (name,), one.stages, neutral)
     values = {**plan.off, **values_of([group], [one.setting])}
     made = {one.place: one.setting}
     points = known or with_followed_names(
@@ -363,11 +369,15 @@ def _apart(points: Sequence[RatedPoint]) -> dict[int, tuple[complex, ...]]:
 
 def _stages(plan: PointsDesignPlan) -> dict[PodPlace, int]:
     own = {place: group.stages for group in plan.groups for place in group.places}
-    plans = plan.prepared.system.components
-    return {
-        place: own.get(place, int(plans[place.component].number(f"{place.controller}.N_S")))
-        for place in plan.candidates
-    }
+    others = [place for place in plan.candidates if place not in own]
+    return own | {place: _stages_at(plan, place) for place in others}
+
+
+def _stages_at(plan: PointsDesignPlan, place: PodPlace) -> int:
+    component = plan.prepared.system.components[place.component]
+    if neutral_time(component, place.controller) is None:
+        return int(component.number(f"{place.controller}.N_S"))
+    return count_stages(plan.prepared, place.component, place.controller)
 
 
 def _frequency(points: Sequence[PointModes]) -> float:
@@ -383,7 +393,7 @@ def values_of(groups: Sequence[PodGroup], settings: Sequence[PodSetting]) -> dic
     """The settings by ``component.variable``, with eight significant digits, as a parameter file has them."""
     values: dict[str, Value] = {}
     for group, setting in zip(groups, settings, strict=True):
-        values |= setting.parameters(group.key, group.controller, group.stages)
+        values |= setting.parameters(group.key, group.controller, group.stages, group.neutral)
     return values
 
 

@@ -73,6 +73,10 @@ class SignalMap:
     offset: float
     unit: str
 
+    def of(self, value: float) -> float:
+        """A value of the FMU's own variable, in our unit."""
+        return self.factor * value + self.offset
+
 
 @dataclass(frozen=True)
 class PortMap:
@@ -239,6 +243,19 @@ def _passed(
     if signal is None or info.type == "Boolean":
         return replace(
             info, name=name, reference=reference if info.type == "Real" else info.reference
+        )
+    if info.causality in ("parameter", "input"):
+        start = None if info.start is None else signal.of(info.start_number)
+        bounds = [None if x is None else signal.of(x) for x in (info.minimum, info.maximum)]
+        lowest, highest = bounds if signal.factor > 0 else bounds[::-1]
+        return replace(
+            info,
+            name=name,
+            reference=reference,
+            unit=signal.unit,
+            start=start,
+            minimum=lowest,
+            maximum=highest,
         )
     return replace(
         info,

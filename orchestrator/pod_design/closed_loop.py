@@ -69,17 +69,30 @@ class PodSetting:
     filters: LeadLag
 
     def parameters(
-        self, keys: Sequence[str], controller: str, stages: int
+        self, keys: Sequence[str], controller: str, stages: int, neutral: float | None = None
     ) -> dict[str, bool | float | str]:
-        """By ``component.variable``, with eight significant digits: far more precise than any controller's setting."""
-        numbers = {"K": self.gain, "T_S1": self.filters.T_S1, "T_S2": self.filters.T_S2}
+        """By ``component.variable``, with eight significant digits: far more precise than any controller's setting.
+
+        ``neutral``: As `tuned` has it."""
+        numbers = self.tuned(neutral)
         found: dict[str, bool | float | str] = {"enabled": self.gain > 0}
-        found |= {key: float(f"{number:.8g}") for key, number in numbers.items()} | {"N_S": stages}
+        found |= {key: float(f"{number:.8g}") for key, number in numbers.items()}
+        found |= {"N_S": stages} if neutral is None else {}
         return {
             f"{component}.{controller}.{key}": value
             for component in keys
             for key, value in found.items()
         }
+
+    def tuned(self, neutral: float | None) -> dict[str, float]:
+        """Gain and time constants.
+
+        ``neutral``: both time constants [s] of a device with a fixed number of stages where there is no compensation;
+        None where the number can be set."""
+        filters = self.filters
+        if neutral is not None and not filters.T_S2:
+            return {"K": self.gain, "T_S1": neutral, "T_S2": neutral}
+        return {"K": self.gain, "T_S1": filters.T_S1, "T_S2": filters.T_S2}
 
 
 @dataclass(frozen=True)
@@ -100,7 +113,8 @@ class PodLoop:
     """Gives one controller of several components a common setting, and linearises the system.
 
     ``controller``: ``pod_p`` or ``pod_q``.
-    ``kept``: Figures that an earlier start of the same design has left."""
+    ``kept``: Figures that an earlier start of the same design has left.
+    ``neutral``: As `PodSetting.tuned` has it."""
 
     def __init__(
         self,
@@ -108,8 +122,10 @@ class PodLoop:
         components: Sequence[str],
         controller: str,
         kept: KeptFigures | None = None,
+        *,
+        neutral: float | None = None,
     ) -> None:
-        self._kept = kept or KeptFigures()
+        self._kept, self._neutral = kept or KeptFigures(), neutral
         self._master, self._components, self._controller = master, tuple(components), controller
         for name in components:
             check_tunable(name, master.components[name].description, controller)
@@ -201,12 +217,7 @@ class PodLoop:
         return self._kept.get({**own, **what}, compute)
 
     def _apply(self, setting: PodSetting) -> None:
-        values = {
-            "enabled": setting.gain != 0,
-            "K": setting.gain,
-            "T_S1": setting.filters.T_S1,
-            "T_S2": setting.filters.T_S2,
-        }
+        values = {"enabled": setting.gain != 0, **setting.tuned(self._neutral)}
         for name in self._components:
             self._master.components[name].set(
                 {f"{self._controller}.{key}": value for key, value in values.items()}

@@ -258,10 +258,9 @@ def design_pod(
     )
     own: dict[str, Value] = {}
     for name in target.components:
-        own |= {
-            f"{name}.{request.controller}.enabled": False,
-            f"{name}.{request.controller}.N_S": float(target.stages),
-        }
+        own[f"{name}.{request.controller}.enabled"] = False
+        if target.neutral is None:
+            own[f"{name}.{request.controller}.N_S"] = float(target.stages)
     overrides = {key: value for key, value in request.overrides.items() if key not in own} | own
     name = mode_name(case, request.mode)
     (prepared,) = case.prepare([target.scenario], overrides, request.step_size, None, request.files)
@@ -282,7 +281,13 @@ def design_pod(
     with running(prepared) as master:
         report("operating point")
         point = find_operating_point(master)
-        loop = PodLoop(master, target.components, request.controller, figures_of(prepared, store))
+        loop = PodLoop(
+            master,
+            target.components,
+            request.controller,
+            figures_of(prepared, store),
+            neutral=target.neutral,
+        )
         report("modes without the controller")
         examined = loop.examine(_OFF)
         with _with_stability(examined.stability):

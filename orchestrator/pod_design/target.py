@@ -4,6 +4,7 @@ import fnmatch
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import repeat
 
 from orchestrator.analysis.modes import Mode
 from orchestrator.cases.case import Case
@@ -12,6 +13,7 @@ from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.schema import CaseTable, NamedModeTable, Value
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import InputError
+from orchestrator.pod_design.stages import NEEDED, count_stages, neutral_time
 
 CRITICAL = "least damped swing"  # the mode that is designed for where the case names none
 
@@ -33,7 +35,9 @@ class Target:
     components: tuple[str, ...]
     # names of the components in a parameter file: one pattern that fits exactly these components, or each name
     key: tuple[str, ...]
-    stages: int  # N_S of the components' lead/lag
+    stages: int  # of the components' lead/lag: N_S, or the fixed number of a device without that variable
+    # both time constants [s] with which stages of a fixed number do nothing; None where N_S can be set
+    neutral: float | None = None
 
 
 def find_target(
@@ -47,51 +51,97 @@ def find_target(
     parameters: Sequence[ParameterFile],
 ) -> Target:
     """Find the scenario and its components. By default it is the scenario in which all PODs exist and are off."""
-    if scenario is not None and scenario not in case.scenarios:
+    scenario = find_scenario(
+        case, controller, scenario=scenario, overrides=overrides, parameters=parameters
+    )
+    plan = case.components_of(scenario, overrides, parameters)
+    chosen, key = _components(scenario, plan, controller, pattern)
+    times = {name: neutral_time(plan[name], controller) for name in chosen}
+    fixed = [name for name, time in times.items() if time is not None]
+    if not fixed:
+        return Target(scenario, chosen, key, _stages_set(plan, chosen, controller, stages))
+    if others := [name for name in chosen if name not in fixed]:
         raise InputError(
-            f"--scenario: there is no scenario {scenario!r}; the case has: {', '.join(case.scenarios)}"
+            f"{fixed[0]} has a fixed number of stages (it has no variable {controller}.N_S), {others[0]} has not; they "
+            f"cannot have one setting: design them one after the other with --component"
         )
-    names = [scenario] if scenario is not None else list(case.scenarios)
-    plans = {name: case.components_of(name, overrides, parameters) for name in names}
-    if scenario is None:
-        on = {
-            name
-            for name, plan in plans.items()
-            for each in DAMPING_CONTROLLERS
-            for unit in with_controller(plan, each)
-            if plan[unit].value(f"{each}.enabled")
-        }
-        fitting = [
-            name
-            for name, plan in plans.items()
-            if with_controller(plan, controller) and name not in on
-        ]
-        # no fault's, say
-        fitting = [name for name in fitting if case.scenarios[name].events is None] or fitting
-        if len(fitting) != 1:
-            what = (
-                "no scenario" if not fitting else f"more than one scenario ({', '.join(fitting)})"
-            )
+    (prepared,) = case.prepare([scenario], overrides, None, None, parameters)
+    counts = {name: count_stages(prepared, name, controller) for name in fixed}
+    number = counts[fixed[0]]
+    if other := next((name for name, count in counts.items() if count != number), None):
+        raise InputError(
+            f"{fixed[0]} has {number} fixed stages in {controller}, {other} has {counts[other]}; they cannot have one "
+            "setting: design them one after the other with --component"
+        )
+    if stages not in (None, number):
+        raise InputError(
+            f"--stages {stages}: {fixed[0]} has {number} stages in {controller}, a fixed number (it has no variable "
+            f"{controller}.N_S); leave --stages out"
+        )
+    return Target(scenario, chosen, key, number, times[fixed[0]])
+
+
+def find_scenario(
+    case: Case,
+    controller: str,
+    *,
+    scenario: str | None,
+    overrides: Mapping[str, Value],
+    parameters: Sequence[ParameterFile],
+) -> str:
+    """The scenario that is asked for; by default that in which all PODs exist and are off."""
+    if scenario is not None:
+        if scenario not in case.scenarios:
             raise InputError(
-                f"{case.name}: {what} has components with {controller} and every POD off, which is what a design "
-                f"starts from; name one with --scenario, from: {', '.join(case.scenarios)}"
+                f"--scenario: there is no scenario {scenario!r}; the case has: {', '.join(case.scenarios)}"
             )
-        (scenario,) = fitting
-    return _components(scenario, plans[scenario], controller, pattern, stages)
+        return scenario
+    plans = {name: case.components_of(name, overrides, parameters) for name in case.scenarios}
+    on = {
+        name
+        for name, plan in plans.items()
+        for enabled in (f"{each}.enabled" for each in DAMPING_CONTROLLERS)
+        for unit in plan.values()
+        if enabled in unit.description.variables and unit.value(enabled)
+    }
+    fitting = [
+        name for name, plan in plans.items() if with_controller(plan, controller) and name not in on
+    ]
+    # no fault's, say
+    fitting = [name for name in fitting if case.scenarios[name].events is None] or fitting
+    if len(fitting) != 1:
+        what = "no scenario" if not fitting else f"more than one scenario ({', '.join(fitting)})"
+        lacking = "" if fitting else "".join(map(_lacking, plans.values(), repeat(controller)))
+        raise InputError(
+            f"{case.name}: {what} has components with {controller} and every POD off, which is what a design "
+            f"starts from; name one with --scenario, from: {', '.join(case.scenarios)}{lacking}"
+        )
+    return fitting[0]
+
+
+def _lacking(plan: Mapping[str, ComponentPlan], controller: str) -> str:
+    """Of the first component with some variables of a controller, which ones it lacks; "" if there is none."""
+    for name, component in plan.items():
+        having = [v for v in NEEDED if f"{controller}.{v}" in component.description.variables]
+        lacks = [f"{controller}.{v}" for v in NEEDED if v not in having]
+        if having and lacks:
+            return (
+                f". {name} has {controller}.{having[0]}, and lacks {', '.join(lacks)}: name them in its binding, as "
+                f'[signals."{lacks[0]}"]'
+            )
+    return ""
 
 
 def _components(
-    scenario: str,
-    plan: Mapping[str, ComponentPlan],
-    controller: str,
-    pattern: str | None,
-    stages: int | None,
-) -> Target:
+    scenario: str, plan: Mapping[str, ComponentPlan], controller: str, pattern: str | None
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The components that are asked for, and their names in a parameter file."""
     having = with_controller(plan, controller)
     if not having:
         raise InputError(
-            f"scenario {scenario!r}: no component has the controller {controller} (a parameter {controller}.K); "
-            "choose a scenario with converters"
+            f"scenario {scenario!r}: no component has the controller {controller} (parameters "
+            f"{', '.join(f'{controller}.{v}' for v in NEEDED)}); choose a scenario with converters"
+            f"{_lacking(plan, controller)}"
         )
     fitting = fnmatch.filter(plan, pattern) if pattern is not None else having
     chosen = [name for name in fitting if name in having]
@@ -101,15 +151,26 @@ def _components(
             f"those with it: {', '.join(having[:12])}{' …' if len(having) > 12 else ''}"
         )
     key = (pattern,) if pattern is not None and chosen == fitting else tuple(chosen)
+    return tuple(chosen), key
+
+
+def _stages_set(
+    plan: Mapping[str, ComponentPlan],
+    chosen: Sequence[str],
+    controller: str,
+    stages: int | None,
+) -> int:
+    """The number that is asked for, or that the components' N_S have."""
     present = {int(plan[name].number(f"{controller}.N_S")) for name in chosen}
-    if stages is None and len(present) > 1:
+    if stages is not None:
+        check_range(plan, chosen, f"{controller}.N_S", stages, "--stages")
+        return stages
+    if len(present) > 1:
         raise InputError(
             f"the components {', '.join(chosen[:12])} have different numbers of stages ({controller}.N_S = "
             f"{', '.join(map(str, sorted(present)))}); give them one number with --stages"
         )
-    if stages is not None:
-        check_range(plan, chosen, f"{controller}.N_S", stages, "--stages")
-    return Target(scenario, tuple(chosen), key, stages if stages is not None else present.pop())
+    return present.pop()
 
 
 def check_range(
@@ -130,7 +191,7 @@ def check_range(
 
 
 def with_controller(plan: Mapping[str, ComponentPlan], controller: str) -> list[str]:
-    wanted = [f"{controller}.{v}" for v in ("enabled", "K", "T_S1", "T_S2", "N_S")]
+    wanted = [f"{controller}.{v}" for v in NEEDED]
     return [name for name, c in plan.items() if all(v in c.description.variables for v in wanted)]
 
 

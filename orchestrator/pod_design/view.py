@@ -190,7 +190,10 @@ def design_json(d: PodDesign) -> dict[str, Any]:
 
 
 def parameters_of(d: PodDesign) -> dict[str, bool | float | str]:
-    return d.final.setting.parameters(d.target.key, d.request.controller, d.target.stages)
+    target = d.target
+    return d.final.setting.parameters(
+        target.key, d.request.controller, target.stages, target.neutral
+    )
 
 
 def provenance(d: PodDesign, command: str) -> list[str]:

@@ -319,3 +319,15 @@ def test_a_switch_has_a_name_of_ours(binding, fmu_path):
 def test_a_switch_is_a_boolean_that_can_be_set(binding, fmu_path, entry, said):
     with pytest.raises(BindingError, match=said):
         bound_fmu(fmu_path("gfor"), binding(OURS + entry))
+
+
+def test_a_bound_parameter_stays_a_parameter(binding, fmu_path):
+    """It can be set by its name, has its start value and bounds in our unit, and is no output of the device."""
+    text = OURS + 'wait = { variable = "pod_q.T_W" }\n'
+    description = bind(read_description(fmu_path("gfor")), binding(text))
+    found, own = (each.variables for each in (description, description.inner))
+    assert (found["wait"].causality, found["wait"].variability) == ("parameter", "tunable")
+    factor = description.port.signals["wait"].factor
+    assert found["wait"].start_number == pytest.approx(factor * own["pod_q.T_W"].start_number)
+    assert found["wait"].minimum == pytest.approx(factor * own["pod_q.T_W"].minimum)
+    assert found["omega"].causality == "output"
