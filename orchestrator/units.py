@@ -87,6 +87,8 @@ def to_unit(value: float | int | str, unit: str) -> float:
     if factor is None:
         try:
             alike = _counts_alike(given, declared)
+            if pint_value(0.0, given, declared):  # such as °C and K, which differ in their zero
+                return float(f"{pint_value(number, given, declared):.15g}")
             factor = pint_factor(given, declared)
         except Exception as error:  # pint lets its parser's errors through
             if type(error).__name__ == "DimensionalityError":
@@ -99,7 +101,12 @@ def to_unit(value: float | int | str, unit: str) -> float:
 
 def pint_factor(given: str, declared: str) -> float:
     """What one of the given units is in the declared one, as pint has it; raises pint's errors."""
-    return float(_registry().Quantity(1, given).to(declared).magnitude)
+    return pint_value(1, given, declared)
+
+
+def pint_value(value: float, given: str, declared: str) -> float:
+    """A value in another unit, as pint has it; raises pint's errors."""
+    return float(_registry().Quantity(value, given).to(declared).magnitude)
 
 
 def _kind(unit: str) -> str:
@@ -149,9 +156,15 @@ def base_exponents(unit: str) -> tuple[float, dict[str, int]] | None:
     }
     try:
         quantity = _registry().Quantity(1, unit).to_base_units()
+        factor = float(quantity.magnitude) - base_offset(unit)
     except Exception:  # pint lets its parser's errors through; an unknown unit is nothing to check
         return None
     powers = {names.get(str(name)): power for name, power in quantity.unit_items()}
     if None in powers or any(power != int(power) for power in powers.values()):
         return None
-    return float(quantity.magnitude), {str(name): int(power) for name, power in powers.items()}
+    return factor, {str(name): int(power) for name, power in powers.items()}
+
+
+def base_offset(unit: str) -> float:
+    """What 0 of a known unit is in SI base units: 273.15 for ``degC``, 0 for most."""
+    return float(_registry().Quantity(0, unit).to_base_units().magnitude)

@@ -17,7 +17,7 @@ PACKAGES = ("fmus", "gfor_fmu", "orchestrator")
 FLOORS = (
     ("orchestrator.added", "orchestrator.spelling"),
     ("orchestrator.arrays", "orchestrator.closing", "orchestrator.cores"),
-    ("orchestrator.errors", "orchestrator.late", "orchestrator.units"),
+    ("orchestrator.errors", "orchestrator.late", "orchestrator.uncollected", "orchestrator.units"),
     ("orchestrator.foreign_files",),
     (
         "orchestrator.asked",
@@ -218,6 +218,7 @@ FOR_TYPES = {
     "cases.case",
     "cases.definition",
     "cases.given",
+    "cases.names",
     "cases.values",
     "coupling.system",
     "cli.terminal",

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from orchestrator.units import USUAL, _counts_alike, pint_factor, to_unit
+from orchestrator.units import USUAL, _counts_alike, base_exponents, pint_factor, to_unit
 
 
 @pytest.mark.parametrize(
@@ -117,3 +117,9 @@ def test_cycles_and_angles_are_not_taken_for_one_another(value, unit):
 def test_factors_of_usual_units_are_those_of_pint_to_the_last_bit(given, declared):
     assert USUAL[declared][given] == pint_factor(given, declared)
     assert _counts_alike(given, declared)
+
+
+def test_units_that_differ_in_their_zero():
+    assert to_unit("20 degC", "K") == pytest.approx(293.15, abs=1e-12)
+    assert to_unit("300 K", "degC") == pytest.approx(26.85, abs=1e-12)
+    assert base_exponents("degC") == (1.0, {"K": 1})

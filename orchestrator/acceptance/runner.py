@@ -18,7 +18,7 @@ from orchestrator.acceptance.checks.running import RUN_FOR
 from orchestrator.acceptance.checks.subject import Subject, Use
 from orchestrator.acceptance.process import FmuProcess, ProcessEndedError
 from orchestrator.binding.binding import bind, read_table
-from orchestrator.binding.misfits import likely_cause
+from orchestrator.binding.misfits import is_consequence, likely_cause
 from orchestrator.errors import (
     BindingError,
     ComponentError,
@@ -188,6 +188,7 @@ def check_fmu(
             runner.run(wanted)
         finally:
             runner.close()
+        report.results = _without_consequences(report, subject.description)
     finally:
         remove_tree(directory)
     return report
@@ -203,6 +204,20 @@ def _unpacked(fmu: Path) -> base.CheckResult:
         f"it lists {', '.join(twice[:3])}{more} twice, with equal bytes",
         "does no harm; other tools may refuse the file, tell whoever packed it",
     )
+
+
+def _without_consequences(
+    report: AcceptanceReport, described: FmuDescription
+) -> list[base.CheckResult]:
+    """The results, without faults that follow from another one."""
+    faults = [r.fault for r in report.failures]
+    because = "because the rating in the binding does not fit, which comes first"
+    return [
+        base.not_applicable(r.check, because)
+        if r.fault and is_consequence(described, r.fault, faults)
+        else r
+        for r in report.results
+    ]
 
 
 def _bound(

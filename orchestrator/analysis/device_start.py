@@ -13,6 +13,7 @@ from orchestrator.arrays import Numbers
 from orchestrator.binding.misfits import (
     Misfit,
     at_rest,
+    is_consequence,
     likely_cause,
     of_current,
     of_frequency,
@@ -34,8 +35,12 @@ def misfits_of(master: Master) -> dict[str, list[Misfit]]:
     found = {}
     for name in master.components:
         try:
+            component, its = master.components[name], list(_of(master, name))
+            faults = [misfit.fault for misfit in its]
             found[name] = [
-                _with_cause(misfit, master.components[name]) for misfit in _of(master, name)
+                _with_cause(misfit, component)
+                for misfit in its
+                if not is_consequence(component.description, misfit.fault, faults)
             ]
         except CosimError:
             continue

@@ -5,11 +5,11 @@ from pathlib import Path
 from orchestrator.asked import path as path_of
 from orchestrator.binding.draft import draft_binding
 from orchestrator.errors import InputError, ResultsError
-from orchestrator.fmi.description import read_description
+from orchestrator.fmi.description import FmuDescription, read_declared
 from orchestrator.safe_files import write_text
 
 
-def bind(fmu: str | Path, out: str | Path | None = None) -> str:
+def bind(fmu: str | Path | FmuDescription, out: str | Path | None = None) -> str:
     """Draft what a foreign FMU's variables mean at our port; returns the text of a binding file.
 
     Lines with ``GUESS`` are to be confirmed, values ``REQUIRED`` to be filled in.
@@ -17,7 +17,7 @@ def bind(fmu: str | Path, out: str | Path | None = None) -> str:
     Parameters
     ----------
     fmu
-        The FMU.
+        The FMU, for whatever platform, or the ``description`` that `info` gives of it.
     out
         File that the draft is written to, over an older one; without it nothing is written.
 
@@ -33,10 +33,8 @@ def bind(fmu: str | Path, out: str | Path | None = None) -> str:
     >>> "[voltage]" in draft, "[current]" in draft
     (True, True)
     """
-    description, place = (
-        read_description(path_of(fmu, "fmu")),
-        None if out is None else path_of(out, "out", "path"),
-    )
+    description = fmu if isinstance(fmu, FmuDescription) else read_declared(path_of(fmu, "fmu"))
+    place = None if out is None else path_of(out, "out", "path")
     text = draft_binding(description, None if place is None else place.parent)
     if place is not None:
         try:

@@ -11,7 +11,14 @@ from typing import Any
 from pydantic import ValidationError
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.binding.scales import PER_UNIT, Bases, UnitsDifferError, amount, unit_of
+from orchestrator.binding.scales import (
+    PER_UNIT,
+    Bases,
+    UnitsDifferError,
+    amount,
+    angle_unit_of,
+    unit_of,
+)
 from orchestrator.binding.tables import BindingTable, PhasorTable, SignalTable, StartTable
 from orchestrator.errors import BindingError, ErrorKind, Problem
 from orchestrator.fmi.description import FmuDescription, VariableInfo, read_description
@@ -199,7 +206,7 @@ class _Reader:
             if table.angle_unit is not None:
                 raise ValueError(f"'angle_unit' has no meaning for form {table.form!r}; remove it")
             return 1.0
-        unit = unit_of(infos[1], table.angle_unit)
+        unit = angle_unit_of(infos[1], table.angle_unit)
         return to_unit("1 rad", unit) if unit != PER_UNIT else 1.0
 
     def _voltage(self, bases: Bases) -> PhasorMap | None:
@@ -266,11 +273,12 @@ class _Reader:
 
     def _start_map(self, name: str, table: StartTable, bases: Bases, own_rating: bool) -> StartMap:
         info = self._variable(table.variable, "parameter", "input")
-        unit = unit_of(info, table.unit)
         if name == "theta_0":
+            unit = angle_unit_of(info, table.unit)
             offset = radians(to_unit(self._table.voltage.frame_angle, "deg"))
             factor = 1.0 if unit == PER_UNIT else to_unit("1 rad", unit)
             return StartMap(info.name, table.sign * factor, table.sign * factor * offset)
+        unit = unit_of(info, table.unit)
         if name == "S_n":
             return StartMap(
                 info.name, bases.power_unit(unit, table.base or "1 MVA", info.name) / bases.rating
@@ -299,7 +307,8 @@ class _Reader:
                 0.0,
                 PER_UNIT,
             )
-        return SignalMap(info.name, 1.0, 0.0, unit_of(info, table.unit))
+        plain = table.unit is None and info.unit == "1"
+        return SignalMap(info.name, 1.0, 0.0, "1" if plain else unit_of(info, table.unit))
 
     def _switch(self, table: SignalTable) -> SignalMap:
         info = self._variable(table.variable, "parameter", "input", kind="Boolean")

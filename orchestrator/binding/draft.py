@@ -279,11 +279,11 @@ def _unit(info: VariableInfo, such_as: str) -> list[str]:
     if not hints.undeclared(info):
         return []
     unit = hints.likely_unit(info)
-    return [
-        f'unit = "{unit}"  # GUESS: from the description'
-        if unit
-        else f'unit = "{REQUIRED}: {such_as}"'
-    ]
+    if unit:
+        return [f'unit = "{unit}"  # GUESS: from the description']
+    if info.unit == "1":
+        return ['unit = "pu"  # GUESS: the FMU declares the unit 1']
+    return [f'unit = "{REQUIRED}: {such_as}"']
 
 
 def _value(variables: Sequence[VariableInfo], unit: str) -> list[str]:

@@ -3,7 +3,7 @@ words, for every command."""
 
 import tomllib
 from cmath import phase
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from math import pi, sqrt
 from pathlib import Path
@@ -35,6 +35,7 @@ _HELD = 5
 REMEDIES: dict[str, str] = tomllib.loads(
     Path(__file__).with_name("remedies.toml").read_text(encoding="utf-8")
 )
+WRONG_FREQUENCY = "wrong rated frequency"
 _OF_RATING = (
     "wrong base",
     "power not as asked",
@@ -77,6 +78,13 @@ def likely_cause(described: FmuDescription, fault: str) -> str:
     )
 
 
+def is_consequence(described: FmuDescription, fault: str, others: Iterable[str]) -> bool:
+    """Whether a fault follows from a wrong rating, which shows in another fault as well.
+
+    Behind a wrong rating a device stands at a point that it was not made for, where its frequency is none to judge."""
+    return fault == WRONG_FREQUENCY and any(likely_cause(described, other) for other in others)
+
+
 def omega_seen(omega: float) -> str:
     return f"omega is {omega:.6g} at rest, in a network of its rated frequency"
 
@@ -91,9 +99,9 @@ def of_frequency(omega: float, f_n: float | None) -> Misfit | None:
 def made_for(says: str, part: float, f_n: float | None, figures: Mapping[str, float]) -> Misfit:
     """By the part [pu, ``f_n``] that shows of its own frequency."""
     if not f_n or part * f_n > _HIGHEST:
-        return Misfit("wrong rated frequency", says, figures)
+        return Misfit(WRONG_FREQUENCY, says, figures)
     says += f", so it is made for {part * f_n:.4g} Hz where {f_n:g} Hz is bound"
-    return Misfit("wrong rated frequency", says, {**figures, "made_for_hz": part * f_n})
+    return Misfit(WRONG_FREQUENCY, says, {**figures, "made_for_hz": part * f_n})
 
 
 def of_power(asked: complex, found: complex) -> Misfit | None:

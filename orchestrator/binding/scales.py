@@ -19,11 +19,22 @@ class UnitsDifferError(ValueError):
     """A binding gives another unit than the FMU declares."""
 
 
+def angle_unit_of(info: VariableInfo, given: str | None) -> str:
+    """The same of an angle, whose unit 1 may be radians or degrees."""
+    if given is None and info.unit == "1":
+        raise ValueError(
+            f'the FMU declares {info.name} in the unit 1, which says nothing of an angle; add "rad" or "deg"'
+        )
+    return unit_of(info, given)
+
+
 def unit_of(info: VariableInfo, given: str | None) -> str:
-    """The unit of an FMU's variable from the binding or the declaration; both must agree if both give one."""
+    """The unit of an FMU's variable from the binding or the declaration; both must agree if both give one.
+
+    The unit 1 is per unit here, unless the binding says more."""
     declared = info.unit
     if given is None:
-        if declared in ("", "1", "-"):
+        if declared in ("", "-"):
             raise ValueError(
                 f'the FMU declares no unit for {info.name}; add the key \'unit\', such as "pu" or "kV"'
             )

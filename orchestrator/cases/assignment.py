@@ -11,7 +11,7 @@ from typing import Any
 
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.imperfection_tables import sets_imperfection
-from orchestrator.cases.names import SERVICE, STATES, close_names, whose
+from orchestrator.cases.names import SERVICE, STATES, close_names, hint_at, whose
 from orchestrator.cases.schema import ConventionsTable, Value
 from orchestrator.cases.values import TWICE, check_system_base, convert, flatten, given_twice
 from orchestrator.fmi.description import VariableInfo
@@ -214,8 +214,11 @@ def _assign(draft: Draft, name: str, variable: str, value: Value, where: str) ->
     if info is None:
         if draft.is_repeated(name, variable):
             return
-        hint = close_names(
-            variable, _settable(draft, name), f"`gfor fmu info {plan.description.path}` lists them"
+        hint = hint_at(
+            plan.description,
+            variable,
+            _settable(draft, name),
+            f"`gfor fmu info {plan.description.path}` lists them",
         )
         draft.note(where, f"component {name!r} has no variable {variable!r}; {hint}")
         return
@@ -227,10 +230,12 @@ def _assign(draft: Draft, name: str, variable: str, value: Value, where: str) ->
         return
     converted = convert_value(draft, info, value, where)
     if converted is None:
+        draft.found.refused_inputs.add(f"{name}.{variable}")
         return
     try:
         check_system_base(plan.description, variable, converted)
     except ValueError as error:
+        draft.found.refused_inputs.add(f"{name}.{variable}")
         draft.note(where, f"component {name!r}: {error}")
     else:
         target: dict[str, Any] = plan.inputs if info.causality == "input" else plan.parameters

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import difflib
-import gc
 import tomllib
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import cached_property, partial
@@ -30,6 +28,7 @@ from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputError, 
 from orchestrator.foreign_files import check_name, cleaned, steering_in, why_refused
 from orchestrator.late import Late
 from orchestrator.toml_files import Table, fault_of, read_toml
+from orchestrator.uncollected import uncollected
 
 if TYPE_CHECKING:
     from orchestrator.cases import event_tables, idle_values, mentions, prepare, sharing
@@ -68,20 +67,8 @@ def built_in_cases() -> tuple[str, ...]:
     return tuple(sorted(p.parent.name for p in BUILT_IN.glob("*/case.toml")))
 
 
-@contextmanager
-def _uncollected() -> Iterator[None]:
-    """A network makes many objects and no circle of them; to look for circles takes a third of its time."""
-    collects = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if collects:
-            gc.enable()
-
-
 class Case(CaseDefinition):
-    @_uncollected()
+    @uncollected()
     def prepare(
         self,
         scenarios: Sequence[str] = (),
@@ -119,7 +106,7 @@ class Case(CaseDefinition):
         problems += [Problem("--scenario", f"the scenario {name!r} {twice}") for name in doubles]
         if unknown or doubles:
             raise CaseError(str(self.path), problems)
-        prepared, questions, named = [], [], mentions.Named()
+        prepared, questions, named = [], [*self.questions], mentions.Named()
         for name in scenarios or self.scenarios:
             preparer = self._preparer(name, overrides, parameters)
             lost, shared = (
@@ -156,7 +143,12 @@ class Case(CaseDefinition):
         changed = [*self.events_given, *(file.path.name for file in parameters if file.text)]
         changed += [f"{key} = {value}" for values in given for key, value in values.items()]
         return [
-            replace(p, beside=beside, questions=(*p.questions, *idle), changed=few(changed, _NAMED))
+            replace(
+                p,
+                beside=beside,
+                questions=(*self.questions, *p.questions, *idle),
+                changed=few(changed, _NAMED),
+            )
             for p in ready
         ]
 
@@ -396,7 +388,8 @@ def _from_ssp(path: Path, trust_fmus: bool) -> Case:
     ssp = reading.read_ssp(path, cache_directory("ssp"))
     text = f"# What {path.name} comes to (SHA-256 {ssp.digest})\n\n{tomli_w.dumps(ssp.tables)}"
     table, problems = _validate(tomllib.loads(text), "", path)
-    return _case(table, text, path, problems, ssp.folder, numbered=False, trust_fmus=trust_fmus)
+    case = _case(table, text, path, problems, ssp.folder, numbered=False, trust_fmus=trust_fmus)
+    return replace(case, questions=ssp.questions)
 
 
 def _case(

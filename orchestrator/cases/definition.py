@@ -44,6 +44,8 @@ class CaseDefinition:
     sharing: SharingRule | None = None
     # whether a component may be a scan: only for what needs neither its states nor a run
     scans: bool = False
+    # what is unusual in the file, found when it was read, for the user to answer
+    questions: tuple[Problem, ...] = ()
     events_given: tuple[str, ...] = ()  # in words, by the caller, in the place of the file's
     # whether the grid takes a current besides at every bus; see `Network.injections`
     injections: bool = False

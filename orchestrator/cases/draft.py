@@ -65,6 +65,8 @@ class Findings:
     not_reached: list[float] = field(default_factory=list)
     # components whose form the network cannot take, each with its model; what follows from that is not noted.
     misfits: dict[str, str] = field(default_factory=dict)
+    # inputs, by ``component.variable``, whose connection or value was refused: that nothing feeds them follows.
+    refused_inputs: set[str] = field(default_factory=set)
     network_failed: bool = False
     # variables of units of a kind that none of them has
     missed: set[tuple[str, str]] = field(default_factory=set)

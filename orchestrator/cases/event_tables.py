@@ -11,7 +11,7 @@ from orchestrator.cases.assignment import convert_value
 from orchestrator.cases.draft import Draft, Findings
 from orchestrator.cases.fault_tables import component_events, note_conflicts, wire_events
 from orchestrator.cases.islands import question_islands
-from orchestrator.cases.names import close_names
+from orchestrator.cases.names import close_names, hint_at
 from orchestrator.coupling import events as coupled
 from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.events import Event
@@ -341,7 +341,10 @@ def _unknown(event: Event, component: str, variable: str, plan: ComponentPlan) -
         some = ", ".join(known[:12]) + (", …" if len(known) > 12 else "")
         hint = close_names(wanted, known, f"it has: {some}" if known else "it has none")
         return f"component {component!r} has no {kind} {wanted!r}; {hint}"
-    return f"component {component!r} has no variable {variable!r} for this event to set"
+    settable = (*plan.description.parameters, *plan.description.inputs)
+    hint = hint_at(plan.description, variable, settable, "")
+    says = f"component {component!r} has no variable {variable!r} for this event to set"
+    return f"{says}; {hint}" if hint else says
 
 
 def _elements(names: Iterable[str], variable: str) -> list[str]:

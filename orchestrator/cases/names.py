@@ -1,11 +1,17 @@
 """Names in a case file: variables in the expression of a signal, and hints at the intended name."""
 
+from __future__ import annotations
+
 import difflib
 import fnmatch
 import re
 from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
 
 from orchestrator.errors import InputError
+
+if TYPE_CHECKING:
+    from orchestrator.fmi.description import FmuDescription
 
 # bytes of a name that becomes a file's, in UTF-8: file systems take 255, and something is added to
 # it
@@ -69,6 +75,15 @@ def close_names(wanted: str, known: Iterable[str], otherwise: str = "") -> str:
     )
     close = close or difflib.get_close_matches(wanted, names, n=3, cutoff=0.5)
     return f"did you mean {' or '.join(close)}?" if close else otherwise
+
+
+def hint_at(described: FmuDescription, wanted: str, known: Iterable[str], otherwise: str) -> str:
+    """A hint at a variable's name, which may be the FMU's own name of a variable that a binding calls otherwise."""
+    bound = getattr(described, "bound_names", None)
+    ours = [] if bound is None else bound(wanted)
+    if ours:
+        return f"the binding calls it {' or '.join(ours)}: write that"
+    return close_names(wanted, known, otherwise)
 
 
 def _parts(name: str) -> list[str]:

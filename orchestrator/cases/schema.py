@@ -214,6 +214,7 @@ class UnitsTable(Table):
 class ConnectionTable(Table):
     source: str = Field(alias="from")
     target: str = Field(alias="to")
+    ignore_units: bool = False  # whether the value is taken as it is, in whatever unit
 
 
 class WireTable(Table):

@@ -1,5 +1,7 @@
 """Connections of a case: those written in the file, and those of every component that names its bus."""
 
+from difflib import get_close_matches
+
 from fmus.toolchain.catalogue import model_names
 from orchestrator.cases.draft import Draft
 from orchestrator.errors import InputError, Problem, few
@@ -11,7 +13,8 @@ def connect(draft: Draft) -> None:
     for index, wire in enumerate(draft.given.case.connections):
         ends = {wire.source.partition(".")[0], wire.target.partition(".")[0]}
         if not ends & set(draft.given.scenario.remove):
-            _try_connect(draft, wire.source, wire.target, draft.given.place("connections", index))
+            place = draft.given.place("connections", index)
+            _try_connect(draft, wire.source, wire.target, place, ignore_units=wire.ignore_units)
     at_buses = [
         n
         for n, table in draft.tables.items()
@@ -96,6 +99,8 @@ def check_inputs(draft: Draft) -> None:
             text = f"{wire.target} is given a constant, but {wire.source} feeds it; remove the one or the other"
             draft.note(draft.given.place("components", wire.target.component, "inputs"), text)
     for endpoint in draft.system.unconnected_inputs():
+        if str(endpoint) in draft.found.refused_inputs:
+            continue
         if draft.found.network_failed and (
             draft.tables[endpoint.component].bus or endpoint.component == draft.grid
         ):
@@ -135,11 +140,25 @@ def _connect_to_bus(draft: Draft, name: str, bus: str, taken: list[str]) -> None
             _try_connect(draft, f"{name}.{variable}", f"{draft.grid}.{name}.{variable}", where)
 
 
-def _try_connect(draft: Draft, source: str, target: str, where: str) -> None:
+def _try_connect(
+    draft: Draft, source: str, target: str, where: str, *, ignore_units: bool = False
+) -> None:
     ends = source.partition(".")[0], target.partition(".")[0]
     if any(end in draft.known and end not in draft.system.components for end in ends):
         return  # the problem of this end is noted already
     try:
-        draft.system.connect(source, target)
+        draft.system.connect(source, target, ignore_units=ignore_units)
     except InputError as error:
         draft.note(where, str(error))
+        draft.found.refused_inputs.add(_meant_input(draft, target))
+
+
+def _meant_input(draft: Draft, target: str) -> str:
+    """The input at which a refused connection was to end; the likeliest one if there is none of that name."""
+    name, _, variable = target.partition(".")
+    plan = draft.system.components.get(name)
+    inputs = () if plan is None else plan.description.inputs
+    if variable in inputs:
+        return target
+    near = get_close_matches(variable, inputs, n=1) or inputs
+    return f"{name}.{near[0]}" if len(near) == 1 else target

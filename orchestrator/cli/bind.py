@@ -7,7 +7,7 @@ from orchestrator.api.binding import bind
 from orchestrator.binding.tables import REQUIRED
 from orchestrator.cli.arguments import add_options
 from orchestrator.errors import InputError
-from orchestrator.fmi.description import read_description
+from orchestrator.fmi.description import read_declared
 from orchestrator.fmi.devices import NO_BUS, is_controller_alone
 
 
@@ -16,13 +16,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    description = read_description(options.file)
+    description = read_declared(options.file)
     out = options.out or Path(f"{options.file.stem}.toml")
     if out.exists() and not options.force:
         raise InputError(
             f"{out}: the file is there already, perhaps filled in; choose another with --out, or --force"
         )
-    text = bind(options.file, out)
+    text = bind(description, out)
     marked = [
         line.strip() for line in text.splitlines() if REQUIRED in line and not line.startswith("#")
     ]

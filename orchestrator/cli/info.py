@@ -9,7 +9,7 @@ from orchestrator.api.dll import KEPT_IN
 from orchestrator.api.fmu import info
 from orchestrator.cli.arguments import add_options
 from orchestrator.cli.terminal import make_console, print_json
-from orchestrator.fmi.description import FmuDescription, missing_binary
+from orchestrator.fmi.description import FmuDescription, hindrance_here
 from orchestrator.fmi.linear_model import EmbeddedModel
 from orchestrator.report.tables import fmu_variables
 
@@ -37,9 +37,9 @@ def run(options: argparse.Namespace) -> int:
         f"state can be saved and restored: {'yes' if description.can_save_state else 'no'}",
         highlight=False,
     )
-    if missing := missing_binary(description):
+    if hindrance := hindrance_here(description):
         console.print(
-            f"[bold]It cannot run here[/bold]: {escape('; '.join(missing))}", highlight=False
+            f"[bold]It cannot run here[/bold]: {escape('; '.join(hindrance))}", highlight=False
         )
     if description.kept_in:
         why = f" ({description.kept_why})" if description.kept_why else ""
@@ -48,7 +48,11 @@ def run(options: argparse.Namespace) -> int:
     if found.linear_model is not None:
         console.print(escape(_in_words(found.linear_model)), highlight=False)
     for table in fmu_variables(description):
-        console.print("", table)
+        console.print()
+        if isinstance(table, str):
+            print(table)
+        else:
+            console.print(table)
     return 0
 
 

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from orchestrator.fmi.description import FmuDescription, VariableInfo
 
 
+# types of inputs that nobody can feed or give a value here
+_KEPT = ("String", "Binary")
+
+
 @dataclass(frozen=True, slots=True)
 class Endpoint:
     component: str
@@ -100,8 +104,10 @@ class System:
             description, dict(parameters or {}), dict(inputs or {}), isolated
         )
 
-    def connect(self, source: str, target: str) -> None:
-        """Connect an output to an input, both written ``component.variable``."""
+    def connect(self, source: str, target: str, *, ignore_units: bool = False) -> None:
+        """Connect an output to an input, both written ``component.variable``.
+
+        ``ignore_units``: take the value as it is, in whatever unit."""
         label = f"connection {source} → {target}"
         start, out = self._resolve(source, label)
         end, into = self._resolve(target, label)
@@ -117,9 +123,10 @@ class System:
             raise InputError(
                 f"{label}: {source} is {out.type} and {target} is {into.type}; only Real variables are coupled"
             )
-        if out.unit and into.unit and out.unit != into.unit:
+        if out.unit and into.unit and out.unit != into.unit and not ignore_units:
             raise InputError(
-                f"{label}: {source} is in {out.unit} and {target} in {into.unit}; units must be equal"
+                f"{label}: {source} is in {out.unit} and {target} in {into.unit}; units must be equal, since "
+                "none is converted on the way: correct the wrong one, or let a component convert"
             )
         feeding = self._sources().get(end)
         if feeding is not None:
@@ -164,9 +171,12 @@ class System:
         return Endpoint(component, variable), info
 
     def unconnected_inputs(self) -> Iterator[Endpoint]:
+        """Inputs that nothing feeds; those of text and of bytes keep their start values."""
         fed = {c.target for c in self.connections}
         for name, plan in self.components.items():
             for variable in plan.description.inputs:
                 endpoint = Endpoint(name, variable)
+                if plan.description.variables[variable].type in _KEPT:
+                    continue
                 if endpoint not in fed and variable not in plan.inputs:
                     yield endpoint

@@ -36,11 +36,14 @@ FREE_BYTES = 64 * 1024**2
 MOST_RATIO = 100
 
 _OUTSIDE = (
-    "an absolute path, or one with a drive or a backslash",
+    "an absolute path, or one with a drive",
     "a path out of the archive's own folder",
     "a link or a device and not a file",
 )
 """Entries that lead out of the folder into which they are unpacked."""
+
+BACKSLASHES = "its archive has backslashes between folders, as old exporters on Windows wrote them"
+PACK_AGAIN = "ZIP and FMI ask for '/': unpack it with a tool of Windows and pack it again, or ask for a newer export"
 
 _CHUNK = 1 << 20
 _METHODS = {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}
@@ -67,7 +70,7 @@ _ON_WINDOWS = os.name == "nt"
 
 def read_model_description_text(path: Path) -> bytes:
     """The bytes of an FMU's modelDescription.xml, well-formed and without a document type."""
-    with _opened(path) as archive:
+    with _opened(path, with_backslashes=True) as archive:
         try:
             entry = archive.getinfo(MODEL_DESCRIPTION)
         except KeyError:
@@ -87,16 +90,17 @@ def read_model_description_text(path: Path) -> bytes:
 
 def read_member(path: Path, name: str, kind: str = "FMU") -> bytes | None:
     """The bytes of another file in an archive; None where there is no such file."""
-    with _opened(path, kind) as archive:
+    with _opened(path, kind, with_backslashes=True) as archive:
         if name not in archive.namelist():
             return None
         with archive.open(name) as content:
             return content.read(MOST_BYTES)
 
 
-def names_in(path: Path, kind: str = "FMU") -> tuple[str, ...]:
-    with _opened(path, kind) as archive:
-        return tuple(entry.filename for entry in archive.infolist())
+def names_in(path: Path, kind: str = "FMU", *, with_backslashes: bool = False) -> tuple[str, ...]:
+    """The names of an archive's files; those with backslashes between folders are an error unless asked for."""
+    with _opened(path, kind, with_backslashes=with_backslashes) as archive:
+        return tuple(entry.orig_filename for entry in archive.infolist())
 
 
 def listed_twice(path: Path) -> tuple[str, ...]:
@@ -165,7 +169,9 @@ def check_xml(path: Path, name: str, text: bytes) -> None:
 
 
 @contextmanager
-def _opened(path: Path, kind: str = "FMU") -> Iterator[zipfile.ZipFile]:
+def _opened(
+    path: Path, kind: str = "FMU", *, with_backslashes: bool = False
+) -> Iterator[zipfile.ZipFile]:
     """The archive, with harmless names and sizes; whatever zipfile raises becomes one error."""
     ending = f".{kind.lower()}"
     try:
@@ -179,6 +185,8 @@ def _opened(path: Path, kind: str = "FMU") -> Iterator[zipfile.ZipFile]:
             )
         with zipfile.ZipFile(path) as archive:
             _check_entries(path, archive)
+            if not with_backslashes and any("\\" in e.orig_filename for e in archive.infolist()):
+                raise FmuFileError(f"{path}: {BACKSLASHES}; {PACK_AGAIN}")
             yield archive
     except _DAMAGE as error:
         raise FmuFileError(
@@ -251,11 +259,12 @@ def _check_sizes(path: Path, unpacked: int, packed: int) -> None:
 
 def _fault_of(entry: zipfile.ZipInfo) -> str | None:
     """What makes an entry one that is not unpacked."""
-    name, kind = entry.orig_filename, stat.S_IFMT(entry.external_attr >> 16)
+    name = entry.orig_filename.replace("\\", "/")  # by itself no harm, wherever it leads
+    kind = stat.S_IFMT(entry.external_attr >> 16)
     parts = name.removesuffix("/").split("/")
     if not name or "\0" in name or any(unicodedata.category(c) == "Cc" for c in name):
         return "a name with control characters"
-    if name.startswith("/") or "\\" in name or ":" in name:
+    if name.startswith("/") or ":" in name:
         return _OUTSIDE[0]
     if ".." in parts:
         return _OUTSIDE[1]

@@ -4,7 +4,7 @@ import re
 import zipfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
@@ -18,10 +18,18 @@ from fmus.toolchain.port_variables import RATED
 from fmus.toolchain.variables import Usual
 from orchestrator.errors import FmuFileError, UnsupportedFmuError
 from orchestrator.fmi import wine
-from orchestrator.fmi.archive import MODEL_DESCRIPTION, names_in, read_model_description_text, told
+from orchestrator.fmi.archive import (
+    BACKSLASHES,
+    MODEL_DESCRIPTION,
+    PACK_AGAIN,
+    names_in,
+    read_model_description_text,
+    told,
+)
 from orchestrator.fmi.clocks import FmiClock, clocks_of, special_variables
 from orchestrator.fmi.values import Scalar, typed
 from orchestrator.fmi.vendor_files import as_fmu
+from orchestrator.uncollected import uncollected
 
 TOOL = "gfor-cosim"
 REVERSE_DOMAIN = "org.gfor-cosim"  # begins the names of what is ours inside other people's formats
@@ -123,6 +131,8 @@ class FmuDescription:
     # where a DLL keeps its state: ``arrays``, ``library``, ``hidden`` or ``not tried``; empty where it is no DLL.
     kept_in: str = ""
     kept_why: str = ""  # why that was not tried, or is hidden, in words
+    # whether its archive has backslashes between folders, which no tool needs to unpack
+    has_backslashes: bool = False
     # what it is in a power system, as in `fmus.toolchain.variables.Kind`; empty where it does not
     # say
     kind: str = ""
@@ -155,13 +165,16 @@ class FmuDescription:
 def read_description(path: Path | str) -> FmuDescription:
     """Read and check an FMU, or that of a vendor's DLL or device's file, which is built first."""
     described = read_declared(path)
-    if missing := missing_binary(described):
-        raise UnsupportedFmuError(f"{described.path}: {missing[0]}", "another platform", missing[1])
+    if hindrance := hindrance_here(described):
+        fault = "backslashes" if described.has_backslashes else "another platform"
+        raise UnsupportedFmuError(f"{described.path}: {hindrance[0]}", fault, hindrance[1])
     return described
 
 
-def missing_binary(described: FmuDescription) -> tuple[str, str] | None:
+def hindrance_here(described: FmuDescription) -> tuple[str, str] | None:
     """The reason why an FMU cannot run on this platform, and the remedy; None where it can."""
+    if described.has_backslashes:
+        return BACKSLASHES, PACK_AGAIN
     if fmpy.platform in described.platforms or runs_under_wine(described):
         return None
     has = ", ".join(described.platforms) or "none"
@@ -190,13 +203,16 @@ def runs_under_wine(described: FmuDescription) -> bool:
 def read_declared(path: Path | str) -> FmuDescription:
     """The same as `read_description`, also where the FMU has no binary for this platform and cannot run here."""
     path = as_fmu(Path(path))
-    return parse_description(path, read_model_description_text(path), names_in(path))
+    names = names_in(path, with_backslashes=True)
+    return parse_description(path, read_model_description_text(path), names)
 
 
-def platforms_of(path: Path) -> tuple[str, ...]:
-    return tuple(fmpy.supported_platforms(path))
+def platforms_of(archive: Path | BytesIO) -> tuple[str, ...]:
+    """The platforms for which an FMU has a binary; sources are none."""
+    return tuple(name for name in fmpy.supported_platforms(archive) if name != "c-code")
 
 
+@uncollected()
 def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> FmuDescription:
     root = _root(path, text)
     version = root.get("fmiVersion", "unknown")
@@ -214,7 +230,7 @@ def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> Fmu
             part.clear()
         description = fmpy.read_model_description(content, validate=False)
         exchange_only = description.coSimulation is None
-        platforms = tuple(fmpy.supported_platforms(_only(text, names)))
+        platforms = platforms_of(_only(text, [name.replace("\\", "/") for name in names]))
         described = (
             None if exchange_only else _describe(path, description, root, platforms, version)
         )
@@ -232,7 +248,7 @@ def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> Fmu
             "no co-simulation",
             "ask for that export",
         )
-    return described
+    return replace(described, has_backslashes=any("\\" in name for name in names))
 
 
 def _only(text: bytes, names: Sequence[str] = ()) -> BytesIO:
@@ -292,8 +308,8 @@ def _describe(
     version: str,
 ) -> FmuDescription:
     kind, usual = _component(root, version)
-    variables = {v.name: _variable(path, v, usual) for v in md.modelVariables}
     _check_names(path, md)
+    variables = {v.name: _variable(path, v, usual) for v in md.modelVariables}
     dependencies = {
         unknown.variable.name: None
         if unknown.dependencies is None
@@ -421,7 +437,13 @@ def _check_names(path: Path, md: ModelDescription) -> None:
         raise FmuFileError(
             f"{path}: modelDescription.xml has no guid, which the binary is told; export it again"
         )
+    first: dict[str, Any] = {}
     for v in md.modelVariables:
+        if first.setdefault(v.name, v) is not v:
+            raise FmuFileError(
+                f"{path}: two variables are named {v.name[:80]!r} (valueReference {first[v.name].valueReference} and "
+                f"{v.valueReference}), so that nobody knows which is meant; FMI wants unique names: export it again"
+            )
         if not v.name:
             raise FmuFileError(
                 f"{path}: modelDescription.xml has a variable without a name; export it again"

@@ -198,6 +198,12 @@ class BoundDescription(FmuDescription):
                         said = f"{name} = {bound:g} {unit}, and the FMU's {info.name} is {value:g} {unit} by itself"
                         yield name, said
 
+    def bound_names(self, own: str) -> list[str]:
+        """Our names of one of the FMU's variables; empty if it has none."""
+        port = self.port
+        starts = [name for name, maps in port.start.items() if own in {m.variable for m in maps}]
+        return starts + [name for name, m in self.inner_names.items() if m == own and name != own]
+
     def likely_cause(self) -> str:
         """Ratings that do not fit, as the end of a sentence; "" without any."""
         unlike = self.unlike_delivered()

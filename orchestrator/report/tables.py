@@ -39,6 +39,8 @@ class VerdictSentence:
 
 
 _FIGURE = re.compile(r"[-+]?\b\d[\d.,]*(?:e[-+]?\d+)?")
+# variables in a table; rich takes half a millisecond for each
+_MOST_IN_A_TABLE = 5000
 _ITEMS_SHOWN = 5  # how many of a long list are shown, largest first
 
 
@@ -99,7 +101,8 @@ def share_text(entry: tuple[str, float]) -> str:
     return f"{entry[0]} {entry[1]:.0%}"
 
 
-def fmu_variables(description: FmuDescription) -> Iterable[Table]:
+def fmu_variables(description: FmuDescription) -> Iterable[Table | str]:
+    """A table for each causality; plain text for one with more than `_MOST_IN_A_TABLE` variables."""
     for causality in ("input", "output", "parameter", "calculatedParameter", "local"):
         variables = [
             v
@@ -120,7 +123,19 @@ def fmu_variables(description: FmuDescription) -> Iterable[Table]:
             )
             for v in variables
         ]
-        yield make_table(f"{causality} ({len(variables)})", *columns, left=6, rows=rows)
+        title = f"{causality} ({len(variables)})"
+        if len(variables) > _MOST_IN_A_TABLE:
+            yield _in_columns(title, columns, rows)
+        else:
+            yield make_table(title, *columns, left=6, rows=rows)
+
+
+def _in_columns(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Text in columns, on one line for each row."""
+    lines = [columns, *rows]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    padded = (map(str.ljust, line, widths) for line in lines)
+    return "\n".join([title, *("  ".join(line).rstrip() for line in padded)])
 
 
 def _bounds(variable: VariableInfo) -> str:

@@ -7,6 +7,7 @@ from xml.etree.ElementTree import Element, SubElement
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import InputError
 from orchestrator.ssp.names import SSP_VERSION, children, tag
+from orchestrator.ssp.units import units_in
 
 # one name for the sets of all components: some tools ask by name which to apply
 SET_NAME = "initialValues"
@@ -14,10 +15,13 @@ SET_NAME = "initialValues"
 
 @dataclass(frozen=True, slots=True)
 class SspValue:
-    """A value of a parameter set; ``unit`` is empty if the set gives no unit."""
+    """A value of a parameter set; ``unit`` is empty if the set gives no unit.
+
+    ``base``: attributes of ``BaseUnit`` that define the unit; None if the file has no definition of it."""
 
     value: float | bool | str
     unit: str = ""
+    base: Mapping[str, str] | None = None
 
 
 def write_parameter_set(name: str, plan: ComponentPlan, tool: str) -> Element:
@@ -64,16 +68,20 @@ def write_units(
             )
 
 
-def read_parameter_set(root: Element) -> dict[str, SspValue]:
+def read_parameter_set(
+    root: Element, around: Mapping[str, Mapping[str, str]] | None = None
+) -> dict[str, SspValue]:
+    """The values by name; ``around`` has the units of the file that the set stands in, which its own come before."""
     if root.tag != tag("ssv:ParameterSet"):
         raise InputError(f"{root.tag!r} is not a parameter set of SSP 1.0")
-    values = {}
+    values, units = {}, {**(around or {}), **units_in(root, "ssv:Units")}
     for parameter in children(root, "ssv:Parameters/ssv:Parameter"):
         name = parameter.get("name", "")
         element = next((e for e in parameter if e.tag != tag("ssv:Annotations")), None)
         if element is None:
             raise InputError(f"parameter {name!r} has no value")
-        values[name] = SspValue(_value(name, element), element.get("unit", ""))
+        unit = element.get("unit", "")
+        values[name] = SspValue(_value(name, element), unit, units.get(unit))
     return values
 
 

@@ -1,17 +1,20 @@
 """An SSP archive as the tables of a case file."""
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
 
 from orchestrator.errors import CaseError, InputError, Problem
-from orchestrator.fmi.description import FmuDescription, read_description
+from orchestrator.fmi.description import FmuDescription, VariableInfo, read_description
+from orchestrator.fmi.values import Scalar
 from orchestrator.ssp.archive import SspArchive
 from orchestrator.ssp.names import STUDY_TYPE, SYSTEM_FILE, children, plain_name, tag
 from orchestrator.ssp.parameter_sets import SspValue
 from orchestrator.ssp.structure import Owner, Structure, read_structure
 from orchestrator.ssp.study import SspStudy, foreign_step, read_study
+from orchestrator.ssp.units import between, contradiction, defined
 
 
 @dataclass(frozen=True)
@@ -19,6 +22,7 @@ class SspCase:
     tables: dict[str, Any]  # contents of a case file, without keys that would need another program
     folder: Path  # folder into which the FMUs are unpacked; paths in the tables are relative to it
     digest: str  # SHA-256 of the archive
+    questions: tuple[Problem, ...] = ()  # what is unusual in it, for the user to answer
 
 
 def read_ssp(path: Path, cache: Path) -> SspCase:
@@ -52,11 +56,21 @@ def read_ssp(path: Path, cache: Path) -> SspCase:
     fmus = {owner: archive.unpack(member, folder) for owner, member in structure.sources.items()}
     descriptions = {owner: _description(fmu) for owner, fmu in fmus.items()}
     tables["connections"] = [
-        {"from": f"{names[source]}.{output}", "to": f"{names[sink]}.{into}"}
-        for (source, output), (sink, into) in structure.connections
+        {
+            "from": f"{names[source[0]]}.{source[1]}",
+            "to": f"{names[sink[0]]}.{sink[1]}",
+            "ignore_units": sink in structure.unconverted,
+        }
+        for source, sink in structure.connections
     ]
+    problems += _odd_connectors(structure, descriptions)
+    given, questions = {}, list[Problem]()
+    for owner in structure.sources:
+        given[owner] = _values(structure, owner, descriptions[owner], problems, questions)
+    if problems:
+        raise CaseError(str(path), problems)
     tables["components"] = {
-        names[owner]: {"fmu": member, "parameters": _values(structure, owner, descriptions[owner])}
+        names[owner]: {"fmu": member, "parameters": given[owner]}
         for owner, member in structure.sources.items()
     }
     if study is not None:
@@ -69,7 +83,7 @@ def read_ssp(path: Path, cache: Path) -> SspCase:
         ]
         tables["solver"] |= {"step_size": step or min(suggested)} if step or suggested else {}
         tables["solver"]["schedule"] = "jacobi"  # does not depend on the order of the elements
-    return SspCase(tables, folder, archive.digest)
+    return SspCase(tables, folder, archive.digest, tuple(questions))
 
 
 def _times(description: Element) -> dict[str, float]:
@@ -107,31 +121,68 @@ def _description(fmu: Path) -> FmuDescription | None:
         return None
 
 
-def _values(structure: Structure, owner: Owner, fmu: FmuDescription | None) -> dict[str, Any]:
+def _odd_connectors(
+    structure: Structure, fmus: Mapping[Owner, FmuDescription | None]
+) -> Iterator[Problem]:
+    """Connected connectors in another unit than their FMU's variable, whose values would have to be converted."""
+    for source, sink in structure.connections:
+        for node in () if sink in structure.unconverted else (source, sink):
+            fmu, stated = fmus[node[0]], structure.units.get(node, "")
+            info = None if fmu is None else fmu.variables.get(node[1])
+            if info is not None and stated and info.unit and stated != info.unit:
+                yield Problem(
+                    f"connector {'.'.join((*node[0], node[1]))}",
+                    f"it is in {stated}, and its FMU has the variable in {info.unit}; gfor converts no units on a "
+                    "connection: state the FMU's, or suppressUnitConversion if the value is meant as it is",
+                )
+
+
+def _values(
+    structure: Structure,
+    owner: Owner,
+    fmu: FmuDescription | None,
+    problems: list[Problem],
+    questions: list[Problem],
+) -> dict[str, Any]:
     """Values of a component by the rules of SSP.
 
     Names that the FMU does not have are ignored. An input without connection keeps its start value. The start value of
     a connected input is left out."""
-    given = structure.values[owner]
     if fmu is None:
         return {}
     fed = {variable for _, (sink, variable) in structure.connections if sink == owner}
-    values = {
-        v: _converted(value, fmu.variables[v].unit)
-        for v, value in given.items()
-        if v in fmu.variables
+    values: dict[str, Any] = {
+        v: start for v in fmu.inputs if (start := _start(fmu.variables[v])) is not None
     }
-    open_inputs = {
-        v: fmu.variables[v].start_number for v in fmu.inputs if fmu.variables[v].type == "Real"
-    }
-    return {v: value for v, value in (open_inputs | values).items() if v not in fed}
+    for variable, value in structure.values[owner].items():
+        if variable not in fmu.variables:
+            continue
+        place = f"value of {'.'.join((*owner, variable))}"
+        try:
+            values[variable] = _converted(value, fmu.variables[variable].unit, fmu)
+            if value.unit and (says := contradiction(value.unit, value.base)):
+                questions.append(Problem(place, says))
+        except InputError as error:
+            problems.append(Problem(place, str(error)))
+    return {v: value for v, value in values.items() if v not in fed}
 
 
-def _converted(value: SspValue, unit: str) -> float | bool | str:
-    """A number in the variable's own unit as it is; one in another unit with that unit, to be converted."""
-    if not value.unit or value.unit == unit or isinstance(value.value, bool | str):
-        return value.value
-    return f"{value.value!r} {value.unit}"
+def _start(info: VariableInfo) -> Scalar | None:
+    """The start value of an input; None of text, which stays what it is without being given."""
+    if info.type not in ("Real", "Integer", "Enumeration", "Boolean"):
+        return None
+    if info.start is not None:
+        return info.start
+    return False if info.type == "Boolean" else max(0, info.minimum or 0)
+
+
+def _converted(value: SspValue, unit: str, fmu: FmuDescription) -> float | bool | str:
+    """A number in the variable's own unit as it is; one in another unit converted, or with that unit's name."""
+    number = value.value
+    if not value.unit or isinstance(number, bool | str):
+        return number
+    own, needed = defined(value.unit, value.base), defined(unit, fmu.units.get(unit))
+    return between(number, (value.unit, own), (unit, needed))
 
 
 def _add_study(tables: dict[str, Any], study: SspStudy, path: Path) -> None:

@@ -14,6 +14,7 @@ from orchestrator.ssp.names import (
     tag,
 )
 from orchestrator.ssp.parameter_sets import SspValue, read_parameter_mapping, read_parameter_set
+from orchestrator.ssp.units import units_in
 
 Owner = tuple[str, ...]  # path of a component or system below the top system; the top system is ()
 Node = tuple[Owner, str]  # A connector of an owner, or its variable where it has no such connector
@@ -32,6 +33,10 @@ class Structure:
 
     sources: dict[Owner, str] = field(default_factory=dict)
     connections: list[tuple[Node, Node]] = field(default_factory=list)
+    # those whose value is taken as it is though the units differ, by their input
+    unconverted: set[Node] = field(default_factory=set)
+    # the unit that a connector states
+    units: dict[Node, str] = field(default_factory=dict)
     values: dict[Owner, dict[str, SspValue]] = field(default_factory=dict)
 
 
@@ -42,18 +47,24 @@ def read_structure(
     if len(systems) != 1:
         note("ssd:System", "there must be exactly one system at the top; export the SSP again")
         return Structure()
-    return _Reader(archive, note).read(systems[0])
+    return _Reader(archive, note, units_in(description, "ssd:Units")).read(systems[0])
 
 
 class _Reader:
     """Walks through nested systems and collects their components, connections and values."""
 
-    def __init__(self, archive: SspArchive, note: Callable[[str, str], None]) -> None:
-        self._archive, self._note = archive, note
+    def __init__(
+        self,
+        archive: SspArchive,
+        note: Callable[[str, str], None],
+        units: Mapping[str, Mapping[str, str]],
+    ) -> None:
+        self._archive, self._note, self._units = archive, note, units
         self._structure = Structure()
         self._elements: dict[Owner, list[str]] = {}
         self._kinds: dict[Node, str] = {}
         self._feeding: dict[Node, Node] = {}
+        self._unconverted: set[Node] = set()  # ends of connections that suppress the conversion
         self._given: dict[Node, SspValue] = {}
 
     def read(self, system: Element) -> Structure:
@@ -91,7 +102,10 @@ class _Reader:
 
     def _connectors(self, element: Element, owner: Owner) -> None:
         for connector in children(element, "ssd:Connectors/ssd:Connector"):
-            self._kinds[owner, connector.get("name", "")] = connector.get("kind", "")
+            node = owner, connector.get("name", "")
+            self._kinds[node] = connector.get("kind", "")
+            for real in children(connector, "ssc:Real"):
+                self._structure.units[node] = real.get("unit", "")
 
     def _source(self, component: Element, owner: Owner) -> str:
         """The component's member of the archive. If this is not an FMU, the problem is noted and the result is
@@ -140,6 +154,8 @@ class _Reader:
             )
         else:
             (source,), (sink,) = sources, [node for node in ends if node not in sources]
+            if connection.get("suppressUnitConversion") in ("true", "1"):
+                self._unconverted.add(sink)
             if self._feeding.setdefault(sink, source) != source:
                 self._note(
                     f"connection {text}",
@@ -161,10 +177,13 @@ class _Reader:
     def _connect(self, sink: Node) -> None:
         """Follow a component's input through the connectors of systems to an output, or to a value."""
         source: Node | None = self._feeding[sink]
-        last = source
+        last, ends = source, [sink]
         while source is not None and source[0] not in self._structure.sources:
+            ends.append(source)
             last, source = source, self._feeding.get(source)
         if source is not None:
+            if self._unconverted.issuperset(ends):
+                self._structure.unconverted.add(sink)
             self._structure.connections.append((source, sink))
         elif last in self._given:
             self._structure.values[sink[0]].setdefault(sink[1], self._given[last])
@@ -187,9 +206,8 @@ class _Reader:
 
     def _values(self, binding: Element) -> Mapping[str, SspValue]:
         self._check_type(binding, PARAMETER_SET_TYPE)
-        values = read_parameter_set(
-            self._content(binding, "ssd:ParameterValues", "ssv:ParameterSet")
-        )
+        content = self._content(binding, "ssd:ParameterValues", "ssv:ParameterSet")
+        values = read_parameter_set(content, None if binding.get("source") else self._units)
         for mapping in children(binding, "ssd:ParameterMapping"):
             self._check_type(mapping, PARAMETER_MAPPING_TYPE)
             targets = read_parameter_mapping(self._content(mapping, ".", "ssm:ParameterMapping"))

@@ -7,7 +7,7 @@ from urllib.parse import quote
 from xml.etree.ElementTree import Element, SubElement
 
 from orchestrator.coupling.imperfections import described
-from orchestrator.coupling.system import ComponentPlan, System
+from orchestrator.coupling.system import ComponentPlan, Connection, System
 from orchestrator.errors import InputError
 from orchestrator.ssp.names import (
     FMU_TYPE,
@@ -84,6 +84,8 @@ def _description(
         for c in system.connections:
             ends = {"startElement": c.source.component, "startConnector": c.source.variable}
             ends |= {"endElement": c.target.component, "endConnector": c.target.variable}
+            if _differ(system, c):
+                ends["suppressUnitConversion"] = "true"
             SubElement(connections, tag("ssd:Connection"), ends)
     units: dict[str, Mapping[str, str]] = {}
     for plan in system.components.values():
@@ -96,6 +98,13 @@ def _description(
     write_osp_step(SubElement(experiment, tag("ssd:Annotations")), study.step_size)
     write_study(SubElement(root, tag("ssd:Annotations")), study)
     return root
+
+
+def _differ(system: System, connection: Connection) -> bool:
+    """Whether its ends are in two units, so that the value is taken as it is."""
+    ends = (connection.source, connection.target)
+    units = {system.components[e.component].description.variables[e.variable].unit for e in ends}
+    return len(units - {""}) > 1
 
 
 def _component(

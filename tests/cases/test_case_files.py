@@ -265,6 +265,29 @@ def test_one_mistake(written, old, new, problem):
     assert consequences == []
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ('to = "k.u"', 'to = "k.uu"', "has no variable 'uu'"),
+        ('to = "k.u"', 'to = "k.y"', "k.y is of causality output"),
+        ('from = "x.y"', 'from = "x.yy"', "has no variable 'yy'"),
+    ],
+)
+def test_a_refused_connection_is_one_problem(written, old, new, problem):
+    text = LOOP.replace(old, new)
+    assert text != LOOP
+    assert problem in the_problem(written(text).prepare)
+
+
+def test_a_refused_value_of_an_input_is_one_problem(written):
+    text = LOOP.replace("K = -3.0 }", 'K = -3.0 }\ninputs = { u = "1 kV" }').replace(
+        'to = "k.u"', 'to = "x.u"'
+    )
+    found = problems_of(written(text).prepare)
+    assert "inputs.u: u: '1 kV' is in kV" in found[0]
+    assert not [p for p in found if text_of_open_input("k.u") in p]
+
+
 EVENT = '[[events]]\ntype = "parameter_change"\ntime = 0.01\ncomponent = "k"\nparameter = "K"\nvalue = 2\n'
 
 

@@ -7,9 +7,12 @@ import fmpy
 import pytest
 
 from fmus.toolchain.catalogue import build_model
+from orchestrator.cli import main
 from orchestrator.errors import FmuFileError, InputError
 from orchestrator.fmi import wine
-from orchestrator.fmi.description import VariableInfo, read_description
+from orchestrator.fmi.archive import extract
+from orchestrator.fmi.description import VariableInfo, read_declared, read_description
+from orchestrator.report import tables
 
 XML = "modelDescription.xml"
 
@@ -111,6 +114,59 @@ def test_model_exchange_only(rewritten):
     exchange = '<ModelExchange modelIdentifier="gfor" />'
     path = rewritten(lambda text: re.sub(r"<CoSimulation .*?/>", exchange, text, flags=re.DOTALL))
     refused(path, "not an FMU for co-simulation", "Model Exchange only", "ask for that export")
+
+
+@pytest.mark.parametrize(
+    "command", [["fmu", "info"], ["fmu", "bind"], ["fmu", "check"], ["fmu", "admittance"]]
+)
+def test_two_variables_of_one_name_are_refused_by_every_command(
+    command, rewritten, capsys, tmp_path
+):
+    path = rewritten(lambda text: text.replace(' name="i_re"', ' name="i_im"'))
+    refused(path, r"two variables are named 'i_im' \(valueReference \d+ and \d+\)", "unique names")
+    more = ["--out", str(tmp_path / "out")] if command[1] in ("bind", "admittance") else []
+    assert main([*command, str(path), *more]) != 0
+    captured = capsys.readouterr()
+    assert "two variables are named 'i_im'" in " ".join((captured.out + captured.err).split())
+
+
+def test_what_runs_nothing_needs_no_binary_of_this_platform(rewritten, capsys, tmp_path):
+    path = rewritten(keep=lambda name: not name.startswith("binaries/"))
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("binaries/win32/gfor.dll", b"")
+        archive.writestr("sources/gfor.c", b"")
+    assert read_declared(path).platforms == ("win32",)  # sources are no platform
+    assert main(["fmu", "bind", str(path), "--out", str(tmp_path / "gfor.toml")]) == 0
+    assert "[voltage]" in (tmp_path / "gfor.toml").read_text(encoding="utf-8")
+    assert main(["fmu", "info", str(path)]) == 0
+    assert "It cannot run here" in capsys.readouterr().out
+    refused(path, "no binary for this platform", "only for: win32")
+
+
+def test_an_archive_with_backslashes_is_called_what_it_is_and_shown(fmu_path, tmp_path, capsys):
+    path = tmp_path / "windows.fmu"
+    with zipfile.ZipFile(fmu_path("gfor")) as good, zipfile.ZipFile(path, "w") as bad:
+        for name in good.namelist():
+            bad.writestr(name.replace("/", "\\"), good.read(name))
+    refused(path, "backslashes between folders", "pack it again")
+    assert read_declared(path).platforms == read_description(fmu_path("gfor")).platforms
+    with pytest.raises(FmuFileError, match="backslashes between folders"):
+        extract(path, tmp_path / "unpacked")
+    assert not (tmp_path / "unpacked").exists()
+    assert main(["fmu", "info", str(path)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "It cannot run here: its archive has backslashes" in said
+    assert "trust" not in said
+    assert main(["fmu", "check", str(path)]) != 0
+    assert "backslashes between folders" in " ".join(capsys.readouterr().out.split())
+
+
+def test_many_variables_are_listed_without_a_table(rewritten, monkeypatch, capsys):
+    monkeypatch.setattr(tables, "_MOST_IN_A_TABLE", 3)
+    assert main(["fmu", "info", str(rewritten(lambda text: text + "\n"))]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    (row,) = [line.split() for line in lines if line.startswith("S_n ")]
+    assert row[:3] == ["S_n", "MVA", "1500.0"]
 
 
 @pytest.mark.parametrize("identifier", ["watertank-c", "3_tanks", "tank.v2"])

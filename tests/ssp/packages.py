@@ -23,11 +23,12 @@ def component(name, model, inside="", source=None, attributes=""):
     )
 
 
-def connector(name, kind):
-    return f'<ssd:Connector name="{name}" kind="{kind}"><ssc:Real/></ssd:Connector>'
+def connector(name, kind, unit=""):
+    stated = f' unit="{unit}"' if unit else ""
+    return f'<ssd:Connector name="{name}" kind="{kind}"><ssc:Real{stated}/></ssd:Connector>'
 
 
-def wire(source, target, inside=""):
+def wire(source, target, inside="", attributes=""):
     """A connection; "a.y" is a connector of an element, "y" one of the system."""
     ends = ""
     for end, text in (("start", source), ("end", target)):
@@ -37,10 +38,16 @@ def wire(source, target, inside=""):
             if dot
             else f' {end}Connector="{text}"'
         )
-    return f"<ssd:Connection{ends}>{inside}</ssd:Connection>"
+    return f"<ssd:Connection{ends} {attributes}>{inside}</ssd:Connection>"
 
 
-def values(prefix="", mapping="", **given):
+def unit(name, **base):
+    """A definition of a unit."""
+    attributes = " ".join(f'{key}="{value}"' for key, value in base.items())
+    return f'<ssc:Unit name="{name}"><ssc:BaseUnit {attributes}/></ssc:Unit>'
+
+
+def values(prefix="", mapping="", units="", **given):
     """A parameter binding with its values inline; __ in a name is a dot, a value may be (number, unit)."""
     entries = "".join(
         f'<ssv:Parameter name="{name.replace("__", ".")}">{_value(value)}</ssv:Parameter>'
@@ -48,6 +55,7 @@ def values(prefix="", mapping="", **given):
     )
     parameters = (
         f'<ssv:ParameterSet version="1.0" name="values"><ssv:Parameters>{entries}</ssv:Parameters>'
+        + (f"<ssv:Units>{units}</ssv:Units>" if units else "")
     )
     return (
         f'<ssd:ParameterBinding prefix="{prefix}"><ssd:ParameterValues>{parameters}</ssv:ParameterSet>'

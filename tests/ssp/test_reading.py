@@ -21,6 +21,7 @@ from tests.ssp.packages import (
     connector,
     experiment,
     system,
+    unit,
     values,
     wire,
     write,
@@ -157,6 +158,117 @@ def test_units_are_converted_where_they_differ(tmp_path):
     ).system.components
     assert components["kilo"].parameters == {"P": 1.5, "on": True}
     assert components["same"].parameters == {"P": 0.1, "on": False}
+
+
+@pytest.mark.parametrize(
+    ("value", "units", "around", "expected"),
+    [
+        # the FMU has the gain in 1/s; a name that nobody else knows
+        ((3.0, "Takt"), unit("Takt", s="-1", factor="0.5"), "", 1.5),
+        # the definition counts, and not the name
+        ((3.0, "kHz"), unit("kHz", s="-1", factor="10"), "", 30.0),
+        ((3.0, "1/s"), unit("1/s", s="-1", factor="7"), "", 21.0),
+        # the set stands in the description, whose units define it
+        ((3.0, "Takt"), "", unit("Takt", s="-1", factor="2"), 6.0),
+        ((3.0, "Takt"), unit("Takt", s="-1"), unit("Takt", s="-1", factor="2"), 3.0),
+        # both say the same
+        ((3.0, "1/ms"), unit("1/ms", s="-1", factor="1000"), "", 3000.0),
+        ((3.0, "1/s"), unit("1/s", s="-1"), "", 3.0),
+    ],
+)
+def test_the_definition_of_a_unit_counts(tmp_path, value, units, around, expected):
+    top = system("top", [component("a", "integrator", bindings(values(units=units, gain=value)))])
+    after = f"<ssd:Units>{around}</ssd:Units>" * bool(around) + experiment("0.1", OSP_STEP)
+    scenario = prepared(write(tmp_path / "u.ssp", top, after))
+    assert scenario.system.components["a"].parameters["gain"] == pytest.approx(expected, rel=1e-12)
+    unlike = [str(question) for question in scenario.questions if "usually means" in str(question)]
+    assert bool(unlike) == (expected in (30.0, 21.0)), unlike
+
+
+@pytest.mark.parametrize(
+    ("value", "definition", "words"),
+    [
+        ((3.0, "Takt"), unit("Takt", m="1"), "'Takt' is defined as 1 m, and '1/s'.* is 1 s.-1"),
+        ((3.0, "Takt"), unit("Takt", rad="1", s="-1"), "defined as 1 rad·s.-1"),
+        ((3.0, "Takt"), unit("Takt", s="-1", offset="x"), "holds what is no number"),
+    ],
+)
+def test_a_definition_of_another_quantity_is_refused(tmp_path, value, definition, words):
+    bound = bindings(values(units=definition, gain=value))
+    top = system("top", [component("a", "integrator", bound)])
+    with pytest.raises(CosimError, match=f"value of a.gain: .*{words}"):
+        load_case(write(tmp_path / "u.ssp", top, valid=False))
+
+
+OPEN = b'causality="input" variability="continuous">\n      <Real unit="1" start="0.0" />'
+
+
+@pytest.mark.parametrize(
+    ("declared", "expected"),
+    [
+        (b'<Integer start="3" />', {"u": 3}),
+        (b'<Boolean start="true" />', {"u": True}),
+        (b'<Enumeration declaredType="E" min="1" max="2" start="2" />', {"u": 2}),
+        (b'<String start="auto" />', {}),
+    ],
+)
+def test_open_inputs_of_every_type_keep_their_start_values(tmp_path, declared, expected):
+    plain = write(tmp_path / "gain.ssp", system("top", [component("a", "gain")]), models=["gain"])
+    other = b'causality="input" variability="discrete">\n      ' + declared
+    path = with_other_fmus(plain, tmp_path / "open.ssp", OPEN, other)
+    if b"Enumeration" in declared:
+        types = (
+            b'<TypeDefinitions><SimpleType name="E"><Enumeration><Item name="a" value="1"/>'
+            b'<Item name="b" value="2"/></Enumeration></SimpleType></TypeDefinitions>\n  <LogCategories>'
+        )
+        path = with_other_fmus(path, tmp_path / "enumeration.ssp", b"<LogCategories>", types)
+    inputs = prepared(path).system.components["a"].inputs
+    assert inputs == expected
+    assert [type(value) for value in inputs.values()] in ([float], [bool], [])
+
+
+MILLI = (
+    b'name="y" valueReference="4" description="Output" causality="output" variability="continuous" '
+)
+
+
+def in_other_units(tmp_path, attributes):
+    """Two gains of 2 and 3 in a row, whose output is in ms and whose input is a number."""
+    parts = [
+        component("a", "gain", bindings(values(K=2.0, u=5.0))),
+        component("b", "gain", bindings(values(K=3.0))),
+    ]
+    wires = [wire("a.y", "b.u", attributes=attributes)]
+    plain = write(tmp_path / "same.ssp", system("top", parts, wires), models=["gain"])
+    old = MILLI + b'initial="calculated">\n      <Real unit="1" />'
+    new = MILLI + b'initial="calculated">\n      <Real unit="s" />'
+    return with_other_fmus(plain, tmp_path / "units.ssp", old, new)
+
+
+def test_a_connection_that_suppresses_the_conversion_takes_the_value_as_it_is(tmp_path):
+    scenario = prepared(in_other_units(tmp_path, 'suppressUnitConversion="true"'))
+    assert response(scenario)[1]["b.y"][-1] == pytest.approx(30.0)
+
+
+def test_a_connection_of_two_units_is_one_problem(tmp_path):
+    with pytest.raises(CosimError) as caught:
+        prepared(in_other_units(tmp_path, ""))
+    assert "1 problem\n" in str(caught.value)
+    assert "units must be equal" in str(caught.value)
+
+
+def test_a_connector_in_another_unit_than_its_fmu_is_refused(tmp_path):
+    """The value would have to be converted on its way."""
+    ports = f"{connector('u', 'input')}{connector('y', 'output', 'ms')}"
+    part = (
+        '<ssd:Component name="a" source="resources/gain.fmu">'
+        f"<ssd:Connectors>{ports}</ssd:Connectors></ssd:Component>"
+    )
+    top = system("top", [part, component("b", "gain")], [wire("a.y", "b.u")])
+    units = f"<ssd:Units>{unit('ms', s='1', factor='0.001')}</ssd:Units>"
+    path = write(tmp_path / "c.ssp", top, units + experiment("0.1", OSP_STEP), models=["gain"])
+    with pytest.raises(CosimError, match=r"connector a\.y: it is in ms, and its FMU has .* in 1"):
+        load_case(path)
 
 
 @pytest.mark.parametrize(
