@@ -79,7 +79,10 @@ def run(options: argparse.Namespace) -> int:
         out = options.out and _writable(options.out)
         return run_over_points(
             options,
-            out or Path(f"{case_of(options).name}_{'_'.join(options.controller)}_points.toml"),
+            out
+            or Path(
+                f"{case_of(options).name}_{'_'.join(dict.fromkeys(options.controller))}_points.toml"
+            ),
         )
     _check_for_one_point(options)
     case, console = case_of(options), make_console(stderr=options.json)

@@ -47,5 +47,8 @@ STUDY = PointStudy(
     task=PointsTask,
     parts=_parts,
     code=_code,
-    remarks=lambda found: words.remarks(found.result.verdict),
+    remarks=lambda found: [
+        *words.about_settings(found.result),
+        *words.remarks(found.result.verdict),
+    ],
 )

@@ -31,6 +31,7 @@ _APART = 0.2
 _EDGE, _POLISHING = 0.1, 40
 _DIFFERENCE = 1e-6
 _WORTH = 1e-6
+_IDLE = 1e-4  # merit (damping ratio) that a controller must bring to be kept
 _TURNS, _CENTRES, _GAINS = (-90.0, -45.0, 0.0, 45.0, 90.0), (0.7, 1.0, 1.8), (0.05, 0.15, 0.4, 1.0)
 _STARTS, _STARTS_OF_SEVERAL = 4, 6
 _GRID, _LEAST_SHARE = (13, 6, 9), 0.025
@@ -107,6 +108,22 @@ class SettingSearch:
         if (best.worth.allowed, best.merit) > (found.worth.allowed, found.merit):
             found = self.improved(self._polished(best))
         return found, len(grid)
+
+    def without_idle(self, found: Tried, least: float | None) -> Tried:
+        """The vector without the gains that bring less than a hundredth of a point; the smallest go first, and one
+        stays.
+
+        ``least``: damping ratio that a vector which has it must keep; None where none is wanted."""
+        for k in sorted(range(len(self._space.groups)), key=lambda k: found.x[3 * k + 2]):
+            x = found.x.copy()
+            x[3 * k + 2] = 0.0
+            if not x[2::3].any() or self._space.lowest[3 * k + 2] > 0:
+                continue
+            one = self.tried(x, found.steps)
+            kept = least is None or one.worth.worst >= min(least, found.worth.worst)
+            if one.worth.allowed and kept and one.merit >= found.merit - _IDLE:
+                found = one
+        return found
 
     def _alone(self) -> list[Tried]:
         """The best setting of each group alone, with the others at their smallest gain."""

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, MISSING, dataclass, replace
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -83,7 +84,7 @@ class PointsDesignRequest(OverCluster):
     controllers: Sequence[str] = asked(
         NAMES,
         ("pod_p",),
-        '``"pod_p"``, ``"pod_q"``, or both; each gets a setting of its own',
+        '``"pod_p"``, ``"pod_q"``, or several; each gets a setting of its own, and as many as components are pairs',
         option=None,
     )
     outages: Names | None = asked(
@@ -93,7 +94,10 @@ class PointsDesignRequest(OverCluster):
     values: Mapping[str, Any] | None = of_values()
     _: KW_ONLY
     components: Sequence[str] = asked(
-        NAMES, (), "converters, or patterns, each with a setting of its own", option="--component"
+        NAMES,
+        (),
+        "converters, or patterns, each with a setting of its own; as many as controllers: pairs",
+        option="--component",
     )
     modes: Sequence[str] = asked(
         NAMES, (), "the case's modes to damp (default: all from 0.1 to 2 Hz)", option="--mode"
@@ -192,30 +196,36 @@ def naming_of(case: CaseDefinition, names: Sequence[str], modes: list[Mode]) -> 
 
 
 def _groups(case: Case, request: PointsDesignRequest) -> tuple[PodGroup, ...]:
-    """The controllers with a setting of their own: each controller of each pattern."""
+    """The controllers with a setting of their own."""
     found: list[PodGroup] = []
-    for controller in dict.fromkeys(request.controllers):
-        for pattern in request.components or (None,):
-            target = find_target(
-                case,
-                controller,
-                scenario=request.scenario,
-                pattern=pattern,
-                stages=request.stages,
-                overrides=request.overrides,
-                parameters=request.files,
-            )
-            group = PodGroup(
-                controller, target.components, target.key, target.stages, target.neutral
-            )
-            for other in found:
-                if shared := set(other.places) & set(group.places):
-                    raise InputError(
-                        f"--component: {min(shared).component} is in two of the patterns; a converter gets one "
-                        "setting: let each pattern have converters of its own"
-                    )
-            found.append(group)
+    for controller, pattern in _pairs(request):
+        target = find_target(
+            case,
+            controller,
+            scenario=request.scenario,
+            pattern=pattern,
+            stages=request.stages,
+            overrides=request.overrides,
+            parameters=request.files,
+        )
+        group = PodGroup(controller, target.components, target.key, target.stages, target.neutral)
+        for other in found:
+            if shared := set(other.places) & set(group.places):
+                raise InputError(
+                    f"--component: {min(shared).component} is in two of the patterns; a converter gets one "
+                    "setting: let each pattern have converters of its own"
+                )
+        found.append(group)
     return tuple(found)
+
+
+def _pairs(request: PointsDesignRequest) -> list[tuple[str, str | None]]:
+    """Controllers with patterns of converters: of as many of both, several, the first with the first and so on; else
+    each with each."""
+    controllers, patterns = request.controllers, request.components
+    if len(controllers) == len(patterns) > 1:
+        return list(zip(controllers, patterns, strict=True))
+    return list(product(dict.fromkeys(controllers), patterns or (None,)))
 
 
 def _scenario(case: Case, request: PointsDesignRequest) -> str:
@@ -260,6 +270,18 @@ class PointsDesign:
     thin: float | None = None  # as `PointsVerdict` has it
 
     @property
+    def used(self) -> list[tuple[PodGroup, PodSetting]]:
+        """The controllers with a gain."""
+        placed = zip(self.plan.groups, self.settings, strict=True)
+        return [(group, setting) for group, setting in placed if setting.gain]
+
+    @property
+    def left_out(self) -> list[PodGroup]:
+        """The controllers whose gains bring nothing."""
+        placed = zip(self.plan.groups, self.settings, strict=True)
+        return [group for group, setting in placed if not setting.gain]
+
+    @property
     def verdict(self) -> PointsVerdict:
         request = self.plan.request
         return PointsVerdict(
@@ -300,6 +322,7 @@ def design_over_points(
     if wanted is not None and not (found.worth.allowed and found.worth.worst >= wanted + _SPARE):
         stage("grid of settings, as the search did not reach what is wanted")
         found, compared = search.over_grid(found)
+    found = search.without_idle(found, None if wanted is None else wanted + _SPARE)
     reached = wanted is not None and found.worth.allowed and found.worth.worst >= wanted + _SPARE
     thin = None
     if wanted is not None and reached:
@@ -390,9 +413,14 @@ def _frequency(points: Sequence[PointModes]) -> float:
 
 
 def values_of(groups: Sequence[PodGroup], settings: Sequence[PodSetting]) -> dict[str, Value]:
-    """The settings by ``component.variable``, with eight significant digits, as a parameter file has them."""
+    """The settings by ``component.variable``, with eight significant digits, as a parameter file has them.
+
+    A controller without gain is switched off, and has no other value."""
     values: dict[str, Value] = {}
     for group, setting in zip(groups, settings, strict=True):
+        if not setting.gain:
+            values |= {f"{name}.{group.controller}.enabled": False for name in group.key}
+            continue
         values |= setting.parameters(group.key, group.controller, group.stages, group.neutral)
     return values
 

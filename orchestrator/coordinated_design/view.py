@@ -11,7 +11,12 @@ from orchestrator.cases.parameter_files import parameter_file_text
 from orchestrator.coordinated_design.search import RankedConverter
 from orchestrator.coordinated_design.study import PointsDesign, values_of
 from orchestrator.coordinated_design.verdict import JudgedPoint, PlacedMode, PointsVerdict
-from orchestrator.coordinated_design.words import remarks, verdict_sentence, what_it_rests_on
+from orchestrator.coordinated_design.words import (
+    about_settings,
+    remarks,
+    verdict_sentence,
+    what_it_rests_on,
+)
 from orchestrator.late import pd
 from orchestrator.pod_design.closed_loop import PodSetting
 from orchestrator.pod_design.view import parameter_file_path
@@ -122,7 +127,8 @@ def as_json(design: PointsDesign) -> dict[str, Any]:
         "harmed": [_where(point) | {"mode": _mode(point.other)} for point in verdict.harmed],
         "astray": [_where(point) | {"difference": point.astray} for point in verdict.astray],
         "unforeseen": [_where(point) for point in verdict.unforeseen],
-        "warnings": remarks(verdict),
+        "warnings": [*about_settings(design), *remarks(verdict)],
+        "left_out": [group.name for group in design.left_out],
         "settings": [
             {
                 "controller": group.controller,
@@ -132,7 +138,7 @@ def as_json(design: PointsDesign) -> dict[str, Any]:
                 "T_S2": setting.filters.T_S2,
                 "N_S": group.stages,
             }
-            for group, setting in zip(plan.groups, design.settings, strict=True)
+            for group, setting in design.used
         ],
         "all": [
             _where(point)
@@ -191,9 +197,9 @@ def _ranked(one: RankedConverter) -> dict[str, Any]:
 
 def settings_table(design: PointsDesign) -> PlainTable:
     columns = ("Controller", "K [pu]", "T_S1 [s]", "T_S2 [s]", "N_S", "Lead [°]", "of")
-    placed = zip(design.plan.groups, design.settings, strict=True)
     rows = [
-        (group.name, *_setting(setting), str(len(group.components))) for group, setting in placed
+        (group.name, *_setting(setting), str(len(group.components)))
+        for group, setting in design.used
     ]
     return make_table("Settings", *columns, rows=rows)
 

@@ -10,6 +10,7 @@ from orchestrator.errors import few
 from orchestrator.report.tables import VerdictSentence, kinds_of
 
 _SHOWN = 4
+_AT_BOUND = 1e-2  # part of the largest gain within which one stands at it
 
 
 def verdict_sentence(verdict: PointsVerdict) -> str:
@@ -133,6 +134,20 @@ def what_it_rests_on(design: PointsDesign) -> str:
         f"the best came from {steps} linear programs. The figures are those of power flow, steady state and "
         "eigenvalues computed anew at every point, of the system without a communication step."
     )
+
+
+def about_settings(design: PointsDesign) -> list[str]:
+    """Controllers that were left out, and gains that stand at their bound."""
+    texts, largest = [], design.plan.request.gain_bounds[1]
+    if design.left_out:
+        names = ", ".join(group.name for group in design.left_out)
+        texts.append(f"left out, as they bring less than 0.01 points of damping: {names}")
+    texts += [
+        f"the gain of {group.name} stands at its bound, {largest:g} pu: a larger one may give more; see --gain-bounds"
+        for group, setting in design.used
+        if setting.gain >= (1 - _AT_BOUND) * largest
+    ]
+    return texts
 
 
 def remarks(verdict: PointsVerdict) -> list[str]:
