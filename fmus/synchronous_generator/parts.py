@@ -7,6 +7,7 @@ from typing import Any
 
 from fmus.synchronous_generator.excitation.alternator import ac8b, esac6a, exac2
 from fmus.synchronous_generator.excitation.common import Exciter
+from fmus.synchronous_generator.excitation.integral import ac7b, dc4b, expic1
 from fmus.synchronous_generator.excitation.rotating import (
     ac1a,
     ac4a,
@@ -29,6 +30,7 @@ from fmus.synchronous_generator.machines.standard import (
 )
 from fmus.synchronous_generator.stabilization.legacy import ieeest, st2cut, stab2a
 from fmus.synchronous_generator.stabilization.standard import pss1a, pss2a, pss2b
+from fmus.synchronous_generator.turbines.diesel import degov, degov1
 from fmus.synchronous_generator.turbines.ggov1 import ggov1
 from fmus.synchronous_generator.turbines.governors import (
     constant_power,
@@ -72,6 +74,9 @@ EXCITERS: dict[str, Exciter] = {
     "exac2": exac2,
     "esac6a": esac6a,
     "ac8b": ac8b,
+    "ac7b": ac7b,
+    "dc4b": dc4b,
+    "expic1": expic1,
     "ac4a": ac4a,
     "st1a": st1a,
     "st4b": st4b,
@@ -84,6 +89,8 @@ GOVERNORS: dict[str, Governor] = {
     "hygov": read_either_way(of_speed(hygov)),
     "gast": read_either_way(of_speed(gast)),
     "ieeeg1": read_either_way(of_speed(ieeeg1)),
+    "degov": read_either_way(degov),
+    "degov1": read_either_way(degov1),
     "ggov1": read_either_way(ggov1),
     "ieesgo": read_either_way(ieesgo),
 }

@@ -92,7 +92,7 @@ EXCITERS = {
         "K_PR": 80.0,
         "K_IR": 5.0,
         "K_DR": 10.0,
-        "T_D": 0.1,
+        "T_DR": 0.1,
         "K_A": 1.3,
         "T_A": 0.02,
         "T_E": 1.2,
@@ -100,6 +100,53 @@ EXCITERS = {
         "K_D": 0.3,
         "K_E": 1.0,
         "T_R": 0.01,
+    },
+}
+
+EXCITERS |= {
+    "expic1": {
+        "K_A": 30.0,
+        "T_A1": 0.2,
+        "T_A2": 0.03,
+        "T_A3": 0.2,
+        "T_A4": 0.08,
+        "K_F": 0.04,
+        "T_F1": 0.9,
+        "T_F2": 0.3,
+        "K_E": 1.0,
+        "T_E": 0.6,
+        "T_R": 0.02,
+    },
+    "dc4b": {
+        "K_PR": 20.0,
+        "K_IR": 15.0,
+        "K_DR": 3.0,
+        "T_DR": 0.1,
+        "K_A": 1.4,
+        "T_A": 0.03,
+        "K_E": 1.0,
+        "T_E": 0.7,
+        "K_F": 0.1,
+        "T_F": 1.2,
+        "T_R": 0.01,
+    },
+    "ac7b": {
+        "K_PR": 4.0,
+        "K_IR": 3.0,
+        "K_DR": 0.5,
+        "T_DR": 0.1,
+        "K_PA": 6.0,
+        "K_IA": 5.0,
+        "K_P": 5.0,
+        "K_F1": 0.2,
+        "K_F2": 0.1,
+        "K_F3": 0.15,
+        "T_F3": 1.1,
+        "K_C": 0.1,
+        "K_D": 0.3,
+        "K_E": 1.0,
+        "T_E": 1.1,
+        "T_R": 0.02,
     },
 }
 
@@ -121,6 +168,16 @@ def exciter_by_hand(name, p, s):
         if name == "dc2a":
             return forward / (field + forward * rate(p, s))
         return forward / (1 + forward * rate(p, s) / (1 + s * p["T_F2"])) / field
+    if name in ("expic1", "dc4b"):
+        points = {"expic1": ((2.85, 0.3), (3.8, 0.6)), "dc4b": ((2.4, 0.03), (5.0, 0.5))}[name]
+        field = p["K_E"] + slope(lambda E: saturated(E, points), E_FD) + s * p["T_E"]
+        if name == "dc4b":
+            forward = control(p, s) * p["K_A"] / (1 + s * p["T_A"])
+            return forward / (field + forward * rate(p, s))
+        forward = p["K_A"] * (1 + s * p["T_A1"]) / s * lead(p, s, "T_A3", "T_A2")
+        forward /= (1 + s * p["T_A4"]) * field
+        back = s * p["K_F"] / (1 + s * p["T_F1"]) / (1 + s * p["T_F2"])
+        return forward / (1 + forward * back)
     field = behind_the_rectifier(p)
     if name == "exac2":
         forward = lead(p, s, "T_C", "T_B") * p["K_A"] / (1 + p["T_A"] * s) * p["K_B"]
@@ -130,8 +187,16 @@ def exciter_by_hand(name, p, s):
         forward = p["K_A"] * lead(p, s, "T_K", "T_A") * lead(p, s, "T_C", "T_B")
         limiter = p["K_H"] * lead(p, s, "T_J", "T_H")
         return forward / (field + s * p["T_E"] + limiter * field)
-    control = p["K_PR"] + p["K_IR"] / s + s * p["K_DR"] / (1 + s * p["T_D"])
-    return control * p["K_A"] / (1 + s * p["T_A"]) / (field + s * p["T_E"])
+    if name == "ac7b":
+        second = (p["K_PA"] + p["K_IA"] / s) * p["K_P"] * V_T / (field + s * p["T_E"])
+        slow = s * p["K_F3"] / (1 + s * p["T_F3"])
+        inner = p["K_F1"] + (p["K_F2"] + control(p, s) * slow) * field
+        return control(p, s) * second / (1 + second * inner)
+    return control(p, s) * p["K_A"] / (1 + s * p["T_A"]) / (field + s * p["T_E"])
+
+
+def control(p, s):
+    return p["K_PR"] + p["K_IR"] / s + s * p["K_DR"] / (1 + s * p["T_DR"])
 
 
 @HERTZ
@@ -145,7 +210,26 @@ def test_an_exciter_is_its_block_diagram(name, hertz):
     response, wanted = alone.response(s, REST), exciter_by_hand(name, p, s)
     assert response["E_fd", "v_s"] == pytest.approx(wanted, rel=1e-6)
     direct = E_FD / V_T if name == "scrx" else 0.0  # fed from the terminal
+    if name == "ac7b":  # its source is the terminal
+        to_V_R = wanted / control(p, s) / (p["K_PA"] + p["K_IA"] / s) / (p["K_P"] * V_T)
+        direct = to_V_R * V_R_of_ac7b(p) / V_T
     assert response["E_fd", "v_t"] == pytest.approx(direct - wanted / (1 + p["T_R"] * s), rel=1e-6)
+
+
+def V_R_of_ac7b(p):
+    V_E = E_FD + 0.577 * p["K_C"] * E_FD
+    return p["K_E"] * V_E + saturated(V_E, ((3.14, 0.03), (4.18, 0.1))) + p["K_D"] * E_FD
+
+
+def test_expic1_without_an_exciter_is_a_rectifier_at_its_source():
+    """T_E = 0 and K_P > 0: E_fd follows the terminal's voltage at once, and stops at its limits."""
+    alone = exciter("expic1", {"T_E": 0.0, "K_P": 5.0, "K_C": 0.1, "E_FDMAX": 4.0, "T_A2": 0.05})
+    assert not refused(alone)
+    direct = alone.response(2e4j * np.pi, REST)["E_fd", "v_t"]
+    bridge = 5.0 * V_T - 0.577 * 0.1 * E_FD
+    assert direct.real == pytest.approx(5.0 * E_FD / bridge, rel=1e-2)
+    found, _ = integrated(alone, lambda t: [V_T, E_FD, 0.5], 3.0)
+    assert found[-1]["E_fd"] == pytest.approx(4.0, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -231,6 +315,35 @@ def test_ieesgo_is_its_block_diagram(hertz):
     assert alone.response(s, [1.0])["P_m", "w"] == pytest.approx(valve * stages, rel=1e-9)
 
 
+DEGOV = {"T_1": 0.2, "T_2": 0.05, "T_3": 0.1, "K": 8.0, "T_4": 0.9, "T_5": 0.15, "T_6": 0.2}
+
+
+@HERTZ
+@pytest.mark.parametrize(("name", "by_power"), [("degov", 0), ("degov1", 0), ("degov1", 1)])
+def test_degov_and_degov1_are_their_block_diagrams(hertz, name, by_power):
+    own = {"R": 0.05, "T_E": 0.2, "power_droop": by_power} if name == "degov1" else {}
+    p, s, T = DEGOV | {"T_D": 0.02} | own, 2j * np.pi * hertz, 0.02
+    alone = governor(name, p)
+    at_rest = [1.0, P_M] if name == "degov1" else [1.0]
+    assert not refused(alone)
+    box = (1 + s * p["T_3"]) / (1 + s * p["T_1"] + s**2 * p["T_1"] * p["T_2"])
+    forward = box * p["K"] / s * lead(p, s, "T_4", "T_5") / (1 + s * p["T_6"])
+    delay = (1 - s * T / 2 + s**2 * T**2 / 12) / (1 + s * T / 2 + s**2 * T**2 / 12)
+    closed = forward / (1 + (forward * p["R"] if own and not by_power else 0))
+    response = alone.response(s, at_rest)
+    assert response["P_m", "w"] == pytest.approx(P_M - closed * delay, rel=1e-6)
+    if by_power:
+        wanted = -p["R"] / (1 + s * p["T_E"]) * closed * delay
+        assert response["P_m", "P_e"] == pytest.approx(wanted, rel=1e-6)
+
+
+@pytest.mark.parametrize(("name", "delay"), [("degov", "T_D"), ("ggov1", "T_eng")])
+def test_a_delay_that_the_fraction_cannot_stand_for_is_refused(name, delay):
+    assert any(
+        f"governor.{delay} must be" in text for text in refused(governor(name, {delay: 1.0}))
+    )
+
+
 @HERTZ
 @pytest.mark.parametrize("feedback", [1, -1, 0])
 def test_ggov1_is_its_block_diagram(hertz, feedback):
@@ -239,8 +352,8 @@ def test_ggov1_is_its_block_diagram(hertz, feedback):
     assert not refused(alone)
     assert alone.outputs([1.0, P_M])["P_m"] == pytest.approx(P_M, rel=1e-12)
     assert max(map(abs, alone.rates([1.0, P_M]).values())) < 1e-12
-    control = p["K_pgov"] + p["K_igov"] / s + s * p["K_dgov"] / (1 + s * p["T_dgov"])
-    valve = control / (1 + s * p["T_act"])
+    regulator = p["K_pgov"] + p["K_igov"] / s + s * p["K_dgov"] / (1 + s * p["T_dgov"])
+    valve = regulator / (1 + s * p["T_act"])
     valve /= 1 + valve * (p["R"] if feedback == -1 else 0)
     T = p["T_eng"]
     delay = (1 - s * T / 2 + s**2 * T**2 / 12) / (1 + s * T / 2 + s**2 * T**2 / 12)

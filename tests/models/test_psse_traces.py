@@ -108,7 +108,7 @@ def beside(name, folder):
 def deviation(t, ours, wanted):
     """Root mean square and most of the deviation [percent of the swing]."""
     swing = np.ptp(wanted[t > EVENT]) / 2
-    of_swing = 100 * np.abs(ours - wanted)[np.abs(t - EVENT) > NEAR] / swing
+    of_swing = 100 * np.abs(ours - wanted)[np.abs(t - EVENT) > NEAR + 1e-9] / swing
     return float(np.sqrt(np.mean(of_swing**2))), float(of_swing.max())
 
 

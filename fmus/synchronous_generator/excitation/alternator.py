@@ -17,7 +17,7 @@ ESAC6A has a limiter of the field's current behind a lead/lag:
 
 AC8B has a PID controller, and limits of V_E by the field's current; ESAC8B is the same without a rectifier:
 
-    V_ref + V_S − v_m → K_PR + K_IR/s + s·K_DR/(1+sT_D), within V_PIDMIN and V_PIDMAX
+    V_ref + V_S − v_m → K_PR + K_IR/s + s·K_DR/(1+sT_DR), within V_PIDMIN and V_PIDMAX
     → K_A/(1+sT_A) = V_R, held within V_RMIN and V_RMAX,  V_EMIN ≤ V_E ≤ (V_FEMAX − K_D·I_FD)/(K_E + S_E)
 
 Sources: OpenIPSL at 2be0558a (EXAC2, AC8B), ANDES 2.0.0 (EXAC2, AC8B), IEEE 421.5 (AC6A)."""
@@ -27,6 +27,7 @@ from dataclasses import dataclass
 from fmus.synchronous_generator.data_lines import Given, declared, number, pu, seconds
 from fmus.synchronous_generator.excitation.common import (
     SOURCE,
+    Controller,
     ExciterSaturation,
     Measurement,
     Regulated,
@@ -42,11 +43,9 @@ from fmus.toolchain.blocks import (
     held_at_limits,
     lead_lag,
     limited_low_pass,
-    limited_proportional_integral,
-    washout,
 )
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else
+from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin
 
 _MOST = 1e9  # no upper limit of V_E [pu]
 _LEAST = 1e-3  # smallest V_E [pu] that the rectifier's loading is divided by
@@ -87,7 +86,7 @@ AC8B = (
     pu("K_PR", 100.0, "Proportional gain", 0),
     number("K_IR", 5.0, "Integral gain", 0, "1/s"),
     number("K_DR", 10.0, "Derivative gain", 0, "s"),
-    seconds("T_D", 0.1, "Lag of the derivative", 1e-3),
+    seconds("T_DR", 0.1, "Lag of the derivative", 1e-3),
     pu("V_PIDMAX", 999.0, "Upper limit of the controller"),
     pu("V_PIDMIN", -999.0, "Lower limit of the controller"),
     pu("K_A", 1.0, "Gain", 1e-3),
@@ -203,22 +202,8 @@ def ac8b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
             p.V_FEMAX - V_R0, "exciter.V_FEMAX must exceed the exciter's field current at the start"
         )
         measured = Measurement(m, seen)
-        integrates = p.K_IR > 0
-        error_0 = if_else(integrates, 0, PID_0 / fmax(p.K_PR, _LEAST))
-        error = measured.error(error_0)
-        m.require(p.K_PR + p.K_IR - 1e-9, "exciter: one of K_PR and K_IR must exceed 0")
-        held = limited_proportional_integral(
-            m,
-            "regulator",
-            error,
-            p.K_PR,
-            p.K_IR,
-            p.V_PIDMIN,
-            p.V_PIDMAX,
-            if_else(integrates, PID_0, 0),
-        )
-        slope = p.K_DR / p.T_D * washout(m, "derivative", error, p.T_D, error_0)
-        PID = clamp(held + slope, p.V_PIDMIN, p.V_PIDMAX)
+        control = Controller(m, p, PID_0, (p.V_PIDMIN, p.V_PIDMAX))
+        PID = control(measured.error(control.error_at_start))
         V_R = limited_low_pass(m, "amplifier", p.K_A * PID, p.T_A, p.V_RMIN, p.V_RMAX, V_R0)
         highest = (p.V_FEMAX - behind.p.K_D * seen.I_fd) / behind.constant
         behind.drive(V_R, p.V_EMIN, fmax(highest, p.V_EMIN))

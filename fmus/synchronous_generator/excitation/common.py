@@ -7,8 +7,15 @@ from dataclasses import dataclass
 from functools import partial
 
 from fmus.synchronous_generator import declarations
+from fmus.synchronous_generator.data_lines import Given
 from fmus.synchronous_generator.machine import Start
-from fmus.toolchain.blocks import BYPASS_TIME, lead_lag
+from fmus.toolchain.blocks import (
+    BYPASS_TIME,
+    clamp,
+    lead_lag,
+    limited_proportional_integral,
+    washout,
+)
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, Scalar, fmax, if_else, logic_and, sqrt
 
@@ -100,6 +107,32 @@ def rate_feedback(
     x = m.state(name, initial, "pu", "rate feedback, slow part of the signal", base=E_FD)
     m.derivative(x, (u - x) / lag)
     return gain_F / lag * (u - x), gain_F
+
+
+class Controller:
+    """K_PR + K_IR/s + s·K_DR/(1+sT_DR) of an error, the sum within limits; the integral stops at them.
+
+    ``error_at_start``: 0, or what it takes without an integral."""
+
+    def __init__(
+        self, m: ModelBuilder, gains: Given, at_start: Expr, limits: tuple[Expr, Expr]
+    ) -> None:
+        m.require(gains.K_PR + gains.K_IR - 1e-9, "exciter: one of K_PR and K_IR must exceed 0")
+        self._m, self._gains, self._limits = m, gains, limits
+        self._integrates = gains.K_IR > 0
+        self._at_start = at_start
+        proportional = at_start / fmax(gains.K_PR, 1e-9)
+        self.error_at_start = if_else(self._integrates, 0, proportional)
+
+    def __call__(self, error: Expr) -> Expr:
+        """The controller's output."""
+        m, gains, (low, high) = self._m, self._gains, self._limits
+        initial = if_else(self._integrates, self._at_start, 0)
+        kept = limited_proportional_integral(
+            m, "regulator", error, gains.K_PR, gains.K_IR, low, high, initial
+        )
+        change = washout(m, "derivative", error, gains.T_DR, self.error_at_start)
+        return clamp(kept + gains.K_DR / gains.T_DR * change, low, high)
 
 
 require_within = partial(

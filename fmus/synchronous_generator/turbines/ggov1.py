@@ -20,7 +20,12 @@ left out: they act while the speed changes by more than a_set per second, or whi
 Sources: IEEE PES-TR1, OpenIPSL at 2be0558a."""
 
 from fmus.synchronous_generator.data_lines import Given, declared, number, power, seconds
-from fmus.synchronous_generator.turbines.governors import SOURCE, power_reference, require_within
+from fmus.synchronous_generator.turbines.governors import (
+    LONGEST_DELAY,
+    SOURCE,
+    power_reference,
+    require_within,
+)
 from fmus.synchronous_generator.variants import Shaft
 from fmus.toolchain.blocks import (
     BYPASS_TIME,
@@ -114,6 +119,7 @@ def _require(m: ModelBuilder, p: Given, valve_0: Expr) -> None:
         m.require(if_else(needs, -1, 1), f"governor.{lag} = 0 needs governor.{lead} = 0 as well")
     whole = fabs(p.R_select * (p.R_select - 1) * (p.R_select + 1))
     m.require(0.5 - whole, "governor.R_select must be 1, -1 or 0")
+    m.require(LONGEST_DELAY - p.T_eng, f"governor.T_eng must be below {LONGEST_DELAY:g} s")
     m.require(-p.R_close, "governor.R_close must be below 0")
 
 

@@ -39,6 +39,9 @@ from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and
 
 SOURCE = "typical data, IEEE PES-TR1"
 
+LONGEST_DELAY = 0.25
+"""Longest delay of an engine [s]: Padé's fraction of second order keeps its phase within 3 degrees up to 8 rad/s."""
+
 
 power = partial(per_unit, base="S_n", source=SOURCE)
 time = partial(time_constant, source=SOURCE)
