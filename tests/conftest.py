@@ -2,6 +2,7 @@
 
 import gc
 import os
+import signal
 from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
@@ -29,6 +30,10 @@ def pytest_configure(config):
     In CI a skip that is not on the list fails the session; with xdist the process that started the others counts.
     """
     gc.disable()
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        # a shell starts what runs in its background deaf to Ctrl-C, and all that this starts would
+        # be: tests of interrupts would wait for ever
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if in_ci() and not hasattr(config, "workerinput"):
         config.pluginmanager.register(Skips(), "skips")
     if MEASURED in os.environ:

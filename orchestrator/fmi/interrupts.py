@@ -113,7 +113,9 @@ class Deferral:
         if sys.platform == "win32":
             _thread.interrupt_main(signal.SIGINT)
         else:
-            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+            deaf = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+            again = signal.SIGTERM if deaf else signal.SIGINT
+            signal.pthread_kill(threading.main_thread().ident or 0, again)
 
 
 class _Calls:
@@ -139,6 +141,9 @@ class _Calls:
 
     def watch(self) -> None:
         """Take Ctrl-C over from Python, where nobody else has; between calls it works as before.
+
+        A process that was started deaf to it, as in the background of a script, stays so, as every program of Unix: a
+        Ctrl-C at the script is not meant for it. SIGTERM ends it in order.
 
         Where Python would swallow it, as in a weak reference's end, it comes again at the next line of ours."""
         here = threading.current_thread() is threading.main_thread()

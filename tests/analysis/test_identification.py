@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from orchestrator.analysis.identification import identify_modes, nearest, sampling
+from orchestrator.analysis.identification import averaging, identify_modes, nearest, sampling
 from orchestrator.errors import AnalysisError
 
 TIMES = np.arange(0, 18, 0.005)
@@ -126,3 +126,12 @@ def test_modes_do_not_depend_on_the_unit_of_the_signal(unit):
     assert [m.amplitude for m in other] == pytest.approx(
         [unit * m.amplitude for m in one], rel=1e-6
     )
+
+
+@pytest.mark.parametrize("mean", [0.0, 50.0, -50.0])
+def test_what_is_too_fast_is_averaged_beside_any_mean(mean):
+    """A hum beside a frequency of 50 Hz is small beside the mean, and not beside what moves."""
+    t = np.arange(2000) * 1e-3
+    slow, hum = np.exp(-0.3 * t) * np.cos(6 * t), 0.3 * np.cos(2 * np.pi * 180 * t)
+    assert len(averaging(mean + slow + hum, 10)) > 1
+    assert len(averaging(mean + slow, 10)) == 1

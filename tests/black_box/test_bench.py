@@ -37,3 +37,16 @@ def test_the_highest_odd_multiple_in_the_range_is_a_line(highest, last):
     lines = odd_lines(1.0, highest, 9)
     assert (lines[0], lines[-1]) == (1, last)
     assert (lines % 2 == 1).all()
+
+
+def test_a_response_is_the_deviation_from_the_operating_point(monkeypatch):
+    rest, at_rest = np.array([1.0, -2.0]), np.array([7.0, -4.0, 0.5])
+    D = np.array([[0.5, -2.0], [3.0, 0.25], [0.0, 1.0]])
+    run = object.__new__(Runs)
+    run._bench = SimpleNamespace(rest=rest)
+    run.operating_point = at_rest
+    monkeypatch.setattr(run, "_rewind", lambda: None)
+    monkeypatch.setattr(run, "_drive", lambda inputs: at_rest + (inputs - rest) @ D.T)
+    deviations = np.array([[0.0, 0.0], [0.1, -0.3]])
+    (found,) = run.respond([deviations])
+    np.testing.assert_allclose(found, deviations @ D.T, atol=1e-12)

@@ -211,6 +211,33 @@ def test_a_second_sigterm_ends_the_process_at_once():
     assert (result.returncode, result.stdout) == (-signal.SIGTERM, "still here\n")
 
 
+_DEAF = """
+import signal
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+from orchestrator.fmi.interrupts import calls
+
+with calls.terminable():
+    signal.raise_signal(signal.SIGINT)
+    print("still here", flush=True)
+    try:
+        signal.raise_signal(signal.SIGTERM)
+    except KeyboardInterrupt:
+        print(calls.how)
+"""
+
+
+def test_a_process_of_a_scripts_background_hears_sigterm_alone():
+    """As every program does that a shell has started deaf to Ctrl-C."""
+    result = subprocess.run(
+        [sys.executable, "-c", _DEAF], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert result.stdout == "still here\nended by SIGTERM\n"
+
+
+def test_the_suite_hears_ctrl_c_however_it_was_started():
+    assert signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
+
+
 def test_the_command_line_ends_with_the_code_of_sigterm(gfor, monkeypatch):
     from orchestrator.cli import info  # noqa: PLC0415
 

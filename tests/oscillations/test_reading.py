@@ -9,7 +9,7 @@ import pytest
 
 from orchestrator.errors import InputError
 from orchestrator.oscillations.measurements import Site
-from orchestrator.oscillations.reading import contest_cases, read_contest
+from orchestrator.oscillations.reading import _table, contest_cases, read_contest
 from orchestrator.oscillations.verdict import locate
 from orchestrator.oscillations.view import Sources
 from tests.support.forced_records import record, sine, times_of
@@ -181,3 +181,16 @@ def test_a_part_of_a_record_without_samples(gfor, tmp_path, measured, part, rule
     assert code == 2
     assert err.count("error:") == 1
     assert rule.format(path) in err
+
+
+def test_a_table_of_the_contest_may_have_one_column(tmp_path):
+    path = tmp_path / "one.txt"
+    path.write_text("'Time' '1|A'\n0 1\n0.1 2\n", encoding="utf-8")
+    times, columns = _table(path)
+    assert (times.tolist(), {n: x.tolist() for n, x in columns.items()}) == (
+        [0.0, 0.1],
+        {"1|A": [1.0, 2.0]},
+    )
+    path.write_text("'Time'\n0\n0.1\n", encoding="utf-8")
+    with pytest.raises(InputError, match="1 names in quotes"):
+        _table(path)
