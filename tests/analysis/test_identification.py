@@ -128,9 +128,9 @@ def test_modes_do_not_depend_on_the_unit_of_the_signal(unit):
     )
 
 
-@pytest.mark.parametrize("mean", [0.0, 50.0, -50.0])
+@pytest.mark.parametrize("mean", [0.0, 1e5, -1e5])
 def test_what_is_too_fast_is_averaged_beside_any_mean(mean):
-    """A hum beside a frequency of 50 Hz is small beside the mean, and not beside what moves."""
+    """A hum is nothing beside a power of 100 GW, and much beside what moves."""
     t = np.arange(2000) * 1e-3
     slow, hum = np.exp(-0.3 * t) * np.cos(6 * t), 0.3 * np.cos(2 * np.pi * 180 * t)
     assert len(averaging(mean + slow + hum, 10)) > 1

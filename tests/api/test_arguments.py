@@ -1,5 +1,7 @@
 """What a user may type in Python: one clear error of our own, or what was meant; never another answer in silence."""
 
+import inspect
+
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -486,3 +488,9 @@ def test_an_fmu_takes_times_with_a_unit_and_refuses_others(fmu):
     for wanted in ({"stop": -1}, {"stop": "x"}, {"binding": 3}):
         with pytest.raises(InputError):
             gfor.open_fmu(fmu, **wanted)
+
+
+@pytest.mark.parametrize("study", [gfor.certify, gfor.verify])
+def test_python_starts_no_processes_unless_it_is_asked(study):
+    """A script without a main guard would start itself again in each."""
+    assert inspect.signature(study).parameters["workers"].default == 1
