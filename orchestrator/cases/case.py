@@ -47,6 +47,7 @@ BUILT_IN = Path(__file__).parent
 _SCHEMA_PASSES = 50
 _SOURCES = {
     ".raw": ("a network of PSS/E", "network", "raw"),
+    ".rawx": ("a network of PSS/E", "network", "raw"),
     ".dyr": ("dynamics data of PSS/E", "units", "dyr"),
     ".m": ("a MATPOWER case", "network", "matpower"),
     ".mat": ("a MATPOWER case", "network", "matpower"),

@@ -17,7 +17,7 @@ from orchestrator.cases.csv_rows import number, rows_of
 from orchestrator.cases.names import close_names
 from orchestrator.cases.network_data import bus_name
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.psse.records import read_records
+from orchestrator.cases.psse.raw_file import read_file
 from orchestrator.cases.short_circuit import source_impedance
 from orchestrator.errors import InputError, Problem, few
 from orchestrator.fmi.description import FmuDescription
@@ -33,6 +33,7 @@ _TABLES = {
 
 _FILES = {
     ".raw": "raw",
+    ".rawx": "raw",
     ".m": "matpower",
     ".mat": "matpower",
     ".json": "pandapower",
@@ -271,8 +272,8 @@ class _Place:
 def _called(files: Sequence[Path]) -> dict[str, list[str]]:
     """The buses by the names that a RAW file gives them."""
     found: dict[str, list[str]] = {}
-    raw = [path for path in files if path.suffix.lower() == ".raw"]
-    for record in (record for path in raw for record in read_records(path).of("bus")):
+    raw = [path for path in files if path.suffix.lower() in (".raw", ".rawx")]
+    for record in (record for path in raw for record in read_file(path).of("bus")):
         found.setdefault(record.text(1, "").strip(), []).append(
             bus_name(str(record.whole(0, "the bus' number")))
         )

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from orchestrator.cases.network_sources import SourceTables
-from orchestrator.cases.psse.records import RawFile, Record, leave_out, read_records
+from orchestrator.cases.psse.raw_file import read_file
+from orchestrator.cases.psse.records import RawFile, Record, leave_out
 from orchestrator.cases.psse.transformers import Transformer, star, transformers
 from orchestrator.cases.source_changes import Changes
 from orchestrator.errors import Problem
@@ -63,7 +64,7 @@ class RawNetwork:
 def read_raw(
     path: Path, leaving_out: Sequence[str] = (), *, keep_load_parts: bool = False
 ) -> RawNetwork:
-    raw = read_records(path)
+    raw = read_file(path)
     return _Reading(raw, Changes(raw.place), keep_load_parts).network(leaving_out)
 
 

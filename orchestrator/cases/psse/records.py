@@ -110,7 +110,7 @@ class RawFile:
 
 
 def read_records(path: Path) -> RawFile:
-    lines = _numbered(_text_of(path))
+    lines = _numbered(text_of(path))
     first = next(lines, None)
     if first is None:
         raise InputError(f"{path}: it is empty; export the case from PSS/E as RAW")
@@ -138,7 +138,8 @@ def read_records(path: Path) -> RawFile:
     return RawFile(str(path), revision, base, frequency or None, *_sections(path, revision, lines))
 
 
-def _text_of(path: Path) -> str:
+def text_of(path: Path) -> str:
+    """The text of a file of PSS/E, if it is one."""
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; give the path of a PSS/E RAW file")
     if (size := path.stat().st_size) > MOST_BYTES:
@@ -147,10 +148,6 @@ def _text_of(path: Path) -> str:
     if b"\x00" in content[:4096]:
         raise InputError(
             f"{path}: it is no text, perhaps a saved case (.sav); export it from PSS/E as RAW"
-        )
-    if content.lstrip()[:1] == b"{":
-        raise InputError(
-            f"{path}: it is JSON, perhaps RAWX; export the case from PSS/E as RAW, revision 33 to 36"
         )
     return visible(content.decode("utf-8-sig", errors="replace"))
 

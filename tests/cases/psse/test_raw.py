@@ -366,7 +366,7 @@ def test_a_file_that_cannot_be_used(old, new, words, written):
     [
         (b"", "it is empty; export the case from PSS/E as RAW"),
         (b"\x00\x01saved", r"it is no text, perhaps a saved case \(.sav\)"),
-        (b'{"network": {}}', "it is JSON, perhaps RAWX; export the case"),
+        (b'{"network": {}}', "network.bus has no rows; export the case"),
         (
             b"0,100,33,0,0,60\n\n\n1,'A',16,3\n",
             "grid.raw: it ends within its bus data; export the case once more",
