@@ -65,7 +65,7 @@ class WantedCase:
 
     files: tuple[Path, ...]
     out: Path
-    converter: WantedConverter | None = None
+    converters: tuple[WantedConverter, ...] = ()
     device: Path | None = None
     binding: Path | None = None
     is_dll: bool = False
@@ -148,10 +148,10 @@ def write_case(wanted: WantedCase) -> NewCase:
             wanted, slack=wanted.slack or largest, frequency=wanted.frequency or "50 Hz"
         )
     base = _prepared(_Text(wanted, sources).text, wanted, ["base"])[0]
-    place = (
-        None if wanted.converter is None else _placed(wanted.converter, base, _called(wanted.files))
-    )
-    draft = _Text(wanted, sources, base, place, _switched(device))
+    places: list[_Place] = []
+    for converter in wanted.converters:
+        places.append(_placed(converter, base, _called(wanted.files), places))
+    draft = _Text(wanted, sources, base, _named(places), _switched(device))
     scenarios = _prepared(draft.text, wanted, [])
     questions = dict.fromkeys(q for prepared in scenarios for q in prepared.questions)
     text = _commented(draft.text, list(questions), sources)
@@ -257,16 +257,35 @@ class _Place:
     v_pu: float
     slack: str
     less: str | None = None
-    before_mw: float = 0.0
+    before_mw: float = 0.0  # less what the converters before this one took over
     rating_mva: float = 1.0
+    name: str = _CONVERTER
+    injection: str = _INJECTION  # the same power without dynamics
+
+    @property
+    def left_mw(self) -> float:
+        """What the machine still feeds."""
+        return self.before_mw - self.wanted.p_mw
 
     @property
     def changed(self) -> dict[str, str]:
         """Values of every scenario with the converter."""
-        if self.wanted.replaces:
+        if self.wanted.replaces or not self.less:
             return {}
-        left = (self.before_mw - self.wanted.p_mw) / self.rating_mva
-        return {f"{self.less}.P_0": f"{left:.6f}"} if self.less else {}
+        return {f"{self.less}.P_0": f"{self.left_mw / self.rating_mva:.6f}"}
+
+
+def _named(places: Sequence[_Place]) -> tuple[_Place, ...]:
+    """Several converters bear the names of their buses, ``gfor_9``; one is ``gfor``."""
+    if len(places) < 2:
+        return tuple(places)
+    found: list[_Place] = []
+    for place in places:
+        name = place.bus.removeprefix("bus_")
+        same = sum(one.bus == place.bus for one in found)
+        name += f"_{same + 1}" if same else ""
+        found.append(replace(place, name=f"{_CONVERTER}_{name}", injection=f"{_INJECTION}_{name}"))
+    return tuple(found)
 
 
 def _called(files: Sequence[Path]) -> dict[str, list[str]]:
@@ -281,7 +300,10 @@ def _called(files: Sequence[Path]) -> dict[str, list[str]]:
 
 
 def _placed(
-    wanted: WantedConverter, base: PreparedScenario, called: Mapping[str, Sequence[str]]
+    wanted: WantedConverter,
+    base: PreparedScenario,
+    called: Mapping[str, Sequence[str]],
+    others: Sequence[_Place] = (),
 ) -> _Place:
     network, flow = base.network, base.power_flow
     if network is None or flow is None:
@@ -319,6 +341,13 @@ def _placed(
         )
     rating = plans[wanted.less].number("S_n")
     power = flow.powers[wanted.less].real * rating
+    sharing = [one for one in others if one.less == wanted.less]
+    if sharing and (wanted.replaces or sharing[-1].wanted.replaces):
+        raise InputError(
+            f"--converter: {wanted.less} is replaced, and another converter names it too; write "
+            f"'less {wanted.less}' at both, or another machine"
+        )
+    power -= sum(one.wanted.p_mw for one in sharing)
     if wanted.replaces:
         if wanted.less in at_slack:
             raise InputError(
@@ -348,23 +377,23 @@ class _Text:
         wanted: WantedCase,
         sources: dict[str, Path],
         base: PreparedScenario | None = None,
-        place: _Place | None = None,
+        places: Sequence[_Place] = (),
         pods: Mapping[str, bool] = MappingProxyType({}),
     ) -> None:
         self._pods = pods
-        self._wanted, self._sources, self._base, self._place = wanted, sources, base, place
+        self._wanted, self._sources, self._base, self._places = wanted, sources, base, places
         self._stray, self._stray_why = _stray_capacitance(base) if base else (0.05, "")
         self._network = base.network if base else None
         largest = max(
             self._network.loads if self._network else (), key=lambda load: load.p_mw, default=None
         )
         buses = self._network.buses if self._network else ("",)
-        self._fault_bus = place.bus if place else largest.bus if largest else buses[0]
+        self._fault_bus = places[0].bus if places else largest.bus if largest else buses[0]
 
     def assumed(self, questions: int) -> list[str]:
         lines, device = [], self._wanted.device
-        if self._place is not None:
-            p, w = self._place, self._place.wanted
+        for p in self._places:
+            w = p.wanted
             dispatch = f"the slack ({p.slack}) feeds {w.p_mw:g} MW less"
             if w.replaces:
                 dispatch = f"{p.less} is gone ({p.before_mw:.5g} MW before); the slack ({p.slack}) feeds the difference"
@@ -372,9 +401,9 @@ class _Text:
                 dispatch = f"{p.less} feeds {w.p_mw:g} MW less ({p.before_mw:.5g} before), with its rating and inertia"
             ours = "ours, with the POD gains of the paper's system (`gfor design` finds others)"
             what = ours if device is None else device.name
-            lines.append(
-                f"converter: {what}; at {p.bus} it holds the {p.v_pu:g} pu of the base; {dispatch}"
-            )
+            called = "converter" if len(self._places) == 1 else p.name
+            holding = f"at {p.bus} it holds the {p.v_pu:g} pu of the base"
+            lines.append(f"{called}: {what}; {holding}; {dispatch}")
         if "dyr" not in self._sources:
             lines.append(
                 "machines: no dynamics data, so all are a steam turbine's with exciter ST1: typical data"
@@ -409,7 +438,7 @@ class _Text:
 
     @property
     def text(self) -> str:
-        w, place = self._wanted, self._place
+        w, places = self._wanted, self._places
         key = next(key for key in self._sources if key not in ("dyr", "units"))
         kind, other = w.kind, "phasor" if w.kind == "emt" else "emt"
         steps = {"emt": "100 us", "phasor": "2 ms"}
@@ -435,13 +464,11 @@ class _Text:
         return _TEMPLATE.format(
             command=w.command,
             name=_quoted(re.sub(r"[^0-9A-Za-z_]+", "_", w.out.stem).strip("_") or "case"),
-            title=_quoted(
-                self._sources[key].name + (f" with a converter at {place.bus}" if place else "")
-            ),
+            title=_quoted(self._sources[key].name + self._with_converters),
             source=_quoted(", ".join(path.name for path in self._sources.values())),
             models=both if w.device is None else "",
             step=steps[kind],
-            record=', "grid.line_*.p"' * lines + ', "gfor.*"' * (place is not None),
+            record=', "grid.line_*.p"' * lines + "".join(f', "{place.name}.*"' for place in places),
             other=rest + stray[other] if w.device is None else "",
             slack=(f"\nslack = {_quoted(w.slack)}" if w.slack else "")
             + "\nreactive_limits = true" * w.reactive_limits,
@@ -473,39 +500,58 @@ class _Text:
             tables.append(f"buses = {_listed(buses)}")
         return "\n".join(tables)
 
-    def _converter(self) -> str:
-        if self._place is None:
+    @property
+    def _with_converters(self) -> str:
+        """Where the converters are, as the end of a title."""
+        if not self._places:
             return ""
-        w, device, place = self._wanted, self._wanted.device, self._place.wanted
+        word = "a converter" if len(self._places) == 1 else "converters"
+        return f" with {word} at {', '.join(place.bus for place in self._places)}"
+
+    def _converter(self) -> str:
+        return "".join(map(self._component, self._places))
+
+    def _component(self, at: _Place) -> str:
+        """The tables of one converter, and of the same power without dynamics."""
+        w, device, place = self._wanted, self._wanted.device, at.wanted
         what = 'model = "gfor"' if w.kind == "emt" else 'model = "gfor_phasor"'
         if device is not None:
             what = f"{'dll' if w.is_dll else 'fmu'} = {self._path(device)}"
             what += f"\nbinding = {self._path(w.binding)}" if w.binding else ""
+        if len(self._places) > 1:
+            what += f"\nvendor = {_quoted(at.name)}    # for `gfor interactions`: whose make it is"
         power = f"P_0 = {place.p_mw / place.rating_mva:.6g}"
-        values = f'S_n = "{place.rating_mva:g} MVA", {power}, v_0 = {self._place.v_pu:g}'
+        values = f'S_n = "{place.rating_mva:g} MVA", {power}, v_0 = {at.v_pu:g}'
         without = values + "".join(
             f", pod_{x}.enabled = false" for x, starts in self._pods.items() if starts
         )
         still = f'model = "static_generation{"" if w.kind == "emt" else "_phasor"}"'
         parts = (
-            (_CONVERTER, what, without, f"P_0 in parts of S_n: {place.p_mw:g} MW"),
-            (_INJECTION, still, values, "the same power without dynamics, in [scenarios.dispatch]"),
+            (at.name, what, without, f"P_0 in parts of S_n: {place.p_mw:g} MW"),
+            (
+                at.injection,
+                still,
+                values,
+                "the same power without dynamics, in [scenarios.dispatch]",
+            ),
         )
         return "".join(
-            f'\n[components.{name}]\n{kind}\nbus = "{self._place.bus}"\nparameters = {{ {given} }}    # {why}\n'
+            f'\n[components.{name}]\n{kind}\nbus = "{at.bus}"\nparameters = {{ {given} }}    # {why}\n'
             for name, kind, given, why in parts
         )
 
     def _scenarios(self) -> list[list[str]]:
-        removed = [f"remove = {_listed((_CONVERTER, _INJECTION))}"] if self._place else []
+        devices = [x for place in self._places for x in (place.name, place.injection)]
+        removed = [f"remove = {_listed(devices)}"] if devices else []
         found = [["[scenarios.base]", 'title = "As in the files"', *removed]]
         if self._base is None or self._network is None:
             return found
-        if self._place is not None:
-            found.append(self._scenario("dispatch", "Dispatch without the device", beside=""))
-            found.append(self._scenario("converter", "Converter"))
+        if self._places:
+            without = "the device" if len(self._places) == 1 else "the devices"
+            found.append(self._scenario("dispatch", f"Dispatch without {without}", beside=""))
+            found.append(self._scenario("converter", f"Converter{'s' * (len(self._places) > 1)}"))
             found += [
-                self._scenario(f"pod_{x}", f"POD-{x.upper()}", f"gfor.pod_{x}.enabled")
+                self._scenario(f"pod_{x}", f"POD-{x.upper()}", f"pod_{x}.enabled")
                 for x in self._pods
             ]
         fault = f'type = "bus_fault", time = "1 s", bus = "{self._fault_bus}", duration = "100 ms"'
@@ -525,20 +571,24 @@ class _Text:
     def _scenario(
         self, name: str, title: str, enabled: str = "", beside: str = "dispatch"
     ) -> list[str]:
-        p = self._place
-        values = [f'"{key}" = {value}' for key, value in p.changed.items()] if p else []
-        values += [f'"{enabled}" = true'] if enabled else []
-        less = (
-            f"    # {p.less}: {p.before_mw - p.wanted.p_mw:.5g} for {p.before_mw:.5g} MW"
-            if p and p.changed
-            else ""
-        )
-        gone = [_CONVERTER if name == "dispatch" else _INJECTION] if p else []
-        gone += [p.less] if p and p.less and p.wanted.replaces else []
+        places = self._places
+        changed = {key: value for p in places for key, value in p.changed.items()}
+        values = [f'"{key}" = {value}' for key, value in changed.items()]
+        values += [f'"{p.name}.{enabled}" = true' for p in places if enabled]
+        before: dict[str, float] = {}
+        left: dict[str, float] = {}
+        for p in (p for p in places if p.changed and p.less):
+            before.setdefault(str(p.less), p.before_mw)
+            left[str(p.less)] = p.left_mw
+        less = "; ".join(f"{unit}: {mw:.5g} for {before[unit]:.5g} MW" for unit, mw in left.items())
+        gone = [p.name if name == "dispatch" else p.injection for p in places]
+        gone += [p.less for p in places if p.less and p.wanted.replaces]
         settings = [f"remove = {_listed(gone)}"] if gone else []
         told = f"beside = {_quoted(beside)}    # `gfor modes` tells what the device brings"
-        settings += [told] if p and beside else []
-        settings += [f"set = {{ {', '.join(values)} }}{less}"] if values else []
+        settings += [told] if places and beside else []
+        settings += (
+            [f"set = {{ {', '.join(values)} }}{f'    # {less}' if less else ''}"] if values else []
+        )
         return [f"[scenarios.{name}]", f'title = "{title}"', *settings]
 
     def _plots(self) -> list[list[str]]:
@@ -555,12 +605,15 @@ class _Text:
         ]
         found = [_plot("speeds", [(speeds, "Speed [pu]")])] if speeds else []
         found.append(_plot("voltages", [([f"grid.{bus}.v" for bus in buses], "v [pu]")]))
-        if self._place is not None:
-            current = f"gfor.{'current_demand' if self._wanted.kind == 'emt' else 'current_limit'}"
+        if self._places:
+            current = f"{'current_demand' if self._wanted.kind == 'emt' else 'current_limit'}"
             panels = [
-                (["gfor.p"], "p [pu]"),
-                (["gfor.q"], "q [pu]"),
-                ([current], "Current / limit"),
+                ([f"{place.name}.{signal}" for place in self._places], label)
+                for signal, label in (
+                    ("p", "p [pu]"),
+                    ("q", "q [pu]"),
+                    (current, "Current / limit"),
+                )
             ]
             found.append(_plot("converter", panels[: 3 if self._wanted.device is None else 2]))
         return found

@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _wanted(options: argparse.Namespace) -> WantedCase:
     device = options.fmu or options.dll
-    if (device or options.binding) and options.converter is None:
+    if (device or options.binding) and not options.converter:
         raise InputError(
             "--fmu, --dll and --binding are for a converter; say where by --converter 'bus 9, 300 MVA, 200 MW'"
         )
@@ -76,7 +76,7 @@ def _wanted(options: argparse.Namespace) -> WantedCase:
     return WantedCase(
         tuple(options.files),
         out,
-        None if options.converter is None else read_converter(options.converter),
+        tuple(map(read_converter, options.converter or ())),
         device,
         options.binding,
         options.dll is not None,
@@ -116,8 +116,8 @@ def _ask(options: argparse.Namespace) -> None:
             _with_unit(line("Its power in MW, such as 200"), "MW"),
         ]
         less = line("Machine that feeds so much less, such as sg3 [the slack]")
-        options.converter = ", ".join([*parts, *([f"less {less}"] if less else [])])
-        read_converter(options.converter)
+        options.converter = [", ".join([*parts, *([f"less {less}"] if less else [])])]
+        read_converter(options.converter[0])
         device = line("A vendor's FMU, or the file of a device around a DLL [our converter]")
         if device and is_vendor_file(Path(device)):
             options.dll = Path(device)

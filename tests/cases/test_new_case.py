@@ -35,7 +35,8 @@ def files(tmp_path):
 
 def made(files, converter=CONVERTER, **more):
     out = files[0].parent / "case.toml"
-    new = write_case(WantedCase(files, out, converter and read_converter(converter), **more))
+    texts = [converter] if isinstance(converter, str) else converter or ()
+    new = write_case(WantedCase(files, out, tuple(map(read_converter, texts)), **more))
     out.write_text(new.text, encoding="utf-8")
     return load_case(out), new
 

@@ -1,0 +1,89 @@
+"""Two converters from one `gfor new`: their names, what machines feed less, and what other commands make of them."""
+
+import pytest
+
+from orchestrator.cases.case import load_case
+from orchestrator.cases.new_case import WantedCase, read_converter, write_case
+from orchestrator.coordinated_design.study import PointsDesignRequest, plan_points_design
+from orchestrator.errors import InputError
+from orchestrator.study.modes import compute_modes
+from tests.screening.five_machines import POWERS, five_machines
+
+A, B = "bus 13, 100 MVA, 60 MW, less sg3", "bus 15, 80 MVA, 30 MW, less sg3"
+
+
+@pytest.fixture
+def made(tmp_path):
+    five_machines(tmp_path)
+
+    def write(*converters):
+        files, out = (tmp_path / "five.raw", tmp_path / "five.dyr"), tmp_path / "case.toml"
+        new = write_case(WantedCase(files, out, tuple(map(read_converter, converters))))
+        out.write_text(new.text, encoding="utf-8")
+        return load_case(out), new
+
+    return write
+
+
+def test_two_converters_bear_the_names_of_their_buses_and_share_what_a_machine_feeds_less(made):
+    case, new = made(A, B)
+    base, dispatch, both, pods = case.prepare(["base", "dispatch", "converter", "pod_p"])
+    assert not {"gfor_13", "gfor_15", "injection_13"} & set(base.system.components)
+    assert {"injection_13", "injection_15"} <= set(dispatch.system.components)
+    assert {"gfor_13", "gfor_15"} <= set(both.system.components)
+    powers = {name: power.real for name, power in both.power_flow.powers.items()}
+    fed = {name: powers[name] * both.system.components[name].number("S_n") for name in powers}
+    assert fed["sg3"] == pytest.approx(POWERS[3] - 60 - 30, rel=1e-5)
+    assert (fed["gfor_13"], fed["gfor_15"]) == pytest.approx((60.0, 30.0))
+    assert compute_modes(both).stability.stable
+    on = {name for name in ("gfor_13", "gfor_15") if pods.values[f"{name}.pod_p.enabled"]}
+    assert on == {"gfor_13", "gfor_15"}
+    assert "sg3: 70 for 160 MW" in new.text
+    # each question once, and none about a power that the command itself has set
+    assert not any("P_0" in str(question) for question in both.questions)
+    assert len(set(map(str, both.questions))) == len(both.questions)
+
+
+def test_two_at_one_bus_have_two_names(made):
+    case, _ = made(A, A.replace("60", "20"))
+    (both,) = case.prepare(["converter"])
+    assert {"gfor_13", "gfor_13_2"} <= set(both.system.components)
+
+
+def test_one_converter_is_gfor_as_before(made):
+    case, _ = made(A)
+    assert "gfor" in case.prepare(["converter"])[0].system.components
+
+
+@pytest.mark.parametrize(
+    ("second", "said"),
+    [
+        ("bus 15, 200 MVA, 110 MW, less sg3", "sg3 feeds 100 MW and cannot feed 110 MW less"),
+        ("bus 15, 200 MVA, 30 MW, instead of sg3", "sg3 is replaced, and another converter names"),
+        ("bus 15, 200 MVA, 100 MW, less sg3", "sg3 would feed nothing"),
+    ],
+)
+def test_what_two_cannot_take_together_is_refused(made, second, said):
+    with pytest.raises(InputError, match=said):
+        made(A, second)
+
+
+def test_the_command_takes_both_and_a_design_takes_them_as_pairs(gfor, made, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    made(A)
+    code, out, err = gfor(
+        "new", "five.raw", "five.dyr", "--converter", A, "--converter", B, "--out", "two.toml"
+    )
+    assert (code, err) == (0, "")
+    assert "gfor_13: ours" in out
+    (tmp_path / "points.csv").write_text("name,load\nusual,1\n")
+    request = PointsDesignRequest(
+        "points.csv",
+        ("pod_p", "pod_q"),
+        scenario="converter",
+        components=("gfor_13", "gfor_15"),
+        ranked=0,
+    )
+    plan = plan_points_design(load_case(tmp_path / "two.toml"), request)
+    assert [group.name for group in plan.groups] == ["gfor_13: pod_p", "gfor_15: pod_q"]
+    assert len(plan.candidates) == 2
