@@ -188,7 +188,7 @@ def check_fmu(
             runner.run(wanted)
         finally:
             runner.close()
-        report.results = _without_consequences(report, subject.description)
+        report.results = without_consequences(report, subject.description)
     finally:
         remove_tree(directory)
     return report
@@ -206,7 +206,7 @@ def _unpacked(fmu: Path) -> base.CheckResult:
     )
 
 
-def _without_consequences(
+def without_consequences(
     report: AcceptanceReport, described: FmuDescription
 ) -> list[base.CheckResult]:
     """The results, without faults that follow from another one."""

@@ -4,7 +4,13 @@ import json
 
 import pytest
 
+from orchestrator.acceptance.checks import base
+from orchestrator.acceptance.runner import AcceptanceReport, without_consequences
+from orchestrator.binding.binding import bound_fmu
+from orchestrator.binding.misfits import WRONG_FREQUENCY
+from orchestrator.cases.names import hint_at
 from orchestrator.cli import main
+from orchestrator.fmi.description import read_description
 
 
 @pytest.fixture
@@ -66,3 +72,43 @@ def test_the_binding_alone_can_be_checked(checked):
 def test_the_binding_alone_needs_a_binding(gallery, capsys):
     assert main(["fmu", "check", str(gallery("converter")[0]), "--only", "binding"]) == 2
     assert "needs a binding" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("rating", "others", "kept"),
+    [
+        ("15 MVA", ["wrong base"], False),  # behind a wrong rating the frequency is none to judge
+        ("15 MVA", ["invalid FMI"], True),
+        ("15 MVA", [], True),
+        ("1500 MVA", ["wrong base"], True),
+    ],
+)
+def test_a_wrong_rating_is_one_problem(rating, others, kept, gallery, tmp_path):
+    fmu, binding = gallery("converter_qd_si")
+    text = binding.read_text(encoding="utf-8")
+    assert 'S_n = "1500 MVA"' in text
+    path = tmp_path / "rated.toml"
+    path.write_text(text.replace('S_n = "1500 MVA"', f'S_n = "{rating}"'), encoding="utf-8")
+    described = bound_fmu(fmu, path)
+    assert bool(described.likely_cause()) == (rating == "15 MVA")
+    report = AcceptanceReport(fmu, path)
+    faults = [("rated_frequency", WRONG_FREQUENCY), *(("power_balance", other) for other in others)]
+    report.results += [base.failed(check, fault, "seen") for check, fault in faults]
+    left = [r.fault for r in without_consequences(report, described) if r.fault]
+    assert left == [WRONG_FREQUENCY] * kept + others
+
+
+def test_the_name_that_the_binding_gives_is_offered(gallery, tmp_path):
+    fmu, _ = gallery("converter_with_damping")
+    (own,) = [v.name for v in read_description(fmu).variables.values() if v.type == "Boolean"]
+    path = tmp_path / "pod.toml"
+    path.write_text(
+        '[rating]\nS_n = "1500 MVA"\nf_n = "50 Hz"\n'
+        '[voltage]\nform = "rectangular"\nvariables = ["v_re", "v_im"]\n'
+        '[current]\nform = "rectangular"\nvariables = ["i_re", "i_im"]\n'
+        f'[signals."pod_p.enabled"]\nvariable = "{own}"\n',
+        encoding="utf-8",
+    )
+    described = bound_fmu(fmu, path)
+    assert hint_at(described, own, [], "") == "the binding calls it pod_p.enabled: write that"
+    assert hint_at(described, "P_00", ["P_0"], "") == "did you mean P_0?"

@@ -3,7 +3,8 @@
 import pytest
 
 from orchestrator.binding.binding import _Reader
-from orchestrator.binding.scales import Bases
+from orchestrator.binding.scales import Bases, angle_unit_of, unit_of
+from orchestrator.fmi.description import VariableInfo
 
 BASES = Bases(1500.0, 230.0, 60.0)
 
@@ -73,3 +74,20 @@ def test_powers_need_one_sign():
     for signs in ((-1.0, 0.0, 0.0, 2.0), (1.0, 0.0, 0.0, -2.0)):
         with pytest.raises(ValueError, match="P and Q need one sign"):
             _Reader._power_matrix(signs, 3.0)
+
+
+def declared(unit):
+    return VariableInfo("x", 0, "Real", "output", "continuous", unit, None, None, None, "")
+
+
+def test_the_unit_1_is_a_unit():
+    """Per unit, unless the binding says more; of an angle it says nothing."""
+    assert unit_of(declared("1"), None) == "pu"
+    assert unit_of(declared("1"), "kV") == "kV"
+    with pytest.raises(ValueError, match="declares no unit for x"):
+        unit_of(declared(""), None)
+    with pytest.raises(
+        ValueError, match='in the unit 1, which says nothing of an angle; add "rad"'
+    ):
+        angle_unit_of(declared("1"), None)
+    assert angle_unit_of(declared("1"), "deg") == "deg"
