@@ -68,6 +68,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     name = ORIGIN[page.file.src_uri]
     text = markdown.replace("```sh first-run", "```sh").replace("<!-- commands -->", commands())
     text = text.replace("<!-- studies -->", studies())
+    text = re.sub(r"^::: (orchestrator\.\S+)$", _as_typed, text, flags=re.MULTILINE)
     text = FILE_MARK.sub(lambda found: f'```{found[3]} title="{found[2]}"\n', text)
     inside, listed, lines = False, False, []
     for line in _with_links(text, name, page.file.src_uri).splitlines():
@@ -143,6 +144,15 @@ def _command(name: str, words: str) -> str:
     )
 
 
+def _as_typed(found: re.Match[str]) -> str:
+    """A directive of mkdocstrings, headed by the name that people type: ``gfor.Scenario``."""
+    name = f"gfor.{found[1].rpartition('.')[2]}"
+    options = {"heading": name, "toc_label": name, "inherited_members": "true"}
+    return "\n".join(
+        [found[0], "    options:", *(f"      {key}: {value}" for key, value in options.items())]
+    )
+
+
 def studies() -> str:
     """What is made from the requests of studies; mkdocstrings reads files, and sees none."""
     from orchestrator.added import rooms, study_in  # noqa: PLC0415 - only the page of Python needs the package
@@ -156,7 +166,7 @@ def studies() -> str:
             f"Case.{name}",
             getattr(Case, name, None) or of_study(name, study_in(rooms()[name])),
         )  # an added study has none
-        for name in sorted({*rooms(), "design_over_points"})
+        for name in ("scenario", "choose", *sorted({*rooms(), "design_over_points"}))
     ]
     of_scenario = [
         (f"Scenario.{name}", getattr(Scenario, name))

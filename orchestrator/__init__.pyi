@@ -1,3 +1,5 @@
+from orchestrator.analysis.modes import Mode as Mode
+from orchestrator.analysis.stability import Stability as Stability
 from orchestrator.api.acceptance import Acceptance as Acceptance
 from orchestrator.api.acceptance import check as check
 from orchestrator.api.admittance import Admittance as Admittance
@@ -26,8 +28,12 @@ from orchestrator.api.results import Modes as Modes
 from orchestrator.api.results import Run as Run
 from orchestrator.api.saved import Saved as Saved
 from orchestrator.api.saved import open as open
+from orchestrator.api.scenario import CheckpointWarning as CheckpointWarning
+from orchestrator.api.scenario import RunEndedWarning as RunEndedWarning
 from orchestrator.api.scenario import Scenario as Scenario
+from orchestrator.api.scenario import UnusualDataWarning as UnusualDataWarning
 from orchestrator.api.source import source as source
+from orchestrator.cases.short_circuit import BusStrength as BusStrength
 from orchestrator.certification.compared import Verification as Verification
 from orchestrator.coordinated_design.view import CoordinatedDesign as CoordinatedDesign
 from orchestrator.errors import CosimError as CosimError

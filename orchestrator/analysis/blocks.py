@@ -14,6 +14,7 @@ from orchestrator.analysis.component_linearization import (
 from orchestrator.analysis.delays import WireLink, links_of
 from orchestrator.analysis.held_inputs import LineMap, over_parts
 from orchestrator.analysis.linear_model import Indices
+from orchestrator.analysis.remembered import remembered
 from orchestrator.analysis.sampled import repeating, steps_of_period
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import Schedule
@@ -236,7 +237,8 @@ def linearize_within(
 ) -> ComponentLinearization:
     """Linearise one component of a running system, which is given the step [s] meanwhile if it knows the step."""
     exchange, time = master.exchanges[name], master.time
-    with other_step(master, name, 0.0 if without_step else step_size):
+
+    def linearized() -> ComponentLinearization:
         if directional:
             return linearize_by_derivatives(exchange, time, step_size, inputs, observed)
         return linearize_component(
@@ -249,6 +251,10 @@ def linearize_within(
             idle=idle,
             once=once,
         )
+
+    with other_step(master, name, 0.0 if without_step else step_size):
+        asked = (step_size, *inputs, "", *observed, derivatives, directional, *sorted(idle), once)
+        return remembered(master, name, asked, linearized)
 
 
 def _has_many_inputs(master: Master, name: str) -> bool:

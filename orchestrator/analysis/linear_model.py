@@ -210,4 +210,13 @@ class Equations:
         rows, columns, values = (
             np.concatenate(part) for part in zip(*self._parts[name], strict=True)
         )
-        return sp.coo_array((values, (rows, columns)), shape=self._shapes[name]).tocsr()
+        shape = self._shapes[name]
+        order = np.lexsort((columns, rows))
+        rows, columns, values = rows[order], columns[order], values[order]
+        if np.any((rows[1:] == rows[:-1]) & (columns[1:] == columns[:-1])):
+            return sp.coo_array((values, (rows, columns)), shape=shape).tocsr()
+        begins = np.zeros(shape[0] + 1, dtype=np.int32)
+        np.cumsum(np.bincount(rows, minlength=shape[0]), out=begins[1:])
+        found = sp.csr_array((values, columns.astype(np.int32), begins), shape=shape)
+        found.has_canonical_format = True
+        return found

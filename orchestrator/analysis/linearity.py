@@ -88,8 +88,11 @@ def doubts(
             text = why.format(
                 narrow=", ".join(f"{name}.{what} by {size:g}" for what, size in narrow.items())
             )
-            worst = int(each[name].argmax())
-            found.append(Doubt(name, modes[worst], float(each[name][worst]), text, turns))
+            # what no component shifts beyond the normal alone, all of them do together
+            alone = each[name].max() > LARGEST_SHIFT
+            shifts = each[name] if alone else together
+            worst = int(shifts.argmax())
+            found.append(Doubt(name, modes[worst], float(shifts[worst]), text, turns))
     return found
 
 
@@ -110,7 +113,14 @@ def _shifts(
     varied = compose(other, schedule)
     if varied.names != model.names:  # even the pattern of direct feed-through differs
         return np.full(len(modes), np.inf)
-    shifts = np.array([_shift(model, varied, mode) for mode in modes])
+    sides = ("left", "shape")
+    left, right = (
+        np.array([[getattr(mode, side)[name] for mode in modes] for name in model.names])
+        for side in sides
+    )
+    values = np.array([mode.eigenvalue for mode in modes])
+    moved = eigenvalue_shifts(model, varied, values, left, right)
+    shifts: Vector = np.abs(moved) / np.maximum(np.abs(values), _SLOWEST)
     slow = np.array([abs(mode.eigenvalue) <= SLOW for mode in modes])
     if len(model.names) <= _DENSE and (shifts[slow] > LARGEST_SHIFT).any():
         shifts[slow] = np.minimum(shifts[slow], shift_of_slowest(model, varied, SLOW) / _SLOWEST)
@@ -123,22 +133,18 @@ def _may_turn(modes: Sequence[Mode], shifts: Vector) -> bool:
     return bool(np.any(shifts * sizes >= np.abs([mode.eigenvalue.real for mode in modes])))
 
 
-def _shift(model: LinearModel, varied: LinearModel, mode: Mode) -> float:
-    left, right = (
-        np.array([vector[name] for name in model.names]) for vector in (mode.left, mode.shape)
-    )
-    shift = eigenvalue_shift(model, varied, mode.eigenvalue, left, right)
-    return abs(shift) / max(abs(mode.eigenvalue), _SLOWEST)
-
-
-def eigenvalue_shift(
-    model: LinearModel, varied: LinearModel, eigenvalue: complex, left: Vector, right: Vector
-) -> complex:
-    """Δλ = lᴴ·(A' − A)·r [rad/s]; of a step map divided by μ·H, as λ = ln μ / H."""
-    change = complex(np.vdot(left, _apply(varied, right) - _apply(model, right)))
+def eigenvalue_shifts(
+    model: LinearModel, varied: LinearModel, eigenvalues: Vector, left: Vector, right: Vector
+) -> Vector:
+    """Δλ = lᴴ·(A' − A)·r [rad/s] of each mode, a column of ``left`` and ``right``; of a step map divided by μ·H, as
+    λ = ln μ / H."""
+    n = len(eigenvalues)
+    both = np.hstack([right.real, right.imag])  # the factors inside are real
+    difference = varied.apply(both) - model.apply(both)
+    moved = (left.conj() * (difference[:, :n] + 1j * difference[:, n:])).sum(axis=0)
     if model.step_size is not None:
-        change /= complex(np.exp(eigenvalue * model.step_size)) * model.step_size
-    return change
+        moved = moved / (np.exp(eigenvalues * model.step_size) * model.step_size)
+    return np.asarray(moved)
 
 
 def shift_of_slowest(model: LinearModel, varied: LinearModel, radius: float) -> float:
@@ -158,9 +164,3 @@ def shift_of_slowest(model: LinearModel, varied: LinearModel, radius: float) -> 
     left, right = left[:, :count], right[:, :count]
     moved = np.trace(np.linalg.solve(left.T @ right, left.T @ (changed - A) @ right))
     return float(abs(moved) / (step or 1.0))
-
-
-def _apply(model: LinearModel, z: Vector) -> Vector:
-    """A·z for a complex z: the factors inside are real."""
-    result: Vector = model.apply(z.real.copy()) + 1j * model.apply(z.imag.copy())
-    return result

@@ -68,14 +68,23 @@ class OfEigenvalue:
 
 @dataclass(frozen=True, repr=False)
 class Mode(OfEigenvalue):
-    """One eigenvalue λ [rad/s] with its participation factors and its shape."""
+    """One eigenvalue λ with its participation factors and its shape.
+
+    Attributes
+    ----------
+    eigenvalue
+        λ [rad/s], complex; ``frequency_hz`` and ``damping_percent`` are its own.
+    participation
+        Factor of every state, largest first; the factors of a mode sum to 1.
+    shape
+        Right eigenvector by state, scaled so that its largest element is 1.
+    left
+        Left eigenvector l by state, scaled so that lᴴ·shape is 1: it recognises the mode elsewhere.
+    """
 
     eigenvalue: complex
-    # factor of every state, largest first; the factors of a mode sum to 1
     participation: tuple[tuple[str, float], ...]
-    # right eigenvector by state name, scaled so that its largest element is 1
     shape: dict[str, complex]
-    # left eigenvector l by state name, scaled so that lᴴ·shape is 1: it recognises the mode elsewhere
     left: dict[str, complex] = field(default_factory=dict)
 
     def __repr__(self) -> str:
@@ -115,6 +124,7 @@ class Mode(OfEigenvalue):
         return together, [s for s in moving if s not in together]
 
     def participation_of(self, states: Iterable[str]) -> float:
+        """Participation of some states together."""
         wanted = set(states)
         return sum(factor for name, factor in self.participation if name in wanted)
 

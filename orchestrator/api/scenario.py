@@ -10,25 +10,28 @@ from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, cast
+from typing import Any, Self, cast
 
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.linear import LinearSystem
 from orchestrator.api.methods import in_turn, method
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.results import Modes, Run
-from orchestrator.asked import Names, flag, number_between
+from orchestrator.asked import Names, flag, frequency_range, number_between
 from orchestrator.asked import names as names_given
 from orchestrator.asked import path as path_of
 from orchestrator.cases.case import Case as CaseFile
-from orchestrator.cases.given import Time, in_seconds
+from orchestrator.cases.given import Time, case_values, in_seconds
 from orchestrator.cases.load_models import as_powers, is_open
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.service import in_service
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.cases.short_circuit import BusStrength, ShortCircuit
 from orchestrator.coupling.observers import Progress
 from orchestrator.coupling.schedule import ScheduleName
 from orchestrator.errors import InputError, Problem
 from orchestrator.late import pd, xr
+from orchestrator.operating_points.bench import PointBench
 from orchestrator.report.notebook import page
 from orchestrator.results.lock import held
 from orchestrator.results.recorded import IN_MEMORY
@@ -37,6 +40,7 @@ from orchestrator.sensitivities.request import SensitivitiesRequest
 from orchestrator.sensitivities.view import Sensitivities
 from orchestrator.study.checkpoints import EVERY, Checkpoints, not_kept
 from orchestrator.study.modes import ModesResult, compute_modes, running
+from orchestrator.study.modes import modes_of as modes_at_point
 from orchestrator.study.request import ModesRequest, Preparing, StepsRequest
 from orchestrator.study.run_request import RunRequest
 from orchestrator.study.step_choice import Allowed, StepChoice, choose_step
@@ -150,6 +154,7 @@ class Scenario:
     def __init__(self, prepared: PreparedScenario, file: CaseFile, asked: Preparing) -> None:
         self.prepared = prepared
         self._file, self._asked = file, asked
+        self._bench: PointBench | None = None
 
     def with_loads_as_powers(self) -> Scenario | None:
         """The same scenario with loads of constant power; None where the case says how its loads follow the voltage."""
@@ -218,6 +223,68 @@ class Scenario:
     run = method("Scenario.run", RunRequest, _run)
 
     @in_turn
+    def modes_at(
+        self,
+        values: Mapping[str, Any] | None = None,
+        frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
+    ) -> Modes:
+        """The modes with other values, on FMUs that stay open: what an optimiser evaluates.
+
+        The result is that of ``case.scenario(name, {...}).modes()`` to the last bit; what the values do not change is
+        not computed again. The FMUs are closed with the ``with`` that the scenario stands in, or by `close`.
+
+        Parameters
+        ----------
+        values
+            By ``component.variable``; they join the scenario's own.
+        frequencies
+            Frequencies shown [Hz].
+
+        Raises
+        ------
+        CaseError
+            With every problem of the values.
+        AnalysisError
+            If no steady state is found, or the system cannot be linearised.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> with gfor.load("two_area").scenario("pod_p") as scenario:
+        ...     for K in (100, 200):
+        ...         mode = scenario.modes_at({"gfor.pod_p.K": K}).named["electromechanical"]
+        ...         print(f"{K}: {mode.damping_percent:.1f} %")
+        100: 19.6 %
+        200: 22.6 %
+        """
+        changed, seen = case_values(values), frequency_range(frequencies)
+        prepared = self._prepared_with(changed) if changed else self.prepared
+        question([replace(prepared, questions=_new(prepared.questions, set(self.questions)))])
+        if self._bench is None:
+            self._bench = PointBench(remember=True)
+        try:
+            return Modes(modes_at_point(prepared, self._bench.master(in_service(prepared)), seen))
+        except BaseException:
+            self.close()
+            raise
+
+    @in_turn
+    def close(self) -> None:
+        """Close the FMUs that `modes_at` keeps open; calling it again does nothing."""
+        bench, self._bench = self._bench, None
+        if bench is not None:
+            bench.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"_bench": None}  # no other process, and no copy, has these FMUs
+
+    @in_turn
     def response(self, stop: Time | None = None) -> xr.Dataset:
         """The linear model's response to the scenario's events, over the time [s]; no FMU is stepped for it.
 
@@ -244,11 +311,11 @@ class Scenario:
 
         return response_at_steady_state(self._until(in_seconds(stop, "stop")))
 
-    def _prepared_with(self, changed: Mapping[str, float]) -> PreparedScenario:
+    def _prepared_with(self, changed: Mapping[str, Any]) -> PreparedScenario:
         (prepared,) = self._file.prepare(
             [self.name], dict(changed), self._asked.step_size, None, self._asked.layers
         )
-        return prepared
+        return self._asked.scheduled(prepared)
 
     def _until(self, stop_time: float | None) -> PreparedScenario:
         """The scenario with another stop time [s]: events after it are left out, and it must fit the step."""

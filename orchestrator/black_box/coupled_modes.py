@@ -6,6 +6,7 @@ always; the box's states in it are those of the fitted model and mean nothing on
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -157,14 +158,19 @@ def _with_boxes(
 ) -> tuple[ModesResult, Blocks]:
     boxes = [name for name, component in master.components.items() if is_black_box(component)]
     require_fitting()
-    most = 0.0
+    most, kept = 0.0, dict[tuple[Any, ...], tuple[ComponentLinearization, float]]()
 
     def identified(master: Master) -> dict[str, ComponentLinearization]:
         nonlocal most
         most, known = max(most, _check_still(master, boxes)), {}
         for name in boxes:
-            response, moved = _respond(master, name, excitation, report=report)
-            known[name] = _as_component(name, fit(response))
+            key = _measured(master, name)
+            if (
+                key not in kept
+            ):  # another scenario, for the names, often has the same box at the same point
+                response, moved = _respond(master, name, excitation, report=report)
+                kept[key] = _as_component(name, fit(response)), moved
+            known[name], moved = kept[key]
             most = max(most, moved)
         return known
 
@@ -173,6 +179,21 @@ def _with_boxes(
     return modes_from(
         prepared, master, point, blocks, frequency_range, critical, identified
     ), blocks
+
+
+def _measured(master: Master, name: str) -> tuple[Any, ...]:
+    """All that a component's measurement follows from."""
+    exchange, plan = master.exchanges[name], master.system.components[name]
+    return (
+        name,
+        plan.description.path,
+        plan.description.guid,
+        tuple(sorted(plan.parameters.items())),
+        tuple(sorted(plan.inputs.items())),
+        master.arriving(name).tobytes(),
+        exchange.outputs.values.tobytes(),
+        master.clock.step_size,
+    )
 
 
 def _respond(

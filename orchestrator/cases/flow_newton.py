@@ -1,6 +1,7 @@
 """Newton's method for a power flow, in polar voltages, with a sparse Jacobian and a shortened step where a whole one
 goes too far."""
 
+import pickle
 import warnings
 from dataclasses import dataclass, replace
 
@@ -34,7 +35,26 @@ class NewtonResult:
     history: tuple[tuple[float, str], ...]
 
 
+_KEPT, _LARGEST_KEPT = 32, 500
+"""Solutions that are kept, and buses of the largest network that is: a larger one takes longer to compare."""
+
+_solved: dict[bytes, NewtonResult] = {}
+
+
 def solve(equations: FlowEquations) -> NewtonResult:
+    """As `_solve`; equations that are equal to the last digit are solved once, as a controller's gain moves no flow."""
+    if len(equations.buses) > _LARGEST_KEPT:
+        return _solve(equations)
+    key = pickle.dumps(equations)
+    if key not in _solved:
+        if len(_solved) >= _KEPT:
+            _solved.clear()
+        _solved[key] = _solve(equations)
+    found = _solved[key]
+    return replace(found, voltages=found.voltages.copy())
+
+
+def _solve(equations: FlowEquations) -> NewtonResult:
     """Solve from the DC angles, or else from a flat start, or else step by step from a network without load and
     generation; the first of these that converges."""
     first = _newton(equations, _start(equations, equations.dc_angles()))

@@ -29,9 +29,21 @@ _FARTHEST = 1e5  # largest factor on the impedances at a bus, and the inverse of
 
 @dataclass(frozen=True)
 class BusStrength:
-    """A bus: its short-circuit power [MVA], X/R of its impedance, and the converters there.
+    """How strong the grid is at a bus. `Scenario.strengths` makes it.
 
-    ``rating_mva`` is that of the converters, or the one that was asked for; None without either."""
+    Attributes
+    ----------
+    bus
+        Its name.
+    s_sc_mva
+        Short-circuit power [MVA].
+    x_r
+        X/R of the impedance; None where that has no resistance.
+    converters
+        Names of the converters there.
+    rating_mva
+        Of the converters, or the one that was asked for [MVA]; None without either.
+    """
 
     bus: str
     s_sc_mva: float
@@ -45,6 +57,7 @@ class BusStrength:
         return self.s_sc_mva / self.rating_mva if self.rating_mva else None
 
     def as_json(self) -> dict[str, Any]:
+        """The same as ``gfor scr --json`` prints of a bus, as JSON's types."""
         return {**asdict(self), "scr": self.scr}
 
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +48,10 @@ class CoupledComponents(Closing):
     """Components at their common start; a context manager that releases every FMU.
 
     ``y``: All coupled outputs, shape (n,), as last exchanged; their names are ``output_names``.
-    ``wires``: The connections that do more than carry a value."""
+    ``wires``: The connections that do more than carry a value.
+    ``remembered``: Linear models of components by all that they follow from; None where none is kept."""
+
+    remembered: dict[Any, Any] | None = None
 
     def __init__(
         self,

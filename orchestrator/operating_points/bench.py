@@ -41,7 +41,9 @@ class PointModel:
 class PointBench(Closing):
     """Holds the FMUs of one operating point; the next one gets the same FMUs, reset, where it has the same."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, remember: bool = False) -> None:
+        """``remember``: keep the linear models of components by their FMU's whole state."""
+        self._remembered: dict[Any, Any] | None = {} if remember else None
         self._master: Master | None = None
         self._models: dict[Any, ComponentLinearization] = {}
         self._like: dict[Path, ComponentLinearization] = {}
@@ -62,6 +64,7 @@ class PointBench(Closing):
             return self._master
         self.close()
         self._master = running(prepared)
+        self._master.remembered = self._remembered
         return self._master
 
     def linearized(self, name: str) -> ComponentLinearization:

@@ -13,7 +13,7 @@ from orchestrator.analysis.continuation import Eigenpair, pair_at, pairs_near
 from orchestrator.analysis.coupled_response import foreign_components
 from orchestrator.analysis.coupled_state import CoupledState
 from orchestrator.analysis.linear_model import LinearModel
-from orchestrator.analysis.linearity import eigenvalue_shift
+from orchestrator.analysis.linearity import eigenvalue_shifts
 from orchestrator.analysis.linearization import Blocks, continuous, where_given
 from orchestrator.analysis.modes import Mode
 from orchestrator.analysis.periodic import model_of
@@ -263,7 +263,9 @@ class _Mode:
 
 
 def _shift(model: LinearModel, varied: LinearModel, pair: Eigenpair) -> complex:
-    return eigenvalue_shift(model, varied, pair.eigenvalue, pair.left, pair.right)
+    sides = (np.asarray(side)[:, None] for side in (pair.left, pair.right))
+    (shift,) = eigenvalue_shifts(model, varied, np.array([pair.eigenvalue]), *sides)
+    return complex(shift)
 
 
 def _stays(master: Master, parameter: Parameter, period: int) -> bool:

@@ -22,6 +22,7 @@ from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.linearization import Blocks, continuous_model
 from orchestrator.analysis.mode_names import Naming
 from orchestrator.analysis.periodic import model_of
+from orchestrator.analysis.remembered import kept
 from orchestrator.analysis.stability import Hidden, Stability, hidden, whole_spectrum
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
 from orchestrator.analysis.threads import side_by_side
@@ -264,7 +265,8 @@ class Linearised:
         with changed(self._master, gains, before):
             for name in {name.partition(".")[0] for name in gains}:
                 blocks = blocks.with_component(self._master, name)
-            return model_of(self._master, blocks)
+            parts = tuple(blocks.components.values())
+            return kept(self._master, "model", parts, lambda: model_of(self._master, blocks))
 
     def finished(self, known: Mapping[str, NamedSystem] = MappingProxyType({})) -> ModesResult:
         """The result, once the eigenvalues are there; the FMUs are asked again for what it rests on."""
@@ -287,6 +289,7 @@ class Linearised:
                 self._at_gains,
                 directional=directional,
                 black_boxes=self._black_boxes,
+                master=self._master,
             )
             naming = self.named.naming
             named = {
@@ -373,28 +376,31 @@ def identified(
     *,
     directional: bool = False,
     black_boxes: BlackBoxes | None = None,
+    master: Master | None = None,
 ) -> NamedSystem:
     """A linearised scenario with the names of its modes, by shape and where two fit by following.
 
     ``at_gains``: the linear model with other gains of damping controllers, where the scenario still runs.
-    ``black_boxes``: identifies components of such a scenario that hide their states."""
+    ``black_boxes``: identifies components of such a scenario that hide their states.
+    ``master``: what keeps spectra of models that come again."""
     first, last = _named_range(frequency_range)
 
     def named(other: PreparedScenario, at: OperatingPoint, linear: LinearModel) -> NamedSystem:
-        found = [
-            mode for mode in spectra.find_spectrum(linear, first, last).modes if mode.is_oscillation
-        ]
+        spectrum = kept(
+            master, (first, last), (linear,), lambda: spectra.find_spectrum(linear, first, last)
+        )
+        found = [mode for mode in spectrum.modes if mode.is_oscillation]
         return NamedSystem(other, at, linear, found, named_modes(other.case, linear, found))
 
     def computed(other: PreparedScenario) -> NamedSystem:
-        with running(in_service(other)) as master:
-            boxes = black_boxes(master) if black_boxes else {}
+        with running(in_service(other)) as beside:
+            boxes = black_boxes(beside) if black_boxes else {}
             at = (
                 OperatingPoint(math.nan, math.nan, math.nan, 0, {})
                 if boxes
-                else find_operating_point(master)
+                else find_operating_point(beside)
             )
-            linear = model_of(master, Blocks(master, directional=directional, known=boxes))
+            linear = model_of(beside, Blocks(beside, directional=directional, known=boxes))
         return named(other, at, linear)
 
     return settled(

@@ -52,7 +52,20 @@ def test_an_example_runs(example, tmp_path, monkeypatch):
     assert not said, "".join(said)
 
 
-RESULTS = ("Nyquist", "RunComparison", "SignalModes", "Sources", "StepChoice", "Verification")
+RESULTS = (
+    "BusStrength",
+    "Mode",
+    "Stability",
+    "CheckpointWarning",
+    "RunEndedWarning",
+    "UnusualDataWarning",
+    "Nyquist",
+    "RunComparison",
+    "SignalModes",
+    "Sources",
+    "StepChoice",
+    "Verification",
+)
 """Types of results, named for annotations; the functions that return them have the examples."""
 
 

@@ -47,6 +47,8 @@ NAMES = {
         "Sources",
     ),
     *("StepChoice", "Verification"),
+    *("BusStrength", "Mode", "Stability"),
+    *("CheckpointWarning", "RunEndedWarning", "UnusualDataWarning"),
     *(
         "ambient",
         "export_comtrade",
