@@ -41,20 +41,20 @@ _KEPT, _LARGEST_KEPT = 32, 500
 _solved: dict[bytes, NewtonResult] = {}
 
 
-def solve(equations: FlowEquations) -> NewtonResult:
-    """As `_solve`; equations that are equal to the last digit are solved once, as a controller's gain moves no flow."""
+def solve_once(equations: FlowEquations) -> NewtonResult:
+    """As `solve`; equations that are equal to the last digit are solved once, as a controller's gain moves no flow."""
     if len(equations.buses) > _LARGEST_KEPT:
-        return _solve(equations)
+        return solve(equations)
     key = pickle.dumps(equations)
     if key not in _solved:
         if len(_solved) >= _KEPT:
             _solved.clear()
-        _solved[key] = _solve(equations)
+        _solved[key] = solve(equations)
     found = _solved[key]
     return replace(found, voltages=found.voltages.copy())
 
 
-def _solve(equations: FlowEquations) -> NewtonResult:
+def solve(equations: FlowEquations) -> NewtonResult:
     """Solve from the DC angles, or else from a flat start, or else step by step from a network without load and
     generation; the first of these that converges."""
     first = _newton(equations, _start(equations, equations.dc_angles()))

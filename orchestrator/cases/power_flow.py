@@ -16,7 +16,7 @@ from orchestrator.cases.flow_balance import (
 )
 from orchestrator.cases.flow_equations import FlowEquations
 from orchestrator.cases.flow_limits import Excess, Limits, exceeded, solve_with_limits
-from orchestrator.cases.flow_newton import CONVERGED, NewtonResult, grow, solve
+from orchestrator.cases.flow_newton import CONVERGED, NewtonResult, grow, solve, solve_once
 from orchestrator.errors import InputError, PowerFlowError
 
 __all__ = ["FlowLine", "FlowLoad", "FlowShunt", "FlowUnit", "PowerFlow", "solve_power_flow"]
@@ -113,7 +113,7 @@ def solve_power_flow(
     if keep_limits:
         final, result, at_limits = solve_with_limits(equations, known)
     else:
-        final, result, at_limits = equations, solve(equations), []
+        final, result, at_limits = equations, solve_once(equations), []
     if not result.converged:
 
         def with_stray(share: float) -> FlowEquations:
