@@ -52,7 +52,7 @@ def case_tables(path: Path) -> dict[str, Value]:
     """What a case's program leaves in the fields that gfor reads, by their names; a field that it lacks is not there.
 
     Raises `InputError` with the line of the first statement that is not understood."""
-    source = read_text(path)
+    source = read_text(path, errors="replace")
     program = _Program(str(path))
     try:
         for statement in statements(source):
