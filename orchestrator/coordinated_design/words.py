@@ -31,6 +31,8 @@ def verdict_of(verdict: PointsVerdict) -> VerdictSentence:
         tail = f"; least damped{which}: {limiting.where}: {limiting.target.words}{unmoved}"
     tail += _of_all_modes(verdict) + _standing_apart(verdict)
     aim = "" if wanted is None else f"{100 * wanted:g} % at all {total} points and outages"
+    if aim and verdict.apart:
+        aim += ", of the modes that these controllers move"
     if verdict.met:
         if wanted is not None:
             return VerdictSentence(
