@@ -159,7 +159,8 @@ def test_what_is_asked_for_is_reached_and_the_other_mode_is_named():
     assert found.met is True
     assert said.startswith(
         "REACHED: 8 % at all 1 points and outages, of the modes that these controllers move; least damped of the "
-        "modes that these controllers move: now, intact: 0.961 Hz, 8.01 % (sg7); of all modes: now, intact: 1.312 Hz, 7.98 % (sg1, sg3); without the "
+        "modes that these controllers move: now, intact: 0.961 Hz, 8.01 % (sg7); of all modes: now, "
+        "intact: 1.312 Hz, 7.98 % (sg1, sg3); without the "
         "controllers: now, intact: 0.961 Hz, 2.91 % (sg7)"
     )
     assert "apart, at 1 of 1" in said
