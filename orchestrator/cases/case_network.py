@@ -39,6 +39,7 @@ def read_network(draft: Draft) -> None:
     try:
         draft.data = network_data(table, draft.given.directory)
         draft.found.questions += draft.data.changes
+        draft.found.records += draft.data.records
     except InputError as error:
         where = draft.given.place("network", source) if source else draft.given.place("network")
         draft.note_network(where, str(error))

@@ -8,6 +8,7 @@ from fmus.grid.network import Network
 from orchestrator.cases.build_choices import Layer
 from orchestrator.cases.network_data import NetworkData
 from orchestrator.cases.parameter_files import ParameterFile
+from orchestrator.cases.record_use import RecordUse
 from orchestrator.cases.schema import CaseTable, ComponentTable, EventTable, ScenarioTable
 from orchestrator.cases.sharing import Dispatch
 from orchestrator.coupling.system import System
@@ -56,6 +57,8 @@ class DraftInput:
 class Findings:
     problems: list[Problem] = field(default_factory=list)
     questions: list[Problem] = field(default_factory=list)
+    # what became of the records of the network's files
+    records: list[RecordUse] = field(default_factory=list)
     # what is asked about values, by ``component.variable``, of the digits that the files have, in another unit.
     thousandfold: dict[str, str] = field(default_factory=dict)
     # S_n of components before one from outside [MVA]

@@ -26,6 +26,7 @@ from orchestrator.cases.load_models import FlowLaws, flow_laws, with_laws
 from orchestrator.cases.network_import import Generation, ImportedNetwork, bus_of, import_network
 from orchestrator.cases.network_sources import read_matpower, read_pandapower
 from orchestrator.cases.psse.raw import Machine, read_raw
+from orchestrator.cases.record_use import RecordUse
 from orchestrator.cases.schema import NetworkTable
 from orchestrator.errors import InputError, Problem
 
@@ -69,6 +70,7 @@ class NetworkData:
     # loads of which the source tells constant impedances and currents, by name: they follow the
     # voltage in a power flow that starts from another, as that of an outage does
     flow_laws: Mapping[str, FlowLaws] = field(default_factory=dict)
+    records: tuple[RecordUse, ...] = ()  # what became of the records of the source
 
 
 def network_data(table: NetworkTable, directory: Path) -> NetworkData:

@@ -18,6 +18,7 @@ from orchestrator.cases.names import close_names
 from orchestrator.cases.network_data import bus_name
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.psse.raw_file import read_file
+from orchestrator.cases.record_use import RecordUse, details, in_one_line
 from orchestrator.cases.short_circuit import source_impedance
 from orchestrator.errors import InputError, Problem, few
 from orchestrator.fmi.description import FmuDescription
@@ -89,6 +90,11 @@ class NewCase:
     assumed: tuple[str, ...]
     scenarios: tuple[PreparedScenario, ...]
     black_box: bool = False  # whether its modes need --black-box
+
+    @property
+    def records(self) -> tuple[RecordUse, ...]:
+        """What became of the records of the network's files."""
+        return self.scenarios[0].records if self.scenarios else ()
 
 
 def read_converter(text: str) -> WantedConverter:
@@ -422,6 +428,8 @@ class _Text:
             f"models: {self._wanted.kind}; stray_B of EMT models: {self._stray:g} pu{self._stray_why}"
         )
         lines.append(f"fault: three-phase at {self._fault_bus}, 100 ms, nothing trips")
+        if self._base is not None and (line := in_one_line(self._base.records)):
+            lines.append(line + " (--details lists them)" * any(details(self._base.records)))
         more = f"{questions} question{'s' * (questions != 1)} about the data: comments at their lines in the file"
         return [*lines, more] if questions else lines
 

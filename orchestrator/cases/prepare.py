@@ -32,6 +32,7 @@ from orchestrator.cases.operating_point import power_flow_of
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.plausibility import check_plausibility, question_loading
 from orchestrator.cases.power_flow import PowerFlow
+from orchestrator.cases.record_use import RecordUse
 from orchestrator.cases.references import references_of
 from orchestrator.cases.run_plan import (
     check_length,
@@ -71,6 +72,8 @@ class PreparedScenario:
     values: dict[str, float | bool]  # every value that was set, by ``component.variable``
     # data that are most unusual, each with its place: see `plausibility`
     questions: tuple[Problem, ...] = ()
+    # what became of the records of the network's files
+    records: tuple[RecordUse, ...] = ()
     # whether the recorded signals go through a low-pass filter before
     record_filtered: bool = False
     # questions about the interval of the recording, which only a run asks
@@ -266,6 +269,7 @@ class Preparer:
             {f"{n}.{v}": x for n, p in plans.items() for v, x in p.parameters.items()}
             | imperfections,
             questions=tuple(draft.found.questions),
+            records=tuple(draft.found.records),
             about_rows=(*about_rows, *left_out),
             references=references,
             record_filtered=draft.given.case.solver.record_filter == "low-pass",

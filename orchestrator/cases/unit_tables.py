@@ -23,6 +23,8 @@ from orchestrator.cases.network_data import bus_name
 from orchestrator.cases.network_import import Generation
 from orchestrator.cases.plausibility import question
 from orchestrator.cases.plausible_values import UnusualValue
+from orchestrator.cases.psse.dyr import record_uses
+from orchestrator.cases.psse.dyr_records import DynamicRecord, read_dyr
 from orchestrator.cases.psse.dyr_units import (
     completed,
     missing_records,
@@ -30,6 +32,7 @@ from orchestrator.cases.psse.dyr_units import (
     with_choices,
     with_records,
 )
+from orchestrator.cases.psse.unused_models import unused_models
 from orchestrator.cases.schema import ComponentTable, UnitsTable
 from orchestrator.cases.source_changes import Changes
 from orchestrator.cases.unit_row import UnitRow, checked
@@ -233,9 +236,17 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
     alphas = _alphas(draft, table, rows)
     replaced = [row.label for row in rows if alphas[row.label] == 1]
     idle = draft.data.idle_machines if draft.data else ()
+    records = read_dyr(path)
     rows = with_records(
-        rows, machines, path, table.dyr_leave_out, replaced, idle, approximate=table.dyr_approximate
+        rows,
+        machines,
+        records,
+        table.dyr_leave_out,
+        replaced,
+        idle,
+        approximate=table.dyr_approximate,
     )
+    _account(draft, table, records)
     rows = with_choices(rows, replaced, _parts_of(table))
     machine_rows = [row for row in rows if row.label not in replaced]
     question(
@@ -279,6 +290,20 @@ def _parameters(entry: Row, kind: str) -> dict[str, Any]:
             name, plain = column.removeprefix(f"{kind}."), text.strip()
             values[name] = {"true": True, "false": False}.get(plain.lower(), plain)
     return values
+
+
+def _account(draft: Draft, table: UnitsTable, records: Sequence[DynamicRecord]) -> None:
+    """Note what became of each record of a DYR file, and ask about those of no machine that could matter."""
+    machines = draft.data.machines if draft.data else ()
+    uses = record_uses(
+        records,
+        {(machine.bus, machine.name.strip()) for machine in machines},
+        draft.data.idle_machines if draft.data else (),
+        table.dyr_leave_out,
+        approximate=table.dyr_approximate,
+    )
+    draft.found.records += uses
+    draft.found.questions += unused_models(records, uses)
 
 
 def _parts_of(table: UnitsTable) -> dict[str, str]:

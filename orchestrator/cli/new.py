@@ -3,13 +3,17 @@
 import argparse
 import shlex
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 from rich.markup import escape
+from rich.table import Table
 
 from orchestrator.cases.new_case import WantedCase, read_converter, sources_of, write_case
+from orchestrator.cases.psse.known_records import known_records
+from orchestrator.cases.record_use import as_json, details
 from orchestrator.cli.arguments import add_options
-from orchestrator.cli.terminal import make_console, print_parts
+from orchestrator.cli.terminal import make_console, print_json, print_parts
 from orchestrator.errors import InputError, ResultsError
 from orchestrator.fmi.vendor_files import is_vendor_file
 from orchestrator.safe_files import write_text
@@ -28,6 +32,13 @@ def run(options: argparse.Namespace) -> int:
     from orchestrator.cases.service import in_service  # noqa: PLC0415 - these import what a run needs
     from orchestrator.study.modes import running  # noqa: PLC0415
 
+    if options.models is True:
+        if options.files:
+            raise InputError(
+                "--models is 'emt' or 'phasor' for a case; alone it lists what gfor reads"
+            )
+        _list_models(as_json=options.json)
+        return 0
     if not options.files:
         _ask(options)
     wanted = _wanted(options)
@@ -41,9 +52,11 @@ def run(options: argparse.Namespace) -> int:
         write_text(wanted.out, made.text)
     except ResultsError as error:
         raise InputError(f"--out {error}") from error
-    console = make_console()
+    console = make_console(stderr=options.json)
     names = ", ".join(prepared.name for prepared in made.scenarios)
-    lines = f"{wanted.out}: scenarios {names}. Assumed:", *(f"- {line}" for line in made.assumed)
+    lines = [f"{wanted.out}: scenarios {names}. Assumed:", *(f"- {line}" for line in made.assumed)]
+    if options.details:
+        lines += ["Records that are not used as they stand:", *details(made.records)]
     print_parts(console, map(escape, lines))
     for prepared in made.scenarios:
         if prepared.name in ("base", "converter"):
@@ -51,7 +64,29 @@ def run(options: argparse.Namespace) -> int:
     console.print(
         escape(f"Next: gfor modes {wanted.out}{' --black-box' * made.black_box}"), highlight=False
     )
+    if options.json:
+        print_json(
+            {
+                "case": str(wanted.out),
+                "scenarios": [prepared.name for prepared in made.scenarios],
+                "assumed": [*made.assumed],
+                "records": as_json(made.records),
+                "questions": [*dict.fromkeys(str(q) for p in made.scenarios for q in p.questions)],
+            }
+        )
     return 0
+
+
+def _list_models(*, as_json: bool) -> None:
+    records = known_records()
+    if as_json:
+        print_json([asdict(record) for record in records])
+        return
+    table = Table("record", "what", "part of ours", "approximated")
+    for record in records:
+        table.add_row(record.name, record.kind, record.part, record.approximated)
+    sources = dict.fromkeys(record.source for record in records)
+    print_parts(make_console(), [table, *(escape(f"Source: {source}") for source in sources)])
 
 
 def _wanted(options: argparse.Namespace) -> WantedCase:

@@ -45,7 +45,7 @@ def test_a_case_is_written_and_said_in_few_lines(gfor, files):
     out = files[0].parent / "case.toml"
     code, text, err = gfor(*files, "--converter", CONVERTER, "--out", out)
     assert (code, err) == (0, "")
-    assert len(text.splitlines()) <= 8
+    assert len(text.splitlines()) <= 9
     assert "base, dispatch, converter, pod_p, pod_q, fault" in text
     assert "sg3 feeds 60 MW less (160 before)" in text
     again = gfor(*files, "--converter", CONVERTER, "--out", out)

@@ -1,6 +1,7 @@
 """PSS/E dynamics data (DYR): machines with their controls, and converters, of the generators of a RAW file."""
 
 import dataclasses
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -8,7 +9,15 @@ from fmus.grid_following.dyr_fields import CONVERTER, FIELDS, MODEL, PLANT, appr
 from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS, DyrField, DyrRecord
 from orchestrator.cases.psse.dyr_records import DynamicRecord, given_values
+from orchestrator.cases.psse.missing_models import (
+    MACHINE,
+    MissingModel,
+    in_words,
+    kind_of,
+    missing_models,
+)
 from orchestrator.cases.psse.raw import Machine
+from orchestrator.cases.record_use import RecordUse, Use
 from orchestrator.errors import InputError
 
 _KNOWN = DYR_RECORDS | REGFM_A1_RECORDS
@@ -56,6 +65,10 @@ def machine_models(
     lines: dict[tuple[int, str], dict[str, int]] = {key: {} for key in at}
     left = {name.upper() for name in leaving_out}
     of: dict[tuple[int, str], list[DynamicRecord]] = {key: [] for key in at}
+    # machines whose own record no part stands for
+    lacking: set[tuple[int, str]] = set()
+    without: set[str] = set()  # names of converters' records, which have a remedy of their own
+    first: dict[str, str] = {}  # place of the first record, by the problem
     for record in records:
         key = (record.bus, record.machine)
         if key not in at and key not in idle and record.name in _KNOWN:
@@ -66,10 +79,11 @@ def machine_models(
             continue
         known = _KNOWN.get(record.name)
         if known is None:
-            problems.append(
-                f"{record.place}: no part of ours stands for {record.name} (bus {record.bus})"
-            )
-            problems[-1] += remedy_for(record.name, approximate=approximate)
+            if remedy := remedy_for(record.name, approximate=approximate):
+                problems.append(f"no part of ours stands for {record.name}{remedy}")
+                first.setdefault(problems[-1], record.place)
+                without.add(record.name)
+                lacking |= {key} if kind_of(record.name) == "converter" else set()
         elif known.kind in parts[key]:
             problems.append(
                 f"{record.place}: a second {known.kind} of machine {record.machine!r} at bus {record.bus}"
@@ -84,12 +98,19 @@ def machine_models(
     following = _followed(of, left, problems) if approximate else {}
     for key in following:
         parts[key]["converter"] = MODEL
-    problems += _unfit(parts, replaced)
-    if problems:
-        more = f"\n  and {len(problems) - _MOST_SHOWN} more" if len(problems) > _MOST_SHOWN else ""
+    passed = {*_KNOWN, *without, *(left - _own_machines(records, left))}
+    missing = missing_models(records, at, {*passed, *(FIELDS if approximate else ())})
+    lacking |= {key for model in missing for key in _machines_of(model) if not model.may_go}
+    missing = [model for model in missing if model.may_go or not _machines_of(model) <= {*replaced}]
+    problems += _unfit(parts, {*replaced, *lacking})
+    if problems or missing:
+        counted_once = [*_counted(problems, first)]
+        hidden = len(counted_once) - _MOST_SHOWN
+        more = f"\n  and {hidden} more" if hidden > 0 else ""
+        shown = [*in_words(missing), *counted_once[:_MOST_SHOWN]]
         raise InputError(
             "the dynamics data cannot be taken over; correct them, or name models that may go in [units] "
-            "dyr_leave_out:\n  " + "\n  ".join(problems[:_MOST_SHOWN]) + more
+            "dyr_leave_out:\n  " + "\n  ".join(shown) + more
         )
     open_ = {(record.bus, record.machine) for record in records if record.name in left}
     return following | {
@@ -101,6 +122,65 @@ def machine_models(
         for key in at
         if {"machine", "converter"} & {*parts[key]} and key not in following
     }
+
+
+def _own_machines(records: Sequence[DynamicRecord], names: Collection[str]) -> set[str]:
+    """Names of models that are a machine's own record, which cannot be left out, among those that records have."""
+    given = {record.name for record in records}
+    return {
+        name for name in names if name in given and name not in _KNOWN and kind_of(name) == MACHINE
+    }
+
+
+def _machines_of(model: MissingModel) -> set[tuple[int, str]]:
+    return {(record.bus, record.machine) for record in model.records}
+
+
+def _counted(problems: Sequence[str], first: Mapping[str, str]) -> Iterator[str]:
+    """The problems, each once: of those with a place of a first record, how many more there are."""
+    for text, count in Counter(problems).items():
+        more = f" and {count - 1} more" if count > 1 else ""
+        yield f"{first[text]}{more}: {text}" if text in first else text
+
+
+def record_uses(
+    records: Sequence[DynamicRecord],
+    machines: Collection[tuple[int, str]],
+    idle: Collection[tuple[int, str]],
+    leaving_out: Sequence[str] = (),
+    *,
+    approximate: bool = False,
+) -> list[RecordUse]:
+    """What becomes of each record, of which none that stops the reading is there."""
+    left = {name.upper() for name in leaving_out}
+    return [
+        RecordUse(
+            record.file,
+            record.line,
+            record.name,
+            *_use_of(record, machines, idle, left, approximate),
+        )
+        for record in records
+    ]
+
+
+def _use_of(
+    record: DynamicRecord,
+    machines: Collection[tuple[int, str]],
+    idle: Collection[tuple[int, str]],
+    left: Collection[str],
+    approximate: bool,
+) -> tuple[Use, str]:
+    key = record.bus, record.machine
+    if key in machines:
+        if record.name in left:
+            return Use.NOT_USED, "dyr_leave_out names it"
+        return Use.USED, f"approximated as {MODEL}" if approximate and record.name in FIELDS else ""
+    if key in idle:
+        return Use.NOT_USED, "its machine is out of service"
+    kind = kind_of(record.name)
+    what = {"load": "a load model", "device": "a model of an SVC or a DC line", "relay": "a relay"}
+    return Use.NOT_USED, f"{what.get(kind, 'a model')} at bus {record.bus}, which is of no machine"
 
 
 def _unfit(

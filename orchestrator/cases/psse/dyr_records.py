@@ -12,7 +12,8 @@ from orchestrator.foreign_files import read_text, visible
 from orchestrator.units import LARGEST
 
 MOST_BYTES = 100_000_000  # of a file
-_TOKEN = re.compile(r"'([^']*)'|([^\s,'/]+)|(/)|(,)")
+_TOKEN = re.compile(r"""(?P<quoted>'[^']*'|"[^"]*")|(?P<plain>[^\s,'"/]+)|(?P<slash>/)|,""")
+_OWN_MODEL = "USRMDL"  # a user's model, whose name is the first value
 
 
 @dataclass(frozen=True)
@@ -42,14 +43,15 @@ def read_dyr(path: Path) -> list[DynamicRecord]:
     ):
         if line.lstrip().startswith(("//", "@!")):
             continue
-        for quoted, plain, slash, _ in _TOKEN.findall(line):
-            if slash:
-                records.append(_record(str(path), begin or number, tokens))
+        for token in _TOKEN.finditer(line):
+            if token["slash"]:
+                if tokens:  # else a comment, or a slash alone
+                    records.append(_record(str(path), begin, tokens))
                 tokens = []
                 break  # what follows on the line is a comment
-            if quoted or plain:
+            if token["quoted"] or token["plain"]:
                 begin = begin if tokens else number
-                tokens.append(quoted.strip() or plain)
+                tokens.append(token["plain"] or token["quoted"][1:-1].strip())
     if tokens:
         raise InputError(
             f"{path}, line {begin}: the record does not end with a slash; the file is cut short"
@@ -62,9 +64,10 @@ def _record(file: str, line: int, tokens: Sequence[str]) -> DynamicRecord:
         raise InputError(
             f"{file}, line {line}: {' '.join(tokens[:4])!r} is no record; one is bus 'MODEL' id values … /"
         )
-    return DynamicRecord(
-        file, line, int(tokens[0]), tokens[1].upper(), tokens[2].strip(), tuple(tokens[3:])
-    )
+    name, machine, values = tokens[1].upper(), tokens[2].strip(), tuple(tokens[3:])
+    if name == _OWN_MODEL and values:
+        name, values = values[0].upper(), values[1:]
+    return DynamicRecord(file, line, int(tokens[0]), name, machine, values)
 
 
 def given_values(

@@ -5,13 +5,12 @@ Parts of machines without a record are what [units] chooses for them, else what 
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 from fmus.synchronous_generator.dyr_fields import MACHINE_VARIANTS
 from orchestrator.cases.network_data import bus_name
 from orchestrator.cases.plausible_values import UnusualValue
 from orchestrator.cases.psse.dyr import machine_models
-from orchestrator.cases.psse.dyr_records import read_dyr
+from orchestrator.cases.psse.dyr_records import DynamicRecord
 from orchestrator.cases.psse.raw import Machine
 from orchestrator.cases.unit_row import UnitRow, checked
 from orchestrator.errors import InputError
@@ -139,7 +138,7 @@ def rows_of_machines(machines: Sequence[Machine], place: str) -> list[UnitRow]:
 def with_records(
     rows: Sequence[UnitRow],
     machines: Sequence[Machine],
-    path: Path,
+    records: Sequence[DynamicRecord],
     leaving_out: Sequence[str],
     without: Collection[str],
     idle: Collection[tuple[int, str]] = (),
@@ -149,9 +148,7 @@ def with_records(
     """The units with what the records say of them."""
     keys = [(machine.bus, machine.name.strip()) for machine in machines]
     replaced = {key for key, row in zip(keys, rows, strict=True) if row.label in without}
-    models = machine_models(
-        read_dyr(path), machines, leaving_out, replaced, idle, approximate=approximate
-    )
+    models = machine_models(records, machines, leaving_out, replaced, idle, approximate=approximate)
     found = []
     for key, row in zip(keys, rows, strict=True):
         model = models.get(key)

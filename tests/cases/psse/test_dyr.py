@@ -99,7 +99,11 @@ def test_records_over_lines_with_commas_or_blanks(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("'SEXS'", "'OLDEXC'", r"grid.dyr, line 6: no part of ours stands for OLDEXC \(bus 1\)"),
+        (
+            "'SEXS'",
+            "'OLDEXC'",
+            r"(?s)for these models.*\n +OLDEXC +1 +72 +line 6 .*type: --dyr-leave-out OLDEXC",
+        ),
         ("3 'GENCLS'", "8 'GENCLS'", r"machine '1' at bus 3 has no record of a machine"),
         ("9.55", "x", r"line 2: GENROU has H = 'x'; it must be a number"),
         ("2.35 0.0 /", "2.35 /", r"line 5: GENCLS has 1 values, and needs 2: H, D"),

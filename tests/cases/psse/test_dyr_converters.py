@@ -87,12 +87,12 @@ def test_every_field_sets_a_parameter_of_the_model():
         (
             "'REGFMA1'",
             "'REGCA1'",
-            r"stands for REGCA1 \(bus 3\), a grid-following converter; write dyr_approximate",
+            r"stands for REGCA1, a grid-following converter; write dyr_approximate",
         ),
         (
             "'REGFMA1'",
             "'WT4G1'",
-            r"stands for WT4G1 \(bus 3\), a grid-following converter; name its .* alpha = 1",
+            r"stands for WT4G1, a grid-following converter; name its .* alpha = 1",
         ),
     ],
 )

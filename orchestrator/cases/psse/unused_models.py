@@ -1,0 +1,75 @@
+"""Questions about records of a DYR file that are of no machine: models of loads, of SVCs, of DC lines."""
+
+from collections.abc import Iterator, Sequence
+
+from orchestrator.cases.psse.dyr_records import DynamicRecord
+from orchestrator.cases.psse.missing_models import kind_of
+from orchestrator.cases.record_use import RecordUse, Use
+from orchestrator.cases.source_changes import Changes
+from orchestrator.errors import Problem, few
+
+_MATTER = {
+    "load": "loads follow [network] load_model",
+    "device": "what it feeds in the power flow is constant",
+    "unknown": "gfor does not know what it is",
+}
+"""What stands for a model of no machine, by its kind; relays act on events only, and are not asked about."""
+
+_EXPONENTIAL = ("IEELAL", "IEELBL", "IEELAR", "IEELOW", "IEELZN")
+_VALUES = 14
+_LAWS = {0.0: "p", 1.0: "i", 2.0: "z"}
+_SUM = 1e-3  # by which shares may miss 1
+_MOST_BUSES = 8
+
+
+def unused_models(records: Sequence[DynamicRecord], uses: Sequence[RecordUse]) -> list[Problem]:
+    """One question for each model that matters, with the lines of all its records."""
+    if not records:
+        return []
+    changes = Changes(records[0].file)
+    unused = [
+        record
+        for record, use in zip(records, uses, strict=True)
+        if use.use is Use.NOT_USED and use.why.endswith("of no machine")
+    ]
+    for name in dict.fromkeys(record.name for record in unused):
+        own = [record for record in unused if record.name == name]
+        if (kind := kind_of(name)) in _MATTER:
+            buses = few(dict.fromkeys(str(record.bus) for record in own), _MOST_BUSES)
+            text = f"{name} (bus {buses}) is of no machine and not used: {_MATTER[kind]}"
+            for record in own:
+                changes.note(record.line, text + _remedy(own))
+    return changes.listed()
+
+
+def _remedy(records: Sequence[DynamicRecord]) -> str:
+    """What to write in the case so that loads follow the records; empty where that is not exact."""
+    if records[0].name not in _EXPONENTIAL or len({record.values for record in records}) > 1:
+        return ""
+    try:
+        values = [float(text) for text in records[0].values]
+    except ValueError:
+        return ""
+    if len(values) != _VALUES:
+        return ""
+    shares, (k_pf, k_qf), powers = values[:6], values[6:8], values[8:]
+    laws = [*_laws(shares[:3], powers[:3]), *_laws(shares[3:], powers[3:])]
+    if len(laws) < 2:
+        return ""
+    active, reactive = laws
+    return (
+        f"; to take it for all loads, write load_model = {{ active = {active}, reactive = {reactive}, k_pf = {k_pf:g}, "
+        f"k_qf = {k_qf:g} }} in [network]"
+    )
+
+
+def _laws(shares: Sequence[float], powers: Sequence[float]) -> Iterator[str]:
+    """A law of shares and powers of the voltage as the case writes it; none where it is no mixture of Z, I and P."""
+    found = dict.fromkeys("zip", 0.0)
+    for share, power in zip(shares, powers, strict=True):
+        if share and power not in _LAWS:
+            return
+        if share:
+            found[_LAWS[power]] += share
+    if abs(sum(found.values()) - 1) < _SUM:
+        yield f"{{ {', '.join(f'{letter} = {share:g}' for letter, share in found.items() if share)} }}"

@@ -1,0 +1,51 @@
+"""What became of each record of a network's files: used, held, or not used, and why."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from typing import Any
+
+from orchestrator.errors import counted
+
+
+class Use(StrEnum):
+    USED = "used"
+    HELD = "held"  # a control that stays at its value, such as a tap
+    NOT_USED = "not used"
+
+
+@dataclass(frozen=True, slots=True)
+class RecordUse:
+    """One record: its file and line, its kind (a section of RAW, a model of DYR), and why it is not used as it is."""
+
+    file: str
+    line: int
+    kind: str
+    use: Use
+    why: str = ""
+
+
+def in_one_line(records: Sequence[RecordUse]) -> str:
+    """``records: 12 used, 3 not used (2 IEELAL, 1 CMLDBLU2)``; empty without records."""
+    parts = []
+    for use in Use:
+        kinds = Counter(record.kind for record in records if record.use is use)
+        if not kinds:
+            continue
+        named = ", ".join(f"{n} {kind}" for kind, n in kinds.most_common())
+        parts.append(f"{kinds.total()} {use}" + (f" ({named})" if use is not Use.USED else ""))
+    return f"{counted(len(records), 'record')}: {', '.join(parts)}" if parts else ""
+
+
+def details(records: Sequence[RecordUse]) -> list[str]:
+    """A line for each record that is not used as it stands there."""
+    return [
+        f"{record.file}, line {record.line}: {record.kind}: {record.use}{f': {record.why}' if record.why else ''}"
+        for record in records
+        if record.use is not Use.USED
+    ]
+
+
+def as_json(records: Sequence[RecordUse]) -> list[dict[str, Any]]:
+    return [asdict(record) for record in records]
