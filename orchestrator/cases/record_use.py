@@ -9,7 +9,7 @@ from typing import Any
 from orchestrator.errors import counted
 
 
-class Use(StrEnum):
+class UseOfRecord(StrEnum):
     USED = "used"
     HELD = "held"  # a control that stays at its value, such as a tap
     NOT_USED = "not used"
@@ -22,19 +22,21 @@ class RecordUse:
     file: str
     line: int
     kind: str
-    use: Use
+    use: UseOfRecord
     why: str = ""
 
 
 def in_one_line(records: Sequence[RecordUse]) -> str:
     """``records: 12 used, 3 not used (2 IEELAL, 1 CMLDBLU2)``; empty without records."""
     parts = []
-    for use in Use:
+    for use in UseOfRecord:
         kinds = Counter(record.kind for record in records if record.use is use)
         if not kinds:
             continue
         named = ", ".join(f"{n} {kind}" for kind, n in kinds.most_common())
-        parts.append(f"{kinds.total()} {use}" + (f" ({named})" if use is not Use.USED else ""))
+        parts.append(
+            f"{kinds.total()} {use}" + (f" ({named})" if use is not UseOfRecord.USED else "")
+        )
     return f"{counted(len(records), 'record')}: {', '.join(parts)}" if parts else ""
 
 
@@ -43,7 +45,7 @@ def details(records: Sequence[RecordUse]) -> list[str]:
     return [
         f"{record.file}, line {record.line}: {record.kind}: {record.use}{f': {record.why}' if record.why else ''}"
         for record in records
-        if record.use is not Use.USED
+        if record.use is not UseOfRecord.USED
     ]
 
 

@@ -17,7 +17,7 @@ from orchestrator.cases.psse.missing_models import (
     missing_models,
 )
 from orchestrator.cases.psse.raw import Machine
-from orchestrator.cases.record_use import RecordUse, Use
+from orchestrator.cases.record_use import RecordUse, UseOfRecord
 from orchestrator.errors import InputError
 
 _KNOWN = DYR_RECORDS | REGFM_A1_RECORDS
@@ -170,17 +170,23 @@ def _use_of(
     idle: Collection[tuple[int, str]],
     left: Collection[str],
     approximate: bool,
-) -> tuple[Use, str]:
+) -> tuple[UseOfRecord, str]:
     key = record.bus, record.machine
     if key in machines:
         if record.name in left:
-            return Use.NOT_USED, "dyr_leave_out names it"
-        return Use.USED, f"approximated as {MODEL}" if approximate and record.name in FIELDS else ""
+            return UseOfRecord.NOT_USED, "dyr_leave_out names it"
+        return (
+            UseOfRecord.USED,
+            f"approximated as {MODEL}" if approximate and record.name in FIELDS else "",
+        )
     if key in idle:
-        return Use.NOT_USED, "its machine is out of service"
+        return UseOfRecord.NOT_USED, "its machine is out of service"
     kind = kind_of(record.name)
     what = {"load": "a load model", "device": "a model of an SVC or a DC line", "relay": "a relay"}
-    return Use.NOT_USED, f"{what.get(kind, 'a model')} at bus {record.bus}, which is of no machine"
+    return (
+        UseOfRecord.NOT_USED,
+        f"{what.get(kind, 'a model')} at bus {record.bus}, which is of no machine",
+    )
 
 
 def _unfit(

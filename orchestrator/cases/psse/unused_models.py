@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from orchestrator.cases.psse.dyr_records import DynamicRecord
 from orchestrator.cases.psse.missing_models import kind_of
-from orchestrator.cases.record_use import RecordUse, Use
+from orchestrator.cases.record_use import RecordUse, UseOfRecord
 from orchestrator.cases.source_changes import Changes
 from orchestrator.errors import Problem, few
 
@@ -30,7 +30,7 @@ def unused_models(records: Sequence[DynamicRecord], uses: Sequence[RecordUse]) -
     unused = [
         record
         for record, use in zip(records, uses, strict=True)
-        if use.use is Use.NOT_USED and use.why.endswith("of no machine")
+        if use.use is UseOfRecord.NOT_USED and use.why.endswith("of no machine")
     ]
     for name in dict.fromkeys(record.name for record in unused):
         own = [record for record in unused if record.name == name]

@@ -8,7 +8,7 @@ from orchestrator.cases.psse.known_records import known_records
 from orchestrator.cases.psse.missing_models import kind_of
 from orchestrator.cases.psse.raw import Machine
 from orchestrator.cases.psse.unused_models import unused_models
-from orchestrator.cases.record_use import Use, in_one_line
+from orchestrator.cases.record_use import UseOfRecord, in_one_line
 from orchestrator.errors import InputError
 
 MACHINES = [
@@ -84,7 +84,7 @@ def test_records_of_no_machine_are_listed_and_asked_about(tmp_path):
     )
     records = read(tmp_path, text)
     uses = record_uses(records, {(bus, "1") for bus in (1, 2, 3)}, {(8, "1")}, ["oel1b"])
-    assert [use.use for use in uses] == [Use.USED] * 3 + [Use.NOT_USED] * 5
+    assert [use.use for use in uses] == [UseOfRecord.USED] * 3 + [UseOfRecord.NOT_USED] * 5
     assert [use.why for use in uses[5:]] == [
         "a relay at bus 9, which is of no machine",
         "dyr_leave_out names it",
