@@ -176,6 +176,7 @@ class Stability(NoTruth):
         return {True: "stable", False: "UNSTABLE", None: "not known"}[self.stable]
 
     def sentence(self) -> str:
+        """The verdict, and the figures behind it."""
         return f"{self.verdict}: {self.because()}"
 
     def because(self) -> str:
@@ -203,6 +204,7 @@ class Stability(NoTruth):
         return f"the {self.cause}{beside}"
 
     def as_json(self) -> dict[str, Any]:
+        """Figures and sentence as JSON's types; rates in 1/s, frequencies in Hz."""
         mode = self.mode
         return {
             "stable": self.stable,
