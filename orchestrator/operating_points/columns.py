@@ -5,9 +5,11 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from orchestrator.cases.build_choices import STAND_IN
 from orchestrator.cases.names import SERVICE, STATES, close_names
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
+from orchestrator.cases.sharing import load_of
 from orchestrator.cases.values import convert
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import InputError, few
@@ -88,6 +90,7 @@ class Setting:
     values: Mapping[str, Value] = field(default_factory=dict)  # by ``component.variable``
     out: tuple[str, ...] = ()  # elements that are out of service
     scale: float | None = None  # factor of all loads that the cell gives; None where it gives none
+    fed_scale: float | None = None  # the same of the loads that feed, which is static generation
     fed: tuple[tuple[str, ...], float] | None = None  # units that together feed a power [MW]
     # power that a load draws, by ``component.variable`` [MW, Mvar]
     drawn: Mapping[str, float] = field(default_factory=dict)
@@ -107,6 +110,8 @@ def reading_of(column: str, elements: Elements, prepared: PreparedScenario) -> R
         return lambda text: Setting(scale=_factor(column, text))
     if column == "generation":
         return lambda text: _generation(_factor(column, text), elements, prepared)
+    if column == "static":
+        return lambda text: _static(_factor(column, text), elements, prepared)
     name, dot, quantity = column.partition(".")
     if (
         quantity in SERVICE
@@ -223,6 +228,23 @@ def _generation(factor: float, elements: Elements, prepared: PreparedScenario) -
     )
 
 
+def _static(factor: float, elements: Elements, prepared: PreparedScenario) -> Setting:
+    plans = {u: prepared.system.components[u] for u in elements.units}
+    values = {
+        f"{unit}.P_0": factor * _dispatched(prepared, unit, plan)
+        for unit, plan in plans.items()
+        if plan.description.model_name.startswith(STAND_IN) and unit not in elements.balancing
+    }
+    return Setting(values, fed_scale=factor)
+
+
+def feeding_loads(elements: Elements, prepared: PreparedScenario) -> dict[str, float]:
+    """The loads of the case that feed, and what each feeds [MW]."""
+    grid = prepared.system.components[elements.grid]
+    drawn = {name: load_of([name], grid) for name in elements.loads}
+    return {name: -power for name, power in drawn.items() if power < 0}
+
+
 def _dispatched(prepared: PreparedScenario, unit: str, plan: ComponentPlan) -> float:
     flow = prepared.power_flow
     return flow.powers[unit].real if flow is not None else plan.number("P_0")
@@ -233,8 +255,8 @@ def _variable(column: str, prepared: PreparedScenario) -> Reading:
     plans = {n: p for n, p in prepared.system.components.items() if fnmatch.fnmatchcase(n, pattern)}
     if not dot or not plans:
         raise InputError(
-            "it is none of time, name, hours, load, generation, ELEMENT.in_service, UNIT.P_mw, LOAD.P_mw, LOAD.Q_mvar, "
-            f"and no component.variable; components: {', '.join([*prepared.system.components][:6])} …"
+            "it is none of time, name, hours, load, generation, static, ELEMENT.in_service, UNIT.P_mw, LOAD.P_mw, "
+            f"LOAD.Q_mvar, and no component.variable; components: {', '.join([*prepared.system.components][:6])} …"
         )
     infos = {
         n: found

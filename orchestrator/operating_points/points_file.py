@@ -10,13 +10,14 @@ from orchestrator.cases.csv_rows import PLACE, Row, place_of, rows_of
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.cases.sharing import load_of
-from orchestrator.errors import InputError, Problem
+from orchestrator.errors import InputError, Problem, few
 from orchestrator.operating_points.columns import (
     ACTIVE,
     IN_SERVICE,
     Elements,
     Reading,
     Setting,
+    feeding_loads,
     own_power,
     reading_of,
 )
@@ -26,6 +27,10 @@ _LABELS = ("time", "name")
 # times smaller than the case's own is a whole column of powers that is asked about
 _ANOTHER_UNIT = 25.0
 _LEFT = 0.05  # part of the case's load that is asked about where points leave it to the slack
+
+
+_FACTORS = ("generation", "static")  # columns whose values for a unit other columns go before
+_SCALES = ("scale", "fed_scale")
 
 
 @dataclass(frozen=True)
@@ -123,6 +128,7 @@ def questions_about(
             unit = "MW" if column.endswith(ACTIVE) else "Mvar"
             text = f"at most {most:g} {unit}, where the case itself has {own:.4g} {unit}; are these values in pu?"
             yield Problem(place, text)
+    yield from _static_question(path, rows[0], prepared, elements)
     feeding = [unit for unit in elements.units if unit not in elements.balancing]
     fed = {unit: own_power(f"{unit}.{ACTIVE}", elements, prepared) or 0.0 for unit in feeding}
     load = load_of(elements.loads, prepared.system.components[elements.grid])
@@ -139,6 +145,20 @@ def questions_about(
         text = f"at {worst} the slack ({who}) feeds {abs(more):.4g} MW {'more' if more > 0 else 'less'}, as the other"
         remedy = "add UNIT.P_mw or a factor 'generation', 1 where the slack is meant"
         yield Problem(str(path), f"{text} units' powers do not follow the load there: {remedy}")
+
+
+def _static_question(
+    path: Path, row: Row, prepared: PreparedScenario, elements: Elements
+) -> Iterator[Problem]:
+    feeding = feeding_loads(elements, prepared)
+    if "load" not in row or "static" in row or not feeding:
+        return
+    who = few([f"{name} ({power:.4g} MW)" for name, power in feeding.items()], 3)
+    yield Problem(
+        f"{path}, line 1: column 'load'",
+        f"does not scale static generation, loads that feed: {who}; a column 'static' gives their factor: 1 leaves "
+        "them as they are, the value of 'load' scales them alike",
+    )
 
 
 def _left(
@@ -206,24 +226,25 @@ def _point(
     _check_slack(out, elements, place)
     _check_switches(settings, elements, place)
     values = _Values(place)
-    if "generation" in settings:
-        values.take("generation", settings["generation"].values)
+    for column in _FACTORS:
+        if column in settings:
+            values.take(column, settings[column].values)
     for column, setting in settings.items():
-        values.take(column, setting.values if column != "generation" else {})
+        values.take(column, {} if column in _FACTORS else setting.values)
     for column, setting in settings.items():
         if setting.fed is not None:
             values.take(column, _fed(column, *setting.fed, out, prepared, values.found, place))
-    scale = next(
-        (setting.scale for setting in settings.values() if setting.scale is not None), None
-    )
+    feeding = feeding_loads(elements, prepared)
+    scale, fed_scale = (_first(getattr(one, name) for one in settings.values()) for name in _SCALES)
+    columns = {load: "static" if load in feeding else "load" for load in elements.loads}
+    factors = {"load": scale, "static": fed_scale}
     scales = {
-        load: _scale_of(load, scale, elements, prepared, values.found, place)
-        for load in elements.loads
+        load: _scale_of(load, factors[column], column, elements, prepared, values.found, place)
+        for load, column in columns.items()
     }
-    if scale is not None:
-        values.take(
-            "load", {f"{elements.grid}.{load}.scale": number for load, number in scales.items()}
-        )
+    for load, column in columns.items():
+        if factors[column] is not None:
+            values.take(column, {f"{elements.grid}.{load}.scale": scales[load]})
     for column, setting in settings.items():
         for key, power in setting.drawn.items():
             values.take(column, {key: _unscaled(column, power, scales[key.split(".")[-2]], place)})
@@ -240,9 +261,9 @@ class _Values:
         self._place, self._by = place, dict[str, str]()
 
     def take(self, column: str, values: Mapping[str, Value]) -> None:
-        """Add a column's values; a unit's own power goes before the factor of all."""
+        """Add a column's values; a unit's own power goes before the factor of all, `_FACTORS` in their order."""
         for key, value in values.items():
-            if self._by.get(key, "generation") != "generation":
+            if self._by.get(key, _FACTORS[0]) not in _FACTORS:
                 both = f"the columns {self._by[key]} and {column} both set {key}; leave one of them empty"
                 raise InputError(f"{self._place}: {both}")
             self.found[key], self._by[key] = value, column
@@ -273,9 +294,14 @@ def _fed(
     return {f"{unit}.P_0": power / rating for unit in feeding}
 
 
+def _first(given: Iterator[float | None]) -> float | None:
+    return next((one for one in given if one is not None), None)
+
+
 def _scale_of(
     load: str,
     scale: float | None,
+    column: str,
     elements: Elements,
     prepared: PreparedScenario,
     values: Mapping[str, Value],
@@ -284,7 +310,7 @@ def _scale_of(
     key = f"{elements.grid}.{load}.scale"
     if scale is not None and key in values:
         raise InputError(
-            f"{place}: the columns load and {key} both scale {load}; leave one of them empty"
+            f"{place}: the columns {column} and {key} both scale {load}; leave one of them empty"
         )
     own = prepared.system.components[elements.grid].number(f"{load}.scale")
     return float(values.get(key, own)) if scale is None else scale * own

@@ -198,6 +198,42 @@ def test_powers_are_shared_and_loads_draw_what_is_said(two_area, tmp_path):
     assert both.values["grid.load_3.scale"] == 0.5
 
 
+@pytest.fixture
+def windy(two_area, monkeypatch):
+    """The two areas, in which load_3 feeds 220 MW."""
+    _, prepared, elements = two_area
+    plan = prepared.system.components["grid"]
+    fed = replace(plan, parameters=plan.parameters | {"load_3.P": -220.0})
+    monkeypatch.setitem(prepared.system.components, "grid", fed)
+    return prepared, elements
+
+
+def test_a_factor_of_loads_leaves_static_generation_and_asks(windy, tmp_path):
+    prepared, elements = windy
+    path = tmp_path / "points.csv"
+    path.write_text("name,load,generation\na,0.7,0.7\n")
+    (point,) = read_points(path, prepared, elements)
+    assert point.values["grid.load_2.scale"] == 0.7
+    assert "grid.load_3.scale" not in point.values
+    (found,) = [one for one in questions(path, prepared, elements) if "column 'load'" in one]
+    assert "does not scale static generation, loads that feed: load_3 (220 MW)" in found
+    for factor in (1, 0.7):  # the remedies that are printed
+        path.write_text(f"name,load,generation,static\na,0.7,0.7,{factor}\n")
+        assert not [one for one in questions(path, prepared, elements) if "static" in one]
+        (point,) = read_points(path, prepared, elements)
+        assert (point.values["grid.load_2.scale"], point.values["grid.load_3.scale"]) == (
+            0.7,
+            factor,
+        )
+
+
+def test_without_static_generation_nothing_is_asked_of_it(two_area, tmp_path):
+    _, prepared, elements = two_area
+    path = tmp_path / "points.csv"
+    path.write_text("name,load,generation\na,0.7,0.7\n")
+    assert not questions(path, prepared, elements)
+
+
 def questions(path, prepared, elements):
     return [
         str(one)
