@@ -221,10 +221,23 @@ class _Once(argparse._StoreAction):
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose help opens with the newcomer's page."""
+    """A parser whose help opens with the newcomer's page, and which knows the commands that have an unknown option."""
 
     def format_help(self) -> str:
         return f"{QUESTIONS}\n{super().format_help()}"
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        found, rest = self.parse_known_args(args, namespace)
+        if rest:
+            options = [word.partition("=")[0] for word in rest if word.startswith("--")]
+            owners = {option: _commands_with(option) for option in options[:1]}
+            hints = [
+                f"; {option} is an option of {', '.join(names)}"
+                for option, names in owners.items()
+                if names
+            ]
+            self.error(f"unrecognized arguments: {' '.join(rest)}{''.join(hints)}")
+        return found
 
 
 class _Command(argparse.ArgumentParser):
@@ -239,6 +252,17 @@ class _Command(argparse.ArgumentParser):
             if isinstance(error.__context__, ValueError) and not isinstance(action.type, type):
                 raise argparse.ArgumentError(action, str(error.__context__)) from error
             raise
+
+
+def _commands_with(option: str) -> list[str]:
+    """The commands that have an option, as they are typed."""
+    found = []
+    for name in COMMANDS:
+        command = argparse.ArgumentParser(add_help=False)
+        module_of(name).add_arguments(command)
+        if option in command._option_string_actions:
+            found.append(f"gfor {name}")
+    return found
 
 
 def module_of(command: str) -> Any:

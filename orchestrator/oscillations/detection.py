@@ -7,6 +7,7 @@ import numpy as np
 
 from orchestrator.arrays import Numbers, Vector
 from orchestrator.oscillations.measurements import Measurements
+from orchestrator.oscillations.onset import Onset, onset_of
 
 LOWEST_HZ, HIGHEST_HZ = 0.08, 8.0
 # power of a line beside the median of its neighbours: a mode that noise shakes seldom reaches it
@@ -29,7 +30,8 @@ class Signals:
 @dataclass(frozen=True)
 class SpectralLine:
     frequency: float
-    begin: float | None  # [s]; None where it was there before the record
+    # [s]: from when on it has half of its level; None where it was there before the record
+    begin: float | None
     # first, last: the part of the record in which it is analysed, as indices.
     first: int
     last: int
@@ -37,6 +39,7 @@ class SpectralLine:
     harmonics: dict[int, float]
     amplitudes: dict[str, float]  # by signal [its unit], the strongest beside its own noise first
     clear: int  # how many of these show it about as well as the first; 0 where none does by itself
+    onset: Onset | None = None  # when it begins; None where ``begin`` is
 
     def periods(self, interval: float) -> float:
         """How many are seen, from the time between two samples [s]."""
@@ -178,7 +181,9 @@ def _described(signals: Signals, frequency: float, shown: dict[int, float]) -> S
     strength = np.abs(phasors(signals.times[used], signals.values[used], [frequency]))
     amplitudes = {signals.names[k]: float(strength[k]) for k in order if strength[k] > 0}
     clear = sum(above > _AS_CLEAR * max(shown.values()) for above in shown.values())
-    return SpectralLine(frequency, begin, first, last, {}, amplitudes, clear)
+    seen = slice(0, last - half if last < len(signals.times) else len(z))
+    onset = None if begin is None else onset_of(signals.times, z[seen], half, frequency)
+    return SpectralLine(frequency, begin, first, last, {}, amplitudes, clear, onset)
 
 
 def _relative(signals: Signals, base: SpectralLine, order: int) -> float:

@@ -225,6 +225,7 @@ class Located:
     controllers: tuple[dict[str, Any], ...] = ()
 
     def as_json(self) -> dict[str, Any]:
+        onset = self.found.onset
         return {
             "frequency_hz": self.found.frequency,
             "kind": self.evidence.kind,
@@ -232,7 +233,8 @@ class Located:
             "drives": self.drives,
             "reason": self.reason,
             "advice": self.advice,
-            "begin": self.found.begin,
+            "begin": None if onset is None else onset.at,
+            "begin_within": None if onset is None else [onset.earliest, onset.latest],
             "harmonics": {str(order): part for order, part in self.found.harmonics.items()},
             "evidence": asdict(self.evidence),
             "controllers": list(self.controllers),

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 from orchestrator.cases.given import Time, part_of_record
 from orchestrator.errors import CosimError
 from orchestrator.late import pd, xr
+from orchestrator.oscillations.detection import SpectralLine
 from orchestrator.oscillations.measurements import Measurements
 from orchestrator.oscillations.reading import measurements_of
+from orchestrator.oscillations.signs import turned_signs
 from orchestrator.oscillations.verdict import Located, locate
 from orchestrator.report.notebook import page
 from orchestrator.report.tables import PlainTable, make_table
@@ -64,7 +66,7 @@ class Sources:
 
     def table(self) -> pd.DataFrame:
         """One row for each oscillation: frequency [Hz], kind, source, what drives, begin [s] and the reason."""
-        keys = ["frequency_hz", "kind", "source", "drives", "begin", "reason"]
+        keys = ["frequency_hz", "kind", "source", "drives", "begin", "begin_within", "reason"]
         return pd.DataFrame([one.as_json() for one in self.oscillations], columns=keys)
 
     def html(self) -> str:
@@ -113,6 +115,8 @@ def sources_of(
     if models and units.isdisjoint(p.name.casefold() for p in measured.places if p.kind == "unit"):
         remark = f"the case's models judge nothing: no signal is named after its units, {', '.join(models.units)}"
         measured = replace(measured, remarks=(remark, *measured.remarks))
+    if prepared and (turned := turned_signs(measured, prepared)):
+        measured = replace(measured, remarks=(*turned, *measured.remarks))
     located = locate(measured, models)
     if models and prepared:
         from orchestrator.oscillations.levers import with_levers  # noqa: PLC0415 - only where there is a case
@@ -128,17 +132,25 @@ def sources_table(found: Sequence[Sources]) -> PlainTable:
     return table
 
 
+def begin_text(line: SpectralLine) -> str:
+    """The best begin, and the interval that holds it [s]."""
+    if line.onset is None:
+        return f"in the first {1.5 / line.frequency:.1f}"  # half of the window that sees it begin
+    return f"{line.onset.at:.1f} ({line.onset.earliest:.1f} to {line.onset.latest:.1f})"
+
+
 def _rows(one: Sources) -> Iterator[Sequence[str]]:
     for x in one:
-        half = 1.5 / x.found.frequency  # of the window that sees it begin
-        begin = (
-            f"in the first {half:.1f}"
-            if x.found.begin is None
-            else f"{x.found.begin:.1f} ± {half:.1f}"
-        )
         multiples = ", ".join(str(order) for order in x.found.harmonics)
         source = x.source or (f"{x.drives}, perhaps others" if x.drives else "not known")
-        yield one.label, f"{x.found.frequency:.4f}", str(x.evidence.kind), source, begin, multiples
+        yield (
+            one.label,
+            f"{x.found.frequency:.4f}",
+            str(x.evidence.kind),
+            source,
+            begin_text(x.found),
+            multiples,
+        )
     if not len(one):
         yield one.label, "–", "no oscillation", "–", "–", ""
 

@@ -239,6 +239,7 @@ def test_modes_as_a_table_with_overrides_and_a_step(gfor):
             "there is no scenario 'none'; the case has: base, gfor, pod_p, pod_q, pod_pq",
         ),
         (["--frequency", "1"], "unrecognized arguments: --frequency 1"),
+        (["--outages", "n-1"], "--outages is an option of"),
     ],
 )
 def test_an_argument_that_cannot_be_used(refused, arguments, words):

@@ -5,8 +5,10 @@ from functools import partial
 
 import numpy as np
 import pytest
+import scipy.signal
 
 from orchestrator.errors import InputError
+from orchestrator.oscillations.detection import Signals, find_oscillations
 from orchestrator.oscillations.location import DEF, QV_PHASE
 from orchestrator.oscillations.measurements import Site, made_ready
 from orchestrator.oscillations.verdict import locate
@@ -42,6 +44,21 @@ def test_where_energy_flow_names_the_machine_beside_the_converter_that_drives_it
     assert flow.ranking[0][0] == unit.replace("gfor", "sg")
     assert not flow.applies
     assert found.drives == unit
+
+
+def test_the_begin_of_a_forcing_beside_a_mode_lies_in_its_interval():
+    """A mode of 0.961 Hz and 2.9 %, forced with 0.95 Hz from 5.0 s on: half of the level is there seconds later.
+
+    `tests/benchmarks/begins.py` measures how often the interval holds the begin."""
+    times, size = times_of(60.0), 2 * np.pi * 0.961
+    mode = ([size**2], [1.0, 2 * 0.029 * size, size**2])
+    _, swing, _ = scipy.signal.lsim(mode, sine(times, 0.95, 1.0, 5.0), times)
+    for seed in range(4):
+        noise = load_noise(len(times), 1, 30.0, 0.2, seed)
+        (line,) = find_oscillations(Signals(times, ("unit.p",), swing[:, None] + noise))
+        assert line.begin > 7.0
+        assert line.onset.earliest <= 5.0 <= line.onset.latest
+        assert line.onset.latest - line.onset.earliest < 6.0
 
 
 PAIRS = [

@@ -7,9 +7,11 @@ from html import escape
 import numpy as np
 import pytest
 
+from orchestrator.cases.case import load_case
 from orchestrator.errors import InputError
 from orchestrator.oscillations.measurements import Site
 from orchestrator.oscillations.reading import _table, contest_cases, read_contest
+from orchestrator.oscillations.signs import turned_signs
 from orchestrator.oscillations.verdict import locate
 from orchestrator.oscillations.view import Sources
 from tests.support.forced_records import record, sine, times_of
@@ -53,6 +55,31 @@ def test_phasors_in_csv(gfor, tmp_path, measured):
         "dynamic-mode participation",
         "Q-V phase",
     }
+
+
+def test_degrees_that_are_labelled_rad_are_remarked(gfor, tmp_path, measured):
+    """Every second bus 9 degrees ahead, written as 9 rad; radians, wrapped or not, are not remarked."""
+    ahead = tuple(replace(place, angle=place.angle + np.deg2rad(9.0)) for place in measured.places)
+    turned = replace(measured, places=ahead)
+    for scale, remarked in ((57.29577951308232, True), (1.0, False)):
+        units, scales = ("pu", "rad", "MW", "Mvar"), (1, scale, 100, 100)
+        path = csv(tmp_path / "pmu.csv", turned, units=units, scale=scales)
+        _, out, _ = gfor("signal", "source", path, "--json")
+        remarks = " ".join(json.loads(out)["remarks"])
+        assert ("are they in degrees? Write [deg]" in remarks) == remarked
+
+
+def test_a_power_with_the_sign_turned_beside_the_case_is_remarked(measured):
+    (prepared,) = load_case("two_area").prepare(["gfor"])
+    assert not turned_signs(measured, prepared)
+    places = tuple(
+        replace(place, p=-place.p, q=-place.q) if place.name == "sg1" else place
+        for place in measured.places
+    )
+    (remark,) = turned_signs(replace(measured, places=places), prepared)
+    power = prepared.power_flow.powers["sg1"].real * prepared.system.components["sg1"].number("S_n")
+    assert remark.startswith("sg1: its P is -")
+    assert f"{power:+.4g} MW in the case" in remark
 
 
 def test_the_page_shows_where_energy_flows(gfor, tmp_path, measured):
