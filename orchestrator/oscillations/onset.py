@@ -8,6 +8,7 @@ and b are those that explain the envelope best, and the interval holds all begin
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orchestrator.arrays import Numbers
 
@@ -23,6 +24,9 @@ chosen by `python -m tests.benchmarks.begins`: 3.84 would be that of a smooth fi
 and the noise of loads is not white beside a mode."""
 
 _LEAST = 0.5  # half of the narrowest interval [periods]
+
+
+Places = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,7 @@ def onset_of(times: Numbers, envelope: Numbers, half: int, frequency: float) -> 
     )
 
 
-def _shifted(law: Numbers, window: Numbers, at: Numbers, begins: Numbers) -> Numbers:
+def _shifted(law: Numbers, window: Numbers, at: Places, begins: Places) -> Numbers:
     """A law that starts at each begin, as the window sees it, shape (begins, samples)."""
     length = len(window)
     # seen[k]: the window's first sample stands k − length behind the begin
