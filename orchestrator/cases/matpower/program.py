@@ -15,7 +15,7 @@ import numpy as np
 from orchestrator.cases.matpower.expressions import UnknownError, Value, indices_of, value_of
 from orchestrator.cases.matpower.statements import Statement, UnendedError, statements
 from orchestrator.errors import InputError
-from orchestrator.foreign_files import read_text
+from orchestrator.foreign_files import read_text, visible
 
 READ = ("baseMVA", "bus", "branch", "gen")
 """Fields of a case that gfor reads."""
@@ -52,7 +52,7 @@ def case_tables(path: Path) -> dict[str, Value]:
     """What a case's program leaves in the fields that gfor reads, by their names; a field that it lacks is not there.
 
     Raises `InputError` with the line of the first statement that is not understood."""
-    source = read_text(path, errors="replace")
+    source = visible(read_text(path, errors="replace"))
     program = _Program(str(path))
     try:
         for statement in statements(source):
