@@ -24,12 +24,8 @@ _NEEDED = {
 _HEAD = 64 * 1024  # bytes of a file in which its profile is looked for
 
 
-def load_cgmes(path: Path) -> Any:
-    if not path.exists():
-        raise InputError(
-            f"{path}: there is no such file; give a zip or a folder with the profiles EQ, SSH, TP and SV"
-        )
-    profiles = _profiles(path)
+def load_cgmes(path: Path, profiles: dict[str, bytes] | None = None) -> Any:
+    profiles = profiles_of(path) if profiles is None else profiles
     require(f"reading the CGMES model {path.name}", "pypowsybl")
     logging.getLogger("powsybl").setLevel(logging.CRITICAL)
     powsybl: Any = import_module("pypowsybl.network")  # seconds to import, and needed only here
@@ -47,7 +43,11 @@ def load_cgmes(path: Path) -> Any:
         ) from error
 
 
-def _profiles(path: Path) -> dict[str, bytes]:
+def profiles_of(path: Path) -> dict[str, bytes]:
+    if not path.exists():
+        raise InputError(
+            f"{path}: there is no such file; give a zip or a folder with the profiles EQ, SSH, TP and SV"
+        )
     files = sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]
     found: dict[str, bytes] = {}
     try:

@@ -4,7 +4,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,8 @@ from orchestrator.cases.cgmes.branches import (
     stars,
     transformers,
 )
-from orchestrator.cases.cgmes.files import load_cgmes
+from orchestrator.cases.cgmes.files import load_cgmes, profiles_of
+from orchestrator.cases.cgmes.reference import Reference, dynamics_of, reference_of
 from orchestrator.cases.network_sources import SourceTables
 from orchestrator.cases.source_changes import Changes
 from orchestrator.errors import InputError, Problem, few
@@ -66,16 +67,31 @@ def _read(
     path: Path, versions: tuple[tuple[str, int], ...], leaving_out: tuple[str, ...]
 ) -> CgmesNetwork:
     """The network; ``versions`` keep newer contents apart. Every scenario of a case asks."""
-    return convert(str(path), load_cgmes(path), leaving_out)
+    profiles = profiles_of(path)
+    found = convert(
+        str(path), load_cgmes(path, profiles), leaving_out, reference=reference_of(profiles)
+    )
+    dynamics = dynamics_of(profiles)
+    if not dynamics:
+        return found
+    listed = ", ".join(f"{count} {name}" for name, count in sorted(dynamics.items()))
+    text = f"the profile DY has {listed}: not read; what the machines are stands in [units] and [components]"
+    return replace(found, changes=(*found.changes, Problem(str(path), text)))
 
 
-def convert(place: str, source: Any, leaving_out: Sequence[str] = ()) -> CgmesNetwork:
-    return _Reading(place, source).network(leaving_out)
+def convert(
+    place: str,
+    source: Any,
+    leaving_out: Sequence[str] = (),
+    *,
+    reference: Reference = Reference(),  # noqa: B008 - frozen
+) -> CgmesNetwork:
+    return _Reading(place, source, reference).network(leaving_out)
 
 
 class _Reading:
-    def __init__(self, place: str, source: Any) -> None:
-        self._place, self._source = place, source
+    def __init__(self, place: str, source: Any, reference: Reference) -> None:
+        self._place, self._source, self._reference = place, source, reference
         self._changes = Changes(place, "element")
         self._nominal: dict[str, float] = {}
         self._numbers: dict[str, int] = {}
@@ -176,9 +192,20 @@ class _Reading:
             self._add_bus(row.Index, named[row.Index])
             if math.isfinite(row.v_mag) and math.isfinite(row.v_angle):
                 self._rows[-1][7:] = self._volts[row.Index], float(row.v_angle)
-        slack = {*self._source.get_extensions("slackTerminal").bus_id} & kept
-        for bus in slack:
+        for bus in self._slack(generators, kept):
             self._rows[self._numbers[bus]][1] = 3
+
+    def _slack(self, generators: Any, kept: set[str]) -> set[str]:
+        """The bus of the slack: pypowsybl's, else by SSH's priorities, else SV's angle reference with a unit."""
+        found = {*self._source.get_extensions("slackTerminal").bus_id} & kept
+        units = generators[generators.connected & generators.bus_id.isin(kept)]
+        for name in (name for name in self._reference.units if name in units.index):
+            return found or {units.bus_id[name]}
+        nodes = self._source.get_bus_breaker_view_buses()
+        for node in (node for node in self._reference.nodes if node in nodes.index):
+            if (bus := nodes.bus_id[node]) in {*units.bus_id}:
+                return found or {bus}
+        return found
 
     def _bus_names(self, buses: Any) -> dict[str, str]:
         """The topological node's name where a bus is one and every name stands once, else the bus' own name or id."""
