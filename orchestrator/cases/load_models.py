@@ -14,7 +14,8 @@ _LARGEST_SHARE = 100.0
 
 _OPEN = (
     "the load model is open: the file's loads (constant powers in its power flow) are taken as constant impedances, as "
-    "ANDES does by itself and stability studies in PSS/E after a conversion to them; it can decide about the damping, "
+    "ANDES does by itself (in eigenvalues since 1.9; before, they are constant powers there) and stability studies in "
+    "PSS/E after a conversion to them; it can decide about the damping, "
     'so say which in [network]: load_model = { active = "impedance", reactive = "impedance" }, "power" or "current"'
 )
 
