@@ -1,5 +1,7 @@
 """Every record of a DYR file is used, listed, or in the table of what gfor does not have."""
 
+from pathlib import Path
+
 import pytest
 
 from orchestrator.cases.psse.dyr import machine_models, record_uses
@@ -116,3 +118,11 @@ def test_what_is_known_is_listed():
     assert all(record.kind and record.part and record.source for record in records.values())
     for name, record in records.items():  # the lists of models say of each what we take it for
         assert kind_of(name) == record.kind.split()[0], name
+
+
+def test_the_page_has_the_table():
+    page = (Path(__file__).parents[3] / ".docs/reference/dynamics-records.md").read_text("utf-8")
+    rows = [line for line in page.splitlines() if line.startswith("|")][2:]
+    assert rows == [
+        f"| {r.name} | {r.kind} | `{r.part}` | {r.approximated} |" for r in known_records()
+    ]
