@@ -125,6 +125,7 @@ OWN = {
     "acceptance.worker": "/proc",
     "api.saved": "results",
     "cases.definition": "is_file before it",
+    "cases.psse.missing_models": "our own table",
     "cases.kept_tables": "the cache and our own tables",
     "certification.acceptance": "is_file before it",
     "certification.files": "what was read before",
