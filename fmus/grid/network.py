@@ -220,6 +220,12 @@ class Network:
                 yield f"transformer {x.name!r} has two windings at one bus: {', '.join(x.buses)}"
             if not min(x.tap) > 0:
                 yield f"transformer {x.name!r} has the ratio {min(x.tap):g}; it must exceed 0, and is 1 without one"
+        if not self.phasors:
+            yield from (
+                f"shunt {x.name!r} has the negative conductance {x.g_mw:g} MW{_ONLY_PHASORS}"
+                for x in self.shunts
+                if x.g_mw < 0
+            )
         if not self.stray_B >= 0:
             yield f"stray_B = {self.stray_B:g} pu; it must not be negative"
 

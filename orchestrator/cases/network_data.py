@@ -30,6 +30,7 @@ from orchestrator.cases.record_use import RecordUse
 from orchestrator.cases.schema import NetworkTable
 from orchestrator.errors import InputError, Problem
 
+_FREQUENCY = 60.0  # of a RAW file that does not say it, as PSS/E's own default [Hz]
 _IN_OHMS = ("kv", "R_ohm", "X_ohm", "B_us")  # of a file of lines, in the place of R, X, B
 
 
@@ -177,21 +178,30 @@ def _source(table: NetworkTable, directory: Path) -> _Source:
 def _from_raw(path: Path, table: NetworkTable) -> _Source:
     """A network of PSS/E; the ratings of the machines are those of the file."""
     raw = read_raw(seen_from_here(path), table.leave_out, keep_load_parts=table.keep_load_parts)
-    if raw.tables.frequency is None and table.frequency is None:
+    if not raw.machines:
         raise InputError(
-            f"{raw.tables.name}: BASFRQ, the sixth value of the first record, is missing or 0, so the frequency is not "
-            'known; write it in [network]: frequency = "50 Hz" or frequency = "60 Hz"'
+            f"{raw.tables.name}: no generator is in service, so nothing feeds the network and nothing can swing; "
+            "give a case with generators"
         )
     own, changes = raw.tables.frequency, list(raw.changes)
+    if own is None and table.frequency is None:
+        text = f"BASFRQ, the sixth value, is missing or 0: {_FREQUENCY:g} Hz are taken"
+        changes.append(
+            Problem(
+                f"{raw.tables.name}, line 1",
+                f'{text}; write frequency = "50 Hz" into [network] (`gfor new --frequency`) if it is another',
+            )
+        )
     if table.frequency is not None and own is not None and own != table.frequency:
         text = f"BASFRQ is {own:g} Hz, and the case's frequency = {table.frequency:g} Hz counts; one of them is wrong"
         changes.append(Problem(f"{raw.tables.name}, line 1", text))
     imported = import_network(raw.tables, joined=False)  # the machines are those of the file
+    imported = replace(imported, frequency=imported.frequency or _FREQUENCY)
     misfit = misfit_of(imported, raw.tables.bus, raw.tables.labels, NOT_SOLVED)
     ratings: dict[str, float] = {}
     for machine in raw.machines:
         bus = bus_name(raw.tables.labels[machine.bus])
-        ratings[bus] = ratings.get(bus, 0.0) + machine.rating_mva
+        ratings[bus] = ratings.get(bus, 0.0) + machine.likely_mva
     generation = {
         bus: replace(g, rating_mva=ratings[bus]) for bus, g in imported.generation.items()
     }

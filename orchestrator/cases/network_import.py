@@ -13,7 +13,6 @@ from fmus.grid.network import SMALLEST_REACTANCE, Line, Load, Shunt, ThreeWindin
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.arrays import Matrix
 from orchestrator.cases.network_sources import SourceTables
-from orchestrator.errors import InputError, few
 
 _REFERENCE, _OUT = 3, 4
 _POWER_FACTOR = 0.9
@@ -86,15 +85,6 @@ def import_network(source: SourceTables, *, joined: bool = True) -> ImportedNetw
         for n, y in ((n, y * source.base_mva) for n, y in to_earth.items())
         if abs(y) > _NEGLIGIBLE
     ]
-    problems = [
-        f"bus {s.name.removeprefix('shunt_')} has the negative conductance {s.g_mw:g} MW to earth"
-        for s in shunts
-        if s.g_mw < 0
-    ]
-    if problems:
-        raise InputError(
-            f"{source.name}: {few(problems, 5, '; ')}; the grid model has no such element"
-        )
     reference = [n for n, row in rows.items() if int(row[1]) == _REFERENCE]
     return ImportedNetwork(
         tuple(bus for label in labels.values() if (bus := bus_of(label)) not in merged),

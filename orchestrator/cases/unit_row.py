@@ -43,11 +43,17 @@ class UnitRow:
     p_max_mw: float = math.inf
 
 
-def checked(row: UnitRow, place: str) -> UnitRow:
+def checked(row: UnitRow, place: str, *, is_base: bool = False) -> UnitRow:
+    """The row.
+
+    ``is_base``: whether the rating is only the base of the machine's data, as MBASE of PSS/E is: a power above it is
+    then a matter for a question.
+
+    Raises `InputError` if a figure cannot be."""
     unit = f"{place}: the unit at bus {row.label}"
     if not row.rating_mva > 0:
         raise InputError(f"{unit} has a rating of {row.rating_mva:g} MVA; it must exceed 0")
-    if abs(row.p_mw) > row.rating_mva:
+    if abs(row.p_mw) > row.rating_mva and not is_base:
         most = f"its rating of {row.rating_mva:g} MVA; raise the rating or lower p_mw"
         raise InputError(f"{unit} feeds {row.p_mw:g} MW, more than {most}")
     if not row.q_min_mvar <= row.q_max_mvar:

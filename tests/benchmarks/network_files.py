@@ -1,4 +1,4 @@
-"""Other people's network files, read as they lie there: which load, why the others do not, and how right the voltages are.
+"""Other people's network files as they lie there: which load, why others do not, how right the voltages are.
 
 python -m tests.benchmarks.network_files FOLDER [--powsybl] [--only WORD] [--out TABLE.md] [--seconds 120]
 
@@ -58,9 +58,11 @@ class Trial:
 
     @property
     def cause(self) -> str:
-        """The message without what differs from file to file."""
-        words = self.words.replace(str(self.path), "").lstrip(": ,")
-        return re.sub(r"'[^']*'|-?\d[\d.e+-]*", "#", words)[:90]
+        """The first problem of the message without what differs from file to file."""
+        words = re.sub(r"\S*\.(toml|rawx?)\b", "", self.words, flags=re.IGNORECASE)
+        problem = re.search(r"- line \d+, (.*)", words)
+        first = problem[1] if problem else words.splitlines()[0]
+        return re.sub(r"'[^']*'|-?\d[\d.e+-]*", "#", first).lstrip(": ,")[:110]
 
 
 def files_in(folder: Path, only: str = "") -> list[Path]:
@@ -102,7 +104,7 @@ def read_here(path: Path) -> Trial:
             running(in_service(base)).close()
         except (CosimError, OSError) as error:
             return Trial(path, REFUSED, str(error))
-        except Exception:  # noqa: BLE001 - what no command expects is what this looks for
+        except Exception:
             return Trial(path, CRASHES, traceback.format_exc().strip().splitlines()[-1])
     return _loaded(path, base)
 
@@ -152,7 +154,7 @@ def with_powsybl(trial: Trial, powsybl: Any) -> Trial:
         buses = network.get_bus_breaker_view_buses(attributes=["v_mag", "v_angle"])
         levels = network.get_voltage_levels(attributes=["nominal_v"])["nominal_v"]
         at = network.get_bus_breaker_view_buses(attributes=["voltage_level_id"])["voltage_level_id"]
-    except Exception as error:  # noqa: BLE001 - another program's refusal is no matter of ours
+    except Exception as error:
         print(f"{trial.path.name}: pypowsybl: {str(error)[:100]}", file=sys.stderr)
         return trial
     theirs = {

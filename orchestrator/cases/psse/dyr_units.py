@@ -131,7 +131,7 @@ def rows_of_machines(machines: Sequence[Machine], place: str) -> list[UnitRow]:
             p_min_mw=machine.p_min_mw,
             p_max_mw=machine.p_max_mw,
         )
-        rows.append(checked(row, place))
+        rows.append(checked(row, place, is_base=True))
     return rows
 
 

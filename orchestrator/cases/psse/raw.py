@@ -1,23 +1,28 @@
-"""A PSS/E RAW file of revision 33 to 36 as tables of a network source."""
+"""A PSS/E RAW file of revision 29 to 36 as tables of a network source."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fmus.grid.element_data import SMALLEST_REACTANCE
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.network_sources import SourceTables
 from orchestrator.cases.psse.raw_file import read_file
-from orchestrator.cases.psse.records import RawFile, Record, leave_out
+from orchestrator.cases.psse.records import SWITCHING_DEVICES, RawFile, Record, leave_out
 from orchestrator.cases.psse.transformers import Transformer, star, transformers
+from orchestrator.cases.psse.zero_impedances import merged_buses, threshold
 from orchestrator.cases.source_changes import Changes
 from orchestrator.errors import Problem
 
 _BUS_COLUMNS, _BRANCH_COLUMNS, _GEN_COLUMNS = 9, 11, 10
 _VM, _VA = 7, 8  # columns of the table of buses
-_REFERENCE = 3
+_REFERENCE, _OUT = 3, 4  # codes IDE of a bus
+MANY_SHUNTS = 35  # first revision with a node in the records of machines and switched shunts
+_POWER_FACTOR = 0.9  # with which a power tells a rating that is not known
 _NO_LIMIT = 9999.0  # MW or Mvar by which PSS/E says that a generator has no limit
 _APART = 0.01  # voltage of a solved file beside what a generator within its limits is to hold [pu]
 _MOST_VOLTAGE = 2.0
@@ -28,6 +33,8 @@ _FAR = 20.0
 _SMALL_LOSS = 10.0  # MW that a fixed shunt may draw unasked
 # step of shifts in radians, and how near a number is to be one of them
 _RADIANS, _NEAR = math.pi / 6, 0.01
+# of a switched shunt: columns of STAT, MODSW and BINIT up to revision 31, up to 34, and after
+_SWITCHED: tuple[tuple[int | None, int, int], ...] = ((None, 1, 7), (3, 1, 9), (4, 2, 11))
 _SAME_VOLTAGE = 0.1  # part by which the nominal voltages at a line's ends may differ
 
 
@@ -47,6 +54,18 @@ class Machine:
     q_max_mvar: float
     p_min_mw: float = -math.inf
     p_max_mw: float = math.inf
+    q_mvar: float = 0.0
+
+    @property
+    def likely_mva(self) -> float:
+        """MBASE, or what the machine must be able to feed, by PT or by PG and QG, if that is more [MVA].
+
+        MBASE is the base of the machine's data; PSS/E warns of a power above it."""
+        fed = abs(complex(self.p_mw, self.q_mvar))
+        if fed <= self.rating_mva:
+            return self.rating_mva
+        most = self.p_max_mw if math.isfinite(self.p_max_mw) else 0.0
+        return max(fed, most) / _POWER_FACTOR
 
 
 @dataclass(frozen=True)
@@ -82,18 +101,24 @@ class _Reading:
         self._idle: set[tuple[int, str]] = set()
         self._lines_of: dict[tuple[Any, ...], int] = {}
         self._load_parts: dict[int, tuple[complex, complex]] = {}
+        self._same: dict[int, int] = {}  # bus that PSS/E takes as one with another → the other
+        self._merged: set[int] = set()  # lines of the records that make them one
+        # least reactance that our network can have [pu of the system]
+        self._least = 1.1 * SMALLEST_REACTANCE * raw.base_mva / SYSTEM_BASE_MVA
 
     def network(self, leaving_out: Sequence[str]) -> RawNetwork:
         for line, section in self._raw.guessed.items():
             text = f"does not say which data begin, as other lines do: taken as {section} data, which are next in order"
             self._changes.note(line, text)
+        for line, text in self._raw.remarks:
+            self._changes.note(line, text)
         leave_out(self._raw, leaving_out, self._changes)
         self._buses()
+        self._merge()
         self._loads()
         self._shunts()
         self._lines()
-        for transformer in transformers(self._raw, self._kilovolts):
-            self._transformer(transformer)
+        self._transformers()
         machines = self._machines()
         gen = np.zeros((len(machines), _GEN_COLUMNS))
         for row, m in zip(gen, machines, strict=True):
@@ -109,7 +134,7 @@ class _Reading:
         tables = SourceTables(
             self._raw.place,
             self._raw.base_mva,
-            np.array(list(self._rows.values())),
+            np.array(list(self._rows.values())).reshape(-1, _BUS_COLUMNS),
             np.array(self._branches).reshape(-1, _BRANCH_COLUMNS),
             gen,
             np.array(self._to_earth, dtype=complex).reshape(-1, 2),
@@ -121,9 +146,19 @@ class _Reading:
 
     def _bus(self, record: Record, index: int = 0) -> int:
         bus = abs(record.whole(index, "the bus' number"))
+        bus = self._same.get(bus, bus)
         if bus not in self._rows:
             raise record.error(f"there is no bus {bus}")
         return bus
+
+    def _own(self, record: Record, index: int = 0) -> int:
+        """The bus that a record names, also if it is one with another."""
+        return abs(record.whole(index, "the bus' number"))
+
+    @property
+    def _ends(self) -> int:
+        """Column of GI in the records of branches."""
+        return 9 if self._raw.revision < SWITCHING_DEVICES else 19
 
     def _once(self, record: Record, what: str, *key: Any) -> None:
         """Refuse a second element of the same name, which PSS/E would put in the first one's place."""
@@ -167,12 +202,45 @@ class _Reading:
                 )
             self._labels[number] = str(number)
 
+    def _merge(self) -> None:
+        """Make one bus of those that a line without impedance joins."""
+        least, joins = threshold(self._raw), []
+        for record in self._raw.of("branch"):
+            z = complex(record.number(3, "R", 0.0), record.number(4, "X", 0.0))
+            ends = [abs(record.whole(k, "the bus' number")) for k in (0, 1)]
+            if abs(z) >= least or not record.whole(self._ends + 4, "ST", 1):
+                continue
+            if all(bus in self._rows and self._rows[bus][1] != _OUT for bus in ends):
+                joins.append((record, ends[0], ends[1]))
+        status = 14 if self._raw.revision < MANY_SHUNTS else 15
+        held = {
+            record.whole(0, "the bus' number")
+            for record in self._raw.of("generator")
+            if record.whole(status, "STAT", 1)
+        }
+        kinds = {bus: int(row[1]) for bus, row in self._rows.items()}
+        self._same, gone, kept = merged_buses(joins, kinds, held)
+        for bus, standing in self._same.items():
+            self._rows.pop(bus)
+            self._changes.note(
+                f"bus {bus} into {standing}",
+                f"zero impedance lines (below THRSHZ = {least:g} pu): the buses are one, as in PSS/E",
+            )
+        self._merged = {record.line for record in gone}
+        for record in kept:
+            text = "zero impedance line between two buses with machines: a branch of the least reactance"
+            self._changes.note(record.line, text)
+
+    def _in_service(self, record: Record, status: int | None, name: str) -> bool:
+        """Whether an element counts: one out of service may even point to a bus that is not there, as in PSS/E."""
+        return status is None or bool(record.whole(status, name, 1))
+
     def _loads(self) -> None:
         for record in self._raw.of("load"):
-            bus = self._bus(record)
-            self._once(record, "load", bus, record.text(1, "1").strip())
-            if record.whole(2, "STATUS", 1) == 0:
+            if not self._in_service(record, 2, "STATUS"):
                 continue
+            bus = self._bus(record)
+            self._once(record, "load", self._own(record), record.text(1, "1").strip())
             names = ("PL", "QL", "IP", "IQ", "YP", "YQ")
             pl, ql, ip, iq, yp, yq = (
                 record.number(5 + k, name, 0.0) for k, name in enumerate(names)
@@ -201,28 +269,31 @@ class _Reading:
 
     def _shunts(self) -> None:
         for record in self._raw.of("fixed shunt"):
-            bus = self._bus(record)
-            if record.whole(2, "STATUS", 1):
+            if self._in_service(record, 2, "STATUS"):
+                bus = self._bus(record)
                 drawn = complex(record.number(3, "GL", 0.0), record.number(4, "BL", 0.0))
                 if drawn.real > max(_SMALL_LOSS, abs(drawn.imag)):
                     self._changes.note(
                         record.line, f"shunt that draws GL = {drawn.real:g} MW: is it BL, in Mvar?"
                     )
                 self._add(bus, 4, drawn)
-        status, mode, initial = (3, 1, 9) if self._raw.revision < 35 else (4, 2, 11)
+        status, mode, initial = _SWITCHED[sum(self._raw.revision >= first for first in (32, 35))]
         for record in self._raw.of("switched shunt"):
-            bus = self._bus(record)
-            if record.whole(status, "STAT", 1) == 0:
+            if not self._in_service(record, status, "STAT"):
                 continue
+            bus = self._bus(record)
             if record.whole(mode, "MODSW", 1):
                 self._changes.note(record.line, "switched shunt: held at BINIT")
             self._add(bus, 4, complex(0.0, record.number(initial, "BINIT", 0.0)))
 
     def _lines(self) -> None:
-        ends = 9 if self._raw.revision == 33 else 19
+        ends = self._ends
         for record in self._raw.of("branch"):
+            if record.line in self._merged or not self._in_service(record, ends + 4, "ST"):
+                continue
             start, end = self._bus(record), self._bus(record, 1)
-            self._once(record, "branch", frozenset((start, end)), record.text(2, "1").strip())
+            pair = frozenset((self._own(record), self._own(record, 1)))
+            self._once(record, "branch", pair, record.text(2, "1").strip())
             z = complex(record.number(3, "R", 0.0), record.number(4, "X"))
             charging = 0.5j * record.number(5, "B", 0.0)
             gi, bi, gj, bj = (
@@ -238,6 +309,8 @@ class _Reading:
                 start, end, z, state, (charging + complex(gi, bi), charging + complex(gj, bj))
             )
         for record in self._raw.of("system switching device"):
+            if not self._in_service(record, 16, "STAT"):
+                continue
             start, end = self._bus(record), self._bus(record, 1)
             if closed := record.whole(16, "STAT", 1):
                 self._changes.note(record.line, "switching device: a branch of its reactance")
@@ -265,10 +338,19 @@ class _Reading:
         tap: float = 0.0,
         shift: float = 0.0,
     ) -> None:
+        if abs(z.imag) < self._least:
+            text = f"reactance of almost 0: taken as {self._least:.2g} pu, the least that the network can have"
+            self._changes.note(f"{start}-{end}", text)
+            z = complex(z.real, self._least)
         self._branches.append(
             [start, end, z.real, z.imag, 0.0, 0.0, 0.0, 0.0, tap, shift, float(state != 0)]
         )
         self._to_earth.append(to_earth)
+
+    def _transformers(self) -> None:
+        for t in transformers(self._raw, self._kilovolts):
+            moved = tuple(replace(w, bus=self._same.get(w.bus, w.bus)) for w in t.windings)
+            self._transformer(replace(t, windings=moved))
 
     def _transformer(self, t: Transformer) -> None:
         windings = t.windings
@@ -280,6 +362,9 @@ class _Reading:
             if abs(turned - round(turned)) < _NEAR * abs(turned):
                 text = f"ANG is {turned * _RADIANS:g} degrees: is it in radians? {round(turned) * 30} degrees are usual"
                 self._changes.note(t.record.line, text)
+        if t.small_loss:
+            text = "R below 1 is a load loss in W by CZ = 3, as good as none: is it in pu, so that CZ = 2 is right?"
+            self._changes.note(t.record.line, text)
         if t.corrected:
             self._changes.note(t.record.line, "impedance correction table: not applied")
         if t.off == (0, 1, 2):
@@ -307,15 +392,19 @@ class _Reading:
                 winding.bus, inner, z, k not in t.off, tap=winding.ratio, shift=winding.shift
             )
 
+    def _is_out(self, bus: int) -> bool:
+        return bus in self._rows and self._rows[bus][1] == _OUT
+
     def _machines(self) -> tuple[Machine, ...]:
         mbase, status = (8, 14) if self._raw.revision < 35 else (9, 15)
         machines = []
         for record in self._raw.of("generator"):
-            bus = self._bus(record)
-            self._once(record, "machine", bus, record.text(1, "1").strip())
-            if record.whole(status, "STAT", 1) == 0 or self._rows[bus][1] == 4:
-                self._idle.add((bus, record.text(1, "1").strip()))
+            own = self._own(record)
+            if not self._in_service(record, status, "STAT") or self._is_out(own):
+                self._idle.add((own, record.text(1, "1").strip()))
                 continue
+            bus = self._bus(record)
+            self._once(record, "machine", own, record.text(1, "1").strip())
             rating = record.number(mbase, "MBASE [MVA]", self._raw.base_mva)
             if not rating > 0:
                 raise record.error(f"MBASE is {rating:g} MVA; it must exceed 0")
@@ -367,8 +456,16 @@ class _Reading:
                     most,
                     p_least,
                     p_most,
+                    record.number(3, "QG", 0.0),
                 )
             )
+            if machines[-1].likely_mva > rating:
+                self._changes.note(
+                    record.line,
+                    "PG or QG exceeds MBASE, which is the base of the machine's data and need not be its rating: "
+                    "a DYR file's data stay on MBASE; without one, typical data are taken on PT, or on PG and QG, "
+                    f"with a power factor of {_POWER_FACTOR:g}. Is the rating such, or is a power wrong?",
+                )
         return tuple(machines)
 
 

@@ -5,15 +5,19 @@ Elements that our network does not have are refused without the user's word, and
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 
+from orchestrator.cases.psse.titles import section_of
 from orchestrator.cases.source_changes import Changes
 from orchestrator.errors import InputError
 from orchestrator.foreign_files import read_bytes, visible
 from orchestrator.units import LARGEST
 
-REVISIONS = (33, 34, 35, 36)  # revisions whose records are known
+REVISIONS = tuple(range(29, 37))  # revisions whose records are known
+SWITCHING_DEVICES = 34  # first revision with system-wide data, switching devices and substations
+_FIXED_SHUNTS = 31  # first revision with fixed shunts beside the buses, and REV in the first record
 MOST_BYTES = 200_000_000  # of a file: ten times the largest interconnections
 
 _TAIL = (
@@ -32,26 +36,26 @@ _TAIL = (
     "induction machine",
 )
 _HEAD = ("bus", "load", "fixed shunt", "generator", "branch")
-_ORDER: dict[int, tuple[str, ...]] = {33: (*_HEAD, "transformer", *_TAIL)}
+_ORDER: dict[int, tuple[str, ...]] = dict.fromkeys((31, 32, 33), (*_HEAD, "transformer", *_TAIL))
+_ORDER[30] = _ORDER[29] = (
+    *("bus", "load", "generator", "branch", "transformer", "area", "two-terminal dc"),
+    *("vsc dc line", "switched shunt", "impedance correction", "multi-terminal dc"),
+    *("multi-section line", "zone", "inter-area transfer", "owner", "facts device"),
+)
 _ORDER[34] = ("system-wide", *_HEAD, "system switching device", "transformer", *_TAIL, "substation")
 _ORDER[35] = _ORDER[34]
 
-_ALIASES = {
-    "two-terminal dc line": "two-terminal dc",
-    "vsc dc": "vsc dc line",
-    "facts": "facts device",
-    "multi-terminal dc line": "multi-terminal dc",
-    "facts control device": "facts device",
-    "gne device": "gne",
-    "multi-section line group": "multi-section line",
-    "transformer impedance correction": "impedance correction",
-    "interarea transfer": "inter-area transfer",
-    "inter-area": "inter-area transfer",
-    "switching device": "system switching device",
-}
 _TOKEN = re.compile(r"""'([^']*)'?|"([^"]*)"?|(,)|(/)|([^\s,'"/]+)""")
-_BEGIN = re.compile(r"BEGIN\s+(.*?)\s+DATA", re.IGNORECASE)
-_END = re.compile(r"END OF\s+(.*?)\s+DATA", re.IGNORECASE)
+# the same between commas, where an apostrophe ends a text only before a comma, a slash or the end of the line: others,
+# doubled or not, belong to it
+_STRICT_TOKEN = re.compile(
+    r"""'((?:[^']|'(?!\s*(?:,|/|$)))*)'?|"((?:[^"]|"(?!\s*(?:,|/|$)))*)"?|(,)|(/)|([^\s,'"/]+)"""
+)
+_BETWEEN_COMMAS = re.compile(r"""[^'"/]*,\s*['"]""")  # begin of a record whose texts stand so
+_BEGIN = re.compile(r"\bBEGIN(?:NING OF)?\s+(.*?)(?:\s+DATA\b.*)?$", re.IGNORECASE)
+_END = re.compile(r"\bEND OF\s+(.*?)(?:\s+DATA\b.*|,.*)?$", re.IGNORECASE)
+_COMMENT = re.compile(r"\s*(@!|//?(\s|$))")  # begins of a line without data
+_WRITER = re.compile(r"PSS\W*(?:\w{1,2}\W*)?E\W*(\d{2})", re.IGNORECASE)  # "PSS/E-30.3"
 _REMEDY = (
     "(such as '0 / END OF BUS DATA, BEGIN LOAD DATA'), and their order is not known for this file; export the case "
     "from PSS/E as revision 35"
@@ -105,6 +109,9 @@ class RawFile:
     # revision's order
     guessed: dict[int, str] = field(default_factory=dict)
 
+    # (line, text) of what the first lines say in another way than usual
+    remarks: tuple[tuple[int, str], ...] = ()
+
     def of(self, section: str) -> list[Record]:
         return self.sections.get(section, [])
 
@@ -115,31 +122,79 @@ def read_records(path: Path) -> RawFile:
     if first is None:
         raise InputError(f"{path}: it is empty; export the case from PSS/E as RAW")
     head = Record(str(path), first[0], _fields(first[1]))
-    if len(head.fields) < 3:
-        raise head.error(
-            "the first record has no revision; a RAW file begins with IC, SBASE, REV, XFRRAT, NXFRAT, BASFRQ"
-        )
-    revision = head.whole(2, "the revision REV", 0)
-    if revision not in REVISIONS:
-        known = ", ".join(map(str, REVISIONS))
-        raise head.error(
-            f"the revision REV is {revision}; {known} are read: export the case from PSS/E as one of them"
-        )
-    if head.whole(0, "IC", 0) != 0:
-        raise head.error(
-            f"IC is {head.text(0)}: the file changes another case; export the whole case (IC = 0)"
-        )
+    revision, remarks = _revision(head, first[1])
+    if head.whole(0, "IC", 0) not in (0, 1):
+        raise head.error(f"IC is {head.text(0)}; it is 0 for a whole case, or 1 for changes")
+    if head.whole(0, "IC", 0):
+        remarks.append("IC = 1, data to be added to a case: read as a whole case")
     base = head.number(1, "the system base SBASE [MVA]", 100.0)
     if not base > 0:
         raise head.error(f"the system base SBASE is {base:g} MVA; it must exceed 0")
     frequency = head.number(5, "the frequency BASFRQ [Hz]", 0.0)
-    for _ in range(2):  # two lines of titles
-        next(lines, None)
-    return RawFile(str(path), revision, base, frequency or None, *_sections(path, revision, lines))
+    titles = [next(lines, None) for _ in range(2)]
+    if titles[1] is not None and _is_bus(titles[1][1]):
+        remarks.append("one line of titles, where PSS/E writes two: the second is a bus")
+        lines = chain([titles[1]], lines)
+    sections, guessed = _sections(path, revision, lines)
+    if revision < _FIXED_SHUNTS:
+        sections = _later_buses(sections)
+    noted = tuple((head.line, text) for text in remarks)
+    return RawFile(str(path), revision, base, frequency or None, sections, guessed, noted)
+
+
+def _revision(head: Record, line: str) -> tuple[int, list[str]]:
+    """REV, which revisions before 31 only tell in the comment, and remarks."""
+    written = _WRITER.search(line)
+    known = f"{REVISIONS[0]} to {REVISIONS[-1]}"
+    if head.text(2):
+        revision = head.whole(2, "the revision REV")
+    elif written:
+        revision = int(written[1])
+    elif len(head.fields) < 2 or not _is_number(head.text(1)):
+        raise head.error(
+            "the first record has no revision; a RAW file begins with IC, SBASE, REV, XFRRAT, NXFRAT, BASFRQ"
+        )
+    else:
+        return 30, ["no revision REV: read as revision 30, the last one without it"]
+    if revision not in REVISIONS:
+        raise head.error(
+            f"the revision REV is {revision}; {known} are read: export the case from PSS/E as one of them"
+        )
+    return revision, []
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _is_bus(line: str) -> bool:
+    """Whether a line of titles is the record of a bus: its number, a name in quotes, and numbers."""
+    if not re.match(r"\s*\d+\s*,?\s*['\"]", line):
+        return False
+    fields = _fields(line)
+    return len(fields) > 7 and all(_is_number(text) for text in fields[2:4])
+
+
+def _later_buses(sections: dict[str, list[Record]]) -> dict[str, list[Record]]:
+    """Buses of revisions 29 and 30, which hold GL and BL, as those of later ones, with fixed shunts."""
+    buses, shunts = [], []
+    for record in sections.get("bus", []):
+        padded = [*record.fields, *[""] * (11 - len(record.fields))]
+        number, name, kilovolts, kind, g, b, area, zone, vm, va, owner = padded[:11]
+        buses.append(
+            replace(record, fields=[number, name, kilovolts, kind, area, zone, owner, vm, va])
+        )
+        if any(_is_number(text) and float(text) for text in (g, b)):
+            shunts.append(replace(record, fields=[number, "1", "1", g, b]))
+    return {**sections, "bus": buses, "fixed shunt": shunts}
 
 
 def text_of(path: Path) -> str:
-    """The text of a file of PSS/E, if it is one."""
+    """The text of a file, in UTF-8 or, if it is none, Latin-1."""
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; give the path of a PSS/E RAW file")
     if (size := path.stat().st_size) > MOST_BYTES:
@@ -149,13 +204,19 @@ def text_of(path: Path) -> str:
         raise InputError(
             f"{path}: it is no text, perhaps a saved case (.sav); export it from PSS/E as RAW"
         )
-    return visible(content.decode("utf-8-sig", errors="replace"))
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = content.decode("latin-1")
+    return visible(text)
 
 
 def _numbered(text: str) -> Iterator[tuple[int, str]]:
     """Lines with their numbers, without those that only comment."""
     yield from (
-        (n, line) for n, line in enumerate(text.splitlines(), start=1) if not line.startswith("@!")
+        (n, line)
+        for n, line in enumerate(text.splitlines(), start=1)
+        if not _COMMENT.match(line) and (line.strip() or n > 1)
     )
 
 
@@ -167,7 +228,7 @@ def _sections(
     guessed: dict[int, str] = {}
     named = False
     order = list(_ORDER.get(revision, ()))
-    name = "bus" if revision == 33 else "system-wide"
+    name = "bus" if revision < SWITCHING_DEVICES else "system-wide"
     for number, line in lines:
         stripped = line.strip()
         if not stripped:
@@ -192,14 +253,17 @@ def _sections(
 
 def _following(path: Path, number: int, line: str, name: str, order: list[str]) -> str:
     """The section that begins: the one that the line names, or else the next in the revision's order."""
-    ended = _known_as(found[1]) if (found := _END.search(line)) else ""
-    if ended in order and name in order and ended != name:
+    ended = section_of(found[1]) if (found := _END.search(line)) else ""
+    if name == "substation" and not _BEGIN.search(line):
+        return name  # each substation has sections of its own
+    shunts = ended.endswith("shunt") and name.endswith("shunt")  # either may be called just so
+    if ended in order and name in order and ended != name and not shunts:
         raise InputError(
             f"{path}, line {number}: it ends the {ended} data, and what stands before it are {name} data by the lines "
             "between sections; one of these is missing or wrong: export the case once more"
         )
     if found := _BEGIN.search(line):
-        return _known_as(found[1])
+        return section_of(found[1])
     if name not in order:
         if ended:
             return "end"
@@ -208,22 +272,19 @@ def _following(path: Path, number: int, line: str, name: str, order: list[str]) 
     return order[following] if following < len(order) else "end"
 
 
-def _known_as(text: str) -> str:
-    name = " ".join(text.lower().split())
-    return _ALIASES.get(name, name)
-
-
 def _fields(line: str) -> list[str]:
     """Fields of a record, separated by commas or blanks; what stands behind a slash is a comment."""
     fields, empty = list[str](), True  # empty: nothing since the last comma
-    for token in _TOKEN.finditer(line):
+    tokens = _STRICT_TOKEN if _BETWEEN_COMMAS.match(line) else _TOKEN
+    for token in tokens.finditer(line):
         quoted, other, comma, slash, plain = token.groups()
         if slash:
             break
         if comma:
             fields += [""] if empty else []
         else:
-            fields.append((quoted or other or plain or "").strip())
+            text = quoted.replace("''", "'") if quoted else other or plain or ""
+            fields.append(text.strip())
         empty = bool(comma)
     return fields
 
@@ -259,7 +320,7 @@ _KNOWN = {
 
 def leave_out(raw: RawFile, allowed: Sequence[str], changes: Changes) -> None:
     """Note the elements that our network does not have."""
-    if unknown := [kind for kind in allowed if kind not in LEFT_OUT]:
+    if unknown := [kind for kind in allowed if kind not in (*LEFT_OUT, *raw.sections)]:
         raise InputError(f"leave_out: {unknown[0]!r} is unknown; choose from {', '.join(LEFT_OUT)}")
     refused = []
     for section, records in raw.sections.items():

@@ -6,8 +6,9 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from orchestrator.cases.psse.records import RawFile, Record
+from orchestrator.cases.psse.records import SWITCHING_DEVICES, RawFile, Record
 
+_LOSSES = 3  # CZ by which R is a load loss [W]
 _CONTROL = {33: 6}
 _TABLE = {33: 13, 34: 22}
 _OPEN = {0: (0, 1, 2), 1: (), 2: (1,), 3: (2,), 4: (0,)}  # STAT → windings that are off
@@ -34,6 +35,8 @@ class Transformer:
     # controlled, corrected: whether a tap changer acts on it, and whether its impedance depends on its tap
     controlled: bool
     corrected: bool
+    # whether a load loss, which CZ = 3 gives in W, is so small that pu may be meant
+    small_loss: bool = False
 
 
 def transformers(raw: RawFile, voltages: Mapping[int, float]) -> Iterator[Transformer]:
@@ -75,7 +78,9 @@ def _transformer(
         for k, (a, _) in enumerate(pairs)
     )
     control, table = (
-        (_CONTROL[33], _TABLE[33]) if raw.revision == 33 else (15, _TABLE[34] + (raw.revision > 34))
+        (_CONTROL[33], _TABLE[33])
+        if raw.revision < SWITCHING_DEVICES
+        else (15, _TABLE[34] + (raw.revision > 34))
     )
     return Transformer(
         first,
@@ -86,6 +91,8 @@ def _transformer(
         _OPEN[state],
         any(line.whole(control, "COD", 0) for line in rest[1:] if len(line.fields) > 3),
         any(line.whole(table, "TAB", 0) for line in rest[1:] if len(line.fields) > 3),
+        codes["CZ"] == _LOSSES
+        and any(0 < rest[0].number(3 * k, "R", 0.0) < 1 for k in range(len(pairs))),
     )
 
 
@@ -112,11 +119,7 @@ def _impedance(raw: RawFile, line: Record, index: int, code: int, nominal: float
         return complex(resistance, reactance)
     if not base > 0:
         raise line.error(f"a winding's SBASE is {base:g} MVA; it must exceed 0")
-    if code == 3:  # load loss [W], and the magnitude of the impedance
-        if 0 < resistance < 1:
-            raise line.error(
-                f"R = {resistance:g} is a load loss in W by CZ = 3; write 0, or CZ = 2 if it is in pu"
-            )
+    if code == _LOSSES:  # load loss [W], and the magnitude of the impedance
         resistance *= 1e-6 / base
         if abs(resistance) > abs(reactance):
             raise line.error(

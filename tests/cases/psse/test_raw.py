@@ -325,13 +325,13 @@ def test_a_case_says_what_was_changed_and_has_modes(tmp_path, gfor):
     [
         (
             "0,100.0,33",
-            "0,100.0,29",
-            r"grid.raw, line 1: the revision REV is 29; 33, 34, 35, 36 are read: export",
+            "0,100.0,28",
+            r"grid.raw, line 1: the revision REV is 28; 29 to 36 are read: export",
         ),
         (
             "0,100.0,33",
-            "1,100.0,33",
-            r"line 1: IC is 1: the file changes another case; export the whole case",
+            "2,100.0,33",
+            r"line 1: IC is 2; it is 0 for a whole case, or 1 for changes",
         ),
         ("0,100.0,33", "0,0,33", r"line 1: the system base SBASE is 0 MVA; it must exceed 0"),
         ("0.01,0.085", "0.01,x", r"line \d+: X is 'x'; it must be a number"),

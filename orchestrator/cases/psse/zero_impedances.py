@@ -1,0 +1,54 @@
+"""Buses that PSS/E takes as one, because a line of (nearly) no impedance joins them.
+
+PSS/E treats a branch that is no transformer as a zero impedance line if its impedance is below the threshold THRSHZ,
+1e-4 pu unless the record GENERAL of a revision from 34 on says otherwise (PSS/E's Program Operation Manual, "Zero
+impedance lines"); PowSyBl's reader merges or keeps such branches likewise."""
+
+import re
+from collections.abc import Collection, Iterable, Mapping
+
+from orchestrator.cases.psse.records import RawFile, Record
+
+USUAL_THRESHOLD = 1e-4  # THRSHZ of a file that does not say it [pu of the system]
+
+
+def threshold(raw: RawFile) -> float:
+    """THRSHZ of a file [pu of the system]."""
+    for record in raw.of("system-wide"):
+        for text in record.fields:
+            found = re.fullmatch(r"THRSHZ\s*=\s*([\d.eEdD+-]+)", text, re.IGNORECASE)
+            if found:
+                return float(found[1].replace("D", "E").replace("d", "e"))
+    return USUAL_THRESHOLD
+
+
+def merged_buses(
+    joins: Iterable[tuple[Record, int, int]], kinds: Mapping[int, int], held: Collection[int]
+) -> tuple[dict[int, int], list[Record], list[Record]]:
+    """Buses that others stand for.
+
+    ``joins``: record and both buses of each line without impedance; ``kinds``: IDE by bus; ``held``: buses with a
+    machine in service. Two of these are not merged, because each machine keeps its bus.
+
+    Returns the bus that stands for each, the lines that are no more, and those that stay."""
+    standing = {bus: bus for bus in kinds}
+
+    def found(bus: int) -> int:
+        while standing[bus] != bus:
+            bus = standing[bus]
+        return bus
+
+    gone, kept = [], []
+    for record, start, end in joins:
+        one, other = found(start), found(end)
+        if one == other:
+            gone.append(record)
+        elif one in held and other in held:
+            kept.append(record)
+        else:
+            first, second = sorted(
+                (one, other), key=lambda bus: (bus not in held, -kinds[bus], bus)
+            )
+            standing[second] = first
+            gone.append(record)
+    return {bus: found(bus) for bus in kinds if found(bus) != bus}, gone, kept
