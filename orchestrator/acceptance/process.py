@@ -254,7 +254,8 @@ class HostedComponent(RemoteCalls):
 
     def __init__(self, name: str, process: FmuProcess) -> None:
         self.name, self.description, self._process = name, process.description, process
-        self._open, self._lost = False, False
+        self._open = False
+        self._lost = False
         self._box = process.box
         self.pointer = self.number = process.opened(name)
         self._open = True

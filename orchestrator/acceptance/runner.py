@@ -39,7 +39,8 @@ from orchestrator.fmi.port import BoundDescription
 from orchestrator.fmi.protection import Protection, missing
 from orchestrator.safe_files import file_hash
 
-CRASH, _LAST = "crash", 3  # fault of a process that dies; how many checks before it are named
+CRASH = "crash"  # fault of a process that dies
+_LAST = 3  # checks before a crash that are named
 _PATIENCE = 10  # A check may take this many times the limit for one call
 
 

@@ -16,9 +16,14 @@ from orchestrator.safe_files import write_text
 # with our converter, from which a certificate's case is made
 BASE = BUILT_IN / "norm631" / "case.toml"
 
-WITHOUT, WITH = "without", "with"
+# scenarios: the controller off and on
+WITHOUT = "without"
+WITH = "with"
+
 # names of files in a certificate's folder
-FMU, BINDING, CASE = "converter.fmu", "vendor.toml", "case.toml"
+FMU = "converter.fmu"
+BINDING = "vendor.toml"
+CASE = "case.toml"
 
 _HEAD = """\
 # Damping test of {fmu}{binding}, written by `gfor certify`.

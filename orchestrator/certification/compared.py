@@ -74,8 +74,8 @@ TAKEN = frozenset(
 )
 """Entries that cannot be had anew; beside those that are written last."""
 
-_SAME, _SAME_IN_SIGNAL = 1e-9, 1e-5
-"""Largest relative difference of a figure that comes out anew; of a mode that is found in a signal."""
+_SAME = 1e-9  # largest relative difference of a figure that is computed again
+_SAME_IN_SIGNAL = 1e-5  # the same of a mode that is found in a signal
 
 _NOTHING = "no such entry"
 _SHOWN = 200  # characters of a value that are shown

@@ -24,12 +24,11 @@ from orchestrator.results.staging import check_free
 from orchestrator.results.storage import save_netcdf
 from orchestrator.safe_files import file_hash, write_text
 
-HTML, JSON, RESPONSES, PDF = (
-    "certificate.html",
-    "certificate.json",
-    "responses.nc",
-    "certificate.pdf",
-)
+# names of files in a certificate's folder
+HTML = "certificate.html"
+JSON = "certificate.json"
+RESPONSES = "responses.nc"
+PDF = "certificate.pdf"
 
 
 def figures_of(c: Certificate) -> dict[str, Any]:

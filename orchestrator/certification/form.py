@@ -106,7 +106,9 @@ class _CodeCertificate(_Certified):
         return code
 
 
-NORM, CODE = 2, "code-2"  # forms of the JSON: of the damping test, and of a code on the test bench
+# forms of the JSON
+NORM = 2  # of the damping test
+CODE = "code-2"  # of a code on the test bench
 
 _FORMS: dict[object, type[_Table]] = {NORM: _Certificate, CODE: _CodeCertificate}
 

@@ -24,8 +24,9 @@ from orchestrator.report.html.elements import document, table
 from orchestrator.results.storage import save_json
 from orchestrator.safe_files import write_text
 
-NOT_TESTED, FIGURES = "not tested", "no verdict"
-"""In place of a verdict: where a device could not be tested at all, and where a code gives figures alone."""
+# in place of a verdict
+NOT_TESTED = "not tested"  # a device could not be tested at all
+FIGURES = "no verdict"  # a code gives figures alone
 
 
 @dataclass
@@ -123,7 +124,9 @@ WORST_FIRST = (
 
 
 FORMAT = "matrix-1"  # form of the JSON
-MATRIX_HTML, MATRIX_JSON = "matrix.html", "matrix.json"
+# names of files in the results
+MATRIX_HTML = "matrix.html"
+MATRIX_JSON = "matrix.json"
 
 READING = TEXTS["matrix"]
 

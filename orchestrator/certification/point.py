@@ -29,7 +29,9 @@ COMPUTED = (0.05, 3.0)
 lists modes just outside."""
 
 CONVERTER = "converter"
-POWER, FREQUENCY = "sg1.p", "bus_2.frequency"
+# signals that are judged
+POWER = "sg1.p"
+FREQUENCY = "bus_2.frequency"
 
 
 @dataclass

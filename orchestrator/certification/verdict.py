@@ -4,7 +4,9 @@ from collections.abc import Sequence
 
 from orchestrator.certification.request import REACTANCES
 
-PASSES, FAILS, INCOMPLETE = "passes", "fails", "incomplete"
+PASSES = "passes"
+FAILS = "fails"
+INCOMPLETE = "incomplete"
 
 EXIT_CODES = {PASSES: 0, FAILS: 1, INCOMPLETE: 3}
 NOT_TRUSTED = 4  # exit code if the damping test is passed but an acceptance test of the FMU failed

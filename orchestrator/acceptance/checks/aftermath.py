@@ -34,13 +34,14 @@ _PROBE = 0.3
 _CHANGED = 0.05  # part of an answer to a small change by which it may differ after a disturbance
 _BACK = 5e-4  # distance of the current from where it was [pu, S_n] at which it has come back
 
-# time [s] from one look to the next, and how often it is looked whether it has come back
-_WINDOW, _WINDOWS = 0.1, 60
+_WINDOW = 0.1  # time from one look to the next [s]
+_WINDOWS = 60  # looks, at most, at whether the device has come back
+_LOST = 0.3  # distance [pu, S_n] at which it is given up
+_GIVEN_UP = 20  # looks before it may be given up
 
-_LOST, _GIVEN_UP = 0.3, 20  # distance [pu, S_n] at which no more is looked after so many windows
-
-_STILL, _ELSEWHERE, _NOTHING = 1e-4, 0.01, 0.01
-"""Movement in a window [pu, S_n] of a device at rest; distance that is another rest; current of one that gives none."""
+_STILL = 1e-4  # movement in a window of a device at rest [pu, S_n]
+_ELSEWHERE = 0.01  # distance from the first rest that is another rest [pu, S_n]
+_NOTHING = 0.01  # current of a device that gives none [pu, S_n]
 
 # part of the current limit, or of the rating, from which a device at rest may be held by its limit
 _LATCHED = 0.9
@@ -55,8 +56,8 @@ _IN_TIME = (("middle", 0.2), ("low", 0.15), ("small jump", 0.2))
 """Kinds of disturbances, and how long they last [s]; the latter are made as long as there is time."""
 _LATER = ((0.15, 0.4), (0.8, 1.6), (2.5, 3.5))
 """Times [s] after a disturbance, of which one each is drawn, at which it is asked before it has come back as well."""
-_NEAR, _BENT = 0.3, 0.5
-"""Distance [pu, S_n] from which it is too far away to be asked; by what more an answer may differ, a pu of it."""
+_NEAR = 0.3  # distance [pu, S_n] from which on the device is too far away to be asked
+_BENT = 0.5  # by what more an answer may differ there, per pu of the distance
 
 
 class _End(Enum):

@@ -27,13 +27,14 @@ _SOME = 5e-3  # answer [pu, S_n] from which it is compared
 _EVEN = 0.67  # part of an answer by which it may differ elsewhere: a third, or three times as much
 _ACTS = 0.5  # part by which what a switch does may differ while it takes power
 _MOST = 0.4  # what a switch does beyond that is no small change [pu, S_n]: it connects, or trips
-_LATE, _MORE = 0.05, 5.0
-"""Swing in the second half of the time, in parts of the answer, that counts; how many times that of elsewhere."""
+_LATE = 0.05  # swing in the second half of the time that counts, in parts of the answer
+_MORE = 5.0  # how many times the swing elsewhere it has to be
 
 _MUCH = 0.9  # power [pu, S_n] from which it is asked for less of it
 
-# time [s] of an answer along a line, its parts, the time before it [s]
-_ANSWERS, _PARTS, _RESTS = 0.5, 10, 2.0
+_ANSWERS = 0.5  # time of an answer along a line [s]
+_PARTS = 10  # parts of an answer whose means are compared
+_RESTS = 2.0  # time before an answer in which the device comes to rest [s]
 # what an answer changes by from one place to the next, in parts of the largest and beyond its slope
 _JUMP = 0.08
 _LINES = (

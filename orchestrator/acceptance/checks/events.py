@@ -12,8 +12,8 @@ from orchestrator.arrays import Numbers
 
 # duration of an episode [s]: time for a deep dip of 0.45 s; a slow FMU gets a shorter one
 EPISODE = 1.2
-# small steps beside the events: how many they stay for, and height in parts of the usual
-_HOLD, _WIGGLE = 10, 0.3
+_HOLD = 10  # steps for which a small step beside the events stays
+_WIGGLE = 0.3  # height of a small step, in parts of the usual one
 _SPENT = 1.0  # time [s] that events may take
 # relative difference of two runs with events that counts where they differ slightly without
 _FAINT = 1e-3

@@ -23,10 +23,8 @@ from orchestrator.errors import ComponentError, EndedError
 
 _OTHER = OperatingAt(v=1.03, theta=0.4, P=0.7, Q=-0.1)
 _CHUNK = 50  # steps that one instance does before the other one's turn comes
-IN_EVENTS, NOT_IN_EVENTS = (
-    ", in dips and jumps as well",
-    "; not judged in dips and jumps, which it refuses",
-)
+IN_EVENTS = ", in dips and jumps as well"
+NOT_IN_EVENTS = "; not judged in dips and jumps, which it refuses"
 
 
 def _in_events(

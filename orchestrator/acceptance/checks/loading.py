@@ -108,7 +108,8 @@ def initial_outputs(subject: Subject) -> CheckResult:
     A master reads outputs in initialisation mode, to find inputs and outputs of all components that agree."""
     if not subject.outputs:
         return not_applicable("initial_outputs", "because the FMU has no Real outputs")
-    worst, seen = 0.0, ""
+    seen = ""
+    worst = 0.0
     for point in (None, _ELSEWHERE) if subject.starts else (None,):
         try:
             before, after, size = _around_the_end(subject, point)

@@ -45,8 +45,9 @@ _RESTS = 2000  # steps for which it is watched at each point
 
 _SMALLER, _LARGER = (0.3, 0.42), (2.2, 3.5)  # bounds of other ratings, in parts of its own
 
-_DIP, _DIP_LASTS, _CYCLE = 0.05, 0.15, 0.02
-"""Voltage of the dip that shows the limit at another rating [pu], its duration and the time of the mean [s]."""
+_DIP = 0.05  # voltage of the dip that shows the limit at another rating [pu]
+_DIP_LASTS = 0.15  # its duration [s]
+_CYCLE = 0.02  # time of the mean at its end [s]: a period of 50 Hz
 
 _ANSWERS = 1.0  # time [s] after which its answer at another rating is taken
 _SEEN = 0.01  # least answer [pu, S_n] that is compared
@@ -219,13 +220,14 @@ def _answer(subject: Subject, rating: float) -> complex:
 # A start [s] at which single precision has no milliseconds left; a day has more seconds
 _LATE = 20_000.0
 
-_SAME, _STILL = 1e-4, 100.0
-"""Difference of two answers, in parts of their range, up to which they are alike; and in parts of a rest's motion."""
+_SAME = 1e-4  # part of their range by which two answers may differ
+_STILL = 100.0  # the same, in parts of the motion of a device at rest
 
 # part of an output's size by which an angle of six million radians, short of digits, changes it
 _ROUNDED = 1e-8
-# frequency [pu] by which it is turned forth, and back for twice as long; in all [s]
-_FASTER, _LASTS = 0.012, 9.0
+# frequency by which the device is turned forth, and back for twice as long [pu]
+_FASTER = 0.012
+_LASTS = 9.0  # time in all [s]
 # difference of the currents that two angles bring [pu, S_n]: a jump of some hundredths of a
 # milliradian
 _TURNED = 5e-5

@@ -18,10 +18,12 @@ from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import Subject, unmoved
 from orchestrator.errors import ComponentError
 
-_BLOCKS, _BLOCK = 8, 0.2  # parts of a measurement, and the longest time of one with instances [s]
+_BLOCKS = 8  # parts of a measurement
+_BLOCK = 0.2  # longest time of a part with instances [s]
 
 _LEAST = 4.0  # bytes kept by each step that count as a leak
-_RESETS, _FEW = 5, 4  # resets in a block, and instances between two counts of open files
+_RESETS = 5  # resets in a block
+_FEW = 4  # instances between two counts of open files
 _INSTANCE = 120.0  # bytes kept by each instance, or each saved state
 # bytes kept by each instance that no study notices: some tools never free its name or log
 _SLIGHT = 4096.0

@@ -32,8 +32,8 @@ from orchestrator.errors import ComponentError
 # of events [s]: a timer or a counter in an FMU may run out between two
 _TIMES = (0.1, 1.0, 2.5, 3.0, 5.0)
 _LASTS = 0.15  # duration of a disturbance [s]; a fault is cleared within it
-_RIDDEN, _OVERLOAD = 2.0, 10.0
-"""Longest dip [s] after which it is asked to be back; one in which a limit that dies with time has died."""
+_RIDDEN = 2.0  # longest dip after which the device is asked to be back [s]
+_OVERLOAD = 10.0  # dip in which a limit that dies with time has died [s]
 
 _STAY = (
     ((0.8, 0.9), 1.0, _RIDDEN, None),
@@ -44,7 +44,8 @@ _STAY = (
 )
 """Dips that stay: to what voltage [pu], when [s], how long [s], from which point."""
 
-_BLOCKED, _GIVES = 0.02, 0.1  # current [pu, S_n] of a device that blocks, and of one that gives any
+_BLOCKED = 0.02  # current of a device that blocks [pu, S_n]
+_GIVES = 0.1  # current of a device that gives any [pu, S_n]
 
 _BLOCKS_FOR = 0.06
 """Time [s] without current at a healthy voltage from which a device blocks: zero crossings of its power are shorter."""
@@ -53,8 +54,9 @@ _HEALTHY = 0.9  # voltage [pu] at which a device has to stay on
 # time [s] over which a current is averaged: what heats the semiconductors and what protection sees
 _CYCLE = 0.02
 
-_UNEVEN, _MUCH = 1.6, 2.2
-"""Current in a dip, in parts of that in a dip to no voltage and in pu, from which a limit acts in some dips only."""
+# a limit acts in some dips only if a dip's current exceeds that in a dip to no voltage by this factor
+_UNEVEN = 1.6
+_MUCH = 2.2  # and this current [pu]
 
 # the same of a jump in a voltage that lasts, in parts of that without; 1.2 where nothing limits
 # both
@@ -163,7 +165,8 @@ def limits(subject: Subject) -> CheckResult:
         return not_applicable("limits", WHY["no port"])
     begin, budget = perf_counter(), _PART * subject.memory.get("run_for", 2.0)
     answers, refused = list[Answer](), list[str]()
-    left_out, other_way = 0, ""
+    other_way = ""
+    left_out = 0
     longest = max(_RIDDEN, _OVERLOAD * min(1.0, 2 * scale(subject, _OVERLOAD)))
     for number, run in enumerate(_runs(subject.random("limits"), longest)):
         rest = list(run)
@@ -222,7 +225,9 @@ def _disturbed(
             healthy = during if abs(event.factor) >= _HEALTHY else during[:0]
             blocked, gone = _blocked(before[-1], np.concatenate([healthy, after]), h)
             if event.lasts > _RIDDEN:  # nobody asks it to ride that through
-                away, blocked, gone = 0.0, 0.0, False
+                away = 0.0
+                blocked = 0.0
+                gone = False
             early = float(np.abs(during[2 * cycle : 3 * cycle]).mean())
             answers.append(
                 Answer(

@@ -26,8 +26,8 @@ RUN_FOR = 2.0  # time [s] for which an FMU is made to run
 _PATIENCE = 10.0  # how many times as long it may take to come to its experiment's end
 # how many times as long a run may take as it computes, on a machine that is busy with other things
 _LOADED = 4.0
-# steps for which inputs stay; how often they change before it is looked at the clock
-_HELD, _ROUNDS = 50, 4
+_HELD = 50  # steps for which inputs stay
+_ROUNDS = 4  # changes of the inputs between two looks at the clock
 
 _WANDERS = 0.5  # part of its current's range by which that may differ a round of inputs later
 _LOOK = 2.5  # simulated time [s] from one look at its memory to the next

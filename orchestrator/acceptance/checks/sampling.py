@@ -131,5 +131,6 @@ def _seconds(time: float) -> str:
         if time >= 0.0999 * s or u == "µs"
     )
     if unit == "ms" and time < 0.999e-3:
-        unit, size = "µs", 1e-6
+        unit = "µs"
+        size = 1e-6
     return f"{time / size:.3g} {unit}"

@@ -25,8 +25,8 @@ from orchestrator.binding.misfits import SLIGHT, Misfit, at_rest, made_for, of_f
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.port import BoundDescription
 
-# time [s] in which an answer settles, and the part of it at other voltages
-_LASTS, _SHORTER = 3.0, 0.67
+_LASTS = 3.0  # time in which an answer settles [s]
+_SHORTER = 0.67  # part of that time at other voltages
 
 _EARLY = (0.005, 0.025)
 """Cycle in which a converter is still the source behind its impedance that it was; oscillations of the network's
@@ -43,8 +43,9 @@ _LOST = 0.02
 _EACH = 5e-3
 # part of the first cycle's reactive power by which its droop lowers the answer, or raises it
 _TURNED = 0.1
-_RINGS, _DAMPED, _TOLD = 1e-3, 0.8, 0.5
-"""Swing [pu, S_n] in the end that counts; parts of the swing before from which it is not damped, and is told."""
+_RINGS = 1e-3  # swing in the end that counts [pu, S_n]
+_DAMPED = 0.8  # part of the swing before from which it is not damped
+_TOLD = 0.5  # part of the swing before from which it is reported
 
 # changes of sign in a third of the time, from which a swing is fast enough to be judged in it
 _CROSSINGS = 6

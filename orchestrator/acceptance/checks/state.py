@@ -200,7 +200,8 @@ def _brought_back(subject: Subject, setting: Setting, moved: Setting) -> tuple[s
     is saved and kept meanwhile."""
     steps, h = affordable(subject, _STEPS), subject.step_size
     stimulus = subject.steps(hold=15 * h)
-    worst, place = 0.0, 0
+    place = 0
+    worst = 0.0
     with subject.running(parameters=setting) as running:
         states = RealBatch(running.component, subject.description.states)
         before = running.component.values(moved)

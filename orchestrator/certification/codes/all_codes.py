@@ -54,8 +54,10 @@ NTS631 = "nts631"
 NTS = GridCode.of(NTS631, tuple(Row(row_of(X), "the line's reactance", "5.10") for X in REACTANCES))
 """Spain's damping test: a case of its own, at each of the norm's line reactances."""
 
-# TR 3.3.1: time at no voltage and of the profile's end [s], and steps between them
-NONE, BACK, PARTS = 0.15, 1.5, 9
+# TR 3.3.1's profile of a dip
+NONE = 0.15  # time at no voltage [s]
+BACK = 1.5  # time of the profile's end [s]
+PARTS = 9  # steps between them: the profile's slope as a staircase
 AREAS = {"dk1": 0.85, "dk2": 0.9}  # voltage at that end, in the west and in the east [pu]
 
 

@@ -26,14 +26,18 @@ from orchestrator.safe_files import write_text
 from orchestrator.study.modes import running
 from orchestrator.watch.watch import Watch
 
-PLANT, DUPLICATE, BENCH = "converter", "duplicate", "bench"
+# components of a row's case
+PLANT = "converter"
+DUPLICATE = "duplicate"
+BENCH = "bench"
 
 # at the connection point [pu of the plant's rating]: no voltage may jump between FMUs
 CAPACITANCE = 0.05
 
 RECORDED = ("v_re", "v_im", "v", "p", "q", "duplicate.p", "duplicate.q", "source.p", "source.q")
 
-STEP, INTERVAL = 1e-4, 1e-3  # communication step, and interval of the record [s]
+STEP = 1e-4  # communication step [s]
+INTERVAL = 1e-3  # interval of the record [s]
 
 
 def case_name(row: str) -> str:

@@ -12,7 +12,9 @@ from orchestrator.certification.codes.measured import MeasuredRow, over_a_period
 from orchestrator.certification.codes.row import Band, Bounded, Judge, RowFinding
 from orchestrator.watch.limits import ABOVE, LASTS, told_of
 
-CODE, READING = "code", "reading"
+# whose a criterion's number is: the code's, or a reading of ours
+CODE = "code"
+READING = "reading"
 CURRENT = "current"  # name of the criterion that every row has, whatever its code asks
 
 SETTLED = 0.02
@@ -33,7 +35,9 @@ FIRST_SWING = 0.1  # time after a jump in which its first response is looked for
 SPIKE = 5e-3
 SIDE = 0.01  # largest deviation of a settled frequency to the wrong side of rated [Hz]
 
-POWER_SHOWN, VOLTAGE_SHOWN = "Active power [pu]", "Voltage [pu]"  # how pictures call what is judged
+# what is judged, as pictures call it
+POWER_SHOWN = "Active power [pu]"
+VOLTAGE_SHOWN = "Voltage [pu]"
 
 LOOK = 0.5  # end of a hold in which it has to be settled [s]
 

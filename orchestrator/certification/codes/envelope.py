@@ -24,10 +24,12 @@ LAG = 0.01  # lag with which the damping follows the frequency of the grid [s]
 # what the bounds come later by for waveforms [s]: the mean over a period of 50 Hz takes as long
 LATE = 0.02
 SLACK = 0.01  # by how much later a bound that asks for something begins [s]
-TUNNEL, TUNNEL_SHARE = 0.02, 0.05
-"""Distance of the bounds in the end: the larger one of these, of the rating and of the peak [pu, 1]."""
+# distance of the bounds in the end: the larger of a part of the rating and a part of the peak
+TUNNEL = 0.02  # of the rating
+TUNNEL_SHARE = 0.05  # of the peak
 
-DEMAND, CEILING = 0.98, 1.2  # largest power that is asked for, and that is allowed [pu]
+DEMAND = 0.98  # largest power that is asked for [pu]
+CEILING = 1.2  # largest power that is allowed [pu]
 
 _NEAR = 1e-6  # roots that are nearer to each other than this part count as one, and are moved apart
 

@@ -39,7 +39,11 @@ def stiffness(response: FrequencyResponse, voltage: complex, f_n: float) -> Stif
     return Stiffness(f, powers_over(f, Y, voltage, current, f_n))
 
 
-FIGURES_CSV, FIGURES_JSON, FIGURES_PNG = "frequency.csv", "frequency.json", "frequency.png"
+# names of files in a certificate's folder
+FIGURES_CSV = "frequency.csv"
+FIGURES_JSON = "frequency.json"
+FIGURES_PNG = "frequency.png"
+
 POWER = 0.5  # active power at which it is measured [pu]
 # band in which the least stiffness is told [Hz]: between the droops and the period of the grid
 BAND = (5.0, 40.0)

@@ -12,20 +12,29 @@ from orchestrator.certification.frequency import bus_frequency
 from orchestrator.errors import InputError
 from orchestrator.watch.finding import NOT_JUDGED, UNSTABLE
 
-NOTHING, ALIVE, GONE = 5e-3, 0.1, 0.1
-"""Apparent power below which a plant feeds in nothing [pu], voltage from which on it could [pu], and how long it has to
-be so in all to be a trip [s]. On the rows of ERCOT ours, with four kinds of limits, is below 0.31 pu for less,
-a grid-following converter below 0.49 pu, and a source behind a reactance, which slips there, below 0.09 pu."""
+NOTHING = 5e-3
+"""Apparent power below which a plant feeds in nothing [pu]."""
 
-NO_CURRENT, STEADY = 1e-6, 0.1
-"""Apparent power in place of `NOTHING` [pu] where the frequency is further from its rated value than that [Hz]: a droop
-may have taken the power back to 0, as 4 % does for 1 Hz of 50 Hz at half power."""
+ALIVE = 0.1
+"""Voltage from which on a plant could feed in [pu]."""
 
-INSIDE, HOLD, LATEST = 1.5, 1.0, 0.05
-"""Reactance behind which the voltage of a plant is looked for [pu], shortest hold in whose end that is done, and how
-long that end is [s]. From 0.75 to 2 pu the same of 92 rows of four converters slip as by their own angles; with less, a
-slip whose current is limited is not seen at a strong grid.
-"""
+GONE = 0.1
+"""How long a plant has to feed in nothing, in all, to be a trip [s]. On the rows of ERCOT ours, with four kinds of
+limits, is below 0.31 pu for less, a grid-following converter below 0.49 pu, and a source behind a reactance, which
+slips there, below 0.09 pu."""
+
+STEADY = 0.1
+"""Distance of the frequency from its rated value [Hz] beyond which `NO_CURRENT` stands for `NOTHING`: a droop may have
+taken the power back to 0, as 4 % does for 1 Hz of 50 Hz at half power."""
+
+NO_CURRENT = 1e-6  # apparent power [pu]
+
+INSIDE = 1.5
+"""Reactance behind which the voltage of a plant is looked for [pu]. From 0.75 to 2 pu the same of 92 rows of four
+converters slip as by their own angles; with less, a slip whose current is limited is not seen at a strong grid."""
+
+HOLD = 1.0  # shortest hold in whose end that voltage is looked at [s]
+LATEST = 0.05  # how long that end is [s]
 
 # what counts as a slip [rad]: on the rows of ERCOT ours moves by 0.10 turns at most
 HALF_TURN = np.pi

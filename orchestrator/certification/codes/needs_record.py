@@ -22,7 +22,9 @@ from orchestrator.safe_files import write_text
 from orchestrator.sensitivities.parameters import Parameter
 
 FORMAT = "margin-sensitivities-1"  # form of the JSON
-NEEDS_HTML, NEEDS_JSON = "sensitivities.html", "sensitivities.json"
+# names of files in the results
+NEEDS_HTML = "sensitivities.html"
+NEEDS_JSON = "sensitivities.json"
 
 _COLUMNS = ("Parameter", "Value", "Margin below", "Margin above", "Points per %")
 

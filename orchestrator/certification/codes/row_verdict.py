@@ -13,8 +13,9 @@ from orchestrator.certification.codes.row import CodeRow, GridCode, RowFinding
 from orchestrator.certification.margins import CriterionMargin
 from orchestrator.errors import InputError
 
-NO_VERDICT, NOT_JUDGED = "no verdict", "not judged"
-"""In place of a verdict: where the code gives none, and where the response allows none."""
+# in place of a verdict
+NO_VERDICT = "no verdict"  # the code gives none
+NOT_JUDGED = "not judged"  # the response allows none
 
 
 @dataclass(frozen=True)

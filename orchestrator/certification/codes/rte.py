@@ -43,7 +43,8 @@ DECLARED = (
 )
 
 HORIZON = 5.0  # how long a response has to stay within its envelope [s]
-STRONG, WEAK = 10.0, 2.0  # short-circuit ratios: the largest and the least
+STRONG = 10.0  # largest short-circuit ratio
+WEAK = 2.0  # least short-circuit ratio
 X_R = 20.0  # X/R of the grid: the formulas have no resistance
 CURRENT = 0.15  # reactive current for which the step of the voltage is made [pu]
 POWER = 0.3  # active power for which the jump of the angle is made [pu]
