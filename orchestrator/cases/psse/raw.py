@@ -1,7 +1,7 @@
 """A PSS/E RAW file of revision 29 to 36 as tables of a network source."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.network_sources import SourceTables
 from orchestrator.cases.psse.raw_file import read_file
 from orchestrator.cases.psse.records import SWITCHING_DEVICES, RawFile, Record, leave_out
+from orchestrator.cases.psse.solution import fits, reactive_needs
 from orchestrator.cases.psse.transformers import Transformer, star, transformers
 from orchestrator.cases.psse.zero_impedances import merged_buses, threshold
 from orchestrator.cases.source_changes import Changes
@@ -25,6 +26,8 @@ MANY_SHUNTS = 35  # first revision with a node in the records of machines and sw
 _POWER_FACTOR = 0.9  # with which a power tells a rating that is not known
 _NO_LIMIT = 9999.0  # MW or Mvar by which PSS/E says that a generator has no limit
 _APART = 0.01  # voltage of a solved file beside what a generator within its limits is to hold [pu]
+_CLOSE = 1e-4  # the same if the file's solution fits the generator's QG [pu]
+_AT_LIMIT = 0.1  # Mvar by which a rounded QG may miss a limit
 _MOST_VOLTAGE = 2.0
 _SBASE = 100.0  # usual base [MVA]
 _FAR = 20.0
@@ -392,12 +395,46 @@ class _Reading:
                 winding.bus, inner, z, k not in t.off, tap=winding.ratio, shift=winding.shift
             )
 
+    def _solved_buses(self, status: int) -> dict[int, tuple[bool, bool]]:
+        """Buses at which the file's voltages fit the machines' QG: whether all are at their least, at their most.
+
+        Empty if the file is not solved. ``status``: column of STAT in the records of machines."""
+        needed = reactive_needs(self._rows, self._branches, self._to_earth, self._raw.base_mva)
+        fed: dict[int, list[float]] = {}
+        ends: dict[int, tuple[bool, bool]] = {}
+        for record in self._raw.of("generator"):
+            bus = self._same.get(self._own(record), self._own(record))
+            if not record.whole(status, "STAT", 1) or bus not in needed:
+                continue
+            q = record.number(3, "QG", 0.0)
+            fed.setdefault(bus, []).append(q)
+            least, most = _limits(record, "QB", 5, "QT", 4, "Mvar")
+            low, high = ends.get(bus, (True, True))
+            ends[bus] = low and q <= least + _AT_LIMIT, high and q >= most - _AT_LIMIT
+        return {bus: ends[bus] for bus, qs in fed.items() if fits(sum(qs), needed[bus])}
+
+    def _is_at_limit(
+        self, bus: int, setpoint: float, solved: Mapping[int, tuple[bool, bool]]
+    ) -> bool:
+        """Whether limits of reactive power keep a bus from its machines' setpoint [pu] in the file's solution."""
+        apart = self._magnitudes[bus] - setpoint
+        if bus not in solved or self._rows[bus][1] == _REFERENCE or abs(apart) <= _CLOSE:
+            return False
+        at_least, at_most = solved[bus]
+        return at_most if apart < 0 else at_least
+
+    def _is_apart(self, bus: int, setpoint: float, solved: Collection[int]) -> bool:
+        """Whether the solved file has another voltage at a bus than its machine's setpoint [pu]."""
+        magnitude = self._magnitudes[bus]
+        allowed = _CLOSE if bus in solved else _APART
+        return abs(setpoint - magnitude) > allowed and (bus in solved or magnitude != 1)
+
     def _is_out(self, bus: int) -> bool:
         return bus in self._rows and self._rows[bus][1] == _OUT
 
     def _machines(self) -> tuple[Machine, ...]:
         mbase, status = (8, 14) if self._raw.revision < 35 else (9, 15)
-        machines = []
+        machines, solved = [], self._solved_buses(status)
         for record in self._raw.of("generator"):
             own = self._own(record)
             if not self._in_service(record, status, "STAT") or self._is_out(own):
@@ -422,13 +459,16 @@ class _Reading:
                 self._changes.note(
                     record.line, "generator at a bus of type 1: it holds the file's voltage"
                 )
-            elif (
-                (VM := self._magnitudes[bus]) != 1  # 1: not solved
-                and abs(held - VM) > _APART
-                and least < record.number(3, "QG", 0.0) < most
-            ):
-                text = f"VS is {held:g} pu, where the solved file has VM = {VM:g} pu, with Q within its limits"
-                self._changes.note(record.line, f"{text}: VS is held")
+            elif self._is_at_limit(bus, held, solved):
+                held = self._magnitudes[bus]
+                self._changes.note(
+                    record.line,
+                    "generator at a limit of its reactive power in the file's solution, where VM is not VS: "
+                    "it holds VM, as PSS/E starts from it",
+                )
+            elif self._is_apart(bus, held, solved) and least < record.number(3, "QG", 0.0) < most:
+                text = f"VS is {held:g} pu, where the solved file has VM = {self._magnitudes[bus]:g} pu"
+                self._changes.note(record.line, f"{text}, with Q within its limits: VS is held")
             if record.number(mbase + 4, "XT", 0.0):
                 self._changes.note(
                     record.line, "step-up transformer within a generator's record: left out"
