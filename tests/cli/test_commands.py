@@ -363,8 +363,8 @@ def test_info_on_model_exchange_only(refused, damaged):
     )
 
 
-def test_info_on_an_fmu_for_other_platforms(gfor, refused, damaged, monkeypatch):
-    """A vendor's FMU for Windows alone can be looked at, and without Wine not be run."""
+def test_info_on_an_fmu_for_other_platforms(gfor, damaged, monkeypatch, tmp_path):
+    """A vendor's FMU for Windows alone can be looked at and bound, and without Wine not be checked."""
 
     def missing():
         raise wine.NoWineError(wine.MISSING)
@@ -376,8 +376,12 @@ def test_info_on_an_fmu_for_other_platforms(gfor, refused, damaged, monkeypatch)
     assert f"It cannot run here: it has no binary for this platform ({fmpy.platform})" in " ".join(
         out.split()
     )
-    assert f"it has no binary for this platform ({fmpy.platform}), only for: " in refused(
-        "fmu", "bind", path
+    code, _, err = gfor("fmu", "bind", path, "--out", tmp_path / "own.toml")
+    assert code == 0, err
+    code, out, _ = gfor("fmu", "check", path)
+    assert code == 2
+    assert f"it has no binary for this platform ({fmpy.platform}), only for: win64" in " ".join(
+        out.split()
     )
 
 
