@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from fmus.synchronous_generator.axis import Axis, Winding
 from fmus.synchronous_generator.conversion import AxisData, RotorBranches, convert
 from fmus.synchronous_generator.data import STAMP, MachineData
+from fmus.toolchain.blocks import BYPASS_TIME
 from fmus.toolchain.frames import Phasor, power
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort
@@ -41,7 +42,8 @@ class Machine:
 
     ``salient`` where its last reactances may differ; ``at_rated_speed`` where the emf is e'' instead of w·e'' unless
     a parameter says otherwise, which only a phasor model can have; ``emf_speed``: what e'' is multiplied by there, w
-    where it is None; ``S_n``: the rating [MVA], which only parts that are chosen by name ask for."""
+    where it is None; ``S_n``: the rating [MVA], which only parts that are chosen by name ask for;
+    ``is_infinite``: whether its speed stays at 1; None of a machine whose speed cannot."""
 
     R: Expr
     R_t: Expr
@@ -57,6 +59,7 @@ class Machine:
     at_rated_speed: bool = False
     emf_speed: Expr | None = None
     S_n: Expr | None = None
+    is_infinite: Expr | None = None
 
     @property
     def current(self) -> Phasor:
@@ -135,7 +138,10 @@ def rotor_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: Expr, P
     for axis, rates in zip((g.d, g.q), _rotor_flux_rates(g, port, E_fd), strict=True):
         for winding, rate in zip(axis.windings, rates, strict=True):
             m.derivative(winding.psi, rate)
-    m.derivative(g.w, (P_m / g.w - g.torque - g.D * (g.w - 1)) / (2 * g.H))
+    acceleration = (P_m / g.w - g.torque - g.D * (g.w - 1)) / (2 * g.H)
+    if g.is_infinite is not None:
+        acceleration = if_else(g.is_infinite, (1 - g.w) / BYPASS_TIME, acceleration)
+    m.derivative(g.w, acceleration)
     m.derivative(g.delta, port.omega_b * (g.w - 1))
 
 

@@ -283,3 +283,17 @@ def test_at_rated_speed_the_emf_behind_the_subtransient_reactance_is_without_the
 def test_a_machine_for_phasors_alone_is_refused_with_stator_transients():
     with pytest.raises(ValueError, match="'genrou_rated_speed': its emf is that of rated speed"):
         synchronous_generator(machine="genrou_rated_speed")
+
+
+@pytest.mark.parametrize("factory", [synchronous_generator, synchronous_generator_phasor])
+def test_without_inertia_the_classical_machine_is_an_infinite_bus(factory):
+    """PSS/E's reading of GENCLS with H = 0: neither power nor voltage moves the speed, so the angle stands still."""
+    torn = [0.3 * BUS.real, -0.8 * BUS.imag]
+
+    def rates(H):
+        device = machine("classical", factory, **{"machine.H": H, "machine.D": 0.0})
+        return device.rates(torn, device.vector(shifted(device, 3) | {"machine.omega": 1.0}))
+
+    infinite, moving = rates(0.0), rates(4.0)
+    assert infinite["machine.omega"] == infinite["machine.delta"] == 0
+    assert abs(moving["machine.omega"]) > 1e-3

@@ -24,10 +24,16 @@ class Common:
     scale: Expr
 
 
-def declare_common(m: ModelBuilder, S_n: Expr, H: float = 6.5) -> Common:
+LEAST_INERTIA = 0.01
+"""Smallest inertia constant of a rotor [s]: far below every machine's."""
+
+
+def declare_common(
+    m: ModelBuilder, S_n: Expr, H: float = 6.5, least_H: float = LEAST_INERTIA
+) -> Common:
     """Declare transformer, base, resistance and motion; in steady state speed is 1.
 
-    ``S_n``: rating [MVA]; ``H``: default of the inertia constant [s]."""
+    ``S_n``: rating [MVA]; ``H``: default of the inertia constant [s]; ``least_H``: its smallest value [s]."""
     with m.scope("transformer"):
         R_t = m.parameter("R_t", 0.0, "pu", "Resistance", base=SN, minimum=0)
         X_t = m.parameter(
@@ -52,18 +58,17 @@ def declare_common(m: ModelBuilder, S_n: Expr, H: float = 6.5) -> Common:
         R_s = m.parameter(
             "R_s", 0.0025, "pu", "Stator resistance", base="S_data", minimum=0, source=SOURCE
         )
-        inertia = m.parameter(
-            "H", H, "s", "Inertia constant, on S_data", minimum=0.01, source=SOURCE
-        )
+        text = "Inertia constant, on S_data" + ("" if least_H else "; 0: an infinite bus")
+        inertia = m.parameter("H", H, "s", text, minimum=least_H, source=SOURCE)
         D = m.parameter(
             "D", 0.0, "pu", "Damping torque per speed deviation", base="S_data", minimum=0
         )
         return Common(R_t, X_t, scale * R_s, inertia / scale, D / scale, scale)
 
 
-def reactance(m: ModelBuilder, name: str, value: float, text: str) -> Expr:
-    """Declare a reactance on the data's base."""
-    return m.parameter(name, value, "pu", text, base="S_data", minimum=1e-4, source=SOURCE)
+def reactance(m: ModelBuilder, name: str, value: float, text: str, *, least: float = 1e-4) -> Expr:
+    """Declare a reactance on the data's base; ``least``: its smallest value [pu]."""
+    return m.parameter(name, value, "pu", text, base="S_data", minimum=least, source=SOURCE)
 
 
 def time(m: ModelBuilder, name: str, value: float, text: str) -> Expr:
