@@ -16,10 +16,11 @@ class Facts:
     # whether devices give the network an emf behind an admittance; else the models are EMT ones
     phasors: bool
     frequency_hz: float | None  # rated; None where no component has one
-    # buses, machines, converters: how many; units out of service do not count
+    # how many; units out of service do not count
     buses: int
     machines: int
     converters: int
+    others: int  # devices of another kind, such as static var compensators
     governed: bool  # whether a machine has a governor
     load_mw: float  # active power of all loads, without what feeds in [MW]
     load_model: str
@@ -30,7 +31,11 @@ class Facts:
     def sentence(self) -> str:
         units = [
             counted(n, what)
-            for n, what in ((self.machines, "machine"), (self.converters, "converter"))
+            for n, what in (
+                (self.machines, "machine"),
+                (self.converters, "converter"),
+                (self.others, "other device"),
+            )
             if n
         ]
         slack = ", ".join(f"{n} at {p:.4g} MW ({100 * p / S_n:.0f} %)" for n, p, S_n in self.slack)
@@ -62,6 +67,7 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
     feeding = [name for name in units if flow.powers.get(name)]
     at_slack = [name for name in feeding if units[name] == units.get(wanted, wanted)]
     machines = [n for n in feeding if plans[n].kind == "machine"]
+    others = sum(plans[n].kind == "load" for n in feeding)
     magnitudes = [abs(flow.voltages[bus]) for bus in network.buses]
     loads = [
         (x, grid.number(f"{x.name}.scale") * grid.number(f"{x.name}.P")) for x in network.loads
@@ -73,7 +79,8 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
         rated_frequency(prepared),
         len(network.buses),
         len(machines),
-        len(feeding) - len(machines),
+        len(feeding) - len(machines) - others,
+        others,
         any(v.startswith("governor.T_") for n in machines for v in plans[n].description.variables),
         sum(p for _, p in loads if p > 0),
         in_words([load for load, p in loads if p > 0]),

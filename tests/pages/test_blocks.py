@@ -28,6 +28,7 @@ FMUS = (
     "infinite_bus",
     "external_grid",
     "static_generation",
+    "csvgn1_phasor",
 )
 """FMUs that the Python blocks of the leaflets open."""
 

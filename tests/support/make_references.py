@@ -107,6 +107,13 @@ REFERENCES = (
         ("i_re", "i_im", "e_re", "e_im", "omega", "E_droop"),
     ),
     Reference(
+        "csvgn1_phasor",
+        "fmus/static_var/reference.csv",
+        {"Q_0": 0.15},
+        *_BUS,
+        ("i_re", "i_im", "e_re", "e_im", "B"),
+    ),
+    Reference(
         "synchronous_generator_ac4a",
         f"{_FOLDER}/reference_ac4a.csv",
         {"P_0": 0.8, **_EXACT},

@@ -28,6 +28,7 @@ LEAFLETS = {
     "static_generation": ROOT / "fmus" / "static_generation" / "README.md",
     "static_generation_phasor": ROOT / "fmus" / "static_generation" / "README.md",
     "regfm_a1_phasor": ROOT / "fmus" / "regfm_a1" / "README.md",
+    "csvgn1_phasor": ROOT / "fmus" / "static_var" / "README.md",
     "infinite_bus": ROOT / "fmus" / "infinite_bus" / "README.md",
     "test_bench": ROOT / "fmus" / "test_bench" / "README.md",
     "probe_a": ROOT / "fmus" / "probe" / "README.md",

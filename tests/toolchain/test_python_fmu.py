@@ -50,6 +50,7 @@ ALL_PATHS_OPEN = {
     "gfl_l2ep": _L2EP_OPEN,
     "gfl_l2ep_phasor": _L2EP_OPEN | {"communication_step": 5e-3},
     "static_generation_phasor": {"communication_step": 5e-3, "R": 0.01},
+    "csvgn1_phasor": {"communication_step": 5e-3, "T1": 0.02},
     "regfm_a1_phasor": {
         "communication_step": 5e-3,
         "RL": 0.01,

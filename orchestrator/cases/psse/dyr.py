@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from fmus.grid_following.dyr_fields import CONVERTER, FIELDS, MODEL, PLANT, approximation
 from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
+from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS, DyrField, DyrRecord
 from orchestrator.cases.psse.dyr_records import DynamicRecord, given_values
 from orchestrator.cases.psse.missing_models import (
@@ -20,7 +21,9 @@ from orchestrator.cases.psse.raw import Machine
 from orchestrator.cases.record_use import RecordUse, UseOfRecord
 from orchestrator.errors import InputError
 
-_KNOWN = DYR_RECORDS | REGFM_A1_RECORDS
+_KNOWN = DYR_RECORDS | REGFM_A1_RECORDS | STATIC_VAR_RECORDS
+_COUPLED = {record.part for record in REGFM_A1_RECORDS.values()}
+"""Models whose coupling impedance is ZSORCE of the network data."""
 
 _MOST_SHOWN = 20
 _SAME = 1e-3  # part by which two figures for one reactance may differ: files round them
@@ -257,8 +260,10 @@ def _model(
     machine: Machine, parts: Mapping[str, str], values: Mapping[str, float], partial: bool
 ) -> MachineModel:
     if "converter" in parts:
-        coupling = {"RL": machine.source.real, "XL": machine.source.imag}
-        return MachineModel({}, {**coupling, **values}, parts["converter"])
+        own = dict(values)
+        if parts["converter"] in _COUPLED:
+            own = {"RL": machine.source.real, "XL": machine.source.imag, **values}
+        return MachineModel({}, own, parts["converter"])
     source = {"machine.R_s": machine.source.real}
     if parts["machine"] == "classical":
         source["machine.X_d1"] = machine.source.imag

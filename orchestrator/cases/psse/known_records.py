@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from fmus.grid_following.dyr_fields import CONVERTER, FIELDS, MODEL
 from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
+from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS, DyrRecord
 
 _LIBRARY = "PSS/E's model library as PowerWorld's and NEPLAN's guides and ANDES' reader describe it"
@@ -34,6 +35,10 @@ def known_records() -> list[KnownRecord]:
     found += [
         KnownRecord(name, record.kind, record.part, _REGFM, "; ".join(_limits(record)))
         for name, record in REGFM_A1_RECORDS.items()
+    ]
+    found += [
+        KnownRecord(name, "device", record.part, _LIBRARY, "; ".join(_limits(record)))
+        for name, record in STATIC_VAR_RECORDS.items()
     ]
     asked = "only with dyr_approximate = true; each case lists what that leaves out"
     found += [

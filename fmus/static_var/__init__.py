@@ -1,0 +1,1 @@
+"""Static var compensators: a susceptance that holds the bus voltage."""
