@@ -25,17 +25,21 @@ def why_idle(system: System, name: str, variable: str, moved: Collection[str] = 
         name not in (c.source.component, c.target.component) for c in system.connections
     ):
         return f"{name} is connected with no other component"
-    parts = variable.split(".")
-    for part in (".".join(parts[:depth]) for depth in range(1, len(parts))):
-        for key in (f"{part}.enabled", *([f"{part}.K"] if part in DAMPING_CONTROLLERS else [])):
-            known = (
-                key != variable
-                and key in plan.description.variables
-                and f"{name}.{key}" not in moved
-            )
-            if known and plan.number(key) == 0:
-                return f"{name}.{key} is {str(plan.value(key)).lower()}"
+    for key in switches_of(plan.description.variables, variable):
+        if f"{name}.{key}" not in moved and plan.number(key) == 0:
+            return f"{name}.{key} is {str(plan.value(key)).lower()}"
     return ""
+
+
+def switches_of(variables: Collection[str], variable: str) -> list[str]:
+    """The switches and gains of the parts that a variable belongs to: with one of them at 0 it cannot act."""
+    parts, found = variable.split("."), []
+    for depth in range(1, len(parts)):
+        part = ".".join(parts[:depth])
+        found.append(f"{part}.enabled")
+        if part in DAMPING_CONTROLLERS:
+            found.append(f"{part}.K")
+    return [key for key in found if key in variables and key != variable]
 
 
 def idle_values(

@@ -7,6 +7,7 @@ from warnings import catch_warnings, simplefilter
 
 from fmus.toolchain.temporary import own_folder, remove
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
+from orchestrator.api.case import Case
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.scenario import UnusualDataWarning
 from orchestrator.asked import read_whole
@@ -35,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
             f"{options.case}: a study has its own values and range, and is not saved as a page; --set, "
             "--range and --save go with a case"
         )
-    name = options.scenario or kind.get("scenario", case.scenarios[-1])
+    name = options.scenario or kind.get("scenario", first_shown(case))
     if name not in case.scenarios:
         raise InputError(
             f"--scenario: there is no scenario {name!r}; the case has: {', '.join(case.scenarios)}"
@@ -76,6 +77,14 @@ def run(options: argparse.Namespace) -> int:
     finally:
         remove(folder)
     return 0
+
+
+def first_shown(case: Case) -> str:
+    """The last scenario that has the events of the case.
+
+    A scenario with events of its own, such as the trip of a unit, is shown if it is asked for."""
+    plain = [name for name, table in case.file.scenarios.items() if table.events is None]
+    return plain[-1] if plain else case.scenarios[0]
 
 
 def way_to(address: str, folder: Path) -> Path:

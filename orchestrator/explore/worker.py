@@ -7,6 +7,7 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from orchestrator.api.case import Case, load
 from orchestrator.api.results import Modes
 from orchestrator.api.scenario import Scenario
 from orchestrator.arrays import Complex
-from orchestrator.cases.idle_values import why_idle
+from orchestrator.cases.idle_values import switches_of, why_idle
 from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.schema import Value
 from orchestrator.cases.service import in_service
@@ -227,6 +228,7 @@ class Desk:
             "title": scenario.title,
             "verdict": modes.stability.sentence(),
             "outside": None if hidden is None else hidden.sentence(remedy=False),
+            "warnings": [*_questions(scenario), *modes.result.unasked],
             "idle": {
                 key: why_idle(system, one, name)
                 for key, one, _, name in parts
@@ -249,13 +251,33 @@ class Desk:
 def _parameters(case: Case, scenario: Scenario) -> dict[str, Any]:
     """The parameters that a slider or a switch can set, the signals that can be drawn, and the diagram."""
     listed = scenario.parameters().reset_index().to_dict("records")
+    shown = [row for row in listed if row["type"] in ("Real", "Integer", "Boolean")]
     return {
-        "parameters": [row for row in listed if row["type"] in ("Real", "Integer", "Boolean")],
+        "parameters": [row | {"switches": _switches(scenario, row["parameter"])} for row in shown],
         "signals": list(scenario.prepared.record),
         "plotted": plotted(scenario),
         "events": events_of(case.file, scenario.name),
         "diagram": diagram(scenario),
     }
+
+
+def _questions(scenario: Scenario) -> list[str]:
+    """What is asked about the scenario's data, without the options that the page does not have."""
+    idle = set(scenario.prepared.idle.values())
+    return [
+        question.text
+        if question in idle
+        else str(replace(question, place=question.place.removeprefix("--set ")))
+        for question in scenario.prepared.questions
+    ]
+
+
+def _switches(scenario: Scenario, parameter: str) -> list[str]:
+    """The parameters that switch a parameter's part on and off."""
+    name, _, variable = parameter.partition(".")
+    known = scenario.prepared.system.components[name].description.variables
+    keys = switches_of(known, variable)
+    return [f"{name}.{key}" for key in keys if known[key].type == "Boolean"]
 
 
 def _stamp(path: Path) -> list[float]:

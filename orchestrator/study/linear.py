@@ -111,11 +111,18 @@ def _selected(space: StateSpace, select: Matrix, outputs: Sequence[str]) -> Stat
     )
 
 
+class NoLinearResponseError(InputError):
+    """A linear model cannot follow a scenario's events."""
+
+
 def response_at_steady_state(prepared: PreparedScenario) -> xr.Dataset:
     """`linear_response` of a scenario that does not run yet."""
     with running(prepared) as master:
         find_operating_point(master)
-        return linear_response(master, prepared)
+        try:
+            return linear_response(master, prepared)
+        except NoLinearResponseError as error:
+            raise InputError(f"{error}; the co-simulation follows it: run that") from error
 
 
 def linear_response(master: Master, prepared: PreparedScenario) -> xr.Dataset:
@@ -127,12 +134,12 @@ def linear_response(master: Master, prepared: PreparedScenario) -> xr.Dataset:
         if any(isinstance(value, bool) for value in settings.values())
     ]
     if faults := faults_among(prepared.events):
-        raise InputError(
-            f"a linear model cannot follow a fault or a forcing ({faults[0]}); leave --linear out"
+        raise NoLinearResponseError(
+            f"a linear model cannot follow a fault or a forcing ({faults[0]})"
         )
     if switching:
-        raise InputError(
-            f"a linear model cannot follow a switching event ({switching[0]}); leave --linear out"
+        raise NoLinearResponseError(
+            f"a linear model cannot follow a switching event ({switching[0]})"
         )
     inputs = default_inputs(prepared)
     if not inputs:

@@ -24,6 +24,7 @@ from orchestrator.errors import (
     AnalysisError,
     ComponentError,
     CosimError,
+    InputError,
     NotTakenUpError,
     ResultsError,
     RunInterruptedError,
@@ -41,7 +42,7 @@ from orchestrator.results.storage import trajectory_dataset
 from orchestrator.study.after_events import modes_after
 from orchestrator.study.checkpoint_mark import computed
 from orchestrator.study.checkpoints import Checkpoints
-from orchestrator.study.linear import linear_response
+from orchestrator.study.linear import NoLinearResponseError, linear_response
 from orchestrator.study.modes import ModesResult, modes_of, running, unknown_modes
 from orchestrator.study.ring_down import ring_down_of
 from orchestrator.watch.finding import NOT_JUDGED, UNSTABLE, Finding
@@ -199,7 +200,7 @@ def _run(
         ):  # a look is in steps, which a foreign federate cannot take back
             modes = replace(modes, warnings=(*modes.warnings, *_diverging(master)))
         shifts = _shifts(master, modes)
-        follows = linear_response(master, prepared) if linear else None
+        follows = _followed(master, prepared) if linear else None
         try:
             if federation is not None:
                 federation.begin(master)
@@ -253,6 +254,14 @@ def _run(
         protections,
         after,
     )
+
+
+def _followed(master: Master, prepared: PreparedScenario) -> xr.Dataset:
+    """The linear model's response to the run's events."""
+    try:
+        return linear_response(master, prepared)
+    except NoLinearResponseError as error:
+        raise InputError(f"{error}; leave --linear out") from error
 
 
 def _diverging(master: Master) -> list[str]:

@@ -118,10 +118,13 @@ def test_the_response_is_not_called_unstable(run):
 
 
 def test_a_linear_response_refuses_a_forcing():
-    with pytest.raises(InputError, match="cannot follow"):
-        gfor.load("two_area_rms").scenario("gfor", force="sg1 0.8 Hz 2 %").run(
-            stop=2.0, linear=True
-        )
+    forced = gfor.load("two_area_rms").scenario("gfor", force="sg1 0.8 Hz 2 %")
+    with pytest.raises(
+        InputError, match=r"cannot follow a fault or a forcing.*; leave (--)?linear out"
+    ):
+        forced.run(stop=2.0, linear=True)
+    with pytest.raises(InputError, match=r"cannot follow .*; the co-simulation follows it"):
+        forced.response(stop=2.0)
 
 
 def test_the_run_tells_who_was_forced(run):

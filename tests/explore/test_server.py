@@ -21,7 +21,7 @@ from fmus.toolchain.exporter import cached
 from fmus.toolchain.python_fmu import PythonFmu
 from fmus.toolchain.temporary import own_folder, remove
 from orchestrator.cli import main
-from orchestrator.cli.explore import way_to
+from orchestrator.cli.explore import first_shown, way_to
 from orchestrator.explore.computing import Computing
 from orchestrator.explore.files import FILES, SCRIPTS, content_of
 from orchestrator.explore.server import Explorer
@@ -254,6 +254,27 @@ def test_a_value_that_cannot_be_is_refused_in_the_commands_words(computing, caps
     said = capsys.readouterr().err.removeprefix("error: ")
     assert found["error"].split() == said.split()
     assert "answer" in answer(computing)  # and the next one is answered
+
+
+def test_a_value_that_cannot_act_is_told_in_the_pages_words_with_its_switch(computing):
+    key, off = "gfor.pod_p.K", "gfor.pod_p.enabled"
+    found = answer(computing, scenario="gfor", values={key: 100.0})["answer"]
+    assert f"{key} cannot act: {off} is false" in found["warnings"]
+    assert not any("--" in text for text in found["warnings"])
+    listed = answer(computing, ask="parameters", scenario="gfor")["answer"]["parameters"]
+    switches = {one["parameter"]: one["switches"] for one in listed}
+    assert switches[key] == [off]
+    assert switches[off] == switches["grid.X_L"] == []
+    asked = {key: 100.0, off: True}
+    acting = answer(computing, scenario="gfor", values=asked)["answer"]
+    assert not any("cannot act" in text for text in acting["warnings"])
+
+
+@pytest.mark.parametrize(
+    ("case", "scenario"), [("two_area", "pod_pq"), ("ieee39", "pod_pq"), ("kundur", "pod_q")]
+)
+def test_a_page_opens_with_the_whole_grid_and_not_with_an_outage(case, scenario):
+    assert first_shown(gfor.load(case)) == scenario
 
 
 def test_parameters_have_units_bounds_and_words(computing):

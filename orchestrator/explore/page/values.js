@@ -77,6 +77,11 @@ function paintControls() {
     }
     const bounds = p && (p.minimum !== null || p.maximum !== null) ? `, from ${p.minimum === null ? "any" : number(p.minimum)} to ${p.maximum === null ? "any" : number(p.maximum)}` : "";
     box.append(make("small", {}, p ? `${p.description}${p.description ? "; " : ""}${p.variability}${bounds}; ${number(original(name))} in the case` : "this scenario has no such parameter"), error);
+    for (const off of (p?.switches ?? []).filter(one => (state.values[one] ?? original(one)) === false)) {
+      const on = make("button", {}, `switch ${off} on`);
+      on.addEventListener("click", () => setValue(off, true, error));
+      box.append(make("small", { class: "idle" }, `${name} cannot act: ${off} is off. `, SAVED ? "" : on));
+    }
     if (SAVED && !SAVED.grid[name]) box.querySelectorAll("input").forEach(input => { input.disabled = true; });
     return box;
   }));
