@@ -2,10 +2,12 @@
 
 import pytest
 
+from orchestrator.black_box import coupled_modes
 from orchestrator.black_box.coupled_modes import (
     component_participation,
     is_black_box,
     linearize_with_box,
+    modes_with_boxes,
 )
 from orchestrator.black_box.frequency_response import Excitation
 from orchestrator.errors import InputError
@@ -54,3 +56,32 @@ def test_our_own_fmus_are_no_black_boxes_and_an_unknown_one_is_refused():
         assert not is_black_box(master.components["gfor"])
         with pytest.raises(InputError, match="no component 'vendor'"):
             linearize_with_box(master, "vendor")
+
+
+def test_a_box_is_measured_once_though_names_ask_for_its_model_again(monkeypatch):
+    measured, asked = [], []
+    measure, modes_from = coupled_modes.measure, coupled_modes.modes_from
+
+    def counted(bench, *given):
+        measured.append(bench)
+        return measure(bench, *given)
+
+    def named(prepared, master, point, blocks, frequencies, critical, identified):
+        """As names are followed from other scenarios: the same point, and one with another gain."""
+        again = identified(master)
+        assert again["gfor"] is blocks.components["gfor"]
+        master.system.components["gfor"].parameters["pod_p.K"] = 1.0
+        assert identified(master)["gfor"] is not again["gfor"]
+        asked.append(len(measured))
+        return modes_from(prepared, master, point, blocks, frequencies, critical, None)
+
+    monkeypatch.setattr(coupled_modes, "is_black_box", lambda component: component.name == "gfor")
+    monkeypatch.setattr(coupled_modes, "measure", counted)
+    prepared = boxes.prepared("gfor")
+    with running(prepared) as master:
+        modes_with_boxes(prepared, master, (0.1, 2.0), excitation=SHORT)
+    assert len(measured) == 1
+    monkeypatch.setattr(coupled_modes, "modes_from", named)
+    with running(prepared) as master:
+        modes_with_boxes(prepared, master, (0.1, 2.0), excitation=SHORT)
+    assert asked == [3]
