@@ -11,6 +11,7 @@ _KEYWORDS = {
     "rank": "ranked",
     "place": "places",
     "out": "folder",
+    "dest": "folder",
     "checkpoint": "checkpoints",
     "resume": "checkpoints",
     "parameter": "parameters",

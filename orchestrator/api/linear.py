@@ -149,8 +149,12 @@ class LinearSystem(StateSpace):
         lines += [f"inputs: {', '.join(self.inputs)}", f"outputs: {', '.join(self.outputs)}"]
         if self.states:
             lines.append("table('A') … table('D') have the matrices, eigenvalues of A the modes")
-        small = self.table("D") if self.outputs and self.inputs else None
-        return page(repr(self).strip("<>"), [*lines, "D, outputs by inputs:"], small)
+        b, c = self.table("B").add_prefix("B: "), self.table("C").T.add_prefix("C: ")
+        lines.append(
+            "B by input and C by output, a row for each state; below, D, outputs by inputs"
+        )
+        below = self.table("D").to_html() if self.outputs and self.inputs else ""
+        return page(repr(self).strip("<>"), lines, b.join(c), rest=below)
 
 
 def read_linear_model(fmu: str | Path) -> LinearSystem:

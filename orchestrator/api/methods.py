@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import MISSING, fields
 from functools import wraps
 from inspect import Parameter, Signature, cleandoc, get_annotations
+from inspect import signature as signature_of
 from textwrap import indent
 from typing import Any, Concatenate, ParamSpec, TypeVar, cast
 
@@ -56,6 +57,18 @@ def in_turn(function: Callable[Asks, Shown]) -> Callable[Asks, Shown]:
             return function(*given, **wanted)
 
     return waiting
+
+
+def by_known_keywords(function: Callable[Asks, Shown]) -> Callable[Asks, Shown]:
+    """A function that refuses a keyword that it lacks in one sentence, with those that it has."""
+    known = [*signature_of(function).parameters]
+
+    @wraps(function)
+    def called(*given: Asks.args, **named: Asks.kwargs) -> Shown:
+        require_known(named, known, function.__name__)
+        return function(*given, **named)
+
+    return called
 
 
 def _named(made: Any, name: str, module: str) -> Any:

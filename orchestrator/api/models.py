@@ -7,6 +7,7 @@ from pathlib import Path
 
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments, parts_of
 from fmus.toolchain.model import FmiVersion, Model
+from orchestrator.api.methods import by_known_keywords
 from orchestrator.asked import flag, names
 from orchestrator.asked import path as path_of
 from orchestrator.errors import InputError
@@ -48,6 +49,7 @@ def catalogue_model(name: str, parts: Mapping[str, str] | None = None) -> Model:
         raise InputError(f"model {name!r} cannot be built: {error}") from error
 
 
+@by_known_keywords
 def build(
     model: str | Model,
     folder: str | Path = ".",

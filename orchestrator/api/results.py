@@ -146,8 +146,9 @@ class Modes(NoTruth, ask=".stability.stable, or len() for the number of modes in
 
     @property
     def eigenvalues(self) -> Complex:
-        """All eigenvalues but zeros, such as the free angle's [rad/s], complex, the largest real part first: ln(μ)/h of
-        the step map, as those of the modes and of the verdict."""
+        """All eigenvalues [rad/s], complex, the largest real part first; zeros, such as the free angle's, are left out.
+
+        They are ln(μ)/h of the step map, from which the modes and the verdict come."""
         found = eigenvalues(self.result.model)
         found = found[np.abs(found) > ZERO]
         return np.asarray(found[np.argsort(-found.real, kind="stable")])

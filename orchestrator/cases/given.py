@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+import sys
 import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -54,6 +55,15 @@ def plain(values: Mapping[str, Any] | None, argument: str = "values") -> dict[st
             f"{argument}: {several[0]} is given several values; give one, or vary it with case.sweep(…)"
         )
     return found
+
+
+def _users_level() -> int:
+    """How far above its caller the nearest code outside of this package stands, as `warnings.warn` counts."""
+    frame, level = sys._getframe(1), 1
+    package = __name__.partition(".")[0]
+    while frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] == package:
+        frame, level = frame.f_back, level + 1
+    return level
 
 
 def case_values(values: Mapping[str, Any] | None, argument: str = "values") -> dict[str, Value]:
@@ -112,7 +122,7 @@ def kept(given: Any, name: str, argument: str) -> Path:
     if table is given and (gaps := [str(name) for name in table if table[name].isna().any()]):
         warnings.warn(
             f"question: {argument}: {', '.join(gaps)}: the case's value is taken at NaN; is it meant?",
-            stacklevel=2,
+            stacklevel=_users_level(),
         )
     named = {"time", "name"} & set(table.columns)
     return keep(table.to_csv(index=not named, index_label=None if named else "name"), name)

@@ -43,7 +43,7 @@ def of_values() -> Any:
         _VALUES,
         None,
         "values by ``component.variable``, as with ``--set``: numbers, truth values, or text such as "
-        '``"1350 MVA"``; they go before the parameter files',
+        '``"1350 MVA"``; they override the parameter files',
         option=None,
     )
 

@@ -66,7 +66,7 @@ class Screening(NoTruth):
         return verdict_sentence(self.summary)
 
     def table(self) -> pd.DataFrame:
-        """Of each outage the worst point, as in `items`: not judged first, then the least damped."""
+        """One row for each outage: its worst point, those not judged first. `items` has all points."""
         rows = self.items().sort_values("least_damping_percent", na_position="first", kind="stable")
         return rows.drop_duplicates("outage").set_index("outage")
 
@@ -94,10 +94,11 @@ class Screening(NoTruth):
         return [place / name for name in (ITEMS, MODES, SUMMARY, CELLS, PAGE)]
 
     def __repr__(self) -> str:
-        return f"<Screening of {self.result.plan.case.name}: {self.verdict}>"
+        head = f"Screening of {self.result.plan.case.name}: {self.verdict}"
+        return f"<{head}; all points stand in items(), the worst of each outage in table()>"
 
     def _repr_html_(self) -> str:
-        lines = [self.verdict, what_was_counted(self.summary)]
+        lines = [self.verdict, what_was_counted(self.summary), "items() has all points"]
         return page(f"Screening of {self.result.plan.case.name}", lines, self.modes())
 
 

@@ -94,6 +94,8 @@ _NAMED = 4  # components of each side of a mode shape that are named, largest fi
 
 
 _RAY = "damping ray"  # marks what belongs to a ray
+_MODE_LABEL = "mode"  # marks the label of a mode
+_LABEL_GAP = (7, 3)  # between a mode and its label, across and up [points]
 _RAY_LABEL = (0.055, 0.05)  # room for a ray's label, in parts of the Axes' width and height
 
 
@@ -145,15 +147,9 @@ def draw_eigenvalues(
         )
         for mode in modes if annotate else ():
             text = f"{result.name_of(mode) or ''} {mode.frequency_hz:.2f} Hz, {mode.damping_percent:.1f} %"
-            look = {
-                "textcoords": "offset points",
-                "size": "x-small",
-                "ha": "right",
-                "color": colour(index),
-            }
-            axis.annotate(
-                text.strip(), (mode.eigenvalue.real, mode.frequency_hz * turn), (-7, 3), **look
-            )
+            look = {"size": "x-small", "color": colour(index), "gid": _MODE_LABEL}
+            place = (mode.eigenvalue.real, mode.frequency_hz * turn)
+            axis.annotate(text.strip(), place, textcoords="offset points", xytext=(0, 0), **look)
         for reference in result.references.values():
             real, hertz = _real_and_hz(reference)
             axis.scatter(
@@ -175,6 +171,22 @@ def draw_eigenvalues(
         axis.axvline(0, color="#888888", linewidth=0.8)
     axis.set_xlabel("Real part [1/s]")
     axis.set_ylabel("Imaginary part [rad/s]" if radians else "Frequency [Hz]")
+    _place_mode_labels(axis)
+
+
+def _place_mode_labels(axis: Any) -> None:
+    """Put the modes' labels beside them, to the left and above where the frame leaves room."""
+    labels = [text for text in axis.texts if text.get_gid() == _MODE_LABEL]
+    if not labels:
+        return
+    axis.figure.draw_without_rendering()  # its layout decides how wide the frame is
+    frame, across, up = axis.get_window_extent(), *_LABEL_GAP
+    for label in labels:
+        label.set(ha="right", va="bottom", position=(-across, up))
+        if label.get_window_extent().x0 < frame.x0:
+            label.set(ha="left", position=(across, up))
+        if label.get_window_extent().y1 > frame.y1:
+            label.set(va="top", position=(label.get_position()[0], -up))
 
 
 def _real_and_hz(reference: ReferenceModeTable) -> tuple[float, float]:

@@ -48,9 +48,9 @@ class Preparing(OfCase):
     sharing: str | None = asked(
         _SHARING,
         None,
-        "how the other units feed what units fed that ``values`` take out of service, such as "
-        '``sg5.connected``: ``"droop"``, ``"rating"``, or ``"slack"``; as the case says by default, which is by droop; '
-        "where ``values`` give powers (``P_0``) as well, nothing is shared",
+        "how the other units replace the power of a unit that ``values`` take out of service, such as by "
+        '``sg5.connected``: by ``"droop"``, by ``"rating"``, or the ``"slack"`` alone; as the case says by default, '
+        "which is by droop; if ``values`` give powers (``P_0``) as well, nothing is shared",
         option=None,
     )
 

@@ -89,9 +89,8 @@ def draw_trajectories(axis: Any, samples: Samples) -> bool:
             )
         if strong:
             ends = [(s["real"], s["frequency"]) for _, s in curve]
-            number = trajectory.name.removeprefix(trajectory.carries or "").strip()
             axis.annotate(
-                number,
+                _number(trajectory),
                 ends[-1],
                 xytext=(5, 3),
                 textcoords="offset points",
@@ -102,6 +101,9 @@ def draw_trajectories(axis: Any, samples: Samples) -> bool:
         unstable = len(sweep.unstable(samples.axes))
         words = f": UNSTABLE at {unstable} of its points" if unstable else ""
         axis.plot([], [], color=colour(k), label=sweep.prepared.title + words)
+    numbered = {t.name: number for _, t, _ in drawn if t.carries and (number := _number(t))}
+    for name, number in numbered.items():
+        axis.plot([], [], linestyle="", marker=f"${number}$", color="black", label=name)
     axis.set_xlim(left, right)
     axis.set_ylim(0, highest)
     damping_rays(axis, left, highest)
@@ -190,8 +192,13 @@ def _percent_of(state: str) -> Callable[[dict[str, Any]], float]:
 
 
 def _dash(trajectory: Trajectory) -> str:
-    number = trajectory.name.removeprefix(trajectory.carries or "").strip()
+    number = _number(trajectory)
     return _DASHES[(int(number) - 1) % len(_DASHES)] if number.isdigit() else _DASHES[0]
+
+
+def _number(trajectory: Trajectory) -> str:
+    """Which of the modes that bear the same name it is; empty if it is the only one."""
+    return trajectory.name.removeprefix(trajectory.carries or "").strip()
 
 
 def _finish(figure: Figure, axes: Any, samples: Samples, curves: Any) -> None:

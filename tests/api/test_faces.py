@@ -170,3 +170,57 @@ def test_threads_take_turns(case):
     with ThreadPoolExecutor(4) as pool:
         together = list(pool.map(damping, reactances))
     assert together == [damping(X_L) for X_L in reactances]
+
+
+def test_labels_of_modes_stay_in_the_frame(case):
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    pyplot.switch_backend("Agg")
+    axes = case.scenario("pod_pq").modes().plot(annotate=True)
+    axes = case.scenario("base").modes().plot(axes, annotate=True)
+    axes.figure.draw_without_rendering()
+    frame = axes.get_window_extent()
+    labels = [text for text in axes.texts if "Hz" in text.get_text()]
+    assert len(labels) > 3
+    for label in labels:
+        place = label.get_window_extent()
+        assert frame.x0 - 1 <= place.x0
+        assert place.x1 <= frame.x1 + 1
+        assert frame.y0 - 1 <= place.y0
+        assert place.y1 <= frame.y1 + 1
+    pyplot.close("all")
+
+
+def test_a_question_about_a_table_is_placed_where_the_caller_stands(case):
+    table = pd.DataFrame({"grid.X_L": [0.1, np.nan]}, index=["short", "long"])
+    with pytest.warns(UserWarning, match="the case's value is taken at NaN") as asked:
+        case.screen(table, scenario="gfor")
+    (question,) = [one for one in asked if "at NaN" in str(one.message)]
+    assert question.filename == __file__
+
+
+def test_a_screening_says_where_its_points_stand(case):
+    screening = case.screen(
+        {"short": {"grid.X_L": 0.1}, "long": {"grid.X_L": 0.3}}, scenario="gfor"
+    )
+    assert "all points stand in items()" in repr(screening)
+    assert len(screening.items()) == 2
+
+
+def test_the_commands_word_for_a_folder_is_answered_by_pythons():
+    with pytest.raises(
+        gfor.CosimError, match=r"build cannot be asked for 'dest', but for .*folder"
+    ):
+        gfor.build("infinite_bus", dest="somewhere")
+
+
+def test_a_notebook_shows_the_matrices_of_a_linear_model(case):
+    model = case.scenario("gfor").linearize(["gfor.droop.delta_P_ref"], ["sg1.omega"])
+    shown = model._repr_html_()
+    assert f"{len(model.states)} states, 1 inputs, 1 outputs" in shown
+    assert model.stability.sentence()[:20] in shown
+    states, D = pd.read_html(StringIO(shown), index_col=0)
+    assert [*states.columns] == ["B: gfor.droop.delta_P_ref", "C: sg1.omega"]
+    first = model.states[0]
+    for matrix, column in ((model.B, "B: gfor.droop.delta_P_ref"), (model.C.T, "C: sg1.omega")):
+        assert float(states.loc[first, column]) == pytest.approx(matrix[0, 0], rel=1e-4)
+    assert D.shape == (1, 1)

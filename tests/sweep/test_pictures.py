@@ -31,6 +31,25 @@ def labelled(figure: Figure):
     assert (last.get_xlabel(), last.get_title("left")) == ("X_L [pu]", "")
 
 
+def test_numbers_beside_curves_stand_in_the_legend():
+    places = {"damping": 5.0, "real": -0.2, "frequency": 0.5}
+    trajectories = [SimpleNamespace(name=f"tie {k}", carries="tie") for k in (1, 2)]
+    sweep = SimpleNamespace(
+        trajectories=trajectories,
+        prepared=SimpleNamespace(title="SG + GFOR"),
+        unstable=lambda axes: [],
+    )
+    samples = SimpleNamespace(
+        result=SimpleNamespace(scenarios=[sweep]),
+        axes=[SimpleNamespace(key="grid.X_L", unit="pu", values=(0.1, 0.3))],
+        of=lambda *_: [((0,), places), ((1,), places | {"real": -0.3})],
+    )
+    axes = Figure().subplots()
+    assert plots.draw_trajectories(axes, samples)
+    assert {"1", "2"} <= {text.get_text() for text in axes.texts}
+    assert axes.get_legend_handles_labels()[1] == ["SG + GFOR", "tie 1", "tie 2"]
+
+
 def test_damping_and_frequency_of_named_modes(drawn):
     assert plots.plot_named(SimpleNamespace(axes=["X_L"]), None)
     labelled(drawn[0])
