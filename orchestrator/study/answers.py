@@ -36,6 +36,9 @@ KINDS = {
 """In words, the findings that no stable system gives."""
 
 
+_SMALLEST = 1e-4  # share of a mode from which on a component is named in files
+
+
 @dataclass(frozen=True)
 class ScenarioAnswer:
     subject: str
@@ -51,10 +54,17 @@ class ScenarioAnswer:
             "verdict": self.verdict,
             "frequency_hz": None if self.mode is None else self.mode.frequency_hz,
             "damping_percent": None if self.mode is None else self.mode.damping_percent,
+            "components": {} if self.mode is None else _shares(self.mode),
             "remark": self.remark,
         }
-        after = self.after and eigenvalue_json(self.after.eigenvalue, self.after.damping_percent)
-        return found | ({"after_events": after} if after else {})
+        if self.after is None:
+            return found
+        after = eigenvalue_json(self.after.eigenvalue, self.after.damping_percent)
+        return found | {"after_events": {**after, "components": _shares(self.after)}}
+
+
+def _shares(mode: Mode) -> dict[str, float]:
+    return {name: share for name, share in mode.by_component.items() if share >= _SMALLEST}
 
 
 def of_modes(result: ModesResult) -> ScenarioAnswer:

@@ -341,6 +341,69 @@ def test_figures_that_moved_between_two_folders(folders, tmp_path):
     assert "+0.7" not in changed  # the other folder's answer is no earlier one of this
 
 
+def in_another_folder(folders, tmp_path, **worst):
+    """The screening once more, elsewhere, with another least damped mode; what the page says changed."""
+    new = tmp_path / "new" / "inner"
+    shutil.copytree(folders[1], new)
+    place = {"point": "mon", "outage": "line_1"}
+    shares = worst.pop("participation")
+    mode = {"worst": place | worst, "participation": shares}
+    (new / "screening.json").write_text(json.dumps(SCREENING | {"modes": [mode]}))
+    page = tmp_path / "page.html"
+    text = write_report(new.parent, [], page, folders[1], short=True).read_text(encoding="utf-8")
+    return text[text.index("Answers that differ") : text.index("</section>")]
+
+
+@pytest.mark.parametrize(
+    ("frequency", "shares", "like"),
+    [
+        (0.93, {"sg1": 0.6, "sg2": 0.3}, True),
+        (0.85, {"sg1": 0.5, "sg2": 0.3, "gfor": 0.2}, True),
+        (1.40, {"sg1": 0.6, "sg2": 0.3}, False),  # beyond 30 % of the frequency
+        (0.95, {"sg3": 0.7, "sg1": 0.2}, False),  # a machine's own mode close by
+    ],
+)
+def test_the_least_damped_of_two_results_may_be_two_modes(
+    folders, tmp_path, frequency, shares, like
+):
+    """The swing rose beyond the other mode, which is least damped now: 3.80 to 4.50 is no change of either."""
+    first = SCREENING["modes"][0] | {"participation": {"sg1": 0.6, "sg2": 0.3}}
+    (folders[1] / "screening.json").write_text(json.dumps(SCREENING | {"modes": [first]}))
+    changed = in_another_folder(
+        folders, tmp_path, frequency_hz=frequency, damping_percent=4.5, participation=shares
+    )
+    assert ("3.80 to 4.50 (+0.7)" in changed) is like
+    who = max(shares, key=shares.get)
+    said = (
+        "the least damped is another mode: 0.930 Hz, 3.80 % (sg1) before, "
+        f"{frequency:.3f} Hz, 4.50 % ({who}) now"
+    )
+    assert (said in changed) is not like
+
+
+def test_a_page_that_keeps_no_modes_tells_no_change_of_one(folders, tmp_path):
+    """As pages were before they kept whose figures they give."""
+    written(folders, tmp_path)
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    old = tmp_path / "old.html"
+    old.write_text(re.sub(r'"least": \[[^]]*\], ', "", page).replace("3.80 %", "3.10 %"))
+    assert '"least"' not in old.read_text(encoding="utf-8")
+    text = written(folders, tmp_path, against=old)
+    changed = text[text.index("Answers that differ") : text.index("</section>")]
+    assert "the older page does not say which modes its figures are of" in changed
+    assert "3.10 to 3.80" not in changed
+
+
+def test_a_run_tells_whose_modes_its_figures_are_of(folders, tmp_path):
+    """Of a run, and of what its events leave: each figure has its own mode."""
+    least = {"frequency_hz": 0.54, "damping_percent": 3.2, "components": {"sg1": 0.9}}
+    later = {"frequency_hz": 1.1, "damping_percent": 2.1, "components": {"sg3": 0.8}}
+    scenario = {"name": "base", "answer": least | {"stable": True, "after_events": later}}
+    told = of_run(tmp_path, [scenario]).least
+    assert [mode.words for mode in told] == ["0.540 Hz, 3.20 % (sg1)", "1.100 Hz, 2.10 % (sg3)"]
+    assert not told[0].is_like(told[1])
+
+
 def test_what_cannot_be_used_is_named(folders, tmp_path):
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "table.json").write_text('{"a": 1}')

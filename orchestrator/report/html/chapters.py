@@ -19,6 +19,7 @@ from orchestrator.errors import InputError, counted
 from orchestrator.report.html import studies
 from orchestrator.report.html.charts import Mark, bar_chart, complex_plane, legend
 from orchestrator.report.html.elements import colour, damping, table
+from orchestrator.report.html.least_damped import LeastDamped
 from orchestrator.report.html.origins import origin_of
 from orchestrator.report.tables import short
 from orchestrator.results.manifest import read_manifest
@@ -47,6 +48,7 @@ class Chapter:
     page: str = ""
     title: str = ""
     bases: Sequence[Mapping[str, Any]] = ()  # what figures rest on: `PreparedScenario.basis`
+    least: Sequence[LeastDamped] = ()  # the modes whose figures the answer gives, in its order
 
     @cached_property
     def origin(self) -> dict[str, Any]:
@@ -99,7 +101,7 @@ def of_run(
     folder: Path, scenarios: Sequence[Content], content: str = "", beside: Sequence[str] = ()
 ) -> Chapter:
     """Of a run's summary, or the same of `gfor modes`; ``beside``: what devices bring."""
-    said, open_, sure = [], [], []
+    said, open_, sure, told = [], [], [], list[LeastDamped]()
     for s in scenarios:
         answer: Content = s.get("answer") or {}
         stability: Content = s.get("stability") or {}
@@ -118,8 +120,10 @@ def of_run(
             if least
             else ""
         )
+        told += [] if least is None else [LeastDamped.of(least)]
         if later := answer.get("after_events"):
             figures += f", after the events {later['frequency_hz']:.3f} Hz, {later['damping_percent']:.2f} %"
+            told.append(LeastDamped.of(later))
         remark = f" ({answer['remark']})" if answer.get("remark") else ""
         said.append((stable, f"{title}: {word}{figures}{remark}"))
         open_ += [
@@ -149,6 +153,7 @@ def of_run(
         open_,
         content,
         bases=_bases(scenarios),
+        least=told,
     )
 
 
@@ -233,9 +238,11 @@ def _screening(file: Path, c: Content) -> Chapter:
     where = "somewhere" if c["stable"] is False else "everywhere"
     points, outages = counted(c["points"], "operating point"), counted(c["outages"], "outage")
     answer = f"{_STABLE[c['stable']]} {where}: {points}, {outages}"
-    if worst := min(
-        (m["worst"] for m in c["modes"]), key=lambda w: w["damping_percent"], default=None
-    ):
+    least = min(c["modes"], key=lambda mode: mode["worst"]["damping_percent"], default=None)
+    told = []
+    if least is not None:
+        worst = least["worst"]
+        told.append(LeastDamped.of({**worst, "components": least.get("participation")}))
         answer += (
             f"; least damped {worst['frequency_hz']:.3f} Hz, {worst['damping_percent']:.2f} %, "
             f"{'' if c['points'] == 1 else worst['point'] + ', '}outage {worst['outage']}"
@@ -255,6 +262,7 @@ def _screening(file: Path, c: Content) -> Chapter:
         f"{counted(c['items'], 'case')} computed, {growth}",
         lost,
         page="screening.html",
+        least=told,
     )
 
 

@@ -15,6 +15,7 @@ from orchestrator.report.html.chapters import Chapter, chapters_of, has_fault, o
 from orchestrator.report.html.chapters import sections as sections_of
 from orchestrator.report.html.elements import Figures, document, held_data, paragraphs, table
 from orchestrator.report.html.folder import SUMMARY, Results, read_results, sweeps_of
+from orchestrator.report.html.least_damped import LeastDamped, other_modes
 from orchestrator.report.html.origins import given_in, made_of
 from orchestrator.report.tables import short
 from orchestrator.results.manifest import MANIFEST, ResultsWarning
@@ -27,6 +28,7 @@ USED = (
 """Commands whose results a report takes."""
 
 Sections = list[tuple[str, str]]
+Answer = Mapping[str, Any]
 _PICTURE = r'(?:<ul class="legend">[^\n]*?</ul>)?<svg class="chart".*?</svg>|<img .*?>'
 
 
@@ -306,7 +308,8 @@ def changes(old: Path, before: Sequence[Chapter] | None, chapters: Sequence[Chap
     now = _by_name(_answers(chapters), _answers(chapters))
     rows = []
     for key in dict.fromkeys([*then, *now]):
-        was, is_now = then.get(key), now.get(key)
+        one, other = then.get(key, {}), now.get(key, {})
+        was, is_now = one.get("answer"), other.get("answer")
         if was != is_now:
             cells = (
                 key[0],
@@ -314,18 +317,24 @@ def changes(old: Path, before: Sequence[Chapter] | None, chapters: Sequence[Chap
                 was or "not there",
                 is_now or "not there any more",
             )
-            rows.append([escape(cell) for cell in (*cells, _moved(was or "", is_now or ""))])
+            rows.append([escape(cell) for cell in (*cells, _moved(one, other))])
     if not rows:
         return f"<p>No answer differs from {escape(old.name)}.</p>"
     columns = ["Question", "Of", "Before", "Now", "Figures that moved"]
     return table(f"Answers that differ from {old.name}", columns, rows, left=5)
 
 
-def _moved(before: str, now: str) -> str:
-    """The figures that differ between two answers that are alike but for them."""
+def _moved(was: Mapping[str, Any], is_now: Mapping[str, Any]) -> str:
+    """The figures that differ between two answers that are alike but for them, if these are of the same modes."""
+    before, now = was.get("answer", ""), is_now.get("answer", "")
     number = r"(?<![\w.])[-−+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
     if re.sub(number, "#", before) != re.sub(number, "#", now):
         return ""
+    if is_now.get("least") and "least" not in was:
+        return "not told: the older page does not say which modes its figures are of"
+    modes = ([LeastDamped.of(mode) for mode in one.get("least", ())] for one in (was, is_now))
+    if other := other_modes(*modes):
+        return "; ".join(other)
     pairs = zip(re.findall(number, before), re.findall(number, now), strict=True)
     moved = [
         (a, b, float(b.replace("−", "-")) - float(a.replace("−", "-"))) for a, b in pairs if a != b
@@ -333,12 +342,12 @@ def _moved(before: str, now: str) -> str:
     return ", ".join(f"{a} to {b} ({by:+.4g})" for a, b, by in moved)
 
 
-def _kept(page: Path) -> list[dict[str, str]]:
+def _kept(page: Path) -> list[Answer]:
     try:
         found = re.search(
             r'id="answers">(.*?)</script>', page.read_text(encoding="utf-8"), re.DOTALL
         )
-        kept: list[dict[str, str]] | None = json.loads(found[1]) if found else None
+        kept: list[Answer] | None = json.loads(found[1]) if found else None
     except (OSError, ValueError) as error:
         raise InputError(
             f"--against {page}: it cannot be read: {error}; give a page of `gfor report`"
@@ -350,13 +359,14 @@ def _kept(page: Path) -> list[dict[str, str]]:
     return kept
 
 
-def _answers(chapters: Sequence[Chapter]) -> list[dict[str, str]]:
+def _answers(chapters: Sequence[Chapter]) -> list[Answer]:
     return [
         {
             "question": one.question,
             "source": "" if one.source.is_dir() else one.source.name,
             "answer": one.answer + "".join(f"; not judged: {text}" for text in one.not_judged),
             "given": given_in(one.origin),
+            "least": [mode.as_json() for mode in one.least],
             "folder": (one.source if one.source.is_dir() else one.source.absolute().parent).name,
         }
         for one in chapters
@@ -364,12 +374,12 @@ def _answers(chapters: Sequence[Chapter]) -> list[dict[str, str]]:
 
 
 def _by_name(
-    answers: Sequence[dict[str, str]], others: Sequence[dict[str, str]]
-) -> dict[tuple[str, str, int], str]:
+    answers: Sequence[Answer], others: Sequence[Answer]
+) -> dict[tuple[str, str, int], Answer]:
     """Answers by question, file and place: first those of folders that the others have as well, at the same place."""
-    found: dict[tuple[str, str, int], str] = {}
+    found: dict[tuple[str, str, int], Answer] = {}
     known = [(x["question"], x["source"], x.get("folder")) for x in others]
-    named = [((x["question"], x["source"], x.get("folder")), x["answer"]) for x in answers]
+    named = [((x["question"], x["source"], x.get("folder")), x) for x in answers]
     for key, answer in sorted(named, key=lambda one: one[0] not in known):
         alike = [x for x in known if x[:2] == key[:2]]
         place = alike.index(key) if key in alike else 0
