@@ -1,6 +1,6 @@
 """The modes that bear names with a setting: those without controllers, followed while the gains grow."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from orchestrator.analysis.continuation import CAREFUL, follow_along, pair_at
@@ -18,13 +18,27 @@ def followed(loops: OpenLoops, setting: Setting, value: complex) -> complex:
     """Where a mode of the open loops [rad/s] is with a setting.
 
     Raises `AnalysisError` if it meets another one on its way."""
+    at = _scaled(loops, setting)
+    return follow_along(pair_at(at(_OPEN), value), at, _OPEN, 1.0, CAREFUL).eigenvalue
+
+
+def origin(loops: OpenLoops, setting: Setting, value: complex) -> complex:
+    """Where a mode with a setting [rad/s] comes from: the same mode of the open loops.
+
+    Raises `AnalysisError` if it meets another one on its way."""
+    at = _scaled(loops, setting)
+    return follow_along(pair_at(at(1.0), value), at, 1.0, _OPEN, CAREFUL).eigenvalue
+
+
+def _scaled(loops: OpenLoops, setting: Setting) -> Callable[[float], LinearModel]:
+    """The closed loops with a part of a setting's gains."""
 
     def at(part: float) -> LinearModel:
         scaled = {place: replace(own, gain=part * own.gain) for place, own in setting.items()}
         matrix = loops.closed(scaled)
         return LinearModel.from_matrix(matrix, tuple(map(str, range(len(matrix)))), None)
 
-    return follow_along(pair_at(at(_OPEN), value), at, _OPEN, 1.0, CAREFUL).eigenvalue
+    return at
 
 
 def with_followed_names(

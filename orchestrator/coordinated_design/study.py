@@ -356,7 +356,17 @@ def design_over_points(
         for point in rated
     }
     where = [plan.read.of(item) for item in plan.read.items]
-    points = tuple(judged(where, before, after, plan.aim, predicted, _apart(rated)))
+    points = tuple(
+        judged(
+            where,
+            before,
+            after,
+            plan.aim,
+            predicted,
+            _apart(rated),
+            setting=space.setting(found.x),
+        )
+    )
     return PointsDesign(
         plan, frequency, settings, found, points, ranking, search.evaluations, compared, thin
     )

@@ -1,12 +1,14 @@
 """The verdict on a design over operating points, from modes that were computed anew at every point."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from types import MappingProxyType
 
 import numpy as np
 
-from orchestrator.analysis.modes import damping_ratio
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, damping_ratio
+from orchestrator.coordinated_design.following import origin
 from orchestrator.coordinated_design.objective import (
     UNMOVED,
     Aim,
@@ -19,13 +21,20 @@ from orchestrator.coordinated_design.objective import (
     split,
     worth_of,
 )
+from orchestrator.coordinated_design.open_loops import Setting
 from orchestrator.coordinated_design.point import PointModes
+from orchestrator.errors import AnalysisError
 from orchestrator.operating_points.outages import Outage
 from orchestrator.operating_points.points_file import OperatingCase
 
 MORE = 1.2  # of all gains: a setting that is not good enough with them has no margin
 # from this difference of damping ratios on, the search's models and the modes anew disagree
 ASTRAY = 1e-3
+# controllers move a mode out of 0.1 to 2 Hz by less than this factor of its frequency
+_BESIDE = 1.5
+
+# damping ratios that differ by no more are the same: what a perturbation leaves open
+_SAME = 1e-4
 
 
 @dataclass(frozen=True)
@@ -72,6 +81,8 @@ class JudgedPoint:
     least: PlacedMode | None = None
     # modes from 0.1 to 2 Hz with the controllers that these do not move, and that the design leaves as they are
     apart: tuple[PlacedMode, ...] = ()
+    # modes that the controllers move out of 0.1 to 2 Hz; the design damps them as before
+    left: tuple[PlacedMode, ...] = ()
 
     @property
     def computed(self) -> bool:
@@ -94,11 +105,21 @@ class JudgedPoint:
 
     @property
     def unmoved(self) -> bool:
-        """Whether the controllers move the mode by less than 0.2 points of damping: a tenth of what a search passes."""
-        before, after = self.target_before, self.target
-        return bool(
-            before and after and abs(after.value - before.value) < 0.1 * UNMOVED * abs(before.value)
-        )
+        """Whether the controllers move the mode by less than 0.2 points of damping: a tenth of what a search passes.
+
+        The least damped mode before may be another one; so the mode is sought among all that there were."""
+        if self.target is None:
+            return False
+        value = self.target.value
+        apart = np.abs(self.before.values - value).min(initial=np.inf)
+        return bool(apart < 0.1 * UNMOVED * abs(value))
+
+    @property
+    def lower(self) -> float:
+        """By how much the least damping ratio of what the design damps is lower than before; negative if higher."""
+        if self.target_before is None or self.target is None:
+            return 0.0
+        return self.target_before.damping_ratio - self.target.damping_ratio
 
     @property
     def why_not(self) -> str:
@@ -109,7 +130,7 @@ class JudgedPoint:
     @property
     def astray(self) -> float:
         """By how much the search's models were wrong on the least damping ratio."""
-        if self.predicted is None or self.worth is None:
+        if self.predicted is None or self.worth is None or self.left:
             return 0.0
         return abs(self.predicted.worst - self.worth.worst)
 
@@ -128,13 +149,17 @@ def judged(
     aim: Aim,
     predicted: Mapping[int, Worth],
     apart: Mapping[int, Sequence[complex]] = MappingProxyType({}),
+    *,
+    setting: Setting | None = None,
 ) -> Iterator[JudgedPoint]:
     """The points with their modes anew.
 
     ``predicted``, ``apart``: by number of the point, the search's worth, and the modes without the controllers [rad/s]
-    that stand apart."""
+    that stand apart.
+    ``setting``: of the controllers, to tell which modes these move out of the range; None if that is not asked."""
     for k, here in enumerate(where):
-        point = _judged(here, before[k], after[k], aim, apart.get(k, ()))
+        origins = None if setting is None else partial(_origin, before[k], setting)
+        point = _judged(here, before[k], after[k], aim, apart.get(k, ()), origins)
         yield replace(point, predicted=predicted.get(k))
 
 
@@ -144,12 +169,15 @@ def _judged(
     after: PointModes,
     aim: Aim,
     apart: Sequence[complex],
+    origins: Callable[[complex], complex | None] | None = None,
 ) -> JudgedPoint:
     if not (before.computed and after.computed):
         return JudgedPoint(*where, before, after)
     first = _watched(before, aim, floors_of((), 0.0), apart)
     floors = floors_of((mode.value for mode in first if mode.floor is not None), aim.least)
     second = _watched(after, aim, floors, apart)
+    left = [] if origins is None or _targets(after, aim) is not None else _left(second, origins)
+    second = [replace(mode, floor=None) if mode.place in left else mode for mode in second]
     others = [mode for mode in second if mode.floor is not None]
     closest = min(others, key=lambda mode: mode.damping - (mode.floor or 0.0), default=None)
     beside = [k for value in apart if (k := nearest(second, value)) is not None]
@@ -165,7 +193,35 @@ def _judged(
         least_before=_least_of_all(before),
         least=_least_of_all(after),
         apart=tuple(_placed(second[k], after) for k in dict.fromkeys(beside)),
+        left=tuple(_placed(mode, after) for mode in second if mode.place in left),
     )
+
+
+def _left(watched: Sequence[Watched], origins: Callable[[complex], complex | None]) -> list[int]:
+    """Places of the modes beside 0.1 to 2 Hz that come from there and have less damping than all that are there.
+
+    Only those would change what a point comes to."""
+    least = min((mode.damping for mode in watched if mode.floor is None), default=np.inf)
+    low, high = (2 * np.pi * hertz for hertz in ELECTROMECHANICAL_HZ)
+    found = []
+    for mode in watched:
+        beside = low / _BESIDE < mode.value.imag < _BESIDE * high
+        if mode.floor is None or not beside or mode.damping >= least:
+            continue
+        origin = None if low <= mode.value.imag <= high else origins(mode.value)
+        if origin is not None and low <= origin.imag <= high:
+            found.append(mode.place)
+    return found
+
+
+def _origin(before: PointModes, setting: Setting, value: complex) -> complex | None:
+    """The mode without the controllers [rad/s] from which one with them comes; None if that cannot be told."""
+    if before.loops is None:
+        return None
+    try:
+        return origin(before.loops, setting, value)
+    except AnalysisError:
+        return None
 
 
 def _watched(
@@ -281,11 +337,21 @@ class PointsVerdict:
         return None if limiting is None else _damping(limiting.target)
 
     @property
+    def limiting_before(self) -> JudgedPoint | None:
+        """The point with the least damping without the controllers; None where no point has a mode to be damped."""
+        having = [point for point in self.known if point.target_before is not None]
+        return min(having, key=lambda point: _damping(point.target_before), default=None)
+
+    @property
     def worst_before(self) -> float | None:
-        return min(
-            (_damping(point.target_before) for point in self.known if point.target_before),
-            default=None,
-        )
+        before = self.limiting_before
+        return None if before is None else _damping(before.target_before)
+
+    @property
+    def lowered(self) -> list[JudgedPoint]:
+        """Points whose least damping is lower with the controllers, that with the greatest loss first."""
+        found = [point for point in self.known if point.lower > _SAME]
+        return sorted(found, key=lambda point: -point.lower)
 
     @property
     def stable(self) -> bool | None:

@@ -109,6 +109,10 @@ def as_json(design: PointsDesign) -> dict[str, Any]:
         "modes": list(request.modes) or "all",
         "least_damping_of_others": request.least_damping,
         "gain_bounds": list(request.gain_bounds),
+        "lowered": [
+            _where(point) | {"before": _mode(point.target_before), "after": _mode(point.target)}
+            for point in verdict.lowered
+        ],
         "worst_damping_ratio": {"before": verdict.worst_before, "after": verdict.worst},
         "least_of_all": {
             "before": _least_json(verdict.least_before, "least_before"),
@@ -247,9 +251,14 @@ def points_table(verdict: PointsVerdict) -> ColumnTable[JudgedPoint]:
                 _two,
                 "damping_before_percent",
             ),
-            Column("", lambda p: of(p.target_before, "frequency"), name="frequency_before_hz"),
+            Column(
+                "f before [Hz]",
+                lambda p: of(p.target_before, "frequency"),
+                _three,
+                "frequency_before_hz",
+            ),
             Column("with it [%]", lambda p: of(p.target, "damping"), _two, "damping_percent"),
-            Column("f [Hz]", lambda p: of(p.target, "frequency"), ".3f", "frequency_hz"),
+            Column("f [Hz]", lambda p: of(p.target, "frequency"), _three, "frequency_hz"),
             Column(
                 "",
                 lambda p: of(p.least_before, "damping"),
@@ -279,6 +288,10 @@ def _lower(value: bool | None) -> str:
 
 def _two(figure: float | str) -> str:
     return "–" if isinstance(figure, str) else f"{figure:.2f}"
+
+
+def _three(figure: float | str) -> str:
+    return "–" if isinstance(figure, str) else f"{figure:.3f}"
 
 
 def least_damped_table(verdict: PointsVerdict) -> ColumnTable[JudgedPoint]:

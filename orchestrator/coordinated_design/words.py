@@ -38,11 +38,13 @@ def verdict_of(verdict: PointsVerdict) -> VerdictSentence:
             return VerdictSentence(
                 True, "REACHED", f"{aim}{tail}{_no_margin(verdict.thin, wanted)}"
             )
-        return VerdictSentence(True, "better", f"at all {total} points and outages{tail}")
+        return VerdictSentence(True, "better", f"{_least_of_points(verdict)}{tail}")
     reasons = _reasons(verdict)
     if verdict.met is None:
         return VerdictSentence(None, "not known", f"{', '.join(reasons)}{tail}")
     word = "NOT REACHED" if wanted is not None else "NO BETTER"
+    if wanted is None:
+        reasons.insert(0, _least_of_points(verdict))
     short = wanted is not None and worst is not None and worst < wanted
     beyond = (
         f"; {_cannot_be_had(verdict, worst)}"
@@ -50,6 +52,23 @@ def verdict_of(verdict: PointsVerdict) -> VerdictSentence:
         else ""
     )
     return VerdictSentence(False, word, f"{', '.join([aim] * bool(aim) + reasons)}{beyond}{tail}")
+
+
+def _least_of_points(verdict: PointsVerdict) -> str:
+    """The least damping of all points before, and the point where it became lower: each with its mode."""
+    before, total = verdict.limiting_before, len(verdict.points)
+    text = f"the least damping of all {total} points and outages"
+    if before is not None and before.target_before is not None:
+        text += f" was that of {before.where}: {before.target_before.words}"
+    if not verdict.lowered:
+        return text
+    first = verdict.lowered[0]
+    assert first.target_before is not None
+    assert first.target is not None
+    return (
+        f"{text}; LOWER than before at {len(verdict.lowered)} of them, most at {first.where}: "
+        f"{first.target_before.words} before, {first.target.words} now"
+    )
 
 
 def _of_all_modes(verdict: PointsVerdict) -> str:
@@ -174,6 +193,12 @@ def remarks(verdict: PointsVerdict) -> list[str]:
         texts.append(
             f"the search was led astray: at {len(verdict.unforeseen)} of {total}, first at {place}, its linear models "
             "showed no harm to other modes, and there is; give a lower upper end of --gain-bounds, or fewer controllers"
+        )
+    if left := [point for point in verdict.known if point.left]:
+        mode = left[0].left[0]
+        texts.append(
+            f"at {len(left)} of {total}, first at {left[0].where}, the controllers move a mode out of 0.1 to 2 Hz, to "
+            f"{mode.words}; it counts as before"
         )
     if free := [point for point in verdict.known if point.after.zeros > 1]:
         texts.append(
