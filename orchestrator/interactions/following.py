@@ -17,8 +17,8 @@ _ONE = 1e-3
 """Two eigenvalues of a mode that was followed on two ways are one if they differ by less than this part."""
 
 Follow = Callable[[complex, SystemName, SystemName], complex | None]
-"""Gives a mode of one system [rad/s] as it is in another one with fewer vendors; None if it is not there. Raises a
-`CosimError` if that cannot be told."""
+"""Gives a mode of one system [rad/s] as it is in another one with fewer or other devices; None if it is not there.
+Raises a `CosimError` if that cannot be told."""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from orchestrator.errors import ErrorKind
+from orchestrator.errors import CosimError, ErrorKind
 from orchestrator.interactions.exchange import settings_of
 from orchestrator.interactions.following import Follow, FollowedMode, Ways, followed
 from orchestrator.interactions.places import NOT_VENDORS, by_group, first_of
@@ -46,7 +46,8 @@ class JudgedSystem:
     """A system with the modes that count for its converters.
 
     A mode of the network or of a machine in which none of them takes part says nothing of them, however little it is
-    damped. A mode that grows counts in any case, and so does one that counts in a pair and was followed to here."""
+    damped. A mode that grows counts in any case, and so does one that counts in a pair, or in another assignment, and
+    was followed to here."""
 
     name: SystemName
     record: SystemRecord
@@ -81,9 +82,8 @@ class JudgedSystem:
         return self.record.error or str(self.record.stability.get("reason") or "no verdict")
 
     def counts(self, mode: SharedMode) -> bool:
-        here = mode.eigenvalue
         return self._share(mode) >= self.threshold or any(
-            abs(here - value) <= _AT_ONE_PLACE * abs(value) for value in self.followed
+            _is_at(mode.eigenvalue, value) for value in self.followed
         )
 
     def _share(self, mode: SharedMode) -> float:
@@ -169,6 +169,10 @@ class JudgedPair:
         return "; ".join(f"{name}: {one.why_unknown}" for name, one in systems if not one.is_known)
 
 
+def _is_at(one: complex, other: complex) -> bool:
+    return abs(one - other) <= _AT_ONE_PLACE * abs(other)
+
+
 def _percent_text(percent: float | None) -> str:
     return "none" if percent is None else f"{percent:.2f} %"
 
@@ -190,6 +194,8 @@ class JudgedInteractions:
         }
         pairs = {name: self._modes(one) for name, one in plain.items() if name.kind is Kind.PAIR}
         self.systems = {name: _with_followed(one, plain, pairs) for name, one in plain.items()}
+        self.unfollowed: dict[SystemName, str] = {}
+        self.systems |= self._assignments_alike()
         self.modes = [self._judged(mode) for mode in self.whole.record.modes]
         alone = self.alone
         found = [
@@ -208,6 +214,43 @@ class JudgedInteractions:
         if critical is not None and critical.eigenvalue not in wanted:
             watched.append(critical)
         return tuple(followed(mode, (first, second), self._follow) for mode in watched)
+
+    def _assignments_alike(self) -> dict[SystemName, JudgedSystem]:
+        """The assignments, in which also those modes count that do so in the worst one, and in it those of any other.
+
+        By the share alone the least damping of two assignments would be that of two modes, and an assignment in which
+        a mode has less share, and less damping, would not be the worst."""
+        known = [
+            one
+            for name, one in self.systems.items()
+            if name.kind is Kind.ASSIGNMENT and one.record.error is None
+        ]
+        if not known:
+            return {}
+        worst = min(known, key=lambda one: one.least_damping or 0.0)
+        others = [one for one in known if one is not worst]
+        worst = self._with_hidden(worst, others)
+        return {one.name: self._with_hidden(one, [worst]) for one in others} | {worst.name: worst}
+
+    def _with_hidden(self, system: JudgedSystem, others: Sequence[JudgedSystem]) -> JudgedSystem:
+        """A system in which also the least damped of those modes counts that do so in one of the others."""
+        hidden = sorted(_hidden(system), key=lambda mode: mode.damping_percent)
+        for mode in hidden:
+            if any(self._counts_in(other, mode, system.name) for other in others):
+                return replace(system, followed=(*system.followed, mode.eigenvalue))
+        return system
+
+    def _counts_in(self, other: JudgedSystem, mode: SharedMode, here: SystemName) -> bool:
+        """Whether a mode of one assignment counts in another one; noted if it cannot be followed there."""
+        try:
+            there = self._follow(mode.eigenvalue, here, other.name)
+        except CosimError as error:
+            text = f"{place_of(mode)}, {mode.damping_percent:.2f} %: {str(error).splitlines()[0]}"
+            self.unfollowed.setdefault(here, text)
+            return False
+        return there is not None and any(
+            _is_at(one.eigenvalue, there) and other.counts(one) for one in other.record.modes
+        )
 
     @property
     def whole(self) -> JudgedSystem:
@@ -280,6 +323,16 @@ class JudgedInteractions:
         return JudgedMode(mode, groups, vendors)
 
 
+def _hidden(system: JudgedSystem) -> list[SharedMode]:
+    """The modes that do not count, with less damping than all that do."""
+    limit = min(system.least_damping or 0.0, WELL_DAMPED)
+    return [
+        mode
+        for mode in system.record.modes
+        if mode.damping_percent < limit - SAME and not system.counts(mode)
+    ]
+
+
 def _with_followed(
     system: JudgedSystem,
     plain: Mapping[SystemName, JudgedSystem],
@@ -341,6 +394,10 @@ def doubts_of(judgement: JudgedInteractions) -> Sequence[str]:
         for pair in judgement.pairs
         for one in pair.unfollowed
         if pair.is_known
+    ]
+    found += [
+        f"{plan_text(plan.swapped, name)}: whether a mode counts there as in another assignment is not known: {text}"
+        for name, text in judgement.unfollowed.items()
     ]
     none = judgement.none
     if none.stable is not True:

@@ -113,6 +113,7 @@ def stand_in_sentence(judgement: JudgedInteractions) -> str:
         f"{plan.stand_in} stands in for the vendors that a system does without, at the same power flow; a mode counts "
         f"if vendors' converters hold {100 * plan.request.threshold:g} % of it, or if it grows; that of a pair is "
         "followed to the systems with one vendor and with none, whatever share these hold there"
+        + (", and those of the assignments to the worst one" if plan.swapped else "")
     )
 
 

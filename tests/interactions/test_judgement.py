@@ -130,6 +130,57 @@ def test_an_assignment_without_a_verdict_is_not_the_worst():
     assert "1 has no verdict" in " ".join(lost.sentences)
 
 
+def reassigned(threshold, **records):
+    """Two devices at two places, with other results or another threshold; ``A_B`` is A west and B east."""
+    result = swapped().result
+    plan = replace(result.plan, request=replace(result.plan.request, threshold=threshold))
+    made = {SystemName(Kind.ASSIGNMENT, tuple(k.split("_"))): one for k, one in records.items()}
+    changed = replace(result, plan=plan, records=result.records | made)
+    return Interactions(changed, by_place(changed) if made else None)
+
+
+def test_an_assignment_with_less_share_and_less_damping_is_the_worst():
+    """The swing has 6 % and a share of 5.5 % with A and A; it has 3 % and a share of 4.5 % with A and B, where by the
+    share the least would be 9 %. The network's own resonance of 1 % counts in none."""
+
+    def found(percent, share):
+        network = mode(1.0, 50.0, grid=0.99, west=0.01)
+        swing = mode(percent, 1.0, sg1=1 - share, west=share)
+        return system(swing, mode(9.0, 5.0), network)
+
+    shares = {"A_A": (6.0, 0.055), "A_B": (3.0, 0.045), "B_A": (7.0, 0.06), "B_B": (8.0, 0.045)}
+    result = reassigned(0.05, **{name: found(*figures) for name, figures in shares.items()})
+    assert result.worst_assignment == {"west": "A", "east": "B"}
+    assert any(
+        text.startswith("worst assignment: west: A, east: B: stable, least damping 3.00 %, 1 Hz")
+        for text in result.sentences
+    )
+    least = {one.name.names: one.least_damping for one in result.judgement.assignments}
+    assert least == pytest.approx(
+        {tuple(name.split("_")): percent for name, (percent, _) in shares.items()}
+    )
+
+
+def test_assignments_are_compared_by_the_same_mode():
+    """The park's resonance of 43 Hz: the vendors hold 59.6 % of it with A and A, and 60.1 % elsewhere."""
+    usual = {one.name.names: one for one in swapped().judgement.assignments}
+    wanted = {names: one.record.modes for names, one in usual.items()}
+    resonance = {
+        names: next(mode for mode in modes if abs(mode.frequency_hz - 43.27) < 0.05)
+        for names, modes in wanted.items()
+    }
+    shares = {
+        names: sum(mode.components.get(place, 0.0) for place in ("west", "east", "north"))
+        for names, mode in resonance.items()
+    }
+    assert shares["A", "A"] < 0.5985 < min(x for names, x in shares.items() if names != ("A", "A"))
+    judgement = reassigned(0.5985).judgement
+    (both,) = [one for one in judgement.assignments if one.name.names == ("A", "A")]
+    assert both.least_damping == resonance["A", "A"].damping_percent  # by the share 12.53 %
+    assert both.least_damping == pytest.approx(5.49, abs=0.01)
+    assert judgement.unfollowed == {}
+
+
 def test_a_mode_of_the_network_alone_does_not_count():
     resonance = mode(0.2, 50.0, grid=0.97, west=0.02, east=0.01)
     shared = mode(9.0, 5.0, grid=0.5, west=0.3, east=0.2)
@@ -191,7 +242,7 @@ def test_settings_of_a_vendor_that_differ_are_told_and_equal_ones_are_not():
         request=SimpleNamespace(black_box=False),
     )
     result, none = SimpleNamespace(plan=plan, records={}), SimpleNamespace(stable=True)
-    (told,) = doubts_of(SimpleNamespace(result=result, none=none, pairs=()))
+    (told,) = doubts_of(SimpleNamespace(result=result, none=none, pairs=(), unfollowed={}))
     assert told.startswith("A's converters have other settings at east than at west")
 
 
