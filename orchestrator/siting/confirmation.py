@@ -34,12 +34,14 @@ and parts of the largest gain."""
 _EQUAL = 2e-4  # least damping ratios in the same part of this size are equally good
 # least similarity with which a mode of the system with the device is taken for the one without it
 _SAME = 0.5
+_ONE = 1e-6  # two eigenvalues that differ by less than this part are one, computed in two ways
 
 
 @dataclass(frozen=True)
 class Confirmation:
     """What the coupled FMUs say of one bus: Δλ [rad/s] by a small gain of the tuned POD, or by a device without one, as
-    predicted and as coupled; λ with the device, its POD off; the POD's setting and λ with it; the least damping then.
+    predicted and as coupled; λ with the device, its POD off; the POD's setting and λ with it; the least damped mode
+    then [rad/s], which may be another one.
     """
 
     bus: str
@@ -48,7 +50,7 @@ class Confirmation:
     with_device: complex = 0j
     setting: PodSetting | None = None
     tuned: complex | None = None
-    least: float | None = None
+    least: complex | None = None
     stable: bool | None = None
     failure: str = ""
 
@@ -66,9 +68,26 @@ class Confirmation:
         return damping_percent(self.with_device)
 
     @property
+    def reached(self) -> complex:
+        """The mode with the device [rad/s], tuned where it has a POD."""
+        return self.tuned if self.tuned is not None else self.with_device
+
+    @property
     def damping(self) -> float:
         """Of the mode with the device, tuned where it has a POD [%]."""
-        return damping_percent(self.tuned if self.tuned is not None else self.with_device)
+        return damping_percent(self.reached)
+
+    @property
+    def least_damping(self) -> float | None:
+        """Of the least damped mode then [%]; None if nothing was computed."""
+        return None if self.least is None else damping_percent(self.least)
+
+    @property
+    def other(self) -> complex | None:
+        """The least damped mode then [rad/s], if it is another one than that which was followed."""
+        if self.least is None or abs(self.least - self.reached) <= _ONE * abs(self.least):
+            return None
+        return self.least
 
 
 def confirmed(
@@ -104,7 +123,7 @@ def _as_it_is(
     found = modes_from(prepared, master, find_operating_point(master), blocks, frequency_range)
     pair, eigenvalue = same_mode(seen.mode, found.model), seen.mode.eigenvalue
     predicted = _predicted(master, blocks.components[name_at(bus)], bus, seen) - eigenvalue
-    coupled, least = pair.eigenvalue - eigenvalue, _least(found.modes)
+    coupled, least = pair.eigenvalue - eigenvalue, _least(found.modes, pair.eigenvalue)
     return Confirmation(
         bus, predicted, coupled, pair.eigenvalue, least=least, stable=found.stability.stable
     )
@@ -137,7 +156,8 @@ def _with_pod(
     predicted = shift(trial)
     coupled = loop.place(start, trial.gain, trial.filters).eigenvalue - start.eigenvalue
     reached = loop.place(start, tuned.gain, tuned.filters)
-    least = _least(find_modes(loop.model(tuned), *frequency_range))
+    modes = find_modes(loop.model(tuned), *frequency_range)
+    least = _least(modes, reached.eigenvalue)
     stable = loop.examine(tuned).stability.stable
     return Confirmation(
         bus, predicted, coupled, start.eigenvalue, tuned, reached.eigenvalue, least, stable
@@ -184,5 +204,7 @@ def same_mode(mode: Mode, model: LinearModel) -> Eigenpair:
     return pairs[best]
 
 
-def _least(modes: Sequence[Mode]) -> float | None:
-    return next((mode.damping_percent for mode in modes if mode.is_oscillation), None)
+def _least(modes: Sequence[Mode], followed: complex) -> complex:
+    """The least damped oscillation of the range [rad/s]; the mode that is followed counts also beside the range."""
+    found = [mode.eigenvalue for mode in modes if mode.is_oscillation]
+    return min([*found, followed], key=damping_ratio)

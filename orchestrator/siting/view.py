@@ -140,10 +140,19 @@ def _best_confirmed(result: SiteResult, among: str) -> str:
     by_support = sorted(result.ranking, key=lambda bus: -result.least(bus)[0])
     small = ", ".join(f"{bus} {shown(result, result.least(bus)[0])}" for bus in by_support[:3])
     order = f"the order of the {len(result.confirmations)} places that coupled FMUs computed"
+    reached = f"{first.damping:.2f} % for the least damped mode ({mode}) with {_rated(result)}{pod}"
     return (
-        f"{first.bus} is the best place for {device_title(result)}{among}: {first.damping:.2f} % for the least damped "
-        f"mode ({mode}) with {_rated(result)}{pod}; then {then}: {order}. By {unit(result, '100')} it is {small}"
+        f"{first.bus} is the best place for {device_title(result)}{among}: {reached}{_lowered(result, first)}; then "
+        f"{then}: {order}. By {unit(result, '100')} it is {small}"
     )
+
+
+def _lowered(result: SiteResult, first: Confirmation) -> str:
+    """What the best place costs: another mode, less damped than the least was before."""
+    before = result.intact.modes[0].mode.damping_percent
+    if first.other is None or damping_percent(first.other) >= before:
+        return ""
+    return f", but {_least_then(first, before)}"
 
 
 def _called(seen: SeenMode) -> str:
@@ -173,9 +182,18 @@ def _confirmed(result: SiteResult, one: Confirmation, before: float) -> str:
     if one in result.breaking:
         word += ", but UNSTABLE with it (`gfor modes` of a case with it tells the cause, often the step)"
     return (
-        f"{one.bus}: {word} by coupled FMUs: {steps}; least damped then {one.least or 0.0:.2f} %; predicted and "
+        f"{one.bus}: {word} by coupled FMUs: {steps}; {_least_then(one, before)}; predicted and "
         f"coupled shift differ by {100 * one.error:.2g} %"
     )
+
+
+def _least_then(one: Confirmation, before: float) -> str:
+    """The least damped mode with the device: whether it is another one, and has less than the least before."""
+    if one.other is None:
+        return "it is the least damped then as well"
+    percent = damping_percent(one.other)
+    worse = f", LESS than the least before, {before:.2f} %" if percent < before else ""
+    return f"least damped then is another mode: {one.other.imag / math.tau:.3f} Hz, {percent:.2f} %{worse}"
 
 
 def _rated(result: SiteResult) -> str:
@@ -312,7 +330,11 @@ def _confirmation(one: Confirmation) -> dict[str, Any]:
         "with_device": device,
         "damping_percent_of_device_alone": one.damping_alone,
         "damping_percent": one.damping,
-        "least_damping_percent": one.least,
+        "least_damping_percent": one.least_damping,
+        "least_damped": None
+        if one.least is None
+        else eigenvalue_json(one.least, damping_percent(one.least)),
+        "least_damped_is_another_mode": one.other is not None,
         "stable": one.stable,
         "pod": pod,
     }
@@ -344,7 +366,7 @@ def _confirmed_headings(result: SiteResult) -> list[str]:
         return []
     label = result.intact.modes[0].label
     pod = [] if result.request.controller is None else ["with its POD [%]"]
-    return [f"{label} with the device alone [%]", *pod, "least damped then [%]"]
+    return [f"{label} with the device alone [%]", *pod, "least damped then [%]", "at [Hz]"]
 
 
 def _confirmed_cells(result: SiteResult, bus: str) -> list[str]:
@@ -353,8 +375,9 @@ def _confirmed_cells(result: SiteResult, bus: str) -> list[str]:
     if one is None:
         return ["–" for _ in headings]
     pod = [] if result.request.controller is None else [f"{one.damping:.2f}"]
-    least = "–" if one.least is None else f"{one.least:.2f}"
-    return [f"{one.damping_alone:.2f}", *pod, least]
+    least = "–" if one.least_damping is None else f"{one.least_damping:.2f}"
+    hertz = "–" if one.least is None else f"{one.least.imag / math.tau:.3f}"
+    return [f"{one.damping_alone:.2f}", *pod, least, hertz]
 
 
 def _cells(result: SiteResult, bus: str) -> list[str]:

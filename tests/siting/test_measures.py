@@ -1,6 +1,7 @@
 """One measure for the headline and the confirmation, machines' terminals, and the rating that was typed."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -23,6 +24,14 @@ def eigenvalue(damping):
     return 9.2 * complex(-damping / 100, (1 - (damping / 100) ** 2) ** 0.5)
 
 
+OTHER = 11.0 * complex(-0.075, (1 - 0.075**2) ** 0.5)
+"""The mode beside it [rad/s], of 7.5 %."""
+
+
+def least_damped(damping):
+    return OTHER if damping > 7.5 else eigenvalue(damping)
+
+
 def planted(monkeypatch, case, **found):
     """The result with confirmations that are given: by bus the damping with the device, and with its POD [%]."""
 
@@ -36,7 +45,7 @@ def planted(monkeypatch, case, **found):
             1j,
             eigenvalue(alone),
             tuned=eigenvalue(tuned),
-            least=7.5,
+            least=least_damped(tuned),
             stable=stable,
         )
 
@@ -71,6 +80,7 @@ def test_what_the_device_brings_without_its_pod_stands_in_a_column(five, monkeyp
     table = ranking_table(found)
     headings = [str(column.header) for column in table.columns]
     alone = next(k for k, text in enumerate(headings) if "with the device alone [%]" in text)
+    assert headings[alone + 2 : alone + 4] == ["least damped then [%]", "at [Hz]"]
     cells = {
         str(row[0]): [str(cell) for cell in row[alone : alone + 3]]
         for row in zip(*(column.cells for column in table.columns), strict=True)
@@ -78,6 +88,31 @@ def test_what_the_device_brings_without_its_pod_stands_in_a_column(five, monkeyp
     assert cells == {"bus_12": ["4.00", "9.30", "7.50"], "bus_11": ["4.61", "8.13", "7.50"]}
     (one,) = [x for x in as_json(found)["confirmed"] if x["bus"] == "bus_11"]
     assert one["damping_percent_of_device_alone"] == pytest.approx(4.61)
+
+
+@pytest.mark.parametrize(
+    ("other", "said", "costs"),
+    [
+        (None, "it is the least damped then as well", False),
+        (14.0, "least damped then is another mode: 1.733 Hz, 14.00 %;", False),
+        (2.0, "least damped then is another mode: 1.750 Hz, 2.00 %, LESS than the least", True),
+    ],
+)
+def test_the_least_damped_with_the_device_may_be_another_mode(
+    five, monkeypatch, other, said, costs
+):
+    """The swing rises from 11.3 to 20 %. Another mode may be least damped then, even less than the swing was."""
+    found = planted(monkeypatch, five, bus_11=(12.0, 20.0, True), bus_12=(12.0, 18.0, True))
+    beside = 11.0 * complex(-(other or 0) / 100, (1 - ((other or 0) / 100) ** 2) ** 0.5)
+    confirmations = tuple(
+        replace(one, least=beside if other else one.reached) for one in found.confirmations
+    )
+    found = replace(found, confirmations=confirmations)
+    assert said in sureness(found)[0]
+    assert ("but least damped then is another mode: 1.750 Hz" in answer(found)) is costs
+    (first, _) = as_json(found)["confirmed"]
+    assert first["least_damped_is_another_mode"] is (other is not None)
+    assert first["least_damping_percent"] == pytest.approx(other or 20.0)
 
 
 def test_terminals_of_machines_are_left_out_unless_they_are_asked_for(five):
