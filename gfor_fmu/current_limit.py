@@ -56,7 +56,7 @@ class CurrentLimit:
     slope: Expr
 
     def is_kind(self, *kinds: int) -> Expr:
-        """Whether the limit is one of these kinds."""
+        """Return whether the limit is one of these kinds."""
         return logic_and(self.kind > min(kinds) - 0.5, self.kind < max(kinds) + 0.5)
 
 

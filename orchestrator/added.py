@@ -15,7 +15,7 @@ def rooms() -> dict[str, str]:
 
 
 def words_of(room: str) -> str:
-    """What a room says of itself, for a list of commands."""
+    """Return what a room says of itself, for a list of commands."""
     text = (
         (import_module(f"{__package__}.{room}").__doc__ or "")
         .strip()

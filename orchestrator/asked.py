@@ -53,7 +53,7 @@ class Asked:
 
     @property
     def meaning(self) -> str:
-        """What the field means to Python, whose signature shows the default."""
+        """Return what the field means to Python, whose signature shows the default."""
         text = self.python or _FOR_COMMANDS.sub("", self.help).replace("%%", "%")
         return (
             text[:1].upper() + text[1:] + (f" [{self.kind.unit}]" if self.kind.unit else "") + "."

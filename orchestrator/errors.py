@@ -49,7 +49,7 @@ class ErrorKind(StrEnum):
 
     @property
     def lasting(self) -> bool:
-        """Whether the same would come out again: an FMU, a worker or the machine may do better another time."""
+        """Return whether the same would come out again: an FMU, a worker or the machine may do better another time."""
         return self in _LASTING
 
 
@@ -93,7 +93,7 @@ class CosimError(Exception):
         return spelled(Exception.__str__(self))
 
     def _render_traceback_(self) -> list[str]:
-        """What a notebook shows of an uncaught error: the sentence, without the calls inside of this package."""
+        """Return what a notebook shows of an uncaught error: the sentence, without the calls inside of this package."""
         return [f"{type(self).__name__}: {self}"]
 
 

@@ -118,5 +118,5 @@ def why_refused(character: str) -> str:
 
 
 def may_steer(text: str) -> bool:
-    """Whether a text in TOML has such a character, or an escape that may give one."""
+    """Return whether a text in TOML has such a character, or an escape that may give one."""
     return bool(_STEERING.search(text)) or "\\" in text

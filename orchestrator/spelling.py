@@ -64,7 +64,7 @@ def as_options() -> Iterator[None]:
 
 
 def for_python() -> bool:
-    """Whether errors are for somebody who writes Python."""
+    """Return whether errors are for somebody who writes Python."""
     return not _commanded
 
 

@@ -94,7 +94,7 @@ def _check_whole_numbers(value: Any) -> None:
 
 
 def fault_of(detail: Any) -> str:
-    """What is wrong with an entry, and the remedy, from one of pydantic's errors."""
+    """Return what is wrong with an entry, and the remedy, from one of pydantic's errors."""
     match detail["type"]:
         case "extra_forbidden":
             return "this key is unknown; check its spelling, or remove it"

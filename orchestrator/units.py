@@ -100,7 +100,7 @@ def to_unit(value: float | int | str, unit: str) -> float:
 
 
 def pint_factor(given: str, declared: str) -> float:
-    """What one of the given units is in the declared one, as pint has it; raises pint's errors."""
+    """Return what one of the given units is in the declared one, as pint has it; raises pint's errors."""
     return pint_value(1, given, declared)
 
 
@@ -166,5 +166,5 @@ def base_exponents(unit: str) -> tuple[float, dict[str, int]] | None:
 
 
 def base_offset(unit: str) -> float:
-    """What 0 of a known unit is in SI base units: 273.15 for ``degC``, 0 for most."""
+    """Return what 0 of a known unit is in SI base units: 273.15 for ``degC``, 0 for most."""
     return float(_registry().Quantity(0, unit).to_base_units().magnitude)

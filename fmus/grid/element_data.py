@@ -27,7 +27,7 @@ class Line:
 
     @property
     def has_ratio(self) -> bool:
-        """Whether an ideal ratio stands at the from side."""
+        """Return whether an ideal ratio stands at the from side."""
         return self.tap != 1.0 or self.shift != 0.0
 
     def variable(self, quantity: str) -> str:
@@ -77,17 +77,17 @@ class Load:
 
     @property
     def active_follows(self) -> bool:
-        """Whether P is anything but a constant conductance."""
+        """Return whether P is anything but a constant conductance."""
         return self.p_mw != 0 and (self.active != IMPEDANCE or self.k_pf != 0)
 
     @property
     def reactive_follows(self) -> bool:
-        """Whether Q is anything but a constant inductor or capacitor."""
+        """Return whether Q is anything but a constant inductor or capacitor."""
         return self.q_mvar != 0 and (self.reactive != IMPEDANCE or self.k_qf != 0)
 
     @property
     def follows(self) -> bool:
-        """Whether the load is anything but a constant impedance."""
+        """Return whether the load is anything but a constant impedance."""
         return self.active_follows or self.reactive_follows
 
     @property
@@ -145,10 +145,10 @@ class ThreeWinding:
 
     @property
     def is_passive(self) -> bool:
-        """Whether its inductances are those of something that stores energy."""
+        """Return whether its inductances are those of something that stores energy."""
         a, b, c = self.X
         return a + c > 0 and a * b + b * c + c * a > 0
 
     def has_ratio(self, winding: int) -> bool:
-        """Whether an ideal ratio stands between a winding and its bus."""
+        """Return whether an ideal ratio stands between a winding and its bus."""
         return self.tap[winding] != 1.0 or self.shift[winding] != 0.0

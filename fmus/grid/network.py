@@ -80,7 +80,7 @@ class Network:
             raise ValueError(f"network {self.name!r}: " + "; ".join(problems))
 
     def has_capacitance(self, bus: str) -> bool:
-        """Whether the bus voltage is a state, because of line charging, a capacitive load or shunt, or stray
+        """Return whether the bus voltage is a state, because of line charging, a capacitive load or shunt, or stray
         capacitance."""
         return (
             self._has_fixed_capacitance(bus)
@@ -89,15 +89,15 @@ class Network:
         )
 
     def floats(self, bus: str) -> bool:
-        """Whether the bus has neither capacitance nor a load or shunt that conducts."""
+        """Return whether the bus has neither capacitance nor a load or shunt that conducts."""
         return not self.has_capacitance(bus) and not self._has_conductance(bus)
 
     def needs_stray(self, bus: str) -> bool:
-        """Whether the bus gets `stray_B`."""
+        """Return whether the bus gets `stray_B`."""
         return self.stray_B > 0 and not self._has_fixed_capacitance(bus)
 
     def hangs_on(self, load: Load) -> bool:
-        """Whether this load alone determines its bus's voltage, and therefore cannot be switched off."""
+        """Return whether this load alone determines its bus's voltage, and therefore cannot be switched off."""
         if self._has_fixed_capacitance(load.bus) or self.needs_stray(load.bus):
             return False
         if capacitive := self._capacitive_loads(load.bus):
@@ -105,7 +105,7 @@ class Network:
         return load.conductance_mw > 0 and not self._has_conductance(load.bus, without=load)
 
     def loads_decide(self, bus: str) -> bool:
-        """Whether only switchable loads determine the bus's voltage."""
+        """Return whether only switchable loads determine the bus's voltage."""
         return not (self._has_fixed_capacitance(bus) or self.needs_stray(bus)) and (
             bool(self._capacitive_loads(bus))
             or bus not in self._conducting

@@ -39,7 +39,7 @@ def cache_directory(kind: str) -> Path:
 
 
 def intact(path: Path) -> bool:
-    """Whether a kept file is there, byte for byte as it was written.
+    """Return whether a kept file is there, byte for byte as it was written.
 
     A file that is there and differs is named in one line of the log, which goes to standard error."""
     try:

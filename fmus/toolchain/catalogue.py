@@ -16,7 +16,7 @@ def model_names() -> tuple[str, ...]:
 
 
 def needs_arguments(name: str) -> bool:
-    """Whether a model can only be built for given data, such as a network."""
+    """Return whether a model can only be built for given data, such as a network."""
     return bool(_signature(name)["needs_arguments"])
 
 

@@ -110,7 +110,7 @@ _MEMBERS = {"v_re": "signal", "v_im": "signal", "i_re": "outflow", "i_im": "outf
 
 
 def has_port(model: Model) -> bool:
-    """Whether a model meets the grid through a bus voltage and an injected current."""
+    """Return whether a model meets the grid through a bus voltage and an injected current."""
     return set(_MEMBERS) <= {v.name for v in (*model.inputs, *model.outputs)}
 
 

@@ -189,7 +189,7 @@ class Slave(Fmi2Slave):
 
     @classmethod
     def _read_tape(cls, resources):
-        """What all instances of the process execute."""
+        """Return what all instances of the process execute."""
         if cls._tape is None:
             cls._tape = (resources / "tape.bin").read_bytes()
         return cls._tape
@@ -256,7 +256,7 @@ class Slave(Fmi2Slave):
         return self._discard(self._failure)
 
     def _begin(self, step_size):
-        """Whether a step may have this size, now that something is not as it was in the last one."""
+        """Return whether a step may have this size, now that something is not as it was in the last one."""
         if self._failure is not None:
             return self._discard(self._failure)
         if self._phase != STEPPING:

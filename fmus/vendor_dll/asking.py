@@ -88,7 +88,7 @@ def _doing(note: Path) -> str:
 
 
 def _wait(process: "subprocess.Popen[bytes]", note: Path, longest: float) -> bool:
-    """Whether it ends in time, which is taken from when the DLL's own code begins."""
+    """Return whether it ends in time, which is taken from when the DLL's own code begins."""
     end, begun = time.monotonic() + BEFORE_IT_STARTS, False
     while True:
         with contextlib.suppress(subprocess.TimeoutExpired):

@@ -136,7 +136,7 @@ def platform_of(path: Path, also: Sequence[str] = ()) -> str:
 
 
 def _is_32_bit(path: Path) -> bool:
-    """Whether a Windows DLL is not for 64-bit x86, by the machine in its head."""
+    """Return whether a Windows DLL is not for 64-bit x86, by the machine in its head."""
     with path.open("rb") as file:
         head = file.read(4096)
     at = int.from_bytes(head[60:64], "little")

@@ -28,7 +28,7 @@ class Library(Protocol):
     """A loaded DLL; addresses are those of its own process."""
 
     def has(self, name: str) -> bool:
-        """Whether it has a function."""
+        """Return whether it has a function."""
 
     def call(self, name: str, argument: int = 0) -> int:
         """A function's answer to one pointer, as 64 bits."""

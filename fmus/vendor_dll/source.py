@@ -154,7 +154,7 @@ class HostVariable:
 
     @property
     def is_state(self) -> bool:
-        """Whether it is a number that the next sample depends on and that a master may set."""
+        """Return whether it is a number that the next sample depends on and that a master may set."""
         own = (HELD, FLOAT_STATE, DOUBLE_STATE, MEMORY_STATE, CIRCUIT_STATE)
         return self.role in own and self.data_type in (8, 9)
 

@@ -71,12 +71,12 @@ class AcceptanceReport:
 
     @property
     def not_judged(self) -> list[str]:
-        """What passed or was remarked on without being judged as a whole, in words."""
+        """Return what passed or was remarked on without being judged as a whole, in words."""
         return [str(r.figures["not_judged"]) for r in self.results if "not_judged" in r.figures]
 
     @property
     def binding_fails(self) -> bool:
-        """Whether the binding is what failed, so that nothing is known of the FMU behind it."""
+        """Return whether the binding is what failed, so that nothing is known of the FMU behind it."""
         return any(r.whose is base.Whose.BINDING for r in self.failures)
 
     @property

@@ -131,7 +131,7 @@ class Host(Worker):
         return 0 if self._elsewhere() else open_files()
 
     def _elsewhere(self) -> bool:
-        """Whether the FMU's code runs in a process under Wine, and nothing of it is seen in this one."""
+        """Return whether the FMU's code runs in a process under Wine, and nothing of it is seen in this one."""
         return runs_under_wine(without_binding(self._description))
 
 

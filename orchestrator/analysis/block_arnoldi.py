@@ -73,7 +73,7 @@ class BlockArnoldi:
         return found
 
     def knows_all_beyond(self, size: float, wanted: Callable[[int], bool]) -> bool:
-        """Whether all values of that size or more are known, and the next ones are seen to be smaller."""
+        """Return whether all values of that size or more are known, and the next ones are seen to be smaller."""
         larger = int((np.abs(self.values) >= size).sum())
         beyond = slice(larger, larger + _BEYOND)
         allowed = np.maximum(ROUGH, (size / np.abs(self.values[beyond]) - 1) / 2)
@@ -88,7 +88,7 @@ class BlockArnoldi:
         )
 
     def is_complete(self, larger: int) -> bool:
-        """Whether none of the largest values is there so often that there may be more of it."""
+        """Return whether none of the largest values is there so often that there may be more of it."""
         among = self.values[:larger]
         apart = np.abs(among[:, None] - among[None, :])
         return bool((apart <= _EQUAL * np.abs(among)).sum(axis=1).max(initial=0) < self._width)

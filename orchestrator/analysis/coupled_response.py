@@ -146,7 +146,7 @@ def _departure(master: Master, model: LinearModel, foreign: Sequence[str]) -> tu
 
 
 def _asked(master: Master, foreign: Sequence[str]) -> str:
-    """What may explain a departure; a control that is declared as sampled declares what it keeps as well."""
+    """Return what may explain a departure; a control that is declared as sampled declares what it keeps as well."""
     if all(master.components[name].description.sample_time is not None for name in foreign):
         return "It declares its samples and its states: does it reach a limit, a dead band or another mode so soon?"
     return (
@@ -283,7 +283,7 @@ def _compare(measured: Matrix, expected: Matrix, size: float, scale: Matrix) -> 
 
 
 def _is_curvature(larger: _Departure, smaller: _Departure) -> bool:
-    """Whether all that is too large at the smaller size grows with the disturbance's cube.
+    """Return whether all that is too large at the smaller size grows with the disturbance's cube.
 
     The odd part of a smooth system's response has no other terms that small. Such a system is stable as its modes are,
     however little a state moves in them: it may answer with nothing but its curvature."""

@@ -136,7 +136,7 @@ class _Cell:
         return max(abs(corner - self.centre) for corner in self.corners)
 
     def holds(self, value: complex) -> bool:
-        """Whether a point lies in the cell, which includes its lower edges but not the upper ones."""
+        """Return whether a point lies in the cell, which includes its lower edges but not the upper ones."""
         return (
             self.low <= value.imag < self.high
             and self.least <= spectra.damping_ratio(value) < self.most

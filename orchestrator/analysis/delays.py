@@ -189,7 +189,7 @@ def values_on_the_way(
 
 
 def warnings_of(master: Master) -> tuple[str, ...]:
-    """What a linear model leaves out of the system's imperfections, or cannot know of its faults."""
+    """Return what a linear model leaves out of the system's imperfections, or cannot know of its faults."""
     said = []
     for plan in master.system.wires.values():
         for imperfection in plan.permanent.values():

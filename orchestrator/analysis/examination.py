@@ -87,7 +87,7 @@ class Pair:
 
     @property
     def is_lost(self) -> bool:
-        """Whether the step map's mode has no relation to the true one: it is far away, or on the other side of
+        """Return whether the step map's mode has no relation to the true one: it is far away, or on the other side of
         stability."""
         return self.error > LOST or (self.error > MOVED and self.seen.real * self.exact.real < 0)
 

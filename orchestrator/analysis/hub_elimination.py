@@ -157,7 +157,7 @@ class HubFactors:
         return b[: e.states]
 
     def left_over(self, right: Vector) -> float:
-        """What a solution leaves over of a right side, shape (n,), as a part of its largest element."""
+        """Return what a solution leaves over of a right side, shape (n,), as a part of its largest element."""
         e = self.equations
         found = self._whole(right)
         rest = _times(e.whole, found)

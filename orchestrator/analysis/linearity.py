@@ -128,7 +128,7 @@ def _shifts(
 
 
 def _may_turn(modes: Sequence[Mode], shifts: Vector) -> bool:
-    """Whether a shift can carry a mode over the stability limit."""
+    """Return whether a shift can carry a mode over the stability limit."""
     sizes = np.array([max(abs(mode.eigenvalue), _SLOWEST) for mode in modes])
     return bool(np.any(shifts * sizes >= np.abs([mode.eigenvalue.real for mode in modes])))
 

@@ -30,7 +30,7 @@ class WindowPart:
     noise_like: bool  # whether the remainder is not correlated with itself
 
     def shows(self, mode: IdentifiedMode) -> bool | None:
-        """Whether this part shows a mode of all of the signal; None where it cannot tell.
+        """Return whether this part shows a mode of all of the signal; None where it cannot tell.
 
         It cannot where it is too short, or where a beat, noise or the decay hides the mode."""
         if mode.frequency_hz * self.length < _FEWEST_PERIODS:
@@ -44,7 +44,7 @@ class WindowPart:
         return True if within < SENSIBLE else None
 
     def _beats(self, mode: IdentifiedMode) -> bool:
-        """Whether another mode beats with this one, slower than this part can tell apart in noise."""
+        """Return whether another mode beats with this one, slower than this part can tell apart in noise."""
         apart = 2 * np.pi / self.length
         return any(
             other is not mode
@@ -74,7 +74,7 @@ def near(modes: Sequence[IdentifiedMode] | None, mode: IdentifiedMode) -> Identi
 def part_of(
     times: NDArray[np.float64], signal: NDArray[np.float64], modes: Sequence[IdentifiedMode]
 ) -> WindowPart:
-    """What the modes of a part of a signal leave of it."""
+    """Return what the modes of a part of a signal leave of it."""
     thin = -(-len(times) // _MOST_SAMPLES)
     t, y = times[::thin] - times[0], signal[::thin]
     length = float(t[-1])
@@ -144,7 +144,7 @@ def with_doubts(
 
 
 def is_trend(mode: IdentifiedMode, length: float) -> bool:
-    """Whether a component is a part of an offset or a trend.
+    """Return whether a component is a part of an offset or a trend.
 
     In the window it changes by less than a factor e and turns by less than one radian."""
     return abs(mode.eigenvalue) * length < 1

@@ -98,7 +98,7 @@ def _in_order_of(
 
 
 def _are_eigenvectors(model: LinearModel, values: NDArray[np.complex128], right: Vector) -> bool:
-    """Whether A·r is λ·r, as far as rounding lets it be."""
+    """Return whether A·r is λ·r, as far as rounding lets it be."""
     moved = model.apply(right)
     rest = np.abs(moved - right * values).max(axis=0)
     return bool(np.all(rest <= _REST * np.maximum(1.0, np.abs(values)) * np.abs(right).max(axis=0)))

@@ -107,14 +107,14 @@ def match(a: ModeSet, b: ModeSet, threshold: float = THRESHOLD) -> list[Link]:
 
 
 def near_an_end(frequency: float, frequency_range: tuple[float, float]) -> bool:
-    """Whether a mode of this frequency may just have entered the range, or may leave it next [Hz]."""
+    """Return whether a mode of this frequency may just have entered the range, or may leave it next [Hz]."""
     return not frequency_range[0] * _EDGE < frequency < frequency_range[1] / _EDGE
 
 
 def is_ambiguous(
     a: ModeSet, b: ModeSet, frequency_range: tuple[float, float], threshold: float = THRESHOLD
 ) -> bool:
-    """Whether a mode of one point has no partner in the other without being near an end of the range [Hz]."""
+    """Return whether a mode of one point has no partner in the other without being near an end of the range [Hz]."""
     links = match(a, b, threshold)
     paired = ({link.source for link in links}, {link.target for link in links})
     return any(

@@ -93,7 +93,7 @@ class Mode(OfEigenvalue):
 
     @property
     def is_oscillation(self) -> bool:
-        """Whether the eigenvalue is neither a real pole nor a zero; see `oscillations`."""
+        """Return whether the eigenvalue is neither a real pole nor a zero; see `oscillations`."""
         return bool(oscillations(np.array([self.eigenvalue]))[0])
 
     @cached_property

@@ -220,7 +220,7 @@ def _without_counts(period: _Period, x: Matrix) -> tuple[Matrix, Mask]:
 
 
 def _correction(period: _Period, counting: Mask) -> Callable[[Matrix], Matrix]:
-    """What solves (I − A)·dx = change, and leaves alone what counts."""
+    """Return what solves (I − A)·dx = change, and leaves alone what counts."""
     free = np.flatnonzero(~counting)
     A = period.maps()[-1][np.ix_(free, free)]
     d = period.scale[free]

@@ -136,7 +136,7 @@ class PresenceWay:
         return self._pairs[id(model)]
 
     def _mixed(self, matrix: str, rows: _Slots, columns: _Slots, part: float) -> sp.csr_array:
-        """What both have is taken in parts; each device's own equations are taken whole."""
+        """Take in parts what both have, and each device's own equations whole."""
         found = []
         for side, weight in ((0, 1 - part), (1, part)):
             entries = sp.coo_array(getattr(self._models[side], matrix))

@@ -42,7 +42,7 @@ def remembered(
 def kept(
     master: Master | None, kind: Hashable, of: tuple[object, ...], make: Callable[[], Made]
 ) -> Made:
-    """What was made of these very objects, where the system keeps linear models."""
+    """Return what was made of these very objects, where the system keeps linear models."""
     store = None if master is None else master.remembered
     if store is None:
         return make()

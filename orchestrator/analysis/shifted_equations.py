@@ -63,7 +63,7 @@ class ShiftedEquations:
 
 
 def _odd(permutation: NDArray[np.int32]) -> bool:
-    """Whether a permutation is odd: an even number of its cycles lacks to its length."""
+    """Return whether a permutation is odd: an even number of its cycles lacks to its length."""
     n = len(permutation)
     cycles = sp.coo_array((np.ones(n), (np.arange(n), permutation)), shape=(n, n))
     count, _ = sp.csgraph.connected_components(cycles, directed=False)

@@ -34,7 +34,7 @@ _ROUNDING = 1e-9  # part of the answer at rest by which it may differ as well
 
 
 def gives_slopes(exchange: Exchange) -> bool:
-    """Whether a component lets its states be set and gives all their derivatives."""
+    """Return whether a component lets its states be set and gives all their derivatives."""
     description = exchange.component.description
     return description.states_are_settable and len(description.rates) == len(description.states)
 
@@ -157,7 +157,7 @@ class _Point:
 
 
 def covers(like: ComponentLinearization, other: ComponentLinearization) -> bool:
-    """Whether a linear model has all states, inputs and outputs of another one."""
+    """Return whether a linear model has all states, inputs and outputs of another one."""
     return set(_entries(other)) <= set(_entries(like)) and set(_exits(other)) <= set(_exits(like))
 
 

@@ -316,7 +316,7 @@ def judge(
 
 
 def _only_slow(spectrum: Spectrum | None, own: Stability) -> bool:
-    """Whether the only growing eigenvalues are those that the perturbation cannot distinguish from zero."""
+    """Return whether the only growing eigenvalues are those that the perturbation cannot distinguish from zero."""
     if spectrum is None:
         return own.mode is not None and own.growing == 1 and abs(own.mode.eigenvalue) <= SLOW
     return bool(np.all(np.abs(spectrum.eigenvalues[grows(spectrum.eigenvalues)]) <= SLOW))

@@ -36,7 +36,7 @@ class Acceptance(NoTruth, ask=".trusted"):
 
     @property
     def trusted(self) -> bool:
-        """Whether it was checked, and nothing failed."""
+        """Return whether it was checked, and nothing failed."""
         return self.report.trusted
 
     @property

@@ -85,7 +85,7 @@ def verify(
     every: bool = False,
     workers: int | None = 1,
 ) -> Verification:
-    """Whether a certificate still holds: hashes, its judgement made again, and points or rows computed anew.
+    """Return whether a certificate still holds: hashes, its judgement made again, and points or rows computed anew.
 
     Parameters
     ----------

@@ -70,7 +70,7 @@ def export_comtrade(
 
 
 def _rated_frequency(dataset: xr.Dataset) -> float:
-    """What the run's components were given as ``f_n`` [Hz]; every model's own is 50 Hz."""
+    """Return what the run's components were given as ``f_n`` [Hz]; every model's own is 50 Hz."""
     values = json.loads(str(dataset.attrs.get("values", "{}")))
     given = {float(value) for name, value in values.items() if name.endswith(".f_n")}
     return max(given, default=50.0)

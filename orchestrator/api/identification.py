@@ -192,7 +192,7 @@ def _seconds(index: Any, otherwise: str) -> Any:
 
 
 def _kind(given: Any) -> str:
-    """What was given, in few words."""
+    """Return what was given, in few words."""
     text = repr(given)
     return text if len(text) <= _SHOWN and "\n" not in text else f"of type {type(given).__name__}"
 

@@ -97,7 +97,7 @@ def _listed(request: type) -> Iterable[tuple[Any, Asked]]:
 
 
 def _documentation(request: type) -> str:
-    """What the class of the request says, with its fields as parameters."""
+    """Return what the class of the request says, with its fields as parameters."""
     text = cleandoc(request.__doc__ or "")
     summary, *rest = re.split(r"\n(?=\w+\n---)", text, maxsplit=1)
     lines = [f"{one.name}\n{indent(asks.meaning, '    ')}" for one, asks in _listed(request)]

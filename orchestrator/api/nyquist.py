@@ -248,7 +248,7 @@ def _range(x: Parameter) -> Tunable:
 
 
 def _is_case(text: str) -> bool:
-    """Whether it is neither a scan nor a device: an FMU, a DLL, or a device's file around one."""
+    """Return whether it is neither a scan nor a device: an FMU, a DLL, or a device's file around one."""
     path = Path(text)
     if path.suffix.lower() == DEVICE_ENDING and path.is_file():
         return (

@@ -68,7 +68,7 @@ class Modes(NoTruth, ask=".stability.stable, or len() for the number of modes in
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is to be borne in mind of the modes."""
+        """Return what is to be borne in mind of the modes."""
         return self.result.warnings
 
     def __iter__(self) -> Iterator[Mode]:
@@ -293,7 +293,7 @@ class Run(NoTruth):
 
     @property
     def dataset(self) -> xr.Dataset:
-        """What was recorded over the time [s], with units, long names and provenance.
+        """Return what was recorded over the time [s], with units, long names and provenance.
 
         Its values cannot be written into, since modes and figures are made from them; ``dataset.copy(deep=True)`` can.
         """
@@ -331,7 +331,7 @@ class Run(NoTruth):
 
     @property
     def findings(self) -> list[Finding]:
-        """What the run did wrong, in the order of its beginning."""
+        """Return what the run did wrong, in the order of its beginning."""
         return list(self.result.findings)
 
     @property

@@ -127,7 +127,7 @@ def sensitivities_of(scenario: Scenario, request: SensitivitiesRequest) -> Sensi
 
 
 def steps_of(scenario: Scenario, request: StepsRequest) -> StepChoice:
-    """What steps and schedules do to the critical modes."""
+    """Return what steps and schedules do to the critical modes."""
     allowed, steps = Allowed(*request.allowed), cast("Sequence[float]", request.steps)
     schedules = cast("Sequence[ScheduleName]", request.schedules)
     return choose_step(scenario.prepared, allowed, steps, schedules, request.frequencies)

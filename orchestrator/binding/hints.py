@@ -42,7 +42,7 @@ def likely_unit(info: VariableInfo) -> str:
 
 
 def is_drawn(info: VariableInfo) -> bool:
-    """Whether the description counts a current or a power as taken from the grid."""
+    """Return whether the description counts a current or a power as taken from the grid."""
     return bool(_DRAWN.search(info.description))
 
 

@@ -70,7 +70,7 @@ def at_rest(hold: Callable[[], Numbers]) -> tuple[float, bool]:
 
 
 def likely_cause(described: FmuDescription, fault: str) -> str:
-    """What of the binding's ratings brings a fault; "" where nothing does."""
+    """Return what of the binding's ratings brings a fault; "" where nothing does."""
     return (
         described.likely_cause()
         if fault in _OF_RATING and isinstance(described, BoundDescription)
@@ -79,7 +79,7 @@ def likely_cause(described: FmuDescription, fault: str) -> str:
 
 
 def is_consequence(described: FmuDescription, fault: str, others: Iterable[str]) -> bool:
-    """Whether a fault follows from a wrong rating, which shows in another fault as well.
+    """Return whether a fault follows from a wrong rating, which shows in another fault as well.
 
     Behind a wrong rating a device stands at a point that it was not made for, where its frequency is none to judge."""
     return fault == WRONG_FREQUENCY and any(likely_cause(described, other) for other in others)
@@ -172,7 +172,7 @@ def diagnosis(of: str, a: complex, b: complex, c: complex, rest: float) -> tuple
 
 
 def known_ratio(ratio: float) -> str:
-    """What a factor between powers stands for; "" where it is none of the usual ones."""
+    """Return what a factor between powers stands for; "" where it is none of the usual ones."""
     names = {
         sqrt(3): "√3: phase for line-to-line",
         sqrt(2): "√2: peak for rms",

@@ -58,7 +58,7 @@ class BoxedSystem:
 
 
 def is_black_box(component: Component) -> bool:
-    """Whether a component does not show its states, so that it cannot be perturbed like the others."""
+    """Return whether a component does not show its states, so that it cannot be perturbed like the others."""
     return obstacle(component) is not None
 
 

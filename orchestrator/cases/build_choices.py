@@ -48,7 +48,7 @@ class PartChoice:
     place: str
 
     def fits(self, component: str, *, has_part: bool) -> bool:
-        """Whether the choice is for a component; a pattern leaves out those that have no such part."""
+        """Return whether the choice is for a component; a pattern leaves out those that have no such part."""
         return component == self.pattern or (has_part and fnmatch.fnmatch(component, self.pattern))
 
     @property

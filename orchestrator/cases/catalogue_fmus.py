@@ -86,7 +86,7 @@ def _arguments(network: Network | None, parts: tuple[tuple[str, str], ...]) -> d
 
 
 def _recipe(planned: PlannedFmu) -> Any:
-    """What an FMU is built by; for its hash the model is built, which takes up to minutes."""
+    """Return what an FMU is built by; for its hash the model is built, which takes up to minutes."""
     from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - needs the extra `build`
     from fmus.toolchain.python_fmu import PythonFmu  # noqa: PLC0415 - as above
 

@@ -113,7 +113,7 @@ class Draft:
         self.note(place, text)
 
     def is_repeated(self, name: str, variable: str) -> bool:
-        """Whether this variable was missed already at a unit of the same kind: all of them have it, or none."""
+        """Return whether this variable was missed already at a unit of the same kind: all of them have it, or none."""
         origin = self.origins.get(name)
         if origin is None:
             return False

@@ -79,7 +79,7 @@ def other_scenarios(draft: Draft, wanted: Collection[str]) -> Iterator[Problem]:
 
 
 def _is_point(draft: Draft, clock: Clock, time: float, what: str, where: str) -> bool:
-    """Whether a time is a communication point; if not, that is noted."""
+    """Return whether a time is a communication point; if not, that is noted."""
     try:
         clock.index(time, what)
     except InputError as error:

@@ -24,7 +24,7 @@ _BREAKER = "connected"
 def wire_events(
     draft: Draft, table: schema.WireEventTable, clock: Clock, stop: float, where: str
 ) -> list[Event]:
-    """What an imperfection that begins at a time, and may end, does to every connection that is meant."""
+    """Return what an imperfection that begins at a time, and may end, does to every connection that is meant."""
     end = table.end
     if end is not None:
         if end <= table.time:

@@ -60,7 +60,7 @@ class FlowLoad:
 
     @property
     def follows(self) -> bool:
-        """Whether the load draws another power at another voltage."""
+        """Return whether the load draws another power at another voltage."""
         return self.active != LAWS["power"] or self.reactive != LAWS["power"]
 
     def parts(self) -> tuple[complex, complex, complex]:

@@ -115,7 +115,7 @@ class FlowEquations:
 
     @cached_property
     def loads_follow(self) -> bool:
-        """Whether some load draws another power at another voltage."""
+        """Return whether some load draws another power at another voltage."""
         return bool(self.drawn_as_current.any() or self.drawn_as_impedance.any())
 
     def missing(self, voltages: np.ndarray) -> np.ndarray:
@@ -128,7 +128,7 @@ class FlowEquations:
         return product
 
     def mismatch(self, voltages: np.ndarray) -> np.ndarray:
-        """What is left of the unknowns' equations [pu]: active powers, then reactive powers."""
+        """Return what is left of the unknowns' equations [pu]: active powers, then reactive powers."""
         left = self.missing(voltages)
         return np.concatenate([left.real[self.angle_buses], left.imag[self.free_buses]])
 

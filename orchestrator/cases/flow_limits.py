@@ -99,7 +99,7 @@ def solve_with_limits(
 
 
 def _can_hold(bus: str, limit: float, limits: Limits, magnitude: float, wanted: float) -> bool:
-    """Whether a bus at a limit would hold its voltage with less: it is too high at most, or too low at least."""
+    """Return whether a bus at a limit would hold its voltage with less: it is too high at most, or too low at least."""
     least, most = limits[bus]
     return least < most and (magnitude > wanted if limit == most else magnitude < wanted)
 

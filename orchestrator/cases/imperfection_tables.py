@@ -110,7 +110,7 @@ def _overridden(
 def imperfection_of(
     draft: Draft, table: schema.ImperfectionTable, connection: Connection, clock: Clock, where: str
 ) -> Imperfection | None:
-    """What a table says of one connection, in the unit of its signal; None where it is wrong, which is noted."""
+    """Return what a table says of one connection, in the unit of its signal; None where it is wrong, which is noted."""
     info = signal_info(draft.system, connection)
     try:
         found = _converted(table, info)
@@ -170,7 +170,7 @@ def signal_info(system: System, connection: Connection) -> VariableInfo:
 
 
 def is_none(imperfection: Imperfection) -> bool:
-    """Whether it changes nothing: a delay, bias, deviation or step of 0."""
+    """Return whether it changes nothing: a delay, bias, deviation or step of 0."""
     match imperfection:
         case (
             Bias(value=size) | Noise(deviation=size) | Quantisation(step=size) | Delay(seconds=size)

@@ -21,7 +21,7 @@ _OPEN = (
 
 
 def is_open(table: NetworkTable | None) -> bool:
-    """Whether a network has another program's loads, and the case does not say how they follow the voltage."""
+    """Return whether a network has another program's loads, and the case does not say how they follow the voltage."""
     if table is None or (table.raw or table.matpower or table.pandapower or table.cgmes) is None:
         return False
     return table.load_model.active is None and table.load_model.reactive is None

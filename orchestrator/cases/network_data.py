@@ -278,7 +278,7 @@ NOT_SOLVED = (
 def misfit_of(
     network: ImportedNetwork, bus: Matrix, labels: Mapping[int, str], unsolved: str = ""
 ) -> str:
-    """What does not fit; "" where all does, and ``unsolved`` where the file has no solution.
+    """Return what does not fit; "" where all does, and ``unsolved`` where the file has no solution.
 
     ``bus``: MATPOWER's table with the voltages [pu, degrees]; ``labels``: names of its buses by number."""
     stated = {

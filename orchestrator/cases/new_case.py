@@ -93,7 +93,7 @@ class NewCase:
 
     @property
     def records(self) -> tuple[RecordUse, ...]:
-        """What became of the records of the network's files."""
+        """Return what became of the records of the network's files."""
         return self.scenarios[0].records if self.scenarios else ()
 
 
@@ -270,7 +270,7 @@ class _Place:
 
     @property
     def left_mw(self) -> float:
-        """What the machine still feeds."""
+        """Return what the machine still feeds."""
         return self.before_mw - self.wanted.p_mw
 
     @property

@@ -55,7 +55,7 @@ class _ForeignClassError(ValueError):
 
 
 def network_text(path: Path, content: bytes) -> str:
-    """What `pandapower.from_json_string` may read of a file.
+    """Return what `pandapower.from_json_string` may read of a file.
 
     Raises an `InputError` if the file is no JSON, or names a class that is none of a network's values."""
     try:

@@ -152,7 +152,7 @@ def solve_power_flow(
 
 
 def _left(limits: Limits, fixed: Mapping[str, complex]) -> Limits:
-    """What the limits of a bus leave to the units that hold its voltage."""
+    """Return what the limits of a bus leave to the units that hold its voltage."""
     fed = {bus: fixed.get(bus, 0j).imag for bus in limits}
     return {bus: (least - fed[bus], most - fed[bus]) for bus, (least, most) in limits.items()}
 
@@ -228,7 +228,7 @@ def explain(
 
 
 def _helps(equations: FlowEquations, with_stray: Callable[[float], FlowEquations] | None) -> str:
-    """What makes it solvable: less stray capacitance, or less power."""
+    """Return what makes it solvable: less stray capacitance, or less power."""
     share, found = grow(equations)
     if with_stray is not None:
         for part in _SHARES:

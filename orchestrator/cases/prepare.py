@@ -112,7 +112,7 @@ class PreparedScenario:
 
     @property
     def about(self) -> dict[str, Any]:
-        """What the JSON of every study says of its scenario."""
+        """Return what the JSON of every study says of its scenario."""
         return {
             "case": self.case.name,
             "scenario": self.name,

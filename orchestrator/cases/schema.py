@@ -398,7 +398,7 @@ class BusFaultTable(GridEventBase):
 
     @property
     def has_bare_duration(self) -> bool:
-        """Whether the duration is a number without a unit."""
+        """Return whether the duration is a number without a unit."""
         return self.duration is not None and self._bare
 
     @model_validator(mode="after")

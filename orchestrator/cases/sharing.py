@@ -75,7 +75,7 @@ def load_of(loads: Collection[str], plan: ComponentPlan) -> float:
 
 
 def lost_load(drawn: float) -> list[str]:
-    """What is told of load that values or an outage take away [MW]."""
+    """Return what is told of load that values or an outage take away [MW]."""
     return (
         [f"{abs(drawn):.4g} MW of load {'lost' if drawn > 0 else 'more'}"]
         if abs(drawn) >= _LEAST_SHARE

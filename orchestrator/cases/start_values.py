@@ -205,7 +205,7 @@ def _limits(limits: Mapping[str, tuple[float, float]], units: Sequence[FlowUnit]
 
 
 def is_connected(plan: ComponentPlan, switch: str) -> bool:
-    """Whether a component's breaker is closed; an FMU without a breaker counts as connected."""
+    """Return whether a component's breaker is closed; an FMU without a breaker counts as connected."""
     state = plan.value(switch) if switch in plan.description.variables else None
     return state is None or bool(state)
 

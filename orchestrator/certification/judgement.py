@@ -283,7 +283,7 @@ def motion_faults(
 
 
 def not_judged(findings: Sequence[Mapping[str, Any]]) -> str:
-    """What the watch could not judge of a run, in its words; empty where it judged all of it."""
+    """Return what the watch could not judge of a run, in its words; empty where it judged all of it."""
     return "; ".join(
         str(finding["message"]) for finding in findings if finding["kind"] == NOT_JUDGED
     )

@@ -185,7 +185,7 @@ def _cell_json(cell: MatrixCell) -> dict[str, Any]:
 
 
 def in_words(cell: MatrixCell) -> list[str]:
-    """What a cell of the matrix shows, line by line: verdict, narrowest margin, and what has no figure."""
+    """Return what a cell of the matrix shows, line by line: verdict, narrowest margin, and what has no figure."""
     if cell.failure is not None:
         return [cell.verdict]
     if cell.figures is not None:

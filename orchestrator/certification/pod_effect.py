@@ -36,7 +36,7 @@ def off_values(pod: str) -> tuple[tuple[str, bool], ...]:
 
 
 def kept_off(stated: Mapping[str, Any]) -> dict[str, Any]:
-    """What a certificate states, as a `PointResult` has it."""
+    """Return what a certificate states, as a `PointResult` has it."""
     if stated["unknown"]:
         return {"off_failure": stated["unknown"]}
     named = [
@@ -124,7 +124,7 @@ def _effect(point: PointResult, event: float, why: str) -> PodEffect:
 
 
 def _misfit(t: Numbers, y: Numbers, eigenvalues: Complex) -> float:
-    """What is left of a signal when swings of these eigenvalues, and slow decays, are taken away."""
+    """Return what is left of a signal when swings of these eigenvalues, and slow decays, are taken away."""
     swings = np.exp(np.outer(t, eigenvalues))
     columns = np.hstack([np.exp(-np.outer(t, _SLOW)), swings.real, swings.imag])
     columns /= np.linalg.norm(columns, axis=0)

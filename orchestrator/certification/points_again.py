@@ -88,7 +88,7 @@ def _controllers(
 def _point(
     point: dict[str, Any], scenario: str, content: dict[str, Any], responses: xr.Dataset
 ) -> PointResult:
-    """What was computed of a point; its states' shapes are not kept, and so its modes have none."""
+    """Return what was computed of a point; its states' shapes are not kept, and so its modes have none."""
     having = scenario == WITH
     modes = [*point["modes"], *point["modes_beside"]] if having else point["modes_without"]
     kept = responses.sel(scenario=scenario, X_L=point["X_L"])

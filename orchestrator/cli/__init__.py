@@ -266,7 +266,7 @@ def _commands_with(option: str) -> list[str]:
 
 
 def module_of(command: str) -> Any:
-    """What has a command's ``add_arguments`` and ``run``: its module, or its study where that is all."""
+    """Return what has a command's ``add_arguments`` and ``run``: its module, or its study where that is all."""
     name = _MODULES.get(command, command).replace("-", "_")
     if name not in _ROOMS or (Path(__file__).parent / f"{name}.py").exists():
         return import_module(f"orchestrator.cli.{name}")

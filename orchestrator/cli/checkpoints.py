@@ -59,7 +59,7 @@ class StudyCheckpoints:
         keep_request(self._results, options)
 
     def _interrupted(self) -> bool:
-        """Whether an earlier run left checkpoints, or was killed before the first one and left its recording."""
+        """Return whether an earlier run left checkpoints, or was killed before the first one and left its recording."""
         if any(path.suffix in (CHECKPOINT, PREVIOUS) for path in self._folder.glob("*")):
             return True
         run = asked_by(self._results)

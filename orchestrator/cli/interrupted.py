@@ -18,7 +18,7 @@ def saying_how_it_goes_on(words: Callable[[], str]) -> Iterator[None]:
 
 
 def is_interrupt(error: BaseException | None) -> bool:
-    """Whether it is Ctrl-C or SIGTERM, or came after one: a library in C may have made another error of it."""
+    """Return whether it is Ctrl-C or SIGTERM, or came after one: a library in C may have made another error of it."""
     if calls.taken:
         return True
     # an error that was kept and is raised again may stand behind its own cause

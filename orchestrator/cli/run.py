@@ -188,7 +188,7 @@ def _outcomes(
     console: Console,
     workers: int,
 ) -> Iterator[tuple[int, Outcome]]:
-    """What came of all scenarios that were begun, in order, each with a bar meanwhile."""
+    """Return what came of all scenarios that were begun, in order, each with a bar meanwhile."""
     bar, tasks = progress_bar(console), dict[int, Any]()
 
     def report(index: int, done: int, total: int) -> None:

@@ -77,7 +77,7 @@ class SideBySide:
     def outcomes(
         self, count: int, report: Callable[[int, int, int], None]
     ) -> list[tuple[int, Outcome]]:
-        """What came of all that were begun, in order.
+        """Return what came of all that were begun, in order.
 
         After one that failed no other is begun. Ctrl-C and SIGTERM end all that are under way, at their next step.
 

@@ -94,7 +94,7 @@ class JudgedPoint:
 
     @property
     def stable(self) -> bool | None:
-        """Whether it is stable with the controllers; None where that is not known."""
+        """Return whether it is stable with the controllers; None where that is not known."""
         if self.grows:
             return False
         return True if self.after.computed and not self.after.doubtful else None
@@ -136,7 +136,7 @@ class JudgedPoint:
 
     @property
     def unforeseen(self) -> bool:
-        """Whether a mode grows or falls below its floor, and the search's models did not show it."""
+        """Return whether a mode grows or falls below its floor, and the search's models did not show it."""
         return bool(
             self.worth and self.predicted and not self.worth.allowed and self.predicted.allowed
         )
@@ -308,7 +308,7 @@ class PointsVerdict:
 
     @property
     def some_apart(self) -> bool:
-        """Whether modes stand apart anywhere, however well they are damped."""
+        """Return whether modes stand apart anywhere, however well they are damped."""
         return any(point.apart for point in self.known)
 
     @property

@@ -197,7 +197,7 @@ class CoupledComponents(Closing):
             exchange.inputs.write()
 
     def arriving(self, name: str) -> NDArray[np.float64]:
-        """What a component's connected inputs are given, shape (number of inputs,)."""
+        """Return what a component's connected inputs are given, shape (number of inputs,)."""
         arriving: NDArray[np.float64] = self._values[self.exchanges[name].delivered]
         return arriving
 

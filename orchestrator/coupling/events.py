@@ -219,7 +219,7 @@ class Forcing(Fault):
         return {self.component: {}}
 
     def values(self, step_size: float, stop: float) -> Iterator[ParameterChange]:
-        """What is set one after the other, at communication points of a step [s], until ``stop`` [s].
+        """Return what is set one after the other, at communication points of a step [s], until ``stop`` [s].
 
         A sine is held for at most a two hundredth of its period, at its value in the middle of that time."""
         end = stop if self.end is None else min(self.end, stop)

@@ -116,7 +116,7 @@ class Keeper(Protocol):
         """Where the run is to go on; None where it is to begin."""
 
     def is_due(self) -> bool:
-        """Whether the state is to be kept now."""
+        """Return whether the state is to be kept now."""
 
     def keep(self, state: Callable[[], RunState]) -> None:
         """Keep the present state; the one before it may be forgotten."""

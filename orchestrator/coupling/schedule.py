@@ -77,7 +77,7 @@ class Schedule:
 
     @property
     def is_plain(self) -> bool:
-        """Whether nothing but the order of the components is special about the steps."""
+        """Return whether nothing but the order of the components is special about the steps."""
         return (
             not (self.extrapolation or self.wire_by_wire or self.ticks_per_second)
             and self.coupling == "held"
@@ -85,7 +85,7 @@ class Schedule:
 
     @property
     def is_second_order(self) -> bool:
-        """Whether inputs follow straight lines during a step.
+        """Return whether inputs follow straight lines during a step.
 
         Components that know the communication step give their outputs for the middle of the next one, because inputs
         are held. Here they are told 0: the schedule itself finds the middle."""

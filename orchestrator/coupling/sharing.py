@@ -54,7 +54,7 @@ def best_number(
 
 
 def worth_sharing(group: Sequence[int], bound: NDArray[np.bool_]) -> bool:
-    """Whether a second thread would find anything to do."""
+    """Return whether a second thread would find anything to do."""
     free = sum(not bound[call] for call in group)
     return free > 1 or (free == 1 and len(group) > 1)
 

@@ -37,7 +37,7 @@ def shortest_internal_step(system: System) -> float | None:
 
 
 def knows_step(master: Master, name: str) -> bool:
-    """Whether a component was given the master's step, and takes another one while it runs."""
+    """Return whether a component was given the master's step, and takes another one while it runs."""
     plan = master.system.components[name]
     if plan.parameters.get(STEP_PARAMETER) != master.clock.step_size:
         return False

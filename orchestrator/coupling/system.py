@@ -47,7 +47,7 @@ class ComponentPlan:
 
     @property
     def has_port(self) -> bool:
-        """Whether it takes the voltage of its bus and gives its current."""
+        """Return whether it takes the voltage of its bus and gives its current."""
         return {"v_re", "v_im"} <= {*self.description.inputs} and {"i_re", "i_im"} <= {
             *self.description.outputs
         }

@@ -32,7 +32,7 @@ class Exchange:
 
     @property
     def follows_directly(self) -> bool:
-        """Whether an output depends on a connected input directly, or the FMU does not say."""
+        """Return whether an output depends on a connected input directly, or the FMU does not say."""
         fed = set(self.inputs.names)
         return any(
             fed.intersection(self.component.description.feedthrough(name))

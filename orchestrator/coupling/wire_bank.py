@@ -148,7 +148,7 @@ class WireBank:
 
     @property
     def delivered(self) -> NDArray[np.int64]:
-        """What the loop gathers for the bank: outputs of components, as they are."""
+        """Return what the loop gathers for the bank: outputs of components, as they are."""
         return self.sources
 
     def check(self, status: int, call: str, time: float | None = None) -> None:

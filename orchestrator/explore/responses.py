@@ -31,7 +31,7 @@ Say = Callable[[dict[str, Any]], None]
 
 
 def plotted(scenario: Scenario) -> list[str]:
-    """What the case plots, as far as the scenario records it: signals ``a.b`` or ``a.b - c.d``."""
+    """Return what the case plots, as far as the scenario records it: signals ``a.b`` or ``a.b - c.d``."""
     recorded = set(scenario.prepared.record)
     listed = [
         str(panel.signal) for plot in scenario.prepared.case.table.plots for panel in plot.panels

@@ -139,7 +139,7 @@ def _handler(explorer: Explorer) -> type[BaseHTTPRequestHandler]:
             self._send(HTTPStatus.OK, json.dumps(found).encode(), "application/json")
 
         def _asked(self) -> str | None:
-            """What is asked for behind the token; None where it is refused."""
+            """Return what is asked for behind the token; None where it is refused."""
             _, token, *rest = (*self.path.split("/", 2), "")[:3]
             known = secrets.compare_digest(token.encode(), explorer.token.encode())
             origin = self.headers.get("Origin")

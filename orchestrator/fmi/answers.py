@@ -64,7 +64,7 @@ def table_of(answer: Any, wanted: list[str]) -> dict[str, float | bool]:
 
 
 def progress(answer: Any) -> tuple[bool, float | None]:
-    """Whether an FMU ended by itself, and when [s]."""
+    """Return whether an FMU ended by itself, and when [s]."""
     if isinstance(answer, list) and len(answer) == 2:
         ended, reached = answer
         if isinstance(ended, bool) and (reached is None or _is_number(reached)):
@@ -96,7 +96,7 @@ def matrix(answer: Any, rows: int, columns: int) -> NDArray[np.float64]:
 
 
 def protections(answer: Any) -> tuple[Protection, ...]:
-    """What keeps the process from the rest of the machine; asked for before the FMU is loaded."""
+    """Return what keeps the process from the rest of the machine; asked for before the FMU is loaded."""
     try:
         return tuple(
             Protection(str(name), bool(in_force), str(how)) for name, in_force, how in answer

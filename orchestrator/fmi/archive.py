@@ -231,7 +231,7 @@ def _check_entries(path: Path, archive: zipfile.ZipFile) -> None:
 def _harmless_twin(
     archive: zipfile.ZipFile, first: zipfile.ZipInfo, second: zipfile.ZipInfo
 ) -> bool:
-    """Whether two entries of one place are the same folder, or one file with the same bytes, listed twice."""
+    """Return whether two entries of one place are the same folder, or one file with the same bytes, listed twice."""
     if first.is_dir() or second.is_dir():
         return first.is_dir() and second.is_dir()
     if first.filename != second.filename or first.file_size != second.file_size:
@@ -258,7 +258,7 @@ def _check_sizes(path: Path, unpacked: int, packed: int) -> None:
 
 
 def _fault_of(entry: zipfile.ZipInfo) -> str | None:
-    """What makes an entry one that is not unpacked."""
+    """Return what makes an entry one that is not unpacked."""
     name = entry.orig_filename.replace("\\", "/")  # by itself no harm, wherever it leads
     kind = stat.S_IFMT(entry.external_attr >> 16)
     parts = name.removesuffix("/").split("/")

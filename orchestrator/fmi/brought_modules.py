@@ -62,7 +62,7 @@ class BroughtModules:
         )
 
     def offers(self, top: str) -> bool:
-        """Whether the FMU brings this module, and not just a copy of the installed one."""
+        """Return whether the FMU brings this module, and not just a copy of the installed one."""
         return top in (self._names or ())
 
     def may_stand_first(self, top: str) -> bool:
@@ -195,7 +195,7 @@ def _imported(
 
 
 def _by_its_binary(brought: BroughtModules, importer: Mapping[str, Any] | None) -> bool:
-    """Whether the FMU's binary imports: it does so in the name of FMPy, which calls it."""
+    """Return whether the FMU's binary imports: it does so in the name of FMPy, which calls it."""
     named = importer is None or str(importer.get("__name__")).partition(".")[0] in {
         "fmpy",
         "ctypes",

@@ -196,7 +196,7 @@ def _or_wine(described: FmuDescription) -> str:
 
 
 def runs_under_wine(described: FmuDescription) -> bool:
-    """Whether an FMU has a binary for Windows alone, and Wine runs it here."""
+    """Return whether an FMU has a binary for Windows alone, and Wine runs it here."""
     return wine.runs_here(described.platforms, fmpy.platform, described.fmi_version)
 
 

@@ -15,7 +15,7 @@ NO_BUS = (
 
 
 def is_controller_alone(description: FmuDescription) -> bool:
-    """Whether an FMU was made of a vendor's DLL and has no port of ours."""
+    """Return whether an FMU was made of a vendor's DLL and has no port of ours."""
     return bool(description.kept_in) and any(name not in description.variables for name in PORT)
 
 

@@ -16,7 +16,7 @@ from orchestrator.fmi.wine_program import compile_programs
 
 
 def is_ours(path: Path) -> bool:
-    """Whether an FMU is one that this machine's own toolchain built, or a copy of it to the last byte.
+    """Return whether an FMU is one that this machine's own toolchain built, or a copy of it to the last byte.
 
     What a file says of itself does not count, nor does its place: a built file that was changed since is a stranger."""
     built = cache_directory("fmus")
@@ -41,7 +41,7 @@ def compile_adapters(description: FmuDescription) -> None:
 
 
 def is_isolated(description: FmuDescription, isolated: bool | None) -> bool:
-    """Whether an FMU runs in a process of its own: as asked, else where it is not one of ours."""
+    """Return whether an FMU runs in a process of its own: as asked, else where it is not one of ours."""
     if isolated is not None:
         return isolated
     native = description.inner if isinstance(description, BoundDescription) else description
@@ -70,7 +70,7 @@ def open_component(
 
 
 def protections_of(component: Component) -> tuple[Protection, ...]:
-    """What keeps a component's FMU from the rest of the machine; nothing where it runs in this process."""
+    """Return what keeps a component's FMU from the rest of the machine; nothing where it runs in this process."""
     if isinstance(component, BoundComponent):
         return protections_of(component.inner)
     return component.protections if isinstance(component, IsolatedComponent) else ()

@@ -90,7 +90,7 @@ class Deferral:
             self._before = None
 
     def too_late(self) -> bool:
-        """Whether the signal that is taken now repeats one that was delivered meanwhile."""
+        """Return whether the signal that is taken now repeats one that was delivered meanwhile."""
         repeats, self._repeats = self._repeats, False
         return repeats and not self.waits
 

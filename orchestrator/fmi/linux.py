@@ -43,7 +43,7 @@ def _done(found: int) -> None:
 
 
 def on_known_machine() -> bool:
-    """Whether this is Linux on a processor whose system calls are known here, with 64-bit Python."""
+    """Return whether this is Linux on a processor whose system calls are known here, with 64-bit Python."""
     return (
         sys.platform == "linux"
         and platform.machine() in ("x86_64", "aarch64")

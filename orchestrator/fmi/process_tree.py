@@ -61,7 +61,7 @@ def running(processes: list[int]) -> list[str]:
 
 
 def usage(processes: list[int], enough: int) -> Usage:
-    """What processes have in use together.
+    """Return what processes have in use together.
 
     Pages that several share are counted for each of them first, and exactly only where that comes to more than
     ``enough`` bytes."""

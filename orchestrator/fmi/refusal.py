@@ -43,7 +43,7 @@ def refusal(
 
 
 def _partly(reached: float | None, time: float) -> str:
-    """What FMI says of a step that an FMU discards without a word."""
+    """Return what FMI says of a step that an FMU discards without a word."""
     if reached is not None and reached > time:
         return f"it logs no text; by FMI it computed the step up to t = {reached:.6g} s only, and a shorter one may do"
     return "it logs no text; by FMI it did not compute the whole step, and a shorter one may do"

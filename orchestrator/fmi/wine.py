@@ -80,7 +80,7 @@ def find_wine() -> Wine:
 
 
 def runs_here(platforms: tuple[str, ...], own: str, fmi_version: str) -> bool:
-    """Whether an FMU is one for Wine: for Windows alone, of FMI 2.0, and Wine is there."""
+    """Return whether an FMU is one for Wine: for Windows alone, of FMI 2.0, and Wine is there."""
     if own in platforms or PLATFORM not in platforms or not fmi_version.startswith("2"):
         return False
     try:

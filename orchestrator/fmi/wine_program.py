@@ -231,7 +231,7 @@ class WineLibrary:
         return self._function(name) != 0
 
     def call(self, name: str, argument: int = 0) -> int:
-        """What a function returns for one pointer, as 64 bits."""
+        """Return what a function returns for one pointer, as 64 bits."""
         function = self._function(name)
         self._now(f"{name} runs")
         found = self._ask(CALL, function, argument)[0]

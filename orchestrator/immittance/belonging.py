@@ -115,7 +115,7 @@ def beside_modes(judgement: CutJudgement, cut: Cut) -> CutJudgement:
 
 
 def _is_of(judgement: CutJudgement, cut: Cut) -> bool:
-    """Whether det(1 + L) is ∏(s − eigenvalues)/∏(s − poles) but for a constant; clocks are eigenvalues alone."""
+    """Return whether det(1 + L) is ∏(s − eigenvalues)/∏(s − poles) but for a constant; clocks are eigenvalues alone."""
     path = judgement.path
     k = np.flatnonzero(
         (path.s.real == 0) & (path.hertz > _COMPARED[0]) & (path.hertz < _COMPARED[1])

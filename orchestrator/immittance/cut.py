@@ -152,7 +152,7 @@ class _Opened:
         ]
 
     def _is_alike(self, one: str, other: str) -> bool:
-        """Whether two devices see one voltage, and the network takes their currents alike."""
+        """Return whether two devices see one voltage, and the network takes their currents alike."""
         a, b = (
             np.concatenate([self.B[:, self._i[d]], self.D[:, self._i[d]]]) for d in (one, other)
         )

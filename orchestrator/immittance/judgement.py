@@ -204,7 +204,7 @@ def _open_loop(loop: CutLoop) -> list[str]:
 
 
 def _resolution(loop: CutLoop, path: LoopPath) -> list[str]:
-    """Whether what is not known between the points could put an eigenvalue on −1."""
+    """Return whether what is not known between the points could put an eigenvalue on −1."""
     if loop.is_exact:
         return []
     Y, Z = loop.device.at(path.s), loop.impedance(path.s)
@@ -223,7 +223,7 @@ def _resolution(loop: CutLoop, path: LoopPath) -> list[str]:
 
 
 def _ends(loop: CutLoop, path: LoopPath) -> list[str]:
-    """Whether an encirclement may lie below the lowest or beyond the highest frequency."""
+    """Return whether an encirclement may lie below the lowest or beyond the highest frequency."""
     reasons = []
     first = _principal(path, 0) - path.lead
     if abs(first - np.pi * round(first / np.pi)) > _BEGIN or path.hertz[0] > _RANGE[0]:
@@ -272,7 +272,7 @@ def _active(side: Side) -> tuple[Numbers, Numbers]:
 
 
 def _frames(loop: CutLoop, nodes: Numbers, count: int) -> list[str]:
-    """Whether the verdict depends on the angle between the two frames, which is not known."""
+    """Return whether the verdict depends on the angle between the two frames, which is not known."""
     device = loop.device
     if not isinstance(device, Sampled) or any(
         _turns_alike(s.at(2j * np.pi * nodes)) for s in (device, loop.network)

@@ -88,7 +88,7 @@ def gains_of(path: LoopPath, crossings: list[Crossing]) -> list[Margin]:
 
 
 def _is_free(a: complex, b: complex) -> bool:
-    """Whether a locus comes from −1 at 0 Hz, as that of a free angle does: from its values at f and at 3·f."""
+    """Return whether a locus comes from −1 at 0 Hz, as that of a free angle does: from its values at f and at 3·f."""
     return abs(1 + a) <= _FREE or (abs(1 + a) < _NEAR and abs(1 + b) > 2 * abs(1 + a))
 
 

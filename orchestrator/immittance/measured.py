@@ -57,7 +57,7 @@ def as_scan(
 
 
 def _without_hold(model: IdentifiedModel, s: Vector) -> Complex:
-    """What held inputs make of the device over a step, taken back to the device itself, mode by mode."""
+    """Return what held inputs make of the device over a step, taken back to the device itself, mode by mode."""
     mu, V = np.linalg.eig(model.A)
     poles = np.log(mu.astype(complex)) / model.step_size
     rise = np.where(np.abs(mu - 1) < 1e-12, 1 / model.step_size, poles / (mu - 1))

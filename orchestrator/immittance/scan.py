@@ -205,7 +205,7 @@ def _turning(
 
 
 def is_active(scan: Scan) -> bool:
-    """Whether it would deliver power in both axes at most of the high frequencies: the sign of a generator."""
+    """Return whether it would deliver power in both axes at most of the high frequencies: the sign of a generator."""
     top = scan.values[scan.frequencies >= scan.frequencies[-1] / _TOP]
     largest = np.linalg.eigvalsh((top + top.conj().transpose(0, 2, 1)) / 2)[:, -1]
     size = np.linalg.norm(top, ord=2, axis=(1, 2))

@@ -62,7 +62,7 @@ def file_at(
 
 
 def _of_place(place: Place, device: FmuDescription | None = None) -> dict[str, Value]:
-    """What the power flow reads of the device there: any device with these values gives the same power flow.
+    """Return what the power flow reads of the device there: any device with these values gives the same power flow.
 
     Rated frequency and breaker are left out where the device, if it is not of the catalogue, does not have them."""
     plan = place.plan

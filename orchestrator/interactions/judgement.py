@@ -119,7 +119,7 @@ class JudgedPair:
 
     @property
     def fights(self) -> bool | None:
-        """Whether both are stable alone and not together; None if a verdict that decides it is not known."""
+        """Return whether both are stable alone and not together; None if a verdict that decides it is not known."""
         verdicts = (*(one.stable for one in self.alone), self.joint.stable)
         if verdicts[0] is False or verdicts[1] is False or verdicts[2] is True:
             return False
@@ -307,7 +307,7 @@ class JudgedInteractions:
 
     @property
     def stable(self) -> bool | None:
-        """Whether no system of the study grows; None where one has no verdict and none grows."""
+        """Return whether no system of the study grows; None where one has no verdict and none grows."""
         verdicts = [record.stable for record in self.result.records.values()]
         return False if False in verdicts else None if None in verdicts else True
 

@@ -70,7 +70,7 @@ class Interactions(NoTruth):
 
     @property
     def stable(self) -> bool | None:
-        """Whether nothing grows in the system as it is; None where that is not known."""
+        """Return whether nothing grows in the system as it is; None where that is not known."""
         return self.judgement.whole.stable
 
     @property
@@ -91,12 +91,12 @@ class Interactions(NoTruth):
 
     @property
     def sentences(self) -> list[str]:
-        """What was found, the verdict on the system as it is first."""
+        """Return what was found, the verdict on the system as it is first."""
         return sentences(self.judgement)
 
     @property
     def warnings(self) -> list[str]:
-        """What is to be borne in mind, with the systems that it is of."""
+        """Return what is to be borne in mind, with the systems that it is of."""
         return warnings_of(self.judgement)
 
     def modes(self) -> pd.DataFrame:

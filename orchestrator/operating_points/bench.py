@@ -137,7 +137,7 @@ class PointBench(Closing):
 
 
 def is_converter(plan: ComponentPlan) -> bool:
-    """Whether a component is a converter with references that a damping controller acts on, and a frequency."""
+    """Return whether a component is a converter with references that a damping controller acts on, and a frequency."""
     return plan.kind == "converter" and all(
         name in plan.description.variables for name in (*DRIVEN, *OBSERVED)
     )

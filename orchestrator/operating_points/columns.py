@@ -199,7 +199,7 @@ def _power(
 
 
 def own_power(column: str, elements: Elements, prepared: PreparedScenario) -> float | None:
-    """What a column of powers gives in the case itself [MW, Mvar]; None for another column."""
+    """Return what a column of powers gives in the case itself [MW, Mvar]; None for another column."""
     name, _, quantity = column.partition(".")
     if quantity == ACTIVE and name not in elements.loads:
         plans = {

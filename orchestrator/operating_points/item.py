@@ -21,7 +21,7 @@ class Status(StrEnum):
 
     @classmethod
     def of(cls, failure: Failure) -> "Status":
-        """What an error of a kind makes of an item; of a kind that is not in the table, an FMU failed."""
+        """Return what an error of a kind makes of an item; of a kind that is not in the table, an FMU failed."""
         return _STATUS.get(failure.kind, cls.FMU)
 
 
@@ -49,5 +49,5 @@ class Item:
 
     @property
     def intact(self) -> bool:
-        """Whether no outage adds to what the point itself has out of service."""
+        """Return whether no outage adds to what the point itself has out of service."""
         return self.outage == 0

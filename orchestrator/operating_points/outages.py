@@ -80,7 +80,7 @@ class Remains:
 
 
 def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[str]) -> Remains:
-    """What outages leave: of all parts with a unit in service, the one with the most load remains."""
+    """Return what outages leave: of all parts with a unit in service, the one with the most load remains."""
     network, grid = prepared.network, prepared.system.components[elements.grid]
     assert network is not None
     values = grid.parameters

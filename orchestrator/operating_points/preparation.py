@@ -124,7 +124,7 @@ class ItemPreparation:
         return found
 
     def _as_followed(self, scenario: PreparedScenario) -> dict[str, Value]:
-        """What loads draw that have followed the voltage after an outage [MW, Mvar]."""
+        """Return what loads draw that have followed the voltage after an outage [MW, Mvar]."""
         grid = self.elements.grid
         plan = scenario.system.components[grid]
         return {

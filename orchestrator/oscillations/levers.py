@@ -43,7 +43,7 @@ def levers_of(prepared: PreparedScenario, hertz: float) -> tuple[complex, list[d
 
 
 def with_levers(prepared: PreparedScenario, one: Located) -> Located:
-    """What was found of a mode, with what helps against it; anything else as it is."""
+    """Return what was found of a mode, with what helps against it; anything else as it is."""
     if one.evidence.kind != "mode":
         return one
     mode, levers = levers_of(prepared, one.found.frequency)

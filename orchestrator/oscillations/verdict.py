@@ -176,7 +176,7 @@ def _judged(
 
 
 def _disturbed(signals: Signals, found: SpectralLine) -> bool:
-    """Whether a level changes, or something far larger than the oscillation happens, where it begins."""
+    """Return whether a level changes, or something far larger than the oscillation happens, where it begins."""
     if found.begin is None:
         return False
     step = float(signals.times[1] - signals.times[0])
@@ -246,7 +246,7 @@ class Located:
 
 
 def locate(measured: Measurements, models: UnitModels | None = None) -> list[Located]:
-    """What is there; with the linear models of a case's units, these decide."""
+    """Return what is there; with the linear models of a case's units, these decide."""
     signals = signals_of(measured)
     found = [
         one for one in find_oscillations(signals) if one.periods(measured.interval) >= _FEWEST_TOLD
@@ -280,7 +280,7 @@ def locate(measured: Measurements, models: UnitModels | None = None) -> list[Loc
 
 
 def _verdict(evidence: Evidence, said: Sequence[Opinion]) -> tuple[str | None, str]:
-    """What drives it, where the methods agree or one is known not to apply."""
+    """Return what drives it, where the methods agree or one is known not to apply."""
     if evidence.kind != "forced":
         known = evidence.kind == "mode" and "a mode of the system has no source"
         return None, f"{known or 'it is not known whether it is forced'}: {evidence.reasons[0]}"

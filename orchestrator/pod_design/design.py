@@ -191,7 +191,7 @@ class PodDesign:
 
     @property
     def met(self) -> bool:
-        """Whether the closed loop has the required damping, and leaves the other modes alone."""
+        """Return whether the closed loop has the required damping, and leaves the other modes alone."""
         return self.damping_met and self.broken is None
 
     @property

@@ -63,7 +63,7 @@ def angle_deg(value: complex) -> float:
 
 
 def compensation_deg(phase_deg: float) -> float:
-    """What all stages together must add to turn a sensitivity's angle to 180° [°]: lead if φ ≥ 0, else lag."""
+    """Return what all stages together must add to turn a sensitivity's angle to 180° [°]: lead if φ ≥ 0, else lag."""
     return 180.0 - phase_deg if phase_deg >= 0 else -180.0 - phase_deg
 
 

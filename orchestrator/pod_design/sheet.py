@@ -233,7 +233,7 @@ def verdict(d: PodDesign) -> str:
 
 
 def _other_gain(d: PodDesign) -> str:
-    """What another gain does with the design's lead/lag."""
+    """Return what another gain does with the design's lead/lag."""
     if d.other_gain is None:
         return "; use --refine"
     low, high = d.request.bounds(search=False)

@@ -40,7 +40,7 @@ class ControllerDesign(NoTruth, ask=".met"):
 
     @property
     def met(self) -> bool:
-        """Whether the closed loop has the required damping, and leaves the other modes alone."""
+        """Return whether the closed loop has the required damping, and leaves the other modes alone."""
         return self.result.met
 
     @property
@@ -50,7 +50,7 @@ class ControllerDesign(NoTruth, ask=".met"):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is to be borne in mind of the design."""
+        """Return what is to be borne in mind of the design."""
         return self.result.warnings
 
     @property

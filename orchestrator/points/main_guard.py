@@ -44,7 +44,7 @@ def _of_script(frame: FrameType | None) -> FrameType | None:
 
 
 def _guards(node: ast.stmt, line: int) -> bool:
-    """Whether a statement that asks for the module's name holds the line."""
+    """Return whether a statement that asks for the module's name holds the line."""
     if not isinstance(node, ast.If) or not node.lineno <= line <= (node.end_lineno or node.lineno):
         return False
     return any(isinstance(one, ast.Name) and one.id == "__name__" for one in ast.walk(node.test))

@@ -58,7 +58,7 @@ class PointStore:
 
 
 def holds_points_alone(folder: Path) -> bool:
-    """Whether a folder is that of a study's points, be it before the first one."""
+    """Return whether a folder is that of a study's points, be it before the first one."""
     return folder.is_dir() and all(path.suffix == _KEPT for path in folder.iterdir())
 
 

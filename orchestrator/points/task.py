@@ -89,7 +89,7 @@ class Kept:
 
     @property
     def lasting(self) -> bool:
-        """Whether computing the point again would give the same. Only such records are kept."""
+        """Return whether computing the point again would give the same. Only such records are kept."""
         return self.failure is None or (self.keeps_failures and self.failure.lasting)
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:

@@ -137,7 +137,7 @@ class _Kept:
 
 
 def read_cells(folder: Path) -> dict[str, Any]:
-    """What `Cells.save` wrote, with the ``case`` as a word that opens it."""
+    """Return what `Cells.save` wrote, with the ``case`` as a word that opens it."""
     file = folder / CELLS
     if not file.is_file():
         raise InputError(

@@ -19,7 +19,7 @@ _OF_NETCDF = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_FillValue"}
 
 
 def open_recording(folder: Path) -> xr.Dataset:
-    """What an unfinished recording holds, also while it grows; signals are read when they are used."""
+    """Return what an unfinished recording holds, also while it grows; signals are read when they are used."""
     parts = parts_of(folder)
     if not parts:
         raise InputError(f"{folder}: nothing was recorded yet")
@@ -61,7 +61,7 @@ def open_whole(path: Path) -> xr.Dataset:
 
 
 def in_memory(dataset: xr.Dataset) -> bool:
-    """Whether nothing of a recording needs its files any more."""
+    """Return whether nothing of a recording needs its files any more."""
     return dataset.nbytes <= IN_MEMORY
 
 

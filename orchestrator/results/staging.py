@@ -122,7 +122,7 @@ def _exchange(new: Path, place: Path, run: str) -> None:
 
 
 def _has_rows(folder: Path) -> bool:
-    """Whether something was recorded in the folder of an unfinished run."""
+    """Return whether something was recorded in the folder of an unfinished run."""
     return any(not path.name.startswith(PARTIAL) for path in folder.rglob("*.nc"))
 
 
@@ -199,14 +199,14 @@ def check_free(folder: Path, contents: Mapping[str, bytes | None]) -> None:
 
 
 def _is_foreign(folder: Path, name: str, content: str | None) -> bool:
-    """Whether a file that is there is read by the command, or of somebody else, and other than the new one."""
+    """Return whether a file that is there is read by the command, or of somebody else, and other than the new one."""
     path = folder / name
     others = path.is_file() and (path.resolve() in inputs or not _is_listed(folder, name))
     return path.is_dir() or (others and sha256_of(path) != content)
 
 
 def _is_listed(folder: Path, name: str) -> bool:
-    """Whether a command has written the file, be it one that was killed while it put its files there."""
+    """Return whether a command has written the file, be it one that was killed while it put its files there."""
     for place in (folder, *folder.glob(f"{PARTIAL}*")):
         with suppress(InputError):  # one that is damaged lists nothing
             if (found := read_manifest(place)) and name in found.files:

@@ -27,7 +27,7 @@ _CSV_ROWS = 10_000  # rows of a table that are written at a time
 
 
 def provenance(prepared: PreparedScenario) -> dict[str, str | float]:
-    """What a result was made from: case text, values and those given, versions, FMU guids, step and schedule."""
+    """Return what a result was made from: case text, values and those given, versions, FMU guids, step and schedule."""
     packages = ("gfor-cosim", "fmpy", "numpy", "pythonfmu", "scipy")
     fmus = {name: plan.description for name, plan in prepared.system.components.items()}
     tolerance = prepared.schedule.tolerance

@@ -110,7 +110,7 @@ class Summary:
 
     @property
     def stable(self) -> bool | None:
-        """Whether nothing grows anywhere; None where an item has no verdict, or is missing, and none grows."""
+        """Return whether nothing grows anywhere; None where an item has no verdict, or is missing, and none grows."""
         return self.stable_here if self.unstable or self.result.complete else None
 
     @property

@@ -57,7 +57,7 @@ class Screening(NoTruth):
 
     @property
     def stable(self) -> bool | None:
-        """Whether nothing grows anywhere; None where an item has no verdict and none grows."""
+        """Return whether nothing grows anywhere; None where an item has no verdict and none grows."""
         return self.summary.stable
 
     @property

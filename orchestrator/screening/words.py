@@ -199,7 +199,7 @@ def _what_was_linearised(summary: Summary) -> str:
 
 
 def _but_slowly(summary: Summary) -> str:
-    """What growth a stable verdict does not exclude; "" where all eigenvalues are known."""
+    """Return what growth a stable verdict does not exclude; "" where all eigenvalues are known."""
     if not summary.slowest:
         return ""
     wanted = summary.result.plan.wanted

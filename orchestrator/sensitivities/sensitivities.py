@@ -200,7 +200,7 @@ def find_sensitivities(
 
 
 def _idle(prepared: PreparedScenario, rows: Mapping[Parameter, Sensitivity]) -> tuple[str, ...]:
-    """What was asked for by name and cannot act, with the reason."""
+    """Return what was asked for by name and cannot act, with the reason."""
     names: dict[str, list[str]] = {}
     for parameter, row in rows.items():
         why = (

@@ -37,7 +37,7 @@ class Sensitivities:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is to be borne in mind of the modes and of all rows."""
+        """Return what is to be borne in mind of the modes and of all rows."""
         return (*self.result.modes.warnings, *self.result.warnings)
 
     def table(self) -> pd.DataFrame:

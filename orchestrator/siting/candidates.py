@@ -56,7 +56,7 @@ def unit_terminals(prepared: PreparedScenario) -> list[str]:
 
 
 def question_about(rating: float | None, prepared: PreparedScenario) -> Problem | None:
-    """Whether a rating [MVA] is meant that is a thousand times smaller, or larger, than the largest unit's."""
+    """Return whether a rating [MVA] is meant that is a thousand times smaller, or larger, than the largest unit's."""
     plans = prepared.system.components
     ports = prepared.network.ports if prepared.network is not None else ()
     ratings = {port.name: plans[port.name].number("S_n") for port in ports if port.name in plans}

@@ -59,12 +59,12 @@ class Siting:
 
     @property
     def remarks(self) -> list[str]:
-        """What coupled FMUs say of the best places, which modes these do not reach, and what was not judged."""
+        """Return what coupled FMUs say of the best places, which modes these do not reach, and what was not judged."""
         return [*sureness(self.result), *remarks(self.result)]
 
     @property
     def agrees(self) -> bool:
-        """Whether the coupled FMUs confirm every place that was tried."""
+        """Return whether the coupled FMUs confirm every place that was tried."""
         return self.result.agrees
 
     def table(self) -> pd.DataFrame:

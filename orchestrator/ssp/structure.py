@@ -170,7 +170,7 @@ class _Reader:
         return (*owner, element) if element else owner, connection.get(f"{end}Connector", "")
 
     def _sends(self, node: Node, system: Owner) -> bool:
-        """Whether data flow from a connector into a connection of the system. The kind of the connector decides,
+        """Return whether data flow from a connector into a connection of the system. The kind of the connector decides,
         because SSP allows start and end in either order."""
         return self._kinds.get(node) in (_SENDING_INSIDE if node[0] == system else _SENDING_OUTSIDE)
 

@@ -63,7 +63,7 @@ def defined(name: str, base: Mapping[str, str] | None) -> UnitDefinition | None:
 
 
 def usual(name: str) -> UnitDefinition | None:
-    """What a unit of this name usually is; None for one that is not known."""
+    """Return what a unit of this name usually is; None for one that is not known."""
     found = base_exponents(name)
     return None if found is None else UnitDefinition(found[0], base_offset(name), found[1])
 
@@ -109,6 +109,6 @@ def contradiction(name: str, base: Mapping[str, str] | None) -> str:
 
 
 def _by_name(name: str, unit: UnitDefinition | None) -> bool:
-    """Whether the name of a unit says what its definition does."""
+    """Return whether the name of a unit says what its definition does."""
     known = usual(name)
     return known is not None and (unit is None or unit.equals(known, angles=False))

@@ -101,7 +101,7 @@ def _description(
 
 
 def _differ(system: System, connection: Connection) -> bool:
-    """Whether its ends are in two units, so that the value is taken as it is."""
+    """Return whether its ends are in two units, so that the value is taken as it is."""
     ends = (connection.source, connection.target)
     units = {system.components[e.component].description.variables[e.variable].unit for e in ends}
     return len(units - {""}) > 1

@@ -59,7 +59,7 @@ def compute_all_modes(
 
 
 def all_ours(prepared: PreparedScenario) -> bool:
-    """Whether no FMU of a scenario is another's: those may allow one instance, or share a file or a licence."""
+    """Return whether no FMU of a scenario is another's: those may allow one instance, or share a file or a licence."""
     plans = prepared.system.components.values()
     return all(plan.isolated is not True for plan in plans) and all(
         map(is_ours, {p.description.path for p in plans})

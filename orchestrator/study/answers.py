@@ -212,7 +212,7 @@ def _after(result: RunResult, mode: Mode, periods: float) -> float:
 
 
 def _settles(result: RunResult, answer: ScenarioAnswer, swing: Mode) -> bool:
-    """Whether a run that is long enough to show a growth of the mode shows none."""
+    """Return whether a run that is long enough to show a growth of the mode shows none."""
     return bool(answer.good) and result.modes.prepared.stop_time >= _after(result, swing, _MANY)
 
 

@@ -110,7 +110,7 @@ def differences(
     texts: tuple[str, str] | None = None,
     file: Path | None = None,
 ) -> str:
-    """What is not as it was, in words; empty where all is."""
+    """Return what is not as it was, in words; empty where all is."""
     found = sorted(_differences(then, now), key=lambda words: not words.startswith(f"{_CASE} "))
     if texts is not None and _digest(texts[0]) == then.get(_CASE) != now.get(_CASE):
         found = [
@@ -121,7 +121,7 @@ def differences(
 
 
 def _in_the_case(was: str, is_now: str, file: Path | None) -> list[str]:
-    """What differs between two texts of a case; a key that is there now with its line."""
+    """Return what differs between two texts of a case; a key that is there now with its line."""
     then, now = (dict(_entries(_read(text))) for text in (was, is_now))
     places = {
         keys: place_in(is_now if keys in now else "", keys) or "its text" for keys in (*then, *now)

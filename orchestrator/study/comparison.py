@@ -130,7 +130,7 @@ def recorded(dataset: xr.Dataset, expression: str, label: str) -> xr.DataArray:
 def strongest_modes(
     curve: xr.DataArray, start: float, stop: float | None = None
 ) -> list[IdentifiedMode]:
-    """What a signal rings with between two times [s], strongest first; see `identify_modes`.
+    """Return what a signal rings with between two times [s], strongest first; see `identify_modes`.
 
     What has less than a thousandth of the strongest's amplitude is left out, whatever the trend that an oscillation is
     on. Each mode has its doubts."""

@@ -85,7 +85,7 @@ def write_modes(
 
 
 def files_of_study(case: CaseDefinition) -> dict[str, bytes | None]:
-    """What `save_study` writes of every case, by name, with what is known of it before."""
+    """Return what `save_study` writes of every case, by name, with what is known of it before."""
     plots = [f"{table.name}.png" for table in case.table.plots]
     unknown = [
         *_TABLES,

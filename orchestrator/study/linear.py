@@ -25,7 +25,7 @@ from orchestrator.study.modes import running
 
 
 def default_inputs(prepared: PreparedScenario) -> list[str]:
-    """What the scenario's events change, as far as a linear model can be driven by it."""
+    """Return what the scenario's events change, as far as a linear model can be driven by it."""
     changed = [
         f"{component}.{variable}"
         for event in prepared.events
@@ -37,7 +37,7 @@ def default_inputs(prepared: PreparedScenario) -> list[str]:
 
 
 def default_outputs(prepared: PreparedScenario) -> list[str]:
-    """What the case plots or reads a ring-down from, as far as the scenario has it."""
+    """Return what the case plots or reads a ring-down from, as far as the scenario has it."""
     case = prepared.case
     expressions = [panel.signal for plot in case.table.plots for panel in plot.panels]
     if case.table.analysis.ring_down:

@@ -454,7 +454,7 @@ def _named_range(shown: tuple[float, float]) -> tuple[float, float]:
 
 
 def _is_swing(mode: spectra.Mode, speeds: Sequence[str]) -> bool:
-    """Whether one of the states that show who swings against whom is among those that take part most."""
+    """Return whether one of the states that show who swings against whom is among those that take part most."""
     states = [state for state, _ in mode.participation[:_LEADING]]
     return any(fnmatch.fnmatchcase(state, pattern) for state in states for pattern in speeds)
 

@@ -265,7 +265,7 @@ def _followed(master: Master, prepared: PreparedScenario) -> xr.Dataset:
 
 
 def _diverging(master: Master) -> list[str]:
-    """What is known before the run of black boxes that the coupling does not bear; a run shows the rest."""
+    """Return what is known before the run of black boxes that the coupling does not bear; a run shows the rest."""
     boxes = [name for name, component in master.components.items() if obstacle(component)]
     try:
         return coupling_growth(master, boxes)
@@ -279,7 +279,7 @@ def _recorded(
     recording: RecordingFolder | None,
     failure: CosimError | None,
 ) -> tuple[xr.Dataset, CosimError | None]:
-    """What was recorded, and the failure, which may be that it cannot be written."""
+    """Return what was recorded, and the failure, which may be that it cannot be written."""
     further = computed(prepared) | ({} if failure is None else {ENDED_EARLY: str(failure)})
     if recording is None:
         return trajectory_dataset(watch.recorder, prepared).assign_attrs(further), failure

@@ -59,7 +59,7 @@ class SignalModes:
         return self.used.interval
 
     def is_trend(self, mode: IdentifiedMode) -> bool:
-        """Whether a component is an offset or a slow trend, whose damping says nothing about growth.
+        """Return whether a component is an offset or a slow trend, whose damping says nothing about growth.
 
         Parameters
         ----------

@@ -67,7 +67,7 @@ class TriedStep:
     doubts: tuple[str, ...] = ()
 
     def is_within(self, allowed: Allowed) -> bool:
-        """Whether the step is stable, beyond doubt, and moves no critical mode by more than is allowed."""
+        """Return whether the step is stable, beyond doubt, and moves no critical mode by more than is allowed."""
         if self.refused or self.doubts or not self.stable:
             return False
         return bool(
@@ -122,7 +122,7 @@ def choose_step(
     schedules: Sequence[ScheduleName] = (),
     frequency_range: tuple[float, float] = (0.1, 2.0),
 ) -> StepChoice:
-    """What schedules do to a scenario's critical modes at several steps, against the continuous system."""
+    """Return what schedules do to a scenario's critical modes at several steps, against the continuous system."""
     lengths, left_out = _fitting(prepared, steps)
     with running(prepared.rescheduled("gauss-seidel")) as master:
         find_operating_point(master)
@@ -279,7 +279,7 @@ def _partners(
 
 
 def _doubts(blocks: Blocks, schedule: Schedule, model: LinearModel) -> tuple[str, ...]:
-    """What the perturbation found out about limits and noise, where a component gave reason to ask."""
+    """Return what the perturbation found out about limits and noise, where a component gave reason to ask."""
     if not any(component.doubtful for component in blocks.components.values()):
         return ()
     modes = [mode for mode in find_spectrum(model).modes if mode.is_oscillation]

@@ -40,7 +40,7 @@ def _until(given: Any, argument: str) -> Until | None:
 
 
 def _varied(vary: Any, argument: str) -> tuple[Vary, ...]:
-    """What is varied, from values by name, from texts, or as it was read already."""
+    """Return what is varied, from values by name, from texts, or as it was read already."""
     if isinstance(vary, Mapping):
         if wrong := [key for key in vary if not isinstance(key, str)]:
             raise InputError(f"{argument}: {wrong[0]!r} is not a name; give values by name, {_HOW}")

@@ -43,7 +43,7 @@ class ParameterSweep(NoTruth):
 
     @property
     def remarks(self) -> list[str]:
-        """What failed, was refined or was not recognised, one sentence each."""
+        """Return what failed, was refined or was not recognised, one sentence each."""
         from orchestrator.sweep import tables  # noqa: PLC0415 - imports Matplotlib, a second
 
         return tables.remarks(self.samples)

@@ -47,7 +47,7 @@ class Swing:
     known: KnownModes = KnownModes()
 
     def is_explained(self, hertz: float) -> bool:
-        """Whether modes that the model knows to decay make a fast swing that does not grow far."""
+        """Return whether modes that the model knows to decay make a fast swing that does not grow far."""
         first, *_, last = (float(part.mean()) for part in np.array_split(self.signal, 3))
         swing_still = (
             self.turns_hz is not None and self.known.holds and self.times[-1] < self.gone(hertz)

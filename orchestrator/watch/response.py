@@ -197,7 +197,7 @@ def _swing(name: str, signal: Numbers, times: Numbers, begin: float) -> Swing | 
 
 
 def _goes_on(swing: Swing, oscillation: oscillations.Oscillation, breaks: Sequence[float]) -> bool:
-    """Whether one oscillation, with one phase, makes the swing before and after each of these times."""
+    """Return whether one oscillation, with one phase, makes the swing before and after each of these times."""
     if not breaks:
         return True
     since = swing.times - swing.times[-1]
@@ -235,7 +235,7 @@ def _roughness(swing: Swing) -> float:
 
 
 def _is_clean(swing: Swing, oscillation: oscillations.Oscillation) -> bool:
-    """Whether one oscillation, with one phase, makes the whole swing, so that its growth is certain."""
+    """Return whether one oscillation, with one phase, makes the whole swing, so that its growth is certain."""
     since = swing.times - swing.times[-1]
     turn = np.exp((oscillation.rate + 2j * np.pi * oscillation.frequency_hz) * since)
     shape = oscillations.without_trend(np.column_stack([turn.real, turn.imag]))

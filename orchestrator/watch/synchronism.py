@@ -212,6 +212,6 @@ def _finding(
 
 
 def slips_at_the_end(relative: Numbers) -> bool:
-    """Whether an angle [rad] moves by more than half a turn in the last tenth of the run."""
+    """Return whether an angle [rad] moves by more than half a turn in the last tenth of the run."""
     last = relative[-max(2, len(relative) // 10) :]
     return float(np.ptp(last)) > _OUT_OF_STEP

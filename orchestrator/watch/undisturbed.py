@@ -32,7 +32,7 @@ class Unrest:
     frequency: float | None = None
 
     def explains(self, finding: Finding) -> bool:
-        """Whether a forcing makes an oscillation: it has its frequency, or a multiple of it."""
+        """Return whether a forcing makes an oscillation: it has its frequency, or a multiple of it."""
         if self.frequency is None or finding.kind not in (
             "sustained_oscillation",
             "growing_oscillation",

@@ -228,7 +228,7 @@ def _known(
     last: float,
     begin: float,
 ) -> KnownModes:
-    """What is known of the modes in a stretch by its begin; ``last`` is the time of the last event [s]."""
+    """Return what is known of the modes in a stretch by its begin; ``last`` is the time of the last event [s]."""
     as_before = settings.as_at_start(begin)
     return (
         KnownModes(later, True)

@@ -100,7 +100,7 @@ def stab2a(m: ModelBuilder, shaft: Shaft) -> Expr:
 
 
 def _signal(m: ModelBuilder, name: str, default: int, shaft: Shaft) -> Expr:
-    """What the stabiliser takes, as its parameter says; 0 in steady state."""
+    """Return what the stabiliser takes, as its parameter says; 0 in steady state."""
     text = "What it takes: 1 speed, 3 electrical power, 5 voltage" + ("" if default else "; 0 none")
     chosen = m.parameter(
         name, default, "1", text, minimum=0 if default == 0 else SPEED, maximum=VOLTAGE

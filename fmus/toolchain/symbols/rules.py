@@ -24,7 +24,7 @@ _LARGEST_POWER = 100  # that is written as products
 
 
 def _same(x: Expr, y: Expr) -> bool:
-    """Whether both are one expression, or the same operation on the very same operands."""
+    """Return whether both are one expression, or the same operation on the very same operands."""
     if x is y:
         return True
     op = x.op

@@ -187,14 +187,14 @@ class _Look:
             return _in_frame(running, factors)
 
     def _answers(self, running: Running) -> tuple[Complex, Complex]:
-        """What it does with and without small changes from here on, where it stays."""
+        """Return what it does with and without small changes from here on, where it stays."""
         with unmoved(running):
             small = _in_frame(running, self._small)
         with unmoved(running):
             return small, _in_frame(running, self._still)
 
     def after(self, segments: Sequence[Segment], soon: bool) -> _After:
-        """What a disturbance of the voltage by factors leaves behind.
+        """Return what a disturbance of the voltage by factors leaves behind.
 
         ``soon``: whether small changes are made before it has come back as well."""
         lasts = f"{self._times * sum(lasts for _, lasts in segments):.2g} s"

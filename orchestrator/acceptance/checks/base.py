@@ -118,14 +118,14 @@ def not_applicable(name: str, because: str) -> CheckResult:
 
 
 def not_supported(name: str, error: UnsupportedFmuError) -> CheckResult:
-    """What this program or this machine cannot do, which says nothing about the FMU."""
+    """Return what this program or this machine cannot do, which says nothing about the FMU."""
     return CheckResult(
         name, Verdict.NOT_SUPPORTED, error.evidence, error.fault, error.remedy, whose=Whose.HERE
     )
 
 
 def provoked(name: str, evidence: str) -> CheckResult:
-    """What an FMU does after a call that FMI forbids."""
+    """Return what an FMU does after a call that FMI forbids."""
     remedy = "only this check makes such a call, and our master never does; an FMU should refuse it, tell the author"
     return CheckResult(
         name,

@@ -27,7 +27,7 @@ from orchestrator.fmi.port import without_binding
 
 @check("loads", "Can its binary be loaded here, and does it give an instance?")
 def loads(subject: Subject) -> CheckResult:
-    """What this machine lacks is said here, once; all that needs an instance is not asked then."""
+    """Say once what this machine lacks; nothing that needs an instance is asked then."""
     described, process = without_binding(subject.description), subject.process()
     try:
         answer = process.talk("loading its binary", -1, "absent_functions")
@@ -84,7 +84,7 @@ def _stepped(subject: Subject) -> HostedComponent:
 
 
 def _accepts(component: HostedComponent, time: float, step_size: float) -> bool:
-    """Whether a call that is forbidden is accepted; the instance is closed after it."""
+    """Return whether a call that is forbidden is accepted; the instance is closed after it."""
     try:
         component.step(time, step_size)
     except (ComponentError, EndedError):

@@ -69,7 +69,7 @@ def _in_words(setting: Setting) -> str:
 def with_each_setting(
     subject: Subject, look: Callable[[Setting], Look]
 ) -> Iterator[tuple[Look, str]]:
-    """What a look gives with one setting after another, and the setting in words.
+    """Return what a look gives with one setting after another, and the setting in words.
 
     A setting with which the FMU does not work is passed over."""
     for setting in _settings(subject):

@@ -194,7 +194,7 @@ def state_size(subject: Subject) -> CheckResult:
 
 
 def _brought_back(subject: Subject, setting: Setting, moved: Setting) -> tuple[str, float, int]:
-    """What reads otherwise after it was restored; the largest difference of two runs, and the output's place.
+    """Return what reads otherwise after it was restored; the largest difference of two runs, and the output's place.
 
     Parameters are moved before the state is saved, and back before it is restored: they belong to it. A second state
     is saved and kept meanwhile."""

@@ -149,7 +149,7 @@ class Subject:
 
     @property
     def watched(self) -> tuple[str, ...]:
-        """What tells runs apart: the outputs, or any Real variable that moves where there is none."""
+        """Return what tells runs apart: the outputs, or any Real variable that moves where there is none."""
         if self.outputs:
             return self.outputs
         variables = self.description.variables.values()

@@ -53,7 +53,7 @@ def _elsewhere(first: Interval, second: Interval) -> list[int] | None:
 
 
 def _switches(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
-    """Whether a signal has few values, the same in both runs, and changes among them."""
+    """Return whether a signal has few values, the same in both runs, and changes among them."""
     values = np.unique(a)
     return 2 <= len(values) <= _LEVELS and np.array_equal(values, np.unique(b))
 
@@ -80,7 +80,7 @@ def _alike(
     moments: tuple[NDArray[np.intp], NDArray[np.intp]],
     size: float,
 ) -> bool:
-    """Whether a signal is the same at the moments of switching, as far as these may be a step late."""
+    """Return whether a signal is the same at the moments of switching, as far as these may be a step late."""
     first, second = moments
     late = np.abs(a[first] - a[first - 1]) + np.abs(b[second] - b[second - 1])
     return bool((np.abs(a[first] - b[second]) <= _ALIKE * size + late).all())

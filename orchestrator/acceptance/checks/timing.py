@@ -154,7 +154,7 @@ def _runs_from(
 
 
 def _stays(runs: tuple[Numbers, Numbers, Numbers]) -> bool:
-    """Whether the longer steps lead to numbers of the same order."""
+    """Return whether the longer steps lead to numbers of the same order."""
     fine, *coarse = runs
     size = np.abs(fine).max(initial=1e-9)
     return all(

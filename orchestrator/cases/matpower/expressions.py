@@ -150,7 +150,7 @@ class _Reader:
             raise UnknownError(f"{self._peek()[1]!r} is not understood")
 
     def _begins_element(self) -> bool:
-        """Whether a blank in a table ends an element here: ``[1 -2]`` has two, and ``[1 - 2]`` one."""
+        """Return whether a blank in a table ends an element here: ``[1 -2]`` has two, and ``[1 - 2]`` one."""
         if not self._in_table[-1] or self._peek(blanks=True)[0] != "blank":
             return False
         rest = self._tokens[self._at + 1 : self._at + 3]

@@ -90,7 +90,7 @@ class _Program:
             ) from error
 
     def _is_branching(self, text: str) -> bool:
-        """Whether a statement is a part of an ``if``, which is then followed."""
+        """Return whether a statement is a part of an ``if``, which is then followed."""
         word, _, condition = text.partition(" ")
         if word.startswith("if("):
             word, condition = "if", text[2:]
@@ -152,7 +152,7 @@ class _Program:
                 self._values[name] = np.array([[place]])
 
     def _counts(self, name: str) -> bool:
-        """Whether a name is of the case as a whole or of a field that gfor reads."""
+        """Return whether a name is of the case as a whole or of a field that gfor reads."""
         fields = READ if self._results else (self._case, *(f"{self._case}.{f}" for f in READ))
         return name in fields
 

@@ -154,7 +154,7 @@ def record_uses(
     *,
     approximate: bool = False,
 ) -> list[RecordUse]:
-    """What becomes of each record, of which none that stops the reading is there."""
+    """Return what becomes of each record, of which none that stops the reading is there."""
     left = {name.upper() for name in leaving_out}
     return [
         RecordUse(
@@ -306,7 +306,7 @@ _FAMILIES = ("REGC", "REEC", "REPC", "WTG", "WT4", "WT3", "PVGU", "PVEU", "PLNTB
 
 
 def remedy_for(name: str, *, approximate: bool) -> str:
-    """What to do about a record that no part stands for; empty where it is of no grid-following converter."""
+    """Return what to do about a record that no part stands for; empty where it is of no grid-following converter."""
     if not name.startswith(_FAMILIES):
         return ""
     if name == PLANT:

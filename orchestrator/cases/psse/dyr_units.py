@@ -46,7 +46,7 @@ def with_choices(
 
 
 def _fits(kind: str, name: str, row: UnitRow) -> bool:
-    """Whether a choice is for this machine: no record says otherwise, and the machine can have the part."""
+    """Return whether a choice is for this machine: no record says otherwise, and the machine can have the part."""
     if kind == "machine":
         return row.parts.get("machine") == MACHINE_VARIANTS.get(name, name)
     classical = row.parts.get("machine") == "classical" and kind in ("exciter", "stabilizer")

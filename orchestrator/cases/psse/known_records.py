@@ -51,7 +51,7 @@ def known_records() -> list[KnownRecord]:
 
 
 def _limits(record: DyrRecord) -> Iterator[str]:
-    """What a part of ours cannot take of a record, and what it does not use."""
+    """Return what a part of ours cannot take of a record, and what it does not use."""
     for field in record.fields:
         if field.only:
             yield f"{field.name} only {' or '.join(f'{value:g}' for value in field.only)}"

@@ -52,7 +52,7 @@ class MissingModel:
 
     @property
     def may_go(self) -> bool:
-        """Whether its records may be left out; a machine's own may not."""
+        """Return whether its records may be left out; a machine's own may not."""
         return self.kind != MACHINE
 
     @property
@@ -79,7 +79,7 @@ def _kinds() -> Mapping[str, str]:
 
 
 def kind_of(name: str) -> str:
-    """What a model is: ``machine``, ``exciter``, …; ``unknown`` if it stands in no list."""
+    """Return what a model is: ``machine``, ``exciter``, …; ``unknown`` if it stands in no list."""
     return _kinds().get(name, UNKNOWN)
 
 

@@ -424,7 +424,7 @@ class _Reading:
         return at_most if apart < 0 else at_least
 
     def _is_apart(self, bus: int, setpoint: float, solved: Collection[int]) -> bool:
-        """Whether the solved file has another voltage at a bus than its machine's setpoint [pu]."""
+        """Return whether the solved file has another voltage at a bus than its machine's setpoint [pu]."""
         magnitude = self._magnitudes[bus]
         allowed = _CLOSE if bus in solved else _APART
         return abs(setpoint - magnitude) > allowed and (bus in solved or magnitude != 1)

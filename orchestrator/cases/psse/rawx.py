@@ -224,7 +224,7 @@ def read_rawx(path: Path, text: str) -> RawFile:
 
 
 def _head(path: Path, tables: Mapping[str, _Table]) -> Record:
-    """What the file says of the case: IC, system base and frequency."""
+    """Return what the file says of the case: IC, system base and frequency."""
     table = tables.get("caseid", _Table("caseid", (), ((1, ()),)))
     line, row = table.rows[0] if table.rows else (1, ())
     given = dict(zip(table.fields, row, strict=False))

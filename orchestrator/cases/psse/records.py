@@ -172,7 +172,7 @@ def _is_number(text: str) -> bool:
 
 
 def _is_bus(line: str) -> bool:
-    """Whether a line of titles is the record of a bus: its number, a name in quotes, and numbers."""
+    """Return whether a line of titles is the record of a bus: its number, a name in quotes, and numbers."""
     if not re.match(r"\s*\d+\s*,?\s*['\"]", line):
         return False
     fields = _fields(line)

@@ -42,7 +42,7 @@ def reactive_needs(
 
 
 def fits(fed_mvar: float, needed_mvar: float) -> bool:
-    """Whether the machines at a bus feed what the file's voltages need there."""
+    """Return whether the machines at a bus feed what the file's voltages need there."""
     return abs(fed_mvar - needed_mvar) <= max(_LEAST, _PART * abs(needed_mvar))
 
 

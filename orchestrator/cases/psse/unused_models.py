@@ -43,7 +43,7 @@ def unused_models(records: Sequence[DynamicRecord], uses: Sequence[RecordUse]) -
 
 
 def _remedy(records: Sequence[DynamicRecord]) -> str:
-    """What to write in the case so that loads follow the records; empty where that is not exact."""
+    """Return what to write in the case so that loads follow the records; empty where that is not exact."""
     if records[0].name not in _EXPONENTIAL or len({record.values for record in records}) > 1:
         return ""
     try:

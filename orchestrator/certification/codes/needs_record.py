@@ -93,7 +93,7 @@ def needs_table(need: CriterionNeeds, *, whole: bool = False) -> PlainTable:
 
 
 def remarks_of(need: CriterionNeeds) -> list[str]:
-    """What else is to be said of a criterion, as sentences: parameters without effect, and runs that meet it."""
+    """Return what else is to be said of a criterion, as sentences: parameters without effect, and runs that meet it."""
     idle = [s.parameter.variable for s in need.sensitivities if s.idle]
     said = (
         [f"No effect at all, to the last bit of the response: {', '.join(idle)}."] if idle else []

@@ -71,7 +71,7 @@ def _row(v: RowVerdict, c: Certificate) -> dict[str, Any]:
 
 
 def row_chapters(c: Certificate, figures: Figures) -> list[tuple[str, str]]:
-    """What the page of a certificate says of its rows."""
+    """Return what the page of a certificate says of its rows."""
     rows = [
         [
             escape(v.name),

@@ -34,7 +34,7 @@ class RowVerdict:
 
     @property
     def accepted(self) -> bool | None:
-        """Whether every criterion is met; None where the row does not count."""
+        """Return whether every criterion is met; None where the row does not count."""
         return all(finding.accepted for finding in self.findings) if self.judged else None
 
     @property

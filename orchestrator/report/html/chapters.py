@@ -52,7 +52,7 @@ class Chapter:
 
     @cached_property
     def origin(self) -> dict[str, Any]:
-        """What the result says of itself, as `origin_of` has it."""
+        """Return what the result says of itself, as `origin_of` has it."""
         return origin_of(self.source)
 
 

@@ -14,7 +14,7 @@ _OUTPUTS = {"--out", "--html"}
 
 
 def origin_of(source: Path) -> dict[str, Any]:
-    """What a result says of itself; empty where that was of another run into the same folder."""
+    """Return what a result says of itself; empty where that was of another run into the same folder."""
     folder = source if source.is_dir() else source.parent
     own = _content(source) if source.suffix == ".json" else {}
     match own.get("made"):
@@ -43,7 +43,7 @@ def _content(file: Path) -> dict[str, Any]:
 
 
 def given_in(origin: Mapping[str, Any]) -> str:
-    """What a command was given: case, scenario, values, files; without where its results went."""
+    """Return what a command was given: case, scenario, values, files; without where its results went."""
     words = shlex.split(origin.get("command", ""))
     shown = (word for before, word in pairwise(words) if before not in _OUTPUTS)
     kept = (word for word in shown if word.partition("=")[0] not in {*_OUTPUTS, "--json"})

@@ -51,7 +51,7 @@ def scenario_legend(results: Results) -> str:
 
 
 def findings(results: Results) -> str:
-    """What a reader in a hurry should take away, from the figures themselves."""
+    """Return what a reader in a hurry should take away, from the figures themselves."""
     items = []
     if early := results.ended_early:
         shade = "soft" if early["word"] == "interrupted" else "bad"
