@@ -43,7 +43,8 @@ def csvgn1_phasor() -> Model:
     port = device_port_of(m, rating, P_0=0.0)
     text = "Reactance of the port, across which the current is fed"
     X = m.parameter("X", 0.5, "pu", text, base="S_n", minimum=0.01)
-    Z = Phasor(0.0, X)
+    R = m.parameter("R", 0.0, "pu", "Resistance of the port", base="S_n", minimum=0.0)
+    Z = Phasor(R, X)
     master = declare_master_step(m)
     seen = extrapolated_voltage(m, port, master)
     seen.follow(m, port.v)

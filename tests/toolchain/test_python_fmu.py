@@ -50,7 +50,7 @@ ALL_PATHS_OPEN = {
     "gfl_l2ep": _L2EP_OPEN,
     "gfl_l2ep_phasor": _L2EP_OPEN | {"communication_step": 5e-3},
     "static_generation_phasor": {"communication_step": 5e-3, "R": 0.01},
-    "csvgn1_phasor": {"communication_step": 5e-3, "T1": 0.02},
+    "csvgn1_phasor": {"communication_step": 5e-3, "R": 0.01},
     "regfm_a1_phasor": {
         "communication_step": 5e-3,
         "RL": 0.01,
@@ -71,7 +71,9 @@ FED = {
 # Outputs that reach some listed states only where a block is left out (time constant 0).
 BEHIND_LEFT_OUT_BLOCKS = {"P_m"}
 # States that act at a threshold alone, which small changes do not reach.
-BEHIND_THRESHOLDS = {name: {"pll.freezing.awake"} for name in ("gfl_l2ep", "gfl_l2ep_phasor")}
+BEHIND_THRESHOLDS = {name: {"pll.freezing.awake"} for name in ("gfl_l2ep", "gfl_l2ep_phasor")} | {
+    "csvgn1_phasor": {"first", "second"}  # T5 = 0 leaves out the lag between them and the outputs
+}
 # Blocks of the generators and the POD that the literature lets one leave out with a time constant of zero.
 LEFT_OUT = {
     "gfor": {"pod_p.enabled": True, "pod_p.T_S1": 0.0, "pod_p.T_S2": 0.0, "pod_p.N_S": 1},
