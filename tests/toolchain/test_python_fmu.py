@@ -69,7 +69,7 @@ FED = {
     }
 }
 # Outputs that reach some listed states only where a block is left out (time constant 0).
-BEHIND_LEFT_OUT_BLOCKS = {"P_m"}
+BEHIND_LEFT_OUT_BLOCKS = {"P_m", "B"}
 # States that act at a threshold alone, which small changes do not reach.
 BEHIND_THRESHOLDS = {name: {"pll.freezing.awake"} for name in ("gfl_l2ep", "gfl_l2ep_phasor")} | {
     "csvgn1_phasor": {"first", "second"}  # T5 = 0 leaves out the lag between them and the outputs
