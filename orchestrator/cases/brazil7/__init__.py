@@ -1,0 +1,1 @@
+"""The Brazilian equivalent of seven buses, a benchmark of the IEEE PES."""

@@ -1,0 +1,1 @@
+"""Three machines at an infinite bus, a benchmark of the IEEE PES."""
