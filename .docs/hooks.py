@@ -173,7 +173,8 @@ def studies() -> str:
         for name in ("modes", "run", "sensitivities", "steps")
     ]
     return "\n\n".join(
-        _method(name, function) for name, function in (*of_case, *of_scenario, ("certify", certify))
+        _method(name, function)
+        for name, function in (*of_case, *of_scenario, ("gfor.certify", certify))
     )
 
 

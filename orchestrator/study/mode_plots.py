@@ -96,6 +96,8 @@ _NAMED = 4  # components of each side of a mode shape that are named, largest fi
 _RAY = "damping ray"  # marks what belongs to a ray
 _MODE_LABEL = "mode"  # marks the label of a mode
 _LABEL_GAP = (7, 3)  # between a mode and its label, across and up [points]
+# of a label, what is turned to its mode; the first that has room is taken
+_LABEL_SIDES = (("right", "bottom"), ("left", "bottom"), ("right", "top"), ("left", "top"))
 _RAY_LABEL = (0.055, 0.05)  # room for a ray's label, in parts of the Axes' width and height
 
 
@@ -175,18 +177,33 @@ def draw_eigenvalues(
 
 
 def _place_mode_labels(axis: Any) -> None:
-    """Put the modes' labels beside them, to the left and above where the frame leaves room."""
+    """Put each label of a mode beside it, where the frame and the labels before it leave room."""
     labels = [text for text in axis.texts if text.get_gid() == _MODE_LABEL]
     if not labels:
         return
     axis.figure.draw_without_rendering()  # its layout decides how wide the frame is
-    frame, across, up = axis.get_window_extent(), *_LABEL_GAP
+    frame, taken = axis.get_window_extent(), list[Any]()
     for label in labels:
-        label.set(ha="right", va="bottom", position=(-across, up))
-        if label.get_window_extent().x0 < frame.x0:
-            label.set(ha="left", position=(across, up))
-        if label.get_window_extent().y1 > frame.y1:
-            label.set(va="top", position=(label.get_position()[0], -up))
+        places = [_extent(label, side) for side in _LABEL_SIDES]
+        inside = [k for k, box in enumerate(places) if _holds(frame, box)] or [0]
+        free = [k for k in inside if not places[k].count_overlaps(taken)]
+        best = (free or inside)[0]
+        taken.append(_extent(label, _LABEL_SIDES[best]))
+
+
+def _extent(label: Any, side: tuple[str, str]) -> Any:
+    """Put a label on a side of its mode, and tell the box that it fills."""
+    across, up = _LABEL_GAP
+    x = -across if side[0] == "right" else across
+    y = up if side[1] == "bottom" else -up
+    label.set(ha=side[0], va=side[1], position=(x, y))
+    return label.get_window_extent()
+
+
+def _holds(frame: Any, box: Any) -> bool:
+    return bool(
+        frame.x0 <= box.x0 and box.x1 <= frame.x1 and frame.y0 <= box.y0 and box.y1 <= frame.y1
+    )
 
 
 def _real_and_hz(reference: ReferenceModeTable) -> tuple[float, float]:

@@ -181,6 +181,8 @@ def test_labels_of_modes_stay_in_the_frame(case):
     frame = axes.get_window_extent()
     labels = [text for text in axes.texts if "Hz" in text.get_text()]
     assert len(labels) > 3
+    boxes = [label.get_window_extent() for label in labels]
+    assert not any(box.count_overlaps(boxes[:k]) for k, box in enumerate(boxes))
     for label in labels:
         place = label.get_window_extent()
         assert frame.x0 - 1 <= place.x0
