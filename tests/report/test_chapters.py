@@ -12,6 +12,7 @@ import xarray as xr
 
 from orchestrator.errors import InputError
 from orchestrator.report.html.chapters import chapters_of, of_run, of_sweep
+from orchestrator.report.html.least_damped import LeastDamped
 from orchestrator.report.html.page import first_page, write_report
 from orchestrator.results import origin
 from orchestrator.results.manifest import ResultsWarning, read_manifest, write_manifest
@@ -375,7 +376,7 @@ def test_the_least_damped_of_two_results_may_be_two_modes(
     assert ("3.80 to 4.50 (+0.7)" in changed) is like
     who = max(shares, key=shares.get)
     said = (
-        "the least damped is another mode: 0.930 Hz, 3.80 % (sg1) before, "
+        "figures of another mode: 0.930 Hz, 3.80 % (sg1) before, "
         f"{frequency:.3f} Hz, 4.50 % ({who}) now"
     )
     assert (said in changed) is not like
@@ -392,6 +393,16 @@ def test_a_page_that_keeps_no_modes_tells_no_change_of_one(folders, tmp_path):
     changed = text[text.index("Answers that differ") : text.index("</section>")]
     assert "the older page does not say which modes its figures are of" in changed
     assert "3.10 to 3.80" not in changed
+
+
+def test_a_design_s_limiting_mode_may_be_another_one():
+    """As a design over points gives it: an eigenvalue and the machine that takes part most."""
+    mode = {"real": -0.35, "imag": 6.9, "damping_ratio": 0.0507, "who": "sg1"}
+    first = LeastDamped.placed(mode)
+    assert first.words == "1.098 Hz, 5.07 % (sg1)"
+    assert first.is_like(LeastDamped.placed(mode | {"real": -0.5}))
+    assert not first.is_like(LeastDamped.placed(mode | {"who": "sg3"}))
+    assert not first.is_like(LeastDamped.placed(mode | {"imag": 3.4}))
 
 
 def test_a_run_tells_whose_modes_its_figures_are_of(folders, tmp_path):

@@ -272,8 +272,16 @@ def _site(file: Path, c: Content) -> Chapter:
     ]
     sure = "; ".join(c["sure"])
     good = True if c["agrees"] and c["confirmed"] else None if c["agrees"] else False
+    least = [LeastDamped.of(mode) for mode in c.get("modes", ())[:1]]
     return Chapter(
-        file, "Where does a converter help most?", c["answer"], good, sure, open_, page="site.html"
+        file,
+        "Where does a converter help most?",
+        c["answer"],
+        good,
+        sure,
+        open_,
+        page="site.html",
+        least=least,
     )
 
 
@@ -304,6 +312,7 @@ def _design(file: Path, c: Content) -> Chapter:
 
 def _coordinated(file: Path, c: Content) -> Chapter:
     lost = [f"{f['point']}, {f['outage']}: {f['why']}" for f in c["failed"]]
+    limiting = c.get("limiting")
     return Chapter(
         file,
         "Do damping controllers help at all operating points?",
@@ -311,6 +320,7 @@ def _coordinated(file: Path, c: Content) -> Chapter:
         bool(c["met"]),
         f"checked at {c['items']} points and outages",
         lost,
+        least=[LeastDamped.placed(limiting["mode"])] if limiting and limiting.get("mode") else [],
     )
 
 
@@ -471,7 +481,15 @@ def _interactions(file: Path, c: Content) -> Chapter:
         sure,
         lost,
         page="interactions.html",
+        least=_of_pair(worst or {}),
     )
+
+
+def _of_pair(pair: Content) -> list[LeastDamped]:
+    """The mode that a pair's sentence tells of."""
+    if pair.get("mode_hz") is None:
+        return []
+    return [LeastDamped(pair["mode_hz"], pair["mode_together_percent"], {})]
 
 
 def _sensitivities(file: Path, c: Content) -> Chapter:

@@ -5,9 +5,12 @@ their figures is then no change of either."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+from orchestrator.analysis.modes import damping_percent
 
 _FREQUENCY = 0.3
 """Two frequencies of one mode differ by less than this part; a certificate compares modes with and without POD so."""
@@ -28,6 +31,13 @@ class LeastDamped:
     def of(cls, mode: Mapping[str, Any]) -> LeastDamped:
         shares = mode.get("components") or {}
         return cls(mode["frequency_hz"], mode["damping_percent"], dict(shares))
+
+    @classmethod
+    def placed(cls, mode: Mapping[str, Any]) -> LeastDamped:
+        """Of a mode that a design over points gives: an eigenvalue [rad/s] and who takes part most."""
+        value, who = complex(mode["real"], mode["imag"]), mode.get("who")
+        shares = {who: 1.0} if who else {}
+        return cls(value.imag / math.tau, damping_percent(value), shares)
 
     def as_json(self) -> dict[str, Any]:
         """What `of` reads."""
@@ -58,7 +68,7 @@ class LeastDamped:
 def other_modes(before: Sequence[LeastDamped], now: Sequence[LeastDamped]) -> list[str]:
     """In words, the answers' modes that are not the same ones as before."""
     return [
-        f"the least damped is another mode: {was.words} before, {one.words} now"
+        f"figures of another mode: {was.words} before, {one.words} now"
         for was, one in zip(before, now, strict=False)
         if not was.is_like(one)
     ]
