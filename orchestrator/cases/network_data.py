@@ -11,6 +11,7 @@ from scipy.sparse.linalg import spsolve
 from fmus.grid.network import Line, Load, Shunt, ThreeWinding
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.arrays import Matrix
+from orchestrator.cases.branch_limits import FileLimits
 from orchestrator.cases.cgmes.network import read_cgmes
 from orchestrator.cases.csv_rows import (
     Row,
@@ -72,6 +73,8 @@ class NetworkData:
     # voltage in a power flow that starts from another, as that of an outage does
     flow_laws: Mapping[str, FlowLaws] = field(default_factory=dict)
     records: tuple[RecordUse, ...] = ()  # what became of the records of the source
+    # ratings and bands of a RAW or MATPOWER file; those of other sources are not meant
+    limits: FileLimits = field(default_factory=FileLimits)
 
 
 def network_data(table: NetworkTable, directory: Path) -> NetworkData:
@@ -132,6 +135,7 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
             for load in source.loads
             if load.name in source.load_parts
         },
+        limits=source.limits if table.raw or table.matpower else FileLimits(),
     )
 
 

@@ -7,17 +7,20 @@ transformer, which is an element of its own."""
 
 import math
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from fmus.grid.network import SMALLEST_REACTANCE, Line, Load, Shunt, ThreeWinding
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.arrays import Matrix
+from orchestrator.cases.branch_limits import FileLimits, Rating
 from orchestrator.cases.network_sources import SourceTables
 
 _REFERENCE, _OUT = 3, 4
 _POWER_FACTOR = 0.9
 _NEGLIGIBLE = 1e-9
 _NO_LIMIT = 1e4
+_RATE_A, _VMAX, _VMIN = 5, 11, 12  # columns of MATPOWER's tables of branches and of buses
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +63,7 @@ class ImportedNetwork:
     load_parts: dict[str, tuple[complex, complex]] = field(default_factory=dict)
     feeding: dict[str, float] = field(default_factory=dict)
     capacitors: dict[str, float] = field(default_factory=dict)
+    limits: FileLimits = field(default_factory=FileLimits)  # by branch and by bus
 
 
 def import_network(source: SourceTables, *, joined: bool = True) -> ImportedNetwork:
@@ -68,7 +72,7 @@ def import_network(source: SourceTables, *, joined: bool = True) -> ImportedNetw
     ``joined``: whether a negative load at a generator's bus is a part of the generators."""
     rows = {int(row[0]): row for row in source.bus if int(row[1]) != _OUT}
     labels = {number: source.labels[number] for number in rows}
-    lines, to_earth = _lines(source, labels)
+    lines, to_earth, ratings = _lines(source, labels)
     at_bus = _generators(source, labels)
     loads = _loads(source, rows, at_bus if joined else {})
     earthed = {n for n, y in to_earth.items() if abs(y) > _NEGLIGIBLE} | {
@@ -76,7 +80,11 @@ def import_network(source: SourceTables, *, joined: bool = True) -> ImportedNetw
     }
     kept = {load.bus for load in loads} | {bus_of(labels[n]) for n in (*at_bus, *earthed)}
     lines, merged = without_negative_reactances(lines, kept)
+    legs = _ratings_of_legs(lines, ratings)
     lines, transformers, stars = without_star_points(lines, kept)
+    for transformer in transformers:
+        names = [f"{transformer.name}.leg_{k + 1}" for k in range(3)]
+        ratings |= {name: legs[name] for name in names if name in legs}
     merged |= stars
     for number, row in rows.items():
         to_earth[number] = to_earth.get(number, 0j) + complex(row[4], row[5]) / source.base_mva
@@ -98,6 +106,7 @@ def import_network(source: SourceTables, *, joined: bool = True) -> ImportedNetw
         {f"load_{labels[n]}": parts for n, parts in source.load_parts.items() if n in labels},
         {bus_of(labels[n]): float(row[2]) for n, row in rows.items() if row[2] < -_NEGLIGIBLE},
         {bus_of(labels[n]): float(row[5]) for n, row in rows.items() if row[5] > _NEGLIGIBLE},
+        FileLimits(ratings, _bands(rows, labels)),
     )
 
 
@@ -105,14 +114,40 @@ def bus_of(label: str) -> str:
     return f"bus_{label}"
 
 
-def _lines(source: SourceTables, labels: dict[int, str]) -> tuple[list[Line], dict[int, complex]]:
-    """Branches, and for each bus the part of their admittance to earth that our π section cannot hold [pu of the
-    source].
+def _bands(rows: Mapping[int, Matrix], labels: Mapping[int, str]) -> dict[str, tuple[float, float]]:
+    """Least and most voltage [pu] of the buses that have both."""
+    found = {}
+    for number, row in rows.items():
+        if len(row) > _VMIN and 0 < row[_VMIN] < row[_VMAX]:
+            found[bus_of(labels[number])] = float(row[_VMIN]), float(row[_VMAX])
+    return found
+
+
+def _ratings_of_legs(lines: list[Line], ratings: Mapping[str, Rating]) -> dict[str, Rating]:
+    """Ratings of three branches at one bus by the names of a transformer's legs, which they may become."""
+    at: dict[str, list[str]] = {}
+    for line in lines:
+        for bus in (line.from_bus, line.to_bus):
+            at.setdefault(bus, []).append(line.name)
+    found = {}
+    for bus, names in at.items():
+        for k, name in enumerate(names):
+            if len(names) == 3 and name in ratings:
+                found[f"transformer_{bus.removeprefix('bus_')}.leg_{k + 1}"] = ratings[name]
+    return found
+
+
+def _lines(
+    source: SourceTables, labels: dict[int, str]
+) -> tuple[list[Line], dict[int, complex], dict[str, Rating]]:
+    """Branches, for each bus the part of their admittance to earth that our π section cannot hold [pu of the
+    source], and the ratings that the source has.
 
     A π section has one capacitance for both ends; a conductance, a difference between the ends and an inductive
     part (magnetisation) go to the buses."""
     lines: list[Line] = []
     to_earth: dict[int, complex] = {}
+    ratings: dict[str, Rating] = {}
     seen: Counter[str] = Counter()
     scale = SYSTEM_BASE_MVA / source.base_mva
     for row, (y_from, y_to) in zip(source.branch, source.branch_to_earth, strict=True):
@@ -125,9 +160,12 @@ def _lines(source: SourceTables, labels: dict[int, str]) -> tuple[list[Line], di
         b = max(0.0, 2 * min(y_from.imag, y_to.imag))
         for bus, rest in ((start, (y_from - 0.5j * b) / tap**2), (end, y_to - 0.5j * b)):
             to_earth[bus] = to_earth.get(bus, 0j) + complex(rest)
+        name = name if seen[name] == 1 else f"{name}_{seen[name]}"
+        if 0 < row[_RATE_A] < math.inf:
+            ratings[name] = Rating(float(row[_RATE_A]), by_current=row[8] == 0)
         lines.append(
             Line(
-                name if seen[name] == 1 else f"{name}_{seen[name]}",
+                name,
                 bus_of(labels[start]),
                 bus_of(labels[end]),
                 X=float(row[3]) * scale,
@@ -137,7 +175,7 @@ def _lines(source: SourceTables, labels: dict[int, str]) -> tuple[list[Line], di
                 shift=math.radians(float(row[9])),
             )
         )
-    return lines, to_earth
+    return lines, to_earth, ratings
 
 
 def _generators(source: SourceTables, labels: dict[int, str]) -> dict[int, list[_Member]]:

@@ -11,6 +11,7 @@ from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases import component_forms
 from orchestrator.cases.areas import in_two_areas
 from orchestrator.cases.assignment import EMF, TORQUE, assign_values
+from orchestrator.cases.branch_limits import FileLimits
 from orchestrator.cases.build_choices import MODELS, PARTS, STAND_IN
 from orchestrator.cases.case_network import (
     check_network_is_used,
@@ -85,6 +86,7 @@ class PreparedScenario:
     # behind the grid component of the power flow; None if there is none
     network: Network | None = None
     source_slack: str | None = None  # reference bus of the network's source
+    file_limits: FileLimits = field(default_factory=FileLimits)  # of the network's source
     following_loads: tuple[str, ...] = ()  # loads that follow the voltage in an outage's power flow
     # prepares another scenario of the case with the same values, or with those of its file alone where that is asked
     # for; None where nothing but the file gave values.
@@ -278,6 +280,7 @@ class Preparer:
             places={name: draft.place_of_component(name) for name in plans},
             not_reached=tuple(sorted(draft.found.not_reached)),
             source_slack=draft.data.slack if draft.data else None,
+            file_limits=draft.data.limits if draft.data else FileLimits(),
             following_loads=tuple(draft.data.flow_laws) if draft.data else (),
             idle=idle_values(
                 draft.system, draft.given.from_outside, draft.places, events, draft.found.absent

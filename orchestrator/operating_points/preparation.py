@@ -41,10 +41,12 @@ class IslandingError(InputError):
 
 @dataclass(frozen=True)
 class PreparedItem:
-    """The scenario at an item, and in words what was lost and who feeds it; "" where nothing is shared."""
+    """The scenario at an item, in words what was lost and who feeds it, "" where nothing is shared, and the buses that
+    are cut off."""
 
     scenario: PreparedScenario
     text: str = ""
+    dead: tuple[str, ...] = ()
 
 
 class ItemPreparation:
@@ -102,7 +104,7 @@ class ItemPreparation:
                 load_of(loads, valued.system.components[self.elements.grid]),
             )
             text = in_words(dispatch, found.power_flow.powers, plans, units, lost_load(load))
-        return PreparedItem(without_units(found, remains.units), text)
+        return PreparedItem(without_units(found, remains.units), text, remains.dead)
 
     def live(self, item: Item) -> dict[str, Value]:
         """Values by which the case alone is at an item: what is off, and what each unit feeds where others share it.

@@ -6,6 +6,7 @@ from rich.console import RenderableType
 
 from orchestrator.operating_points.item import Status
 from orchestrator.points.study import PointStudy
+from orchestrator.screening.limits import limits_table
 from orchestrator.screening.point import StretchTask
 from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import plan_screening, run_screening
@@ -17,6 +18,8 @@ def _parts(found: Screening) -> Iterator[RenderableType]:
     yield verdict(found.summary)
     if len(plan.outages) + len(plan.points) > 2:
         yield from ("", overview(found.summary))
+    if (beyond := limits_table(found.summary)) is not None:
+        yield from ("", beyond)
     yield from ("", modes_table(found.summary), "")
 
 

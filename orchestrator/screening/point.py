@@ -14,6 +14,7 @@ from orchestrator.analysis.linearization import Blocks
 from orchestrator.analysis.mode_tracking import ModeSet, match
 from orchestrator.analysis.slope_linearization import gives_slopes
 from orchestrator.analysis.steady_state import find_operating_point
+from orchestrator.cases.branch_limits import Loading, Outlier, loadings, outliers
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.sharing import SharingRule
@@ -147,21 +148,46 @@ class _Worker:
 
     def _item(self, item: Item, neighbour: FoundModes | None, *, count: bool) -> _Result:
         warnings: tuple[str, ...] = ()
+        loaded: tuple[Loading, ...] = ()
+        outside: tuple[Outlier, ...] = ()
+        flow = None
         try:
             prepared = self._preparation.prepared(item)
+            flow = prepared.scenario.power_flow
+            if flow is not None:
+                limits = prepared.scenario.file_limits
+                loaded = loadings(flow, limits, prepared.dead)
+                outside = outliers(flow, limits, prepared.dead)
             warnings = self._preparation.warnings(prepared.scenario)
             found = self._modes(prepared.scenario, neighbour, warnings, count=count)
             beyond, fed = (
                 self._preparation.overloads(prepared.scenario),
                 self._preparation.reactive(prepared.scenario),
             )
-            found.record = replace(found.record, text=prepared.text, beyond=beyond, reactive=fed)
+            found.record = replace(
+                found.record,
+                text=prepared.text,
+                beyond=beyond,
+                reactive=fed,
+                loadings=loaded,
+                outliers=outside,
+                has_flow=flow is not None,
+            )
             return found
         except (
             Exception
         ) as error:  # an error that nobody expected must neither end the other points nor be hidden
             kind, text, lasting = failure(error, item)
-            return _Result(ItemRecord(kind, text, warnings=warnings, lasting=lasting))
+            record = ItemRecord(
+                kind,
+                text,
+                warnings,
+                loadings=loaded,
+                outliers=outside,
+                has_flow=flow is not None,
+                lasting=lasting,
+            )
+            return _Result(record)
 
     def _modes(
         self,

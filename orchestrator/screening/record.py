@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.analysis.mode_tracking import ModeSet
+from orchestrator.cases.branch_limits import Loading, Outlier
 from orchestrator.operating_points.item import Status
 from orchestrator.points.task import Kept
 
@@ -18,6 +19,11 @@ class ItemRecord:
     warnings: tuple[str, ...] = ()
     beyond: dict[str, float] = field(default_factory=dict)  # units beyond their rating [pu of it]
     reactive: str = ""  # the bus whose units are furthest beyond their limits of reactive power
+    # of the file's ratings and bands: the branch that is loaded most and all beyond their rating, buses outside of
+    # their band; the worst first
+    loadings: tuple[Loading, ...] = ()
+    outliers: tuple[Outlier, ...] = ()
+    has_flow: bool = False  # whether there is a power flow, without which nothing is known of both
     residual: float = float("nan")
     # whether no mode grows; None where that is not known: nothing was computed, growth was not ``counted``, or a limit
     # is so close that the linear model is doubtful

@@ -21,6 +21,12 @@ from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.results.storage import save_json
 from orchestrator.safe_files import made_folder, write_text
+from orchestrator.screening.limits import (
+    limit_columns,
+    limits_json,
+    limits_sentence,
+    limits_table,
+)
 from orchestrator.screening.study import ScreenedItem, ScreeningResult
 from orchestrator.screening.summary import ModeAt, ScreenedMode, Summary, duration, least_of
 from orchestrator.screening.words import (
@@ -98,7 +104,8 @@ class Screening(NoTruth):
         return f"<{head}; all points stand in items(), the worst of each outage in table()>"
 
     def _repr_html_(self) -> str:
-        lines = [self.verdict, what_was_counted(self.summary), "items() has all points"]
+        told = (self.verdict, limits_sentence(self.summary), what_was_counted(self.summary))
+        lines = [*filter(None, told), "items() has all points"]
         return page(f"Screening of {self.result.plan.case.name}", lines, self.modes())
 
 
@@ -127,6 +134,7 @@ def items_table(summary: Summary) -> ColumnTable[ScreenedItem]:
                 lambda item: "; ".join(filter(None, (item.record.text, *item.record.warnings))),
                 name="why",
             ),
+            *limit_columns(summary),
             Column("Why", lambda item: item.record.text),
         ),
         summary.result.items,
@@ -212,7 +220,8 @@ def _every_mode(summary: Summary) -> ColumnTable[tuple[ModeAt, str]]:
 
 
 def verdict(summary: Summary) -> str:
-    return f"{verdict_of(summary).markup()}\n{escape_markup(what_was_counted(summary))}"
+    told = [escape_markup(text) for text in (limits_sentence(summary), what_was_counted(summary))]
+    return "\n".join(filter(None, (verdict_of(summary).markup(), *told)))
 
 
 def overview(summary: Summary, most: int = 12) -> ColumnTable[OutageRow]:
@@ -333,6 +342,7 @@ def as_json(summary: Summary) -> dict[str, Any]:
         ],
         "counts": {str(status): number for status, number in summary.counts.items()},
         "beyond_rating": summary.beyond or None,
+        "limits": limits_json(summary),
         "unstable": [_where(item) for item in summary.unstable],
         "failures": [
             _where(item) | {"status": str(item.record.status), "why": item.record.text}
@@ -364,6 +374,8 @@ def _page(summary: Summary) -> str:
     """One file that needs no other: what is worst, when, with which outage, and where a damping controller helps."""
     plan, figures = summary.result.plan, Figures()
     content = [("Outages", overview(summary, 20).html())] if len(plan.outages) > 1 else []
+    if (beyond := limits_table(summary, 20)) is not None:
+        content.append(("Ratings and voltage bands", beyond.html()))
     content += [("Modes", modes_table(summary, 20, whole=True).html())]
     content += [("Damping and how long", _durations(summary, figures))]
     if len(plan.points) > 1:
@@ -377,7 +389,8 @@ def _page(summary: Summary) -> str:
         content.append(("Not computed", shown.html()))
     title = f"{plan.case.table.title or plan.case.name}: screening"
     kind = f"{plan.prepared.title}, {len(plan.points)} operating points, {len(plan.outages) - 1} outages"
-    findings = paragraphs(summary.stable, [verdict_sentence(summary), what_was_counted(summary)])
+    told = [verdict_sentence(summary), limits_sentence(summary), what_was_counted(summary)]
+    findings = paragraphs(summary.stable, [text for text in told if text])
     return document(title, kind, findings, content)
 
 

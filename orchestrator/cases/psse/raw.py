@@ -19,8 +19,9 @@ from orchestrator.cases.psse.zero_impedances import merged_buses, threshold
 from orchestrator.cases.source_changes import Changes
 from orchestrator.errors import Problem
 
-_BUS_COLUMNS, _BRANCH_COLUMNS, _GEN_COLUMNS = 9, 11, 10
+_BUS_COLUMNS, _BRANCH_COLUMNS, _GEN_COLUMNS = 13, 11, 10
 _VM, _VA = 7, 8  # columns of the table of buses
+_BAND = slice(11, 13)  # columns of the most and the least voltage there; 0 where the file has none
 _REFERENCE, _OUT = 3, 4  # codes IDE of a bus
 MANY_SHUNTS = 35  # first revision with a node in the records of machines and switched shunts
 _POWER_FACTOR = 0.9  # with which a power tells a rating that is not known
@@ -194,9 +195,13 @@ class _Reading:
             self._rows[number] = [number, kind, *[0.0] * (_BUS_COLUMNS - 2)]
             self._kilovolts[number] = record.number(2, "BASKV", 0.0)
             self._magnitudes[number] = record.number(7, "VM", 1.0)
-            self._rows[number][_VM:] = (
+            self._rows[number][_VM : _VA + 1] = (
                 self._magnitudes[number],
                 record.number(8, "VA [degrees]", 0.0),
+            )
+            self._rows[number][_BAND] = (
+                record.number(9, "NVHI", 0.0),
+                record.number(10, "NVLO", 0.0),
             )
             if kind != 4 and not 0 < self._magnitudes[number] <= _MOST_VOLTAGE:
                 raise record.error(
@@ -308,9 +313,11 @@ class _Reading:
                 text = f"line between buses of BASKV = {one:g} and {other:g} kV: is one wrong, or a transformer meant?"
                 self._changes.note(record.line, text)
             self._ohms.append((record.line, z.imag, one))
-            self._branch(
-                start, end, z, state, (charging + complex(gi, bi), charging + complex(gj, bj))
-            )
+            to_earth = (charging + complex(gi, bi), charging + complex(gj, bj))
+            # a name stands before the ratings from revision 34 on
+            column = 6 if self._raw.revision < SWITCHING_DEVICES else 7
+            rating = record.number(column, "RATEA [MVA]", 0.0)
+            self._branch(start, end, z, state, to_earth, rating=rating)
         for record in self._raw.of("system switching device"):
             if not self._in_service(record, 16, "STAT"):
                 continue
@@ -340,13 +347,14 @@ class _Reading:
         to_earth: tuple[complex, complex] = (0j, 0j),
         tap: float = 0.0,
         shift: float = 0.0,
+        rating: float = 0.0,
     ) -> None:
         if abs(z.imag) < self._least:
             text = f"reactance of almost 0: taken as {self._least:.2g} pu, the least that the network can have"
             self._changes.note(f"{start}-{end}", text)
             z = complex(z.real, self._least)
         self._branches.append(
-            [start, end, z.real, z.imag, 0.0, 0.0, 0.0, 0.0, tap, shift, float(state != 0)]
+            [start, end, z.real, z.imag, 0.0, rating, 0.0, 0.0, tap, shift, float(state != 0)]
         )
         self._to_earth.append(to_earth)
 
@@ -383,6 +391,7 @@ class _Reading:
                 1,
                 tap=first.ratio / second.ratio,
                 shift=first.shift - second.shift,
+                rating=first.rating_mva,
             )
             return
         inner = max(self._rows) + 1
@@ -392,7 +401,13 @@ class _Reading:
         )
         for k, (winding, z) in enumerate(zip(windings, star(t.impedances), strict=True)):
             self._branch(
-                winding.bus, inner, z, k not in t.off, tap=winding.ratio, shift=winding.shift
+                winding.bus,
+                inner,
+                z,
+                k not in t.off,
+                tap=winding.ratio,
+                shift=winding.shift,
+                rating=winding.rating_mva,
             )
 
     def _solved_buses(self, status: int) -> dict[int, tuple[bool, bool]]:

@@ -16,12 +16,14 @@ _OPEN = {0: (0, 1, 2), 1: (), 2: (1,), 3: (2,), 4: (0,)}  # STAT → windings th
 
 @dataclass(frozen=True)
 class Winding:
-    """One winding: bus, ratio [pu of the bus' base voltage], shift [degrees], nominal voltage by that of its bus."""
+    """One winding: bus, ratio [pu of the bus' base voltage], shift [degrees], nominal voltage by that of its bus, and
+    RATA, 0 where the file has none [MVA]."""
 
     bus: int
     ratio: float
     shift: float
     nominal: float
+    rating_mva: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,8 @@ def _winding(line: Record, bus: int, base: float, code: int) -> Winding:
     ratio = {1: ratio, 2: ratio / base if base else 0.0, 3: ratio * by_base}[code]
     if not ratio > 0:
         raise line.error(f"WINDV comes to {ratio:g} pu of the bus' base voltage; it must exceed 0")
-    return Winding(bus, ratio, line.number(2, "ANG [degrees]", 0.0), by_base)
+    shift, rating = line.number(2, "ANG [degrees]", 0.0), line.number(3, "RATA [MVA]", 0.0)
+    return Winding(bus, ratio, shift, by_base, rating)
 
 
 def _impedance(raw: RawFile, line: Record, index: int, code: int, nominal: float) -> complex:
