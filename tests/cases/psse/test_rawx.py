@@ -24,8 +24,8 @@ def network():
         },
         "general": table("thrshz pqbrak", [[0.0001, 0.7]]),
         "bus": table(
-            "name ibus ide baskv vm va",
-            [[f"BUS {n}", n, kind, kv, vm, 0.0] for n, (kv, kind, vm) in BUSES.items()],
+            "name ibus ide baskv nvlo nvhi vm va",
+            [[f"BUS {n}", n, kind, kv, 0.9, 1.1, vm, 0.0] for n, (kv, kind, vm) in BUSES.items()],
         ),
         "load": table("ql pl ibus loadid", [[q, p, n, "1"] for n, (p, q) in LOADS.items()]),
         "generator": table(
