@@ -112,7 +112,8 @@ def checked(request: type, wanted: Mapping[str, Any]) -> dict[str, Any]:
 
 def require_known(wanted: Iterable[str], known: Iterable[str], who: str) -> None:
     """Refuse keywords that a study does not have; ``who`` is such as ``a design``."""
-    if unknown := [name for name in wanted if name not in known]:
+    unknown = [name for name in wanted if name not in known]
+    if unknown:
         raise InputError(
             f"{who} cannot be asked for {', '.join(map(repr, unknown))}, but for {', '.join(known)}"
         )

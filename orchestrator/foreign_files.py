@@ -37,7 +37,8 @@ def check_regular(path: Path | str, label: str = "") -> None:
         mode = os.stat(path).st_mode
     except (OSError, ValueError):
         return
-    if kind := next((word for is_one, word in _KINDS if is_one(mode)), ""):
+    kind = next((word for is_one, word in _KINDS if is_one(mode)), "")
+    if kind:
         raise InputError(
             f"{label} {path}: it is {kind}, and no file; write its content into a file, and give that".lstrip()
         )
@@ -46,7 +47,8 @@ def check_regular(path: Path | str, label: str = "") -> None:
 def check_name(path: Path | str, label: str = "") -> None:
     """Raise an `InputError` if a name has bytes that are no UTF-8: neither XML nor JSON can hold it."""
     text = str(path)
-    if found := _NOT_UTF_8.search(text):
+    found = _NOT_UTF_8.search(text)
+    if found:
         byte = ord(found.group()) - 0xDC00
         shown = text.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
         raise InputError(
@@ -60,7 +62,8 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
 
     Raises an `InputError` if it is none, or has more than ``most`` bytes; an `OSError` as `Path.read_bytes` does."""
     check_regular(path)
-    if (size := path.stat().st_size) > most:
+    size = path.stat().st_size
+    if size > most:
         raise InputError(
             f"{path}: it has {size} bytes; at most {most} are read, so cut it into parts"
         )
@@ -89,11 +92,13 @@ def visible(text: str) -> str:
 def steering_in(value: Any, *place: Any) -> Iterator[tuple[tuple[Any, ...], str]]:
     """Where a table of texts holds characters that steer a terminal, and the first of each text."""
     if isinstance(value, str):
-        if found := _STEERING.search(value):
+        found = _STEERING.search(value)
+        if found:
             yield place, found.group()
     elif isinstance(value, dict):
         for key, inner in value.items():
-            if found := _STEERING.search(key):
+            found = _STEERING.search(key)
+            if found:
                 yield (*place, key), found.group()
             yield from steering_in(inner, *place, key)
     elif isinstance(value, list):

@@ -37,7 +37,8 @@ def read_toml(
     source = f"{option} {path}".lstrip()
     try:
         check_regular(path, option)
-        if (size := path.stat().st_size) > MOST_BYTES:
+        size = path.stat().st_size
+        if size > MOST_BYTES:
             raise InputError(
                 f"{source}: {subject} has {size} bytes; at most {MOST_BYTES} are read, so move tables of numbers into "
                 "files of their own"

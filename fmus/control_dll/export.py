@@ -132,7 +132,8 @@ def with_values(part: ControlPart, values: Mapping[str, float], sample_time: flo
     """
     model = part.model
     known = {p.name: p for p in model.parameters}
-    if unknown := [name for name in values if name not in known]:
+    unknown = [name for name in values if name not in known]
+    if unknown:
         raise ControlDllError(
             f"there is no parameter {unknown[0]!r}; there are: {', '.join(known)}"
         )
@@ -176,7 +177,8 @@ def write_dll(
     ``sample_time``: Between two calls of the control [s].
     ``values``: Other defaults of the DLL's parameters, by name.
     ``report``: Called with a sentence before each part of the work."""
-    if unknown := [name for name in platforms if name not in DLL_TARGETS]:
+    unknown = [name for name in platforms if name not in DLL_TARGETS]
+    if unknown:
         raise ControlDllError(
             f"there is no platform {unknown[0]!r}; choose from: {', '.join(DLL_TARGETS)}"
         )

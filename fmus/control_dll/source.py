@@ -39,7 +39,8 @@ def _declarations(model: Model, sample_time: float) -> str:
     parameters = model.parameters
     for group in (parameters, model.inputs, model.outputs):
         names = [c_name(variable.name) for variable in group]
-        if twice := [name for name in names if names.count(name) > 1]:
+        twice = [name for name in names if names.count(name) > 1]
+        if twice:
             raise ValueError(
                 f"model {model.name}: two variables would be called {twice[0]!r} in the DLL"
             )

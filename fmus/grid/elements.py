@@ -296,7 +296,8 @@ def declare_shunt(
 def add_stray(m: ModelBuilder, network: Network, buses: dict[str, Bus]) -> None:
     """Declare the stray capacitance of every bus without capacitance of its own, if the network has stray
     capacitance."""
-    if floating := [bus for name, bus in buses.items() if network.needs_stray(name)]:
+    floating = [bus for name, bus in buses.items() if network.needs_stray(name)]
+    if floating:
         text = "Capacitance to earth of every bus that has none of its own"
         stray = m.parameter(
             "stray_B", network.stray_B, "pu", text, base=SYSTEM_BASE, minimum=1e-9, maximum=100

@@ -100,7 +100,8 @@ class Network:
         """Return whether this load alone determines its bus's voltage, and therefore cannot be switched off."""
         if self._has_fixed_capacitance(load.bus) or self.needs_stray(load.bus):
             return False
-        if capacitive := self._capacitive_loads(load.bus):
+        capacitive = self._capacitive_loads(load.bus)
+        if capacitive:
             return capacitive == [load]
         return load.conductance_mw > 0 and not self._has_conductance(load.bus, without=load)
 

@@ -82,7 +82,8 @@ def structure(model: Model) -> Structure:
 
 def _voltages(model: Model, *marks: Callable[[int], int]) -> list[Callable[[int], int]]:
     """What each voltage of a network that is solved as data depends on: all elements and currents of its island."""
-    if (nodal := model.nodal) is None:
+    nodal = model.nodal
+    if nodal is None:
         return []
     (matrix,), (currents,) = nodal.values.dependence(*marks[1:]), nodal.currents.dependence(*marks)
     n, entries = len(nodal.plan.order), nodal.plan.entries

@@ -93,7 +93,8 @@ def component_element(model: Model) -> Element:
     """Our annotation: the component's kind, and the usual ranges of its parameters."""
     element = Element("Component", {"kind": model.kind} if model.kind else {})
     for parameter in model.parameters:
-        if (usual := parameter.usual) is not None:
+        usual = parameter.usual
+        if usual is not None:
             bounds = {
                 "name": parameter.name,
                 "low": repr(float(usual.low)),
@@ -139,7 +140,8 @@ def _write_units(root: Element, model: Model) -> None:
     definitions = SubElement(root, "UnitDefinitions")
     for unit in sorted(used):
         element = SubElement(definitions, "Unit", name=unit)
-        if exponents := {key: f"{value:g}" for key, value in UNITS[unit].items()}:
+        exponents = {key: f"{value:g}" for key, value in UNITS[unit].items()}
+        if exponents:
             SubElement(element, "BaseUnit", exponents)
 
 

@@ -28,7 +28,8 @@ def require(purpose: str, *libraries: str) -> None:
 
     ``purpose``: The task, as the subject of the error's sentence, such as "building an FMU".
     ``libraries``: Keys of `EXTRAS`."""
-    if missing := [library for library in libraries if find_spec(library) is None]:
+    missing = [library for library in libraries if find_spec(library) is None]
+    if missing:
         extras = ",".join(sorted({EXTRAS[library] for library in missing}))
         are = "is" if len(missing) == 1 else "are"
         raise MissingLibraryError(

@@ -238,7 +238,8 @@ class ModelBuilder:
         p, c, u, x, _ = ([declared for _, declared in entries] for entries in kinds.values())
         algebraic = self._closed_signals()
         self._check_origins(p)
-        if missing := [s.name for s, _ in kinds[State] if s.name not in self._derivatives]:
+        missing = [s.name for s, _ in kinds[State] if s.name not in self._derivatives]
+        if missing:
             raise ValueError(f"model {self.name}: no derivative is given for {', '.join(missing)}")
         if integrator == "sdirk" and any(
             isinstance(v, State) and v.stepwise for v, _ in kinds[State]
@@ -311,7 +312,8 @@ class ModelBuilder:
 
         Raises a `ValueError` if one was never closed, or several depend on one another in a circle."""
         closed = [symbol.name() for symbol, _ in self._algebraic]
-        if never := [symbol.name() for symbol in self._opened if symbol.name() not in closed]:
+        never = [symbol.name() for symbol in self._opened if symbol.name() not in closed]
+        if never:
             raise ValueError(
                 f"model {self.name}: signal {', '.join(never)} is used but never closed"
             )

@@ -266,7 +266,8 @@ class NativeFmu:
 
     def host_platforms(self) -> tuple[str, ...]:
         """That of this machine; without compiled code there is no native FMU."""
-        if host := this_machine():
+        host = this_machine()
+        if host:
             return host
         raise RuntimeError(
             "native FMUs cannot be compiled for this machine; use the Python-backed ones"

@@ -217,7 +217,8 @@ class Slave(Fmi2Slave):
 
     def _check_requirements(self):
         self._kernel.requirements(*self._arguments, self._margins_address)
-        if broken := [rule for rule, margin in zip(self._rules, self._margins) if not margin > 0.0]:
+        broken = [rule for rule, margin in zip(self._rules, self._margins) if not margin > 0.0]
+        if broken:
             self._fail("parameters cannot be used: " + "; ".join(broken))
 
     def enter_initialization_mode(self):
@@ -227,7 +228,8 @@ class Slave(Fmi2Slave):
         try:
             self._refresh()
             self._check_requirements()
-            if worst := [n for n, v in zip(self._names, self._z) if not math.isfinite(v)]:
+            worst = [n for n, v in zip(self._names, self._z) if not math.isfinite(v)]
+            if worst:
                 self._fail(
                     f"initialisation gives no finite value for {', '.join(worst[:5])}; check the parameters"
                 )

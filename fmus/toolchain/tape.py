@@ -132,7 +132,8 @@ LIBRARY = tuple(Path(__file__).with_name("c") / name for name in ("tape.c", "sla
 def tape_of(model: Model) -> bytes:
     nodal, plan = model.nodal, Plan([], [0], [], [], [0], [])
     elimination = plan_elimination(model) if model.integrator == "sdirk" else None
-    if solved := nodal or elimination:
+    solved = nodal or elimination
+    if solved:
         plan = solved.plan
     groups = {"p": model.parameters, "c": model.calculated, "u": model.inputs, "x": model.states}
     sizes = {group: len(variables) for group, variables in groups.items()}
@@ -217,14 +218,16 @@ class _Values:
         return [value[result] for vector in function.outputs for result in vector]
 
     def _number(self, bits: bytes) -> int:
-        if (found := self.numbers.get(bits)) is None:
+        found = self.numbers.get(bits)
+        if found is None:
             found = self.numbers[bits] = len(self.operations)
             self.operations.append(None)
             self.fixed.add(found)
         return found
 
     def _operation(self, operation: Operation) -> int:
-        if (found := self._known.get(operation)) is None:
+        found = self._known.get(operation)
+        if found is None:
             found = self._known[operation] = len(self.operations)
             self.operations.append(operation)
             if self.fixed.issuperset(operation[1:]):

@@ -97,7 +97,8 @@ def remove(folder: Path) -> None:
 
 def _give_back(folder: Path) -> None:
     """Close a folder's lock, unless another thread has."""
-    if (lock := _locks.pop(folder, None)) is not None:
+    lock = _locks.pop(folder, None)
+    if lock is not None:
         os.close(lock)
 
 

@@ -48,11 +48,13 @@ def dll_description(
         canGetAndSetFMUstate="true" if trial.state in ("arrays", "library") else "false",
         canSerializeFMUstate="true" if trial.state == "arrays" else "false",
     )
-    if units := sorted({v.unit for v in variables if v.unit and v.kind == "Real"}):
+    units = sorted({v.unit for v in variables if v.unit and v.kind == "Real"})
+    if units:
         definitions = SubElement(root, "UnitDefinitions")
         for unit in units:
             element = SubElement(definitions, "Unit", name=unit)
-            if exponents := {key: f"{value:g}" for key, value in UNITS.get(unit, {}).items()}:
+            exponents = {key: f"{value:g}" for key, value in UNITS.get(unit, {}).items()}
+            if exponents:
                 SubElement(element, "BaseUnit", exponents)
     write_log_categories(root, "fmi2")
     experiment = SubElement(root, "DefaultExperiment", startTime="0")
@@ -71,7 +73,8 @@ def dll_description(
     for reference, variable in enumerate(variables):
         _write(listed, reference, variable)
     structure_element = SubElement(root, "ModelStructure")
-    if known := _dependencies(variables, circuit):
+    known = _dependencies(variables, circuit)
+    if known:
         parent = SubElement(structure_element, "Outputs")
         for index, follows in known.items():
             SubElement(

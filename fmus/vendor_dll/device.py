@@ -121,7 +121,8 @@ def read_device_file(path: Path) -> tuple[Path, dict[str, Any]]:
         ) from error
     except (ValueError, RecursionError) as error:
         raise DeviceFileError(f"{path}: it is not TOML: {error}") from error
-    if unknown := sorted(table.keys() - _KEYS):
+    unknown = sorted(table.keys() - _KEYS)
+    if unknown:
         raise DeviceFileError(
             f"{path}: {unknown[0]!r} is no key here; there are: {', '.join(sorted(_KEYS))}"
         )
@@ -333,7 +334,8 @@ class _Reader:
             "trim_time": "trim_time",
             "voltage_per_q": "voltage_per_q",
         }
-        if unknown := sorted(part.keys() - {"trims", *times}):
+        unknown = sorted(part.keys() - {"trims", *times})
+        if unknown:
             raise ValueError(f"[start] {unknown[0]}: there are: trims, {', '.join(times)}")
         given = {route.quantity for route in measured}
         usual = [letter for letter in ("P", "Q") if f"{letter}_ref" in given]
@@ -346,7 +348,8 @@ class _Reader:
             raise ValueError(
                 f'[start] trims = {trims!r}; it must be a list of "P" and one of "Q" and "V"'
             )
-        if idle := [letter for letter in trims if f"{letter}_ref" not in given]:
+        idle = [letter for letter in trims if f"{letter}_ref" not in given]
+        if idle:
             raise ValueError(
                 f"[start] trims: {idle[0]}_ref goes to no input of the DLL; the references are: "
                 f"{', '.join(REFERENCES)}"

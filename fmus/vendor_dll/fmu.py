@@ -94,7 +94,8 @@ def read_dll(
         if "error" in answer:
             raise DllError(f"{path.name}: {answer['error']}")
         interface = DllInterface.from_json(answer["interface"])
-        if faults := interface.faults():
+        faults = interface.faults()
+        if faults:
             raise DllError(f"{path.name}: {'; '.join(faults)}; its author must mend that")
         looked = places(interface, given, path, folder)
         named = {name: place for name, place in looked.items() if place.is_file()}
@@ -205,7 +206,8 @@ def _plain(name: str) -> str:
 
 def _check_texts(dll: VendorDll, given: Mapping[str, str]) -> None:
     words = {p.name for p in dll.interface.parameters if DATA_TYPES[p.data_type].kind == "String"}
-    if unknown := sorted(given.keys() - words):
+    unknown = sorted(given.keys() - words)
+    if unknown:
         has = ", ".join(sorted(words)) or "none"
         raise DllError(
             f"{dll.path.name}: {unknown[0]!r} is no parameter that is text; there are: {has}"
@@ -214,7 +216,8 @@ def _check_texts(dll: VendorDll, given: Mapping[str, str]) -> None:
 
 def _check_names(dll: VendorDll, names: Sequence[str]) -> None:
     taken = Counter(names)
-    if twice := [name for name, count in taken.items() if count > 1]:
+    twice = [name for name, count in taken.items() if count > 1]
+    if twice:
         raise DllError(
             f"{dll.path.name}: the name {twice[0]!r} would stand for two variables of the FMU; rename it in the DLL"
         )

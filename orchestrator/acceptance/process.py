@@ -182,7 +182,8 @@ class FmuProcess:
         while not (answered := wait(box.address, self._number, _LOOK)):
             now = monotonic()
             if not self._process.running:
-                if answered := wait(box.address, self._number, 0.0):
+                answered = wait(box.address, self._number, 0.0)
+                if answered:
                     break  # with its last breath
                 raise self._died(call)
             if box.head.steps != steps:
@@ -237,7 +238,8 @@ class FmuProcess:
         self._instances -= 1
         if self._instances or not self.alive or runs_under_wine(self.description):
             return
-        if left := self._process.left_behind(_GRACE):
+        left = self._process.left_behind(_GRACE)
+        if left:
             more = f" and {len(left) - _SHOWN} more" if len(left) > _SHOWN else ""
             raise self._end(
                 ProcessFault.LEFT,

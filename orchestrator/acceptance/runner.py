@@ -144,7 +144,8 @@ def check_fmu(
     before.
     Raises an `InputError` if there is no such file or no such check, or the binding is not TOML, not of its form or not
     filled in."""
-    if unknown := [name for name in only if name not in CHECKS and name not in FILE_CHECKS]:
+    unknown = [name for name in only if name not in CHECKS and name not in FILE_CHECKS]
+    if unknown:
         known = ", ".join([*FILE_CHECKS, *CHECKS])
         raise InputError(f"there is no check {', '.join(map(repr, unknown))}; there are: {known}")
     if "binding" in only and binding is None:
@@ -277,15 +278,15 @@ class _Runner:
         for place, name in enumerate(names):
             self._deadline = monotonic() + _PATIENCE * crowded() * self._limits.seconds
             result = self._answer(CHECKS[name])
-            if cause := likely_cause(self._subject.description, result.fault):
+            cause = likely_cause(self._subject.description, result.fault)
+            if cause:
                 result = replace(
                     result, evidence=f"{result.evidence}; {cause}", whose=base.Whose.BINDING
                 )
             results.append(self._with_whom(result))
             self._asked.append(name)
-            if (because := self._harmful(result)) or (
-                name == "runs" and (because := self._too_bad(result))
-            ):
+            because = self._harmful(result)
+            if because or (name == "runs" and (because := self._too_bad(result))):
                 results += [base.not_applicable(later, because) for later in names[place + 1 :]]
                 return
 

@@ -86,7 +86,8 @@ def linearize_component(
     component = exchange.component
     # refuses a component that can neither be perturbed nor has a model inside
     StateAccess(component)
-    if (inside := embedded_model(component)) is not None:
+    inside = embedded_model(component)
+    if inside is not None:
         return _from_inside(exchange, inside, time, step_size, inputs, observed)
     names = component.description.states
     rates = component.description.rates if derivatives else ()
@@ -184,9 +185,10 @@ def _from_inside(
     component = exchange.component
     check_operating_point(component, model)
     entries, exits = (*exchange.inputs.names, *inputs), (*exchange.outputs.names, *observed)
-    if missing := [v for v in entries if v not in model.inputs] + [
+    missing = [v for v in entries if v not in model.inputs] + [
         v for v in exits if v not in model.outputs
-    ]:
+    ]
+    if missing:
         raise AnalysisError(
             f"component {component.name!r}: the linear model inside its FMU has no {', '.join(map(repr, missing))}; it "
             f"has the inputs {', '.join(model.inputs)} and the outputs {', '.join(model.outputs)}"

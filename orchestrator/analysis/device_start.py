@@ -101,7 +101,9 @@ def _of(master: Master, name: str) -> Iterator[Misfit]:
     v = complex(given.get("v_re", 0.0), given.get("v_im", 0.0))
     if described.port.start.get("P_0") and abs(v - rect(start["v_0"], start["theta_0"])) < _AT:
         asked = complex(start["P_0"], start["Q_0"])
-        if misfit := of_power(asked, v * current.conjugate()):
+        misfit = of_power(asked, v * current.conjugate())
+        if misfit:
             yield misfit
-    if misfit := of_current(abs(current), described.port.current_limit):
+    misfit = of_current(abs(current), described.port.current_limit)
+    if misfit:
         yield misfit

@@ -306,7 +306,8 @@ def examine(
     )
     if long and not (stability.stable is False and _has_delays(blocks, model, rightmost)):
         stability = replace(stability, stable=None, reason="; ".join(long))
-    if turning := _turning(blocks, master, model, stability, found, rightmost):
+    turning = _turning(blocks, master, model, stability, found, rightmost)
+    if turning:
         stability = replace(stability, stable=None, reason="; ".join(map(str, turning)))
         found = [doubt for doubt in found if doubt not in turning]
         return Examination(stability, (*verdict_warnings(stability), *map(str, found), *wires))

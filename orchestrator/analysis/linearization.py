@@ -133,7 +133,8 @@ def _line_names(blocks: Blocks, lines: Mapping[int, tuple[DelayLine, slice]]) ->
 def continuous(blocks: Blocks) -> LinearModel:
     """The same components, connected without any communication step: ẋ = A·x."""
     blocks.check_made_for(None)
-    if silent := [name for name, c in blocks.components.items() if c.A_c is None]:
+    silent = [name for name, c in blocks.components.items() if c.A_c is None]
+    if silent:
         raise AnalysisError(
             f"components {', '.join(silent)} do not give their derivatives, so no continuous model can be made"
         )

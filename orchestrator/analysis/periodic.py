@@ -76,7 +76,8 @@ def _names_and_scales(blocks: Blocks, schedule: Schedule) -> tuple[tuple[str, ..
     """All states, held outputs among them, and what is 1 to each: at least 1, or what a change of another one by 1 does
     to it in one step."""
     model = compose(blocks, schedule, within_period=True)
-    if delayed := [name for name in model.names if DELAYED in name]:
+    delayed = [name for name in model.names if DELAYED in name]
+    if delayed:
         raise AnalysisError(
             f"sampled controllers that repeat after {blocks.period} communication steps have modes only where nothing "
             f"is on its way between components; here {delayed[0]} is: leave the delays of connections out"

@@ -32,7 +32,8 @@ def check_operating_point(component: Component, model: EmbeddedModel) -> None:
         )
     variables = component.description.variables
     expected = {**model.states, **model.inputs, **model.outputs, **_parameters(component, model)}
-    if unknown := [name for name in expected if name not in variables]:
+    unknown = [name for name in expected if name not in variables]
+    if unknown:
         raise AnalysisError(
             f"{where} speaks of {unknown[0]!r}, which the FMU does not have; build both together"
         )
@@ -90,7 +91,8 @@ class StateAccess:
     """Reads and sets the continuous states of one component; those that cannot be set stay as they are."""
 
     def __init__(self, component: Component) -> None:
-        if reason := obstacle(component):
+        reason = obstacle(component)
+        if reason:
             raise AnalysisError(reason, kind=ErrorKind.HIDDEN_STATES)
         self._settable = component.description.states_are_settable
         self.batch = RealBatch(component, component.description.states)

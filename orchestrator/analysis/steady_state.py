@@ -44,7 +44,8 @@ def find_operating_point(
     over a shorter step.
     ``accept``: below this change, the power flow's point is taken as it is. Between ``accept`` and ``tolerance`` a
     better point is searched for, and kept if it is better."""
-    if (steps := steps_of_period(master, master.clock.step_size)) > 1:
+    steps = steps_of_period(master, master.clock.step_size)
+    if steps > 1:
         return _periodic_point(master, steps, tolerance, accept, max_iterations)
     state = CoupledState(master)
     x = state.read()
@@ -72,7 +73,8 @@ def find_operating_point(
     if not residual <= tolerance:
         worst = ", ".join(f"{names[i]} ({change[i]:+.3g})" for i in np.argsort(-np.abs(change))[:3])
         changes = f"{_newton_in_words(iterations)} a communication step changes {worst}, more than {tolerance:g}"
-        if present := described(master.system.wires):
+        present = described(master.system.wires)
+        if present:
             raise AnalysisError(
                 f"no steady state found with {'; '.join(present)}: leave it out, or let it begin later, as an event "
                 f"([[events]] with a time); {changes}",
@@ -121,7 +123,8 @@ def what_to_check(master: Master) -> str:
             f"{late}. Its partners started from the first value: have the FMU compute its outputs in initialisation "
             "mode (`gfor fmu check --only initial_outputs` shows it alone)"
         )
-    if misfits := sentences(misfits_of(master)):
+    misfits = sentences(misfits_of(master))
+    if misfits:
         return "; ".join(misfits)
     return (
         "check the start values of the component of these states, which for a model of yours are the arguments of its "

@@ -171,7 +171,8 @@ class Case:
                 "with_(**tables)"
             )
         known = {field.alias or name for name, field in CaseTable.model_fields.items()}
-        if unknown := [name for name in tables if name not in known]:
+        unknown = [name for name in tables if name not in known]
+        if unknown:
             hint = close_names(unknown[0], known)
             raise InputError(
                 f"with_({unknown[0]}=…): a case file has no table {unknown[0]!r}; "

@@ -104,9 +104,10 @@ def _warn_of_other_files(first: xr.Dataset, second: xr.Dataset, labels: tuple[st
         )
         warnings.warn(text, ResultsWarning, stacklevel=3)
     one, two = (json.loads(run.attrs.get("inputs", "{}")) for run in (first, second))
-    if other := [
+    other = [
         name for name in one if one[name] != two.get(name, one[name]) and not name.endswith(".fmu")
-    ]:
+    ]
+    if other:
         text = f"{labels[0]} and {labels[1]} are of files that differ: {few(other, 3)}"
         warnings.warn(text, ResultsWarning, stacklevel=3)
 

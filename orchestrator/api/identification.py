@@ -172,7 +172,8 @@ def as_dataset(given: Any, otherwise: str) -> Any:
         data = data.assign_coords(time=_seconds(given["time"].to_index(), otherwise))
     else:
         return given
-    if wrong := [name for name in data if data[name].dtype.kind not in "fiub"]:
+    wrong = [name for name in data if data[name].dtype.kind not in "fiub"]
+    if wrong:
         raise InputError(f"{otherwise}: column {wrong[0]!r} holds no numbers; leave it out")
     return data
 

@@ -40,7 +40,8 @@ def catalogue_model(name: str, parts: Mapping[str, str] | None = None) -> Model:
             f"parts = {parts!r}; give models by part, such as {{'machine': 'genrou', 'exciter': 'sexs'}}"
         )
     chosen, known = dict(parts or {}), parts_of(name)
-    if unknown := [part for part in chosen if part not in known]:
+    unknown = [part for part in chosen if part not in known]
+    if unknown:
         has = f"it is made of {', '.join(known)}" if known else "'synchronous_generator' has some"
         raise InputError(f"model {name!r} has no part {unknown[0]!r} to choose; {has}")
     try:
@@ -148,7 +149,8 @@ def with_reference(path: Path) -> Path:
 
 def _platforms(given: Sequence[str], known: Collection[str]) -> tuple[str, ...]:
     listed = names(given, "platforms")
-    if wrong := [name for name in listed if name not in known]:
+    wrong = [name for name in listed if name not in known]
+    if wrong:
         raise InputError(
             f"platforms: there is no platform {wrong[0]!r}; choose from {', '.join(sorted(known))}"
         )

@@ -322,7 +322,8 @@ class Scenario:
         if stop_time is None or stop_time == self.prepared.stop_time:
             return self.prepared
         prepared = self._anew(self._file, stop_time)
-        if changed := _differences(self.prepared, prepared):
+        changed = _differences(self.prepared, prepared)
+        if changed:
             raise InputError(
                 f"{self._file.path}: files of the case were changed since the scenario was made, which changes "
                 f"{', '.join(changed[:3])}; load the case again"

@@ -335,7 +335,8 @@ class _Reader:
         """Each variable may be bound once, and the start values must give finite numbers."""
         used = [*port.voltage.variables, *port.current.variables, *port.settings]
         used += [m.variable for maps in port.start.values() for m in maps]
-        if twice := sorted({name for name in used if used.count(name) > 1}):
+        twice = sorted({name for name in used if used.count(name) > 1})
+        if twice:
             self._problems.append(
                 Problem("", f"{', '.join(twice)}: bound more than once; a variable has one meaning")
             )

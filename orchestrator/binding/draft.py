@@ -198,9 +198,10 @@ def _rated_voltage(fmu: FmuDescription, ports: Iterable[Guess | None]) -> str:
         for v in fmu.variables.values()
         if v.causality == "parameter" and v.type == "Real" and v.start
     ]
-    if named := next(
+    named = next(
         (v for v in known if v.unit in hints.VOLTS and _RATED_VOLTAGE.search(_last(v.name))), None
-    ):
+    )
+    if named:
         return f'V_n = "{named.start_number:g} {named.unit}"  # GUESS: start value of {_comment(named.name)}'
     units = {hints.likely_unit(v) for guess in ports if guess is not None for v in guess.variables}
     if units & {*hints.VOLTS, *hints.AMPERES}:
@@ -289,7 +290,8 @@ def _unit(info: VariableInfo, such_as: str) -> list[str]:
 def _value(variables: Sequence[VariableInfo], unit: str) -> list[str]:
     """Which value of an alternating quantity in V or A is meant."""
     text = " ".join(v.description for v in variables)
-    if kind := hints.kind_of_voltage(text) if unit in hints.VOLTS else hints.kind_of_current(text):
+    kind = hints.kind_of_voltage(text) if unit in hints.VOLTS else hints.kind_of_current(text)
+    if kind:
         return [f'value = "{kind}"  # GUESS: from the description']
     kinds = "line-to-line rms, phase rms or phase peak" if unit in hints.VOLTS else "rms or peak"
     return [f'value = "{REQUIRED}: {kinds}"']

@@ -17,7 +17,8 @@ class DraftedTable(Table):
     @classmethod
     def _nothing_left_to_fill_in(cls, values: Any) -> Any:
         given = values.items() if isinstance(values, dict) else ()
-        if left := [k for k, v in given if isinstance(v, str) and v.startswith(REQUIRED)]:
+        left = [k for k, v in given if isinstance(v, str) and v.startswith(REQUIRED)]
+        if left:
             raise ValueError(
                 f"still to be filled in: {', '.join(left)}; the comments in the draft say what is meant"
             )

@@ -122,7 +122,8 @@ def _assign_key(draft: Draft, key: str, value: Value, where: str) -> None:
     variable may be a pattern, too."""
     if sets_imperfection(key):
         return  # done when the connections are made
-    if other := _switch(draft, key, value):
+    other = _switch(draft, key, value)
+    if other:
         draft.note(where, other)
         return
     pattern, _, variable = key.partition(".")

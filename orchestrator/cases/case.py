@@ -86,7 +86,8 @@ class Case(CaseDefinition):
         ``dispatch``: What the units fed before an outage that they share; None where each feeds its own ``P_0``.
         ``voltages_before``: Bus voltages before an outage [pu], from which loads follow the voltage whose source tells
         their constant currents and impedances."""
-        if (other := self._of_kind(overrides, parameters)) is not self:
+        other = self._of_kind(overrides, parameters)
+        if other is not self:
             return other.prepare(
                 scenarios,
                 overrides,
@@ -193,7 +194,8 @@ class Case(CaseDefinition):
                     for name, p in plans
                     if fnmatchcase(name, pattern)
                 }
-                if off := [scenario for scenario, is_on in on.items() if not is_on]:
+                off = [scenario for scenario, is_on in on.items() if not is_on]
+                if off:
                     text = f"too, where it is off: choose one scenario of {', '.join(on)}"
                     if len(on) == 1:
                         remedy = f"choose another scenario, or set {others[0]} = true too where both are meant"
@@ -302,7 +304,8 @@ class Case(CaseDefinition):
     ) -> dict[str, tuple[ComponentTable, ComponentPlan]]:
         preparer = self._of_kind(overrides, parameters)._preparer(scenario, overrides, parameters)
         components = preparer.assemble().components
-        if problems := [*self.problems, *preparer.problems]:
+        problems = [*self.problems, *preparer.problems]
+        if problems:
             raise CaseError(str(self.path), problems)
         return {name: (preparer.draft.tables[name], plan) for name, plan in components.items()}
 
@@ -365,7 +368,8 @@ def load_case(name_or_path: str | Path, *, trust_fmus: bool = False) -> Case:
         )
     if path.suffix.lower() == ".ssp":
         return _from_ssp(path, trust_fmus)
-    if (source := _SOURCES.get(path.suffix.lower())) is not None:
+    source = _SOURCES.get(path.suffix.lower())
+    if source is not None:
         what, section, key = source
         raise InputError(
             f"{name_or_path}: this is {what}, not a case; `gfor new` writes one (.toml), whose [{section}] has "

@@ -89,9 +89,10 @@ def _with_ports(draft: Draft, grid: ComponentTable) -> Network | None:
     if network is None:
         return None
     known = {port.name for port in network.ports}
-    if further := [
+    further = [
         Port(n, t.bus) for n, t in draft.tables.items() if t.bus in network.buses and n not in known
-    ]:
+    ]
+    if further:
         network = replace(network, ports=(*network.ports, *further))
     return _with_switches(network, draft)
 
@@ -123,7 +124,8 @@ def _from_table(draft: Draft, grid: ComponentTable, everything: Tables) -> Netwo
     if draft.found.network_failed:
         return None
     held = {table.bus for table in everything.values()}
-    if idle := [bus for bus in data.generation if bus not in held]:
+    idle = [bus for bus in data.generation if bus not in held]
+    if idle:
         remedy = "add a row to the units' file, or a component with this bus"
         text = f"the source has generators at {', '.join(idle)}, where the case has no unit and no component; {remedy}"
         draft.note_network(draft.given.place("network"), text)

@@ -47,7 +47,8 @@ def rows_of(path: Path, columns: Sequence[str]) -> list[Row]:
         reader = csv.DictReader(io.StringIO(text), restval="")
         names = reader.fieldnames or ()
         _check_names(path, names)
-        if missing := [c for c in columns if c not in names]:
+        missing = [c for c in columns if c not in names]
+        if missing:
             raise InputError(
                 f"{path}: column {', '.join(missing)} is missing; it should hold {', '.join(columns)}"
             )

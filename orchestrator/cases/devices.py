@@ -78,7 +78,8 @@ def _names(named: Sequence[tuple[str | None, Path]]) -> list[str]:
                 for k, name in zip(alike, longer, strict=True):
                     found[k] = name
                 break
-    if twice := _doubles(found):
+    twice = _doubles(found)
+    if twice:
         name = twice[0]
         files = [
             path

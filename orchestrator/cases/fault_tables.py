@@ -96,9 +96,10 @@ def _trip(draft: Draft, table: schema.ComponentTripTable, where: str) -> list[Ev
     name, components = table.component, draft.system.components
     own = _BREAKER in components[name].description.variables
     port = f"{name}.{_BREAKER}"
-    if grid := next(
+    grid = next(
         (other for other, plan in components.items() if port in plan.description.variables), None
-    ):
+    )
+    if grid:
         return [coupled.UnitSwitching(table.time, grid, name, connected=False, has_breaker=own)]
     if own:
         return [coupled.ParameterChange(table.time, name, _BREAKER, False)]

@@ -121,7 +121,8 @@ def check_connected(buses: Sequence[str], lines: Sequence[FlowLine], slack_bus: 
         found = neighbours[waiting.pop()] - reached
         waiting += found
         reached |= found
-    if islands := [bus for bus in buses if bus not in reached]:
+    islands = [bus for bus in buses if bus not in reached]
+    if islands:
         opened = [
             line.name
             for line in lines

@@ -38,19 +38,22 @@ def plain(values: Mapping[str, Any] | None, argument: str = "values") -> dict[st
         raise InputError(
             f"{argument} = {values!r}; give values by name, such as {{'grid.X_L': 0.3}}"
         )
-    if wrong := [key for key in _keys(values) if not isinstance(key, str)]:
+    wrong = [key for key in _keys(values) if not isinstance(key, str)]
+    if wrong:
         raise InputError(
             f"{argument}: {wrong[0]!r} is not a name; give values by name, such as {{'grid.X_L': 0.3}}"
         )
     flat = flatten(values)
-    if twice := given_twice(flat):
+    twice = given_twice(flat)
+    if twice:
         raise InputError(f"{argument}: {twice[0]!r} is given twice, flat and nested; give it once")
     found = {".".join(path): plain_value(value) for path, value in flat}
-    if several := [
+    several = [
         name
         for name, value in found.items()
         if hasattr(value, "__len__") and not isinstance(value, str)
-    ]:
+    ]
+    if several:
         raise InputError(
             f"{argument}: {several[0]} is given several values; give one, or vary it with case.sweep(…)"
         )

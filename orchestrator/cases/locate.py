@@ -30,7 +30,8 @@ def _lines(text: str) -> dict[tuple[str, ...], int]:
     table: tuple[str, ...] = ()
     counts: dict[tuple[str, ...], int] = {}
     for number, line in enumerate(text.splitlines(), start=-1 if text.startswith(FROM_TEXT) else 1):
-        if header := _HEADER.match(line):
+        header = _HEADER.match(line)
+        if header:
             table = _parts(header.group(2))
             if header.group(1) == "[[":
                 index = counts.get(table, 0)

@@ -40,7 +40,8 @@ def file_name(name: str) -> str:
         raise ValueError(f"this name is empty; {rule}")
     if len(name.encode("utf-8", "surrogatepass")) > LONGEST:
         raise ValueError(f"this name is longer than {LONGEST} bytes ({name[:40]}…); {rule}")
-    if found := _FORBIDDEN.search(name):
+    found = _FORBIDDEN.search(name)
+    if found:
         raise ValueError(f"the name {name!r} holds the character {found.group()!r}; {rule}")
     if name[0] in ".-=+@ " or name[-1] in ". ":
         raise ValueError(
@@ -99,7 +100,8 @@ def whose(part: str, variables: Mapping[str, Iterable[str]]) -> str:
 
 
 def variables_of(expression: str) -> list[str]:
-    if of := re.fullmatch(r"\s*\|(.+)\|\s*", expression):  # the magnitude of a phasor
+    of = re.fullmatch(r"\s*\|(.+)\|\s*", expression)
+    if of:  # the magnitude of a phasor
         return [f"{of[1].strip()}_re", f"{of[1].strip()}_im"]
     names = [part.strip() for part in expression.split(" - ")]
     if not 1 <= len(names) <= 2 or not all(names):

@@ -230,11 +230,8 @@ def without_negative_reactances(lines: list[Line], kept: set[str]) -> tuple[list
     for line in [line for line in lines if line.X < SMALLEST_REACTANCE]:
         for bus in (line.from_bus, line.to_bus):
             others = [x for x in lines if bus in (x.from_bus, x.to_bus) and x is not line]
-            if (
-                joined := _joined(line, others[0], bus)
-                if len(others) == 1 and bus not in kept
-                else None
-            ):
+            joined = _joined(line, others[0], bus) if len(others) == 1 and bus not in kept else None
+            if joined:
                 lines = [joined if x is others[0] else x for x in lines if x is not line]
                 merged.add(bus)
                 break

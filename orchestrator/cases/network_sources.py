@@ -48,7 +48,8 @@ def read_matpower(path: Path) -> SourceTables:
         raise InputError(
             f"{path}: it cannot be read as a MATPOWER case: {error or type(error).__name__}"
         ) from error
-    if missing := [name for name in ("baseMVA", *_COLUMNS) if tables.get(name) is None]:
+    missing = [name for name in ("baseMVA", *_COLUMNS) if tables.get(name) is None]
+    if missing:
         raise InputError(
             f"{path}: it is not a MATPOWER case, because mpc.{', mpc.'.join(missing)} is missing"
         )

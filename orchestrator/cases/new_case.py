@@ -121,7 +121,8 @@ def read_converter(text: str) -> WantedConverter:
             raise InputError(f"--converter {text!r}: {key} is given twice; {how}")
         found[key] = part if quantity is not None else rest.strip()
     missing = {"bus": "bus", "MVA": "rating in MVA", "MW": "power in MW"}
-    if lacks := [words for key, words in missing.items() if key not in found]:
+    lacks = [words for key, words in missing.items() if key not in found]
+    if lacks:
         raise InputError(f"--converter {text!r}: the {' and the '.join(lacks)} is missing; {how}")
     rating, power = to_unit(found["MVA"], "MVA"), to_unit(found["MW"], "MW")
     if not 0 < rating < math.inf or not abs(power) <= rating:

@@ -36,7 +36,8 @@ def network_doubts(draft: Draft) -> Iterator[UnusualValue]:
         yield from _line(draft, draft.grid, grid, line)
     for transformer in draft.network.transformers:
         yield from _transformer(draft, draft.grid, grid, transformer)
-    if (stray := value_of(grid, "stray_B")) is not None:
+    stray = value_of(grid, "stray_B")
+    if stray is not None:
         yield from outside(
             draft, draft.grid, "stray_B", stray, STRAY_B, draft.given.place("network", "stray_B")
         )
@@ -45,7 +46,8 @@ def network_doubts(draft: Draft) -> Iterator[UnusualValue]:
 def _equivalents(draft: Draft, name: str, network: Network) -> Iterator[UnusualValue]:
     """Name the branches of a network of phasors that only a reduction can have made."""
     for quantity, what in (("R", "resistance"), ("X", "reactance")):
-        if found := [line for line in network.lines if getattr(line, quantity) < 0]:
+        found = [line for line in network.lines if getattr(line, quantity) < 0]
+        if found:
             shown = few(
                 (f"{line.name!r} ({getattr(line, quantity):g} pu)" for line in found), _SHOWN
             )
@@ -112,7 +114,8 @@ def _line(draft: Draft, name: str, grid: ComponentPlan, line: Line) -> Iterator[
     found = {q: value_of(grid, variable) for q, variable in variables.items()}
     place = {q: _place(draft, "lines", line.name, q, variable) for q, variable in variables.items()}
     for quantity, usual in {"X": LINE_X, "B": LINE_B, "tap": LINE_RATIO}.items():
-        if (value := found[quantity]) is not None and not (quantity == "X" and line.X < 0):
+        value = found[quantity]
+        if value is not None and not (quantity == "X" and line.X < 0):
             yield from outside(draft, name, variables[quantity], value, usual, place[quantity])
     yield from _shift(name, variables["shift"], found["shift"], place["shift"])
     R, X, X_C = found["R"], found["X"], found["X_C"]
@@ -172,7 +175,8 @@ def _swapped(
 def _place(draft: Draft, kind: str, element: str, key: str, *variables: str) -> str:
     table = draft.given.case.network
     for variable in variables:
-        if set_at := draft.places.get(f"{draft.grid}.{variable}"):
+        set_at = draft.places.get(f"{draft.grid}.{variable}")
+        if set_at:
             return set_at
     if table is not None and element in getattr(table, kind):
         return draft.given.place("network", kind, element, key)

@@ -146,10 +146,12 @@ def _unlike_others(draft: Draft) -> Iterator[UnusualValue]:
     """Values of a machine's records that are far from those of all others, which are alike."""
     found: dict[tuple[str, str | None], dict[str, float]] = {}
     for name, origin in draft.origins.items():
-        if (plan := draft.system.components.get(name)) is None:
+        plan = draft.system.components.get(name)
+        if plan is None:
             continue
         for variable in origin.lines:
-            if (value := value_of(plan, variable)) is not None and value > 0:
+            value = value_of(plan, variable)
+            if value is not None and value > 0:
                 usual = plan.description.variables[variable].usual
                 part = getattr(draft.tables[name], _PARTS.get(variable.partition(".")[0], ""), None)
                 if usual is None or usual.fits(value):  # else its range asks

@@ -294,7 +294,8 @@ class Preparer:
         where = self.draft.given.place("components", name)
         if takes_network(table) and self.draft.found.network_failed:
             return
-        if wrong := component_forms.contradiction(table):
+        wrong = component_forms.contradiction(table)
+        if wrong:
             self.draft.note(where, wrong)
             return
         if table.scan is not None and not self._case.scans:

@@ -116,9 +116,10 @@ def recorded(draft: Draft) -> tuple[tuple[str, ...], list[Problem]]:
         text = f"nothing is recorded in scenario {draft.given.name!r}: none of its outputs fits a pattern"
         questions.append(Problem(draft.given.place("solver", "record"), text))
     for place, expression in shown_signals(draft.given.case, draft.given.place):
-        if missing := [
+        missing = [
             name for name in _variables(expression) if name in outputs and name not in wanted
-        ]:
+        ]
+        if missing:
             text = f"{expression!r} is not shown, because solver.record leaves out {' and '.join(missing)}"
             questions.append(Problem(place, text))
     return tuple(name for name in outputs if name in wanted), questions

@@ -94,13 +94,16 @@ def _fractions(plan: ComponentPlan) -> float:
 
 def droop_gain(plan: ComponentPlan) -> float:
     """Power that a unit adds in steady state by frequency [pu, S_n and f_n]; 0 of one that does not answer to it."""
-    if gain := _number(plan, "governor.inverse_R"):
+    gain = _number(plan, "governor.inverse_R")
+    if gain:
         return gain
-    if gain := _number(plan, "governor.K"):
+    gain = _number(plan, "governor.K")
+    if gain:
         return gain * _fractions(plan)
     following = "frequency_droop.R_f" if _number(plan, "frequency_droop.enabled") else ""
     for name in ("governor.R", "droop.R_f", following, "mp"):
-        if (droop := _number(plan, name)) is not None:
+        droop = _number(plan, name)
+        if droop is not None:
             if not droop:
                 return _ISOCHRONOUS
             return (_number(plan, "governor.A_t") or 1.0) / droop
@@ -115,7 +118,8 @@ def power_limits(plan: ComponentPlan, reactive: float = 0.0) -> tuple[float, flo
 
     def turbine(least: str, most: str, factor: float = 1.0, idle: float = 0.0) -> None:
         for name, found in ((least, low), (most, high)):
-            if (value := _number(plan, f"governor.{name}")) is not None:
+            value = _number(plan, f"governor.{name}")
+            if value is not None:
                 found.append(factor * (value - idle))
 
     turbine("V_MIN", "V_MAX")
@@ -137,7 +141,8 @@ def power_limits(plan: ComponentPlan, reactive: float = 0.0) -> tuple[float, flo
         high.append(math.sqrt(max(0.0, (v_0 * circle) ** 2 - reactive**2)))
     if len(high) > 1 and low == [-math.inf]:
         low.append(-min(high))
-    if (most := plan.description.variables["P_0"].maximum) is not None:
+    most = plan.description.variables["P_0"].maximum
+    if most is not None:
         high.append(most)
     losses = 1.5 * (_number(plan, "machine.R_s") or 0.0)
     return max(low) + _ROOM, min(high) - _ROOM - losses

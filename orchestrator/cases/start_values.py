@@ -147,7 +147,8 @@ def _loads(
         p_mw = scale * grid.number(f"{load.name}.P")
         q_mvar = scale * grid.number(f"{load.name}.Q") if load.q_mvar else 0.0
         loads[load.name] = FlowLoad(load.bus, p_mw, q_mvar)
-        if (own := following.get(load.name)) is not None:
+        own = following.get(load.name)
+        if own is not None:
             loads[load.name] = FlowLoad(
                 load.bus, p_mw, q_mvar, own.laws.active, own.laws.reactive, own.reference
             )
@@ -198,7 +199,8 @@ def _limits(limits: Mapping[str, tuple[float, float]], units: Sequence[FlowUnit]
     found = {}
     for bus, both in limits.items():
         whole = sum(u.S_n for u in units if u.bus == bus)
-        if feeding := sum(u.S_n for u in units if u.bus == bus and u.connected):
+        feeding = sum(u.S_n for u in units if u.bus == bus and u.connected)
+        if feeding:
             least, most = (q * feeding / whole / SYSTEM_BASE_MVA for q in both)
             found[bus] = (least, most)
     return found

@@ -140,7 +140,8 @@ def unit_rows(
         figures = {
             column: _figure(entry, column, given) for column in ("rating_mva", "p_mw", "v_pu")
         }
-        if missing := [column for column, value in figures.items() if value is None]:
+        missing = [column for column, value in figures.items() if value is None]
+        if missing:
             raise InputError(
                 f"{place_of(entry)}: the unit at bus {entry['bus']} has no {', '.join(missing)}; add the column, or "
                 "take the network from a source with a generator at this bus"

@@ -231,7 +231,8 @@ def modal_test(times: NDArray[np.float64], signal: NDArray[np.float64], start: f
         for m in oscillating
         if is_judged(m.frequency_hz) and m.amplitude >= LEAST_AMPLITUDE * largest
     )
-    if bad := [m for m in judged if not m.damping_percent > 100 * LEAST_DAMPING]:
+    bad = [m for m in judged if not m.damping_percent > 100 * LEAST_DAMPING]
+    if bad:
         worst = min(bad, key=lambda m: m.damping_percent)
         return ModalTest(
             judged, False, f"{worst.frequency_hz:.3f} Hz has {worst.damping_percent:.2f} % ≤ 5 %"

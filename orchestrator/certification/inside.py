@@ -222,7 +222,8 @@ def _unpacked(fmu: Path, into: Path) -> bytes | None:
 
 def _check_names(fmu: Path) -> None:
     names = names_in(fmu)
-    if taken := [name for name in names if name.startswith(f"{FOLDER}/")]:
+    taken = [name for name in names if name.startswith(f"{FOLDER}/")]
+    if taken:
         raise InputError(
             f"--into: {fmu} holds {taken[0]}; certify the FMU without certificates, and name this file "
             "as --into: the new certificate joins those in it"

@@ -216,7 +216,8 @@ def _wrong(having: PointResult, pod: str, event_time: float) -> list[str]:
         if not np.isfinite(values).all():
             at = having.times[int(np.argmax(~np.isfinite(values)))]
             wrong.append(f"{name} is not finite from t = {at:g} s on")
-    if told := told_of(having.findings, CONVERTER):
+    told = told_of(having.findings, CONVERTER)
+    if told:
         wrong.append(str(told["message"]))
     wrong += motion_faults(having.times, having.signals, event_time, having.findings)
     return wrong + [text for letter in "pq" if (text := _idle(having, pod, letter))]

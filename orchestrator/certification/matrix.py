@@ -192,7 +192,8 @@ def in_words(cell: MatrixCell) -> list[str]:
         return [cell.verdict, *cell.figures]
     without_figure = (m for m in cell.margins if not m.accepted and m.margin is None)
     lines = [cell.verdict, *(f"{m.place}: {m.criterion}" for m in without_figure)]
-    if (least := cell.narrowest) is not None:
+    least = cell.narrowest
+    if least is not None:
         lines.append(f"{margin_text(least.margin)} {least.place}: {least.criterion}")
     return lines
 

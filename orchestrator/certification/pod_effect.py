@@ -58,11 +58,8 @@ def with_pod(
     """The verdicts with what the active controllers change.
 
     They have to damp where the mode needs it most, and in the response as at the eigenvalues."""
-    if not (
-        name := " and ".join(
-            f"POD-{letter.upper()}" for letter in controllers.pod.removeprefix("none")
-        )
-    ):
+    name = " and ".join(f"POD-{letter.upper()}" for letter in controllers.pod.removeprefix("none"))
+    if not name:
         return list(verdicts)
     why = (
         ""
@@ -111,11 +108,10 @@ def _effect(point: PointResult, event: float, why: str) -> PodEffect:
         slow_part(point.times, signal.astype(np.float32).astype(float))[window],
     )
     with suppress(AnalysisError):  # it does not swing
-        if (
-            found := [m.eigenvalue for m in identify_modes(t, y) if m.eigenvalue.imag > 0]
-            if modes
-            else []
-        ):
+        found = (
+            [m.eigenvalue for m in identify_modes(t, y) if m.eigenvalue.imag > 0] if modes else []
+        )
+        if found:
             modes["response"] = complex(min(found, key=lambda x: abs(x - modes["on"])))
     with_it, without = (
         _misfit(t[::_EVERY] - t[0], y[::_EVERY], x) for x in (point.modes.eigenvalues, point.off)

@@ -163,7 +163,8 @@ def _value(mode: dict[str, Any]) -> complex:
 def faults(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Iterator[str]:
     """Values of a damping test's case file that are others than the certificate's, and what it leaves out or adds."""
     stated = [point["X_L"] for point in content["points"]]
-    if left_out := [f"{X:g}" for X in responses["X_L"].values.tolist() if X not in stated]:
+    left_out = [f"{X:g}" for X in responses["X_L"].values.tolist() if X not in stated]
+    if left_out:
         yield f"the record has no points for the responses at X_L = {', '.join(left_out)} pu"
     for point in content["points"]:
         partners = [

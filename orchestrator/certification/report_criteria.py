@@ -67,7 +67,8 @@ def signal_name(signal: str) -> str:
 
 def converter_model(points: Iterable[PointResult]) -> str:
     known = [p for p in points if p.modes is not None]
-    if boxes := [p for p in known if p.identified is not None]:
+    boxes = [p for p in known if p.identified is not None]
+    if boxes:
         orders = ", ".join(dict.fromkeys(str(p.identified) for p in boxes))
         error = max(p.fit_errors.get(CONVERTER, 0.0) for p in boxes)
         return (
@@ -326,7 +327,8 @@ def _time_cells(time: TimeVerdict | None) -> list[str]:
 
 
 def _remark(c: Certificate) -> Iterator[str]:
-    if lowered := [(m, v.X_L) for v in c.verdicts for m in v.lowered]:
+    lowered = [(m, v.X_L) for v in c.verdicts for m in v.lowered]
+    if lowered:
         worst, X_L = min(lowered, key=lambda entry: entry[0].damping_percent)
         places = ", ".join(f"{X:g}" for X in dict.fromkeys(X for _, X in lowered))
         change = (
@@ -344,9 +346,10 @@ def _where(bad: list[PointVerdict]) -> str:
 
 
 def _least_and_growth(c: Certificate) -> Iterator[str]:
-    if least := min(
+    least = min(
         (m for v in c.verdicts for m in v.modes), key=lambda m: m.damping_percent, default=None
-    ):
+    )
+    if least:
         yield f"Least damping of all judged modes: {damping(least.damping_percent)} % at {least.frequency_hz:.3f} Hz"
     growing = [c.results[WITH, v.X_L] for v in c.verdicts]
     if growing and all(p.modes is not None for p in growing):

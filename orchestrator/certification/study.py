@@ -32,7 +32,8 @@ def certify(
         case = write_case(request, controllers.settings, place)
         return {name: case.prepare([name], first)[0] for name in (WITHOUT, WITH)}
 
-    if (own := rated_frequency(request, NTS.f_n)) != NTS.f_n:
+    own = rated_frequency(request, NTS.f_n)
+    if own != NTS.f_n:
         others = (
             ", ".join(f"--code {key}" for key, code in CODES.items() if code.f_n == own) or "none"
         )

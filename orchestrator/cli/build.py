@@ -123,7 +123,8 @@ def run(options: argparse.Namespace) -> int:
 
 def _take_from_table(options: argparse.Namespace) -> None:
     given = {"--native": options.native, "--fmi": options.fmi, "--platform": options.platform}
-    if said := [name for name, value in given.items() if value]:
+    said = [name for name, value in given.items() if value]
+    if said:
         raise InputError(
             f"--for {options.host} chooses that by itself: leave out {', '.join(said)}, or --for"
         )
@@ -153,7 +154,8 @@ def _from_dll(options: argparse.Namespace) -> int:
             "--reference, --fmi and --for"
         )
     pairs = [entry.partition("=") for entry in options.text]
-    if wrong := [name for name, sign, _ in pairs if not (name and sign)]:
+    wrong = [name for name, sign, _ in pairs if not (name and sign)]
+    if wrong:
         raise InputError(f"--text {wrong[0]}: give NAME=VALUE")
     built = build_from_dll(
         options.from_dll, options.dest, texts={name: value for name, _, value in pairs}

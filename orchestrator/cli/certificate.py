@@ -116,7 +116,8 @@ def _remarks(found: Certificate) -> list[str]:
         said += [
             f"the binding has {text}" for text in found.description.unlike_delivered().values()
         ]
-    if left := [part for part in found.missing if part not in found.departures]:
+    left = [part for part in found.missing if part not in found.departures]
+    if left:
         said.append(f"Not tested: {'; '.join(left)}")
     return list(dict.fromkeys(said))
 
@@ -156,7 +157,8 @@ def _show_damping_test(found: Certificate, test: DampingTest, console: Console) 
         )
     console.print(table, "")
     for v in found.verdicts:
-        if said := v.of_base_critical():
+        said = v.of_base_critical()
+        if said:
             console.print(f"X_L = {v.X_L:g} pu: {escape(said)}", soft_wrap=True, highlight=False)
     if found.stored:
         console.print(f"{found.stored} of {len(found.results)} points were there already")
@@ -227,14 +229,14 @@ def check_code_options(options: argparse.Namespace, devices: Sequence[Device]) -
         "--black-box": options.black_box,
         "--reactances": options.reactances,
     }
-    if other := [name for name, value in asked.items() if value]:
+    other = [name for name, value in asked.items() if value]
+    if other:
         raise InputError(
             f"{', '.join(other)}: only --code {NTS631} has it; leave it out, and set a damping "
             "controller by --set"
         )
-    if study := [
-        name for device in devices for name in device.values if name.split(".")[0] in STUDY
-    ]:
+    study = [name for device in devices for name in device.values if name.split(".")[0] in STUDY]
+    if study:
         raise InputError(
             f"--set {study[0]}: the test bench has no such component; give values of the converter only"
         )
@@ -279,7 +281,8 @@ def certified(
 
 def run_stiffness(options: argparse.Namespace, device: Device) -> int:
     asked = {"--pdf": options.pdf, "--details": options.details, "--check": options.check}
-    if other := [name for name, value in asked.items() if value]:
+    other = [name for name, value in asked.items() if value]
+    if other:
         raise InputError(
             f"{', '.join(other)}: --code {GB} gives figures and no certificate; leave it out"
         )

@@ -40,7 +40,8 @@ def check_sensitivity_options(options: argparse.Namespace, codes: Sequence[str],
         "--confirm": options.confirm,
     }
     if not options.sensitivities:
-        if idle := [name for name, value in others.items() if value]:
+        idle = [name for name, value in others.items() if value]
+        if idle:
             raise InputError(
                 f"{idle[0]}: it belongs to --sensitivities, which is not given; add it, or leave this out"
             )
@@ -84,7 +85,8 @@ def find_needs(
                     escape(needs_record.confirmed_text(need)), soft_wrap=True, highlight=False
                 )
             console.print("")
-        if text := needs_record.left_out_text(plan):
+        text = needs_record.left_out_text(plan)
+        if text:
             console.print(escape(f"Not changed: {text}"), soft_wrap=True, highlight=False)
         console.print(
             escape(f"Report in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True

@@ -92,7 +92,8 @@ def _print(report: AcceptanceReport) -> None:
     if report.protections:
         in_force = [protection.name for protection in report.protections if protection.in_force]
         console.print(f"In force around the FMU's process: {', '.join(in_force)}.")
-    if lacking := missing(report.protections):
+    lacking = missing(report.protections)
+    if lacking:
         console.print(f"Not in force on this system: {', '.join(lacking)}.")
     colour = "" if report.trusted else "bold red" if report.failures else "bold yellow"
     console.print(escape(f"{report.fmu.name}: {report.sentence}"), style=colour)

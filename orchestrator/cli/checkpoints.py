@@ -71,7 +71,8 @@ class StudyCheckpoints:
         self, name: str, recording: RecordingFolder, place: ScenarioFolder
     ) -> Checkpoints | None:
         """Those of a scenario, which has what it recorded until then; None where none are wanted."""
-        if found := self._of.get(name):
+        found = self._of.get(name)
+        if found:
             found.take_back(
                 recording, [place.path / TRAJECTORY, place.place / TRAJECTORY], self.run
             )

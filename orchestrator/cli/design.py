@@ -134,7 +134,8 @@ def run(options: argparse.Namespace) -> int:
 
 def _check_for_one_point(options: argparse.Namespace) -> None:
     for name in ("controller", "component", "mode"):
-        if (times := len(getattr(options, name))) > 1:
+        times = len(getattr(options, name))
+        if times > 1:
             raise InputError(
                 f"--{name} is given {times} times; only a design with --points takes several: give one"
             )

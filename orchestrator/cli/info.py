@@ -37,7 +37,8 @@ def run(options: argparse.Namespace) -> int:
         f"state can be saved and restored: {'yes' if description.can_save_state else 'no'}",
         highlight=False,
     )
-    if hindrance := hindrance_here(description):
+    hindrance = hindrance_here(description)
+    if hindrance:
         console.print(
             f"[bold]It cannot run here[/bold]: {escape('; '.join(hindrance))}", highlight=False
         )

@@ -44,7 +44,8 @@ def run(options: argparse.Namespace) -> int:
         )
         kind = "continuous" if model.step_size is None else f"step map of {model.step_size:g} s"
         lines.append(f"{scenario.name}: {kind}, {size}: {', '.join(map(str, paths))}")
-        if exceptions := exceptions_in_words(model.sources):
+        exceptions = exceptions_in_words(model.sources)
+        if exceptions:
             lines.append(exceptions)
     print_stability(make_console(), verdicts)
     print("\n".join(lines))

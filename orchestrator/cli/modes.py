@@ -49,7 +49,8 @@ def run(options: argparse.Namespace) -> int:
     """Compute, print, and write what is asked for, while no other command works in the folder of the results."""
     if options.component is not None:
         return _with_a_black_box(options)
-    if excited := excitation_given(options):
+    excited = excitation_given(options)
+    if excited:
         raise InputError(
             f"{excited[0]} is for a black box of its own: give --black-box --component NAME as well"
         )
@@ -74,7 +75,8 @@ def _with_a_black_box(options: argparse.Namespace) -> int:
         "--range": options.frequencies is not None,
         "--details": options.details,
     }
-    if given := [name for name, is_given in others.items() if is_given]:
+    given = [name for name, is_given in others.items() if is_given]
+    if given:
         raise InputError(
             f"{given[0]} does not go with --component, which shows all modes of one black box; leave it out"
         )

@@ -144,7 +144,8 @@ def _ask(options: argparse.Namespace) -> None:
     if not options.files:
         raise InputError(f"no network is given; all in one line it is\n  {_EXAMPLE}")
     sources_of(options.files)  # what is wrong is said before the next question
-    if bus := line("Bus of a converter, such as 9 [no converter]"):
+    bus = line("Bus of a converter, such as 9 [no converter]")
+    if bus:
         parts = [
             f"bus {bus.removeprefix('bus ')}",
             _with_unit(line("Its rating in MVA, such as 300"), "MVA"),

@@ -210,7 +210,8 @@ def _outcomes(
 
 
 def _say_unfinished(folder: Path) -> None:
-    if begun := [path.name for path in unfinished(folder)]:
+    begun = [path.name for path in unfinished(folder)]
+    if begun:
         text = (
             f"{folder} holds recordings of runs that did not end, or still go on: {', '.join(begun)}; "
             "`gfor signal identify` and `compare` read them, and you may delete those that you do not need"

@@ -72,7 +72,8 @@ def with_request(options: argparse.Namespace) -> argparse.Namespace:
         raise InputError(
             f"--resume {options.resume}: {file} cannot be read ({error}); start the run anew, without --resume"
         ) from error
-    if given_anew := options.checkpoint is not None:
+    given_anew = options.checkpoint is not None
+    if given_anew:
         kept[_GIVEN_ANEW] = options.checkpoint
     kept["set"] = [(name, value) for name, value in kept["set"]]
     kept["parameters"] = [Path(path) for path in kept["parameters"]]

@@ -59,7 +59,8 @@ def _compute(
         for one in found:
             warn(one.result.modes.prepared.name, one.result.warnings)
             console.print(sensitivity_table(one.result), "")
-            if missing := left_out(one.result):
+            missing = left_out(one.result)
+            if missing:
                 console.print(
                     f"{len(missing)} of {len(one.result.rows)} parameters have no derivative", ""
                 )

@@ -79,7 +79,8 @@ def _print(choice: StepChoice) -> None:
         said = "none of those tried" if best is None else f"{1e6 * best.step_size:g} µs"
         if best is choice.of(name)[-1]:
             said += ", the longest that was tried"
-        if islands := choice.islands(name):
+        islands = choice.islands(name)
+        if islands:
             longer = ", ".join(f"{1e6 * trial.step_size:g} µs" for trial in islands)
             said += f" (not {longer}: within the error, but a shorter step is not)"
         console.print(f"  {name}: {said}")

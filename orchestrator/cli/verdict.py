@@ -46,7 +46,8 @@ def stability_lines(verdicts: Mapping[str, Stability], outside: Mapping[str, str
 def _headline(verdicts: Mapping[str, Stability]) -> str:
     """One line on all of them; what is worst comes first."""
     for wanted, text in ((False, "UNSTABLE"), (None, "stability not known")):
-        if found := [title for title, verdict in verdicts.items() if verdict.stable is wanted]:
+        found = [title for title, verdict in verdicts.items() if verdict.stable is wanted]
+        if found:
             return f"[bold {COLOURS[wanted]}]{text}[/]: {escape(', '.join(found))} ({len(found)} of {len(verdicts)})"
     return f"[bold green]stable[/]: all {len(verdicts)}"
 
@@ -64,7 +65,8 @@ def print_answers(
     ranges = [r.hidden.frequency_range for r in results if r.hidden is not None]
     console.print(answers_table(answers, ranges[0] if ranges else ELECTROMECHANICAL_HZ))
     print_parts(console, map(escape, beside))
-    if rest := outside(results):
+    rest = outside(results)
+    if rest:
         console.print(escape(rest), style="dim", soft_wrap=True, highlight=False)
     console.print("")
 

@@ -106,7 +106,8 @@ def _show(found: Verified, console: Console, *, norm: bool) -> None:
     else:
         count = f"{len(found.faults)} disagreement{'' if len(found.faults) == 1 else 's'}"
         console.print(f"[bold red]The certificate does not hold: {count}.[/]")
-        if (issued := issued_by(found.content)) not in ("", THIS):
+        issued = issued_by(found.content)
+        if issued not in ("", THIS):
             console.print(
                 f"gfor-cosim {issued} issued it, and this is {THIS}, whose tables may ask for something "
                 "else."

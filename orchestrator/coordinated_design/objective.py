@@ -102,7 +102,8 @@ def kept_as_they_are(watched: Sequence[Watched], values: Iterable[complex]) -> l
     """The modes, of which those that are next to some values [rad/s] are not damped, and keep what these have."""
     found = list(watched)
     for value in values:
-        if (k := nearest(found, value)) is not None:
+        k = nearest(found, value)
+        if k is not None:
             found[k] = replace(found[k], floor=damping_ratio(value) - ALLOWED)
     return found
 
@@ -203,7 +204,8 @@ class RatedPoint:
         """The modes; those that no loop moves, or hardly any gain, are not damped but kept as they are."""
         found = kept_as_they_are(split(values, targets, self._floors), (*self._held, *self.apart))
         for value in self._hardly:
-            if (k := nearest(found, value)) is not None:
+            k = nearest(found, value)
+            if k is not None:
                 found[k] = replace(found[k], hardly_moved=True)
         return found
 

@@ -190,9 +190,8 @@ def _at(
     warnings: tuple[str, ...],
 ) -> PointModes:
     find_operating_point(master, accept=ACCEPT)
-    if silent := [
-        name for name, exchange in master.exchanges.items() if not gives_slopes(exchange)
-    ]:
+    silent = [name for name, exchange in master.exchanges.items() if not gives_slopes(exchange)]
+    if silent:
         raise AnalysisError(
             f"components {', '.join(silent[:3])} do not give their derivatives; a design over operating points needs "
             "them of all FMUs"

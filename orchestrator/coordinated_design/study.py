@@ -171,10 +171,11 @@ def plan_points_design(case: Case, request: PointsDesignRequest) -> PointsDesign
             check_range(plans, group.components, f"{group.controller}.K", bound, "--gain-bounds")
     for place in candidates:
         check_tunable(place.component, plans[place.component].description, place.controller)
-    if clash := {key for item in read.items for key in item.values} & {
+    clash = {key for item in read.items for key in item.values} & {
         *off,
         *(f"{p.name}.K" for p in candidates),
-    }:
+    }
+    if clash:
         raise InputError(
             f"{request.points}: the column for {min(clash)} sets what is to be designed; leave it out"
         )
@@ -210,7 +211,8 @@ def _groups(case: Case, request: PointsDesignRequest) -> tuple[PodGroup, ...]:
         )
         group = PodGroup(controller, target.components, target.key, target.stages, target.neutral)
         for other in found:
-            if shared := set(other.places) & set(group.places):
+            shared = set(other.places) & set(group.places)
+            if shared:
                 raise InputError(
                     f"--component: {min(shared).component} is in two of the patterns; a converter gets one "
                     "setting: let each pattern have converters of its own"

@@ -194,17 +194,20 @@ def remarks(verdict: PointsVerdict) -> list[str]:
             f"the search was led astray: at {len(verdict.unforeseen)} of {total}, first at {place}, its linear models "
             "showed no harm to other modes, and there is; give a lower upper end of --gain-bounds, or fewer controllers"
         )
-    if left := [point for point in verdict.known if point.left]:
+    left = [point for point in verdict.known if point.left]
+    if left:
         mode = left[0].left[0]
         texts.append(
             f"at {len(left)} of {total}, first at {left[0].where}, the controllers move a mode out of 0.1 to 2 Hz, to "
             f"{mode.words}; it counts as before"
         )
-    if free := [point for point in verdict.known if point.after.zeros > 1]:
+    free = [point for point in verdict.known if point.after.zeros > 1]
+    if free:
         texts.append(
             f"at {len(free)} of {total}, first at {free[0].where}: {zeros_in_words(free[0].after.zeros)}"
         )
-    if unnamed := [point for point in verdict.known if point.unnamed]:
+    unnamed = [point for point in verdict.known if point.unnamed]
+    if unnamed:
         texts.append(
             f"at {len(unnamed)} of {total}, first at {unnamed[0].where}: a name that is asked for is borne by no mode, "
             "or its mode meets another one while the gains grow, so all modes from 0.1 to 2 Hz count there"

@@ -50,9 +50,10 @@ class AdaptiveLoop:
             raise ValueError(f"schedule {schedule.name!r} has no tolerance")
         self._inner, self._y, self._tracks, self._tolerance = inner, y, tracks, schedule.tolerance
         self._turns = [exchange for group in groups for exchange in group]
-        if stuck := [
+        stuck = [
             t.component.name for t in self._turns if not t.component.description.can_save_state
-        ]:
+        ]
+        if stuck:
             raise InputError(
                 f"tolerance = {self._tolerance:g}: steps that are too long are taken back, and component "
                 f"{', '.join(map(repr, stuck))} declares no canGetAndSetFMUstate; leave the tolerance out, and find a "

@@ -61,7 +61,8 @@ class CoupledComponents(Closing):
         stop_time: float | None,
         opener: Callable[[str, ComponentPlan, Path], Component],
     ) -> None:
-        if open_inputs := [str(endpoint) for endpoint in system.unconnected_inputs()]:
+        open_inputs = [str(endpoint) for endpoint in system.unconnected_inputs()]
+        if open_inputs:
             raise InputError(
                 f"inputs that nothing feeds: {', '.join(open_inputs)}; connect them or give them a constant value"
             )
@@ -122,7 +123,8 @@ class CoupledComponents(Closing):
                 window,
                 np.array([place[c.source] for c in feeding], dtype=np.int64),
             )
-            if arriving := self.wires.delivered:
+            arriving = self.wires.delivered
+            if arriving:
                 exchanges[name].delivered = np.array(
                     [arriving.get(c.target, place[c.source]) for c in feeding], dtype=np.int64
                 )
@@ -164,9 +166,10 @@ class CoupledComponents(Closing):
         before = self.y.copy()
         for name, exchange in self.exchanges.items():
             exchange.outputs.read()
-            if late := _jump(
+            late = _jump(
                 self.output_names[exchange.window], before[exchange.window], self.y[exchange.window]
-            ):
+            )
+            if late:
                 self.late_starts[name] = late
 
     def _take_start_values(self) -> None:

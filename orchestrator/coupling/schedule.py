@@ -125,9 +125,8 @@ class Schedule:
                 f"schedule {self.name!r}: {self.coupling} needs consistent first inputs, and no extrapolation, "
                 "wire_by_wire or ticks beside it"
             )
-        if faults := [
-            f"{what}: {', '.join(sorted(names))}" for what, names in wrong.items() if names
-        ]:
+        faults = [f"{what}: {', '.join(sorted(names))}" for what, names in wrong.items() if names]
+        if faults:
             raise InputError(
                 f"schedule {self.name!r}: {'; '.join(faults)}; list every component exactly once"
             )

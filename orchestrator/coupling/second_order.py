@@ -203,9 +203,10 @@ class NewtonLoop(_LineLoop):
         self, groups: Sequence[Sequence[Exchange]], y: Values, tracks: Tracks, schedule: Schedule
     ) -> None:
         super().__init__(groups, y, tracks, schedule)
-        if stuck := [
+        stuck = [
             t.component.name for t in self._turns if not t.component.description.can_save_state
-        ]:
+        ]
+        if stuck:
             raise InputError(
                 f"schedule 'newton' takes steps back and repeats them: component {', '.join(map(repr, stuck))} "
                 "declares no canGetAndSetFMUstate; take midpoint"

@@ -52,7 +52,8 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
     points = places(network.buses, ends)
     points += np.array([WIDTH, HEIGHT]) / 2 - (points.max(axis=0) + points.min(axis=0)) / 2
     given = prepared.case.table.diagram.positions
-    if unknown := [bus for bus in given if bus not in network.buses]:
+    unknown = [bus for bus in given if bus not in network.buses]
+    if unknown:
         raise InputError(
             f"{prepared.case.path}: [diagram] positions: there is no bus {unknown[0]!r}; "
             + close_names(unknown[0], network.buses, f"there are: {few(network.buses, 8)}")

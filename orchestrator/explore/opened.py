@@ -47,7 +47,8 @@ def certified(file: Path) -> tuple[str, dict[str, Any]]:
             ) from error
     for k, (code, place) in enumerate(places):
         folder, content = read_certificate(place)
-        if faults := verify_files(folder, content).faults:
+        faults = verify_files(folder, content).faults
+        if faults:
             raise InputError(
                 f"{folder}: the certificate does not hold: {faults[0]}; `gfor verify` says all"
             )

@@ -87,7 +87,8 @@ class Explorer:
                 computing.cancel(page, math.inf)
 
     def tell(self, page: str, what: Answer) -> None:
-        if (told := self._pages.get(page)) is not None:
+        told = self._pages.get(page)
+        if told is not None:
             told.put(what)
 
     def answer(self, page: str, question: Answer) -> Answer:

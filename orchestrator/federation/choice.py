@@ -38,7 +38,8 @@ class Federates:
             raise InputError(
                 "--broker names a broker that runs, --broker-port has gfor start one; give only one of them"
             )
-        if both := sorted(set(self.names) & set(self.external)):
+        both = sorted(set(self.names) & set(self.external))
+        if both:
             raise InputError(
                 f"{', '.join(both)}: a federate is either started by gfor or external; name it only once"
             )

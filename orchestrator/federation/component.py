@@ -104,7 +104,8 @@ class FederatedComponent(Derived):
             )
         known = self._known
         if self.inner is None:
-            if missing := [r for r in references if r not in known and r not in self._inputs]:
+            missing = [r for r in references if r not in known and r not in self._inputs]
+            if missing:
                 raise ComponentError(
                     self.name, "reading", "nothing", f"reference {missing[0]} is not published"
                 )

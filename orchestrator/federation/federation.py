@@ -92,7 +92,8 @@ class Federation(Closing):
         else:
             broker = choice.broker
             require_broker(broker)
-        if waited := [part.name for part in self.layout.parts if part.external]:
+        waited = [part.name for part in self.layout.parts if part.external]
+        if waited:
             where = (
                 f"port {choice.port} of this machine"
                 if choice.port is not None
@@ -216,7 +217,8 @@ class Federation(Closing):
 
     def _look_for_the_dead(self, name: str) -> None:
         """Raise if a federate has died: that is the reason of what the hub tells, and may come to light after it."""
-        if process := self._processes.get(name):
+        process = self._processes.get(name)
+        if process:
             with suppress(subprocess.TimeoutExpired):
                 process.wait(_LOOK)
                 self._look(time.monotonic() + _LOOK)

@@ -62,7 +62,8 @@ def _left(end: float | None) -> float | None:
     """Time until then [s], for a socket's timeout."""
     if end is None:
         return None
-    if (left := end - monotonic()) <= 0:
+    left = end - monotonic()
+    if left <= 0:
         raise TimeoutError("timed out")
     return left
 

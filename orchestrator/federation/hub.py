@@ -235,11 +235,12 @@ class Hub:
             text := helics.helicsInputGetString(self._faults[name])
         ):
             raise _FederationError("a fault", text, name)
-        if silent := [
+        silent = [
             v
             for v, handle in self._outputs[name].items()
             if not helics.helicsInputIsUpdated(handle)
-        ]:
+        ]
+        if silent:
             there = name in set(
                 helics_calls.ask(self._federate, "root", "federates") or ()
             ) and helics_calls.ask(self._federate, name, "state") not in (

@@ -47,7 +47,8 @@ def make_layout(
 ) -> Layout:
     system, known = prepared.system, prepared.system.components
     for option, given in (("--federate", names), ("--external", external)):
-        if wrong := [name for name in given if name not in known]:
+        wrong = [name for name in given if name not in known]
+        if wrong:
             raise InputError(
                 f"{option} {wrong[0]}: scenario {prepared.name!r} has no component {wrong[0]!r}; "
                 f"components: {', '.join(known)}"

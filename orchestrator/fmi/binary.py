@@ -77,7 +77,8 @@ def unload(library: ctypes.CDLL) -> None:
 def _not_loaded(fmu: Path, library: Path, text: str) -> FmuFileError:
     """The loader's words as an error: what is missing here, or what is wrong with the binary."""
     for pattern in _MISSING:
-        if found := pattern.search(text):
+        found = pattern.search(text)
+        if found:
             name = found.group(1)
             if (library.parent / name).is_file():
                 return FmuFileError(
@@ -89,13 +90,15 @@ def _not_loaded(fmu: Path, library: Path, text: str) -> FmuFileError:
                 "missing system library",
                 "install it",
             )
-    if found := _NEWER.search(text):
+    found = _NEWER.search(text)
+    if found:
         return UnsupportedFmuError(
             f"{fmu}: it needs {found.group(1)}, and this system is older",
             "newer system needed",
             "run it on a newer one, or ask for a build that needs less",
         )
-    if found := _UNDEFINED.search(text):
+    found = _UNDEFINED.search(text)
+    if found:
         return FmuFileError(
             f"{fmu}: its binary calls {found.group(1)}, which is in none of the libraries that it names; ask its author"
         )

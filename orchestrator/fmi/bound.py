@@ -132,7 +132,8 @@ class BoundComponent(Derived):
         except NotFiniteError:
             raise
         except ComponentError as error:
-            if not (cause := self.description.likely_cause()):
+            cause = self.description.likely_cause()
+            if not cause:
                 raise
             said = f"{error.log}; {cause}"
             raise ComponentError(

@@ -125,7 +125,8 @@ class RealBatch:
     ) -> None:
         variables = component.description.variables
         self.names = tuple(names)
-        if unknown := [name for name in self.names if name not in variables]:
+        unknown = [name for name in self.names if name not in variables]
+        if unknown:
             raise InputError(
                 f"component {component.name!r} has no variable {', '.join(map(repr, unknown))}; `gfor fmu info` lists "
                 "them"

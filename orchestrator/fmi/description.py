@@ -165,7 +165,8 @@ class FmuDescription:
 def read_description(path: Path | str) -> FmuDescription:
     """Read and check an FMU, or that of a vendor's DLL or device's file, which is built first."""
     described = read_declared(path)
-    if hindrance := hindrance_here(described):
+    hindrance = hindrance_here(described)
+    if hindrance:
         fault = "backslashes" if described.has_backslashes else "another platform"
         raise UnsupportedFmuError(f"{described.path}: {hindrance[0]}", fault, hindrance[1])
     return described
@@ -409,7 +410,8 @@ def _discrete_states(
         return ()
     names = {str(v.valueReference): v.name for v in reversed(md.modelVariables) if v.type == "Real"}
     references = (listed.get("valueReferences") or "").split()
-    if unknown := [r for r in references if r not in names]:
+    unknown = [r for r in references if r not in names]
+    if unknown:
         raise FmuFileError(
             f"{path}: DiscreteStates under VendorAnnotations names value reference {unknown[0][:20]!r}, which no Real "
             "variable has; export it again"

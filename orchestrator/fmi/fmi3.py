@@ -159,11 +159,12 @@ def needed_functions(description: FmuDescription) -> set[str]:
 
 def refuse_other_clocks(description: FmuDescription) -> None:
     """Raise where a clock ticks only with those of other FMUs, which this master does not connect."""
-    if others := [
+    others = [
         c.name
         for c in description.clocks
         if c.variability == "triggered" and c.causality == "input"
-    ]:
+    ]
+    if others:
         raise UnsupportedFmuError(
             f"{description.path}: its clock {others[0]!r} is triggered by another FMU's clock, and this master has "
             "clocks that tick by the time only",

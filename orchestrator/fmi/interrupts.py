@@ -225,7 +225,8 @@ class _Calls:
         if self._depth:
             self._asked.value = 1
             return True
-        if (ours := frame_of_ours(frame)) is None:
+        ours = frame_of_ours(frame)
+        if ours is None:
             return False
         self._deferral.until(ours)
         return True

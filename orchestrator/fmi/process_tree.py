@@ -80,7 +80,8 @@ def _resident(process: int) -> int:
             _PROC / str(process) / "task"
         ):  # the first has none once it ended before the others
             text = (_PROC / str(process) / "task" / task / "statm").read_text(encoding="ascii")
-            if pages := int(text.split()[1]):
+            pages = int(text.split()[1])
+            if pages:
                 return pages * os.sysconf("SC_PAGE_SIZE")
     return 0
 

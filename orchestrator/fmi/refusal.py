@@ -54,5 +54,6 @@ def in_its_words(description: FmuDescription, text: str) -> str:
 
 
 def check_log(name: str, said_by: Said, call: str) -> None:
-    if errors := said_by(ERROR):
+    errors = said_by(ERROR)
+    if errors:
         raise ComponentError(name, call, "an error in the log", "; ".join(errors))

@@ -86,7 +86,8 @@ def _program(own_process: int | None, *, signals: bool, attributes: bool, ipc: b
     for numbers in (
         numbers for group in wanted if wanted[group] for numbers in _CALLS[group].values()
     ):
-        if (number := numbers[which]) >= 0:
+        number = numbers[which]
+        if number >= 0:
             steps += [_step(_EQUAL, number, 0, 1), _refuse()]
     # its flags lie where no filter can look
     steps += [_step(_EQUAL, _CLONE3[which], 0, 1), _refuse(errno.ENOSYS)]

@@ -157,7 +157,8 @@ def _supervise(request: dict[str, Any], told: int, work: Path, means: Means) -> 
             _end_as(-signal.SIGKILL)
         if _LINUX and not request["windows"]:
             _make_idle(started_by_fmu(me))
-        if excess := _excess(limits, me, work):
+        excess = _excess(limits, me, work)
+        if excess:
             end_descendants(me)
             _exit(excess)
 

@@ -66,7 +66,8 @@ def as_fmu(path: Path) -> Path:
         kept = cache_directory(_KEPT) / _digest(path, library) / f"{path.stem}.fmu"
         if intact(kept) and _unchanged(kept, path):
             return kept
-        if (for_now := _tried_now.get(kept)) is not None and intact(for_now):
+        for_now = _tried_now.get(kept)
+        if for_now is not None and intact(for_now):
             return for_now
         texts = (table or {}).get("texts")
         given = texts if isinstance(texts, dict) else {}

@@ -53,7 +53,8 @@ def cut_of(prepared: PreparedScenario, bus: str | None, names: tuple[str, ...]) 
         devices = _devices(homes, bus, names)
         find_operating_point(master)
         blocks = Blocks(master, without_step=True)
-        if silent := [d for d, c in blocks.components.items() if c.A_c is None]:
+        silent = [d for d, c in blocks.components.items() if c.A_c is None]
+        if silent:
             raise InputError(
                 f"component {silent[0]!r} gives no derivatives; scan its FMU and give that in its place"
             )
@@ -98,7 +99,8 @@ def _devices(homes: dict[str, str], bus: str | None, names: tuple[str, ...]) -> 
             "the case has no device that takes a voltage (v_re, v_im) and gives a current (i_re, i_im); phasor models "
             "have another port: cut its EMT models, such as by --set models=emt"
         )
-    if unknown := [name for name in names if name not in homes]:
+    unknown = [name for name in names if name not in homes]
+    if unknown:
         raise InputError(
             f"--component {unknown[0]}: it is no device with a voltage and a current in this scenario (--scenario "
             f"chooses another); there are: {', '.join(homes)}"
@@ -196,7 +198,8 @@ class _Opened:
     ) -> tuple[Any, Any, tuple[Unit, ...], list[tuple[str, ...]]]:
         """Those of a cut at some devices, the units at it, and the devices at each port."""
         own = [unit for unit in self._units if set(unit[0]) & set(devices)]
-        if left := [d for unit in own for d in unit[0] if d not in devices]:
+        left = [d for unit in own for d in unit[0] if d not in devices]
+        if left:
             raise InputError(
                 f"{', '.join(left)}: other signals connect it to what is cut; cut there, too"
             )

@@ -245,7 +245,8 @@ def _ends(loop: CutLoop, path: LoopPath) -> list[str]:
         (_active(side)[1] & (_active(side)[0] >= path.hertz[-1] / _END)).any()
         for side in (loop.device, loop.network)
     )
-    if (early := path.hertz[-1] < _RANGE[1]) or not (small or passive):
+    early = path.hertz[-1] < _RANGE[1]
+    if early or not (small or passive):
         why = (
             "loci may grow again" if early else "neither are both sides passive nor the loci small"
         )

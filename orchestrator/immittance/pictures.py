@@ -28,7 +28,8 @@ def draw(
             loci,
         )
         save_figure(_matrices(result), matrices)
-        if shown := [one for one in retuned if one.figures][:_PANELS]:
+        shown = [one for one in retuned if one.figures][:_PANELS]
+        if shown:
             save_figure(_retuned(shown, goal, result.scr), folder / "retune.png")
     return [loci, matrices, *([folder / "retune.png"] if shown else [])]
 

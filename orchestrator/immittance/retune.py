@@ -199,11 +199,12 @@ def _tell(out: Retuned) -> None:
     family = _family(out)
     out.values = np.unique(np.r_[out.setting.grid, family.nodes])
     out.figures = [family.figures(value) for value in out.values.tolist()]
-    if open_ := {
+    open_ = {
         f"{value:.4g}": r.judgement.reasons
         for value, r in sorted(out.scans.items())
         if r.judgement.reasons
-    }:
+    }
+    if open_:
         why = next(iter(open_.values()))[0]
         out.remark = f"scans at {', '.join(open_)} give no verdict by themselves, and none of these is taken: {why}"
 

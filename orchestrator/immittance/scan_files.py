@@ -49,7 +49,8 @@ def read_ztool(path: Path, text: str, rated_hz: float) -> Scan:
 
 
 def _ports(path: Path, names: list[str]) -> tuple[str, ...]:
-    if direct := [name for name in names if name.endswith("_dc")]:
+    direct = [name for name in names if name.endswith("_dc")]
+    if direct:
         raise InputError(
             f"{path.name}: the ports {', '.join(direct)} are DC; only AC ports can be judged"
         )
@@ -123,7 +124,8 @@ def _points(path: Path, ports: tuple[str, ...]) -> dict[str, PortPoint]:
             found[cells[0].strip()].update(figures)
     points = {}
     for port in ports:
-        if figures := found.get(port, found.get(re.sub(r"-[12]$", "", port), {})):
+        figures = found.get(port, found.get(re.sub(r"-[12]$", "", port), {}))
+        if figures:
             points[port] = PortPoint(*(figures.get(column) for column in _COLUMNS))
     return points
 

@@ -310,11 +310,12 @@ def _read(request: CutRequest, side: str, path: Path) -> Scan:
             f"{path}: the network is a scan's file or a case; an FMU can be the device"
         )
     scan, kv = read_scan(path, request.frequency, network=side == "network"), request.kilovolt
-    if off := [
+    off = [
         p.kilovolt
         for p in scan.points.values()
         if p.kilovolt and kv and not 0.8 < p.kilovolt / kv < 1.25
-    ]:
+    ]
+    if off:
         raise InputError(
             f"{path.name} was scanned at {off[0]:g} kV, and --voltage is {kv:g} kV; leave the option out"
         )

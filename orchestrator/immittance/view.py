@@ -108,7 +108,8 @@ def parts(found: Nyquist) -> Iterator[RenderableType]:
     result = found.result
     good = {"stable": True, "unstable": False}.get(str(result.verdict))
     yield VerdictSentence(good, str(result.verdict), result.because).markup()
-    if (m := result.margins) is not None:
+    m = result.margins
+    if m is not None:
         rows = [(name, *_cells(getattr(m, key), text)) for name, key, text in _MARGINS]
         yield make_table("Margins", "Margin", "Value", "at [Hz]", rows=rows)
     yield from _by_bus(result)
@@ -117,7 +118,8 @@ def parts(found: Nyquist) -> Iterator[RenderableType]:
     for side, bands in result.judgement.active.items():
         said = ", ".join(f"{a:.4g}–{b:.4g} Hz" for a, b in bands) or "nowhere"
         yield escape(f"{side} ({named(getattr(result.loop, side).name)}) not passive: {said}")
-    if (far := result.difference) is not None:
+    far = result.difference
+    if far is not None:
         yield (
             f"The device differs from the case's own by {100 * far['largest_relative']:.2g} % at most, at "
             f"{far['frequency_hz']:.4g} Hz"

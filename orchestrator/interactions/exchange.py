@@ -49,7 +49,8 @@ def settings_of(place: Place) -> dict[str, Value]:
 def file_at(
     place: Place, file: Path, binding: Path | None, values: Mapping[str, Value]
 ) -> ComponentTable:
-    if wrong := [name for name in values if name in _OF_PLACE]:
+    wrong = [name for name in values if name in _OF_PLACE]
+    if wrong:
         raise InputError(
             f"{file}: {', '.join(wrong)} cannot be set, because it is the place's, not the device's"
         )
@@ -72,7 +73,8 @@ def _of_place(place: Place, device: FmuDescription | None = None) -> dict[str, V
     )
     if place.table.bus is None:  # no power flow computes the rest
         found |= {name: plan.number(name) for name in ("Q_0", "v_0", "theta_0")}
-    if (f_n := _rated_frequency(place)) is not None:
+    f_n = _rated_frequency(place)
+    if f_n is not None:
         found["f_n"] = f_n
     if "connected" in plan.parameters:
         found["connected"] = bool(plan.parameters["connected"])

@@ -361,9 +361,10 @@ def _rank(pair: JudgedPair) -> tuple[bool, bool, float]:
 def doubts_of(judgement: JudgedInteractions) -> Sequence[str]:
     result, found = judgement.result, []
     plan = result.plan
-    if identified := list(
+    identified = list(
         dict.fromkeys(name for one in result.records.values() for name in one.identified)
-    ):
+    )
+    if identified:
         found.append(
             f"{', '.join(identified)} was identified from outside: its share in a mode rests on the states of the "
             "model that was fitted to it"

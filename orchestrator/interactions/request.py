@@ -96,11 +96,12 @@ class InteractionsRequest(OverPoints):
                 "--place says where devices are swapped; give --swap or a --device as well"
             )
         if isinstance(self.bindings, Mapping):
-            if lonely := [
+            lonely = [
                 name
                 for name in self.bindings
                 if name not in cast("Mapping[str, Path]", self.devices)
-            ]:
+            ]
+            if lonely:
                 there = ", ".join(map(str, self.devices)) or "none"
                 raise InputError(
                     f"bindings: there is no device {lonely[0]!r}; the devices are: {there}"

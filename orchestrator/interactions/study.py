@@ -137,7 +137,8 @@ def _scenario(case: Case, wanted: str | None) -> str:
 
 
 def _swapped(places: Mapping[str, Place], wanted: Sequence[str]) -> tuple[str, ...]:
-    if unknown := [name for name in wanted if name not in places]:
+    unknown = [name for name in wanted if name not in places]
+    if unknown:
         raise InputError(
             f"--place {unknown[0]}: no converter stands there; the places of converters are: {', '.join(places)}"
         )

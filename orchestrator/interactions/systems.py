@@ -76,7 +76,8 @@ def assignments(
     templates = first_of({name: places[name] for name in at})
     # those at places that are not swapped as well
     vendors = {place.vendor for place in places.values()}
-    if twice := [device.name for device in given if device.name in vendors]:
+    twice = [device.name for device in given if device.name in vendors]
+    if twice:
         raise InputError(
             f"--device {twice[0]}: a vendor of the case has this name already; give another one, as in NAME=FILE"
         )

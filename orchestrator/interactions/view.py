@@ -268,7 +268,8 @@ def warnings_of(judgement: JudgedInteractions) -> list[str]:
     for name, record in result.records.items():
         for text in record.warnings:
             systems = having.setdefault(text, [])
-            if (called := plan_text(result.plan.swapped, name)) not in systems:
+            called = plan_text(result.plan.swapped, name)
+            if called not in systems:
                 systems.append(called)
     return [
         *doubts_of(judgement),

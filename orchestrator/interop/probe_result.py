@@ -156,7 +156,8 @@ def _table(path: Path) -> tuple[list[str], list[list[str]]]:
 
 def _columns(path: Path, heads: list[str], named: dict[str, str]) -> dict[str, int]:
     """Signal → index of its column, the time first."""
-    if unknown := [signal for signal in named if signal not in ("time", *SIGNALS)]:
+    unknown = [signal for signal in named if signal not in ("time", *SIGNALS)]
+    if unknown:
         raise InputError(
             f"there is no signal {', '.join(unknown)}; signals: time, {', '.join(SIGNALS)}"
         )

@@ -71,7 +71,8 @@ class Elements:
 
 def _step_ups(prepared: PreparedScenario, units: Mapping[str, str]) -> dict[str, str]:
     """Branches without charging that alone lead to a bus with one unit and nothing else."""
-    if (network := prepared.network) is None:
+    network = prepared.network
+    if network is None:
         return {}
     ends = Counter(bus for line in network.lines for bus in (line.from_bus, line.to_bus))
     ends.update([*(bus for x in network.transformers for bus in x.buses), *units.values()])

@@ -106,7 +106,8 @@ def _labelled(path: Path) -> tuple[list[Row], str, list[str]]:
 def _name_of(row: Row, label: str) -> str:
     if row.get(None):  # type: ignore[call-overload]
         raise InputError(f"{place_of(row)}: the row has more cells than the first line has columns")
-    if not (name := (row[label] or "").strip()):
+    name = (row[label] or "").strip()
+    if not name:
         raise InputError(f"{place_of(row)}: {label} is empty; it names the operating point")
     return name
 
@@ -217,7 +218,8 @@ def _point(
     name = _name_of(row, label)
     settings: dict[str, Setting] = {}
     for column, reading in readings.items():
-        if text := (row[column] or "").strip():
+        text = (row[column] or "").strip()
+        if text:
             try:
                 settings[column] = reading(text)
             except ValueError as error:

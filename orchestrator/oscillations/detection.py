@@ -88,7 +88,8 @@ def find_oscillations(signals: Signals) -> list[SpectralLine]:
         shown = {signal: size for signal, size in lines[k].items() if signal >= 0}
         frequency = refined(signals, [*shown] or [*range(count)], float(grid[k]))
         kept.append(frequency)
-        if base := next((o for o in found if _multiple(frequency, o.frequency, length)), None):
+        base = next((o for o in found if _multiple(frequency, o.frequency, length)), None)
+        if base:
             order = round(frequency / base.frequency)
             base.harmonics[order] = _relative(signals, base, order)
         else:

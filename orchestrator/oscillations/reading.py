@@ -103,7 +103,8 @@ def _of_columns(dataset: xr.Dataset, label: str) -> tuple[list[Site], float]:
     columns: dict[str, dict[str, Numbers]] = {}
     bases: dict[str, set[str]] = {}
     for name in map(str, dataset.data_vars):
-        if parts := _COLUMN.fullmatch(name):
+        parts = _COLUMN.fullmatch(name)
+        if parts:
             what = parts["what"].lower()
             values, base = _in_base(dataset[name], what, f"{label}: {name!r}")
             columns.setdefault(parts["place"], {})[what] = values

@@ -100,7 +100,8 @@ def recorded_case(attributes: Mapping[str, Any]) -> PreparedScenario | None:
     scenario, values = str(attributes["scenario"]), json.loads(attributes["values"])
     (prepared,) = case.prepare([scenario])
     given = json.loads(attributes.get("given", "{}"))
-    if changed := {key: value for key, value in given.items() if prepared.given.get(key) != value}:
+    changed = {key: value for key, value in given.items() if prepared.given.get(key) != value}
+    if changed:
         (prepared,) = case.prepare([scenario], changed)
     return prepared if dict(prepared.values) == values else None
 
@@ -110,11 +111,8 @@ def unlike(attributes: Mapping[str, Any], prepared: PreparedScenario) -> str:
     case, there = prepared.case, prepared.given
     found = ["the case file"] if attributes.get("case_file", case.text) != case.text else []
     for name, content in json.loads(attributes.get("inputs", "{}")).items():
-        if (
-            (path := case.directory / name) != case.path
-            and path.is_file()
-            and file_hash(path) != content
-        ):
+        path = case.directory / name
+        if path != case.path and path.is_file() and file_hash(path) != content:
             found.append(name)
     if attributes.get("scenario", prepared.name) != prepared.name:
         found.append(f"the scenario ({attributes['scenario']!r}, not {prepared.name!r})")

@@ -195,7 +195,8 @@ def _edge(
         bad *= stride
     for _ in range(_HALVINGS):
         middle = (good + bad) / 2
-        if (found := lost(middle)) is None:
+        found = lost(middle)
+        if found is None:
             good = middle
         else:
             bad, what = middle, found

@@ -60,7 +60,8 @@ def find_target(
     fixed = [name for name, time in times.items() if time is not None]
     if not fixed:
         return Target(scenario, chosen, key, _stages_set(plan, chosen, controller, stages))
-    if others := [name for name in chosen if name not in fixed]:
+    others = [name for name in chosen if name not in fixed]
+    if others:
         raise InputError(
             f"{fixed[0]} has a fixed number of stages (it has no variable {controller}.N_S), {others[0]} has not; they "
             f"cannot have one setting: design them one after the other with --component"
@@ -68,7 +69,8 @@ def find_target(
     (prepared,) = case.prepare([scenario], overrides, None, None, parameters)
     counts = {name: count_stages(prepared, name, controller) for name in fixed}
     number = counts[fixed[0]]
-    if other := next((name for name, count in counts.items() if count != number), None):
+    other = next((name for name, count in counts.items() if count != number), None)
+    if other:
         raise InputError(
             f"{fixed[0]} has {number} fixed stages in {controller}, {other} has {counts[other]}; they cannot have one "
             "setting: design them one after the other with --component"

@@ -128,7 +128,8 @@ class DaskCluster:
             raise InputError(
                 f"--scheduler {address}: --tls needs an address that begins with tls://"
             )
-        if missing := [name for name in TLS_FILES if not (tls / name).is_file()]:
+        missing = [name for name in TLS_FILES if not (tls / name).is_file()]
+        if missing:
             raise InputError(
                 f"--tls {tls}: there is no {' and no '.join(missing)}; the folder must hold {', '.join(TLS_FILES)}"
             )

@@ -18,7 +18,8 @@ def exceptions_in_words(
     """One sentence about the components that were not perturbed; None where all were."""
     parts = []
     for source, how in _HOW.items():
-        if names := [name for name, found in sources.items() if found == source]:
+        names = [name for name, found in sources.items() if found == source]
+        if names:
             parts.append(f"{_named(names, fit_errors or {})} {how}")
     if not parts:
         return None

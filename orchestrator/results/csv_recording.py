@@ -93,7 +93,8 @@ def _table(path: Path) -> pd.DataFrame:
                     break
         except (OSError, csv.Error) as error:
             raise InputError(f"{path}: it cannot be read as CSV: {error}") from error
-    if odd := next((row for row in rows if len(row) != len(names)), None):
+    odd = next((row for row in rows if len(row) != len(names)), None)
+    if odd:
         both = "the comma both parts the columns and stands in the numbers: write decimal points, or ';' between them"
         remedy = both if mark == "," and len(rows[0]) == 2 * len(names) else "name them all"
         raise InputError(

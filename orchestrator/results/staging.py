@@ -209,7 +209,8 @@ def _is_listed(folder: Path, name: str) -> bool:
     """Return whether a command has written the file, be it one that was killed while it put its files there."""
     for place in (folder, *folder.glob(f"{PARTIAL}*")):
         with suppress(InputError):  # one that is damaged lists nothing
-            if (found := read_manifest(place)) and name in found.files:
+            found = read_manifest(place)
+            if found and name in found.files:
                 return True
     return False
 

@@ -382,7 +382,8 @@ def _page(summary: Summary) -> str:
         content.append(("Damping over the points", _over_points(summary, figures)))
     content.append(("All critical modes", _plane(summary, figures)))
     content.append(("Where a damping controller helps", _ranking(summary)))
-    if failed := list(summary.failures()):
+    failed = list(summary.failures())
+    if failed:
         shown = ColumnTable(
             "Points and outages without modes", items_table(summary).columns, failed, 4, 20, ITEMS
         )
@@ -481,7 +482,8 @@ def _ranking(summary: Summary) -> str:
     )
     for mode in summary.modes[:_CURVES]:
         where = f"at {mode.worst.item.point.name}, {mode.worst.item.outage.name}"
-        if found := mode.worst.ranking():
+        found = mode.worst.ranking()
+        if found:
             parts.append(ColumnTable(f"{mode.name}, {where}", columns, found).html())
     return (
         "".join(parts) if len(parts) > 1 else "<p>No converter of this scenario can be ranked.</p>"

@@ -77,7 +77,8 @@ def load_of(plan: ScreeningPlan, point: OperatingCase) -> float:
 
 def not_judged(summary: Summary) -> str:
     """How many items have no modes, and what they have in common: what is out, and a high or a low load."""
-    if not (items := list(summary.failures())):
+    items = list(summary.failures())
+    if not items:
         return ""
     which = "all" if len(items) > 1 else "it is"
     common = [text for text in (_out(summary, items), _loading(summary, items)) if text]
@@ -146,7 +147,8 @@ def verdict_of(summary: Summary) -> VerdictSentence:
     left = summary.result.plan.number_of_items - total
     missing = [text] if (text := not_judged(summary)) else []
     missing += [f"{left} not computed yet"] if left else []
-    if uncounted := computed - summary.counted:
+    uncounted = computed - summary.counted
+    if uncounted:
         wanted = summary.result.plan.wanted
         missing.append(
             f"{uncounted} were searched only from {wanted.lowest_hz:g} to {wanted.highest_hz:g} Hz above -30 % damping "
@@ -214,9 +216,11 @@ def where(item: ScreenedItem) -> str:
 
 
 def _least(item: ScreenedItem) -> str:
-    if outside := growth_outside(item.record):
+    outside = growth_outside(item.record)
+    if outside:
         return f": {outside}"
-    if (one := least_of(item)) is None:
+    one = least_of(item)
+    if one is None:
         return ""
     who = ", ".join(f"{name} {share:.2f}" for name, share in one.participation(2))
     return f": {one.frequency:.3f} Hz, {one.damping:.2f} % ({who})"

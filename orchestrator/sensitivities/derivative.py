@@ -91,9 +91,8 @@ def _judged(slopes: dict[int, list[Shift]], floor: float) -> Derivative:
             doubts.append(
                 f"upwards it moves the mode by {abs(up):.3g}, downwards by {abs(down):.3g} rad/s a unit"
             )
-    if edges := sorted(
-        {name for pair in slopes.values() for shift in pair for name in shift.edges}
-    ):
+    edges = sorted({name for pair in slopes.values() for shift in pair for name in shift.edges})
+    if edges:
         doubts.append(
             f"beside its value the edge of a limit or of a dead band is near, in {', '.join(edges)}"
         )

@@ -21,7 +21,8 @@ def candidates(wanted: Sequence[str], prepared: PreparedScenario) -> list[str]:
     found = {
         name: fnmatch.filter(known, name) or fnmatch.filter(known, f"bus_{name}") for name in wanted
     }
-    if unknown := [name for name, there in found.items() if not there]:
+    unknown = [name for name, there in found.items() if not there]
+    if unknown:
         hint = close_names(unknown[0], known, f"the buses are {few(known, 8)}")
         raise InputError(f"--buses {unknown[0]}: there is no such bus; {hint}")
     if wanted:

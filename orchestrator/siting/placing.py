@@ -51,12 +51,14 @@ def placed(case: Case, device: ComponentTable, buses: Sequence[str]) -> Case:
     further: Mapping[str, ComponentTable] = {
         name_at(b): device.model_copy(update={"bus": b}) for b in buses
     }
-    if taken := [name for name in further if name in table.components]:
+    taken = [name for name in further if name in table.components]
+    if taken:
         raise InputError(
             f"{case.path}: the name {taken[0]!r} is for what `gfor site` puts there; give it another name"
         )
     grid = table.power_flow.grid if table.power_flow else ""
-    if groups := table.solver.groups:
+    groups = table.solver.groups
+    if groups:
         first = next((k for k, group in enumerate(groups) if grid not in group), 0)
         groups = [[*group, *further] if k == first else group for k, group in enumerate(groups)]
     solver = table.solver.model_copy(update={"groups": groups})

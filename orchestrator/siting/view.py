@@ -403,7 +403,8 @@ def _page(result: SiteResult) -> str:
     ]
     headings = ["Bus", *modes, *_confirmed_headings(result)]
     content.append(("All buses", table(unit(result, "100"), headings, cells)))
-    if outages := [at for at in result.worst_first if at.name != result.intact.name]:
+    outages = [at for at in result.worst_first if at.name != result.intact.name]
+    if outages:
         best = []
         for at in outages:
             mode = at.modes[0]

@@ -60,7 +60,8 @@ def write_units(
     ``parent``: takes the group of units as its last element.
     ``name``: name of the group of units, with its namespace.
     ``known``: attributes of ``BaseUnit`` by unit; a unit that is missing here gets no attributes."""
-    if units := [(unit, known.get(unit, {})) for unit in used]:
+    units = [(unit, known.get(unit, {})) for unit in used]
+    if units:
         group = SubElement(parent, name)
         for unit, base in units:
             SubElement(
@@ -108,9 +109,10 @@ def read_parameter_mapping(root: Element) -> dict[str, str]:
     mapping = {}
     for entry in children(root, "ssm:MappingEntry"):
         source, target = entry.get("source", ""), entry.get("target", "")
-        if change := next(
+        change = next(
             (e.tag.rpartition("}")[2] for e in entry if e.tag.endswith("Transformation")), None
-        ):
+        )
+        if change:
             raise InputError(
                 f"the mapping of {source!r} to {target!r} has a {change}, which is not supported; give the value as "
                 "the component takes it"

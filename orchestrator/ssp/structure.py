@@ -224,7 +224,8 @@ class _Reader:
             )
 
     def _content(self, element: Element, inline: str, name: str) -> Element:
-        if source := element.get("source"):
+        source = element.get("source")
+        if source:
             return self._archive.xml(self._archive.member(source))
         found = next(
             (e for holder in children(element, inline) for e in children(holder, name)), None

@@ -43,7 +43,8 @@ def study_of(
     tables: Mapping[str, Any],
 ) -> SspStudy:
     """The study of a scenario. Each event is written as the variables that it sets."""
-    if faults := faults_among(events):
+    faults = faults_among(events)
+    if faults:
         raise InputError(
             f"an SSP cannot hold faults ({faults[0]}); remove them from the scenario to export it"
         )

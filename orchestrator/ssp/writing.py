@@ -26,7 +26,8 @@ def ssp_members(
     name: str, title: str, system: System, stop_time: float, study: SspStudy
 ) -> dict[str, bytes]:
     """Members of the archive by path: the structure, the components' values and their FMUs."""
-    if disturbed := described(system.wires):
+    disturbed = described(system.wires)
+    if disturbed:
         raise InputError(
             f"an SSP cannot hold what a connection does to its value ({disturbed[0]}); remove the imperfections from "
             "the case to export it"

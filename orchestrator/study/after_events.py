@@ -22,7 +22,8 @@ def modes_after(
     values = lasting_changes(prepared)
     if not values or prepared.beside is None:
         return None
-    if shared := [key for key in values if key.endswith(".scale") or ".delta_" in key]:
+    shared = [key for key in values if key.endswith(".scale") or ".delta_" in key]
+    if shared:
         reason = f"units share what {shared[0]} changes by what their controls do"
     else:
         try:

@@ -142,7 +142,8 @@ def _by_response(result: RunResult) -> ScenarioAnswer:
         return ScenarioAnswer(title, False, "failed", mode, short(str(result.failure), _LONGEST))
     if by_modes.good is False:
         return by_modes
-    if missing := result.missing_limits:
+    missing = result.missing_limits
+    if missing:
         names = ", ".join(dict.fromkeys(finding.component for finding in missing))
         table = result.modes.prepared.case.table
         how = (
@@ -167,13 +168,15 @@ def _by_response(result: RunResult) -> ScenarioAnswer:
         return replace(
             by_modes, remark="; ".join(filter(None, ("no event disturbs it", by_modes.remark)))
         )
-    if forced := [
+    forced = [
         e for e in result.modes.prepared.events if isinstance(e, Forcing) and (e.end or end) >= end
-    ]:
+    ]
+    if forced:
         names = ", ".join(dict.fromkeys(f"{e.component}.{e.variable}" for e in forced))
         remark = f"keeps synchronism until {end:g} s; {names}: forced until then, so settling is not judged"
         return ScenarioAnswer(title, None, "not known", mode, short(remark, _LONGEST))
-    if (wanted := _seen_from(result, mode)) > end:
+    wanted = _seen_from(result, mode)
+    if wanted > end:
         remark = (
             f"the run is too short to show whether what the events leave settles: --stop {wanted:g}"
         )

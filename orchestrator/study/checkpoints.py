@@ -225,9 +225,8 @@ class Checkpoints:
             was: str | None = self._case.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError):
             was = None
-        if said := differences(
-            then, self._mark, None if was is None else (was, self._text), self._file
-        ):
+        said = differences(then, self._mark, None if was is None else (was, self._text), self._file)
+        if said:
             raise InputError(
                 f"scenario {self._name!r} cannot be resumed: {said}; bring that back to what it was, or start the run "
                 "anew, without --resume"

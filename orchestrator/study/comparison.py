@@ -86,17 +86,15 @@ def open_trajectory(path: Path) -> xr.Dataset:
 
 
 def _hint(path: Path) -> str:
-    if (
-        inside := sorted(p.parent.name for p in path.glob("*/trajectory.nc"))
-        if path.is_dir()
-        else []
-    ):
+    inside = sorted(p.parent.name for p in path.glob("*/trajectory.nc")) if path.is_dir() else []
+    if inside:
         return f"choose a scenario in it: {', '.join(inside)}"
-    if begun := [
+    begun = [
         folder.name
         for folder in unfinished(path.parent)
         if folder.name.startswith(f"{path.name}{PARTIAL}")
-    ]:
+    ]
+    if begun:
         return f"its run did not end, or still goes on; what it recorded is in {', '.join(begun)} beside it"
     return "`gfor run` writes one a scenario"
 

@@ -46,9 +46,10 @@ def emulate(
     other masters do not support events.
     ``order``: order in which the components step, for a master that steps them one after the other; by default the
     order of the system."""
-    if disturbed := [plan.name for plan in system.wires.values()] + [
+    disturbed = [plan.name for plan in system.wires.values()] + [
         str(fault) for fault in faults_among(events)
-    ]:
+    ]
+    if disturbed:
         raise InputError(
             f"{rules.title} knows no imperfections of connections and no faults, but the case has some "
             f"({'; '.join(disturbed[:3])}); leave them out to see what it would record"

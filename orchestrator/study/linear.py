@@ -68,7 +68,8 @@ def linear_model(
     ``as_continuous``: A model in continuous time instead of the map over one communication step.
     ``boxes``: finds the step map where components hide their states."""
     parts = {output: variables_of(output) for output in outputs}
-    if phasors := [output for output in outputs if "|" in output]:
+    phasors = [output for output in outputs if "|" in output]
+    if phasors:
         raise InputError(f"outputs: {phasors[0]!r}: a magnitude is not linear; give its two parts")
     wanted, outputs = (
         list(outputs),
@@ -133,7 +134,8 @@ def linear_response(master: Master, prepared: PreparedScenario) -> xr.Dataset:
         for settings in event.changes().values()
         if any(isinstance(value, bool) for value in settings.values())
     ]
-    if faults := faults_among(prepared.events):
+    faults = faults_among(prepared.events)
+    if faults:
         raise NoLinearResponseError(
             f"a linear model cannot follow a fault or a forcing ({faults[0]})"
         )

@@ -48,7 +48,8 @@ def _weight(
     network = result.prepared.case.table.network
     if not is_open(network) or result.prepared.network is None or not result.prepared.network.loads:
         return 0.0, ""
-    if (states := result.model.number_of_states) > _MOST_STATES:
+    states = result.model.number_of_states
+    if states > _MOST_STATES:
         return -math.inf, (
             f"the load model is open, and how much it moves the modes was not computed, as the system has {states} "
             f"states, more than {_MOST_STATES}; write which in [network], as load_model, once as each, and compare"

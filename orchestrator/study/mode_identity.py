@@ -229,9 +229,8 @@ class _Others:
             system = self._undamped()
             if system is not None and name in system.naming.named:
                 self.checked = True
-                if (
-                    found := self._from("without its damping controllers", system, name, sure=True)
-                ) is not None:
+                found = self._from("without its damping controllers", system, name, sure=True)
+                if found is not None:
                     return found
         self.checked = self.checked or self._differs_in_foreign()
         tied = name in self._system.naming.reasons
@@ -246,7 +245,8 @@ class _Others:
     def _from(self, place: str, system: NamedSystem, name: str, *, sure: bool) -> _Origin | None:
         if place not in self._ways:
             self._ways[place] = self._way_from(system)
-        if (way := self._ways[place]) is None:
+        way = self._ways[place]
+        if way is None:
             self.lost = self.lost or place
             return None
         mode, names = system.naming.named[name], system.model.names
@@ -281,7 +281,8 @@ class _Others:
             nonlocal starts
             if part == 1:
                 return self._system.model
-            if (starts := starts + 1) > most:
+            starts = starts + 1
+            if starts > most:
                 raise AnalysisError(f"{most} steps on the way did not do")
             mixed = {
                 name: x if x == y else (1 - part) * x + part * y for name, (x, y) in values.items()
@@ -330,7 +331,8 @@ class _Others:
     def _at(self, name: str, *, plain: bool, sure: bool) -> Iterator[tuple[str, NamedSystem, bool]]:
         if (name, plain) not in self._kept:
             self._kept[name, plain] = self._other(name, plain=plain)
-        if (found := self._kept[name, plain]) is not None:
+        found = self._kept[name, plain]
+        if found is not None:
             yield f"in {name!r}" + (" with the values of its file" if plain else ""), found, sure
 
     def _undamped(self) -> NamedSystem | None:
@@ -341,7 +343,8 @@ class _Others:
 
     def _at_rest(self) -> NamedSystem | None:
         prepared = self._system.prepared
-        if not (gains := dict.fromkeys(damping_gains(prepared), 0.0)):
+        gains = dict.fromkeys(damping_gains(prepared), 0.0)
+        if not gains:
             return None
         try:
             if self._by_gains is not None:

@@ -223,7 +223,8 @@ def _read_schedule(text: str) -> str:
 
 def _schedules(given: Any, argument: str) -> tuple[str, ...]:
     chosen = names(given, argument)
-    if wrong := [name for name in chosen if name not in SCHEDULES]:
+    wrong = [name for name in chosen if name not in SCHEDULES]
+    if wrong:
         raise InputError(f"{argument}: {wrong[0]!r} is none; give some of {', '.join(SCHEDULES)}")
     return chosen
 

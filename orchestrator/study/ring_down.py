@@ -43,7 +43,8 @@ def ring_down_of(
             f"of {1 / mode.frequency_hz:.3g} s of the mode at {mode.frequency_hz:.4g} Hz, which it would show at "
             f"another frequency; {used.remedy}"
         )
-    if why := _obstacle(modes, times, findings):
+    why = _obstacle(modes, times, findings)
+    if why:
         return None, f"no ring-down of {table.signal} is shown: {why}"
     try:
         seen = nearest(identify_modes(times, window.values), mode.eigenvalue)

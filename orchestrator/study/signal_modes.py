@@ -78,7 +78,8 @@ class SignalModes:
             f"The samples used, every {self.interval:g} s, show nothing above {highest:.4g} Hz: "
             f"a faster oscillation appears as a slower one.{' Is the time in ms?' * (self.interval > _RARE)}"
         ]
-        if near := [f"{m.frequency_hz:.4g} Hz" for m in self.modes if m.frequency_hz > highest / 2]:
+        near = [f"{m.frequency_hz:.4g} Hz" for m in self.modes if m.frequency_hz > highest / 2]
+        if near:
             texts.append(
                 f"Above a quarter of the sampling frequency of {1 / self.interval:.4g} Hz, and perhaps no frequency "
                 f"of the system: {', '.join(near)}. To be sure, {self.used.remedy}."

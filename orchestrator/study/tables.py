@@ -100,7 +100,8 @@ def mode_shapes(results: Sequence[ModesResult]) -> Table:
 def power_flows(results: Sequence[ModesResult]) -> Iterator[Table]:
     flows: dict[str, dict[str, Any]] = {}
     for r in results:
-        if flow := power_flow_json(r.prepared):
+        flow = power_flow_json(r.prepared)
+        if flow:
             same = next((titles for titles, other in flows.items() if other == flow), "")
             flows.pop(same, None)
             flows[f"{same}, {r.prepared.title}" if same else r.prepared.title] = flow
@@ -185,7 +186,8 @@ def run_statistics(results: Sequence[RunResult]) -> Table:
         "Of each FMU",
     )
     for r in results:
-        if s := r.statistics:
+        s = r.statistics
+        if s:
             shares = sorted(((c.name, c.share) for c in s.components), key=lambda entry: -entry[1])
             speed = (f"{s.steps_per_second:,.0f}", f"{s.real_time_factor:.3g}", str(s.threads))
             inside = (f"{s.share_in_fmus:.0%}", first_few(shares, share_text))

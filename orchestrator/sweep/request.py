@@ -42,7 +42,8 @@ def _until(given: Any, argument: str) -> Until | None:
 def _varied(vary: Any, argument: str) -> tuple[Vary, ...]:
     """Return what is varied, from values by name, from texts, or as it was read already."""
     if isinstance(vary, Mapping):
-        if wrong := [key for key in vary if not isinstance(key, str)]:
+        wrong = [key for key in vary if not isinstance(key, str)]
+        if wrong:
             raise InputError(f"{argument}: {wrong[0]!r} is not a name; give values by name, {_HOW}")
         for key, values in vary.items():
             check_case_name(key, argument)
@@ -51,7 +52,8 @@ def _varied(vary: Any, argument: str) -> tuple[Vary, ...]:
                     f"{argument}: {key} = {values!r}; a sweep needs a list of values, {_HOW}"
                 )
         lists = {key: tuple(map(plain_value, values)) for key, values in vary.items()}
-        if empty := [key for key, values in lists.items() if not values]:
+        empty = [key for key, values in lists.items() if not values]
+        if empty:
             raise InputError(
                 f"{', '.join(empty)}: a sweep needs values, such as {{'grid.X_L': [0.1, 0.3]}}"
             )

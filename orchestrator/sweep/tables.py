@@ -119,7 +119,8 @@ def remarks(samples: Samples) -> list[str]:
         [f"question: {question}" for question in samples.result.plan.idle],
     )
     texts += [text for limit in result.limits for text in limit.remarks]
-    if failures := list(result.failures()):
+    failures = list(result.failures())
+    if failures:
         texts.append(f"{counted(len(failures), 'point')} of {result.plan.number_of_points} failed:")
         texts += [
             f"  {sweep.prepared.name}, {place_text(samples, place)}: {error}"

@@ -159,7 +159,8 @@ def _angle(seen: Seen, system: System, settings: Settings, name: str) -> Numbers
 def _forget_turns_off_the_grid(angles: Numbers, on: NDArray[np.bool_]) -> None:
     """Take away the whole turns by which a unit differs from the others when it comes back to the grid."""
     for unit, row in np.argwhere(on[:, 1:] & ~on[:, :-1]):
-        if others := [k for k in range(len(on)) if k != unit and on[k, row + 1]]:
+        others = [k for k in range(len(on)) if k != unit and on[k, row + 1]]
+        if others:
             ahead = angles[unit, row + 1] - np.mean(angles[others, row + 1])
             angles[unit, row + 1 :] -= 2 * np.pi * np.round(ahead / (2 * np.pi))
 

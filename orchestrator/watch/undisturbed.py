@@ -52,7 +52,8 @@ def disturbances(system: System, events: Sequence[Event], end: float) -> list[Un
     permanent = set[tuple[str, str]]()
     for plan in system.wires.values():
         for imperfection in plan.permanent.values():
-            if kind := _kind(imperfection):
+            kind = _kind(imperfection)
+            if kind:
                 permanent.add((plan.name, kind))
                 since[plan.name, kind] = 0.0
     for event in events:

@@ -68,7 +68,8 @@ def _moved(values: Vector, symbols: Mapping[Expr, dict[int, Expr]]) -> list[dict
 
 def _partials(f: Expr) -> _Partials:
     """Derivatives of an operation by its first and by its second operand; none of comparisons, logic, floor."""
-    if (by_two := _BY_TWO.get(f.op)) is not None:
+    by_two = _BY_TWO.get(f.op)
+    if by_two is not None:
         return by_two(f, f.a, f.b)
     return _BY_ONE[f.op](f, f.a) if f.op in _BY_ONE else ZERO, ZERO
 

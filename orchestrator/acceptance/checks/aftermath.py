@@ -109,7 +109,8 @@ def after_dips(subject: Subject) -> CheckResult:
                     [(1 + (voltage - 1) / 3, lasts / 2) for voltage, lasts in segments], False
                 )
             )
-        if result := _wrong(found[-1]):
+        result = _wrong(found[-1])
+        if result:
             return result
     return _judged(found)
 
@@ -211,7 +212,8 @@ class _Look:
             ):
                 end, away, kept, answers = self._seen(running, segments, soon)
             for steps, small, here in answers:
-                if changed := self._changed(segments, steps, small, here):
+                changed = self._changed(segments, steps, small, here)
+                if changed:
                     later = f"{words}, {steps * self._subject.step_size:.2g} s later"
                     return _After(later, _End.BACK, away, changed, kept)
         except ComponentError:

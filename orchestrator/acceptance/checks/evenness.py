@@ -85,7 +85,8 @@ def evenness(subject: Subject) -> CheckResult:
             if point is _GIVES:
                 raise
             continue  # which 'power_balance' and 'operating_points' tell
-        if fault := _other(found[_GIVES].real, found[point].real, subject.is_machine):
+        fault = _other(found[_GIVES].real, found[point].real, subject.is_machine)
+        if fault:
             says = f"{fault[1]} from P_0 = {point.P:g}, Q_0 = {point.Q:g}, v_0 = {point.v:g}"
             return failed("evenness", fault[0], f"{says}, and not from P_0 = {_GIVES.P:g}")
     for larger, word in ((_LARGER, "less"), (-_LARGER, "more")):
@@ -96,7 +97,8 @@ def evenness(subject: Subject) -> CheckResult:
             says = f"with {100 * _LARGER * FREQUENCY:g} % {word} frequency its active power goes the wrong way, "
             says += f"by {abs(end.mean()):.2g} pu, and not after a smaller change"
             return failed("evenness", "wrong sign", says)
-    if jump := _jump(subject):
+    jump = _jump(subject)
+    if jump:
         return remarked(
             "evenness",
             jump,
@@ -171,7 +173,8 @@ def _jump(subject: Subject) -> str:
                 * (np.abs(slopes - usual).max(axis=1) * gaps > _JUMP)
             )
         )
-        if (beyond := np.abs(slopes[k] - usual[k]).max() * gaps[k]) > _JUMP:
+        beyond = np.abs(slopes[k] - usual[k]).max() * gaps[k]
+        if beyond > _JUMP:
             ends = f"{name} = {places[k]:.3g} and {places[k + 1]:.3g}"
             return f"its answer to a small change jumps by {100 * beyond:.2g} % between {ends}"
     return ""

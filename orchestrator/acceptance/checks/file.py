@@ -51,7 +51,8 @@ def fmi_validity(subject: Subject) -> CheckResult:
 def units(subject: Subject) -> CheckResult:
     described = without_binding(subject.description)
     bound = described is not subject.description
-    if wrong := _wrong_definitions(subject.directory) + _wrong_port_units(described, bound=bound):
+    wrong = _wrong_definitions(subject.directory) + _wrong_port_units(described, bound=bound)
+    if wrong:
         return failed("units", "wrong units", few(wrong, _SOME, "; "))
     open_ends = [
         v.name

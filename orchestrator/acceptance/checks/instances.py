@@ -200,7 +200,8 @@ def _like_new(subject: Subject, setting: Setting) -> CheckResult:
         running.reset()
         after = running.component.values(moved)
         again = running.record(steps, h, stimulus)
-    if left := [n for n in moved if after[n] != begun[n]]:
+    left = [n for n in moved if after[n] != begun[n]]
+    if left:
         says = f"{left[0]} is {after[left[0]]:g} after fmi2Reset, and {begun[left[0]]:g} in a new instance"
         return failed("reset", "reset leaves something", says)
     apart, place = difference(fresh, again)

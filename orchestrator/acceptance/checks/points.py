@@ -82,7 +82,8 @@ def operating_points(subject: Subject) -> CheckResult:
         )
     tried, left_out, found = 0, [], []
     for words, point in _points(subject):
-        if reason := port.cannot_import(subject, point):
+        reason = port.cannot_import(subject, point)
+        if reason:
             left_out.append(reason)
             continue
         try:
@@ -113,7 +114,8 @@ def operating_points(subject: Subject) -> CheckResult:
         if moved > port.DRIFT:
             left_out.append(f"{words} its current moves by {moved:.3g} pu")
     seen = f"it starts and rests at {tried} points, among them {'none' if not tried else 'no power and full power'}"
-    if coarse := _coarse(found):
+    coarse = _coarse(found)
+    if coarse:
         return remarked(
             "operating_points", f"{coarse}; {seen}", "ask in which steps it takes its power"
         )
@@ -242,7 +244,8 @@ def later_times(subject: Subject) -> CheckResult:
     if not subject.port:
         return not_applicable("later_times", WHY["no port"])
     steps, h, said, found = affordable(subject, ANSWER), subject.step_size, [], 0.0
-    if (rested := subject.memory.get("rested")) is not None:
+    rested = subject.memory.get("rested")
+    if rested is not None:
         point, rest, late = rested
         first = subject.trajectory(steps, h, subject.one_step(), point=point)
         found = _differs(first, late, _STILL * rest.moved)

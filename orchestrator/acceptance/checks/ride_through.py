@@ -316,7 +316,8 @@ def _judged(
         return failed("limits", "blocks", f"{says}; {seen}", blocked=longest.blocked, **figures)
     if refused:
         seen += f"; {refused[0]}"
-    if gone := [a for a in answers if a.gone]:
+    gone = [a for a in answers if a.gone]
+    if gone:
         seen += f"; it gives no current any more after {gone[0].event}"
     if lost:
         seen += f"; it is {lost[0].away:.2g} pu away after {lost[0].event}" + (

@@ -224,7 +224,8 @@ def start_values(subject: Subject) -> CheckResult:
     ]
     if wrong:
         return failed("start_values", "start values differ", "; ".join(wrong[:3]))
-    if lost := _not_taken(subject):
+    lost = _not_taken(subject)
+    if lost:
         return failed("start_values", "parameter not taken", lost)
     return passed("start_values", f"{len(names)} parameters and inputs start as declared")
 

@@ -220,7 +220,8 @@ def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
         return remarked(
             "signs", says, "ask how it is damped, and at which network impedance", **figures
         )
-    if lag := _lag(frequency):
+    lag = _lag(frequency)
+    if lag:
         remedy = "ask for its time constant: what is controlled or judged by omega comes so late"
         return remarked("signs", f"{lag} ({said})", remedy, **figures)
     return passed("signs", said, **figures)
@@ -321,7 +322,8 @@ def _wrong(
             if way.far < _AWAY and crossings >= _CROSSINGS and late > max(_RINGS, _DAMPED * before):
                 says = f"after a small change of {kind} its power swings by {before:.2g} pu, and by {late:.2g} pu later"
                 return "keeps moving", says
-    if lost := _lost(voltage, frequency):
+    lost = _lost(voltage, frequency)
+    if lost:
         return "loses synchronism", lost
     steady = [a.moving < max(_SOME, _SETTLED * abs(a.power)) for a in (voltage, frequency)]
     least = _least(point)

@@ -229,7 +229,8 @@ def _brought_back(subject: Subject, setting: Setting, moved: Setting) -> tuple[s
                                 0,
                             )
                     found = running.component.values(moved)
-                    if stays := [n for n in moved if found[n] != tuned[n]]:
+                    stays = [n for n in moved if found[n] != tuned[n]]
+                    if stays:
                         says = f"{stays[0]} was {tuned[stays[0]]:g} and is {found[stays[0]]:g} after it"
                         return f"parameters belong to a state: {says}", 0.0, 0
                     again = running.record(steps, h, stimulus)

@@ -104,9 +104,11 @@ def delay(subject: Subject) -> CheckResult:
         if late and late == _shift(fine, fourfold, 4):
             says = f"the response{words} comes {late} communication step{'s' * (late > 1)} late, with any step size"
             return failed("delay", "delayed output", says, steps=late)
-    if stale := _stale(subject, declared=True):
+    stale = _stale(subject, declared=True)
+    if stale:
         return failed("delay", "delayed output", stale, steps=1)
-    if stale := _stale(subject, declared=False):
+    stale = _stale(subject, declared=False)
+    if stale:
         return remarked(
             "delay", stale, "its partners see it one step late; ask for outputs that follow at once"
         )
@@ -333,7 +335,8 @@ def internal_step(subject: Subject) -> CheckResult:
     seen = f"with {share} times the step of {h:g} s the answer differs by {worst:.3g} of the range"
     if worst > max(3 * one_step, 5e-3):
         pairs = [((plain, h), (run, span / many * h)) for (span, many), run in odd.items()]
-        if elsewhere := switches_elsewhere(subject.watched, pairs):
+        elsewhere = switches_elsewhere(subject.watched, pairs)
+        if elsewhere:
             if subject.memory.get("switching"):
                 return not_applicable(
                     "internal_step", "because only moments of switching differ, as was said above"

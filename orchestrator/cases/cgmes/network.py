@@ -52,7 +52,8 @@ class CgmesNetwork:
 
 
 def read_cgmes(path: Path, leaving_out: Sequence[str] = ()) -> CgmesNetwork:
-    if unknown := [kind for kind in leaving_out if kind not in LEFT_OUT]:
+    unknown = [kind for kind in leaving_out if kind not in LEFT_OUT]
+    if unknown:
         raise InputError(
             f"leave_out: {unknown[0]!r} is unknown for CGMES; choose from {', '.join(LEFT_OUT)}"
         )
@@ -203,7 +204,8 @@ class _Reading:
             return found or {units.bus_id[name]}
         nodes = self._source.get_bus_breaker_view_buses()
         for node in (node for node in self._reference.nodes if node in nodes.index):
-            if (bus := nodes.bus_id[node]) in {*units.bus_id}:
+            bus = nodes.bus_id[node]
+            if bus in {*units.bus_id}:
                 return found or {bus}
         return found
 

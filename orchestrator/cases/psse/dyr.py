@@ -82,7 +82,8 @@ def machine_models(
             continue
         known = _KNOWN.get(record.name)
         if known is None:
-            if remedy := remedy_for(record.name, approximate=approximate):
+            remedy = remedy_for(record.name, approximate=approximate)
+            if remedy:
                 problems.append(f"no part of ours stands for {record.name}{remedy}")
                 first.setdefault(problems[-1], record.place)
                 without.add(record.name)

@@ -33,7 +33,8 @@ class DynamicRecord:
 def read_dyr(path: Path) -> list[DynamicRecord]:
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; give the path of a PSS/E DYR file")
-    if (size := path.stat().st_size) > MOST_BYTES:
+    size = path.stat().st_size
+    if size > MOST_BYTES:
         raise InputError(f"{path}: it has {size} bytes; at most {MOST_BYTES} are read")
     records: list[DynamicRecord] = []
     tokens: list[str] = []
@@ -73,7 +74,8 @@ def _record(file: str, line: int, tokens: Sequence[str]) -> DynamicRecord:
 def given_values(
     record: DynamicRecord, fields: Sequence[DyrField], known: Collection[str]
 ) -> dict[str, float]:
-    if following := next((text for text in record.values[2:] if text.upper() in known), None):
+    following = next((text for text in record.values[2:] if text.upper() in known), None)
+    if following:
         raise InputError(
             f"{record.place}: the record {record.name} has no slash at its end, and runs into the next, {following}"
         )

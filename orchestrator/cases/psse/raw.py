@@ -322,7 +322,8 @@ class _Reading:
             if not self._in_service(record, 16, "STAT"):
                 continue
             start, end = self._bus(record), self._bus(record, 1)
-            if closed := record.whole(16, "STAT", 1):
+            closed = record.whole(16, "STAT", 1)
+            if closed:
                 self._changes.note(record.line, "switching device: a branch of its reactance")
             self._branch(start, end, complex(0.0, record.number(3, "X", 1e-4)), closed)
         if self._raw.base_mva != _SBASE:

@@ -197,7 +197,8 @@ def text_of(path: Path) -> str:
     """The text of a file, in UTF-8 or, if it is none, Latin-1."""
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; give the path of a PSS/E RAW file")
-    if (size := path.stat().st_size) > MOST_BYTES:
+    size = path.stat().st_size
+    if size > MOST_BYTES:
         raise InputError(f"{path}: it has {size} bytes; at most {MOST_BYTES} are read")
     content = read_bytes(path, MOST_BYTES)
     if b"\x00" in content[:4096]:
@@ -262,7 +263,8 @@ def _following(path: Path, number: int, line: str, name: str, order: list[str]) 
             f"{path}, line {number}: it ends the {ended} data, and what stands before it are {name} data by the lines "
             "between sections; one of these is missing or wrong: export the case once more"
         )
-    if found := _BEGIN.search(line):
+    found = _BEGIN.search(line)
+    if found:
         return section_of(found[1])
     if name not in order:
         if ended:
@@ -320,7 +322,8 @@ _KNOWN = {
 
 def leave_out(raw: RawFile, allowed: Sequence[str], changes: Changes) -> None:
     """Note the elements that our network does not have."""
-    if unknown := [kind for kind in allowed if kind not in (*LEFT_OUT, *raw.sections)]:
+    unknown = [kind for kind in allowed if kind not in (*LEFT_OUT, *raw.sections)]
+    if unknown:
         raise InputError(f"leave_out: {unknown[0]!r} is unknown; choose from {', '.join(LEFT_OUT)}")
     refused = []
     for section, records in raw.sections.items():

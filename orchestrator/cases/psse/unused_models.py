@@ -34,7 +34,8 @@ def unused_models(records: Sequence[DynamicRecord], uses: Sequence[RecordUse]) -
     ]
     for name in dict.fromkeys(record.name for record in unused):
         own = [record for record in unused if record.name == name]
-        if (kind := kind_of(name)) in _MATTER:
+        kind = kind_of(name)
+        if kind in _MATTER:
             buses = few(dict.fromkeys(str(record.bus) for record in own), _MOST_BUSES)
             text = f"{name} (bus {buses}) is of no machine and not used: {_MATTER[kind]}"
             for record in own:

@@ -90,7 +90,8 @@ def carries() -> Judge:
 
     def judge(row: MeasuredRow) -> RowFinding:
         rule = f"for no more than {1e3 * LASTS:g} ms is the current over a period above its limit"
-        if told := told_of(row.findings, PLANT):
+        told = told_of(row.findings, PLANT)
+        if told:
             return _finding(
                 CURRENT, rule, READING, told["mean"], ABOVE * told["declared"], str(told["message"])
             )

@@ -124,7 +124,8 @@ def row_chapters(c: Certificate, figures: Figures) -> list[tuple[str, str]]:
 def _pictures(c: Certificate, figures: Figures) -> str:
     parts = []
     for v in c.verdicts:
-        if content := row_pictures(v, c.results[v.row.name], c.f_n, figures):
+        content = row_pictures(v, c.results[v.row.name], c.f_n, figures)
+        if content:
             word = "accepted" if v.accepted else NO_VERDICT if v.row.shown_only else "not accepted"
             title = escape(f"{v.row.name}: {v.row.title}: {word}")
             parts.append(

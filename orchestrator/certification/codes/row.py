@@ -30,10 +30,12 @@ def checked(
     wanted: Sequence[Declaration], given: Mapping[str, object], code: str
 ) -> dict[str, float]:
     names = [declaration.name for declaration in wanted]
-    if unknown := [name for name in given if name not in names]:
+    unknown = [name for name in given if name not in names]
+    if unknown:
         takes = f"it takes {', '.join(names)}" if names else "it takes none; leave it out"
         raise InputError(f"--declare {unknown[0]}: --code {code} knows no such value; {takes}")
-    if missing := [d for d in wanted if d.name not in given]:
+    missing = [d for d in wanted if d.name not in given]
+    if missing:
         said = "; ".join(f"{d.name} ({d.meaning}) [{d.unit}]" for d in missing)
         example = " ".join(f"--declare {d.name}=…" for d in missing)
         raise InputError(
@@ -176,7 +178,8 @@ def _fault_of_words(key: str) -> str:
     place, words = f"{_FILE}, [{key}]", _WORDS.get(key)
     if words is None:
         return f"{_FILE} has no section [{key}]; a code has its words there: {', '.join(_KINDS)}"
-    if strange := [name for name in words if name not in _KINDS]:
+    strange = [name for name in words if name not in _KINDS]
+    if strange:
         return f"{place}: {strange[0]!r} is no word of a code; its words are {', '.join(_KINDS)}"
     for name, (kind, rule) in _KINDS.items():
         if not isinstance(words.get(name), kind):
@@ -188,7 +191,8 @@ def _fault_of_rows(key: str, rows: Sequence[Row]) -> str:
     names = [row.name for row in rows]
     if not rows:
         return f"all_codes.py: code {key!r} has no row; give it one at least"
-    if twice := [name for name in names if names.count(name) > 1]:
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
         return f"all_codes.py, code {key!r}: two rows are named {twice[0]!r}, and would be judged as one; rename one"
     for row in (row for row in rows if isinstance(row, CodeRow)):
         if not re.fullmatch(r"\w+", row.name, re.ASCII):
@@ -226,7 +230,8 @@ class GridCode(Generic[AnyRow]):
         rows: tuple[AnyRow, ...],
         declared: Mapping[str, float] = MappingProxyType({}),
     ) -> "GridCode[AnyRow]":
-        if fault := _fault_of_words(key) or _fault_of_rows(key, rows):
+        fault = _fault_of_words(key) or _fault_of_rows(key, rows)
+        if fault:
             return cls(key, rows, fault=fault)
         texts: dict[str, Any] = {
             n: tuple(text) if isinstance(text, list) else text for n, text in _WORDS[key].items()

@@ -106,7 +106,8 @@ def judge_row(
             not current.accepted or stated is None or any(c["criterion"] == CURRENT for c in stated)
         ):
             found.append(current)
-        if reason := measured.broken:
+        reason = measured.broken
+        if reason:
             why = f"{NOT_JUDGED}, {reason}"  # what a broken response meets has no meaning
             found = [
                 replace(f, accepted=None, margin=None, text=f"{f.text}; {why}") if f.accepted else f

@@ -70,7 +70,8 @@ def rebuilt(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Cer
 
 def _response(row: str, stated: dict[str, Any] | None, responses: xr.Dataset) -> BenchResult:
     said = stated or {"unknown": "", "findings": []}
-    if why := said["unknown"]:
+    why = said["unknown"]
+    if why:
         return BenchResult(
             row, findings=said["findings"], failure=Failure(ErrorKind.OTHER, why, False)
         )
@@ -142,7 +143,8 @@ def choose(content: Content, wanted: Sequence[str] = (), *, every: bool = False)
     ``wanted``: Names that were asked for; where empty, the row with the narrowest margin that is met, and `DRAWN`
     others that chance draws, so that nobody knows them beforehand."""
     known = [stated["row"] for stated in content["rows"] if not stated["unknown"]]
-    if unknown := [name for name in wanted if name not in known]:
+    unknown = [name for name in wanted if name not in known]
+    if unknown:
         raise InputError(
             f"--rows: the certificate has no row {unknown[0]!r}; it has: {', '.join(known)}"
         )
@@ -172,7 +174,8 @@ def compare(content: Content, task: BenchTask, again: BenchResult, data: xr.Data
         row for row in code_for(content["code"], content["declared"]).rows if row.name == task.row
     )
     until = min((float(f["time"]) for f in again.findings if f["kind"] in UNSTABLE), default=np.inf)
-    if fault := _fault_of_row(content, row, again, data, until):
+    fault = _fault_of_row(content, row, again, data, until)
+    if fault:
         yield f"row {row.name}: {fault}", ""
     else:
         said = (

@@ -169,9 +169,10 @@ def confirm_changes(
     wanted: dict[int, tuple[MarginSensitivity, float]] = {}
     tasks: dict[int, change_point.ChangeTask] = {}
     for k, need in enumerate(needs):
-        if tried := [
+        tried = [
             (s, change) for s in need.sensitivities if (change := s.change_to_meet()) is not None
-        ]:
+        ]
+        if tried:
             best = max(tried, key=lambda entry: (min(_expected(*entry), 0.0), -abs(entry[1])))
             wanted[k] = best
             tasks[k] = _task(plan.certificate, plan.folder, need.row, best[0].parameter, best[1])

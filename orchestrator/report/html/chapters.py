@@ -121,7 +121,8 @@ def of_run(
             else ""
         )
         told += [] if least is None else [LeastDamped.of(least)]
-        if later := answer.get("after_events"):
+        later = answer.get("after_events")
+        if later:
             figures += f", after the events {later['frequency_hz']:.3f} Hz, {later['damping_percent']:.2f} %"
             told.append(LeastDamped.of(later))
         remark = f" ({answer['remark']})" if answer.get("remark") else ""
@@ -131,7 +132,8 @@ def of_run(
         ]
         open_ += [f"{title}: {s['failure']}"] if s.get("failure") else []
         open_ += [f"{title}: {stability.get('reason') or 'stability'}"] if stable is None else []
-        if ring := s.get("ring_down"):
+        ring = s.get("ring_down")
+        if ring:
             sure.append(
                 f"{title} rings with {ring['frequency_hz']:.3f} Hz, {ring['damping_percent']:.2f} % in time"
             )
@@ -292,7 +294,8 @@ def _design(file: Path, c: Content) -> Chapter:
         f"{'yes' if c['met'] else 'not as required'}: with K = {c['K']:.4g} the mode has {after:.2f} % of damping, "
         f"{before:.2f} % before, {wanted:.2f} % wanted"
     )
-    if thin := c.get("thin_margin_damping_ratio"):
+    thin = c.get("thin_margin_damping_ratio")
+    if thin:
         answer += f"; no margin: {100 * thin:.2f} % with 20 % more gain"
     if c["met"] and (spoilt := c.get("larger_gain_spoils")):
         answer += f"; no margin: with 20 % more gain {spoilt}"
@@ -595,7 +598,8 @@ def _nyquist(file: Path, c: Content) -> Chapter:
         if m
     ]
     content = table("Margins", ["Margin", "Value", "at [Hz]"], rows)
-    if found := c.get("retune"):
+    found = c.get("retune")
+    if found:
         made = [
             [
                 escape(x["name"]),
@@ -689,7 +693,8 @@ def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:
         "basis": json.loads(sweep.attrs.get("basis", "{}")),
     }
     models, bases = "".join(f"{kind}; " for kind in _kinds([about])), _bases([about])
-    if limits := limits_of(place):
+    limits = limits_of(place)
+    if limits:
         said = _limits_text(limits)
         holds = all(one["ends_with"] == "holds" for one in limits)
         return Chapter(

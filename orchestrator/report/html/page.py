@@ -59,9 +59,11 @@ def page(
 ) -> str:
     told, runs = _told(places, Figures())
     chapters = [chapter for chapter, _ in told]
-    if differ := _of_several_studies(chapters):
+    differ = _of_several_studies(chapters)
+    if differ:
         warnings.warn(differ, ResultsWarning, stacklevel=2)
-    if changed := _changed_since(chapters):
+    changed = _changed_since(chapters)
+    if changed:
         warnings.warn(changed, ResultsWarning, stacklevel=2)
     headings = [heading for _, content in told for heading, _ in content]
     content = [
@@ -117,7 +119,8 @@ def _told(
         before = len(told)
         for part in within:
             count = len(told)
-            if (run := runs.get(part)) is not None:
+            run = runs.get(part)
+            if run is not None:
                 split = (
                     [s for s in run.scenarios if has_fault(s) is faulted]
                     for faulted in (False, True)
@@ -333,7 +336,8 @@ def _moved(was: Mapping[str, Any], is_now: Mapping[str, Any]) -> str:
     if is_now.get("least") and "least" not in was:
         return "not told: the older page does not say which modes its figures are of"
     modes = ([LeastDamped.of(mode) for mode in one.get("least", ())] for one in (was, is_now))
-    if other := other_modes(*modes):
+    other = other_modes(*modes)
+    if other:
         return "; ".join(other)
     pairs = zip(re.findall(number, before), re.findall(number, now), strict=True)
     moved = [

@@ -53,7 +53,8 @@ def scenario_legend(results: Results) -> str:
 def findings(results: Results) -> str:
     """Return what a reader in a hurry should take away, from the figures themselves."""
     items = []
-    if early := results.ended_early:
+    early = results.ended_early
+    if early:
         shade = "soft" if early["word"] == "interrupted" else "bad"
         items.append(f'<b class="{shade}">{escape(early["word"])}</b> {escape(early["place"])}')
     for s in results.scenarios:
@@ -119,7 +120,8 @@ def _answers(results: Results) -> str:
 def _least_damped(results: Results) -> list[tuple[str, dict[str, str]]]:
     found = []
     for name, title in titles(results).items():
-        if rows := [r for r in results.modes if r["scenario"] == name]:
+        rows = [r for r in results.modes if r["scenario"] == name]
+        if rows:
             found.append((title, min(rows, key=lambda r: float(r["damping [%]"]))))
     return found
 
@@ -465,7 +467,8 @@ def step_sizes(results: Results) -> str:
 
 def provenance(results: Results) -> str:
     parts = []
-    if attributes := next((d.attrs for d in results.trajectories.values()), {}):
+    attributes = next((d.attrs for d in results.trajectories.values()), {})
+    if attributes:
         versions = json.loads(attributes["versions"])
         parts.append(f"<p>{escape(', '.join(f'{name} {v}' for name, v in versions.items()))}</p>")
     fmus: dict[str, tuple[str, str, str]] = {}
@@ -474,7 +477,8 @@ def provenance(results: Results) -> str:
             n: (f["model"], f["guid"], f["tool"])
             for n, f in json.loads(dataset.attrs["fmus"]).items()
         }
-    if rows := [[escape(name), *map(escape, content)] for name, content in fmus.items()]:
+    rows = [[escape(name), *map(escape, content)] for name, content in fmus.items()]
+    if rows:
         listed = table("FMUs", ["Component", "Model", "Guid", "Made by"], rows, left=4)
         parts.append(
             f"<details><summary>{len(rows)} FMUs with their guids</summary>{listed}</details>"

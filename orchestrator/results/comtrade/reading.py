@@ -233,7 +233,8 @@ def _joint(path: Path) -> tuple[str, bytes, tuple[str, str]]:
             following = _SECTION.search(content, begin)
             position = following.start() if following else len(content)
         sections[kind] = content[begin:position]
-    if missing := [kind for kind in ("CFG", "DAT") if kind not in sections]:
+    missing = [kind for kind in ("CFG", "DAT") if kind not in sections]
+    if missing:
         raise InputError(
             f"{path}: it has no part '--- file type: {missing[0]} ---', so it is no recording in one file"
         )
@@ -245,7 +246,8 @@ def _content(path: Path, most: int) -> bytes:
         raise InputError(
             f"{path}: there is no such file; give the .cfg or .cff of a COMTRADE recording"
         )
-    if (size := path.stat().st_size) > most:
+    size = path.stat().st_size
+    if size > most:
         raise InputError(
             f"{path}: it has {size} bytes; at most {most} are read; cut the recording into parts"
         )
@@ -291,7 +293,8 @@ def _times(configuration: Configuration, stamps: Numbers, place: str) -> Numbers
 
 def _warn_of_skew(configuration: Configuration, times: Numbers) -> None:
     interval = float(np.diff(times).min()) if len(times) > 1 else np.inf
-    if late := [c for c in configuration.analog if abs(c.skew) > 0.1 * interval]:
+    late = [c for c in configuration.analog if abs(c.skew) > 0.1 * interval]
+    if late:
         shown = ", ".join(f"{c.name} ({c.skew:.3g} s)" for c in late[:5])
         text = f"{configuration.place}: samples are skewed by more than a tenth of a sample: {shown}; the times "
         warnings.warn(f"{text}of all channels are taken as equal", ResultsWarning, stacklevel=3)
