@@ -64,11 +64,11 @@ def by_known_keywords(function: Callable[Asks, Shown]) -> Callable[Asks, Shown]:
     known = [*signature_of(function).parameters]
 
     @wraps(function)
-    def called(*given: Asks.args, **named: Asks.kwargs) -> Shown:
+    def call(*given: Asks.args, **named: Asks.kwargs) -> Shown:
         require_known(named, known, function.__name__)
         return function(*given, **named)
 
-    return called
+    return call
 
 
 def _named(made: Any, name: str, module: str) -> Any:

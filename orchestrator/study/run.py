@@ -200,7 +200,7 @@ def _run(
         ):  # a look is in steps, which a foreign federate cannot take back
             modes = replace(modes, warnings=(*modes.warnings, *_diverging(master)))
         shifts = _shifts(master, modes)
-        follows = _followed(master, prepared) if linear else None
+        follows = _response_of(master, prepared) if linear else None
         try:
             if federation is not None:
                 federation.begin(master)
@@ -256,7 +256,7 @@ def _run(
     )
 
 
-def _followed(master: Master, prepared: PreparedScenario) -> xr.Dataset:
+def _response_of(master: Master, prepared: PreparedScenario) -> xr.Dataset:
     """The linear model's response to the run's events."""
     try:
         return linear_response(master, prepared)
