@@ -44,6 +44,7 @@ class _Source:
     machines: tuple[Machine, ...] = ()
     idle: frozenset[tuple[int, str]] = frozenset()
     misfit: str = ""
+    records: tuple[RecordUse, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -136,6 +137,7 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
             if load.name in source.load_parts
         },
         limits=source.limits if table.raw or table.matpower else FileLimits(),
+        records=found.records,
     )
 
 
@@ -210,7 +212,12 @@ def _from_raw(path: Path, table: NetworkTable) -> _Source:
         bus: replace(g, rating_mva=ratings[bus]) for bus, g in imported.generation.items()
     }
     return _Source(
-        replace(imported, generation=generation), tuple(changes), raw.machines, raw.idle, misfit
+        replace(imported, generation=generation),
+        tuple(changes),
+        raw.machines,
+        raw.idle,
+        misfit,
+        raw.records,
     )
 
 

@@ -37,6 +37,13 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
     if slack not in units.values():
         known = close_names(wanted, dict.fromkeys(units.values()), f"units: {', '.join(units)}")
         text = f"{wanted!r} is neither a unit of this scenario nor a bus with one; {known}"
+        if draft.data is not None and draft.data.slack == wanted:
+            text = (
+                f"the reference {wanted!r} (IDE = 3 in PSS/E) has no machine in service, so nothing feeds what is "
+                "left: PSS/E does not solve such a file. Add the machine or the infinite bus that is meant there (in "
+                "PSS/E a machine with GENCLS and H = 0), or name a unit that is to feed it, such as slack = "
+                f'"{next(iter(units), "sg1")}" (`gfor new --slack`)'
+            )
         draft.note(draft.given.place("power_flow", "slack"), text)
         return None
     note_contradictions(draft, units)

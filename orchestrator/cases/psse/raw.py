@@ -1,7 +1,7 @@
 """A PSS/E RAW file of revision 29 to 36 as tables of a network source."""
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,11 +11,13 @@ import numpy as np
 from fmus.grid.element_data import SMALLEST_REACTANCE
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.network_sources import SourceTables
+from orchestrator.cases.psse.raw_accounts import record_uses
 from orchestrator.cases.psse.raw_file import read_file
 from orchestrator.cases.psse.records import SWITCHING_DEVICES, RawFile, Record, leave_out
 from orchestrator.cases.psse.solution import fits, reactive_needs
 from orchestrator.cases.psse.transformers import Transformer, star, transformers
 from orchestrator.cases.psse.zero_impedances import merged_buses, threshold
+from orchestrator.cases.record_use import RecordUse
 from orchestrator.cases.source_changes import Changes
 from orchestrator.errors import Problem
 
@@ -26,7 +28,7 @@ _REFERENCE, _OUT = 3, 4  # codes IDE of a bus
 MANY_SHUNTS = 35  # first revision with a node in the records of machines and switched shunts
 _POWER_FACTOR = 0.9  # with which a power tells a rating that is not known
 _NO_LIMIT = 9999.0  # MW or Mvar by which PSS/E says that a generator has no limit
-_APART = 0.01  # voltage of a solved file beside what a generator within its limits is to hold [pu]
+_APART = 0.01  # voltage of a file beside what a generator within its limits is to hold [pu]
 _CLOSE = 1e-4  # the same if the file's solution fits the generator's QG [pu]
 _AT_LIMIT = 0.1  # Mvar by which a rounded QG may miss a limit
 _MOST_VOLTAGE = 2.0
@@ -82,6 +84,7 @@ class RawNetwork:
     machines: tuple[Machine, ...]
     changes: tuple[Problem, ...]
     idle: frozenset[tuple[int, str]] = frozenset()
+    records: tuple[RecordUse, ...] = ()
 
 
 def read_raw(
@@ -146,7 +149,10 @@ class _Reading:
             self._raw.frequency,
             self._load_parts,
         )
-        return RawNetwork(tables, machines, tuple(self._changes.listed()), frozenset(self._idle))
+        records = record_uses(self._raw, self._merged, leaving_out)
+        return RawNetwork(
+            tables, machines, tuple(self._changes.listed()), frozenset(self._idle), records
+        )
 
     def _bus(self, record: Record, index: int = 0) -> int:
         bus = abs(record.whole(index, "the bus' number"))
@@ -354,10 +360,23 @@ class _Reading:
             text = f"reactance of almost 0: taken as {self._least:.2g} pu, the least that the network can have"
             self._changes.note(f"{start}-{end}", text)
             z = complex(z.real, self._least)
+        if start == end:
+            self._within_bus(start, z, to_earth, tap or 1.0, shift)
+            return
         self._branches.append(
             [start, end, z.real, z.imag, 0.0, rating, 0.0, 0.0, tap, shift, float(state != 0)]
         )
         self._to_earth.append(to_earth)
+
+    def _within_bus(
+        self, bus: int, z: complex, to_earth: tuple[complex, complex], tap: float, shift: float
+    ) -> None:
+        """Add a branch whose ends are one bus, because zero impedance lines join them: it is an admittance to earth."""
+        text = "both ends are one bus by zero impedance lines: an admittance to earth, by its charging and ratio"
+        self._changes.note(f"{bus}-{bus}", text)
+        through = 2 * math.cos(math.radians(shift)) / tap
+        drawn = (1 / z + to_earth[0]) / tap**2 + 1 / z + to_earth[1] - through / z
+        self._add(bus, 4, drawn * self._raw.base_mva)
 
     def _transformers(self) -> None:
         for t in transformers(self._raw, self._kilovolts):
@@ -411,39 +430,37 @@ class _Reading:
                 rating=winding.rating_mva,
             )
 
-    def _solved_buses(self, status: int) -> dict[int, tuple[bool, bool]]:
-        """Buses at which the file's voltages fit the machines' QG: whether all are at their least, at their most.
+    def _solved_buses(self, status: int) -> set[int]:
+        """Return the buses at which the file's voltages fit the machines' QG; none if the file is not solved.
 
-        Empty if the file is not solved. ``status``: column of STAT in the records of machines."""
+        ``status``: column of STAT in the records of machines."""
         needed = reactive_needs(self._rows, self._branches, self._to_earth, self._raw.base_mva)
-        fed: dict[int, list[float]] = {}
-        ends: dict[int, tuple[bool, bool]] = {}
+        fed: dict[int, float] = {}
         for record in self._raw.of("generator"):
             bus = self._same.get(self._own(record), self._own(record))
-            if not record.whole(status, "STAT", 1) or bus not in needed:
-                continue
-            q = record.number(3, "QG", 0.0)
-            fed.setdefault(bus, []).append(q)
-            least, most = _limits(record, "QB", 5, "QT", 4, "Mvar")
-            low, high = ends.get(bus, (True, True))
-            ends[bus] = low and q <= least + _AT_LIMIT, high and q >= most - _AT_LIMIT
-        return {bus: ends[bus] for bus, qs in fed.items() if fits(sum(qs), needed[bus])}
+            if record.whole(status, "STAT", 1) and bus in needed:
+                fed[bus] = fed.get(bus, 0.0) + record.number(3, "QG", 0.0)
+        return {bus for bus, q in fed.items() if fits(q, needed[bus])}
 
-    def _is_at_limit(
-        self, bus: int, setpoint: float, solved: Mapping[int, tuple[bool, bool]]
-    ) -> bool:
-        """Whether limits of reactive power keep a bus from its machines' setpoint [pu] in the file's solution."""
-        apart = self._magnitudes[bus] - setpoint
-        if bus not in solved or self._rows[bus][1] == _REFERENCE or abs(apart) <= _CLOSE:
-            return False
-        at_least, at_most = solved[bus]
-        return at_most if apart < 0 else at_least
-
-    def _is_apart(self, bus: int, setpoint: float, solved: Collection[int]) -> bool:
-        """Return whether the solved file has another voltage at a bus than its machine's setpoint [pu]."""
-        magnitude = self._magnitudes[bus]
-        allowed = _CLOSE if bus in solved else _APART
-        return abs(setpoint - magnitude) > allowed and (bus in solved or magnitude != 1)
+    def _setpoint(
+        self, record: Record, bus: int, limits: tuple[float, float], solved: Collection[int]
+    ) -> float:
+        """Return the voltage that a machine is to hold [pu]: VS, or VM if the file's solution fits there."""
+        least, most = limits
+        fed, VM = record.number(3, "QG", 0.0), self._magnitudes[bus]
+        held = record.number(6, "VS", 1.0)
+        is_within = least + _AT_LIMIT < fed < most - _AT_LIMIT
+        if bus in solved and abs(held - VM) > _CLOSE:
+            text = "VS is not VM of the file's solution, as QG is at a limit"
+            if is_within:
+                text = f"VS is {held:g} pu, where the solved file has VM = {VM:g} pu, with Q within its limits"
+            text += ": it holds VM, from which PSS/E starts as well; the unit's v_0 in the case changes it"
+            self._changes.note(record.line, text)
+            return VM
+        if bus not in solved and VM != 1 and abs(held - VM) > _APART and least < fed < most:
+            text = f"VS is {held:g} pu, where the solved file has VM = {VM:g} pu, with Q within its limits: VS is held"
+            self._changes.note(record.line, text)
+        return held
 
     def _is_out(self, bus: int) -> bool:
         return bus in self._rows and self._rows[bus][1] == _OUT
@@ -463,7 +480,6 @@ class _Reading:
                 raise record.error(f"MBASE is {rating:g} MVA; it must exceed 0")
             least, most = _limits(record, "QB", 5, "QT", 4, "Mvar")
             remote = record.whole(7, "IREG", 0)
-            held = record.number(6, "VS", 1.0)
             if remote not in (0, bus):
                 held = self._magnitudes[bus]
                 self._changes.note(
@@ -475,16 +491,8 @@ class _Reading:
                 self._changes.note(
                     record.line, "generator at a bus of type 1: it holds the file's voltage"
                 )
-            elif self._is_at_limit(bus, held, solved):
-                held = self._magnitudes[bus]
-                self._changes.note(
-                    record.line,
-                    "generator at a limit of its reactive power in the file's solution, where VM is not VS: "
-                    "it holds VM, as PSS/E starts from it",
-                )
-            elif self._is_apart(bus, held, solved) and least < record.number(3, "QG", 0.0) < most:
-                text = f"VS is {held:g} pu, where the solved file has VM = {self._magnitudes[bus]:g} pu"
-                self._changes.note(record.line, f"{text}, with Q within its limits: VS is held")
+            else:
+                held = self._setpoint(record, bus, (least, most), solved)
             if record.number(mbase + 4, "XT", 0.0):
                 self._changes.note(
                     record.line, "step-up transformer within a generator's record: left out"

@@ -1,7 +1,8 @@
 """The solution that a RAW file holds, VM and VA: at which buses it fits the machines' reactive powers QG.
 
 PSS/E solves with the limits of the machines' reactive power, and saves what came out: a machine at a limit has
-QG = QT or QB and another VM than VS.  Such a bus tells the machine's operating point by VM, and VS does not."""
+QG = QT or QB and another VM than VS.  Its dynamics start from VM and QG.  If both fit, VM tells the machine's operating
+point, and VS does not."""
 
 from collections.abc import Mapping, Sequence
 
@@ -21,7 +22,7 @@ def reactive_needs(
     to_earth: Sequence[tuple[complex, complex]],
     base_mva: float,
 ) -> dict[int, float]:
-    """Reactive power that machines must feed into each bus for the file's voltages [Mvar].
+    """Return the reactive power that machines must feed into each bus for the file's voltages [Mvar].
 
     ``rows``, ``branches``: MATPOWER's tables of buses, by number, and of branches; ``to_earth``: admittances at both
     ends of each branch [pu of ``base_mva``].  A bus without a voltage is a star point, which feeds nothing.  Empty if
@@ -47,7 +48,7 @@ def fits(fed_mvar: float, needed_mvar: float) -> bool:
 
 
 def _admittances(branches: Matrix, to_earth: np.ndarray, place: Mapping[int, int]) -> coo_matrix:
-    """The admittance matrix of the branches in service [pu]."""
+    """Return the admittance matrix of the branches in service [pu]."""
     closed = branches[:, 10] != 0
     branches, to_earth = branches[closed], to_earth[closed]
     start, end = (np.array([place[int(n)] for n in branches[:, k]], dtype=int) for k in (0, 1))

@@ -1,0 +1,100 @@
+"""What became of each record of a RAW file: used, held at its value, or not used."""
+
+from collections.abc import Collection, Iterator, Sequence
+
+from orchestrator.cases.psse.records import LEFT_OUT, SWITCHING_DEVICES, RawFile, Record
+from orchestrator.cases.record_use import RecordUse, UseOfRecord
+
+_OUT = 4  # IDE of a bus that is out of service
+_NODES = 35  # first revision with a node in the records of machines and switched shunts
+_SHUNT_STATUS = 32  # first revision with STAT of a switched shunt
+_LINES = {"two-terminal dc": 3, "vsc dc line": 3}  # lines of an element
+_IREG = 7  # column of the bus whose voltage a machine controls
+_USED = (UseOfRecord.USED, "")
+_NO_EFFECT = (UseOfRecord.NOT_USED, "no effect on the network")
+_OF_SECTION = {
+    "area": (UseOfRecord.HELD, "interchange is not controlled: the machines feed PG"),
+    "impedance correction": (UseOfRecord.NOT_USED, "not applied"),
+    "multi-section line": (UseOfRecord.NOT_USED, "its sections are branches of their own"),
+    "system-wide": (UseOfRecord.NOT_USED, "settings of PSS/E's solution, beside THRSHZ"),
+    "substation": (UseOfRecord.NOT_USED, "its nodes and switches are passed over"),
+}
+
+
+def record_uses(
+    raw: RawFile, merged: Collection[int], leaving_out: Collection[str]
+) -> tuple[RecordUse, ...]:
+    """Return what became of every element of a file, by the first line of its record.
+
+    ``merged``: lines of zero impedance lines that make their buses one; ``leaving_out``: elements that the user leaves
+    out."""
+    found = []
+    for section, records in raw.sections.items():
+        for lines in _elements(section, records):
+            use, why = _use(raw, section, lines, leaving_out)
+            if section == "branch" and lines[0].line in merged:
+                use, why = UseOfRecord.NOT_USED, "zero impedance: its buses are one"
+            found.append(RecordUse(raw.place, lines[0].line, section, use, why))
+    return tuple(found)
+
+
+def _elements(section: str, records: Sequence[Record]) -> Iterator[Sequence[Record]]:
+    """Yield the records of each element."""
+    start = 0
+    while start < len(records):
+        count = _LINES.get(section, 1)
+        if section == "transformer":
+            count = 5 if records[start].whole(2, "K", 0) else 4
+        yield records[start : start + count]
+        start += count
+
+
+def _use(
+    raw: RawFile, section: str, lines: Sequence[Record], leaving_out: Collection[str]
+) -> tuple[UseOfRecord, str]:
+    record = lines[0]
+    if section in LEFT_OUT:
+        if section in leaving_out:
+            return UseOfRecord.NOT_USED, "left out, as leave_out says"
+        return UseOfRecord.HELD, "what it feeds or draws in the file's solution"
+    if section == "bus":
+        return _out_of_service("IDE = 4") if record.whole(3, "IDE", 1) == _OUT else _USED
+    status = _status(raw.revision).get(section)
+    if status is not None and not record.whole(status, "the status", 1):
+        return _out_of_service("its status is 0")
+    if section == "switched shunt" and record.whole(_mode(raw.revision), "MODSW", 1):
+        return UseOfRecord.HELD, "at BINIT"
+    if section == "transformer" and _is_controlled(raw.revision, lines):
+        return UseOfRecord.HELD, "its tap or phase shift"
+    bus = abs(record.whole(0, "the bus' number")) if section == "generator" else 0
+    if bus and record.whole(_IREG, "IREG", 0) not in (0, bus):
+        return UseOfRecord.HELD, "the voltage of its own bus, instead of that of IREG"
+    is_element = section in _status(raw.revision) or section == "switched shunt"
+    return _USED if is_element else _OF_SECTION.get(section, _NO_EFFECT)
+
+
+def _out_of_service(how: str) -> tuple[UseOfRecord, str]:
+    return UseOfRecord.NOT_USED, f"out of service: {how}"
+
+
+def _status(revision: int) -> dict[str, int]:
+    """Return the column of an element's status by section."""
+    shunt = {} if revision < _SHUNT_STATUS else {"switched shunt": 3 + (revision >= _NODES)}
+    return shunt | {
+        "load": 2,
+        "fixed shunt": 2,
+        "generator": 14 + (revision >= _NODES),
+        "branch": 13 if revision < SWITCHING_DEVICES else 23,
+        "system switching device": 16,
+        "transformer": 11,
+    }
+
+
+def _mode(revision: int) -> int:
+    """Return the column of MODSW of a switched shunt."""
+    return 1 + (revision >= _NODES)
+
+
+def _is_controlled(revision: int, lines: Sequence[Record]) -> bool:
+    column = 6 if revision < SWITCHING_DEVICES else 15
+    return any(line.whole(column, "COD", 0) for line in lines[2:] if len(line.fields) > 3)
