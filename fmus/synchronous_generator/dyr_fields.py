@@ -8,7 +8,7 @@ Sources: PSS/E's model library as it is described in public (PowerWorld's and NE
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -44,12 +44,14 @@ class DyrRecord:
 
     ``kind``: key of the component's table: ``machine``, ``exciter``, ``governor`` or ``stabilizer``; ``converter`` for
     a record that is a whole component; ``part``: its value, the name of our part; for a whole component, its model;
-    ``fields``: in the file's order; ``lacks``: parameters of our part that 0 leaves out, as the record has none."""
+    ``fields``: in the file's order; ``lacks``: parameters of our part that 0 leaves out, as the record has none;
+    ``omissions``: what our part leaves out where a field, by its name, is not 0."""
 
     kind: str
     part: str
     fields: tuple[DyrField, ...]
     lacks: tuple[str, ...] = ()
+    omissions: Mapping[str, str] = field(default_factory=dict)
 
 
 _WORD = re.compile(
@@ -79,7 +81,7 @@ def _record(table: Mapping[str, Any]) -> DyrRecord:
         only = tuple(map(float, found["only"].split("|"))) if found["only"] else ()
         times, same = found["times"] or "", found["same"] or ""
         chooser = f"{scope}{found['chooser']}" if found["chooser"] else ""
-        field = DyrField(
+        one = DyrField(
             found["name"],
             sets,
             negated,
@@ -91,12 +93,13 @@ def _record(table: Mapping[str, Any]) -> DyrRecord:
             switch=found["switch"] != "",
             nothing_without=found["without"] or "",
         )
-        fields.append(field)
+        fields.append(one)
     return DyrRecord(
         table["kind"],
         table["part"],
         tuple(fields),
         tuple(f"{scope}{p}" for p in table.get("lacks", ())),
+        table.get("omissions", {}),
     )
 
 

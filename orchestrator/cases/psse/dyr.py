@@ -239,6 +239,7 @@ def _followed(
 def _doubts(
     machine: Machine, records: Sequence[DynamicRecord], values: Mapping[str, float]
 ) -> Iterator[tuple[str, str, str]]:
+    yield from _omissions(records)
     x_d2, x_source = values.get("machine.X_d2"), machine.source.imag
     if x_d2 is None or abs(x_source - x_d2) <= _SAME * abs(x_d2):
         return
@@ -249,6 +250,22 @@ def _doubts(
         f"{record.name} has X''d = {x_d2:g} pu, and the RAW file has ZX = {x_source:g} pu of the same machine in line "
         f"{machine.line}; PSS/E wants one figure in both, and X''d counts here; correct the one that is wrong",
     )
+
+
+def _omissions(records: Sequence[DynamicRecord]) -> Iterator[tuple[str, str, str]]:
+    """What a part of ours leaves out of its record, by the fields that ask for it."""
+    for record in records:
+        known = _KNOWN.get(record.name)
+        if known is None or not known.omissions:
+            continue
+        given = given_values(record, known.fields, {*_KNOWN, *FIELDS})
+        for name, text in known.omissions.items():
+            if given[name]:
+                yield (
+                    known.kind,
+                    record.place,
+                    f"{record.name} has {name} = {given[name]:g}: {text}",
+                )
 
 
 def _sets(name: str) -> set[str]:

@@ -161,6 +161,19 @@ def test_honest_governors_are_not_asked_about(questions, record):
     assert questions(dyr=changed(DYR, (TGOV1, record))) == []
 
 
+@pytest.mark.parametrize("gain", ["10", "0"])
+def test_a_limiter_of_the_acceleration_that_is_left_out_is_asked_about(questions, gain):
+    """GGOV1's Aset, Ka, Ta: no part of ours has them, and with Ka = 0 there is none in PSS/E either."""
+    record = (
+        "3 'GGOV1' 1 1 0 0.04 1 0.05 -0.05 10 2 0 1 1 0.15 0.5 1.5 0.2 0.1 0 0 3 2 0.67 1 0 0.1 -0.1 0"
+        f" 0.01 {gain} 0.1 0 0 4 5 99 -99 /"
+    )
+    asked = [q for q in questions(dyr=changed(DYR, (TGOV1, record))) if "acceleration" in q]
+    assert len(asked) == (gain != "0")
+    assert all("GGOV1 has Ka = 10: the limiter of the acceleration" in q for q in asked)
+    assert all("areas.dyr, line 11" in q for q in asked)
+
+
 @pytest.mark.parametrize("kind", ["TGOV1", "EXST1", "STAB1"])
 def test_parts_that_no_machine_has_are_a_choice(questions, kind):
     dyr = without(kind, 1, 2, 3, 4)
