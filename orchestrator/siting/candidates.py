@@ -12,6 +12,9 @@ from orchestrator.errors import InputError, Problem, few
 # load of a plant's own at its terminal, in parts of the rating there
 _AUXILIARY = 0.05
 
+# rating of a device by that of the largest unit, beyond which it is questioned: kVA for MVA
+_MOST_TIMES_LARGEST = 10.0
+
 
 def candidates(wanted: Sequence[str], prepared: PreparedScenario) -> list[str]:
     """The buses that patterns name; without any, all but the terminals of units.
@@ -57,14 +60,14 @@ def unit_terminals(prepared: PreparedScenario) -> list[str]:
 
 
 def question_about(rating: float | None, prepared: PreparedScenario) -> Problem | None:
-    """Return whether a rating [MVA] is meant that is a thousand times smaller, or larger, than the largest unit's."""
+    """Return whether a rating [MVA] is meant that is a thousandth of the largest unit's, or ten times it."""
     plans = prepared.system.components
     ports = prepared.network.ports if prepared.network is not None else ()
     ratings = {port.name: plans[port.name].number("S_n") for port in ports if port.name in plans}
     if rating is None or not ratings:
         return None
     largest = max(ratings, key=lambda name: ratings[name])
-    if SMALLEST_SHARE <= rating / ratings[largest] <= 1 / SMALLEST_SHARE:
+    if SMALLEST_SHARE <= rating / ratings[largest] <= _MOST_TIMES_LARGEST:
         return None
     beside = f"{rating:g} MVA beside {largest}'s {ratings[largest]:g} MVA; is it in MVA?"
     return Problem(

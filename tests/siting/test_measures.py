@@ -134,10 +134,10 @@ def test_a_bus_with_lines_is_no_terminal_and_some_bus_is_left():
 
 @pytest.mark.parametrize(
     ("rating", "asked"),
-    [(0.25, True), (0.27, False), (250.0, False), (250000.0, False), (300e3, True)],
+    [(0.25, True), (0.27, False), (250.0, False), (2500.0, False), (25e3, True)],
 )
 def test_a_rating_in_another_unit_is_questioned(five, rating, asked):
-    """The largest machine has 260 MVA; from a thousandth of it to a thousand times it everything is possible."""
+    """The largest machine has 260 MVA; from a thousandth of it to ten times it everything is possible."""
     (prepared,) = five.prepare()
     question = question_about(rating, prepared)
     assert (question is not None) is asked

@@ -108,6 +108,8 @@ class _Reading:
         self._idle: set[tuple[int, str]] = set()
         self._lines_of: dict[tuple[Any, ...], int] = {}
         self._load_parts: dict[int, tuple[complex, complex]] = {}
+        # active power that the loads at a bus draw together, as far as they are read [MW]
+        self._drawn: dict[int, float] = {}
         self._same: dict[int, int] = {}  # bus that PSS/E takes as one with another → the other
         self._merged: set[int] = set()  # lines of the records that make them one
         # least reactance that our network can have [pu of the system]
@@ -271,6 +273,15 @@ class _Reading:
                     self._changes.note(
                         record.line, "distributed generation: taken away from its load"
                     )
+            drawn = pl + current.real + admittance.real * v**2
+            if drawn * self._drawn.get(bus, 0.0) < 0:
+                text = (
+                    f"loads of both signs at bus {bus}, {self._drawn[bus]:g} and {drawn:g} MW: one load of their sum "
+                    "here, which 'load' and 'static' cannot scale apart; give generation a bus of its own, or a "
+                    "machine's record"
+                )
+                self._changes.note(record.line, text)
+            self._drawn[bus] = self._drawn.get(bus, 0.0) + drawn
             self._add(bus, 2, complex(pl, ql) + current - own)
             if self._keep_load_parts and (current or admittance):
                 # YQ is positive where it generates, as with shunts

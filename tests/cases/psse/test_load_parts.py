@@ -97,3 +97,9 @@ def test_the_key_is_for_psse(tmp_path):
         InputError, match="keep_load_parts is for networks of PSS/E; remove the key"
     ):
         network_data(NetworkTable(pandapower="case9", keep_load_parts=True), tmp_path)
+
+
+def test_loads_of_both_signs_at_a_bus_are_asked_about(written):
+    data = written("5,'W ',1,1,1,-300,0,0,0,0,0,1,1,0", keep_load_parts=True)
+    (question,) = [str(change) for change in data.changes if "both signs" in str(change)]
+    assert "loads of both signs at bus 5, 125 and -300 MW" in question
