@@ -88,5 +88,5 @@ def _susceptance(m: ModelBuilder, port: DevicePort, rating: Expr, v: Phasor) -> 
     first = lead_lag(m, "first", K * (v.magnitude() - reference), leads[0], T3, y_0)
     second = lead_lag(m, "second", first, leads[1], T4, y_0)
     asked = clamp(second, V_MIN, V_MAX)
-    y = limited_low_pass(m, "reactor", asked, T5, least / rating, 1, y_0)
+    y = limited_low_pass(m, "reactor", asked, T5, least / rating, 1, initial=y_0)
     return C_BASE / rating - y

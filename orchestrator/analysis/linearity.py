@@ -113,11 +113,8 @@ def _shifts(
     varied = compose(other, schedule)
     if varied.names != model.names:  # even the pattern of direct feed-through differs
         return np.full(len(modes), np.inf)
-    sides = ("left", "shape")
-    left, right = (
-        np.array([[getattr(mode, side)[name] for mode in modes] for name in model.names])
-        for side in sides
-    )
+    left = np.array([[mode.left[name] for mode in modes] for name in model.names])
+    right = np.array([[mode.shape[name] for mode in modes] for name in model.names])
     values = np.array([mode.eigenvalue for mode in modes])
     moved = eigenvalue_shifts(model, varied, values, left, right)
     shifts: Vector = np.abs(moved) / np.maximum(np.abs(values), _SLOWEST)

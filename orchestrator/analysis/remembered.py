@@ -29,7 +29,7 @@ def remembered(
         return linearized()
     if len(store) >= _KEPT:
         store.clear()
-    if not kept(master, "ours", (component,), lambda: is_ours(description.path)):
+    if not keep_by_system(master, "ours", (component,), lambda: is_ours(description.path)):
         return linearized()
     names = (exchange.inputs.names, exchange.outputs.names)
     key = (name, description.path, description.guid, names, asked, master.time, _state(component))
@@ -39,7 +39,7 @@ def remembered(
     return found
 
 
-def kept(
+def keep_by_system(
     master: Master | None, kind: Hashable, of: tuple[object, ...], make: Callable[[], Made]
 ) -> Made:
     """Return what was made of these very objects, where the system keeps linear models."""

@@ -64,11 +64,10 @@ def assign_conventions(draft: Draft) -> None:
 def _chosen(table: ConventionsTable) -> Convention:
     usual = LIKE[table.like]
     gives = {"torque": True, "power": False}.get(table.governor_gives or "")
-    return Convention(
-        usual.speed_in_emf if table.speed_in_emf is None else table.speed_in_emf,
-        usual.output_is_torque if gives is None else gives,
-        usual.torque_of_classical if gives is None else gives,
-    )
+    in_emf = usual.speed_in_emf if table.speed_in_emf is None else table.speed_in_emf
+    if gives is None:
+        return Convention(in_emf, usual.output_is_torque, usual.torque_of_classical)
+    return Convention(in_emf, gives, gives)
 
 
 # between a value and another one of the same digits, in another unit

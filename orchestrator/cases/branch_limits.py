@@ -10,7 +10,7 @@ from orchestrator.cases.power_flow import PowerFlow
 
 @dataclass(frozen=True, slots=True)
 class Rating:
-    """What a branch carries for good: RATEA [MVA], of a line at 1 pu, so that its current counts, as in PSS/E."""
+    """The load that a branch carries for good: RATEA [MVA], of a line at 1 pu: its current counts, as in PSS/E."""
 
     mva: float
     by_current: bool
@@ -61,7 +61,7 @@ def loadings(
 
 
 def _carried(line: FlowLine, flow: PowerFlow, limits: FileLimits, rating: Rating) -> float:
-    """What flows at the end where it is more [MVA]; at a star point of a transformer nothing is measured."""
+    """Return what flows at the end where it is more [MVA]; at a star point of a transformer nothing is measured."""
     ends = (line.from_bus, line.to_bus)
     powers = line.powers(flow.voltages[ends[0]], flow.voltages[ends[1]])
     outer = [k for k in (0, 1) if ends[k] in limits.bands] or [0, 1]

@@ -158,7 +158,7 @@ def write_case(wanted: WantedCase) -> NewCase:
     places: list[_Place] = []
     for converter in wanted.converters:
         places.append(_placed(converter, base, _called(wanted.files), places))
-    draft = _Text(wanted, sources, base, _named(places), _switched(device))
+    draft = _Text(wanted, sources, base, _with_names(places), _switched(device))
     scenarios = _prepared(draft.text, wanted, [])
     questions = dict.fromkeys(q for prepared in scenarios for q in prepared.questions)
     text = _commented(draft.text, list(questions), sources)
@@ -282,7 +282,7 @@ class _Place:
         return {f"{self.less}.P_0": f"{self.left_mw / self.rating_mva:.6f}"}
 
 
-def _named(places: Sequence[_Place]) -> tuple[_Place, ...]:
+def _with_names(places: Sequence[_Place]) -> tuple[_Place, ...]:
     """Several converters bear the names of their buses, ``gfor_9``; one is ``gfor``."""
     if len(places) < 2:
         return tuple(places)
@@ -395,7 +395,11 @@ class _Text:
             self._network.loads if self._network else (), key=lambda load: load.p_mw, default=None
         )
         buses = self._network.buses if self._network else ("",)
-        self._fault_bus = places[0].bus if places else largest.bus if largest else buses[0]
+        self._fault_bus = buses[0]
+        if places:
+            self._fault_bus = places[0].bus
+        elif largest:
+            self._fault_bus = largest.bus
 
     def assumed(self, questions: int) -> list[str]:
         lines, device = [], self._wanted.device

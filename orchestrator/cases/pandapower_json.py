@@ -34,12 +34,10 @@ _TABLES = {
 }
 _NETWORK = ("pandapower.auxiliary", "pandapowerNet")
 _OBJECTS = {("pandapower.control.util.characteristic", name) for name in _CURVES}
-_CLASSES = (
-    {_NETWORK, ("networkx", "MultiGraph"), *_TABLES, *_OBJECTS}
-    | {("numpy", name) for name in _NUMPY}
-    | {("builtins", name) for name in ("complex", "tuple", "set", "frozenset")}
-    | {(f"pandas.core.indexes.{module}", name) for module, name in _INDICES.items()}
-)
+_CLASSES = {_NETWORK, ("networkx", "MultiGraph"), *_TABLES, *_OBJECTS}
+_CLASSES |= {("numpy", name) for name in _NUMPY}
+_CLASSES |= {("builtins", name) for name in ("complex", "tuple", "set", "frozenset")}
+_CLASSES |= {(f"pandas.core.indexes.{module}", name) for module, name in _INDICES.items()}
 """Module and class of what a power flow needs; each holds values alone."""
 
 _OF_A_TABLE = {"_module", "_class", "_object", "orient", "dtype", "typ"}

@@ -1,4 +1,4 @@
-"""What became of each record of a network's files: used, held, or not used, and why."""
+"""Uses of the records of a network's files: used, held, or not used, and why."""
 
 from collections import Counter
 from collections.abc import Sequence

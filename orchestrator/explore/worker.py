@@ -262,7 +262,7 @@ def _parameters(case: Case, scenario: Scenario) -> dict[str, Any]:
 
 
 def _questions(scenario: Scenario) -> list[str]:
-    """What is asked about the scenario's data, without the options that the page does not have."""
+    """Return what is asked about the scenario's data, without the options that the page does not have."""
     idle = set(scenario.prepared.idle.values())
     return [
         question.text

@@ -45,7 +45,7 @@ class Frames:
                 if len(self._rest) >= end:
                     content, self._rest = self._rest[_HEAD.size : end], self._rest[end:]
                     return kind, content
-            self._socket.settimeout(_left(end_of_wait))
+            self._socket.settimeout(_time_left(end_of_wait))
             try:
                 more = self._socket.recv(1 << 16)
             except ConnectionError:
@@ -58,7 +58,7 @@ class Frames:
         self._socket.close()
 
 
-def _left(end: float | None) -> float | None:
+def _time_left(end: float | None) -> float | None:
     """Time until then [s], for a socket's timeout."""
     if end is None:
         return None

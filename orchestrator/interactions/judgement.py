@@ -241,7 +241,7 @@ class JudgedInteractions:
         return system
 
     def _counts_in(self, other: JudgedSystem, mode: SharedMode, here: SystemName) -> bool:
-        """Whether a mode of one assignment counts in another one; noted if it cannot be followed there."""
+        """Return whether a mode of one assignment counts in another one; noted if it cannot be followed there."""
         try:
             there = self._follow(mode.eigenvalue, here, other.name)
         except CosimError as error:

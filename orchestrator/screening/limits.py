@@ -1,5 +1,6 @@
 """Branches beyond the ratings and buses outside of the bands that a network's file has."""
 
+from collections.abc import Collection
 from typing import Any
 
 from orchestrator.cases.branch_limits import Loading
@@ -65,32 +66,35 @@ def limits_table(summary: Summary, most: int = 12) -> ColumnTable[ScreenedItem] 
 
 
 def limits_json(summary: Summary) -> dict[str, Any] | None:
-    """Of every item with a branch beyond its rating or a bus outside of its band; None where the file has neither."""
+    """Give every item with a branch beyond its rating or a bus outside of its band; None where the file has neither."""
     if not limits_sentence(summary):
         return None
     intact = _beyond_intact(summary)
+    concerned = [
+        item for item in summary.result.items if branches_beyond(item) or item.record.outliers
+    ]
+    return {"items": [_item_json(item, intact.get(item.point.name, ())) for item in concerned]}
+
+
+def _item_json(item: ScreenedItem, beyond_intact: Collection[str]) -> dict[str, Any]:
+    branches = [
+        {
+            "branch": one.branch,
+            "loading_percent": 100 * one.part,
+            "beyond_in_intact_network": one.branch in beyond_intact,
+        }
+        for one in item.record.loadings
+        if one.beyond
+    ]
+    buses = [
+        {"bus": one.bus, "voltage_pu": one.voltage, "limit_pu": one.limit}
+        for one in item.record.outliers
+    ]
     return {
-        "items": [
-            {
-                "point": item.point.name,
-                "outage": item.outage.name,
-                "branches": [
-                    {
-                        "branch": one.branch,
-                        "loading_percent": 100 * one.part,
-                        "beyond_in_intact_network": one.branch in intact.get(item.point.name, ()),
-                    }
-                    for one in item.record.loadings
-                    if one.beyond
-                ],
-                "buses": [
-                    {"bus": one.bus, "voltage_pu": one.voltage, "limit_pu": one.limit}
-                    for one in item.record.outliers
-                ],
-            }
-            for item in summary.result.items
-            if branches_beyond(item) or item.record.outliers
-        ]
+        "point": item.point.name,
+        "outage": item.outage.name,
+        "branches": branches,
+        "buses": buses,
     }
 
 
@@ -128,7 +132,7 @@ def _voltages_in_words(summary: Summary) -> str:
 
 
 def _without_flow(summary: Summary) -> str:
-    """Of how many items that is not known; "" where it is known of all."""
+    """Say of how many items that is not known; "" where it is known of all."""
     number = sum(not item.record.has_flow for item in summary.result.items)
     return f", except for {counted(number, 'item')} without a power flow" if number else ""
 

@@ -148,7 +148,7 @@ def _best_confirmed(result: SiteResult, among: str) -> str:
 
 
 def _lowered(result: SiteResult, first: Confirmation) -> str:
-    """What the best place costs: another mode, less damped than the least was before."""
+    """Return what the best place costs: another mode, less damped than the least was before."""
     before = result.intact.modes[0].mode.damping_percent
     if first.other is None or damping_percent(first.other) >= before:
         return ""

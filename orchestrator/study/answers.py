@@ -49,12 +49,15 @@ class ScenarioAnswer:
     after: Mode | None = None  # the same where the events leave something switched
 
     def as_json(self) -> dict[str, Any]:
+        mode = self.mode
+        frequency = None if mode is None else mode.frequency_hz
+        percent = None if mode is None else mode.damping_percent
         found = {
             "stable": self.good,
             "verdict": self.verdict,
-            "frequency_hz": None if self.mode is None else self.mode.frequency_hz,
-            "damping_percent": None if self.mode is None else self.mode.damping_percent,
-            "components": {} if self.mode is None else _shares(self.mode),
+            "frequency_hz": frequency,
+            "damping_percent": percent,
+            "components": _shares(mode),
             "remark": self.remark,
         }
         if self.after is None:
@@ -63,7 +66,9 @@ class ScenarioAnswer:
         return found | {"after_events": {**after, "components": _shares(self.after)}}
 
 
-def _shares(mode: Mode) -> dict[str, float]:
+def _shares(mode: Mode | None) -> dict[str, float]:
+    if mode is None:
+        return {}
     return {name: share for name, share in mode.by_component.items() if share >= _SMALLEST}
 
 

@@ -22,7 +22,7 @@ from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.linearization import Blocks, continuous_model
 from orchestrator.analysis.mode_names import Naming
 from orchestrator.analysis.periodic import model_of
-from orchestrator.analysis.remembered import kept
+from orchestrator.analysis.remembered import keep_by_system
 from orchestrator.analysis.stability import Hidden, Stability, hidden, whole_spectrum
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
 from orchestrator.analysis.threads import side_by_side
@@ -266,7 +266,9 @@ class Linearised:
             for name in {name.partition(".")[0] for name in gains}:
                 blocks = blocks.with_component(self._master, name)
             parts = tuple(blocks.components.values())
-            return kept(self._master, "model", parts, lambda: model_of(self._master, blocks))
+            return keep_by_system(
+                self._master, "model", parts, lambda: model_of(self._master, blocks)
+            )
 
     def finished(self, known: Mapping[str, NamedSystem] = MappingProxyType({})) -> ModesResult:
         """The result, once the eigenvalues are there; the FMUs are asked again for what it rests on."""
@@ -386,7 +388,7 @@ def identified(
     first, last = _named_range(frequency_range)
 
     def named(other: PreparedScenario, at: OperatingPoint, linear: LinearModel) -> NamedSystem:
-        spectrum = kept(
+        spectrum = keep_by_system(
             master, (first, last), (linear,), lambda: spectra.find_spectrum(linear, first, last)
         )
         found = [mode for mode in spectrum.modes if mode.is_oscillation]

@@ -39,7 +39,9 @@ class ParameterSweep(NoTruth):
     def stable(self) -> bool | None:
         """Whether nothing grows at any point of any scenario; None where a point has no verdict and none grows."""
         verdicts = [scenario.stable for scenario in self.result.scenarios]
-        return False if False in verdicts else None if None in verdicts else True
+        if False in verdicts:
+            return False
+        return None if None in verdicts else True
 
     @property
     def remarks(self) -> list[str]:

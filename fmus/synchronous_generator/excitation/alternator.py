@@ -163,7 +163,9 @@ def exac2(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         V_F, _ = rate_feedback(m, behind.V_FE, V_R0, 0.03, 1.0)
         measured = Measurement(m, seen)
         error = lead_lag_stage(m, measured.error(V_A0 / p.K_A) - V_F, V_A0 / p.K_A)
-        V_A = limited_low_pass(m, "amplifier", p.K_A * error, p.T_A, p.V_AMIN, p.V_AMAX, V_A0)
+        V_A = limited_low_pass(
+            m, "amplifier", p.K_A * error, p.T_A, p.V_AMIN, p.V_AMAX, initial=V_A0
+        )
         gate = fmin(V_A - p.K_H * behind.V_FE, p.K_L * (p.V_LR - behind.V_FE))
         behind.drive(clamp(p.K_B * gate, p.V_RMIN, p.V_RMAX))
         return measured.close(behind.E_fd)
@@ -204,7 +206,7 @@ def ac8b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         measured = Measurement(m, seen)
         control = Controller(m, p, PID_0, (p.V_PIDMIN, p.V_PIDMAX))
         PID = control(measured.error(control.error_at_start))
-        V_R = limited_low_pass(m, "amplifier", p.K_A * PID, p.T_A, p.V_RMIN, p.V_RMAX, V_R0)
+        V_R = limited_low_pass(m, "amplifier", p.K_A * PID, p.T_A, p.V_RMIN, p.V_RMAX, initial=V_R0)
         highest = (p.V_FEMAX - behind.p.K_D * seen.I_fd) / behind.constant
         behind.drive(V_R, p.V_EMIN, fmax(highest, p.V_EMIN))
         return measured.close(behind.E_fd)

@@ -129,7 +129,7 @@ class Controller:
         m, gains, (low, high) = self._m, self._gains, self._limits
         initial = if_else(self._integrates, self._at_start, 0)
         kept = limited_proportional_integral(
-            m, "regulator", error, gains.K_PR, gains.K_IR, low, high, initial
+            m, "regulator", error, gains.K_PR, gains.K_IR, low=low, high=high, initial=initial
         )
         change = washout(m, "derivative", error, gains.T_DR, self.error_at_start)
         return clamp(kept + gains.K_DR / gains.T_DR * change, low, high)

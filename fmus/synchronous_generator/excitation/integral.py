@@ -128,7 +128,7 @@ def expic1(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         measured = Measurement(m, seen)
         error = measured.error(0.0) - p.K_F / p.T_F1 * (seen_by_rate - x)
         V_A = limited_proportional_integral(
-            m, "regulator", error, p.K_A * p.T_A1, p.K_A, p.V_R2, p.V_R1, V_R0
+            m, "regulator", error, p.K_A * p.T_A1, p.K_A, low=p.V_R2, high=p.V_R1, initial=V_R0
         )
         lags = p.T_A2 + p.T_A4, p.T_A2 * p.T_A4
         m.require(
@@ -166,7 +166,7 @@ def dc4b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         signal = control(measured.error(control.error_at_start) - V_F)
         v_t = seen.terminal_voltage(E_fd)
         V_R = limited_low_pass(
-            m, "amplifier", p.K_A * signal, p.T_A, v_t * p.V_RMIN, v_t * p.V_RMAX, V_R0
+            m, "amplifier", p.K_A * signal, p.T_A, v_t * p.V_RMIN, v_t * p.V_RMAX, initial=V_R0
         )
         rate = (V_R - p.K_E * E_fd - curve.part(E_fd)) / p.T_E
         m.derivative(x, held_at_limits(x, rate, p.V_EMIN, _MOST))
@@ -193,7 +193,7 @@ def ac7b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         first = control(measured.error(control.error_at_start) - V_F)
         rest = first - p.K_F1 * behind.E_fd - p.K_F2 * behind.V_FE
         V_A = limited_proportional_integral(
-            m, "second", rest, p.K_PA, p.K_IA, p.V_AMIN, p.V_AMAX, V_A0
+            m, "second", rest, p.K_PA, p.K_IA, low=p.V_AMIN, high=p.V_AMAX, initial=V_A0
         )
         V_R = fmax(V_A * p.K_P * seen.terminal_voltage(behind.E_fd), -p.K_L * behind.V_FE)
         highest = (p.V_FEMAX - behind.p.K_D * seen.I_fd) / behind.constant

@@ -80,7 +80,7 @@ def dc1a(
         if compensated:
             error = lead_lag_stage(m, error, V_R0 / K_A)
         v = seen.terminal_voltage(E_fd) if bus_fed else Expr(1)
-        V_R = limited_low_pass(m, "amplifier", K_A * error, T_A, v * low, v * high, V_R0)
+        V_R = limited_low_pass(m, "amplifier", K_A * error, T_A, v * low, v * high, initial=V_R0)
         m.derivative(E_fd, (V_R - K_E * E_fd - curve.part(E_fd)) / T_E)
         return measured.close(E_fd)
 
@@ -163,7 +163,7 @@ def ac1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         V_F, _ = rate_feedback(m, V_FE, V_R0, 0.03, 1.0)
         measured = Measurement(m, seen)
         error = lead_lag_stage(m, measured.error(V_R0 / K_A) - V_F, V_R0 / K_A)
-        V_A = limited_low_pass(m, "amplifier", K_A * error, T_A, A_low, A_high, V_R0)
+        V_A = limited_low_pass(m, "amplifier", K_A * error, T_A, A_low, A_high, initial=V_R0)
         m.derivative(x, held_at_limits(x, (clamp(V_A, R_low, R_high) - V_FE) / T_E, 0.0, _MOST))
         return measured.close(V_E * rectifier(K_C * seen.I_fd / fmax(V_E, _LEAST)))
 
@@ -198,5 +198,7 @@ def ac4a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         compensated = lead_lag_stage(m, error, V_I0, lead=1.0)
         ceiling = fmax(high - K_C * seen.I_fd, low)
         return measured.close(
-            limited_low_pass(m, "amplifier", K_A * compensated, T_A, low, ceiling, seen.start.E_fd)
+            limited_low_pass(
+                m, "amplifier", K_A * compensated, T_A, low, ceiling, initial=seen.start.E_fd
+            )
         )

@@ -147,7 +147,9 @@ def st4b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         require_within(m, V_A0, low, high, ("exciter.V_RMIN", "exciter.V_RMAX"))
         measured = Measurement(m, seen)
         error = measured.error(0.0)
-        V_R = limited_proportional_integral(m, "regulator", error, K_PR, K_IR, low, high, V_A0)
+        V_R = limited_proportional_integral(
+            m, "regulator", error, K_PR, K_IR, low=low, high=high, initial=V_A0
+        )
         V_A = low_pass_or_nothing(m, "bridge", V_R, T_A, V_A0)
         x = m.state(
             "inner",
@@ -220,7 +222,9 @@ def sexs(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         error = measured.error(seen.start.E_fd / K)
         compensated = lead_lag(m, "lead_lag", error, T_A, T_B, seen.start.E_fd / K)
         return measured.close(
-            limited_low_pass(m, "amplifier", K * compensated, T_E, low, high, seen.start.E_fd)
+            limited_low_pass(
+                m, "amplifier", K * compensated, T_E, low, high, initial=seen.start.E_fd
+            )
         )
 
 
@@ -241,7 +245,9 @@ def scrx(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         require_within(m, x_0, p.E_MIN, p.E_MAX, ("exciter.E_MIN", "exciter.E_MAX"))
         measured = Measurement(m, seen)
         compensated = lead_lag(m, "lead_lag", measured.error(x_0 / p.K), p.T_A, p.T_B, x_0 / p.K)
-        x = limited_low_pass(m, "amplifier", p.K * compensated, p.T_E, p.E_MIN, p.E_MAX, x_0)
+        x = limited_low_pass(
+            m, "amplifier", p.K * compensated, p.T_E, p.E_MIN, p.E_MAX, initial=x_0
+        )
         E = times_supply(x, seen.terminal_voltage(times_supply(x, measured.nearly)))
         through_resistance = logic_and(p.r_C_over_r_FD > 0, seen.I_fd < 0)
         return measured.close(if_else(through_resistance, -p.r_C_over_r_FD * seen.I_fd, E))

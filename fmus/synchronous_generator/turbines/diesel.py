@@ -56,7 +56,7 @@ def degov(m: ModelBuilder, shaft: Shaft, *, droop: bool = False) -> Expr:
         require_within(m, P_0, p.T_MIN, p.T_MAX, ("governor.T_MIN", "governor.T_MAX"))
         x = m.state("integral", P_0, "pu", "Integral of the actuator", base="S_n")
         actuated = lead_lag(m, "actuator", x, p.T_4, p.T_5, P_0)
-        torque = limited_low_pass(m, "torque", actuated, p.T_6, p.T_MIN, p.T_MAX, P_0)
+        torque = limited_low_pass(m, "torque", actuated, p.T_6, p.T_MIN, p.T_MAX, initial=P_0)
         error = 1 - shaft.w
         if droop:
             given = declared(m, DROOP, SOURCE)

@@ -124,7 +124,7 @@ def hygov(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
         m.close(
             c,
             blocks.limited_proportional_integral(
-                m, "c_slow", filtered, 1 / r, 1 / (r * T_r), low, high, g_0
+                m, "c_slow", filtered, 1 / r, 1 / (r * T_r), low=low, high=high, initial=g_0
             ),
         )
         x = m.state("gate", g_0, "pu", "Gate", base="S_n")
@@ -160,7 +160,7 @@ def gast(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
         )
         exhaust = m.state("exhaust", P_m_0, "pu", "Measured temperature of the exhaust", base="S_n")
         wanted = fmin(power_reference(m, P_m_0) - (w - 1) / R, A_T + K_T * (A_T - exhaust))
-        valve = blocks.limited_low_pass(m, "valve", wanted, T_1, low, high, P_m_0)
+        valve = blocks.limited_low_pass(m, "valve", wanted, T_1, low, high, initial=P_m_0)
         fuel = blocks.low_pass(m, "combustion", valve, T_2, P_m_0)
         m.derivative(exhaust, (fuel - exhaust) / T_3)
         return fuel - D_turb * (w - 1)
@@ -186,7 +186,7 @@ def tgov1(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
         )
         require_within(m, P_m_0, low, high, ("governor.V_MIN", "governor.V_MAX"))
         valve = blocks.limited_low_pass(
-            m, "valve", power_reference(m, P_m_0) - (w - 1) / R, T_1, low, high, P_m_0
+            m, "valve", power_reference(m, P_m_0) - (w - 1) / R, T_1, low, high, initial=P_m_0
         )
         return blocks.lead_lag(m, "reheater", valve, T_2, T_3, P_m_0) - D_t * (w - 1)
 

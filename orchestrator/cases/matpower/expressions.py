@@ -211,7 +211,7 @@ class _Reader:
         if kind == "text":
             return text[1:-1]
         if kind == "name":
-            return self._named(text)
+            return self._value_by_name(text)
         if text == "(":
             self._in_table.append(False)
             found = self.expression()
@@ -248,7 +248,7 @@ class _Reader:
         except ValueError as error:
             raise UnknownError("the rows of a table differ in length") from error
 
-    def _named(self, name: str) -> Value:
+    def _value_by_name(self, name: str) -> Value:
         while self._peek(blanks=True) == ("mark", "."):
             self._next()
             name = f"{name}.{self._next()[1]}"

@@ -108,7 +108,7 @@ def machine_models(
     missing = [model for model in missing if model.may_go or not _machines_of(model) <= {*replaced}]
     problems += _unfit(parts, {*replaced, *lacking})
     if problems or missing:
-        counted_once = [*_counted(problems, first)]
+        counted_once = [*_count_repeats(problems, first)]
         hidden = len(counted_once) - _MOST_SHOWN
         more = f"\n  and {hidden} more" if hidden > 0 else ""
         shown = [*in_words(missing), *counted_once[:_MOST_SHOWN]]
@@ -140,7 +140,7 @@ def _machines_of(model: MissingModel) -> set[tuple[int, str]]:
     return {(record.bus, record.machine) for record in model.records}
 
 
-def _counted(problems: Sequence[str], first: Mapping[str, str]) -> Iterator[str]:
+def _count_repeats(problems: Sequence[str], first: Mapping[str, str]) -> Iterator[str]:
     """The problems, each once: of those with a place of a first record, how many more there are."""
     for text, count in Counter(problems).items():
         more = f" and {count - 1} more" if count > 1 else ""
@@ -253,7 +253,7 @@ def _doubts(
 
 
 def _omissions(records: Sequence[DynamicRecord]) -> Iterator[tuple[str, str, str]]:
-    """What a part of ours leaves out of its record, by the fields that ask for it."""
+    """Return what a part of ours leaves out of its record, by the fields that ask for it."""
     for record in records:
         known = _KNOWN.get(record.name)
         if known is None or not known.omissions:

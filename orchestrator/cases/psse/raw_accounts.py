@@ -1,4 +1,4 @@
-"""What became of each record of a RAW file: used, held at its value, or not used."""
+"""Uses of the records of a RAW file: used, held at its value, or not used."""
 
 from collections.abc import Collection, Iterator, Sequence
 

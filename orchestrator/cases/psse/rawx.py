@@ -235,7 +235,7 @@ def _records(path: Path, table: _Table) -> Iterator[tuple[str, list[Record]]]:
     """The section of a table, and its rows as the lines of that section's records."""
     place = str(path)
     if table.name == "transformer":
-        rows = [(line, _named(table, row)) for line, row in table.rows]
+        rows = [(line, _by_field(table, row)) for line, row in table.rows]
         lines = [
             Record(place, line, record)
             for line, given in rows
@@ -245,18 +245,18 @@ def _records(path: Path, table: _Table) -> Iterator[tuple[str, list[Record]]]:
     elif table.name in _LAYOUTS:
         section, layout = _LAYOUTS[table.name]
         for line, row in table.rows:
-            given = _named(table, row)
+            given = _by_field(table, row)
             yield section, [Record(place, line, _in_order(given, fields)) for fields in layout]
     elif table.name == "general":
         for line, row in table.rows:
-            settings = [f"{name.upper()}={value}" for name, value in _named(table, row).items()]
+            settings = [f"{name.upper()}={value}" for name, value in _by_field(table, row).items()]
             yield "system-wide", [Record(place, line, ["GENERAL", *settings])]
     elif table.name not in {"caseid", *_SOLUTION}:
         section = _WITHOUT_EFFECT.get(table.name, table.name)
         yield section, [Record(place, line, row) for line, row in table.rows]
 
 
-def _named(table: _Table, row: Sequence[str]) -> dict[str, str]:
+def _by_field(table: _Table, row: Sequence[str]) -> dict[str, str]:
     return dict(zip(table.fields, row, strict=False))
 
 

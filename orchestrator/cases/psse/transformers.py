@@ -84,6 +84,7 @@ def _transformer(
         if raw.revision < SWITCHING_DEVICES
         else (15, _TABLE[34] + (raw.revision > 34))
     )
+    windings_lines = [line for line in rest[1:] if len(line.fields) > 3]
     return Transformer(
         first,
         first.text(3, "1"),
@@ -91,11 +92,15 @@ def _transformer(
         impedances,
         _magnetisation(raw, first, rest[0], codes["CM"], windings[0]),
         _OPEN[state],
-        any(line.whole(control, "COD", 0) for line in rest[1:] if len(line.fields) > 3),
-        any(line.whole(table, "TAB", 0) for line in rest[1:] if len(line.fields) > 3),
-        codes["CZ"] == _LOSSES
-        and any(0 < rest[0].number(3 * k, "R", 0.0) < 1 for k in range(len(pairs))),
+        any(line.whole(control, "COD", 0) for line in windings_lines),
+        any(line.whole(table, "TAB", 0) for line in windings_lines),
+        codes["CZ"] == _LOSSES and _has_tiny_losses(rest[0], len(pairs)),
     )
+
+
+def _has_tiny_losses(line: Record, pairs: int) -> bool:
+    """Return whether a load loss between two windings is below 1 W, so that R was perhaps meant in pu."""
+    return any(0 < line.number(3 * k, "R", 0.0) < 1 for k in range(pairs))
 
 
 def _winding(line: Record, bus: int, base: float, code: int) -> Winding:

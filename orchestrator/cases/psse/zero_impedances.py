@@ -33,14 +33,14 @@ def merged_buses(
     Returns the bus that stands for each, the lines that are no more, and those that stay."""
     standing = {bus: bus for bus in kinds}
 
-    def found(bus: int) -> int:
+    def root_of(bus: int) -> int:
         while standing[bus] != bus:
             bus = standing[bus]
         return bus
 
     gone, kept = [], []
     for record, start, end in joins:
-        one, other = found(start), found(end)
+        one, other = root_of(start), root_of(end)
         if one == other:
             gone.append(record)
         elif one in held and other in held:
@@ -51,4 +51,4 @@ def merged_buses(
             )
             standing[second] = first
             gone.append(record)
-    return {bus: found(bus) for bus in kinds if found(bus) != bus}, gone, kept
+    return {bus: root_of(bus) for bus in kinds if root_of(bus) != bus}, gone, kept

@@ -40,7 +40,7 @@ class LeastDamped:
         return cls(value.imag / math.tau, damping_percent(value), shares)
 
     def as_json(self) -> dict[str, Any]:
-        """What `of` reads."""
+        """Return what `of` reads."""
         return {
             "frequency_hz": self.frequency_hz,
             "damping_percent": self.damping_percent,
@@ -54,7 +54,7 @@ class LeastDamped:
         return f"{self.frequency_hz:.3f} Hz, {self.damping_percent:.2f} %{named}"
 
     def is_like(self, other: LeastDamped) -> bool:
-        """Whether it is the same mode, by frequency and by who takes part."""
+        """Return whether it is the same mode, by frequency and by who takes part."""
         apart = abs(self.frequency_hz - other.frequency_hz)
         if apart > _FREQUENCY * max(self.frequency_hz, other.frequency_hz):
             return False

@@ -307,7 +307,9 @@ def origins(chapters: Sequence[Chapter]) -> str:
 
 def changes(old: Path, before: Sequence[Chapter] | None, chapters: Sequence[Chapter]) -> str:
     """``before``: the chapters of older results; None where ``old`` is an older page."""
-    then = _by_name(_answers(before) if before is not None else _kept(old), _answers(chapters))
+    then = _by_name(
+        _answers(before) if before is not None else _kept_answers(old), _answers(chapters)
+    )
     now = _by_name(_answers(chapters), _answers(chapters))
     rows = []
     for key in dict.fromkeys([*then, *now]):
@@ -320,14 +322,14 @@ def changes(old: Path, before: Sequence[Chapter] | None, chapters: Sequence[Chap
                 was or "not there",
                 is_now or "not there any more",
             )
-            rows.append([escape(cell) for cell in (*cells, _moved(one, other))])
+            rows.append([escape(cell) for cell in (*cells, _change_in_words(one, other))])
     if not rows:
         return f"<p>No answer differs from {escape(old.name)}.</p>"
     columns = ["Question", "Of", "Before", "Now", "Figures that moved"]
     return table(f"Answers that differ from {old.name}", columns, rows, left=5)
 
 
-def _moved(was: Mapping[str, Any], is_now: Mapping[str, Any]) -> str:
+def _change_in_words(was: Mapping[str, Any], is_now: Mapping[str, Any]) -> str:
     """The figures that differ between two answers that are alike but for them, if these are of the same modes."""
     before, now = was.get("answer", ""), is_now.get("answer", "")
     number = r"(?<![\w.])[-−+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
@@ -346,7 +348,7 @@ def _moved(was: Mapping[str, Any], is_now: Mapping[str, Any]) -> str:
     return ", ".join(f"{a} to {b} ({by:+.4g})" for a, b, by in moved)
 
 
-def _kept(page: Path) -> list[Answer]:
+def _kept_answers(page: Path) -> list[Answer]:
     try:
         found = re.search(
             r'id="answers">(.*?)</script>', page.read_text(encoding="utf-8"), re.DOTALL
