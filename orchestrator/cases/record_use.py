@@ -24,6 +24,7 @@ class RecordUse:
     kind: str
     use: UseOfRecord
     why: str = ""
+    of_no_machine: bool = False  # a record of a DYR file at a bus and identifier without a machine
 
 
 def in_one_line(records: Sequence[RecordUse]) -> str:

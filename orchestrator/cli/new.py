@@ -7,7 +7,6 @@ from dataclasses import asdict
 from pathlib import Path
 
 from rich.markup import escape
-from rich.table import Table
 
 from orchestrator.cases.new_case import WantedCase, read_converter, sources_of, write_case
 from orchestrator.cases.psse.known_records import known_records
@@ -16,6 +15,7 @@ from orchestrator.cli.arguments import add_options
 from orchestrator.cli.terminal import make_console, print_json, print_parts
 from orchestrator.errors import InputError, ResultsError
 from orchestrator.fmi.vendor_files import is_vendor_file
+from orchestrator.report.tables import make_table
 from orchestrator.safe_files import write_text
 
 _EXAMPLE = 'gfor new own.raw own.dyr --converter "bus 9, 300 MVA, 200 MW, less sg3" --out case.toml'
@@ -82,9 +82,12 @@ def _list_models(*, as_json: bool) -> None:
     if as_json:
         print_json([asdict(record) for record in records])
         return
-    table = Table("record", "what", "part of ours", "approximated")
-    for record in records:
-        table.add_row(record.name, record.kind, record.part, record.approximated)
+    table = make_table(
+        "Records of dynamics data that gfor reads",
+        *("record", "what", "part of ours", "approximated"),
+        left=4,
+        rows=[(r.name, r.kind, r.part, r.approximated) for r in records],
+    )
     sources = dict.fromkeys(record.source for record in records)
     print_parts(make_console(), [table, *(escape(f"Source: {source}") for source in sources)])
 

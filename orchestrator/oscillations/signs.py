@@ -1,9 +1,14 @@
 """Powers of a record whose sign is turned, beside what the case's units feed."""
 
-from collections.abc import Iterator
+from __future__ import annotations
 
-from orchestrator.cases.prepare import PreparedScenario
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
 from orchestrator.oscillations.measurements import Measurements, Site
+
+if TYPE_CHECKING:
+    from orchestrator.cases.prepare import PreparedScenario
 
 _ALIKE = 0.25
 """A mean power that is the case's with its sign turned differs from it by less than this part; a record is of another

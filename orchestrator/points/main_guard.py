@@ -36,6 +36,9 @@ def _of_script(frame: FrameType | None) -> FrameType | None:
     main = sys.modules.get("__main__")
     if main is None or getattr(main, "__file__", None) is None:
         return None
+    module = getattr(main.__spec__, "name", "")  # of ``python -m package``
+    if module.rpartition(".")[2] == "__main__":  # which Python imports in no process again
+        return None
     while frame is not None:
         if frame.f_code.co_name == "<module>" and frame.f_globals is vars(main):
             return frame if frame.f_code.co_filename == main.__file__ else None

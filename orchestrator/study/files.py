@@ -211,6 +211,8 @@ def summary_of(result: RunResult) -> dict[str, Any]:
     """Figures of one scenario: steady state, named modes, references, ring-down, speed, findings, failure."""
     modes = result.modes
     seen, stats = result.ring_down, result.statistics
+    # no event has happened that growth would have to wait for
+    undecided = result.before_its_events and modes.stability.stable is not False
     return {
         "name": modes.prepared.name,
         "title": modes.prepared.title,
@@ -221,7 +223,7 @@ def summary_of(result: RunResult) -> dict[str, Any]:
         if math.isnan(modes.operating_point.residual)
         else modes.operating_point.residual,
         "states": modes.model.number_of_states,
-        "stable": None if result.before_its_events else modes.stability.stable,
+        "stable": None if undecided else modes.stability.stable,
         "largest_growth_rate": modes.stability.largest_growth_rate,
         "stability": modes.stability.as_json(),
         "outside_range": None if modes.hidden is None else modes.hidden.as_json(),

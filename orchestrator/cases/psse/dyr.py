@@ -174,22 +174,22 @@ def _use_of(
     idle: Collection[tuple[int, str]],
     left: Collection[str],
     approximate: bool,
-) -> tuple[UseOfRecord, str]:
+) -> tuple[UseOfRecord, str, bool]:
+    """Return what became of a record, why, and whether it is of no machine."""
     key = record.bus, record.machine
     if key in machines:
         if record.name in left:
-            return UseOfRecord.NOT_USED, "dyr_leave_out names it"
-        return (
-            UseOfRecord.USED,
-            f"approximated as {MODEL}" if approximate and record.name in FIELDS else "",
-        )
+            return UseOfRecord.NOT_USED, "dyr_leave_out names it", False
+        stand_in = f"approximated as {MODEL}" if approximate and record.name in FIELDS else ""
+        return UseOfRecord.USED, stand_in, False
     if key in idle:
-        return UseOfRecord.NOT_USED, "its machine is out of service"
+        return UseOfRecord.NOT_USED, "its machine is out of service", False
     kind = kind_of(record.name)
     what = {"load": "a load model", "device": "a model of an SVC or a DC line", "relay": "a relay"}
     return (
         UseOfRecord.NOT_USED,
         f"{what.get(kind, 'a model')} at bus {record.bus}, which is of no machine",
+        True,
     )
 
 

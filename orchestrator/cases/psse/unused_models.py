@@ -30,7 +30,7 @@ def unused_models(records: Sequence[DynamicRecord], uses: Sequence[RecordUse]) -
     unused = [
         record
         for record, use in zip(records, uses, strict=True)
-        if use.use is UseOfRecord.NOT_USED and use.why.endswith("of no machine")
+        if use.use is UseOfRecord.NOT_USED and use.of_no_machine
     ]
     for name in dict.fromkeys(record.name for record in unused):
         own = [record for record in unused if record.name == name]
