@@ -241,7 +241,7 @@ def test_values_may_be_numpys_and_have_units():
 @pytest.mark.parametrize(
     ("mistake", "says"),
     [
-        (lambda: face.load("two_aera"), "built-in: four_vsc, "),
+        (lambda: face.load("two_aera"), "built-in: brazil7, four_vsc, "),
         (
             lambda: face.load("infinite_bus").scenario(),
             "2 scenarios; choose one of: dip, load_step",

@@ -249,6 +249,9 @@ def test_a_signal_while_the_copies_are_made_leaves_none(monkeypatch):
     monkeypatch.setattr(side_by_side.os, "fork", interrupted)
     with calls.terminable(), pytest.raises(KeyboardInterrupt), SideBySide(1, lambda *_: None):
         pass
+    end = time.monotonic() + 10.0  # on a busy machine the end of a process takes a moment
+    while copies_of(os.getpid()) != before and time.monotonic() < end:
+        time.sleep(0.01)
     assert copies_of(os.getpid()) == before
 
 
