@@ -57,6 +57,8 @@ def checked(path, binding=None, only=()):
         ("ignored_in_the_run", "tunables"),
         ("feedthrough_of_high_voltage", "feedthrough"),
         ("hidden_state", "state"),
+        ("order_of_start_values", "repeatability"),
+        ("order_of_inputs", "repeatability"),
         ("sign_bound", "power_balance"),
         ("delayed", "delay"),
         ("delayed_in_dips", "delay"),

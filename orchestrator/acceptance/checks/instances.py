@@ -20,8 +20,10 @@ from orchestrator.acceptance.checks.settings import Setting, elsewhere, tune, wi
 from orchestrator.acceptance.checks.subject import OperatingAt, Running, Stimulus, Subject
 from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError, EndedError
+from orchestrator.fmi.port import BoundDescription
 
 _OTHER = OperatingAt(v=1.03, theta=0.4, P=0.7, Q=-0.1)
+_IN_ORDER = 50  # steps of a run that is set in reversed order: start values and inputs tell at once
 _CHUNK = 50  # steps that one instance does before the other one's turn comes
 IN_EVENTS = ", in dips and jumps as well"
 NOT_IN_EVENTS = "; not judged in dips and jumps, which it refuses"
@@ -153,6 +155,16 @@ def repeatability(subject: Subject) -> CheckResult:
         says = f"{subject.watched[place]} differs by {apart:.3g} of its range between two equal runs of {steps} steps"
         return failed("repeatability", "not repeatable", says, difference=apart)
     says = f"two runs of {steps} steps differ by {apart:.1g}"
+    if not isinstance(subject.description, BoundDescription):  # a binding has an order of its own
+        few = min(steps, _IN_ORDER)
+        other = subject.trajectory(few, subject.step_size, stimulus, backwards=True)
+        moved, place = difference(first[: few + 1], other)
+        if moved > EQUAL:
+            wrong = (
+                f"{subject.watched[place]} differs by {moved:.3g} of its range if start values and inputs are set "
+                "in reversed order"
+            )
+            return failed("repeatability", "order of setting matters", wrong, difference=moved)
     if not subject.port:
         return passed("repeatability", says, difference=apart)
     rows = episode(subject, "repeatability")

@@ -110,11 +110,14 @@ class Subject:
         name: str = "fmu",
         point: OperatingAt | None = None,
         parameters: Mapping[str, float | bool] | None = None,
+        backwards: bool = False,
     ) -> "Running":
-        """A new instance, initialised; use it as a context manager."""
+        """A new instance, initialised; use it as a context manager.
+
+        ``backwards``: Whether its start values, parameters and inputs are set in reversed order."""
         component = self.open(name)
         try:
-            return Running(self, component, point, parameters)
+            return Running(self, component, point, parameters, backwards=backwards)
         except BaseException:
             component.close()
             raise
@@ -124,16 +127,25 @@ class Subject:
         component: HostedComponent,
         point: OperatingAt | None = None,
         parameters: Mapping[str, float | bool] | None = None,
+        *,
+        backwards: bool = False,
     ) -> None:
         """Give a new instance what it is given before initialisation.
 
-        ``point``: operating point that it starts from; the one of use where None."""
+        ``point``: operating point that it starts from; the one of use where None.
+        ``backwards``: Whether it is given that in reversed order."""
         component.setup(self.start_time, None)
+        values: dict[str, float | bool] = {}
         if self.starts:
             at = point or self.point
             start = {"P_0": at.P, "Q_0": at.Q, "v_0": at.v, "theta_0": at.theta}
-            component.set({n: v for n, v in start.items() if n in self.description.variables})
-        component.set({**self.use.values, **(parameters or {})})
+            values = {n: v for n, v in start.items() if n in self.description.variables}
+        wanted = {**self.use.values, **(parameters or {})}
+        if backwards:
+            component.set(dict(reversed({**values, **wanted}.items())))
+            return
+        component.set(values)
+        component.set(wanted)
 
     def memory_in_use(self) -> int:
         """Bytes in use in the FMU's process, as it says; 0 where it cannot."""
@@ -236,25 +248,29 @@ class Running(Closing):
         component: HostedComponent,
         point: OperatingAt | None = None,
         parameters: Mapping[str, float | bool] | None = None,
+        *,
+        backwards: bool = False,
     ) -> None:
         self.subject, self.component, self.point = subject, component, point
+        self.order = slice(None, None, -1 if backwards else 1)  # in which inputs are set
+        self.backwards = backwards
         self.parameters = dict(parameters or {})
         self.begin()
 
     def begin(self) -> None:
         subject, component = self.subject, self.component
         self.time = subject.start_time
-        subject.prepare(component, self.point, self.parameters)
+        subject.prepare(component, self.point, self.parameters, backwards=self.backwards)
         component.enter_initialization_mode()
         self.rest = subject.start_inputs(self.point)
-        self._in = RealBatch(component, subject.inputs)
+        self._in = RealBatch(component, subject.inputs[self.order])
         self._out = RealBatch(component, subject.watched)
         self.feed(np.zeros(len(self.rest)))
         component.exit_initialization_mode()
 
     def feed(self, deviation: Numbers) -> None:
         """Set the inputs to their start values plus a deviation."""
-        self._in.values[:] = self.rest + deviation
+        self._in.values[:] = (self.rest + deviation)[self.order]
         self._in.write()
 
     def read(self) -> Numbers:
@@ -281,7 +297,9 @@ class Running(Closing):
         begin = self.time
         if not steps:
             return np.empty((0, len(self._out.names)))
-        rows = self.rest + deviations if len(self.rest) else np.empty((0, 0))
+        rows = np.empty((0, 0))
+        if len(self.rest):
+            rows = np.ascontiguousarray((self.rest + deviations)[:, self.order])
         values = self.component.run(self._in, rows, self._out, steps, begin, step_size)
         self.time = begin + steps * step_size
         return values

@@ -285,6 +285,9 @@ EXPORT int fmi2SetReal(void *c, const unsigned *references, size_t n, const doub
         if (references[k] == GAIN) shared_gain = values[k];
 #endif
         S->z[references[k]] = values[k];
+#ifdef FAULT_CLEARS_NEXT /* setting this variable sets the one after it back */
+        if (references[k] == FAULT_CLEARS_NEXT) S->z[references[k] + 1] = 0;
+#endif
     }
 #if defined FAULT_STALE
     if (S->phase < STEPPING) S->dirty = 1; /* outputs follow in the next step only */

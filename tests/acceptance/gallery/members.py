@@ -335,6 +335,8 @@ def faulty():
     return [
         wrong("hidden_state", "hidden state", FAULT_HIDDEN=1),
         wrong("hidden_state_slow", "hidden state", FAULT_HIDDEN=1, DROOP=0.002),
+        wrong("order_of_start_values", "order of setting matters", FAULT_CLEARS_NEXT="P_0"),
+        wrong("order_of_inputs", "order of setting matters", FAULT_CLEARS_NEXT="IN_1"),
         wrong("sign", "wrong sign", I_FACTOR=-1),
         wrong("sign_bound", "wrong sign", I_FACTOR=-1, bound=IDENTITY),
         wrong("sign_of_q", "wrong sign", Q_FACTOR=-1),
