@@ -373,12 +373,12 @@ def test_without_points_the_case_itself_is_the_only_one(gfor, five, tmp_path):
         "counted",
         "least_damping_percent",
         "frequency_hz",
+        "why",
         "branch",
         "loading_percent",
         "branches_beyond",
         "bus_outside",
         "voltage_pu",
         "buses_outside",
-        "why",
     ]
     assert rows[1]["why"].startswith("sg2 is lost, which fed 130 MW; shared: sg5 +")
