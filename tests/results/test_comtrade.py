@@ -65,6 +65,14 @@ def test_text_of_1999(recording):
     check(read_comtrade(recording().with_suffix(".dat")))
 
 
+def test_characters_that_steer_a_terminal_are_written_out(recording):
+    """An analog name, a status name and a unit that would erase or turn the line they are shown on."""
+    steering = CFG.replace("UL1,A,,kV", "UL1\x1b[2K,A,,k\u202eV").replace("1,CB", "1,CB\u202e")
+    dataset = read_comtrade(recording(steering))
+    assert list(dataset) == ["UL1\\x1b[2K", "F (A2)", "F (A3)", "CB\\u202e", "TRIP"]
+    assert dataset["UL1\\x1b[2K"].attrs["units"] == "k\\u202eV"
+
+
 def test_sixteen_bits_of_1999(recording):
     dat = b"".join(struct.pack("<IIhhhH", k + 1, 20000 * k, *row) for k, row in enumerate(ROWS))
     check(read_comtrade(recording(CFG.replace("ASCII", "BINARY"), dat)))

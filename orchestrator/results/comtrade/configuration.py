@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from orchestrator.errors import InputError
+from orchestrator.foreign_files import visible
 
 FORMS = ("ASCII", "BINARY", "BINARY32", "FLOAT32")  # forms of the samples
 # 2001 is IEC's edition of 1999; a file of 1991 names none
@@ -97,11 +98,11 @@ class _Lines:
 
 
 def read_configuration(text: str, place: str) -> Configuration:
-    """Read the text of a ``.cfg``.
+    r"""Read the text of a ``.cfg``.
 
     Raises an `InputError` if a line is missing or holds something else than the standard says; file, line and field are
-    named."""
-    lines = _Lines(text, place)
+    named. Characters that steer a terminal are written out, such as ``\x1b``."""
+    lines = _Lines(visible(text), place)
     station, device, revision = (*lines.next("the station's name"), "", "", "")[:3]
     revision = revision or "1991"
     if revision not in REVISIONS:
