@@ -223,6 +223,7 @@ FOR_TYPES = {
     "coupling.system",
     "cli.terminal",
     "coupling.observers",
+    "oscillations.signs",
     "oscillations.view",
     "report.plot_style",
     "report.tables",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,6 @@ from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import ScenarioFolder, new_run_id, staged
 from orchestrator.safe_files import made_folder
 from orchestrator.spelling import spelled
-from orchestrator.study.answers import of_run
 from orchestrator.study.comparison import recorded
 from orchestrator.truth import NoTruth
 
@@ -306,12 +306,13 @@ class Run(NoTruth):
     @property
     def stable(self) -> bool | None:
         """Whether the run and the modes before and after its events show no growth; None where that is not known."""
-        return of_run(self.result).good
+        good: bool | None = _answers().of_run(self.result).good
+        return good
 
     @property
     def verdict(self) -> str:
         """The verdict in one sentence, as ``gfor run`` has it."""
-        answer = of_run(self.result)
+        answer = _answers().of_run(self.result)
         return spelled(f"{answer.verdict}: {answer.remark}" if answer.remark else answer.verdict)
 
     @property
@@ -447,3 +448,8 @@ class Run(NoTruth):
             lines,
             rest=str(self.dataset._repr_html_()),
         )
+
+
+def _answers() -> Any:
+    """Return the module of a run's answers, which brings what computes: a recording is read without it."""
+    return import_module("orchestrator.study.answers")
