@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +13,7 @@ from orchestrator.analysis.modes import ZERO, Mode, eigenvalues
 from orchestrator.arrays import Complex
 from orchestrator.cases.given import Time
 from orchestrator.errors import CosimError, InputError
-from orchestrator.late import pd, xr
+from orchestrator.late import Late, pd, xr
 from orchestrator.oscillations.view import Sources, sources_of
 from orchestrator.report.notebook import Axes, axes_or_new, curves_on, page
 from orchestrator.results.mode_json import eigenvalue_json
@@ -26,9 +25,12 @@ from orchestrator.truth import NoTruth
 
 if TYPE_CHECKING:
     from orchestrator.analysis.stability import Stability
+    from orchestrator.study import answers
     from orchestrator.study.modes import ModesResult
     from orchestrator.study.run import RunResult
     from orchestrator.watch.finding import Finding
+else:  # what computes, which a recording is read without
+    answers = Late("orchestrator.study.answers")
 
 _STATES = 3
 """States with the largest participation that stand in a table."""
@@ -306,13 +308,12 @@ class Run(NoTruth):
     @property
     def stable(self) -> bool | None:
         """Whether the run and the modes before and after its events show no growth; None where that is not known."""
-        good: bool | None = _answers().of_run(self.result).good
-        return good
+        return answers.of_run(self.result).good
 
     @property
     def verdict(self) -> str:
         """The verdict in one sentence, as ``gfor run`` has it."""
-        answer = _answers().of_run(self.result)
+        answer = answers.of_run(self.result)
         return spelled(f"{answer.verdict}: {answer.remark}" if answer.remark else answer.verdict)
 
     @property
@@ -448,8 +449,3 @@ class Run(NoTruth):
             lines,
             rest=str(self.dataset._repr_html_()),
         )
-
-
-def _answers() -> Any:
-    """Return the module of a run's answers, which brings what computes: a recording is read without it."""
-    return import_module("orchestrator.study.answers")
