@@ -13,6 +13,7 @@ from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import phasor_builder
 from fmus.toolchain.port import declare_rating, device_port_of
+from fmus.toolchain.port_variables import LARGEST_POWER_ON_BASE
 from fmus.toolchain.symbols import if_else
 
 S_N, P_0 = 100.0, 0.8  # defaults of rating [MVA] and power [pu]
@@ -39,7 +40,7 @@ def synchronous_generator(
     parts = chosen_parts(machine, exciter, governor, stabilizer)
     m = ModelBuilder(parts.model_name(), parts.title("EMT-type"), kind="machine", usual=MACHINE)
     S_n = declare_rating(m, S_N)
-    port = device_port_of(m, S_n, P_0)
+    port = device_port_of(m, S_n, P_0, LARGEST_POWER_ON_BASE)
     g = replace(parts.machine(m, port, S_n, flux_state), S_n=S_n)
     if g.at_rated_speed:
         raise ValueError(
@@ -73,7 +74,7 @@ def synchronous_generator_phasor(
         parts.model_name("phasor"), parts.title("phasor type"), kind="machine", usual=MACHINE
     )
     S_n = declare_rating(m, S_N)
-    port = device_port_of(m, S_n, P_0)
+    port = device_port_of(m, S_n, P_0, LARGEST_POWER_ON_BASE)
     g = parts.machine(m, port, S_n, lambda m, name, start, text: m.algebraic(name))
     with m.scope("machine"):
         with_speed = m.switch(

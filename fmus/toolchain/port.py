@@ -46,11 +46,15 @@ def device_port(m: ModelBuilder, S_n: float, P_0: float) -> DevicePort:
     return device_port_of(m, declare_rating(m, S_n), P_0)
 
 
-def device_port_of(m: ModelBuilder, rating: Expr, P_0: float) -> DevicePort:
-    """`device_port` of a device that has declared its rating [MVA], because its data depend on it."""
+def device_port_of(
+    m: ModelBuilder, rating: Expr, P_0: float, most: float = port_variables.LARGEST_POWER
+) -> DevicePort:
+    """`device_port` of a device that has declared its rating [MVA], because its data depend on it.
+
+    ``most``: Largest active and reactive power of the operating point [pu, S_n]."""
     system = m.declare(port_variables.S_BASE)
     v = Phasor(m.declare(port_variables.V_RE), m.declare(port_variables.V_IM))
-    return port_at(m, v, P_0, rating / system)
+    return port_at(m, v, P_0, rating / system, most)
 
 
 def declare_rating(m: ModelBuilder, S_n: float) -> Expr:
@@ -58,24 +62,37 @@ def declare_rating(m: ModelBuilder, S_n: float) -> Expr:
     return m.declare(replace(port_variables.S_N, start=float(S_n)))
 
 
-def port_at(m: ModelBuilder, v: Phasor, P_0: float, current_scale: Expr) -> DevicePort:
+def port_at(
+    m: ModelBuilder,
+    v: Phasor,
+    P_0: float,
+    current_scale: Expr,
+    most: float = port_variables.LARGEST_POWER,
+) -> DevicePort:
     """Declare the power-flow start values of a device at a bus voltage.
 
     ``v``: Bus voltage, network frame [pu].
     ``P_0``: Default of the active power into the bus [pu, S_n].
-    ``current_scale``: Device current [pu, S_n] times this is the current in the port's unit."""
-    start = declare_operating_point(m, P_0)
+    ``current_scale``: Device current [pu, S_n] times this is the current in the port's unit.
+    ``most``: Largest active and reactive power of the operating point [pu, S_n]."""
+    start = declare_operating_point(m, P_0, most)
     connected = m.switch("connected", True, "The breaker at the port is closed", tunable=True)
     return DevicePort(start.v_0, start.i_0, start.omega_b, v, current_scale, connected)
 
 
-def declare_operating_point(m: ModelBuilder, P_0: float) -> OperatingPoint:
-    """Declare the rated frequency and the power-flow start values; ``P_0`` is the default active power [pu, S_n]."""
+def declare_operating_point(
+    m: ModelBuilder, P_0: float, most: float = port_variables.LARGEST_POWER
+) -> OperatingPoint:
+    """Declare the rated frequency and the power-flow start values.
+
+    ``P_0``: Default of the active power [pu, S_n].
+    ``most``: Largest active and reactive power [pu, S_n]."""
+    limits = {"minimum": -most, "maximum": most}
     f_n = m.declare(port_variables.F_N)
     v_0, theta_0 = m.declare(port_variables.V_0), m.declare(port_variables.THETA_0)
     p_0, q_0 = (
-        m.declare(replace(port_variables.P_0, start=float(P_0))),
-        m.declare(port_variables.Q_0),
+        m.declare(replace(port_variables.P_0, start=float(P_0), **limits)),
+        m.declare(replace(port_variables.Q_0, **limits)),
     )
     bus = polar(v_0, theta_0)
     return OperatingPoint(bus, current_of_power(p_0, q_0, bus), 2 * pi * f_n)

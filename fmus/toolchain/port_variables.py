@@ -26,11 +26,26 @@ S_N = Parameter(
 )
 """Each device has its own start value; the same holds for `P_0`."""
 
+# power of a unit at its operating point beyond which its rating is wrong [pu, S_n]
+LARGEST_POWER = 2.0
+# the same of a machine, whose S_n may be the base of its data alone, as MBASE of PSS/E: 100 MVA for 10 000 MW
+LARGEST_POWER_ON_BASE = 100.0
+
 P_0 = Parameter(
-    "P_0", "pu", "Power flow: active power into the bus", base="S_n", minimum=-2.0, maximum=2.0
+    "P_0",
+    "pu",
+    "Power flow: active power into the bus",
+    base="S_n",
+    minimum=-LARGEST_POWER,
+    maximum=LARGEST_POWER,
 )
 Q_0 = Parameter(
-    "Q_0", "pu", "Power flow: reactive power into the bus", base="S_n", minimum=-2.0, maximum=2.0
+    "Q_0",
+    "pu",
+    "Power flow: reactive power into the bus",
+    base="S_n",
+    minimum=-LARGEST_POWER,
+    maximum=LARGEST_POWER,
 )
 V_0 = Parameter(
     "v_0",

@@ -25,6 +25,8 @@ class UnitOrigin:
     common: str  # key of ``[units]`` with the common parameters of this kind of unit
     # lines of the row's file by the parameter that they give, where there are several.
     lines: Mapping[str, int] = field(default_factory=dict)
+    # likely rating [MVA] if S_n is only the base of the unit's data; otherwise None
+    rating_mva: float | None = None
 
 
 @dataclass
@@ -136,6 +138,14 @@ class Draft:
             return self.given.place("units", origin.common, *path)
         line = origin.lines.get(".".join(path))
         return f"{origin.row}{'' if line is None else f', line {line}'}, {name}.{'.'.join(path)}"
+
+    @property
+    def base_ratings(self) -> dict[str, float]:
+        """Likely ratings [MVA] of the units whose S_n is only the base of their data."""
+        found = {
+            name: self.origins[name].rating_mva for name in self.tables if name in self.origins
+        }
+        return {name: rating for name, rating in found.items() if rating is not None}
 
     @property
     def grid(self) -> str | None:

@@ -34,15 +34,16 @@ def power_flow_json(prepared: PreparedScenario) -> dict[str, Any] | None:
     machines: list[dict[str, Any]] = []
     for name, power in flow.powers.items():
         plan = prepared.system.components[name]
-        rating = plan.number("S_n")
+        S_n = plan.number("S_n")
+        rating = prepared.base_ratings.get(name, S_n)
         machines.append(
             {
                 "name": name,
                 "bus": places[name],
                 "rating_mva": rating,
-                "p_mw": power.real * rating,
-                "q_mvar": power.imag * rating,
-                "loading_percent": 100 * abs(power),
+                "p_mw": power.real * S_n,
+                "q_mvar": power.imag * S_n,
+                "loading_percent": 100 * abs(power) * S_n / rating,
             }
         )
     total = sum(machine["p_mw"] for machine in machines)

@@ -69,6 +69,7 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
             dispatch=draft.dispatch,
             active=draft.active_limits,
             following=_following(draft),
+            ratings=draft.base_ratings,
         )
     except InputError as error:
         kind = ErrorKind.VALUES if error.kind is ErrorKind.INPUT else error.kind

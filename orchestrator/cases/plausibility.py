@@ -152,9 +152,8 @@ def _doubts(draft: Draft) -> Iterator[UnusualValue]:
         for variable in plan.description.parameters:
             wanted, value = plan.description.variables[variable].usual, value_of(plan, variable)
             if wanted is not None and value is not None:
-                yield from outside(
-                    draft, name, variable, value, wanted, scale=_to_rating(plan, variable)
-                )
+                scale, bases = _to_rating(draft, name, variable)
+                yield from outside(draft, name, variable, value, wanted, scale=scale, bases=bases)
         for own, of_lead, of_lag in _LEADS:
             lead, lag = value_of(plan, of_lead), value_of(plan, of_lag)
             if (
@@ -251,8 +250,14 @@ def _rescaled(draft: Draft, flow: PowerFlow | None) -> Iterator[UnusualValue]:
             yield UnusualValue(f"{name}.S_n", place_of(draft, name, "S_n"), text)
 
 
-def overloads(plans: Mapping[str, ComponentPlan], meant: Iterable[str]) -> dict[str, float]:
-    """Units whose operating point exceeds their rating, with what it asks for [pu of the rating]."""
+def overloads(
+    plans: Mapping[str, ComponentPlan],
+    meant: Iterable[str],
+    ratings: Mapping[str, float] | None = None,
+) -> dict[str, float]:
+    """Units whose operating point exceeds their rating, with what it asks for [pu of the rating].
+
+    ``ratings``: likely ratings [MVA] of units whose S_n is only the base of their data."""
     found = {}
     for name, plan in plans.items():
         P, Q, S_n = (value_of(plan, v) for v in ("P_0", "Q_0", "S_n"))
@@ -264,6 +269,7 @@ def overloads(plans: Mapping[str, ComponentPlan], meant: Iterable[str]) -> dict[
         ):
             continue
         apparent = abs(P) if plan.kind == "machine" else math.hypot(P, Q)
+        apparent *= S_n / (ratings or {}).get(name, S_n)
         if apparent > _FULL and not any(
             fnmatch.fnmatchcase(f"{name}.S_n", pattern) for pattern in meant
         ):
@@ -272,7 +278,9 @@ def overloads(plans: Mapping[str, ComponentPlan], meant: Iterable[str]) -> dict[
 
 
 def _overloaded(draft: Draft) -> Iterator[UnusualValue]:
-    for name, apparent in overloads(draft.system.components, draft.given.case.meant).items():
+    for name, apparent in overloads(
+        draft.system.components, draft.given.case.meant, draft.base_ratings
+    ).items():
         plan = draft.system.components[name]
         P, Q, S_n = (value_of(plan, v) for v in ("P_0", "Q_0", "S_n"))
         text = (
@@ -285,14 +293,28 @@ def _overloaded(draft: Draft) -> Iterator[UnusualValue]:
 # -- one value ---------------------------------------------------------------------------------------
 
 
-def _to_rating(plan: ComponentPlan, variable: str) -> float:
-    """The factor from the base of a machine's data, ``machine.S_data``, to its rating; otherwise 1."""
+_OF_RATING = ("governor.V_M", "governor.P_M", "governor.G_M", "governor.K", "governor.D_t")
+"""Begins of variables that shrink as a base grows: limits, gains and damping of turbines."""
+
+
+def _to_rating(draft: Draft, name: str, variable: str) -> tuple[float, tuple[str, str]]:
+    """The factor from the base of a machine's data to its rating, and the names of both; otherwise 1.
+
+    The base is ``machine.S_data``, or S_n where that is only the base."""
+    plan = draft.system.components[name]
     S_data, S_n = value_of(plan, "machine.S_data"), value_of(plan, "S_n")
-    if not S_data or not S_n:
-        return 1.0
+    likely = draft.origins[name].rating_mva if name in draft.origins else None
+    if likely is not None and S_n and variable.startswith(_OF_RATING):
+        return S_n / likely, ("S_n", "the likely rating")
+    known = [(S_data, "machine.S_data"), (S_n, "S_n"), (likely, "the likely rating")]
+    bases = [(size, word) for size, word in known if size]
+    if len(bases) < 2:
+        return 1.0, ("", "")
+    (smaller, first), (larger, last) = bases[0], bases[-1]
     if variable == "machine.H":
-        return S_data / S_n
-    return S_n / S_data if variable == "machine.R_s" or variable.startswith("machine.X_") else 1.0
+        return smaller / larger, (first, last)
+    impedance = variable in ("machine.R_s", "governor.R") or variable.startswith("machine.X_")
+    return (larger / smaller if impedance else 1.0), (first, last)
 
 
 def _check_rule(draft: Draft, name: str, plan: ComponentPlan, rule: Rule) -> None:

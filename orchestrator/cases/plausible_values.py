@@ -53,7 +53,11 @@ def outside(
     wanted: Usual,
     where: str | None = None,
     scale: float = 1.0,
+    bases: tuple[str, str] = ("", ""),
 ) -> Iterator[UnusualValue]:
+    """Yield a question about a value outside of its usual range.
+
+    ``scale``: factor from the base of the value to that of the range; ``bases``: the names of both."""
     given, value = value, value * scale
     if wanted.fits(value):
         return
@@ -88,7 +92,7 @@ def outside(
     shown = (
         f"{given:g}{unit}"
         if scale == 1
-        else f"{given:g}{unit} on machine.S_data, {value:.4g}{unit} on S_n,"
+        else f"{given:g}{unit} on {bases[0]}, {value:.4g}{unit} on {bases[1]},"
     )
     text = f"{variable} = {shown} is outside of {wanted.low:g} to {wanted.high:g}{unit} ({wanted.why}){slip}"
     yield UnusualValue(

@@ -87,6 +87,8 @@ class PreparedScenario:
     network: Network | None = None
     source_slack: str | None = None  # reference bus of the network's source
     file_limits: FileLimits = field(default_factory=FileLimits)  # of the network's source
+    # likely ratings [MVA] of units whose S_n is only the base of their data
+    base_ratings: Mapping[str, float] = field(default_factory=dict)
     following_loads: tuple[str, ...] = ()  # loads that follow the voltage in an outage's power flow
     # prepares another scenario of the case with the same values, or with those of its file alone where that is asked
     # for; None where nothing but the file gave values.
@@ -281,6 +283,7 @@ class Preparer:
             not_reached=tuple(sorted(draft.found.not_reached)),
             source_slack=draft.data.slack if draft.data else None,
             file_limits=draft.data.limits if draft.data else FileLimits(),
+            base_ratings=draft.base_ratings,
             following_loads=tuple(draft.data.flow_laws) if draft.data else (),
             idle=idle_values(
                 draft.system, draft.given.from_outside, draft.places, events, draft.found.absent

@@ -5,6 +5,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from fmus.toolchain.port_variables import LARGEST_POWER
 from orchestrator.cases.power_flow import FlowUnit, PowerFlow
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import ErrorKind, InputError
@@ -35,6 +36,21 @@ class Dispatch:
     rule: SharingRule
     powers: Mapping[str, complex]
     change: float
+
+
+@dataclass(frozen=True)
+class Room:
+    """What a file says of the units' powers beside their models.
+
+    ``active``: least and most active power [MW]; ``ratings``: likely ratings [MVA] of units whose S_n is only the base
+    of their data."""
+
+    active: Mapping[str, tuple[float, float]]
+    ratings: Mapping[str, float]
+
+    def limits_of(self, name: str) -> tuple[float, float]:
+        low, high = self.active.get(name, (-math.inf, math.inf))
+        return low, min(high, self.ratings.get(name, math.inf))
 
 
 @dataclass(frozen=True)
@@ -143,7 +159,9 @@ def power_limits(plan: ComponentPlan, reactive: float = 0.0) -> tuple[float, flo
         low.append(-min(high))
     most = plan.description.variables["P_0"].maximum
     if most is not None:
-        high.append(most)
+        # beyond it S_n is only the base of the unit's data
+        usual = abs(plan.number("P_0")) <= LARGEST_POWER
+        high.append(min(most, LARGEST_POWER) if usual else most)
     losses = 1.5 * (_number(plan, "machine.R_s") or 0.0)
     return max(low) + _ROOM, min(high) - _ROOM - losses
 
@@ -201,7 +219,7 @@ def shared_flow(
     plans: Mapping[str, ComponentPlan],
     slack_bus: str,
     dispatch: Dispatch,
-    active: Mapping[str, tuple[float, float]],
+    room: Room,
 ) -> PowerFlow:
     """The power flow in which the units share what the dispatch before lacks now, with the change of the losses."""
     left = [
@@ -209,7 +227,7 @@ def shared_flow(
     ]
     if dispatch.rule is SharingRule.SLACK:
         return solve(left)
-    reserves = _reserves(left, plans, dispatch, active)
+    reserves = _reserves(left, plans, dispatch, room)
     at_slack = {
         one.name for one in left if one.connected and one.bus == slack_bus and one.Q_0 is None
     }
@@ -243,19 +261,20 @@ def _reserves(
     units: Sequence[FlowUnit],
     plans: Mapping[str, ComponentPlan],
     dispatch: Dispatch,
-    active: Mapping[str, tuple[float, float]],
+    room: Room,
 ) -> list[Reserve]:
     """Of the units that are left. Where none answers to the frequency, ratings decide."""
     left = [one for one in units if one.connected]
     gains = {one.name: droop_gain(plans[one.name]) for one in left}
     if dispatch.rule is SharingRule.RATING or not any(gains.values()):
-        gains = {one.name: 1.0 if one.Q_0 is None else 0.0 for one in left}
+        parts = {one.name: room.ratings.get(one.name, one.S_n) / one.S_n for one in left}
+        gains = {one.name: parts[one.name] if one.Q_0 is None else 0.0 for one in left}
     found = []
     for one in left:
         least, most = (
             x * one.S_n for x in power_limits(plans[one.name], dispatch.powers[one.name].imag)
         )
-        low, high = active.get(one.name, (-math.inf, math.inf))
+        low, high = room.limits_of(one.name)
         found.append(
             Reserve(
                 one.name,

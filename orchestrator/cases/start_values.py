@@ -1,17 +1,22 @@
 """Start values of every component, from a power flow with the values that are set."""
 
 import cmath
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from fmus.grid.network import OPEN_CHARGING, Network, Shunt, ThreeWinding
-from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
+from fmus.toolchain.port_variables import (
+    LARGEST_POWER,
+    LARGEST_POWER_ON_BASE,
+    SYSTEM_BASE_MVA,
+)
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt, inner_buses, legs_of
 from orchestrator.cases.flow_limits import Limits
 from orchestrator.cases.flow_units import flow_unit
 from orchestrator.cases.load_models import FlowLaws
 from orchestrator.cases.power_flow import FlowUnit, PowerFlow, solve_power_flow
-from orchestrator.cases.sharing import Dispatch, shared_flow
+from orchestrator.cases.sharing import Dispatch, Room, shared_flow
 from orchestrator.coupling.system import ComponentPlan, System
 from orchestrator.errors import ErrorKind, InputError
 
@@ -42,6 +47,7 @@ def start_from_power_flow(
     dispatch: Dispatch | None = None,
     active: Mapping[str, tuple[float, float]] | None = None,
     following: Mapping[str, FollowingLoad] | None = None,
+    ratings: Mapping[str, float] | None = None,
 ) -> PowerFlow:
     """Solve the power flow and set the start values of the grid and of all units.
 
@@ -52,7 +58,9 @@ def start_from_power_flow(
     disconnected, the limits shrink with the rating.
     ``returning``: units that an event connects; a limit of theirs must stay.
     ``active``: least and most active power of units that share [MW], beside their models' own limits.
-    ``following``: loads that follow the voltage, by name; they are set to what they draw in the solution."""
+    ``following``: loads that follow the voltage, by name; they are set to what they draw in the solution.
+    ``ratings``: likely ratings [MVA] of units whose S_n is only the base of their data; they may feed more than twice
+    S_n."""
     loads = _loads(network, system.components[grid], following or {})
     feeding = [
         _unit(name, bus, system.components[name], system.components[grid])
@@ -74,7 +82,9 @@ def start_from_power_flow(
     if dispatch is None:
         flow = solve(feeding)
     else:
-        flow = shared_flow(solve, feeding, system.components, slack, dispatch, active or {})
+        plans = system.components
+        above = {n: mva for n, mva in (ratings or {}).items() if mva > plans[n].number("S_n")}
+        flow = shared_flow(solve, feeding, plans, slack, dispatch, Room(active or {}, above))
     for bus, voltage in ((bus, flow.voltages[bus]) for bus in network.buses):
         system.components[grid].parameters |= {
             f"{bus}.v_0": abs(voltage),
@@ -82,7 +92,8 @@ def start_from_power_flow(
         }
     _set_following(system.components[grid], loads, flow.voltages)
     for name, bus in units.items():
-        _start_unit(name, system.components[name], flow.voltages[bus], flow.powers[name])
+        most = LARGEST_POWER_ON_BASE if name in (ratings or {}) else LARGEST_POWER
+        _start_unit(name, system.components[name], flow.voltages[bus], flow.powers[name], most)
     for name in (
         unit.name for unit in feeding if not unit.connected and unit.name not in returning
     ):
@@ -220,7 +231,9 @@ def _let_idle(plan: ComponentPlan) -> None:
             plan.parameters[limit] = _IDLE
 
 
-def _start_unit(name: str, plan: ComponentPlan, voltage: complex, power: complex) -> None:
+def _start_unit(
+    name: str, plan: ComponentPlan, voltage: complex, power: complex, usual: float
+) -> None:
     start = {
         "P_0": power.real,
         "Q_0": power.imag,
@@ -228,8 +241,9 @@ def _start_unit(name: str, plan: ComponentPlan, voltage: complex, power: complex
         "theta_0": cmath.phase(voltage),
     }
     for variable in ("P_0", "Q_0"):
-        most = plan.description.variables[variable].maximum
-        if most is not None and abs(start[variable]) > most:
+        declared = plan.description.variables[variable].maximum
+        most = math.inf if declared is None else min(declared, usual)
+        if abs(start[variable]) > most:
             kept = (
                 ", or keep its limits ([power_flow] reactive_limits, gfor new --reactive-limits)"
                 * (variable == "Q_0")

@@ -41,6 +41,8 @@ class UnitRow:
     lines: Mapping[str, int] = field(default_factory=dict)
     p_min_mw: float = -math.inf
     p_max_mw: float = math.inf
+    # likely rating [MVA] if rating_mva is only the base of the machine's data; otherwise None
+    likely_mva: float | None = None
 
 
 def checked(row: UnitRow, place: str, *, is_base: bool = False) -> UnitRow:

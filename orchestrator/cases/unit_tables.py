@@ -35,8 +35,9 @@ from orchestrator.cases.psse.dyr_units import (
 from orchestrator.cases.psse.unused_models import unused_models
 from orchestrator.cases.schema import ComponentTable, UnitsTable
 from orchestrator.cases.source_changes import Changes
+from orchestrator.cases.source_ratings import with_needed_ratings
 from orchestrator.cases.unit_row import UnitRow, checked
-from orchestrator.errors import InputError, few
+from orchestrator.errors import InputError, Problem, few
 
 UNIT_KINDS = ("sg", "gfor")  # first parts of the names of a unit's generator and converter
 _LIMITS = ("q_min_mvar", "q_max_mvar")
@@ -54,8 +55,8 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
     table = draft.given.case.units
     if table is None or (draft.found.network_failed and table.file is None):
         return {}
-    generation = draft.data.generation if draft.data else {}
     try:
+        generation = _generation(draft, table)
         rows = (
             unit_rows(table, draft.given.directory, generation)
             if table.dyr is None
@@ -100,11 +101,28 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
                     model=row.converter or model, bus=row.bus, parameters=values, **parts
                 )
                 of_row = frozenset((*row.parameters.get(kind, {}), *own))
+                likely = None if row.likely_mva is None else share * row.likely_mva
                 draft.origins[name] = UnitOrigin(
-                    row.place or draft.given.place("units"), of_row, key, row.lines
+                    row.place or draft.given.place("units"), of_row, key, row.lines, likely
                 )
                 draft.active_limits[name] = share * row.p_min_mw, share * row.p_max_mw
     return components
+
+
+def _generation(draft: Draft, table: UnitsTable) -> Mapping[str, Generation]:
+    """What the network's source has at each bus; of a RAW file with ratings that fit the power flow."""
+    data, network = draft.data, draft.given.case.network
+    if data is None or network is None:
+        return {}
+    flow = draft.given.case.power_flow
+    if network.raw is None or table.dyr or table.file or not data.misfit or flow is None:
+        return data.generation
+    slack = flow.slack or data.slack or ""
+    slack = slack if slack in data.generation else bus_name(slack.removeprefix("sg"))
+    found, text = with_needed_ratings(data, slack)
+    if text:
+        draft.found.questions.append(Problem(draft.given.place("network", "raw"), text))
+    return found
 
 
 def unit_rows(

@@ -154,8 +154,8 @@ class ItemPreparation:
     def overloads(self, prepared: PreparedScenario) -> dict[str, float]:
         """Units beyond their rating [pu of it], and further than without the item's values."""
         meant = self._case.table.meant
-        before = overloads(self.base.system.components, meant)
-        found = overloads(prepared.system.components, meant)
+        before = overloads(self.base.system.components, meant, self.base.base_ratings)
+        found = overloads(prepared.system.components, meant, prepared.base_ratings)
         return {name: load for name, load in found.items() if load > before.get(name, 0.0) + 0.01}
 
     def reactive(self, prepared: PreparedScenario) -> str:

@@ -67,5 +67,9 @@ def _record(result: ModesResult) -> PointRecord:
         linearised=result.linearised,
         stability=result.stability.as_json(),
         because=result.stability.because(),
-        overloads=overloads(result.prepared.system.components, result.prepared.case.table.meant),
+        overloads=overloads(
+            result.prepared.system.components,
+            result.prepared.case.table.meant,
+            result.prepared.base_ratings,
+        ),
     )

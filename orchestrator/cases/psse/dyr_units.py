@@ -130,6 +130,7 @@ def rows_of_machines(machines: Sequence[Machine], place: str) -> list[UnitRow]:
             q_max_mvar=sum(m.q_max_mvar for m in here),
             p_min_mw=machine.p_min_mw,
             p_max_mw=machine.p_max_mw,
+            likely_mva=machine.likely_mva,
         )
         rows.append(checked(row, place, is_base=True))
     return rows
