@@ -110,7 +110,7 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
 
 
 def _generation(draft: Draft, table: UnitsTable) -> Mapping[str, Generation]:
-    """What the network's source has at each bus; of a RAW file with ratings that fit the power flow."""
+    """Return what the network's source has at each bus, of a RAW file with ratings that fit the power flow."""
     data, network = draft.data, draft.given.case.network
     if data is None or network is None:
         return {}
