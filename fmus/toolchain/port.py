@@ -87,12 +87,11 @@ def declare_operating_point(
 
     ``P_0``: Default of the active power [pu, S_n].
     ``most``: Largest active and reactive power [pu, S_n]."""
-    limits = {"minimum": -most, "maximum": most}
     f_n = m.declare(port_variables.F_N)
     v_0, theta_0 = m.declare(port_variables.V_0), m.declare(port_variables.THETA_0)
     p_0, q_0 = (
-        m.declare(replace(port_variables.P_0, start=float(P_0), **limits)),
-        m.declare(replace(port_variables.Q_0, **limits)),
+        m.declare(replace(port_variables.P_0, start=float(P_0), minimum=-most, maximum=most)),
+        m.declare(replace(port_variables.Q_0, minimum=-most, maximum=most)),
     )
     bus = polar(v_0, theta_0)
     return OperatingPoint(bus, current_of_power(p_0, q_0, bus), 2 * pi * f_n)
