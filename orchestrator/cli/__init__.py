@@ -4,7 +4,7 @@ import argparse
 import codecs
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from importlib import import_module
 from io import TextIOWrapper
 from itertools import pairwise
@@ -89,7 +89,7 @@ def _done(words: Sequence[str]) -> int:
     try:
         words = _spelt_today(words)
         with calls:  # libraries take an interrupt in their import for an error of their own
-            parser = _parser(_command_in(words))
+            parser = _parser({_command_in(words)})
         options = parser.parse_args(words)
         origin.check_named(vars(options))
         files = origin.files_read(vars(options))
@@ -275,8 +275,13 @@ def module_of(command: str) -> Any:
     return StudyCommand(command, study_in(_ROOMS[name]))
 
 
-def _parser(chosen: str | None) -> argparse.ArgumentParser:
-    """The parser, with the arguments of the one command that was chosen: the others' imports would take seconds."""
+def whole_parser() -> argparse.ArgumentParser:
+    """Return the parser with the arguments of every command, which imports all of them."""
+    return _parser(COMMANDS)
+
+
+def _parser(chosen: Collection[str | None]) -> argparse.ArgumentParser:
+    """The parser, with the arguments of the commands that were chosen: the others' imports would take seconds."""
     parser = _Parser(
         prog="gfor",
         description="Co-simulation of grid-forming converters: run, linearise, build FMUs.",
@@ -291,7 +296,7 @@ def _parser(chosen: str | None) -> argparse.ArgumentParser:
             whole.set_defaults(command=lambda _, whole=whole: _print(whole.format_help()))
             lists[group] = whole.add_subparsers(metavar="COMMAND", parser_class=_Command)
         command = lists[group].add_parser(last, help=words)
-        if name == chosen:
+        if name in chosen:
             for kind in (None, "store"):
                 command.register("action", kind, _Once)
             if name in _READERS:

@@ -172,7 +172,7 @@ def main_of(words: list[str]) -> int:
     count, seed = [*numbers, *(COUNT, SEED)[len(numbers) :]][:2]
     chance, wrongs = random.Random(seed), 0
     for command in COMMANDS:
-        _parser(command)  # imports
+        _parser({command})  # imports
     top = Path(tempfile.mkdtemp())  # nothing that a copy of this process removes at its end
     try:
         before = made(top / "made")

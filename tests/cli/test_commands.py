@@ -102,7 +102,7 @@ def test_alone_it_answers_a_newcomers_questions_with_lines_that_parse(gfor):
     assert max(map(len, out.splitlines())) <= 100
     for line in lines:
         words = shlex.split(line)[1:]
-        _parser(_command_in(words)).parse_args(words)
+        _parser({_command_in(words)}).parse_args(words)
     named = {name for name in COMMANDS if re.search(rf"\b{name.split()[-1]}\b", out)}
     assert named == set(COMMANDS)
 

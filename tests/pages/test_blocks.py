@@ -60,7 +60,7 @@ def parses(words, place, capsys):
     if ADDED.intersection(words):
         return
     try:
-        cli._parser(cli._command_in(words)).parse_args(words)
+        cli._parser({cli._command_in(words)}).parse_args(words)
     except SystemExit as stop:  # argparse's way out
         if stop.code:
             pytest.fail(f"{place}: gfor {shlex.join(words)}: {capsys.readouterr().err}")
