@@ -151,7 +151,9 @@ def _doubts(draft: Draft) -> Iterator[UnusualValue]:
     for name, plan in draft.system.components.items():
         for variable in plan.description.parameters:
             wanted, value = plan.description.variables[variable].usual, value_of(plan, variable)
-            if wanted is not None and value is not None:
+            winding = _OF_WINDINGS.get(variable)
+            has_effect = winding is None or not _is_missing(plan, *winding)
+            if wanted is not None and value is not None and has_effect:
                 scale, bases = _to_rating(draft, name, variable)
                 yield from outside(draft, name, variable, value, wanted, scale=scale, bases=bases)
         for own, of_lead, of_lag in _LEADS:
@@ -317,9 +319,27 @@ def _to_rating(draft: Draft, name: str, variable: str) -> tuple[float, tuple[str
     return (larger / smaller if impedance else 1.0), (first, last)
 
 
+_OF_WINDINGS = {
+    "machine.T_d20": ("machine.X_d1", "machine.X_d2"),
+    "machine.T_q20": ("machine.X_q1", "machine.X_q2"),
+}
+"""Time constants of a winding that is missing where two reactances are equal."""
+
+
+def _is_missing(plan: ComponentPlan, transient: str, subtransient: str) -> bool:
+    """Return whether X'' = X' says that an axis has no damper winding; X''_d is X''_q where there is one for both."""
+    known = plan.description.variables
+    X1 = value_of(plan, transient)
+    X2 = value_of(plan, subtransient if subtransient in known else "machine.X_d2")
+    return X1 is not None and X1 == X2
+
+
 def _check_rule(draft: Draft, name: str, plan: ComponentPlan, rule: Rule) -> None:
     larger, smaller = value_of(plan, rule.larger), value_of(plan, rule.smaller)
     if larger is None or smaller is None or rule.holds(larger, smaller):
+        return
+    winding = _OF_WINDINGS.get(rule.smaller)
+    if winding is not None and _is_missing(plan, *winding):
         return
     texts = [
         f"{v} = {x:g}{f' {unit_of(plan, v)}'.removesuffix(' 1')}{'' if v in plan.parameters else ' (the default)'}"

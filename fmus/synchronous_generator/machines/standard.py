@@ -26,7 +26,7 @@ from fmus.synchronous_generator.machines.base import Common, declare_common, rea
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort
-from fmus.toolchain.symbols import Expr, fmax, if_else, logic_and
+from fmus.toolchain.symbols import Expr, fmax, fmin, if_else, logic_and
 
 
 @dataclass(frozen=True)
@@ -172,6 +172,7 @@ _FIRST_Q = ("psi_1q", "First damper flux, q axis")
 _SECOND_Q = ("psi_2q", "Second damper flux, q axis")
 
 _NO_TIME = 1e-3  # stands for the time constant [s] of a fast winding that a machine does not have
+_OF_NO_WINDING = 0.1  # part of T'_0 that stands for a longer T''_0 of such a winding
 
 
 def two_axis(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclaration) -> Machine:
@@ -239,6 +240,7 @@ def genrou(
         X_q, X_q1, T_q10 = _synchronous(m, "q"), _transient(m, "q"), _time_1(m, "q")
         T_q20 = time(m, "T_q20", 0.05, "Open-circuit subtransient time constant T''_q0")
         k = common.scale
+        T_q20 = _of_winding(T_q20, T_q10, X_q1 - X_2)
         q = AxisData(k * X_q, k * X_q1, k * X_2, k * X_l, T_q10, T_q20)
         _require_order(m, d, q, "X_q1")
         m.require(
@@ -291,16 +293,22 @@ def _one_winding(common: Common, X: Expr, X1: Expr, T_0: Expr, X_l: Expr | float
 
 def _d_axis(m: ModelBuilder, common: Common) -> tuple[Expr, Expr, AxisData]:
     """X_l and X'' as they are given, and the data of the d axis on S_n."""
-    X_l = reactance(m, "X_l", 0.2, "Stator leakage reactance")
+    X_l = reactance(m, "X_l", 0.2, "Stator leakage reactance", least=0.0)
     X, X1 = _synchronous(m, "d"), _transient(m, "d")
     X2 = reactance(m, "X_d2", 0.25, "Subtransient reactance X''_d = X''_q")
     T_10 = _time_1(m, "d")
     T_20 = time(m, "T_d20", 0.03, "Open-circuit subtransient time constant T''_d0")
     m.require(if_else(X2 <= X1, 1, -1), "machine.X_d2 must not exceed machine.X_d1")
     m.require(X2 - X_l, "machine.X_d2 must exceed machine.X_l")
+    T_20 = _of_winding(T_20, T_10, X1 - X2)
     m.require(T_10 - T_20, "machine.T_d10 must exceed machine.T_d20")
     k = common.scale
     return X_l, X2, AxisData(k * X, k * X1, k * X2, k * X_l, T_10, T_20)
+
+
+def _of_winding(fast: Expr, slow: Expr, screened: Expr) -> Expr:
+    """T''_0 of an axis, or, where X'' = X' says that it has no such winding, less than T'_0: it then has no effect."""
+    return if_else(screened <= 0, fmin(fast, _OF_NO_WINDING * slow), fast)
 
 
 def _require_order(m: ModelBuilder, d: AxisData, q: AxisData, lower: str) -> None:
