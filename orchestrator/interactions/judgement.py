@@ -47,7 +47,7 @@ class JudgedSystem:
 
     A mode of the network or of a machine in which none of them takes part says nothing of them, however little it is
     damped. A mode that grows counts in any case, and so does one that counts in a pair, or in another assignment, and
-    was followed to here."""
+    was followed to here. Without any converter only those count that were followed to here."""
 
     name: SystemName
     record: SystemRecord
@@ -61,7 +61,7 @@ class JudgedSystem:
 
     @property
     def critical(self) -> SharedMode | None:
-        """The least damped of the modes that count; None where none does. Without any converter all modes count."""
+        """The least damped of the modes that count; None where none does."""
         counting = [mode for mode in self.record.modes if self.counts(mode)]
         growing = [] if self.record.growing is None else [self.record.growing]
         return min([*counting, *growing], key=lambda mode: mode.damping_percent, default=None)
@@ -74,6 +74,11 @@ class JudgedSystem:
         return 100.0 if self.critical is None else self.critical.damping_percent
 
     @property
+    def least_of_all(self) -> SharedMode | None:
+        """The least damped of all modes of the range, whoever holds it; None if there is none."""
+        return min(self.record.modes, key=lambda mode: mode.damping_percent, default=None)
+
+    @property
     def is_known(self) -> bool:
         return self.stable is not None and self.least_damping is not None
 
@@ -82,13 +87,10 @@ class JudgedSystem:
         return self.record.error or str(self.record.stability.get("reason") or "no verdict")
 
     def counts(self, mode: SharedMode) -> bool:
-        return self._share(mode) >= self.threshold or any(
-            _is_at(mode.eigenvalue, value) for value in self.followed
-        )
+        holds_enough = bool(self.converters) and self._share(mode) >= self.threshold
+        return holds_enough or any(_is_at(mode.eigenvalue, value) for value in self.followed)
 
     def _share(self, mode: SharedMode) -> float:
-        if not self.converters:
-            return 1.0
         return sum(share for name, share in mode.components.items() if name in self.converters)
 
 
@@ -194,6 +196,8 @@ class JudgedInteractions:
         }
         pairs = {name: self._modes(one) for name, one in plain.items() if name.kind is Kind.PAIR}
         self.systems = {name: _with_followed(one, plain, pairs) for name, one in plain.items()}
+        if not pairs:
+            self.systems[NONE] = self._none_of_one_vendor()
         self.unfollowed: dict[SystemName, str] = {}
         self.systems |= self._assignments_alike()
         self.modes = [self._judged(mode) for mode in self.whole.record.modes]
@@ -214,6 +218,16 @@ class JudgedInteractions:
         if critical is not None and critical.eigenvalue not in wanted:
             watched.append(critical)
         return tuple(followed(mode, (first, second), self._follow) for mode in watched)
+
+    def _none_of_one_vendor(self) -> JudgedSystem:
+        """The system without the only vendor, in which those modes count that do so with it."""
+        (alone,) = self.alone.values()
+        counting = [mode.eigenvalue for mode in alone.record.modes if alone.counts(mode)]
+        try:
+            ends = [self._follow(value, alone.name, NONE) for value in counting]
+        except CosimError:
+            ends = []
+        return replace(self.none, followed=tuple(value for value in ends if value is not None))
 
     def _assignments_alike(self) -> dict[SystemName, JudgedSystem]:
         """The assignments, in which also those modes count that do so in the worst one, and in it those of any other.
@@ -338,7 +352,15 @@ def _with_followed(
     plain: Mapping[SystemName, JudgedSystem],
     pairs: Mapping[SystemName, Sequence[FollowedMode]],
 ) -> JudgedSystem:
-    """A vendor's system in which also those modes count that do so in a pair of it."""
+    """A system of one vendor or of none in which also those modes count that do so in a pair."""
+    if system.name.kind is Kind.NONE:
+        ends = (
+            mode.neither
+            for name, modes in pairs.items()
+            for mode in modes
+            if plain[name].counts(mode.together)
+        )
+        return replace(system, followed=tuple(value for value in ends if value is not None))
     if system.name.kind is not Kind.ALONE:
         return system
     (vendor,) = system.name.names

@@ -203,7 +203,7 @@ def modes_table(judgement: JudgedInteractions) -> ColumnTable[JudgedMode]:
 def _figures(of: Callable[[Row], JudgedSystem]) -> list[Column[Row]]:
     return [
         Column("Verdict", lambda row: of(row).stable, verdict, "stable"),
-        Column("Least damping [%]", of, damping_text),
+        Column("Vendors' modes [%]", of, damping_text),
         Column("", lambda row: of(row).least_damping, name="least_damping_percent"),
         Column("Mode", of, frequency_text),
         Column(
@@ -211,7 +211,25 @@ def _figures(of: Callable[[Row], JudgedSystem]) -> list[Column[Row]]:
             lambda row: None if (mode := of(row).critical) is None else mode.frequency_hz,
             name="frequency_hz",
         ),
+        Column("All modes [%]", lambda row: least_percent(of(row)), _percent_cell),
+        Column("", lambda row: least_percent(of(row)), name="least_damping_of_all_percent"),
+        Column("Mode of all", lambda row: _least_place(of(row))),
     ]
+
+
+def least_percent(system: JudgedSystem) -> float | None:
+    """Damping [%] of the least damped of all modes of the range; None if there is none or the system failed."""
+    least = system.least_of_all
+    return None if least is None else least.damping_percent
+
+
+def _percent_cell(percent: float | None) -> str:
+    return "none" if percent is None else f"{percent:.2f}"
+
+
+def _least_place(system: JudgedSystem) -> str:
+    least = system.least_of_all
+    return "" if least is None else place_of(least)
 
 
 def systems_table(judgement: JudgedInteractions) -> ColumnTable[tuple[str, JudgedSystem]]:
@@ -220,7 +238,12 @@ def systems_table(judgement: JudgedInteractions) -> ColumnTable[tuple[str, Judge
     rows += [(pair.text, pair.joint) for pair in judgement.pairs]
     name = Column[tuple[str, JudgedSystem]]("System", lambda r: r[0])
     columns = (name, *_figures(lambda r: r[1]))
-    return ColumnTable("Vendors alone and in pairs", columns, rows, left=2)
+    return ColumnTable(
+        "Least damping of vendors alone and in pairs: of the modes that count, and of all",
+        columns,
+        rows,
+        left=2,
+    )
 
 
 def pairs_table(judgement: JudgedInteractions) -> ColumnTable[JudgedPair]:
@@ -228,8 +251,7 @@ def pairs_table(judgement: JudgedInteractions) -> ColumnTable[JudgedPair]:
 
     def column(title: str, of: Callable[[FollowedMode], float | None]) -> Column[JudgedPair]:
         def text(pair: JudgedPair) -> str:
-            percent = None if pair.mode is None else of(pair.mode)
-            return "none" if percent is None else f"{percent:.2f}"
+            return _percent_cell(None if pair.mode is None else of(pair.mode))
 
         return Column(title, text)
 
@@ -351,6 +373,7 @@ def _system(system: JudgedSystem, groups: dict[str, str], *, modes: bool = True)
         "stable": system.stable,
         "stability": system.record.stability,
         "least_damping_percent": system.least_damping,
+        "least_damping_of_all_percent": least_percent(system),
         "critical": None
         if critical is None
         else eigenvalue_json(critical.eigenvalue, critical.damping_percent),

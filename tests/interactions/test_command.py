@@ -98,13 +98,17 @@ def test_the_guides_pairs_are_those_that_are_computed():
     by_name |= {pair.text: pair.joint for pair in judgement.pairs}
     table = rows("System")
     assert [row[0] for row in table] == [*by_name]
-    for name, verdict, damping, where in table:
+    for name, verdict, damping, where, of_all, mode_of_all in table:
         system = by_name[name]
         assert verdict == {True: "stable", False: "UNSTABLE"}[system.stable]
         assert damping == ("none" if system.critical is None else f"{system.least_damping:.2f}")
         assert where == (
             "" if system.critical is None else f"{system.critical.frequency_hz:.4g} Hz"
         )
+        least = system.least_of_all
+        wanted = ("none", "") if least is None else (least.damping_percent, least.frequency_hz)
+        assert of_all == (wanted[0] if least is None else f"{wanted[0]:.2f}")
+        assert mode_of_all == (wanted[1] if least is None else f"{wanted[1]:.4g} Hz")
 
 
 def test_the_guides_followed_modes_are_those_that_are_computed():

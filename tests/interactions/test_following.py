@@ -84,6 +84,8 @@ def test_two_converters_that_help_are_not_accused():
         " ".join(helped().sentences)
     )
     assert judgement.alone["B"].least_damping == pytest.approx(apart["B"], abs=1e-4)
+    none = [mode for mode in judgement.none.record.modes if judgement.none.counts(mode)]
+    assert [mode.damping_percent for mode in none] == pytest.approx([apart["neither"]], abs=1e-4)
 
 
 @pytest.mark.parametrize("threshold", [0.0, 0.01, 0.2, 0.5])

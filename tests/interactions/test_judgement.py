@@ -9,7 +9,7 @@ from orchestrator.errors import ErrorKind
 from orchestrator.interactions.judgement import JudgedSystem, doubts_of
 from orchestrator.interactions.point import SharedMode, SystemRecord
 from orchestrator.interactions.systems import NONE, WHOLE, Kind, SystemName
-from orchestrator.interactions.view import Interactions
+from orchestrator.interactions.view import Interactions, systems_table
 from orchestrator.points.failure import Failure
 from tests.interactions.park import park, studied, swapped, written
 
@@ -187,9 +187,25 @@ def test_a_mode_of_the_network_alone_does_not_count():
     both = JudgedSystem(WHOLE, system(resonance, shared), frozenset({"west", "east"}), 0.05)
     assert both.critical == shared
     assert replace(both, threshold=0.02).critical == resonance
-    assert replace(both, converters=frozenset()).critical == resonance
+    assert replace(both, converters=frozenset()).critical is None
+    assert replace(both, converters=frozenset()).least_of_all == resonance
     grows = replace(both, record=system(resonance, shared, growing=mode(-1.0, 50.0, grid=1.0)))
     assert grows.least_damping == pytest.approx(-1.0)
+
+
+def test_without_any_vendor_the_same_modes_count_as_with_one():
+    """The network's own resonance of 0.2 % is neither the pairs' mode nor that of the row without any vendor."""
+    resonance = mode(0.2, 50.0, grid=0.99, west=0.01)
+    swing, bare = mode(8.0), mode(6.0, 10.0, sg1=1.0)
+    with_vendors = {name: system(swing, resonance) for name in ALL}
+    found = judged(**with_vendors | {"NONE": system(bare, resonance)})
+    rows = systems_table(found.judgement).records()
+    dampings = [row["least_damping_percent"] for row in rows]
+    assert dampings == pytest.approx([6.0] + [8.0] * 6)
+    assert [row["least_damping_of_all_percent"] for row in rows] == pytest.approx([0.2] * 7)
+    shown = found.as_json()["no_vendor"]
+    assert shown["least_damping_percent"] == pytest.approx(6.0)
+    assert shown["least_damping_of_all_percent"] == pytest.approx(0.2)
 
 
 def test_a_mode_belongs_to_those_who_take_part_by_the_threshold():
