@@ -332,6 +332,14 @@ class PointsVerdict:
         return sorted(below, key=lambda one: one[1].damping_ratio)
 
     @property
+    def below(self) -> tuple[JudgedPoint, PlacedMode] | None:
+        """The least damped of all modes from 0.1 to 2 Hz, with its point, if it has less than is wanted."""
+        point = self.least
+        if self.wanted is None or point is None or point.least is None:
+            return None
+        return (point, point.least) if point.least.damping_ratio < self.wanted else None
+
+    @property
     def worst(self) -> float | None:
         limiting = self.limiting
         return None if limiting is None else _damping(limiting.target)

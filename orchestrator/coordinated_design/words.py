@@ -29,15 +29,14 @@ def verdict_of(verdict: PointsVerdict) -> VerdictSentence:
         if verdict.names:
             which = f" of {few(verdict.names, _SHOWN)}"
         tail = f"; least damped{which}: {limiting.where}: {limiting.target.words}{unmoved}"
-    tail += _of_all_modes(verdict) + _standing_apart(verdict)
+    tail += _of_all_modes(verdict)
     aim = "" if wanted is None else f"{100 * wanted:g} % at all {total} points and outages"
+    if verdict.met and wanted is not None:
+        return _reached(verdict, wanted, aim, tail)
+    tail += _standing_apart(verdict)
     if aim and verdict.apart:
         aim += ", of the modes that these controllers move"
     if verdict.met:
-        if wanted is not None:
-            return VerdictSentence(
-                True, "REACHED", f"{aim}{tail}{_no_margin(verdict.thin, wanted)}"
-            )
         return VerdictSentence(True, "better", f"{_least_of_points(verdict)}{tail}")
     reasons = _reasons(verdict)
     if verdict.met is None:
@@ -52,6 +51,26 @@ def verdict_of(verdict: PointsVerdict) -> VerdictSentence:
         else ""
     )
     return VerdictSentence(False, word, f"{', '.join([aim] * bool(aim) + reasons)}{beyond}{tail}")
+
+
+def _reached(verdict: PointsVerdict, wanted: float, aim: str, tail: str) -> VerdictSentence:
+    """The verdict where what is wanted is there; its word also says for which modes it is not."""
+    before, below = verdict.worst_before, verdict.below
+    held = before is not None and before >= wanted
+    word = "HELD WITHOUT THE CONTROLLERS ALREADY" if held else "REACHED"
+    reason = ""
+    if below is not None:
+        point, mode = below
+        word += (
+            " for the named modes, NOT REACHED for others"
+            if verdict.names
+            else " for the modes that these controllers move, NOT REACHED for others"
+        )
+        reason = f"{point.where}: {mode.words} is below {100 * wanted:g} %; "
+    if held and before is not None:
+        reason += f"{100 * before:.2f} % without any gain; "
+    rest = f"{tail}{_standing_apart(verdict)}{_no_margin(verdict.thin, wanted)}"
+    return VerdictSentence(True if below is None else None, word, f"{reason}{aim}{rest}")
 
 
 def _least_of_points(verdict: PointsVerdict) -> str:

@@ -23,7 +23,7 @@ COLOURS = {True: "green", False: "red", None: "yellow"}
 
 @dataclass(frozen=True)
 class VerdictSentence:
-    """``word: text``, and whether that is good; None where it is not known."""
+    """``word: text``, and whether that is good; None if that is not known, or if it is so in part only."""
 
     good: bool | None
     word: str

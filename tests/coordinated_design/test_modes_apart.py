@@ -15,7 +15,7 @@ from orchestrator.coordinated_design.point import PointModes
 from orchestrator.coordinated_design.search import SettingSearch
 from orchestrator.coordinated_design.settings import PodGroup, SettingSpace
 from orchestrator.coordinated_design.verdict import PointsVerdict, judged
-from orchestrator.coordinated_design.words import verdict_sentence
+from orchestrator.coordinated_design.words import verdict_of, verdict_sentence
 from orchestrator.operating_points.item import Status
 from orchestrator.operating_points.outages import Outage
 from orchestrator.operating_points.points_file import OperatingCase
@@ -158,7 +158,8 @@ def test_what_is_asked_for_is_reached_and_the_other_mode_is_named():
     said = verdict_sentence(found)
     assert found.met is True
     assert said.startswith(
-        "REACHED: 8 % at all 1 points and outages, of the modes that these controllers move; least damped of the "
+        "REACHED for the modes that these controllers move, NOT REACHED for others: now, intact: 1.312 Hz, 7.98 % "
+        "(sg1, sg3) is below 8 %; 8 % at all 1 points and outages; least damped of the "
         "modes that these controllers move: now, intact: 0.961 Hz, 8.01 % (sg7); of all modes: now, "
         "intact: 1.312 Hz, 7.98 % (sg1, sg3); without the "
         "controllers: now, intact: 0.961 Hz, 2.91 % (sg7)"
@@ -184,6 +185,31 @@ def test_beside_a_named_mode_the_least_of_all_is_told():
     said = verdict_sentence(found)
     assert found.met is True
     assert found.worst == pytest.approx(0.0801)
+    assert said.startswith(
+        "REACHED for the named modes, NOT REACHED for others: now, intact: 1.041 Hz, 7.27 %"
+    )
     assert "least damped of south-west: now, intact: 0.734 Hz, 8.01 %" in said
     assert "of all modes: now, intact: 1.041 Hz, 7.27 % (sg1, sg3)" in said
     assert "without the controllers: now, intact: 0.734 Hz, 2.91 %" in said
+
+
+@pytest.mark.parametrize(
+    ("swing", "local", "words"),
+    [
+        (0.0801, 0.0980, "HELD WITHOUT THE CONTROLLERS ALREADY: 8.01 % without any gain"),
+        (
+            0.0801,
+            0.0798,
+            "HELD WITHOUT THE CONTROLLERS ALREADY for the modes that these controllers move, NOT REACHED for "
+            "others: now, intact: 1.312 Hz, 7.98 %",
+        ),
+        (0.0799, 0.0980, "REACHED: 8 % at all"),
+    ],
+)
+def test_what_no_gain_was_needed_for_is_said_first(swing, local, words):
+    before, after = (spectrum((0.961, x), (1.312, local)) for x in (swing, 0.0803))
+    apart = [complex(before.values[1])]
+    found = verdict(before, after, Aim((), 0.05), apart)
+    assert found.met is True
+    assert verdict_sentence(found).startswith(words)
+    assert verdict_of(found).good is (None if local < WANTED else True)
