@@ -2,7 +2,7 @@
 
 import cmath
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,10 +31,27 @@ _TURNS, _PARTS = (-30.0, 0.0, 30.0), (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
 """Settings that are tried: turns beside the residue's angle [°], as the POD sees the frequency that it changes itself;
 and parts of the largest gain."""
 
-_EQUAL = 2e-4  # least damping ratios in the same part of this size are equally good
+_EQUAL = 2e-4  # damping ratios in the same part of this size are equally good
+_GIVEN_UP = 1e-3
+"""Least damping ratio that is given up for more damping of the followed mode: a mode that moves by no more is one that
+the controller does not move."""
+
 # least similarity with which a mode of the system with the device is taken for the one without it
 _SAME = 0.5
 _ONE = 1e-6  # two eigenvalues that differ by less than this part are one, computed in two ways
+
+
+@dataclass(frozen=True)
+class SearchEnd:
+    """Why a search among gains chose none that is larger.
+
+    ``bound``: the largest gain [pu] that was allowed.
+    ``next_gain``, ``next_least``: the next larger gain that was tried, and its least damping ratio; None for the
+    damping if something grows. Both are None if the largest gain was chosen."""
+
+    bound: float
+    next_gain: float | None = None
+    next_least: float | None = None
 
 
 @dataclass(frozen=True)
@@ -53,6 +70,7 @@ class Confirmation:
     least: complex | None = None
     stable: bool | None = None
     failure: str = ""
+    search: SearchEnd | None = None  # for the gain of the POD
 
     @property
     def error(self) -> float:
@@ -150,7 +168,7 @@ def _with_pod(
     by_gain = shift(PodSetting(1.0, NO_COMPENSATION))
     if not by_gain:
         raise AnalysisError("a POD there does not move the mode at all")
-    tuned = _tuned(loop, by_gain, eigenvalue, gain)
+    tuned, search = _tuned(loop, start, by_gain, eigenvalue, gain)
     small = _SMALL * abs(eigenvalue / (by_gain * tuned.filters.response(eigenvalue)))
     trial = replace(tuned, gain=min(tuned.gain, small))
     predicted = shift(trial)
@@ -160,7 +178,15 @@ def _with_pod(
     least = _least(modes, reached.eigenvalue)
     stable = loop.examine(tuned).stability.stable
     return Confirmation(
-        bus, predicted, coupled, start.eigenvalue, tuned, reached.eigenvalue, least, stable
+        bus,
+        predicted,
+        coupled,
+        start.eigenvalue,
+        tuned,
+        reached.eigenvalue,
+        least,
+        stable,
+        search=search,
     )
 
 
@@ -169,9 +195,13 @@ def _predicted(master: Master, model: ComponentLinearization, bus: str, seen: Se
     return seen.mode.eigenvalue + seen.settled(bus, lambda at: response_of(master, model, at))
 
 
-def _tuned(loop: PodLoop, by_gain: complex, eigenvalue: complex, most: float) -> PodSetting:
-    """The setting with the best least damping: around the angle that the residue asks for, with gains up to the most;
-    of equally good ones that with the smallest gain."""
+def _tuned(
+    loop: PodLoop, start: Placed, by_gain: complex, eigenvalue: complex, most: float
+) -> tuple[PodSetting, SearchEnd]:
+    """The setting with the best least damping: around the angle that the residue asks for, with gains up to the most.
+
+    Of those that come within a tenth of a point of it, as where another mode that the POD hardly moves is the least
+    damped, that which damps the followed mode best; of several with the same damping that with the smallest gain."""
     angle = math.degrees(cmath.phase(-1 / by_gain))
     settings = [
         PodSetting(part * most, lead_lag_turning(angle + turn, eigenvalue.imag, STAGES))
@@ -183,7 +213,30 @@ def _tuned(loop: PodLoop, by_gain: complex, eigenvalue: complex, most: float) ->
     for setting in settings:
         weakest, growing = extremes(loop.model(setting))
         worth[setting] = -1.0 if growing is not None else damping_ratio(weakest)
-    return min(settings, key=lambda one: (-round(worth[one] / _EQUAL), one.gain))
+    top = max(worth.values())
+    equal = [one for one in settings if worth[one] > max(top - _GIVEN_UP, -1.0)] or settings
+    of_followed = {one: _of_followed(loop, start, one) for one in equal}
+    best = min(equal, key=lambda one: (-round(of_followed[one] / _EQUAL), one.gain))
+    return best, _search_end(best, settings, worth, most)
+
+
+def _of_followed(loop: PodLoop, start: Placed, setting: PodSetting) -> float:
+    """Damping ratio of the followed mode with a setting; −1 if it cannot be followed there."""
+    try:
+        return damping_ratio(loop.place(start, setting.gain, setting.filters).eigenvalue)
+    except AnalysisError:
+        return -1.0
+
+
+def _search_end(
+    best: PodSetting, settings: Sequence[PodSetting], worth: Mapping[PodSetting, float], most: float
+) -> SearchEnd:
+    larger = [one for one in settings if one.gain > best.gain and one.filters == best.filters]
+    if not larger:
+        return SearchEnd(most)
+    following = min(larger, key=lambda one: one.gain)
+    least = worth[following]
+    return SearchEnd(most, following.gain, None if least <= -1 else least)
 
 
 def same_mode(mode: Mode, model: LinearModel) -> Eigenpair:

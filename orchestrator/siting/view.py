@@ -178,13 +178,25 @@ def _confirmed(result: SiteResult, one: Confirmation, before: float) -> str:
     word = "confirmed" if one.agrees else "NOT CONFIRMED"
     steps = f"{before:.2f} % → {one.damping_alone:.2f} % with {_rated(result)}"
     if one.setting is not None:
-        steps += f" → {one.damping:.2f} % with its POD (K {one.setting.gain:g})"
+        steps += f" → {one.damping:.2f} % with its POD (K {one.setting.gain:g}{_search_end(one)})"
     if one in result.breaking:
         word += ", but UNSTABLE with it (`gfor modes` of a case with it tells the cause, often the step)"
     return (
         f"{one.bus}: {word} by coupled FMUs: {steps}; {_least_then(one, before)}; predicted and "
         f"coupled shift differ by {100 * one.error:.2g} %"
     )
+
+
+def _search_end(one: Confirmation) -> str:
+    """Tell whether the search for the gain ended at its bound, or where more gain brings nothing."""
+    if one.search is None:
+        return ""
+    if one.search.next_gain is None:
+        return ", the largest that --gain allows"
+    least = one.search.next_least
+    if least is None:
+        return f"; with {one.search.next_gain:g} something grows"
+    return f"; with {one.search.next_gain:g} the least damped mode has {100 * least:.2f} %"
 
 
 def _least_then(one: Confirmation, before: float) -> str:
@@ -315,6 +327,7 @@ def _confirmation(one: Confirmation) -> dict[str, Any]:
         if one.setting is None
         else {
             "K": one.setting.gain,
+            "search_ended_at_bound": one.search is not None and one.search.next_gain is None,
             "T_S1": one.setting.filters.T_S1,
             "T_S2": one.setting.filters.T_S2,
             "N_S": one.setting.filters.N_S,

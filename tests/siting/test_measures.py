@@ -2,13 +2,19 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
+from scipy.linalg import block_diag
 
+from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.cases.case import load_case
+from orchestrator.pod_design.closed_loop import PodSetting
+from orchestrator.pod_design.lead_lag import NO_COMPENSATION
 from orchestrator.siting import study
 from orchestrator.siting.candidates import question_about, unit_terminals
-from orchestrator.siting.confirmation import Confirmation
+from orchestrator.siting.confirmation import Confirmation, SearchEnd, _tuned
 from orchestrator.siting.study import SiteRequest, find_sites
 from orchestrator.siting.view import Siting, answer, as_json, ranking_table, remarks, sureness
 from tests.screening.five_machines import RATINGS, five_machines
@@ -151,3 +157,57 @@ def test_the_question_about_the_rating_is_on_the_screen_and_in_the_json(gfor, fi
     assert "0.25 MVA beside sg5's 260 MVA; is it in MVA?" in err
     assert any("0.25 MVA" in text for text in json.loads(out)["questions"])
     assert Siting(find_sites(five, SiteRequest(confirm=0))).ranking[0] in json.loads(out)["answer"]
+
+
+class Loop:
+    """A swing of 1.4 Hz that gains 0.05 points of damping by 1 pu, beside a mode of 1.8 Hz with a damping by gain."""
+
+    SWING, OTHER = 2.8 * np.pi, 3.6 * np.pi
+
+    def __init__(self, other):
+        self._other = other
+
+    def dampings(self, setting):
+        turn = np.angle(setting.filters.response(1j * self.SWING))
+        return 0.03 + 5e-4 * setting.gain * np.cos(turn), self._other(setting.gain)
+
+    def model(self, setting):
+        pairs = zip((self.SWING, self.OTHER), self.dampings(setting), strict=True)
+        blocks = [
+            w * np.array([[-zeta, np.sqrt(1 - zeta**2)], [-np.sqrt(1 - zeta**2), -zeta]])
+            for w, zeta in pairs
+        ]
+        return LinearModel.from_matrix(block_diag(*blocks), tuple("abcd"), None)
+
+    def place(self, start, gain, filters):
+        zeta, _ = self.dampings(PodSetting(gain, filters))
+        return SimpleNamespace(eigenvalue=self.SWING * complex(-zeta, np.sqrt(1 - zeta**2)))
+
+
+@pytest.mark.parametrize(
+    ("other", "most", "gain", "ended"),
+    [
+        (lambda K: 0.30, 200.0, 200.0, SearchEnd(200.0)),
+        (lambda K: 0.02, 200.0, 200.0, SearchEnd(200.0)),  # nothing moves it
+        (lambda K: 0.02 - 2e-6 * K, 200.0, 200.0, SearchEnd(200.0)),  # by 0.04 points it falls
+        (lambda K: 0.09 - 4e-4 * K, 200.0, 50.0, SearchEnd(200.0, 100.0, pytest.approx(0.05))),
+        (lambda K: -0.01 if K > 60 else 0.09, 200.0, 50.0, SearchEnd(200.0, 100.0)),
+    ],
+)
+def test_gain_rises_until_damping_does_no_longer_or_its_bound_is_reached(other, most, gain, ended):
+    setting, search = _tuned(Loop(other), None, complex(-1.0), complex(0.0, Loop.SWING), most)
+    assert setting.gain == gain
+    assert search == ended
+
+
+def test_what_ended_the_search_is_said(five, monkeypatch):
+    found = planted(monkeypatch, five, bus_11=(4.61, 8.13, True))
+    (one,) = found.confirmations
+    tuned = replace(one, setting=PodSetting(100.0, NO_COMPENSATION))
+    for search, words in (
+        (SearchEnd(100.0), "(K 100, the largest that --gain allows)"),
+        (SearchEnd(200.0, 200.0, 0.0711), "(K 100; with 200 the least damped mode has 7.11 %)"),
+        (SearchEnd(200.0, 200.0), "(K 100; with 200 something grows)"),
+    ):
+        ended = replace(found, confirmations=(replace(tuned, search=search),))
+        assert words in " ".join(sureness(ended))
