@@ -85,7 +85,7 @@ class Case(CaseDefinition):
         ``parameters``: Their values have priority over the scenario's, and ``overrides`` have priority over theirs.
         ``dispatch``: What the units fed before an outage that they share; None where each feeds its own ``P_0``.
         ``voltages_before``: Bus voltages before an outage [pu], from which loads follow the voltage whose source tells
-        their constant currents and impedances."""
+        their constant currents and impedances. None for those without what ``overrides`` take out of service."""
         other = self._of_kind(overrides, parameters)
         if other is not self:
             return other.prepare(
@@ -111,13 +111,21 @@ class Case(CaseDefinition):
         prepared, questions, named = [], [*self.questions], mentions.Named()
         for name in scenarios or self.scenarios:
             preparer = self._preparer(name, overrides, parameters)
+            follow = voltages_before is None and preparer.draft.loads_follow
+            shares = dispatch is None and not any(k.endswith(".P_0") for k in overrides or {})
+            before = (
+                self._before_outage(name, overrides or {}, parameters) if follow or shares else None
+            )
             lost, shared = (
-                self._switched_off(name, overrides or {}, parameters)
-                if dispatch is None
+                self._switched_off(name, before, overrides or {}, parameters)
+                if shares and before is not None
                 else ((), dispatch)
             )
             preparer.draft.dispatch = shared
             preparer.draft.voltages_before = voltages_before or {}
+            if follow and before is not None and before.power_flow is not None:
+                preparer.draft.voltages_before = before.power_flow.voltages
+                preparer.draft.loads_as_given = self._loads_as_given(before, overrides or {})
             prepared.append(_told(preparer.prepare(step_size, stop_time), lost, shared))
             named.add(preparer.draft)
             problems += [p for p in preparer.problems if p not in problems]
@@ -223,21 +231,34 @@ class Case(CaseDefinition):
             )[0]
         return self.prepare([name], None, step_size)[0] if overrides or parameters else None
 
-    def _switched_off(
+    def _before_outage(
         self, name: str, overrides: Mapping[str, Value], parameters: Sequence[ParameterFile]
+    ) -> PreparedScenario | None:
+        """The scenario without what values take out of service; None if they take nothing, or without a power flow."""
+        on = _without_outages(overrides)
+        if self.table.power_flow is None or len(on) == len(overrides):
+            return None
+        return self._preparer(name, on, parameters).prepare(None, None)
+
+    def _loads_as_given(
+        self, before: PreparedScenario, overrides: Mapping[str, Value]
+    ) -> frozenset[str]:
+        """Loads whose power is given: they draw that after an outage, and do not follow the voltage."""
+        heads = [key.rpartition(".")[0] for key in overrides if key.endswith((".P", ".Q"))]
+        loads = [f"{before.grid}.{name}" for name in before.following_loads]
+        given = [load for load in loads if any(fnmatchcase(load, head) for head in heads)]
+        return frozenset(load.removeprefix(f"{before.grid}.") for load in given)
+
+    def _switched_off(
+        self,
+        name: str,
+        before: PreparedScenario,
+        overrides: Mapping[str, Value],
+        parameters: Sequence[ParameterFile],
     ) -> tuple[Collection[str], Dispatch | None]:
-        """Units that values take out of service, and how others share their power; none where powers are given too."""
-        table = self.table.power_flow
-        on = {
-            key: value
-            for key, value in overrides.items()
-            if value or not key.endswith(".connected")
-        }
-        given = any(key.endswith(".P_0") for key in overrides)
-        if table is None or given or len(on) == len(overrides):
-            return (), None
-        before = self._preparer(name, on, parameters).prepare(None, None)
-        if before is None or before.power_flow is None:
+        """Units that values take out of service, and how others share their power."""
+        table, on = self.table.power_flow, _without_outages(overrides)
+        if table is None or before.power_flow is None:
             return (), None
         powers, plans = before.power_flow.powers, before.system.components
         off = [key for key in overrides if key not in on]
@@ -322,6 +343,11 @@ class Case(CaseDefinition):
         self, name: str, overrides: Mapping[str, Value] | None, parameters: Sequence[ParameterFile]
     ) -> Preparer:
         return prepare.Preparer(self, name, dict(overrides or {}), parameters)
+
+
+def _without_outages(overrides: Mapping[str, Value]) -> dict[str, Value]:
+    """The values but for those that take something out of service."""
+    return {k: value for k, value in overrides.items() if value or not k.endswith(".connected")}
 
 
 _NAMED = 2  # values set that a title names; the others are counted

@@ -101,6 +101,13 @@ class Draft:
     dispatch: Dispatch | None = None
     # voltages before an outage [pu], at which loads that follow the voltage draw what is set
     voltages_before: Mapping[str, complex] = field(default_factory=dict)
+    # loads that do not, as their power is given
+    loads_as_given: frozenset[str] = frozenset()
+
+    @property
+    def loads_follow(self) -> bool:
+        """Return whether there are loads that follow the voltage in an outage's power flow."""
+        return self.data is not None and bool(self.data.flow_laws)
 
     def note(self, place: str, text: str, kind: ErrorKind = ErrorKind.VALUES) -> None:
         problem = Problem(place, text, kind)

@@ -90,7 +90,7 @@ def _following(draft: Draft) -> dict[str, FollowingLoad]:
     return {
         name: FollowingLoad(laws, abs(draft.voltages_before[buses[name]]))
         for name, laws in draft.data.flow_laws.items()
-        if name in buses
+        if name in buses and name not in draft.loads_as_given
     }
 
 

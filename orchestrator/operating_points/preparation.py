@@ -184,7 +184,7 @@ class ItemPreparation:
             None,
             self._layers,
             dispatch=dispatch,
-            voltages_before=voltages_before,
+            voltages_before=voltages_before or {},
         )
         return prepared
 

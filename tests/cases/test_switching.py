@@ -353,9 +353,10 @@ def test_a_load_that_is_lost_with_a_unit_is_not_shared_by_the_others(tmp_path):
     (tmp_path / "case.toml").write_text(RING, encoding="utf-8")
     case, shared = load_case(tmp_path / "case.toml"), {}
     for scale in (1.0, 0.4):
-        lost, dispatch = case._switched_off(
-            next(iter(case.scenarios)), {"vsc.connected": False, "grid.town.scale": scale}, ()
-        )
+        name = next(iter(case.scenarios))
+        values = {"vsc.connected": False, "grid.town.scale": scale}
+        before = case._before_outage(name, values, ())
+        lost, dispatch = case._switched_off(name, before, values, ())
         assert lost == ["vsc"]
         shared[scale] = dispatch.change
     assert shared[1.0] == pytest.approx(300, abs=1e-6)

@@ -128,6 +128,36 @@ def test_the_load_is_set_to_what_it_draws_then(prepared):
     )
 
 
+def typed(preparation, values):
+    """The case with values as `gfor modes --set` gives them."""
+    (found,) = preparation._case.prepare([preparation._scenario], values)
+    return found
+
+
+def test_the_same_outage_by_set_is_the_one_of_a_screening(prepared):
+    preparation, item = prepared()
+    off = {f"grid.{item.lost[0]}.connected": False}
+    assert max(differences(typed(preparation, off), independent_voltages(LOST))) < 1e-8
+    powers = {
+        f"{name}.P_0": power.real for name, power in preparation.base.power_flow.powers.items()
+    }
+    with_powers = typed(preparation, off | powers)
+    assert max(differences(with_powers, independent_voltages(LOST))) < 1e-8
+
+
+def test_a_load_whose_power_is_given_draws_that_after_an_outage(prepared):
+    preparation, item = prepared()
+    off = {f"grid.{item.lost[0]}.connected": False, "grid.load_5.P": 160.0}
+    grid = typed(preparation, off).system.components["grid"]
+    assert grid.number("load_5.P") == 160.0
+
+
+def test_what_a_screening_names_to_see_an_item_again_is_the_item_as_it_is_typed(prepared):
+    preparation, item = prepared()
+    alone = typed(preparation, preparation.live(item))
+    assert max(differences(alone, independent_voltages(LOST))) < 1e-8
+
+
 def test_the_case_alone_is_at_the_item_by_its_values(prepared):
     """What `gfor screen` names as the way to see an item again."""
     preparation, item = prepared()
