@@ -61,7 +61,7 @@ def own_models(
     Where all that are observed do as their models: the bus that is not, or the load, that explains the voltages."""
     units = {name.casefold(): unit for name, unit in models.units.items()}
     seen = [p for p in measured.places if p.kind == "unit" and p.name.casefold() in units]
-    places = [p for p in seen if _fits(units[p.name.casefold()], p, measured.base)]
+    places = [p for p in seen if fits(units[p.name.casefold()], p, measured.base)]
     if not places:
         off = ", ".join(p.name for p in seen)
         why = (
@@ -178,12 +178,15 @@ def own_models(
     return Opinion(OWN_MODEL, None, True, why, ranking)
 
 
-def _fits(model: UnitModel, place: Site, base: float) -> bool:
+def power_there(place: Site, base: float) -> complex:
+    """The mean power of a place on 100 MVA; ``base``: what 100 MVA are in the unit of its powers."""
+    return complex(place.p.mean(), place.q.mean()) / base
+
+
+def fits(model: UnitModel, place: Site, base: float) -> bool:
+    """Return whether a unit feeds in the record what it does in the case, so that its model is of the same point."""
     wanted = model.voltage * np.conj(model.current)
-    return bool(
-        abs(complex(place.p.mean(), place.q.mean()) / base - wanted)
-        < _OTHER_POINT * max(abs(wanted), 0.1)
-    )
+    return bool(abs(power_there(place, base) - wanted) < _OTHER_POINT * max(abs(wanted), 0.1))
 
 
 def _frame(voltage: complex) -> Matrix:

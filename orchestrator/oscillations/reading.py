@@ -14,12 +14,12 @@ from orchestrator.arrays import Numbers
 from orchestrator.errors import InputError
 from orchestrator.foreign_files import check_regular
 from orchestrator.oscillations.measurements import Kind, Measurements, Site, made_ready
+from orchestrator.oscillations.unused_columns import COLUMN, remarks_on_unused
 from orchestrator.units import to_unit
 
 if TYPE_CHECKING:
     import xarray as xr
 
-_COLUMN = re.compile(r"(?P<place>.+?)[ ._:](?P<what>vm|va|im|ia|p|q)", re.IGNORECASE)
 _BASES = {
     "p": ("MW", "pu"),
     "q": ("Mvar", "pu"),
@@ -39,22 +39,26 @@ CONTEST_FILES = ("BusVolMag.txt", "BusVolAng.txt", "LinCurMag.txt", "LinCurAng.t
 
 def measurements_of(dataset: xr.Dataset, label: str) -> Measurements:
     times = np.asarray(dataset["time"].values, dtype=np.float64)
-    places, base = (
-        (_of_run(dataset), 1.0) if "places" in dataset.attrs else _of_columns(dataset, label)
-    )
+    unused: list[str] = []
+    if "places" in dataset.attrs:
+        places, base = _of_run(dataset), 1.0
+    else:
+        places, base, unused = _of_columns(dataset, label)
     if not places:
         more = "run again with 'record = [\"*\"]' in [solver], or with --force, which records what is needed"
         raise InputError(
             f"{label}: no place has voltage, P and Q; {more if 'places' in dataset.attrs else _FORM}"
+            + "".join(f"; {remark}" for remark in unused)
         )
-    return replace(made_ready(label, times, places, _large_angles(dataset)), base=base)
+    said = [*unused, *_large_angles(dataset)]
+    return replace(made_ready(label, times, places, said), base=base)
 
 
 def _large_angles(dataset: xr.Dataset) -> list[str]:
     """A remark where angles that are labelled rad begin beyond a turn: radians are wrapped, or begin within one."""
     largest: dict[str, float] = {}
     for name in map(str, dataset.data_vars):
-        parts = _COLUMN.fullmatch(name)
+        parts = COLUMN.fullmatch(name)
         if parts is None or parts["what"].lower() not in ("va", "ia"):
             continue
         values = np.asarray(dataset[name].values, dtype=np.float64)
@@ -98,12 +102,12 @@ def _of_run(dataset: xr.Dataset) -> list[Site]:
     return found
 
 
-def _of_columns(dataset: xr.Dataset, label: str) -> tuple[list[Site], float]:
-    """Places, and what 100 MVA are in the unit of their powers."""
+def _of_columns(dataset: xr.Dataset, label: str) -> tuple[list[Site], float, list[str]]:
+    """Places, what 100 MVA are in the unit of their powers, and remarks on what is not used."""
     columns: dict[str, dict[str, Numbers]] = {}
     bases: dict[str, set[str]] = {}
     for name in map(str, dataset.data_vars):
-        parts = _COLUMN.fullmatch(name)
+        parts = COLUMN.fullmatch(name)
         if parts:
             what = parts["what"].lower()
             values, base = _in_base(dataset[name], what, f"{label}: {name!r}")
@@ -138,7 +142,9 @@ def _of_columns(dataset: xr.Dataset, label: str) -> tuple[list[Site], float]:
                     beyond,
                 )
             )
-    return found, 1.0 if True in per_unit else 100.0
+    used = {site.name for site in found} | {site.bus for site in found}
+    unused = remarks_on_unused(list(map(str, dataset.data_vars)), columns, used)
+    return found, 1.0 if True in per_unit else 100.0, unused
 
 
 def _in_base(curve: xr.DataArray, what: str, where: str) -> tuple[Numbers, str]:

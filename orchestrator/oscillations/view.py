@@ -13,7 +13,7 @@ from orchestrator.late import pd, xr
 from orchestrator.oscillations.detection import SpectralLine
 from orchestrator.oscillations.measurements import Measurements
 from orchestrator.oscillations.reading import measurements_of
-from orchestrator.oscillations.signs import turned_signs
+from orchestrator.oscillations.signs import other_powers, turned_signs
 from orchestrator.oscillations.verdict import Located, locate
 from orchestrator.report.notebook import page
 from orchestrator.report.tables import PlainTable, make_table
@@ -115,8 +115,9 @@ def sources_of(
     if models and units.isdisjoint(p.name.casefold() for p in measured.places if p.kind == "unit"):
         remark = f"the case's models judge nothing: no signal is named after its units, {', '.join(models.units)}"
         measured = replace(measured, remarks=(remark, *measured.remarks))
-    if prepared and (turned := turned_signs(measured, prepared)):
-        measured = replace(measured, remarks=(*turned, *measured.remarks))
+    turned = turned_signs(measured, prepared) if prepared else {}
+    elsewhere = other_powers(measured, models, turned) if models else []
+    measured = replace(measured, remarks=(*turned.values(), *elsewhere, *measured.remarks))
     located = locate(measured, models)
     if models and prepared:
         from orchestrator.oscillations.levers import with_levers  # noqa: PLC0415 - only where there is a case

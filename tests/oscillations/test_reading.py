@@ -7,14 +7,15 @@ from html import escape
 import numpy as np
 import pytest
 
+from orchestrator import source
 from orchestrator.cases.case import load_case
 from orchestrator.errors import InputError
 from orchestrator.oscillations.measurements import Site
 from orchestrator.oscillations.reading import _table, contest_cases, read_contest
-from orchestrator.oscillations.signs import turned_signs
+from orchestrator.oscillations.signs import other_powers, turned_signs
 from orchestrator.oscillations.verdict import locate
 from orchestrator.oscillations.view import Sources
-from tests.support.forced_records import record, sine, times_of
+from tests.support.forced_records import model, record, sine, times_of, unit_models_of
 
 TIMES = times_of(40.0)
 
@@ -76,10 +77,89 @@ def test_a_power_with_the_sign_turned_beside_the_case_is_remarked(measured):
         replace(place, p=-place.p, q=-place.q) if place.name == "sg1" else place
         for place in measured.places
     )
-    (remark,) = turned_signs(replace(measured, places=places), prepared)
+    (remark,) = turned_signs(replace(measured, places=places), prepared).values()
     power = prepared.power_flow.powers["sg1"].real * prepared.system.components["sg1"].number("S_n")
     assert remark.startswith("sg1: its P is -")
     assert f"{power:+.4g} MW in the case" in remark
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "remarks"),
+    [
+        (
+            "sg1.vm",
+            "sg1.vmm",
+            ["the column 'sg1.vmm' is not used: is 'sg1.vm' meant?", "sg1: left out, without .vm"],
+        ),
+        (
+            "sg1.q",
+            "sg1.mvar",
+            ["the column 'sg1.mvar' is not used: is 'sg1.q' meant?", "sg1: left out, without .q"],
+        ),
+        (
+            "sg1.va",
+            "sgl.va",
+            [
+                "sg1: left out, without .va; is 'sgl' meant?",
+                "sgl: left out, without .vm and .p and .q; is 'sg1' meant?",
+            ],
+        ),
+        (
+            "sg1.p",
+            "frequency",
+            [
+                "1 columns are not used, as their names do not end in .vm, .va, .im, .ia, .p or .q: 'frequency'",
+                "sg1: left out, without .p",
+            ],
+        ),
+    ],
+)
+def test_a_column_that_is_not_used_is_named(tmp_path, measured, old, new, remarks):
+    """A whole record has no such remark; without one signal a place is not there, and that is said."""
+    path = csv(tmp_path / "pmu.csv", measured)
+    assert not source(path).remarks
+    path.write_text(path.read_text().replace(f",{old} [", f",{new} [", 1))
+    found = source(path)
+    assert "sg1" not in found.places
+    assert list(found.remarks) == remarks
+
+
+def test_a_bus_whose_voltage_a_line_uses_is_not_left_out(tmp_path, measured):
+    path = csv(tmp_path / "pmu.csv", measured)
+    text = path.read_text().replace("sg1.p [", "sg1->hub.p [").replace("sg1.q [", "sg1->hub.q [")
+    path.write_text(text)
+    found = source(path)
+    assert "sg1->hub" in found.places
+    assert not found.remarks
+
+
+@pytest.mark.parametrize(
+    ("change", "meaning"),
+    [
+        (lambda s: s.conjugate(), "is the sign of its Q turned?"),
+        (lambda s: complex(s.imag, s.real), "are its P and Q exchanged?"),
+        (lambda s: 100 * s, "is it in MW where pu are written?"),
+        (lambda s: 1.3 * s, "is the record of another hour"),
+    ],
+)
+def test_a_unit_that_its_model_does_not_judge_is_named(measured, change, meaning):
+    """A unit of the case that feeds 3 + 1j on 100 MVA, beside a record that has another power of it."""
+    whole, wanted = unit_models_of(model("two_area")), 3.0 + 1.0j
+    assert not other_powers(measured, whole)
+    unit = whole.units["sg1"]
+    other = replace(unit, current=np.conj(wanted / unit.voltage))
+    models = replace(whole, units={**whole.units, "sg1": other})
+
+    def changed(place):
+        power = change(wanted)
+        return replace(place, p=place.p * 0 + power.real, q=place.q * 0 + power.imag)
+
+    places = tuple(changed(p) if p.name == "sg1" else p for p in measured.places)
+    (remark,) = other_powers(replace(measured, places=places), models)
+    assert remark.startswith("sg1: its own model does not judge it, since its power is ")
+    assert "+300 MW, +100 Mvar in the case" in remark
+    assert meaning in remark
+    assert not other_powers(replace(measured, places=places), models, {"sg1"})
 
 
 def test_the_page_shows_where_energy_flows(gfor, tmp_path, measured):
