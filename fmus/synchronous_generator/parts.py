@@ -31,6 +31,7 @@ from fmus.synchronous_generator.machines.standard import (
 from fmus.synchronous_generator.stabilization.legacy import ieeest, st2cut, stab2a
 from fmus.synchronous_generator.stabilization.standard import pss1a, pss2a, pss2b
 from fmus.synchronous_generator.turbines.diesel import degov, degov1
+from fmus.synchronous_generator.turbines.gas import gast2a
 from fmus.synchronous_generator.turbines.ggov1 import ggov1
 from fmus.synchronous_generator.turbines.governors import (
     constant_power,
@@ -41,7 +42,9 @@ from fmus.synchronous_generator.turbines.governors import (
     read_either_way,
     tgov1,
 )
-from fmus.synchronous_generator.turbines.steam import ieesgo
+from fmus.synchronous_generator.turbines.steam import ieesgo, tgov3
+from fmus.synchronous_generator.turbines.water import hygov2, ieeeg2, ieeeg3
+from fmus.synchronous_generator.turbines.water_pid import pidgov, wpidhy, wshygp
 from fmus.synchronous_generator.variants import Governor, Stabilizer, of_power, of_speed
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort
@@ -93,6 +96,14 @@ GOVERNORS: dict[str, Governor] = {
     "degov1": read_either_way(degov1),
     "ggov1": read_either_way(ggov1),
     "ieesgo": read_either_way(ieesgo),
+    "tgov3": read_either_way(tgov3),
+    "gast2a": read_either_way(gast2a),
+    "ieeeg2": read_either_way(ieeeg2),
+    "ieeeg3": read_either_way(ieeeg3),
+    "hygov2": read_either_way(hygov2),
+    "pidgov": read_either_way(pidgov),
+    "wpidhy": read_either_way(wpidhy),
+    "wshygp": read_either_way(wshygp),
 }
 STABILIZERS: dict[str, Stabilizer | None] = {
     NONE: None,

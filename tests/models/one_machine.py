@@ -75,17 +75,19 @@ def four_buses():
     return Network(voltages, lines, infinite=1, machine=2, loads={3: load}, behind=0.01j), lines[1:]
 
 
-def three_buses(tripped=((101, 102),)):
-    """The three buses of PowerSimulationsDynamics.jl's ThreeBusMulti.raw, and the lines that stay after the trip."""
+def three_buses(tripped=((101, 102),), given=1.0, drawn=2.5):
+    """The three buses of PowerSimulationsDynamics.jl's ThreeBusMulti.raw, and the lines that stay after the trip.
+
+    ``given``, ``drawn``: power of the machine and of the load [pu], which differ from file to file."""
     Z = 0.01 + 0.12j
     lines = ((101, 102, Z), (101, 103, Z), (102, 103, Z))
-    voltages = _solved(lines)
-    network = Network(voltages, lines, infinite=101, machine=102, loads={103: 2.5 + 0.3j})
+    voltages = _solved(lines, given, drawn)
+    network = Network(voltages, lines, infinite=101, machine=102, loads={103: drawn + 0.3j})
     return network, tuple(line for line in lines if line[:2] not in tripped)
 
 
-def _solved(lines):
-    """Power flow: 1.05 at bus 101, 100 MW and 1.02 at bus 102, 250 MW and 30 Mvar at bus 103."""
+def _solved(lines, given, drawn):
+    """Power flow: 1.05 at bus 101, power and 1.02 at bus 102, power and 30 Mvar at bus 103."""
 
     def misfit(x):
         v = {101: 1.05 + 0j, 102: 1.02 * np.exp(1j * x[0]), 103: x[1] * np.exp(1j * x[2])}
@@ -94,7 +96,7 @@ def _solved(lines):
             current = (v[start] - v[end]) / Z
             flow[start] += v[start] * np.conj(current)
             flow[end] -= v[end] * np.conj(current)
-        return [flow[102].real - 1.0, flow[103].real + 2.5, flow[103].imag + 0.3]
+        return [flow[102].real - given, flow[103].real + drawn, flow[103].imag + 0.3]
 
     x = fsolve(misfit, [0.0, 1.0, -0.1], xtol=1e-13)
     return {101: 1.05 + 0j, 102: 1.02 * np.exp(1j * x[0]), 103: x[1] * np.exp(1j * x[2])}

@@ -16,7 +16,7 @@ V_T, E_FD, P_M = 1.01, 2.2, 0.7
 
 START = Start(Expr(V_T), Expr(E_FD), Expr(P_M), Phasor(1.0, 0.0), Phasor(0.7, -0.1))
 AT_REST = {"exciter": [V_T, E_FD, 0.0], "governor": [1.0], "pss": [0.0, 0.8]}
-OF_POWER, OF_VOLTAGE = ("ggov1", "degov1", "pidgov", "wpidhy"), ("ieeest", "st2cut")
+OF_POWER, OF_VOLTAGE = ("ggov1", "degov1", "pidgov", "wpidhy", "wshygp"), ("ieeest", "st2cut")
 """Governors that see the electrical power too, an input more; and stabilisers that see the voltage."""
 
 BUS = 1.02 * np.exp(-0.4j)

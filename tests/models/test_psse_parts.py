@@ -384,6 +384,15 @@ def test_the_valve_of_ggov1_moves_no_faster_than_its_rates():
         assert 1.5 * fastest * 0.5 == pytest.approx(P[799] - P[299], rel=1e-3)
 
 
+@pytest.mark.parametrize(("moved", "fastest"), [(0.1, 0.02), (-0.1, -0.04)])
+def test_a_moved_reference_of_ggov1_arrives_at_its_rates(moved, fastest):
+    values = {"R_up": 0.02, "R_down": -0.04, "R": 1.0, "K_pgov": 1.0, "K_igov": 0.0, "R_select": 0}
+    alone = governor("ggov1", values | {"max_err": 1.0, "min_err": -1.0, "delta_P_ref": moved})
+    at = [s.name for s in alone.model.states].index("governor.reference")
+    found = [integrated(alone, lambda t: [1.0, P_M], T)[1][at] for T in (1.0, 6.0)]
+    assert found == pytest.approx([fastest, moved], rel=1e-6)
+
+
 # -- stabilisers --------------------------------------------------------------------------------
 
 AT = AT_REST["pss"]

@@ -14,8 +14,8 @@ A PID controller of the speed and a limiter of the load, by the exhaust's temper
 
 Feedback (R_select) is the electrical power through 1/(1+sT_pelec) (1), the valve (−1) or none (0). An integrator stops
 while its controller asks for more than it gets. Powers are on T_rate, or on S_n where that is 0; the delay is Padé's of
-second order. The limiter of the acceleration (a_set, K_a, T_a) and the rates of the load's reference (R_up, R_down) are
-left out: they act while the speed changes by more than a_set per second, or while the reference is moved.
+second order. A moved reference arrives at R_up and R_down per second at most. The limiter of the acceleration (a_set,
+K_a, T_a) is left out: it acts while the speed gains more than a_set per second.
 
 Sources: IEEE PES-TR1, OpenIPSL at 2be0558a."""
 
@@ -79,6 +79,8 @@ GGOV1 = (
     power("db", 0.0, "Dead band of the speed's error", 0),
     seconds("T_sa", 4.0, "Exhaust, lead"),
     seconds("T_sb", 5.0, "Exhaust, lag; 0 leaves the stage out"),
+    number("R_up", 99.0, "Fastest rise of the load's reference", 0, "pu/s"),
+    number("R_down", -99.0, "Fastest fall of the load's reference", None, "pu/s"),
 )
 
 _LEAST_SPEED = 0.1  # pu, below which a power of the speed is not followed
@@ -132,7 +134,9 @@ def _error(m: ModelBuilder, p: Given, shaft: Shaft, share: Expr, valve: Expr) ->
     most = _LOAD_CONTROLLER * p.R
     moves = held_at_limits(z, p.K_imw * (P_e_0 - P_e), -most, most)
     m.derivative(z, if_else(p.K_imw > 0, moves, -z / BYPASS_TIME))
-    moved = power_reference(m, P_0) - P_0
+    moved = m.state("reference", 0.0, "pu", "Change of the reference, at its rates", base="S_n")
+    rest = (power_reference(m, P_0) - P_0 - moved) / BYPASS_TIME
+    m.derivative(moved, clamp(rest, p.R_down, p.R_up))
     error = p.R * (moved - feedback) + clamp(z, -most, most) - (shaft.w - 1)
     beyond = if_else(p.db > 0, error - clamp(error, -p.db, p.db), error)
     return clamp(beyond, p.min_err, p.max_err)

@@ -89,6 +89,25 @@ def constant_torque(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
         return power_reference(m, P_m_0) * w
 
 
+def servo(
+    m: ModelBuilder,
+    wanted: Expr,
+    T: Expr,
+    speed: tuple[Expr, Expr],
+    limits: tuple[Expr, Expr],
+    initial: Expr,
+) -> Expr:
+    """Declare the state ``gate`` that follows with the time constant T and no faster than its rates; return it.
+
+    ``T``: [s], above 0; ``speed``: fastest closing, below 0, and opening [pu/s]; ``limits``: lowest and highest, where
+    it does not wind up."""
+    x = m.state("gate", initial, "pu", "Valve", base="S_n")
+    gate = blocks.clamp(x, *limits)
+    rate = blocks.clamp((wanted - gate) / T, *speed)
+    m.derivative(x, blocks.held_at_limits(x, rate, *limits))
+    return gate
+
+
 _LEAST_GATE = 1e-3  # smallest gate [pu] that the flow is divided by
 
 
@@ -236,10 +255,8 @@ def ieeeg1(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
         valve_0 = P_m_0 / fmax(fractions, 1e-3)
         require_within(m, valve_0, low, high, ("governor.P_MIN", "governor.P_MAX"))
         control = blocks.lead_lag(m, "controller", K * (w - 1), T_2, T_1)
-        x = m.state("gate", valve_0, "pu", "Valve", base="S_n")
-        valve = blocks.clamp(x, low, high)
-        rate = blocks.clamp((power_reference(m, valve_0) - control - valve) / T_3, U_c, U_o)
-        m.derivative(x, blocks.held_at_limits(x, rate, low, high))
+        wanted = power_reference(m, valve_0) - control
+        valve = servo(m, wanted, T_3, (U_c, U_o), (low, high), valve_0)
         signal, total = valve, Expr(0)
         for stage, name in enumerate(_STAGES):
             signal = blocks.low_pass_or_nothing(m, name, signal, T[stage], valve_0)

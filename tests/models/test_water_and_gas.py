@@ -1,0 +1,329 @@
+"""Governors of PSS/E with water, steam and gas turbines: transfer functions by hand, limits, curves, start values."""
+
+import numpy as np
+import pytest
+
+from fmus.synchronous_generator.turbines.curves import through_points
+from fmus.toolchain.model_builder import ModelBuilder
+from tests.models.one_machine import OneMachine, three_buses
+from tests.models.parts import P_M, governor, integrated, refused
+from tests.support.evaluated import Evaluated
+
+HERTZ = pytest.mark.parametrize("hertz", [0.02, 0.3, 1.3, 6.0])
+
+LINEAR = {
+    "ieeeg2": {"K": 18.0, "T_1": 40.0, "T_2": 4.0, "T_3": 0.8, "T_4": 1.3},
+    "ieeeg3": {
+        "T_G": 0.5,
+        "T_P": 0.04,
+        "sigma": 0.05,
+        "delta": 0.3,
+        "T_R": 5.0,
+        "T_W": 1.1,
+        "a_11": 0.55,
+        "a_13": 1.1,
+        "a_21": 1.4,
+        "a_23": 1.2,
+    },
+    "hygov2": {
+        "K_P": 1.1,
+        "K_I": 0.2,
+        "K_A": 4.0,
+        "T_1": 0.9,
+        "T_2": 0.1,
+        "T_3": 1.2,
+        "T_4": 0.06,
+        "T_5": 1.1,
+        "T_6": 0.6,
+        "T_R": 4.0,
+        "r": 0.4,
+        "R": 0.06,
+        "P_MAX": 1.1,
+    },
+    "tgov3": {
+        "K": 21.0,
+        "T_1": 3.0,
+        "T_2": 0.9,
+        "T_3": 0.12,
+        "T_4": 0.25,
+        "K_1": 0.3,
+        "T_5": 6.0,
+        "K_2": 0.25,
+        "T_6": 0.5,
+        "K_3": 0.4,
+    },
+    "gast2a": {
+        "W": 22.0,
+        "X": 0.1,
+        "Y": 0.3,
+        "T_CD": 0.2,
+        "T": 0.03,
+        "E_CR": 0.02,
+        "K_3": 0.77,
+        "a": 1.1,
+        "b": 0.06,
+        "c": 1.2,
+        "T_f": 0.4,
+        "K_f": 0.1,
+        "a_f2": -0.3,
+        "b_f2": 1.3,
+        "c_f2": 0.5,
+        "K_6": 0.23,
+        "T_rate": 80.0,
+        "T_C": 1200.0,
+    },
+}
+PID = {"R": 0.06, "K_P": 3.0, "K_I": 0.6, "K_D": 1.2}
+WITH_CURVE = {"G_0": 0.1, "G_1": 0.4, "P_1": 0.3, "G_2": 0.8, "P_2": 0.75, "P_3": 0.95}
+SLOPE = (0.75 - 0.3) / (0.8 - 0.4)  # of that curve at P_M
+
+
+def delay(s, T):
+    return (1 - s * T / 2 + (s * T) ** 2 / 12) / (1 + s * T / 2 + (s * T) ** 2 / 12)
+
+
+def water(s, T):
+    return (1 - s * T) / (1 + s * T / 2)
+
+
+def by_hand(name, p, s):
+    """P_m over the speed."""
+    if name == "ieeeg2":
+        control = p["K"] * (1 + s * p["T_2"]) / (1 + s * p["T_1"]) / (1 + s * p["T_3"])
+        return -control * water(s, p["T_4"])
+    if name == "ieeeg3":
+        forward = 1 / (p["T_G"] * (1 + s * p["T_P"]) * s)
+        droop = p["sigma"] + p["delta"] * s * p["T_R"] / (1 + s * p["T_R"])
+        lead = p["a_11"] - p["a_13"] * p["a_21"] / p["a_23"]
+        turbine = p["a_23"] * (1 + lead * s * p["T_W"]) / (1 + p["a_11"] * s * p["T_W"])
+        return -forward / (1 + forward * droop) * turbine
+    if name == "hygov2":
+        forward = p["K_A"] * (1 + s * p["T_1"]) / (s * p["T_3"]) / s
+        forward *= (1 + s * p["T_2"]) / (1 + s * p["T_4"])
+        droop = p["R"] + p["r"] * s * p["T_R"] / (1 + s * p["T_R"])
+        gate = -(p["K_P"] + p["K_I"] / s) * forward / (1 + forward * droop)
+        return gate * p["P_MAX"] * (1 - s * p["T_5"]) / (1 + s * p["T_6"])
+    if name == "tgov3":
+        valve = -p["K"] * (1 + s * p["T_2"]) / (1 + s * p["T_1"]) / (1 + s * p["T_3"])
+        chest = valve / (1 + s * p["T_4"])
+        reheated = chest / (1 + s * p["T_5"])
+        return p["K_1"] * chest + (p["K_2"] + p["K_3"] / (1 + s * p["T_6"])) * reheated
+    return gast2a_by_hand(p, s)
+
+
+def gast2a_by_hand(p, s):
+    share = p["T_rate"] / 100.0
+    power = P_M / share
+    flow = (power - p["a_f2"]) / p["b_f2"]
+    asked = ((p["c"] / p["a"] + p["K_f"]) * flow - p["K_6"]) / p["K_3"]
+    by_speed = asked - p["W"] * (1 + s * p["X"]) / (1 + s * p["Y"])  # product with the speed
+    forward = p["a"] / (p["c"] + s * p["b"]) / (1 + s * p["T_f"])
+    fuel = p["K_3"] * delay(s, p["T"]) * by_speed * forward / (1 + p["K_f"] * forward)
+    burnt = fuel * delay(s, p["E_CR"]) / (1 + s * p["T_CD"])
+    return share * (power + p["b_f2"] * burnt - p["c_f2"])
+
+
+@HERTZ
+@pytest.mark.parametrize("name", LINEAR)
+def test_a_governor_is_its_block_diagram(name, hertz):
+    p, s = LINEAR[name], 2j * np.pi * hertz
+    alone = governor(name, p)
+    assert not refused(alone)
+    assert alone.outputs([1.0])["P_m"] == pytest.approx(P_M, rel=1e-12)
+    assert max(map(abs, alone.rates([1.0]).values())) < 1e-11
+    assert alone.response(s, [1.0])["P_m", "w"] == pytest.approx(by_hand(name, p, s), rel=1e-6)
+
+
+@HERTZ
+@pytest.mark.parametrize("gate_droop", [0, 1])
+@pytest.mark.parametrize("name", ["pidgov", "wpidhy"])
+def test_a_pid_governor_is_its_block_diagram(name, gate_droop, hertz):
+    s = 2j * np.pi * hertz
+    p = PID | {"T_reg": 0.03, "T_a": 0.05, "T_b": 0.4, "T_W": 1.2, "D_turb": 0.3} | WITH_CURVE
+    switch = {"gate_droop": gate_droop, "A_TW": 1.1} if name == "pidgov" else {}
+    alone = governor(name, p | switch)
+    at_rest = [1.0, P_M]
+    assert not refused(alone)
+    assert alone.outputs(at_rest)["P_m"] == pytest.approx(P_M, rel=1e-12)
+    assert max(map(abs, alone.rates(at_rest).values())) < 1e-12
+    control = (p["K_P"] + p["K_I"] / s + s * p["K_D"]) / (1 + s * p["T_a"]) ** 2
+    gate = control / (1 + s * p["T_b"]) / (1 if name == "pidgov" else s)
+    droop = p["R"] / (1 + s * p["T_reg"])
+    closed = gate / (1 + droop * gate) if switch.get("gate_droop") else gate
+    turbine = SLOPE * water(s, p["T_W"] * switch.get("A_TW", 1.0))
+    response = alone.response(s, at_rest)
+    assert response["P_m", "w"] == pytest.approx(-closed * turbine - p["D_turb"], rel=1e-6)
+    of_power = 0.0 if switch.get("gate_droop") else -droop * gate * turbine
+    assert response["P_m", "P_e"] == pytest.approx(of_power, rel=1e-6, abs=1e-12)
+
+
+@HERTZ
+@pytest.mark.parametrize("T_d", [0.0, 0.06])
+@pytest.mark.parametrize("T_t", [0.0, 0.3])
+@pytest.mark.parametrize("curve", [True, False])
+def test_wshygp_is_its_block_diagram(curve, T_t, T_d, hertz):
+    s = 2j * np.pi * hertz
+    p = PID | {"T_f": 0.1, "K_G": 2.2, "T_P": 0.06, "A_turb": -1.0, "B_turb": 0.5, "T_turb": 0.9}
+    x, y = (0.0, 0.3, 0.6, 0.8, 1.0), (0.0, 0.25, 0.55, 0.8, 1.0)
+    names = [f"{kind}_{k}" for kind in ("GV", "PGV") for k in range(1, 6)]
+    points = dict(zip(names, (*x, *y) if curve else [0.0] * 10, strict=True))
+    alone = governor("wshygp", p | points | {"T_t": T_t, "T_d": T_d, "T_rate": 125.0})
+    at_rest = [1.0, P_M]
+    assert not refused(alone)
+    assert alone.outputs(at_rest)["P_m"] == pytest.approx(P_M, rel=1e-12)
+    assert max(map(abs, alone.rates(at_rest).values())) < 1e-12
+    control = p["K_P"] + p["K_I"] / s + s * p["K_D"] / (1 + s * p["T_f"])
+    control /= 1 + s * T_d
+    if not T_t:
+        control /= 1 + p["R"] * control
+    servo = p["K_G"] / (1 + s * p["T_P"]) / s
+    slope = (0.8 - 0.55) / (0.8 - 0.6) if curve else 1.0
+    lead, lag = -p["T_turb"], 0.5 * p["T_turb"]
+    whole = 1.25 * control * servo / (1 + servo) * slope * (1 + s * lead) / (1 + s * lag)
+    response = alone.response(s, at_rest)
+    assert response["P_m", "w"] == pytest.approx(-whole, rel=1e-6)
+    of_power = -p["R"] / (1 + s * T_t) * whole / 1.25 if T_t else 0.0
+    assert response["P_m", "P_e"] == pytest.approx(of_power, rel=1e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["pidgov", "wshygp"])
+def test_a_controller_without_an_integral_holds_its_error(name):
+    alone = governor(name, {"K_I": 0.0, "T_d": 0.0} if name == "wshygp" else {"K_I": 0.0})
+    assert not refused(alone)
+    assert alone.outputs([1.0, P_M])["P_m"] == pytest.approx(P_M, rel=1e-12)
+    assert max(map(abs, alone.rates([1.0, P_M]).values())) < 1e-12
+
+
+# -- limits -------------------------------------------------------------------------------------
+
+SETTLED = {
+    # name: values, P_m with the gate or valve fully open, and closed
+    "ieeeg2": ({"P_MAX": 0.9, "P_MIN": 0.2, "T_1": 0.0, "T_2": 0.0}, 0.9, 0.2),
+    "ieeeg3": ({"P_MAX": 0.9, "P_MIN": 0.2}, 0.9, 0.2),
+    "hygov2": ({"G_MAX": 0.9, "G_MIN": 0.2, "P_MAX": 1.1}, 0.99, 0.22),
+    "tgov3": ({"P_MAX": 0.9, "P_MIN": 0.2, "T_5": 1.0}, 0.9, 0.2),
+    "pidgov": ({"G_MAX": 0.8, "G_MIN": 0.4}, 0.8, 0.35),
+    "wpidhy": ({"G_MAX": 0.8, "G_MIN": 0.4}, 0.8, 0.35),
+    "wshygp": ({"P_MAX": 0.75, "P_MIN": 0.5}, 0.78, 0.48),
+}
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("name", SETTLED)
+def test_the_gate_stops_at_its_limits(name, side):
+    values, high, low = SETTLED[name]
+    alone = governor(name, values)
+    rest = [P_M] if len(alone.model.inputs) == 2 else []
+    found, _ = integrated(alone, lambda t: [1 - side * 0.1, *rest], 40.0, step=2e-3)
+    assert found[-1]["P_m"] == pytest.approx(high if side > 0 else low, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "fast"),
+    [
+        ("ieeeg3", {"U_o": 0.1, "U_c": -0.1}, 0.1),
+        ("hygov2", {"V_GMAX": 0.1, "P_MAX": 1.0}, 0.1),
+        ("tgov3", {"U_o": 0.1, "U_c": -0.1}, 0.1),
+        ("pidgov", {"V_MAX": 0.05, "V_MIN": -0.05}, 0.05),
+        ("wpidhy", {"V_MAX": 0.05, "V_MIN": -0.05}, 0.05),
+        ("wshygp", {"VEL_open": 0.05, "VEL_close": 0.05, "T_P": 0.0}, 0.05),
+    ],
+)
+@pytest.mark.parametrize("side", [1, -1])
+def test_the_gate_moves_no_faster_than_its_rates(name, values, fast, side):
+    alone = governor(name, values)
+    at = [s.name for s in alone.model.states].index("governor.gate")
+    rest = [P_M] if len(alone.model.inputs) == 2 else []
+    steps = [integrated(alone, lambda t: [1 - side * 0.08, *rest], T)[1][at] for T in (0.2, 0.3)]
+    assert steps[1] - steps[0] == pytest.approx(side * fast * 0.1, rel=1e-6)
+
+
+def test_the_temperature_control_of_gast2a_takes_over_and_lets_go():
+    """At 4 % too little speed its governor asks for all; the exhaust settles at T_C, and the fuel with it."""
+    values = {"T_C": 850.0, "W": 25.0, "T_3": 1.0, "T_t": 450.0, "b_f1": 0.0, "c_f2": 0.0}
+    alone = governor("gast2a", values)
+    found, x = integrated(alone, lambda t: [0.96], 60.0, step=2e-3)
+    flow = 1 - (950.0 - 850.0) / 700.0  # where K_4 + K_5 = 1 gives T_C
+    assert found[-1]["P_m"] == pytest.approx(0.96 * (-0.3 + 1.3 * flow), rel=1e-4)
+    found, _ = integrated(alone, lambda t: [1.01], 20.0, step=2e-3, x=x)
+    asked = (P_M + 0.3) / 1.3 - 0.23
+    asked = (asked / 0.77 - 25.0 * 0.01) * 0.77 * 1.01 + 0.23
+    assert found[-1]["P_m"] == pytest.approx(1.01 * (-0.3 + 1.3 * asked), rel=1e-4)
+
+
+def test_gast2a_refuses_an_exhaust_that_is_too_hot_at_the_start():
+    assert any("governor.T_C" in text for text in refused(governor("gast2a", {"T_C": 700.0})))
+
+
+def test_the_reheater_of_tgov3_stops_at_its_pressure():
+    values = {"P_RMAX": 0.8, "T_5": 1.0, "U_o": 9.0, "K_1": 0.0, "K_2": 1.0, "K_3": 0.0}
+    found, _ = integrated(governor("tgov3", values), lambda t: [0.95], 10.0, step=2e-3)
+    assert found[-1]["P_m"] == pytest.approx(0.8, rel=1e-6)
+
+
+# -- curves -------------------------------------------------------------------------------------
+
+
+def test_a_curve_goes_through_its_points_and_ends_level():
+    m = ModelBuilder("curve", "A curve")
+    x = m.input("x", "1", "x")
+    points = [(0.1, 0.0), (0.4, 0.3), (0.8, 0.75), (0.0, 0.0), (0.0, 0.0)]
+    m.output("y", through_points(x, points), "1", "y")
+    curve = Evaluated(m.build())
+    found = [curve.outputs([at])["y"] for at in (0.0, 0.1, 0.25, 0.4, 0.6, 0.8, 1.2)]
+    assert found == pytest.approx([0.0, 0.0, 0.15, 0.3, 0.525, 0.75, 0.75])
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [("pidgov", {"G_1": 0.05}), ("wpidhy", {"P_2": 0.3}), ("wshygp", {"GV_3": 0.2})],
+)
+def test_a_curve_that_falls_is_refused(name, values):
+    assert any("must rise from point to point" in text for text in refused(governor(name, values)))
+
+
+# -- another program ----------------------------------------------------------------------------
+
+BEHIND = """
+102 GENROU 1 8.0 0.03 0.4 0.05 6.175 0.05 1.8 1.7 0.3 0.55 0.25 0.2 0 1 /
+102 SEXS 1 0.4 5.0 20.0 1.0 -50.0 50.0 /
+"""
+PIDGOV = "0.05 0.01 5 1 0.1 0.5 0.99 0.001 0.1 0.7 0.3 0.9 0.5 0.9 1 0.05 1 0.6 0.04 -0.04"
+WPIDHY = (
+    "0.01 -0.05 3 0.5 3 0.02 0.01 0.025 -0.025 1 0.2 3.25 52001 0 0 0.12 0.545 0.4 0.827 0.83 1"
+)
+OTHERS = {
+    f"PIDGOV 1 0 {PIDGOV}": (-0.86866757 + 8.49611155j, -0.28282149 + 1.10977593j, -0.1169796),
+    f"PIDGOV 1 1 {PIDGOV}": (-0.9001334 + 8.44783636j, -1.22285558 + 0.72000477j, -0.04238523),
+    f"WPIDHY 1 {WPIDHY}": (-1.39512724 + 5.96660797j, -0.0305766 + 0.30118043j, -0.48179150),
+}
+"""Records, and eigenvalues of PowerSimulationsDynamics.jl at d94d74e, test/results/results_eigenvalues.jl, test58 and
+test60."""
+
+
+@pytest.mark.parametrize("record", OTHERS)
+def test_a_pid_governor_has_the_eigenvalues_of_another_program(record, tmp_path):
+    network, _ = three_buses(given=0.7, drawn=2.0)
+    alone = OneMachine(f"{BEHIND}102 {record} /", tmp_path, network, source=0.25j)
+    found = eigenvalues(alone, network)
+    for wanted in OTHERS[record]:
+        assert min(abs(found - wanted)) < 2e-5
+
+
+def eigenvalues(alone, network):
+    """Of the machine at its network, by differences of what `OneMachine.run` integrates."""
+    device, seen = alone.device, network.seen(network.lines)
+    model, p, c = device.model, device.p, device.c
+    names = [v.name for v in model.outputs]
+    at = [names.index(name) for name in ("i_re", "i_im", "y_re", "y_im")]
+
+    def rate(x):
+        still = np.array(model.outputs_function(x, [0.0, 0.0], p, c)).ravel()[at]
+        v = (seen[0] + seen[1] * complex(*still[:2])) / (1 + seen[1] * complex(*still[2:]))
+        return np.array(model.derivatives(x, [v.real, v.imag], p, c)[0], dtype=float).ravel()
+
+    step = 1e-6
+    columns = [
+        (rate(device.x + e) - rate(device.x - e)) / (2 * step) for e in step * np.eye(len(device.x))
+    ]
+    return np.linalg.eigvals(np.column_stack(columns))
