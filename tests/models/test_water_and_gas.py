@@ -311,7 +311,7 @@ def test_a_pid_governor_has_the_eigenvalues_of_another_program(record, tmp_path)
 
 
 def eigenvalues(alone, network):
-    """Of the machine at its network, by differences of what `OneMachine.run` integrates."""
+    """Eigenvalues of the machine at its network, by differences of what `OneMachine.run` integrates."""
     device, seen = alone.device, network.seen(network.lines)
     model, p, c = device.model, device.p, device.c
     names = [v.name for v in model.outputs]

@@ -218,7 +218,7 @@ def wshygp(m: ModelBuilder, shaft: Shaft) -> Expr:
 def _curve(
     m: ModelBuilder, points: list[Point], limits: tuple[Expr, Expr]
 ) -> tuple[Expr, Expr, Expr]:
-    """Whether there is a curve, and its least and most power; without one those of the gate."""
+    """Truth of there being a curve, and its least and most power; without one those of the gate."""
     widest = most = Expr(0)
     for x, y in points:
         widest, most = fmax(widest, fabs(x)), fmax(most, y)
@@ -237,7 +237,7 @@ def _curve(
 
 
 def _speed_controller(m: ModelBuilder, p: Given, shaft: Shaft, share: Expr, g_0: Expr) -> Expr:
-    """What the gate is asked to be. Without a filter its own feedback is solved for, as it passes directly."""
+    """The gate that is asked for. Without a filter its own feedback is solved for, as it passes directly."""
     e_0, speed = _held_error(m, p, g_0), shaft.w - 1
     P_0, P_e_0 = shaft.P_m_0 / share, shaft.P_e_0 / share
     measured = low_pass_or_nothing(m, "power", shaft.P_e / share, p.T_t, P_e_0)
