@@ -112,7 +112,7 @@ def reading_of(column: str, elements: Elements, prepared: PreparedScenario) -> R
     if column == "generation":
         return lambda text: _generation(_factor(column, text), elements, prepared)
     if column == "static":
-        return lambda text: _static(_factor(column, text), elements, prepared)
+        return lambda text: _static(_part(column, text), elements, prepared)
     name, dot, quantity = column.partition(".")
     if (
         quantity in SERVICE
@@ -125,6 +125,11 @@ def reading_of(column: str, elements: Elements, prepared: PreparedScenario) -> R
     if dot and quantity in (ACTIVE, REACTIVE):
         return _power(column, name, quantity, elements, prepared)
     return _variable(column, prepared)
+
+
+def _part(column: str, text: str) -> float:
+    """A factor that may be 0: hours without wind are usual."""
+    return 0.0 if _number(column, text) == 0 else _factor(column, text)
 
 
 def _factor(column: str, text: str) -> float:
@@ -197,6 +202,11 @@ def _power(
             f"the reactive power of {name} follows from its voltage in the power flow; set {name}.v_0"
         )
     return lambda text: Setting(fed=(members, _number(column, text)))
+
+
+def least_scale(load: str, grid: ComponentPlan) -> float:
+    """The scale of a load that is off: 0, or the trace that keeps a voltage which it alone determines."""
+    return max(0.0, grid.description.variables[f"{load}.scale"].minimum or 0.0)
 
 
 def own_power(column: str, elements: Elements, prepared: PreparedScenario) -> float | None:

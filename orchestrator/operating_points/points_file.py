@@ -18,6 +18,7 @@ from orchestrator.operating_points.columns import (
     Reading,
     Setting,
     feeding_loads,
+    least_scale,
     own_power,
     reading_of,
 )
@@ -31,6 +32,7 @@ _LEFT = 0.05  # part of the case's load that is asked about where points leave i
 
 _FACTORS = ("generation", "static")  # columns whose values for a unit other columns go before
 _SCALES = ("scale", "fed_scale")
+_TRACE = 1e-5  # scale of a load up to which it is off, and keeps a voltage at most
 
 
 @dataclass(frozen=True)
@@ -314,12 +316,15 @@ def _scale_of(
         raise InputError(
             f"{place}: the columns {column} and {key} both scale {load}; leave one of them empty"
         )
-    own = prepared.system.components[elements.grid].number(f"{load}.scale")
-    return float(values.get(key, own)) if scale is None else scale * own
+    grid = prepared.system.components[elements.grid]
+    own = grid.number(f"{load}.scale")
+    if scale is None:
+        return float(values.get(key, own))
+    return max(scale * own, least_scale(load, grid))
 
 
 def _unscaled(column: str, power: float, scale: float, place: str) -> float:
-    if not scale:
+    if scale <= _TRACE:
         raise InputError(
             f"{place}: {column} = {power:g}, but the load is switched off (its scale is 0)"
         )

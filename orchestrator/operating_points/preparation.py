@@ -16,7 +16,7 @@ from orchestrator.cases.service import without_units
 from orchestrator.cases.sharing import Dispatch, SharingRule, in_words, load_of, lost_load
 from orchestrator.coupling.system import System
 from orchestrator.errors import CosimError, ErrorKind, InputError, StartError, few
-from orchestrator.operating_points.columns import Elements
+from orchestrator.operating_points.columns import Elements, least_scale
 from orchestrator.operating_points.item import Item, Status
 from orchestrator.operating_points.outages import Remains, what_remains
 from orchestrator.points.failure import Failure
@@ -259,10 +259,7 @@ def switched_off(
     ]
     values: dict[str, Value] = {f"{grid}.{name}.connected": False for name in opened}
     plan = prepared.system.components[grid]
-    for scale in (
-        f"{name}.scale" for name in remains.loads
-    ):  # some loads alone determine a voltage, and keep a trace
-        values[f"{grid}.{scale}"] = max(0.0, plan.description.variables[scale].minimum or 0.0)
+    values |= {f"{grid}.{name}.scale": least_scale(name, plan) for name in remains.loads}
     return values | {
         f"{grid}.{name}": _DEAD_CHARGING * plan.number(name) for name in remains.charging
     }

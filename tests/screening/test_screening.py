@@ -227,6 +227,22 @@ def test_a_factor_of_loads_leaves_static_generation_and_asks(windy, tmp_path):
         )
 
 
+def test_an_hour_without_wind_keeps_the_trace_that_a_voltage_needs(windy, tmp_path):
+    prepared, elements = windy
+    variables = prepared.system.components["grid"].description.variables
+    assert variables["load_3.scale"].minimum == 1e-6
+    path = tmp_path / "points.csv"
+    path.write_text("name,static\na,0\n")
+    (point,) = read_points(path, prepared, elements)
+    assert point.values["grid.load_3.scale"] == 1e-6
+    path.write_text("name,static,load_3.P_mw\na,0,-200\n")
+    with pytest.raises(InputError, match="the load is switched off"):
+        read_points(path, prepared, elements)
+    path.write_text("name,static\na,-1\n")
+    with pytest.raises(InputError, match="it must exceed 0"):
+        read_points(path, prepared, elements)
+
+
 def test_without_static_generation_nothing_is_asked_of_it(two_area, tmp_path):
     _, prepared, elements = two_area
     path = tmp_path / "points.csv"
