@@ -1,10 +1,12 @@
 """The effect of a POD setting on all other modes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
+from orchestrator.analysis.continuation import pair_of
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.modes import (
     ELECTROMECHANICAL_HZ,
@@ -63,9 +65,6 @@ class Surroundings:
             rest = (*(m for m in rest if m is not self.other_named), *followed)
         return min(rest, key=lambda m: m.damping_ratio, default=None)
 
-    def below(self, damping: float) -> int:
-        return sum(mode.damping_ratio < damping for mode in self.others)
-
 
 def surroundings(model: LinearModel, target: complex | None, naming: Naming) -> Surroundings:
     """All modes except the one at ``target`` [rad/s]; ``naming`` finds the mode with the target's name."""
@@ -81,22 +80,46 @@ def surroundings(model: LinearModel, target: complex | None, naming: Naming) -> 
 
 
 def breach(before: Surroundings, after: Surroundings, least: float) -> str | None:
-    """The prohibited effect of a design: the system becomes unstable, or a mode falls below the least damping that was
-    above it."""
+    """The prohibited effect of a design: the system becomes unstable, or another mode falls below the least damping.
+
+    Each mode is compared with the one that it was before. A mode that was below the least damping may not fall, and
+    one that was not there before may not be below."""
     if after.growth > (1 + _EQUAL) * before.growth:
         return (
             f"the system becomes unstable: an eigenvalue has a real part of {after.growth:+.3g} 1/s"
         )
-    worst = after.worst
-    if worst is None or worst.damping_ratio >= least:
-        return None
-    was = before.worst.damping_ratio if before.worst else least
-    if after.below(least) > before.below(least) or worst.damping_ratio < min(was, least) - _EQUAL:
-        return (
-            f"the mode at {worst.frequency_hz:.3f} Hz ({worst.participation[0][0]}) has {worst.damping_percent:.2f} % "
-            f"of damping, below {100 * least:g} %"
-        )
+    for mode, was in _as_before(before.others, after.others):
+        if mode.damping_ratio >= least:
+            return None  # so have all that follow
+        limit = least if was is None else min(was.damping_ratio, least)
+        if mode.damping_ratio < limit - _EQUAL:
+            had = "" if was is None else f" (before: {was.damping_percent:.2f} %)"
+            return (
+                f"the mode at {mode.frequency_hz:.3f} Hz ({mode.participation[0][0]}) has {mode.damping_percent:.2f} % "
+                f"of damping{had}, below {100 * least:g} %"
+            )
     return None
+
+
+def _as_before(before: Sequence[Mode], after: Sequence[Mode]) -> Iterator[tuple[Mode, Mode | None]]:
+    """Each mode, least damped first, with the one that it was before; None for one that was not there.
+
+    Those belong together whose shapes are alike, and whose eigenvalues are near; each belongs to one at most."""
+    unlike = np.array([[_unlikeness(one, other) for other in before] for one in after])
+    rows, columns = linear_sum_assignment(unlike.reshape(len(after), len(before)))
+    was = dict(zip(rows.tolist(), columns.tolist(), strict=True))
+    for row in sorted(range(len(after)), key=lambda k: after[k].damping_ratio):
+        yield after[row], before[was[row]] if row in was else None
+
+
+def _unlikeness(one: Mode, other: Mode) -> float:
+    """How far two modes are from being one: 0 if their shapes and their eigenvalues are the same."""
+    away = abs(one.eigenvalue - other.eigenvalue) / abs(other.eigenvalue)
+    names = [name for name in one.shape if name in other.shape]
+    if not (one.left and other.left and names):
+        return away
+    alike = pair_of(one, names).similarity(pair_of(other, names))
+    return 1.0 - min(alike, 1.0) + away
 
 
 def extremes(model: LinearModel) -> tuple[complex, complex | None]:
