@@ -69,6 +69,12 @@ def solve(equations: FlowEquations) -> NewtonResult:
     return min(first, flat, key=lambda result: result.history[-1][0])
 
 
+def solve_from(equations: FlowEquations, voltages: NDArray[np.complex128]) -> NewtonResult:
+    """Solve from voltages that are near the solution, such as those of almost the same equations."""
+    angles = voltages / np.abs(voltages)
+    return _newton(equations, np.where(equations.held, equations.magnitudes * angles, voltages))
+
+
 def grow(equations: FlowEquations) -> tuple[float, NewtonResult | None]:
     """The largest share of all given powers, loads and units alike, with a solution that is reached from no power at
     all, and this solution; (0, None) where there is none without power."""

@@ -56,6 +56,14 @@ def open_question(table: NetworkTable | None, loads: Sequence[Load], place: str)
     return [Problem(place, _OPEN)] if is_open(table) and any(x.p_mw > 0 for x in loads) else []
 
 
+def device_laws(table: NetworkTable) -> LoadModelTable:
+    """How a source's devices, such as DC lines, follow the voltage: constant powers where the case says nothing."""
+    own = table.device_model
+    return own.model_copy(
+        update={"active": own.active or "power", "reactive": own.reactive or "power"}
+    )
+
+
 def with_laws(
     load: Load,
     table: NetworkTable,

@@ -23,14 +23,19 @@ from orchestrator.cases.csv_rows import (
 )
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt, inner_buses, legs_of
 from orchestrator.cases.flow_equations import FlowEquations
-from orchestrator.cases.load_models import FlowLaws, flow_laws, with_laws
+from orchestrator.cases.load_models import FlowLaws, device_laws, flow_laws, with_laws
 from orchestrator.cases.network_import import Generation, ImportedNetwork, bus_of, import_network
 from orchestrator.cases.network_sources import read_matpower, read_pandapower
+from orchestrator.cases.psse.device_flow import solved_devices
+from orchestrator.cases.psse.device_notes import device_notes
 from orchestrator.cases.psse.raw import Machine, read_raw
+from orchestrator.cases.psse.solution import stated_voltages
+from orchestrator.cases.psse.synchronous_parts import synchronous_part
 from orchestrator.cases.record_use import RecordUse
 from orchestrator.cases.schema import NetworkTable
-from orchestrator.errors import InputError, Problem
+from orchestrator.errors import InputError, Problem, few
 
+_REFERENCE = 3  # code of a reference in the table of buses
 _FREQUENCY = 60.0  # of a RAW file that does not say it, as PSS/E's own default [Hz]
 _IN_OHMS = ("kv", "R_ohm", "X_ohm", "B_us")  # of a file of lines, in the place of R, X, B
 
@@ -45,6 +50,7 @@ class _Source:
     idle: frozenset[tuple[int, str]] = frozenset()
     misfit: str = ""
     records: tuple[RecordUse, ...] = ()
+    device_loads: tuple[Load, ...] = ()  # in the place of DC lines and the like
 
 
 @dataclass(frozen=True)
@@ -116,6 +122,7 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
                 with_laws(x, table, parts=source.load_parts.get(x.name, (0j, 0j)))
                 for x in source.loads
             ),
+            *(with_laws(x, table, device_laws(table)) for x in found.device_loads),
             *loads,
         ),
         (*source.shunts, *shunts),
@@ -201,11 +208,28 @@ def _from_raw(path: Path, table: NetworkTable) -> _Source:
     if table.frequency is not None and own is not None and own != table.frequency:
         text = f"BASFRQ is {own:g} Hz, and the case's frequency = {table.frequency:g} Hz counts; one of them is wrong"
         changes.append(Problem(f"{raw.tables.name}, line 1", text))
-    imported = import_network(raw.tables, joined=False)  # the machines are those of the file
+    # the machines are those of the file
+    needed = {bus for device in raw.devices for bus in device.places}
+    imported = import_network(raw.tables, joined=False, needed=needed)
     imported = replace(imported, frequency=imported.frequency or _FREQUENCY)
-    misfit = misfit_of(imported, raw.tables.bus, raw.tables.labels, NOT_SOLVED)
+    references = [
+        bus_of(raw.tables.labels[int(row[0])]) for row in raw.tables.bus if row[1] == _REFERENCE
+    ]
+    part = synchronous_part(imported, raw.devices, references)
+    imported, machines = part.network, raw.machines
+    if part.left:
+        machines = tuple(x for x in machines if bus_name(str(x.bus)) not in part.left)
+        text = (
+            f"only DC lines lead to {few(sorted(part.left), _SHOWN)}: a part with a frequency of its own, which is "
+            "left out; the DC lines feed here what they do at the file's voltages there"
+        )
+        changes.append(Problem(raw.tables.name, text))
+    solved = solved_devices(raw.devices, imported, stated_voltages(raw.tables.bus))
+    changes += device_notes(solved, table, raw.tables.name)
+    with_devices = replace(imported, loads=(*imported.loads, *solved.loads))
+    misfit = misfit_of(with_devices, raw.tables.bus, raw.tables.labels, NOT_SOLVED)
     ratings: dict[str, float] = {}
-    for machine in raw.machines:
+    for machine in machines:
         bus = bus_name(raw.tables.labels[machine.bus])
         ratings[bus] = ratings.get(bus, 0.0) + machine.likely_mva
     generation = {
@@ -214,10 +238,11 @@ def _from_raw(path: Path, table: NetworkTable) -> _Source:
     return _Source(
         replace(imported, generation=generation),
         tuple(changes),
-        raw.machines,
+        machines,
         raw.idle,
         misfit,
-        raw.records,
+        tuple(replace(x, why=solved.words_of(x.kind, x.line) or x.why) for x in raw.records),
+        solved.loads,
     )
 
 

@@ -7,7 +7,7 @@ transformer, which is an element of its own."""
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from fmus.grid.network import SMALLEST_REACTANCE, Line, Load, Shunt, ThreeWinding
@@ -66,10 +66,13 @@ class ImportedNetwork:
     limits: FileLimits = field(default_factory=FileLimits)  # by branch and by bus
 
 
-def import_network(source: SourceTables, *, joined: bool = True) -> ImportedNetwork:
+def import_network(
+    source: SourceTables, *, joined: bool = True, needed: Collection[int] = ()
+) -> ImportedNetwork:
     """Convert a source's tables to elements. Everything out of service is left out.
 
-    ``joined``: whether a negative load at a generator's bus is a part of the generators."""
+    ``joined``: whether a negative load at a generator's bus is a part of the generators.
+    ``needed``: numbers of buses at which something else stands, which stay."""
     rows = {int(row[0]): row for row in source.bus if int(row[1]) != _OUT}
     labels = {number: source.labels[number] for number in rows}
     lines, to_earth, ratings = _lines(source, labels)
@@ -78,7 +81,7 @@ def import_network(source: SourceTables, *, joined: bool = True) -> ImportedNetw
     earthed = {n for n, y in to_earth.items() if abs(y) > _NEGLIGIBLE} | {
         n for n, r in rows.items() if any(r[4:6])
     }
-    kept = {load.bus for load in loads} | {bus_of(labels[n]) for n in (*at_bus, *earthed)}
+    kept = {load.bus for load in loads} | {bus_of(labels[n]) for n in (*at_bus, *earthed, *needed)}
     lines, merged = without_negative_reactances(lines, kept)
     legs = _ratings_of_legs(lines, ratings)
     lines, transformers, stars = without_star_points(lines, kept)

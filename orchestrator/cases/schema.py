@@ -188,6 +188,7 @@ class NetworkTable(Table):
     loads: dict[str, LoadTable] = {}
     load_model: LoadModelTable = LoadModelTable()
     generation_model: LoadModelTable = LoadModelTable()
+    device_model: LoadModelTable = LoadModelTable()
     shunts: dict[str, ShuntTable] = {}
 
 

@@ -11,10 +11,18 @@ import numpy as np
 from fmus.grid.element_data import SMALLEST_REACTANCE
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.network_sources import SourceTables
+from orchestrator.cases.psse.device_records import (
+    NOT_THERE,
+    FoundDevices,
+    Places,
+    read_devices,
+    series_impedances,
+)
+from orchestrator.cases.psse.devices import Device
 from orchestrator.cases.psse.raw_accounts import record_uses
 from orchestrator.cases.psse.raw_file import read_file
-from orchestrator.cases.psse.records import SWITCHING_DEVICES, RawFile, Record, leave_out
-from orchestrator.cases.psse.solution import fits, reactive_needs
+from orchestrator.cases.psse.records import NODES, SWITCHING_DEVICES, RawFile, Record, leave_out
+from orchestrator.cases.psse.solution import fits, reactive_needs, stated_voltages
 from orchestrator.cases.psse.transformers import Transformer, star, transformers
 from orchestrator.cases.psse.zero_impedances import merged_buses, threshold
 from orchestrator.cases.record_use import RecordUse
@@ -25,7 +33,6 @@ _BUS_COLUMNS, _BRANCH_COLUMNS, _GEN_COLUMNS = 13, 11, 10
 _VM, _VA = 7, 8  # columns of the table of buses
 _BAND = slice(11, 13)  # columns of the most and the least voltage there; 0 where the file has none
 _REFERENCE, _OUT = 3, 4  # codes IDE of a bus
-MANY_SHUNTS = 35  # first revision with a node in the records of machines and switched shunts
 _POWER_FACTOR = 0.9  # with which a power tells a rating that is not known
 _NO_LIMIT = 9999.0  # MW or Mvar by which PSS/E says that a generator has no limit
 _APART = 0.01  # voltage of a file beside what a generator within its limits is to hold [pu]
@@ -78,13 +85,15 @@ class Machine:
 class RawNetwork:
     """A file's tables, its machines in service, and what was taken over in another form.
 
-    ``idle`` has bus and identifier of the machines that are out of service."""
+    ``idle`` has bus and identifier of the machines that are out of service; ``devices`` what feeds or draws by
+    controls of its own, such as DC lines."""
 
     tables: SourceTables
     machines: tuple[Machine, ...]
     changes: tuple[Problem, ...]
     idle: frozenset[tuple[int, str]] = frozenset()
     records: tuple[RecordUse, ...] = ()
+    devices: tuple[Device, ...] = ()
 
 
 def read_raw(
@@ -110,6 +119,7 @@ class _Reading:
         self._load_parts: dict[int, tuple[complex, complex]] = {}
         # active power that the loads at a bus draw together, as far as they are read [MW]
         self._drawn: dict[int, float] = {}
+        self._devices = FoundDevices((), {})
         self._same: dict[int, int] = {}  # bus that PSS/E takes as one with another → the other
         self._merged: set[int] = set()  # lines of the records that make them one
         # least reactance that our network can have [pu of the system]
@@ -128,6 +138,7 @@ class _Reading:
         self._shunts()
         self._lines()
         self._transformers()
+        self._read_devices(leaving_out)
         machines = self._machines()
         gen = np.zeros((len(machines), _GEN_COLUMNS))
         for row, m in zip(gen, machines, strict=True):
@@ -151,9 +162,14 @@ class _Reading:
             self._raw.frequency,
             self._load_parts,
         )
-        records = record_uses(self._raw, self._merged, leaving_out)
+        records = record_uses(self._raw, self._merged, leaving_out, self._devices.unused)
         return RawNetwork(
-            tables, machines, tuple(self._changes.listed()), frozenset(self._idle), records
+            tables,
+            machines,
+            tuple(self._changes.listed()),
+            frozenset(self._idle),
+            records,
+            self._devices.devices,
         )
 
     def _bus(self, record: Record, index: int = 0) -> int:
@@ -228,7 +244,7 @@ class _Reading:
                 continue
             if all(bus in self._rows and self._rows[bus][1] != _OUT for bus in ends):
                 joins.append((record, ends[0], ends[1]))
-        status = 14 if self._raw.revision < MANY_SHUNTS else 15
+        status = 14 if self._raw.revision < NODES else 15
         held = {
             record.whole(0, "the bus' number")
             for record in self._raw.of("generator")
@@ -441,12 +457,39 @@ class _Reading:
                 rating=winding.rating_mva,
             )
 
+    def _read_devices(self, leaving_out: Sequence[str]) -> None:
+        """Read DC lines, FACTS devices and the like; series parts of FACTS devices may be branches."""
+        places = Places(self._standing, self._kilovolts)
+        self._devices = read_devices(self._raw, leaving_out, places)
+        for line, why in self._devices.unused.items():
+            if why.startswith(NOT_THERE):
+                self._changes.note(line, why)
+        for record, z in series_impedances(self._raw, leaving_out):
+            start, end = (self._standing(self._own(record, k)) for k in (1, 2))
+            if start is not None and end is not None and start != end:
+                self._branch(start, end, z, 1)
+
+    def _standing(self, bus: int) -> int | None:
+        """Return the bus that stands for one of the file; None if it is not there, or out of service."""
+        standing = self._same.get(bus, bus)
+        return standing if standing in self._rows and not self._is_out(standing) else None
+
+    def _fed_by_devices(self) -> dict[int, float]:
+        """Return the reactive power that devices feed at the file's voltages, by bus [Mvar]."""
+        voltages = stated_voltages(list(self._rows.values()))
+        fed: dict[int, float] = {}
+        for device in self._devices.devices:
+            for ending in device.endings(voltages):
+                fed[ending.bus] = fed.get(ending.bus, 0.0) + ending.fed.imag
+        return fed
+
     def _solved_buses(self, status: int) -> set[int]:
         """Return the buses at which the file's voltages fit the machines' QG; none if the file is not solved.
 
         ``status``: column of STAT in the records of machines."""
         needed = reactive_needs(self._rows, self._branches, self._to_earth, self._raw.base_mva)
-        fed: dict[int, float] = {}
+        fed = self._fed_by_devices() if needed else {}
+        fed = {bus: q for bus, q in fed.items() if bus in needed}
         for record in self._raw.of("generator"):
             bus = self._same.get(self._own(record), self._own(record))
             if record.whole(status, "STAT", 1) and bus in needed:

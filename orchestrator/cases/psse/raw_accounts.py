@@ -1,14 +1,19 @@
 """Uses of the records of a RAW file: used, held at its value, or not used."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
-from orchestrator.cases.psse.records import LEFT_OUT, SWITCHING_DEVICES, RawFile, Record
+from orchestrator.cases.psse.records import (
+    LEFT_OUT,
+    NODES,
+    SWITCHING_DEVICES,
+    RawFile,
+    Record,
+    elements,
+)
 from orchestrator.cases.record_use import RecordUse, UseOfRecord
 
 _OUT = 4  # IDE of a bus that is out of service
-_NODES = 35  # first revision with a node in the records of machines and switched shunts
 _SHUNT_STATUS = 32  # first revision with STAT of a switched shunt
-_LINES = {"two-terminal dc": 3, "vsc dc line": 3}  # lines of an element
 _IREG = 7  # column of the bus whose voltage a machine controls
 _USED = (UseOfRecord.USED, "")
 _NO_EFFECT = (UseOfRecord.NOT_USED, "no effect on the network")
@@ -22,31 +27,25 @@ _OF_SECTION = {
 
 
 def record_uses(
-    raw: RawFile, merged: Collection[int], leaving_out: Collection[str]
+    raw: RawFile,
+    merged: Collection[int],
+    leaving_out: Collection[str],
+    unused: Mapping[int, str],
 ) -> tuple[RecordUse, ...]:
     """Return what became of every element of a file, by the first line of its record.
 
     ``merged``: lines of zero impedance lines that make their buses one; ``leaving_out``: elements that the user leaves
-    out."""
+    out; ``unused``: why a device is not used, by line."""
     found = []
     for section, records in raw.sections.items():
-        for lines in _elements(section, records):
+        for lines in elements(section, records):
             use, why = _use(raw, section, lines, leaving_out)
             if section == "branch" and lines[0].line in merged:
                 use, why = UseOfRecord.NOT_USED, "zero impedance: its buses are one"
+            if section in LEFT_OUT and lines[0].line in unused:
+                use, why = UseOfRecord.NOT_USED, unused[lines[0].line]
             found.append(RecordUse(raw.place, lines[0].line, section, use, why))
     return tuple(found)
-
-
-def _elements(section: str, records: Sequence[Record]) -> Iterator[Sequence[Record]]:
-    """Yield the records of each element."""
-    start = 0
-    while start < len(records):
-        count = _LINES.get(section, 1)
-        if section == "transformer":
-            count = 5 if records[start].whole(2, "K", 0) else 4
-        yield records[start : start + count]
-        start += count
 
 
 def _use(
@@ -79,11 +78,11 @@ def _out_of_service(how: str) -> tuple[UseOfRecord, str]:
 
 def _status(revision: int) -> dict[str, int]:
     """Return the column of an element's status by section."""
-    shunt = {} if revision < _SHUNT_STATUS else {"switched shunt": 3 + (revision >= _NODES)}
+    shunt = {} if revision < _SHUNT_STATUS else {"switched shunt": 3 + (revision >= NODES)}
     return shunt | {
         "load": 2,
         "fixed shunt": 2,
-        "generator": 14 + (revision >= _NODES),
+        "generator": 14 + (revision >= NODES),
         "branch": 13 if revision < SWITCHING_DEVICES else 23,
         "system switching device": 16,
         "transformer": 11,
@@ -92,7 +91,7 @@ def _status(revision: int) -> dict[str, int]:
 
 def _mode(revision: int) -> int:
     """Return the column of MODSW of a switched shunt."""
-    return 1 + (revision >= _NODES)
+    return 1 + (revision >= NODES)
 
 
 def _is_controlled(revision: int, lines: Sequence[Record]) -> bool:

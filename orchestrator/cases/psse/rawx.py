@@ -14,6 +14,7 @@ from orchestrator.errors import InputError
 
 REVISION = 35  # whose records the tables are put into; RAWX began with it
 _RATINGS = 12  # of a branch or a winding
+_VALUES_OF_GNE = 10  # of each kind of a GNE
 _SHUNT_BLOCKS = 8  # of a switched shunt
 _MOST_WINDINGS = 3  # of a transformer
 
@@ -163,6 +164,17 @@ _LAYOUTS: Mapping[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
 }
 """Table of RAWX → section of RAW, and the fields of each line of a record, in RAW's order."""
 
+_MULTI_TERMINAL = {
+    "ntermdc": ("nconv", "ndcbs", "ndcln", "mdc", "vconv", "vcmod", "vconvn"),
+    "ntermdcconv": (
+        *("ib", "n", "angmx", "angmn", "rc", "xc", "ebas", "tr", "tap", "tpmx", "tpmn", "tstp"),
+        *("setvl", "dcpf", "marg", "cnvcod"),
+    ),
+    "ntermdcbus": ("idc", "ib", "area", "zone", "dcname", "idc2", "rgrnd", "owner"),
+    "ntermdclink": ("idc", "jdc", "dcckt", "met", "rdc", "ldc"),
+}
+"""Tables of multi-terminal DC networks, each with the network's name first, and their fields in RAW's order."""
+
 _SYNONYMS = {"scode": "sc", "dcode": "dc", "tcode": "tc", "bcode": "bc"}
 
 _WITHOUT_EFFECT = {
@@ -176,11 +188,6 @@ _WITHOUT_EFFECT = {
     "subnode": "substation",
     "subswd": "substation",
     "subterm": "substation",
-    "ntermdc": "multi-terminal dc",
-    "ntermdcconv": "multi-terminal dc",
-    "ntermdcbus": "multi-terminal dc",
-    "ntermdclink": "multi-terminal dc",
-    "gne": "gne",
 }
 """Table of RAWX → section of RAW, where nothing reads the fields."""
 
@@ -218,6 +225,7 @@ def read_rawx(path: Path, text: str) -> RawFile:
     for table in tables.values():
         for section, records in _records(path, table):
             sections.setdefault(section, []).extend(records)
+    sections |= _multi_terminal(path, tables)
     if "bus" not in sections:
         raise InputError(f"{path}: network.bus has no rows; export the case once more")
     return RawFile(str(path), REVISION, base, frequency or None, sections)
@@ -251,9 +259,45 @@ def _records(path: Path, table: _Table) -> Iterator[tuple[str, list[Record]]]:
         for line, row in table.rows:
             settings = [f"{name.upper()}={value}" for name, value in _by_field(table, row).items()]
             yield "system-wide", [Record(place, line, ["GENERAL", *settings])]
-    elif table.name not in {"caseid", *_SOLUTION}:
+    elif table.name == "gne":
+        yield "gne", [line for row in table.rows for line in _gne_lines(place, table, row)]
+    elif table.name not in {"caseid", *_SOLUTION, *_MULTI_TERMINAL}:
         section = _WITHOUT_EFFECT.get(table.name, table.name)
         yield section, [Record(place, line, row) for line, row in table.rows]
+
+
+def _multi_terminal(path: Path, tables: Mapping[str, _Table]) -> dict[str, list[Record]]:
+    """Return the lines of multi-terminal DC networks: each network, then its converters, DC buses and links."""
+    rows = {
+        name: [(line, _by_field(tables[name], row)) for line, row in tables[name].rows]
+        for name in _MULTI_TERMINAL
+        if name in tables
+    }
+    records = []
+    for line, head in rows.get("ntermdc", []):
+        own = head.get("name", "")
+        fields = _in_order(head, _MULTI_TERMINAL["ntermdc"])
+        records.append(Record(str(path), line, [own, *fields]))
+        for table in ("ntermdcconv", "ntermdcbus", "ntermdclink"):
+            records += [
+                Record(str(path), at, _in_order(given, _MULTI_TERMINAL[table]))
+                for at, given in rows.get(table, [])
+                if given.get("name", "") == own
+            ]
+    return {"multi-terminal dc": records} if records else {}
+
+
+def _gne_lines(place: str, table: _Table, row: tuple[int, tuple[str, ...]]) -> Iterator[Record]:
+    """Yield the lines of a GNE in a RAW file: its head, then a line for each kind of values that it has."""
+    line, values = row
+    given = _by_field(table, values)
+    count = given.get("nterm", "")
+    buses = _numbered("bus", int(count) if count.isdigit() else 0)
+    head = ("name", "model", "nterm", *buses, "nreal", "nintg", "nchar", "stat", "owner", "nmet")
+    yield Record(place, line, _in_order(given, head))
+    for name, kind in (("nreal", "real"), ("nintg", "intg"), ("nchar", "char")):
+        if given.get(name, "0") not in ("", "0"):
+            yield Record(place, line, _in_order(given, _numbered(kind, _VALUES_OF_GNE)))
 
 
 def _by_field(table: _Table, row: Sequence[str]) -> dict[str, str]:

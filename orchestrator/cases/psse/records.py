@@ -16,6 +16,7 @@ from orchestrator.foreign_files import read_bytes, visible
 from orchestrator.units import LARGEST
 
 REVISIONS = tuple(range(29, 37))  # revisions whose records are known
+NODES = 35  # first revision with nodes in the records of machines, switched shunts and converters
 SWITCHING_DEVICES = 34  # first revision with system-wide data, switching devices and substations
 _FIXED_SHUNTS = 31  # first revision with fixed shunts beside the buses, and REV in the first record
 MOST_BYTES = 200_000_000  # of a file: ten times the largest interconnections
@@ -291,10 +292,51 @@ def _fields(line: str) -> list[str]:
     return fields
 
 
-# lines of a record
-_LINES = {"two-terminal dc": 3, "vsc dc line": 3, "facts device": 1, "induction machine": 1}
-LEFT_OUT = (*_LINES, "multi-terminal dc", "gne")
-"""Elements that our network does not have; `leave_out` of the case names those that may go."""
+LEFT_OUT = (
+    "two-terminal dc",
+    "vsc dc line",
+    "facts device",
+    "induction machine",
+    "multi-terminal dc",
+    "gne",
+)
+"""Devices that feed or draw by controls of their own; `leave_out` of the case names those that may go."""
+
+_FIELDS_OF_GNE = 10  # in the first line of one with one bus
+_IN_A_LINE = 10  # most values of a kind in one line of a GNE
+
+
+def elements(section: str, records: Sequence[Record]) -> Iterator[Sequence[Record]]:
+    """Yield the lines of each element of a section; the last one may lack some of its own."""
+    start = 0
+    while start < len(records):
+        count = _lines_of(section, records[start])
+        yield records[start : start + count]
+        start += count
+
+
+def _lines_of(section: str, record: Record) -> int:
+    """Return the number of lines of the element that begins with a record."""
+    if section in ("two-terminal dc", "vsc dc line"):
+        return 3
+    if section == "transformer":
+        return 5 if record.whole(2, "K", 0) else 4
+    if section == "multi-terminal dc":
+        counts = (record.text(k) for k in (1, 2, 3))
+        return 1 + sum(int(text) for text in counts if text.isdigit())
+    if section == "gne" and record.text(2).isdigit():
+        first = first_of_gne(record)
+        counts = (record.text(first + k) for k in range(3))
+        return 1 + sum(-(-int(text) // _IN_A_LINE) for text in counts if text.isdigit())
+    return 1
+
+
+def first_of_gne(record: Record) -> int:
+    """Return the column of NREAL of a GNE, behind its buses; with one bus, some programs write a second one of 0."""
+    terminals = record.whole(2, "NTERM")
+    has_second = terminals == 1 and len(record.fields) > _FIELDS_OF_GNE
+    return 3 + terminals + has_second
+
 
 _WITHOUT_EFFECT = {
     "area",
@@ -321,7 +363,10 @@ _KNOWN = {
 
 
 def leave_out(raw: RawFile, allowed: Sequence[str], changes: Changes) -> None:
-    """Note the elements that our network does not have."""
+    """Note the devices that the user leaves out.
+
+    Raises an `InputError` for sections that are not known, until the user leaves them out, and for a wish that means
+    nothing."""
     unknown = [kind for kind in allowed if kind not in (*LEFT_OUT, *raw.sections)]
     if unknown:
         raise InputError(f"leave_out: {unknown[0]!r} is unknown; choose from {', '.join(LEFT_OUT)}")
@@ -329,12 +374,11 @@ def leave_out(raw: RawFile, allowed: Sequence[str], changes: Changes) -> None:
     for section, records in raw.sections.items():
         if section in _WITHOUT_EFFECT | _KNOWN or not records:
             continue
-        step = _LINES.get(section, len(records))
-        lines = [record.line for record in records[::step]]
+        lines = [element[0].line for element in elements(section, records)]
         if section in allowed:
             for line in lines:
                 changes.note(line, f"{section}: left out, as leave_out says")
-        else:
+        elif section not in LEFT_OUT:
             refused.append(f"{section} (line {', '.join(map(str, lines))})")
     if refused:
         raise InputError(

@@ -4,6 +4,8 @@ PSS/E solves with the limits of the machines' reactive power, and saves what cam
 QG = QT or QB and another VM than VS.  Its dynamics start from VM and QG.  If both fit, VM tells the machine's operating
 point, and VS does not."""
 
+import cmath
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -40,6 +42,11 @@ def reactive_needs(
         voltages[inner] = np.atleast_1d(spsolve(matrix[np.ix_(inner, inner)].tocsc(), drawn))
     needed = base_mva * (voltages * (matrix @ voltages).conj()).imag + table[:, 3]
     return dict(zip(rows, map(float, needed), strict=True))
+
+
+def stated_voltages(rows: Sequence[Sequence[float]] | Matrix) -> dict[int, complex]:
+    """Return the file's voltages [pu] by bus, from MATPOWER's table of buses; a star point has none."""
+    return {int(row[0]): cmath.rect(row[7], math.radians(row[8])) for row in rows if row[7] > 0}
 
 
 def fits(fed_mvar: float, needed_mvar: float) -> bool:
