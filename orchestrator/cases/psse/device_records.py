@@ -14,7 +14,6 @@ from orchestrator.cases.psse.two_terminal import TwoTerminal
 from orchestrator.cases.psse.unknown_devices import UnknownDevice
 from orchestrator.cases.psse.vsc_lines import Converter, VscLine
 
-NOT_THERE = "not used: bus "  # begin of what is said of a device at a bus that is not there
 _KILO = 1000.0
 _NO_LIMIT = 9999.0  # Mvar by which PSS/E says that a converter has no limit
 _STATUS = {
@@ -39,10 +38,13 @@ class Places:
 
 @dataclass(frozen=True)
 class FoundDevices:
-    """Devices in service, and by line why others are not used."""
+    """Devices in service, and why others are not used, by section and place among its elements."""
 
     devices: tuple[Device, ...]
-    unused: Mapping[int, str]
+    unused: Mapping[tuple[str, int], str]
+    not_there: tuple[
+        tuple[int, str], ...
+    ] = ()  # lines of those at a bus that is not there, and what is said
 
 
 def read_devices(raw: RawFile, left_out: Collection[str], places: Places) -> FoundDevices:
@@ -50,25 +52,28 @@ def read_devices(raw: RawFile, left_out: Collection[str], places: Places) -> Fou
 
     Raises an `InputError` for a record that cannot be understood, and for what our network cannot have."""
     found: list[Device] = []
-    unused: dict[int, str] = {}
+    unused: dict[tuple[str, int], str] = {}
+    not_there = []
     for section, read in _READERS.items():
         if section in left_out:
             continue
-        for lines in elements(section, raw.of(section)):
+        for k, lines in enumerate(elements(section, raw.of(section))):
             record = lines[0]
             if not any(record.fields):
-                unused[record.line] = "an empty record"
+                unused[section, k] = "an empty record"
                 continue
             if not _status(section, record):
-                unused[record.line] = "out of service: its status is 0"
+                unused[section, k] = "out of service: its status is 0"
                 continue
             missing = [bus for bus in _buses(raw, section, lines) if places.standing(bus) is None]
             if missing:
                 named = ", ".join(map(str, missing))
-                unused[record.line] = f"{NOT_THERE}{named} is not in the file, or out of service"
+                text = f"not used: bus {named} is not in the file, or out of service"
+                unused[section, k] = text
+                not_there.append((record.line, text))
                 continue
             found.append(read(raw, lines, places))
-    return FoundDevices(tuple(found), unused)
+    return FoundDevices(tuple(found), unused, tuple(not_there))
 
 
 def _status(section: str, record: Record) -> int:

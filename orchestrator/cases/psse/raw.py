@@ -12,7 +12,6 @@ from fmus.grid.element_data import SMALLEST_REACTANCE
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.network_sources import SourceTables
 from orchestrator.cases.psse.device_records import (
-    NOT_THERE,
     FoundDevices,
     Places,
     read_devices,
@@ -461,9 +460,8 @@ class _Reading:
         """Read DC lines, FACTS devices and the like; series parts of FACTS devices may be branches."""
         places = Places(self._standing, self._kilovolts)
         self._devices = read_devices(self._raw, leaving_out, places)
-        for line, why in self._devices.unused.items():
-            if why.startswith(NOT_THERE):
-                self._changes.note(line, why)
+        for line, text in self._devices.not_there:
+            self._changes.note(line, text)
         for record, z in series_impedances(self._raw, leaving_out):
             start, end = (self._standing(self._own(record, k)) for k in (1, 2))
             if start is not None and end is not None and start != end:

@@ -30,20 +30,20 @@ def record_uses(
     raw: RawFile,
     merged: Collection[int],
     leaving_out: Collection[str],
-    unused: Mapping[int, str],
+    unused: Mapping[tuple[str, int], str],
 ) -> tuple[RecordUse, ...]:
     """Return what became of every element of a file, by the first line of its record.
 
     ``merged``: lines of zero impedance lines that make their buses one; ``leaving_out``: elements that the user leaves
-    out; ``unused``: why a device is not used, by line."""
+    out; ``unused``: why a device is not used, by section and place among its elements."""
     found = []
     for section, records in raw.sections.items():
-        for lines in elements(section, records):
+        for k, lines in enumerate(elements(section, records)):
             use, why = _use(raw, section, lines, leaving_out)
             if section == "branch" and lines[0].line in merged:
                 use, why = UseOfRecord.NOT_USED, "zero impedance: its buses are one"
-            if section in LEFT_OUT and lines[0].line in unused:
-                use, why = UseOfRecord.NOT_USED, unused[lines[0].line]
+            if (section, k) in unused:
+                use, why = UseOfRecord.NOT_USED, unused[section, k]
             found.append(RecordUse(raw.place, lines[0].line, section, use, why))
     return tuple(found)
 

@@ -272,7 +272,7 @@ def test_loads_shunts_and_machines(written):
     assert lines[int(held) - 1].startswith("6,1,0")
 
 
-def test_what_the_network_does_not_have_is_refused_unless_the_user_lets_it_go(written, tmp_path):
+def test_devices_may_be_left_out_and_an_unknown_section_must_be(written):
     found = records(33)
     found["TWO-TERMINAL DC"] += [
         "'DC 1',1,5,100,500",
@@ -285,15 +285,19 @@ def test_what_the_network_does_not_have_is_refused_unless_the_user_lets_it_go(wr
     found["FACTS DEVICE"] += ["'F',5,0,1"]
     text = raw(33, found)
     first = text.splitlines().index("'DC 1',1,5,100,500") + 1
-    with pytest.raises(
-        InputError,
-        match=rf"two-terminal dc \(line {first}, {first + 3}\); facts device .*leave_out = \['two-ter",
-    ):
-        written(text)
     data = written(text, leave_out=["two-terminal dc", "facts device"])
     assert data.changes[0].place.rpartition("grid.raw, ")[2] == f"lines {first}, {first + 3}"
+    assert data.changes[0].text == "two-terminal dc: left out, as leave_out says"
     with pytest.raises(InputError, match="leave_out: 'dc' is unknown; choose from two-terminal dc"):
         written(text, leave_out=["dc"])
+    unknown = raw(33).replace(
+        "END OF GNE DATA, BEGIN", "END OF GNE DATA, BEGIN WAVE TRAP DATA\n5,1\n0 / BEGIN"
+    )
+    with pytest.raises(
+        InputError, match=r"no such elements: wave trap .*leave_out = \['wave trap'\]"
+    ):
+        written(unknown)
+    assert written(unknown, leave_out=["wave trap"]).buses == written(raw(33)).buses
 
 
 @pytest.mark.slow
