@@ -21,8 +21,8 @@ from orchestrator.cases.csv_rows import (
     rows_of,
     seen_from_here,
 )
-from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt, inner_buses, legs_of
-from orchestrator.cases.flow_equations import FlowEquations
+from orchestrator.cases.flow_balance import inner_buses
+from orchestrator.cases.imported_flow import imported_equations
 from orchestrator.cases.load_models import FlowLaws, device_laws, flow_laws, with_laws
 from orchestrator.cases.network_import import Generation, ImportedNetwork, bus_of, import_network
 from orchestrator.cases.network_sources import read_matpower, read_pandapower
@@ -241,8 +241,10 @@ def _from_raw(path: Path, table: NetworkTable) -> _Source:
         machines,
         raw.idle,
         misfit,
-        tuple(replace(x, why=solved.words_of(x.kind, x.line) or x.why) for x in raw.records),
-        solved.loads,
+        records=tuple(
+            replace(x, why=solved.words_of(x.kind, x.line) or x.why) for x in raw.records
+        ),
+        device_loads=solved.loads,
     )
 
 
@@ -326,21 +328,7 @@ def misfit_of(
     # of transformers with an open winding
     stars = [place for place in network.buses if place not in stated]
     buses = [*places, *stars, *(inner for x in network.transformers for inner in inner_buses(x))]
-    lines = [
-        FlowLine(x.name, x.from_bus, x.to_bus, x.R, x.X, x.B, x.tap, x.shift) for x in network.lines
-    ]
-    equations = FlowEquations.of(
-        buses,
-        [*lines, *(leg for x in network.transformers for leg in legs_of(x))],
-        [FlowLoad(x.bus, x.p_mw, x.q_mvar) for x in network.loads],
-        [
-            FlowShunt(x.bus, x.g_mw / SYSTEM_BASE_MVA, x.b_mvar / SYSTEM_BASE_MVA)
-            for x in network.shunts
-        ],
-        {place: g.p_mw / SYSTEM_BASE_MVA for place, g in network.generation.items()},
-        {},
-        network.slack,
-    )
+    equations = imported_equations(network, buses, {}, network.slack)
     known, matrix = len(places), equations.matrix
     voltages = np.array([*(stated[place] for place in places), *[1 + 0j] * (len(buses) - known)])
     if known < len(buses):

@@ -14,11 +14,12 @@ from scipy.sparse.csgraph import connected_components
 
 from fmus.grid.network import Load
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt, inner_buses, legs_of
+from orchestrator.cases.flow_balance import FlowLine, inner_buses
 from orchestrator.cases.flow_equations import FlowEquations
 from orchestrator.cases.flow_newton import solve, solve_from
+from orchestrator.cases.imported_flow import flow_lines, imported_equations
 from orchestrator.cases.network_import import ImportedNetwork
-from orchestrator.cases.psse.devices import Device, Ending
+from orchestrator.cases.psse.devices import DeviceEnd, HeldDevice
 from orchestrator.errors import InputError
 
 _ROUNDS = 100
@@ -34,8 +35,8 @@ class SolvedDevices:
     """Loads in the place of devices, what these feed in words, and what is unusual in them, each with its device."""
 
     loads: tuple[Load, ...] = ()
-    words: tuple[tuple[Device, str], ...] = ()
-    doubts: tuple[tuple[Device, str], ...] = ()
+    words: tuple[tuple[HeldDevice, str], ...] = ()
+    doubts: tuple[tuple[HeldDevice, str], ...] = ()
 
     def words_of(self, section: str, line: int) -> str:
         """Return what the devices of a section feed whose records stand in a line; in RAWX there may be several."""
@@ -44,7 +45,7 @@ class SolvedDevices:
 
 
 def solved_devices(
-    devices: Sequence[Device], network: ImportedNetwork, stated: Mapping[int, complex]
+    devices: Sequence[HeldDevice], network: ImportedNetwork, stated: Mapping[int, complex]
 ) -> SolvedDevices:
     """Solve devices and network together.
 
@@ -53,7 +54,7 @@ def solved_devices(
     Raises an `InputError` where a device cannot feed what its record says, or the file does not tell it."""
     if not devices:
         return SolvedDevices()
-    doubts: list[tuple[Device, str]] = []
+    doubts: list[tuple[HeldDevice, str]] = []
     solution = _Solution.of(devices, network, stated)
     state = solution.state()
     if state is None:
@@ -76,7 +77,7 @@ def solved_devices(
     return SolvedDevices(tuple(loads), tuple(words), tuple(doubts))
 
 
-def _in_words(device: Device, endings: Sequence["_Fed"]) -> str:
+def _in_words(device: HeldDevice, endings: Sequence["_Fed"]) -> str:
     """Return what a device feeds and draws, such as ``feeds 98.7 MW and draws 26.3 Mvar at bus 8``."""
     parts = []
     for ending in endings:
@@ -89,9 +90,9 @@ def _in_words(device: Device, endings: Sequence["_Fed"]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Fed:
-    """What one end of a device feeds in the solution [MW, Mvar]."""
+    """Power that one end of a device feeds in the solution [MW, Mvar]."""
 
-    device: Device
+    device: HeldDevice
     name: str
     bus: int
     fed: complex
@@ -118,7 +119,7 @@ class _Solution:
 
     def __init__(
         self,
-        devices: Sequence[Device],
+        devices: Sequence[HeldDevice],
         equations: FlowEquations,
         stated: Mapping[int, complex],
         machines: frozenset[int],
@@ -135,7 +136,7 @@ class _Solution:
     @classmethod
     def of(
         cls,
-        devices: Sequence[Device],
+        devices: Sequence[HeldDevice],
         network: ImportedNetwork,
         stated: Mapping[int, complex],
     ) -> "_Solution":
@@ -175,7 +176,7 @@ class _Solution:
         fed = tuple(_Fed(d, e.name, e.bus, e.fed) for d, e in endings)
         return _State(self._stated, fed)
 
-    def _endings(self, voltages: Mapping[int, complex]) -> list[tuple[Device, Ending]]:
+    def _endings(self, voltages: Mapping[int, complex]) -> list[tuple[HeldDevice, DeviceEnd]]:
         found = []
         for device in self._devices:
             for ending in device.endings(voltages):
@@ -187,7 +188,7 @@ class _Solution:
                 found.append((device, known))
         return found
 
-    def _balance(self, device: Device, ending: Ending) -> complex:
+    def _balance(self, device: HeldDevice, ending: DeviceEnd) -> complex:
         """Return what the file's solution lacks at a bus [MW, Mvar], which the only device there must feed.
 
         Raises an `InputError` if the file is not solved, or something else may feed it as well."""
@@ -214,7 +215,7 @@ class _Solution:
         number = bus.removeprefix("bus_")
         return int(number) if number.isdigit() else -1
 
-    def _is_held(self, ending: Ending) -> bool:
+    def _is_held(self, ending: DeviceEnd) -> bool:
         """Return whether an end holds its bus' voltage: no machine does, and no limit acts."""
         limit = self._limits.get(ending.bus)
         return (
@@ -224,7 +225,7 @@ class _Solution:
             and not (limit and limit.acts)
         )
 
-    def _limited(self, ending: Ending) -> float:
+    def _limited(self, ending: DeviceEnd) -> float:
         """Return the reactive power of an end at its limit [Mvar]; 0 where none acts."""
         limit = self._limits.get(ending.bus)
         if ending.hold is None or limit is None or not limit.acts or ending.bus in self._machines:
@@ -232,12 +233,14 @@ class _Solution:
         return ending.hold.most_mvar if limit.most else ending.hold.least_mvar
 
     def _with(
-        self, endings: Sequence[tuple[Device, Ending]], voltages: Mapping[int, complex]
+        self, endings: Sequence[tuple[HeldDevice, DeviceEnd]], voltages: Mapping[int, complex]
     ) -> FlowEquations:
         """Return the equations with what the devices feed, linear about these voltages."""
         equations = self._equations
-        fed, held = equations.fed.copy(), equations.held.copy()
-        magnitudes, current = equations.magnitudes.copy(), equations.drawn_as_current.copy()
+        fed = equations.fed.copy()
+        held = equations.held.copy()
+        magnitudes = equations.magnitudes.copy()
+        current = equations.drawn_as_current.copy()
         for device, ending in endings:
             k = self._place.get(ending.bus)
             if k is None:
@@ -254,7 +257,7 @@ class _Solution:
 
     def _fed(
         self,
-        endings: Sequence[tuple[Device, Ending]],
+        endings: Sequence[tuple[HeldDevice, DeviceEnd]],
         equations: FlowEquations,
         voltages: NDArray[np.complex128],
     ) -> list[_Fed]:
@@ -263,7 +266,8 @@ class _Solution:
         holding = Counter(ending.bus for _, ending in endings if self._is_held(ending))
         found = []
         for device, ending in endings:
-            q, doubt = self._limited(ending), ""
+            doubt = ""
+            q = self._limited(ending)
             if self._is_held(ending):
                 q = float(lacking[self._place[ending.bus]]) / holding[ending.bus]
             elif q:
@@ -276,7 +280,7 @@ class _Solution:
 
     def _switch(
         self,
-        endings: Sequence[tuple[Device, Ending]],
+        endings: Sequence[tuple[HeldDevice, DeviceEnd]],
         fed: Sequence[_Fed],
         voltages: Mapping[int, complex],
     ) -> bool:
@@ -302,7 +306,7 @@ class _Solution:
         return switched
 
 
-def _slope(device: Device, ending: Ending, voltages: Mapping[int, complex]) -> complex:
+def _slope(device: HeldDevice, ending: DeviceEnd, voltages: Mapping[int, complex]) -> complex:
     """Return the derivative of what an end feeds by its own voltage's magnitude [MW, Mvar per pu]."""
     v = voltages[ending.bus]
     moved = {**voltages, ending.bus: v * (1 + _STEP / abs(v))}
@@ -314,27 +318,12 @@ def _equations(network: ImportedNetwork) -> FlowEquations:
     """Return the equations of the part of a network in which its slack is."""
     inner = [bus for x in network.transformers for bus in inner_buses(x)]
     buses = [*network.buses, *inner]
-    own = [
-        FlowLine(x.name, x.from_bus, x.to_bus, x.R, x.X, x.B, x.tap, x.shift) for x in network.lines
-    ]
-    lines = [*own, *(leg for x in network.transformers for leg in legs_of(x))]
     slack = network.slack or max(
         network.generation, key=lambda bus: network.generation[bus].p_mw, default=buses[0]
     )
-    reached = _reached(buses, lines, slack)
-    return FlowEquations.of(
-        [bus for bus in buses if bus in reached],
-        [line for line in lines if line.from_bus in reached],
-        [FlowLoad(x.bus, x.p_mw, x.q_mvar) for x in network.loads if x.bus in reached],
-        [
-            FlowShunt(x.bus, x.g_mw / SYSTEM_BASE_MVA, x.b_mvar / SYSTEM_BASE_MVA)
-            for x in network.shunts
-            if x.bus in reached
-        ],
-        {bus: g.p_mw / SYSTEM_BASE_MVA for bus, g in network.generation.items() if bus in reached},
-        {bus: g.v_pu for bus, g in network.generation.items() if bus in reached},
-        slack,
-    )
+    reached = _reached(buses, flow_lines(network), slack)
+    held = {bus: g.v_pu for bus, g in network.generation.items()}
+    return imported_equations(network, [bus for bus in buses if bus in reached], held, slack)
 
 
 def _reached(buses: Sequence[str], lines: Sequence[FlowLine], slack: str) -> set[str]:

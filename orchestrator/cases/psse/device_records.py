@@ -5,8 +5,8 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from orchestrator.cases.psse.bridges import Bridges
-from orchestrator.cases.psse.devices import Device
-from orchestrator.cases.psse.facts_devices import BYPASSED, IMPEDANCE, NORMAL, Facts
+from orchestrator.cases.psse.devices import HeldDevice
+from orchestrator.cases.psse.facts_devices import BYPASSED, IMPEDANCE, NORMAL, FactsDevice
 from orchestrator.cases.psse.induction_machines import ABSENT, Circuit, InductionMachine
 from orchestrator.cases.psse.multi_terminal import MultiTerminal, Terminal
 from orchestrator.cases.psse.records import NODES, RawFile, Record, elements, first_of_gne
@@ -40,7 +40,7 @@ class Places:
 class FoundDevices:
     """Devices in service, and why others are not used, by section and place among its elements."""
 
-    devices: tuple[Device, ...]
+    devices: tuple[HeldDevice, ...]
     unused: Mapping[tuple[str, int], str]
     not_there: tuple[
         tuple[int, str], ...
@@ -51,7 +51,7 @@ def read_devices(raw: RawFile, left_out: Collection[str], places: Places) -> Fou
     """Return the devices of a file that are in service, without the kinds that the user leaves out.
 
     Raises an `InputError` for a record that cannot be understood, and for what our network cannot have."""
-    found: list[Device] = []
+    found: list[HeldDevice] = []
     unused: dict[tuple[str, int], str] = {}
     not_there = []
     for section, read in _READERS.items():
@@ -122,13 +122,13 @@ def _bridges(line: Record, capacitor: int | None) -> Bridges:
     if not tap > 0:
         raise line.error(f"TAP is {tap:g}; it must exceed 0")
     return Bridges(
-        line.whole(1, "NB", 0),
-        line.number(5, "XC [ohm]", 0.0),
-        0.0 if capacitor is None else line.number(capacitor, "XCAP [ohm]", 0.0),
-        line.number(6, "EBAS [kV]", 0.0),
-        line.number(7, "TR", 1.0) / tap,
-        math.radians(line.number(3, "ANMN [degrees]", 0.0)),
-        math.radians(line.number(2, "ANMX [degrees]", 90.0)),
+        count=line.whole(1, "NB", 0),
+        x_ohm=line.number(5, "XC [ohm]", 0.0),
+        capacitor_ohm=0.0 if capacitor is None else line.number(capacitor, "XCAP [ohm]", 0.0),
+        base_kv=line.number(6, "EBAS [kV]", 0.0),
+        ratio=line.number(7, "TR", 1.0) / tap,
+        least_angle=math.radians(line.number(3, "ANMN [degrees]", 0.0)),
+        most_angle=math.radians(line.number(2, "ANMX [degrees]", 90.0)),
     )
 
 
@@ -198,20 +198,20 @@ def _converter(line: Record, places: Places) -> Converter:
         raise line.error(f"MAXQ is {most:g} Mvar, less than MINQ of {least:g}; swap them")
     remote = abs(line.whole(13, "the controlled bus", 0))
     return Converter(
-        bus,
-        kind,
-        mode,
-        setting,
-        held,
-        line.number(5, "ALOSS [kW]", 0.0) / _KILO,
-        line.number(6, "BLOSS [kW/A]", 0.0),
-        line.number(7, "MINLOSS [kW]", 0.0) / _KILO,
-        line.number(8, "SMAX [MVA]", 0.0),
-        line.number(9, "IMAX [A]", 0.0) / _KILO,
-        most if most < _NO_LIMIT else math.inf,
-        least if least > -_NO_LIMIT else -math.inf,
-        bool(remote) and places.standing(remote) != bus,
-        places.kilovolts.get(bus, 0.0),
+        bus=bus,
+        type=kind,
+        mode=mode,
+        dc_setting=setting,
+        ac_setting=held,
+        loss_mw=line.number(5, "ALOSS [kW]", 0.0) / _KILO,
+        loss_kv=line.number(6, "BLOSS [kW/A]", 0.0),
+        least_loss_mw=line.number(7, "MINLOSS [kW]", 0.0) / _KILO,
+        rating_mva=line.number(8, "SMAX [MVA]", 0.0),
+        rating_ka=line.number(9, "IMAX [A]", 0.0) / _KILO,
+        most_mvar=most if most < _NO_LIMIT else math.inf,
+        least_mvar=least if least > -_NO_LIMIT else -math.inf,
+        is_remote=bool(remote) and places.standing(remote) != bus,
+        base_kv=places.kilovolts.get(bus, 0.0),
     )
 
 
@@ -281,7 +281,7 @@ def _link(line: Record) -> tuple[int, int, float]:
     return line.whole(0, "IDC"), line.whole(1, "JDC"), ohm
 
 
-def _facts(raw: RawFile, lines: Sequence[Record], places: Places) -> Facts:
+def _facts(raw: RawFile, lines: Sequence[Record], places: Places) -> FactsDevice:
     (record,) = lines
     mode, far = record.whole(3, "MODE", 1), record.whole(2, "J", 0)
     if far and mode not in (NORMAL, BYPASSED, IMPEDANCE):
@@ -294,7 +294,7 @@ def _facts(raw: RawFile, lines: Sequence[Record], places: Places) -> Facts:
         raise record.error(f"VSET is {held:g} pu; a voltage of 0 to 2 pu is wanted")
     sending = _bus(record, 1, places)
     remote = abs(record.whole(19, "the controlled bus", 0))
-    return Facts(
+    return FactsDevice(
         "facts device",
         record.line,
         record.text(0),
@@ -369,7 +369,7 @@ def _gne(raw: RawFile, lines: Sequence[Record], places: Places) -> UnknownDevice
     return UnknownDevice("gne", head.line, head.text(0), place=raw.place, buses=buses)
 
 
-_READERS: Mapping[str, Callable[[RawFile, Sequence[Record], Places], Device]] = {
+_READERS: Mapping[str, Callable[[RawFile, Sequence[Record], Places], HeldDevice]] = {
     "two-terminal dc": _two_terminal,
     "vsc dc line": _vsc_line,
     "multi-terminal dc": _multi_terminal,

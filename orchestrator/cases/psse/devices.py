@@ -19,7 +19,7 @@ class Hold:
 
 
 @dataclass(frozen=True, slots=True)
-class Ending:
+class DeviceEnd:
     """A place where a device meets the AC network.
 
     ``fed``: P + jQ that it feeds into the bus [MW, Mvar]; of one that holds a voltage, Q is what it feeds besides.
@@ -33,7 +33,7 @@ class Ending:
 
 
 @dataclass(frozen=True)
-class Device(ABC):
+class HeldDevice(ABC):
     """A device: the section of its record, its line there, and its name."""
 
     section: str
@@ -46,7 +46,7 @@ class Device(ABC):
         """Return the numbers of the device's buses."""
 
     @abstractmethod
-    def endings(self, voltages: Voltages) -> tuple[Ending, ...]:
+    def endings(self, voltages: Voltages) -> tuple[DeviceEnd, ...]:
         """Return what the device feeds at these voltages."""
 
     def doubts(self, voltages: Voltages) -> tuple[str, ...]:

@@ -2,14 +2,16 @@
 
 from dataclasses import dataclass
 
-from orchestrator.cases.psse.devices import Device, Ending, Hold, Voltages
+from orchestrator.cases.psse.devices import DeviceEnd, HeldDevice, Hold, Voltages
 
-NORMAL, BYPASSED, IMPEDANCE = 1, 2, 3
-"""MODE: the series part sets a power, is bypassed, or is an impedance."""
+# MODE: the series part sets a power, is bypassed, or is an impedance
+NORMAL = 1
+BYPASSED = 2
+IMPEDANCE = 3
 
 
 @dataclass(frozen=True)
-class Facts(Device):
+class FactsDevice(HeldDevice):
     sending: int  # the bus of the shunt part
     terminal: int  # the bus behind the series part; 0 for none
     mode: int
@@ -27,10 +29,11 @@ class Facts(Device):
     def places(self) -> tuple[int, ...]:
         return (self.sending, self.terminal) if self.terminal else (self.sending,)
 
-    def endings(self, voltages: Voltages) -> tuple[Ending, ...]:
+    def endings(self, voltages: Voltages) -> tuple[DeviceEnd, ...]:
         v = abs(voltages[self.sending])
         held = v if self.is_remote else self.v_pu
-        fed, series = 0j, 0.0
+        fed = 0j
+        series = 0.0  # reactive power that flows into the series part
         found = []
         if self.sets_power:
             # the shunt part brings what active power the series part takes; both are at the sending bus
@@ -38,11 +41,11 @@ class Facts(Device):
             series = (voltages[self.sending] * current.conjugate()).imag
             fed = complex(-self.power.real)
             name = self.ending_name("facts", self.terminal)
-            found.append(Ending(name, self.terminal, self.power))
+            found.append(DeviceEnd(name, self.terminal, self.power))
         most = self.most_mva * v
         hold = Hold(held, -most - series, most - series)
         name = self.ending_name("facts", self.sending)
-        return (Ending(name, self.sending, fed, hold), *found)
+        return (DeviceEnd(name, self.sending, fed, hold), *found)
 
     def doubts(self, voltages: Voltages) -> tuple[str, ...]:
         if self.is_remote:

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from orchestrator.cases.psse.devices import Device, Ending, Voltages
+from orchestrator.cases.psse.devices import DeviceEnd, HeldDevice, Voltages
 from orchestrator.errors import InputError
 
 ABSENT = 999.0  # value of a resistance or a reactance that is not given
-_EFFICIENCY, _REACTIVE = 0.945, 0.55
-"""Electrical power by mechanical, and Q by P, of machines whose record names a standard design instead of a circuit.
-
-Source: the four machines of design B in the solved sample case of PSS/E 34 have 0.945, and 0.52 to 0.59."""
+# of machines whose record names a standard design instead of a circuit; the four machines of design B in the solved
+# sample case of PSS/E 34 have 0.945, and 0.52 to 0.59
+_EFFICIENCY = 0.945
+_REACTIVE = 0.55  # Q by P
 
 _SLIPS = np.geomspace(1e-6, 1.0, 400)  # at which the torque is looked for
 
@@ -39,7 +39,7 @@ class Circuit:
 
 
 @dataclass(frozen=True)
-class InductionMachine(Device):
+class InductionMachine(HeldDevice):
     place: str
     bus: int
     is_mechanical: bool  # whether PSET is the power at the shaft
@@ -53,9 +53,9 @@ class InductionMachine(Device):
     def places(self) -> tuple[int, ...]:
         return (self.bus,)
 
-    def endings(self, voltages: Voltages) -> tuple[Ending, ...]:
+    def endings(self, voltages: Voltages) -> tuple[DeviceEnd, ...]:
         drawn = self._drawn(abs(voltages[self.bus]))
-        return (Ending(self.ending_name("induction", self.bus), self.bus, -drawn),)
+        return (DeviceEnd(self.ending_name("induction", self.bus), self.bus, -drawn),)
 
     def doubts(self, voltages: Voltages) -> tuple[str, ...]:
         found = []

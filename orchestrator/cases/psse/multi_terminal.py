@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.cases.psse.bridges import Bridges
-from orchestrator.cases.psse.devices import Device, Ending, Voltages
+from orchestrator.cases.psse.devices import DeviceEnd, HeldDevice, Voltages
 from orchestrator.errors import InputError
 
 CURRENT = 2  # MDC
-_ROUNDS, _ACCURATE = 500, 1e-12
+_ROUNDS = 500
+_ACCURATE = 1e-12  # change of a voltage in a round, by the held one
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +25,7 @@ class Terminal:
 
 
 @dataclass(frozen=True)
-class MultiTerminal(Device):
+class MultiTerminal(HeldDevice):
     place: str
     mode: int
     terminals: tuple[Terminal, ...]
@@ -36,12 +37,12 @@ class MultiTerminal(Device):
     def places(self) -> tuple[int, ...]:
         return tuple(terminal.bus for terminal in self.terminals)
 
-    def endings(self, voltages: Voltages) -> tuple[Ending, ...]:
+    def endings(self, voltages: Voltages) -> tuple[DeviceEnd, ...]:
         found = []
         for terminal, kilovolts, current in self.state():
             q = terminal.bridges.reactive(abs(voltages[terminal.bus]), abs(current), abs(kilovolts))
             name = self.ending_name("dc", terminal.bus)
-            found.append(Ending(name, terminal.bus, complex(-kilovolts * current, -q)))
+            found.append(DeviceEnd(name, terminal.bus, complex(-kilovolts * current, -q)))
         return tuple(found)
 
     def doubts(self, voltages: Voltages) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from orchestrator.cases.psse.device_records import (
     read_devices,
     series_impedances,
 )
-from orchestrator.cases.psse.devices import Device
+from orchestrator.cases.psse.devices import HeldDevice
 from orchestrator.cases.psse.raw_accounts import record_uses
 from orchestrator.cases.psse.raw_file import read_file
 from orchestrator.cases.psse.records import NODES, SWITCHING_DEVICES, RawFile, Record, leave_out
@@ -92,7 +92,7 @@ class RawNetwork:
     changes: tuple[Problem, ...]
     idle: frozenset[tuple[int, str]] = frozenset()
     records: tuple[RecordUse, ...] = ()
-    devices: tuple[Device, ...] = ()
+    devices: tuple[HeldDevice, ...] = ()
 
 
 def read_raw(
@@ -167,8 +167,8 @@ class _Reading:
             machines,
             tuple(self._changes.listed()),
             frozenset(self._idle),
-            records,
-            self._devices.devices,
+            records=records,
+            devices=self._devices.devices,
         )
 
     def _bus(self, record: Record, index: int = 0) -> int:
@@ -263,7 +263,7 @@ class _Reading:
             self._changes.note(record.line, text)
 
     def _in_service(self, record: Record, status: int | None, name: str) -> bool:
-        """Whether an element counts: one out of service may even point to a bus that is not there, as in PSS/E."""
+        """Return whether an element counts; one out of service may point to a bus that is not there, as in PSS/E."""
         return status is None or bool(record.whole(status, name, 1))
 
     def _loads(self) -> None:

@@ -8,7 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from orchestrator.cases.network_import import ImportedNetwork, bus_of
-from orchestrator.cases.psse.devices import Device
+from orchestrator.cases.psse.devices import HeldDevice
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class SynchronousPart:
 
 
 def synchronous_part(
-    network: ImportedNetwork, devices: Sequence[Device], references: Collection[str]
+    network: ImportedNetwork, devices: Sequence[HeldDevice], references: Collection[str]
 ) -> SynchronousPart:
     """Return the part with the most buses of all that devices join; the network itself where none joins any.
 

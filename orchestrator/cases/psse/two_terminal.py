@@ -4,11 +4,12 @@ import math
 from dataclasses import dataclass
 
 from orchestrator.cases.psse.bridges import Bridges
-from orchestrator.cases.psse.devices import Device, Ending, Voltages
+from orchestrator.cases.psse.devices import DeviceEnd, HeldDevice, Voltages
 from orchestrator.errors import InputError
 
-_POWER, _CURRENT = 1, 2  # MDC
-_ROUNDS, _ACCURATE = 500, 1e-12
+_CURRENT = 2  # MDC of a line that holds its current
+_ROUNDS = 500
+_ACCURATE = 1e-12  # change of the current in a round [kA]
 _BEYOND = math.radians(0.5)  # by which an angle may exceed its band unasked
 
 
@@ -22,7 +23,7 @@ class Pole:
 
 
 @dataclass(frozen=True)
-class TwoTerminal(Device):
+class TwoTerminal(HeldDevice):
     """A DC line: the rectifier's firing angle holds the current or the power, the inverter's the voltage.
 
     Taps stay where the file has them."""
@@ -42,13 +43,13 @@ class TwoTerminal(Device):
     def places(self) -> tuple[int, ...]:
         return self.buses
 
-    def endings(self, voltages: Voltages) -> tuple[Ending, ...]:
+    def endings(self, voltages: Voltages) -> tuple[DeviceEnd, ...]:
         pole = self.pole(voltages)
         found = []
         for bus, bridges, kilovolts, sign in self._ends(pole):
             q = bridges.reactive(abs(voltages[bus]), pole.current, kilovolts)
             fed = complex(sign * kilovolts * pole.current, -q)
-            found.append(Ending(self.ending_name("dc", bus), bus, fed))
+            found.append(DeviceEnd(self.ending_name("dc", bus), bus, fed))
         return tuple(found)
 
     def doubts(self, voltages: Voltages) -> tuple[str, ...]:

@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 
-from orchestrator.cases.psse.devices import Device, Ending, Voltages
+from orchestrator.cases.psse.devices import DeviceEnd, HeldDevice, Voltages
 
 
 @dataclass(frozen=True)
-class UnknownDevice(Device):
+class UnknownDevice(HeldDevice):
     """A device that feeds what its buses lack in the file's solution."""
 
     place: str
@@ -16,7 +16,7 @@ class UnknownDevice(Device):
     def places(self) -> tuple[int, ...]:
         return self.buses
 
-    def endings(self, voltages: Voltages) -> tuple[Ending, ...]:
+    def endings(self, voltages: Voltages) -> tuple[DeviceEnd, ...]:
         return tuple(
-            Ending(self.ending_name("gne", bus), bus, is_unknown=True) for bus in self.buses
+            DeviceEnd(self.ending_name("gne", bus), bus, is_unknown=True) for bus in self.buses
         )

@@ -3,12 +3,18 @@
 import math
 from dataclasses import dataclass
 
-from orchestrator.cases.psse.devices import Device, Ending, Hold, Voltages
+from orchestrator.cases.psse.devices import DeviceEnd, HeldDevice, Hold, Voltages
 from orchestrator.errors import InputError
 
-OUT, DC_VOLTAGE, POWER = 0, 1, 2  # TYPE
-HOLDS_VOLTAGE, POWER_FACTOR = 1, 2  # MODE
-_ROUNDS, _ACCURATE = 500, 1e-12
+# TYPE: out of service, holds the DC voltage, or sets a power
+OUT = 0
+DC_VOLTAGE = 1
+POWER = 2
+# MODE: holds the voltage of its bus, or a power factor
+HOLDS_VOLTAGE = 1
+POWER_FACTOR = 2
+_ROUNDS = 500
+_ACCURATE = 1e-12  # change of the current in a round [kA]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +55,7 @@ class Converter:
 
 
 @dataclass(frozen=True)
-class VscLine(Device):
+class VscLine(HeldDevice):
     """A line of two converters: one holds the DC voltage, the other a power, each beside its bus' voltage or a power
     factor."""
 
@@ -61,7 +67,7 @@ class VscLine(Device):
     def places(self) -> tuple[int, ...]:
         return self.converters[0].bus, self.converters[1].bus
 
-    def endings(self, voltages: Voltages) -> tuple[Ending, ...]:
+    def endings(self, voltages: Voltages) -> tuple[DeviceEnd, ...]:
         found = []
         for converter, p in zip(self.converters, self.powers(), strict=True):
             if converter.type == OUT:
@@ -69,10 +75,10 @@ class VscLine(Device):
             name, bus = self.ending_name("vsc", converter.bus), converter.bus
             v = abs(voltages[bus])
             if converter.mode == POWER_FACTOR:
-                found.append(Ending(name, bus, complex(p, converter.reactive(p))))
+                found.append(DeviceEnd(name, bus, complex(p, converter.reactive(p))))
                 continue
             held = v if converter.is_remote else converter.ac_setting
-            found.append(Ending(name, bus, complex(p), Hold(held, *converter.limits(p, v))))
+            found.append(DeviceEnd(name, bus, complex(p), Hold(held, *converter.limits(p, v))))
         return tuple(found)
 
     def doubts(self, voltages: Voltages) -> tuple[str, ...]:
