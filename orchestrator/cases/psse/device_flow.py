@@ -293,7 +293,8 @@ class _Solution:
             if limit is not None and limit.acts:
                 apart = abs(voltages[ending.bus]) - ending.hold.v_pu
                 if (apart if limit.most else -apart) > _CLOSE and limit.releases < _MOST_RELEASES:
-                    limit.acts, switched = False, True
+                    limit.acts = False
+                    switched = True
                     limit.releases += 1
                 continue
             q = (state.fed - ending.fed).imag
