@@ -25,7 +25,7 @@ FLOORS = (
         "orchestrator.toml_files",
         "orchestrator.truth",
     ),
-    ("orchestrator.fmi",),
+    ("orchestrator.fmi", "orchestrator.signatures"),
     ("orchestrator.coupling", "orchestrator.binding"),
     ("orchestrator.ssp", "orchestrator.acceptance"),
     ("orchestrator.analysis", "orchestrator.cases"),

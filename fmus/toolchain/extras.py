@@ -11,6 +11,7 @@ EXTRAS = {
     "skrf": "black-box",
     "distributed": "cluster",
     "helics": "federation",
+    "cryptography": "sign",
 }
 """Name of a library in an import → extra of this distribution that installs it."""
 

@@ -13,10 +13,12 @@ from orchestrator.certification.compared import Verification
 from orchestrator.certification.files import JSON, read_record, save, spare_another
 from orchestrator.certification.inside import check_target, laid_out, put_inside
 from orchestrator.certification.kinds import CertifyRequest, usual_folder
+from orchestrator.certification.signed import sign_folder
 from orchestrator.certification.verification import verified
 from orchestrator.points.study import choose_executor
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
+from orchestrator.signatures.signing import check_key
 from orchestrator.truth import NoTruth
 
 
@@ -57,6 +59,8 @@ def _certified(request: CertifyRequest) -> IssuedCertificate:
     target = None if request.into is None else Path(request.into)
     if target is not None:
         check_target(file, target)
+    if request.sign is not None:
+        check_key(Path(request.sign))
     place = made_folder(Path(request.folder or usual_folder(file.stem, request.code)), "folder")
     spare_another(place, request.code, issue.request.fmu, issue.request.binding)
     with (
@@ -70,6 +74,8 @@ def _certified(request: CertifyRequest) -> IssuedCertificate:
         asked = issue.request
         found.acceptance = run_checks(asked.fmu, asked.binding, place) if request.check else None
         save(found, place)
+        if request.sign is not None:
+            sign_folder(place, read_record(place / JSON), Path(request.sign))
     if target is not None:
         put_inside(place, file, target)
     return IssuedCertificate(place, read_record(place / JSON))

@@ -5,7 +5,10 @@ import subprocess
 from importlib.metadata import version
 from pathlib import Path
 
+from orchestrator.points.code import code_hash
 from orchestrator.results.storage import versions_of
+
+CODE = "Code"  # entry with the hash of this program's code
 
 _LIBRARIES = ("numpy", "scipy", "fmpy", "xarray", "scikit-rf")
 _ROOT = Path(__file__).parents[2]
@@ -15,6 +18,7 @@ def environment() -> dict[str, str]:
     known = {
         "gfor-cosim": version("gfor-cosim"),
         "Commit": commit(),
+        CODE: code_hash(),
         "Operating system": platform.platform(),
         "Processor": platform.machine(),
         "Python": platform.python_version(),

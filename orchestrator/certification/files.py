@@ -23,6 +23,7 @@ from orchestrator.report.pdf import print_pdf
 from orchestrator.results.staging import check_free
 from orchestrator.results.storage import save_netcdf
 from orchestrator.safe_files import file_hash, write_text
+from orchestrator.signatures.beside import Beside
 
 # names of files in a certificate's folder
 HTML = "certificate.html"
@@ -47,8 +48,14 @@ def save(c: Certificate, folder: Path, *, pdf: bool = False) -> list[Path]:
     write_text(html, page(c, hashes | {f"{JSON}, its figures": figures_hash(content)}, made))
     printed = [print_pdf(html, folder / PDF)] if pdf else []
     content["files"] = hashes | {file.name: file_hash(file) for file in (html, *printed)}
+    signatures_of(folder).remove()
     write_sealed(content, target)
     return [html, target, folder / RESPONSES, *printed]
+
+
+def signatures_of(folder: Path) -> Beside:
+    """Where the signatures of a certificate lie."""
+    return Beside(folder, "certificate")
 
 
 def spare_another(folder: Path, code: str, fmu: Path, binding: Path | None) -> None:
@@ -75,6 +82,11 @@ def spare_another(folder: Path, code: str, fmu: Path, binding: Path | None) -> N
             f"{folder}: it holds a certificate by {there}, which one by {code} would replace; give "
             "another --out, or leave it out"
         )
+
+
+def is_own_file(path: Path) -> bool:
+    """Return whether a file lies there itself; a link is none, wherever it leads."""
+    return path.is_file() and not path.is_symlink()
 
 
 def write_sealed(content: Mapping[str, Any], path: Path) -> None:

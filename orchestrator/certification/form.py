@@ -66,6 +66,14 @@ class _Certified(_Table):
     acceptance: _Acceptance | None
     files: dict[str, str | None]
 
+    @field_validator("files")
+    @classmethod
+    def _in_the_folder(cls, files: dict[str, str | None]) -> dict[str, str | None]:
+        """Refuse names that lead out of the certificate's folder, on any system."""
+        if any(name in ("", ".", "..") or set(name) & set("/\\:") for name in files):
+            raise ValueError(files)
+        return files
+
 
 class _Certificate(_Certified):
     judged: str

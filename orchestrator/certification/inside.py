@@ -8,7 +8,7 @@ import io
 import json
 import zipfile
 from base64 import b64decode, b64encode
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,18 +23,20 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.certification.case_file import CASE, FMU, WITH
 from orchestrator.certification.codes.all_codes import NTS631
 from orchestrator.certification.codes.bench_point import case_name
-from orchestrator.certification.files import JSON, read_record
+from orchestrator.certification.files import JSON, read_record, signatures_of
 from orchestrator.certification.form import NORM
 from orchestrator.certification.point import CONVERTER
 from orchestrator.certification.points_again import choose
+from orchestrator.certification.signed import sign_folder
 from orchestrator.certification.texts import TEXTS
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
-from orchestrator.errors import CosimError, FmuFileError, InputError
-from orchestrator.fmi.archive import extract, names_in
+from orchestrator.errors import CosimError, FmuFileError, InputError, few
+from orchestrator.fmi.archive import DAMAGE, extract, names_in
 from orchestrator.fmi.bound import BoundComponent
 from orchestrator.fmi.component import Component
 from orchestrator.safe_files import write_bytes
+from orchestrator.signatures.signing import Made
 from orchestrator.ssp.reference_experiment import FOLDER as LS_REF
 from orchestrator.ssp.reference_experiment import as_csv, experiment, manifest, parameter_set
 from orchestrator.study.modes import running
@@ -150,15 +152,49 @@ _PURPOSES = TEXTS["purposes"]
 _SIGNATURE = ("application/json", "signature", "SHA-256 of the FMU that was tested")
 
 
+def holds_certificates(fmu: Path) -> bool:
+    return any(name.startswith(f"{FOLDER}/") for name in names_in(fmu, with_backslashes=True))
+
+
 def put_inside(folder: Path, fmu: Path, target: Path) -> Path:
     """Write an FMU with a certificate in it; where ``target`` holds others of the same FMU, this one joins them."""
     tested, members = check_target(fmu, target)
     content = read_record(folder / JSON)
     own = f"{FOLDER}/{content.get('code', NTS631)}"
     members = {name: data for name, data in members.items() if not name.startswith(f"{own}/")}
-    names = [JSON, *(name for name in content["files"] if name != FMU)]
+    names = [
+        JSON,
+        *(name for name in content["files"] if name != FMU),
+        *signatures_of(folder).names(),
+    ]
     members |= {f"{own}/{name}": (folder / name).read_bytes() for name in names}
     members |= {f"{own}/{name}": data for name, data in experiments_of(folder, content).items()}
+    _write(tested, members, target)
+    return target
+
+
+def sign_inside(fmu: Path, key: Path, check: Callable[[Path], None]) -> list[Made]:
+    """Sign each certificate in an FMU; ``check`` refuses one that nobody should sign."""
+    with TemporaryDirectory() as folder:
+        places = taken_out(fmu, Path(folder))
+        for place in places:
+            check(place)
+        made = [sign_folder(place, read_record(place / JSON), key) for place in places]
+        tested = (places[0] / FMU).read_bytes()
+        members = _others(fmu, tested)
+        for place in places:
+            own = f"{FOLDER}/{place.name}"
+            members |= {
+                f"{own}/{name}": (place / name).read_bytes()
+                for name in signatures_of(place).names()
+            }
+        _write(tested, members, fmu)
+    return made
+
+
+def _write(tested: bytes, certificates: Mapping[str, bytes], target: Path) -> None:
+    """Write the FMU that was tested, with certificates behind it."""
+    members = dict(certificates)
     members[_TESTED] = _signature(tested)
     members[_MANIFEST] = manifest(
         {
@@ -174,10 +210,9 @@ def put_inside(folder: Path, fmu: Path, target: Path) -> Path:
                 zipfile.ZipInfo(name, (2020, 1, 1, 0, 0, 0)), data, zipfile.ZIP_DEFLATED
             )
     write_bytes(target, buffer.getvalue())
-    return target
 
 
-def check_target(fmu: Path, target: Path) -> tuple[bytes, Mapping[str, bytes]]:
+def check_target(fmu: Path, target: Path) -> tuple[bytes, dict[str, bytes]]:
     """Refuse an FMU or a file that a certificate cannot go into; gives the FMU and the members that others left."""
     tested = fmu.read_bytes()
     _check_names(fmu)
@@ -215,9 +250,31 @@ def _unpacked(fmu: Path, into: Path) -> bytes | None:
     extract(fmu, into)
     try:
         said: dict[str, Any] = json.loads((into / _TESTED).read_bytes())
-        return fmu.read_bytes()[: said["members_end"]] + b64decode(said["directory"], validate=True)
+        tested = fmu.read_bytes()[: said["members_end"]] + b64decode(
+            said["directory"], validate=True
+        )
     except (OSError, KeyError, ValueError, TypeError):
         return None
+    _check_members(fmu, tested)
+    return tested
+
+
+def _check_members(fmu: Path, tested: bytes) -> None:
+    """Refuse an FMU that a tool unpacks to something else than the FMU that was tested, though that lies in it too."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(tested)) as archive:
+            wanted = {name: archive.read(name) for name in archive.namelist()}
+    except (zipfile.BadZipFile, *DAMAGE):
+        return  # its hash is not that of the certificate, which is said later
+    with zipfile.ZipFile(fmu) as archive:
+        own = [n for n in archive.namelist() if n != _MANIFEST and not n.startswith(f"{FOLDER}/")]
+        there = {name: archive.read(name) for name in own}
+    others = [n for n in {**wanted, **there} if wanted.get(n) != there.get(n)]
+    if others or len(own) != len(there):
+        raise InputError(
+            f"{fmu}: what a tool unpacks of it is not the FMU that was tested: {few(others or own, 3)}; its "
+            "certificates are of another FMU, so do not use it as it is"
+        )
 
 
 def _check_names(fmu: Path) -> None:
@@ -235,7 +292,7 @@ def _check_names(fmu: Path) -> None:
         )
 
 
-def _others(target: Path, tested: bytes) -> Mapping[str, bytes]:
+def _others(target: Path, tested: bytes) -> dict[str, bytes]:
     """The certificates that a file holds, of the FMU that was tested."""
     with TemporaryDirectory() as folder:
         place = Path(folder)

@@ -202,6 +202,12 @@ class CertifyRequest:
         python="where the FMU is written with the "
         "certificate in it, and with experiments that any tool can repeat",
     )
+    sign: str | Path | None = asked(
+        FILE,
+        None,
+        "sign it: a private key of OpenSSH, the public key of one that the agent or hardware has, or a PEM key",
+        "KEY",
+    )
     workers: int | None = asked(ANYTHING, 1, "processes; one for each core where None", option=None)
     progress: bool = asked(FLAG, False, "show a bar", option=None)
 

@@ -26,20 +26,31 @@ from orchestrator.certification.files import (
     figures_of,
     read_record,
     seal_of,
+    signatures_of,
 )
 from orchestrator.certification.form import case_files, check_form
 from orchestrator.certification.kinds import Parts, parts_of, rebuilt
+from orchestrator.certification.signed import (
+    Asked,
+    SignatureSeen,
+    look_at_signature,
+)
 from orchestrator.certification.verdict import INCOMPLETE, PASSES
 from orchestrator.errors import InputError
 from orchestrator.late import xr
 from orchestrator.points.executor import Executor
 from orchestrator.points.points import CountReport, nobody
 from orchestrator.safe_files import file_hash
+from orchestrator.signatures.checking import State
 
 
 def read_certificate(path: Path) -> tuple[Path, dict[str, Any]]:
     """Folder and content of a certificate, from either the folder or ``certificate.json``."""
     file = path / JSON if path.is_dir() else path
+    if file.is_symlink():
+        raise InputError(
+            f"{file}: it is a link, and a certificate's files lie in its folder; give the folder to which it leads"
+        )
     try:
         content = read_record(file)
     except OSError as error:
@@ -68,8 +79,11 @@ def verify_files(folder: Path, content: dict[str, Any]) -> Verification:
         [FMU, RESPONSES, HTML, *([BINDING] if content["binding"] else [])],
     )
     names += case_files(content)
-    for name in dict.fromkeys([*names, *hashes]):
+    names = list(dict.fromkeys([*names, *hashes]))
+    for name in names:
         _compare_file(folder, name, hashes.get(name), found)
+    if any((folder / name).is_symlink() for name in names):
+        return found
     _compare_page(folder / HTML, content, found)
     faults = _judged_again(folder, content, found.agreed)
     found.faults += faults
@@ -125,7 +139,11 @@ def _judged_again(folder: Path, content: dict[str, Any], said: list[str]) -> lis
 
 def _compare_file(folder: Path, name: str, wanted: str | None, found: Verification) -> None:
     path = folder / name
-    if not path.is_file():
+    if path.is_symlink():
+        found.faults.append(
+            f"{name}: it is a link, and a certificate's files lie in its folder; nothing else was looked at"
+        )
+    elif not path.is_file():
         found.faults.append(
             f"{name}: there is no such file beside {JSON}; it was removed or renamed"
         )
@@ -146,6 +164,8 @@ class Verified(Verification):
     chosen: list[Any]
     computed: list[Any]
     later: tuple[str, ...]  # rows that the table had not in the version that issued the certificate
+    signature: SignatureSeen
+    unproved: list[str]  # files in the folder that nothing vouches for
 
     @property
     def verdict(self) -> str:
@@ -161,10 +181,13 @@ def verified(
     report: CountReport = nobody,
     *,
     every: bool = False,
+    asked: Asked | None = None,
 ) -> Verified:
     """Verify the files of a certificate, and, if they hold, parts computed anew: by default those that count most.
 
-    ``wanted``: no part where it is empty and ``every`` is not asked for; ``executor``: made of a worker's imports."""
+    ``wanted``: no part where it is empty and ``every`` is not asked for; ``executor``: made of a worker's imports.
+    ``asked``: who may have signed it; where signers are named, a certificate without a signature of theirs does not
+    hold."""
     folder, content = read_certificate(place)
     parts = parts_of(content)
     chosen = (
@@ -172,7 +195,11 @@ def verified(
         if wanted == () and not every
         else parts.chosen(folder, content, wanted or (), every=every)
     )
+    asked = asked or Asked()
     files = verify_files(folder, content)
+    signature = look_at_signature(folder, content, asked)
+    if signature.state is State.CHANGED:
+        files.faults.append(f"signature: {signature.sentence}")
     found = Verified(
         faults=files.faults,
         agreed=files.agreed,
@@ -181,6 +208,8 @@ def verified(
         chosen=chosen,
         computed=chosen if files.holds else [],
         later=parts.later(content),
+        signature=signature,
+        unproved=_unproved(folder, content),
     )
     if found.later:
         found.agreed.append(
@@ -192,4 +221,14 @@ def verified(
         with closing(executor([parts.task.__module__])) as workers:
             again = parts.verify(folder, content, chosen, workers, report)
         found.faults, found.agreed = found.faults + again.faults, found.agreed + again.agreed
+    if asked.signers is not None and signature.state in (State.UNSIGNED, State.UNKNOWN):
+        found.faults.append(f"signature: {signature.sentence}")
     return found
+
+
+def _unproved(folder: Path, content: Content) -> list[str]:
+    """Files in the folder of which the certificate has no hash."""
+    known = {JSON, *content["files"], *signatures_of(folder).names()}
+    return sorted(
+        path.name for path in folder.iterdir() if path.is_file() and path.name not in known
+    )

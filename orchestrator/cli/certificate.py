@@ -20,7 +20,13 @@ from orchestrator.certification.codes.all_codes import NTS631
 from orchestrator.certification.codes.row import checked, in_words, like
 from orchestrator.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED
 from orchestrator.certification.details import Details, read_details
-from orchestrator.certification.files import JSON, save, spare_another
+from orchestrator.certification.files import (
+    JSON,
+    read_record,
+    save,
+    signatures_of,
+    spare_another,
+)
 from orchestrator.certification.inside import check_target, put_inside
 from orchestrator.certification.judgement import PointVerdict
 from orchestrator.certification.kinds import (
@@ -31,6 +37,7 @@ from orchestrator.certification.kinds import (
 )
 from orchestrator.certification.margins import margin_of, narrowest
 from orchestrator.certification.request import STUDY, rated_frequency
+from orchestrator.certification.signed import sign_folder
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, exit_code
 from orchestrator.cli.arguments import asked_by, choose_executor
 from orchestrator.cli.certify_sensitivities import find_needs
@@ -48,6 +55,7 @@ from orchestrator.fmi.port import BoundDescription
 from orchestrator.report.tables import PlainTable, make_table, short
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
+from orchestrator.signatures.signing import check_key
 from orchestrator.watch.finding import MISFIT
 
 _LONGEST = 100  # of a remark in the first table [characters]
@@ -258,6 +266,8 @@ def certified(
     details = read_details(options.details) if options.details else Details()
     acceptance = read_checks(options.check, request.fmu, request.binding) if options.check else None
     spare_another(folder, key, request.fmu, request.binding)
+    if options.sign:
+        check_key(options.sign)
     made_folder(folder, "--out")
     progress = Progressing(folder)
     with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):
@@ -276,7 +286,11 @@ def certified(
             with console.status("Acceptance tests of the FMU"):
                 acceptance = run_checks(request.fmu, request.binding, folder)
         found.details, found.acceptance = details, acceptance
-        return found, save(found, folder, pdf=options.pdf)
+        files = save(found, folder, pdf=options.pdf)
+        if options.sign:
+            sign_folder(folder, read_record(folder / JSON), options.sign)
+            files.append(folder / signatures_of(folder).envelope)
+        return found, files
 
 
 def run_stiffness(options: argparse.Namespace, device: Device) -> int:

@@ -47,7 +47,7 @@ PACK_AGAIN = "ZIP and FMI ask for '/': unpack it with a tool of Windows and pack
 
 _CHUNK = 1 << 20
 _METHODS = {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}
-_DAMAGE = (
+DAMAGE = (
     zipfile.BadZipFile,
     zlib.error,
     lzma.LZMAError,
@@ -188,7 +188,7 @@ def _opened(
             if not with_backslashes and any("\\" in e.orig_filename for e in archive.infolist()):
                 raise FmuFileError(f"{path}: {BACKSLASHES}; {PACK_AGAIN}")
             yield archive
-    except _DAMAGE as error:
+    except DAMAGE as error:
         raise FmuFileError(
             f"{path}: the archive is damaged ({told(error)}); export it again, or get the file anew"
         ) from error

@@ -9,6 +9,7 @@ from typing import Any
 from orchestrator.foreign_files import check_name, check_regular, read_text
 
 WRITTEN = ("out", "into", "html", "save", "scan", "junit")  # options that name what is written
+_SECRET = ("sign",)  # options that name a private key, of which no record is kept
 # endings of what is written beside a file
 _BESIDE = {".toml": (".csv", ".json"), ".cfg": (".dat",)}
 
@@ -48,7 +49,7 @@ def _texts(options: Mapping[str, Any]) -> Iterator[str]:
 def files_read(options: Mapping[str, Any]) -> dict[str, Path]:
     """Files that options name to be read, and those that the TOML files among them name."""
     found = {}
-    for text in _texts(options):
+    for text in _texts({k: value for k, value in options.items() if k not in _SECRET}):
         for path in (Path(text), Path(text.rpartition("=")[2])):
             with suppress(OSError, ValueError):
                 if path.is_file():
