@@ -5,6 +5,7 @@ at 5 ms. A row for each: seconds of processor time of each part, peak memory, st
 which all that grows with the number of buses. Each network has a process of its own, with nothing kept from others.
 ``--check`` compares the critical modes with the dense eigenvalues where there are at most `WHOLE` states. ``--count``
 counts the eigenvalues of the region by the turns of the determinant around it, in networks with a hub.
+``--json`` prints three stages beside their floors, both measured in the same run (`floors`), as seconds and multiples.
 """
 
 import argparse
@@ -21,14 +22,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
 
 from orchestrator.analysis.critical_modes import find_critical_modes
+from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.modes import eigenvalues
+from orchestrator.analysis.shifted_equations import ShiftedEquations
 from orchestrator.analysis.stability import WHOLE
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import load_case
-from orchestrator.cases.network_data import network_data
+from orchestrator.cases.network_data import NetworkData, network_data
 from orchestrator.cases.power_flow import (
     FlowLine,
     FlowLoad,
@@ -48,6 +53,12 @@ STRAY = 0.001
 
 BELOW, HIGHEST_HZ, LOWEST_HZ = 0.1, 2.0, 0.1
 """Critical modes: damping ratio and range of frequencies."""
+
+STAGES = {"linearisation": "linearise", "critical modes": "modes", "step": "step"}
+"""Names of the stages of ``--json``, with the key of a row that holds their seconds."""
+
+COPIED_BYTES = 256 * 1024**2
+"""What the measurement of the memory's bandwidth copies: far beyond any cache."""
 
 STEPS = 200
 _LOADING, _LEAST_MVA = 0.6, 20.0
@@ -143,10 +154,16 @@ def measure(name: str, native: str, *, check: bool, count: bool) -> dict[str, fl
             with timed("steady"):
                 row["residual"] = find_operating_point(master).residual
             with timed("linearise"):
-                model = compose(Blocks(master), master.schedule)
+                blocks = Blocks(master)
+                model = compose(blocks, master.schedule)
+            with timed("linearise_floor"):
+                blocks.renew(master, one_of_each_kind(master))
             with timed("modes"):
                 critical = find_critical_modes(model, LOWEST_HZ, HIGHEST_HZ, BELOW)
             row["found"] = len(critical)
+            shift = complex(0.0, 2 * np.pi * np.sqrt(LOWEST_HZ * HIGHEST_HZ))
+            with timed("modes_floor"):
+                solve_around(model, shift, len(critical))
             row["peak_mb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
             if count:
                 with timed("count"):
@@ -157,8 +174,75 @@ def measure(name: str, native: str, *, check: bool, count: bool) -> dict[str, fl
                 row |= _against_dense(eigenvalues(model), critical)
             begun = time.process_time()
             master.advance(STEPS)
-            row["steps"] = STEPS / (time.process_time() - begun)
+            row["step"] = (time.process_time() - begun) / STEPS
+            row["steps"] = 1 / row["step"]
+            table = NetworkTable(pandapower=name, stray_B=STRAY)
+            numbers = network_bytes(network_data(table, Path(folder))) + 8 * row["states"]
+            row["step_floor"] = numbers / bandwidth()
     return row
+
+
+def one_of_each_kind(master: Master) -> list[str]:
+    """Return the first component of each model: equal devices need to be perturbed only once."""
+    firsts: dict[str, str] = {}
+    for name, component in master.components.items():
+        firsts.setdefault(component.description.model_name, name)
+    return list(firsts.values())
+
+
+def solve_around(model: LinearModel, shift: complex, modes: int) -> None:
+    """Do what no search can do without: one factorisation, and a solution for each left and right eigenvector.
+
+    ``shift``: a point of the region [rad/s]."""
+    sigma = complex(np.exp(shift * model.step_size)) if model.step_size else shift
+    factors = ShiftedEquations(model).at(sigma)
+    right = np.ones((len(model.names), 1), dtype=complex)
+    for adjoint in (False, True):
+        for _ in range(modes):
+            factors.solve(right, adjoint=adjoint)
+
+
+def network_bytes(data: NetworkData) -> int:
+    """Return the bytes of the factors of the network's admittances, which each step's solution reads once."""
+    place = {bus: k for k, bus in enumerate(data.buses)}
+    ends = np.array([(place[x.from_bus], place[x.to_bus]) for x in data.lines]).T
+    series = np.array([1 / complex(x.R, x.X) for x in data.lines])
+    shape = (len(place), len(place))
+    off_diagonal = sp.coo_array((-series, ends), shape=shape)
+    both = off_diagonal + off_diagonal.T
+    # every bus has something to earth, so that the matrix has an inverse
+    admittances = both - sp.diags_array(both.sum(axis=1) + complex(0, STRAY))
+    factors = spla.splu(sp.csc_array(admittances))
+    numbers = factors.L.nnz + factors.U.nnz
+    return int(numbers) * (np.dtype(complex).itemsize + np.dtype(np.int32).itemsize)
+
+
+def bandwidth() -> float:
+    """Return the bytes that this machine's memory reads in a second, the best of five copies."""
+    source = np.ones(COPIED_BYTES // 8)
+    target = np.empty_like(source)
+    took = []
+    for _ in range(5):
+        begun = time.perf_counter()
+        np.copyto(target, source)
+        took.append(time.perf_counter() - begun)
+    return 2 * COPIED_BYTES / min(took)
+
+
+def stages(row: dict[str, float]) -> list[dict[str, float | str]]:
+    """Return the stages of a network beside the least that their arithmetic needs [s of processor time].
+
+    Floors: linearisation, one device of each kind; critical modes, one factorisation and a solution for each left and
+    right eigenvector; step, the bytes of the network's factors and of the states by the memory's bandwidth."""
+    return [
+        {
+            "name": name,
+            "seconds": row[key],
+            "floor_seconds": row[f"{key}_floor"],
+            "multiple_of_floor": row[key] / row[f"{key}_floor"],
+        }
+        for name, key in STAGES.items()
+    ]
 
 
 def _against_dense(values: Any, critical: list[Any]) -> dict[str, float]:
@@ -172,7 +256,7 @@ def _against_dense(values: Any, critical: list[Any]) -> dict[str, float]:
 def _processor_time() -> float:
     """Of this process and of its children that have ended [s]."""
     times = os.times()
-    return times.user + times.system + times.children_user + times.children_system
+    return time.process_time() + times.children_user + times.children_system
 
 
 def main() -> None:
@@ -189,6 +273,9 @@ def main() -> None:
     )
     parser.add_argument(
         "--count", action="store_true", help="count the critical modes by turns of the determinant"
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print the stages beside their floors, as JSON"
     )
     given = parser.parse_args()
     if given.one:
@@ -224,11 +311,17 @@ def main() -> None:
             print(f"{name}: not reached (exit status {done.returncode}); the reason stands above")
             continue
         rows[name] = json.loads(done.stdout)
+        figures = ", ".join(f"{key} {value:.4g}" for key, value in rows[name].items())
+        print(f"{name}: {figures}", file=sys.stderr if given.json else sys.stdout, flush=True)
+    if given.json:
+        networks = [
+            {"case": name, "buses": row["buses"], "states": row["states"], "stages": stages(row)}
+            for name, row in rows.items()
+        ]
         print(
-            f"{name}: " + ", ".join(f"{key} {value:.4g}" for key, value in rows[name].items()),
-            flush=True,
+            json.dumps(networks[0] if len(given.cases) == 1 and networks else {"cases": networks})
         )
-    if len(rows) > 1:
+    elif len(rows) > 1:
         buses = np.log([row["buses"] for row in rows.values()])
         for key in ("build", "prepare", "steady", "linearise", "modes", "peak_mb", "steps"):
             slope = np.polyfit(buses, np.log([max(row[key], 1e-3) for row in rows.values()]), 1)[0]
