@@ -80,6 +80,7 @@ class NetworkData:
     # voltage in a power flow that starts from another, as that of an outage does
     flow_laws: Mapping[str, FlowLaws] = field(default_factory=dict)
     records: tuple[RecordUse, ...] = ()  # what became of the records of the source
+    device_loads: tuple[str, ...] = ()  # names of the loads in the place of DC lines and the like
     # ratings and bands of a RAW or MATPOWER file; those of other sources are not meant
     limits: FileLimits = field(default_factory=FileLimits)
 
@@ -145,6 +146,7 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
         },
         limits=source.limits if table.raw or table.matpower else FileLimits(),
         records=found.records,
+        device_loads=tuple(x.name for x in found.device_loads),
     )
 
 
@@ -216,9 +218,10 @@ def _from_raw(path: Path, table: NetworkTable) -> _Source:
         bus_of(raw.tables.labels[int(row[0])]) for row in raw.tables.bus if row[1] == _REFERENCE
     ]
     part = synchronous_part(imported, raw.devices, references)
-    imported, machines = part.network, raw.machines
+    imported = part.network
+    left = {x for x in raw.machines if bus_name(str(x.bus)) in part.left}
+    machines = tuple(x for x in raw.machines if x not in left)
     if part.left:
-        machines = tuple(x for x in machines if bus_name(str(x.bus)) not in part.left)
         text = (
             f"only DC lines lead to {few(sorted(part.left), _SHOWN)}: a part with a frequency of its own, which is "
             "left out; the DC lines feed here what they do at the file's voltages there"
@@ -239,7 +242,7 @@ def _from_raw(path: Path, table: NetworkTable) -> _Source:
         replace(imported, generation=generation),
         tuple(changes),
         machines,
-        raw.idle,
+        raw.idle | {(x.bus, x.name.strip()) for x in left},
         misfit,
         records=tuple(
             replace(x, why=solved.words_of(x.kind, x.line) or x.why) for x in raw.records

@@ -90,6 +90,9 @@ class PreparedScenario:
     # likely ratings [MVA] of units whose S_n is only the base of their data
     base_ratings: Mapping[str, float] = field(default_factory=dict)
     following_loads: tuple[str, ...] = ()  # loads that follow the voltage in an outage's power flow
+    device_loads: tuple[
+        str, ...
+    ] = ()  # loads in the place of DC lines and the like, which no load factor scales
     # prepares another scenario of the case with the same values, or with those of its file alone where that is asked
     # for; None where nothing but the file gave values.
     beside: "Callable[..., PreparedScenario | None] | None" = field(
@@ -285,6 +288,7 @@ class Preparer:
             file_limits=draft.data.limits if draft.data else FileLimits(),
             base_ratings=draft.base_ratings,
             following_loads=tuple(draft.data.flow_laws) if draft.data else (),
+            device_loads=draft.data.device_loads if draft.data else (),
             idle=idle_values(
                 draft.system, draft.given.from_outside, draft.places, events, draft.found.absent
             ),

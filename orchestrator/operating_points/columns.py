@@ -250,9 +250,10 @@ def _static(factor: float, elements: Elements, prepared: PreparedScenario) -> Se
 
 
 def feeding_loads(elements: Elements, prepared: PreparedScenario) -> dict[str, float]:
-    """The loads of the case that feed, and what each feeds [MW]."""
+    """The loads of the case that feed, and what each feeds [MW], without those in the place of DC lines."""
     grid = prepared.system.components[elements.grid]
-    drawn = {name: load_of([name], grid) for name in elements.loads}
+    own = [name for name in elements.loads if name not in prepared.device_loads]
+    drawn = {name: load_of([name], grid) for name in own}
     return {name: -power for name, power in drawn.items() if power < 0}
 
 

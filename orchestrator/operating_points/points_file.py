@@ -241,7 +241,10 @@ def _point(
     feeding = feeding_loads(elements, prepared)
     scale, fed_scale = (_first(getattr(one, name) for one in settings.values()) for name in _SCALES)
     columns = {load: "static" if load in feeding else "load" for load in elements.loads}
-    factors = {"load": scale, "static": fed_scale}
+    factors = {"load": scale, "static": fed_scale, "": None}
+    columns |= dict.fromkeys(
+        prepared.device_loads, ""
+    )  # DC lines and the like have a power of their own
     scales = {
         load: _scale_of(load, factors[column], column, elements, prepared, values.found, place)
         for load, column in columns.items()

@@ -61,7 +61,8 @@ def solved_devices(
         state = solution.at_the_files_voltages()
         text = (
             "the power flow with DC lines, FACTS devices and the like has no solution: they feed what they do at the "
-            "file's voltages, and what holds a voltage feeds no reactive power"
+            "file's voltages, and what holds a voltage feeds no reactive power; leave_out (gfor new --leave-out) lets "
+            "a kind of them go"
         )
         doubts.append((devices[0], text))
     loads, words, seen, standing = [], [], Counter[str](), set(network.buses)
@@ -82,9 +83,10 @@ def _in_words(device: HeldDevice, endings: Sequence["_Fed"]) -> str:
     parts = []
     for ending in endings:
         p, q = ending.fed.real, ending.fed.imag
-        active = f"{'feeds' if p >= 0 else 'draws'} {abs(p):.4g} MW"
-        reactive = f"{'feeds' if q >= 0 else 'draws'} {abs(q):.4g} Mvar"
-        parts.append(f"{active} and {reactive} at bus {ending.bus}")
+        active, reactive = ("feeds" if power >= 0 else "draws" for power in (p, q))
+        second = "" if reactive == active else f"{reactive} "
+        text = f"{active} {abs(p):.4g} MW and {second}{abs(q):.4g} Mvar"
+        parts.append(f"{text} at bus {ending.bus}")
     return f"{device.name or device.section}: {', '.join(parts)}"
 
 

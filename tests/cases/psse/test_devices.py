@@ -1,5 +1,6 @@
 """DC lines, FACTS devices, induction machines and GNE of a PSS/E file: loads with the powers of the solved state."""
 
+import json
 import math
 
 import numpy as np
@@ -12,6 +13,7 @@ from orchestrator.cases.schema import NetworkTable
 from orchestrator.errors import InputError
 from tests.cases.psse import BUSES, LINES, LOADS, MACHINES, TRANSFORMERS, raw, records
 from tests.cases.psse.test_dialects import old
+from tests.cases.psse.test_rawx import network, table
 
 DC = [
     "'TIE 1',1,8.0,60.0,250.0,0.0,0.0,0.1,'I',0.0,20,1.0",
@@ -43,16 +45,16 @@ def lines_of(section, revision):
 def read(tmp_path):
     """Text of a RAW file, or lines of data by section → its network."""
 
-    def network(content, revision=33, **table):
+    def from_content(content, revision=33, **keys):
         if not isinstance(content, str):
             found = records(revision)
             for section, lines in content.items():
                 found[section] = [*found[section], *lines]
             content = raw(revision, found)
         (tmp_path / "grid.raw").write_text(content)
-        return network_data(NetworkTable(raw="grid.raw", **table), tmp_path)
+        return network_data(NetworkTable(raw="grid.raw", **keys), tmp_path)
 
-    return network
+    return from_content
 
 
 def fed(data):
@@ -243,7 +245,7 @@ def test_every_revision_has_the_same_devices(section, revision, read):
     assert fed(data) == {name: pytest.approx(value, abs=1e-6) for name, value in usual.items()}
     (use,) = (x for x in data.records if x.kind == section.lower())
     assert use.use is UseOfRecord.HELD
-    assert "MW and" in use.why
+    assert " MW and " in use.why
     assert "without dynamics, at the solved powers" in texts(data)
 
 
@@ -335,6 +337,7 @@ def test_a_part_that_only_a_dc_line_joins_is_left_out_and_told(read):
     data = read(other)
     assert "bus_10" not in data.buses
     assert {m.bus for m in data.machines} == {1, 2, 3}
+    assert data.idle_machines == {(10, "1")}  # of whose dynamics nothing is asked
     assert list(fed(data)) == ["dc_TIE_1_5"]
     assert "only DC lines lead to bus_10: a part with a frequency of its own" in texts(data)
     assert data.slack == "bus_1"
@@ -387,3 +390,51 @@ def test_a_solved_file_with_devices_fits_its_data(read):
     assert read(raw(33, found)).misfit == ""
     found["TWO-TERMINAL DC"] = [q_line[0].replace("60.0,250", "70.0,250"), *q_line[1:]]
     assert "bus_5" in read(raw(33, found)).misfit
+
+
+MULTI = [
+    "'M 1',3,3,2,1,8,250.0,0",
+    "5,2,20,8,0,10.0,230.0,0.5,1.0,1.1,0.9,0.01,40.0,1,0.1,1",
+    "6,2,20,8,0,10.0,230.0,0.5,1.0,1.1,0.9,0.01,30.0,1,0.1,1",
+    "8,2,20,17,0,10.0,230.0,0.5,1.0,1.1,0.9,0.01,250.0,1,0.1,1",
+    "1,5,1,1,'A',0,0.0,1",
+    "2,6,1,1,'B',0,0.0,1",
+    "3,8,1,1,'C',0,0.0,1",
+    "1,3,'1',{met}20.0,0.0",
+    "2,3,'1',{met}10.0,0.0",
+]
+
+
+@pytest.mark.parametrize("metered", ["", "1,"])
+def test_terminals_of_a_dc_network_share_its_losses(metered, read):
+    """Two rectifiers feed one inverter of 250 kV, over 20 and 10 ohms; links have a metered end since revision 31."""
+    data = read({"MULTI-TERMINAL DC": [line.replace("{met}", metered) for line in MULTI]})
+    found = fed(data)
+    currents = [(math.sqrt(250**2 + 4 * r * p) - 250) / (2 * r) for p, r in ((40, 20), (30, 10))]
+    powers = [found[f"dc_M_1_{bus}"].real for bus in (5, 6, 8)]
+    assert powers == pytest.approx([-40, -30, 250 * sum(currents)], abs=1e-6)
+    assert all(value.imag < -5 for value in found.values())
+    lost = [line.replace("{met}", metered) for line in MULTI[:-1]]
+    with pytest.raises(InputError, match=r"which do not fit the lines that follow.*leave_out"):
+        read({"MULTI-TERMINAL DC": lost})
+
+
+def test_rawx_has_the_same_multi_terminal_network_and_gne(tmp_path, read):
+    usual = fed(read({"MULTI-TERMINAL DC": [line.replace("{met}", "1,") for line in MULTI]}))
+    rows = [[x.strip("'") for x in line.replace("{met}", "1,").split(",")] for line in MULTI]
+    whole = network()
+    whole["ntermdc"] = table("name nconv ndcbs ndcln mdc vconv vcmod vconvn", rows[:1])
+    names = "name ib n angmx angmn rc xc ebas tr tap tpmx tpmn tstp setvl dcpf marg cnvcod"
+    whole["ntermdcconv"] = table(names, [["M 1", *row] for row in rows[1:4]])
+    names = "name idc ib area zone dcname idc2 rgrnd owner"
+    whole["ntermdcbus"] = table(names, [["M 1", *row] for row in rows[4:7]])
+    whole["ntermdclink"] = table(
+        "name idc jdc dcckt met rdc ldc", [["M 1", *row] for row in rows[7:]]
+    )
+    names = "name model nterm bus1 bus2 nreal nintg nchar stat owner nmet real1 intg1"
+    whole["gne"] = table(names, [["G", "OWN", 1, 8, 0, 1, 1, 0, 0, 1, 8, 1.0, 5]])
+    (tmp_path / "nine.rawx").write_text(json.dumps({"network": whole}))
+    data = network_data(NetworkTable(raw="nine.rawx"), tmp_path)
+    assert fed(data) == {name: pytest.approx(value, abs=1e-6) for name, value in usual.items()}
+    told = {x.kind: x.why for x in data.records if x.kind == "gne"}
+    assert told == {"gne": "out of service: its status is 0"}
