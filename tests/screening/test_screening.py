@@ -227,6 +227,19 @@ def test_a_factor_of_loads_leaves_static_generation_and_asks(windy, tmp_path):
         )
 
 
+def test_no_factor_of_loads_scales_a_dc_line(windy, tmp_path):
+    """A load in the place of a converter has the power that the line's controls hold, whatever the hour."""
+    prepared, elements = windy
+    linked = replace(prepared, device_loads=("load_3",))
+    path = tmp_path / "points.csv"
+    path.write_text("name,load,generation\na,0.7,0.7\n")
+    assert not [one for one in questions(path, linked, elements) if "column 'load'" in one]
+    path.write_text("name,load,generation,static\na,0.7,0.7,0.5\n")
+    (point,) = read_points(path, linked, elements)
+    assert point.values["grid.load_2.scale"] == 0.7
+    assert "grid.load_3.scale" not in point.values
+
+
 def test_an_hour_without_wind_keeps_the_trace_that_a_voltage_needs(windy, tmp_path):
     prepared, elements = windy
     variables = prepared.system.components["grid"].description.variables
