@@ -1,5 +1,7 @@
 """Modes of a linear model: eigenvalues, damping ratio, frequency, participation factors, mode shapes."""
 
+import cmath
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -123,10 +125,53 @@ class Mode(OfEigenvalue):
         together = [s for s in moving if (self.shape[s] * leader.conjugate()).real > 0]
         return together, [s for s in moving if s not in together]
 
+    def swing_groups(self, states: Iterable[str], least: float = 0.1) -> "SwingGroups":
+        """Groups of some states by the angle to the largest one: beside it, against it, and in between.
+
+        ``least``: states that move less than this part of the largest are left out."""
+        together, others = self.swing(states, least)
+        moving = [*together, *others]
+        angles = {
+            state: math.degrees(cmath.phase(self.shape[state] / self.shape[moving[0]]))
+            for state in moving
+        }
+        return SwingGroups(
+            tuple(s for s in moving if abs(angles[s]) <= _ALIKE_DEG),
+            tuple(s for s in moving if abs(angles[s]) >= 180 - _ALIKE_DEG),
+            {s: angles[s] for s in moving if _ALIKE_DEG < abs(angles[s]) < 180 - _ALIKE_DEG},
+        )
+
     def participation_of(self, states: Iterable[str]) -> float:
         """Participation of some states together."""
         wanted = set(states)
         return sum(factor for name, factor in self.participation if name in wanted)
+
+
+_ALIKE_DEG = 45.0
+"""Two states swing together, or against each other, if their angle is within this of 0 or of 180 degrees: then the
+greater part of each motion is along that of the other one."""
+
+
+@dataclass(frozen=True)
+class SwingGroups:
+    """States that swing with the largest one, against it, and those in between with their angles to it [degrees]."""
+
+    together: tuple[str, ...]
+    against: tuple[str, ...]
+    between: dict[str, float]
+
+    def words(self, most: Callable[[Sequence[str]], str]) -> str:
+        """Who swings against whom: ``sg1, sg2 against sg3; sg4 at +87°``; "" if nothing moves.
+
+        ``most``: Writes a list of components."""
+        sides = [most([_component(s) for s in side]) for side in (self.together, self.against)]
+        said = " against ".join(side for side in sides if side)
+        apart = most([f"{_component(s)} at {angle:+.0f}°" for s, angle in self.between.items()])
+        return f"{said}; {apart}" if apart else said
+
+
+def _component(state: str) -> str:
+    return state.partition(".")[0]
 
 
 @dataclass(frozen=True)

@@ -290,10 +290,8 @@ def outside(results: Sequence[ModesResult]) -> str:
 
 
 def _swing(result: ModesResult, mode: Mode) -> str:
-    sides = [first_few(side, str) for side in result.swing_of(mode)]
-    if all(sides):
-        return f"{sides[0]} against {sides[1]}"
-    return sides[0] or sides[1] or ", ".join(state for state, _ in mode.participation[:2])
+    said = mode.swing_groups(result.swing).words(lambda side: first_few(side, str))
+    return said or ", ".join(state for state, _ in mode.participation[:2])
 
 
 @dataclass(frozen=True)

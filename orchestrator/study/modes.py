@@ -110,9 +110,14 @@ class ModesResult:
         return mode.by_group(lambda state: self.areas.get(state.partition(".")[0]))
 
     def swing_of(self, mode: spectra.Mode) -> tuple[list[str], list[str]]:
-        """Components that swing together in a mode, and those that swing against them; each largest first."""
-        together, against = mode.swing(self.swing)
-        return [s.partition(".")[0] for s in together], [s.partition(".")[0] for s in against]
+        """Components that swing together in a mode, and those that swing against them; each largest first.
+
+        Those at an angle in between are in neither: `Mode.swing_groups` has them."""
+        groups = mode.swing_groups(self.swing)
+        together, against = (
+            [s.partition(".")[0] for s in side] for side in (groups.together, groups.against)
+        )
+        return together, against
 
 
 def compute_modes(

@@ -81,18 +81,22 @@ def all_modes(result: ModesResult) -> Table:
 
 def mode_shapes(results: Sequence[ModesResult]) -> Table:
     """Who swings against whom in the modes with a name, or in all where none has one, and who takes part."""
-    columns = ["Mode", "Swing together", "Against", "Participation by component"]
-    columns += ["By area"] if any(r.areas for r in results) else []
-    table = make_table("Mode shapes", *columns, left=len(columns))
     names = list(dict.fromkeys(name for r in results for name in r.named))
     entries = [(name, r, r.named[name]) for name in names for r in results if name in r.named]
     if not names:
         entries = [(f"{mode.frequency_hz:.3f} Hz", r, mode) for r in results for mode in r.modes]
-    for label, r, mode in entries:
+    groups = [mode.swing_groups(r.swing) for _, r, mode in entries]
+    across, areas = any(group.between for group in groups), any(r.areas for r in results)
+    columns = ["Mode", "Swing together", "Against"]
+    columns += ["In between"] * across + ["Participation by component"] + ["By area"] * areas
+    table = make_table("Mode shapes", *columns, left=len(columns))
+    for (label, r, mode), group in zip(entries, groups, strict=True):
         sides = [first_few(side, str) for side in r.swing_of(mode)]
+        between = [f"{s.partition('.')[0]} {angle:+.0f}°" for s, angle in group.between.items()]
+        sides += [first_few(between, str)] * across
         row = [r.prepared.title if len(names) == 1 else f"{label}: {r.prepared.title}", *sides]
         row.append(first_few(mode.by_component.items(), share_text))
-        row += [first_few(r.by_area(mode).items(), share_text)] if len(columns) > 4 else []
+        row += [first_few(r.by_area(mode).items(), share_text)] if areas else []
         table.add_row(*row)
     return table
 

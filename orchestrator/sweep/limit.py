@@ -258,11 +258,9 @@ def _who(mode: Mode, speeds: Sequence[str]) -> str:
     states = [
         name for name in mode.shape if any(fnmatch.fnmatchcase(name, pattern) for pattern in speeds)
     ]
-    together, against = (
-        ", ".join(s.partition(".")[0] for s in side) for side in mode.swing(states)
-    )
-    if mode.participation_of(states) >= 0.1 and together:
-        return f"{together} against {against}" if against else together
+    said = mode.swing_groups(states).words(", ".join)
+    if mode.participation_of(states) >= 0.1 and said:
+        return said
     return ", ".join(
         f"{name} {share:.0%}" for name, share in list(mode.by_component.items())[:_PARTS]
     )

@@ -1,11 +1,14 @@
 """Eigenvalues, damping and participation factors of systems whose answer is known."""
 
+import cmath
+import math
+
 import numpy as np
 import pytest
 import scipy.linalg
 
 from orchestrator.analysis.linear_model import LinearModel
-from orchestrator.analysis.modes import find_modes
+from orchestrator.analysis.modes import Mode, find_modes
 
 OMEGA, ZETA = 2 * np.pi * 0.7, 0.08
 OSCILLATOR = np.array([[0.0, 1.0], [-(OMEGA**2), -2 * ZETA * OMEGA]])
@@ -99,3 +102,21 @@ def test_swing_tells_both_sides_and_leaves_out_what_does_not_move():
     assert mode.swing(["b.speed", "a.speed", "c.speed"]) == (["a.speed"], ["b.speed"])
     assert mode.swing(["b.speed", "a.speed"], least=0.6) == (["a.speed"], [])
     assert mode.swing([]) == ([], [])
+
+
+def test_who_stands_across_is_neither_together_nor_against():
+    """Four machines at 0, 40, 87 and 172 degrees; by a cut at 90 the third would swing with the first."""
+    angles = {"sg1": 0.0, "sg2": 40.0, "sg3": 87.0, "sg4": 172.0}
+    shape = {
+        f"{name}.omega": (1.0 - 0.1 * k) * cmath.exp(1j * math.radians(angle))
+        for k, (name, angle) in enumerate(angles.items())
+    }
+    mode = Mode(complex(-0.1, 6.0), (("sg1.omega", 1.0),), shape)
+    groups = mode.swing_groups(shape)
+    assert groups.together == ("sg1.omega", "sg2.omega")
+    assert groups.against == ("sg4.omega",)
+    assert groups.between == {"sg3.omega": pytest.approx(87.0)}
+    assert groups.words(", ".join) == "sg1, sg2 against sg4; sg3 at +87°"
+    alone = mode.swing_groups(["sg1.omega", "sg3.omega"])
+    assert alone.words(", ".join) == "sg1; sg3 at +87°"
+    assert mode.swing_groups([]).words(", ".join) == ""

@@ -164,7 +164,7 @@ def test_the_terminals_mode_shapes(gfor):
                 assert int(share) == pytest.approx(100 * mode[of][name], abs=0.5)
         turned = {entry["state"].split(".")[0]: entry["angle_deg"] for entry in mode["shape"]}
         opposed = abs(turned[row["Swing together"]] - turned[row["Against"]])
-        assert 90 < opposed < 270
+        assert 135 <= opposed <= 225
 
 
 # -- the page -----------------------------------------------------------------------------------

@@ -30,8 +30,12 @@ def test_the_first_screen_of_modes_has_one_line_a_scenario(capsys):
     assert not [line for line in text if "largest real part" in line or "a mode grows" in line]
 
 
+SPEEDS = ("sg1.machine.omega", "sg2.machine.omega")
+
+
 def result(findings=(), stable=True, events=(1.0,), failure=None, kind=None):
-    mode = make_mode(-0.2 + 5j, np.array([1.0 + 0j]), np.array([1.0 + 0j]), ("sg1.machine.omega",))
+    shape = np.array([1.0 + 0j, -0.8 + 0j])
+    mode = make_mode(-0.2 + 5j, shape / 1.64, shape, SPEEDS)
     case = SimpleNamespace(
         table=SimpleNamespace(
             analysis=SimpleNamespace(modes={}), models=kind, emt=KindTable(step_size=1e-4)
@@ -55,7 +59,7 @@ def result(findings=(), stable=True, events=(1.0,), failure=None, kind=None):
         named={},
         unnamed={},
         misfits={},
-        swing_of=lambda _: (["sg1"], ["sg2"]),
+        swing=SPEEDS,
         stability=Stability(stable, mode, reason="" if stable else "not searched"),
     )
     return RunResult(modes, None, findings=list(findings), failure=failure)
