@@ -29,6 +29,10 @@ _STEERING = re.compile("[\x01-\x08\x0e-\x19\x1b\x7f-\x84\x86-\x9f\u202a-\u202e\u
 """Begin a command to a terminal, or turn the direction of writing; tabs, ends of lines and DOS's end of file do not."""
 
 
+_BREAKING = re.compile("[\t-\r\x1a\x1c-\x1e\x85\u2028\u2029]")
+"""End a line or move in it; a name needs none of them."""
+
+
 def check_regular(path: Path | str, label: str = "") -> None:
     """Raise an `InputError` if something is there that is neither a file nor a folder; what is absent passes.
 
@@ -87,6 +91,11 @@ def read_text(
 def visible(text: str) -> str:
     r"""A text in which characters that steer a terminal are written out, such as ``\x1b``."""
     return _STEERING.sub(lambda found: repr(found.group())[1:-1], text)
+
+
+def one_line(text: str) -> str:
+    r"""A name or a title in which also tabs and ends of lines are written out, such as ``\n``: no line is forged."""
+    return _BREAKING.sub(lambda found: repr(found.group())[1:-1], visible(text))
 
 
 def steering_in(value: Any, *place: Any) -> Iterator[tuple[tuple[Any, ...], str]]:

@@ -3,6 +3,7 @@
 import ast
 import os
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -12,14 +13,16 @@ from orchestrator.cases.case import load_case
 from orchestrator.cases.csv_rows import rows_of
 from orchestrator.cases.psse.dyr_records import read_dyr
 from orchestrator.cases.psse.records import read_records
+from orchestrator.cases.source_changes import Changes
 from orchestrator.errors import CaseError, InputError
 from orchestrator.fmi.vendor_files import as_fmu
-from orchestrator.foreign_files import check_regular, read_bytes, read_text, visible
+from orchestrator.foreign_files import check_regular, one_line, read_bytes, read_text, visible
 from orchestrator.immittance.scan_files import read_scan
 from orchestrator.interop.probe_result import read_probe_result
 from orchestrator.results.comtrade.reading import read_comtrade
 from orchestrator.results.csv_recording import read_table
 from orchestrator.safe_files import file_hash
+from orchestrator.ssp.archive import SspArchive
 from orchestrator.toml_files import read_toml
 
 ROOT = Path(__file__).parents[1]
@@ -251,3 +254,24 @@ def test_a_folder_whose_name_is_no_utf_8_is_named_before_anything_is_computed(
 def test_the_characters_are_named_once():
     assert foreign_files.may_steer("\x1b")
     assert not foreign_files.may_steer("plain, with ä and\ttabs\n")
+
+
+def test_a_name_has_one_line():
+    assert one_line("a\nb\t\r\x1b[2K\x85\u2028é\xa0→") == "a\\nb\\t\\r\\x1b[2K\\x85\\u2028é\xa0→"
+
+
+def test_what_a_networks_source_calls_its_elements_is_shown_in_one_line():
+    changes = Changes("grid.zip", "element")
+    changes.note("L1\nUNSTABLE\x1b[2K", "held")
+    (problem,) = changes.listed()
+    assert str(problem) == "grid.zip, element L1\\nUNSTABLE\\x1b[2K: held"
+
+
+def test_names_of_an_ssp_are_shown_in_one_line_and_its_values_stay(tmp_path):
+    path = tmp_path / "a.ssp"
+    text = '<S name="a&#10;b\u202e"><P name="k" description="\x9b" value="x&#10;y"/></S>'
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("SystemStructure.ssd", text)
+    root = SspArchive(path).xml("SystemStructure.ssd")
+    assert root.attrib == {"name": "a\\nb\\u202e"}
+    assert root[0].attrib == {"name": "k", "description": "\\x9b", "value": "x\ny"}

@@ -12,6 +12,7 @@ from orchestrator.api.acceptance import check
 from orchestrator.cli.arguments import add_kept_argument, add_options
 from orchestrator.cli.terminal import keep_json, print_json
 from orchestrator.fmi.protection import missing
+from orchestrator.foreign_files import one_line
 
 _COLOURS = {
     Verdict.PASS: "green",
@@ -78,7 +79,7 @@ def _print(report: AcceptanceReport) -> None:
     for result in _each_once(report.results):
         mark = f"[{_COLOURS[result.verdict]}]{result.verdict:<14}[/]"
         fault = f"[bold]{result.fault}:[/] " if result.fault else ""
-        evidence = escape(_in_one_line(result.evidence))
+        evidence = escape(one_line(result.evidence))
         if result.fault:
             first = told.setdefault((result.fault, result.evidence), result.check)
             evidence = evidence if first == result.check else f"the same as in {first!r}"
@@ -97,8 +98,3 @@ def _print(report: AcceptanceReport) -> None:
         console.print(f"Not in force on this system: {', '.join(lacking)}.")
     colour = "" if report.trusted else "bold red" if report.failures else "bold yellow"
     console.print(escape(f"{report.fmu.name}: {report.sentence}"), style=colour)
-
-
-def _in_one_line(text: str) -> str:
-    """An FMU's text with control characters made visible: they could move the cursor and forge lines."""
-    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

@@ -29,6 +29,7 @@ from orchestrator.fmi.archive import (
 from orchestrator.fmi.clocks import FmiClock, clocks_of, special_variables
 from orchestrator.fmi.values import Scalar, typed
 from orchestrator.fmi.vendor_files import as_fmu
+from orchestrator.foreign_files import one_line
 from orchestrator.uncollected import uncollected
 
 TOOL = "gfor-cosim"
@@ -309,6 +310,8 @@ def _describe(
     version: str,
 ) -> FmuDescription:
     kind, usual = _component(root, version)
+    for v in md.modelVariables:
+        v.name = one_line(v.name or "")
     _check_names(path, md)
     variables = {v.name: _variable(path, v, usual) for v in md.modelVariables}
     dependencies = {
@@ -321,10 +324,10 @@ def _describe(
     return FmuDescription(
         path=path,
         guid=md.guid,
-        model_name=md.modelName or "",
-        title=md.description or "",
+        model_name=one_line(md.modelName or ""),
+        title=one_line(md.description or ""),
         model_identifier=md.coSimulation.modelIdentifier,
-        generation_tool=md.generationTool or "",
+        generation_tool=one_line(md.generationTool or ""),
         variables=variables,
         states=(*_states(path, md), *discrete),
         states_are_settable=_settable(root, version) or bool(discrete),
@@ -463,7 +466,10 @@ def _positive(text: str | None) -> float | None:
 
 def _units(root: ElementTree.Element) -> dict[str, dict[str, str]]:
     bases = ((unit, unit.find("BaseUnit")) for unit in root.findall("UnitDefinitions/Unit"))
-    return {unit.get("name", ""): {} if base is None else dict(base.attrib) for unit, base in bases}
+    return {
+        one_line(unit.get("name", "")): {} if base is None else dict(base.attrib)
+        for unit, base in bases
+    }
 
 
 def _component(root: ElementTree.Element, version: str) -> tuple[str, dict[str, Usual]]:
@@ -491,11 +497,11 @@ def _variable(path: Path, v: Any, usual: Mapping[str, Usual]) -> VariableInfo:
         type=fmi_type,
         causality=v.causality or "local",
         variability=v.variability or "continuous",
-        unit=unit,
+        unit=one_line(unit),
         start=None if v.start is None else _start(path, v, fmi_type),
         minimum=None if v.min is None else float(v.min),
         maximum=None if v.max is None else float(v.max),
-        description=v.description or "",
+        description=one_line(v.description or ""),
         declared_type=v.type,
         usual=usual.get(v.name)
         or (rated.usual if (rated := _RATED.get(v.name)) and rated.unit == unit else None),

@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element
 from fmus.toolchain.cache import intact, keep
 from orchestrator.errors import InputError
 from orchestrator.fmi.archive import check_xml, names_in, read_member
-from orchestrator.foreign_files import read_bytes
+from orchestrator.foreign_files import one_line, read_bytes
 from orchestrator.ssp.names import SYSTEM_FILE
 
 _KIND = "SSP"
@@ -66,7 +66,7 @@ class SspArchive:
         text = self.read(member)
         check_xml(self.path, member, text)
         try:
-            return ElementTree.fromstring(text)
+            return _told_names(ElementTree.fromstring(text))
         except (
             ElementTree.ParseError,
             LookupError,
@@ -80,3 +80,16 @@ class SspArchive:
         """Copy a member into the cache, under its own path in a folder there; an intact copy stays."""
         target = folder / member
         return target if intact(target) else keep(target, self.read(member))
+
+
+_AS_WRITTEN = {"value", "source"}
+"""Attributes that are no names: values of texts, and where files lie."""
+
+
+def _told_names(root: Element) -> Element:
+    """The same elements, with characters that steer a terminal or end a line written out in names and texts."""
+    for element in root.iter():
+        for key, text in element.attrib.items():
+            if key not in _AS_WRITTEN:
+                element.set(key, one_line(text))
+    return root

@@ -17,9 +17,9 @@ from orchestrator.acceptance.checks.subject import OperatingAt
 from orchestrator.cases import infinite_bus, two_area
 from orchestrator.cases.case import load_case
 from orchestrator.cases.use import use_in_case
-from orchestrator.cli.check import _in_one_line
 from orchestrator.errors import CaseError
 from orchestrator.fmi.protection import NAMES
+from orchestrator.foreign_files import one_line
 from orchestrator.sweep.axes import parse_vary
 from orchestrator.sweep.request import SweepRequest
 from orchestrator.sweep.sweep import plan_sweep
@@ -240,7 +240,7 @@ def test_a_start_value_that_a_case_does_not_give_has_its_default(gallery, tmp_pa
 
 def test_what_an_fmu_says_stays_in_its_line():
     """An FMU could write a verdict of its own on the terminal."""
-    assert _in_one_line("x\n\x1b[1Apass runs") == "x\\n\\x1b[1Apass runs"
+    assert one_line("x\n\x1b[1Apass runs") == "x\\n\\x1b[1Apass runs"
 
 
 def _bound(paths):

@@ -339,3 +339,24 @@ def test_a_start_value_as_a_number(start, number):
         VariableInfo("x", 0, "Real", "parameter", "fixed", "", start, None, None, "").start_number
         == number
     )
+
+
+def test_names_and_texts_that_steer_a_terminal_are_written_out(rewritten, capsys):
+    """XML allows line ends by their numbers, and the second set of control characters as they are."""
+    hostile = "&#10;stable&#13;\x9b2K\u202e"
+    shown = "\\nstable\\r\\x9b2K\\u202e"
+
+    def change(text):
+        text = text.replace('modelName="', f'modelName="{hostile}', 1)
+        text = re.sub(r'( description=")', rf"\1{hostile}", text)
+        return text.replace('name="pod_p.K"', f'name="pod_p.K{hostile}"')
+
+    found = read_description(rewritten(change))
+    assert found.model_name.startswith(shown)
+    assert found.title.startswith(shown)
+    assert f"pod_p.K{shown}" in found.variables
+    assert found.variables[f"pod_p.K{shown}"].description.startswith(shown)
+    assert main(["fmu", "info", str(found.path)]) == 0
+    said = capsys.readouterr().out
+    assert not re.search("[\r\x9b\u202e]", said)
+    assert "\nstable" not in said
