@@ -16,12 +16,27 @@ CRITICAL = np.array([-0.3137 + 3.7193j, -0.9071 + 7.3391j])
 
 def test_the_walker_sees_a_unit_and_a_sign():
     source = {"eigenvalue": -0.3137 + 3.7193j, "share": 0.417}
-    right = {"frequency_hz": 3.7193 / (2 * np.pi), "percent": [41.7, 0.417]}
+    right = {"frequency_hz": 3.7193 / (2 * np.pi), "share_percent": 41.7, "share": 0.417}
     assert foreign_in_json(right, source) == []
     for wrong in (3.7193 * 2 * np.pi, -3.7193 / (2 * np.pi), 3.7193 / np.pi):
         assert foreign_in_json({"frequency_hz": wrong}, source) == [(".frequency_hz", wrong)]
     assert foreign_in_text("<td>−0.314 ± j3.719</td><td>0.5919</td>", source) == []
     assert foreign_in_text("<td>0.314</td><td>23.3690</td>", source) == ["0.314", "23.3690"]
+
+
+def test_the_walker_sees_percent_that_are_none_and_a_lost_sign():
+    source = {"share": 0.417, "change": -0.0123, "damping_percent": 8.43}
+    assert foreign_in_json({"share": 41.7, "share_percent": 0.417}, source) == [
+        (".share", 41.7),
+        (".share_percent", 0.417),
+    ]
+    assert foreign_in_json({"change": 0.0123, "damping_percent": 843.0}, source) == [
+        (".change", 0.0123),
+        (".damping_percent", 843.0),
+    ]
+    assert foreign_in_text("41.7 % and 0.417, −0.012", source) == []
+    assert foreign_in_text("41.7 and 0.417 %, 0.012", source) == ["41.7", "0.417", "0.012"]
+    assert foreign_in_text("41.7", source, "Share [%]") == []
 
 
 def test_of_a_choice_of_the_step():
@@ -58,7 +73,7 @@ def test_of_a_table_of_modes():
     )
     for row in _mode_rows([result]):
         for heading, cell in row.items():
-            assert foreign_in_text(cell, modes) == [], heading
+            assert foreign_in_text(cell, modes, heading) == [], heading
 
 
 def test_of_a_certificates_page(monkeypatch):
@@ -76,11 +91,10 @@ def test_of_a_certificates_page(monkeypatch):
     verdict = SimpleNamespace(
         X_L=0.1, modes=[mode], neighbours=[neighbour], faults=[], unknown="", judged=True
     )
-    for cells in (
-        report_criteria._mode(mode.eigenvalue),
-        [report_criteria.before(mode.before)],
-    ):
-        assert foreign_in_text(" ".join(cells), mode) == []
+    headings = ("Eigenvalue [rad/s]", "f [Hz]", "Damping [%]")
+    for heading, cell in zip(headings, report_criteria._mode(mode.eigenvalue), strict=True):
+        assert foreign_in_text(cell, mode, heading) == []
+    assert foreign_in_text(report_criteria.before(mode.before), mode) == []
     point = SimpleNamespace(
         modes=SimpleNamespace(eigenvalues=np.array([mode.eigenvalue])), components=["a"]
     )

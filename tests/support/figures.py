@@ -1,48 +1,65 @@
 """Whether what goes out, as JSON or a page, shows figures of the object that it was made from, and no others.
 
-Nobody computes with a figure that only goes out, so a wrong unit in it fails no other test."""
+Nobody computes with a figure that only goes out, so a wrong unit in it fails no other test. A figure has its sign, and
+is 100 times one of the object only where percent are said: by a key, a heading, or the sign behind it."""
 
 import re
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from html import unescape
 
 import numpy as np
 
-_NUMBER = re.compile(r"[-−+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+_NUMBER = re.compile(r"([-−+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?)(\s*%)?")
+_PERCENT = re.compile(r"percent|%|points", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Figures:
+    """``plain``: as they are, and what is told of a complex one: its frequency [Hz] and damping ratio; ``percent``."""
+
+    plain: np.ndarray
+    percent: np.ndarray
+
+    def of(self, percent):
+        return self.percent if percent else self.plain
 
 
 def figures_of(source):
-    """Every number in an object, and what is told of it: its part of 100, and a mode's frequency and damping."""
-    found = set()
-    for value in _values(source):
+    """Every number in an object; those whose own name says percent are no ratios."""
+    plain, percent = set(), set()
+    for name, value in _values(source):
         if isinstance(value, complex):
-            parts = [value.real, value.imag, abs(value.imag), value.imag / (2 * np.pi)]
+            plain.update([value.real, value.imag, value.imag / (2 * np.pi)])
             if abs(value):
-                parts += [-value.real / abs(value), -100 * value.real / abs(value)]
-            found.update(parts)
+                plain.add(-value.real / abs(value))
+                percent.add(-100 * value.real / abs(value))
+        elif _PERCENT.search(name):
+            percent.add(value)
         else:
-            found.update((value, abs(value), 100 * value))
-    return np.array(sorted(found))
+            plain.add(value)
+            percent.add(100 * value)
+    return Figures(np.array(sorted(plain)), np.array(sorted(percent)))
 
 
-def _values(source):
+def _values(source, name=""):
     if isinstance(source, str | bytes | None) or callable(source):
         return
     if isinstance(source, bool | np.bool_ | int | float | np.integer | np.floating):
-        yield float(source)
+        yield name, float(source)
     elif isinstance(source, complex | np.complexfloating):
-        yield complex(source)
+        yield name, complex(source)
     elif isinstance(source, np.ndarray):
-        yield from (x for one in source.ravel().tolist() for x in _values(one))
+        yield from (x for one in source.ravel().tolist() for x in _values(one, name))
     elif isinstance(source, Mapping):
-        yield from (x for pair in source.items() for one in pair for x in _values(one))
-    elif isinstance(source, list | tuple | set):
-        yield from (x for one in source for x in _values(one))
+        yield from (x for key, one in source.items() for x in _values(one, f"{name}.{key}"))
+        yield from (x for key in source for x in _values(key, name))
+    elif isinstance(source, list | tuple | set | frozenset):
+        yield from (x for one in source for x in _values(one, name))
     elif is_dataclass(source):
-        yield from (x for f in fields(source) for x in _values(getattr(source, f.name)))
+        yield from (x for f in fields(source) for x in _values(getattr(source, f.name), f.name))
     else:
-        yield from (x for one in vars(source).values() for x in _values(one))
+        yield from (x for key, one in vars(source).items() for x in _values(one, key))
 
 
 def foreign_in_json(said, source, place=""):
@@ -51,7 +68,7 @@ def foreign_in_json(said, source, place=""):
     return [
         (where, value)
         for where, value in _numbers(said, place)
-        if not np.isclose(known, value, rtol=1e-9, atol=1e-12).any()
+        if not np.isclose(known.of(_PERCENT.search(where)), value, rtol=1e-9, atol=1e-12).any()
     ]
 
 
@@ -66,13 +83,16 @@ def _numbers(said, place):
         yield place, float(said)
 
 
-def foreign_in_text(text, source):
-    """Numbers of a page that are no figure of the object, rounded as they are shown."""
+def foreign_in_text(text, source, heading=""):
+    """Numbers of a page that are no figure of the object, rounded as they are shown.
+
+    ``heading``: of the column, which may say percent."""
     known, shown = figures_of(source), unescape(re.sub(r"<[^>]*>", " ", text)).replace("j", " ")
     found = []
-    for word in _NUMBER.findall(shown):
+    for word, sign in _NUMBER.findall(shown):
         decimals = len(word.partition("e")[0].partition(".")[2])
         value = float(word.replace("−", "-"))
-        if not (np.abs(known - value) <= 0.5000001 * 10.0**-decimals).any():
+        figures = known.of(sign or _PERCENT.search(heading))
+        if not (np.abs(figures - value) <= 0.5000001 * 10.0**-decimals).any():
             found.append(word)
     return found
