@@ -20,10 +20,10 @@ class Changes:
     def listed(self) -> list[Problem]:
         """One row for each kind, complete: how many, what was done, and every line or name."""
         return [
-            Problem(f"{self._place}, {self._named(items)}", text)
+            Problem(f"{self._place}, {self._place_of(items)}", text)
             for text, items in self._items.items()
         ]
 
-    def _named(self, items: list[int | str]) -> str:
+    def _place_of(self, items: list[int | str]) -> str:
         plural = "s" if len(items) > 1 else ""
         return f"{self._what}{plural} {', '.join(one_line(str(item)) for item in items)}"

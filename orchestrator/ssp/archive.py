@@ -66,7 +66,7 @@ class SspArchive:
         text = self.read(member)
         check_xml(self.path, member, text)
         try:
-            return _told_names(ElementTree.fromstring(text))
+            return _with_plain_names(ElementTree.fromstring(text))
         except (
             ElementTree.ParseError,
             LookupError,
@@ -86,7 +86,7 @@ _AS_WRITTEN = {"value", "source"}
 """Attributes that are no names: values of texts, and where files lie."""
 
 
-def _told_names(root: Element) -> Element:
+def _with_plain_names(root: Element) -> Element:
     """The same elements, with characters that steer a terminal or end a line written out in names and texts."""
     for element in root.iter():
         for key, text in element.attrib.items():

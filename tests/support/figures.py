@@ -7,43 +7,56 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from html import unescape
+from pathlib import PurePath
 
 import numpy as np
 
-_NUMBER = re.compile(r"([-−+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?)(\s*%)?")
-_PERCENT = re.compile(r"percent|%|points", re.IGNORECASE)
+_NUMBER = re.compile(r"([-−+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?)(\s*(?:%|Hz))?")
+_PERCENT = re.compile(r"percent|%", re.IGNORECASE)
+_POINTS = re.compile(
+    r"_points\b|\[points\]"
+)  # a difference of percent, which an object may hold as such
+_HERTZ = re.compile(r"hz\b", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class Figures:
-    """``plain``: as they are, and what is told of a complex one: its frequency [Hz] and damping ratio; ``percent``."""
+    """``plain``: as they are, and a complex one's parts and damping ratio; ``hertz``: with its frequency instead."""
 
     plain: np.ndarray
+    hertz: np.ndarray
     percent: np.ndarray
 
-    def of(self, percent):
-        return self.percent if percent else self.plain
+    def of(self, words):
+        """Those that may stand behind a key, a heading or before a unit."""
+        if _POINTS.search(words):
+            return np.append(self.plain, self.percent)
+        if _PERCENT.search(words):
+            return self.percent
+        return self.hertz if _HERTZ.search(words) else self.plain
 
 
 def figures_of(source):
     """Every number in an object; those whose own name says percent are no ratios."""
-    plain, percent = set(), set()
+    plain, hertz, percent = set(), set(), set()
     for name, value in _values(source):
         if isinstance(value, complex):
-            plain.update([value.real, value.imag, value.imag / (2 * np.pi)])
+            plain.update([value.real, value.imag])
+            hertz.add(value.imag / (2 * np.pi))
             if abs(value):
                 plain.add(-value.real / abs(value))
                 percent.add(-100 * value.real / abs(value))
-        elif _PERCENT.search(name):
+        elif _PERCENT.search(name) or _POINTS.search(name):
             percent.add(value)
         else:
             plain.add(value)
+            hertz.add(value)
             percent.add(100 * value)
-    return Figures(np.array(sorted(plain)), np.array(sorted(percent)))
+    return Figures(*(np.array(sorted(values)) for values in (plain, hertz, percent)))
 
 
 def _values(source, name=""):
-    if isinstance(source, str | bytes | None) or callable(source):
+    if isinstance(source, str | bytes | PurePath | None) or callable(source):
         return
     if isinstance(source, bool | np.bool_ | int | float | np.integer | np.floating):
         yield name, float(source)
@@ -68,8 +81,13 @@ def foreign_in_json(said, source, place=""):
     return [
         (where, value)
         for where, value in _numbers(said, place)
-        if not np.isclose(known.of(_PERCENT.search(where)), value, rtol=1e-9, atol=1e-12).any()
+        if not np.isclose(known.of(_key(where)), value, rtol=1e-9, atol=1e-12).any()
     ]
+
+
+def _key(place):
+    """The key behind which a number stands, alone or in a list."""
+    return re.sub(r"(\.\d+)+$", "", place).rpartition(".")[2]
 
 
 def _numbers(said, place):
@@ -89,10 +107,11 @@ def foreign_in_text(text, source, heading=""):
     ``heading``: of the column, which may say percent."""
     known, shown = figures_of(source), unescape(re.sub(r"<[^>]*>", " ", text)).replace("j", " ")
     found = []
-    for word, sign in _NUMBER.findall(shown):
+    for word, unit in _NUMBER.findall(shown):
         decimals = len(word.partition("e")[0].partition(".")[2])
         value = float(word.replace("−", "-"))
-        figures = known.of(sign or _PERCENT.search(heading))
+        words = unit or heading
+        figures = known.of(words) if words else np.append(known.plain, known.hertz)
         if not (np.abs(figures - value) <= 0.5000001 * 10.0**-decimals).any():
             found.append(word)
     return found
