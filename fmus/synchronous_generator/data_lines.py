@@ -1,7 +1,7 @@
 """A part's parameters as data, one line each; `declared` gives their values by name where the equations are."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 
 from fmus.synchronous_generator import declarations
@@ -54,6 +54,10 @@ class Given:
     def __init__(self, values: dict[str, Expr]) -> None:
         self._values = values
 
+    def has(self, name: str) -> bool:
+        """Return whether there is such a parameter."""
+        return name in self._values
+
     def __getattr__(self, name: str) -> Expr:
         try:
             return self._values[name]
@@ -61,11 +65,19 @@ class Given:
             raise AttributeError(name) from None
 
 
-def declared(m: ModelBuilder, lines: Sequence[Line], source: str) -> Given:
+def declared(
+    m: ModelBuilder, lines: Sequence[Line], source: str, values: Mapping[str, float] | None = None
+) -> Given:
     """Declare parameters in the current scope.
 
-    ``source``: of the defaults."""
-    return Given({line.name: _declare(m, line, source) for line in lines})
+    ``source``: of the defaults; ``values``: defaults in place of the lines', by name."""
+    own = values or {}
+    return Given(
+        {
+            line.name: _declare(m, replace(line, value=own.get(line.name, line.value)), source)
+            for line in lines
+        }
+    )
 
 
 def _declare(m: ModelBuilder, line: Line, source: str) -> Expr:

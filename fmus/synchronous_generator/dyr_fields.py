@@ -42,8 +42,9 @@ class DyrField:
 class DyrRecord:
     """One kind of record.
 
-    ``kind``: key of the component's table: ``machine``, ``exciter``, ``governor`` or ``stabilizer``; ``converter`` for
-    a record that is a whole component; ``part``: its value, the name of our part; for a whole component, its model;
+    ``kind``: key of the component's table: ``machine``, ``exciter``, ``governor`` or ``stabilizer``; ``compensator``
+    for what an exciter measures, which is no part of its own; ``converter`` for a record that is a whole component;
+    ``part``: its value, the name of our part; for a whole component, its model;
     ``fields``: in the file's order; ``lacks``: parameters of our part that 0 leaves out, as the record has none;
     ``omissions``: what our part leaves out where a field, by its name, is not 0."""
 
@@ -55,7 +56,7 @@ class DyrRecord:
 
 
 _WORD = re.compile(
-    r"(?P<name>[^:=!&]+)(:(?P<sets>[\w+]+))?(-(?P<negated>[A-Za-z]\w*))?(\*(?P<times>[^=!&]+))?(==(?P<same>\w+))?(=(?P<only>[-\d|]+))?"
+    r"(?P<name>[^:=!&-]+)(:(?P<sets>[\w+]+))?(-(?P<negated>[A-Za-z]\w*))?(\*(?P<times>[^=!&]+))?(==(?P<same>\w+))?(=(?P<only>[-\d|]+))?"
     r"(!(?P<chooser>\w*))?(?P<switch>\??)(&(?P<without>\S+))?"
 )
 """A field as the table has it."""
@@ -65,6 +66,7 @@ _SCOPES = {
     "exciter": "exciter.",
     "governor": "governor.",
     "stabilizer": "pss.",
+    "compensator": "exciter.",
     "converter": "",
 }
 

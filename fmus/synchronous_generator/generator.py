@@ -69,12 +69,18 @@ def with_controls(
     stabilizer: Stabilizer | None,
 ) -> Model:
     """A machine with stator transients and its controls."""
-    v_nearly = terminal_voltage(g, port, g.field_current)
+    v_nearly = terminal_voltage(g, port, g.field_current).magnitude()
     shaft = Shaft(g.w, g.start.T_e, *terminal_power(g, port), v_nearly, g.start.v_t, g.S_n)
     v_s = 0.0 if stabilizer is None else stabilizer(m, shaft)
-    E_fd, v_t = exciter(
-        m, Regulated(g.start, lambda E: terminal_voltage(g, port, E), g.field_current, v_s)
+    seen = Regulated(
+        g.start,
+        lambda E: terminal_voltage(g, port, E),
+        g.field_current,
+        v_s,
+        i=g.current,
+        v_0=g.start.terminal(g.R_t, g.X_t),
     )
+    E_fd, v_t = exciter(m, seen)
     P_m = governor(m, shaft)
     machine_equations(m, g, port, E_fd, P_m)
     declare_port_outputs(m, port, g.current.rotated(g.delta))

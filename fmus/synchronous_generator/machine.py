@@ -18,7 +18,7 @@ from fmus.toolchain.blocks import BYPASS_TIME
 from fmus.toolchain.frames import Phasor, power
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort
-from fmus.toolchain.symbols import Expr, exp, fmin, if_else, log
+from fmus.toolchain.symbols import Expr, Scalar, exp, fmin, if_else, log
 
 FluxDeclaration = Callable[[ModelBuilder, str, Expr, str], Expr]
 """Declares a flux by its name, start value and description."""
@@ -34,6 +34,10 @@ class Start:
     T_e: Expr
     v: Phasor
     i: Phasor
+
+    def terminal(self, R_t: Scalar, X_t: Scalar) -> Phasor:
+        """Terminal voltage behind a transformer's impedance, rotor frame [pu, S_n]."""
+        return self.v + Phasor(R_t, X_t) * self.i
 
 
 @dataclass(frozen=True)
@@ -145,8 +149,8 @@ def rotor_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: Expr, P
     m.derivative(g.delta, port.omega_b * (g.w - 1))
 
 
-def terminal_voltage(g: Machine, port: DevicePort, E_fd: Expr) -> Expr:
-    """|v_t| at the machine's terminal: the bus voltage plus the transformer's drop, di/dt included."""
+def terminal_voltage(g: Machine, port: DevicePort, E_fd: Expr) -> Phasor:
+    """v_t at the machine's terminal, rotor frame: the bus voltage plus the transformer's drop, di/dt included."""
     psi_q, psi_d, d_rotor, q_rotor = _flux_rates(g, port, E_fd)
     rate = Phasor(g.q.current_rate(psi_q, q_rotor), -g.d.current_rate(psi_d, d_rotor))
     drop = Phasor(g.R_t, g.w * g.X_t) * g.current + rate * (g.X_t / port.omega_b)
@@ -155,7 +159,7 @@ def terminal_voltage(g: Machine, port: DevicePort, E_fd: Expr) -> Expr:
         - g.current * g.R
         + Phasor(g.w * g.d.psi, g.w * g.q.psi)
     )
-    return (port.through_breaker(port.v.rotated(-g.delta), opened) + drop).magnitude()
+    return port.through_breaker(port.v.rotated(-g.delta), opened) + drop
 
 
 def terminal_power(g: Machine, port: DevicePort) -> tuple[Expr, Expr]:

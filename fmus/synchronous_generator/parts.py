@@ -5,12 +5,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fmus.synchronous_generator.excitation.alternator import ac8b, esac6a, exac2
+from fmus.synchronous_generator.excitation.alternator import ac8b, esac6a, exac2, exbas
+from fmus.synchronous_generator.excitation.bridge import st5b, st6b, st7b, st8c
 from fmus.synchronous_generator.excitation.common import Exciter
+from fmus.synchronous_generator.excitation.compound import esst2a, esst3a, ieeet3
 from fmus.synchronous_generator.excitation.integral import ac7b, dc4b, expic1
 from fmus.synchronous_generator.excitation.rotating import (
     ac1a,
     ac4a,
+    ac5a,
     dc1a,
     dc2a,
     ieeet1,
@@ -28,8 +31,9 @@ from fmus.synchronous_generator.machines.standard import (
     gensal,
     two_axis,
 )
-from fmus.synchronous_generator.stabilization.legacy import ieeest, st2cut, stab2a
-from fmus.synchronous_generator.stabilization.standard import pss1a, pss2a, pss2b
+from fmus.synchronous_generator.stabilization.bands import pss3b, pss4b
+from fmus.synchronous_generator.stabilization.legacy import iee2st, ieeest, st2cut, stab2a
+from fmus.synchronous_generator.stabilization.standard import pss1a, pss2a, pss2b, pss2c
 from fmus.synchronous_generator.turbines.diesel import degov, degov1
 from fmus.synchronous_generator.turbines.gas import gast2a
 from fmus.synchronous_generator.turbines.ggov1 import ggov1
@@ -81,8 +85,17 @@ EXCITERS: dict[str, Exciter] = {
     "dc4b": dc4b,
     "expic1": expic1,
     "ac4a": ac4a,
+    "ac5a": ac5a,
+    "exbas": exbas,
+    "ieeet3": ieeet3,
     "st1a": st1a,
+    "esst2a": esst2a,
+    "esst3a": esst3a,
     "st4b": st4b,
+    "st5b": st5b,
+    "st6b": st6b,
+    "st7b": st7b,
+    "st8c": st8c,
     "external": external,
 }
 GOVERNORS: dict[str, Governor] = {
@@ -107,11 +120,15 @@ GOVERNORS: dict[str, Governor] = {
 }
 STABILIZERS: dict[str, Stabilizer | None] = {
     NONE: None,
-    "pss1a": of_power(pss1a),
+    "pss1a": pss1a,
     "pss2a": of_power(pss2a),
     "pss2b": of_power(pss2b),
+    "pss2c": of_power(pss2c),
+    "pss3b": pss3b,
+    "pss4b": pss4b,
     "ieeest": ieeest,
     "st2cut": st2cut,
+    "iee2st": iee2st,
     "stab2a": stab2a,
 }
 

@@ -79,10 +79,19 @@ def with_controls(
     emf = Phasor(g.d.emf, g.q.emf) * (g.w if g.emf_speed is None else g.emf_speed)
     close_stator(m, g, port, emf)
     at_port = port.through_breaker(port.v.rotated(-g.delta), emf)  # the emf behind an open breaker
-    v_t = (at_port + Phasor(g.R_t, g.X_t) * g.current).magnitude()
+    terminal = at_port + Phasor(g.R_t, g.X_t) * g.current
+    v_t = terminal.magnitude()
     shaft = Shaft(g.w, g.start.T_e, *terminal_power(g, port), v_t, g.start.v_t, g.S_n)
     v_s = 0.0 if stabilizer is None else stabilizer(m, shaft)
-    E_fd, _ = exciter(m, Regulated(g.start, lambda E: v_t, g.field_current, v_s))
+    seen = Regulated(
+        g.start,
+        lambda E: terminal,
+        g.field_current,
+        v_s,
+        i=g.current,
+        v_0=g.start.terminal(g.R_t, g.X_t),
+    )
+    E_fd, _ = exciter(m, seen)
     P_m = governor(m, shaft)
     rotor_equations(m, g, port, E_fd, P_m)
     declare_phasor_port(m, g, port, emf)

@@ -70,6 +70,29 @@ def lead_lag(
     return if_else(left_out, u, x + (T_lead / T) * (u - x))
 
 
+def limited_lead_lag(
+    m: ModelBuilder,
+    name: str,
+    u: Expr,
+    T_lead: Scalar,
+    T_lag: Scalar,
+    low: Scalar,
+    high: Scalar,
+    initial: Scalar = 0.0,
+) -> Expr:
+    """(1 + s·T_lead)/(1 + s·T_lag) whose output is limited, and whose state waits while the output is at a limit.
+
+    ``T_lead``, ``T_lag``: time constants [s], 0 or more; T_lag = 0: a limiter; ``low``, ``high``: limits of the
+    output."""
+    x = m.state(name, initial, "pu", "lead/lag with limits", base="S_n")
+    left_out = _is_zero(T_lag)
+    T = if_else(left_out, BYPASS_TIME, T_lag)
+    y = if_else(left_out, u, x + (T_lead / T) * (u - x))
+    outward = logic_or(logic_and(y > high, u > x), logic_and(y < low, u < x))
+    m.derivative(x, if_else(logic_and(outward, T_lag > 0), 0, (u - x) / T))
+    return clamp(y, low, high)
+
+
 def second_order(
     m: ModelBuilder, name: str, u: Expr, lags: tuple[Expr, Expr], leads: tuple[Expr, Expr]
 ) -> Expr:

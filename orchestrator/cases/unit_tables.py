@@ -31,6 +31,7 @@ from orchestrator.cases.psse.dyr_units import (
     rows_of_machines,
     with_choices,
     with_records,
+    without_idle_controls,
 )
 from orchestrator.cases.psse.unused_models import unused_models
 from orchestrator.cases.schema import ComponentTable, UnitsTable
@@ -267,6 +268,7 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
     )
     _account(draft, table, records)
     rows = with_choices(rows, replaced, _parts_of(table))
+    rows = without_idle_controls(rows, str(path))
     machine_rows = [row for row in rows if row.label not in replaced]
     question(
         draft,
@@ -320,6 +322,7 @@ def _account(draft: Draft, table: UnitsTable, records: Sequence[DynamicRecord]) 
         draft.data.idle_machines if draft.data else (),
         table.dyr_leave_out,
         approximate=table.dyr_approximate,
+        exciter=table.exciter,
     )
     draft.found.records += uses
     draft.found.questions += unused_models(records, uses)

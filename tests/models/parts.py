@@ -14,9 +14,11 @@ from tests.support.evaluated import Evaluated
 V_T, E_FD, P_M = 1.01, 2.2, 0.7
 """Operating point of the parts: terminal voltage, field voltage and current, mechanical power [pu]."""
 
-START = Start(Expr(V_T), Expr(E_FD), Expr(P_M), Phasor(1.0, 0.0), Phasor(0.7, -0.1))
+CURRENT = Phasor(0.7, -0.1)
+START = Start(Expr(V_T), Expr(E_FD), Expr(P_M), Phasor(1.0, 0.0), CURRENT)
 AT_REST = {"exciter": [V_T, E_FD, 0.0], "governor": [1.0], "pss": [0.0, 0.8]}
-OF_POWER, OF_VOLTAGE = ("ggov1", "degov1", "pidgov", "wpidhy", "wshygp"), ("ieeest", "st2cut")
+OF_POWER = ("ggov1", "degov1", "pidgov", "wpidhy", "wshygp")
+OF_VOLTAGE = ("ieeest", "st2cut", "iee2st")
 """Governors that see the electrical power too, an input more; and stabilisers that see the voltage."""
 
 BUS = 1.02 * np.exp(-0.4j)
@@ -30,7 +32,9 @@ def exciter(name, values=None):
         m.input(name, "pu", name, base="S_n", start=start)
         for name, start in (("v_t", V_T), ("I_fd", E_FD), ("v_s", 0))
     )
-    E_fd, _ = EXCITERS[name](m, Regulated(START, lambda E: v_t, I_fd, v_s))
+    terminal = Phasor(v_t, 0.0)
+    seen = Regulated(START, lambda E: terminal, I_fd, v_s, i=CURRENT, v_0=Phasor(V_T, 0.0))
+    E_fd, _ = EXCITERS[name](m, seen)
     m.output("E_fd", E_fd, "pu", "Field voltage", base="E_fd")
     return Evaluated(m.build(), {f"exciter.{key}": value for key, value in (values or {}).items()})
 
@@ -45,14 +49,15 @@ def governor(name, values=None):
     return Evaluated(m.build(), {f"governor.{key}": value for key, value in (values or {}).items()})
 
 
-def stabilizer(name, values=None):
-    """A stabiliser behind speed deviation and power."""
+def stabilizer(name, values=None, *, sees_voltage=False):
+    """A stabiliser behind speed deviation and power; ``sees_voltage``: behind the voltage too."""
     m = ModelBuilder("alone", "The stabiliser alone")
     speed, power = (
         m.input("speed", "pu", "w − 1", base="f_n"),
         m.input("power", "pu", "P_e", base="S_n", start=0.8),
     )
-    v_t = m.input("v_t", "pu", "|v|", base="S_n", start=V_T) if name in OF_VOLTAGE else Expr(V_T)
+    sees_voltage = sees_voltage or name in OF_VOLTAGE
+    v_t = m.input("v_t", "pu", "|v|", base="S_n", start=V_T) if sees_voltage else Expr(V_T)
     part = STABILIZERS[name]
     assert part is not None
     shaft = Shaft(1 + speed, Expr(0.8), power, Expr(0.8), v_t, Expr(V_T), Expr(100))

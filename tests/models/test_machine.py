@@ -134,7 +134,7 @@ def excited(exciter, values):
         m.input(name, "pu", name, base="S_n", start=start)
         for name, start in (("v_t", 1.01), ("I_fd", 2.2), ("v_s", 0))
     )
-    E_fd, _ = exciter(m, Regulated(START, lambda E: v_t, I_fd, v_s))
+    E_fd, _ = exciter(m, Regulated(START, lambda E: Phasor(v_t, 0.0), I_fd, v_s))
     m.output("E_fd", E_fd, "pu", "Field voltage", base="E_fd")
     return Evaluated(m.build(), {f"exciter.{name}": value for name, value in values.items()})
 

@@ -1,4 +1,4 @@
-"""EXAC2, ESAC6A and AC8B: alternators with a rotating rectifier, field-controlled.
+"""EXAC2, ESAC6A, AC8B and EXBAS: alternators with a rotating rectifier, field-controlled.
 
 What they share is the alternator behind the rectifier, driven by V_R:
 
@@ -20,7 +20,12 @@ AC8B has a PID controller, and limits of V_E by the field's current; ESAC8B is t
     V_ref + V_S − v_m → K_PR + K_IR/s + s·K_DR/(1+sT_DR), within V_PIDMIN and V_PIDMAX
     → K_A/(1+sT_A) = V_R, held within V_RMIN and V_RMAX,  V_EMIN ≤ V_E ≤ (V_FEMAX − K_D·I_FD)/(K_E + S_E)
 
-Sources: OpenIPSL at 2be0558a (EXAC2, AC8B), ANDES 2.0.0 (EXAC2, AC8B), IEEE 421.5 (AC6A)."""
+EXBAS has a PI controller, and a rate feedback of V_R with a lead and a lag:
+
+    V_ref + V_S − v_m − V_F → K_PR + K_IR/s → (1+sT_C)/(1+sT_B) → K_A/(1+sT_A) = V_R, held within V_RMIN and V_RMAX
+    V_F = s·K_F·(1+sT_F1)/((1+sT_F)·(1+sT_F2))·V_R
+
+Sources: OpenIPSL at 2be0558a (EXAC2, AC8B, EXBAS), ANDES 2.0.0 (EXAC2, AC8B), IEEE 421.5 (AC6A)."""
 
 from dataclasses import dataclass
 
@@ -40,12 +45,13 @@ from fmus.synchronous_generator.excitation.common import (
 )
 from fmus.toolchain.blocks import (
     clamp,
+    close_limited_low_pass,
     held_at_limits,
     lead_lag,
     limited_low_pass,
 )
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin
+from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and
 
 _MOST = 1e9  # no upper limit of V_E [pu]
 _LEAST = 1e-3  # smallest V_E [pu] that the rectifier's loading is divided by
@@ -95,6 +101,16 @@ AC8B = (
     pu("V_RMIN", 0.0, "Lower limit of V_R"),
     pu("V_FEMAX", 999.0, "Highest field current, as V_FE"),
     pu("V_EMIN", 0.0, "Lower limit of V_E", 0),
+)
+EXBAS = (
+    pu("K_PR", 1.0, "Proportional gain", 0),
+    number("K_IR", 0.0, "Integral gain", 0, "1/s"),
+    pu("K_A", 355.0, "Gain", 1e-3),
+    seconds("T_A", 0.01, "Amplifier; 0 leaves the lag out"),
+    pu("V_RMAX", 8.33, "Upper limit of V_R"),
+    pu("V_RMIN", -6.66, "Lower limit of V_R"),
+    seconds("T_F1", 0.043, "Lead of the rate feedback"),
+    seconds("T_F2", 0.19, "Second lag of the rate feedback; 0 leaves the stage out"),
 )
 
 
@@ -209,4 +225,31 @@ def ac8b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         V_R = limited_low_pass(m, "amplifier", p.K_A * PID, p.T_A, p.V_RMIN, p.V_RMAX, initial=V_R0)
         highest = (p.V_FEMAX - behind.p.K_D * seen.I_fd) / behind.constant
         behind.drive(V_R, p.V_EMIN, fmax(highest, p.V_EMIN))
+        return measured.close(behind.E_fd)
+
+
+def exbas(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
+    """Declare it and return (E_fd, |v_t|) [pu]."""
+    with m.scope("exciter"):
+        p, behind = declared(m, EXBAS, SOURCE), alternator(m, seen)
+        V_R0 = behind.V_FE_0
+        PI_0 = V_R0 / p.K_A
+        require_within(m, V_R0, p.V_RMIN, p.V_RMAX, ("exciter.V_RMIN", "exciter.V_RMAX"))
+        amplifier = m.state("amplifier", V_R0, "pu", "first-order lag with limits", base="E_fd")
+        V_R = clamp(amplifier, p.V_RMIN, p.V_RMAX)
+        fast, K_F = rate_feedback(m, V_R, V_R0, 0.029, 2.6)
+        V_F = lead_lag(m, "feedback_2", fast, p.T_F1, p.T_F2)
+        m.require(
+            if_else(logic_and(K_F > 0, p.T_A <= 0), -1, 1), "exciter.K_F > 0 needs exciter.T_A > 0"
+        )
+        m.require(
+            if_else(logic_and(p.T_F2 <= 0, p.T_F1 > 0), -1, 1),
+            "exciter.T_F2 = 0 needs exciter.T_F1 = 0 as well",
+        )
+        measured = Measurement(m, seen)
+        control = Controller(m, p, PI_0)
+        signal = control(measured.error(control.error_at_start) - V_F)
+        compensated = lead_lag_stage(m, signal, PI_0)
+        close_limited_low_pass(m, amplifier, p.K_A * compensated, p.T_A, p.V_RMIN, p.V_RMAX)
+        behind.drive(V_R)
         return measured.close(behind.E_fd)

@@ -14,13 +14,16 @@ from fmus.toolchain.blocks import (
     clamp,
     lead_lag,
     limited_proportional_integral,
+    proportional_integral,
     washout,
 )
+from fmus.toolchain.frames import ZERO, Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, Scalar, fmax, if_else, logic_and, sqrt
 
-TerminalVoltage = Callable[[Expr], Expr]
-"""|v_t| [pu, S_n] for an E_fd [pu]; it depends, weakly, on E_fd because of the transformer in series."""
+TerminalVoltage = Callable[[Expr], Phasor]
+"""v_t [pu, S_n] in the rotor's frame for an E_fd [pu]; it depends, weakly, on E_fd because of the transformer in
+series."""
 
 SOURCE = "typical data, IEEE 421.5"
 
@@ -29,12 +32,21 @@ E_FD = "E_fd"
 
 @dataclass(frozen=True)
 class Regulated:
-    """What an exciter sees: operating point, terminal voltage and field current of its machine, and a stabiliser."""
+    """What an exciter sees: operating point, terminal and field current of its machine, and a stabiliser.
+
+    ``i``: stator current in the rotor's frame [pu, S_n]; ``v_0``: terminal voltage of the operating point, same frame.
+    """
 
     start: Start
-    terminal_voltage: TerminalVoltage
+    terminal: TerminalVoltage
     I_fd: Expr  # 1 pu gives 1 pu of voltage on open circuit
     v_s: Scalar = 0.0  # added to the voltage reference [pu, S_n]
+    i: Phasor = ZERO
+    v_0: Phasor = ZERO
+
+    def terminal_voltage(self, E_fd: Expr) -> Expr:
+        """|v_t| [pu, S_n] for an E_fd [pu]."""
+        return self.terminal(E_fd).magnitude()
 
 
 # an excitation system; gives (E_fd, |v_t|) [pu]
@@ -48,33 +60,55 @@ time = partial(declarations.time_constant, source=SOURCE)
 class Measurement:
     """The measured terminal voltage, 1/(1 + s·T_R), and the reference that it is compared with.
 
-    The field current is the first guess of E_fd where T_R = 0 lets |v_t| pass directly."""
+    What is measured is |v_t + (R_C + j·X_C)·i|, which regulates a point behind (positive) or before (negative) the
+    terminal. The field current is the first guess of E_fd where T_R = 0 lets the voltage pass directly."""
 
     def __init__(self, m: ModelBuilder, seen: Regulated) -> None:
         self._m, self._seen = m, seen
         T_R = time(m, "T_R", 0.01, "Voltage measurement; 0 leaves it out")
+        self._impedance = Phasor(
+            *(
+                m.parameter(name, 0.0, "pu", f"{text} of the compensation of load", base="S_n")
+                for name, text in (("R_C", "Resistance"), ("X_C", "Reactance"))
+            )
+        )
         self._left_out = T_R <= 0
         self._T_R = if_else(self._left_out, BYPASS_TIME, T_R)
-        self._state = m.state("v_m", seen.start.v_t, "pu", "Measured terminal voltage", base="S_n")
-        self.nearly = seen.terminal_voltage(seen.I_fd)
+        self.at_start = self._compensated(seen.v_0, seen.start.i)
+        self._state = m.state("v_m", self.at_start, "pu", "Measured terminal voltage", base="S_n")
+        nearly = seen.terminal(seen.I_fd)
+        self.nearly = nearly.magnitude()
         """|v_t| [pu] for an E_fd that equals the field current, as it does in steady state."""
+        self.value = if_else(self._left_out, self._compensated(nearly, seen.i), self._state)
+        """The measured voltage [pu, S_n]."""
+
+    def _compensated(self, v_t: Phasor, i: Phasor) -> Expr:
+        return (v_t + self._impedance * i).magnitude()
+
+    def reference(self, at_start: Scalar) -> Expr:
+        """The reference, above the measured voltage by ``at_start`` in steady state [pu, S_n]."""
+        m = self._m
+        V_ref = m.calculated(
+            "V_ref",
+            self.at_start + at_start,
+            "pu",
+            "Voltage reference of the operating point",
+            base="S_n",
+        )
+        return V_ref + m.parameter(
+            "delta_V_ref", 0.0, "pu", "Change of the voltage reference", base="S_n", tunable=True
+        )
 
     def error(self, at_start: Scalar) -> Expr:
         """Reference and stabiliser's signal less the measured voltage [pu, S_n]; ``at_start`` in steady state."""
-        m, v_t_0 = self._m, self._seen.start.v_t
-        V_ref = m.calculated(
-            "V_ref", v_t_0 + at_start, "pu", "Voltage reference of the operating point", base="S_n"
-        )
-        delta = m.parameter(
-            "delta_V_ref", 0.0, "pu", "Change of the voltage reference", base="S_n", tunable=True
-        )
-        return V_ref + delta + self._seen.v_s - if_else(self._left_out, self.nearly, self._state)
+        return self.reference(at_start) + self._seen.v_s - self.value
 
     def close(self, E_fd: Expr) -> tuple[Expr, Expr]:
         """(E_fd, |v_t|) of the exciter."""
-        v_t = self._seen.terminal_voltage(E_fd)
-        self._m.derivative(self._state, (v_t - self._state) / self._T_R)
-        return E_fd, v_t
+        v_t = self._seen.terminal(E_fd)
+        measured = self._compensated(v_t, self._seen.i)
+        self._m.derivative(self._state, (measured - self._state) / self._T_R)
+        return E_fd, v_t.magnitude()
 
 
 def lead_lag_stage(
@@ -112,10 +146,14 @@ def rate_feedback(
 class Controller:
     """K_PR + K_IR/s + s·K_DR/(1+sT_DR) of an error, the sum within limits; the integral stops at them.
 
-    ``error_at_start``: 0, or what it takes without an integral."""
+    Without limits it is K_PR + K_IR/s alone. ``error_at_start``: 0, or what it takes without an integral."""
 
     def __init__(
-        self, m: ModelBuilder, gains: Given, at_start: Expr, limits: tuple[Expr, Expr]
+        self,
+        m: ModelBuilder,
+        gains: Given,
+        at_start: Expr,
+        limits: tuple[Expr, Expr] | None = None,
     ) -> None:
         m.require(gains.K_PR + gains.K_IR - 1e-9, "exciter: one of K_PR and K_IR must exceed 0")
         self._m, self._gains, self._limits = m, gains, limits
@@ -126,8 +164,11 @@ class Controller:
 
     def __call__(self, error: Expr) -> Expr:
         """The controller's output."""
-        m, gains, (low, high) = self._m, self._gains, self._limits
+        m, gains = self._m, self._gains
         initial = if_else(self._integrates, self._at_start, 0)
+        if self._limits is None:
+            return proportional_integral(m, "regulator", error, gains.K_PR, gains.K_IR, initial)
+        low, high = self._limits
         kept = limited_proportional_integral(
             m, "regulator", error, gains.K_PR, gains.K_IR, low=low, high=high, initial=initial
         )

@@ -1,9 +1,9 @@
 """EXPIC1, DC4B and AC7B: exciters whose regulator integrates, so that the voltage is at its reference at rest.
 
-EXPIC1 has a PI controller, and an exciter or, with T_E = 0, none; V_B is the source, 1 with K_P = 0:
+EXPIC1 has a PI controller, and an exciter or, with T_E = 0, none; V_B is the source of `sources`, 1 with K_P = K_I = 0:
 
     V_ref + V_S − v_m − V_F → K_A·(1+sT_A1)/s, within V_R2 and V_R1 → (1+sT_A3)/((1+sT_A2)·(1+sT_A4))
-    → within V_RMIN and V_RMAX → times V_B = K_P·v_t·F_EX(K_C·I_FD/(K_P·v_t)) → within E_FDMIN and E_FDMAX
+    → within V_RMIN and V_RMAX → times V_B → within E_FDMIN and E_FDMAX
     T_E·dE_fd/dt = … − (K_E + S_E(E_fd))·E_fd,  V_F = s·K_F/((1+sT_F1)·(1+sT_F2))·E_fd
 
 DC4B has a PID controller and a commutator exciter:
@@ -18,7 +18,7 @@ AC7B has a PID and a PI controller, and the alternator of `alternator`:
     → K_PA + K_IA/s, within V_AMIN and V_AMAX → times K_P·v_t, at least −K_L·V_FE = V_R
     V_EMIN ≤ V_E ≤ (V_FEMAX − K_D·I_FD)/(K_E + S_E),  V_F = s·K_F3/(1+sT_F3)·V_FE
 
-EXPIC1's source from the stator's current (K_I) is left out. Sources: IEEE 421.5 (DC4B, AC7B), OpenIPSL at 2be0558a
+Sources: IEEE 421.5 (DC4B, AC7B), OpenIPSL at 2be0558a
 (DC4B, AC7B), the CIM's description of ExcPIC."""
 
 from fmus.synchronous_generator.data_lines import declared, number, pu, seconds
@@ -30,9 +30,9 @@ from fmus.synchronous_generator.excitation.common import (
     Regulated,
     exciter_saturation,
     rate_feedback,
-    rectifier,
     require_within,
 )
+from fmus.synchronous_generator.excitation.sources import COMPOUND, LOADED, Source
 from fmus.toolchain.blocks import (
     BYPASS_TIME,
     clamp,
@@ -41,11 +41,11 @@ from fmus.toolchain.blocks import (
     limited_proportional_integral,
     second_order,
 )
+from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, fmax, if_else, logic_and
 
 _MOST = 1e9  # no upper limit [pu]
-_LEAST = 1e-3  # smallest source [pu] that the rectifier's loading is divided by
 
 EXPIC1 = (
     number("K_A", 50.0, "Integral gain", 1e-6, "1/s"),
@@ -64,8 +64,6 @@ EXPIC1 = (
     pu("E_FDMIN", -9.0, "Lowest voltage into the exciter"),
     pu("K_E", 1.0, "Exciter constant"),
     seconds("T_E", 0.5, "Exciter's field; 0: there is no exciter"),
-    pu("K_P", 0.0, "Potential source gain; 0: the source is 1", 0),
-    pu("K_C", 0.0, "Rectifier loading factor", 0),
 )
 PID = (
     pu("K_PR", 20.0, "Proportional gain", 0),
@@ -107,12 +105,9 @@ def expic1(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         curve = exciter_saturation(m, 2.85, 0.3, 3.8, 0.6)
         rotates = p.T_E > 0
 
-        def source(v_t: Expr, I_fd: Expr) -> Expr:
-            V = fmax(p.K_P * v_t, _LEAST)
-            return if_else(p.K_P > 0, fmax(V * rectifier(p.K_C * I_fd / V), _LEAST), 1)
-
+        source = Source(declared(m, (*COMPOUND[:2], LOADED[0]), SOURCE, {"K_P": 0.0}), seen)
         into_0 = if_else(rotates, p.K_E * E_0 + curve.part(E_0), E_0)
-        V_R0 = into_0 / source(seen.start.v_t, E_0)
+        V_R0 = into_0 / source.at_start
         require_within(m, V_R0, p.V_R2, p.V_R1, ("exciter.V_R2", "exciter.V_R1"))
         require_within(m, V_R0, p.V_RMIN, p.V_RMAX, ("exciter.V_RMIN", "exciter.V_RMAX"))
         require_within(m, into_0, p.E_FDMIN, p.E_FDMAX, ("exciter.E_FDMIN", "exciter.E_FDMAX"))
@@ -137,10 +132,10 @@ def expic1(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         V_R = V_R0 + second_order(m, "lags", V_A - V_R0, lags, (p.T_A3, Expr(0)))
         V_R = clamp(V_R, p.V_RMIN, p.V_RMAX)
 
-        def into(v_t: Expr) -> Expr:
-            return clamp(V_R * source(v_t, seen.I_fd), p.E_FDMIN, p.E_FDMAX)
+        def into(v_t: Phasor) -> Expr:
+            return clamp(V_R * source.available(v_t), p.E_FDMIN, p.E_FDMAX)
 
-        driven = into(seen.terminal_voltage(into(measured.nearly)))
+        driven = into(seen.terminal(into(seen.terminal(seen.I_fd))))
         T_E = if_else(rotates, p.T_E, BYPASS_TIME)
         back = if_else(rotates, p.K_E * E + curve.part(E), E)
         m.derivative(E, (driven - back) / T_E)

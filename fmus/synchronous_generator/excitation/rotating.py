@@ -1,4 +1,4 @@
-"""DC1A, DC2A, IEEE types 1 and 2 (IEEET1, IEEET2), AC1A and AC4A: exciters on the machine's shaft.
+"""DC1A, DC2A, IEEE types 1 and 2 (IEEET1, IEEET2), AC1A, AC4A and AC5A: exciters on the machine's shaft.
 
 DC1A is a regulated commutator exciter with saturation and rate feedback; IEEET1 has no stage (1+sT_C)/(1+sT_B), and
 DC2A, fed from the machine's terminal, the limits v_t·V_RMIN and v_t·V_RMAX:
@@ -10,6 +10,10 @@ DC2A, fed from the machine's terminal, the limits v_t·V_RMIN and v_t·V_RMAX:
 IEEET2 has no such stage either, and its rate feedback is of the regulator's voltage:
 
     V_F = s·K_F/((1+sT_F)·(1+sT_F2))·V_R
+
+AC5A is a simplified alternator: IEEET2 with a lead in the rate feedback, and without negative field voltages:
+
+    V_F = s·K_F·(1+sT_F3)/((1+sT_F)·(1+sT_F2))·V_R,  E_fd ≥ 0
 
 AC1A is an alternator, field-controlled, with a rotating rectifier, uncontrolled, and rate feedback:
 
@@ -41,11 +45,11 @@ from fmus.toolchain.blocks import (
     clamp,
     close_limited_low_pass,
     held_at_limits,
+    lead_lag,
     limited_low_pass,
-    low_pass_or_nothing,
 )
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.symbols import Expr, fmax, if_else
+from fmus.toolchain.symbols import Expr, fmax, if_else, logic_and
 
 _MOST = 1e9  # no upper limit of V_E [pu]
 _LEAST = 1e-3  # smallest V_E [pu] that the rectifier's loading is divided by
@@ -89,8 +93,10 @@ ieeet1 = partial(dc1a, compensated=False)  # DC1A without its lead and lag
 dc2a = partial(dc1a, bus_fed=True)  # DC1A fed from the machine's terminal
 
 
-def ieeet2(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
-    """Declare it and return (E_fd, |v_t|) [pu]."""
+def ieeet2(m: ModelBuilder, seen: Regulated, *, alternator: bool = False) -> tuple[Expr, Expr]:
+    """Declare it and return (E_fd, |v_t|) [pu].
+
+    ``alternator``: whether it is AC5A, with a lead in its rate feedback and no negative field voltage."""
     with m.scope("exciter"):
         K_A, T_A = gain(m, "K_A", 200.0, "Gain", 1e-3), time(m, "T_A", 0.02, "Amplifier", 1e-3)
         high = gain(m, "V_RMAX", 6.08, "Upper limit of V_R")
@@ -101,17 +107,28 @@ def ieeet2(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         K_E = _constant(m, given_K_E, high, curve, seen.start.E_fd)
         V_R0 = K_E * seen.start.E_fd + curve.part(seen.start.E_fd)
         require_within(m, V_R0, low, high, ("exciter.V_RMIN", "exciter.V_RMAX"))
-        E_fd = m.state("E", seen.start.E_fd, "pu", "Field voltage", base="E_fd")
+        E = m.state("E", seen.start.E_fd, "pu", "Field voltage", base="E_fd")
+        E_fd = fmax(E, 0) if alternator else E
         amplifier = m.state("amplifier", V_R0, "pu", "first-order lag with limits", base="E_fd")
         V_R = clamp(amplifier, low, high)
         fast, _ = rate_feedback(m, V_R, V_R0, 0.06, 0.3)
         T_F2 = time(m, "T_F2", 0.6, "Second lag of the rate feedback; 0 leaves it out")
-        V_F = low_pass_or_nothing(m, "feedback_2", fast, T_F2)
+        T_F3 = time(m, "T_F3", 0.0, "Lead of the rate feedback") if alternator else Expr(0)
+        if alternator:
+            m.require(
+                if_else(logic_and(T_F2 <= 0, T_F3 > 0), -1, 1),
+                "exciter.T_F2 = 0 needs exciter.T_F3 = 0 as well",
+            )
+        V_F = lead_lag(m, "feedback_2", fast, T_F3, T_F2)
         measured = Measurement(m, seen)
         error = measured.error(V_R0 / K_A) - V_F
         close_limited_low_pass(m, amplifier, K_A * error, T_A, low, high)
-        m.derivative(E_fd, (V_R - K_E * E_fd - curve.part(E_fd)) / T_E)
+        rate = (V_R - K_E * E_fd - curve.part(E_fd)) / T_E
+        m.derivative(E, held_at_limits(E, rate, 0, _MOST) if alternator else rate)
         return measured.close(E_fd)
+
+
+ac5a = partial(ieeet2, alternator=True)  # IEEET2 with a lead in its feedback, and E_fd >= 0
 
 
 _SHARE_AT_START = 0.1

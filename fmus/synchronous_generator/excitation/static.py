@@ -15,16 +15,14 @@ ST1A is controlled, with a limiter of the field current:
 
 The rate feedback starts before the ceilings, so it goes on while E_fd stands at one.
 
-ST4B has two PI controllers; the standard's source from the stator current (K_I, X_L, θ_P) is left out, and an
-integrator stops while its output is at a limit:
+ST4B has two PI controllers behind the source V_B of `sources`; an integrator stops while its output is at a limit:
 
     V_ref + V_S − v_m → K_PR + K_IR/s within V_RMIN and V_RMAX → 1/(1+sT_A) → − K_G·E_fd
     → K_PM + K_IM/s within V_MMIN and V_MMAX = V_M
-    E_fd = V_M·V_B,  V_B = min(V_E·F_EX(K_C·I_FD/V_E), V_BMAX),  V_E = K_P·v_t
+    E_fd = V_M·V_B
 
 Two fixed-point passes take the ceilings' v_t, because it depends, behind the transformer, weakly on E_fd."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from fmus.synchronous_generator.data_lines import declared, number, pu, seconds
@@ -35,10 +33,10 @@ from fmus.synchronous_generator.excitation.common import (
     gain,
     lead_lag_stage,
     rate_feedback,
-    rectifier,
     require_within,
     time,
 )
+from fmus.synchronous_generator.excitation.sources import compound_source
 from fmus.toolchain.blocks import (
     BYPASS_TIME,
     clamp,
@@ -48,8 +46,9 @@ from fmus.toolchain.blocks import (
     limited_proportional_integral,
     low_pass_or_nothing,
 )
+from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.symbols import Expr, fmax, fmin, if_else, logic_and, logic_or
+from fmus.toolchain.symbols import Expr, fmax, if_else, logic_and, logic_or
 
 SCRX = (
     pu("K", 100.0, "Gain", 1e-3),
@@ -138,8 +137,8 @@ def st4b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
             gain(m, "V_RMIN", -0.87, "Lower limit of V_R"),
         )
         T_A = time(m, "T_A", 0.02, "Bridge; 0 leaves the lag out")
-        source = _source(m)
-        inner = _inner(m, seen.start.E_fd / source(seen.start.v_t, seen.start.E_fd))
+        source = compound_source(m, seen)
+        inner = _inner(m, seen.start.E_fd / source.at_start)
         V_A0 = (
             if_else(inner.K_IM > 0, 0, inner.at_start / fmax(inner.K_PM, 1e-9))
             + inner.K_G * seen.start.E_fd
@@ -159,12 +158,12 @@ def st4b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
             base="E_fd",
         )
 
-        def field_voltage(v_t: Expr) -> Expr:
-            V_B = source(v_t, seen.I_fd)
+        def field_voltage(v_t: Phasor) -> Expr:
+            V_B = source.available(v_t)
             free = (inner.K_PM * V_A + x) / (1 + V_B * inner.K_PM * inner.K_G)
             return V_B * clamp(free, inner.low, inner.high)
 
-        E_fd = field_voltage(seen.terminal_voltage(field_voltage(measured.nearly)))
+        E_fd = field_voltage(seen.terminal(field_voltage(seen.terminal(seen.I_fd))))
         rest = V_A - inner.K_G * E_fd
         free = inner.K_PM * rest + x
         outward = logic_or(
@@ -173,19 +172,6 @@ def st4b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         without = -x / BYPASS_TIME  # no integrator, and no eigenvalue of 0
         m.derivative(x, if_else(inner.K_IM > 0, if_else(outward, 0, inner.K_IM * rest), without))
         return measured.close(E_fd)
-
-
-def _source(m: ModelBuilder) -> Callable[[Expr, Expr], Expr]:
-    """V_B [pu] of |v_t| and field current."""
-    K_P = gain(m, "K_P", 6.5, "Potential source gain", 0.1)
-    K_C = gain(m, "K_C", 0.08, "Rectifier loading factor", 0)
-    V_BMAX = gain(m, "V_BMAX", 8.0, "Upper limit of V_B", 0.1)
-
-    def V_B(v_t: Expr, field_current: Expr) -> Expr:
-        V_E = fmax(K_P * v_t, 1e-3)
-        return fmin(V_E * rectifier(K_C * field_current / V_E), V_BMAX)
-
-    return V_B
 
 
 def _inner(m: ModelBuilder, V_M0: Expr) -> _Inner:

@@ -1,4 +1,4 @@
-"""IEEEST, ST2CUT and STAB2A: stabilisers of stability programs that are older than IEEE 421.5.
+"""IEEEST, ST2CUT, IEE2ST and STAB2A: stabilisers of stability programs that are older than IEEE 421.5.
 
 IEEEST takes one signal, ST2CUT two; a signal is the speed, w − 1 (1), the electrical power (3) or the voltage (5), the
 last two as changes from the operating point, which the washout removes anyway; 0 (ST2CUT) is none:
@@ -8,22 +8,25 @@ last two as changes from the operating point, which the washout removes anyway; 
     ST2CUT  K_1/(1+sT_1) of the first and K_2/(1+sT_2) of the second signal → s·T_3/(1+sT_4)
             → three times (1+sT_lead)/(1+sT_lag) → within limits
 
-    V_S = 0 while the voltage is above V_CU or below V_CL; 0 leaves either out. ST2CUT's are changes from the start.
+    V_S = 0 while the voltage is above V_CU or below V_CL; 0 leaves either out. ST2CUT's are changes from the start;
+    IEE2ST is ST2CUT with voltages themselves.
 
 STAB2A takes the electrical power, less at more power:
 
     −P_e → (K_2·s·T_2/(1+sT_2))³ → K_4 + K_3/(1+sT_3) → (K_5/(1+sT_5))² → within ± H_LIM
 
-Sources: PowerSimulationsDynamics.jl at d94d74e (IEEEST), ANDES 2.0.0 (both), OpenIPSL at 2be0558a (STAB2A)."""
+Sources: PowerSimulationsDynamics.jl at d94d74e (IEEEST), ANDES 2.0.0 (IEEEST, ST2CUT), OpenIPSL at 2be0558a (STAB2A,
+IEE2ST)."""
+
+from functools import partial
 
 from fmus.synchronous_generator.data_lines import Given, declared, number, power, seconds
+from fmus.synchronous_generator.stabilization.signals import SPEED, cut_off, input_signal
 from fmus.synchronous_generator.stabilization.standard import SOURCE, limited_output, stage
 from fmus.synchronous_generator.variants import Shaft
 from fmus.toolchain.blocks import clamp, low_pass_or_nothing, second_order, washout
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.symbols import Expr, fabs, if_else, logic_and, logic_or
-
-SPEED, POWER, VOLTAGE = 1, 3, 5  # numbers of the signals in PSS/E's records
+from fmus.toolchain.symbols import Expr, if_else, logic_and
 
 IEEEST = (
     number("A_1", 0.0, "Filter, first lag of the first pair", 0, "s"),
@@ -59,20 +62,22 @@ STAB2A = (
 def ieeest(m: ModelBuilder, shaft: Shaft) -> Expr:
     """Declare the stabiliser and return its signal to the voltage regulator [pu]."""
     with m.scope("pss"):
-        signal = _signal(m, "signal", SPEED, shaft)
+        signal = input_signal(m, "signal", SPEED, shaft)
         p = declared(m, IEEEST, SOURCE)
         signal = _filter(m, p, signal)
         signal = stage(m, signal, 1, ("T_1", "T_2"), (0.1, 0.02))
         signal = stage(m, signal, 2, ("T_3", "T_4"), (0.1, 0.02))
         signal = p.K_S * p.T_5 / p.T_6 * washout(m, "washout", signal, p.T_6)
-        return _cut(m, limited_output(m, signal), shaft.v_t, Expr(0))
+        return cut_off(m, limited_output(m, signal), shaft.v_t, Expr(0))
 
 
-def st2cut(m: ModelBuilder, shaft: Shaft) -> Expr:
-    """Declare the stabiliser and return its signal to the voltage regulator [pu]."""
+def st2cut(m: ModelBuilder, shaft: Shaft, *, of_changes: bool = True) -> Expr:
+    """Declare the stabiliser and return its signal to the voltage regulator [pu].
+
+    ``of_changes``: whether V_CU and V_CL are changes from the voltage at the start."""
     with m.scope("pss"):
-        one = _signal(m, "signal_1", SPEED, shaft)
-        other = _signal(m, "signal_2", 0, shaft)
+        one = input_signal(m, "signal_1", SPEED, shaft)
+        other = input_signal(m, "signal_2", 0, shaft)
         p = declared(m, ST2CUT, SOURCE)
         signal = p.K_1 * low_pass_or_nothing(m, "transducer_1", one, p.T_1)
         signal += p.K_2 * low_pass_or_nothing(m, "transducer_2", other, p.T_2)
@@ -80,7 +85,11 @@ def st2cut(m: ModelBuilder, shaft: Shaft) -> Expr:
         signal = stage(m, signal, 1, ("T_lead_1", "T_lag_1"), (0.1, 0.02))
         signal = stage(m, signal, 2, ("T_lead_2", "T_lag_2"), (0.1, 0.02))
         signal = stage(m, signal, 3, ("T_lead_3", "T_lag_3"), (0.0, 0.0))
-        return _cut(m, limited_output(m, signal), shaft.v_t, shaft.v_t_0)
+        beside = shaft.v_t_0 if of_changes else Expr(0)
+        return cut_off(m, limited_output(m, signal), shaft.v_t, beside)
+
+
+iee2st = partial(st2cut, of_changes=False)  # ST2CUT with a band of voltages themselves
 
 
 def stab2a(m: ModelBuilder, shaft: Shaft) -> Expr:
@@ -97,28 +106,6 @@ def stab2a(m: ModelBuilder, shaft: Shaft) -> Expr:
         for number_ in (1, 2):
             signal = p.K_5 * low_pass_or_nothing(m, f"output_{number_}", signal, p.T_5)
         return enabled * clamp(signal, -p.H_LIM, p.H_LIM)
-
-
-def _signal(m: ModelBuilder, name: str, default: int, shaft: Shaft) -> Expr:
-    """Return what the stabiliser takes, as its parameter says; 0 in steady state."""
-    text = "What it takes: 1 speed, 3 electrical power, 5 voltage" + ("" if default else "; 0 none")
-    chosen = m.parameter(
-        name, default, "1", text, minimum=0 if default == 0 else SPEED, maximum=VOLTAGE
-    )
-    known = logic_or(
-        _equal(chosen, SPEED), logic_or(_equal(chosen, POWER), _equal(chosen, VOLTAGE))
-    )
-    known = logic_or(known, _equal(chosen, 0))
-    m.require(if_else(known, 1, -1), f"pss.{name} must be 1, 3 or 5")
-    return (
-        if_else(_equal(chosen, SPEED), shaft.w - 1, 0)
-        + if_else(_equal(chosen, POWER), shaft.P_e - shaft.P_e_0, 0)
-        + if_else(_equal(chosen, VOLTAGE), shaft.v_t - shaft.v_t_0, 0)
-    )
-
-
-def _equal(value: Expr, number_: int) -> Expr:
-    return fabs(value - number_) < 0.5  # numbers of signals are whole
 
 
 def _filter(m: ModelBuilder, p: Given, u: Expr) -> Expr:
@@ -151,16 +138,3 @@ def _filter(m: ModelBuilder, p: Given, u: Expr) -> Expr:
     m.require(if_else(logic_and(p.A_5 > 0, one[0] + one[1] <= 0), -1, 1), "pss.A_5 > 0 needs a lag")
     led = second_order(m, "filter", u, (one[0], one[1]), (p.A_5, p.A_6))
     return second_order(m, "filter_2", led, (other[0], other[1]), (Expr(0), Expr(0)))
-
-
-def _cut(m: ModelBuilder, signal: Expr, v_t: Expr, beside: Expr) -> Expr:
-    """The signal while the voltage is between V_CL and V_CU, which are ``beside`` a voltage; else 0."""
-    high = m.parameter(
-        "V_CU", 0.0, "pu", "Voltage above which there is no signal; 0: none", base="S_n"
-    )
-    low = m.parameter(
-        "V_CL", 0.0, "pu", "Voltage below which there is no signal; 0: none", base="S_n"
-    )
-    above = logic_and(fabs(high) > 0, v_t > high + beside)
-    below = logic_and(fabs(low) > 0, v_t < low + beside)
-    return if_else(logic_or(above, below), 0, signal)

@@ -1,8 +1,8 @@
-"""PSS1A, PSS2A and PSS2B.
+"""PSS1A, PSS2A, PSS2B and PSS2C.
 
-PSS1A takes the speed; it is STAB1 too:
+PSS1A takes one signal (`signals`), and is cut off as IEEEST is; of the speed it is STAB1 too:
 
-    w − 1 → 1/(1+sT_6) → K_S·s·T_5/(1+sT_5) → 1/(1 + A_1·s + A_2·s²)
+    signal → 1/(1+sT_6) → K_S·s·T_5/(1+sT_5) → 1/(1 + A_1·s + A_2·s²)
     → (1+sT_1)/(1+sT_2) → (1+sT_3)/(1+sT_4) → V_STMIN ≤ V_S ≤ V_STMAX
 
 PSS2A and PSS2B take the integral of accelerating power, from speed and electrical power:
@@ -12,13 +12,17 @@ PSS2A and PSS2B take the integral of accelerating power, from speed and electric
     (speed + K_s3·power) → (1+sT_8)/(1+sT_9)^5 → − power → K_s1
     → (1+sT_1)/(1+sT_2) → (1+sT_3)/(1+sT_4) → (1+sT_10)/(1+sT_11) → V_STMIN ≤ V_S ≤ V_STMAX
 
-The limits of the inputs, V_SI1MIN … V_SI2MAX, and the third stage are PSS2B's. The power's limits hold for its change
-from the operating point. A block whose time constant is 0 is left out. M = 5 and N = 1 of the ramp-tracking filter."""
+The limits of the inputs, V_SI1MIN … V_SI2MAX, and the third stage are PSS2B's; PSS2C has a fourth,
+(1+sT_12)/(1+sT_13), and V_S = 0 while P_e is below P_off. Its higher threshold, above which the signal comes back, is
+left out. The power's limits hold for its change from the operating point. A block whose time constant is 0 is left
+out. M = 5 and N = 1 of the ramp-tracking filter."""
 
 from functools import partial
 
 from fmus.synchronous_generator.declarations import per_unit, time_constant
 from fmus.synchronous_generator.stabilization.norm631 import RAMP_LAGS
+from fmus.synchronous_generator.stabilization.signals import SPEED, cut_off, input_signal
+from fmus.synchronous_generator.variants import Shaft
 from fmus.toolchain.blocks import (
     clamp,
     lead_lag,
@@ -67,19 +71,20 @@ def limited_output(m: ModelBuilder, signal: Expr) -> Expr:
     return enabled * clamp(signal, low, high)
 
 
-def pss1a(m: ModelBuilder, delta_omega: Expr, P_e: Expr, P_e_0: Expr) -> Expr:
+def pss1a(m: ModelBuilder, shaft: Shaft) -> Expr:
     """Declare the stabiliser and return its signal to the voltage regulator [pu]."""
     with m.scope("pss"):
+        taken = input_signal(m, "signal", SPEED, shaft)
         K_S = gain(m, "K_S", 20.0, "Gain")
         signal = low_pass_or_nothing(
-            m, "transducer", delta_omega, time(m, "T_6", 0.0, "Transducer; 0 leaves it out")
+            m, "transducer", taken, time(m, "T_6", 0.0, "Transducer; 0 leaves it out")
         )
         T_5 = m.parameter("T_5", 10.0, "s", "Washout", minimum=1e-3, source=SOURCE)
         signal = K_S * washout(m, "washout", signal, T_5)
         signal = _filter(m, signal)
         signal = stage(m, signal, 1, ("T_1", "T_2"), (0.05, 0.02))
         signal = stage(m, signal, 2, ("T_3", "T_4"), (3.0, 5.4))
-        return limited_output(m, signal)
+        return cut_off(m, limited_output(m, signal), shaft.v_t, Expr(0))
 
 
 def _filter(m: ModelBuilder, u: Expr) -> Expr:
@@ -102,11 +107,17 @@ def _filter(m: ModelBuilder, u: Expr) -> Expr:
 
 
 def pss2a(
-    m: ModelBuilder, delta_omega: Expr, P_e: Expr, P_e_0: Expr, *, newer: bool = False
+    m: ModelBuilder,
+    delta_omega: Expr,
+    P_e: Expr,
+    P_e_0: Expr,
+    *,
+    newer: bool = False,
+    newest: bool = False,
 ) -> Expr:
     """Declare the stabiliser and return its signal to the voltage regulator [pu].
 
-    ``newer``: whether it has what PSS2B has beyond PSS2A."""
+    ``newer``: whether it has what PSS2B has beyond PSS2A; ``newest``: what PSS2C has beyond PSS2B."""
     with m.scope("pss"):
         speed, power = delta_omega, P_e - P_e_0
         if newer:
@@ -135,10 +146,15 @@ def pss2a(
         signal = stage(m, signal, 2, ("T_3", "T_4"), (0.15, 0.015))
         if newer:
             signal = stage(m, signal, 3, ("T_10", "T_11"), (0.0, 0.0))
-        return limited_output(m, signal)
+        if not newest:
+            return limited_output(m, signal)
+        signal = limited_output(m, stage(m, signal, 4, ("T_12", "T_13"), (0.0, 0.0)))
+        least = gain(m, "P_off", 0.0, "Electrical power below which there is no signal; 0: none", 0)
+        return if_else(logic_and(least > 0, P_e < least), 0, signal)
 
 
 pss2b = partial(pss2a, newer=True)  # PSS2A with limited inputs and a third stage
+pss2c = partial(pss2a, newer=True, newest=True)  # PSS2B with a fourth, and off at little power
 
 
 def _input_limits(m: ModelBuilder, number: str, text: str) -> tuple[Expr, Expr]:

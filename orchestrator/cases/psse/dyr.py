@@ -25,6 +25,12 @@ _KNOWN = DYR_RECORDS | REGFM_A1_RECORDS | STATIC_VAR_RECORDS
 _COUPLED = {record.part for record in REGFM_A1_RECORDS.values()}
 """Models whose coupling impedance is ZSORCE of the network data."""
 
+MANUAL = "manual"
+"""The exciter without a regulator, on which neither a stabiliser nor a compensator acts."""
+
+COMPENSATION = ("exciter.R_C", "exciter.X_C")
+"""Parameters of an exciter that a compensator's record sets."""
+
 _MOST_SHOWN = 20
 _SAME = 1e-3  # part by which two figures for one reactance may differ: files round them
 
@@ -154,15 +160,23 @@ def record_uses(
     leaving_out: Sequence[str] = (),
     *,
     approximate: bool = False,
+    exciter: str | None = None,
 ) -> list[RecordUse]:
-    """Return what becomes of each record, of which none that stops the reading is there."""
+    """Return what becomes of each record, of which none that stops the reading is there.
+
+    ``exciter``: what machines without a record of one get, where the case says so."""
     left = {name.upper() for name in leaving_out}
+    excited = {
+        (record.bus, record.machine)
+        for record in records
+        if exciter not in (None, MANUAL) or kind_of(record.name) == "exciter"
+    }
     return [
         RecordUse(
             record.file,
             record.line,
             record.name,
-            *_use_of(record, machines, idle, left, approximate),
+            *_use_of(record, machines, idle, left, approximate, excited),
         )
         for record in records
     ]
@@ -174,12 +188,15 @@ def _use_of(
     idle: Collection[tuple[int, str]],
     left: Collection[str],
     approximate: bool,
+    excited: Collection[tuple[int, str]],
 ) -> tuple[UseOfRecord, str, bool]:
     """Return what became of a record, why, and whether it is of no machine."""
     key = record.bus, record.machine
     if key in machines:
         if record.name in left:
             return UseOfRecord.NOT_USED, "dyr_leave_out names it", False
+        if key not in excited and kind_of(record.name) in ("stabilizer", "compensator"):
+            return UseOfRecord.NOT_USED, "its machine has no exciter", False
         stand_in = f"approximated as {MODEL}" if approximate and record.name in FIELDS else ""
         return UseOfRecord.USED, stand_in, False
     if key in idle:
@@ -286,7 +303,8 @@ def _model(
     if parts["machine"] == "classical":
         source["machine.X_d1"] = machine.source.imag
     step_up = {"transformer.X_t": 0.0, "transformer.R_t": 0.0}  # the network has them
-    return MachineModel(parts, {**source, **values, **step_up}, partial=partial)
+    made_of = {kind: part for kind, part in parts.items() if kind != "compensator"}
+    return MachineModel(made_of, {**source, **values, **step_up}, partial=partial)
 
 
 def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:

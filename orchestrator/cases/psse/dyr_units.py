@@ -9,13 +9,13 @@ from dataclasses import replace
 from fmus.synchronous_generator.dyr_fields import MACHINE_VARIANTS
 from orchestrator.cases.network_data import bus_name
 from orchestrator.cases.plausible_values import UnusualValue
-from orchestrator.cases.psse.dyr import machine_models
+from orchestrator.cases.psse.dyr import COMPENSATION, MANUAL, machine_models
 from orchestrator.cases.psse.dyr_records import DynamicRecord
 from orchestrator.cases.psse.raw import Machine
 from orchestrator.cases.unit_row import UnitRow, checked
 from orchestrator.errors import InputError
 
-_WITHOUT = {"exciter": "manual", "governor": "constant_power", "stabilizer": "none"}
+_WITHOUT = {"exciter": MANUAL, "governor": "constant_power", "stabilizer": "none"}
 """What PSS/E assumes where there is no record."""
 
 # what is constant without the part
@@ -65,6 +65,40 @@ def _reason(kind: str, machines: Sequence[UnitRow]) -> str:
     )
     known = ", ".join(names)
     return f"the records of the DYR file say what each machine is ({known}){there}; correct or remove the key"
+
+
+def without_idle_controls(rows: Sequence[UnitRow], place: str) -> list[UnitRow]:
+    """The units without a stabiliser or a compensator where there is no exciter, with a question for each.
+
+    PSS/E leaves them idle. ``place``: of a record whose line is not known."""
+    return [row if row.partial else _without_idle_controls(row, place) for row in rows]
+
+
+def _without_idle_controls(row: UnitRow, place: str) -> UnitRow:
+    own = row.parameters.get("sg", {})
+    if row.parts.get("exciter", MANUAL) != MANUAL or row.converter is not None:
+        return row
+    kinds = {
+        "stabiliser": [name for name in own if name.startswith("pss.")],
+        "compensator": [name for name in own if name in COMPENSATION],
+    }
+    doubts = [
+        (
+            names[0],
+            f"{place}, line {row.lines[names[0]]}" if names[0] in row.lines else place,
+            f"a {kind} at a machine without an exciter acts on nothing, as in PSS/E, and is left out; add the "
+            "exciter's record, or choose one in [units], such as exciter = 'sexs'",
+        )
+        for kind, names in kinds.items()
+        if names
+    ]
+    idle = {name for names in kinds.values() for name in names}
+    return replace(
+        row,
+        parts={kind: part for kind, part in row.parts.items() if kind != "stabilizer"},
+        parameters={**row.parameters, "sg": {k: x for k, x in own.items() if k not in idle}},
+        doubts=(*row.doubts, *doubts),
+    )
 
 
 def missing_records(rows: Sequence[UnitRow], place: str) -> Iterator[UnusualValue]:

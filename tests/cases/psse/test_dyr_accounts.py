@@ -1,16 +1,19 @@
 """Every record of a DYR file is used, listed, or in the table of what gfor does not have."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from orchestrator.cases.psse.dyr import machine_models, record_uses
+from orchestrator.cases.psse.dyr import COMPENSATION, machine_models, record_uses
 from orchestrator.cases.psse.dyr_records import read_dyr
+from orchestrator.cases.psse.dyr_units import without_idle_controls
 from orchestrator.cases.psse.known_records import known_records
 from orchestrator.cases.psse.missing_models import kind_of
 from orchestrator.cases.psse.raw import Machine
 from orchestrator.cases.psse.unused_models import unused_models
 from orchestrator.cases.record_use import UseOfRecord, in_one_line
+from orchestrator.cases.unit_row import UnitRow
 from orchestrator.errors import InputError
 
 MACHINES = [
@@ -126,3 +129,56 @@ def test_the_page_has_the_table():
     assert rows == [
         f"| {r.name} | {r.kind} | `{r.part}` | {r.approximated} |" for r in known_records()
     ]
+
+
+def test_a_stabilizer_without_an_exciter_is_idle_and_said_so():
+    """PSS/E leaves it idle; an exciter that the case chooses for machines without a record makes it act."""
+    own = {"machine.H": 4.0, "pss.K_S": 9.0, "exciter.X_C": 0.05}
+    row = UnitRow(
+        "30",
+        "bus_30",
+        100.0,
+        80.0,
+        1.0,
+        parts={"machine": "genrou", "stabilizer": "ieeest"},
+        parameters={"sg": own},
+        lines={"pss.K_S": 7},
+    )
+    (idle,) = without_idle_controls([row], "one.dyr")
+    assert idle.parameters["sg"] == {"machine.H": 4.0}
+    assert idle.parts == {"machine": "genrou"}
+    assert [(name, place) for name, place, _ in idle.doubts] == [
+        ("pss.K_S", "one.dyr, line 7"),
+        ("exciter.X_C", "one.dyr"),
+    ]
+    for parts, partial in (({"exciter": "sexs"}, False), ({}, True)):
+        active = replace(row, parts={**row.parts, **parts}, partial=partial)
+        assert without_idle_controls([active], "one.dyr") == [active]
+
+
+@pytest.mark.parametrize(
+    ("exciter", "use"), [(None, UseOfRecord.NOT_USED), ("sexs", UseOfRecord.USED)]
+)
+def test_an_idle_stabilizers_record_is_not_used(exciter, use, tmp_path):
+    place = tmp_path / "one.dyr"
+    place.write_text("1 GENCLS 1 4 0 /\n1 STAB1 1 1 2 3 4 5 6 7 /\n1 COMP 1 0.05 /\n")
+    uses = record_uses(read_dyr(place), {(1, "1")}, (), exciter=exciter)
+    assert [one.use for one in uses] == [UseOfRecord.USED, use, use]
+
+
+@pytest.mark.parametrize(
+    ("record", "wanted"),
+    [
+        ("COMP 1 0.05", {"exciter.X_C": -0.05}),
+        ("IEEEVC 1 0.01 0.06", {"exciter.R_C": 0.01, "exciter.X_C": 0.06}),
+    ],
+)
+def test_a_compensator_is_an_impedance_of_the_exciter(record, wanted, tmp_path):
+    """COMP takes the drop at its reactance off, IEEEVC adds that at its impedance."""
+    place = tmp_path / "one.dyr"
+    genrou = "1 GENROU 1 8 0.03 0.4 0.05 6 0 1.8 1.7 0.3 0.55 0.25 0.2 0 0 /"
+    place.write_text(f"{genrou}\n1 SEXS 1 0.1 10 100 0.1 0 5 /\n1 {record} /\n")
+    machine = Machine(1, "1", 1, 80.0, 1.0, 100.0, 0.25j, -9e3, 9e3)
+    model = machine_models(read_dyr(place), [machine])[1, "1"]
+    assert {name: x for name, x in model.parameters.items() if name in COMPENSATION} == wanted
+    assert model.parts == {"machine": "genrou", "exciter": "sexs"}

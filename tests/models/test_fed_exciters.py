@@ -1,0 +1,219 @@
+"""Exciters with a compound source, the bridges of the newer standards, EXBAS and AC5A: diagrams by hand, and limits."""
+
+import numpy as np
+import pytest
+
+from tests.models.parts import AT_REST, CURRENT, E_FD, V_T, exciter, integrated, refused
+from tests.models.test_part_exciters import F_EX, saturated, slope
+from tests.models.test_psse_parts import HERTZ, behind_the_rectifier, control, lead, rate
+
+REST = AT_REST["exciter"]
+I_T = complex(CURRENT.re, CURRENT.im)
+
+AMPLIFIER = {"K_A": 60.0, "T_A": 0.05, "T_R": 0.02}
+FEEDBACK = {"K_F": 0.04, "T_F": 0.7}
+SOURCE = {"K_P": 4.0, "K_I": 1.5, "K_C": 0.2}
+TURNED = SOURCE | {"X_L": 0.1, "theta_P": 20.0}
+WIDE = {"V_RMAX": 50.0, "V_RMIN": -50.0}
+EXCITERS = {
+    "ac5a": AMPLIFIER | FEEDBACK | {"T_F2": 0.9, "T_F3": 0.3, "K_E": 0.9, "T_E": 0.4},
+    "exbas": AMPLIFIER
+    | FEEDBACK
+    | {"K_PR": 3.0, "K_IR": 2.0, "T_B": 0.05, "T_C": 0.2, "T_F1": 0.3, "T_F2": 0.1}
+    | {"K_E": 1.0, "T_E": 0.8, "K_C": 0.1, "K_D": 0.3},
+    "ieeet3": AMPLIFIER | FEEDBACK | WIDE | {"K_P": 3.0, "K_I": 1.2, "K_E": 0.8, "T_E": 0.5},
+    "esst2a": AMPLIFIER | FEEDBACK | WIDE | TURNED | {"K_E": 0.9, "T_E": 0.5},
+    "esst3a": AMPLIFIER
+    | TURNED
+    | {"T_C": 1.0, "T_B": 6.0, "K_M": 7.0, "T_M": 0.4, "K_G": 0.6}
+    | {"V_IMAX": 9.0, "V_MMAX": 9.0},
+    "st5b": {"T_C1": 0.8, "T_B1": 6.0, "T_C2": 0.08, "T_B2": 0.02, "K_R": 120.0, "T_1": 0.03}
+    | {"K_C": 0.1, "T_R": 0.02},
+    "st6b": {"K_PR": 18.0, "K_IR": 15.0, "K_DR": 2.0, "T_DR": 0.1, "K_FF": 0.7, "K_M": 1.2}
+    | {"K_G": 0.8, "T_G": 0.1, "T_R": 0.02},
+    "st7b": {"T_G": 1.2, "T_F": 0.7, "K_PA": 40.0, "T_C": 0.5, "T_B": 0.9, "K_IA": 0.8}
+    | {"T_IA": 3.0, "T_R": 0.02},
+    "st8c": TURNED
+    | {"K_PR": 5.0, "K_IR": 4.0, "K_PA": 3.0, "K_IA": 0.5, "K_A": 1.3, "T_A": 0.02}
+    | {"K_F": 0.5, "T_F": 0.03, "SW1": 1.0, "T_R": 0.02, "K_C2": 0.02, "K_I2": 0.5},
+}
+
+
+def source_voltage(p, v):
+    """V_E of the terminal's voltage, in its own frame."""
+    K_P = p["K_P"] * np.exp(1j * np.radians(p.get("theta_P", 0.0)))
+    return abs(K_P * v + 1j * (p["K_I"] + K_P * p.get("X_L", 0.0)) * I_T)
+
+
+def available(p, v):
+    """V_B of the terminal's voltage."""
+    V_E = source_voltage(p, v)
+    return V_E * F_EX(p["K_C"] * E_FD / V_E)
+
+
+def commutated(p, v):
+    """The source of IEEET3 behind its commutating reactance."""
+    return np.sqrt(source_voltage(p, v) ** 2 - (0.78 * E_FD) ** 2)
+
+
+def second_rectifier(p):
+    """V_B2 of ST8C."""
+    current = p["K_I2"] * abs(I_T)
+    return current * F_EX(p["K_C2"] * E_FD / current)
+
+
+def by_hand(name, p, s):
+    """E_fd over the stabiliser's signal, and over the terminal's voltage beside the measurement."""
+    if name in ("ac5a", "exbas"):
+        forward = p["K_A"] / (1 + s * p["T_A"])
+        if name == "ac5a":
+            curve = slope(lambda E: saturated(E, ((2.85, 0.3), (3.8, 0.6))), E_FD)
+            field, back = p["K_E"] + curve, lead(p, s, "T_F3", "T_F2")
+        else:
+            forward *= (p["K_PR"] + p["K_IR"] / s) * lead(p, s, "T_C", "T_B")
+            field, back = behind_the_rectifier(p), lead(p, s, "T_F1", "T_F2")
+        return forward / (1 + forward * rate(p, s) * back) / (field + s * p["T_E"]), 0.0
+    if name in ("ieeet3", "esst2a"):
+        times = 1.0 if name == "ieeet3" else available(p, V_T)
+        forward = p["K_A"] / (1 + s * p["T_A"]) * times
+        whole = p["K_E"] + s * p["T_E"] + forward * rate(p, s)
+        if name == "ieeet3":
+            return forward / whole, slope(lambda v: commutated(p, v), V_T) / whole
+        V_A = p["K_E"] * E_FD / times
+        return forward / whole, V_A * slope(lambda v: available(p, v), V_T) / whole
+    if name == "esst3a":
+        V_B = available(p, V_T)
+        outer = lead(p, s, "T_C", "T_B") * p["K_A"] / (1 + s * p["T_A"])
+        inner = p["K_M"] / (1 + s * p["T_M"])
+        whole = 1 + V_B * inner * p["K_G"]
+        direct = E_FD / V_B * slope(lambda v: available(p, v), V_T)
+        return V_B * inner * outer / whole, direct / whole
+    if name == "st5b":
+        stages = lead(p, s, "T_C1", "T_B1") * lead(p, s, "T_C2", "T_B2")
+        return stages * p["K_R"] / (1 + s * p["T_1"]), 0.0
+    if name == "st6b":
+        whole = 1 + V_T * p["K_M"] * p["K_G"] / (1 + s * p["T_G"])
+        return V_T * (p["K_FF"] + p["K_M"]) * control(p, s) / whole, E_FD / V_T / whole
+    if name == "st7b":
+        return p["K_PA"] * lead(p, s, "T_C", "T_B") / (1 - p["K_IA"] / (1 + s * p["T_IA"])), 0.0
+    V_B, V_B2 = available(p, V_T), second_rectifier(p)
+    both = (p["K_PR"] + p["K_IR"] / s) * (p["K_PA"] + p["K_IA"] / s)
+    direct = (E_FD - V_B2) / V_B * slope(lambda v: available(p, v), V_T)
+    return both * p["K_A"] / (1 + s * p["T_A"]) * V_B, direct
+
+
+@HERTZ
+@pytest.mark.parametrize("name", EXCITERS)
+def test_an_exciter_is_its_block_diagram(name, hertz):
+    p, s = EXCITERS[name], 2j * np.pi * hertz
+    alone = exciter(name, p)
+    assert not refused(alone)
+    assert alone.outputs(REST)["E_fd"] == pytest.approx(E_FD, rel=1e-12)
+    assert max(map(abs, alone.rates(REST).values())) < 1e-9
+    response, (wanted, direct) = alone.response(s, REST), by_hand(name, p, s)
+    assert response["E_fd", "v_s"] == pytest.approx(wanted, rel=1e-6)
+    measured = (lead(p, s, "T_G", "T_F") if name == "st7b" else 1) / (1 + p["T_R"] * s)
+    assert response["E_fd", "v_t"] == pytest.approx(direct - wanted * measured, rel=1e-5)
+
+
+@pytest.mark.parametrize("name", ["ieeet3", "esst2a", "st8c"])
+def test_a_stator_current_compounds_the_source(name):
+    """Without the stator's current the same field voltage needs more of the regulator."""
+    with_current = exciter(name, EXCITERS[name])
+    without = exciter(
+        name,
+        EXCITERS[name] | {"K_I": 0.0, "X_L": 0.0}
+        if name != "ieeet3"
+        else EXCITERS[name] | {"K_I": 0.0},
+    )
+    amplifier = "exciter.bridge" if name == "st8c" else "exciter.amplifier"
+    assert without.states[amplifier] > with_current.states[amplifier] * 1.01
+
+
+@pytest.mark.parametrize("name", ["sexs", "ac7b", "st7b"])
+def test_a_compensator_is_measured_with_the_voltage(name):
+    """|v_t + (R_C + jX_C)·i| is at its reference at the start, and what passes the lag of the measurement."""
+    R_C, X_C, s = 0.02, 0.06, 2j * np.pi * 0.7
+    alone = exciter(name, {"R_C": R_C, "X_C": X_C} | ({"V_MAX": 1.2} if name == "st7b" else {}))
+    plain = exciter(name)
+    assert not refused(alone)
+    assert max(map(abs, alone.rates(REST).values())) < 1e-9
+    point = V_T + (R_C + 1j * X_C) * I_T
+    shift = alone.parameters["exciter.V_ref"] - plain.parameters["exciter.V_ref"]
+    assert shift == pytest.approx(abs(point) - V_T, rel=1e-9)
+    assert alone.states["exciter.v_m"] == pytest.approx(abs(point), rel=1e-12)
+    with_it, without = alone.response(s, REST), plain.response(s, REST)
+    share = with_it["E_fd", "v_t"] - without["E_fd", "v_t"]
+    of_measurement = -with_it["E_fd", "v_s"] / (1 + 0.01 * s)
+    assert share == pytest.approx(of_measurement * (point.real / abs(point) - 1), rel=1e-6)
+
+
+# -- limits -------------------------------------------------------------------------------------
+
+NO_CURVE = {"S_E1": 0.0, "S_E2": 0.0}
+PLAIN = {"K_P": 5.0, "K_I": 0.0, "K_C": 0.0}
+QUICK = PLAIN | {"T_B": 0.0, "T_C": 0.0, "V_IMAX": 9.0, "V_IMIN": -9.0, "V_GMAX": 1.0}
+LIMITS = {
+    # case: (exciter, values, E_fd at rest at the upper and at the lower limit)
+    "ac5a, V_R": ("ac5a", NO_CURVE | {"V_RMAX": 4.0, "V_RMIN": 0.5, "T_E": 0.2}, 4.0, 0.5),
+    "ac5a, E_fd": ("ac5a", NO_CURVE | {"T_E": 0.2}, 6.08, 0.0),
+    "exbas, V_R": (
+        "exbas",
+        NO_CURVE | {"V_RMAX": 4.0, "V_RMIN": -3.0, "K_C": 0.0, "K_D": 0.0, "T_E": 0.2},
+        4.0,
+        0.0,
+    ),
+    "ieeet3, V_R": (
+        "ieeet3",
+        {"K_I": 0.0, "V_RMAX": 2.5, "V_RMIN": -1.0, "T_E": 0.2},
+        2.5 + np.sqrt((2.5 * V_T) ** 2 - (0.78 * E_FD) ** 2),
+        -1.0 + np.sqrt((2.5 * V_T) ** 2 - (0.78 * E_FD) ** 2),
+    ),
+    "ieeet3, V_B": ("ieeet3", {"V_BMAX": 4.0, "T_E": 0.2}, 4.0, 0.0),
+    "esst2a, V_R": (
+        "esst2a",
+        PLAIN | {"V_RMAX": 0.8, "V_RMIN": 0.2, "T_E": 0.2},
+        0.8 * 5.0 * V_T,
+        0.2 * 5.0 * V_T,
+    ),
+    "esst2a, E_fd": ("esst2a", PLAIN | {"E_FDMAX": 3.5, "T_E": 0.2}, 3.5, 0.0),
+    "esst3a, V_M": (
+        "esst3a",
+        QUICK | {"V_MMAX": 0.9, "V_MMIN": 0.1},
+        0.9 * 5.0 * V_T,
+        0.1 * 5.0 * V_T,
+    ),
+    "esst3a, V_B": ("esst3a", QUICK | {"K_P": 9.0, "V_BMAX": 4.0}, 4.0, 0.0),
+    "st5b, ceiling": (
+        "st5b",
+        {"V_RMAX": 4.0, "V_RMIN": -2.0, "K_C": 0.0},
+        4.0,
+        -2.0,
+    ),
+    "st6b, V_R": ("st6b", {"V_RMAX": 3.0, "V_RMIN": -2.0}, 3.0 * V_T, -2.0 * V_T),
+    "st7b, ceiling": ("st7b", {"V_RMAX": 4.0, "V_RMIN": -2.0}, 4.0 * V_T, -2.0 * V_T),
+    "st8c, V_R": (
+        "st8c",
+        PLAIN
+        | {"V_RMAX": 0.8, "V_RMIN": -0.4, "V_AMAX": 1.0, "V_AMIN": -1.0, "K_PA": 8.0}
+        | {"V_PIMAX": 2.0, "V_PIMIN": -1.0},
+        0.8 * 5.0,
+        -0.4 * 5.0,
+    ),
+}
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("case", LIMITS)
+def test_the_field_voltage_stops_at_its_limit_and_leaves_it_at_once(case, side):
+    """After seconds at the limit an error of the other sign is answered within a second: nothing has wound up."""
+    name, values, upper, lower = LIMITS[case]
+    alone = exciter(name, values)
+    assert not refused(alone)
+    limit = upper if side > 0 else lower
+    found, x = integrated(alone, lambda t: [V_T, E_FD, 0.3 * side], 6.0)
+    voltages = [y["E_fd"] for y in found]
+    assert voltages[-1] == pytest.approx(limit, rel=1e-4, abs=2e-3)
+    assert side * max(side * np.array(voltages)) == pytest.approx(limit, rel=1e-3, abs=2e-3)
+    back, _ = integrated(alone, lambda t: [V_T, E_FD, -0.3 * side], 1.0, x=x)
+    assert side * (limit - back[-1]["E_fd"]) > 0.2

@@ -1,0 +1,177 @@
+"""PSS1A of all signals, PSS2C, PSS3B, PSS4B and IEE2ST: diagrams by hand, and what cuts them off."""
+
+import numpy as np
+import pytest
+
+from fmus.synchronous_generator.composed import synchronous_generator, synchronous_generator_phasor
+from tests.models.parts import AT_BUS, AT_REST, BUS, OF_VOLTAGE, V_T, refused, stabilizer
+from tests.models.test_part_stabilizers import ONE, TWO
+from tests.models.test_psse_parts import HERTZ, lead
+from tests.support.evaluated import Evaluated
+
+AT = AT_REST["pss"]
+ADDED = ("pss2c", "pss3b", "pss4b", "iee2st")
+
+
+def washed(p, s, name):
+    return s * p[name] / (1 + s * p[name])
+
+
+@HERTZ
+@pytest.mark.parametrize(("signal", "taken"), [(1, "speed"), (3, "power"), (5, "v_t")])
+def test_pss1a_takes_one_of_three_signals(signal, taken, hertz):
+    s, p = 2j * np.pi * hertz, ONE
+    wanted = p["K_S"] * washed(p, s, "T_5") / (1 + s * p["T_6"])
+    wanted *= lead(p, s, "T_1", "T_2") * lead(p, s, "T_3", "T_4")
+    alone = stabilizer("pss1a", p | {"signal": signal}, sees_voltage=True)
+    response = alone.response(s, [*AT, V_T])
+    assert response["v_s", taken] == pytest.approx(wanted, rel=1e-9)
+    others = {"speed", "power", "v_t"} - {taken}
+    assert [response["v_s", other] for other in others] == [0, 0]
+
+
+@HERTZ
+def test_pss2c_is_pss2b_with_a_fourth_stage(hertz):
+    s, p = 2j * np.pi * hertz, TWO | {"T_10": 0.25, "T_11": 0.04}
+    before = stabilizer("pss2b", p).response(s, AT)
+    after = stabilizer("pss2c", p | {"T_12": 0.3, "T_13": 0.06}).response(s, AT)
+    stage = (1 + 0.3 * s) / (1 + 0.06 * s)
+    assert after == pytest.approx({key: stage * value for key, value in before.items()}, rel=1e-9)
+
+
+def test_pss2c_is_silent_at_little_power():
+    alone = stabilizer("pss2c", {"P_off": 0.2})
+    x = alone.x - 0.001
+    signals = [alone.outputs([0.0, P], x)["v_s"] for P in (0.19, 0.21)]
+    assert [signal != 0 for signal in signals] == [False, True]
+    always = stabilizer("pss2c")
+    assert always.outputs([0.0, 0.01], x)["v_s"] != 0
+
+
+PSS3B = {"K_S1": 0.4, "T_1": 0.02, "T_w1": 1.5, "K_S2": 4.0, "T_2": 0.03, "T_w2": 2.0} | {
+    "T_w3": 0.4,
+    **{f"A_{k}": value for k, value in enumerate((0.1, 0.01, 0.2, 0.02, 0.3, 0.03, 0.4, 0.04), 1)},
+}
+
+
+@HERTZ
+@pytest.mark.parametrize("left_out", [(), ("A_1", "A_2", "A_3", "A_4", "T_w1", "T_2")])
+def test_pss3b_is_the_standards_diagram(hertz, left_out):
+    s, p = 2j * np.pi * hertz, PSS3B | dict.fromkeys(left_out, 0.0)
+    common = washed(p, s, "T_w3")
+    for b1, b2, a1, a2 in ((1, 2, 3, 4), (5, 6, 7, 8)):
+        common *= 1 + p[f"A_{b1}"] * s + p[f"A_{b2}"] * s**2
+        common /= 1 + p[f"A_{a1}"] * s + p[f"A_{a2}"] * s**2
+    first = washed(p, s, "T_w1") if p["T_w1"] else 1.0
+    wanted = {
+        ("v_s", "power"): common * p["K_S1"] / (1 + s * p["T_1"]) * first,
+        ("v_s", "speed"): common * p["K_S2"] / (1 + s * p["T_2"]) * washed(p, s, "T_w2"),
+    }
+    alone = stabilizer("pss3b", p)
+    assert not refused(alone)
+    assert alone.response(s, AT) == pytest.approx(wanted, rel=1e-9)
+
+
+@pytest.mark.parametrize("filters", [{"A_1": 0.1}, {"A_5": 0.1, "A_6": 0.1, "A_7": 0.1}])
+def test_pss3b_takes_no_lead_without_a_lag(filters):
+    assert any("needs a lag" in text for text in refused(stabilizer("pss3b", filters)))
+
+
+def branch(band, first, s):
+    """One branch of a band of PSS4B: constant and six time constants."""
+    K, T = band[first][0], band[first][1:]
+    found = (K + s * T[0]) / (1 + s * T[1])
+    return found * (1 + s * T[2]) / (1 + s * T[3]) * (1 + s * T[4]) / (1 + s * T[5])
+
+
+BANDS = {
+    "L": (0.30, 0.20, (1.1, 0.02, 0.05, 0.03, 0.06, 0.04, 0.08), 0.10, 7.0),
+    "I": (0.20, 0.10, (0.9, 0.03, 0.01, 0.02, 0.04, 0.03, 0.06), 0.05, 20.0),
+    "H": (0.20, 0.30, (1.0, 0.005, 0.02, 0.01, 0.03, 0.02, 0.04), 0.05, 90.0),
+}
+"""K_1, K_2, the first branch (the second is it with other constants), a time constant for it, and the band's gain."""
+
+TRANSDUCERS = {"a_LI1": 0.05, "a_LI2": 0.002, "b_LI1": 0.08, "b_LI2": 0.004, "B_LI1": 0.4}
+TRANSDUCERS |= {"w_LI1": 8.0, "B_LI2": 0.5, "w_LI2": 12.0, "T_H": 0.04, "b_H1": 0.06, "b_H2": 0.003}
+TRANSDUCERS |= {"M": 9.0, "B_H1": 0.4, "w_H1": 10.0, "B_H2": 0.5, "w_H2": 14.0}
+
+
+def notch(s, B, w):
+    return (s**2 + w**2) / (s**2 + B * s + w**2)
+
+
+@HERTZ
+@pytest.mark.parametrize("notched", [True, False])
+def test_pss4b_is_the_standards_diagram(hertz, notched):
+    s, p = 2j * np.pi * hertz, dict(TRANSDUCERS)
+    if not notched:
+        p |= {f"w_{which}{k}": 0.0 for which in ("LI", "H") for k in (1, 2)}
+    of_band = {}
+    for letter, (K_1, K_2, first, other, gain) in BANDS.items():
+        second = (1.2, *(T + other for T in first[1:]))
+        p |= {f"K_{letter}1": K_1, f"K_{letter}2": K_2, f"K_{letter}": gain}
+        p |= {f"K_{letter}11": first[0], f"K_{letter}17": second[0]}
+        p |= {f"T_{letter}{k}": T for k, T in enumerate((*first[1:], *second[1:]), 1)}
+        p |= {f"V_{letter}MAX": 9.0, f"V_{letter}MIN": -9.0}
+        pair = (first, second)
+        of_band[letter] = gain * (K_1 * branch(pair, 0, s) - K_2 * branch(pair, 1, s))
+    speed = (1 + p["a_LI1"] * s + p["a_LI2"] * s**2) / (1 + p["b_LI1"] * s + p["b_LI2"] * s**2)
+    made = -s / p["M"] / (1 + s * p["T_H"]) / (1 + p["b_H1"] * s + p["b_H2"] * s**2)
+    if notched:
+        speed *= notch(s, p["B_LI1"], p["w_LI1"]) * notch(s, p["B_LI2"], p["w_LI2"])
+        made *= notch(s, p["B_H1"], p["w_H1"]) * notch(s, p["B_H2"], p["w_H2"])
+    alone = stabilizer("pss4b", p)
+    assert not refused(alone)
+    wanted = {
+        ("v_s", "speed"): speed * (of_band["L"] + of_band["I"]),
+        ("v_s", "power"): made * of_band["H"],
+    }
+    assert alone.response(s, AT) == pytest.approx(wanted, rel=1e-9)
+
+
+@pytest.mark.parametrize("letter", ["L", "I", "H"])
+def test_each_band_of_pss4b_has_its_own_limits(letter):
+    """All bands driven hard one way give the sum of their limits, as long as the whole allows it."""
+    wide = {f"V_{other}M{end}": 0.0 for other in "LIH" for end in ("AX", "IN")}
+    own = {f"V_{letter}MAX": 0.03, f"V_{letter}MIN": -0.02}
+    alone = stabilizer("pss4b", wide | own)
+    signals = [
+        alone.outputs([0.0, 0.8], alone.x + way * np.arange(len(alone.x)) * 0.01)["v_s"]
+        for way in (1, -1)
+    ]
+    assert sorted(signals) == pytest.approx([-0.02, 0.03])
+
+
+@HERTZ
+def test_iee2st_is_st2cut_with_another_band_of_voltages(hertz):
+    s, p = 2j * np.pi * hertz, {"K_1": 8.0, "K_2": 0.4, "signal_2": 3, "T_1": 0.02, "T_3": 2.0}
+    both = [stabilizer(name, p).response(s, [*AT, V_T]) for name in ("st2cut", "iee2st")]
+    assert both[0] == both[1]
+
+
+def test_iee2st_is_cut_off_outside_of_a_band_of_voltages():
+    alone = stabilizer("iee2st", {"V_CL": 0.9, "V_CU": 1.1})
+    x = alone.x - 0.001
+    signals = [alone.outputs([0.0, 0.8, v], x)["v_s"] for v in (0.89, 0.91, 1.09, 1.11)]
+    assert [signal != 0 for signal in signals] == [False, True, True, False]
+
+
+@pytest.mark.parametrize("name", ADDED)
+def test_the_signal_stays_within_two_limits_of_its_own(name):
+    last = [V_T] if name in OF_VOLTAGE else []
+    free = stabilizer(name, {"V_STMAX": 99.0, "V_STMIN": -99.0})
+    limited = stabilizer(name, {"V_STMAX": 0.008, "V_STMIN": -0.005})
+    for way in (-1, 1):
+        x = free.x + way * np.arange(len(free.x)) * 0.01
+        wanted = free.outputs([0.0, 0.8, *last], x)["v_s"]
+        found = limited.outputs([0.0, 0.8, *last], x)["v_s"]
+        assert abs(wanted) > 0.008
+        assert found == pytest.approx(np.clip(wanted, -0.005, 0.008), rel=1e-12)
+
+
+@pytest.mark.parametrize("factory", [synchronous_generator, synchronous_generator_phasor])
+@pytest.mark.parametrize("name", ADDED)
+def test_a_generator_with_it_starts_in_steady_state(name, factory):
+    device = Evaluated(factory(exciter="st1a", stabilizer=name), AT_BUS)
+    assert not refused(device)
+    assert max(map(abs, device.rates([BUS.real, BUS.imag]).values())) < 1e-8
