@@ -51,7 +51,7 @@ def available(p, v):
     return V_E * F_EX(p["K_C"] * E_FD / V_E)
 
 
-def commutated(p, v):
+def behind_reactance(p, v):
     """The source of IEEET3 behind its commutating reactance."""
     return np.sqrt(source_voltage(p, v) ** 2 - (0.78 * E_FD) ** 2)
 
@@ -78,7 +78,7 @@ def by_hand(name, p, s):
         forward = p["K_A"] / (1 + s * p["T_A"]) * times
         whole = p["K_E"] + s * p["T_E"] + forward * rate(p, s)
         if name == "ieeet3":
-            return forward / whole, slope(lambda v: commutated(p, v), V_T) / whole
+            return forward / whole, slope(lambda v: behind_reactance(p, v), V_T) / whole
         V_A = p["K_E"] * E_FD / times
         return forward / whole, V_A * slope(lambda v: available(p, v), V_T) / whole
     if name == "esst3a":

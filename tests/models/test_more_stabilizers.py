@@ -13,7 +13,7 @@ AT = AT_REST["pss"]
 ADDED = ("pss2c", "pss3b", "pss4b", "iee2st")
 
 
-def washed(p, s, name):
+def washout(p, s, name):
     return s * p[name] / (1 + s * p[name])
 
 
@@ -21,7 +21,7 @@ def washed(p, s, name):
 @pytest.mark.parametrize(("signal", "taken"), [(1, "speed"), (3, "power"), (5, "v_t")])
 def test_pss1a_takes_one_of_three_signals(signal, taken, hertz):
     s, p = 2j * np.pi * hertz, ONE
-    wanted = p["K_S"] * washed(p, s, "T_5") / (1 + s * p["T_6"])
+    wanted = p["K_S"] * washout(p, s, "T_5") / (1 + s * p["T_6"])
     wanted *= lead(p, s, "T_1", "T_2") * lead(p, s, "T_3", "T_4")
     alone = stabilizer("pss1a", p | {"signal": signal}, sees_voltage=True)
     response = alone.response(s, [*AT, V_T])
@@ -58,14 +58,14 @@ PSS3B = {"K_S1": 0.4, "T_1": 0.02, "T_w1": 1.5, "K_S2": 4.0, "T_2": 0.03, "T_w2"
 @pytest.mark.parametrize("left_out", [(), ("A_1", "A_2", "A_3", "A_4", "T_w1", "T_2")])
 def test_pss3b_is_the_standards_diagram(hertz, left_out):
     s, p = 2j * np.pi * hertz, PSS3B | dict.fromkeys(left_out, 0.0)
-    common = washed(p, s, "T_w3")
+    common = washout(p, s, "T_w3")
     for b1, b2, a1, a2 in ((1, 2, 3, 4), (5, 6, 7, 8)):
         common *= 1 + p[f"A_{b1}"] * s + p[f"A_{b2}"] * s**2
         common /= 1 + p[f"A_{a1}"] * s + p[f"A_{a2}"] * s**2
-    first = washed(p, s, "T_w1") if p["T_w1"] else 1.0
+    first = washout(p, s, "T_w1") if p["T_w1"] else 1.0
     wanted = {
         ("v_s", "power"): common * p["K_S1"] / (1 + s * p["T_1"]) * first,
-        ("v_s", "speed"): common * p["K_S2"] / (1 + s * p["T_2"]) * washed(p, s, "T_w2"),
+        ("v_s", "speed"): common * p["K_S2"] / (1 + s * p["T_2"]) * washout(p, s, "T_w2"),
     }
     alone = stabilizer("pss3b", p)
     assert not refused(alone)

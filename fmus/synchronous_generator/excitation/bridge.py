@@ -148,7 +148,7 @@ def st6b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         V_R0 = E_0 / seen.start.v_t
         V_A0 = (V_R0 + p.K_M * p.K_G * E_0) / fmax(p.K_FF + p.K_M, 1e-9)
 
-        def held(signal: Expr, I_fd: Expr) -> Expr:
+        def hold(signal: Expr, I_fd: Expr) -> Expr:
             highest = fmax(p.K_LR * (p.K_CI * p.I_LR - I_fd), limits.V_RMIN)
             limited = clamp(signal, limits.V_RMIN, limits.V_RMAX)
             return if_else(p.K_LR > 0, fmin(limited, highest), limited)
@@ -164,7 +164,7 @@ def st6b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         control = Controller(m, gains, V_A0, (p.V_AMIN, p.V_AMAX))
         V_A = control(measured.error(control.error_at_start))
         V_G = m.state("feedback", p.K_G * E_0, "pu", "Field voltage through T_G", base="E_fd")
-        V_R = held(p.K_FF * V_A + p.K_M * (V_A - V_G), seen.I_fd)
+        V_R = hold(p.K_FF * V_A + p.K_M * (V_A - V_G), seen.I_fd)
         E_fd = V_R * seen.terminal_voltage(V_R * measured.nearly)
         m.derivative(V_G, (p.K_G * E_fd - V_G) / p.T_G)
         return measured.close(E_fd)

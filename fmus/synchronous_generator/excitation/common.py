@@ -74,15 +74,15 @@ class Measurement:
         )
         self._left_out = T_R <= 0
         self._T_R = if_else(self._left_out, BYPASS_TIME, T_R)
-        self.at_start = self._compensated(seen.v_0, seen.start.i)
+        self.at_start = self._measure(seen.v_0, seen.start.i)
         self._state = m.state("v_m", self.at_start, "pu", "Measured terminal voltage", base="S_n")
         nearly = seen.terminal(seen.I_fd)
         self.nearly = nearly.magnitude()
         """|v_t| [pu] for an E_fd that equals the field current, as it does in steady state."""
-        self.value = if_else(self._left_out, self._compensated(nearly, seen.i), self._state)
+        self.value = if_else(self._left_out, self._measure(nearly, seen.i), self._state)
         """The measured voltage [pu, S_n]."""
 
-    def _compensated(self, v_t: Phasor, i: Phasor) -> Expr:
+    def _measure(self, v_t: Phasor, i: Phasor) -> Expr:
         return (v_t + self._impedance * i).magnitude()
 
     def reference(self, at_start: Scalar) -> Expr:
@@ -106,7 +106,7 @@ class Measurement:
     def close(self, E_fd: Expr) -> tuple[Expr, Expr]:
         """(E_fd, |v_t|) of the exciter."""
         v_t = self._seen.terminal(E_fd)
-        measured = self._compensated(v_t, self._seen.i)
+        measured = self._measure(v_t, self._seen.i)
         self._m.derivative(self._state, (measured - self._state) / self._T_R)
         return E_fd, v_t.magnitude()
 

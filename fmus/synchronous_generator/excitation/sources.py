@@ -1,4 +1,4 @@
-"""What feeds static exciters: the terminal's voltage and current, and the rectifier behind them.
+"""The sources of static exciters: the terminal's voltage and current, and the rectifier behind them.
 
     V_E = |K̄_P·v̄_t + j·(K_I + K̄_P·X_L)·ī_t|,  K̄_P = K_P·e^{j·θ_P}
     V_B = V_E·F_EX(K_C·I_FD/V_E), at most V_BMAX

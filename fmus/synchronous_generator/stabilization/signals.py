@@ -1,4 +1,4 @@
-"""What stabilisers take, by the numbers of PSS/E's records, and the band of voltages that they act in."""
+"""Signals that stabilisers take, by the numbers of PSS/E's records, and the band of voltages that they act in."""
 
 from fmus.synchronous_generator.variants import Shaft
 from fmus.toolchain.model_builder import ModelBuilder
