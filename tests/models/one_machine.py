@@ -137,9 +137,11 @@ class OneMachine:
             },
         )
 
-    def run(self, lines, until, event=1.0, every=0.02):
-        """Outputs and voltages at every so many seconds; the network is ``lines`` alone after the event [s]."""
-        model, p, c = self.device.model, self.device.p, self.device.c
+    def run(self, lines, until, event=1.0, every=0.02, changed=None):
+        """Outputs and voltages at every so many seconds; the network is ``lines`` alone after the event [s].
+
+        ``changed``: values that parameters take at the event."""
+        model, p, c = self.device.model, self.device.p.copy(), self.device.c
         names = [v.name for v in model.outputs]
         i_at, y_at = (
             [names.index(n) for n in pair] for pair in (("i_re", "i_im"), ("y_re", "y_im"))
@@ -160,6 +162,8 @@ class OneMachine:
 
         for k in range(round(until / STEP) + 1):
             seen = before if k < round(event / STEP) else after
+            for place, parameter in enumerate(model.parameters if k == round(event / STEP) else ()):
+                p[place] = (changed or {}).get(parameter.name, p[place])
             if k % round(every / STEP) == 0:
                 v, current = voltage(x, seen)
                 out = np.array(model.outputs_function(x, [v.real, v.imag], p, c)).ravel()

@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from fmus.synchronous_generator.composed import synchronous_generator, synchronous_generator_phasor
-from tests.models.parts import AT_BUS, AT_REST, BUS, OF_VOLTAGE, V_T, refused, stabilizer
+from tests.models.parts import (
+    AT_BUS,
+    AT_REST,
+    BUS,
+    OF_VOLTAGE,
+    V_T,
+    integrated,
+    refused,
+    stabilizer,
+)
 from tests.models.test_part_stabilizers import ONE, TWO
 from tests.models.test_psse_parts import HERTZ, lead
 from tests.support.evaluated import Evaluated
@@ -39,13 +48,21 @@ def test_pss2c_is_pss2b_with_a_fourth_stage(hertz):
     assert after == pytest.approx({key: stage * value for key, value in before.items()}, rel=1e-9)
 
 
-def test_pss2c_is_silent_at_little_power():
-    alone = stabilizer("pss2c", {"P_off": 0.2})
-    x = alone.x - 0.001
-    signals = [alone.outputs([0.0, P], x)["v_s"] for P in (0.19, 0.21)]
-    assert [signal != 0 for signal in signals] == [False, True]
-    always = stabilizer("pss2c")
-    assert always.outputs([0.0, 0.01], x)["v_s"] != 0
+def test_pss2c_acts_between_two_thresholds_of_the_power():
+    """At 0.8 pu it acts; below 0.2 no more; between 0.2 and 0.3 as before; from 0.3 on again."""
+    alone = stabilizer("pss2c", {"P_on": 0.3, "P_off": 0.2, "V_STMAX": 9.0, "V_STMIN": -9.0})
+    memory = [s.name for s in alone.model.states].index("pss.is_active")
+    x, found = alone.x, []
+    for P in (0.8, 0.25, 0.19, 0.25, 0.31, 0.25):
+        _, x = integrated(alone, lambda t, P=P: [0.0, P], 0.05, x=x)
+        found.append(round(x[memory]))
+    assert found == [1, 1, 0, 0, 1, 1]
+    x = x - 0.001
+    x[memory] = 0.0
+    assert alone.outputs([0.01, 0.25], x)["v_s"] == 0.0
+    x[memory] = 1.0
+    assert alone.outputs([0.01, 0.25], x)["v_s"] != 0.0
+    assert stabilizer("pss2c").states["pss.is_active"] == 1.0
 
 
 PSS3B = {"K_S1": 0.4, "T_1": 0.02, "T_w1": 1.5, "K_S2": 4.0, "T_2": 0.03, "T_w2": 2.0} | {

@@ -81,7 +81,7 @@ def test_the_signal_stays_within_two_limits_of_its_own(name):
 
 def test_the_inputs_of_pss2b_are_limited():
     alone = stabilizer(
-        "pss2b", {"V_SI1MAX": 0.01, "V_SI1MIN": -0.02, "V_SI2MAX": 0.1, "V_SI2MIN": -0.3}
+        "pss2b", {"V_SI1MAX": 0.01, "V_SI1MIN": -0.02, "V_SI2MAX": 0.9, "V_SI2MIN": 0.5}
     )
     rates = alone.rates
     assert rates([0.5, 0.8]) == rates([0.01, 0.8])

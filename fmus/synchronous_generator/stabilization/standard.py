@@ -12,10 +12,9 @@ PSS2A and PSS2B take the integral of accelerating power, from speed and electric
     (speed + K_s3·power) → (1+sT_8)/(1+sT_9)^5 → − power → K_s1
     → (1+sT_1)/(1+sT_2) → (1+sT_3)/(1+sT_4) → (1+sT_10)/(1+sT_11) → V_STMIN ≤ V_S ≤ V_STMAX
 
-The limits of the inputs, V_SI1MIN … V_SI2MAX, and the third stage are PSS2B's; PSS2C has a fourth,
-(1+sT_12)/(1+sT_13), and V_S = 0 while P_e is below P_off. Its higher threshold, above which the signal comes back, is
-left out. The power's limits hold for its change from the operating point. A block whose time constant is 0 is left
-out. M = 5 and N = 1 of the ramp-tracking filter."""
+The limits of the inputs, V_SI1MIN … V_SI2MAX, of the speed's deviation and of the power itself, and the third stage are
+PSS2B's; PSS2C has a fourth, (1+sT_12)/(1+sT_13), and acts from P_e = P_on on until P_e falls below P_off. A block whose
+time constant is 0 is left out. M = 5 and N = 1 of the ramp-tracking filter."""
 
 from functools import partial
 
@@ -24,6 +23,7 @@ from fmus.synchronous_generator.stabilization.norm631 import RAMP_LAGS
 from fmus.synchronous_generator.stabilization.signals import SPEED, cut_off, input_signal
 from fmus.synchronous_generator.variants import Shaft
 from fmus.toolchain.blocks import (
+    RETURN_TIME,
     clamp,
     lead_lag,
     low_pass_or_nothing,
@@ -35,6 +35,8 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, fmax, if_else, logic_and, logic_or
 
 SOURCE = "typical data, IEEE 421.5"
+
+_MIDDLE = 0.5  # between the two values of a memory
 
 
 gain = partial(per_unit, base="S_n", source=SOURCE)
@@ -122,7 +124,8 @@ def pss2a(
         speed, power = delta_omega, P_e - P_e_0
         if newer:
             speed = clamp(speed, *_input_limits(m, "1", "speed"))
-            power = clamp(power, *_input_limits(m, "2", "power, as its change"))
+            limits = _input_limits(m, "2", "power")
+            power = clamp(P_e, *limits) - clamp(P_e_0, *limits)
         speed = washout_or_nothing(
             m, "washout_1", speed, time(m, "T_w1", 2.0, "First washout of the speed")
         )
@@ -149,8 +152,7 @@ def pss2a(
         if not newest:
             return limited_output(m, signal)
         signal = limited_output(m, stage(m, signal, 4, ("T_12", "T_13"), (0.0, 0.0)))
-        least = gain(m, "P_off", 0.0, "Electrical power below which there is no signal; 0: none", 0)
-        return if_else(logic_and(least > 0, P_e < least), 0, signal)
+        return if_else(_is_active(m, P_e, P_e_0), signal, 0)
 
 
 pss2b = partial(pss2a, newer=True)  # PSS2A with limited inputs and a third stage
@@ -158,13 +160,25 @@ pss2c = partial(pss2a, newer=True, newest=True)  # PSS2B with a fourth, and off 
 
 
 def _input_limits(m: ModelBuilder, number: str, text: str) -> tuple[Expr, Expr]:
-    low = m.parameter(
-        f"V_SI{number}MIN", -2.0, "pu", f"Lower limit of the {text}", base="S_n", maximum=0
-    )
-    high = m.parameter(
-        f"V_SI{number}MAX", 2.0, "pu", f"Upper limit of the {text}", base="S_n", minimum=0
-    )
+    low = m.parameter(f"V_SI{number}MIN", -2.0, "pu", f"Lower limit of the {text}", base="S_n")
+    high = m.parameter(f"V_SI{number}MAX", 2.0, "pu", f"Upper limit of the {text}", base="S_n")
+    m.require(high - low, f"pss.V_SI{number}MAX must exceed pss.V_SI{number}MIN")
     return low, high
+
+
+def _is_active(m: ModelBuilder, P_e: Expr, P_e_0: Expr) -> Expr:
+    """Whether the stabiliser acts: from P_on on, until the power falls below P_off.
+
+    The state is a memory: it goes to 1 or 0, whichever the power asks for or it is nearer to."""
+    on = gain(m, "P_on", 0.0, "Electrical power from which on there is a signal; 0: always", 0)
+    off = gain(m, "P_off", 0.0, "Electrical power below which there is none any more", 0)
+    starts = if_else(logic_or(on <= 0, P_e_0 >= off), 1, 0)
+    memory = m.state("is_active", starts, "1", "Whether the stabiliser acts, 1 or 0")
+    kept = if_else(memory > _MIDDLE, 1, 0)
+    wanted = if_else(P_e < off, 0, kept)
+    wanted = if_else(logic_or(on <= 0, P_e >= on), 1, wanted)
+    m.derivative(memory, (wanted - memory) / RETURN_TIME)
+    return memory > _MIDDLE
 
 
 def _ramp_filter(m: ModelBuilder, u: Expr) -> Expr:
