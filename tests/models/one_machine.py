@@ -137,28 +137,52 @@ class OneMachine:
             },
         )
 
+    def eigenvalues(self, step=1e-7):
+        """Eigenvalues [rad/s] of the machine at its network, by differences about the start."""
+        seen = self.network.seen(self.network.lines)
+        x0 = np.array(self.device.x, dtype=float)
+
+        def rate(x):
+            v, _ = self._voltage(x, seen, self.device.p)
+            return self._rates(x, v, self.device.p)
+
+        columns = [
+            (rate(x0 + step * unit) - rate(x0 - step * unit)) / (2 * step)
+            for unit in np.eye(len(x0))
+        ]
+        return np.linalg.eigvals(np.array(columns).T)
+
+    def _voltage(self, x, seen, p):
+        """Voltage of the machine's bus, and its current behind its admittance."""
+        model = self.device.model
+        names = [v.name for v in model.outputs]
+        i_at, y_at = (
+            [names.index(n) for n in pair] for pair in (("i_re", "i_im"), ("y_re", "y_im"))
+        )
+        still = np.array(model.outputs_function(x, [0.0, 0.0], p, self.device.c)).ravel()
+        current, y = complex(*still[i_at]), complex(*still[y_at])
+        v = (seen[0] + seen[1] * current) / (1 + seen[1] * y)
+        return v, current - y * v
+
+    def _rates(self, x, v, p):
+        rates = self.device.model.derivatives(x, [v.real, v.imag], p, self.device.c)[0]
+        return np.array(rates, dtype=float).ravel()
+
     def run(self, lines, until, event=1.0, every=0.02, changed=None):
         """Outputs and voltages at every so many seconds; the network is ``lines`` alone after the event [s].
 
         ``changed``: values that parameters take at the event."""
         model, p, c = self.device.model, self.device.p.copy(), self.device.c
         names = [v.name for v in model.outputs]
-        i_at, y_at = (
-            [names.index(n) for n in pair] for pair in (("i_re", "i_im"), ("y_re", "y_im"))
-        )
         before, after = self.network.seen(self.network.lines), self.network.seen(lines)
         x = np.array(self.device.x, dtype=float)
         rows = []
 
         def voltage(x, seen):
-            still = np.array(model.outputs_function(x, [0.0, 0.0], p, c)).ravel()
-            current, y = complex(*still[i_at]), complex(*still[y_at])
-            v = (seen[0] + seen[1] * current) / (1 + seen[1] * y)
-            return v, current - y * v
+            return self._voltage(x, seen, p)
 
         def rate(x, seen):
-            v, _ = voltage(x, seen)
-            return np.array(model.derivatives(x, [v.real, v.imag], p, c)[0], dtype=float).ravel()
+            return self._rates(x, voltage(x, seen)[0], p)
 
         for k in range(round(until / STEP) + 1):
             seen = before if k < round(event / STEP) else after
