@@ -42,9 +42,8 @@ class FoundDevices:
 
     devices: tuple[HeldDevice, ...]
     unused: Mapping[tuple[str, int], str]
-    not_there: tuple[
-        tuple[int, str], ...
-    ] = ()  # lines of those at a bus that is not there, and what is said
+    # lines of those that are asked about, and what is said
+    remarks: tuple[tuple[int, str], ...] = ()
 
 
 def read_devices(raw: RawFile, left_out: Collection[str], places: Places) -> FoundDevices:
@@ -53,7 +52,8 @@ def read_devices(raw: RawFile, left_out: Collection[str], places: Places) -> Fou
     Raises an `InputError` for a record that cannot be understood, and for what our network cannot have."""
     found: list[HeldDevice] = []
     unused: dict[tuple[str, int], str] = {}
-    not_there = []
+    remarks = []
+    seen = set[tuple[str, str, tuple[int, ...]]]()
     for section, read in _READERS.items():
         if section in left_out:
             continue
@@ -70,10 +70,21 @@ def read_devices(raw: RawFile, left_out: Collection[str], places: Places) -> Fou
                 named = ", ".join(map(str, missing))
                 text = f"not used: bus {named} is not in the file, or out of service"
                 unused[section, k] = text
-                not_there.append((record.line, text))
+                remarks.append((record.line, text))
                 continue
             found.append(read(raw, lines, places))
-    return FoundDevices(tuple(found), unused, tuple(not_there))
+            own = _identity(found[-1])
+            if own in seen:
+                text = f"a second {section} of the name {own[1]!r}: both are used, and PSS/E keeps one of a name"
+                remarks.append((record.line, text))
+            seen.add(own)
+    return FoundDevices(tuple(found), unused, tuple(remarks))
+
+
+def _identity(device: HeldDevice) -> tuple[str, str, tuple[int, ...]]:
+    """Return what PSS/E knows a device by: its kind and name, and for an induction machine its bus."""
+    places = device.places if device.section == "induction machine" else ()
+    return device.section, device.name, places
 
 
 def _status(section: str, record: Record) -> int:

@@ -55,5 +55,5 @@ class HeldDevice(ABC):
 
     def ending_name(self, kind: str, bus: int) -> str:
         """Return the name of a load of our network, such as ``dc_WATL_P1_12``."""
-        own = re.sub(r"\W+", "_", self.name).strip("_")
+        own = re.sub(r"[^0-9A-Za-z]+", "_", self.name).strip("_")
         return f"{kind}_{own}_{bus}" if own else f"{kind}_{bus}"

@@ -460,7 +460,7 @@ class _Reading:
         """Read DC lines, FACTS devices and the like; series parts of FACTS devices may be branches."""
         places = Places(self._standing, self._kilovolts)
         self._devices = read_devices(self._raw, leaving_out, places)
-        for line, text in self._devices.not_there:
+        for line, text in self._devices.remarks:
             self._changes.note(line, text)
         for record, z in series_impedances(self._raw, leaving_out):
             start, end = (self._standing(self._own(record, k)) for k in (1, 2))

@@ -438,3 +438,39 @@ def test_rawx_has_the_same_multi_terminal_network_and_gne(tmp_path, read):
     assert fed(data) == {name: pytest.approx(value, abs=1e-6) for name, value in usual.items()}
     told = {x.kind: x.why for x in data.records if x.kind == "gne"}
     assert told == {"gne": "out of service: its status is 0"}
+
+
+def test_two_devices_of_one_name_are_both_used_and_asked_about(read):
+    other = STATCON[0].replace("{node}", "").replace("'F 1',8", "'F 1',5")
+    data = read({"FACTS DEVICE": [*lines_of("FACTS DEVICE", 33), other]})
+    assert set(fed(data)) == {"facts_F_1_8", "facts_F_1_5"}
+    assert "a second facts device of the name 'F 1'" in texts(data)
+    motors = [MOTOR[0], MOTOR[0].replace("6,'1 '", "5,'1 '")]
+    assert "a second" not in texts(read({"INDUCTION MACHINE": motors}))
+
+
+def test_a_name_of_any_letters_becomes_one_of_ours(read):
+    lines = [line.replace("'F 1'", "'Süd/3 #'") for line in lines_of("FACTS DEVICE", 33)]
+    assert list(fed(read({"FACTS DEVICE": lines}))) == ["facts_S_d_3_8"]
+
+
+def test_a_rating_leaves_room_for_reactive_power(read):
+    """SMAX of 60 MVA beside 49 MW; beyond it nothing is left, which is said."""
+    weak = [line.replace("1.02,90", "1.2,90") for line in lines_of("VSC DC LINE", 33)]
+    small = [line.replace("40.0,350,1200", "40.0,60,1200") for line in weak]
+    value = fed(read({"VSC DC LINE": small}))["vsc_V_1_8"]
+    assert abs(value) == pytest.approx(60.0)
+    assert value.imag > 30
+    tiny = [line.replace("40.0,350,1200", "40.0,45,1200") for line in weak]
+    data = read({"VSC DC LINE": tiny})
+    assert fed(data)["vsc_V_1_8"].imag == pytest.approx(0.0, abs=1e-9)
+    assert "takes the whole rating (SMAX, IMAX)" in texts(data)
+
+
+def test_both_ends_at_one_bus_are_two_loads(read):
+    """The line's losses are what both feed together."""
+    current = (math.sqrt(250**2 + 4 * 8 * 60) - 250) / 16
+    lines = [line.replace("8,1,22", "5,1,22") for line in lines_of("TWO-TERMINAL DC", 33)]
+    found = fed(read({"TWO-TERMINAL DC": lines}))
+    assert list(found) == ["dc_TIE_1_5", "dc_TIE_1_5_2"]
+    assert sum(found.values()).real == pytest.approx(-8 * current**2)
