@@ -275,3 +275,48 @@ def test_names_of_an_ssp_are_shown_in_one_line_and_its_values_stay(tmp_path):
     root = SspArchive(path).xml("SystemStructure.ssd")
     assert root.attrib == {"name": "a\\nb\\u202e"}
     assert root[0].attrib == {"name": "k", "description": "\\x9b", "value": "x\ny"}
+
+
+RUNS_CODE = {
+    "read_pickle",
+    "read_hdf",
+    "eval",
+    "Unpickler",
+}
+"""Functions of the libraries that read files here, which run code or build any object out of a file."""
+
+FROM_OUR_OWN_PROCESS = {"orchestrator/federation/federate.py"}
+"""Modules that unpickle what another process of the same run wrote."""
+
+
+def _called(tree):
+    """Names that a module calls, and the keyword arguments that it gives there."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            function = node.func
+            name = (
+                function.attr
+                if isinstance(function, ast.Attribute)
+                else getattr(function, "id", "")
+            )
+            owner = getattr(getattr(function, "value", None), "id", "")
+            yield owner, name, {word.arg: word.value for word in node.keywords}
+
+
+def test_no_reader_is_called_that_runs_code_out_of_a_file():
+    found = []
+    for package in ("orchestrator", "fmus", "gfor_fmu"):
+        for path in sorted((ROOT / package).rglob("*.py")):
+            place = path.relative_to(ROOT).as_posix()
+            for owner, name, words in _called(ast.parse(path.read_text(encoding="utf-8"))):
+                allowed = words.get("allow_pickle")
+                pickles = allowed is not None and getattr(allowed, "value", True) is not False
+                unpickles = owner in {"pickle", "dill", "joblib", "skrf", "rf"} and name in {
+                    "load",
+                    "loads",
+                    "read",
+                }
+                if (name in RUNS_CODE and owner in {"pd", "pickle"}) or pickles or unpickles:
+                    found.append((place, f"{owner}.{name}".lstrip(".")))
+    assert [one for one in found if one[0] not in FROM_OUR_OWN_PROCESS] == []
+    assert {place for place, _ in found} == FROM_OUR_OWN_PROCESS
