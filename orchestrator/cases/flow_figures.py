@@ -60,7 +60,12 @@ def power_flow_json(prepared: PreparedScenario) -> dict[str, Any] | None:
         "generation_mw": total,
         "losses_mw": sum(branch["losses_mw"] for branch in branches),
         "buses": [
-            {"name": bus, "v_pu": abs(v), "angle_deg": math.degrees(cmath.phase(v))}
+            {
+                "name": bus,
+                "title": prepared.titles.get(bus, ""),
+                "v_pu": abs(v),
+                "angle_deg": math.degrees(cmath.phase(v)),
+            }
             for bus, v in flow.voltages.items()
         ],
         "branches": branches,

@@ -36,6 +36,7 @@ class SourceTables:
     # number of a bus → what its loads draw as constant impedance and as constant current [MW, Mvar], where the source
     # tells them apart; the rest of the bus' load is as the case says
     load_parts: dict[int, tuple[complex, complex]] = field(default_factory=dict)
+    titles: dict[int, str] = field(default_factory=dict)  # number of a bus → its name in the file
 
 
 LIBRARIES = ("pandapower", "numpy", "scipy", "pandas", "lightsim2grid")

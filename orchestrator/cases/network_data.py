@@ -83,6 +83,7 @@ class NetworkData:
     device_loads: tuple[str, ...] = ()  # names of the loads in the place of DC lines and the like
     # ratings and bands of a RAW or MATPOWER file; those of other sources are not meant
     limits: FileLimits = field(default_factory=FileLimits)
+    titles: Mapping[str, str] = field(default_factory=dict)  # names in the source's file, by bus
 
 
 def network_data(table: NetworkTable, directory: Path) -> NetworkData:
@@ -146,6 +147,7 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
         },
         limits=source.limits if table.raw or table.matpower else FileLimits(),
         records=found.records,
+        titles=source.titles,
         device_loads=tuple(x.name for x in found.device_loads),
     )
 

@@ -64,6 +64,7 @@ class ImportedNetwork:
     feeding: dict[str, float] = field(default_factory=dict)
     capacitors: dict[str, float] = field(default_factory=dict)
     limits: FileLimits = field(default_factory=FileLimits)  # by branch and by bus
+    titles: dict[str, str] = field(default_factory=dict)  # names in the file, by bus
 
 
 def import_network(
@@ -110,6 +111,7 @@ def import_network(
         {bus_of(labels[n]): float(row[2]) for n, row in rows.items() if row[2] < -_NEGLIGIBLE},
         {bus_of(labels[n]): float(row[5]) for n, row in rows.items() if row[5] > _NEGLIGIBLE},
         FileLimits(ratings, _bands(rows, labels)),
+        {bus_of(labels[n]): title for n, title in source.titles.items() if title and n in labels},
     )
 
 

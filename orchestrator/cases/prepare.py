@@ -87,6 +87,7 @@ class PreparedScenario:
     network: Network | None = None
     source_slack: str | None = None  # reference bus of the network's source
     file_limits: FileLimits = field(default_factory=FileLimits)  # of the network's source
+    titles: Mapping[str, str] = field(default_factory=dict)  # names in the network's file, by bus
     # likely ratings [MVA] of units whose S_n is only the base of their data
     base_ratings: Mapping[str, float] = field(default_factory=dict)
     following_loads: tuple[str, ...] = ()  # loads that follow the voltage in an outage's power flow
@@ -286,6 +287,7 @@ class Preparer:
             not_reached=tuple(sorted(draft.found.not_reached)),
             source_slack=draft.data.slack if draft.data else None,
             file_limits=draft.data.limits if draft.data else FileLimits(),
+            titles=draft.data.titles if draft.data else {},
             base_ratings=draft.base_ratings,
             following_loads=tuple(draft.data.flow_laws) if draft.data else (),
             device_loads=draft.data.device_loads if draft.data else (),

@@ -2,10 +2,12 @@
 
 import argparse
 import json
+from collections.abc import Mapping
+from typing import Any
 
 from rich.markup import escape
 
-from orchestrator.cases.short_circuit import CONVENTION, weakest_first
+from orchestrator.cases.short_circuit import CONVENTION, BusStrength, weakest_first
 from orchestrator.cli.arguments import add_json_argument, add_kept_argument, add_options
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.terminal import keep_json, make_console, print_json
@@ -27,7 +29,8 @@ def run(options: argparse.Namespace) -> int:
         for s in chosen(options)
     }
     told = [
-        {"name": s.name, "buses": [bus.as_json() for bus in buses]} for s, buses in found.items()
+        {"name": s.name, "buses": [_with_title(s.prepared.titles, bus) for bus in buses]}
+        for s, buses in found.items()
     ]
     about = next(iter(found)).prepared.about
     kept = {key: about[key] for key in ("case", "models", "basis", "questions")}
@@ -38,7 +41,8 @@ def run(options: argparse.Namespace) -> int:
         return 0
     alike: dict[str, list[str]] = {}
     for scenario, buses in found.items():
-        alike.setdefault(json.dumps([bus.as_json() for bus in buses]), []).append(scenario.title)
+        with_titles = [_with_title(scenario.prepared.titles, bus) for bus in buses]
+        alike.setdefault(json.dumps(with_titles), []).append(scenario.title)
     for rows, titles in alike.items():
         table = make_table(
             ", ".join(titles), "Bus", "S_sc [MVA]", "SCR", "of [MVA]", "X/R", "Converters"
@@ -51,7 +55,12 @@ def run(options: argparse.Namespace) -> int:
                 (x["x_r"], ".1f"),
             )
             figures = ["–" if value is None else f"{value:{form}}" for value, form in numbers]
-            table.add_row(x["bus"], *figures, ", ".join(x["converters"]))
+            table.add_row(f"{x['bus']} {x['title']}".strip(), *figures, ", ".join(x["converters"]))
         console.print(table, "")
     console.print(escape(f"Convention: {convention}."), soft_wrap=True, highlight=False)
     return 0
+
+
+def _with_title(titles: Mapping[str, str], bus: BusStrength) -> dict[str, Any]:
+    """The bus as JSON, with its name in the network's file."""
+    return bus.as_json() | {"title": titles.get(bus.bus, "")}

@@ -1,6 +1,6 @@
 """The tables of a power flow: columns, rows as text, and totals."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 COLUMNS = {
@@ -46,7 +46,15 @@ def totals(found: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def cells(rows: Sequence[dict[str, Any]], kind: str) -> list[list[str]]:
-    return [[_cell(column, row[column]) for column in COLUMNS[kind]] for row in rows]
+    """The rows as text; a bus has its name in the file beside it."""
+    return [
+        [_cell(column, row[column]) + _titled(column, row) for column in COLUMNS[kind]]
+        for row in rows
+    ]
+
+
+def _titled(column: str, row: Mapping[str, Any]) -> str:
+    return f" {row['title']}" if column == "name" and row.get("title") else ""
 
 
 def _cell(column: str, value: Any) -> str:

@@ -111,6 +111,7 @@ class _Reading:
         self._branches: list[list[float]] = []
         self._to_earth: list[tuple[complex, complex]] = []
         self._labels: dict[int, str] = {}
+        self._titles: dict[int, str] = {}
         # line of the record, X, and kV of each branch
         self._ohms: list[tuple[int, float, float]] = []
         self._idle: set[tuple[int, str]] = set()
@@ -160,6 +161,7 @@ class _Reading:
             self._labels,
             self._raw.frequency,
             self._load_parts,
+            self._titles,
         )
         records = record_uses(self._raw, self._merged, leaving_out, self._devices.unused)
         return RawNetwork(
@@ -232,6 +234,7 @@ class _Reading:
                     "no percent): export the solved case, or give 1"
                 )
             self._labels[number] = str(number)
+            self._titles[number] = record.text(1).strip()
 
     def _merge(self) -> None:
         """Make one bus of those that a line without impedance joins."""

@@ -7,6 +7,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.cases.flow_figures import power_flow_json
 from orchestrator.cases.new_case import WantedCase, write_case
 from orchestrator.errors import CaseError
+from orchestrator.report.power_flow import cells
 from orchestrator.study.modes import compute_modes
 
 RAW = """\
@@ -107,3 +108,13 @@ def test_a_rating_in_a_table_is_one(tmp_path):
     out.write_text(text, encoding="utf-8")
     with pytest.raises(CaseError, match="more than 2"):
         load_case(out).prepare(["base"], {"sg3.S_n": 200.0, "sg3.P_0": 1.0, "sg1.S_n": 300.0})
+
+
+def test_a_bus_has_its_name_in_the_file_beside_its_number(prepared):
+    buses = power_flow_json(prepared(900.0, 600.0))["buses"]
+    assert {bus["name"]: bus["title"] for bus in buses} == {
+        "bus_1": "WEST GEN",
+        "bus_3": "EAST GEN",
+        "bus_7": "WEST",
+    }
+    assert cells(buses, "buses")[0][0] == "bus_1 WEST GEN"
