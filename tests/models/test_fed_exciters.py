@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.models.one_machine import OneMachine, three_buses
 from tests.models.parts import AT_REST, CURRENT, E_FD, V_T, exciter, integrated, refused
 from tests.models.test_part_exciters import F_EX, saturated, slope
 from tests.models.test_psse_parts import HERTZ, behind_the_rectifier, control, lead, rate
@@ -146,6 +147,58 @@ def test_a_compensator_is_measured_with_the_voltage(name):
     share = with_it["E_fd", "v_t"] - without["E_fd", "v_t"]
     of_measurement = -with_it["E_fd", "v_s"] / (1 + 0.01 * s)
     assert share == pytest.approx(of_measurement * (point.real / abs(point) - 1), rel=1e-6)
+
+
+ROUND = "102 GENROU 1 8.0 0.03 0.4 0.05 6.175 0.05 1.8 1.7 0.3 0.55 0.25 0.2 0.1 0.8 /\n"
+BESIDE_PSID = {
+    # record, power of the machine and of the load, eigenvalues, part by which they may differ
+    "ST6B": (
+        "102 ST6B 1 0 0.012 50.038 45.094 0 0 4.81 -3.85 1 1 1.0577 17.33 21.53 4.81 -3.85 1 0.02 /",
+        (1.0, 2.5),
+        (-39.79684, -38.3445, -8.550154, -0.6772739 + 8.637736j, -0.368234 + 0.5649228j),
+        5e-4,
+    ),
+    "ST8C": (
+        "102 ST8C 1 0 0 0 0 0.01 5 5 99.99 0 4 0.1 99.9962 -99.866 1.35 0.003 99.3449 -99.1691 0.5 0.005 "
+        "0.1 4 0 0 0 99 0 0 99 /",
+        (0.7, 2.0),
+        (
+            -351.66843,
+            -163.48585,
+            -98.322705,
+            -49.907784,
+            -39.634776,
+            -10.878948,
+            -2.7521728 + 8.057381j,
+            -1.5898058,
+            -0.36444429,
+            -0.025119359,
+        ),
+        1e-5,
+    ),
+}
+"""Records of PowerSimulationsDynamics.jl at d94d74e, test/benchmarks/psse, and its eigenvalues (tests 59 and 61).
+
+Its ST6B multiplies by the measured voltage, ours by the voltage, as IEEE 421.5 draws it: the two fastest are left out.
+It sets ILR to ten times the field current; the record here has that."""
+
+
+@pytest.mark.parametrize("name", BESIDE_PSID)
+def test_a_machine_with_it_has_the_eigenvalues_of_another_program(name, tmp_path):
+    record, (given, drawn), wanted, part = BESIDE_PSID[name]
+    network, _ = three_buses(given=given, drawn=drawn)
+    alone = OneMachine(ROUND + record, tmp_path, network, source=0.25j, torque=True)
+    ours = alone.eigenvalues()
+    for z in wanted:
+        assert min(abs(ours - z)) < part * abs(z), z
+
+
+@pytest.mark.parametrize("name", ["ac7b", "ac8b", "dc4b", "st6b"])
+def test_a_derivative_without_a_lag_is_none(name):
+    """T_DR = 0 is how records leave the derivative out."""
+    s = 2j * np.pi * 0.7
+    found = [exciter(name, values).response(s, REST) for values in ({"T_DR": 0.0}, {"K_DR": 0.0})]
+    assert found[0] == pytest.approx(found[1])
 
 
 # -- limits -------------------------------------------------------------------------------------

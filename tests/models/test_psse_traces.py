@@ -28,6 +28,16 @@ HYDRO = """
 2 HYGOV 1 0.04 0.5 1.0 0.05 0.2 0.1 1.0 0.0 1 1.0 0 0 /
 """
 
+# the same of T''do and T''qo; the limits of the inputs act, and so do the thresholds of PSS2C
+OF_POWER = "1 GENROU 1 7.0 0.03 0.4 0.05 4.0 0 2.2 2.2 0.3 0.3 0.3 0.2 0 0 /\n1 SEXS 1 1 1 120 0.4 -10 10 /\n"
+DUAL = "1 0 3 0 5 1 1.5 1.5 0 1.5 0 1.5 0.1875 1.0 0.5 0.1 2.0 0.59451 0.0447 0.59451 0.0447"
+INPUTS = "0.00035 -0.00055 0.915 0.895"
+REFERENCE = 1.04691  # that the voltage's reference becomes [pu]
+TWO_BUSES = Network(
+    {1: np.exp(1j * np.radians(25.085)), 2: 0.95512 + 0j}, ((1, 2, 0.45j),), infinite=2, machine=1
+)
+"""The buses of PowerSimulationsDynamics.jl's OMIB.raw of PSS2A, PSS2B and PSS2C."""
+
 
 def delta(device, buses):
     return np.degrees(device["delta"])
@@ -37,19 +47,26 @@ def E_fd(device, buses):
     return device["E_fd"]
 
 
+def v_1(device, buses):
+    return abs(buses[1])
+
+
 def v_2(device, buses):
     return abs(buses[2])
 
 
-SIGNALS = {"delta [deg]": delta, "E_fd [pu]": E_fd, "v_2 [pu]": v_2}
+SIGNALS = {"delta [deg]": delta, "E_fd [pu]": E_fd, "v_1 [pu]": v_1, "v_2 [pu]": v_2}
 
 
 @dataclass(frozen=True)
 class Recorded:
-    """The records behind a recording; ``four``: at the network of four buses, else at that of three."""
+    """The records behind a recording; ``four``: at the network of four buses, else at that of three.
+
+    ``reference``: at that of two, where the reference of the voltage becomes this instead of a trip [pu]."""
 
     records: str
     four: bool = False
+    reference: float | None = None
 
 
 RECORDED = {
@@ -86,6 +103,12 @@ RECORDED = {
         four=True,
     ),
     "exst1": Recorded(HYDRO + "2 EXST1 1 0.01 5 -5 10 20 200 0.1 6 0 0 0 0.1 /", four=True),
+    "pss2a": Recorded(f"{OF_POWER}1 PSS2A 1 {DUAL} 0.1 -0.1 /", reference=REFERENCE),
+    "pss2b": Recorded(f"{OF_POWER}1 PSS2B 1 {DUAL} 0 0 {INPUTS} 0.1 -0.1 /", reference=REFERENCE),
+    "pss2c": Recorded(
+        f"{OF_POWER}1 PSS2C 1 {DUAL} 0 0 {INPUTS} 0.1 -0.1 0 0 0.895 0.885 0 0 /",
+        reference=REFERENCE,
+    ),
     "exac1": Recorded(
         HYDRO + "2 EXAC1 1 0.01 1 1 200 0.2 10 -10 0.1 0.001 0.1 1 1 1 1 0 1.2 0 /", four=True
     ),
@@ -95,11 +118,25 @@ RECORDED = {
 def beside(name, folder):
     """Ours and the recording at the same instants, and the instants [s]."""
     trace, recorded = TRACES[name], RECORDED[name]
+    if recorded.reference is not None:
+        return beside_a_step(trace, recorded, folder)
     network, after = four_buses() if recorded.four else three_buses()
     rating, source = (500.0, 0.4j) if recorded.four else (100.0, 0.25j)
     alone = OneMachine(recorded.records, folder, network, rating=rating, source=source)
     wanted, every = np.array(trace["values"]), trace["every"]
     rows = alone.run(after, every * (len(wanted) - 1), EVENT, every)
+    signal = SIGNALS[trace["signal"]]
+    ours = np.array([signal(device, buses) for _, device, buses in rows])
+    return np.array([t for t, _, _ in rows]), ours, wanted
+
+
+def beside_a_step(trace, recorded, folder):
+    """As `beside`, of a recording with a step of the reference."""
+    wanted, every = np.array(trace["values"]), trace["every"]
+    alone = OneMachine(recorded.records, folder, TWO_BUSES, source=0.3j)
+    step = recorded.reference - alone.device.parameters["exciter.V_ref"]
+    until = every * (len(wanted) - 1)
+    rows = alone.run(TWO_BUSES.lines, until, EVENT, every, {"exciter.delta_V_ref": step})
     signal = SIGNALS[trace["signal"]]
     ours = np.array([signal(device, buses) for _, device, buses in rows])
     return np.array([t for t, _, _ in rows]), ours, wanted

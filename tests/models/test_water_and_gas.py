@@ -305,25 +305,6 @@ test60."""
 def test_a_pid_governor_has_the_eigenvalues_of_another_program(record, tmp_path):
     network, _ = three_buses(given=0.7, drawn=2.0)
     alone = OneMachine(f"{BEHIND}102 {record} /", tmp_path, network, source=0.25j)
-    found = eigenvalues(alone, network)
+    found = alone.eigenvalues()
     for wanted in OTHERS[record]:
         assert min(abs(found - wanted)) < 2e-5
-
-
-def eigenvalues(alone, network):
-    """Eigenvalues of the machine at its network, by differences of what `OneMachine.run` integrates."""
-    device, seen = alone.device, network.seen(network.lines)
-    model, p, c = device.model, device.p, device.c
-    names = [v.name for v in model.outputs]
-    at = [names.index(name) for name in ("i_re", "i_im", "y_re", "y_im")]
-
-    def rate(x):
-        still = np.array(model.outputs_function(x, [0.0, 0.0], p, c)).ravel()[at]
-        v = (seen[0] + seen[1] * complex(*still[:2])) / (1 + seen[1] * complex(*still[2:]))
-        return np.array(model.derivatives(x, [v.real, v.imag], p, c)[0], dtype=float).ravel()
-
-    step = 1e-6
-    columns = [
-        (rate(device.x + e) - rate(device.x - e)) / (2 * step) for e in step * np.eye(len(device.x))
-    ]
-    return np.linalg.eigvals(np.column_stack(columns))

@@ -92,7 +92,7 @@ AC8B = (
     pu("K_PR", 100.0, "Proportional gain", 0),
     number("K_IR", 5.0, "Integral gain", 0, "1/s"),
     number("K_DR", 10.0, "Derivative gain", 0, "s"),
-    seconds("T_DR", 0.1, "Lag of the derivative", 1e-3),
+    seconds("T_DR", 0.1, "Lag of the derivative; 0 leaves the derivative out"),
     pu("V_PIDMAX", 999.0, "Upper limit of the controller"),
     pu("V_PIDMIN", -999.0, "Lower limit of the controller"),
     pu("K_A", 1.0, "Gain", 1e-3),

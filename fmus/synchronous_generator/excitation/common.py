@@ -146,7 +146,8 @@ def rate_feedback(
 class Controller:
     """K_PR + K_IR/s + s·K_DR/(1+sT_DR) of an error, the sum within limits; the integral stops at them.
 
-    Without limits it is K_PR + K_IR/s alone. ``error_at_start``: 0, or what it takes without an integral."""
+    T_DR = 0 leaves the derivative out; without limits it is K_PR + K_IR/s alone. ``error_at_start``: 0, or what
+    it takes without an integral."""
 
     def __init__(
         self,
@@ -172,8 +173,10 @@ class Controller:
         kept = limited_proportional_integral(
             m, "regulator", error, gains.K_PR, gains.K_IR, low=low, high=high, initial=initial
         )
-        change = washout(m, "derivative", error, gains.T_DR, self.error_at_start)
-        return clamp(kept + gains.K_DR / gains.T_DR * change, low, high)
+        has_derivative = gains.T_DR > 0
+        lag = if_else(has_derivative, gains.T_DR, BYPASS_TIME)
+        change = washout(m, "derivative", error, lag, self.error_at_start)
+        return clamp(kept + if_else(has_derivative, gains.K_DR / lag, 0) * change, low, high)
 
 
 require_within = partial(

@@ -69,7 +69,7 @@ PID = (
     pu("K_PR", 20.0, "Proportional gain", 0),
     number("K_IR", 20.0, "Integral gain", 0, "1/s"),
     number("K_DR", 0.0, "Derivative gain", 0, "s"),
-    seconds("T_DR", 0.1, "Lag of the derivative", 1e-3),
+    seconds("T_DR", 0.1, "Lag of the derivative; 0 leaves the derivative out"),
 )
 DC4B = (
     pu("V_RMAX", 10.8, "Upper limit of V_R at v_t = 1"),
