@@ -186,44 +186,70 @@ class Runs:
 
     def _drive(self, inputs: Numbers) -> Numbers:
         """Outputs after each of some steps, shape (n, p)."""
-        outputs = np.empty((len(inputs), len(self._bench.outputs)))
-        for first in range(0, len(inputs), _STRETCH):
-            part = slice(first, min(first + _STRETCH, len(inputs)))
-            self._stretch(np.ascontiguousarray(inputs[part]), outputs[part])
+        bench = self._bench
+        names = bench.inputs, bench.outputs
+        outputs = drive(self._running, names, inputs, bench.step_size, self._index)
+        self._index += len(inputs)
         return outputs
 
-    def _stretch(self, inputs: Numbers, outputs: Numbers) -> None:
-        component, bench = self._running, self._bench
-        into, out = (
-            RealBatch(component, bench.inputs, inputs[0]),
-            RealBatch(component, bench.outputs, outputs[0]),
+
+def drive(
+    component: Component,
+    names: tuple[Sequence[str], Sequence[str]],
+    inputs: Numbers,
+    step_size: float,
+    index: int = 0,
+) -> Numbers:
+    """Step a component with one row of inputs after another; its outputs at the end of each step, shape (n, p).
+
+    ``names``: of the inputs and of the outputs; ``inputs``: shape (n, m); ``index``: steps that were made before.
+
+    Raises an `AnalysisError` if an output is no finite number, and a `ComponentError` if the FMU refuses a call."""
+    outputs = np.empty((len(inputs), len(names[1])))
+    for first in range(0, len(inputs), _STRETCH):
+        part = slice(first, min(first + _STRETCH, len(inputs)))
+        rows = np.ascontiguousarray(inputs[part])
+        _drive_stretch(component, names, (rows, outputs[part]), step_size, index + first)
+    return outputs
+
+
+def _drive_stretch(
+    component: Component,
+    names: tuple[Sequence[str], Sequence[str]],
+    rows: tuple[Numbers, Numbers],
+    step_size: float,
+    index: int,
+) -> None:
+    inputs, outputs = rows
+    into, out = (
+        RealBatch(component, names[0], inputs[0]),
+        RealBatch(component, names[1], outputs[0]),
+    )
+    failed = (ctypes.c_int64 * 2)()
+    with calls:
+        status = _library().drive(
+            component.pointer,
+            *(
+                ctypes.cast(f, ctypes.c_void_p)
+                for f in (component.set_real, component.get_real, component.do_step)
+            ),
+            into.arguments[1],
+            len(names[0]),
+            out.arguments[1],
+            len(names[1]),
+            inputs.ctypes.data,
+            outputs.ctypes.data,
+            index,
+            len(inputs),
+            step_size,
+            failed,
         )
-        failed = (ctypes.c_int64 * 2)()
-        with calls:
-            status = _library().drive(
-                component.pointer,
-                *(
-                    ctypes.cast(f, ctypes.c_void_p)
-                    for f in (component.set_real, component.get_real, component.do_step)
-                ),
-                into.arguments[1],
-                len(bench.inputs),
-                out.arguments[1],
-                len(bench.outputs),
-                inputs.ctypes.data,
-                outputs.ctypes.data,
-                self._index,
-                len(inputs),
-                bench.step_size,
-                failed,
-            )
-        if status:
-            component.check(status, _CALLS[failed[1]], (self._index + failed[0]) * bench.step_size)
-        self._index += len(inputs)
-        if not np.isfinite(outputs).all():
-            raise AnalysisError(
-                f"{bench.description.path.name}: its current is no longer a finite number"
-            )
+    if status:
+        component.check(status, _CALLS[failed[1]], (index + failed[0]) * step_size)
+    if not np.isfinite(outputs).all():
+        raise AnalysisError(
+            f"{component.description.path.name}: its current is no longer a finite number"
+        )
 
 
 @cache
