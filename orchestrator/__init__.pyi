@@ -33,6 +33,7 @@ from orchestrator.api.scenario import RunEndedWarning as RunEndedWarning
 from orchestrator.api.scenario import Scenario as Scenario
 from orchestrator.api.scenario import UnusualDataWarning as UnusualDataWarning
 from orchestrator.api.source import source as source
+from orchestrator.api.validation import validate as validate
 from orchestrator.cases.short_circuit import BusStrength as BusStrength
 from orchestrator.certification.compared import Verification as Verification
 from orchestrator.coordinated_design.view import CoordinatedDesign as CoordinatedDesign
@@ -48,3 +49,4 @@ from orchestrator.study.signal_modes import RunComparison as RunComparison
 from orchestrator.study.signal_modes import SignalModes as SignalModes
 from orchestrator.study.step_choice import StepChoice as StepChoice
 from orchestrator.sweep.view import ParameterSweep as ParameterSweep
+from orchestrator.validation.view import Validation as Validation

@@ -42,16 +42,19 @@ FLOORS = (
         "orchestrator.immittance",
         "orchestrator.sweep",
     ),
-    ("orchestrator.certification", "orchestrator.coordinated_design", "orchestrator.siting"),
+    (
+        "orchestrator.certification",
+        "orchestrator.coordinated_design",
+        "orchestrator.siting",
+        "orchestrator.validation",
+    ),
     ("orchestrator.api",),
     ("orchestrator.explore",),
     ("orchestrator.cli",),
 )
 """Lowest first; those on one floor do not know each other."""
 
-ADDED = FLOORS.index(
-    ("orchestrator.certification", "orchestrator.coordinated_design", "orchestrator.siting")
-)
+ADDED = next(k for k, rooms in enumerate(FLOORS) if "orchestrator.certification" in rooms)
 """The floor of a study that is added in a room of its own, with a module ``command``."""
 
 PLAIN_DATA = {"fmus.grid.names", "fmus.toolchain.port_variables", "fmus.toolchain.variables"}

@@ -1,0 +1,53 @@
+"""Doubts about a recording, or between it and the model, as kinds with figures; `words` says it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+
+class QuestionKind(StrEnum):
+    """Programs decide by the kind; the sentence is for people."""
+
+    VOLTAGE_LEVEL = "voltage level"
+    RATING = "rating"
+    RATED_FREQUENCY = "rated frequency"
+    ANGLE_UNIT = "angle unit"
+    ANGLE_HELD = "angle held"
+    ANGLE_AND_FREQUENCY = "angle and frequency differ"
+    FREQUENCY_ALONE = "frequency alone"
+    NO_STEADY_STATE = "no steady state before"
+    NO_EVENT = "no event"
+    SLOW_SAMPLES = "slow samples"
+    MISSING = "missing samples"
+    START = "starts elsewhere"
+    READ_OTHERWISE = "read otherwise"
+    CLOCKS = "clocks"
+    SETPOINT = "setpoint"
+    TOO_GOOD = "too good"
+    NO_NOISE = "no noise"
+    NOISE = "noise"
+    SHORT_BEFORE = "short before"
+
+
+FIGURES_HOLD = {
+    QuestionKind.FREQUENCY_ALONE,
+    QuestionKind.MISSING,
+    QuestionKind.SLOW_SAMPLES,
+    QuestionKind.NOISE,
+    QuestionKind.NO_NOISE,
+    QuestionKind.SHORT_BEFORE,
+}
+"""Kinds that are borne in mind, and leave a verdict standing; every other one keeps it open."""
+
+
+@dataclass(frozen=True)
+class Question:
+    kind: QuestionKind
+    # what the sentence needs, as JSON's types
+    figures: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def keeps_open(self) -> bool:
+        """Return whether a verdict has to wait for its answer."""
+        return self.kind not in FIGURES_HOLD
