@@ -115,13 +115,13 @@ def _link(found: re.Match[str], name: str, site: str) -> str:
 
 def commands() -> str:
     """The reference of all commands, from their argument parsers."""
-    from orchestrator.cli import COMMANDS  # noqa: PLC0415 - only the page of commands needs the package
+    from orchestrator.face.cli import COMMANDS  # noqa: PLC0415 - only the page of commands needs the package
 
     return "\n\n".join(_command(name, words) for name, words in COMMANDS.items())
 
 
 def _command(name: str, words: str) -> str:
-    from orchestrator.cli import module_of  # noqa: PLC0415 - as above
+    from orchestrator.face.cli import module_of  # noqa: PLC0415 - as above
 
     parser = argparse.ArgumentParser(prog=f"gfor {name}", formatter_class=_formatter)
     module_of(name).add_arguments(parser)
@@ -155,11 +155,11 @@ def _as_typed(found: re.Match[str]) -> str:
 
 def studies() -> str:
     """What is made from the requests of studies; mkdocstrings reads files, and sees none."""
-    from orchestrator.added import rooms, study_in  # noqa: PLC0415 - only the page of Python needs the package
-    from orchestrator.api.case import Case  # noqa: PLC0415 - as above
-    from orchestrator.api.certification import certify  # noqa: PLC0415 - as above
-    from orchestrator.api.scenario import Scenario  # noqa: PLC0415 - as above
-    from orchestrator.api.studies import of_study  # noqa: PLC0415 - as above
+    from orchestrator.face.api.case import Case  # noqa: PLC0415 - as above
+    from orchestrator.face.api.certification import certify  # noqa: PLC0415 - as above
+    from orchestrator.face.api.scenario import Scenario  # noqa: PLC0415 - as above
+    from orchestrator.face.api.studies import of_study  # noqa: PLC0415 - as above
+    from orchestrator.studies.added import rooms, study_in  # noqa: PLC0415 - only the page of Python needs the package
 
     of_case = [
         (

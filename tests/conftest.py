@@ -18,8 +18,8 @@ from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.exporter import cached
 from fmus.toolchain.native_fmu import NativeFmu
 from fmus.toolchain.python_fmu import PythonFmu
-from orchestrator.cli import main
-from orchestrator.spelling import as_options
+from orchestrator.core.spelling import as_options
+from orchestrator.face.cli import main
 from tests.support.durations import MEASURED, Measure, longest_first, mark
 from tests.support.skips import Skips, in_ci
 

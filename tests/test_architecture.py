@@ -9,52 +9,66 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.points.code import code_files, needed_modules
+from orchestrator.studies.points.code import code_files, needed_modules
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("fmus", "gfor_fmu", "orchestrator")
 
 FLOORS = (
-    ("orchestrator.added", "orchestrator.spelling"),
-    ("orchestrator.arrays", "orchestrator.closing", "orchestrator.cores"),
-    ("orchestrator.errors", "orchestrator.late", "orchestrator.uncollected", "orchestrator.units"),
-    ("orchestrator.foreign_files",),
+    ("orchestrator.studies.added", "orchestrator.core.spelling"),
+    ("orchestrator.core.arrays", "orchestrator.core.closing", "orchestrator.core.cores"),
     (
-        "orchestrator.asked",
-        "orchestrator.safe_files",
-        "orchestrator.toml_files",
-        "orchestrator.truth",
+        "orchestrator.core.errors",
+        "orchestrator.core.late",
+        "orchestrator.core.uncollected",
+        "orchestrator.core.units",
     ),
-    ("orchestrator.fmi", "orchestrator.signatures"),
-    ("orchestrator.coupling", "orchestrator.binding"),
-    ("orchestrator.ssp", "orchestrator.acceptance"),
-    ("orchestrator.analysis", "orchestrator.cases"),
-    ("orchestrator.federation",),
-    ("orchestrator.results", "orchestrator.points", "orchestrator.interop", "orchestrator.watch"),
-    ("orchestrator.report",),
-    ("orchestrator.study",),
-    ("orchestrator.operating_points",),
-    ("orchestrator.black_box", "orchestrator.oscillations", "orchestrator.pod_design"),
+    ("orchestrator.core.foreign_files",),
     (
-        "orchestrator.screening",
-        "orchestrator.sensitivities",
-        "orchestrator.interactions",
-        "orchestrator.immittance",
-        "orchestrator.sweep",
+        "orchestrator.core.asked",
+        "orchestrator.core.safe_files",
+        "orchestrator.core.toml_files",
+        "orchestrator.core.truth",
+    ),
+    ("orchestrator.devices.fmi", "orchestrator.output.signatures"),
+    ("orchestrator.systems.coupling", "orchestrator.devices.binding"),
+    ("orchestrator.systems.ssp", "orchestrator.devices.acceptance"),
+    ("orchestrator.linear", "orchestrator.cases"),
+    ("orchestrator.simulation.federation",),
+    (
+        "orchestrator.output.results",
+        "orchestrator.studies.points",
+        "orchestrator.simulation.interop",
+        "orchestrator.simulation.watch",
+    ),
+    ("orchestrator.output.report",),
+    ("orchestrator.studies",),
+    ("orchestrator.studies.operating_points",),
+    (
+        "orchestrator.studies.black_box",
+        "orchestrator.studies.oscillations",
+        "orchestrator.studies.pod_design",
     ),
     (
-        "orchestrator.certification",
-        "orchestrator.coordinated_design",
-        "orchestrator.siting",
-        "orchestrator.validation",
+        "orchestrator.studies.screening",
+        "orchestrator.studies.sensitivities",
+        "orchestrator.studies.interactions",
+        "orchestrator.studies.immittance",
+        "orchestrator.studies.sweep",
     ),
-    ("orchestrator.api",),
-    ("orchestrator.explore",),
-    ("orchestrator.cli",),
+    (
+        "orchestrator.studies.certification",
+        "orchestrator.studies.coordinated_design",
+        "orchestrator.studies.siting",
+        "orchestrator.studies.validation",
+    ),
+    ("orchestrator.face.api",),
+    ("orchestrator.face.explore",),
+    ("orchestrator.face.cli",),
 )
 """Lowest first; those on one floor do not know each other."""
 
-ADDED = next(k for k, rooms in enumerate(FLOORS) if "orchestrator.certification" in rooms)
+ADDED = next(k for k, rooms in enumerate(FLOORS) if "orchestrator.studies.certification" in rooms)
 """The floor of a study that is added in a room of its own, with a module ``command``."""
 
 PLAIN_DATA = {"fmus.grid.names", "fmus.toolchain.port_variables", "fmus.toolchain.variables"}
@@ -130,7 +144,9 @@ def test_the_imports_are_read():
     """The tools of this file see what is known to be there."""
     graph = imports()
     assert "fmus.toolchain.model" in graph["gfor_fmu.converter"]
-    assert "orchestrator.coupling.observers" in graph["orchestrator.coupling.master"]
+    assert (
+        "orchestrator.systems.coupling.observers" in graph["orchestrator.systems.coupling.master"]
+    )
     assert "pandapower" in imported_names(modules()["orchestrator.cases.network_sources"])
 
 
@@ -176,14 +192,14 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
     Everybody may know the names, units and limits that models and bindings share: `PLAIN_DATA` holds no equations.
     """
     borrowers = {
-        "orchestrator.black_box.bench",
-        "orchestrator.coupling.compiled_loop",
-        "orchestrator.coupling.wire_bank",
-        "orchestrator.fmi.bound",
-        "orchestrator.fmi.fmi3",
-        "orchestrator.fmi.mailbox",
+        "orchestrator.studies.black_box.bench",
+        "orchestrator.systems.coupling.compiled_loop",
+        "orchestrator.systems.coupling.wire_bank",
+        "orchestrator.devices.fmi.bound",
+        "orchestrator.devices.fmi.fmi3",
+        "orchestrator.devices.fmi.mailbox",
     }
-    importers = {"orchestrator.api", "orchestrator.cases", "orchestrator.cli"}
+    importers = {"orchestrator.face.api", "orchestrator.cases", "orchestrator.face.cli"}
 
     def allowed(a, b):
         if not within(a, "orchestrator") or within(b, "orchestrator"):
@@ -194,14 +210,14 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
             return True  # the first says which library is missing
         if a in borrowers:
             return b == "fmus.toolchain.compiler"
-        if a in ("orchestrator.fmi.vendor_files", "orchestrator.fmi.dll_reading"):
+        if a in ("orchestrator.devices.fmi.vendor_files", "orchestrator.devices.fmi.dll_reading"):
             return (
                 within(b, "fmus.vendor_dll", "fmus.toolchain.cache", "fmus.toolchain.archive")
                 or b == "fmus"
             )
-        if a == "orchestrator.fmi.wine_program":
+        if a == "orchestrator.devices.fmi.wine_program":
             return b in ("fmus.toolchain.compiler", "fmus.vendor_dll.memory")
-        if a in ("orchestrator.fmi.instance", "orchestrator.ssp.archive"):
+        if a in ("orchestrator.devices.fmi.instance", "orchestrator.systems.ssp.archive"):
             # what was built or unpacked here, and is intact, is trusted
             return b == "fmus.toolchain.cache"
         return within(a, *importers) and not within(b, "gfor_fmu")
@@ -323,14 +339,14 @@ def test_there_is_no_cycle():
         (
             "fmpy",
             {
-                f"orchestrator.fmi.{name}"
+                f"orchestrator.devices.fmi.{name}"
                 for name in ("binary", "description", "loaded", "messages", "validation")
             },
         ),
         ("pandapower", {"orchestrator.cases.network_sources"}),
-        ("skrf", {"orchestrator.black_box.fitting"}),
-        ("pint", {"orchestrator.units"}),
-        ("helics", {"orchestrator.federation.helics_calls"}),
+        ("skrf", {"orchestrator.studies.black_box.fitting"}),
+        ("pint", {"orchestrator.core.units"}),
+        ("helics", {"orchestrator.simulation.federation.helics_calls"}),
     ],
 )
 def test_a_library_is_used_in_one_place(library, users):
@@ -377,7 +393,7 @@ COMPUTING = {
 def test_a_command_is_written_on_the_face(command):
     names = {
         name.removeprefix("orchestrator.")
-        for name in imported_names(modules()[f"orchestrator.cli.{command}"])
+        for name in imported_names(modules()[f"orchestrator.face.cli.{command}"])
     }
     assert names >= ON_THE_FACE[command]
     assert not names & COMPUTING
@@ -386,7 +402,7 @@ def test_a_command_is_written_on_the_face(command):
 def test_only_the_command_line_reads_options():
     using = {name for name, tree in modules().items() if "argparse" in imported_names(tree)}
     assert using
-    assert all(within(name, "orchestrator.cli") for name in using)
+    assert all(within(name, "orchestrator.face.cli") for name in using)
 
 
 def test_equations_are_written_in_models_only():
@@ -483,5 +499,7 @@ def test_a_class_name_has_one_meaning():
                 homes.setdefault(node.name, []).append(name)
     twice = {name: modules for name, modules in homes.items() if len(modules) > 1}
     assert {
-        name: m for name, m in twice.items() if not any(within(x, "orchestrator.api") for x in m)
+        name: m
+        for name, m in twice.items()
+        if not any(within(x, "orchestrator.face.api") for x in m)
     } == {}

@@ -8,22 +8,22 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import foreign_files
 from orchestrator.cases.case import load_case
 from orchestrator.cases.csv_rows import rows_of
 from orchestrator.cases.psse.dyr_records import read_dyr
 from orchestrator.cases.psse.records import read_records
 from orchestrator.cases.source_changes import Changes
-from orchestrator.errors import CaseError, InputError
-from orchestrator.fmi.vendor_files import as_fmu
-from orchestrator.foreign_files import check_regular, one_line, read_bytes, read_text, visible
-from orchestrator.immittance.scan_files import read_scan
-from orchestrator.interop.probe_result import read_probe_result
-from orchestrator.results.comtrade.reading import read_comtrade
-from orchestrator.results.csv_recording import read_table
-from orchestrator.safe_files import file_hash
-from orchestrator.ssp.archive import SspArchive
-from orchestrator.toml_files import read_toml
+from orchestrator.core import foreign_files
+from orchestrator.core.errors import CaseError, InputError
+from orchestrator.core.foreign_files import check_regular, one_line, read_bytes, read_text, visible
+from orchestrator.core.safe_files import file_hash
+from orchestrator.core.toml_files import read_toml
+from orchestrator.devices.fmi.vendor_files import as_fmu
+from orchestrator.output.results.comtrade.reading import read_comtrade
+from orchestrator.output.results.csv_recording import read_table
+from orchestrator.simulation.interop.probe_result import read_probe_result
+from orchestrator.studies.immittance.scan_files import read_scan
+from orchestrator.systems.ssp.archive import SspArchive
 
 ROOT = Path(__file__).parents[1]
 unix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no named pipes among files")
@@ -186,7 +186,7 @@ def test_whoever_reads_a_named_file_asks_here():
         if lines := list(reads_by_itself(ast.parse(path.read_text(encoding="utf-8")))):
             found[name.removesuffix(".__init__")] = lines
     new = {name: lines for name, lines in found.items() if name not in OWN}
-    assert not new, "use orchestrator.foreign_files, or say in OWN why it need not"
+    assert not new, "use orchestrator.core.foreign_files, or say in OWN why it need not"
     assert not set(OWN) - set(found), "these read nothing any more"
 
 
@@ -285,7 +285,7 @@ RUNS_CODE = {
 }
 """Functions of the libraries that read files here, which run code or build any object out of a file."""
 
-FROM_OUR_OWN_PROCESS = {"orchestrator/federation/federate.py"}
+FROM_OUR_OWN_PROCESS = {"orchestrator/simulation/federation/federate.py"}
 """Modules that unpickle what another process of the same run wrote."""
 
 

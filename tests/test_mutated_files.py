@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from orchestrator.errors import CosimError
+from orchestrator.core.errors import CosimError
 from tests.benchmarks.reader_fuzz import Defect, fuzzed, kinds
 
 KINDS = (

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from fmus.toolchain.catalogue import model_names
-from orchestrator.acceptance.checks.all import CHECKS
-from orchestrator.acceptance.runner import FILE_CHECKS
 from orchestrator.cases.case import BUILT_IN
-from orchestrator.cli import COMMANDS, OLD
-from orchestrator.interop.rules import MASTERS
+from orchestrator.devices.acceptance.checks.all import CHECKS
+from orchestrator.devices.acceptance.runner import FILE_CHECKS
+from orchestrator.face.cli import COMMANDS, OLD
+from orchestrator.simulation.interop.rules import MASTERS
 
 ROOT = Path(__file__).parents[1]
 VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
@@ -32,7 +32,7 @@ def test_changelog_and_citation_have_the_version_of_the_distribution():
 
 def test_gfor_tells_its_version_without_a_heavy_library():
     script = (
-        "import sys\nfrom orchestrator.cli import main\n"
+        "import sys\nfrom orchestrator.face.cli import main\n"
         "try:\n main(['--version'])\nexcept SystemExit as end:\n assert not end.code\n"
         "heavy = {'numpy', 'scipy', 'xarray', 'rich', 'fmpy', 'pint'} & set(sys.modules)\n"
         "assert not heavy, heavy"
@@ -87,7 +87,7 @@ def test_nothing_lies_at_the_top_that_has_no_place_there():
 def test_commands_that_read_results_start_without_what_computes_them(command):
     """Each of these takes half a second or more, and reading and judging kept results needs none."""
     code = (
-        f"import sys, orchestrator.cli.{command}\n"
+        f"import sys, orchestrator.face.cli.{command}\n"
         "heavy = {'scipy.optimize', 'scipy.signal', 'scipy.stats', 'matplotlib'} & set(sys.modules)\n"
         "assert not heavy, heavy\n"
     )

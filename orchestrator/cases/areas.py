@@ -3,7 +3,7 @@
 import fnmatch
 from collections.abc import Mapping, Sequence
 
-from orchestrator.coupling.system import System
+from orchestrator.systems.coupling.system import System
 
 
 def areas_of(areas: Mapping[str, Sequence[str]], system: System) -> dict[str, str]:

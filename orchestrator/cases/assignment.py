@@ -14,7 +14,7 @@ from orchestrator.cases.imperfection_tables import sets_imperfection
 from orchestrator.cases.names import SERVICE, STATES, close_names, hint_at, whose
 from orchestrator.cases.schema import ConventionsTable, Value
 from orchestrator.cases.values import TWICE, check_system_base, convert, flatten, given_twice
-from orchestrator.fmi.description import VariableInfo
+from orchestrator.devices.fmi.description import VariableInfo
 
 EMF, TORQUE = "machine.speed_in_emf", "governor.output_is_torque"
 

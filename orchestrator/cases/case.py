@@ -24,24 +24,24 @@ from orchestrator.cases.names import close_names
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.schema import CaseTable, ComponentTable, Value
 from orchestrator.cases.values import TWICE, flatten, given_twice
-from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputError, Problem, few
-from orchestrator.foreign_files import check_name, cleaned, steering_in, why_refused
-from orchestrator.late import Late
-from orchestrator.toml_files import Table, fault_of, read_toml
-from orchestrator.uncollected import uncollected
+from orchestrator.core.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputError, Problem, few
+from orchestrator.core.foreign_files import check_name, cleaned, steering_in, why_refused
+from orchestrator.core.late import Late
+from orchestrator.core.toml_files import Table, fault_of, read_toml
+from orchestrator.core.uncollected import uncollected
 
 if TYPE_CHECKING:
     from orchestrator.cases import event_tables, idle_values, mentions, prepare, sharing
     from orchestrator.cases.prepare import PreparedScenario, Preparer
     from orchestrator.cases.sharing import Dispatch
-    from orchestrator.coupling.system import ComponentPlan
-    from orchestrator.ssp import reading
+    from orchestrator.systems.coupling.system import ComponentPlan
+    from orchestrator.systems.ssp import reading
 else:  # what prepares a scenario: FMUs and the power flow, which reading a file does without
     event_tables, idle_values, mentions, prepare, sharing = (
         Late(f"orchestrator.cases.{name}")
         for name in ("event_tables", "idle_values", "mentions", "prepare", "sharing")
     )
-    reading = Late("orchestrator.ssp.reading")
+    reading = Late("orchestrator.systems.ssp.reading")
 
 BUILT_IN = Path(__file__).parent
 _SCHEMA_PASSES = 50

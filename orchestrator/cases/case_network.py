@@ -14,7 +14,7 @@ from orchestrator.cases.schema import (
     ShuntReconnectionTable,
     ShuntTripTable,
 )
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 Tables = Mapping[str, ComponentTable]
 

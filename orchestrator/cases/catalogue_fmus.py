@@ -9,7 +9,7 @@ from typing import Any
 from fmus.grid.network import Network
 from fmus.toolchain.catalogue import build_model, entry_of
 from fmus.toolchain.notes import known, noted
-from orchestrator.fmi.description import (
+from orchestrator.devices.fmi.description import (
     FmuDescription,
     parse_description,
     platforms_of,

@@ -7,8 +7,8 @@ from orchestrator.cases.build_choices import STAND_IN
 from orchestrator.cases.names import close_names
 from orchestrator.cases.schema import CaseTable, ComponentTable
 from orchestrator.cases.values import TWICE, flatten, given_twice
-from orchestrator.errors import Problem
-from orchestrator.units import to_unit
+from orchestrator.core.errors import Problem
+from orchestrator.core.units import to_unit
 
 Locate = Callable[..., str]
 

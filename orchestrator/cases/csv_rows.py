@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
 
-from orchestrator.errors import InputError
-from orchestrator.foreign_files import check_regular, read_text, visible
-from orchestrator.units import LARGEST
+from orchestrator.core.errors import InputError
+from orchestrator.core.foreign_files import check_regular, read_text, visible
+from orchestrator.core.units import LARGEST
 
 
 def seen_from_here(path: Path) -> Path:

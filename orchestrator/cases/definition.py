@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from orchestrator.cases.locate import place_in
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.schema import CaseTable, ComponentTable, ScenarioTable
-from orchestrator.errors import Problem
+from orchestrator.core.errors import Problem
 
 if TYPE_CHECKING:
     from orchestrator.cases.sharing import SharingRule

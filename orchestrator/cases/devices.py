@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from orchestrator.cases.schema import Value
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 _NAME = re.compile(r"[\w+-][\w.+-]*")  # what a device may be called: its name is that of a folder
 

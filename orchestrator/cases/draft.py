@@ -11,8 +11,8 @@ from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.record_use import RecordUse
 from orchestrator.cases.schema import CaseTable, ComponentTable, EventTable, ScenarioTable
 from orchestrator.cases.sharing import Dispatch
-from orchestrator.coupling.system import System
-from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, ErrorKind, Problem
+from orchestrator.core.errors import MOST_PROBLEMS, TOO_MANY, CaseError, ErrorKind, Problem
+from orchestrator.systems.coupling.system import System
 
 Locate = Callable[..., str]
 COMMAND_LINE = "--set"

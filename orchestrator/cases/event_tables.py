@@ -12,11 +12,11 @@ from orchestrator.cases.draft import Draft, Findings
 from orchestrator.cases.fault_tables import component_events, note_conflicts, wire_events
 from orchestrator.cases.islands import question_islands
 from orchestrator.cases.names import close_names, hint_at
-from orchestrator.coupling import events as coupled
-from orchestrator.coupling.clock import Clock
-from orchestrator.coupling.events import Event
-from orchestrator.coupling.system import ComponentPlan, Endpoint
-from orchestrator.errors import InputError, Problem
+from orchestrator.core.errors import InputError, Problem
+from orchestrator.systems.coupling import events as coupled
+from orchestrator.systems.coupling.clock import Clock
+from orchestrator.systems.coupling.events import Event
+from orchestrator.systems.coupling.system import ComponentPlan, Endpoint
 
 _POWERS = ("P_ref", "Pref")
 # product of the frequency of a forcing and the communication step up to which it is followed

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from orchestrator.cases.load_models import in_words
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.errors import counted
+from orchestrator.core.errors import counted
 
 # keys of ``[network]`` that name another program's data
 SOURCES = ("raw", "matpower", "pandapower", "cgmes")

@@ -10,13 +10,13 @@ from orchestrator.cases.imperfection_tables import (
     imperfection_of,
     note_long_delay,
 )
-from orchestrator.coupling import events as coupled
-from orchestrator.coupling.clock import Clock
-from orchestrator.coupling.events import Event
-from orchestrator.coupling.imperfections import DropOut
-from orchestrator.coupling.system import System
-from orchestrator.errors import InputError
-from orchestrator.fmi.instance import is_isolated
+from orchestrator.core.errors import InputError
+from orchestrator.devices.fmi.instance import is_isolated
+from orchestrator.systems.coupling import events as coupled
+from orchestrator.systems.coupling.clock import Clock
+from orchestrator.systems.coupling.events import Event
+from orchestrator.systems.coupling.imperfections import DropOut
+from orchestrator.systems.coupling.system import System
 
 _BREAKER = "connected"
 

@@ -8,7 +8,7 @@ import numpy as np
 from fmus.grid.element_data import LAWS, ThreeWinding, Zip
 from fmus.grid.network import OPEN_CHARGING
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ import numpy as np
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow_equations import FlowEquations
 from orchestrator.cases.flow_newton import NewtonResult, solve
-from orchestrator.errors import PowerFlowError
+from orchestrator.core.errors import PowerFlowError
 
 Limits = Mapping[str, tuple[float, float]]
 """Least and most reactive power of the units at a bus together [pu, 100 MVA], by bus."""

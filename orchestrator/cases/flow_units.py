@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.plausible_values import UnusualValue, place_of, unit_of
 from orchestrator.cases.power_flow import FlowUnit
-from orchestrator.coupling.system import ComponentPlan
+from orchestrator.systems.coupling.system import ComponentPlan
 
 _HELD = "holds its bus there, whatever reactive power that takes; give v_0, or give Q_0 and the voltage follows"
 

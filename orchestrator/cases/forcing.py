@@ -7,8 +7,8 @@ from dataclasses import replace
 from orchestrator.cases.case import Case
 from orchestrator.cases.network_data import bus_name
 from orchestrator.cases.schema import BusFaultTable, CaseTable, ForcingTable
-from orchestrator.errors import InputError
-from orchestrator.units import to_unit
+from orchestrator.core.errors import InputError
+from orchestrator.core.units import to_unit
 
 _BEGIN = 1.0  # time at which an event in words begins unless it says another [s]
 _FORMS = {

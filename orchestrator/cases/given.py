@@ -13,14 +13,14 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.asked import Value, number_between, number_in, path, plain_value
 from orchestrator.cases.locate import FROM_TABLES
-from orchestrator.errors import InputError
-from orchestrator.late import pd
+from orchestrator.core.asked import Value, number_between, number_in, path, plain_value
+from orchestrator.core.errors import InputError
+from orchestrator.core.late import pd
 
 if TYPE_CHECKING:
-    from orchestrator.arrays import Numbers
     from orchestrator.cases.parameter_files import ParameterFile
+    from orchestrator.core.arrays import Numbers
 
 Time = float | str  # A time: a number of seconds, or text with a unit such as ``"200 us"``
 Paths = str | Path | Iterable[str | Path]  # one path, or several
@@ -134,7 +134,7 @@ def kept(given: Any, name: str, argument: str) -> Path:
 def keep(text: str, name: str) -> Path:
     """A text as a file in the cache, where workers find it."""
     from fmus.toolchain.cache import cache_directory  # noqa: PLC0415 - a record needs no cache
-    from orchestrator.safe_files import write_text  # noqa: PLC0415 - as above
+    from orchestrator.core.safe_files import write_text  # noqa: PLC0415 - as above
 
     place = cache_directory("given") / hashlib.sha256(text.encode()).hexdigest()[:16] / name
     if not place.is_file():

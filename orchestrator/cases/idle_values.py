@@ -5,9 +5,9 @@ from collections.abc import Collection, Mapping, Sequence
 from itertools import groupby
 from types import MappingProxyType
 
-from orchestrator.coupling.events import Event
-from orchestrator.coupling.system import System
-from orchestrator.errors import Problem, few
+from orchestrator.core.errors import Problem, few
+from orchestrator.systems.coupling.events import Event
+from orchestrator.systems.coupling.system import System
 
 _SHOWN = 3
 

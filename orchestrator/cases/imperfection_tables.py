@@ -11,8 +11,11 @@ from orchestrator.cases import schema
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.names import close_names
 from orchestrator.cases.values import convert
-from orchestrator.coupling.clock import Clock
-from orchestrator.coupling.imperfections import (
+from orchestrator.core.errors import InputError, Problem
+from orchestrator.core.toml_files import fault_of
+from orchestrator.devices.fmi.description import VariableInfo
+from orchestrator.systems.coupling.clock import Clock
+from orchestrator.systems.coupling.imperfections import (
     Bias,
     Delay,
     DropOut,
@@ -20,11 +23,8 @@ from orchestrator.coupling.imperfections import (
     Noise,
     Quantisation,
 )
-from orchestrator.coupling.system import Connection, System
-from orchestrator.coupling.wire_bank import whole_steps
-from orchestrator.errors import InputError, Problem
-from orchestrator.fmi.description import VariableInfo
-from orchestrator.toml_files import fault_of
+from orchestrator.systems.coupling.system import Connection, System
+from orchestrator.systems.coupling.wire_bank import whole_steps
 
 KEY = "imperfections"
 """Values of the command line and of a scenario reach an imperfection as ``imperfections.NAME.KEY``."""

@@ -9,8 +9,8 @@ from scipy.sparse.csgraph import connected_components
 
 from fmus.grid.network import Network
 from orchestrator.cases.draft import Draft
-from orchestrator.coupling.events import Event
-from orchestrator.errors import Problem, few
+from orchestrator.core.errors import Problem, few
+from orchestrator.systems.coupling.events import Event
 
 _SHOWN = 5  # buses that a question names; the others are counted
 

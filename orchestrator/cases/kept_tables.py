@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fmus.toolchain.cache import CacheError, cache_directory, intact, keep
 from fmus.toolchain.extras import installed_version
-from orchestrator.arrays import Matrix
+from orchestrator.core.arrays import Matrix
 
 
 @dataclass(frozen=True)

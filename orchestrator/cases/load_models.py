@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from fmus.grid.element_data import LAWS, Load, Zip
 from orchestrator.cases.schema import LoadLaw, LoadModelTable, NetworkTable
-from orchestrator.errors import InputError, Problem
+from orchestrator.core.errors import InputError, Problem
 
 _NAMES = {zip_: name for name, zip_ in LAWS.items()}
 # of a part by the whole: above, the parts cancel, and the whole is none to take shares of

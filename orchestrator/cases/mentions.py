@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from orchestrator.cases.draft import Draft, Locate
 from orchestrator.cases.names import close_names, variables_of
 from orchestrator.cases.schema import CaseTable
-from orchestrator.errors import InputError, Problem
+from orchestrator.core.errors import InputError, Problem
 
 
 @dataclass

@@ -7,7 +7,7 @@ from orchestrator.cases.build_choices import MODELS
 from orchestrator.cases.names import TWINS
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.schema import CaseTable, PlotTable, Value
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 KINDS = ("emt", "phasor")
 

@@ -8,10 +8,10 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 if TYPE_CHECKING:
-    from orchestrator.fmi.description import FmuDescription
+    from orchestrator.devices.fmi.description import FmuDescription
 
 # bytes of a name that becomes a file's, in UTF-8: file systems take 255, and something is added to
 # it

@@ -10,7 +10,6 @@ from scipy.sparse.linalg import spsolve
 
 from fmus.grid.network import Line, Load, Shunt, ThreeWinding
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.arrays import Matrix
 from orchestrator.cases.branch_limits import FileLimits
 from orchestrator.cases.cgmes.network import read_cgmes
 from orchestrator.cases.csv_rows import (
@@ -33,7 +32,8 @@ from orchestrator.cases.psse.solution import stated_voltages
 from orchestrator.cases.psse.synchronous_parts import synchronous_part
 from orchestrator.cases.record_use import RecordUse
 from orchestrator.cases.schema import NetworkTable
-from orchestrator.errors import InputError, Problem, few
+from orchestrator.core.arrays import Matrix
+from orchestrator.core.errors import InputError, Problem, few
 
 _REFERENCE = 3  # code of a reference in the table of buses
 _FREQUENCY = 60.0  # of a RAW file that does not say it, as PSS/E's own default [Hz]

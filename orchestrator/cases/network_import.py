@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 
 from fmus.grid.network import SMALLEST_REACTANCE, Line, Load, Shunt, ThreeWinding
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.arrays import Matrix
 from orchestrator.cases.branch_limits import FileLimits, Rating
 from orchestrator.cases.network_sources import SourceTables
+from orchestrator.core.arrays import Matrix
 
 _REFERENCE, _OUT = 3, 4
 _POWER_FACTOR = 0.9

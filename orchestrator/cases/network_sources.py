@@ -19,8 +19,8 @@ from orchestrator.cases.kept_tables import SourceTables, kept_tables, tables_bes
 from orchestrator.cases.matpower.program import case_tables
 from orchestrator.cases.names import close_names
 from orchestrator.cases.pandapower_json import network_text
-from orchestrator.errors import InputError
-from orchestrator.foreign_files import read_bytes
+from orchestrator.core.errors import InputError
+from orchestrator.core.foreign_files import read_bytes
 
 __all__ = ["SourceTables", "read_matpower", "read_pandapower"]
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from types import MappingProxyType
 
 from fmus.toolchain.port_variables import I_IM, I_RE, SYSTEM_BASE_MVA, V_IM, V_RE
-from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.case import Case, case_of_text
 from orchestrator.cases.csv_rows import number, rows_of
 from orchestrator.cases.names import close_names
@@ -20,9 +19,10 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.psse.raw_file import read_file
 from orchestrator.cases.record_use import RecordUse, details, in_one_line
 from orchestrator.cases.short_circuit import source_impedance
-from orchestrator.errors import InputError, Problem, few
-from orchestrator.fmi.description import FmuDescription
-from orchestrator.units import to_unit
+from orchestrator.core.errors import InputError, Problem, few
+from orchestrator.core.units import to_unit
+from orchestrator.devices.binding.binding import bound_fmu
+from orchestrator.devices.fmi.description import FmuDescription
 
 _TABLES = {
     "lines_file": ("from", "to"),

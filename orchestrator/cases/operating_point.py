@@ -10,7 +10,7 @@ from orchestrator.cases.plausibility import question
 from orchestrator.cases.power_flow import PowerFlow
 from orchestrator.cases.schema import UnitReconnectionTable
 from orchestrator.cases.start_values import FollowingLoad, is_connected, start_from_power_flow
-from orchestrator.errors import ErrorKind, InputError, Problem, few
+from orchestrator.core.errors import ErrorKind, InputError, Problem, few
 
 _USUAL_VOLTAGES = (0.8, 1.2)  # magnitudes [pu] of bus voltages that are not questioned
 _CLOSE = 1e-3  # power [pu of the rating] by which a limit is not passed

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 _NUMPY: tuple[str, ...] = (
     "array",

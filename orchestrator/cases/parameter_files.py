@@ -7,8 +7,8 @@ from pathlib import Path
 from orchestrator.cases.locate import line_of
 from orchestrator.cases.schema import Value
 from orchestrator.cases.values import TWICE, flatten, given_twice
-from orchestrator.errors import CaseError, InputError, Problem
-from orchestrator.toml_files import read_toml
+from orchestrator.core.errors import CaseError, InputError, Problem
+from orchestrator.core.toml_files import read_toml
 
 _TABLE = "set"
 _EXAMPLE = '[set]\n"gfor.pod_p.K" = 200.0'

@@ -16,10 +16,10 @@ from orchestrator.cases.plausible_ranges import SMALLEST_SHARE
 from orchestrator.cases.plausible_sources import SOLVED, source_doubts
 from orchestrator.cases.plausible_values import UnusualValue, outside, place_of, unit_of, value_of
 from orchestrator.cases.power_flow import PowerFlow
-from orchestrator.coupling.schedule import SECOND_ORDER
-from orchestrator.coupling.system import ComponentPlan
-from orchestrator.errors import Problem, few
-from orchestrator.fmi.port import BoundDescription
+from orchestrator.core.errors import Problem, few
+from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.systems.coupling.schedule import SECOND_ORDER
+from orchestrator.systems.coupling.system import ComponentPlan
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,8 @@ from orchestrator.cases.plausible_ranges import (
     STRAY_B,
 )
 from orchestrator.cases.plausible_values import UnusualValue, outside, place_of_source, value_of
-from orchestrator.coupling.system import ComponentPlan
-from orchestrator.errors import few
+from orchestrator.core.errors import few
+from orchestrator.systems.coupling.system import ComponentPlan
 
 _SHOWN = 3  # equivalents that are named; lines beyond which one is compared with the others
 _UNLIKE = 8.0  # times from which on a line is unlike the others

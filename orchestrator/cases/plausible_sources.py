@@ -10,7 +10,7 @@ from orchestrator.cases.plausible_values import (
     unit_of,
     value_of,
 )
-from orchestrator.coupling.system import ComponentPlan
+from orchestrator.systems.coupling.system import ComponentPlan
 
 SOLVED = "solved"  # of the grid, in ``meant``: the source's voltages are a flat start on purpose
 # usual reactances of step-up transformers on the machine's rating [pu], widened

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from fmus.toolchain.variables import Usual
 from orchestrator.cases.draft import Draft
-from orchestrator.coupling.system import ComponentPlan
+from orchestrator.systems.coupling.system import ComponentPlan
 
 _FAR = 3
 """A value that is outside of its range by less than this factor may be a mistake, but not one of a factor of 1000."""

@@ -17,7 +17,7 @@ from orchestrator.cases.flow_balance import (
 from orchestrator.cases.flow_equations import FlowEquations
 from orchestrator.cases.flow_limits import Excess, Limits, exceeded, solve_with_limits
 from orchestrator.cases.flow_newton import CONVERGED, NewtonResult, grow, solve, solve_once
-from orchestrator.errors import InputError, PowerFlowError
+from orchestrator.core.errors import InputError, PowerFlowError
 
 __all__ = ["FlowLine", "FlowLoad", "FlowShunt", "FlowUnit", "PowerFlow", "solve_power_flow"]
 

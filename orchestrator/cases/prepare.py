@@ -7,7 +7,6 @@ from typing import Any
 
 from fmus.grid.network import Network
 from fmus.toolchain.catalogue import model_names, network_of, parts_of
-from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases import component_forms
 from orchestrator.cases.areas import in_two_areas
 from orchestrator.cases.assignment import EMF, TORQUE, assign_values
@@ -46,13 +45,19 @@ from orchestrator.cases.scheduling import schedule_in, told_again
 from orchestrator.cases.schema import ComponentTable, ReferenceModeTable, Value
 from orchestrator.cases.unit_tables import unit_components
 from orchestrator.cases.wiring import check_inputs, connect
-from orchestrator.coupling.events import Event
-from orchestrator.coupling.schedule import SECOND_ORDER, Schedule, ScheduleName, check_tolerance
-from orchestrator.coupling.step_awareness import STEP_PARAMETER, tell_step
-from orchestrator.coupling.system import ComponentPlan, System
-from orchestrator.errors import InputError, Problem
-from orchestrator.fmi.description import FmuDescription
-from orchestrator.fmi.instance import is_ours
+from orchestrator.core.errors import InputError, Problem
+from orchestrator.devices.binding.binding import bound_fmu
+from orchestrator.devices.fmi.description import FmuDescription
+from orchestrator.devices.fmi.instance import is_ours
+from orchestrator.systems.coupling.events import Event
+from orchestrator.systems.coupling.schedule import (
+    SECOND_ORDER,
+    Schedule,
+    ScheduleName,
+    check_tolerance,
+)
+from orchestrator.systems.coupling.step_awareness import STEP_PARAMETER, tell_step
+from orchestrator.systems.coupling.system import ComponentPlan, System
 
 
 @dataclass(frozen=True)

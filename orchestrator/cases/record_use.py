@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
-from orchestrator.errors import counted
+from orchestrator.core.errors import counted
 
 
 class UseOfRecord(StrEnum):

@@ -8,9 +8,9 @@ from orchestrator.cases.mentions import shown_signals
 from orchestrator.cases.names import close_names, variables_of
 from orchestrator.cases.scheduling import schedule_of
 from orchestrator.cases.schema import LONGEST_STEP, ForcingTable
-from orchestrator.coupling.clock import Clock
-from orchestrator.coupling.schedule import Schedule
-from orchestrator.errors import InputError, Problem
+from orchestrator.core.errors import InputError, Problem
+from orchestrator.systems.coupling.clock import Clock
+from orchestrator.systems.coupling.schedule import Schedule
 
 MOST_STEPS = 1e11  # communication steps of a run: a month and more
 _STEPS_A_SECOND = 30_000  # of the two-area system on one core, about

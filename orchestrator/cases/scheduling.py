@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.schema import SolverTable
-from orchestrator.coupling.schedule import Schedule, ScheduleName, jacobi, of_kind
-from orchestrator.coupling.step_awareness import STEP_PARAMETER, shortest_internal_step
-from orchestrator.coupling.system import System
+from orchestrator.systems.coupling.schedule import Schedule, ScheduleName, jacobi, of_kind
+from orchestrator.systems.coupling.step_awareness import STEP_PARAMETER, shortest_internal_step
+from orchestrator.systems.coupling.system import System
 
 Groups = tuple[tuple[str, ...], ...]
 

@@ -13,10 +13,10 @@ from pydantic import (
 )
 
 from orchestrator.cases.names import file_name
-from orchestrator.coupling.events import ForcingShape
-from orchestrator.coupling.schedule import TOLERANCES, ScheduleName
-from orchestrator.toml_files import Table
-from orchestrator.units import to_unit
+from orchestrator.core.toml_files import Table
+from orchestrator.core.units import to_unit
+from orchestrator.systems.coupling.events import ForcingShape
+from orchestrator.systems.coupling.schedule import TOLERANCES, ScheduleName
 
 Value = bool | float | str
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import UnitReconnectionTable
 from orchestrator.cases.start_values import is_connected
-from orchestrator.coupling.schedule import Schedule
-from orchestrator.coupling.system import System
+from orchestrator.systems.coupling.schedule import Schedule
+from orchestrator.systems.coupling.system import System
 
 
 def in_service(prepared: PreparedScenario) -> PreparedScenario:

@@ -7,8 +7,8 @@ from enum import StrEnum
 
 from fmus.toolchain.port_variables import LARGEST_POWER
 from orchestrator.cases.power_flow import FlowUnit, PowerFlow
-from orchestrator.coupling.system import ComponentPlan
-from orchestrator.errors import ErrorKind, InputError
+from orchestrator.core.errors import ErrorKind, InputError
+from orchestrator.systems.coupling.system import ComponentPlan
 
 _CLOSE = 1e-6  # power [MW] that may be left to the units at the slack bus beside their share
 

@@ -17,8 +17,8 @@ from orchestrator.cases.flow_balance import FlowLine
 from orchestrator.cases.names import close_names
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.start_values import is_connected
-from orchestrator.coupling.system import ComponentPlan
-from orchestrator.errors import InputError, few
+from orchestrator.core.errors import InputError, few
+from orchestrator.systems.coupling.system import ComponentPlan
 
 CONVENTION = (
     "initial three-phase short circuit from 1 pu (c = 1); machines as R_s + jX''d with their transformer, external "

@@ -2,8 +2,8 @@
 
 from collections import defaultdict
 
-from orchestrator.errors import Problem
-from orchestrator.foreign_files import one_line
+from orchestrator.core.errors import Problem
+from orchestrator.core.foreign_files import one_line
 
 
 class Changes:

@@ -11,7 +11,7 @@ from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt, inner
 from orchestrator.cases.network_data import NetworkData
 from orchestrator.cases.network_import import Generation
 from orchestrator.cases.power_flow import FlowUnit, solve_power_flow
-from orchestrator.errors import InputError, few
+from orchestrator.core.errors import InputError, few
 
 POWER_FACTOR = 0.9  # with which a power tells a rating that is not known
 _SHOWN = 5

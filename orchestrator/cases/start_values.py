@@ -17,8 +17,8 @@ from orchestrator.cases.flow_units import flow_unit
 from orchestrator.cases.load_models import FlowLaws
 from orchestrator.cases.power_flow import FlowUnit, PowerFlow, solve_power_flow
 from orchestrator.cases.sharing import Dispatch, Room, shared_flow
-from orchestrator.coupling.system import ComponentPlan, System
-from orchestrator.errors import ErrorKind, InputError
+from orchestrator.core.errors import ErrorKind, InputError
+from orchestrator.systems.coupling.system import ComponentPlan, System
 
 # lower limits of the power of governors without losses
 _LEAST_POWER = ("governor.V_MIN", "governor.P_MIN")

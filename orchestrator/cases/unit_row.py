@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 _MOST_VOLTAGE = 2.0  # largest voltage [pu] that a unit can hold
 

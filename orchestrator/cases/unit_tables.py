@@ -38,7 +38,7 @@ from orchestrator.cases.schema import ComponentTable, UnitsTable
 from orchestrator.cases.source_changes import Changes
 from orchestrator.cases.source_ratings import with_needed_ratings
 from orchestrator.cases.unit_row import UnitRow, checked
-from orchestrator.errors import InputError, Problem, few
+from orchestrator.core.errors import InputError, Problem, few
 
 UNIT_KINDS = ("sg", "gfor")  # first parts of the names of a unit's generator and converter
 _LIMITS = ("q_min_mvar", "q_max_mvar")

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from orchestrator.acceptance.checks.subject import OperatingAt, Use
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.names import close_names
-from orchestrator.coupling.system import ComponentPlan
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
+from orchestrator.devices.acceptance.checks.subject import OperatingAt, Use
+from orchestrator.systems.coupling.system import ComponentPlan
 
 _START = {"P_0": 0.0, "Q_0": 0.0, "v_0": 1.0, "theta_0": 0.0}
 """Names of the start values, and the defaults if neither the case nor the FMU gives a value."""

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from fmus.toolchain.port_variables import I_RE, S_BASE, S_N, SYSTEM_BASE, SYSTEM_BASE_MVA
 from orchestrator.cases.schema import Value
-from orchestrator.units import to_unit
+from orchestrator.core.units import to_unit
 
 if TYPE_CHECKING:
-    from orchestrator.fmi.description import FmuDescription, VariableInfo
+    from orchestrator.devices.fmi.description import FmuDescription, VariableInfo
 
 # in the description of a variable that chooses: what its numbers mean
 _CHOICES = re.compile(r"\b0: .*\b1: ")
@@ -53,7 +53,7 @@ def convert(info: VariableInfo, value: Value) -> float | bool:
 
 def check_system_base(description: FmuDescription, variable: str, value: float | bool) -> None:
     """Refuse another system base for a device with our port. In a bound FMU the name has another meaning."""
-    from orchestrator.fmi.port import BoundDescription  # noqa: PLC0415 - FMUs, which reading a file does without
+    from orchestrator.devices.fmi.port import BoundDescription  # noqa: PLC0415 - FMUs, which reading a file does without
 
     own = not isinstance(description, BoundDescription) and I_RE.name in description.variables
     if own and variable == S_BASE.name and value != SYSTEM_BASE_MVA:

@@ -4,7 +4,7 @@ from difflib import get_close_matches
 
 from fmus.toolchain.catalogue import model_names
 from orchestrator.cases.draft import Draft
-from orchestrator.errors import InputError, Problem, few
+from orchestrator.core.errors import InputError, Problem, few
 
 _PHASOR_PORT = ("e_re", "e_im", "y_re", "y_im")  # what a device gives to a network of phasors
 

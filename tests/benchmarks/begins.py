@@ -11,7 +11,7 @@ import argparse
 
 import numpy as np
 
-from orchestrator.oscillations.detection import find_oscillations, signals_of
+from orchestrator.studies.oscillations.detection import find_oscillations, signals_of
 from tests.support.forced_records import model, record, sine, times_of
 
 MODES = {"two_area": 0.5817, "ieee39": 0.722}

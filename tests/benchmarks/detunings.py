@@ -13,16 +13,16 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.analysis.stability import Cause, Stability
-from orchestrator.analysis.threads import alone
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.coupling.events import Event, LoadChange, ReferenceChange
-from orchestrator.coupling.master import Master
-from orchestrator.coupling.recorder import Recorder
-from orchestrator.coupling.schedule import jacobi
-from orchestrator.errors import CosimError
-from orchestrator.study.modes import compute_modes
+from orchestrator.core.errors import CosimError
+from orchestrator.core.threads import alone
+from orchestrator.linear.spectra.stability import Cause, Stability
+from orchestrator.studies.modes.modes import compute_modes
+from orchestrator.systems.coupling.events import Event, LoadChange, ReferenceChange
+from orchestrator.systems.coupling.master import Master
+from orchestrator.systems.coupling.recorder import Recorder
+from orchestrator.systems.coupling.schedule import jacobi
 from tests.support.exact import exact_continuous, exact_step_map, network_of
 
 CASES = {"two_area": "two_area", "wscc9": str(Path(__file__).parent / "nine_buses" / "case.toml")}

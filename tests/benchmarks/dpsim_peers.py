@@ -157,7 +157,7 @@ def main() -> None:
     run = [
         sys.executable,
         "-m",
-        "orchestrator.cli",
+        "orchestrator.face.cli",
         "run",
         "wscc9",
         "--scenario",

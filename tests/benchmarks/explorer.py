@@ -10,8 +10,8 @@ from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
-from orchestrator.explore.server import Explorer
-from tests.explore.test_page import CHROMIUM, OPTIONS, add, computed, opened
+from orchestrator.face.explore.server import Explorer
+from tests.face.explore.test_page import CHROMIUM, OPTIONS, add, computed, opened
 
 DRAGS = 10_000
 

@@ -18,16 +18,16 @@ from pathlib import Path
 import numpy as np
 from pythonfmu import FmuBuilder
 
-from orchestrator.analysis.coupled_state import CoupledState
-from orchestrator.analysis.linearization import Blocks, LinearModel, compose
-from orchestrator.analysis.modes import eigenvalues
-from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.coupling.master import Master
-from orchestrator.coupling.system import System
-from orchestrator.fmi.description import FmuDescription, read_description
-from orchestrator.study.modes import compute_modes
+from orchestrator.devices.fmi.description import FmuDescription, read_description
+from orchestrator.linear.models.coupled_state import CoupledState
+from orchestrator.linear.models.linearization import Blocks, LinearModel, compose
+from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.linear.spectra.modes import eigenvalues
+from orchestrator.studies.modes.modes import compute_modes
+from orchestrator.systems.coupling.master import Master
+from orchestrator.systems.coupling.system import System
 
 STEPS, REPEATS = 5_000, 3
 BRUTE_FORCE_SAMPLE = 20

@@ -11,12 +11,12 @@ from time import perf_counter
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.exporter import cached
 from fmus.toolchain.python_fmu import PythonFmu
-from orchestrator.coupling.master import Master
-from orchestrator.coupling.schedule import jacobi
-from orchestrator.coupling.system import System
-from orchestrator.fmi.description import read_description
-from tests.acceptance.gallery.build import build
-from tests.acceptance.gallery.members import converter
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.systems.coupling.master import Master
+from orchestrator.systems.coupling.schedule import jacobi
+from orchestrator.systems.coupling.system import System
+from tests.devices.acceptance.gallery.build import build
+from tests.devices.acceptance.gallery.members import converter
 
 STEPS = 50_000
 

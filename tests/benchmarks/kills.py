@@ -22,7 +22,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from tests.cli.test_resume import WORDS, checkpoints_in, started, values_of, write_case
+from tests.face.cli.test_resume import WORDS, checkpoints_in, started, values_of, write_case
 
 STOP = 2.0
 TIMES = (0.5, 1.1, 1.1005, 1.3333, 1.6)

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from time import process_time
 
-from orchestrator.api.case import load
-from orchestrator.coupling.schedule import SCHEDULES, ScheduleName
-from orchestrator.study.modes import running
+from orchestrator.face.api.case import load
+from orchestrator.studies.modes.modes import running
+from orchestrator.systems.coupling.schedule import SCHEDULES, ScheduleName
 
 RUNS: tuple[tuple[ScheduleName, float], ...] = (
     ("gauss-seidel", 1e-4),

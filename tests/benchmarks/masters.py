@@ -24,13 +24,13 @@ from typing import Any
 import numpy as np
 
 from orchestrator.cases.case import load_case
-from orchestrator.coupling.master import Master
-from orchestrator.coupling.schedule import Schedule, gauss_seidel, jacobi
-from orchestrator.coupling.system import System
-from orchestrator.fmi.component import RealBatch
-from orchestrator.fmi.description import read_description
-from tests.interop import drivers
-from tests.interop.jobs import job_of
+from orchestrator.devices.fmi.component import RealBatch
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.systems.coupling.master import Master
+from orchestrator.systems.coupling.schedule import Schedule, gauss_seidel, jacobi
+from orchestrator.systems.coupling.system import System
+from tests.simulation.interop import drivers
+from tests.simulation.interop.jobs import job_of
 
 STEPS, POINTS, REPEATS = 20_000, 40, 3
 STEP_SIZE = 1e-4

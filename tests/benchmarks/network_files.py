@@ -28,8 +28,8 @@ from orchestrator.cases.new_case import WantedCase, write_case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.psse.raw import read_raw
 from orchestrator.cases.service import in_service
-from orchestrator.errors import CosimError
-from orchestrator.study.modes import running
+from orchestrator.core.errors import CosimError
+from orchestrator.studies.modes.modes import running
 
 LOADS, REFUSED, CRASHES, TOO_LONG = "loads", "refused", "crashes", "takes too long"
 SUFFIXES = (".raw", ".rawx")

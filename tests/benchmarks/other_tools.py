@@ -9,9 +9,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.markup import escape
 
-from orchestrator.errors import CosimError
-from orchestrator.fmi.description import read_declared
-from orchestrator.report.tables import make_table
+from orchestrator.core.errors import CosimError
+from orchestrator.devices.fmi.description import read_declared
+from orchestrator.output.report.tables import make_table
 
 _PATIENCE = 300
 """Longest time for the checks of one FMU [s]."""
@@ -21,7 +21,7 @@ def said(path: Path) -> str:
     """The last line that `gfor fmu check` prints of an FMU, without its name."""
     try:
         done = subprocess.run(
-            [sys.executable, "-m", "orchestrator.cli", "fmu", "check", str(path)],
+            [sys.executable, "-m", "orchestrator.face.cli", "fmu", "check", str(path)],
             capture_output=True,
             text=True,
             timeout=_PATIENCE,

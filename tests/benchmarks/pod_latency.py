@@ -20,18 +20,18 @@ import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
-from orchestrator.analysis.coupled_state import CoupledState
-from orchestrator.analysis.critical_modes import find_critical_modes
-from orchestrator.analysis.delays import WireLink
-from orchestrator.analysis.identification import identify_modes, nearest
-from orchestrator.analysis.linear_model import LinearModel
-from orchestrator.analysis.linearization import Blocks, compose
-from orchestrator.analysis.modes import eigenvalues, find_spectrum
-from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import BUILT_IN, Case, load_case
-from orchestrator.coupling.master import Master
-from orchestrator.coupling.recorder import Recorder
-from orchestrator.study.naming import named_modes
+from orchestrator.linear.models.coupled_state import CoupledState
+from orchestrator.linear.models.delays import WireLink
+from orchestrator.linear.models.linear_model import LinearModel
+from orchestrator.linear.models.linearization import Blocks, compose
+from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.linear.signals.identification import identify_modes, nearest
+from orchestrator.linear.spectra.critical_modes import find_critical_modes
+from orchestrator.linear.spectra.modes import eigenvalues, find_spectrum
+from orchestrator.studies.modes.naming import named_modes
+from orchestrator.systems.coupling.master import Master
+from orchestrator.systems.coupling.recorder import Recorder
 
 PODS = {"pod_p": "POD-P", "pod_q": "POD-Q", "pod_pq": "both"}
 DELAYS = (0.0, 0.01, 0.02, 0.05, 0.1, 0.15, 0.2)

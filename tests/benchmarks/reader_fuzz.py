@@ -26,25 +26,26 @@ from fmus.toolchain.exporter import cached
 from fmus.toolchain.python_fmu import PythonFmu
 from fmus.vendor_dll.device import DeviceFileError, device_of, read_device_file
 from fmus.vendor_dll.interface import DllInterface, DllParameter, Signal
-from orchestrator.binding.binding import bind
-from orchestrator.binding.draft import draft_binding
 from orchestrator.cases.case import BUILT_IN, load_case
 from orchestrator.cases.parameter_files import read_parameter_file
 from orchestrator.cases.psse.raw import read_raw
-from orchestrator.errors import CosimError
-from orchestrator.fmi.archive import read_model_description_text
-from orchestrator.fmi.description import parse_description, read_description
-from orchestrator.operating_points.columns import Elements
-from orchestrator.operating_points.points_file import read_points
-from orchestrator.results.comtrade.reading import read_comtrade
-from orchestrator.ssp.names import STUDY_TYPE, SYSTEM_FILE
+from orchestrator.core.errors import CosimError
+from orchestrator.devices.binding.binding import bind
+from orchestrator.devices.binding.draft import draft_binding
+from orchestrator.devices.fmi.archive import read_model_description_text
+from orchestrator.devices.fmi.description import parse_description, read_description
+from orchestrator.output.results.comtrade.reading import read_comtrade
+from orchestrator.studies.operating_points.columns import Elements
+from orchestrator.studies.operating_points.points_file import read_points
+from orchestrator.systems.ssp.names import STUDY_TYPE, SYSTEM_FILE
 from tests.cases.psse import raw
 from tests.cases.psse.test_dyr import CASE as DYR_CASE
 from tests.cases.psse.test_dyr import DYR
-from tests.coupling.small_fmus import small_fmu
-from tests.fmi.fuzz import text_changed as xml_changed
-from tests.results.test_comtrade import CFG, DAT
-from tests.ssp.packages import (
+from tests.devices.fmi.fuzz import text_changed as xml_changed
+from tests.output.results.test_comtrade import CFG, DAT
+from tests.support.vendor_dlls import DEVICE
+from tests.systems.coupling.small_fmus import small_fmu
+from tests.systems.ssp.packages import (
     OSP_STEP,
     bindings,
     component,
@@ -54,7 +55,6 @@ from tests.ssp.packages import (
     wire,
     write,
 )
-from tests.support.vendor_dlls import DEVICE
 
 NUMBERS = (
     *(

@@ -12,9 +12,9 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from orchestrator.analysis.hub_elimination import HubFactors, hub_equations
-from orchestrator.analysis.linear_model import LinearModel
-from orchestrator.analysis.shifted_equations import Factors
+from orchestrator.linear.models.hub_elimination import HubFactors, hub_equations
+from orchestrator.linear.models.linear_model import LinearModel
+from orchestrator.linear.spectra.shifted_equations import Factors
 
 STEP = 0.7
 """Largest change of a logarithm between two points, and from one half of the way to the other."""

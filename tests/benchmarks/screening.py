@@ -10,14 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.analysis.threads import alone
 from orchestrator.cases.case import load_case
-from orchestrator.operating_points.item import Status
-from orchestrator.points.executor import Serial
-from orchestrator.points.points import Work
-from orchestrator.points.store import PointStore
-from orchestrator.screening.request import ScreeningRequest
-from orchestrator.screening.study import plan_screening, run_screening
+from orchestrator.core.threads import alone
+from orchestrator.studies.operating_points.item import Status
+from orchestrator.studies.points.executor import Serial
+from orchestrator.studies.points.points import Work
+from orchestrator.studies.points.store import PointStore
+from orchestrator.studies.screening.request import ScreeningRequest
+from orchestrator.studies.screening.study import plan_screening, run_screening
 
 
 def processor_seconds():

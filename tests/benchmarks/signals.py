@@ -21,7 +21,7 @@ from collections import Counter
 from pathlib import Path
 
 from fmus.toolchain import temporary
-from orchestrator.cli import COMMANDS, _parser, main
+from orchestrator.face.cli import COMMANDS, _parser, main
 from tests.benchmarks.kills import processor_time
 
 COUNT, SEED, LONGEST = 1000, 1, 300.0
@@ -157,7 +157,7 @@ def made(folder: Path) -> Path:
     folder.mkdir()
     for words in ((*RUN, "--out", "before"), ("fmu", "build", "gfor", "--dest", ".")):
         subprocess.run(
-            [sys.executable, "-m", "orchestrator.cli", *words],
+            [sys.executable, "-m", "orchestrator.face.cli", *words],
             cwd=folder,
             check=True,
             capture_output=True,

@@ -25,13 +25,6 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from orchestrator.analysis.critical_modes import find_critical_modes
-from orchestrator.analysis.linear_model import LinearModel
-from orchestrator.analysis.linearization import Blocks, compose
-from orchestrator.analysis.modes import eigenvalues
-from orchestrator.analysis.shifted_equations import ShiftedEquations
-from orchestrator.analysis.stability import WHOLE
-from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import load_case
 from orchestrator.cases.network_data import NetworkData, network_data
 from orchestrator.cases.power_flow import (
@@ -43,7 +36,14 @@ from orchestrator.cases.power_flow import (
     solve_power_flow,
 )
 from orchestrator.cases.schema import NetworkTable
-from orchestrator.coupling.master import Master
+from orchestrator.linear.models.linear_model import LinearModel
+from orchestrator.linear.models.linearization import Blocks, compose
+from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.linear.spectra.critical_modes import find_critical_modes
+from orchestrator.linear.spectra.modes import eigenvalues
+from orchestrator.linear.spectra.shifted_equations import ShiftedEquations
+from orchestrator.linear.spectra.stability import WHOLE
+from orchestrator.systems.coupling.master import Master
 from tests.benchmarks.region_count import count_within
 
 CASES = ("case39", "case118", "case300", "case1354pegase", "case2869pegase", "case9241pegase")

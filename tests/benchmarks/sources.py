@@ -4,7 +4,7 @@
     python -m tests.benchmarks.sources --case ieee118 --part 2/4   # every fourth try, from the second on
     python -m tests.benchmarks.sources --pairs 60         # two references at once, at one frequency
     python -m tests.benchmarks.sources --noise 300        # noise of loads alone: what is named is named wrongly
-    python -m tests.benchmarks.sources --models           # the linear models of tests/oscillations/models
+    python -m tests.benchmarks.sources --models           # the linear models of tests/studies/oscillations/models
 
 Records are 60 s at 30 samples a second from the case's linear model, with noise of loads and of measuring. With every
 second bus in view, units elsewhere are not seen at all. Each is judged with the units' own models and without.
@@ -15,9 +15,9 @@ from collections import Counter
 
 import numpy as np
 
-from orchestrator.oscillations import location
-from orchestrator.oscillations.models import OWN_MODEL
-from orchestrator.oscillations.verdict import locate
+from orchestrator.studies.oscillations import location
+from orchestrator.studies.oscillations.models import OWN_MODEL
+from orchestrator.studies.oscillations.verdict import locate
 from tests.support.forced_records import (
     make_model,
     model,

@@ -52,7 +52,7 @@ def measured(checkout: Path, words: tuple[str, ...], repeats: int) -> tuple[floa
         command = [
             sys.executable,
             "-m",
-            "orchestrator.cli",
+            "orchestrator.face.cli",
             *(word.format(folder=folder) for word in words),
         ]
         times = [_once(command, environment, checkout) for _ in range(repeats + 1)][1:]

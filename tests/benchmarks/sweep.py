@@ -24,13 +24,13 @@ COUNT = 20_000_000
 def sweep(points: int, executor: str, folder: str) -> None:
     """Print the seconds of a sweep's points; run by ``python -c``, so that all imports count in the whole."""
     from orchestrator.cases.case import load_case  # noqa: PLC0415
-    from orchestrator.points.points import Work  # noqa: PLC0415
-    from orchestrator.points.store import PointStore  # noqa: PLC0415
-    from orchestrator.points.study import choose_executor  # noqa: PLC0415
-    from orchestrator.sweep.axes import parse_vary  # noqa: PLC0415
-    from orchestrator.sweep.point import SweepPointTask  # noqa: PLC0415
-    from orchestrator.sweep.request import SweepRequest  # noqa: PLC0415
-    from orchestrator.sweep.sweep import plan_sweep, run_sweep  # noqa: PLC0415
+    from orchestrator.studies.points.points import Work  # noqa: PLC0415
+    from orchestrator.studies.points.store import PointStore  # noqa: PLC0415
+    from orchestrator.studies.points.study import choose_executor  # noqa: PLC0415
+    from orchestrator.studies.sweep.axes import parse_vary  # noqa: PLC0415
+    from orchestrator.studies.sweep.point import SweepPointTask  # noqa: PLC0415
+    from orchestrator.studies.sweep.request import SweepRequest  # noqa: PLC0415
+    from orchestrator.studies.sweep.sweep import plan_sweep, run_sweep  # noqa: PLC0415
 
     where = (int(executor), None) if executor.isdigit() else (None, executor)
     chosen = choose_executor(*where, [SweepPointTask.__module__])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.coupling.master import Master
+from orchestrator.systems.coupling.master import Master
 
 CASES = (("two_area", "pod_pq"), ("ieee118", "pod_pq"))
 TURNS, SECONDS_OF_A_TURN = 200, 0.005

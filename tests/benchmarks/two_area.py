@@ -11,8 +11,8 @@ import sys
 import time
 
 from orchestrator.cases.case import load_case
-from orchestrator.coupling.master import Master
-from orchestrator.study.modes import compute_modes
+from orchestrator.studies.modes.modes import compute_modes
+from orchestrator.systems.coupling.master import Master
 
 STEPS = 50_000
 

@@ -11,10 +11,10 @@ from time import perf_counter
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.exporter import cached
 from fmus.toolchain.native_fmu import NativeFmu
-from orchestrator.coupling.master import Master
-from orchestrator.coupling.schedule import gauss_seidel
-from orchestrator.coupling.system import System
-from orchestrator.fmi.description import read_description
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.systems.coupling.master import Master
+from orchestrator.systems.coupling.schedule import gauss_seidel
+from orchestrator.systems.coupling.system import System
 from tests.support.vendor_dlls import droop_device
 
 SECONDS = 2.0

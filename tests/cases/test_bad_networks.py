@@ -9,8 +9,8 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.catalogue_fmus import plan_fmu
-from orchestrator.errors import CaseError
-from orchestrator.study.modes import compute_modes
+from orchestrator.core.errors import CaseError
+from orchestrator.studies.modes.modes import compute_modes
 
 CASE = """\
 name = "three"

@@ -5,7 +5,7 @@ import pytest
 from orchestrator.cases.build_choices import NativeChoice, layer_of
 from orchestrator.cases.case import load_case
 from orchestrator.cases.parameter_files import read_parameter_file
-from orchestrator.errors import CaseError
+from orchestrator.core.errors import CaseError
 
 
 def native(components):

@@ -6,12 +6,12 @@ import shutil
 
 import pytest
 
-from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import built_in_cases, load_case
-from orchestrator.coupling.events import LoadChange, ParameterChange
-from orchestrator.coupling.master import Master
-from orchestrator.errors import CaseError, InputError
-from tests.coupling.small_fmus import small_fmu
+from orchestrator.core.errors import CaseError, InputError
+from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.systems.coupling.events import LoadChange, ParameterChange
+from orchestrator.systems.coupling.master import Master
+from tests.systems.coupling.small_fmus import small_fmu
 
 LOOP = """\
 name = "loop"

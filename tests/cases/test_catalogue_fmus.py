@@ -10,8 +10,8 @@ from fmus.toolchain import dependencies, notes
 from orchestrator.cases import catalogue_fmus
 from orchestrator.cases.case import load_case
 from orchestrator.cases.catalogue_fmus import build_fmu, catalogue_fmu, plan_fmu
-from orchestrator.errors import CaseError
-from orchestrator.fmi.description import read_description
+from orchestrator.core.errors import CaseError
+from orchestrator.devices.fmi.description import read_description
 
 NETWORK = Network(
     "net",

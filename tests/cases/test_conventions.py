@@ -8,8 +8,8 @@ import pytest
 import orchestrator as gfor
 from orchestrator.cases.assignment import EMF, TORQUE, assign_conventions
 from orchestrator.cases.schema import ConventionsTable
-from orchestrator.errors import CaseError
-from tests.screening.five_machines import five_machines
+from orchestrator.core.errors import CaseError
+from tests.studies.screening.five_machines import five_machines
 
 IN_ANDES = (
     -0.927208 + 7.621295j,

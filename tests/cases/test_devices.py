@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.cases.devices import devices_of
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 
 def names(*files):

@@ -9,12 +9,12 @@ import pytest
 
 from fmus.grid import phasor_grid
 from fmus.grid.network import Line, Network, Port
-from orchestrator.analysis.linearization import linearize
-from orchestrator.analysis.modes import find_modes
-from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import load_case
-from orchestrator.coupling.master import Master
-from orchestrator.errors import CaseError
+from orchestrator.core.errors import CaseError
+from orchestrator.linear.models.linearization import linearize
+from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.linear.spectra.modes import find_modes
+from orchestrator.systems.coupling.master import Master
 from tests.support.kernels import in_python, taped, vector
 from tests.support.written_out import written_out
 

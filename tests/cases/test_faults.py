@@ -4,16 +4,22 @@ import numpy as np
 import pytest
 
 from orchestrator.cases.case import BUILT_IN, load_case
-from orchestrator.cli import main
-from orchestrator.coupling.events import NotANumber, Silence, UnitSwitching, WireFault, WireRecovery
-from orchestrator.coupling.imperfections import Bias, Delay, DropOut, Noise, Quantisation
-from orchestrator.errors import AnalysisError, CaseError
-from orchestrator.interop.rules import MASTERS
-from orchestrator.study.like import run_like
-from orchestrator.study.linear import linear_response
-from orchestrator.study.modes import compute_modes, running
-from orchestrator.study.run import run_scenario
-from orchestrator.watch.settings import Settings
+from orchestrator.core.errors import AnalysisError, CaseError
+from orchestrator.face.cli import main
+from orchestrator.simulation.interop.rules import MASTERS
+from orchestrator.simulation.watch.settings import Settings
+from orchestrator.studies.modes.linear import linear_response
+from orchestrator.studies.modes.modes import compute_modes, running
+from orchestrator.studies.runs.like import run_like
+from orchestrator.studies.runs.run import run_scenario
+from orchestrator.systems.coupling.events import (
+    NotANumber,
+    Silence,
+    UnitSwitching,
+    WireFault,
+    WireRecovery,
+)
+from orchestrator.systems.coupling.imperfections import Bias, Delay, DropOut, Noise, Quantisation
 
 TEXT = (BUILT_IN / "two_area" / "case.toml").read_text(encoding="utf-8")
 OWN_EVENT = TEXT[TEXT.index("[[events]]") : TEXT.index("[scenarios.base]")]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.coupling.events import BusFault, LineSwitching
-from orchestrator.errors import CaseError
+from orchestrator.core.errors import CaseError
+from orchestrator.systems.coupling.events import BusFault, LineSwitching
 from tests.cases.test_switching import RING, watch
 
 FAULT = '[[events]]\ntype = "bus_fault"\ntime = "0.1 s"\nbus = "b3"\n'

@@ -4,7 +4,7 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.names import file_name
-from orchestrator.errors import CaseError
+from orchestrator.core.errors import CaseError
 
 CASE = """name = {case}
 [components.gfor]

@@ -5,8 +5,8 @@ import pytest
 
 import orchestrator as gfor
 from orchestrator.cases.forcing import event_of
-from orchestrator.coupling.events import Forcing
-from orchestrator.errors import CaseError, InputError
+from orchestrator.core.errors import CaseError, InputError
+from orchestrator.systems.coupling.events import Forcing
 
 
 def values(**changed):

@@ -5,7 +5,7 @@ import pytest
 
 import orchestrator as gfor
 from orchestrator.cases.case import load_case
-from orchestrator.errors import CaseError
+from orchestrator.core.errors import CaseError
 from tests.cases.test_case_files import THREE_BUSES
 
 PHASORS = (

@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.power_flow import FlowLine, FlowLoad, FlowUnit, solve_power_flow
-from orchestrator.errors import CaseError, InputError
+from orchestrator.core.errors import CaseError, InputError
 from tests.cases.test_case_files import THREE_BUSES
 
 FOLLOWING = THREE_BUSES.replace('model = "gfor"', 'model = "gfl"')

@@ -6,10 +6,10 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.csv_rows import MOST_ROWS, rows_of
-from orchestrator.errors import MOST_PROBLEMS, CaseError, InputError
-from orchestrator.fmi.archive import MOST_XML_ELEMENTS
-from orchestrator.fmi.description import read_description
-from orchestrator.toml_files import MOST_BYTES
+from orchestrator.core.errors import MOST_PROBLEMS, CaseError, InputError
+from orchestrator.core.toml_files import MOST_BYTES
+from orchestrator.devices.fmi.archive import MOST_XML_ELEMENTS
+from orchestrator.devices.fmi.description import read_description
 
 HEAD = 'name = "x"\n[components.a]\nmodel = "gfor"\n'
 

@@ -4,10 +4,10 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.idle_values import idle_everywhere, idle_values, why_idle
-from orchestrator.coupling.system import System
-from orchestrator.sweep.axes import parse_vary
-from orchestrator.sweep.request import SweepRequest
-from orchestrator.sweep.sweep import plan_sweep
+from orchestrator.studies.sweep.axes import parse_vary
+from orchestrator.studies.sweep.request import SweepRequest
+from orchestrator.studies.sweep.sweep import plan_sweep
+from orchestrator.systems.coupling.system import System
 
 CASE = load_case("two_area")
 

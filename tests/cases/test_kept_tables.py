@@ -8,7 +8,7 @@ import pytest
 from orchestrator.cases import ieee39, network_sources
 from orchestrator.cases import kept_tables as module
 from orchestrator.cases.kept_tables import LIBRARIES, SourceTables, kept_tables
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 NUMBERS = np.array([[0.1 + 0.2, -0.0, np.inf], [np.nan, 5e-324, 1 / 3]])
 TABLES = SourceTables(

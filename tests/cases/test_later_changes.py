@@ -6,8 +6,8 @@ import pytest
 
 import orchestrator as gfor
 from orchestrator.cases.case import load_case
-from orchestrator.errors import InputError
-from tests.coupling.small_fmus import small_fmu
+from orchestrator.core.errors import InputError
+from tests.systems.coupling.small_fmus import small_fmu
 
 CASE = """\
 name = "loop"

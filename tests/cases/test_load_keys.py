@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import load_case
-from orchestrator.coupling.master import Master
-from orchestrator.errors import CaseError
+from orchestrator.core.errors import CaseError
+from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.systems.coupling.master import Master
 from tests.cases.test_switching import RING
 
 LAWS = """

@@ -5,7 +5,7 @@ import pytest
 
 from orchestrator.cases.matpower.program import case_tables
 from orchestrator.cases.network_sources import read_matpower
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 TABLES = """\
 function mpc = town

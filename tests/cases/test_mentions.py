@@ -6,7 +6,7 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.mentions import _of_foreign
-from orchestrator.errors import CaseError
+from orchestrator.core.errors import CaseError
 
 
 def problems(tmp_path, text, scenario="with_gen"):

@@ -7,7 +7,7 @@ import pytest
 from orchestrator.cases import assignment
 from orchestrator.cases.case import load_case
 from orchestrator.cases.names import close_names
-from orchestrator.errors import CaseError, InputError
+from orchestrator.core.errors import CaseError, InputError
 from tests.cases.test_plausibility import CASE
 
 EVENT = '[[events]]\ntype = "fault"\ntime = "0.05 s"\nbus = "b2"\n'

@@ -15,7 +15,7 @@ from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt
 from orchestrator.cases.network_data import network_data
 from orchestrator.cases.power_flow import FlowUnit, solve_power_flow
 from orchestrator.cases.schema import NetworkTable
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 SMALL = """\
 function mpc = small

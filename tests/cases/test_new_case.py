@@ -8,15 +8,15 @@ from functools import partial
 
 import pytest
 
-from orchestrator.analysis.continuation import ModesMeetError
 from orchestrator.cases.case import case_of_text, load_case
 from orchestrator.cases.new_case import WantedCase, _switched, read_converter, write_case
 from orchestrator.cases.parameter_files import read_parameter_file
-from orchestrator.errors import CaseError, InputError
-from orchestrator.fmi.description import read_description
-from orchestrator.study import beside
-from orchestrator.study.modes import compute_modes
-from tests.screening.five_machines import POWERS, RATINGS, five_machines
+from orchestrator.core.errors import CaseError, InputError
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.linear.spectra.continuation import ModesMeetError
+from orchestrator.studies.modes import beside
+from orchestrator.studies.modes.modes import compute_modes
+from tests.studies.screening.five_machines import POWERS, RATINGS, five_machines
 from tests.support import vendor
 
 CONVERTER = "bus 13, 100 MVA, 60 MW, less sg3"

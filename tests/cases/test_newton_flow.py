@@ -11,7 +11,7 @@ from orchestrator.cases.flow_equations import FlowEquations
 from orchestrator.cases.flow_newton import _newton, solve
 from orchestrator.cases.network_sources import _pandapower_tables
 from orchestrator.cases.power_flow import FlowUnit, explain, solve_power_flow
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 pandapower = pytest.importorskip("pandapower")
 pytestmark = pytest.mark.filterwarnings("ignore:tap_dependency_table:DeprecationWarning")

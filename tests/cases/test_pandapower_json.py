@@ -12,7 +12,7 @@ from pandapower.control.util.characteristic import SplineCharacteristic
 
 from orchestrator.cases.network_sources import read_pandapower
 from orchestrator.cases.pandapower_json import network_text
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 
 def saved(folder, change=lambda net: None):

@@ -4,7 +4,7 @@ import pytest
 
 from orchestrator.cases.network_data import network_data
 from orchestrator.cases.schema import NetworkTable
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 TABLE = NetworkTable(lines_file="lines.csv")
 HEADER = "from,to,circuit,R,X,B\n"

@@ -4,7 +4,7 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.parameter_files import parameter_file_text, read_parameter_file
-from orchestrator.errors import CaseError, InputError
+from orchestrator.core.errors import CaseError, InputError
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import pytest
 
 from orchestrator.cases.build_choices import PARTS, layer_of
 from orchestrator.cases.case import load_case
-from orchestrator.errors import CaseError
+from orchestrator.core.errors import CaseError
 
 CASE = """
 name = "parts"

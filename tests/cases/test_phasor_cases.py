@@ -2,12 +2,12 @@
 
 import pytest
 
-from orchestrator.analysis.linearization import linearize
-from orchestrator.analysis.modes import find_modes
-from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import load_case
-from orchestrator.coupling.master import Master
-from orchestrator.errors import CaseError
+from orchestrator.core.errors import CaseError
+from orchestrator.linear.models.linearization import linearize
+from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.linear.spectra.modes import find_modes
+from orchestrator.systems.coupling.master import Master
 from tests.cases.test_switching import RING, watch
 
 PHASOR = (

@@ -21,10 +21,10 @@ from orchestrator.cases import plausibility
 from orchestrator.cases.case import built_in_cases, load_case
 from orchestrator.cases.plausibility import RULES, question
 from orchestrator.cases.plausible_values import UnusualValue
-from orchestrator.coupling.system import ComponentPlan
-from orchestrator.errors import CaseError
-from orchestrator.fmi.description import parse_description, read_description
-from tests.binding.test_binding import OURS
+from orchestrator.core.errors import CaseError
+from orchestrator.devices.fmi.description import parse_description, read_description
+from orchestrator.systems.coupling.system import ComponentPlan
+from tests.devices.binding.test_binding import OURS
 
 CASE = """\
 name = "plausible"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cases.power_flow import FlowLine, FlowLoad, FlowUnit, solve_power_flow
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 TOLERANCE = 1e-9
 X = 0.2

@@ -3,7 +3,7 @@
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.errors import CaseError
+from orchestrator.core.errors import CaseError
 
 WHEN = 'when = { "grid.X_L" = 0.1 }'
 

@@ -4,10 +4,10 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.new_case import WantedCase, read_converter, write_case
-from orchestrator.coordinated_design.study import PointsDesignRequest, plan_points_design
-from orchestrator.errors import InputError
-from orchestrator.study.modes import compute_modes
-from tests.screening.five_machines import POWERS, five_machines
+from orchestrator.core.errors import InputError
+from orchestrator.studies.coordinated_design.study import PointsDesignRequest, plan_points_design
+from orchestrator.studies.modes.modes import compute_modes
+from tests.studies.screening.five_machines import POWERS, five_machines
 
 A, B = "bus 13, 100 MVA, 60 MW, less sg3", "bus 15, 80 MVA, 30 MW, less sg3"
 

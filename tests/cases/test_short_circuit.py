@@ -8,9 +8,9 @@ import pytest
 from orchestrator.cases.case import load_case
 from orchestrator.cases.flow_balance import FlowLine
 from orchestrator.cases.short_circuit import ShortCircuit
-from orchestrator.errors import InputError
-from orchestrator.sweep.axes import parse_vary, resolve
-from tests.screening.five_machines import RATINGS, five_machines
+from orchestrator.core.errors import InputError
+from orchestrator.studies.sweep.axes import parse_vary, resolve
+from tests.studies.screening.five_machines import RATINGS, five_machines
 
 C_MAX = 1.1
 """IEC 60909: voltage factor of networks above 1 kV."""

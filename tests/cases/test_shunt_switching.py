@@ -3,8 +3,8 @@
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.coupling.events import ShuntSwitching
-from orchestrator.errors import CaseError
+from orchestrator.core.errors import CaseError
+from orchestrator.systems.coupling.events import ShuntSwitching
 from tests.cases.test_switching import RING, watch
 
 TRIP = '[[events]]\ntype = "shunt_trip"\ntime = "0.1 s"\nshunt = "bank"\n'

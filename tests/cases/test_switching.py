@@ -8,11 +8,11 @@ from fmus.toolchain.exporter import cached
 from fmus.toolchain.frames import current_of_power, polar
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.python_fmu import PythonFmu
-from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import load_case
-from orchestrator.coupling.events import LineSwitching, LoadSwitching, UnitSwitching
-from orchestrator.coupling.master import Master
-from orchestrator.errors import CaseError, ComponentError
+from orchestrator.core.errors import CaseError, ComponentError
+from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.systems.coupling.events import LineSwitching, LoadSwitching, UnitSwitching
+from orchestrator.systems.coupling.master import Master
 
 RING = """\
 name = "ring"

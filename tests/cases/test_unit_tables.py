@@ -7,10 +7,10 @@ import pytest
 from orchestrator.cases import unit_tables
 from orchestrator.cases.case import load_case
 from orchestrator.cases.parameter_files import read_parameter_file
-from orchestrator.errors import CaseError
-from orchestrator.sweep.axes import parse_vary
-from orchestrator.sweep.request import SweepRequest
-from orchestrator.sweep.sweep import plan_sweep
+from orchestrator.core.errors import CaseError
+from orchestrator.studies.sweep.axes import parse_vary
+from orchestrator.studies.sweep.request import SweepRequest
+from orchestrator.studies.sweep.sweep import plan_sweep
 from tests.cases.test_network_sources import SMALL
 
 CASE = """\

@@ -15,9 +15,9 @@ from fmus.control_dll.export import (
     write_dll,
 )
 from fmus.vendor_dll.fmu import dll_fmu, read_dll
-from orchestrator.cli import main
-from orchestrator.fmi.description import read_description
-from orchestrator.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.face.cli import main
 from tests.control_dll.conftest import PODS
 from tests.control_dll.hosts import STEP, ControlHost, compiled_host, driven, fmu_call
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fmus.toolchain.catalogue import build_model
-from orchestrator.fmi.description import read_description
-from orchestrator.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.fmi.loaded import LoadedComponent
 
 GENERATORS = [f"synchronous_generator_{exciter}" for exciter in ("ac4a", "st1", "st4b")]
 WATCHED = ("i_re", "i_im", "p", "q", "omega")

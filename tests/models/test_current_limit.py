@@ -12,11 +12,11 @@ from scipy.optimize import brentq
 
 from fmus.toolchain.catalogue import build_model
 from orchestrator.cases.case import load_case
-from orchestrator.errors import ComponentError
-from orchestrator.fmi.component import RealBatch
-from orchestrator.fmi.description import read_description
-from orchestrator.fmi.loaded import LoadedComponent
-from orchestrator.study.run import run_scenario
+from orchestrator.core.errors import ComponentError
+from orchestrator.devices.fmi.component import RealBatch
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.studies.runs.run import run_scenario
 from tests.support.converter_at_grid import AtGrid
 from tests.support.evaluated import Evaluated
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fmus.toolchain.catalogue import build_model
-from orchestrator.errors import ComponentError
-from orchestrator.fmi.description import read_description
-from orchestrator.fmi.loaded import LoadedComponent
+from orchestrator.core.errors import ComponentError
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.fmi.loaded import LoadedComponent
 from tests.support.evaluated import Evaluated
 
 OTHERWISE = {

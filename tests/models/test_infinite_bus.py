@@ -5,9 +5,9 @@ import pytest
 
 from fmus.toolchain.catalogue import build_model
 from orchestrator.cases.case import load_case
-from orchestrator.coupling.master import Master
-from orchestrator.coupling.recorder import Recorder
-from orchestrator.study.modes import compute_modes
+from orchestrator.studies.modes.modes import compute_modes
+from orchestrator.systems.coupling.master import Master
+from orchestrator.systems.coupling.recorder import Recorder
 
 H, STOP = 1e-4, 0.06
 FASTEST = 2.0 / 0.5 * 2 * np.pi * 50

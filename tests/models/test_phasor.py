@@ -8,9 +8,9 @@ import pytest
 from fmus.grid.network import Line, Load, Network, Port, Shunt
 from fmus.grid.phasor_grid import phasor_grid
 from fmus.toolchain.catalogue import build_model
-from orchestrator.errors import ComponentError
-from orchestrator.fmi.description import read_description
-from orchestrator.fmi.loaded import LoadedComponent
+from orchestrator.core.errors import ComponentError
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.fmi.loaded import LoadedComponent
 from tests.support.jacobians import jacobians
 from tests.support.kernels import taped, vector
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fmus.toolchain.catalogue import build_model
-from orchestrator.fmi.description import read_description
-from orchestrator.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.fmi.loaded import LoadedComponent
 from tests.support.evaluated import Evaluated
 
 NAME, STEP = "regfm_a1_phasor", 1e-3

@@ -9,7 +9,7 @@ from importlib.util import find_spec
 
 import pytest
 
-from orchestrator import cli
+from orchestrator.face import cli
 from tests.pages.markdown import ROOT, blocks, commands, name_of, pages
 
 PAGES = [page for page in pages() if blocks(page)]

@@ -47,7 +47,7 @@ def environment(tmp_path):
     (packages,) = home.rglob("site-packages")
     (packages / "beneath.pth").write_text(f"{sysconfig.get_path('purelib')}\n", encoding="utf-8")
     for command, module in {
-        "gfor": "orchestrator.cli",
+        "gfor": "orchestrator.face.cli",
         "pip": "pip",
         "pytest": "pytest",
         "mypy": "mypy",

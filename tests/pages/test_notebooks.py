@@ -85,7 +85,7 @@ def test_every_cell_that_draws_shows_its_picture(tmp_path):
     path = tmp_path / "small.ipynb"
     cells = [
         nbformat.v4.new_code_cell(
-            "from orchestrator.report.notebook import new_axes\nnew_axes().plot([0, 1]);"
+            "from orchestrator.output.report.notebook import new_axes\nnew_axes().plot([0, 1]);"
         )
     ]
     cells += [nbformat.v4.new_code_cell("new_axes().plot([1, 0]);") for _ in range(2)]

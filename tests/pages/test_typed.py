@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cli import COMMANDS, QUESTIONS, _command_in
+from orchestrator.face.cli import COMMANDS, QUESTIONS, _command_in
 from tests.pages.markdown import blocks, commands, name_of, pages
 from tests.pages.test_guides import ANYWHERE, HEAVY, IN_A_CHECKOUT
 

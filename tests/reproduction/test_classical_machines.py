@@ -8,7 +8,7 @@ import pytest
 import tomli_w
 
 from orchestrator.cases.case import BUILT_IN, load_case
-from orchestrator.study.modes import compute_modes
+from orchestrator.studies.modes.modes import compute_modes
 from tests.reference.published import wscc9
 
 pytestmark = pytest.mark.reproduction

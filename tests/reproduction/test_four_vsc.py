@@ -7,8 +7,8 @@ import pytest
 
 import orchestrator as gfor
 from orchestrator.cases.case import BUILT_IN, load_case
-from orchestrator.study.modes import compute_modes
-from orchestrator.study.run import run_scenario
+from orchestrator.studies.modes.modes import compute_modes
+from orchestrator.studies.runs.run import run_scenario
 from tests.reference.four_vsc import BUSES, HVDC1, HVDC2, WP1, WP2, FourVsc, emtp, report, with_all
 from tests.support.tables import figures
 

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.analysis.linearization import Blocks, compose
-from orchestrator.analysis.modes import eigenvalues
 from orchestrator.cases.case import load_case
-from orchestrator.coupling.master import Master
-from orchestrator.coupling.schedule import jacobi
-from orchestrator.study.modes import compute_modes
-from orchestrator.study.run import run_scenario
+from orchestrator.linear.models.linearization import Blocks, compose
+from orchestrator.linear.spectra.modes import eigenvalues
+from orchestrator.studies.modes.modes import compute_modes
+from orchestrator.studies.runs.run import run_scenario
+from orchestrator.systems.coupling.master import Master
+from orchestrator.systems.coupling.schedule import jacobi
 
 pytestmark = pytest.mark.reproduction
 

@@ -9,8 +9,8 @@ import pytest
 from pandapower import networks
 
 from orchestrator.cases.case import load_case
-from orchestrator.study.modes import compute_modes
-from orchestrator.study.run import run_scenario
+from orchestrator.studies.modes.modes import compute_modes
+from orchestrator.studies.runs.run import run_scenario
 
 pytestmark = pytest.mark.reproduction
 

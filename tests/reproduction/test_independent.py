@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.analysis.linearization import Blocks, continuous
-from orchestrator.analysis.modes import eigenvalues, find_spectrum
 from orchestrator.cases.case import load_case
-from orchestrator.study.modes import compute_modes, running
+from orchestrator.linear.models.linearization import Blocks, continuous
+from orchestrator.linear.spectra.modes import eigenvalues, find_spectrum
+from orchestrator.studies.modes.modes import compute_modes, running
 from tests.reference.__main__ import REACTANCES, contents, figures, grid_code_rows, two_area_rows
 from tests.reference.grid_forming import GFOR
 from tests.reference.synchronous_machine import PSS2A, SG1, SG2

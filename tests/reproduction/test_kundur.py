@@ -8,7 +8,7 @@ import pytest
 from fmus.synchronous_generator.conversion import AxisData, exact
 from fmus.toolchain.symbols import Expr
 from orchestrator.cases.case import BUILT_IN, load_case
-from orchestrator.study.modes import compute_modes
+from orchestrator.studies.modes.modes import compute_modes
 from tests.reference.multi_machine import hertz_and_percent
 from tests.reference.published import KUNDUR_EXCITERS, kundur
 from tests.support.tables import figures

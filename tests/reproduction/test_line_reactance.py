@@ -6,7 +6,7 @@ The least damped swing of a scenario is the mode with the least damping in which
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.study.modes import compute_modes
+from orchestrator.studies.modes.modes import compute_modes
 
 pytestmark = [pytest.mark.reproduction, pytest.mark.slow]
 

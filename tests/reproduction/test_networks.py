@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import root
 
 from orchestrator.cases.case import load_case
-from orchestrator.study.modes import compute_modes
+from orchestrator.studies.modes.modes import compute_modes
 from tests.support.tables import figures
 
 pytestmark = pytest.mark.reproduction

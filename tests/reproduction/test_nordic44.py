@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cases.case import BUILT_IN, load_case
-from orchestrator.study.modes import compute_modes
+from orchestrator.studies.modes.modes import compute_modes
 from tests.reference.multi_machine import hertz_and_percent
 from tests.reference.nordic44 import Nordic44
 from tests.support.tables import figures

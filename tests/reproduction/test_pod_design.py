@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from orchestrator.analysis.modes import damping_ratio
 from orchestrator.cases.case import load_case
-from orchestrator.coordinated_design.one_point import design_controller
-from orchestrator.errors import InputError
-from orchestrator.pod_design.closed_loop import PodLoop, PodSetting
-from orchestrator.pod_design.design import DesignRequest
-from orchestrator.pod_design.lead_lag import angle_deg
-from orchestrator.study.modes import compute_modes, running
+from orchestrator.core.errors import InputError
+from orchestrator.linear.spectra.modes import damping_ratio
+from orchestrator.studies.coordinated_design.one_point import design_controller
+from orchestrator.studies.modes.modes import compute_modes, running
+from orchestrator.studies.pod_design.closed_loop import PodLoop, PodSetting
+from orchestrator.studies.pod_design.design import DesignRequest
+from orchestrator.studies.pod_design.lead_lag import angle_deg
 
 pytestmark = pytest.mark.reproduction
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from orchestrator.cases.case import BUILT_IN, load_case
-from orchestrator.study.modes import compute_modes
-from orchestrator.study.run import run_scenario
+from orchestrator.studies.modes.modes import compute_modes
+from orchestrator.studies.runs.run import run_scenario
 from tests.reference.multi_machine import hertz_and_percent
 from tests.reference.rotor_circuits import Axis, classical_data, of_short_circuit_data
 from tests.reference.short_circuit import ShortCircuit, rms_micro

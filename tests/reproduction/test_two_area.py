@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.analysis.modes import find_modes
 from orchestrator.cases.case import load_case
-from orchestrator.study.modes import compute_modes
-from orchestrator.study.run import run_scenario
+from orchestrator.linear.spectra.modes import find_modes
+from orchestrator.studies.modes.modes import compute_modes
+from orchestrator.studies.runs.run import run_scenario
 from tests.support.exact import exact_continuous
 
 pytestmark = [pytest.mark.reproduction, pytest.mark.quick]

@@ -6,15 +6,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from orchestrator.analysis.linearization import Blocks, compose, continuous
 from orchestrator.cases.case import load_case
-from orchestrator.coupling.schedule import jacobi
-from orchestrator.coupling.step_awareness import other_step
-from orchestrator.errors import InputError
-from orchestrator.study.linear import linear_model
-from orchestrator.study.linear_model_files import component_model
-from orchestrator.study.modes import compute_modes, running
-from orchestrator.study.run import run_scenario
+from orchestrator.core.errors import InputError
+from orchestrator.linear.models.linearization import Blocks, compose, continuous
+from orchestrator.studies.modes.linear import linear_model
+from orchestrator.studies.modes.linear_model_files import component_model
+from orchestrator.studies.modes.modes import compute_modes, running
+from orchestrator.studies.runs.run import run_scenario
+from orchestrator.systems.coupling.schedule import jacobi
+from orchestrator.systems.coupling.step_awareness import other_step
 from tests.support.exact import exact_continuous
 
 pytestmark = pytest.mark.reproduction

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cases.case import BUILT_IN, load_case
-from orchestrator.study.modes import compute_modes
+from orchestrator.studies.modes.modes import compute_modes
 from tests.reference.multi_machine import hertz_and_percent
 from tests.reference.published import quadratic, with_subtransients, wscc9
 from tests.support.tables import figures

@@ -1,6 +1,6 @@
 """Records whose source is known: a case's linear model, forced at any reference, with noise of loads and of measuring.
 
-The model is kept with its slow eigenvalues alone (tests/oscillations/models); `python -m tests.benchmarks.sources
+The model is kept with its slow eigenvalues alone (tests/studies/oscillations/models); `python -m tests.benchmarks.sources
 --models` makes them anew.
 """
 
@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 import orchestrator as gfor
-from orchestrator.oscillations.measurements import Site, made_ready
-from orchestrator.oscillations.models import UnitModel, UnitModels
+from orchestrator.studies.oscillations.measurements import Site, made_ready
+from orchestrator.studies.oscillations.models import UnitModel, UnitModels
 
 MODELS = Path(__file__).parents[1] / "oscillations" / "models"
 FASTEST = 80.0

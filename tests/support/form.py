@@ -43,7 +43,7 @@ class SourceFile:
 
     @property
     def room(self) -> str:
-        """The package and its folder, such as ``orchestrator/sweep``."""
+        """The package and its folder, such as ``orchestrator/studies/sweep``."""
         parts = self.path.relative_to(ROOT).parts
         return "/".join(parts[: min(2, len(parts) - 1)])
 

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from orchestrator.cases import infinite_bus
-from tests.acceptance.gallery.build import build
-from tests.acceptance.gallery.members import converter
+from tests.devices.acceptance.gallery.build import build
+from tests.devices.acceptance.gallery.members import converter
 
 RATING, V_N = 1500.0, 20.0
 """[MVA], and [kV] line to line."""

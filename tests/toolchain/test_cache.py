@@ -11,7 +11,7 @@ import pytest
 
 from fmus.toolchain.cache import CacheError, intact, keep
 from fmus.toolchain.compiler import compile_library, host_platform
-from orchestrator.fmi.instance import is_ours
+from orchestrator.devices.fmi.instance import is_ours
 
 ROOT = Path(__file__).parents[2]
 SOURCE = '__attribute__((visibility("default"))) int number(void) { return 7; }\n'
@@ -63,7 +63,7 @@ def test_a_damaged_library_is_compiled_again(own_cache, damage, caplog):
 def gfor_in(folder, *arguments):
     """`gfor` in a process of its own: there nothing is known to be intact yet."""
     environment = {**os.environ, "GFOR_COSIM_CACHE": str(folder)}
-    command = [sys.executable, "-m", "orchestrator.cli", *arguments]
+    command = [sys.executable, "-m", "orchestrator.face.cli", *arguments]
     return subprocess.run(
         command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False
     )

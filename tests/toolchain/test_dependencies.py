@@ -11,7 +11,7 @@ from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.dependencies import structure, unlisted
 from fmus.toolchain.description import model_description
 from fmus.toolchain.symbols import symbols_in
-from orchestrator.fmi.description import parse_description
+from orchestrator.devices.fmi.description import parse_description
 
 
 def _chain(buses):

@@ -52,7 +52,7 @@ import sys
 for library in {libraries}:
     sys.modules[library] = None
 from pathlib import Path
-from orchestrator.cli import COMMANDS, main, module_of
+from orchestrator.face.cli import COMMANDS, main, module_of
 for name in COMMANDS:
     module_of(name)
 sys.exit(main({arguments}))

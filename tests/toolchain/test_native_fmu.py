@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.exporter import cached, export
 from fmus.toolchain.native_fmu import NativeFmu
-from orchestrator.errors import ComponentError
-from orchestrator.fmi.description import read_description
-from orchestrator.fmi.loaded import LoadedComponent
+from orchestrator.core.errors import ComponentError
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.fmi.loaded import LoadedComponent
 from tests.support.host import DISCARD, ERROR, GENERATOR, OK, H, running
 
 MODELS = [name for name in model_names() if not needs_arguments(name)]

@@ -13,9 +13,9 @@ from fmus.toolchain import native_fmu
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.exporter import export
 from fmus.toolchain.native_fmu import NativeFmu
-from orchestrator.errors import ComponentError
-from orchestrator.fmi.description import read_description
-from orchestrator.fmi.loaded import LoadedComponent
+from orchestrator.core.errors import ComponentError
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.fmi.loaded import LoadedComponent
 from tests.support.host import OK, Host
 from tests.toolchain.test_native_fmi3 import Host3
 

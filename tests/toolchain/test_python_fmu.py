@@ -17,9 +17,9 @@ from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.exporter import cached, export
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.python_fmu import PythonFmu
-from orchestrator.fmi.component import RealBatch
-from orchestrator.fmi.description import read_description
-from orchestrator.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.component import RealBatch
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.fmi.loaded import LoadedComponent
 
 NAMES = [name for name in model_names() if not needs_arguments(name)]
 STEP = 1e-4

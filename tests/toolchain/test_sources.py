@@ -14,7 +14,7 @@ from fmus.toolchain.archive import write_archive
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.exporter import export
 from fmus.toolchain.native_fmu import NativeFmu
-from orchestrator.cli import main
+from orchestrator.face.cli import main
 
 pytestmark = pytest.mark.slow
 

@@ -17,10 +17,10 @@ from fmus.toolchain.python_fmu import PythonFmu
 from fmus.toolchain.symbols import if_else
 from fmus.toolchain.tape import tape_of
 from fmus.toolchain.tape_kernel import Kernel
-from orchestrator.errors import ComponentError
-from orchestrator.fmi.component import RealBatch
-from orchestrator.fmi.description import read_description
-from orchestrator.fmi.loaded import LoadedComponent
+from orchestrator.core.errors import ComponentError
+from orchestrator.devices.fmi.component import RealBatch
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.fmi.loaded import LoadedComponent
 from tests.support.kernels import KERNELS, compiled, tape_library, taped, vector
 from tests.support.written_out import written_out
 

@@ -188,7 +188,7 @@ def test_files_that_nobody_finished_go(tmp_path):
 _SWEEP = """
 import os, sys, tempfile
 tempfile.tempdir = sys.argv[1]
-from orchestrator.points.processes import Processes
+from orchestrator.studies.points.processes import Processes
 
 if __name__ == "__main__":
     executor = Processes(1)

@@ -7,10 +7,10 @@ import pytest
 from scipy.linalg import eigvals
 from scipy.optimize import approx_fprime
 
-from orchestrator.analysis.blocks import Blocks
-from orchestrator.analysis.modes import eigenvalues
-from orchestrator.analysis.periodic import model_of
-from orchestrator.analysis.steady_state import find_operating_point
+from orchestrator.linear.models.blocks import Blocks
+from orchestrator.linear.models.periodic import model_of
+from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.linear.spectra.modes import eigenvalues
 from tests.support.vendor_dlls import droop_device
 from tests.vendor_dll.test_device import LAG, P_0, Q_0, W_B, device_master, swing
 

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 
 import orchestrator as gfor
-from orchestrator.analysis.blocks import Blocks
-from orchestrator.analysis.linearization import compose
-from orchestrator.analysis.modes import eigenvalues
-from orchestrator.analysis.periodic import model_of
-from orchestrator.analysis.sampled import steps_of_period
-from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import load_case
-from orchestrator.coupling.master import Master
-from orchestrator.coupling.schedule import gauss_seidel
-from orchestrator.coupling.system import System
-from orchestrator.errors import AnalysisError, ComponentError, InputError
-from orchestrator.fmi.description import read_description
-from orchestrator.fmi.instance import is_ours
-from orchestrator.fmi.vendor_files import as_fmu
+from orchestrator.core.errors import AnalysisError, ComponentError, InputError
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.fmi.instance import is_ours
+from orchestrator.devices.fmi.vendor_files import as_fmu
+from orchestrator.linear.models.blocks import Blocks
+from orchestrator.linear.models.linearization import compose
+from orchestrator.linear.models.periodic import model_of
+from orchestrator.linear.models.sampled import steps_of_period
+from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.linear.spectra.modes import eigenvalues
+from orchestrator.systems.coupling.master import Master
+from orchestrator.systems.coupling.schedule import gauss_seidel
+from orchestrator.systems.coupling.system import System
 from tests.support.vendor_dlls import compiled, droop_device, lag
 
 W_B = 2 * np.pi * 50

@@ -3,7 +3,7 @@
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.study.modes import compute_modes
+from orchestrator.studies.modes.modes import compute_modes
 from tests.support.vendor_dlls import INTERFACE, compiled
 
 EXCITER = (

@@ -8,13 +8,13 @@ import pytest
 from fmus.vendor_dll import fmu as dll_module
 from fmus.vendor_dll.fmu import DllError, dll_fmu, read_dll
 from fmus.vendor_dll.interface import DllParameter, Signal, layout
-from orchestrator.analysis.component_linearization import linearize_component
-from orchestrator.cli import main
-from orchestrator.coupling.turns import Exchange
-from orchestrator.errors import ComponentError
-from orchestrator.fmi.component import RealBatch
-from orchestrator.fmi.description import read_description
-from orchestrator.fmi.loaded import LoadedComponent
+from orchestrator.core.errors import ComponentError
+from orchestrator.devices.fmi.component import RealBatch
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.face.cli import main
+from orchestrator.linear.models.component_linearization import linearize_component
+from orchestrator.systems.coupling.turns import Exchange
 from tests.support.vendor_dlls import CALLS, INTERFACE, compiled, lag
 
 

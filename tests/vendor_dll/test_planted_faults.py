@@ -3,12 +3,12 @@
 import pytest
 
 from fmus.vendor_dll.fmu import read_dll
-from orchestrator.acceptance.runner import check_fmu
-from orchestrator.errors import CosimError, InputError
-from orchestrator.fmi.description import read_description
-from orchestrator.fmi.instance import open_component
-from orchestrator.fmi.limits import Limits
-from orchestrator.fmi.vendor_files import as_fmu
+from orchestrator.core.errors import CosimError, InputError
+from orchestrator.devices.acceptance.runner import check_fmu
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.fmi.instance import open_component
+from orchestrator.devices.fmi.limits import Limits
+from orchestrator.devices.fmi.vendor_files import as_fmu
 from tests.support.vendor_dlls import CALLS, INTERFACE, compiled, lag
 
 LATE = "if (s->time > 0.005) "

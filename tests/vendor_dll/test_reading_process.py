@@ -10,9 +10,9 @@ from fmus.vendor_dll import fmu as dll_module
 from fmus.vendor_dll.fmu import DllError, read_dll
 from fmus.vendor_dll.interface import DllInterface
 from fmus.vendor_dll.state_trial import Trial
-from orchestrator.fmi import vendor_files
-from orchestrator.fmi.description import read_description
-from orchestrator.fmi.vendor_files import as_fmu
+from orchestrator.devices.fmi import vendor_files
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.fmi.vendor_files import as_fmu
 from tests.support.vendor_dlls import compiled, lag
 
 SLOW = lag(begin="usleep(1500000);", head="\n#include <unistd.h>\n")

@@ -6,9 +6,9 @@ import json
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.certification import kinds
-from orchestrator.cli import main
-from orchestrator.study.modes import compute_modes
+from orchestrator.face.cli import main
+from orchestrator.studies.certification import kinds
+from orchestrator.studies.modes.modes import compute_modes
 from tests.support.vendor_dlls import droop_device
 from tests.vendor_dll.test_device import swing
 

@@ -4,13 +4,13 @@ import fmpy
 import pytest
 
 import orchestrator as gfor
-from orchestrator.api.dll import build_from_dll
-from orchestrator.coupling.master import Master
-from orchestrator.coupling.schedule import gauss_seidel
-from orchestrator.coupling.system import System
-from orchestrator.errors import ComponentError, InputError
-from orchestrator.fmi.description import read_description
-from orchestrator.fmi.vendor_files import as_fmu
+from orchestrator.core.errors import ComponentError, InputError
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.fmi.vendor_files import as_fmu
+from orchestrator.face.api.dll import build_from_dll
+from orchestrator.systems.coupling.master import Master
+from orchestrator.systems.coupling.schedule import gauss_seidel
+from orchestrator.systems.coupling.system import System
 from tests.support.vendor_dlls import INFO, INTERFACE, compiled
 
 SIGNALS = """

@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 
 from fmus.vendor_dll.fmu import DllError, read_dll
-from orchestrator.analysis.blocks import Blocks
-from orchestrator.analysis.modes import eigenvalues
-from orchestrator.analysis.periodic import model_of
-from orchestrator.analysis.steady_state import find_operating_point
-from orchestrator.api.fmu import info
-from orchestrator.errors import ComponentError, InputError
-from orchestrator.fmi import wine
-from orchestrator.fmi.description import read_description
-from orchestrator.fmi.instance import open_component
-from orchestrator.fmi.isolation import IsolatedComponent
-from orchestrator.fmi.limits import Limits
-from orchestrator.fmi.vendor_files import READER, foreign_platforms
+from orchestrator.core.errors import ComponentError, InputError
+from orchestrator.devices.fmi import wine
+from orchestrator.devices.fmi.description import read_description
+from orchestrator.devices.fmi.instance import open_component
+from orchestrator.devices.fmi.isolation import IsolatedComponent
+from orchestrator.devices.fmi.limits import Limits
+from orchestrator.devices.fmi.vendor_files import READER, foreign_platforms
+from orchestrator.face.api.fmu import info
+from orchestrator.linear.models.blocks import Blocks
+from orchestrator.linear.models.periodic import model_of
+from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.linear.spectra.modes import eigenvalues
 from tests.support.vendor_dlls import compiled, droop_device, lag
 from tests.vendor_dll.test_device import device_master, swing
 

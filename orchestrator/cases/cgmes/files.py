@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from fmus.toolchain.extras import require
-from orchestrator.errors import InputError, few
-from orchestrator.foreign_files import read_bytes
+from orchestrator.core.errors import InputError, few
+from orchestrator.core.foreign_files import read_bytes
 
 # of all profiles together, unpacked: twenty times a national grid of 10,000 buses
 MOST_BYTES = 2_000_000_000

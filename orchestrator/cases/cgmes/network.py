@@ -24,7 +24,7 @@ from orchestrator.cases.cgmes.files import load_cgmes, profiles_of
 from orchestrator.cases.cgmes.reference import Reference, dynamics_of, reference_of
 from orchestrator.cases.network_sources import SourceTables
 from orchestrator.cases.source_changes import Changes
-from orchestrator.errors import InputError, Problem, few
+from orchestrator.core.errors import InputError, Problem, few
 
 _TABLES = {
     "static var compensator": "get_static_var_compensators",

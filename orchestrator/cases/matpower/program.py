@@ -14,8 +14,8 @@ import numpy as np
 
 from orchestrator.cases.matpower.expressions import UnknownError, Value, indices_of, value_of
 from orchestrator.cases.matpower.statements import Statement, UnendedError, statements
-from orchestrator.errors import InputError
-from orchestrator.foreign_files import read_text, visible
+from orchestrator.core.errors import InputError
+from orchestrator.core.foreign_files import read_text, visible
 
 READ = ("baseMVA", "bus", "branch", "gen")
 """Fields of a case that gfor reads."""

@@ -20,7 +20,7 @@ from orchestrator.cases.flow_newton import solve, solve_from
 from orchestrator.cases.imported_flow import flow_lines, imported_equations
 from orchestrator.cases.network_import import ImportedNetwork
 from orchestrator.cases.psse.devices import DeviceEnd, HeldDevice
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 _ROUNDS = 100
 _ACCURATE = 1e-7  # change of a power between two rounds [pu, 100 MVA] at the end

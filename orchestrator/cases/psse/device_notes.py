@@ -3,7 +3,7 @@
 from orchestrator.cases.psse.device_flow import SolvedDevices
 from orchestrator.cases.schema import NetworkTable
 from orchestrator.cases.source_changes import Changes
-from orchestrator.errors import Problem, counted, few
+from orchestrator.core.errors import Problem, counted, few
 
 _SHOWN = (
     3  # devices of a kind whose powers a question tells; the records (--details) have the others

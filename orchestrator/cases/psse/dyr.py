@@ -19,7 +19,7 @@ from orchestrator.cases.psse.missing_models import (
 )
 from orchestrator.cases.psse.raw import Machine
 from orchestrator.cases.record_use import RecordUse, UseOfRecord
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 _KNOWN = DYR_RECORDS | REGFM_A1_RECORDS | STATIC_VAR_RECORDS
 _COUPLED = {record.part for record in REGFM_A1_RECORDS.values()}

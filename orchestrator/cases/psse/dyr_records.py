@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fmus.synchronous_generator.dyr_fields import DyrField
-from orchestrator.errors import InputError
-from orchestrator.foreign_files import read_text, visible
-from orchestrator.units import LARGEST
+from orchestrator.core.errors import InputError
+from orchestrator.core.foreign_files import read_text, visible
+from orchestrator.core.units import LARGEST
 
 MOST_BYTES = 100_000_000  # of a file
 _TOKEN = re.compile(r"""(?P<quoted>'[^']*'|"[^"]*")|(?P<plain>[^\s,'"/]+)|(?P<slash>/)|,""")

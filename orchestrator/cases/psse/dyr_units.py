@@ -13,7 +13,7 @@ from orchestrator.cases.psse.dyr import COMPENSATION, MANUAL, machine_models
 from orchestrator.cases.psse.dyr_records import DynamicRecord
 from orchestrator.cases.psse.raw import Machine
 from orchestrator.cases.unit_row import UnitRow, checked
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 _WITHOUT = {"exciter": MANUAL, "governor": "constant_power", "stabilizer": "none"}
 """What PSS/E assumes where there is no record."""

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from orchestrator.cases.psse.devices import DeviceEnd, HeldDevice, Voltages
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 ABSENT = 999.0  # value of a resistance or a reactance that is not given
 # of machines whose record names a standard design instead of a circuit; the four machines of design B in the solved

@@ -7,7 +7,7 @@ import numpy as np
 
 from orchestrator.cases.psse.bridges import Bridges
 from orchestrator.cases.psse.devices import DeviceEnd, HeldDevice, Voltages
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 CURRENT = 2  # MDC
 _ROUNDS = 500

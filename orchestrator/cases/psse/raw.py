@@ -26,7 +26,7 @@ from orchestrator.cases.psse.transformers import Transformer, star, transformers
 from orchestrator.cases.psse.zero_impedances import merged_buses, threshold
 from orchestrator.cases.record_use import RecordUse
 from orchestrator.cases.source_changes import Changes
-from orchestrator.errors import Problem
+from orchestrator.core.errors import Problem
 
 _BUS_COLUMNS, _BRANCH_COLUMNS, _GEN_COLUMNS = 13, 11, 10
 _VM, _VA = 7, 8  # columns of the table of buses

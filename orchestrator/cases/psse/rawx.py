@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.psse.records import RawFile, Record
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 REVISION = 35  # whose records the tables are put into; RAWX began with it
 _RATINGS = 12  # of a branch or a winding

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from orchestrator.cases.psse.titles import section_of
 from orchestrator.cases.source_changes import Changes
-from orchestrator.errors import InputError
-from orchestrator.foreign_files import read_bytes, visible
-from orchestrator.units import LARGEST
+from orchestrator.core.errors import InputError
+from orchestrator.core.foreign_files import read_bytes, visible
+from orchestrator.core.units import LARGEST
 
 REVISIONS = tuple(range(29, 37))  # revisions whose records are known
 NODES = 35  # first revision with nodes in the records of machines, switched shunts and converters

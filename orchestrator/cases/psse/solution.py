@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
-from orchestrator.arrays import Matrix
+from orchestrator.core.arrays import Matrix
 
 _LEAST = 1.0  # reactive power that rounded voltages and a loose tolerance may leave at a bus [Mvar]
 _PART = 0.02  # part of a bus' reactive power that they may leave

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from orchestrator.cases.psse.bridges import Bridges
 from orchestrator.cases.psse.devices import DeviceEnd, HeldDevice, Voltages
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 _CURRENT = 2  # MDC of a line that holds its current
 _ROUNDS = 500

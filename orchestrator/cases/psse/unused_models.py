@@ -6,7 +6,7 @@ from orchestrator.cases.psse.dyr_records import DynamicRecord
 from orchestrator.cases.psse.missing_models import kind_of
 from orchestrator.cases.record_use import RecordUse, UseOfRecord
 from orchestrator.cases.source_changes import Changes
-from orchestrator.errors import Problem, few
+from orchestrator.core.errors import Problem, few
 
 _MATTER = {
     "load": "loads follow [network] load_model",

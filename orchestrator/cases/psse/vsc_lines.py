@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from orchestrator.cases.psse.devices import DeviceEnd, HeldDevice, Hold, Voltages
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 # TYPE: out of service, holds the DC voltage, or sets a power
 OUT = 0

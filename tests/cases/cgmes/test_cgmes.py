@@ -16,7 +16,7 @@ from orchestrator.cases.cgmes.network import convert, read_cgmes
 from orchestrator.cases.network_data import network_data
 from orchestrator.cases.network_import import import_network
 from orchestrator.cases.schema import NetworkTable
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 from tests.cases.psse.test_raw import pandapowers
 from tests.cases.test_network_sources import solved
 

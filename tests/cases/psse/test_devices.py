@@ -10,7 +10,7 @@ from scipy.optimize import fsolve
 from orchestrator.cases.network_data import network_data
 from orchestrator.cases.record_use import UseOfRecord
 from orchestrator.cases.schema import NetworkTable
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 from tests.cases.psse import BUSES, LINES, LOADS, MACHINES, TRANSFORMERS, raw, records
 from tests.cases.psse.test_dialects import old
 from tests.cases.psse.test_rawx import network, table

@@ -7,7 +7,7 @@ import pytest
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
 from orchestrator.cases.case import load_case
 from orchestrator.cases.psse.dyr_records import read_dyr
-from orchestrator.errors import CaseError, InputError
+from orchestrator.core.errors import CaseError, InputError
 from tests.cases.psse import raw, records
 
 DYR = """\

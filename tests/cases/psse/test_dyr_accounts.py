@@ -14,7 +14,7 @@ from orchestrator.cases.psse.raw import Machine
 from orchestrator.cases.psse.unused_models import unused_models
 from orchestrator.cases.record_use import UseOfRecord, in_one_line
 from orchestrator.cases.unit_row import UnitRow
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 
 MACHINES = [
     Machine(bus, "1 ", 10 + bus, 100.0 * bus, 1.0, 500.0, 0.2j, -99.0, 99.0) for bus in (1, 2, 3)

@@ -7,7 +7,7 @@ import pytest
 from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
 from fmus.toolchain.catalogue import build_model
 from orchestrator.cases.case import load_case
-from orchestrator.errors import CaseError
+from orchestrator.core.errors import CaseError
 from tests.cases.psse import raw, records
 from tests.cases.psse.test_dyr import CASE, DYR
 

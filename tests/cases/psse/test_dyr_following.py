@@ -8,7 +8,7 @@ import pytest
 from fmus.grid_following.dyr_fields import FIELDS, MODEL, approximation
 from fmus.toolchain.catalogue import build_model
 from orchestrator.cases.case import load_case
-from orchestrator.errors import CaseError
+from orchestrator.core.errors import CaseError
 from tests.cases.psse import raw
 from tests.cases.psse.test_dyr import DYR
 from tests.cases.psse.test_dyr_converters import PHASORS

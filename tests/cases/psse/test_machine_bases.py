@@ -6,9 +6,9 @@ import pytest
 from orchestrator.cases.case import load_case
 from orchestrator.cases.flow_figures import power_flow_json
 from orchestrator.cases.new_case import WantedCase, write_case
-from orchestrator.errors import CaseError
-from orchestrator.report.power_flow import cells
-from orchestrator.study.modes import compute_modes
+from orchestrator.core.errors import CaseError
+from orchestrator.output.report.power_flow import cells
+from orchestrator.studies.modes.modes import compute_modes
 
 RAW = """\
 0, 100.0, 33, 0, 1, 60.0 / two machines, a tie

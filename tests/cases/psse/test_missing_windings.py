@@ -4,8 +4,8 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.new_case import WantedCase, write_case
-from orchestrator.errors import CaseError
-from orchestrator.study.modes import compute_modes
+from orchestrator.core.errors import CaseError
+from orchestrator.studies.modes.modes import compute_modes
 from tests.cases.psse.test_machine_bases import dynamics, network
 
 WITHOUT = "3 'GENSAL' 1 8.0 {fast} 0.05 5.0 0.0 1.8 1.7 0.3 {X2} {X_l} 0.03 0.2 /\n"

@@ -11,7 +11,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.cases.network_data import misfit_of
 from orchestrator.cases.network_import import import_network
 from orchestrator.cases.network_sources import read_pandapower
-from orchestrator.errors import CaseError
+from orchestrator.core.errors import CaseError
 
 FILES = Path(__file__).parents[3] / ".docs" / "tutorials" / "psse"
 RAW, DYR = ((FILES / name).read_text() for name in ("areas.raw", "areas.dyr"))

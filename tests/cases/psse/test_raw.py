@@ -12,7 +12,7 @@ from pandapower import networks
 from orchestrator.cases.network_data import network_data
 from orchestrator.cases.psse.raw import read_raw
 from orchestrator.cases.schema import NetworkTable
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 from tests.cases.psse import BUSES, LINES, LOADS, MACHINES, TRANSFORMERS, raw, records
 from tests.cases.test_network_sources import solved
 

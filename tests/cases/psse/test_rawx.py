@@ -7,7 +7,7 @@ import pytest
 
 from fmus.grid.element_data import SMALLEST_REACTANCE
 from orchestrator.cases.psse.raw import read_raw
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 from tests.cases.psse import BUSES, LINES, LOADS, MACHINES, REACTANCES, TRANSFORMERS, raw, records
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from orchestrator.cases.psse.raw import read_raw
-from orchestrator.errors import InputError
+from orchestrator.core.errors import InputError
 from tests.cases.psse import raw
 
 

@@ -1,1 +1,0 @@
-"""Analysis of a coupled system: operating point, linear model by perturbation, modes, identification."""

@@ -1,0 +1,1 @@
+"""Foundations of every floor above: errors, units, arrays, options, files."""

@@ -1,0 +1,27 @@
+"""Results whose truth value would be taken for their verdict: ``if modes:`` is true of any object, also of an unstable
+system's."""
+
+from typing import ClassVar, NoReturn
+
+from orchestrator.core.errors import InputError
+
+
+class NoTruthError(InputError, TypeError):
+    """A result was taken for true or false."""
+
+
+class NoTruth:
+    """Refuses to be true or false; ``ask`` says what has the verdict, such as ``.stable``."""
+
+    ask: ClassVar[str] = ".stable, which is True, False, or None where it is not known"
+
+    def __init_subclass__(cls, ask: str = "") -> None:
+        super().__init_subclass__()
+        if ask:
+            cls.ask = ask
+
+    def __bool__(self) -> NoReturn:
+        name = type(self).__name__
+        raise NoTruthError(
+            f"{name} is neither true nor false, as that could be mistaken for its verdict; ask {self.ask}"
+        )

@@ -1,0 +1,1 @@
+"""One FMU: how it runs, what its variables mean, whether it can be trusted."""

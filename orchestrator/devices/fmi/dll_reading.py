@@ -1,0 +1,52 @@
+"""The process that reads a vendor's DLL for `vendor_files`: closed off before the DLL is loaded.
+
+A DLL for Windows is loaded by a program under Wine."""
+
+import json
+import sys
+from pathlib import Path
+
+from fmus.vendor_dll.memory import LocalLibrary
+from fmus.vendor_dll.reading import answer_for, texts_in
+from orchestrator.core.errors import InputError
+from orchestrator.devices.fmi import wine
+from orchestrator.devices.fmi.confinement import LAYERS, Means, confine
+
+
+def _files(texts: dict[str, str] | None) -> list[Path]:
+    """Those that text parameters name, which it may read."""
+    return [
+        path for path in map(Path, (texts or {}).values()) if path.is_absolute() and path.is_file()
+    ]
+
+
+def _read(library: Path, answer: Path, texts: dict[str, str] | None) -> None:
+    confine(Means(), LAYERS, answer.parent, [library, *_files(texts)])
+    answer_for(lambda note: LocalLibrary(library, note), answer, texts)
+
+
+def _read_under_wine(library: Path, answer: Path, texts: dict[str, str] | None) -> None:
+    from orchestrator.devices.fmi.wine_program import WineLibrary, compile_programs  # noqa: PLC0415 - numpy, for others in vain
+
+    try:
+        programs = compile_programs()
+        confine(Means(), LAYERS, answer.parent, [library, *programs, *_files(texts)], windows=True)
+    except (wine.NoWineError, InputError) as error:
+        answer.write_text(json.dumps({"error": str(error)}), encoding="utf-8")
+        return
+    if texts is not None:
+        files = set(map(str, _files(texts)))
+        texts = {
+            n: f"Z:{text}".replace("/", "\\") if text in files else text
+            for n, text in texts.items()
+        }
+    answer_for(lambda note: WineLibrary(library, note), answer, texts)
+    wine.in_process[0].close()
+
+
+if __name__ == "__main__":
+    given, found = Path(sys.argv[1]), Path(sys.argv[2])
+    read = (
+        _read_under_wine if sys.platform == "linux" and given.read_bytes()[:2] == b"MZ" else _read
+    )
+    read(given, found, texts_in(sys.argv))

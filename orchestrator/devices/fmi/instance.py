@@ -1,0 +1,76 @@
+"""How an FMU is brought to life: in this process or in one of its own, behind a binding or not."""
+
+import filecmp
+from pathlib import Path
+
+from fmus.toolchain.cache import cache_directory, intact
+from orchestrator.devices.fmi.bound import BoundComponent, compiled_adapter
+from orchestrator.devices.fmi.component import Component
+from orchestrator.devices.fmi.description import FmuDescription, runs_under_wine
+from orchestrator.devices.fmi.fmi3 import adapter_path
+from orchestrator.devices.fmi.isolation import IsolatedComponent
+from orchestrator.devices.fmi.loaded import LoadedComponent
+from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.protection import Protection
+from orchestrator.devices.fmi.wine_program import compile_programs
+
+
+def is_ours(path: Path) -> bool:
+    """Return whether an FMU is one that this machine's own toolchain built, or a copy of it to the last byte.
+
+    What a file says of itself does not count, nor does its place: a built file that was changed since is a stranger."""
+    built = cache_directory("fmus")
+    if path.resolve().is_relative_to(built.resolve()):
+        return intact(path)
+    size = path.stat().st_size
+    return any(
+        file.stat().st_size == size and filecmp.cmp(path, file, shallow=False) and intact(file)
+        for file in built.glob("*/*.fmu")
+    )
+
+
+def compile_adapters(description: FmuDescription) -> None:
+    """Compile what an FMU runs behind, or find it compiled: a process with limits does not see the cache."""
+    if isinstance(description, BoundDescription):
+        compiled_adapter()
+        description = description.inner
+    if description.fmi_version == "3.0":
+        adapter_path()
+    if runs_under_wine(description):
+        compile_programs()
+
+
+def is_isolated(description: FmuDescription, isolated: bool | None) -> bool:
+    """Return whether an FMU runs in a process of its own: as asked, else where it is not one of ours."""
+    if isolated is not None:
+        return isolated
+    native = description.inner if isinstance(description, BoundDescription) else description
+    return not is_ours(native.path)
+
+
+def open_component(
+    name: str,
+    description: FmuDescription,
+    directory: Path | None = None,
+    *,
+    isolated: bool | None = None,
+) -> Component:
+    """Instantiate an FMU; behind a `BoundDescription` it speaks our port.
+
+    ``directory``: where its archive is extracted; by default a new temporary folder of its own.
+    ``isolated``: whether it runs in a process of its own; by default all but our own FMUs do."""
+    compile_adapters(description)
+    if isinstance(description, BoundDescription):
+        return BoundComponent(
+            open_component(name, description.inner, directory, isolated=isolated), description
+        )
+    if is_isolated(description, isolated):
+        return IsolatedComponent(name, description, directory)
+    return LoadedComponent(name, description, directory, ours=is_ours(description.path))
+
+
+def protections_of(component: Component) -> tuple[Protection, ...]:
+    """Return what keeps a component's FMU from the rest of the machine; nothing where it runs in this process."""
+    if isinstance(component, BoundComponent):
+        return protections_of(component.inner)
+    return component.protections if isinstance(component, IsolatedComponent) else ()

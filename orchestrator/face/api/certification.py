@@ -1,0 +1,138 @@
+"""Certificates: a converter's FMU under a grid code, and whether a certificate still holds."""
+
+from collections.abc import Iterable
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+from orchestrator.core.asked import path as path_of
+from orchestrator.core.safe_files import made_folder
+from orchestrator.core.truth import NoTruth
+from orchestrator.face.api.methods import function
+from orchestrator.face.api.progress import shown_progress
+from orchestrator.output.results.lock import held
+from orchestrator.output.signatures.signing import check_key
+from orchestrator.studies.certification.acceptance import run_checks
+from orchestrator.studies.certification.compared import Verification
+from orchestrator.studies.certification.files import JSON, read_record, save, spare_another
+from orchestrator.studies.certification.inside import check_target, laid_out, put_inside
+from orchestrator.studies.certification.kinds import CertifyRequest, usual_folder
+from orchestrator.studies.certification.signed import sign_folder
+from orchestrator.studies.certification.verification import verified
+from orchestrator.studies.points.study import choose_executor
+
+
+class IssuedCertificate(NoTruth, ask=".verdict"):
+    """A certificate in its folder. `certify` makes it.
+
+    Attributes
+    ----------
+    folder
+        It holds the page, the figures, the responses and the FMU; `verify` takes it.
+    content
+        The figures, as ``certificate.json`` has them.
+    """
+
+    def __init__(self, folder: Path, content: dict[str, Any]) -> None:
+        self.folder, self.content = folder, content
+
+    @property
+    def verdict(self) -> str:
+        """``passes``, ``fails`` or ``incomplete``."""
+        return str(self.content["verdict"])
+
+    @property
+    def sentence(self) -> str:
+        """The verdict as a sentence, with what failed or was not tested."""
+        return str(self.content["sentence"])
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as ``gfor certify --json`` prints, as JSON's types."""
+        return self.content
+
+    def __repr__(self) -> str:
+        return f"<IssuedCertificate in {self.folder}: {self.verdict}>"
+
+
+def _certified(request: CertifyRequest) -> IssuedCertificate:
+    issue, file = request.issue(), Path(request.fmu)
+    target = None if request.into is None else Path(request.into)
+    if target is not None:
+        check_target(file, target)
+    if request.sign is not None:
+        check_key(Path(request.sign))
+    place = made_folder(Path(request.folder or usual_folder(file.stem, request.code)), "folder")
+    spare_another(place, request.code, issue.request.fmu, issue.request.binding)
+    with (
+        held(place),
+        shown_progress(f"Certificate, {request.code}", shown=request.progress) as report,
+    ):
+        with closing(
+            choose_executor(request.workers, None, [issue.parts.task.__module__])
+        ) as executor:
+            found = issue.compute(executor, place, report)
+        asked = issue.request
+        found.acceptance = run_checks(asked.fmu, asked.binding, place) if request.check else None
+        save(found, place)
+        if request.sign is not None:
+            sign_folder(place, read_record(place / JSON), Path(request.sign))
+    if target is not None:
+        put_inside(place, file, target)
+    return IssuedCertificate(place, read_record(place / JSON))
+
+
+certify = function("certify", "certification", CertifyRequest, _certified)
+
+
+def verify(
+    certificate: str | Path,
+    anew: Iterable[float | str] | None = None,
+    *,
+    every: bool = False,
+    workers: int | None = 1,
+) -> Verification:
+    """Return whether a certificate still holds: hashes, its judgement made again, and points or rows computed anew.
+
+    Parameters
+    ----------
+    certificate
+        Its folder, its ``certificate.json``, or an FMU with certificates in it, which are all verified.
+    anew
+        Line reactances [pu], or names of rows, that are computed anew; the least damped point, or the row with the
+        narrowest margin and one by chance, where None; none where empty.
+    every
+        Compute all of them anew.
+    workers
+        Processes; one for each core where None.
+
+    Returns
+    -------
+    Verification
+        ``holds``, with what agreed and what did not.
+
+    Raises
+    ------
+    InputError
+        If it is no certificate, or has no such point or row.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> gfor.verify("certificate", anew=()).holds  # doctest: +SKIP
+    True
+    >>> try:
+    ...     gfor.verify("nowhere")
+    ... except gfor.CosimError as error:
+    ...     print(type(error).__name__)
+    InputError
+    """
+    found, wanted = Verification(), None if anew is None else tuple(anew)
+    with laid_out(path_of(certificate, "certificate")) as places:
+        for place in places:
+            one = verified(
+                place, wanted, lambda imports: choose_executor(workers, None, imports), every=every
+            )
+            prefix = f"{place.name}: " if len(places) > 1 else ""
+            found.faults += [prefix + text for text in one.faults]
+            found.agreed += [prefix + text for text in one.agreed]
+    return found

@@ -1,0 +1,198 @@
+"""A device's model beside recordings of the plant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from orchestrator.cases.given import Time, binding_path, case_values, in_seconds, moment, plain
+from orchestrator.core.asked import names, number_in
+from orchestrator.core.asked import path as path_of
+from orchestrator.core.errors import InputError
+from orchestrator.devices.binding.binding import bound_fmu
+from orchestrator.devices.fmi.description import FmuDescription
+from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.face.api.identification import Recorded, opened
+from orchestrator.face.api.methods import in_turn
+from orchestrator.studies.black_box.port import start_of, values_for
+from orchestrator.studies.points.key import sha256_of
+from orchestrator.studies.validation.device import PlayedDevice
+from orchestrator.studies.validation.limits import read_limits
+from orchestrator.studies.validation.record import PortBases
+from orchestrator.studies.validation.study import GivenRecording, ValidationRequest, validate_device
+from orchestrator.studies.validation.transformer import read_impedance
+from orchestrator.studies.validation.view import Validation
+
+_FMUS = (".fmu", ".dll", ".so", ".dylib", ".toml")
+_RATED_HZ = 50.0  # of a device that says nothing
+
+
+@in_turn
+def validate(
+    device: str | Path,
+    recordings: Recorded | Sequence[Recorded],
+    *,
+    values: Mapping[str, Any] | None = None,
+    binding: str | Path | None = None,
+    component: str | None = None,
+    scenario: str | None = None,
+    channels: Sequence[str] = (),
+    place: str | None = None,
+    voltage: float | str | None = None,
+    transformer: str | None = None,
+    events: Sequence[tuple[Time, Time]] = (),
+    average: Time | None = None,
+    limits: str | Path | None = None,
+    start: Time | None = None,
+    stop: Time | None = None,
+    step: Time = 1e-4,
+    report: Callable[[str], None] = lambda text: None,
+) -> Validation:
+    """Let the recorded voltage drive a device, and compare its P and Q with the measured ones.
+
+    Parameters
+    ----------
+    device
+        An FMU, a DLL or the file of a device around one, the name of a model of ours, or a case with ``component``.
+    recordings
+        One or several: runs, datasets, DataFrames over the time [s], or files (CSV, Excel, COMTRADE).
+    values
+        Of the device, such as ``{"pod_p.enabled": True}``; of a case ``component.parameter``.
+    binding
+        File that says what the device's variables mean at our port.
+    component, scenario
+        Of a case.
+    channels
+        Which column is what, such as ``"p=-P_total in kW"``; others are found by their names.
+    place
+        Unit of a run, or the part of the names before the point.
+    voltage
+        Rated voltage between lines [kV], where the recording is in kV or V.
+    transformer
+        Between meter and port, such as ``"X 0.12"`` or ``"R 0.005 X 0.12"`` [pu of the rating].
+    events
+        Begin and end of the event [s], one for all recordings or one for each; found where none is given.
+    average
+        Time over which P and Q are averaged before they are compared [s]; a period by default, 0 for none.
+    limits
+        File of limits; without it there is no verdict.
+    start, stop
+        The part of each recording that is used [s].
+    step
+        Communication step [s].
+    report
+        Called with a sentence before each part of the work.
+
+    Raises
+    ------
+    InputError
+        If a file, channel, unit or value cannot be used.
+    ComponentError
+        If the device fails while it runs.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> run = gfor.load("two_area").scenario("pod_p").run(stop=3.0)
+    >>> found = gfor.validate("gfor", run, values={"pod_p.enabled": True}, place="gfor")
+    >>> [question["kind"] for question in found.as_json()["events"][0]["questions"]]
+    ['too good']
+    """
+    step_size = in_seconds(step, "step") or 1e-4
+    if component is not None:
+        found = _of_case(str(device), component, scenario, values, step_size)
+    else:
+        found = _alone(device, binding, values, step_size)
+    port = found.description.port if isinstance(found.description, BoundDescription) else None
+    kilovolt = port.V_n if port else None
+    if voltage is not None:
+        kilovolt = number_in(voltage, "kV", "voltage", "a voltage in kV, such as 230")
+    mean = None if average is None else moment(average, "average")
+    bases = PortBases(found.rating, found.rated_hz, kilovolt, read_impedance(transformer), mean)
+    given = [_read_given(one, k, start, stop) for k, one in enumerate(_as_list(recordings), 1)]
+    request = ValidationRequest(
+        found,
+        given,
+        bases,
+        channels=names(channels, "channels"),
+        place=place,
+        events=[_window(one) for one in events],
+        limits=None if limits is None else read_limits(path_of(limits, "limits")),
+    )
+    return Validation(validate_device(request, report))
+
+
+def _as_list(recordings: Any) -> list[Any]:
+    found = list(recordings) if isinstance(recordings, list | tuple) else [recordings]
+    if not found:
+        raise InputError("recordings = []; give at least one recording")
+    return found
+
+
+def _window(given: Any) -> tuple[float, float]:
+    if not isinstance(given, tuple | list) or len(given) != 2:
+        raise InputError(f"events: {given!r}; give begin and end of an event, such as (2.0, 2.15)")
+    return moment(given[0], "events"), moment(given[1], "events")
+
+
+def _read_given(one: Any, number: int, start: Time | None, stop: Time | None) -> GivenRecording:
+    dataset, label = opened(one, f"recording {number}")
+    low = None if start is None else moment(start, "start")
+    high = None if stop is None else moment(stop, "stop")
+    dataset = dataset.sel(time=slice(low, high))
+    if not dataset.sizes["time"]:
+        raise InputError(f"{label}: it has no sample between start and stop")
+    is_file = isinstance(one, str | Path) and Path(one).is_file()
+    return GivenRecording(dataset, label, sha256_of(Path(one)) if is_file else "")
+
+
+def _alone(
+    device: str | Path, binding: str | Path | None, values: Mapping[str, Any] | None, step: float
+) -> PlayedDevice:
+    path = path_of(device, "device")
+    of_ours = not path.exists() and path.suffix.lower() not in _FMUS
+    description = _of_ours(str(device)) if of_ours else bound_fmu(path, binding_path(binding))
+    own = values_for(description, plain(values))
+    rating = float(own.get("S_n", _declared(description, "S_n", 100.0)))
+    if isinstance(description, BoundDescription):
+        rated_hz = description.port.f_n
+    else:
+        rated_hz = float(own.get("f_n", _declared(description, "f_n", _RATED_HZ)))
+    return PlayedDevice(path.stem, description, own, rating, rated_hz, step)
+
+
+def _declared(description: FmuDescription, name: str, otherwise: float) -> float:
+    known = name in description.variables
+    return (start_of(description, name) or otherwise) if known else otherwise
+
+
+def _of_ours(name: str) -> FmuDescription:
+    """A model of ours, without Python in it where this machine can compile."""
+    from orchestrator.cases.catalogue_fmus import catalogue_fmu  # noqa: PLC0415 - likewise
+    from orchestrator.face.api.models import catalogue_model  # noqa: PLC0415 - builds models
+
+    catalogue_model(name)  # refuses what is none, or needs a network
+    return catalogue_fmu(name)
+
+
+def _of_case(
+    case: str, component: str, scenario: str | None, values: Mapping[str, Any] | None, step: float
+) -> PlayedDevice:
+    from orchestrator.face.api.case import load  # noqa: PLC0415 - an FMU needs no case
+
+    prepared = load(case).scenario(scenario, case_values(plain(values))).prepared
+    plans = prepared.system.components
+    if component not in plans:
+        raise InputError(
+            f"component = {component!r}: {case} has {', '.join(plans)}; give one of them"
+        )
+    plan = plans[component]
+    known = plan.description.variables
+    own = {k: v for k, v in plan.parameters.items() if k not in ("P_0", "Q_0", "v_0", "theta_0")}
+    rating = plan.number("S_n") if "S_n" in known else 100.0
+    rated_hz = plan.number("f_n") if "f_n" in known else _RATED_HZ
+    held = {k: float(v) for k, v in plan.inputs.items() if k not in ("v_re", "v_im")}
+    return PlayedDevice(
+        component, plan.description, own, rating, rated_hz, step_size=step, held=held
+    )

@@ -1,0 +1,211 @@
+"""``gfor design``: a POD controller by eigenvalue sensitivity."""
+
+import argparse
+from contextlib import suppress
+from pathlib import Path
+from shutil import rmtree
+
+from rich.markup import escape
+
+from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
+from orchestrator.core.errors import NOT_MET, CosimError, InputError
+from orchestrator.face.cli.arguments import (
+    add_executor_arguments,
+    add_options,
+    add_request_arguments,
+    option,
+)
+from orchestrator.face.cli.case_arguments import add_case_arguments, asked_of_case, case_of
+from orchestrator.face.cli.interrupted import saying_how_it_goes_on
+from orchestrator.face.cli.study import shown, working_in
+from orchestrator.face.cli.terminal import (
+    make_console,
+    print_json,
+    print_parts,
+    print_questions,
+    warn,
+)
+from orchestrator.face.cli.verdict import add_verdict_argument, exit_code, print_stability
+from orchestrator.output.results.origin import as_typed
+from orchestrator.studies.coordinated_design.command import STUDY
+from orchestrator.studies.coordinated_design.one_point import design_controller
+from orchestrator.studies.coordinated_design.study import ALL, PointsDesignRequest
+from orchestrator.studies.pod_design.design import DesignRequest
+from orchestrator.studies.pod_design.sheet import first_screen, sheet
+from orchestrator.studies.pod_design.view import parameter_file_path
+from orchestrator.studies.points.store import PointStore, any_kept
+
+
+def run_over_points(options: argparse.Namespace, path: Path) -> int:
+    several = {
+        "controllers": tuple(options.controller),
+        "components": tuple(options.component),
+        "modes": () if ALL in options.mode else tuple(options.mode),
+    }
+    with working_in(options, "design", STUDY, path.with_suffix(".points"), **several) as (
+        _,
+        compute,
+        folder,
+    ):
+        design = compute()
+        written = design.save(path, as_typed())
+    files = ", ".join(one.name for one in written[1:])
+    end = f"Parameter file {path}, beside it {files}; points are kept in {folder}"
+    return shown(options, STUDY, design, folder, written, end)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_case_arguments(parser, several=False)
+    parser.add_argument(
+        "--controller",
+        action="append",
+        required=True,
+        choices=DAMPING_CONTROLLERS,
+        help="the controller to design (with --points repeatable)",
+    )
+    add_options(parser, "design")
+    add_request_arguments(parser, DesignRequest)
+    add_options(parser, "design 2")
+    add_verdict_argument(parser)
+    option(
+        parser,
+        "--out",
+        "FILE.toml",
+        "parameter file (default: <case>_<controller>.toml, here)",
+        read=Path,
+    )
+    over_points = parser.add_argument_group("over operating points")
+    add_request_arguments(over_points, PointsDesignRequest)
+    add_executor_arguments(over_points)
+
+
+def run(options: argparse.Namespace) -> int:
+    if options.points is not None:
+        _check_over_points(options)
+        out = options.out and _writable(options.out)
+        return run_over_points(
+            options,
+            out
+            or Path(
+                f"{case_of(options).name}_{'_'.join(dict.fromkeys(options.controller))}_points.toml"
+            ),
+        )
+    _check_for_one_point(options)
+    case, console = case_of(options), make_console(stderr=options.json)
+    request = _request(options)
+    path = _writable(options.out or Path(f"{case.name}_{request.controller}.toml"))
+    folder = path.with_suffix(".points")
+    with saying_how_it_goes_on(lambda: _how_it_goes_on(folder)):
+        try:
+            with console.status("starting") as status:
+                store = PointStore(folder)
+                controller = design_controller(case, request, report=status.update, store=store)
+        except CosimError:
+            rmtree(folder, ignore_errors=True)  # the same would come out again
+            raise
+        design = controller.result
+        print_questions([design.prepared], as_json=options.json)
+        warn(design.prepared.name, design.warnings)
+        controller.save(path, as_typed())
+        rmtree(folder, ignore_errors=True)
+    ends = exit_code(options, [design.stability]) or (0 if design.met else NOT_MET)
+    if options.json:
+        print_json(controller.as_json(path))
+        return ends
+    print_parts(console, first_screen(design))
+    print_stability(
+        console,
+        {
+            "without the controller": design.stability_before,
+            "with the final setting": design.stability,
+        },
+    )
+    print_parts(console, sheet(design))
+    warned = "" if design.met else " (the requirement is not met)"
+    emt = (
+        "; EMT models may differ: add --set models=emt"
+        if design.prepared.case.table.models == "phasor"
+        else ""
+    )
+    console.print(
+        escape(
+            f"Parameter file {path}{warned}; use it with: gfor modes {options.case} --scenario "
+            f"{design.target.scenario} --parameters {path}{emt}"
+        ),
+        soft_wrap=True,
+        highlight=False,
+    )
+    return ends
+
+
+def _check_for_one_point(options: argparse.Namespace) -> None:
+    for name in ("controller", "component", "mode"):
+        times = len(getattr(options, name))
+        if times > 1:
+            raise InputError(
+                f"--{name} is given {times} times; only a design with --points takes several: give one"
+            )
+    for name in ("outages", "workers", "scheduler", "tls"):
+        if getattr(options, name) is not None:
+            raise InputError(
+                f"--{name} belongs to a design over operating points: give --points FILE as well"
+            )
+
+
+def _check_over_points(options: argparse.Namespace) -> None:
+    given = {
+        "--damping-increment": options.damping_increment is not None,
+        "--refine": options.refine,
+        "--delta-gain": options.delta_gain is not None,
+        "--no-margins": options.no_margins,
+        "--gain-from": options.gain_from != "non-compensated",
+    }
+    for name in (name for name, is_given in given.items() if is_given):
+        raise InputError(
+            f"{name} belongs to a design for one operating point; with --points leave it out"
+        )
+
+
+def _how_it_goes_on(folder: Path) -> str:
+    """How to go on after an interrupt; "" and no empty folder where nothing is kept."""
+    if any_kept(folder):
+        return f"what was computed is in {folder}; the same command continues from there"
+    with suppress(OSError):
+        folder.rmdir()
+    return ""
+
+
+def _request(options: argparse.Namespace) -> DesignRequest:
+    first = {
+        name: next(iter(getattr(options, name)), None)
+        for name in ("controller", "component", "mode")
+    }
+    how = {
+        "compensated_gain": options.gain_from == "compensated",
+        "margins": not options.no_margins,
+    }
+    return DesignRequest(**asked_of_case(options, DesignRequest, "design") | first | how)
+
+
+def _writable(out: Path) -> Path:
+    """The parameter file's path, tried before anything is computed."""
+    path = parameter_file_path(out, "--out")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        existed = path.exists()
+        if (
+            existed
+            and path.is_file()
+            and "[set]" not in (path.read_text("utf-8", "replace") or "[set]")
+        ):
+            raise InputError(
+                f"--out {path}: another file is there, not a parameter file; choose another place"
+            )
+        path.open("a", encoding="utf-8").close()
+        if not existed:
+            path.unlink()
+    except OSError as error:
+        raise InputError(
+            f"--out {path}: the parameter file cannot be written there: {error.strerror}; choose another place"
+        ) from error
+    return path

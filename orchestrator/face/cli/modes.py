@@ -1,0 +1,131 @@
+"""``gfor modes``: steady state and eigenvalues of a case's scenarios."""
+
+import argparse
+from collections.abc import Sequence
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+
+from rich.markup import escape
+
+from orchestrator.core.errors import InputError
+from orchestrator.core.safe_files import made_folder
+from orchestrator.face.api.scenario import Scenario, modes_of
+from orchestrator.face.cli import terminal
+from orchestrator.face.cli.arguments import add_options, add_request_arguments, asked_by
+from orchestrator.face.cli.case_arguments import (
+    add_case_arguments,
+    add_excitation_arguments,
+    chosen,
+    excitation_given,
+)
+from orchestrator.face.cli.verdict import (
+    add_details_argument,
+    add_verdict_argument,
+    exit_code,
+    print_answers,
+    print_details,
+)
+from orchestrator.output.results.lock import held
+from orchestrator.studies.modes import beside
+from orchestrator.studies.modes.all_modes import compute_all_modes
+from orchestrator.studies.modes.load_model_weight import load_model_weights
+from orchestrator.studies.modes.modes import modes_json
+from orchestrator.studies.modes.request import ModesRequest
+from orchestrator.studies.runs import tables
+from orchestrator.studies.runs.answers import of_modes
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_case_arguments(parser, schedule=True)
+    add_request_arguments(parser, ModesRequest)
+    add_options(parser, "modes")
+    add_excitation_arguments(parser)
+    add_options(parser, "modes 2")
+    add_verdict_argument(parser)
+    add_details_argument(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compute, print, and write what is asked for, while no other command works in the folder of the results."""
+    if options.component is not None:
+        return _with_a_black_box(options)
+    excited = excitation_given(options)
+    if excited:
+        raise InputError(
+            f"{excited[0]} is for a black box of its own: give --black-box --component NAME as well"
+        )
+    scenarios = chosen(options)
+    request = ModesRequest(**asked_by(options, ModesRequest))
+    request.check()
+    folder = made_folder(options.out, "--out") if options.out else None
+    with held(folder) if folder else nullcontext():
+        return _compute(scenarios, request, options, folder)
+
+
+def _with_a_black_box(options: argparse.Namespace) -> int:
+    from orchestrator.face.cli import black_box  # noqa: PLC0415 - only here
+
+    if not options.black_box:
+        raise InputError(
+            "--component names what is taken for a black box: give --black-box as well"
+        )
+    others = {
+        "--critical": options.critical is not None,
+        "--directional": options.directional,
+        "--range": options.frequencies is not None,
+        "--details": options.details,
+    }
+    given = [name for name, is_given in others.items() if is_given]
+    if given:
+        raise InputError(
+            f"{given[0]} does not go with --component, which shows all modes of one black box; leave it out"
+        )
+    return black_box.run(options)
+
+
+def _compute(
+    scenarios: Sequence[Scenario],
+    request: ModesRequest,
+    options: argparse.Namespace,
+    folder: Path | None,
+) -> int:
+    if request.black_box:
+        with terminal.said_stages() as report:
+            results = [
+                modes_of(scenario, replace(request, report=report)) for scenario in scenarios
+            ]
+    else:
+        prepared = [scenario.prepared for scenario in scenarios]
+        results = compute_all_modes(
+            prepared, request.frequencies, request.critical, directional=request.directional
+        )
+    weights = (
+        [] if options.black_box else load_model_weights(scenarios, results, request.frequencies)
+    )
+    written, said = [], [*beside.told(results)]
+    if folder:
+        from orchestrator.studies.runs.files import write_modes  # noqa: PLC0415 - plots: a second to import
+
+        written = write_modes(results, folder, weights, said)
+    if options.json:
+        terminal.print_json(modes_json(results, weights, said))
+        return exit_code(options, [r.stability for r in results])
+    console = terminal.make_console()
+    print_answers(console, [of_modes(r) for r in results], results, said)
+    terminal.print_warnings(results)
+    terminal.say("question", weights)
+    whole = len(results) == 1 or options.details
+    for result in results if whole else ():
+        console.print(tables.all_modes(result), "")
+    terminal.print_named_modes(console, results, shapes=whole or any(r.named for r in results))
+    terminal.print_sources(console, results)
+    if options.details:
+        print_details(console, results)
+    if not whole:
+        console.print(
+            "All modes of each scenario, and who swings in them: --details, or one --scenario"
+        )
+    if folder:
+        console.print(escape(f"Modes in {folder}: {', '.join(written)}"), soft_wrap=True)
+    return exit_code(options, [r.stability for r in results])

@@ -1,0 +1,172 @@
+"""``gfor new``: a case file from a network's files; without arguments it asks."""
+
+import argparse
+import shlex
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+from rich.markup import escape
+
+from orchestrator.cases.new_case import WantedCase, read_converter, sources_of, write_case
+from orchestrator.cases.psse.known_records import known_records
+from orchestrator.cases.record_use import as_json, details
+from orchestrator.core.errors import InputError, ResultsError
+from orchestrator.core.safe_files import write_text
+from orchestrator.devices.fmi.vendor_files import is_vendor_file
+from orchestrator.face.cli.arguments import add_options
+from orchestrator.face.cli.terminal import make_console, print_json, print_parts
+from orchestrator.output.report.tables import make_table
+
+_EXAMPLE = 'gfor new own.raw own.dyr --converter "bus 9, 300 MVA, 200 MW, less sg3" --out case.toml'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_options(parser, "new")
+    device = parser.add_mutually_exclusive_group()
+    add_options(device, "new 2")
+    add_options(parser, "new 3")
+
+
+def run(options: argparse.Namespace) -> int:
+    from orchestrator.cases.service import in_service  # noqa: PLC0415 - these import what a run needs
+    from orchestrator.studies.modes.modes import running  # noqa: PLC0415
+
+    if options.models is True:
+        if options.files:
+            raise InputError(
+                "--models is 'emt' or 'phasor' for a case; alone it lists what gfor reads"
+            )
+        _list_models(as_json=options.json)
+        return 0
+    if not options.files:
+        _ask(options)
+    wanted = _wanted(options)
+    sources_of(wanted.files)
+    if wanted.out.exists() and not options.force:
+        raise InputError(
+            f"{wanted.out}: the file is there already; choose another with --out, or --force"
+        )
+    made = write_case(wanted)
+    try:
+        write_text(wanted.out, made.text)
+    except ResultsError as error:
+        raise InputError(f"--out {error}") from error
+    console = make_console(stderr=options.json)
+    names = ", ".join(prepared.name for prepared in made.scenarios)
+    lines = [f"{wanted.out}: scenarios {names}. Assumed:", *(f"- {line}" for line in made.assumed)]
+    if options.details:
+        lines += ["Records that are not used as they stand:", *details(made.records)]
+    print_parts(console, map(escape, lines))
+    for prepared in made.scenarios:
+        if prepared.name in ("base", "converter"):
+            running(in_service(prepared)).close()  # what cannot start is told at once
+    console.print(
+        escape(f"Next: gfor modes {wanted.out}{' --black-box' * made.black_box}"), highlight=False
+    )
+    if options.json:
+        print_json(
+            {
+                "case": str(wanted.out),
+                "scenarios": [prepared.name for prepared in made.scenarios],
+                "assumed": [*made.assumed],
+                "records": as_json(made.records),
+                "questions": [*dict.fromkeys(str(q) for p in made.scenarios for q in p.questions)],
+            }
+        )
+    return 0
+
+
+def _list_models(*, as_json: bool) -> None:
+    records = known_records()
+    if as_json:
+        print_json([asdict(record) for record in records])
+        return
+    table = make_table(
+        "Records of dynamics data that gfor reads",
+        *("record", "what", "part of ours", "approximated"),
+        left=4,
+        rows=[(r.name, r.kind, r.part, r.approximated) for r in records],
+    )
+    sources = dict.fromkeys(record.source for record in records)
+    print_parts(make_console(), [table, *(escape(f"Source: {source}") for source in sources)])
+
+
+def _wanted(options: argparse.Namespace) -> WantedCase:
+    device = options.fmu or options.dll
+    if (device or options.binding) and not options.converter:
+        raise InputError(
+            "--fmu, --dll and --binding are for a converter; say where by --converter 'bus 9, 300 MVA, 200 MW'"
+        )
+    if options.binding is not None and options.fmu is None:
+        raise InputError("--binding says what an FMU's variables mean; give it with --fmu")
+    for path in (
+        path for path in (device, options.binding) if path is not None and not path.is_file()
+    ):
+        raise InputError(f"{path}: there is no such file")
+    if device is not None and options.models == "phasor":
+        raise InputError(
+            f"{device}: a vendor's file meets the network by its currents, as EMT models do; leave out --models"
+        )
+    out = options.out or Path(f"{options.files[0].stem}.toml")
+    if out.suffix.lower() != ".toml":
+        raise InputError(f"--out {out}: a case file ends in .toml")
+    return WantedCase(
+        tuple(options.files),
+        out,
+        tuple(map(read_converter, options.converter or ())),
+        device,
+        options.binding,
+        options.dll is not None,
+        options.models,
+        options.frequency,
+        options.slack,
+        tuple(options.leave_out),
+        tuple(options.dyr_leave_out),
+        options.reactive_limits,
+        f"gfor {shlex.join(sys.argv[1:])}" if sys.argv[1:2] == ["new"] else "gfor new",
+    )
+
+
+def _ask(options: argparse.Namespace) -> None:
+    """Ask for what is missing, a line each; an empty answer takes what stands in brackets."""
+    if not sys.stdin.isatty():
+        raise InputError(
+            f"no network is given, and there is no terminal to ask at; write it like\n  {_EXAMPLE}"
+        )
+
+    def line(question: str) -> str:
+        try:
+            return input(f"{question}: ").strip()
+        except EOFError as error:
+            raise InputError(f"the answers ended; all in one line it is\n  {_EXAMPLE}") from error
+
+    options.files = [
+        Path(word) for word in shlex.split(line("Network file(s), such as own.raw own.dyr"))
+    ]
+    if not options.files:
+        raise InputError(f"no network is given; all in one line it is\n  {_EXAMPLE}")
+    sources_of(options.files)  # what is wrong is said before the next question
+    bus = line("Bus of a converter, such as 9 [no converter]")
+    if bus:
+        parts = [
+            f"bus {bus.removeprefix('bus ')}",
+            _with_unit(line("Its rating in MVA, such as 300"), "MVA"),
+            _with_unit(line("Its power in MW, such as 200"), "MW"),
+        ]
+        less = line("Machine that feeds so much less, such as sg3 [the slack]")
+        options.converter = [", ".join([*parts, *([f"less {less}"] if less else [])])]
+        read_converter(options.converter[0])
+        device = line("A vendor's FMU, or the file of a device around a DLL [our converter]")
+        if device and is_vendor_file(Path(device)):
+            options.dll = Path(device)
+        elif device:
+            options.fmu = Path(device)
+            binding = line("Its binding, as `gfor fmu bind` drafts it [none]")
+            options.binding = Path(binding) if binding else None
+    default = f"{options.files[0].stem}.toml"
+    options.out = options.out or Path(line(f"Case file [{default}]") or default)
+
+
+def _with_unit(answer: str, unit: str) -> str:
+    return f"{answer} {unit}" if answer.replace(".", "", 1).isdigit() else answer

@@ -1,0 +1,66 @@
+"""``gfor scr``: short-circuit power of every bus, and the short-circuit ratio of the converters there."""
+
+import argparse
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from rich.markup import escape
+
+from orchestrator.cases.short_circuit import CONVENTION, BusStrength, weakest_first
+from orchestrator.face.cli.arguments import add_json_argument, add_kept_argument, add_options
+from orchestrator.face.cli.case_arguments import add_case_arguments, chosen
+from orchestrator.face.cli.terminal import keep_json, make_console, print_json
+from orchestrator.output.report.tables import make_table
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_case_arguments(parser)
+    add_options(parser, "scr")
+    add_json_argument(parser)
+    add_kept_argument(parser, "scr")
+    parser.set_defaults(scans=True)
+
+
+def run(options: argparse.Namespace) -> int:
+    convention, console = CONVENTION.format(options.converter_current), make_console()
+    found = {
+        s: weakest_first(s.strengths(options.converter_current, options.rating))
+        for s in chosen(options)
+    }
+    told = [
+        {"name": s.name, "buses": [_with_title(s.prepared.titles, bus) for bus in buses]}
+        for s, buses in found.items()
+    ]
+    about = next(iter(found)).prepared.about
+    kept = {key: about[key] for key in ("case", "models", "basis", "questions")}
+    content = kept | {"convention": convention, "scenarios": told}
+    keep_json(content, options.out, "scr")
+    if options.json:
+        print_json(content)
+        return 0
+    alike: dict[str, list[str]] = {}
+    for scenario, buses in found.items():
+        with_titles = [_with_title(scenario.prepared.titles, bus) for bus in buses]
+        alike.setdefault(json.dumps(with_titles), []).append(scenario.title)
+    for rows, titles in alike.items():
+        table = make_table(
+            ", ".join(titles), "Bus", "S_sc [MVA]", "SCR", "of [MVA]", "X/R", "Converters"
+        )
+        for x in json.loads(rows):
+            numbers = (
+                (x["s_sc_mva"], ".0f"),
+                (x["scr"], ".2f"),
+                (x["rating_mva"], ".5g"),
+                (x["x_r"], ".1f"),
+            )
+            figures = ["–" if value is None else f"{value:{form}}" for value, form in numbers]
+            table.add_row(f"{x['bus']} {x['title']}".strip(), *figures, ", ".join(x["converters"]))
+        console.print(table, "")
+    console.print(escape(f"Convention: {convention}."), soft_wrap=True, highlight=False)
+    return 0
+
+
+def _with_title(titles: Mapping[str, str], bus: BusStrength) -> dict[str, Any]:
+    """The bus as JSON, with its name in the network's file."""
+    return bus.as_json() | {"title": titles.get(bus.bus, "")}

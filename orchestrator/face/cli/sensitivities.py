@@ -1,0 +1,75 @@
+"""``gfor sensitivities``: how each parameter of each FMU moves a mode."""
+
+import argparse
+from collections.abc import Sequence
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+
+from rich.markup import escape
+
+from orchestrator.core.safe_files import made_folder
+from orchestrator.face.api.progress import shown_progress
+from orchestrator.face.api.scenario import Scenario, sensitivities_of
+from orchestrator.face.cli.arguments import (
+    add_json_argument,
+    add_request_arguments,
+    asked_by,
+    option,
+)
+from orchestrator.face.cli.case_arguments import add_case_arguments, chosen
+from orchestrator.face.cli.terminal import make_console, print_json, print_warnings, warn
+from orchestrator.face.cli.verdict import add_verdict_argument, exit_code, print_verdicts
+from orchestrator.output.results.lock import held
+from orchestrator.studies.sensitivities.request import SensitivitiesRequest
+from orchestrator.studies.sensitivities.view import left_out, sensitivity_table
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_case_arguments(parser)
+    add_request_arguments(parser, SensitivitiesRequest)
+    option(
+        parser, "--out", "DIR", "write sensitivities.csv and sensitivities.json there", read=Path
+    )
+    add_json_argument(parser)
+    add_verdict_argument(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compute, print, and write what is asked for; returns 1 if no parameter has a derivative."""
+    scenarios = chosen(options)
+    folder = made_folder(options.out, "--out") if options.out else None
+    with held(folder) if folder else nullcontext():
+        return _compute(scenarios, options, folder)
+
+
+def _compute(
+    scenarios: Sequence[Scenario], options: argparse.Namespace, folder: Path | None
+) -> int:
+    request, found = SensitivitiesRequest(**asked_by(options, SensitivitiesRequest)), []
+    for scenario in scenarios:
+        with shown_progress("Parameters", shown=not options.json) as report:
+            found.append(sensitivities_of(scenario, replace(request, report=report)))
+    written = []
+    if folder:
+        for scenario, one in zip(scenarios, found, strict=True):
+            written += one.save(folder / scenario.name)
+    results = [one.result.modes for one in found]
+    if options.json:
+        print_json([one.as_json() for one in found])
+    else:
+        console = make_console()
+        print_verdicts(console, results)
+        print_warnings(results)
+        for one in found:
+            warn(one.result.modes.prepared.name, one.result.warnings)
+            console.print(sensitivity_table(one.result), "")
+            missing = left_out(one.result)
+            if missing:
+                console.print(
+                    f"{len(missing)} of {len(one.result.rows)} parameters have no derivative", ""
+                )
+        if written:
+            console.print(escape(f"Written: {', '.join(map(str, written))}"), soft_wrap=True)
+    failed = int(all(row.derivative is None for one in found for row in one.result.rows))
+    return failed or exit_code(options, [r.stability for r in results])

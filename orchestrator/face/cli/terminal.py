@@ -1,0 +1,151 @@
+"""Printing that all commands share: consoles, JSON, progress, warnings."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console, RenderableType
+from rich.markup import escape
+
+from orchestrator.core.errors import Problem
+from orchestrator.core.safe_files import made_folder
+from orchestrator.output.report.linearised import exceptions_in_words
+from orchestrator.output.results.manifest import ResultsWarning
+from orchestrator.output.results.staging import new_run_id, staged
+from orchestrator.output.results.storage import save_json
+
+if TYPE_CHECKING:
+    from orchestrator.cases.prepare import PreparedScenario
+    from orchestrator.studies.modes.modes import ModesResult
+    from orchestrator.studies.runs.run import RunResult
+
+
+def make_console(*, stderr: bool = False) -> Console:
+    """A terminal's own width; elsewhere one that lets no table wrap."""
+    console = Console(stderr=stderr)
+    return console if console.is_terminal else Console(stderr=stderr, width=160)
+
+
+def make_errors() -> Console:
+    """Standard error, one line for each message."""
+    return Console(stderr=True, soft_wrap=True, highlight=False, emoji=False)
+
+
+def print_json(content: Any) -> None:
+    """The only thing on standard output of a command with ``--json``."""
+    print(json.dumps(content, indent=1, ensure_ascii=False))
+
+
+def keep_json(content: Any, folder: Path | None, name: str) -> None:
+    """Write what ``--json`` prints into the folder of ``--out``, with a manifest, for ``gfor report``."""
+    if folder is not None:
+        with staged(made_folder(folder, "--out"), new_run_id()) as staging:
+            save_json(content, staging / f"{name}.json")
+
+
+def print_parts(console: Console, parts: Iterable[RenderableType]) -> None:
+    for part in parts:
+        console.print(part, soft_wrap=isinstance(part, str), highlight=False)
+
+
+def say(kind: str, texts: Iterable[str]) -> None:
+    """Sentences of a kind, such as ``warning``, on standard error."""
+    for text in texts:
+        make_errors().print(f"[bold yellow]{kind}:[/bold yellow] {escape(text)}")
+
+
+def print_named_modes(
+    console: Console, results: Sequence[ModesResult], *, shapes: bool = True
+) -> None:
+    """The modes that a case names, beside somebody else's figures for them, and who swings in them."""
+    from orchestrator.studies.runs import tables  # noqa: PLC0415 - imports all that a run needs
+
+    reference = results[0].prepared.case.table.reference
+    if any(r.named or r.unnamed for r in results):
+        title = reference.title if reference else None
+        console.print(tables.named_modes(results, title))
+        if reference and any(r.references for r in results):
+            console.print(escape(f"{title}: {reference.source}"), style="dim", soft_wrap=True)
+    if shapes and any(r.swing and (r.named or r.modes) for r in results):
+        console.print("", tables.mode_shapes(results), "")
+
+
+def print_sources(console: Console, results: Sequence[ModesResult]) -> None:
+    """Which linear models do not come from perturbing the running FMUs; nothing where all do."""
+    said = {
+        r.prepared.title: text
+        for r in results
+        if (text := exceptions_in_words(r.linearised, r.fit_errors))
+    }
+    if len(set(said.values())) == 1 and len(said) == len(results):
+        said = {"": next(iter(said.values()))}
+    for title, text in said.items():
+        console.print(
+            f"{title}: {text}" if title else text, soft_wrap=True, highlight=False, markup=False
+        )
+
+
+def print_questions(scenarios: Sequence[PreparedScenario], *, as_json: bool) -> None:
+    """Before anything is computed: what the network's files come to, and on standard error, once, questions about data
+    that are most unusual."""
+    from orchestrator.cases.facts import facts_of  # noqa: PLC0415 - imports the reading of cases
+
+    facts = facts_of(scenarios[0]) if scenarios and not as_json else None
+    if facts is not None:
+        make_console().print(facts.sentence(), soft_wrap=True, highlight=False, markup=False)
+    ask(q for prepared in scenarios for q in prepared.questions)
+
+
+def ask(questions: Iterable[Problem]) -> None:
+    say("question", dict.fromkeys(map(str, questions)))
+
+
+def print_warnings(results: Sequence[ModesResult]) -> None:
+    for result in results:
+        warn(result.prepared.name, result.unasked)
+
+
+def warn(scenario: str, texts: Iterable[str]) -> None:
+    say("warning", (f"scenario {scenario!r}: {text}" for text in texts))
+
+
+def print_findings(results: Sequence[RunResult]) -> None:
+    """Say on standard error what runs did wrong; a failure is said where the study ends."""
+    for result in results:
+        known = (str(result.failure), *result.modes.warnings)
+        name, found = (
+            result.modes.prepared.name,
+            [f.message for f in result.findings if f.message not in known],
+        )
+        say("found", (f"scenario {name!r}: {text}" for text in found))
+
+
+@contextmanager
+def said_stages() -> Iterator[Callable[[str], None]]:
+    """Inside, a callback for what is being done: a status on a terminal, else lines, both on standard error."""
+    console = make_errors()
+    if not console.is_terminal:
+        yield lambda text: console.print(text, markup=False)
+        return
+    with console.status("starting") as status:
+        yield lambda text: status.update(escape(text))
+
+
+@contextmanager
+def saying_warnings() -> Iterator[None]:
+    """Say on standard error what is to be borne in mind of results that are read."""
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always", ResultsWarning)
+        yield
+    say(
+        "warning",
+        dict.fromkeys(str(w.message) for w in found if issubclass(w.category, ResultsWarning)),
+    )
+    for other in found:
+        if not issubclass(other.category, ResultsWarning):
+            warnings.warn_explicit(other.message, other.category, other.filename, other.lineno)

@@ -1,0 +1,74 @@
+"""``gfor validate``: a device's model beside recordings of the plant."""
+
+import argparse
+from typing import Any
+
+from orchestrator.core.asked import as_number
+from orchestrator.core.errors import INTERRUPTED, NOT_MET
+from orchestrator.core.units import read_value, to_unit
+from orchestrator.face.api.validation import validate
+from orchestrator.face.cli.arguments import add_options
+from orchestrator.face.cli.terminal import (
+    make_console,
+    print_json,
+    print_parts,
+    said_stages,
+    say,
+    saying_warnings,
+)
+from orchestrator.studies.validation.limits import LimitVerdict
+from orchestrator.studies.validation.view import Validation, parts
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_options(parser, "validate", event=_read_event, moment=_moment, INTERRUPTED=INTERRUPTED)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print how far the device is off, and whether limits are met; returns the exit code that the help tells."""
+    with saying_warnings(), said_stages() as report:
+        found = validate(options.device, options.recordings, report=report, **_keywords(options))
+    say("question", found.questions)
+    if options.json:
+        print_json(found.as_json())
+    else:
+        print_parts(make_console(), parts(found))
+    return _exit_code(found)
+
+
+def _keywords(options: argparse.Namespace) -> dict[str, Any]:
+    return {
+        "values": dict(options.set),
+        "binding": options.binding,
+        "component": options.component,
+        "scenario": options.scenario,
+        "channels": options.channel,
+        "place": options.place,
+        "voltage": options.voltage,
+        "transformer": options.transformer,
+        "events": options.event,
+        "average": options.average,
+        "limits": options.limits,
+        "start": options.start,
+        "stop": options.stop,
+        "step": options.step,
+    }
+
+
+def _exit_code(found: Validation) -> int:
+    return 0 if found.result.verdict in (None, LimitVerdict.MET) else NOT_MET
+
+
+def _read_event(text: str) -> tuple[float, float]:
+    """``BEGIN:END`` [s]."""
+    low, colon, high = text.partition(":")
+    begin, end = as_number(low), as_number(high)
+    if not colon or not begin < end:
+        raise ValueError(
+            f"{text!r} is no event; write BEGIN:END in seconds of the recording, such as 2.0:2.15"
+        )
+    return begin, end
+
+
+def _moment(text: str) -> float:
+    return float(to_unit(read_value(text), "s"))

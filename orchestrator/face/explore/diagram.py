@@ -1,0 +1,92 @@
+"""The network as a single-line diagram: where buses lie, and which values act on each of its elements."""
+
+from typing import Any
+
+import numpy as np
+
+from orchestrator.cases.names import close_names
+from orchestrator.core.errors import InputError, few
+from orchestrator.face.api.scenario import Scenario
+from orchestrator.output.report.html.network_map import HEIGHT, WIDTH, places
+
+
+def diagram(scenario: Scenario) -> dict[str, Any] | None:
+    """Buses with their places, and branches, loads and units with the names of the values that move them; None for a
+    case without a network. A value that an element lacks is None."""
+    prepared = scenario.prepared
+    network, grid = prepared.network, prepared.grid
+    if network is None:
+        return None
+    units = prepared.system.components
+    plan = units[grid]
+    has = plan.description.variables
+
+    def of_grid(variable: str) -> str | None:
+        return f"{grid}.{variable}" if variable in has else None
+
+    lines: list[dict[str, Any]] = [
+        {
+            "name": line.name,
+            "from": line.from_bus,
+            "to": line.to_bus,
+            "kind": "branch" if line.has_ratio else "line",
+            "open": of_grid(line.variable("connected")),
+            "length": of_grid(line.variable("X")),
+            "resistance": of_grid(line.variable("R")),
+            "charging": of_grid(line.variable("B")),
+        }
+        for line in network.lines
+    ]
+    lines += [
+        {
+            "name": x.name,
+            "from": x.buses[0],
+            "to": bus,
+            "kind": "branch",
+            "open": of_grid(f"{x.name}.connected"),
+        }
+        for x in network.transformers
+        for bus in x.buses[1:]
+    ]
+    ends = [(line["from"], line["to"]) for line in lines]
+    points = places(network.buses, ends)
+    points += np.array([WIDTH, HEIGHT]) / 2 - (points.max(axis=0) + points.min(axis=0)) / 2
+    given = prepared.case.table.diagram.positions
+    unknown = [bus for bus in given if bus not in network.buses]
+    if unknown:
+        raise InputError(
+            f"{prepared.case.path}: [diagram] positions: there is no bus {unknown[0]!r}; "
+            + close_names(unknown[0], network.buses, f"there are: {few(network.buses, 8)}")
+        )
+    at = [given.get(bus, tuple(xy)) for bus, xy in zip(network.buses, points.tolist(), strict=True)]
+    return {
+        "width": WIDTH,
+        "height": HEIGHT,
+        "buses": [
+            {"name": bus, "x": x, "y": y} for bus, (x, y) in zip(network.buses, at, strict=True)
+        ],
+        "lines": lines,
+        "loads": [
+            {
+                "name": load.name,
+                "bus": load.bus,
+                "scale": of_grid(f"{load.name}.scale"),
+                "p_mw": plan.number(power) if (power := f"{load.name}.P") in has else load.p_mw,
+            }
+            for load in network.loads
+        ],
+        "units": [
+            {
+                "name": port.name,
+                "bus": port.bus,
+                "machine": any(
+                    state.endswith("machine.omega") for state in units[port.name].description.states
+                ),
+                "out": f"{port.name}.connected"
+                if "connected" in units[port.name].description.variables
+                else of_grid(f"{port.name}.connected"),
+            }
+            for port in network.ports
+            if port.name in units
+        ],
+    }

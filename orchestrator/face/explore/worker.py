@@ -1,0 +1,318 @@
+"""The process that computes for the page: a line of JSON for each question, lines of JSON for its answer.
+
+It has a process of its own so that an FMU that dies or hangs ends a computation, and not the page."""
+
+import json
+import os
+import sys
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from orchestrator.cases.idle_values import switches_of, why_idle
+from orchestrator.cases.layers import OptionValues
+from orchestrator.cases.schema import Value
+from orchestrator.cases.service import in_service
+from orchestrator.cases.sharing import SharingRule
+from orchestrator.core.arrays import Complex
+from orchestrator.core.errors import CosimError, InputError
+from orchestrator.core.spelling import as_options
+from orchestrator.devices.fmi.interrupts import calls
+from orchestrator.face.api.case import Case, load
+from orchestrator.face.api.results import Modes
+from orchestrator.face.api.scenario import Scenario
+from orchestrator.face.explore.copied import copied, events_of, explored, saved
+from orchestrator.face.explore.diagram import diagram
+from orchestrator.face.explore.responses import linear, plotted, recorded, simulated
+from orchestrator.studies.modes.modes import modes_of
+from orchestrator.studies.operating_points.bench import PointBench
+from orchestrator.studies.operating_points.item import Item
+from orchestrator.studies.operating_points.preparation import ItemPreparation
+
+_CHANGE = 2e-3  # of the parameter, in parts of its value, or of 1 where that is 0
+# an eigenvalue that moves by more than this part of itself is no longer known to be the same
+_FAR = 0.05
+_WIDER = 1.5  # the range in which changed modes are looked for, beyond that which is shown
+
+
+def slopes(
+    scenario_with: Callable[[Mapping[str, Value]], Scenario],
+    values: Mapping[str, Value],
+    parameter: str,
+    frequencies: tuple[float, float],
+    say: Callable[[dict[str, Any]], None],
+    computed: Callable[[Scenario, tuple[float, float]], Modes] = Scenario.modes,
+) -> dict[str, Any]:
+    """``value``, ``eigenvalues`` there, and ``slopes``, each a list of [real, imag]; None where no slope is known.
+
+    The operating point moves with the parameter, and the FMUs are started and linearised at both sides of its value."""
+    here = scenario_with(values)
+    component, _, variable = parameter.partition(".")
+    plan = here.prepared.system.components.get(component)
+    if plan is None or variable not in plan.description.variables:
+        raise InputError(f"there is no parameter {parameter!r} in scenario {here.name!r}")
+    info, value = plan.description.variables[variable], plan.value(variable)
+    if info.type != "Real" or isinstance(value, str | bool) or value is None:
+        raise InputError(
+            f"{parameter} is of type {info.type}, by which nothing can be differentiated"
+        )
+    change = _CHANGE * (abs(value) or 1.0)
+    least, most = (
+        -np.inf if info.minimum is None else info.minimum,
+        np.inf if info.maximum is None else info.maximum,
+    )
+    ends = [min(max(end, least), most) for end in (value - change, value + change)]
+    say({"progress": "modes at the value itself"})
+    base = eigenvalues(computed(here, frequencies))
+    wider = (frequencies[0] / _WIDER, frequencies[1] * _WIDER)
+    say({"progress": f"modes at both sides of {parameter} = {value:.5g}"})
+    beside = (scenario_with({**values, parameter: end}) for end in ends)
+    moved = [matched(base, eigenvalues(computed(one, wider))) for one in beside]
+    width = ends[1] - ends[0]
+    found = (moved[1] - moved[0]) / width if width > 0 else np.full(base.shape, np.nan + 0j)
+    return {
+        "parameter": parameter,
+        "value": value,
+        "eigenvalues": [[x.real, x.imag] for x in base.tolist()],
+        "slopes": [[x.real, x.imag] if np.isfinite(x) else None for x in found.tolist()],
+    }
+
+
+def eigenvalues(modes: Modes) -> Complex:
+    return np.array([mode.eigenvalue for mode in modes], dtype=np.complex128)
+
+
+def matched(base: Complex, other: Complex) -> Complex:
+    """Of each eigenvalue, the one that it moved to; nan where none is near."""
+    found = np.full(base.shape, np.nan + 0j)
+    if base.size and other.size:
+        apart = np.abs(base[:, None] - other[None]) / np.maximum(np.abs(base[:, None]), 1e-9)
+        rows, columns = linear_sum_assignment(apart)
+        near = apart[rows, columns] < _FAR
+        found[rows[near]] = other[columns[near]]
+    return found
+
+
+Say = Callable[[dict[str, Any]], None]
+
+_FOLDER = Path("results") / "explore"
+_UNEXPECTED = (
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    MemoryError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
+
+
+class Desk:
+    """Answers the questions about one case, which it reads again where its file has changed."""
+
+    def __init__(
+        self, word: str, trust_fmus: bool, recorded: Mapping[str, str] | None = None
+    ) -> None:
+        self._word, self._trust, self._recorded = word, trust_fmus, recorded or {}
+        self._case: Case | None = None
+        self._stamp: list[float] = []
+        # with its points' numbers
+        self._prepared: tuple[str, ItemPreparation, dict[str, int]] | None = None
+        # the next question's FMUs are those of the last one, where they can be and their files have not changed
+        self._bench, self._files = PointBench(), dict[Path, list[float]]()
+
+    def answer(self, question: Mapping[str, Any], say: Say) -> dict[str, Any]:
+        """What is asked for under ``ask``: open, cell, parameters, modes, slopes, response, recorded, run, save."""
+        ask = str(question["ask"])
+        case = self._read()
+        if ask == "open":
+            titles = {name: table.title or name for name, table in case.file.scenarios.items()}
+            named = case.file.table.title or case.name
+            return {"case": case.name, "title": named, "scenarios": titles, "stamp": self._stamp}
+        events, original = question.get("events"), case
+        if events is not None:
+            case = case.with_(scenarios={question["scenario"]: {"events": events}})
+        name = str(question["scenario"])
+        scenario = partial(case.scenario, name, step=question.get("step"))
+        values: dict[str, Value] = dict(question.get("values") or {})
+        low, high = question.get("range") or (0.1, 2.0)
+        signals = question.get("signals") or ()
+        if ask == "cell":
+            return {"values": self._values_of(case, question, values), "stamp": self._stamp}
+        answers: dict[str, Callable[[], dict[str, Any]]] = {
+            "parameters": lambda: _parameters(case, scenario(values)),
+            "modes": lambda: self._modes(case, scenario(values), values, (low, high), question),
+            "slopes": lambda: slopes(
+                scenario, values, str(question["parameter"]), (low, high), say, self._computed
+            ),
+            "response": lambda: linear(scenario(values), signals),
+            "recorded": lambda: recorded(
+                self._recorded.get(name, self._recorded.get("", "")), scenario(values), signals
+            ),
+            "save": lambda: {
+                "file": str(
+                    saved(
+                        original.file,
+                        explored(case.file, name, values, question.get("places")),
+                        _FOLDER,
+                    )
+                )
+            },
+            "run": lambda: simulated(scenario(values), signals, lambda part: say({"part": part})),
+        }
+        return {**answers[ask](), "stamp": self._stamp}
+
+    def _read(self) -> Case:
+        stamp = _stamp(self._case.file.path) if self._case else []
+        if self._case is None or stamp != self._stamp:
+            self._case = load(self._word, trust_fmus=self._trust)
+            self._stamp = _stamp(self._case.file.path)
+        return self._case
+
+    def _values_of(
+        self, case: Case, question: Mapping[str, Any], values: dict[str, Value]
+    ) -> dict[str, Value]:
+        """Values by which the case is at a cell of a study: at an operating point, with its outage."""
+        own, lost = ([str(name) for name in question.get(key) or ()] for key in ("own", "lost"))
+        if not own and not lost:
+            return values
+        rule, base, step = question.get("sharing"), question.get("base"), question.get("step")
+        key = json.dumps([self._stamp, question["scenario"], rule, base, step])
+        if (
+            self._prepared is None or self._prepared[0] != key
+        ):  # the base case serves all cells of a study
+            sharing = None if rule is None else SharingRule(rule)
+            layers = [OptionValues.of(base)] if base else ()
+            made = ItemPreparation(case.file, question["scenario"], layers, step, sharing=sharing)
+            self._prepared = key, made, {}
+        _, preparation, points = self._prepared
+        point = points.setdefault(json.dumps([values, own], sort_keys=True), len(points))
+        lost = [name for name in lost if name not in own]
+        return preparation.live(Item(point, int(bool(lost)), values, (*own, *lost), tuple(lost)))
+
+    def _computed(self, scenario: Scenario, frequencies: tuple[float, float]) -> Modes:
+        prepared = scenario.prepared
+        files = {
+            path: _stamp(path)
+            for plan in prepared.system.components.values()
+            if (path := plan.description.path)
+        }
+        if files != self._files:
+            self._bench.close()
+            self._files = files
+        try:
+            return Modes(modes_of(prepared, self._bench.master(in_service(prepared)), frequencies))
+        except BaseException:
+            self._bench.close()
+            raise
+
+    def _modes(
+        self,
+        case: Case,
+        scenario: Scenario,
+        values: Mapping[str, Value],
+        frequencies: tuple[float, float],
+        question: Mapping[str, Any],
+    ) -> dict[str, Any]:
+        """The JSON of ``gfor modes``, the verdict in its words, and what reproduces it."""
+        modes, system = self._computed(scenario, frequencies), scenario.prepared.system
+        hidden, parts = modes.result.hidden, [(key, *key.partition(".")) for key in values]
+        return {
+            "modes": modes.as_json(),
+            "title": scenario.title,
+            "verdict": modes.stability.sentence(),
+            "outside": None if hidden is None else hidden.sentence(remedy=False),
+            "warnings": [*_questions(scenario), *modes.result.unasked],
+            "idle": {
+                key: why_idle(system, one, name)
+                for key, one, _, name in parts
+                if one in system.components
+            },
+            "swings": [modes.result.swing_of(mode) for mode in modes],
+            "copied": copied(
+                case.file,
+                self._word,
+                scenario.name,
+                values,
+                frequencies,
+                question.get("events"),
+                question.get("places"),
+                question.get("step"),
+            ),
+        }
+
+
+def _parameters(case: Case, scenario: Scenario) -> dict[str, Any]:
+    """The parameters that a slider or a switch can set, the signals that can be drawn, and the diagram."""
+    listed = scenario.parameters().reset_index().to_dict("records")
+    shown = [row for row in listed if row["type"] in ("Real", "Integer", "Boolean")]
+    return {
+        "parameters": [row | {"switches": _switches(scenario, row["parameter"])} for row in shown],
+        "signals": list(scenario.prepared.record),
+        "plotted": plotted(scenario),
+        "events": events_of(case.file, scenario.name),
+        "diagram": diagram(scenario),
+    }
+
+
+def _questions(scenario: Scenario) -> list[str]:
+    """Return what is asked about the scenario's data, without the options that the page does not have."""
+    idle = set(scenario.prepared.idle.values())
+    return [
+        question.text
+        if question in idle
+        else str(replace(question, place=question.place.removeprefix("--set ")))
+        for question in scenario.prepared.questions
+    ]
+
+
+def _switches(scenario: Scenario, parameter: str) -> list[str]:
+    """The parameters that switch a parameter's part on and off."""
+    name, _, variable = parameter.partition(".")
+    known = scenario.prepared.system.components[name].description.variables
+    keys = switches_of(known, variable)
+    return [f"{name}.{key}" for key in keys if known[key].type == "Boolean"]
+
+
+def _stamp(path: Path) -> list[float]:
+    return [path.stat().st_mtime, path.stat().st_size] if path.is_file() else []
+
+
+def main() -> None:
+    """Answer line by line until nobody asks any more; what FMUs print goes to standard error."""
+    out = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+    given = json.loads(sys.stdin.readline())
+    desk = Desk(given["case"], given["trust_fmus"], given["recorded"])
+
+    def say(content: dict[str, Any]) -> None:
+        out.write(json.dumps(content) + "\n")
+        out.flush()
+
+    warnings.simplefilter("ignore")  # the answers have them
+    for line in sys.stdin:
+        try:
+            say({"answer": desk.answer(json.loads(line), say)})
+        except CosimError as error:
+            say({"error": str(error), "kind": error.kind})
+        except _UNEXPECTED as error:
+            say(
+                {
+                    "error": f"it failed in a way that nobody expected: {error!r}; the command may say more",
+                    "kind": "",
+                }
+            )
+
+
+if __name__ == "__main__":
+    with calls.terminable(ending=True), as_options():
+        try:
+            main()
+        except (KeyboardInterrupt, BrokenPipeError):
+            os._exit(1)

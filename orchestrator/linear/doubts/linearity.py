@@ -1,0 +1,163 @@
+"""Doubts about modes that depend on the perturbation of the FMUs; the modes of a linear model must not.
+
+Every component was perturbed with two sizes, and up as well as down. At the edge of a limit, inside a dead band that is
+smaller than the perturbation, or in noise the results differ, and the linear model describes neither side. How far the
+difference moves each mode follows from its eigenvectors, to first order."""
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+
+from orchestrator.core.arrays import Vector
+from orchestrator.linear.models.linear_model import LinearModel
+from orchestrator.linear.models.linearization import Blocks, compose
+from orchestrator.linear.spectra.modes import Mode
+from orchestrator.linear.spectra.stability import SLOW
+from orchestrator.systems.coupling.schedule import Schedule
+
+LARGEST_SHIFT = 1e-3
+"""Shift of a mode from which a doubt is reported, as a part of |λ|: a tenth of a point of damping. In smooth systems,
+up to the IEEE 118-bus system, the shift is at most 1.5e-4."""
+
+# the shift of a mode slower than this [rad/s] is divided by this figure instead of |λ|
+_SLOWEST = 0.5
+# most states of a model whose slowest eigenvalues are told apart from the free angle by a Schur
+# form
+_DENSE = 1000
+
+_WHY = (
+    "a perturbation of twice the size has another effect per unit: look for noise in it, a coarse tolerance of its "
+    "integrator, or a limit or dead band close by",
+    "it answers differently up and down: it stands at the edge of a limit or of a dead band",
+    "it is linear for small changes only ({narrow}), beyond which a limit or a dead band acts",
+)
+"""The meaning of a difference in each of `ComponentLinearization.variants`, in their order."""
+
+_EDGE = 1  # index of the variant at an edge, where there is no linear model at all
+_SMALL_ONLY = 2  # index of the variant in which the model is right for small changes
+
+_EDGE_SHIFT = 1e-2
+"""Shift from which an edge leaves open whether the system is stable, as a part of |λ|. The shift belongs to a
+perturbation of 1e-5; beyond the limit it is larger."""
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """A component for which the modes depend on how it was perturbed."""
+
+    component: str
+    mode: Mode
+    shift: float  # the shift of this mode, relative to |λ|
+    why: str
+    # Whether the shift leaves open on which side of the stability limit a mode is. It does not if the model is right
+    # for small changes.
+    turns: bool = False
+
+    def __str__(self) -> str:
+        m = self.mode
+        return (
+            f"component {self.component!r} is not linear at the operating point: {self.why}. That moves the mode at "
+            f"{m.frequency_hz:.3f} Hz with {m.damping_percent:.2f} % damping by {100 * self.shift:.2g} % of its "
+            f"eigenvalue, and its damping by up to {100 * self.shift:.2g} points; {100 * LARGEST_SHIFT:g} % is normal"
+        )
+
+
+def doubts(
+    blocks: Blocks, schedule: Schedule, model: LinearModel, modes: Sequence[Mode]
+) -> list[Doubt]:
+    """Components whose perturbation leaves the modes in doubt; empty for a smooth system."""
+    found = []
+    for kind, why in enumerate(_WHY):
+        perturbed = [name for name, c in blocks.components.items() if len(c.variants) > kind]
+        if not perturbed or not modes:
+            continue
+        together = _shifts(blocks, schedule, model, modes, perturbed, kind)
+        if together.max() <= LARGEST_SHIFT:
+            continue
+        turns = kind != _SMALL_ONLY and _may_turn(modes, together)
+        turns = turns or (kind == _EDGE and bool(together.max() > _EDGE_SHIFT))
+        each = {name: _shifts(blocks, schedule, model, modes, [name], kind) for name in perturbed}
+        most = max(each, key=lambda name: float(each[name].max()))
+        # A single component may shift a mode less than all components together.
+        guilty = [name for name, shifts in each.items() if shifts.max() > LARGEST_SHIFT] or [most]
+        for name in guilty:
+            narrow = blocks.components[name].narrow
+            text = why.format(
+                narrow=", ".join(f"{name}.{what} by {size:g}" for what, size in narrow.items())
+            )
+            # what no component shifts beyond the normal alone, all of them do together
+            alone = each[name].max() > LARGEST_SHIFT
+            shifts = each[name] if alone else together
+            worst = int(shifts.argmax())
+            found.append(Doubt(name, modes[worst], float(shifts[worst]), text, turns))
+    return found
+
+
+def _shifts(
+    blocks: Blocks,
+    schedule: Schedule,
+    model: LinearModel,
+    modes: Sequence[Mode],
+    names: Sequence[str],
+    kind: int,
+) -> Vector:
+    """Relative shift of every mode if some components are replaced by one of their variants."""
+    other = copy.copy(blocks)
+    other.components = dict(blocks.components)
+    for name in names:
+        component = blocks.components[name]
+        other.components[name] = replace(component, **component.variants[kind]._asdict())
+    varied = compose(other, schedule)
+    if varied.names != model.names:  # even the pattern of direct feed-through differs
+        return np.full(len(modes), np.inf)
+    left = np.array([[mode.left[name] for mode in modes] for name in model.names])
+    right = np.array([[mode.shape[name] for mode in modes] for name in model.names])
+    values = np.array([mode.eigenvalue for mode in modes])
+    moved = eigenvalue_shifts(model, varied, values, left, right)
+    shifts: Vector = np.abs(moved) / np.maximum(np.abs(values), _SLOWEST)
+    slow = np.array([abs(mode.eigenvalue) <= SLOW for mode in modes])
+    if len(model.names) <= _DENSE and (shifts[slow] > LARGEST_SHIFT).any():
+        shifts[slow] = np.minimum(shifts[slow], shift_of_slowest(model, varied, SLOW) / _SLOWEST)
+    return shifts
+
+
+def _may_turn(modes: Sequence[Mode], shifts: Vector) -> bool:
+    """Return whether a shift can carry a mode over the stability limit."""
+    sizes = np.array([max(abs(mode.eigenvalue), _SLOWEST) for mode in modes])
+    return bool(np.any(shifts * sizes >= np.abs([mode.eigenvalue.real for mode in modes])))
+
+
+def eigenvalue_shifts(
+    model: LinearModel, varied: LinearModel, eigenvalues: Vector, left: Vector, right: Vector
+) -> Vector:
+    """Δλ = lᴴ·(A' − A)·r [rad/s] of each mode, a column of ``left`` and ``right``; of a step map divided by μ·H, as
+    λ = ln μ / H."""
+    n = len(eigenvalues)
+    both = np.hstack([right.real, right.imag])  # the factors inside are real
+    difference = varied.apply(both) - model.apply(both)
+    moved = (left.conj() * (difference[:, :n] + 1j * difference[:, n:])).sum(axis=0)
+    if model.step_size is not None:
+        moved = moved / (np.exp(eigenvalues * model.step_size) * model.step_size)
+    return np.asarray(moved)
+
+
+def shift_of_slowest(model: LinearModel, varied: LinearModel, radius: float) -> float:
+    """|Δ| of the sum of all eigenvalues nearer to zero than a radius [rad/s], to first order.
+
+    A slow eigenvalue beside the free angle's zero is nearly double: each one alone moves by the root of an error, in
+    opposite directions, and their sum by the error itself."""
+    step, A, changed = model.step_size, model.A, varied.A
+
+    def is_near(real: float, imaginary: float = 0.0) -> bool:
+        value = complex(real, imaginary)
+        rate = value if step is None else np.log(value) / step if value else complex(np.inf)
+        return bool(abs(rate) <= radius)
+
+    _, right, count = scipy.linalg.schur(A, sort=is_near)
+    _, left, _ = scipy.linalg.schur(A.T, sort=is_near)
+    left, right = left[:, :count], right[:, :count]
+    moved = np.trace(np.linalg.solve(left.T @ right, left.T @ (changed - A) @ right))
+    return float(abs(moved) / (step or 1.0))

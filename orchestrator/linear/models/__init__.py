@@ -1,0 +1,1 @@
+"""Linear models of a coupled system, by perturbation of its components, at its operating point."""

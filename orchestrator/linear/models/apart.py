@@ -1,0 +1,30 @@
+"""States that are coupled with nothing: clocks, which say nothing of a system, and what should not be taken for one."""
+
+from orchestrator.core.errors import few
+from orchestrator.linear.models.linear_model import LinearModel
+from orchestrator.systems.coupling.master import Master
+
+_SHOWN = 3
+
+
+def standing_apart(master: Master, model: LinearModel, zeros: int) -> list[str]:
+    """A sentence on states that nothing moves and that move nothing, where their zeros would not pass for the free
+    angle.
+
+    Their zeros are not counted among those that nothing restores. An integrator of a controller that is off looks just
+    like that, so that whoever believes it on must be told. A state in seconds is a clock."""
+    if zeros + len(model.apart) <= 1:
+        return []
+    names = [name for name in model.apart if _unit(master, name) != "s"]
+    if not names:
+        return []
+    text = f"states that nothing moves and that move nothing, as of a controller that is off: {few(names, _SHOWN)}"
+    return [f"{text}; their zeros are not counted"]
+
+
+def _unit(master: Master, name: str) -> str:
+    """The unit that an FMU gives a state ``component.state``; "" where it gives none."""
+    component, _, state = name.partition(".")
+    found = master.components.get(component)
+    variable = None if found is None else found.description.variables.get(state)
+    return "" if variable is None else variable.unit or ""

@@ -1,0 +1,101 @@
+"""Differences of one running FMU over one communication step, by perturbing its states and inputs one at a time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from orchestrator.core.arrays import Matrix
+from orchestrator.devices.fmi.component import Component, RealBatch
+
+
+class Differences(NamedTuple):
+    """Columns of d(x⁺), d(y) and d(ẋ) by what was perturbed; ``_up`` from the perturbation upwards only."""
+
+    after: Matrix
+    outputs: Matrix
+    slopes: Matrix
+    after_up: Matrix
+    outputs_up: Matrix
+
+
+@dataclass(frozen=True)
+class PerturbedStep:
+    """One communication step of a component, which begins a little beside its operating point."""
+
+    component: Component
+    # inputs, exits: names of the inputs that are perturbed after the states, and of the outputs that are read
+    inputs: Sequence[str]
+    exits: Sequence[str]
+    # time, step_size: of the operating point, and the communication step [s]
+    time: float
+    step_size: float
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        return self.component.description.states
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (*self.states, *self.inputs)
+
+    def differences(
+        self, varied: Sequence[int], size: float, rates: Sequence[str] = ()
+    ) -> Differences:
+        """Central differences, one column for each perturbed state or input; the component is put back.
+
+        ``size``: of the perturbation, relative to max(1, |value|); ``rates`` are read before the step."""
+        component, names = self.component, self.names
+        z_0 = RealBatch(component, names).read().copy()
+        after, outputs, slopes = (
+            RealBatch(component, group) for group in (self.states, self.exits, rates)
+        )
+        columns = tuple(
+            np.zeros((len(varied), len(batch.names))) for batch in (after, outputs, slopes)
+        )
+        upwards = tuple(np.zeros_like(column) for column in columns[:2])
+        saved = component.save_state()
+        try:
+            outputs_0, slopes_0 = outputs.read().copy(), slopes.read().copy()
+            component.step(self.time, self.step_size)
+            after_0 = after.read().copy()
+            component.restore_state(saved)
+            for k, place in enumerate(varied):
+                perturbed, value = RealBatch(component, [names[place]]), z_0[place]
+                step = size * max(1.0, abs(value))
+                signs = _allowed_signs(component, names[place], value, step)
+                for sign in signs:
+                    perturbed.values[0] = value + sign * step
+                    perturbed.write()
+                    for batch, column in zip((outputs, slopes), columns[1:], strict=True):
+                        column[k] += sign * batch.read()
+                    component.step(self.time, self.step_size)
+                    columns[0][k] += sign * after.read()
+                    if sign == signs[0]:
+                        upwards[0][k] = sign * (after.values - after_0)
+                        upwards[1][k] = sign * (outputs.values - outputs_0)
+                    component.restore_state(saved)
+                if len(signs) == 1:
+                    for column, at_rest in zip(
+                        columns, (after_0, outputs_0, slopes_0), strict=True
+                    ):
+                        column[k] -= signs[0] * at_rest
+                for column in columns:
+                    column[k] /= len(signs) * step
+                for column in upwards:
+                    column[k] /= step
+        finally:
+            component.restore_state(saved)
+            component.free_state(saved)
+        return Differences(*(column.T for column in (*columns, *upwards)))
+
+
+def _allowed_signs(component: Component, name: str, value: float, step: float) -> tuple[float, ...]:
+    """Directions of a perturbation that stay within a parameter's declared bounds; both, where none does."""
+    info = component.description.variables[name]
+    if info.causality != "parameter":
+        return (+1.0, -1.0)
+    above = info.maximum is None or value + step <= info.maximum
+    below = info.minimum is None or value - step >= info.minimum
+    return tuple(sign for sign, within in ((+1.0, above), (-1.0, below)) if within) or (+1.0, -1.0)

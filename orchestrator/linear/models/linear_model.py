@@ -1,0 +1,222 @@
+"""A linear model of a coupled system, kept as sparse equations of its parts.
+
+z⁺ = F·z + G·w and w = H·z + K·w (ż for z⁺ where the model is continuous): z holds the states, w the outputs on
+their way between components. The matrix A = F + G·(I − K)⁻¹·H that this comes down to is dense in large parts;
+the equations are not, which is what a search for a few eigenvalues of a large system lives on."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+from numpy.typing import NDArray
+
+from orchestrator.core.arrays import Matrix, Vector
+from orchestrator.linear.models.hub_elimination import HubEquations, hub_equations
+
+HELD = " (held)"
+DELAYED = " (delayed"  # in the name of a state that stands for what is on its way over a connection
+# with fewer states, one vector at a time, which keeps the last digits of modes
+LEAST_IN_BLOCKS = 4_000
+
+PERTURBED, DIRECTIONAL, PACKED, IDENTIFIED = "perturbed", "directional", "packed", "identified"
+"""Origins of a component's linear model: perturbation of its running FMU, directional derivatives of the FMU, a model
+in the FMU's file, or a model fitted to measurements at its inputs and outputs."""
+
+
+@dataclass(frozen=True)
+class ShiftedSolver:
+    """Solves (A − σI)·x = b with ``solve`` and (A − σI)ᴴ·x = b with ``solve_adjoint``."""
+
+    solve: Callable[[Vector], Vector]
+    solve_adjoint: Callable[[Vector], Vector]
+    # whether both take many vectors as columns, and take hardly longer for them than for one
+    takes_many: bool = False
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """z⁺ = A·z around an operating point."""
+
+    # F, G, H, K: sparse matrices, shapes (n, n), (n, m), (m, n), (m, m); I − K is regular
+    F: sp.csr_array
+    G: sp.csr_array
+    H: sp.csr_array
+    K: sp.csr_array
+    # ``component.state`` for states, ``component.output (held)`` for what the exchange remembers and ``a.out -> b.in
+    # (delayed k)`` for what is on its way over a connection; length n
+    names: tuple[str, ...]
+    # communication step [s]; None for a continuous model, whose A is in 1/s
+    step_size: float | None
+    # largest difference between the two perturbation sizes, in elements of the components' matrices
+    disagreement: float
+    sources: Mapping[str, str] = field(default_factory=dict)
+    # communication steps over which the map's power is that of the system; more than 1 with sampled controllers
+    period: int = 1
+    # what each element of w is: ``component.output``, several times where it is computed several times; empty where the
+    # model was not composed from components
+    wires: tuple[str, ...] = ()
+
+    @classmethod
+    def from_matrix(
+        cls, A: Matrix, names: tuple[str, ...], step_size: float | None, disagreement: float = 0.0
+    ) -> Self:
+        """The model of one matrix, without outputs that travel between components."""
+        n = len(A)
+        G, H, K = (sp.csr_array(shape) for shape in ((n, 0), (0, n), (0, 0)))
+        return cls(sp.csr_array(A), G, H, K, names, step_size, disagreement)
+
+    @cached_property
+    def A(self) -> Matrix:
+        """The whole matrix, dense, shape (n, n)."""
+        A: Matrix = self.F.toarray() + self.G @ self.settle(self.H.toarray())
+        return A
+
+    def apply(self, z: Vector) -> Vector:
+        """A·z, computed without forming A; z may be complex, of shape (n,) or (n, k)."""
+        w = self.H @ z
+        settled = (
+            self.settle(w.real) + 1j * self.settle(w.imag) if np.iscomplexobj(w) else self.settle(w)
+        )
+        result: Vector = self.F @ z + self.G @ settled
+        return result
+
+    @property
+    def clocks(self) -> int:
+        """Number of states that stand `apart`: each is a zero of its own that says nothing of the system."""
+        return len(self.apart)
+
+    @cached_property
+    def apart(self) -> tuple[str, ...]:
+        """Names of the states that stand or advance by themselves, and are coupled with no other: clocks, and the
+        integrators of controllers that are off."""
+        return tuple(self.names[k] for k in np.flatnonzero(self._is_apart))
+
+    @cached_property
+    def _is_apart(self) -> NDArray[np.bool_]:
+        own = self.F.diagonal()
+        others = sp.csr_array(self.F - sp.diags_array(own))
+        alone: NDArray[np.bool_] = own == (0.0 if self.step_size is None else 1.0)
+        for matrix, axis in ((others, 0), (others, 1), (self.G, 1), (self.H, 0)):
+            alone &= np.asarray(abs(matrix).sum(axis=axis)).ravel() == 0
+        return alone
+
+    @property
+    def coupled(self) -> Self:
+        """The model without the states that stand `apart`: the others' eigenvalues are the same."""
+        kept = np.flatnonzero(~self._is_apart)
+        if len(kept) == len(self.names):
+            return self
+        F = self.F[kept][:, kept]
+        return replace(
+            self, F=F, G=self.G[kept], H=self.H[:, kept], names=tuple(self.names[k] for k in kept)
+        )
+
+    @cached_property
+    def settle(self) -> Callable[[Any], Any]:
+        """W = (I − K)⁻¹·b."""
+        m = self.K.shape[0]
+        return spla.splu(sp.csc_array(sp.eye_array(m) - self.K)).solve if m else lambda b: b
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the factorisation, which cannot be pickled or copied, and is made anew where it is needed."""
+        return {name: value for name, value in vars(self).items() if name not in ("settle", "_hub")}
+
+    @cached_property
+    def _hub(self) -> HubEquations | None:
+        return hub_equations(self.F, self.G, self.H, self.K)
+
+    @property
+    def is_searched_in_blocks(self) -> bool:
+        """Whether a search takes many vectors at once: in large models with a hub, whose dense rest is read once for
+        all of them."""
+        return len(self.names) >= LEAST_IN_BLOCKS and self._hub is not None
+
+    @property
+    def number_of_states(self) -> int:
+        """States of the components, without what the exchange remembers."""
+        return sum(not (name.endswith(HELD) or DELAYED in name) for name in self.names)
+
+    def shifted(self, sigma: complex) -> ShiftedSolver:
+        """Factorise A − σI once, through the sparse equations; σ must not be an eigenvalue."""
+        factors_of_hub = self._hub.at(sigma) if self._hub else None
+        if factors_of_hub:
+            return ShiftedSolver(
+                factors_of_hub.solve,
+                factors_of_hub.solve_adjoint,
+                takes_many=self.is_searched_in_blocks,
+            )
+        n, m = self.G.shape
+        identity_n, identity_m = sp.eye_array(n), sp.eye_array(m)
+        whole = sp.block_array(
+            [[self.F - sigma * identity_n, self.G], [self.H, self.K - identity_m]], format="csc"
+        )
+        factors = spla.splu(whole)
+        kind = whole.dtype
+
+        def solve(b: Vector, transposed: str = "N") -> Any:
+            right = np.zeros(n + m, dtype=kind)
+            right[:n] = b
+            return factors.solve(right, transposed)[:n]
+
+        return ShiftedSolver(solve, lambda b: solve(b, "H"))
+
+
+Indices = NDArray[np.int64]
+
+
+class Equations:
+    """Collects the blocks of z⁺ = F·z + G·w, w = H·z + K·w."""
+
+    def __init__(self, n: int, m: int) -> None:
+        self._shapes = {"F": (n, n), "G": (n, m), "H": (m, n), "K": (m, m)}
+        self._parts: dict[str, list[tuple[Indices, Indices, Matrix]]] = {
+            name: [] for name in self._shapes
+        }
+
+    def next_state(self, rows: slice, states: slice, A: Matrix, w: Indices, B: Matrix) -> None:
+        """Add z⁺[rows] = A·z[states] + B·w[w]."""
+        n = self._shapes["F"][0]
+        self._add("F", np.arange(n)[rows], np.arange(n)[states], A)
+        self._add("G", np.arange(n)[rows], w, B)
+
+    def output(self, rows: Indices, states: slice, C: Matrix, w: Indices, D: Matrix) -> None:
+        """Add w[rows] = C·z[states] + D·w[w]."""
+        self._add("H", rows, np.arange(self._shapes["F"][0])[states], C)
+        self._add("K", rows, w, D)
+
+    def _add(self, name: str, rows: Indices, columns: Indices, block: Matrix) -> None:
+        i, k = np.nonzero(block)
+        self._parts[name].append((rows[i], columns[k], block[i, k]))
+
+    def model(
+        self,
+        names: Iterable[str],
+        step_size: float | None,
+        disagreement: float,
+        sources: Mapping[str, str],
+        *,
+        wires: Iterable[str] = (),
+    ) -> LinearModel:
+        F, G, H, K = (self._matrix(name) for name in self._shapes)
+        return LinearModel(
+            F, G, H, K, tuple(names), step_size, disagreement, sources, wires=tuple(wires)
+        )
+
+    def _matrix(self, name: str) -> sp.csr_array:
+        rows, columns, values = (
+            np.concatenate(part) for part in zip(*self._parts[name], strict=True)
+        )
+        shape = self._shapes[name]
+        order = np.lexsort((columns, rows))
+        rows, columns, values = rows[order], columns[order], values[order]
+        if np.any((rows[1:] == rows[:-1]) & (columns[1:] == columns[:-1])):
+            return sp.coo_array((values, (rows, columns)), shape=shape).tocsr()
+        begins = np.zeros(shape[0] + 1, dtype=np.int32)
+        np.cumsum(np.bincount(rows, minlength=shape[0]), out=begins[1:])
+        found = sp.csr_array((values, columns.astype(np.int32), begins), shape=shape)
+        found.has_canonical_format = True
+        return found

@@ -1,0 +1,1 @@
+"""Modes in recorded signals: ring-down and ambient identification, and doubts about them."""

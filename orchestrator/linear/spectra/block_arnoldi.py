@@ -1,0 +1,124 @@
+"""Arnoldi's method with many vectors at once, for systems whose equations are dense in part.
+
+A solution for one vector reads a whole dense factor and does little with it; one for sixteen takes hardly longer. What
+ARPACK saves by beginning anew with few vectors it pays in solutions, so all vectors are kept here."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+from scipy.linalg.blas import zgemm
+
+from orchestrator.core.arrays import Matrix, Vector
+
+# vectors at once; an eigenvalue as often there as that may be there more often than it was found
+WIDTH = 16
+MOST = 640  # largest number of vectors; 48,000 states take 0.5 GB for them
+# of ν: what the rest may be of what is found; left and right vectors together give ν to its square
+TOLERANCE = 1e-7
+
+ROUGH = 1e-2
+"""A value beyond a limit has settled if it moves by less than this part of itself, or of half its distance from the
+limit: its place need not be known better."""
+
+# the largest values beyond a limit that have to have settled before the search there may end
+_BEYOND = 8
+
+# values are looked at where the vectors are more by this factor; there are many operations in it
+_GROWTH = 1.25
+_DEPENDENT = 1e-12  # A direction that is smaller than this part of the largest one is none
+# where what is new of the vectors is less than this part of them, it is made orthogonal twice
+_AGAIN = 1e-2
+_EQUAL = 1e-6  # values of ν that differ by less than this part are one
+
+
+class BlockArnoldi:
+    """The eigenvalues ν of largest size of an operator, and vectors, from a space that grows.
+
+    ``apply``: The operator, for complex vectors as columns, shape (n, k).
+
+    ``values``, ``accuracy``: Approximations of the eigenvalues, largest first; and how large what they leave over is,
+    as a part of each."""
+
+    def __init__(self, apply: Callable[[Vector], Vector], size: int, most: int = MOST) -> None:
+        self._apply, self._size = apply, size
+        self._width = max(1, min(WIDTH, size // 2))
+        self._most = max(min(most, size - self._width), self._width)
+        self._random = np.random.default_rng(0)  # the same search gives the same answer
+        self._basis = np.empty((size, self._most + self._width), dtype=complex, order="F")
+        self._image = np.zeros((self._most + self._width, self._most), dtype=complex)
+        start = self._random.standard_normal((size, self._width))
+        self._basis[:, : self._width] = np.linalg.qr(start)[0]
+        self._done = 0
+        self.values: NDArray[np.complex128] = np.zeros(0, dtype=complex)
+        self.accuracy: NDArray[np.float64] = np.zeros(0)
+        self._coordinates: Matrix = np.zeros((0, 0), dtype=complex)
+
+    def grow(self) -> bool:
+        """Take more vectors, and look at the values; False where there are as many as may be."""
+        wanted = min(self._most, max(5 * self._width, int(np.ceil(_GROWTH * self._done))))
+        if self._done + self._width > self._most:
+            return False
+        while self._done < wanted and self._done + self._width <= self._most:
+            self._extend()
+        self._look()
+        return True
+
+    def vectors(self, places: Sequence[int]) -> Vector:
+        """Eigenvectors of some of the values, shape (n, number of places)."""
+        found: Vector = (
+            self._basis[:, : len(self._coordinates)] @ self._coordinates[:, list(places)]
+        )
+        return found
+
+    def knows_all_beyond(self, size: float, wanted: Callable[[int], bool]) -> bool:
+        """Return whether all values of that size or more are known, and the next ones are seen to be smaller."""
+        larger = int((np.abs(self.values) >= size).sum())
+        beyond = slice(larger, larger + _BEYOND)
+        allowed = np.maximum(ROUGH, (size / np.abs(self.values[beyond]) - 1) / 2)
+        if (
+            len(allowed) < min(_BEYOND, self._size - larger)
+            or (self.accuracy[beyond] > allowed).any()
+        ):
+            return False
+        near = self.accuracy[:larger]
+        return bool((near <= ROUGH).all()) and not any(
+            map(wanted, np.flatnonzero(near > TOLERANCE).tolist())
+        )
+
+    def is_complete(self, larger: int) -> bool:
+        """Return whether none of the largest values is there so often that there may be more of it."""
+        among = self.values[:larger]
+        apart = np.abs(among[:, None] - among[None, :])
+        return bool((apart <= _EQUAL * np.abs(among)).sum(axis=1).max(initial=0) < self._width)
+
+    def _extend(self) -> None:
+        first, last = self._done, self._done + self._width
+        new = self._apply(self._basis[:, first:last])
+        known = self._basis[:, :last]
+        part = zgemm(1.0, known, new, trans_a=2)  # without a copy of all vectors
+        before, rest = np.linalg.norm(new, axis=0), new - known @ part
+        directions, sizes = np.linalg.qr(rest)
+        dependent = np.abs(np.diag(sizes)) <= _DEPENDENT * before.max()
+        if dependent.any():
+            directions[:, dependent] = self._random.standard_normal(
+                (self._size, int(dependent.sum()))
+            )
+            sizes[dependent] = 0.0
+        if dependent.any() or np.linalg.svd(sizes, compute_uv=False).min() < _AGAIN * before.max():
+            again = zgemm(1.0, known, directions, trans_a=2)
+            directions, turned = np.linalg.qr(directions - known @ again)
+            part, sizes = part + again @ sizes, turned @ sizes
+        self._image[:last, first:last] = part
+        self._image[last : last + self._width, first:last] = sizes
+        self._basis[:, last : last + self._width] = directions
+        self._done = last
+
+    def _look(self) -> None:
+        m = self._done
+        nu, vectors = scipy.linalg.eig(self._image[:m, :m], check_finite=False)
+        rest = np.linalg.norm(self._image[m : m + self._width, :m] @ vectors, axis=0)
+        order = np.argsort(-np.abs(nu), kind="stable")
+        self.values, self._coordinates = nu[order], vectors[:, order]
+        self.accuracy = rest[order] / np.abs(self.values)

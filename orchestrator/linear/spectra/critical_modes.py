@@ -1,0 +1,358 @@
+"""The critical modes of a large system, without its full spectrum: sparse shift-and-invert search.
+
+Around a point σ of the complex plane, Arnoldi's method on (A − σI)⁻¹ finds the eigenvalues nearest to σ. All
+eigenvalues nearer than the farthest one found are then known. Discs around a few points cover the region of the
+critical modes: a range of frequencies, from well into instability to a damping that needs no attention."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse.linalg as spla
+from numpy.typing import NDArray
+
+from orchestrator.core.arrays import Vector
+from orchestrator.core.errors import AnalysisError
+from orchestrator.core.threads import one_thread
+from orchestrator.linear.models.linear_model import LinearModel
+from orchestrator.linear.spectra import modes as spectra
+from orchestrator.linear.spectra.block_arnoldi import MOST, TOLERANCE, BlockArnoldi
+
+DENSE = 200  # up to this number of states, the full spectrum is cheaper
+# ratio of the ends of the stretches of the range: the region is a wedge, so discs grow upwards
+_STRETCH = 1.35
+
+_SHORT_STRETCH = 1.15
+"""The same where a model has a hub: a factorisation is worth few vectors there, and short stretches keep the crowd of
+better damped modes out of the discs."""
+
+_AT_A_TIME = (20, 80)
+"""Numbers of eigenvalues to find around one point: the first number, and the largest one if the first does not reach
+far enough. Many equal units have many equal local modes, and a small number would find only these."""
+
+_KEPT = 100
+"""Least number of vectors that Arnoldi's method keeps. With 50 it begins anew more often, and solves a fifth more
+equations (299 buses, 0.1 to 2 Hz)."""
+
+# the same where only the eigenvalue nearest to the point is looked for, mostly next to it
+_KEPT_FOR_ONE = 30
+
+_TOLERANCE = 1e-9
+"""Of Arnoldi's method, relative. The last digits of eigenvalues at the rim, which crowd, cost most of its equations;
+eigenvalues inside have settled far beyond it by then."""
+
+_SAME = 1e-5
+"""Eigenvalues of the equations and of their adjoint are one where they differ by less than this part of their distance
+from σ."""
+
+_FAR, _CIRCLE = 10.0, np.exp(2j * np.pi * np.arange(8) / 8)
+"""An eigenvalue that has not settled may be farther from where it seems to be than its equations leave over by this
+factor, as none of the matrices is normal; and directions in which it may be."""
+
+_BESIDE = 1e-7
+"""An eigenvalue nearer to the point than this part of it drowns the others' digits: 1e-11 rad/s away they were off by
+6e-7 rad/s, on it by 1.5e-3. The point moves then."""
+
+_SMALLEST = 1e-4  # smallest size of a cell of the region, relative to its distance from 0
+# how far into instability the region reaches: to this negative damping ratio
+_UNSTABLE_MARGIN = 0.1
+
+
+def find_critical_modes(
+    model: LinearModel,
+    lowest_hz: float = spectra.ELECTROMECHANICAL_HZ[0],
+    highest_hz: float = spectra.ELECTROMECHANICAL_HZ[1],
+    damping: float = 0.2,
+) -> list[spectra.Mode]:
+    """Modes of a frequency range with less than a given damping, least damped first.
+
+    ``model``: step map or continuous matrix, of any size.
+    ``lowest_hz`` and ``highest_hz``: range of Im λ/2π [Hz], both ends included; the lowest must exceed 0.
+    ``damping``: damping ratio between 0 and 0.9. All modes with less damping are found, down to a damping ratio of
+    −0.1."""
+    if not (0 < lowest_hz < highest_hz and 0 < damping <= 0.9):
+        raise AnalysisError(
+            f"a search from {lowest_hz:g} to {highest_hz:g} Hz below a damping ratio of {damping:g} is none; "
+            "the frequencies must rise from above 0, and the damping ratio lie between 0 and 0.9"
+        )
+    if len(model.names) <= DENSE:
+        found = spectra.find_modes(model, lowest_hz, highest_hz)
+    else:
+        beyond = 1 + _SMALLEST  # a cell does not own its upper edges
+        found = _search(
+            model, 2 * np.pi * lowest_hz, 2 * np.pi * highest_hz * beyond, damping * beyond
+        )
+    wanted = (m for m in found if lowest_hz <= m.frequency_hz <= highest_hz)
+    return spectra.least_damped_first(
+        m for m in wanted if -_UNSTABLE_MARGIN <= m.damping_ratio <= damping
+    )
+
+
+def nearest_eigenvalue(model: LinearModel, wanted: complex) -> complex:
+    """The eigenvalue λ [rad/s] nearest to a given one, from the sparse equations alone."""
+    if len(model.names) <= DENSE:
+        values, _ = spectra.to_continuous(
+            np.linalg.eigvals(model.A).astype(complex), model.step_size
+        )
+        return complex(values[np.argmin(np.abs(values - wanted))])
+    values = Search(model, wanted).nearest(2, _KEPT_FOR_ONE)
+    return complex(values[np.argmin(np.abs(values - wanted))])
+
+
+def nearest_pairs(
+    model: LinearModel, wanted: complex, count: int
+) -> list[tuple[complex, Vector, Vector]]:
+    """The eigenvalues λ [rad/s] nearest to a given one, each with its left and right eigenvector."""
+    search = Search(model, wanted)
+    search.nearest(count)
+    return search.pairs(range(count))
+
+
+@dataclass(frozen=True)
+class _Cell:
+    """A part of the region: Im λ from ``low`` to ``high`` [rad/s], damping ratio from ``least`` to ``most``."""
+
+    low: float
+    high: float
+    least: float
+    most: float
+
+    @property
+    def corners(self) -> list[complex]:
+        return [
+            complex(-ratio / np.sqrt(1 - ratio**2) * omega, omega)
+            for omega in (self.low, self.high)
+            for ratio in (self.least, self.most)
+        ]
+
+    @property
+    def centre(self) -> complex:
+        return complex(np.mean(self.corners))
+
+    @property
+    def radius(self) -> float:
+        return max(abs(corner - self.centre) for corner in self.corners)
+
+    def holds(self, value: complex) -> bool:
+        """Return whether a point lies in the cell, which includes its lower edges but not the upper ones."""
+        return (
+            self.low <= value.imag < self.high
+            and self.least <= spectra.damping_ratio(value) < self.most
+        )
+
+    def halves(self) -> tuple["_Cell", "_Cell"]:
+        """Cut across the longer side."""
+        if self.high - self.low > (self.most - self.least) * self.high:
+            middle = float(np.sqrt(self.low * self.high))
+            return replace(self, high=middle), replace(self, low=middle)
+        between = (self.least + self.most) / 2
+        return replace(self, most=between), replace(self, least=between)
+
+
+def _search(
+    model: LinearModel, lowest: float, highest: float, damping: float
+) -> list[spectra.Mode]:
+    """Cover the region with discs. If a disc is too small, find more eigenvalues around its point, or cut the cell."""
+    modes: list[spectra.Mode] = []
+    stretch = _SHORT_STRETCH if model.is_searched_in_blocks else _STRETCH
+    edges = np.geomspace(
+        lowest, highest, 1 + int(np.ceil(np.log(highest / lowest) / np.log(stretch)))
+    ).tolist()
+    waiting = [_Cell(low, high, -_UNSTABLE_MARGIN, damping) for low, high in pairwise(edges)]
+    while waiting:
+        cell = waiting.pop()
+        if cell.radius < _SMALLEST * abs(cell.centre):
+            raise AnalysisError(
+                f"more than {_AT_A_TIME[1]} modes lie at {cell.centre:.4g} rad/s; compute the full spectrum instead"
+            )
+        search, values = _searched(model, cell)
+        if values is None:
+            waiting += cell.halves()
+        else:
+            modes += search.modes([k for k, value in enumerate(values) if cell.holds(value)])
+    return modes
+
+
+def _searched(model: LinearModel, cell: _Cell) -> "tuple[Search, NDArray[np.complex128] | None]":
+    """All eigenvalues of a disc around a cell, or None where there are too many. The point is not on one of them."""
+    for moved in (0.0, 0.02, 0.05):
+        search = Search(model, cell.centre + moved * cell.radius)
+        values = search.reaching((1 + moved) * cell.radius, cell.holds)
+        if (
+            values is None
+            or not len(values)
+            or np.abs(values - search.centre).min() > _BESIDE * abs(search.centre)
+        ):
+            break
+    return search, values
+
+
+class Search:
+    """Arnoldi's method on (A − σI)⁻¹ around one point λ = ``centre``.
+
+    ``sigma``: The point in the plane of A's own eigenvalues.
+    ``reach``: Distance from ``sigma`` up to which the last search has found every eigenvalue."""
+
+    def __init__(self, model: LinearModel, centre: complex) -> None:
+        self._model, self.centre = model, centre
+        self.sigma = np.exp(centre * model.step_size) if model.step_size else centre
+        with one_thread():
+            self._solver = model.shifted(self.sigma)
+        self._values: NDArray[np.complex128] = np.zeros(0, dtype=complex)
+        self.reach = 0.0
+        self._right = np.zeros((len(model.names), 0), dtype=complex)
+        self._blocks: BlockArnoldi | None = None
+
+    def nearest(self, count: int, kept: int = _KEPT) -> NDArray[np.complex128]:
+        self._blocks = None
+        nu, self._right = self._arnoldi(self._solver.solve, count, kept)
+        self._values = self._to_lambda(nu)
+        self.reach = float(1 / np.abs(nu).min())
+        return self._values
+
+    def reaching(
+        self, radius: float, wanted: Callable[[complex], bool] = lambda _: True
+    ) -> NDArray[np.complex128] | None:
+        """All eigenvalues nearer than ``radius``; None if there are too many. Those that are not wanted may be rough.
+
+        ``radius``: distance from ``centre`` [rad/s].
+        ``wanted``: whether an eigenvalue λ is looked for."""
+        if self._solver.takes_many:
+            self._blocks = BlockArnoldi(self._solver.solve, len(self._model.names))
+            return self._reaching_in_blocks(self._blocks, radius, wanted)
+        count, most = _AT_A_TIME
+        while count <= most:
+            values = self.nearest(count)
+            if np.abs(values - self.centre).max() > radius:
+                return values
+            count *= 2
+        return None
+
+    def modes(self, chosen: Sequence[int]) -> list[spectra.Mode]:
+        return [
+            spectra.make_mode(value, left, right, self._model.names)
+            for value, left, right in self.pairs(chosen)
+        ]
+
+    def pairs(self, chosen: Sequence[int]) -> list[tuple[complex, Vector, Vector]]:
+        """Eigenvalue, left and right eigenvector of some of the eigenvalues of the last search."""
+        if not chosen:
+            return []
+        if self._blocks is not None:
+            return self._pairs_of_blocks(self._blocks, list(chosen))
+        nu, left = self._arnoldi(self._solver.solve_adjoint, len(self._values))
+        partners = self._to_lambda(nu.conj())
+        return [
+            (
+                complex(self._values[k]),
+                left[:, np.argmin(np.abs(partners - self._values[k]))],
+                self._right[:, k],
+            )
+            for k in chosen
+        ]
+
+    def _reaching_in_blocks(
+        self, blocks: BlockArnoldi, radius: float, wanted: Callable[[complex], bool]
+    ) -> NDArray[np.complex128] | None:
+        self.reach = self._farthest(radius)
+
+        def may_be_wanted(place: int) -> bool:
+            (value,) = self._to_lambda(blocks.values[place : place + 1])
+            around = value + _FAR * blocks.accuracy[place] * abs(value - self.centre) * _CIRCLE
+            return wanted(complex(value)) or any(map(wanted, around.tolist()))
+
+        if not _grow(blocks, lambda found: found.knows_all_beyond(1 / self.reach, may_be_wanted)):
+            return None
+        count = int((np.abs(blocks.values) >= 1 / self.reach).sum())
+        self._values = self._to_lambda(blocks.values[:count])
+        return self._values if blocks.is_complete(count) else None
+
+    def _pairs_of_blocks(
+        self, blocks: BlockArnoldi, chosen: list[int]
+    ) -> list[tuple[complex, Vector, Vector]]:
+        """The same, from the space of both sides' vectors: its eigenvalues have the square of their accuracy."""
+        from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - half a second to import
+
+        wanted = blocks.values[chosen]
+        adjoint = BlockArnoldi(self._solver.solve_adjoint, len(self._model.names), 2 * MOST)
+        if not _grow(adjoint, lambda found: _partners(found, wanted) is not None):
+            raise self._not_converging
+        with one_thread():
+            left, right = adjoint.vectors(_partners(adjoint, wanted) or ()), blocks.vectors(chosen)
+            moved = self._solver.solve(right)
+            nu, of_left, of_right = scipy.linalg.eig(
+                left.conj().T @ moved, left.conj().T @ right, left=True
+            )
+            left, right, moved = left @ of_left, right @ of_right, moved @ of_right
+        order = linear_sum_assignment(np.abs(wanted[:, None] - nu[None, :]))[1]
+        rest = np.linalg.norm(moved - right * nu, axis=0) / (
+            np.abs(nu) * np.linalg.norm(right, axis=0)
+        )
+        moves = np.abs(nu[order] - wanted) / np.abs(wanted)
+        if not (
+            np.concatenate([rest, moves]) <= _SAME
+        ).all():  # nor is it where one is not a number
+            raise self._not_converging
+        values = self._to_lambda(nu)
+        return [(complex(values[k]), left[:, k], right[:, k]) for k in order.tolist()]
+
+    def _farthest(self, radius: float) -> float:
+        """Distance from ``sigma`` of the farthest point of the circle around ``centre``."""
+        if not self._model.step_size:
+            return radius
+        circle = self.centre + radius * np.exp(1j * np.linspace(0, 2 * np.pi, 65))
+        return float(np.abs(np.exp(circle * self._model.step_size) - self.sigma).max())
+
+    def _to_lambda(self, nu: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        return spectra.to_continuous(self.sigma + 1 / nu, self._model.step_size)[0]
+
+    @property
+    def _not_converging(self) -> AnalysisError:
+        return AnalysisError(
+            f"the search for modes around {self.centre:.3g} rad/s does not converge; compute the full spectrum"
+        )
+
+    def _arnoldi(
+        self, solve: Callable[[Vector], Vector], count: int, kept: int = _KEPT
+    ) -> tuple[Vector, Vector]:
+        n = len(self._model.names)
+        # the same search gives the same answer
+        start = np.random.default_rng(0).standard_normal(n).astype(complex)
+        inverse = spla.LinearOperator((n, n), matvec=solve, dtype=complex)
+        try:
+            with one_thread():
+                nu, vectors = spla.eigs(
+                    inverse,
+                    k=count,
+                    ncv=min(n, max(kept, 2 * count + 10)),
+                    v0=start,
+                    tol=_TOLERANCE,
+                )
+        except spla.ArpackNoConvergence as error:
+            raise self._not_converging from error
+        return nu, vectors
+
+
+def _grow(blocks: BlockArnoldi, enough: Callable[[BlockArnoldi], bool]) -> bool:
+    """Take vectors until there are enough; whether they suffice before there are too many."""
+    with one_thread():
+        while not enough(blocks):
+            if not blocks.grow():
+                return False
+    return True
+
+
+def _partners(blocks: BlockArnoldi, wanted: NDArray[np.complex128]) -> list[int] | None:
+    """Places of the settled values of the adjoint equations that are those wanted, one for each; None if one lacks."""
+    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - half a second to import
+
+    settled = np.flatnonzero(blocks.accuracy <= TOLERANCE)
+    if len(settled) < len(wanted):
+        return None
+    apart = (
+        np.abs(wanted[:, None] - blocks.values[settled].conj()[None, :]) / np.abs(wanted)[:, None]
+    )
+    rows, columns = linear_sum_assignment(np.minimum(apart, 1.0))
+    return settled[columns].tolist() if bool((apart[rows, columns] <= _SAME).all()) else None

@@ -1,0 +1,177 @@
+"""Modes of a model from those of a similar one, and critical modes beside them.
+
+The first are found by two-sided inverse iteration in the space of all of them: the known eigenvectors of both sides,
+improved by one solution each at a point near their eigenvalues, span a small space; its eigenvalues are those of the
+model up to the square of what the vectors still lack.
+
+Where the modes of one operating point are made from those of another, a mode that was not critical there, or not there
+at all, is missed. With the known modes projected out, Arnoldi's method around a few points finds what else lies
+nearby; mostly nothing."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse.linalg as spla
+from numpy.typing import NDArray
+
+from orchestrator.core.arrays import Vector
+from orchestrator.core.errors import AnalysisError
+from orchestrator.linear.models.linear_model import LinearModel
+from orchestrator.linear.spectra.modes import damping_ratio
+from orchestrator.linear.spectra.shifted_equations import ShiftedEquations
+
+_ROUNDS = 8
+# the eigenvalues have settled where a round moves none of them by more than this part
+_SETTLED = 1e-8
+# what A·r may differ from λ·r by, as a part of λ and r. The eigenvalue has the square of it.
+_REST = 1e-4
+_SPREAD = 1.1  # eigenvalues whose sizes differ by up to this factor share a point
+# by this part the point lies beside its eigenvalues' middle: on one nothing could be solved
+_BESIDE = 1e-3
+
+
+@dataclass(frozen=True)
+class RefinedModes:
+    """Eigenvalues λ [rad/s], shape (m,), with left and right eigenvectors as columns, shape (n, m)."""
+
+    values: NDArray[np.complex128]
+    left: Vector
+    right: Vector
+    settled: bool  # Whether the last round left them where they were. Others are not to be trusted.
+
+
+def refine(
+    model: LinearModel,
+    equations: ShiftedEquations,
+    values: NDArray[np.complex128],
+    left: Vector,
+    right: Vector,
+) -> RefinedModes:
+    """Modes of a continuous model, from values and vectors that are nearly so."""
+    settled = False
+    for _ in range(_ROUNDS):
+        new_left, new_right = left.copy(), right.copy()
+        for members in _groups(values):
+            middle = values[members].mean()
+            factors = equations.at(middle * (1 + _BESIDE * (1 + 1j)))
+            new_right[:, members] = factors.solve(right[:, members])
+            new_left[:, members] = factors.solve(left[:, members], adjoint=True)
+        new_right, new_left = (np.linalg.qr(vectors)[0] for vectors in (new_right, new_left))
+        small, mass = new_left.conj().T @ model.apply(new_right), new_left.conj().T @ new_right
+        if not np.isfinite(small + mass).all():
+            break
+        found, of_left, of_right = scipy.linalg.eig(small, mass, left=True, right=True)
+        if not np.isfinite(found).all():
+            break
+        order = _in_order_of(values, found)
+        before, values = values, found[order]
+        left, right = new_left @ of_left[:, order], new_right @ of_right[:, order]
+        settled = bool(np.all(np.abs(values - before) <= _SETTLED * np.abs(values)))
+        if settled:
+            break
+    return RefinedModes(values, left, right, settled and _are_eigenvectors(model, values, right))
+
+
+def _groups(values: NDArray[np.complex128]) -> list[NDArray[np.int64]]:
+    """Places of eigenvalues of similar size."""
+    order = np.argsort(np.abs(values), kind="stable")
+    groups: list[list[int]] = []
+    for k in order.tolist():
+        if groups and abs(values[k]) <= _SPREAD * abs(values[groups[-1][0]]):
+            groups[-1].append(k)
+        else:
+            groups.append([k])
+    return [np.array(group, dtype=np.int64) for group in groups]
+
+
+def _in_order_of(
+    before: NDArray[np.complex128], found: NDArray[np.complex128]
+) -> NDArray[np.int64]:
+    """Places of what was found, each next to what it was before."""
+    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - half a second to import
+
+    apart = np.abs(before[:, None] - found[None, :])
+    apart[~np.isfinite(apart)] = np.finfo(float).max ** 0.5
+    return np.asarray(linear_sum_assignment(apart)[1], dtype=np.int64)
+
+
+def _are_eigenvectors(model: LinearModel, values: NDArray[np.complex128], right: Vector) -> bool:
+    """Return whether A·r is λ·r, as far as rounding lets it be."""
+    moved = model.apply(right)
+    rest = np.abs(moved - right * values).max(axis=0)
+    return bool(np.all(rest <= _REST * np.maximum(1.0, np.abs(values)) * np.abs(right).max(axis=0)))
+
+
+_STRETCH = 3.0  # ratio of the ends of a stretch of frequencies around each point
+_GROWTH = 0.3  # how far into instability the search reaches: to this negative damping ratio
+_AT_A_TIME = (2, 64)
+"""Numbers of unknown eigenvalues to find around one point: the first, and the largest where that does not reach far
+enough."""
+
+
+_ROUGH = 1e-3  # accuracy of what is found: enough to say whether something is there
+
+
+def missed(
+    equations: ShiftedEquations, known: RefinedModes, lowest: float, highest: float, damping: float
+) -> list[complex]:
+    """Eigenvalues [rad/s] of a region beside the known ones.
+
+    ``lowest`` and ``highest``: range of Im λ [rad/s], above 0.
+    ``damping``: damping ratio below which nothing may be missed, down to −0.3. What is found is rough."""
+    norms = np.einsum("ij,ij->j", known.left.conj(), known.right)
+    left = (known.left / norms.conj()).conj().T
+    edges = np.geomspace(
+        lowest, highest, 1 + int(np.ceil(np.log(highest / lowest) / np.log(_STRETCH)))
+    ).tolist()
+    slopes = [-ratio / np.sqrt(1 - ratio**2) for ratio in (-_GROWTH, damping)]
+    found: list[complex] = []
+    for low, high in pairwise(edges):
+        corners = [complex(slope * omega, omega) for slope in slopes for omega in (low, high)]
+        centre = complex(np.mean(corners))
+        radius = max(abs(corner - centre) for corner in corners)
+        for value in _unknown(equations, left, known.right, centre, radius):
+            if low <= value.imag < high and -_GROWTH <= damping_ratio(value) < damping:
+                found.append(value)
+    return found
+
+
+def _unknown(
+    equations: ShiftedEquations, left: Vector, right: Vector, centre: complex, radius: float
+) -> list[complex]:
+    """All unknown eigenvalues nearer to a point than a radius, and some farther ones."""
+    factors, n = equations.at(centre), right.shape[0]
+
+    def solve(vector: Vector) -> Vector:
+        rest = vector.reshape(n, 1)
+        rest = factors.solve(rest - right @ (left @ rest))
+        found: Vector = (rest - right @ (left @ rest))[:, 0]
+        return found
+
+    # the same search gives the same answer
+    start = np.random.default_rng(0).standard_normal((n,)).astype(complex)
+    inverse = spla.LinearOperator((n, n), matvec=solve, dtype=complex)
+    count, most = _AT_A_TIME
+    while count <= min(most, n - 2):
+        try:
+            nu = spla.eigs(
+                inverse,
+                k=count,
+                ncv=min(n, max(24, 3 * count)),
+                v0=start,
+                tol=_ROUGH,
+                return_eigenvectors=False,
+            )
+        except spla.ArpackNoConvergence as error:
+            raise AnalysisError(
+                f"the search for modes around {centre:.3g} rad/s does not converge; compute the full spectrum"
+            ) from error
+        values = centre + 1 / nu
+        if np.abs(values - centre).max() > radius:
+            return [complex(value) for value in values]
+        count *= 2
+    raise AnalysisError(
+        f"more than {most} modes lie at {centre:.4g} rad/s; compute the full spectrum instead"
+    )

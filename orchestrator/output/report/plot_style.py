@@ -1,0 +1,54 @@
+"""The look that all plots share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from orchestrator.core.safe_files import write_bytes
+from orchestrator.output.report.html import elements
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+STYLE: dict[Any, Any] = {
+    "axes.grid": True,
+    "grid.color": "#e3e3e3",
+    "grid.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 11,
+    "font.size": 9.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.3,
+}
+colour = elements.colour
+_DPI = 150
+_LEGEND_WIDTH = 96  # characters that fit in a line of a legend, marks included
+
+
+def add_legend(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) -> None:
+    """Below the axes, in as many columns as the longest label leaves room for."""
+    columns = max(1, min(3, _LEGEND_WIDTH // (6 + max(map(len, labels), default=1))))
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    _to_the_letter(figure)
+    picture = BytesIO()
+    figure.savefig(picture, dpi=_DPI, format=path.suffix.removeprefix("."))
+    write_bytes(path, picture.getvalue())
+
+
+def _to_the_letter(figure: Figure) -> None:
+    """Titles, labels and legends are foreign text: two dollar signs in it begin no formula. Ticks keep theirs."""
+    from matplotlib.text import Text  # noqa: PLC0415 - a second to import
+
+    numbers: set[Any] = set()
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            numbers |= set(axis.findobj(Text)) - {axis.label}
+    for text in set(figure.findobj(Text)) - numbers:
+        text.set_parse_math(False)

@@ -1,0 +1,145 @@
+"""Which values a federation exchanges, and when; times of HELICS are whole nanoseconds."""
+
+import socket
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from itertools import pairwise
+
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.core.errors import InputError
+from orchestrator.simulation.federation.choice import address_of
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """One exchange within each communication step, for the federates of one group; times from its beginning [ns]."""
+
+    # publish, compute, read: when gfor publishes inputs, when the federates compute, and when gfor reads their outputs
+    publish: int
+    compute: int
+    read: int
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    name: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    needed: tuple[str, ...]
+    start: dict[str, float]
+    units: dict[str, str]
+    slot: int
+    external: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """All exchanges of a federation; ``period`` is the communication step [ns]."""
+
+    period: int
+    slots: tuple[Slot, ...]
+    parts: tuple[Part, ...]
+
+
+def make_layout(
+    prepared: PreparedScenario, names: Sequence[str], external: Sequence[str]
+) -> Layout:
+    system, known = prepared.system, prepared.system.components
+    for option, given in (("--federate", names), ("--external", external)):
+        wrong = [name for name in given if name not in known]
+        if wrong:
+            raise InputError(
+                f"{option} {wrong[0]}: scenario {prepared.name!r} has no component {wrong[0]!r}; "
+                f"components: {', '.join(known)}"
+            )
+    if not prepared.schedule.is_plain:
+        raise InputError(
+            "--engine helics needs a schedule with held inputs and a plain clock, gauss-seidel or jacobi; "
+            "leave --like and --tolerance out"
+        )
+    period = round(prepared.step_size * 1e9)
+    wanted = {*names, *external}
+    groups = [[n for n in group if n in wanted] for group in prepared.schedule.groups]
+    groups = [group for group in groups if group]
+    if abs(prepared.step_size * 1e9 - period) > 1e-6 or period < 2 * len(groups):
+        raise InputError(
+            f"communication step {prepared.step_size:g} s: HELICS counts time in whole nanoseconds, and each group "
+            "with federates needs two of them in a step; give another step with --step"
+        )
+    edges = [period * i // len(groups) for i in range(len(groups) + 1)]
+    slots = tuple(Slot(a, (a + b) // 2, b) for a, b in pairwise(edges))
+    parts = []
+    for slot, group in enumerate(groups):
+        for name in group:
+            plan = known[name]
+            variables = plan.description.variables
+            inputs = [c.target.variable for c in system.connections if c.target.component == name]
+            outputs = [v for v in plan.description.outputs if variables[v].type == "Real"]
+            start = {
+                v: float(x)
+                for v, x in (plan.parameters | plan.inputs).items()
+                if not isinstance(x, str)
+            }
+            needed = dict.fromkeys(
+                c.source.variable for c in system.connections if c.source.component == name
+            )
+            units = {v: variables[v].unit for v in (*inputs, *outputs, *start)}
+            parts.append(
+                Part(
+                    name,
+                    tuple(inputs),
+                    tuple(outputs),
+                    tuple(needed),
+                    start,
+                    units,
+                    slot,
+                    name in set(external),
+                )
+            )
+    return Layout(period, slots, tuple(parts))
+
+
+_TRIES = 50
+_TO_CONNECT = 5.0  # how long a broker's address is tried [s]
+
+
+def broker_port(wanted: int | None) -> int:
+    """The port of a broker that is about to be started; the one after it is free as well, which HELICS takes too."""
+    if wanted is not None:
+        taken = _taken(wanted, "")
+        if taken is not None:
+            raise InputError(
+                f"--broker-port {wanted}: port {taken} is in use (a broker takes two ports, {wanted} and {wanted + 1})"
+                "; give another port, or use the broker that runs there with --broker"
+            )
+        return wanted
+    for _ in range(_TRIES):
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            port: int = server.getsockname()[1]
+        if port < 65000 and _taken(port, "127.0.0.1") is None:
+            return port
+    raise InputError(
+        "this machine has no two free ports one after the other for a broker; give one with --broker-port"
+    )
+
+
+def _taken(port: int, host: str) -> int | None:
+    with ExitStack() as stack:
+        for number in (port, port + 1):
+            try:
+                stack.enter_context(socket.create_server((host, number)))
+            except (OSError, OverflowError):
+                return number
+    return None
+
+
+def require_broker(broker: str) -> None:
+    host, port = address_of(broker)
+    try:
+        socket.create_connection((host, port), timeout=_TO_CONNECT).close()
+    except OSError as error:
+        raise InputError(
+            f"--broker {broker}: nothing answers there ({error}); start one with `helics_broker -f N --ipv4 "
+            f"--port={port}`, N being the number of federates and one more for gfor, and look at the firewall"
+        ) from error

@@ -1,0 +1,279 @@
+"""A test bench: one FMU alone at a bus whose voltage we impose, brought to the same operating point for every run.
+
+An FMU that can save its state is put back to it; any other is instantiated anew. Nothing but FMI is used: no states
+are read or set, and parameters only before initialisation."""
+
+import ctypes
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fmus.toolchain.compiler import compile_here
+from orchestrator.core.arrays import Numbers
+from orchestrator.core.errors import AnalysisError, InputError
+from orchestrator.devices.fmi.component import Component, RealBatch
+from orchestrator.devices.fmi.description import FmuDescription
+from orchestrator.devices.fmi.instance import open_component
+from orchestrator.devices.fmi.interrupts import calls
+from orchestrator.linear.models.sampled import steps_of_times, times_of
+
+_SOURCE = Path(__file__).with_name("drive.c")
+_CALLS = {1: "fmi2SetReal", 2: "fmi2DoStep", 3: "fmi2GetReal"}
+# steps in one call of the C library; an interrupt from the keyboard takes effect between two
+_STRETCH = 20000
+
+STILL = 1e-9
+"""Largest change of an output over a second [pu] at which the device counts as being in steady state; of its mean over
+the period, where a sampled controller of phase quantities makes the output repeat after a period."""
+
+
+@dataclass
+class Bench:
+    """Start of a device, and the variables through which it is measured."""
+
+    # description, parameters: the FMU and what it is given before initialisation: rating, power-flow values, its own
+    # parameters
+    description: FmuDescription
+    parameters: Mapping[str, float | bool]
+    rest: Numbers  # values of the inputs at the operating point, shape (m,)
+    # inputs, outputs: names, such as ``v_re``, ``v_im`` and ``i_re``, ``i_im``
+    inputs: Sequence[str] = ("v_re", "v_im")
+    outputs: Sequence[str] = ("i_re", "i_im")
+    # constant values of the inputs that the bench does not change
+    held: Mapping[str, float] = field(default_factory=dict)
+    step_size: float = 1e-4  # communication step [s]
+    # whether the bench saves and restores the FMU's state; None if it does so with every FMU that can
+    restore: bool | None = None
+    isolated: bool | None = None  # as in `open_component`
+    longest_wait: float = 120.0  # longest time that the device may take to come to rest [s]
+
+    @property
+    def saves_state(self) -> bool:
+        return self.description.can_save_state if self.restore is None else self.restore
+
+    @contextmanager
+    def runs(self) -> Iterator["Runs"]:
+        runs = Runs(self)
+        try:
+            yield runs
+        finally:
+            runs.close()
+
+
+class Runs:
+    """Runs on a bench; each begins at the operating point.
+
+    ``still_after``: Time that the device needed to come to rest [s].
+    ``operating_point``: Outputs at the operating point, shape (p,)."""
+
+    def __init__(self, bench: Bench) -> None:
+        self._bench = bench
+        self._component: Component | None = None
+        self._state: Any = None
+        self._index = 0
+        self.still_after = 0.0
+        try:
+            self._start()
+            self.operating_point = self._come_to_rest()
+            if bench.saves_state:
+                self._state = self._running.save_state()
+            self._rest_index = self._index
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def _running(self) -> Component:
+        assert self._component is not None
+        return self._component
+
+    def respond(self, parts: Iterable[Numbers]) -> Iterator[Numbers]:
+        """Outputs after every step while the inputs deviate from rest, part by part as they are asked for.
+
+        ``parts``: Deviations in the order of time, each of shape (n, m); row k holds from point k to point k + 1.
+
+        Yields
+        ------
+        Deviations of the outputs from the operating point, shape (n, p); row k is read at the end of step k, with
+        the inputs of that step still in place.
+        """
+        self._rewind()
+        for deviations in parts:
+            yield self._drive(self._bench.rest + deviations) - self.operating_point
+
+    def feedthrough(self, size: float) -> Numbers:
+        """Direct effect of the inputs on the outputs, shape (p, m): set and read without a step, ± ``size``."""
+        bench = self._bench
+        found = np.zeros((len(bench.outputs), len(bench.inputs)))
+        self._rewind()
+        inputs, outputs = (
+            RealBatch(self._running, names) for names in (bench.inputs, bench.outputs)
+        )
+        for k in range(len(bench.inputs)):
+            for sign in (1.0, -1.0):
+                inputs.values[:] = bench.rest
+                inputs.values[k] += sign * size
+                inputs.write()
+                found[:, k] += sign * outputs.read()
+        inputs.values[:] = bench.rest
+        inputs.write()
+        return found / (2 * size)
+
+    def close(self) -> None:
+        component, self._component = self._component, None
+        if component is not None:
+            if self._state is not None:
+                component.free_state(self._state)
+                self._state = None
+            component.close()
+
+    def _start(self) -> None:
+        bench = self._bench
+        component = self._component = open_component(
+            "box", bench.description, isolated=bench.isolated
+        )
+        component.setup(0.0, None)
+        component.set(bench.parameters)
+        component.enter_initialization_mode()
+        component.set(dict(bench.held) | dict(zip(bench.inputs, bench.rest.tolist(), strict=True)))
+        component.exit_initialization_mode()
+        self._index = 0
+
+    def _rewind(self) -> None:
+        if self._state is not None:
+            self._running.restore_state(self._state)
+            self._index = self._rest_index
+        else:
+            self.close()
+            self._start()
+            self._hold(self._rest_index)
+
+    def _come_to_rest(self) -> Numbers:
+        """Hold the voltage until no output moves. A device that starts exactly at the power flow's values is at rest at
+        once."""
+        bench = self._bench
+        second = round(1.0 / bench.step_size)
+        while True:
+            outputs = self._means(self._hold(second))
+            movement = np.abs(np.ptp(outputs, axis=0)).max()
+            if movement <= STILL:
+                self.still_after = self._index * bench.step_size - 1.0
+                return np.asarray(outputs[-1])
+            if self._index * bench.step_size >= bench.longest_wait:
+                raise AnalysisError(
+                    f"{bench.description.path.name}: alone at an ideal bus its current still moves by {movement:.3g} "
+                    f"pu in a second after {bench.longest_wait:g} s, so there is no operating point to identify it at; "
+                    "check its start values, or give it more time"
+                )
+
+    def _means(self, outputs: Numbers) -> Numbers:
+        """Means over the period after which the device repeats, one below the other; else the outputs as they are."""
+        period = steps_of_times(times_of(self._running), self._bench.step_size)
+        whole = len(outputs) // period  # periods
+        if period == 1 or whole < 2:
+            return outputs
+        return np.asarray(
+            outputs[len(outputs) - whole * period :].reshape(whole, period, -1).mean(axis=1)
+        )
+
+    def _hold(self, count: int) -> Numbers:
+        return self._drive(np.tile(self._bench.rest, (count, 1)))
+
+    def _drive(self, inputs: Numbers) -> Numbers:
+        """Outputs after each of some steps, shape (n, p)."""
+        bench = self._bench
+        names = bench.inputs, bench.outputs
+        outputs = drive(self._running, names, inputs, bench.step_size, self._index)
+        self._index += len(inputs)
+        return outputs
+
+
+def drive(
+    component: Component,
+    names: tuple[Sequence[str], Sequence[str]],
+    inputs: Numbers,
+    step_size: float,
+    index: int = 0,
+) -> Numbers:
+    """Step a component with one row of inputs after another; its outputs at the end of each step, shape (n, p).
+
+    ``names``: of the inputs and of the outputs; ``inputs``: shape (n, m); ``index``: steps that were made before.
+
+    Raises an `AnalysisError` if an output is no finite number, and a `ComponentError` if the FMU refuses a call."""
+    outputs = np.empty((len(inputs), len(names[1])))
+    for first in range(0, len(inputs), _STRETCH):
+        part = slice(first, min(first + _STRETCH, len(inputs)))
+        rows = np.ascontiguousarray(inputs[part])
+        _drive_stretch(component, names, (rows, outputs[part]), step_size, index + first)
+    return outputs
+
+
+def _drive_stretch(
+    component: Component,
+    names: tuple[Sequence[str], Sequence[str]],
+    rows: tuple[Numbers, Numbers],
+    step_size: float,
+    index: int,
+) -> None:
+    inputs, outputs = rows
+    into, out = (
+        RealBatch(component, names[0], inputs[0]),
+        RealBatch(component, names[1], outputs[0]),
+    )
+    failed = (ctypes.c_int64 * 2)()
+    with calls:
+        status = _library().drive(
+            component.pointer,
+            *(
+                ctypes.cast(f, ctypes.c_void_p)
+                for f in (component.set_real, component.get_real, component.do_step)
+            ),
+            into.arguments[1],
+            len(names[0]),
+            out.arguments[1],
+            len(names[1]),
+            inputs.ctypes.data,
+            outputs.ctypes.data,
+            index,
+            len(inputs),
+            step_size,
+            failed,
+        )
+    if status:
+        component.check(status, _CALLS[failed[1]], (index + failed[0]) * step_size)
+    if not np.isfinite(outputs).all():
+        raise AnalysisError(
+            f"{component.description.path.name}: its current is no longer a finite number"
+        )
+
+
+@cache
+def _library() -> Any:
+    try:
+        # PyDLL keeps Python's lock: Python-backed FMUs would only take it back at every call.
+        library = ctypes.PyDLL(str(compile_here(_SOURCE)))
+    except (OSError, RuntimeError) as error:
+        raise InputError(f"the test bench is compiled, and {error}") from error
+    address, integer = ctypes.c_void_p, ctypes.c_int64
+    library.drive.argtypes = [
+        address,
+        address,
+        address,
+        address,
+        address,
+        integer,
+        address,
+        integer,
+        address,
+        address,
+        integer,
+        integer,
+        ctypes.c_double,
+        address,
+    ]
+    return library

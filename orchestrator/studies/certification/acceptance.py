@@ -1,0 +1,85 @@
+"""The acceptance tests of the FMU that is certified: run, or read from a report of `gfor fmu check --json`."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from orchestrator.core.errors import InputError
+from orchestrator.core.safe_files import file_hash, write_text
+
+KEPT = "check.json"  # name of the report's file in a certificate's folder
+
+
+@dataclass(frozen=True)
+class Acceptance:
+    trusted: bool
+    faults: tuple[str, ...]
+    report: Mapping[str, Any] = field(repr=False)
+
+    @property
+    def checks(self) -> list[dict[str, Any]]:
+        return list(self.report["checks"])
+
+    def keep(self, folder: Path) -> None:
+        text = json.dumps(self.report, indent=1, ensure_ascii=False)
+        write_text(folder / KEPT, text + "\n")
+
+
+def run_checks(fmu: Path, binding: Path | None, folder: Path) -> Acceptance:
+    """Run the tests and write the report into the folder; a report of an earlier start is used if it fits."""
+    kept = folder / KEPT
+    if kept.is_file():
+        try:
+            return read_checks(kept, fmu, binding)
+        except InputError:
+            pass  # of another FMU or version, or cut off: it is made anew
+    from orchestrator.devices.acceptance.runner import check_fmu  # noqa: PLC0415 - `gfor verify` runs no checks
+
+    report = check_fmu(fmu, binding)
+    found = Acceptance(report.trusted, tuple(report.faults), report.as_dict())
+    found.keep(folder)
+    return found
+
+
+def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
+    remedy = "write it with `gfor fmu check FILE.fmu --json`, or leave --check away to have the tests run"
+    try:
+        report = json.loads(path.read_text(encoding="utf-8"))
+        hashes = report["sha256"]["fmu"], report["sha256"]["binding"]
+        said, found = (
+            bool(report["trusted"]),
+            [(r["verdict"], r["fault"], r["check"]) for r in report["checks"]],
+        )
+        tool = report["tool"]
+    except OSError as error:
+        raise InputError(
+            f"--check {path}: it cannot be read: {error.strerror}; {remedy}"
+        ) from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"--check {path}: it is no report of `gfor fmu check --json`; {remedy}"
+        ) from error
+    if hashes != (file_hash(fmu), file_hash(binding)):
+        raise InputError(f"--check {path}: it is of another FMU or binding than {fmu}; {remedy}")
+    if tool != _tool():
+        raise InputError(f"--check {path}: it was made by {tool}, this is {_tool()}; {remedy}")
+    faults = tuple(dict.fromkeys(fault for verdict, fault, _ in found if verdict == "fail"))
+    if said != (not faults):
+        raise InputError(f"--check {path}: its checks say otherwise than its 'trusted'; {remedy}")
+    from orchestrator.devices.acceptance.checks.all import CHECKS  # noqa: PLC0415 - as above
+
+    there = {name for *_, name in found}
+    if not faults and (left := [name for name in CHECKS if name not in there]):
+        raise InputError(f"--check {path}: it does not hold {', '.join(left)}; {remedy}")
+    if not faults and not any(verdict == "pass" for verdict, *_ in found):
+        raise InputError(
+            f"--check {path}: none of its checks was passed, so that it says nothing of the FMU; {remedy}"
+        )
+    return Acceptance(not faults, faults, report)
+
+
+def _tool() -> str:
+    return f"gfor-cosim {version('gfor-cosim')}"

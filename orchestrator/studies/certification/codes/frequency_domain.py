@@ -1,0 +1,194 @@
+"""GB: the network-frequency-perturbation plot of a converter, and how stiff a source it is; without a verdict."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestrator.core.arrays import Complex, Numbers
+from orchestrator.devices.binding.binding import bound_fmu
+from orchestrator.output.report.plot_style import STYLE, colour, save_figure
+from orchestrator.output.results.storage import save_json, save_table
+from orchestrator.studies.black_box.frequency_response import Excitation, FrequencyResponse, measure
+from orchestrator.studies.black_box.port import bench_at
+from orchestrator.studies.certification.codes.bench_point import STEP
+from orchestrator.studies.certification.codes.programme import RATING_MVA, jumps
+from orchestrator.studies.certification.request import CertificationRequest
+from orchestrator.studies.immittance.forms import powers_over, rows_of
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """Powers that a device feeds in, over changes of the voltage at its terminals, at frequencies [Hz]."""
+
+    frequencies: Numbers
+    powers: dict[str, Complex]  # as of `powers_over`
+
+    def least(self, name: str, low: float, high: float) -> tuple[float, float]:
+        inside = np.flatnonzero((self.frequencies >= low) & (self.frequencies <= high))
+        if not len(inside):
+            raise ValueError(f"no frequency was measured from {low:g} to {high:g} Hz")
+        sizes = np.abs(self.powers[name][inside])
+        return float(sizes.min()), float(self.frequencies[inside[int(np.argmin(sizes))]])
+
+
+def stiffness(response: FrequencyResponse, voltage: complex, f_n: float) -> Stiffness:
+    f, Y, current = response.frequencies, response.continuous(), complex(*response.operating_point)
+    return Stiffness(f, powers_over(f, Y, voltage, current, f_n))
+
+
+# names of files in a certificate's folder
+FIGURES_CSV = "frequency.csv"
+FIGURES_JSON = "frequency.json"
+FIGURES_PNG = "frequency.png"
+
+POWER = 0.5  # active power at which it is measured [pu]
+# band in which the least stiffness is told [Hz]: between the droops and the period of the grid
+BAND = (5.0, 40.0)
+EXCITATION = Excitation()  # how it is excited: from 0.05 to 1000 Hz
+
+NO_VERDICT = (
+    "no verdict: the GB Grid Code (ECP.A.3.9) states no criteria for the plot, and the thresholds and the band of "
+    f"arXiv 2605.02131 were not at hand; {BAND[0]:g} to {BAND[1]:g} Hz is this program's band"
+)
+
+JUMP, OPPOSED, SCR, LONGEST = np.deg2rad(10.0), 0.2, 3.0, 0.015
+"""What MISO and ERCOT ask in time: a power [pu] against a jump of the angle [rad] at a short-circuit ratio, and 90 % of
+the first change within a time [s] (MISO BPM-015 r32 appendix H)."""
+
+
+@dataclass(frozen=True)
+class AskedStiffness:
+    """What the criterion of phase jumps comes to as a least |P/θ|, and what was found."""
+
+    value: float  # least |P/θ| that it asks for at the terminals [pu/rad]
+    band: tuple[float, float]  # frequencies at which it asks for it [Hz]
+    # found, at: least |P/θ| in the band [pu/rad], and its frequency [Hz].
+    found: float
+    at: float
+
+    @property
+    def met(self) -> bool:
+        return self.found >= self.value
+
+    def sentence(self) -> str:
+        low, high = self.band
+        return (
+            f"{OPPOSED:g} pu against {np.rad2deg(JUMP):g}° at SCR {SCR:g} (MISO, ERCOT) asks, by this program's "
+            f"derivation, for |P/θ| of {self.value:.3g} pu/rad from {low:.3g} to {high:.3g} Hz: "
+            f"{'met' if self.met else 'not met'}, {self.found:.3g} at {self.at:.3g} Hz; no code says so"
+        )
+
+
+def asked_stiffness(found: Stiffness, f_n: float) -> AskedStiffness:
+    """Compare a device with what the criterion of phase jumps comes to.
+
+    A stiffness K at the terminals and that of the grid, K_g = X/|Z|², lie in series: a jump Δθ of the source moves the
+    power by Δθ/(1/K + 1/K_g), which is to be `OPPOSED` or more. The power is a mean over a period T, so that K has to
+    last as long: an angle that follows the bus with the time constant T has its corner at 1/(2π·T). And 90 % of the
+    change within `LONGEST` is what a lag of `LONGEST`/ln 10 reaches, whose corner is the upper end of the band."""
+    Z = jumps(SCR, POWER, ()).impedance
+    asked = 1 / (JUMP / OPPOSED - abs(Z) ** 2 / Z.imag)
+    band = (f_n / (2 * np.pi), float(np.log(10) / (2 * np.pi * LONGEST)))
+    return AskedStiffness(float(asked), band, *found.least("P/theta", *band))
+
+
+def measure_stiffness(
+    request: CertificationRequest, f_n: float, report: Callable[[str], None]
+) -> Stiffness:
+    """Measure a converter at an ideal bus, at half of its rating and 1 pu."""
+    description = bound_fmu(request.fmu, request.binding)
+    given = {"S_n": RATING_MVA, "P_0": POWER, "Q_0": 0.0, "v_0": 1.0, "theta_0": 0.0, "f_n": f_n}
+    known = {name: value for name, value in given.items() if name in description.variables}
+    bench = bench_at(description, known | dict(request.values), STEP)
+    return stiffness(measure(bench, EXCITATION, report), complex(*bench.rest), f_n)
+
+
+def figures_of_stiffness(found: Stiffness, model: str, f_n: float) -> dict[str, Any]:
+    least = {
+        f"{name} [{unit}]": dict(zip(("value", "at_hz"), found.least(name, *BAND), strict=True))
+        for name, unit in (("P/theta", "pu/rad"), ("Q/V", "pu/pu"))
+    }
+    slow, asked = found.powers["P/omega"][0], asked_stiffness(found, f_n)
+    return {
+        "code": "gb",
+        "model": model,
+        "verdict": None,
+        "sentence": NO_VERDICT,
+        "band_hz": list(BAND),
+        "least": least,
+        "slow": {
+            "name": "P/omega [pu/pu]",
+            "real": float(slow.real),
+            "imag": float(slow.imag),
+            "at_hz": float(found.frequencies[0]),
+        },
+        "phase_jump": {
+            "name": "P/theta [pu/rad]",
+            "asked": asked.value,
+            "band_hz": list(asked.band),
+            "found": asked.found,
+            "at_hz": asked.at,
+            "met": asked.met,
+            "sentence": asked.sentence(),
+        },
+    }
+
+
+def stiffness_in_words(figures: dict[str, Any]) -> list[str]:
+    slow = figures["slow"]
+    least = [
+        f"least |{name}|: {one['value']:.4g} at {one['at_hz']:.4g} Hz"
+        for name, one in figures["least"].items()
+    ]
+    return [*least, f"P/ω at {slow['at_hz']:g} Hz: {slow['real']:.4g} {slow['imag']:+.4g}j pu/pu"]
+
+
+def save_stiffness(found: Stiffness, model: str, f_n: float, folder: Path) -> list[Path]:
+    table, figures, picture = (folder / name for name in (FIGURES_CSV, FIGURES_JSON, FIGURES_PNG))
+    save_table(rows_of(found.frequencies, found.powers), table)
+    save_json(figures_of_stiffness(found, model, f_n), figures)
+    _plot(found, asked_stiffness(found, f_n), picture)
+    return [table, figures, picture]
+
+
+def _plot(found: Stiffness, asked: AskedStiffness, path: Path) -> None:
+    import matplotlib as mpl  # noqa: PLC0415 - a second to import
+    from matplotlib.figure import Figure  # noqa: PLC0415 - as above
+
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(7.2, 6.4), layout="constrained")
+        size, phase, stiff = figure.subplots(3, 1, sharex=True)
+        size.plot(found.frequencies, np.abs(found.powers["P/omega"]), ".-", ms=3, color=colour(0))
+        size.set(xscale="log", yscale="log", ylabel="|P/ω| [pu/pu]")
+        size.set_title("Network frequency perturbation, no verdict", loc="left")
+        phase.plot(
+            found.frequencies,
+            np.rad2deg(np.angle(found.powers["P/omega"])),
+            ".-",
+            ms=3,
+            color=colour(0),
+        )
+        phase.set_ylabel("Phase of P/ω [°]")
+        for k, (name, key) in enumerate((("|P/θ| [pu/rad]", "P/theta"), ("|Q/V| [pu/pu]", "Q/V"))):
+            stiff.plot(
+                found.frequencies,
+                np.abs(found.powers[key]),
+                ".-",
+                ms=3,
+                color=colour(k),
+                label=name,
+            )
+        stiff.axvspan(*BAND, color="0.9", zorder=0)
+        stiff.plot(
+            asked.band,
+            [asked.value] * 2,
+            color="0.3",
+            ls="--",
+            label="asked by 0.2 pu for 10° at SCR 3",
+        )
+        stiff.set(yscale="log", ylabel="Stiffness", xlabel="Frequency of the change [Hz]")
+        stiff.legend()
+        save_figure(figure, path)

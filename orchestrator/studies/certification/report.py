@@ -1,0 +1,225 @@
+"""The report on a damping test as one HTML page, with every figure that a person needs to check it by hand."""
+
+from collections.abc import Mapping
+from datetime import datetime
+from html import escape
+
+from orchestrator.devices.binding.binding import read_table
+from orchestrator.devices.fmi.archive import read_origin
+from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.values import Scalar, as_text
+from orchestrator.output.report.html.elements import Figures, document, listed, table
+from orchestrator.studies.certification.case_file import BINDING, FMU, WITH
+from orchestrator.studies.certification.certificate import Certificate, missing_of
+from orchestrator.studies.certification.codes.record import row_chapters
+from orchestrator.studies.certification.environment import environment
+from orchestrator.studies.certification.figures import commands, parameter_rows
+from orchestrator.studies.certification.point import FREQUENCY
+from orchestrator.studies.certification.report_criteria import (
+    damping_chapters,
+    damping_findings,
+    told_of_damping,
+)
+from orchestrator.studies.certification.texts import TEXTS
+from orchestrator.studies.certification.verdict import FAILS, INCOMPLETE, PASSES
+
+_LINE = '<span class="blank"></span>'  # A line to be filled in by hand
+
+Hashes = Mapping[str, str | None]
+
+
+def details(c: Certificate) -> str:
+    rows = [
+        [label, escape(text).replace("\n", "<br>") or _LINE] for label, text in c.details.rows()
+    ]
+    rows += [[f"Signature of the {who}", _LINE] for who in ("tester", "applicant")]
+    return table("Filled in from the file of --details, or by hand", ["", ""], rows, left=2)
+
+
+def converter(c: Certificate, hashes: Hashes) -> str:
+    origin = read_origin(c.description.path)
+    switched = {} if c.damping is None else c.damping.controllers.settings
+    values = {**c.request.values, **switched, **c.request.study_values}
+    given = {
+        "FMU": c.request.fmu.name,
+        "Model": c.description.model_name,
+        "Description": origin["description"],
+        "Author": origin["author"],
+        "Version": origin["version"],
+        "Made by": origin["generation_tool"],
+        "Made on": origin["generated"],
+        "Copyright": origin["copyright"],
+        "License": origin["license"],
+        "FMI": f"{origin['fmi_version']}, co-simulation",
+        "Guid": c.description.guid,
+        "SHA-256": hashes[FMU],
+        "Rating": _rating(c),
+        "Voltage": _voltage(c),
+        "Binding": c.request.binding.name if c.request.binding else "none: the port is ours",
+        "Values set": ", ".join(f"{k} = {as_text(v)}" for k, v in values.items()) or "none",
+        **({} if c.damping is None else told_of_damping(c, c.damping)),
+    }
+    rows = [
+        [escape(name), escape(str(value)) or '<span class="soft">not said</span>']
+        for name, value in given.items()
+    ]
+    return table("The converter", ["", ""], rows, left=2)
+
+
+def _rating(c: Certificate) -> str:
+    used = float(c.values.get("converter.S_n", 0.0))
+    if isinstance(c.description, BoundDescription):
+        return f"{c.description.port.rating:g} MVA by the binding; {used:g} MVA in the study"
+    info = c.description.variables.get("S_n")
+    return f"{info.start if info else '?'} MVA by the FMU; {used:g} MVA in the study"
+
+
+def _voltage(c: Certificate) -> str:
+    if c.request.binding is None:
+        return "per unit of the bus; the FMU has no rated voltage"
+    given = read_table(c.request.binding).rating.V_n
+    return (
+        f"{given} (V_n of the binding)"
+        if given is not None
+        else "per unit of the bus; the binding gives no V_n"
+    )
+
+
+def parameters(c: Certificate) -> str:
+    rows = [
+        [
+            escape(r.name),
+            _text(r.start),
+            f"<b>{_text(r.used)}</b>" if r.changed_by else _text(r.used),
+            escape(r.unit),
+            escape(r.changed_by or "–"),
+            escape(r.description),
+        ]
+        for r in parameter_rows(c)
+    ]
+    columns = ["Parameter", "In the file", "Used", "Unit", "Changed by", "Description"]
+    changed = sum(1 for r in parameter_rows(c) if r.changed_by)
+    return table(
+        f"All {len(rows)} parameters by the FMU's own names, {changed} of them given a value",
+        columns,
+        rows,
+    )
+
+
+def _text(value: Scalar | None) -> str:
+    if value is None:
+        return "–"
+    return escape(as_text(value) if not isinstance(value, float) else f"{value:.12g}")
+
+
+def binding(c: Certificate, hashes: Hashes) -> str:
+    if c.request.binding is None:
+        return "<p>None: the FMU has the variables of our port.</p>"
+    text = escape(c.request.binding.read_text(encoding="utf-8"))
+    return f"<p>{escape(c.request.binding.name)}, SHA-256 {hashes[BINDING]}</p><pre>{text}</pre>"
+
+
+def acceptance(c: Certificate) -> str:
+    if c.acceptance is None:
+        return "<p>They were not run (--no-check).</p>"
+    marks = {"fail": "bad", "pass": "good"}
+    rows = [
+        [
+            escape(r["check"]),
+            f'<span class="{marks.get(r["verdict"], "soft")}">{escape(r["verdict"])}</span>',
+            escape(f"{r['fault']}: {r['evidence']}" if r["fault"] else r["evidence"]),
+        ]
+        for r in c.acceptance.checks
+    ]
+    said = (
+        "No check failed." if c.acceptance.trusted else f"FAILED: {', '.join(c.acceptance.faults)}."
+    )
+    style = "good" if c.acceptance.trusted else "bad"
+    listed = table("gfor fmu check", ["Check", "Verdict", "What was seen"], rows, left=3)
+    return f'<p class="{style}">{escape(said)}</p>{listed}'
+
+
+def provenance(c: Certificate, hashes: Hashes) -> str:
+    machine = table(
+        "Computed on", ["", ""], [[escape(k), escape(v)] for k, v in environment().items()], left=2
+    )
+    files = table(
+        "SHA-256 of the files beside this page",
+        ["File", "SHA-256"],
+        [[escape(name), str(value)] for name, value in hashes.items()],
+        left=2,
+    )
+    first = c.verdicts[0]
+    again, worst = {"response": f"gfor run {c.case.name} --out again"}, ""
+    if c.damping is not None:
+        again = commands(
+            first.X_L, WITH, identified=c.results[WITH, first.X_L].identified is not None
+        )
+        residual = max(p.residual for p in c.results.values())
+        worst = f"Steady states hold to {residual:.1e} pu in one communication step. "
+    named = "".join(f"<li>{name}: <code>{escape(text)}</code></li>" for name, text in again.items())
+    text = escape(c.case.read_text(encoding="utf-8"))
+    return (
+        f"{machine}{files}<p>{worst}Any {'row' if c.damping is None else 'point'} can be computed again in the folder "
+        f"of this page; the case file holds every value that was set. For {escape(first.name)}:</p>"
+        f"<ul>{named}</ul>{TEXTS['integrity']}"
+        f"<details data-print><summary>Case file</summary><pre>{text}</pre></details>"
+    )
+
+
+def page(c: Certificate, hashes: Hashes, made: datetime) -> str:
+    figures, test = Figures(), c.damping
+    own = row_chapters(c, figures) if test is None else damping_chapters(c, test, figures)
+    watched = "by_frequency" if test and test.signal == FREQUENCY else "by_power"
+    readings = [text.replace("{watched}", TEXTS[watched]) for text in c.code.readings]
+    content = [
+        ("For whom and by whom", details(c)),
+        ("What was tested", converter(c, hashes) + (TEXTS["study"] if test else "")),
+        *own,
+        ("Acceptance tests of the FMU", acceptance(c)),
+        ("Parameters of the FMU", parameters(c)),
+        ("Binding", binding(c, hashes)),
+        (
+            "How the code was read",
+            f"{listed(readings)}<p>{escape(c.code.source)}, {escape(c.code.date)}.</p>",
+        ),
+        ("Provenance", provenance(c, hashes)),
+    ]
+    return document(title(c), c.code.title, _findings(c), content, made)
+
+
+_TITLES = {PASSES: "passed", FAILS: "failed", INCOMPLETE: "incomplete"}
+
+
+def title(c: Certificate) -> str:
+    word = _TITLES[c.verdict]
+    if c.damping is not None and (left := missing_of(c)):
+        word += f" ({len(c.code.rows) - len(left)} of {len(c.code.rows)})"
+    if c.refused:
+        word += ", acceptance tests failed"
+    kind = c.code.key.upper() if c.damping is None else "Damping test"
+    return f"{kind} of {c.description.model_name!r}: {word}"
+
+
+def _findings(c: Certificate) -> str:
+    good = c.passed and not c.refused
+    items = [f'<b class="{"good" if good else "bad"}">{escape(c.sentence())}</b>']
+    checked = (
+        "not run"
+        if c.acceptance is None
+        else "no check failed"
+        if c.acceptance.trusted
+        else "FAILED"
+    )
+    if c.acceptance is not None and c.refused:
+        items = [
+            f'<b class="bad">ACCEPTANCE TESTS FAILED: {escape(", ".join(c.acceptance.faults))}</b>',
+            *items,
+        ]
+    items.append(f"Acceptance tests of the FMU (gfor fmu check): {checked}")
+    items += [] if c.damping is None else damping_findings(c, c.damping)
+    warnings = dict.fromkeys(
+        text for result in c.results.values() for text in getattr(result, "warnings", ())
+    )
+    extra = "".join(f'<div class="warning">{escape(text)}</div>' for text in warnings)
+    return f'<div class="findings"><ul>{"".join(f"<li>{item}</li>" for item in items)}</ul></div>{extra}'

@@ -1,0 +1,234 @@
+"""Whether a certificate still holds: its hashes, all that it says, rebuilt from what its folder keeps, and parts
+computed anew."""
+
+import json
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from orchestrator.core.errors import InputError
+from orchestrator.core.late import xr
+from orchestrator.core.safe_files import file_hash
+from orchestrator.output.signatures.checking import State
+from orchestrator.studies.certification.case_file import BINDING, FMU
+from orchestrator.studies.certification.compared import (
+    THIS,
+    Content,
+    Verification,
+    faults_of,
+    issued_by,
+    of_one_program,
+)
+from orchestrator.studies.certification.files import (
+    HTML,
+    JSON,
+    RESPONSES,
+    figures_hash,
+    figures_of,
+    read_record,
+    seal_of,
+    signatures_of,
+)
+from orchestrator.studies.certification.form import case_files, check_form
+from orchestrator.studies.certification.kinds import Parts, parts_of, rebuilt
+from orchestrator.studies.certification.signed import (
+    Asked,
+    SignatureSeen,
+    look_at_signature,
+)
+from orchestrator.studies.certification.verdict import INCOMPLETE, PASSES
+from orchestrator.studies.points.executor import Executor
+from orchestrator.studies.points.points import CountReport, nobody
+
+
+def read_certificate(path: Path) -> tuple[Path, dict[str, Any]]:
+    """Folder and content of a certificate, from either the folder or ``certificate.json``."""
+    file = path / JSON if path.is_dir() else path
+    if file.is_symlink():
+        raise InputError(
+            f"{file}: it is a link, and a certificate's files lie in its folder; give the folder to which it leads"
+        )
+    try:
+        content = read_record(file)
+    except OSError as error:
+        raise InputError(
+            f"{file}: the certificate cannot be read: {error.strerror}; give the folder that `gfor "
+            "certify` wrote"
+        ) from error
+    except (ValueError, RecursionError) as error:
+        raise InputError(
+            f"{file}: it is not JSON: {error}; give the certificate.json of `gfor certify`"
+        ) from error
+    check_form(file, content)
+    return file.parent, content
+
+
+def verify_files(folder: Path, content: dict[str, Any]) -> Verification:
+    found = Verification()
+    if content.get("seal") != seal_of(content):
+        found.faults.append(
+            f"{JSON}: its figures or words are not those that were written: its own hash differs"
+        )
+    else:
+        found.agreed.append(f"{JSON}: its own hash")
+    hashes, names = (
+        content["files"],
+        [FMU, RESPONSES, HTML, *([BINDING] if content["binding"] else [])],
+    )
+    names += case_files(content)
+    names = list(dict.fromkeys([*names, *hashes]))
+    for name in names:
+        _compare_file(folder, name, hashes.get(name), found)
+    if any((folder / name).is_symlink() for name in names):
+        return found
+    _compare_page(folder / HTML, content, found)
+    faults = _judged_again(folder, content, found.agreed)
+    found.faults += faults
+    found.agreed += (
+        []
+        if faults
+        else ["every row and the verdict, judged again from the figures and the responses"]
+    )
+    return found
+
+
+def _compare_page(page: Path, content: dict[str, Any], found: Verification) -> None:
+    if not page.is_file():
+        return
+    text = page.read_text(encoding="utf-8", errors="replace")
+    if f">{escape(content['sentence'])}</b>" not in text:
+        found.faults.append(f"{HTML}: it does not hold the verdict's sentence of {JSON}")
+    if figures_hash(content) not in text:
+        found.faults.append(
+            f"{HTML}: it was made of other figures than those of {JSON}: their hash is not on the page"
+        )
+    else:
+        found.agreed.append(f"{HTML}: the hash of the figures that it shows")
+
+
+def _judged_again(folder: Path, content: dict[str, Any], said: list[str]) -> list[str]:
+    try:
+        with xr.open_dataset(folder / RESPONSES, engine="scipy") as data:
+            again = json.loads(json.dumps(figures_of(rebuilt(folder, content, data))))
+            if not of_one_program(content, again):
+                said.append(
+                    "figures and verdicts alone: another commit issued it, so title, source, readings and the "
+                    "rows' titles are not compared"
+                )
+            return [
+                *faults_of(content, again),
+                *parts_of(content).again.faults(folder, content, data),
+            ]
+    except (
+        InputError,
+        OSError,
+        KeyError,
+        ValueError,
+        TypeError,
+        IndexError,
+        AttributeError,
+    ) as error:
+        kind = "" if isinstance(error, InputError) else f"{type(error).__name__}: "
+        return [
+            f"the certificate cannot be judged again from {FMU}, its case files and {RESPONSES}: {kind}{error}"
+        ]
+
+
+def _compare_file(folder: Path, name: str, wanted: str | None, found: Verification) -> None:
+    path = folder / name
+    if path.is_symlink():
+        found.faults.append(
+            f"{name}: it is a link, and a certificate's files lie in its folder; nothing else was looked at"
+        )
+    elif not path.is_file():
+        found.faults.append(
+            f"{name}: there is no such file beside {JSON}; it was removed or renamed"
+        )
+    elif wanted is None:
+        found.faults.append(f"{name}: {JSON} has no hash of it")
+    elif file_hash(path) != wanted:
+        found.faults.append(f"{name}: it is not the file that was certified: its SHA-256 differs")
+    else:
+        found.agreed.append(f"{name}: SHA-256")
+
+
+@dataclass(kw_only=True)
+class Verified(Verification):
+    """A certificate with what was said of it; ``computed`` are the parts that were computed anew."""
+
+    content: Content
+    parts: Parts
+    chosen: list[Any]
+    computed: list[Any]
+    later: tuple[str, ...]  # rows that the table had not in the version that issued the certificate
+    signature: SignatureSeen
+    unproved: list[str]  # files in the folder that nothing vouches for
+
+    @property
+    def verdict(self) -> str:
+        """The record's; what passed is incomplete where the table has more rows by now."""
+        stated = str(self.content["verdict"])
+        return INCOMPLETE if self.later and stated == PASSES else stated
+
+
+def verified(
+    place: Path,
+    wanted: Sequence[Any] | None,
+    executor: Callable[[list[str]], Executor],
+    report: CountReport = nobody,
+    *,
+    every: bool = False,
+    asked: Asked | None = None,
+) -> Verified:
+    """Verify the files of a certificate, and, if they hold, parts computed anew: by default those that count most.
+
+    ``wanted``: no part where it is empty and ``every`` is not asked for; ``executor``: made of a worker's imports.
+    ``asked``: who may have signed it; where signers are named, a certificate without a signature of theirs does not
+    hold."""
+    folder, content = read_certificate(place)
+    parts = parts_of(content)
+    chosen = (
+        []
+        if wanted == () and not every
+        else parts.chosen(folder, content, wanted or (), every=every)
+    )
+    asked = asked or Asked()
+    files = verify_files(folder, content)
+    signature = look_at_signature(folder, content, asked)
+    if signature.state is State.CHANGED:
+        files.faults.append(f"signature: {signature.sentence}")
+    found = Verified(
+        faults=files.faults,
+        agreed=files.agreed,
+        content=content,
+        parts=parts,
+        chosen=chosen,
+        computed=chosen if files.holds else [],
+        later=parts.later(content),
+        signature=signature,
+        unproved=_unproved(folder, content),
+    )
+    if found.later:
+        found.agreed.append(
+            f"issued by gfor-cosim {issued_by(content)}, whose table had not "
+            f"{', '.join(found.later)}: this version, {THIS}, judges {len(found.later)} more; "
+            "certify anew to have that judged"
+        )
+    if found.computed:
+        with closing(executor([parts.task.__module__])) as workers:
+            again = parts.verify(folder, content, chosen, workers, report)
+        found.faults, found.agreed = found.faults + again.faults, found.agreed + again.agreed
+    if asked.signers is not None and signature.state in (State.UNSIGNED, State.UNKNOWN):
+        found.faults.append(f"signature: {signature.sentence}")
+    return found
+
+
+def _unproved(folder: Path, content: Content) -> list[str]:
+    """Files in the folder of which the certificate has no hash."""
+    known = {JSON, *content["files"], *signatures_of(folder).names()}
+    return sorted(
+        path.name for path in folder.iterdir() if path.is_file() and path.name not in known
+    )

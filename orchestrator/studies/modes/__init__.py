@@ -1,0 +1,1 @@
+"""Modes of a case's scenarios: their names, their linear models and the communication step."""

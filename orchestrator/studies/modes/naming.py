@@ -1,0 +1,31 @@
+"""Which modes of a model bear the names that a case gives."""
+
+import fnmatch
+from collections.abc import Sequence
+from functools import partial
+
+from orchestrator.cases.definition import CaseDefinition
+from orchestrator.linear.models.linear_model import LinearModel
+from orchestrator.linear.spectra.mode_names import Measure, Naming, name_modes, opposition
+from orchestrator.linear.spectra.modes import Mode
+
+
+def named_modes(case: CaseDefinition, model: LinearModel, modes: Sequence[Mode]) -> Naming:
+    """The modes whose shape the case describes, and what it describes without a clear answer."""
+    return modes_named(case, model.names, modes)
+
+
+def modes_named(case: CaseDefinition, names: Sequence[str], modes: Sequence[Mode]) -> Naming:
+    """The same, from the names of the states alone."""
+
+    def states(patterns: Sequence[str]) -> list[str]:
+        return [name for name in names if any(fnmatch.fnmatch(name, p) for p in patterns)]
+
+    measures: dict[str, Measure] = {}
+    for table in case.table.analysis.modes:
+        if table.against is not None:
+            side, other = (states(patterns) for patterns in table.against)
+            measures[table.name] = partial(opposition, side=side, other=other)
+        else:
+            measures[table.name] = partial(Mode.participation_of, states=states(table.states))
+    return name_modes(modes, measures)

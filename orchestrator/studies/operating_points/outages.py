@@ -1,0 +1,158 @@
+"""Outages: which elements leave the network, and what remains of it."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from orchestrator.cases.names import close_names
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.core.errors import InputError, few
+from orchestrator.studies.operating_points.columns import Elements
+
+INTACT = "intact"  # name of the network without an outage
+_KINDS = ("n-1", "lines", "units")
+_SHOWN = 4
+# the name of the outage of a unit with its own transformer, ``sg3 (line_6_1)``
+_WITH_TRANSFORMER = re.compile(r"^(\S+)\s*\((\S+)\)$")
+_AUXILIARY = 0.05
+"""Load of a plant's own, in parts of its rating: cut off with so little, its units are lost; with more, an island is
+left.
+"""
+
+
+@dataclass(frozen=True)
+class Outage:
+    """Elements that are lost together; none for the intact network."""
+
+    name: str
+    elements: tuple[str, ...] = ()
+
+
+def read_outages(text: str | None, elements: Elements) -> list[Outage]:
+    """The intact network, and the outages that a text names.
+
+    ``text``: ``n-1`` (each line, transformer and unit; a unit with its own transformer is one outage), ``lines``,
+    ``units``, or names with commas between them; None for none. ``line_1_2+sg3`` loses two elements together, and so
+    does ``sg3 (line_6_1)``, as a unit with its own transformer is called."""
+    names: list[str] = []
+    for part in (part.strip() for part in (text or "").split(",") if part.strip()):
+        names += _of_kind(part.lower(), elements) if part.lower() in _KINDS else [part]
+    found = [Outage(INTACT)]
+    for name in names:
+        lost = tuple(one.strip() for one in _WITH_TRANSFORMER.sub(r"\1+\2", name).split("+"))
+        for one in lost:
+            if one not in elements.names:
+                hint = close_names(
+                    one, elements.names, f"write {', '.join(_KINDS)}, or names of elements"
+                )
+                raise InputError(
+                    f"--outages: there is no unit, line, load or shunt {one!r}; {hint}"
+                )
+        if any(set(lost) == set(other.elements) for other in found) or len(set(lost)) < len(lost):
+            raise InputError(f"--outages: {name} is named twice; name it once")
+        found.append(Outage(name, lost))
+    return found
+
+
+def _of_kind(kind: str, elements: Elements) -> list[str]:
+    if kind != "n-1":
+        return list(elements.lines if kind == "lines" else elements.units)
+    own = {unit: branch for branch, unit in elements.step_ups.items() if branch in elements.lines}
+    lines = [name for name in elements.lines if name not in elements.step_ups]
+    return lines + [f"{name} ({own[name]})" if name in own else name for name in elements.units]
+
+
+@dataclass(frozen=True)
+class Remains:
+    none: str = ""  # why no system remains; "" where one does
+    # units, loads, shunts: what is out of service or dead: without a way to the part that remains
+    units: tuple[str, ...] = ()
+    loads: tuple[str, ...] = ()
+    shunts: tuple[str, ...] = ()
+    charging: tuple[str, ...] = ()  # the grid's variables of the charging of dead lines
+    # lost branches that stay closed, because a dead part hangs on each: nothing flows there
+    ties: tuple[str, ...] = ()
+    dead: tuple[str, ...] = ()
+
+
+def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[str]) -> Remains:
+    """Return what outages leave: of all parts with a unit in service, the one with the most load remains."""
+    network, grid = prepared.network, prepared.system.components[elements.grid]
+    assert network is not None
+    values = grid.parameters
+    branches = [(x.name, x.from_bus, x.to_bus) for x in network.lines]
+    branches += [(x.name, x.buses[0], bus) for x in network.transformers for bus in x.buses[1:]]
+    part = _parts(network.buses, [ends for name, *ends in branches if _closed(name, out, values)])
+    power = {
+        x.name: grid.number(f"{x.name}.scale") * grid.number(f"{x.name}.P") for x in network.loads
+    }
+    units = [name for name in elements.units if _closed(name, out, values)]
+    rating = {name: prepared.system.components[name].number("S_n") for name in units}
+    fed = {part[elements.units[name]] for name in units}
+    out_units = tuple(name for name in elements.units if name in out)
+    if not fed:
+        return Remains("no unit is left, so no system remains")
+    weight = {
+        k: (
+            sum(power[x.name] for x in network.loads if part[x.bus] == k and x.name not in out),
+            sum(rating[name] for name in units if part[elements.units[name]] == k),
+        )
+        for k in fed
+    }
+    main = max(weight, key=lambda k: weight[k])
+    dead = [bus for bus in network.buses if part[bus] != main]
+    for k in fed - {main}:
+        load, power_there = weight[k]
+        if load > _AUXILIARY * power_there:
+            names = ", ".join(name for name in units if part[elements.units[name]] == k)
+            buses = few((bus for bus in dead if part[bus] == k), _SHOWN)
+            return Remains(
+                f"{buses} cut off, with {load:.4g} MW of load and the units {names}, which may go on alone"
+            )
+    ties, joined = [], {k: k for k in set(part.values())}
+    for name, one, other in branches:
+        a, b = joined[part[one]], joined[part[other]]
+        if name in out and a != b and bool(values.get(f"{name}.connected", True)):
+            ties.append(name)
+            joined = {k: a if at == b else at for k, at in joined.items()}
+    if any(joined[part[bus]] != joined[main] for bus in dead):
+        return Remains(
+            f"{few(dead, _SHOWN)} cut off by branches that the case or the point has open"
+        )
+    opened = set(out) - set(ties)
+    return Remains(
+        units=tuple(
+            dict.fromkeys((*out_units, *(n for n in units if part[elements.units[n]] != main)))
+        ),
+        loads=tuple(
+            x.name
+            for x in network.loads
+            if x.name in out or (part[x.bus] != main and power[x.name])
+        ),
+        shunts=tuple(
+            x.name for x in network.shunts if x.name in elements.shunts and part[x.bus] != main
+        ),
+        charging=tuple(
+            x.variable("B")
+            for x in network.lines
+            if x.B and x.name not in opened and {x.from_bus, x.to_bus} & set(dead)
+        ),
+        ties=tuple(dict.fromkeys(ties)),
+        dead=tuple(dead),
+    )
+
+
+def _parts(buses: Sequence[str], ends: Sequence[Sequence[str]]) -> dict[str, int]:
+    row = {bus: k for k, bus in enumerate(buses)}
+    starts, stops = ([row[end[k]] for end in ends] for k in (0, 1))
+    links = coo_array((np.ones(len(ends)), (starts, stops)), shape=(len(row), len(row)))
+    _, part_of = connected_components(links, directed=False)
+    return {bus: int(part_of[k]) for bus, k in row.items()}
+
+
+def _closed(name: str, out: Sequence[str], values: Mapping[str, float | bool]) -> bool:
+    return name not in out and bool(values.get(f"{name}.connected", True))

@@ -1,0 +1,122 @@
+"""The linear models of a case's units, and how far each unit's current reaches in the closed system."""
+
+import json
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from orchestrator.cases.case import built_in_cases, load_case
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.core.arrays import Complex, Matrix
+from orchestrator.core.errors import InputError, few
+from orchestrator.core.safe_files import file_hash
+from orchestrator.linear.models.blocks import Blocks
+from orchestrator.linear.models.linearization import continuous
+from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.output.results.storage import measuring_places
+from orchestrator.studies.modes.modes import running
+from orchestrator.studies.oscillations.models import Response, UnitModel, UnitModels, turn
+
+_VOLTAGE, _CURRENT, _EMF, _SHUNT = (
+    ("v_re", "v_im"),
+    ("i_re", "i_im"),
+    ("e_re", "e_im"),
+    ("y_re", "y_im"),
+)
+
+
+def unit_models(prepared: PreparedScenario) -> UnitModels:
+    with running(prepared) as master:
+        find_operating_point(master)
+        homes = {
+            name: bus
+            for name, bus in measuring_places(prepared).items()
+            if name in master.exchanges
+            and {*_CURRENT} <= {*master.components[name].description.variables}
+        }
+        if not homes:
+            raise InputError(
+                f"{prepared.case.name}: no unit takes a voltage (v_re, v_im) and shows a current (i_re, "
+                "i_im), so there are no models to compare the record with"
+            )
+        grid = {bus.partition(".")[0] for bus in homes.values()} & set(master.components)
+        scales = [
+            f"{name}.{v}"
+            for name in sorted(grid)
+            for v in master.components[name].description.variables
+            if v.endswith(".scale")
+        ]
+        observed = [f"{unit}.{i}" for unit in homes for i in _CURRENT]
+        blocks = Blocks(master, inputs=scales, outputs=observed, without_step=True)
+        model = continuous(blocks)
+        currents = {
+            unit: complex(*master.components[unit].get([*_CURRENT]).values()) for unit in homes
+        }
+        values = dict(zip(master.output_names, master.y.tolist(), strict=True))
+    F, G, H, K = (M.toarray() for M in (model.F, model.G, model.H, model.K))
+    settled = np.linalg.inv(np.eye(len(K)) - K)
+    row = {name: k for k, name in enumerate(blocks.output_names)}
+    buses = tuple(dict.fromkeys(homes.values()))
+    seen = [row[f"{bus}.{v}"] for bus in buses for v in _VOLTAGE]
+    A, C = F + G @ settled @ H, (settled @ H)[seen]
+
+    def reach(drive: Matrix) -> Response:
+        return lambda s: _response(s, A, G @ drive, C, drive[seen])
+
+    first = len(row) + len(blocks.links)
+    loads = {
+        name.removesuffix(".scale"): reach(settled[:, [first + k]]) for k, name in enumerate(scales)
+    }
+    found = {}
+    for unit, bus in homes.items():
+        c = blocks.components[unit]
+        assert c.A_c is not None and c.B_c is not None  # noqa: PT018 - `continuous` has refused it
+        columns = [c.inputs.index(v) for v in _VOLTAGE]
+        given, y = _CURRENT, complex(1.0)
+        if (
+            f"{unit}.i_re" not in row
+        ):  # a source behind an admittance y, which gives y times its own voltage
+            given, y = _EMF, complex(*(values.get(f"{unit}.{part}", 0.0) for part in _SHUNT))
+        if not y or f"{unit}.{given[0]}" not in row:
+            continue
+        drive = settled[:, [row[f"{unit}.{name}"] for name in given]] @ np.linalg.inv(turn(y))
+        own = partial(_response, A=c.A_c, B=c.B_c[:, columns], C=c.C_o, D=c.D_o[:, columns])
+        voltage = complex(*(values[f"{bus}.{v}"] for v in _VOLTAGE))
+        found[unit] = UnitModel(bus, voltage, currents[unit], own, reach(drive))
+    return UnitModels(found, buses, loads)
+
+
+def _response(s: complex, A: Matrix, B: Matrix, C: Matrix, D: Matrix) -> Complex:
+    return np.asarray(C @ np.linalg.solve(s * np.eye(len(A)) - A, B) + D)
+
+
+def recorded_case(attributes: Mapping[str, Any]) -> PreparedScenario | None:
+    """The scenario that a run's record is of, where it is one of a built-in case with the values that it has now."""
+    name, text = str(attributes.get("case")), attributes.get("case_file")
+    if name not in built_in_cases() or (case := load_case(name)).text != text:
+        return None
+    scenario, values = str(attributes["scenario"]), json.loads(attributes["values"])
+    (prepared,) = case.prepare([scenario])
+    given = json.loads(attributes.get("given", "{}"))
+    changed = {key: value for key, value in given.items() if prepared.given.get(key) != value}
+    if changed:
+        (prepared,) = case.prepare([scenario], changed)
+    return prepared if dict(prepared.values) == values else None
+
+
+def unlike(attributes: Mapping[str, Any], prepared: PreparedScenario) -> str:
+    """What of a record's own case is another one in the scenario whose models judge it; "" where nothing is known."""
+    case, there = prepared.case, prepared.given
+    found = ["the case file"] if attributes.get("case_file", case.text) != case.text else []
+    for name, content in json.loads(attributes.get("inputs", "{}")).items():
+        path = case.directory / name
+        if path != case.path and path.is_file() and file_hash(path) != content:
+            found.append(name)
+    if attributes.get("scenario", prepared.name) != prepared.name:
+        found.append(f"the scenario ({attributes['scenario']!r}, not {prepared.name!r})")
+    elif "given" in attributes:
+        own = json.loads(attributes["given"])
+        found += sorted(key for key in {*own, *there} if own.get(key) != there.get(key))
+    return few(found, 4)

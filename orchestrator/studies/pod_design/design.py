@@ -1,0 +1,469 @@
+"""Design of POD-P or POD-Q by eigenvalue sensitivity, from linearisations of the coupled system (the paper's method).
+
+The sensitivities are finite differences between two real linearisations, and the result is checked on the closed loop.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import KW_ONLY, MISSING, dataclass, replace
+from typing import Any
+
+from orchestrator.cases.case import Case
+from orchestrator.cases.definition import CaseDefinition
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.schema import Value
+from orchestrator.core.asked import DAMPING, FLAG, GAIN, GAIN_BOUNDS, NAME, STAGES, asked
+from orchestrator.core.errors import AnalysisError, InputError
+from orchestrator.linear.doubts.examination import Examination
+from orchestrator.linear.models.linear_model import LinearModel
+from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.linear.spectra.continuation import pair_at
+from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ, Mode, damping_ratio
+from orchestrator.linear.spectra.stability import Stability
+from orchestrator.studies.modes.modes import identified, running
+from orchestrator.studies.modes.naming import named_modes
+from orchestrator.studies.pod_design import lead_lag as leads
+from orchestrator.studies.pod_design.closed_loop import Placed, PodLoop, PodSetting, figures_of
+from orchestrator.studies.pod_design.guard import Naming, Surroundings, breach, surroundings
+from orchestrator.studies.pod_design.margins import LARGER_GAIN, VARIATION, Margins, compute_margins
+from orchestrator.studies.pod_design.refinement import Judgement, Refinement, refine, sweep
+from orchestrator.studies.pod_design.target import (
+    CRITICAL,
+    Target,
+    check_range,
+    find_target,
+    mode_name,
+    naming_critical,
+    require_controllers,
+)
+from orchestrator.studies.points.request import ANYTHING, OfCase, of_scenario, of_values
+from orchestrator.studies.points.store import PointStore
+
+StageReport = Callable[[str], None]
+
+_OFF = PodSetting(0.0, leads.NO_COMPENSATION)
+# a requirement counts as met if the damping ratio falls short of it by less: 0.05 points
+_MET = 5e-4
+
+
+@dataclass(frozen=True)
+class DesignRequest(OfCase):
+    """Design a POD controller by eigenvalue sensitivity, and check it on the closed loop.
+
+    Raises
+    ------
+    InputError
+        If scenario, component, mode or requirement cannot be found or make no sense.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> design = gfor.load("two_area").design("pod_p", margins=False)
+    >>> design.met
+    True
+    >>> design.parameters["gfor.pod_p.K"]
+    200.0
+    """
+
+    controller: str = asked(ANYTHING, MISSING, '``"pod_p"`` or ``"pod_q"``', option=None)
+    scenario: str | None = of_scenario("its name; by default the one without this controller")
+    values: Mapping[str, Any] | None = of_values()
+    _: KW_ONLY
+    component: str | None = asked(
+        NAME, None, "the converter, or a pattern for several with one setting"
+    )
+    mode: str | None = asked(
+        NAME,
+        None,
+        "the case's mode to damp (default: its first; the least damped swing where it names none)",
+    )
+    damping: float | None = asked(DAMPING, None, "required damping, such as 20")
+    damping_increment: float | None = asked(
+        DAMPING,
+        None,
+        "required increase of the damping in points (default: 10)",
+        "POINTS",
+        python="required increase of the damping, in points and in the place of ``damping``",
+    )
+    delta_gain: float = asked(
+        GAIN, 50.0, "gain of the finite-difference sensitivity [pu] (default: 50)"
+    )
+    gain_bounds: tuple[float, float] | None = asked(
+        GAIN_BOUNDS,
+        None,
+        "bounds of the gain [pu] (default: 200:400, and 0:400 in a search or with --points)",
+    )
+    stages: int | None = asked(STAGES, None, "lead/lag stages (default: the component's own)")
+    compensated_gain: bool = asked(
+        FLAG, False, "compute the gain from the sensitivity with the lead/lag in place", option=None
+    )
+    least_damping: float = asked(
+        DAMPING,
+        0.05,
+        "damping below which no other mode may be pushed (default: 5)",
+        option="--min-damping",
+    )
+    refine: bool = asked(
+        FLAG, False, "search gain and lead/lag on the closed loop (without bounds: where needed)"
+    )
+    margins: bool = asked(FLAG, True, "compute the margins, which take longest", option=None)
+    progress: bool = asked(
+        FLAG, False, "show a line with the stage that the design has come to", option=None
+    )
+
+    def bounds(self, *, search: bool) -> tuple[float, float]:
+        return self.gain_bounds or (0.0 if search else 200.0, 400.0)
+
+    @property
+    def increment(self) -> float:
+        return 0.10 if self.damping_increment is None else self.damping_increment
+
+
+SearchOnLinearModels = Callable[
+    [CaseDefinition, DesignRequest, Target, str, PodLoop, float], Sequence[tuple[str, PodSetting]]
+]
+"""From case, request, target, the mode's name, the running system and the mode's frequency [rad/s]: the best settings
+with where they come from."""
+
+
+@dataclass(frozen=True)
+class GainSensitivities:
+    """Mode [rad/s] and eigenvalue sensitivity [rad/s per pu] at the gain ΔK, without and with the lead/lag."""
+
+    mode: complex
+    value: complex
+    compensated: complex
+
+
+@dataclass(frozen=True)
+class PodDesign:
+    """A design with every figure on the way.
+
+    ``filters``, ``gain``, ``designed``: By the paper's equations, and the closed loop with them."""
+
+    request: DesignRequest
+    case: str
+    target: Target
+    prepared: PreparedScenario
+    mode_name: str
+    # initial, required_damping, predicted: λ_0 [rad/s], ζ_d, λ_d [rad/s].
+    initial: complex
+    required_damping: float
+    predicted: complex
+    sensitivities: GainSensitivities
+    filters: leads.LeadLag
+    gain_non_compensated: float
+    gain_compensated: float
+    gain: float
+    designed: Placed
+    refinement: Refinement | None
+    # smallest gain with the design's lead/lag that has the required damping, else that with most; None where refined
+    other_gain: Placed | None
+    # the closed loop with the final setting: the refined setting, or ``designed`` without
+    # refinement
+    final: Placed
+    before: Surroundings
+    after: Surroundings
+    # the prohibited effect of the final setting on other modes; empty if there is no such effect
+    broken: str | None
+    margins: Margins | None
+    # what `LARGER_GAIN` does to other modes, as ``broken``; None where it does not, or without margins
+    spoilt: str | None
+    # examined_before, examined: verdict over the whole spectrum without the controller and with the final setting.
+    examined_before: Examination
+    examined: Examination
+
+    @property
+    def unbounded_gain(self) -> float:
+        return self.gain_compensated if self.request.compensated_gain else self.gain_non_compensated
+
+    @property
+    def stability_before(self) -> Stability:
+        return self.examined_before.stability
+
+    @property
+    def stability(self) -> Stability:
+        return self.examined.stability
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys([*self.examined_before.warnings, *self.examined.warnings]))
+
+    @property
+    def met(self) -> bool:
+        """Return whether the closed loop has the required damping, and leaves the other modes alone."""
+        return self.damping_met and self.broken is None
+
+    @property
+    def damping_met(self) -> bool:
+        return self.achieved_damping >= self.required_damping - _MET
+
+    @property
+    def thin_margin(self) -> float | None:
+        """The target's damping ratio with a gain that is larger by `VARIATION`, where the requirement is met and that
+        is too little; None where it holds there, or that is not known."""
+        there = self.margins.variations.get(LARGER_GAIN) if self.margins else None
+        return (
+            there
+            if self.met and there is not None and there < self.required_damping - _MET
+            else None
+        )
+
+    @property
+    def achieved(self) -> complex:
+        """The mode [rad/s] that counts with the final setting; see `Surroundings.counting`."""
+        return self.after.counting(self.final.eigenvalue)
+
+    @property
+    def worst_other(self) -> Mode | None:
+        return self.after.worst_beside(self.final.eigenvalue)
+
+    @property
+    def achieved_damping(self) -> float:
+        return damping_ratio(self.achieved)
+
+    @property
+    def active_bound(self) -> str | None:
+        """``lower`` or ``upper`` where the design's gain was brought to a bound."""
+        if self.gain == self.unbounded_gain:
+            return None
+        return "lower" if self.gain > self.unbounded_gain else "upper"
+
+
+def design_pod(
+    case: Case,
+    request: DesignRequest,
+    report: StageReport,
+    store: PointStore | None,
+    search: SearchOnLinearModels,
+) -> PodDesign:
+    """Design a controller and check it on the closed loop.
+
+    ``store``: keeps figures on the way as soon as they are there; those that are there already are not computed again.
+    ``search``: gives a refinement settings to try."""
+    require_controllers([request.controller])
+    if request.damping is not None and request.damping_increment is not None:
+        raise InputError(
+            "--damping and --damping-increment both say what is required; give one of them"
+        )
+    report("preparing the case")
+    target = find_target(
+        case,
+        request.controller,
+        scenario=request.scenario,
+        pattern=request.component,
+        stages=request.stages,
+        overrides=request.overrides,
+        parameters=request.files,
+    )
+    own: dict[str, Value] = {}
+    for name in target.components:
+        own[f"{name}.{request.controller}.enabled"] = False
+        if target.neutral is None:
+            own[f"{name}.{request.controller}.N_S"] = float(target.stages)
+    overrides = {key: value for key, value in request.overrides.items() if key not in own} | own
+    name = mode_name(case, request.mode)
+    (prepared,) = case.prepare([target.scenario], overrides, request.step_size, None, request.files)
+    rules: CaseDefinition = case
+
+    def naming(model: LinearModel, modes: list[Mode]) -> Mode | None:
+        # with a gain of any size, a tie counts as a change
+        fitting = named_modes(rules, model, modes).fits.get(name)
+        return None if fitting is None else fitting[0]
+
+    for value, option in (
+        (request.delta_gain, "--delta-gain"),
+        (request.bounds(search=True)[1], "--gain-bounds"),
+    ):
+        check_range(
+            prepared.system.components, target.components, f"{request.controller}.K", value, option
+        )
+    with running(prepared) as master:
+        report("operating point")
+        point = find_operating_point(master)
+        loop = PodLoop(
+            master,
+            target.components,
+            request.controller,
+            figures_of(prepared, store),
+            neutral=target.neutral,
+        )
+        report("modes without the controller")
+        examined = loop.examine(_OFF)
+        with _with_stability(examined.stability):
+            model = loop.model(_OFF)
+            before = surroundings(model, None, naming)
+            modes = [mode for mode in before.others if mode.is_oscillation]
+            if name == CRITICAL:
+                rules = replace(case, table=naming_critical(case.table, modes))
+                prepared = replace(prepared, case=rules)
+            names = identified(prepared, point, model, modes).naming
+            before = replace(before, named=names.named.get(name))
+            if before.named is None:
+                low, high = ELECTROMECHANICAL_HZ
+                if name in names.reasons:
+                    raise InputError(f"scenario {target.scenario!r}: {names.reasons[name]}")
+                raise InputError(
+                    f"scenario {target.scenario!r} shows no mode {name!r} between {low:g} and {high:g} Hz; "
+                    f"modes there: {', '.join(f'{m.frequency_hz:.3f} Hz' for m in before.others) or 'none'}"
+                )
+            off = Placed(_OFF, pair_at(model, before.named.eigenvalue))
+            start = _Start(
+                case.name,
+                request,
+                target,
+                prepared,
+                name,
+                off,
+                before.without(before.named),
+                naming,
+                examined,
+                search,
+            )
+            return _design(start, loop, report)
+
+
+@contextmanager
+def _with_stability(stability: Stability) -> Iterator[None]:
+    """Add to an error that ends a design that the system is unstable without the controller, if it is."""
+    try:
+        yield
+    except (InputError, AnalysisError) as error:
+        if stability.stable is not False:
+            raise
+        raise type(error)(
+            f"{error}\nWithout the controller the system is {stability.sentence()}"
+        ) from error
+
+
+@dataclass(frozen=True)
+class _Start:
+    case: str
+    request: DesignRequest
+    target: Target
+    prepared: PreparedScenario
+    mode_name: str
+    off: Placed
+    before: Surroundings
+    naming: Naming
+    examined: Examination
+    search: SearchOnLinearModels
+
+
+def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
+    request, off, before = start.request, start.off, start.before
+    initial = off.eigenvalue
+    required = _required(request, initial)
+    predicted = leads.predicted_mode(required, initial)
+
+    def around(placed: Placed) -> Surroundings:
+        return surroundings(loop.model(placed.setting), placed.eigenvalue, start.naming)
+
+    judged: dict[PodSetting, Judgement] = {}
+
+    def judge(placed: Placed) -> Judgement:
+        if placed.setting not in judged:
+            after = around(placed)
+            damping = damping_ratio(after.counting(placed.eigenvalue))
+            least = min(
+                [damping_ratio(placed.eigenvalue), *(mode.damping_ratio for mode in after.others)]
+            )
+            judged[placed.setting] = Judgement(
+                damping, breach(before, after, request.least_damping), least
+            )
+        return judged[placed.setting]
+
+    def settings() -> Sequence[tuple[str, PodSetting]]:
+        report("refinement: a search and a grid of settings on the linear model")
+        return start.search(
+            start.prepared.case, request, start.target, start.mode_name, loop, initial.imag
+        )
+
+    report("sensitivity of the mode")
+    bare = loop.place(off, request.delta_gain)
+    S = leads.sensitivity(bare.eigenvalue, initial, request.delta_gain)
+    filters = leads.lead_lag(leads.angle_deg(S), initial.imag, start.target.stages)
+    turned = loop.place(off, request.delta_gain, filters)
+    S_turned = leads.sensitivity(turned.eigenvalue, initial, request.delta_gain)
+    gains = [leads.required_gain(predicted, initial, abs(value)) for value in (S, S_turned)]
+    gain = leads.bounded(gains[request.compensated_gain], request.bounds(search=False))
+
+    report("closed loop with the design")
+    final = designed = loop.place(off, gain, filters)
+    refinement, after = None, around(designed)
+    short = damping_ratio(after.counting(designed.eigenvalue)) < required - _MET
+    broken = breach(before, after, request.least_damping)
+    if request.refine or ((short or broken) and request.gain_bounds is None):
+        bounds, evenly = request.bounds(search=True), request.mode is None
+        refinement = refine(
+            loop, off, filters, required, bounds, judge, settings, evenly=evenly, report=report
+        )
+        final = refinement.chosen or designed
+        after = around(final)
+        broken = breach(before, after, request.least_damping)
+    examined = loop.examine(final.setting)
+    other_gain = None
+    if refinement is None and short:
+        report("other gains")
+        with suppress(AnalysisError):  # the mode cannot be followed
+            other_gain = sweep(
+                loop, off, filters, required, request.bounds(search=False), "as designed"
+            ).chosen
+    margins = spoilt = None
+    if request.margins and final.setting.gain and examined.stability.stable is not False:
+        report("margins")
+        margins = compute_margins(loop, off, final, request.least_damping)
+        with suppress(AnalysisError):  # the mode cannot be followed
+            more = loop.place(off, (1 + VARIATION) * final.setting.gain, final.setting.filters)
+            spoilt = breach(before, around(more), request.least_damping)
+    return PodDesign(
+        request=request,
+        case=start.case,
+        target=start.target,
+        prepared=start.prepared,
+        mode_name=start.mode_name,
+        initial=initial,
+        required_damping=required,
+        predicted=predicted,
+        sensitivities=GainSensitivities(bare.eigenvalue, S, S_turned),
+        filters=filters,
+        gain_non_compensated=gains[0],
+        gain_compensated=gains[1],
+        gain=gain,
+        designed=designed,
+        refinement=refinement,
+        other_gain=other_gain,
+        final=final,
+        before=before,
+        after=after,
+        broken=broken or _unstable(examined.stability),
+        margins=margins,
+        spoilt=spoilt,
+        examined_before=start.examined,
+        examined=examined,
+    )
+
+
+def _unstable(stability: Stability) -> str | None:
+    """The fault of a design with which the system is not known to be stable at all frequencies; None if it is."""
+    if stability.stable:
+        return None
+    subject = "the system is" if stability.stable is False else "whether the system is stable is"
+    return f"{subject} {stability.sentence()}"
+
+
+def _required(request: DesignRequest, initial: complex) -> float:
+    """ζ_d, checked against the damping ratio without the controller."""
+    present = damping_ratio(initial)
+    required = request.damping if request.damping is not None else present + request.increment
+    if required <= present:
+        raise InputError(
+            f"--damping {100 * required:g}: without the controller the mode has {100 * present:.2f} % already; "
+            "ask for more, or for an increase with --damping-increment"
+        )
+    if required >= 1:
+        raise InputError(
+            f"{100 * required:.1f} % of damping are required (the mode has {100 * present:.1f} %); "
+            "it must be less than 100 %"
+        )
+    return required

@@ -1,0 +1,223 @@
+"""The target of a POD design: the scenario, the components with the controller, and the mode."""
+
+import fnmatch
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import repeat
+
+from orchestrator.cases.case import Case
+from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
+from orchestrator.cases.parameter_files import ParameterFile
+from orchestrator.cases.schema import CaseTable, NamedModeTable, Value
+from orchestrator.core.errors import InputError
+from orchestrator.linear.spectra.modes import Mode
+from orchestrator.studies.pod_design.stages import NEEDED, count_stages, neutral_time
+from orchestrator.systems.coupling.system import ComponentPlan
+
+CRITICAL = "least damped swing"  # the mode that is designed for where the case names none
+
+
+def require_controllers(controllers: Sequence[str]) -> None:
+    known = ", ".join(DAMPING_CONTROLLERS)
+    if not controllers:
+        raise InputError(f"controllers is empty; name one or both of {known}")
+    for controller in controllers:
+        if controller not in DAMPING_CONTROLLERS:
+            raise InputError(f"there is no controller {controller!r}; there are: {known}")
+
+
+@dataclass(frozen=True)
+class Target:
+    """A scenario, and those of its components that get one common setting."""
+
+    scenario: str
+    components: tuple[str, ...]
+    # names of the components in a parameter file: one pattern that fits exactly these components, or each name
+    key: tuple[str, ...]
+    stages: int  # of the components' lead/lag: N_S, or the fixed number of a device without that variable
+    # both time constants [s] with which stages of a fixed number do nothing; None where N_S can be set
+    neutral: float | None = None
+
+
+def find_target(
+    case: Case,
+    controller: str,
+    *,
+    scenario: str | None,
+    pattern: str | None,
+    stages: int | None,
+    overrides: Mapping[str, Value],
+    parameters: Sequence[ParameterFile],
+) -> Target:
+    """Find the scenario and its components. By default it is the scenario in which all PODs exist and are off."""
+    scenario = find_scenario(
+        case, controller, scenario=scenario, overrides=overrides, parameters=parameters
+    )
+    plan = case.components_of(scenario, overrides, parameters)
+    chosen, key = _components(scenario, plan, controller, pattern)
+    times = {name: neutral_time(plan[name], controller) for name in chosen}
+    fixed = [name for name, time in times.items() if time is not None]
+    if not fixed:
+        return Target(scenario, chosen, key, _stages_set(plan, chosen, controller, stages))
+    others = [name for name in chosen if name not in fixed]
+    if others:
+        raise InputError(
+            f"{fixed[0]} has a fixed number of stages (it has no variable {controller}.N_S), {others[0]} has not; they "
+            f"cannot have one setting: design them one after the other with --component"
+        )
+    (prepared,) = case.prepare([scenario], overrides, None, None, parameters)
+    counts = {name: count_stages(prepared, name, controller) for name in fixed}
+    number = counts[fixed[0]]
+    other = next((name for name, count in counts.items() if count != number), None)
+    if other:
+        raise InputError(
+            f"{fixed[0]} has {number} fixed stages in {controller}, {other} has {counts[other]}; they cannot have one "
+            "setting: design them one after the other with --component"
+        )
+    if stages not in (None, number):
+        raise InputError(
+            f"--stages {stages}: {fixed[0]} has {number} stages in {controller}, a fixed number (it has no variable "
+            f"{controller}.N_S); leave --stages out"
+        )
+    return Target(scenario, chosen, key, number, times[fixed[0]])
+
+
+def find_scenario(
+    case: Case,
+    controller: str,
+    *,
+    scenario: str | None,
+    overrides: Mapping[str, Value],
+    parameters: Sequence[ParameterFile],
+) -> str:
+    """The scenario that is asked for; by default that in which all PODs exist and are off."""
+    if scenario is not None:
+        if scenario not in case.scenarios:
+            raise InputError(
+                f"--scenario: there is no scenario {scenario!r}; the case has: {', '.join(case.scenarios)}"
+            )
+        return scenario
+    plans = {name: case.components_of(name, overrides, parameters) for name in case.scenarios}
+    on = {
+        name
+        for name, plan in plans.items()
+        for enabled in (f"{each}.enabled" for each in DAMPING_CONTROLLERS)
+        for unit in plan.values()
+        if enabled in unit.description.variables and unit.value(enabled)
+    }
+    fitting = [
+        name for name, plan in plans.items() if with_controller(plan, controller) and name not in on
+    ]
+    # no fault's, say
+    fitting = [name for name in fitting if case.scenarios[name].events is None] or fitting
+    if len(fitting) != 1:
+        what = "no scenario" if not fitting else f"more than one scenario ({', '.join(fitting)})"
+        lacking = "" if fitting else "".join(map(_lacking, plans.values(), repeat(controller)))
+        raise InputError(
+            f"{case.name}: {what} has components with {controller} and every POD off, which is what a design "
+            f"starts from; name one with --scenario, from: {', '.join(case.scenarios)}{lacking}"
+        )
+    return fitting[0]
+
+
+def _lacking(plan: Mapping[str, ComponentPlan], controller: str) -> str:
+    """Of the first component with some variables of a controller, which ones it lacks; "" if there is none."""
+    for name, component in plan.items():
+        having = [v for v in NEEDED if f"{controller}.{v}" in component.description.variables]
+        lacks = [f"{controller}.{v}" for v in NEEDED if v not in having]
+        if having and lacks:
+            return (
+                f". {name} has {controller}.{having[0]}, and lacks {', '.join(lacks)}: name them in its binding, as "
+                f'[signals."{lacks[0]}"]'
+            )
+    return ""
+
+
+def _components(
+    scenario: str, plan: Mapping[str, ComponentPlan], controller: str, pattern: str | None
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The components that are asked for, and their names in a parameter file."""
+    having = with_controller(plan, controller)
+    if not having:
+        raise InputError(
+            f"scenario {scenario!r}: no component has the controller {controller} (parameters "
+            f"{', '.join(f'{controller}.{v}' for v in NEEDED)}); choose a scenario with converters"
+            f"{_lacking(plan, controller)}"
+        )
+    fitting = fnmatch.filter(plan, pattern) if pattern is not None else having
+    chosen = [name for name in fitting if name in having]
+    if not chosen:
+        raise InputError(
+            f"--component {pattern}: scenario {scenario!r} has no component of that name with {controller}; "
+            f"those with it: {', '.join(having[:12])}{' …' if len(having) > 12 else ''}"
+        )
+    key = (pattern,) if pattern is not None and chosen == fitting else tuple(chosen)
+    return tuple(chosen), key
+
+
+def _stages_set(
+    plan: Mapping[str, ComponentPlan],
+    chosen: Sequence[str],
+    controller: str,
+    stages: int | None,
+) -> int:
+    """The number that is asked for, or that the components' N_S have."""
+    present = {int(plan[name].number(f"{controller}.N_S")) for name in chosen}
+    if stages is not None:
+        check_range(plan, chosen, f"{controller}.N_S", stages, "--stages")
+        return stages
+    if len(present) > 1:
+        raise InputError(
+            f"the components {', '.join(chosen[:12])} have different numbers of stages ({controller}.N_S = "
+            f"{', '.join(map(str, sorted(present)))}); give them one number with --stages"
+        )
+    return present.pop()
+
+
+def check_range(
+    plan: Mapping[str, ComponentPlan],
+    components: Sequence[str],
+    variable: str,
+    value: float,
+    option: str,
+) -> None:
+    for name in components:
+        info = plan[name].description.variables[variable]
+        low = info.minimum if info.minimum is not None else -math.inf
+        high = info.maximum if info.maximum is not None else math.inf
+        if not low <= value <= high:
+            raise InputError(
+                f"{option}: {value:g} is out of range: {name}.{variable} takes from {low:g} to {high:g}"
+            )
+
+
+def with_controller(plan: Mapping[str, ComponentPlan], controller: str) -> list[str]:
+    wanted = [f"{controller}.{v}" for v in NEEDED]
+    return [name for name, c in plan.items() if all(v in c.description.variables for v in wanted)]
+
+
+def mode_name(case: Case, wanted: str | None) -> str:
+    """The name of the mode to design for: the requested one, or by default the first mode that the case names; in a
+    case without names the least damped swing, which is called `CRITICAL`."""
+    names = [table.name for table in case.table.analysis.modes] or [CRITICAL]
+    name = wanted if wanted is not None else names[0]
+    if name not in names:
+        raise InputError(f"--mode: the case names no mode {name!r}; it names: {', '.join(names)}")
+    return name
+
+
+def naming_critical(table: CaseTable, modes: Sequence[Mode]) -> CaseTable:
+    """A case's tables that call the first of some modes `CRITICAL`: by the machines that swing against each other in
+    it, else by the state that takes part most."""
+    if not modes:
+        return table
+    speeds = [state for state, _ in modes[0].participation if state.endswith(".omega")]
+    together, against = modes[0].swing(speeds)
+    if against:
+        rule = NamedModeTable(name=CRITICAL, against=(list(together), list(against)))
+    else:
+        rule = NamedModeTable(name=CRITICAL, states=speeds[:1] or [modes[0].participation[0][0]])
+    return table.model_copy(
+        update={"analysis": table.analysis.model_copy(update={"modes": [rule]})}
+    )

@@ -1,0 +1,57 @@
+"""A point that cannot be computed says why; the other points stand."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Protocol, Self
+
+import numpy as np
+
+from orchestrator.core.errors import CaseError, CosimError, ErrorKind
+from orchestrator.core.spelling import as_options
+
+
+@dataclass(frozen=True)
+class Failure:
+    kind: ErrorKind
+    text: str
+    lasting: bool
+
+    @classmethod
+    @as_options()  # the same for everybody, wherever it was computed
+    def of(cls, error: BaseException) -> Self:
+        if isinstance(error, CosimError):
+            text = (
+                "; ".join(map(str, error.problems)) if isinstance(error, CaseError) else str(error)
+            )
+            return cls(error.kind, text, error.kind.lasting)
+        if isinstance(error, np.linalg.LinAlgError):
+            return cls(ErrorKind.ANALYSIS, f"no eigenvalues: {error}", True)
+        return cls(ErrorKind.OTHER, f"{type(error).__name__}: {error}", False)
+
+    @classmethod
+    def lost(cls, error: Exception) -> Self:
+        return cls(ErrorKind.WORKER_LOST, str(error), False)
+
+    def __str__(self) -> str:
+        return self.text
+
+
+class Failing(Protocol):
+    """The result of a point that may hold a failure in place of figures."""
+
+    failure: Failure | None
+
+
+@contextmanager
+def failure_kept(result: Failing) -> Iterator[None]:
+    """Inside, an error ends the computation of one point and becomes part of its result.
+
+    An interrupt goes through: it is to end them all."""
+    try:
+        with as_options():
+            yield
+    except (
+        Exception
+    ) as error:  # an unexpected error of a foreign FMU or library must not end the other points
+        result.failure = Failure.of(error)

@@ -1,0 +1,97 @@
+"""A hash over everything that the result of a point depends on, which names the point's file; and the hash by which a
+worker refuses a changed case or changed code."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from orchestrator.cases.case import BUILT_IN, Case, load_case
+from orchestrator.cases.definition import CaseDefinition
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.core.errors import InputError
+from orchestrator.core.foreign_files import check_regular
+from orchestrator.devices.fmi.description import FmuDescription
+from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.studies.points.code import code_hash, numbers_hash
+from orchestrator.systems.coupling.imperfections import described
+
+
+def digest(content: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
+
+
+def key_of(content: Mapping[str, Any], module: str) -> str:
+    """Name of a point whose result depends on the content [JSON's types], and on what a module computes."""
+    return digest({**content, "code": numbers_hash(module)})
+
+
+def scenario_content(prepared: PreparedScenario) -> dict[str, Any]:
+    fmus = {
+        name: component_content(plan.description)
+        for name, plan in prepared.system.components.items()
+    }
+    wires = described(prepared.system.wires)
+    return {"scenario": prepared.name, "fmus": fmus, "values": prepared.values} | (
+        {"wires": wires} if wires else {}
+    )
+
+
+def component_content(description: FmuDescription) -> list[str]:
+    """What a key contains for an FMU: a hash of its file, because a vendor may keep the guid of an older file, and the
+    effect of its binding."""
+    port = repr(description.port) if isinstance(description, BoundDescription) else ""
+    return [sha256_of(description.path), port]
+
+
+def fingerprint(case: CaseDefinition) -> str:
+    """Two hashes: of this package's code and the libraries' versions, and of the texts of the case and its parameter
+    files."""
+    files = [
+        f"{name}\0{file if isinstance(file, str) else file.text}"
+        for name, file in case.parameter_files.items()
+    ]
+    texts = "\0".join([case.text, *files])
+    return f"{code_hash()[:32]}-{hashlib.sha256(texts.encode()).hexdigest()[:32]}"
+
+
+def reference_to(case: CaseDefinition) -> str:
+    """Name by which any worker finds a case: of a built-in one, or the path of a file that all can read."""
+    path = (case.home / case.path.name).resolve()
+    return path.parent.name if path.parent.parent == BUILT_IN.resolve() else str(path)
+
+
+@lru_cache(maxsize=8)
+def same_case(reference: str, wanted: str, trust_fmus: bool = False) -> Case:
+    """The case of a task, as a worker sees it."""
+    case = load_case(reference, trust_fmus=trust_fmus)
+    here = fingerprint(case)
+    if here.partition("-")[0] != wanted.partition("-")[0]:
+        raise InputError(
+            f"{case.path}: a worker has other code of gfor-cosim or of its libraries than the study was started with; "
+            "give all machines the same versions, and restart the workers"
+        )
+    if here != wanted:
+        own = [
+            str(file.path) for file in case.parameter_files.values() if not isinstance(file, str)
+        ]
+        which = f", or one of its parameter files ({', '.join(own)})" if own else ""
+        raise InputError(
+            f"{case.path}: this file{which} has another text now than when the study loaded it; load the case again, "
+            "and on a cluster give all machines the same files"
+        )
+    return case
+
+
+def sha256_of(path: Path) -> str:
+    check_regular(path)
+    status = path.stat()
+    return _file_hash(path, status.st_mtime_ns, status.st_size)
+
+
+@lru_cache(maxsize=1024)
+def _file_hash(path: Path, mtime_ns: int, size: int) -> str:
+    """SHA-256 of a file as it is now; the time of its last change keeps the cache from giving an older file's hash."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()

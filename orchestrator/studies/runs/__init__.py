@@ -1,0 +1,1 @@
+"""Runs of a case's scenarios, with their modes, checkpoints and files."""

@@ -1,0 +1,35 @@
+"""The system after a run's events, where these leave a line open or another value changed."""
+
+from collections.abc import Mapping
+
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.core.errors import CosimError
+from orchestrator.simulation.watch.settings import left_changed
+from orchestrator.studies.modes.modes import ModesResult, compute_modes
+
+
+def lasting_changes(prepared: PreparedScenario) -> Mapping[str, float | bool]:
+    """Values by ``component.variable`` that the events leave changed; a fault at the end of the run is none."""
+    left = left_changed(prepared.system, prepared.events)
+    return {name: value for name, value in left.items() if ".fault." not in name}
+
+
+def modes_after(
+    prepared: PreparedScenario, frequency_range: tuple[float, float]
+) -> ModesResult | str | None:
+    """The modes from a power flow with what the events leave changed; the reason where there are none beside a switch
+    that is left, else None. Units share what loads and references change, which no power flow tells."""
+    values = lasting_changes(prepared)
+    if not values or prepared.beside is None:
+        return None
+    shared = [key for key in values if key.endswith(".scale") or ".delta_" in key]
+    if shared:
+        reason = f"units share what {shared[0]} changes by what their controls do"
+    else:
+        try:
+            after = prepared.beside(prepared.name, False, values, prepared.stop_time)
+            return compute_modes(after, frequency_range) if after else None
+        except CosimError as error:
+            reason = ": ".join(line.strip(" -:") for line in str(error).splitlines()[:2])
+    is_switched = any(isinstance(value, bool) for value in values.values())
+    return f"the modes after the events are not known: {reason}" if is_switched else None

@@ -1,0 +1,316 @@
+"""A run: the modes of a scenario, its response to the events, what links the two, and what went wrong in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.core.errors import (
+    AnalysisError,
+    ComponentError,
+    CosimError,
+    InputError,
+    NotTakenUpError,
+    ResultsError,
+    RunInterruptedError,
+)
+from orchestrator.devices.fmi.instance import is_isolated, protections_of
+from orchestrator.devices.fmi.interrupts import calls
+from orchestrator.devices.fmi.protection import Protection, missing
+from orchestrator.linear.doubts.coupling_growth import coupling_growth
+from orchestrator.linear.doubts.external_exciters import start_warnings
+from orchestrator.linear.models.device_start import misfits_of, sentences
+from orchestrator.linear.models.linearization import Blocks, compose
+from orchestrator.linear.models.state_access import obstacle
+from orchestrator.linear.signals.identification import IdentifiedMode
+from orchestrator.linear.spectra.critical_modes import nearest_eigenvalue
+from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
+from orchestrator.output.results.recorded import open_whole
+from orchestrator.output.results.recording import ENDED_EARLY, TRAJECTORY, RecordingFolder
+from orchestrator.output.results.storage import trajectory_dataset
+from orchestrator.simulation.federation.choice import Federates
+from orchestrator.simulation.federation.component import obstacle_of
+from orchestrator.simulation.federation.federation import Federation
+from orchestrator.simulation.federation.pace import Pace
+from orchestrator.simulation.watch.finding import NOT_JUDGED, UNSTABLE, Finding
+from orchestrator.simulation.watch.watch import Watch
+from orchestrator.studies.modes.linear import NoLinearResponseError, linear_response
+from orchestrator.studies.modes.modes import ModesResult, modes_of, running, unknown_modes
+from orchestrator.studies.runs.after_events import modes_after
+from orchestrator.studies.runs.checkpoint_mark import computed
+from orchestrator.studies.runs.checkpoints import Checkpoints
+from orchestrator.studies.runs.ring_down import ring_down_of
+from orchestrator.systems.coupling.master import Master
+from orchestrator.systems.coupling.observers import Observer
+from orchestrator.systems.coupling.run_state import NOT_KEPT
+from orchestrator.systems.coupling.schedule import jacobi
+from orchestrator.systems.coupling.statistics import StepStatistics
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+STEPS = (0.5, 1.0, 2.0, 5.0)
+"""Communication steps for which the shift of the electromechanical mode is reported, in parts of the case's own."""
+
+
+@dataclass(frozen=True, slots=True)
+class ModeShift:
+    """How far a communication step moves the electromechanical mode from the continuous system's [rad/s]."""
+
+    schedule: str
+    step_size: float
+    continuous: complex
+    eigenvalue: complex
+
+    @property
+    def shift(self) -> float:
+        return abs(self.eigenvalue - self.continuous)
+
+
+@dataclass
+class RunResult:
+    modes: ModesResult
+    dataset: xr.Dataset
+    statistics: StepStatistics | None = None
+    ring_down: IdentifiedMode | None = None
+    shifts: list[ModeShift] = field(default_factory=list)
+    linear: xr.Dataset | None = None
+    failure: CosimError | None = None  # the error that ended the run before its time
+    # what the run did wrong, each said once, in the order of its beginning
+    findings: list[Finding] = field(default_factory=list)
+    # what kept each foreign FMU from the rest of the machine, by component
+    protections: dict[str, tuple[Protection, ...]] = field(default_factory=dict)
+    after: ModesResult | str | None = None  # as `modes_after` has it
+
+    @property
+    def went_unstable(self) -> list[Finding]:
+        """The findings that no stable system gives, whatever its linear model says."""
+        return [finding for finding in self.findings if finding.kind in UNSTABLE]
+
+    @property
+    def missing_limits(self) -> list[Finding]:
+        """Limits that would have acted, and that the models lack."""
+        return [finding for finding in self.findings if not finding.represented]
+
+    @property
+    def before_its_events(self) -> bool:
+        return bool(self.modes.prepared.not_reached) and not self.modes.prepared.events
+
+    @property
+    def stable_in_simulation(self) -> bool | None:
+        """None where a part was not judged or not reached, or a limit would act that the model lacks, and nothing else
+        was wrong."""
+        if self.went_unstable:
+            return False
+        if self.before_its_events:
+            return None
+        return (
+            None
+            if any(
+                finding.kind == NOT_JUDGED or not finding.represented for finding in self.findings
+            )
+            else True
+        )
+
+
+def run_scenario(
+    prepared: PreparedScenario,
+    frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
+    observers: Sequence[Observer] = (),
+    *,
+    linear: bool = False,
+    recording: RecordingFolder | None = None,
+    checkpoints: Checkpoints | None = None,
+    federates: Federates | None = None,
+    threads: int | None = 1,
+    boxes: Callable[..., ModesResult] | None = None,
+) -> RunResult:
+    """Compute the modes of a scenario and its response to the case's events, the linear model's as well if wanted.
+
+    A system that cannot be linearised is simulated from its initial state, with a warning instead of modes.
+    A component that fails in the middle ends the run, and so do Ctrl-C and SIGTERM; what was recorded until then is in
+    the result.
+
+    ``recording``: where the rows go while the run goes on; at the end they are ``trajectory.nc`` beside it.
+    ``checkpoints``: keep the run while it goes on, and go on from the newest where one was left; not with federates.
+    ``boxes``: finds the modes where components hide their states."""
+    if federates is not None:
+        if federates.announce is not None:
+            observers = [*observers, Pace(federates.announce)]
+        with Federation(prepared, federates) as federation:
+            ready = federation.prepared
+            return _run(
+                ready,
+                frequency_range,
+                observers,
+                linear,
+                recording,
+                None,
+                threads,
+                boxes,
+                federation,
+            )
+    try:
+        return _run(
+            prepared, frequency_range, observers, linear, recording, checkpoints, threads, boxes
+        )
+    except NotTakenUpError as error:
+        if checkpoints is None:
+            raise
+        checkpoints.forget(str(error))
+        return _run(
+            prepared, frequency_range, observers, linear, recording, checkpoints, threads, boxes
+        )
+
+
+def _run(
+    prepared: PreparedScenario,
+    frequency_range: tuple[float, float],
+    observers: Sequence[Observer],
+    linear: bool,
+    recording: RecordingFolder | None,
+    checkpoints: Checkpoints | None,
+    threads: int | None,
+    boxes: Callable[..., ModesResult] | None,
+    federation: Federation | None = None,
+) -> RunResult:
+    watch = Watch(prepared, recording)
+    statistics = None
+    failure: CosimError | None = None
+    after = modes_after(prepared, frequency_range)
+    with running(prepared, federation, threads) as master:
+        protections = {
+            name: found for name, c in master.components.items() if (found := protections_of(c))
+        }
+        reasons = [
+            text for c in master.components.values() if (text := obstacle_of(c) or obstacle(c))
+        ]
+        if reasons and boxes is not None:
+            modes = boxes(prepared, master, frequency_range)
+        elif reasons:
+            misfits, modes = misfits_of(master), unknown_modes(prepared, reasons)
+            started = (*sentences(misfits), *start_warnings(master))
+            modes = replace(modes, warnings=(*started, *modes.warnings), misfits=misfits)
+        else:
+            modes = modes_of(prepared, master, frequency_range)
+        if reasons and not (
+            boxes or federation
+        ):  # a look is in steps, which a foreign federate cannot take back
+            modes = replace(modes, warnings=(*modes.warnings, *_diverging(master)))
+        shifts = _shifts(master, modes)
+        follows = _response_of(master, prepared) if linear else None
+        try:
+            if federation is not None:
+                federation.begin(master)
+            statistics = master.run(
+                prepared.stop_time,
+                prepared.events,
+                [*watch.observers, *observers],
+                checkpoints or NOT_KEPT,
+            )
+        except NotTakenUpError:
+            raise
+        except CosimError as error:
+            failure = error
+        except KeyboardInterrupt:
+            failure = RunInterruptedError(f"{calls.how} at t = {master.time:.6g} s")
+    dataset, failure = _recorded(watch, prepared, recording, failure)
+    known, later = (
+        () if not isinstance(r, ModesResult) or r.fit_errors else r.eigenvalues
+        for r in (modes, after)
+    )
+    findings = watch.findings(failure, master.late_starts, modes.misfits, known, later)
+    ring_down, why_none = (None, "") if failure else ring_down_of(modes, dataset, findings)
+    unprotected = tuple(
+        f"{name} runs in a process of its own, and this system lacks: {'; '.join(lacking)}"
+        for name, found in protections.items()
+        if (lacking := missing(found))
+    )
+    inside = tuple(
+        f"component {name!r} runs in gfor's own process, because the case and --trust-fmus say so"
+        for name, plan in prepared.system.components.items()
+        if plan.isolated is False and is_isolated(plan.description, None)
+    )
+    not_known = [after] if isinstance(after, str) else []
+    about_run = (
+        *map(str, prepared.about_rows),
+        *filter(None, [why_none]),
+        *not_known,
+        *unprotected,
+        *inside,
+    )
+    modes = replace(modes, warnings=(*modes.warnings, *about_run))
+    return RunResult(
+        modes,
+        dataset,
+        statistics,
+        ring_down,
+        shifts,
+        follows,
+        failure,
+        findings,
+        protections,
+        after,
+    )
+
+
+def _response_of(master: Master, prepared: PreparedScenario) -> xr.Dataset:
+    """The linear model's response to the run's events."""
+    try:
+        return linear_response(master, prepared)
+    except NoLinearResponseError as error:
+        raise InputError(f"{error}; leave --linear out") from error
+
+
+def _diverging(master: Master) -> list[str]:
+    """Return what is known before the run of black boxes that the coupling does not bear; a run shows the rest."""
+    boxes = [name for name, component in master.components.items() if obstacle(component)]
+    try:
+        return coupling_growth(master, boxes)
+    except (AnalysisError, ComponentError):
+        return []  # they cannot be looked at so, which is no fault of theirs
+
+
+def _recorded(
+    watch: Watch,
+    prepared: PreparedScenario,
+    recording: RecordingFolder | None,
+    failure: CosimError | None,
+) -> tuple[xr.Dataset, CosimError | None]:
+    """Return what was recorded, and the failure, which may be that it cannot be written."""
+    further = computed(prepared) | ({} if failure is None else {ENDED_EARLY: str(failure)})
+    if recording is None:
+        return trajectory_dataset(watch.recorder, prepared).assign_attrs(further), failure
+    try:
+        recording.join(recording.folder.parent / TRAJECTORY, further)
+        return open_whole(recording.folder.parent / TRAJECTORY), failure
+    except ResultsError as error:
+        kept = trajectory_dataset(watch.recorder, prepared)  # the looks, which are in memory
+        if failure is None or isinstance(failure, ResultsError):
+            return kept, failure or error
+        return kept, ResultsError(f"{failure}; and what was recorded is not published: {error}")
+
+
+def _shifts(master: Master, modes: ModesResult) -> list[ModeShift]:
+    """The electromechanical mode at several steps and both schedules, beside the continuous system's."""
+    if modes.electromechanical is None or modes.system is None:
+        return []
+    try:
+        exact = nearest_eigenvalue(modes.system, modes.electromechanical.eigenvalue)
+    except AnalysisError:
+        return []
+    schedules = {master.schedule.name: master.schedule}
+    if (
+        not master.schedule.is_second_order
+    ):  # else components are not told the step, as they would be under jacobi
+        schedules["jacobi"] = jacobi(tuple(master.components))
+    shifts = []
+    for part in STEPS:
+        step_size = part * master.clock.step_size
+        at_step = Blocks(master, step_size)
+        for name, schedule in sorted(schedules.items()):
+            value = nearest_eigenvalue(compose(at_step, schedule), exact)
+            shifts.append(ModeShift(name, step_size, exact, value))
+    return shifts

@@ -1,0 +1,177 @@
+"""Branches beyond the ratings and buses outside of the bands that a network's file has."""
+
+from collections.abc import Collection
+from typing import Any
+
+from orchestrator.cases.branch_limits import Loading
+from orchestrator.core.errors import counted
+from orchestrator.output.report.table import Column, ColumnTable
+from orchestrator.studies.screening.study import ScreenedItem
+from orchestrator.studies.screening.summary import Summary
+
+_FEW = 3
+
+
+def worst_branch(item: ScreenedItem) -> Loading | None:
+    """The branch that is loaded most; None where the file has no ratings."""
+    return item.record.loadings[0] if item.record.loadings else None
+
+
+def branches_beyond(item: ScreenedItem) -> list[str]:
+    return [one.branch for one in item.record.loadings if one.beyond]
+
+
+def limit_columns(summary: Summary) -> tuple[Column[ScreenedItem], ...]:
+    """Columns of ``items.csv``: the worst branch and bus, and how many are beyond."""
+    has_bands = _has_bands(summary)
+    return (
+        Column("", _branch, name="branch"),
+        Column("", _percent, name="loading_percent"),
+        Column("", lambda item: _number(item, branches_beyond(item)), name="branches_beyond"),
+        Column("", _bus, name="bus_outside"),
+        Column("", _voltage, name="voltage_pu"),
+        Column("", lambda item: _outside(item, has_bands), name="buses_outside"),
+    )
+
+
+def limits_sentence(summary: Summary) -> str:
+    """At how many items a branch is beyond its rating, and a bus outside of its band; "" where the file has neither."""
+    sentences = (_branches_in_words(summary), _voltages_in_words(summary))
+    return " ".join(filter(None, sentences))
+
+
+def limits_table(summary: Summary, most: int = 12) -> ColumnTable[ScreenedItem] | None:
+    """Items with a branch beyond its rating or a bus outside of its band, the most loaded first; None without any."""
+    found = [item for item in summary.result.items if branches_beyond(item) or item.record.outliers]
+    if not found:
+        return None
+    found.sort(key=lambda item: -(_percent(item) or 0.0))
+    return ColumnTable(
+        "Branches beyond their rating, and buses outside of their band",
+        (
+            Column("Point", lambda item: item.point.name),
+            Column("Outage", lambda item: item.outage.name),
+            Column("Branch", lambda item: _branch(item) or ""),
+            Column("Loading [%]", _percent, ".4g"),
+            Column("Beyond", lambda item: _number(item, branches_beyond(item))),
+            Column("Bus", lambda item: _bus(item) or ""),
+            Column("Voltage [pu]", _voltage, ".4f"),
+            Column("Outside", lambda item: len(item.record.outliers)),
+        ),
+        found,
+        3,
+        most,
+        "items.csv",
+    )
+
+
+def limits_json(summary: Summary) -> dict[str, Any] | None:
+    """Give every item with a branch beyond its rating or a bus outside of its band; None where the file has neither."""
+    if not limits_sentence(summary):
+        return None
+    intact = _beyond_intact(summary)
+    concerned = [
+        item for item in summary.result.items if branches_beyond(item) or item.record.outliers
+    ]
+    return {"items": [_item_json(item, intact.get(item.point.name, ())) for item in concerned]}
+
+
+def _item_json(item: ScreenedItem, beyond_intact: Collection[str]) -> dict[str, Any]:
+    branches = [
+        {
+            "branch": one.branch,
+            "loading_percent": 100 * one.part,
+            "beyond_in_intact_network": one.branch in beyond_intact,
+        }
+        for one in item.record.loadings
+        if one.beyond
+    ]
+    buses = [
+        {"bus": one.bus, "voltage_pu": one.voltage, "limit_pu": one.limit}
+        for one in item.record.outliers
+    ]
+    return {
+        "point": item.point.name,
+        "outage": item.outage.name,
+        "branches": branches,
+        "buses": buses,
+    }
+
+
+def _branches_in_words(summary: Summary) -> str:
+    rated = [(one, item) for item in summary.result.items if (one := worst_branch(item))]
+    if not rated:
+        return ""
+    worst, item = max(rated, key=lambda entry: entry[0].part)
+    most = f"{worst.branch} with {100 * worst.part:.4g} % ({_where(item)})"
+    over, total = sum(one.beyond for one, _ in rated), len(summary.result.items)
+    if not over:
+        return f"No branch is beyond its rating{_without_flow(summary)}; {most} is loaded most."
+    text = f"At {over} of {total} items a branch is beyond its rating, most {most}."
+    already = sorted({name for names in _beyond_intact(summary).values() for name in names})
+    if already:
+        shown = ", ".join(already[:_FEW]) + f" and {len(already) - _FEW} more" * (
+            len(already) > _FEW
+        )
+        text += f" Beyond it without an outage already: {shown}."
+    return text
+
+
+def _voltages_in_words(summary: Summary) -> str:
+    found = [(item.record.outliers[0], item) for item in summary.result.items if _bus(item)]
+    if not found:
+        if not _has_bands(summary) or not any(x.record.has_flow for x in summary.result.items):
+            return ""
+        return f"All bus voltages are within their bands{_without_flow(summary)}."
+    worst, item = max(found, key=lambda entry: abs(entry[0].voltage - entry[0].limit))
+    side = "below" if worst.voltage < worst.limit else "above"
+    return (
+        f"At {len(found)} of {len(summary.result.items)} items a bus voltage is outside of its band, furthest "
+        f"{worst.bus} with {worst.voltage:.4f} pu, {side} {worst.limit:g} pu ({_where(item)})."
+    )
+
+
+def _without_flow(summary: Summary) -> str:
+    """Say of how many items that is not known; "" where it is known of all."""
+    number = sum(not item.record.has_flow for item in summary.result.items)
+    return f", except for {counted(number, 'item')} without a power flow" if number else ""
+
+
+def _has_bands(summary: Summary) -> bool:
+    return bool(summary.result.plan.prepared.file_limits.bands)
+
+
+def _outside(item: ScreenedItem, has_bands: bool) -> int | None:
+    return len(item.record.outliers) if has_bands and item.record.has_flow else None
+
+
+def _beyond_intact(summary: Summary) -> dict[str, set[str]]:
+    """Branches that are beyond their rating in the intact network, by point."""
+    intact = [item for item in summary.result.items if not item.outage.elements]
+    return {item.point.name: set(branches_beyond(item)) for item in intact}
+
+
+def _branch(item: ScreenedItem) -> str | None:
+    one = worst_branch(item)
+    return None if one is None else one.branch
+
+
+def _percent(item: ScreenedItem) -> float | None:
+    one = worst_branch(item)
+    return None if one is None else 100 * one.part
+
+
+def _number(item: ScreenedItem, beyond: list[str]) -> int | None:
+    return len(beyond) if item.record.loadings else None
+
+
+def _bus(item: ScreenedItem) -> str | None:
+    return item.record.outliers[0].bus if item.record.outliers else None
+
+
+def _voltage(item: ScreenedItem) -> float | None:
+    return item.record.outliers[0].voltage if item.record.outliers else None
+
+
+def _where(item: ScreenedItem) -> str:
+    return f"{item.point.name}, {item.outage.name}"

@@ -1,0 +1,206 @@
+"""Critical modes of one operating point, from scratch or from those of another, with a check that none is missed."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.core.arrays import Vector
+from orchestrator.core.errors import AnalysisError
+from orchestrator.linear.models.linear_model import LinearModel
+from orchestrator.linear.spectra.critical_modes import DENSE, find_critical_modes, nearest_pairs
+from orchestrator.linear.spectra.mode_refinement import RefinedModes, missed, refine
+from orchestrator.linear.spectra.mode_tracking import ModeSet
+from orchestrator.linear.spectra.modes import ZERO, damping_ratio, find_spectrum
+from orchestrator.linear.spectra.shifted_equations import GROWING, ShiftedEquations, count_growing
+from orchestrator.linear.spectra.stability import grows
+
+_BEYOND = 1.3
+"""Modes are followed a little beyond the range and the damping that are asked for, so that those which enter are known
+already."""
+
+_MOST_STATES = 4000
+"""Up to this number of states, all eigenvalues are computed where a search for some of them does not converge: they
+take some minutes and a gigabyte."""
+
+_BESIDE_ZERO, _NEAREST = 1e-2, 6
+"""Beside 0 [rad/s], where so many nearest eigenvalues are sought: those that are zero or grow slowly are among them."""
+
+_MOST = 0.9
+MOST_DAMPING = 0.6  # damping ratio up to which modes are looked for
+UNSTABLE = 1e-6  # A real part above this [1/s] is growth and not rounding
+
+
+@dataclass(frozen=True)
+class CriticalRegion:
+    """Which modes are looked for: frequencies [Hz], and the damping ratio below which a mode is critical."""
+
+    lowest_hz: float
+    highest_hz: float
+    damping: float
+
+    def holds(self, value: complex) -> bool:
+        hertz = value.imag / (2 * np.pi)
+        return self.lowest_hz <= hertz <= self.highest_hz and damping_ratio(value) <= self.damping
+
+    @property
+    def wider(self) -> "CriticalRegion":
+        damping = min(_MOST, _BEYOND * self.damping)
+        return CriticalRegion(self.lowest_hz / _BEYOND, self.highest_hz * _BEYOND, damping)
+
+
+@dataclass(frozen=True)
+class FoundModes:
+    modes: ModeSet
+    searched: bool  # whether they come from a search of their own rather than from a neighbour's
+    # number of growing eigenvalues that are none of these modes; None where they were not counted
+    growing_elsewhere: int | None
+    # the one of them with the largest real part [rad/s]; None where there is none, or they were only counted
+    fastest: complex | None = None
+    # number of eigenvalues that are zero, where growth was counted: one may be the free angle
+    zeros: int = 0
+    # Growth [1/s] from which it was counted at all frequencies; slower growth was sought in the range and near 0 only.
+    # 0 where all eigenvalues are known.
+    slowest: float = 0.0
+
+    def critical(self, wanted: CriticalRegion) -> list[int]:
+        held = [k for k, value in enumerate(self.modes.eigenvalues.tolist()) if wanted.holds(value)]
+        return sorted(held, key=lambda k: damping_ratio(complex(self.modes.eigenvalues[k])))
+
+    @property
+    def grows(self) -> bool:
+        return bool((self.modes.eigenvalues.real > UNSTABLE).any()) or bool(self.growing_elsewhere)
+
+
+def find_modes_here(
+    model: LinearModel,
+    alone: Vector,
+    wanted: CriticalRegion,
+    neighbour: ModeSet | None,
+    *,
+    count: bool,
+) -> FoundModes:
+    """The modes of an operating point.
+
+    ``alone``: eigenvalues of the components alone [rad/s], as `count_growing` takes them.
+    ``neighbour``: modes of a similar operating point; None searches from scratch.
+    ``count``: whether all growing eigenvalues are counted, at any frequency. Small systems always are.
+    Raises an `AnalysisError` if neither the search nor the growth that is counted comes to an end, and the system is
+    too large for all of its eigenvalues."""
+    if len(model.names) <= DENSE:
+        return _whole(model, wanted)
+    equations = ShiftedEquations(model)
+    found = None if neighbour is None else _from_neighbour(model, equations, wanted, neighbour)
+    searched = found is None
+    if found is None:
+        try:
+            found = _from_search(model, equations, wanted)
+        except AnalysisError:
+            if len(model.names) > _MOST_STATES:
+                raise
+            return _whole(model, wanted)
+    if not count:
+        return FoundModes(found, searched, None)
+    zeros, slow = _near_zero(model, found)
+    return FoundModes(
+        found, searched, _elsewhere(equations, alone, found) + slow, None, zeros, GROWING
+    )
+
+
+def _from_search(
+    model: LinearModel, equations: ShiftedEquations, wanted: CriticalRegion
+) -> ModeSet:
+    """The modes from a search over the region, or from all eigenvalues where it has missed some."""
+    wide = wanted.wider
+    found = ModeSet.of(
+        find_critical_modes(model, wide.lowest_hz, wide.highest_hz, wide.damping), model.names
+    )
+    if missed(equations, _columns(found), *_radians(wanted), wanted.damping):
+        return _whole(model, wanted).modes
+    return found
+
+
+def _from_neighbour(
+    model: LinearModel, equations: ShiftedEquations, wanted: CriticalRegion, neighbour: ModeSet
+) -> ModeSet | None:
+    """The neighbour's modes as they are here; None where these do not settle, or are not all."""
+    if not len(neighbour.eigenvalues):
+        return None
+    start = _columns(_with_names(neighbour, model.names))
+    try:
+        refined = refine(model, equations, start.values, start.left, start.right)
+        if not refined.settled or missed(equations, refined, *_radians(wanted), wanted.damping):
+            return None
+    except (AnalysisError, np.linalg.LinAlgError):
+        return None
+    return _kept(ModeSet(refined.values, refined.left.T, refined.right.T, model.names), wanted)
+
+
+def _with_names(modes: ModeSet, names: tuple[str, ...]) -> ModeSet:
+    """The same modes with the states of another model; a state that they lack is at rest."""
+    if modes.names == names:
+        return modes
+    place = {name: k for k, name in enumerate(modes.names)}
+    to = [k for k, name in enumerate(names) if name in place]
+    of = [place[names[k]] for k in to]
+    left, right = (np.zeros((len(modes.eigenvalues), len(names)), dtype=complex) for _ in range(2))
+    left[:, to], right[:, to] = modes.left[:, of], modes.right[:, of]
+    return ModeSet(modes.eigenvalues, left, right, names)
+
+
+def _kept(modes: ModeSet, wanted: CriticalRegion) -> ModeSet:
+    wider = wanted.wider
+    held = [k for k, value in enumerate(modes.eigenvalues.tolist()) if wider.holds(value)]
+    held.sort(key=lambda k: damping_ratio(complex(modes.eigenvalues[k])))
+    return replace(
+        modes, eigenvalues=modes.eigenvalues[held], left=modes.left[held], right=modes.right[held]
+    )
+
+
+def _whole(model: LinearModel, wanted: CriticalRegion) -> FoundModes:
+    spectrum = find_spectrum(model, wanted.wider.lowest_hz, wanted.wider.highest_hz)
+    modes = _kept(
+        ModeSet.of([mode for mode in spectrum.modes if mode.is_oscillation], model.names), wanted
+    )
+    growing = spectrum.eigenvalues[grows(spectrum.eigenvalues)]
+    others = growing[(np.abs(growing) > ZERO) & ~np.isin(growing, modes.eigenvalues)]
+    fastest = complex(others[np.argmax(others.real)]) if len(others) else None
+    zeros = int((np.abs(spectrum.eigenvalues) <= ZERO).sum()) - model.clocks
+    return FoundModes(modes, True, int((1 + (others.imag > 0)).sum()), fastest, zeros)
+
+
+def _elsewhere(equations: ShiftedEquations, alone: Vector, found: ModeSet) -> int:
+    known = 2 * int((found.eigenvalues.real > GROWING).sum())
+    return max(0, count_growing(equations, alone) - known)
+
+
+def _near_zero(model: LinearModel, found: ModeSet) -> tuple[int, int]:
+    """How many eigenvalues are zero, and how many others near 0 grow too slowly to be counted; a pair counts twice."""
+    # Arnoldi's method finds one copy of a zero that many have, and the nearest six would be clocks where there are six.
+    values = np.array(
+        [value for value, _, _ in nearest_pairs(model.coupled, complex(_BESIDE_ZERO), _NEAREST)]
+    )
+    zeros = np.abs(values) <= ZERO
+    slow = values[~zeros & (values.real > UNSTABLE) & (values.real <= GROWING)]
+    known = [
+        value for value in slow if np.abs(found.eigenvalues - value).min(initial=np.inf) < ZERO
+    ]
+    # Arnoldi's method gives a real one an imaginary part of rounding, of either sign.
+    upper = [value for value in slow.tolist() if value.imag > -ZERO and value not in known]
+    return int(zeros.sum()), sum(1 + (value.imag > ZERO) for value in upper)
+
+
+def _columns(modes: ModeSet) -> RefinedModes:
+    return RefinedModes(modes.eigenvalues, modes.left.T, modes.right.T, settled=True)
+
+
+def _radians(wanted: CriticalRegion) -> tuple[float, float]:
+    return 2 * np.pi * wanted.lowest_hz, 2 * np.pi * wanted.highest_hz
+
+
+def residue(modes: ModeSet, entry: Vector, exit: Vector) -> NDArray[np.complex128]:
+    """Residue of each mode in the transfer from an entry to an exit, shape (m,) [rad/s, by the units of both].
+
+    ``entry`` and ``exit``: column of B and row of C for the whole system, shape (n,)."""
+    norms = np.einsum("ij,ij->i", modes.left.conj(), modes.right)
+    return np.asarray((modes.left.conj() @ entry) * (modes.right @ exit) / norms, dtype=complex)

@@ -1,0 +1,99 @@
+"""What is asked of a screening."""
+
+from collections.abc import Mapping
+from dataclasses import KW_ONLY, dataclass
+from functools import partial
+from typing import Any
+
+from orchestrator.cases.sharing import SharingRule
+from orchestrator.core.asked import (
+    FLAG,
+    OUTAGES,
+    FieldKind,
+    Names,
+    asked,
+    one_of,
+    percent,
+    read_percent,
+)
+from orchestrator.core.errors import InputError
+from orchestrator.studies.points.request import (
+    POINTS_FILE,
+    OverCluster,
+    of_frequencies,
+    of_scenario,
+    of_values,
+)
+from orchestrator.studies.screening.modes import MOST_DAMPING, CriticalRegion
+
+_MOST = 100 * MOST_DAMPING
+_DAMPING = FieldKind(
+    "PERCENT", partial(read_percent, most=_MOST), partial(percent, most=_MOST), unit="%", times=100
+)
+
+
+@dataclass(frozen=True)
+class ScreeningRequest(OverCluster):
+    """Critical modes of many operating points, each with its outages.
+
+    Raises
+    ------
+    InputError
+        If points, outages, scenario or values cannot be used; with file and line of what is wrong in the points.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> from pathlib import Path
+    >>> lines = "time,grid.X_L", "00:00,0.1", "01:00,0.5"
+    >>> _ = Path("day.csv").write_text(chr(10).join(lines))
+    >>> screening = gfor.load("two_area").screen("day.csv", scenario="gfor")
+    >>> screening.stable
+    True
+    >>> screening.modes()[["point", "frequency_hz", "damping_percent"]].round(2)
+       point  frequency_hz  damping_percent
+    0  00:00          0.58            10.57
+    """
+
+    points: Any = asked(
+        POINTS_FILE,
+        None,
+        "operating points: a CSV file, a row each (default: the case as it is)",
+        python="CSV file or DataFrame, a row each: a column ``time`` or ``name``, and what differs from the case; or "
+        '``{"night": {"load": 0.6}}``; the case as it is by default',
+    )
+    outages: Names | None = asked(
+        OUTAGES,
+        None,
+        "n-1, lines, units, or names such as line_1_2,sg3 or line_1_2+sg3 (repeatable)",
+    )
+    scenario: str | None = of_scenario()
+    values: Mapping[str, Any] | None = of_values()
+    _: KW_ONLY
+    sharing: str | None = asked(
+        one_of(SharingRule),
+        None,
+        "who feeds what an outage takes: droop (units by droop and rating, the default), "
+        "rating, or slack (the slack alone)",
+    )
+    frequencies: tuple[float, float] = of_frequencies(
+        "modes from the first to the second are critical [Hz], where they are damped less than ``damping``"
+    )
+    damping: float = asked(
+        _DAMPING, 0.2, "damping below which a mode is critical, at most 60 (default: 20)"
+    )
+    whole: bool = asked(
+        FLAG,
+        False,
+        "count growing modes of all frequencies at every point; takes longer",
+        python="whether growing modes of all frequencies are counted at every point, rather than at one in 24",
+    )
+
+    @property
+    def region(self) -> CriticalRegion:
+        low, high = self.frequencies
+        if not low > 0:
+            raise InputError(
+                f"frequencies {low:g}:{high:g} (--range): a screening begins above 0 Hz"
+            )
+        return CriticalRegion(low, high, self.damping)

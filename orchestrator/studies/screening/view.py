@@ -1,0 +1,496 @@
+"""A screening as Python has it, as tables, as JSON, as files and as a page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.markup import escape as escape_markup
+
+from orchestrator.cases.layers import joined_values
+from orchestrator.core.late import pd
+from orchestrator.core.safe_files import made_folder, write_text
+from orchestrator.core.truth import NoTruth
+from orchestrator.output.report.cells import CELLS, Cell, CellLine, Cells
+from orchestrator.output.report.html.charts import (
+    ChartCurve,
+    Mark,
+    complex_plane,
+    legend,
+    line_chart,
+)
+from orchestrator.output.report.html.elements import Figures, colour, document, paragraphs
+from orchestrator.output.report.notebook import page
+from orchestrator.output.report.table import Column, ColumnTable, Marked, damping
+from orchestrator.output.report.tables import eigenvalue_text, kinds_of
+from orchestrator.output.results.mode_json import eigenvalue_json
+from orchestrator.output.results.staging import new_run_id, staged
+from orchestrator.output.results.storage import save_json
+from orchestrator.studies.operating_points.item import Status
+from orchestrator.studies.screening.limits import (
+    limit_columns,
+    limits_json,
+    limits_sentence,
+    limits_table,
+)
+from orchestrator.studies.screening.study import ScreenedItem, ScreeningResult
+from orchestrator.studies.screening.summary import ModeAt, ScreenedMode, Summary, duration, least_of
+from orchestrator.studies.screening.words import (
+    OutageRow,
+    by_outage,
+    verdict_of,
+    verdict_sentence,
+    what_was_counted,
+    where,
+)
+
+ITEMS, MODES, SUMMARY, PAGE = "items.csv", "modes.csv", "screening.json", "screening.html"
+
+_SHOWN, _FEW = 4, 6
+_CURVES = 6
+_MOST_MARKS = 4000
+
+
+class Screening(NoTruth):
+    """Critical modes of operating points and outages. `Case.screen` makes it.
+
+    Attributes
+    ----------
+    result
+        All items.
+    summary
+        What they come to.
+    """
+
+    def __init__(self, result: ScreeningResult) -> None:
+        self.result = result
+        self.summary = Summary(result)
+
+    @property
+    def stable(self) -> bool | None:
+        """Return whether nothing grows anywhere; None where an item has no verdict and none grows."""
+        return self.summary.stable
+
+    @property
+    def verdict(self) -> str:
+        """The verdict in one sentence."""
+        return verdict_sentence(self.summary)
+
+    def table(self) -> pd.DataFrame:
+        """One row for each outage: its worst point, those not judged first. `items` has all points."""
+        rows = self.items().sort_values("least_damping_percent", na_position="first", kind="stable")
+        return rows.drop_duplicates("outage").set_index("outage")
+
+    def items(self) -> pd.DataFrame:
+        """One row for each operating point with each outage: status, verdict and least damping [%]."""
+        return items_table(self.summary).frame()
+
+    def modes(self) -> pd.DataFrame:
+        """One row for each mode: where it is damped least, and how much there."""
+        return modes_table(self.summary).frame()
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as ``gfor screen --json`` prints, as JSON's types."""
+        return as_json(self.summary)
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write ``items.csv``, ``modes.csv``, ``screening.json``, ``cells.json`` and the page ``screening.html``."""
+        place = made_folder(folder)
+        with staged(place, new_run_id()) as staging:
+            items_table(self.summary).save(staging / ITEMS)
+            _every_mode(self.summary).save(staging / MODES)
+            save_json(self.as_json(), staging / SUMMARY)
+            _cells(self.summary).save(staging, place)
+            write_text(staging / PAGE, _page(self.summary))
+        return [place / name for name in (ITEMS, MODES, SUMMARY, CELLS, PAGE)]
+
+    def __repr__(self) -> str:
+        head = f"Screening of {self.result.plan.case.name}: {self.verdict}"
+        return f"<{head}; all points stand in items(), the worst of each outage in table()>"
+
+    def _repr_html_(self) -> str:
+        told = (self.verdict, limits_sentence(self.summary), what_was_counted(self.summary))
+        lines = [*filter(None, told), "items() has all points"]
+        return page(f"Screening of {self.result.plan.case.name}", lines, self.modes())
+
+
+def items_table(summary: Summary) -> ColumnTable[ScreenedItem]:
+    return ColumnTable(
+        "Items",
+        (
+            Column("Point", lambda item: item.point.name, name="point"),
+            Column("Outage", lambda item: item.outage.name, name="outage"),
+            Column("", lambda item: item.point.hours, name="hours"),
+            Column("What", lambda item: str(item.record.status), name="status"),
+            Column("", lambda item: item.record.stable, name="stable"),
+            Column("", lambda item: item.record.counted, name="counted"),
+            Column(
+                "",
+                lambda item: None if (one := least_of(item)) is None else one.damping,
+                name="least_damping_percent",
+            ),
+            Column(
+                "",
+                lambda item: None if (one := least_of(item)) is None else one.frequency,
+                name="frequency_hz",
+            ),
+            Column(
+                "",
+                lambda item: "; ".join(filter(None, (item.record.text, *item.record.warnings))),
+                name="why",
+            ),
+            *limit_columns(summary),
+            Column("Why", lambda item: item.record.text),
+        ),
+        summary.result.items,
+        left=4,
+    )
+
+
+def _cells(summary: Summary) -> Cells:
+    """Outages by operating points, the worst outage first."""
+    result, plan = summary.result, summary.result.plan
+    of = {(item.outage.name, item.point.name): item for item in result.items}
+    taken = {one.name: one.elements for one in plan.outages}
+    outages = [row.name for row in by_outage(summary)]
+
+    def cell(item: ScreenedItem | None) -> Cell | None:
+        if item is None:
+            return None
+        least, record = least_of(item), item.record
+        text = "; ".join(
+            filter(None, ("" if record.status is Status.COMPUTED else record.status, record.text))
+        )
+        if least is None:
+            return Cell(
+                text or f"no mode below {100 * plan.wanted.damping:g} %", None, record.stable
+            )
+        figures = f"{least.frequency:.3f} Hz, {least.damping:.2f} %"
+        return Cell(
+            "; ".join(filter(None, (figures, text))),
+            least.damping,
+            record.stable,
+            least.value.real,
+            least.frequency,
+        )
+
+    return Cells(
+        f"Least damping of {plan.case.table.title or plan.case.name}: outages, worst first, by operating points",
+        plan.case,
+        plan.prepared.name,
+        (plan.wanted.lowest_hz, plan.wanted.highest_hz),
+        [CellLine(name, out=taken[name]) for name in outages],
+        [CellLine(one.name, one.values, out=one.out) for one in plan.points],
+        [[cell(of.get((name, point.name))) for point in plan.points] for name in outages],
+        joined_values(plan.layers),
+        plan.tasks[0].study.step_size,
+        plan.tasks[0].sharing,
+    )
+
+
+def _every_mode(summary: Summary) -> ColumnTable[tuple[ModeAt, str]]:
+    names = {(id(one.item), one.place): mode.name for mode in summary.modes for one in mode.at}
+    rows = [
+        (ModeAt(item, place), names[id(item), place])
+        for item in summary.result.items
+        for place in item.record.critical
+    ]
+    return ColumnTable(
+        "Modes",
+        (
+            Column("", lambda row: row[0].item.point.name, name="point"),
+            Column("", lambda row: row[0].item.outage.name, name="outage"),
+            Column("", lambda row: row[1], name="mode"),
+            Column("", lambda row: row[0].value.real, name="real"),
+            Column("", lambda row: row[0].value.imag, name="imag"),
+            Column("", lambda row: row[0].frequency, name="frequency_hz"),
+            Column("", lambda row: row[0].damping, name="damping_percent"),
+            Column(
+                "",
+                lambda row: " ".join(
+                    f"{name}:{share:.3f}" for name, share in row[0].participation(3)
+                ),
+                name="participation",
+            ),
+            Column(
+                "",
+                lambda row: next(
+                    (f"{n}:{max(abs(p), abs(q)):.4g}" for n, p, q in row[0].ranking(1)), ""
+                ),
+                name="converter",
+            ),
+        ),
+        rows,
+    )
+
+
+def verdict(summary: Summary) -> str:
+    told = [escape_markup(text) for text in (limits_sentence(summary), what_was_counted(summary))]
+    return "\n".join(filter(None, (verdict_of(summary).markup(), *told)))
+
+
+def overview(summary: Summary, most: int = 12) -> ColumnTable[OutageRow]:
+    """Outages and points: the least damping of each, by points where these are few, else at the worst one."""
+    plan, rows = summary.result.plan, by_outage(summary)
+    at = {(item.outage.name, item.point.name): item for item in summary.result.items}
+    title = f"Least damping [%] below {100 * plan.wanted.damping:g} %, worst outage first"
+    columns = [Column[OutageRow]("Outage", lambda row: row.name)]
+
+    def at_point(name: str) -> Column[OutageRow]:
+        return Column(name, lambda row: at.get((row.name, name)), _cell)
+
+    if 1 < len(plan.points) <= _FEW:
+        return ColumnTable(
+            title,
+            [*columns, *(at_point(point.name) for point in plan.points)],
+            rows,
+            1,
+            most,
+            ITEMS,
+        )
+    columns += [
+        Column("Worst point", lambda row: (row.worst or row.unjudged[0]).point.name),
+        Column("Mode", lambda row: row.least, _who),
+        Column("Damping [%]", lambda row: row.worst, _cell),
+        Column(
+            "Not judged", lambda row: f"{len(row.unjudged)} of {row.points}" if row.unjudged else ""
+        ),
+    ]
+    return ColumnTable(title, columns, rows, 3, most, ITEMS)
+
+
+def _who(mode: ModeAt | None) -> str:
+    if mode is None:
+        return ""
+    return f"{mode.frequency:.2f} Hz ({', '.join(name for name, _ in mode.participation(2))})"
+
+
+def _cell(item: ScreenedItem | None) -> str | Marked:
+    """The least damping at an item, or what became of it."""
+    if item is None or item.record.status is not Status.COMPUTED:
+        return "–" if item is None else str(item.record.status)
+    least = least_of(item)
+    if item.record.stable is False:
+        return Marked(f"{least.damping:.2f} UNSTABLE" if least else "UNSTABLE", "bad")
+    return "more" if least is None else damping(least.damping)
+
+
+def modes_table(
+    summary: Summary, most: int = 12, *, whole: bool = False
+) -> ColumnTable[ScreenedMode]:
+    """Each mode where it is damped least, and the converter whose damping controller moves it most there.
+
+    ``whole``: with eigenvalue and participation, for which a terminal is too narrow."""
+    more: list[Column[ScreenedMode]] = [
+        Column("λ [rad/s]", lambda mode: mode.worst.value, eigenvalue_text),
+        Column(
+            "Participation",
+            lambda mode: ", ".join(f"{name} {x:.2f}" for name, x in mode.worst.participation(4)),
+        ),
+    ]
+
+    def best(mode: ScreenedMode) -> tuple[str, float | None]:
+        return next(((n, max(abs(p), abs(q))) for n, p, q in mode.worst.ranking(1)), ("–", None))
+
+    return ColumnTable(
+        "Modes, each where it is damped least",
+        (
+            Column("Mode", lambda mode: mode.name, name="mode"),
+            Column("Point", lambda mode: mode.worst.item.point.name, name="point"),
+            Column("Outage", lambda mode: mode.worst.item.outage.name, name="outage"),
+            Column("", lambda mode: mode.worst.frequency, name="frequency_hz"),
+            Column("Damping [%]", lambda mode: mode.worst.damping, damping, "damping_percent"),
+            Column("Items", lambda mode: len(mode.at), name="items"),
+            *(more if whole else ()),
+            Column("Converter", lambda mode: best(mode)[0]),
+            Column("by gain [rad/s]", lambda mode: best(mode)[1], ".3g"),
+        ),
+        summary.modes,
+        3,
+        most,
+        MODES,
+    )
+
+
+def remarks(summary: Summary) -> list[str]:
+    texts = []
+    for status, number in summary.counts.items():
+        if status is Status.COMPUTED:
+            continue
+        named = [item for item in summary.failures() if item.record.status is status]
+        texts.append(f"{status}: {number} of {len(summary.result.items)}:")
+        texts += [f"  {where(item)}: {item.record.text}" for item in named[:_SHOWN]]
+        texts += [f"  … and {number - _SHOWN} more, in items.csv"] if number > _SHOWN else []
+    every = summary.result.items
+    kinds = kinds_of((item, item.record.warnings) for item in every)
+    texts += [
+        f"at {len(x)} of {len(every)}, first at {where(x[0])}: {text}" for text, x in kinds[:_SHOWN]
+    ]
+    if len(kinds) > _SHOWN:
+        texts.append(f"… and {len(kinds) - _SHOWN} more warnings, in items.csv")
+    return texts
+
+
+def as_json(summary: Summary) -> dict[str, Any]:
+    result = summary.result
+    return {
+        **result.plan.prepared.about,
+        "points": len(result.plan.points),
+        "outages": len(result.plan.outages) - 1,
+        "items": len(result.items),
+        "complete": result.complete,
+        "stable": summary.stable,
+        "counted_at_all_frequencies": summary.counted,
+        "slowest_growth_counted": summary.slowest,
+        "nothing_restores": [
+            _where(item) | {"zero_eigenvalues": item.record.zeros} for item in summary.free
+        ],
+        "counts": {str(status): number for status, number in summary.counts.items()},
+        "beyond_rating": summary.beyond or None,
+        "limits": limits_json(summary),
+        "unstable": [_where(item) for item in summary.unstable],
+        "failures": [
+            _where(item) | {"status": str(item.record.status), "why": item.record.text}
+            for item in summary.failures()
+        ],
+        "modes": [
+            {
+                "name": mode.name,
+                "worst": _where(mode.worst.item)
+                | eigenvalue_json(mode.worst.value, mode.worst.damping),
+                "participation": dict(mode.worst.participation()),
+                "items": len(mode.at),
+                "hours": mode.hours,
+                "converters": [
+                    {"component": name, "residue_p": abs(p), "residue_q": abs(q)}
+                    for name, p, q in mode.worst.ranking()
+                ],
+            }
+            for mode in summary.modes
+        ],
+    }
+
+
+def _where(item: ScreenedItem) -> dict[str, Any]:
+    return {"point": item.point.name, "outage": item.outage.name, "place": item.point.place}
+
+
+def _page(summary: Summary) -> str:
+    """One file that needs no other: what is worst, when, with which outage, and where a damping controller helps."""
+    plan, figures = summary.result.plan, Figures()
+    content = [("Outages", overview(summary, 20).html())] if len(plan.outages) > 1 else []
+    if (beyond := limits_table(summary, 20)) is not None:
+        content.append(("Ratings and voltage bands", beyond.html()))
+    content += [("Modes", modes_table(summary, 20, whole=True).html())]
+    content += [("Damping and how long", _durations(summary, figures))]
+    if len(plan.points) > 1:
+        content.append(("Damping over the points", _over_points(summary, figures)))
+    content.append(("All critical modes", _plane(summary, figures)))
+    content.append(("Where a damping controller helps", _ranking(summary)))
+    failed = list(summary.failures())
+    if failed:
+        shown = ColumnTable(
+            "Points and outages without modes", items_table(summary).columns, failed, 4, 20, ITEMS
+        )
+        content.append(("Not computed", shown.html()))
+    title = f"{plan.case.table.title or plan.case.name}: screening"
+    kind = f"{plan.prepared.title}, {len(plan.points)} operating points, {len(plan.outages) - 1} outages"
+    told = [verdict_sentence(summary), limits_sentence(summary), what_was_counted(summary)]
+    findings = paragraphs(summary.stable, [text for text in told if text])
+    return document(title, kind, findings, content)
+
+
+def _durations(summary: Summary, figures: Figures) -> str:
+    parts = []
+    for outages, text in ((False, "the intact network"), (True, "the worst outage of each point")):
+        if outages and len(summary.result.plan.outages) < 2:
+            continue
+        curves = []
+        for k, mode in enumerate(_longest(summary)):
+            hours, percent = duration(mode, outages=outages)
+            if len(hours):
+                steps = np.repeat(np.concatenate([[0.0], hours]), 2)[1:-1]
+                curves.append(ChartCurve(mode.name, colour(k + 1), steps, np.repeat(percent, 2)))
+        if curves:
+            key = legend((curve.label, curve.colour) for curve in curves)
+            chart = line_chart(
+                f"Damping and duration, {text}",
+                "Hours with at most this damping",
+                "Damping [%]",
+                curves,
+                260,
+            )
+            picture, _ = figures.add(
+                key + chart, f"For how long each mode is damped by at most so much, {text}."
+            )
+            parts.append(picture)
+    return "".join(parts) or "<p>No critical mode was found.</p>"
+
+
+def _longest(summary: Summary) -> list[ScreenedMode]:
+    most = max((len(mode.at) for mode in summary.modes), default=0)
+    return [mode for mode in summary.modes if len(mode.at) >= most / 4][:_CURVES]
+
+
+def _over_points(summary: Summary, figures: Figures) -> str:
+    place = {point.name: float(k) for k, point in enumerate(summary.result.plan.points)}
+    curves = []
+    for k, mode in enumerate(_longest(summary)):
+        intact = [one for one in mode.at if not one.item.outage.elements]
+        if len(intact) > 1:
+            at = np.array([place[one.item.point.name] for one in intact])
+            curves.append(
+                ChartCurve(mode.name, colour(k + 1), at, np.array([one.damping for one in intact]))
+            )
+    if not curves:
+        return "<p>No critical mode was followed over several points.</p>"
+    key = legend((curve.label, curve.colour) for curve in curves)
+    chart = line_chart(
+        "Damping over the points",
+        "Operating point, in the file's order",
+        "Damping [%]",
+        curves,
+        260,
+    )
+    return figures.add(key + chart, "Damping of the modes in the intact network.")[0]
+
+
+def _plane(summary: Summary, figures: Figures) -> str:
+    every = [(k, one) for k, mode in enumerate(summary.modes) for one in mode.at]
+    shown = every if len(every) <= _MOST_MARKS else every[:: len(every) // _MOST_MARKS + 1]
+    marks = [
+        Mark(
+            one.value.real,
+            one.frequency,
+            colour(k + 1),
+            f"{one.item.point.name}, {one.item.outage.name}\n{one.frequency:.3f} Hz, {one.damping:.2f} %",
+            "dot" if one.item.outage.elements else "cross",
+        )
+        for k, one in shown
+    ]
+    text = "Critical modes of all points and outages; crosses: the intact network, dots: outages."
+    if len(shown) < len(every):
+        text += f" {len(shown)} of {len(every)} are shown."
+    return figures.add(complex_plane("Critical modes", marks), text)[0]
+
+
+def _ranking(summary: Summary) -> str:
+    parts = [
+        "<p>Size of the residue from a converter's power reference to its own frequency: so far a damping controller "
+        "there moves the eigenvalue by unit gain [pu of its rating by pu of frequency], if its phase is right and its "
+        "gain small.</p>"
+    ]
+    columns: tuple[Column[tuple[str, complex, complex]], ...] = (
+        Column("Converter", lambda row: row[0]),
+        Column("through P [rad/s]", lambda row: abs(row[1]), ".4f"),
+        Column("through Q [rad/s]", lambda row: abs(row[2]), ".4f"),
+    )
+    for mode in summary.modes[:_CURVES]:
+        where = f"at {mode.worst.item.point.name}, {mode.worst.item.outage.name}"
+        found = mode.worst.ranking()
+        if found:
+            parts.append(ColumnTable(f"{mode.name}, {where}", columns, found).html())
+    return (
+        "".join(parts) if len(parts) > 1 else "<p>No converter of this scenario can be ranked.</p>"
+    )

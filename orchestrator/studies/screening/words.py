@@ -1,0 +1,243 @@
+"""A screening in words: its verdict, what it rests on, what it could not judge, and its outages, worst first."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestrator.core.errors import counted
+from orchestrator.linear.spectra.critical_modes import DENSE
+from orchestrator.linear.spectra.shifted_equations import GROWING
+from orchestrator.linear.spectra.stability import zeros_in_words
+from orchestrator.output.report.tables import VerdictSentence
+from orchestrator.studies.operating_points.columns import Elements
+from orchestrator.studies.operating_points.item import Status
+from orchestrator.studies.operating_points.points_file import OperatingCase
+from orchestrator.studies.screening.modes import UNSTABLE
+from orchestrator.studies.screening.record import ItemRecord
+from orchestrator.studies.screening.study import ScreenedItem, ScreeningPlan
+from orchestrator.studies.screening.summary import ModeAt, Summary, least_of
+
+
+@dataclass(frozen=True)
+class OutageRow:
+    name: str
+    # the item with the least damping, or that grows; None where none has modes
+    worst: ScreenedItem | None
+    least: ModeAt | None  # its least damped mode; None where it has none in the range
+    unjudged: tuple[ScreenedItem, ...]  # items without modes
+    points: int
+
+    @property
+    def unstable(self) -> bool:
+        return self.worst is not None and self.worst.record.stable is False
+
+
+def by_outage(summary: Summary) -> list[OutageRow]:
+    groups: dict[str, list[ScreenedItem]] = {}
+    for item in summary.result.items:
+        groups.setdefault(item.outage.name, []).append(item)
+    rows = []
+    for name, items in groups.items():
+        known = [item for item in items if item.record.status is Status.COMPUTED]
+        worst = min(
+            known,
+            key=lambda item: (
+                item.record.stable is not False,
+                one.damping if (one := least_of(item)) else np.inf,
+            ),
+            default=None,
+        )
+        least = None if worst is None else least_of(worst)
+        unjudged = tuple(item for item in items if item.record.status is not Status.COMPUTED)
+        rows.append(OutageRow(name, worst, least, unjudged, len(items)))
+    return sorted(
+        rows,
+        key=lambda row: (
+            not row.unstable,
+            not (row.unstable or row.unjudged),
+            row.least.damping if row.least else np.inf,
+        ),
+    )
+
+
+def load_of(plan: ScreeningPlan, point: OperatingCase) -> float:
+    """Active power of all loads at a point [MW]."""
+    elements = Elements.of(plan.prepared)
+    grid = plan.prepared.system.components[elements.grid]
+
+    def number(name: str) -> float:
+        return float(point.values.get(f"{elements.grid}.{name}", grid.number(name)))
+
+    return sum(
+        number(f"{x}.scale") * number(f"{x}.P") for x in elements.loads if x not in point.out
+    )
+
+
+def not_judged(summary: Summary) -> str:
+    """How many items have no modes, and what they have in common: what is out, and a high or a low load."""
+    items = list(summary.failures())
+    if not items:
+        return ""
+    which = "all" if len(items) > 1 else "it is"
+    common = [text for text in (_out(summary, items), _loading(summary, items)) if text]
+    kinds = ", ".join(
+        f"{number} {status}" for status, number in Counter(i.record.status for i in items).items()
+    )
+    return f"{len(items)} not judged ({kinds})" + (
+        f", {which} {' '.join(common)}" if common else ""
+    )
+
+
+def _out(summary: Summary, items: Sequence[ScreenedItem]) -> str:
+    elements = Elements.of(summary.result.plan.prepared)
+    names = {item.outage.name for item in items}
+    if len(names) == 1:
+        (name,) = names
+        return f"with {name} out" if items[0].outage.elements else "of the intact network"
+    for kind, known in (
+        ("unit", set(elements.units)),
+        ("line or transformer", set(elements.lines)),
+    ):
+        if all(known & set(item.outage.elements) for item in items):
+            return f"with a {kind} out"
+    return ""
+
+
+def _loading(summary: Summary, items: Sequence[ScreenedItem]) -> str:
+    plan = summary.result.plan
+    loads = {point.name: load_of(plan, point) for point in plan.points}
+    if len(loads) == 2 and len(at := {item.point.name for item in items}) == 1:
+        return f"at {at.pop()}"
+    middle, here = (
+        float(np.median(list(loads.values()))),
+        [loads[item.point.name] for item in items],
+    )
+    if min(here) > middle:
+        return f"at high load (from {min(here):.4g} MW on; half of the points have at most {middle:.4g} MW)"
+    if max(here) < middle:
+        return f"at low load (up to {max(here):.4g} MW; half of the points have at least {middle:.4g} MW)"
+    return ""
+
+
+def verdict_sentence(summary: Summary) -> str:
+    return str(verdict_of(summary))
+
+
+def verdict_of(summary: Summary) -> VerdictSentence:
+    total = len(summary.result.items)
+    if summary.unstable:
+        growing = (one.item for one in summary.least_damped() if one.item.record.stable is False)
+        worst = next(growing, summary.unstable[0])
+        lost = "".join(f"; {text}" for text in (not_judged(summary), summary.beyond) if text)
+        text = f"{counted(len(summary.unstable), 'item')} of {total}; worst: {where(worst)}{_least(worst)}{lost}"
+        return VerdictSentence(False, "UNSTABLE", text)
+    computed = summary.counts[Status.COMPUTED]
+    least = summary.least_damped()[:1]
+    tail = f"; least damped: {where(least[0].item)}{_least(least[0].item)}" if least else ""
+    if summary.free:
+        first = summary.free[0]
+        items, zeros = counted(len(summary.free), "item"), zeros_in_words(first.record.zeros)
+        tail += f"; at {items}, first at {where(first)}, {zeros}"
+    tail += f"; {summary.beyond}" if summary.beyond else ""
+    if summary.stable:
+        text = f"nothing grows at any of {total} points and outages{_but_slowly(summary)}{tail}"
+        return VerdictSentence(True, "stable", text)
+    left = summary.result.plan.number_of_items - total
+    missing = [text] if (text := not_judged(summary)) else []
+    missing += [f"{left} not computed yet"] if left else []
+    uncounted = computed - summary.counted
+    if uncounted:
+        wanted = summary.result.plan.wanted
+        missing.append(
+            f"{uncounted} were searched only from {wanted.lowest_hz:g} to {wanted.highest_hz:g} Hz above -30 % damping "
+            "(--whole counts all growth)"
+        )
+    doubtful = sum(
+        item.record.stable is None and item.record.counted for item in summary.result.items
+    )
+    missing += [f"{doubtful} stand at the edge of a limit"] if doubtful else []
+    text = (
+        f"nothing grows at {computed} of {total} points and outages, but {', '.join(missing)}{tail}"
+    )
+    return VerdictSentence(None, "not known", text)
+
+
+def what_was_counted(summary: Summary) -> str:
+    wanted, computed = summary.result.plan.wanted, summary.counts[Status.COMPUTED]
+    searched = sum(item.record.searched for item in summary.result.items)
+    others = (
+        ", the others from a neighbour with a check that no mode is missed there"
+        if searched < computed
+        else ""
+    )
+    return (
+        f"Scenario {summary.result.plan.prepared.name}: modes from {wanted.lowest_hz:g} to {wanted.highest_hz:g} Hz "
+        f"below {100 * wanted.damping:g} % damping, of the "
+        f"{_what_was_linearised(summary)}: {searched} of {computed} items were searched from scratch"
+        f"{others}. Growth at other frequencies was counted at "
+        f"{summary.counted} of {computed} items, in systems of more than {DENSE} states where it is faster than "
+        f"{GROWING:g} 1/s, or near 0."
+    )
+
+
+def _what_was_linearised(summary: Summary) -> str:
+    step = summary.result.plan.prepared.step_size
+    computed = [
+        item.record.map_steps
+        for item in summary.result.items
+        if item.record.status is Status.COMPUTED
+    ]
+    found = []
+    for steps, number in sorted(Counter(computed).items()):
+        which = "map over a communication step" if steps else "system without a communication step"
+        if steps > 1:
+            which = f"map over {steps} communication steps ({steps * step:g} s), after which sampled controllers repeat"
+        found.append(
+            which if number == len(computed) else f"{which} at {number} of {len(computed)} items"
+        )
+    return ", of the ".join(found) or "system without a communication step"
+
+
+def _but_slowly(summary: Summary) -> str:
+    """Return what growth a stable verdict does not exclude; "" where all eigenvalues are known."""
+    if not summary.slowest:
+        return ""
+    wanted = summary.result.plan.wanted
+    return (
+        f", but what grows slower than {summary.slowest:g} 1/s outside of {wanted.lowest_hz:g} to "
+        f"{wanted.highest_hz:g} Hz is seen near 0 Hz only"
+    )
+
+
+def where(item: ScreenedItem) -> str:
+    return f"{item.point.name}, {item.outage.name}"
+
+
+def _least(item: ScreenedItem) -> str:
+    outside = growth_outside(item.record)
+    if outside:
+        return f": {outside}"
+    one = least_of(item)
+    if one is None:
+        return ""
+    who = ", ".join(f"{name} {share:.2f}" for name, share in one.participation(2))
+    return f": {one.frequency:.3f} Hz, {one.damping:.2f} % ({who})"
+
+
+def growth_outside(record: ItemRecord) -> str:
+    """What grows beside the critical modes, how fast if that is known, and at which frequency; "" if nothing does."""
+    followed = np.delete(record.eigenvalues, record.critical)
+    known = followed[followed.real > UNSTABLE].tolist()
+    number = record.growing_elsewhere + 2 * len(known)
+    if not number:
+        return ""
+    text = f"{number} eigenvalue{'s grow' if number > 1 else ' grows'} outside of the range"
+    if record.fastest is not None:
+        known.append(complex(*record.fastest))
+    elif record.growing_elsewhere:
+        return f"{text}; `gfor modes` shows how fast"
+    fastest = max(known, key=lambda value: value.real)
+    at = f"at {fastest.imag / (2 * np.pi):.3g} Hz" if fastest.imag else "without an oscillation"
+    return f"{text}, {'the fastest ' if number > 2 else ''}by {fastest.real:.3g} 1/s {at}"

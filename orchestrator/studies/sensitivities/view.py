@@ -1,0 +1,173 @@
+"""Sensitivities of a mode as Python has them, as rows for files, as JSON, and as a table for a terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from orchestrator.core.late import pd
+from orchestrator.core.safe_files import made_folder
+from orchestrator.output.report.notebook import page
+from orchestrator.output.report.table import Column, ColumnTable
+from orchestrator.output.results.mode_json import eigenvalue_json
+from orchestrator.output.results.staging import new_run_id, staged
+from orchestrator.output.results.storage import save_json, save_table
+from orchestrator.studies.sensitivities.sensitivities import Sensitivity, SensitivityResult
+
+
+class Sensitivities:
+    """∂λ/∂p of one mode by the parameters of all FMUs, largest effect first.
+
+    Attributes
+    ----------
+    result
+        All that was computed.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> scenario = gfor.load("infinite_bus").scenario("dip", {"gfor.pod_p.enabled": True})
+    >>> found = scenario.sensitivities("critical", ["gfor.pod_p.K"], frequencies=(0.01, 20.0))
+    >>> found.table().index.tolist()
+    ['gfor.pod_p.K']
+    """
+
+    def __init__(self, result: SensitivityResult) -> None:
+        self.result = result
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Return what is to be borne in mind of the modes and of all rows."""
+        return (*self.result.modes.warnings, *self.result.warnings)
+
+    def table(self) -> pd.DataFrame:
+        """One row for each parameter; columns as in ``sensitivities.csv``."""
+        return sensitivity_table(self.result).frame().set_index("parameter")
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as ``gfor sensitivities --json`` prints, as JSON's types."""
+        return as_json(self.result)
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write ``sensitivities.csv`` and ``sensitivities.json``; give their paths."""
+        place = made_folder(folder, "folder")
+        with staged(place, new_run_id()) as staging:
+            save_table(rows_of(self.result), staging / "sensitivities.csv")
+            save_json(self.as_json(), staging / "sensitivities.json")
+        return [place / "sensitivities.csv", place / "sensitivities.json"]
+
+    def __repr__(self) -> str:
+        mode = self.result.mode
+        return (
+            f"<Sensitivities of {mode.frequency_hz:.3g} Hz to {len(self.result.rows)} parameters>"
+        )
+
+    def _repr_html_(self) -> str:
+        table, lines = self.table(), [f"warning: {text}" for text in self.warnings]
+        for name, text in _long_texts(table).items():
+            lines.append(f"{name}: {text}")
+        return page(repr(self).strip("<>"), lines, table.map(_short_text))
+
+
+_LONGEST = 40
+"""Characters of a text in a table that a notebook shows; a longer one makes rows of many lines, and stands above."""
+
+
+def _long_texts(table: pd.DataFrame) -> dict[str, str]:
+    """Of each parameter, its texts that are too long for a table."""
+    found = {}
+    for name, row in table.iterrows():
+        texts = [one for one in row if isinstance(one, str) and len(one) > _LONGEST]
+        if texts:
+            found[str(name)] = "; ".join(texts)
+    return found
+
+
+def _short_text(value: Any) -> Any:
+    return "see above" if isinstance(value, str) and len(value) > _LONGEST else value
+
+
+def sensitivity_table(result: SensitivityResult) -> ColumnTable[Sensitivity]:
+    mode = result.mode
+    name = result.modes.name_of(mode) or "critical"
+    kind = (
+        "the operating point held"
+        if result.held
+        else "total: the operating point moves with the parameter"
+    )
+    title = f"{result.modes.prepared.title}, {name}, {mode.frequency_hz:.4f} Hz, {mode.damping_percent:.2f} %; {kind}"
+    return ColumnTable(
+        title,
+        (
+            Column("Parameter", lambda row: row.parameter.name, name="parameter"),
+            Column(
+                "Value",
+                lambda row: row.parameter,
+                lambda p: f"{p.value:.5g} {p.unit}".removesuffix(" 1"),
+            ),
+            Column("", lambda row: row.parameter.value, name="value"),
+            Column("", lambda row: row.parameter.unit, name="unit"),
+            Column(
+                "", lambda row: "tunable" if row.parameter.tunable else "fixed", name="variability"
+            ),
+            Column(
+                "Hz per unit", lambda row: row.frequency_per_unit, _text, "frequency_hz_per_unit"
+            ),
+            Column(
+                "Points per unit",
+                lambda row: row.damping_per_unit,
+                _text,
+                "damping_points_per_unit",
+            ),
+            Column(
+                "Hz per %", lambda row: row.frequency_per_percent, _text, "frequency_hz_per_percent"
+            ),
+            Column(
+                "Points per %",
+                lambda row: row.damping_per_percent,
+                _text,
+                "damping_points_per_percent",
+            ),
+            Column("", lambda row: _part(row.derivative, "real"), name="real_per_unit"),
+            Column("", lambda row: _part(row.derivative, "imag"), name="imag_per_unit"),
+            Column("", lambda row: _part(row.continuous, "real"), name="continuous_real_per_unit"),
+            Column("", lambda row: _part(row.continuous, "imag"), name="continuous_imag_per_unit"),
+            Column("Point", lambda row: row.operating_point, name="operating_point"),
+            Column("", lambda row: "; ".join(row.doubts), name="doubts"),
+            Column("", lambda row: row.reason, name="reason"),
+            Column("Doubt", lambda row: row.reason or "; ".join(row.doubts), text=True),
+        ),
+        result.rows,
+    )
+
+
+def rows_of(result: SensitivityResult) -> list[dict[str, Any]]:
+    return sensitivity_table(result).records()
+
+
+def _part(value: complex | None, part: str) -> float | None:
+    return None if value is None else float(getattr(value, part))
+
+
+def as_json(result: SensitivityResult) -> dict[str, Any]:
+    modes, mode = result.modes, result.mode
+    return {
+        **modes.prepared.about,
+        "stable": modes.stability.stable,
+        "stability": modes.stability.as_json(),
+        "mode": {
+            **eigenvalue_json(mode.eigenvalue, mode.damping_percent),
+            "name": modes.name_of(mode),
+        },
+        "derivative": "partial" if result.held else "total",
+        "warnings": [*modes.warnings, *result.warnings],
+        "sensitivities": rows_of(result),
+    }
+
+
+def _text(figure: float | None) -> str:
+    return "–" if figure is None else "0" if figure == 0 else f"{figure:+.3g}"
+
+
+def left_out(result: SensitivityResult) -> list[Sensitivity]:
+    return [row for row in result.rows if row.derivative is None]

@@ -1,0 +1,1 @@
+"""Modes in recorded signals, and recordings side by side."""

@@ -1,0 +1,231 @@
+"""Recorded runs side by side: how far two differ in a signal, and the modes that each rings with."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from orchestrator.cases.names import close_names
+from orchestrator.core.errors import AnalysisError, InputError, few
+from orchestrator.core.safe_files import PARTIAL
+from orchestrator.linear.signals.identification import (
+    TOLERANCE,
+    IdentifiedMode,
+    identify_modes,
+    sampling,
+)
+from orchestrator.linear.signals.mode_doubts import (
+    COARSER,
+    SHORTER,
+    WindowPart,
+    part_of,
+    with_doubts,
+    worth_showing,
+)
+from orchestrator.output.results.comtrade.reading import is_comtrade, read_comtrade
+from orchestrator.output.results.csv_recording import SUFFIXES, read_table
+from orchestrator.output.results.manifest import MANIFEST, ResultsWarning, checked
+from orchestrator.output.results.recorded import open_recording, open_whole
+from orchestrator.output.results.recording import FOLDER, TRAJECTORY, parts_of
+from orchestrator.output.results.signals import signal
+from orchestrator.output.results.staging import unfinished
+from orchestrator.studies.signals.measured import common_times, is_measured, measured_modes
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_SHOWN = 40  # largest number of signals that an error names; the others are counted
+_WEAKEST = 1e-3
+
+
+@dataclass(frozen=True)
+class Comparison:
+    expression: str
+    unit: str
+    # largest deviation of each run from its own start [unit of the signal]
+    deviations: tuple[float, float]
+    # largest, rms: difference between the runs at the times of the run with the longer interval [unit of the signal];
+    # see `common_times`
+    largest: float
+    rms: float
+    at: float  # time of the largest difference [s]
+    # strongest oscillation in each run from ``start`` on; None where none is found
+    modes: tuple[IdentifiedMode | None, IdentifiedMode | None]
+
+
+def open_trajectory(path: Path) -> xr.Dataset:
+    """A recorded run: ``trajectory.nc``, or the scenario's folder that holds it; also one that is not finished.
+
+    A path to ``.cfg``, ``.dat`` or ``.cff`` is a measured recording in COMTRADE; CSV and Excel are read as well."""
+    if is_comtrade(path):
+        return read_comtrade(path)
+    if path.suffix.lower() in SUFFIXES and path.is_file():
+        return read_table(path)
+    if parts_of(path / FOLDER):
+        dataset = open_recording(path / FOLDER)
+        if not dataset.sizes["time"]:
+            raise InputError(f"{path}: nothing was recorded yet")
+        reached = float(dataset["time"][-1])
+        text = f"{path}: this recording is not finished; it reaches t = {reached:.6g} s"
+        warnings.warn(text, ResultsWarning, stacklevel=2)
+        return dataset
+    file = path / TRAJECTORY if path.is_dir() else path
+    if not file.is_file():
+        raise InputError(f"{path}: there is no trajectory.nc; {_hint(path)}")
+    if path.is_dir() or (path.parent / MANIFEST).is_file():
+        checked(file.parent, [file.name])
+    try:
+        dataset = open_whole(file)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"{file}: it cannot be read as NetCDF, or is damaged; give the folder of a scenario's results, its "
+            "trajectory.nc, a measured recording in COMTRADE (.cfg, .cff), in CSV (.csv) or Excel (.xlsx)"
+        ) from error
+    if not dataset.sizes.get("time"):
+        raise InputError(f"{file}: nothing was recorded in it; run the scenario again")
+    return dataset
+
+
+def _hint(path: Path) -> str:
+    inside = sorted(p.parent.name for p in path.glob("*/trajectory.nc")) if path.is_dir() else []
+    if inside:
+        return f"choose a scenario in it: {', '.join(inside)}"
+    begun = [
+        folder.name
+        for folder in unfinished(path.parent)
+        if folder.name.startswith(f"{path.name}{PARTIAL}")
+    ]
+    if begun:
+        return f"its run did not end, or still goes on; what it recorded is in {', '.join(begun)} beside it"
+    return "`gfor run` writes one a scenario"
+
+
+def require_numbers(curve: xr.DataArray, expression: str, label: str) -> None:
+    bad = np.flatnonzero(~np.isfinite(curve.values))
+    if len(bad):
+        times = curve["time"].values
+        raise InputError(
+            f"{label}: {expression} is no finite number ({curve.values[bad[0]]}) at t = {times[bad[0]]:.6g} s, and at "
+            f"{len(bad)} of {len(times)} times in all; take another signal, or a part of the run without them"
+        )
+
+
+def recorded(dataset: xr.Dataset, expression: str, label: str) -> xr.DataArray:
+    if not isinstance(expression, str):
+        raise InputError(
+            f"signal = {expression!r}; give one signal, 'a.b' or the difference 'a.b - c.d' of two"
+        )
+    found = signal(dataset, expression)
+    if found is None:
+        known = list(map(str, dataset.data_vars))
+        hint = close_names(expression, known)
+        raise InputError(
+            f"{label}: signal {expression!r} was not recorded; there are: {few(known, _SHOWN)}; "
+            f"{hint + ' ' if hint else ''}a signal is 'a.b', or the difference 'a.b - c.d' of two"
+        )
+    return found
+
+
+def strongest_modes(
+    curve: xr.DataArray, start: float, stop: float | None = None
+) -> list[IdentifiedMode]:
+    """Return what a signal rings with between two times [s], strongest first; see `identify_modes`.
+
+    What has less than a thousandth of the strongest's amplitude is left out, whatever the trend that an oscillation is
+    on. Each mode has its doubts."""
+    window = curve.sel(time=slice(start, stop))
+    found = _modes_of(window)
+    begin, end = float(window["time"][0]), float(window["time"][-1])
+    try:
+        others = _modes_of(window.sel(time=slice(begin + SHORTER * (end - begin), None)), COARSER)
+    except AnalysisError:
+        others = None
+    middle = (begin + end) / 2
+    halves = [_part(window.sel(time=side)) for side in (slice(None, middle), slice(middle, None))]
+    whole = part_of(window["time"].values, window.values, found)
+    kept = worth_showing(found, end - begin, _WEAKEST)
+    return with_doubts(kept, end - begin, others, halves, whole.noise_like)
+
+
+def _part(window: xr.DataArray) -> WindowPart:
+    try:
+        modes = _modes_of(window)
+    except AnalysisError:
+        modes = []
+    return part_of(window["time"].values, window.values, modes)
+
+
+def _modes_of(window: xr.DataArray, coarser: float = 1.0) -> list[IdentifiedMode]:
+    """Modes of a part of a signal; ``coarser`` is a factor of what is taken for noise."""
+    if is_measured(window):
+        return measured_modes(window, coarser)
+    # Oscillations are small beside the value that they are around, and would count as noise beside it.
+    deviation = window.values - float(window.mean())
+    return identify_modes(window["time"].values, deviation, tolerance=coarser * TOLERANCE)
+
+
+def compare(
+    a: xr.Dataset, b: xr.Dataset, expression: str, start: float, labels: tuple[str, str]
+) -> Comparison:
+    """Compare one signal of two runs; oscillations are looked for from ``start`` [s] on."""
+    first, second = (
+        recorded(run, expression, label) for run, label in zip((a, b), labels, strict=True)
+    )
+    for curve, label in zip((first, second), labels, strict=True):
+        require_numbers(curve, expression, label)
+    common = common_times(first["time"].values, second["time"].values, labels)
+    y_1, y_2 = (common.values(run, curve.values) for run, curve in enumerate((first, second)))
+    for label, values in zip(labels, (y_1, y_2), strict=True):
+        if not np.isfinite(values).all():
+            raise InputError(
+                f"{label}: {expression!r} has samples that are missing, the first at t = "
+                f"{common.times[int((~np.isfinite(values)).argmax())]:g} s; compare a part without them"
+            )
+    difference = y_2 - y_1
+    worst = int(np.argmax(np.abs(difference)))
+    return Comparison(
+        expression,
+        str(
+            first.attrs.get("units")
+            or a[expression.partition(" - ")[0].strip()].attrs.get("units", "")
+        ),
+        (float(np.abs(y_1 - y_1[0]).max()), float(np.abs(y_2 - y_2[0]).max())),
+        float(abs(difference[worst])),
+        float(np.sqrt(np.mean(difference**2))),
+        float(common.times[worst]),
+        (_strongest(first, start), _strongest(second, start)),
+    )
+
+
+def most_different(
+    a: xr.Dataset,
+    b: xr.Dataset,
+    count: int = 10,
+    labels: tuple[str, str] = ("the first run", "the second run"),
+) -> list[str]:
+    """Signals that both runs have, those first whose difference is largest beside their own deviation."""
+    times = common_times(a["time"].values, b["time"].values, labels)
+
+    def share(name: str) -> float:
+        one, other = (times.values(number, run[name].values) for number, run in enumerate((a, b)))
+        deviation = max(np.abs(one - one[0]).max(), np.abs(other - other[0]).max(), 1e-12)
+        found = float(np.abs(one - other).max() / deviation)
+        return found if np.isfinite(found) else -1.0  # what is no number cannot be compared
+
+    common = [str(name) for name in a.data_vars if name in b.data_vars]
+    return sorted(common, key=share, reverse=True)[:count]
+
+
+def _strongest(curve: xr.DataArray, start: float) -> IdentifiedMode | None:
+    """Above a quarter of the sampling frequency there is perhaps no oscillation of the system."""
+    times = curve["time"].values
+    highest = 0.25 / sampling(times).interval if len(times) > 1 else 0.0
+    try:
+        found = [m for m in strongest_modes(curve, start) if 0.05 < m.frequency_hz <= highest]
+    except AnalysisError:
+        return None
+    return found[0] if found else None

@@ -1,0 +1,176 @@
+"""Measured recordings, made ready for the identification of modes, and the times at which two can be compared."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from orchestrator.core.arrays import Numbers
+from orchestrator.core.errors import AnalysisError
+from orchestrator.linear.signals.identification import (
+    IdentifiedMode,
+    averaging,
+    identify_modes,
+    sampling,
+)
+from orchestrator.output.results.comtrade.reading import LINE_FREQUENCY
+
+if TYPE_CHECKING:
+    import xarray as xr
+from dataclasses import dataclass
+
+from orchestrator.core.arrays import Vector
+from orchestrator.core.errors import InputError
+
+# times that differ by less than this part of the shorter interval are one time, rounded in two ways
+_NOISE = 1e-6
+
+
+@dataclass(frozen=True)
+class CommonTimes:
+    """Times of the run with the longer interval, within the time that both runs have."""
+
+    times: Numbers  # shape (n,) [s]
+    remark: str  # sentence on runs with different intervals; empty where both have the same times
+    _rows: tuple[Vector | None, Vector | None]
+    _recorded: tuple[Numbers, Numbers]
+
+    def values(self, run: int, signal: Numbers) -> Numbers:
+        rows = self._rows[run]
+        found = (
+            signal[rows] if rows is not None else np.interp(self.times, self._recorded[run], signal)
+        )
+        return np.asarray(found, dtype=float)
+
+
+def common_times(a: Numbers, b: Numbers, labels: tuple[str, str]) -> CommonTimes:
+    """Times at which two runs are compared: those of the run with the longer interval.
+
+    The other run's values are those that it recorded at these times. Where it lacks one of these times, its values are
+    interpolated: between two times of the shorter interval, and never between two of the longer one."""
+    both = (np.asarray(a, dtype=float), np.asarray(b, dtype=float))
+    noise = _NOISE * min(map(_interval, both))
+    begin, end = max(t[0] for t in both) - noise, min(t[-1] for t in both) + noise
+    inside = [np.flatnonzero((t >= begin) & (t <= end)) for t in both]
+    coarse = 0 if len(inside[0]) <= len(inside[1]) else 1
+    fine = 1 - coarse
+    times = both[coarse][inside[coarse]]
+    if len(times) < 2:
+        raise InputError(
+            f"{labels[0]} and {labels[1]} have no time in common; nothing can be compared"
+        )
+    at = np.searchsorted(both[fine], times - noise)
+    met = bool(np.all(np.abs(both[fine][np.minimum(at, len(both[fine]) - 1)] - times) <= noise))
+    rows: list[Vector | None] = [inside[coarse], at if met else None]
+    order = (rows[0], rows[1]) if coarse == 0 else (rows[1], rows[0])
+    same = met and len(inside[0]) == len(inside[1])
+    remark = "" if same else _remark(both, coarse, len(times), labels, met=met)
+    return CommonTimes(times, remark, order, both)
+
+
+def _remark(
+    both: tuple[Numbers, Numbers], coarse: int, count: int, labels: tuple[str, str], *, met: bool
+) -> str:
+    intervals = [f"{_interval(times):.6g} s" for times in both]
+    head = f"{labels[0]} is recorded every {intervals[0]}, {labels[1]} every {intervals[1]}"
+    if met:
+        return f"{head}: they are compared at the {count} times that both have."
+    return (
+        f"{head}, and they do not have all times in common: they are compared at the {count} times of "
+        f"{labels[coarse]}, between the records of {labels[1 - coarse]} where it has none. A fast motion "
+        "differs a little by that alone."
+    )
+
+
+_UNEVEN = 0.01  # part of the interval by which samples may be off
+# part of a signal's power near the line's frequency from which it is a value of the grid's wave
+_WAVEFORM = 0.5
+
+_NEAR = 0.15
+# singular values below this part of the largest are noise: the resolution of 16 bits
+_LEAST_NOISE = 1e-5
+
+
+def is_measured(curve: xr.DataArray) -> bool:
+    return LINE_FREQUENCY in curve.coords
+
+
+def measured_modes(window: xr.DataArray, coarser: float = 1.0) -> list[IdentifiedMode]:
+    times, values = window["time"].values, np.asarray(window.values, dtype=float)
+    _check(times, values, float(window.coords[LINE_FREQUENCY]))
+    deviation = values - float(values.mean())
+    thin = sampling(times).thin
+    seen = np.convolve(deviation, averaging(deviation, thin), mode="valid")[::thin]
+    return identify_modes(times, deviation, tolerance=coarser * _noise(seen))
+
+
+def _noise(values: Numbers) -> float:
+    """Singular values of the signal's Hankel matrix that are noise, as a part of the largest: those below 2.2 times the
+    median, for a matrix with half as many columns as rows.
+
+    Gavish and Donoho, "The optimal hard threshold for singular values is 4/sqrt(3)", IEEE Trans. Information Theory
+    60(8), 2014, equation 5."""
+    if len(values) < 6:
+        return _LEAST_NOISE
+    hankel = np.lib.stride_tricks.sliding_window_view(values, len(values) // 3 + 1)
+    singular = np.linalg.svd(hankel, compute_uv=False)
+    beta = hankel.shape[1] / hankel.shape[0]
+    factor = 0.56 * beta**3 - 0.95 * beta**2 + 1.82 * beta + 1.43
+    return max(_LEAST_NOISE, float(factor * np.median(singular) / (singular[0] or 1.0)))
+
+
+def _interval(times: Numbers) -> float:
+    return float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+
+
+def _check(times: Numbers, values: Numbers, line_frequency: float) -> None:
+    if len(times) < 2:
+        raise AnalysisError(
+            "no mode can be identified in a signal of fewer than 2 samples; give an earlier start"
+        )
+    if (missing := ~np.isfinite(values)).any():
+        begin, end = _longest(~missing)
+        stretch = f"from {times[begin]:.6g} to {times[end]:.6g} s"
+        remedy = f"the longest stretch without a gap is {stretch}; choose it by the "
+        raise AnalysisError(
+            f"{int(missing.sum())} of {len(values)} samples are missing, the first at t = "
+            f"{times[int(missing.argmax())]:.6g} s; {remedy}start and the stop"
+        )
+    steps = np.diff(times)
+    off = np.abs(steps - steps[0]) > _UNEVEN * steps[0]
+    if off.any():
+        at = times[int(off.argmax())]
+        raise AnalysisError(
+            f"the sampling rate changes at t = {at:.6g} s, and modes need one rate; choose a start and a stop on one "
+            "side of it"
+        )
+    share = _share_near(times, values, line_frequency)
+    if share > _WAVEFORM:
+        raise AnalysisError(
+            f"{100 * share:.0f} % of the signal's power lies near the line's frequency of {line_frequency:g} Hz: it is "
+            "an instantaneous voltage or current, whose electromechanical modes cannot be read; use a channel of its "
+            "RMS value, frequency, angle or power"
+        )
+
+
+def _share_near(times: Numbers, values: Numbers, frequency: float) -> float:
+    """Part of the power within 15 % of a frequency."""
+    interval = _interval(times)
+    deviation = (values - values.mean()) * np.hanning(len(values))
+    power = np.abs(np.fft.rfft(deviation)) ** 2
+    if not frequency or not power.sum() or frequency > 0.5 / interval:
+        return 0.0
+    at = np.fft.rfftfreq(len(values), interval)
+    near = np.abs(at - frequency) < _NEAR * frequency
+    return float(power[near].sum() / power.sum())
+
+
+def _longest(good: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> tuple[int, int]:
+    """First and last index of the longest run of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
+    if not len(edges):
+        return 0, 0
+    begins, ends = edges[::2], edges[1::2] - 1
+    k = int((ends - begins).argmax())
+    return int(begins[k]), int(ends[k])

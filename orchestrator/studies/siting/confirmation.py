@@ -1,0 +1,263 @@
+"""The best places confirmed: a device is put there as an FMU, and the coupled system's mode is compared."""
+
+import cmath
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.core.errors import AnalysisError, CosimError
+from orchestrator.linear.models.component_linearization import ComponentLinearization
+from orchestrator.linear.models.linear_model import LinearModel
+from orchestrator.linear.models.linearization import Blocks
+from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.linear.spectra.continuation import Eigenpair, pairs_near
+from orchestrator.linear.spectra.modes import Mode, damping_percent, damping_ratio, find_modes
+from orchestrator.studies.modes.modes import modes_from, running
+from orchestrator.studies.pod_design.closed_loop import Placed, PodLoop, PodSetting
+from orchestrator.studies.pod_design.guard import extremes
+from orchestrator.studies.pod_design.lead_lag import LARGEST_TURN, NO_COMPENSATION, lead_lag_turning
+from orchestrator.studies.siting.placing import STAGES, name_at, response_of
+from orchestrator.studies.siting.residues import SeenMode
+from orchestrator.systems.coupling.master import Master
+
+# A coupled shift that is farther than this part from the predicted one confirms nothing
+AGREES = 0.05
+_SMALL = 2e-3  # part of |λ| by which the trial gain moves the mode
+
+_TURNS, _PARTS = (-30.0, 0.0, 30.0), (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
+"""Settings that are tried: turns beside the residue's angle [°], as the POD sees the frequency that it changes itself;
+and parts of the largest gain."""
+
+_EQUAL = 2e-4  # damping ratios in the same part of this size are equally good
+_GIVEN_UP = 1e-3
+"""Least damping ratio that is given up for more damping of the followed mode: a mode that moves by no more is one that
+the controller does not move."""
+
+# least similarity with which a mode of the system with the device is taken for the one without it
+_SAME = 0.5
+_ONE = 1e-6  # two eigenvalues that differ by less than this part are one, computed in two ways
+
+
+@dataclass(frozen=True)
+class SearchEnd:
+    """Why a search among gains chose none that is larger.
+
+    ``bound``: the largest gain [pu] that was allowed.
+    ``next_gain``, ``next_least``: the next larger gain that was tried, and its least damping ratio; None for the
+    damping if something grows. Both are None if the largest gain was chosen."""
+
+    bound: float
+    next_gain: float | None = None
+    next_least: float | None = None
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """What the coupled FMUs say of one bus: Δλ [rad/s] by a small gain of the tuned POD, or by a device without one, as
+    predicted and as coupled; λ with the device, its POD off; the POD's setting and λ with it; the least damped mode
+    then [rad/s], which may be another one.
+    """
+
+    bus: str
+    predicted: complex = 0j
+    coupled: complex = 0j
+    with_device: complex = 0j
+    setting: PodSetting | None = None
+    tuned: complex | None = None
+    least: complex | None = None
+    stable: bool | None = None
+    failure: str = ""
+    search: SearchEnd | None = None  # for the gain of the POD
+
+    @property
+    def error(self) -> float:
+        return abs(self.predicted - self.coupled) / max(abs(self.coupled), 1e-12)
+
+    @property
+    def agrees(self) -> bool:
+        return not self.failure and self.error <= AGREES
+
+    @property
+    def damping_alone(self) -> float:
+        """Of the mode with the device, without its POD [%]."""
+        return damping_percent(self.with_device)
+
+    @property
+    def reached(self) -> complex:
+        """The mode with the device [rad/s], tuned where it has a POD."""
+        return self.tuned if self.tuned is not None else self.with_device
+
+    @property
+    def damping(self) -> float:
+        """Of the mode with the device, tuned where it has a POD [%]."""
+        return damping_percent(self.reached)
+
+    @property
+    def least_damping(self) -> float | None:
+        """Of the least damped mode then [%]; None if nothing was computed."""
+        return None if self.least is None else damping_percent(self.least)
+
+    @property
+    def other(self) -> complex | None:
+        """The least damped mode then [rad/s], if it is another one than that which was followed."""
+        if self.least is None or abs(self.least - self.reached) <= _ONE * abs(self.least):
+            return None
+        return self.least
+
+
+def confirmed(
+    prepared: PreparedScenario,
+    bus: str,
+    seen: SeenMode,
+    frequency_range: tuple[float, float],
+    controller: str | None,
+    gain: float,
+) -> Confirmation:
+    """Compare a mode's predicted shift with that of the coupled FMUs.
+
+    ``prepared``: With the device at the bus.
+    ``controller``: ``pod_p`` or ``pod_q``, of at most a gain [pu of the rating]; None for a device as it is."""
+    try:
+        with running(prepared) as master:
+            if controller is None:
+                return _as_it_is(prepared, master, bus, seen, frequency_range)
+            find_operating_point(master)
+            return _with_pod(master, bus, seen, frequency_range, controller, gain)
+    except CosimError as error:
+        return Confirmation(bus, failure=str(error))
+
+
+def _as_it_is(
+    prepared: PreparedScenario,
+    master: Master,
+    bus: str,
+    seen: SeenMode,
+    frequency_range: tuple[float, float],
+) -> Confirmation:
+    blocks = Blocks(master, derivatives=True)
+    found = modes_from(prepared, master, find_operating_point(master), blocks, frequency_range)
+    pair, eigenvalue = same_mode(seen.mode, found.model), seen.mode.eigenvalue
+    predicted = _predicted(master, blocks.components[name_at(bus)], bus, seen) - eigenvalue
+    coupled, least = pair.eigenvalue - eigenvalue, _least(found.modes, pair.eigenvalue)
+    return Confirmation(
+        bus, predicted, coupled, pair.eigenvalue, least=least, stable=found.stability.stable
+    )
+
+
+def _with_pod(
+    master: Master,
+    bus: str,
+    seen: SeenMode,
+    frequency_range: tuple[float, float],
+    controller: str,
+    gain: float,
+) -> Confirmation:
+    name, eigenvalue = name_at(bus), seen.mode.eigenvalue
+    loop = PodLoop(master, [name], controller)
+    rest = _predicted(master, loop.block(name), bus, seen)
+    off = PodSetting(0.0, NO_COMPENSATION)
+
+    def shift(setting: PodSetting) -> complex:
+        loop.model(setting)
+        return _predicted(master, loop.block(name), bus, seen) - rest
+
+    start = Placed(off, same_mode(seen.mode, loop.model(off)))
+    by_gain = shift(PodSetting(1.0, NO_COMPENSATION))
+    if not by_gain:
+        raise AnalysisError("a POD there does not move the mode at all")
+    tuned, search = _tuned(loop, start, by_gain, eigenvalue, gain)
+    small = _SMALL * abs(eigenvalue / (by_gain * tuned.filters.response(eigenvalue)))
+    trial = replace(tuned, gain=min(tuned.gain, small))
+    predicted = shift(trial)
+    coupled = loop.place(start, trial.gain, trial.filters).eigenvalue - start.eigenvalue
+    reached = loop.place(start, tuned.gain, tuned.filters)
+    modes = find_modes(loop.model(tuned), *frequency_range)
+    least = _least(modes, reached.eigenvalue)
+    stable = loop.examine(tuned).stability.stable
+    return Confirmation(
+        bus,
+        predicted,
+        coupled,
+        start.eigenvalue,
+        tuned,
+        reached.eigenvalue,
+        least,
+        stable,
+        search=search,
+    )
+
+
+def _predicted(master: Master, model: ComponentLinearization, bus: str, seen: SeenMode) -> complex:
+    """λ with a component, whose answer is that at λ itself."""
+    return seen.mode.eigenvalue + seen.settled(bus, lambda at: response_of(master, model, at))
+
+
+def _tuned(
+    loop: PodLoop, start: Placed, by_gain: complex, eigenvalue: complex, most: float
+) -> tuple[PodSetting, SearchEnd]:
+    """The setting with the best least damping: around the angle that the residue asks for, with gains up to the most.
+
+    Of those that come within a tenth of a point of it, as where another mode that the POD hardly moves is the least
+    damped, that which damps the followed mode best; of several with the same damping that with the smallest gain."""
+    angle = math.degrees(cmath.phase(-1 / by_gain))
+    settings = [
+        PodSetting(part * most, lead_lag_turning(angle + turn, eigenvalue.imag, STAGES))
+        for part in _PARTS
+        for turn in _TURNS
+        if abs(angle + turn) < LARGEST_TURN * STAGES
+    ]
+    worth = {}
+    for setting in settings:
+        weakest, growing = extremes(loop.model(setting))
+        worth[setting] = -1.0 if growing is not None else damping_ratio(weakest)
+    top = max(worth.values())
+    equal = [one for one in settings if worth[one] > max(top - _GIVEN_UP, -1.0)] or settings
+    of_followed = {one: _of_followed(loop, start, one) for one in equal}
+    best = min(equal, key=lambda one: (-round(of_followed[one] / _EQUAL), one.gain))
+    return best, _search_end(best, settings, worth, most)
+
+
+def _of_followed(loop: PodLoop, start: Placed, setting: PodSetting) -> float:
+    """Damping ratio of the followed mode with a setting; −1 if it cannot be followed there."""
+    try:
+        return damping_ratio(loop.place(start, setting.gain, setting.filters).eigenvalue)
+    except AnalysisError:
+        return -1.0
+
+
+def _search_end(
+    best: PodSetting, settings: Sequence[PodSetting], worth: Mapping[PodSetting, float], most: float
+) -> SearchEnd:
+    larger = [one for one in settings if one.gain > best.gain and one.filters == best.filters]
+    if not larger:
+        return SearchEnd(most)
+    following = min(larger, key=lambda one: one.gain)
+    least = worth[following]
+    return SearchEnd(most, following.gain, None if least <= -1 else least)
+
+
+def same_mode(mode: Mode, model: LinearModel) -> Eigenpair:
+    """The mode in a model with further states: the most similar one among those near."""
+    common = {name: k for k, name in enumerate(model.names) if name in mode.shape}
+    left, right = (
+        np.array([vector[name] for name in common]) for vector in (mode.left, mode.shape)
+    )
+    own, places = Eigenpair(mode.eigenvalue, left, right), list(common.values())
+    pairs = pairs_near(model, mode.eigenvalue)
+    alike = {k: own.similarity(pair.within(places)) for k, pair in enumerate(pairs)}
+    best = max(alike, key=lambda k: alike[k])
+    if alike[best] < _SAME:
+        raise AnalysisError(
+            f"with the device no mode is like that of {mode.frequency_hz:.3f} Hz any more (at most {alike[best]:.2f} "
+            "of 1): it changes too much; take a smaller --rating"
+        )
+    return pairs[best]
+
+
+def _least(modes: Sequence[Mode], followed: complex) -> complex:
+    """The least damped oscillation of the range [rad/s]; the mode that is followed counts also beside the range."""
+    found = [mode.eigenvalue for mode in modes if mode.is_oscillation]
+    return min([*found, followed], key=damping_ratio)

@@ -1,0 +1,129 @@
+"""Modes as the buses see them: how a current at each bus drives a mode, and how the mode shows in the voltage there."""
+
+import cmath
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fmus.grid.names import injection_names
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.core.arrays import Matrix, Vector
+from orchestrator.core.errors import InputError
+from orchestrator.linear.models.linear_model import LinearModel
+from orchestrator.linear.models.linearization import Blocks
+from orchestrator.linear.models.state_space import StateSpace, state_space
+from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.linear.spectra.modes import Mode
+from orchestrator.studies.modes.modes import ModesResult, modes_from, running
+
+_ROUNDS = 12  # in which a shift settles
+
+
+@dataclass(frozen=True)
+class SeenMode:
+    """A mode, and by bus: what a current into it does to the eigenvalue [rad/s per pu], the voltage in the mode's shape
+    [pu], both by real and imaginary part, and how a current there moves the voltage through all other modes [pu]."""
+
+    label: str
+    mode: Mode
+    drive: Mapping[str, Vector]
+    shown: Mapping[str, Vector]
+    impedance: Mapping[str, Vector]
+
+    def shift(self, bus: str, response: Vector) -> complex:
+        """Δλ [rad/s] by a device whose current [pu, 100 MVA] answers the bus voltage [pu] so at the mode, as long as it
+        moves the mode little; what it does to its own bus is taken in."""
+        at_mode = np.linalg.solve(np.eye(2) - response @ self.impedance[bus], response)
+        return complex(self.drive[bus] @ at_mode @ self.shown[bus])
+
+    def settled(self, bus: str, response: Callable[[complex], Vector]) -> complex:
+        """The same of a device that moves the mode farther: it answers at the mode where that is then. Of one that
+        moves it by more than the mode's own size, the shift by its answer at the mode as it was."""
+        start = eigenvalue = self.mode.eigenvalue
+        first = self.shift(bus, response(start))
+        for _ in range(_ROUNDS):
+            eigenvalue = start + self.shift(bus, response(eigenvalue))
+            if not abs(eigenvalue - start) < abs(start):
+                return first
+        return eigenvalue - start
+
+
+@dataclass(frozen=True)
+class Situation:
+    """The network as it is, or after an outage: its poorly damped modes, least damped first."""
+
+    name: str
+    found: ModesResult
+    modes: tuple[SeenMode, ...]
+    voltages: Mapping[str, complex]
+
+
+def situation_of(
+    prepared: PreparedScenario, name: str, frequency_range: tuple[float, float], below: float
+) -> Situation:
+    """The modes with less damping than ``below`` [%], or the least damped one, of a case with `injections`."""
+    network, table = prepared.network, prepared.case.table.power_flow
+    if network is None or table is None or prepared.schedule.is_second_order:
+        raise InputError(
+            f"{prepared.case.path}: a place is looked for among the buses of a grid component, with the schedule "
+            "gauss-seidel or jacobi; give the case a [power_flow] table whose grid is a model with a network"
+        )
+    outputs = [f"{table.grid}.{bus}.v_{part}" for bus in network.buses for part in ("re", "im")]
+    inputs = [f"{table.grid}.{part}" for bus in network.buses for part in injection_names(bus)]
+    with running(prepared) as master:
+        point = find_operating_point(master)
+        blocks = Blocks(master, inputs=inputs, outputs=outputs, derivatives=True)
+        found = modes_from(prepared, master, point, blocks, frequency_range)
+        space = state_space(blocks, master.schedule)
+        early = _early(blocks, found.model)
+        values = master.components[table.grid].get([name.partition(".")[2] for name in outputs])
+    parts = list(values.values())
+    oscillating = [mode for mode in found.modes if mode.is_oscillation]
+    poor = [mode for mode in oscillating if mode.damping_percent < below] or oscillating[:1]
+    labels = [found.name_of(mode) or f"{mode.frequency_hz:.3f} Hz" for mode in poor]
+    labels = [
+        text if text not in labels[:k] else f"{text} ({k + 1})" for k, text in enumerate(labels)
+    ]
+    seen = [
+        _seen(label, mode, space, early, network.buses)
+        for label, mode in zip(labels, poor, strict=True)
+    ]
+    voltages = {bus: complex(*parts[2 * k : 2 * k + 2]) for k, bus in enumerate(network.buses)}
+    return Situation(name, found, tuple(seen), voltages)
+
+
+def _early(blocks: Blocks, model: LinearModel) -> Matrix:
+    """The part of B with which an input acts on what the grid gives directly, at a step's beginning."""
+    m, outputs, inputs = model.G.shape[1], len(blocks.output_names), len(blocks.inputs)
+    direct = np.zeros((m, inputs))
+    direct[:outputs] = model.K[:outputs][:, m - inputs :].toarray()
+    return np.asarray(model.G @ model.settle(direct))
+
+
+def _seen(
+    label: str, mode: Mode, space: StateSpace, early: Matrix, buses: Sequence[str]
+) -> SeenMode:
+    """The residues of one mode between the current and the voltage of each bus, and what is left without it.
+
+    A device's current at a step's beginning is that of the step before, which an input's is not."""
+    assert space.step_size is not None
+    z, n = cmath.exp(mode.eigenvalue * space.step_size), len(space.A)
+    left, right = (
+        np.array([vector[name] for name in space.states]) for vector in (mode.left, mode.shape)
+    )
+    B = space.B - (1 - 1 / z) * early
+    drive, shown = left.conj() @ B / (z * space.step_size), space.C @ right
+    bordered = np.block(
+        [[z * np.eye(n) - space.A, right[:, None]], [left.conj()[None], np.zeros((1, 1))]]
+    )
+    others = np.linalg.solve(bordered, np.vstack([B, np.zeros((1, B.shape[1]))]))[:n]
+    at = {bus: slice(2 * k, 2 * k + 2) for k, bus in enumerate(buses)}
+    back = {bus: space.C[i] @ others[:, i] + space.D[i, i] / z for bus, i in at.items()}
+    return SeenMode(
+        label,
+        mode,
+        {b: drive[i] for b, i in at.items()},
+        {b: shown[i] for b, i in at.items()},
+        back,
+    )

@@ -1,0 +1,362 @@
+"""Where a device helps: its effect at every bus, intact and after outages, and the best places confirmed."""
+
+import cmath
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, replace
+from pathlib import Path
+from typing import Any, cast
+
+from orchestrator.cases.case import Case
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.schema import ComponentTable
+from orchestrator.core.asked import (
+    DAMPING,
+    FILE,
+    NAMES,
+    OUTAGES,
+    POSITIVE,
+    RANKED,
+    FieldKind,
+    Names,
+    asked,
+    text_or_none,
+)
+from orchestrator.core.asked import positive as above_zero
+from orchestrator.core.errors import CosimError, InputError
+from orchestrator.linear.models.linearization import Blocks
+from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.linear.spectra.modes import damping_percent
+from orchestrator.studies.modes.modes import running
+from orchestrator.studies.operating_points.item import Item
+from orchestrator.studies.operating_points.outages import INTACT, read_outages
+from orchestrator.studies.operating_points.preparation import ItemPreparation, failure
+from orchestrator.studies.points.request import OfCase, of_frequencies, of_scenario, of_values
+from orchestrator.studies.siting import placing
+from orchestrator.studies.siting.candidates import candidates, question_about, unit_terminals
+from orchestrator.studies.siting.confirmation import Confirmation, confirmed
+from orchestrator.studies.siting.residues import SeenMode, Situation, situation_of
+
+PODS = {"pod_p": placing.ACTIVE, "pod_q": placing.REACTIVE}
+DROOP = "droop"
+_RATING = FieldKind(
+    "MVA", POSITIVE.read, lambda given, name: None if given is None else above_zero(given, name)
+)
+_DEVICE = FieldKind("DEVICE", str, lambda given, argument: str(text_or_none(str(given), argument)))
+# A bus that moves a mode by less than this part of what the best bus does hardly reaches it
+HARDLY = 0.02
+
+
+@dataclass(frozen=True)
+class SiteRequest(OfCase):
+    """Where to put a converter: how far support at each bus moves each poorly damped mode.
+
+    Residues of the whole linear model between the frequency of a bus and P or Q injected there; the operating
+    point stays. The best buses are confirmed: a converter at rest is put there as an FMU, its POD is tuned, and
+    the coupled system's mode is compared.
+
+    Raises
+    ------
+    InputError
+        If the case has no network, no oscillation is in the range, or the device cannot be used.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> places = gfor.load("two_area_rms").site("pod_p", scenario="gfor", confirm=1)
+    >>> places.ranking, places.agrees
+    (('bus_2', 'bus_3'), True)
+    """
+
+    device: str | Path = asked(
+        _DEVICE, "pod_p", "pod_p (default), pod_q, droop, or a vendor's .fmu"
+    )
+    scenario: str | None = of_scenario()
+    values: Mapping[str, Any] | None = of_values()
+    _: KW_ONLY
+    binding: str | Path | None = asked(FILE, None, "binding of the vendor's FMU")
+    below: float = asked(
+        DAMPING,
+        0.1,
+        "damping of poorly damped modes (default: 10)",
+        python="damping [%] of the modes that are looked at; the least damped one where none is damped so little",
+    )
+    frequencies: tuple[float, float] = of_frequencies()
+    outages: Names | None = asked(
+        OUTAGES, None, "rank for these as well: n-1, lines, units, or names (repeatable)"
+    )
+    buses: Sequence[str] = asked(
+        NAMES,
+        (),
+        "only these may be the place, such as 9, bus_9 or 'bus_1*' (default: all but units' terminals)",
+    )
+    confirm: int = asked(
+        RANKED,
+        3,
+        "confirm the best N by coupled FMUs (default: 3)",
+        python="how many of the best buses are confirmed by coupled FMUs",
+    )
+    rating: float | None = asked(
+        _RATING,
+        None,
+        "of the converter that confirms (default: 100), or of the vendor's FMU (default: its own)",
+    )
+    gain: float = asked(
+        POSITIVE, 200.0, "largest of its POD [pu of its rating] (default: 200)", "K"
+    )
+
+    @property
+    def name(self) -> str:
+        return str(self.device)
+
+    @property
+    def binding_file(self) -> Path | None:
+        return None if self.binding is None else Path(self.binding)
+
+    @property
+    def controller(self) -> str | None:
+        """The POD that is tuned; None for a device that is as it is."""
+        return self.name if self.device in PODS else None
+
+    @property
+    def is_foreign(self) -> bool:
+        return self.device not in (*PODS, DROOP)
+
+
+@dataclass(frozen=True)
+class SupportShift:
+    """Δλ [rad/s] by a device, or by 1 MW/Hz or 1 Mvar/Hz without a phase shift; the change of the damping ratio
+    [points], with the phase that a tuned POD gives or by the device as it is; and its part of the best bus's."""
+
+    change: complex
+    damping: float
+    part: float
+
+    @property
+    def hardly(self) -> bool:
+        return self.part < HARDLY
+
+
+DEVICE = "device"
+ByMode = Mapping[str, Mapping[str, SupportShift]]
+Shift = Callable[[Situation, str, SeenMode], complex]
+
+
+@dataclass(frozen=True)
+class SiteResult:
+    """Shifts of `DEVICE`, of 1 MW/Hz (`ACTIVE`) and of 1 Mvar/Hz (`REACTIVE`), by name of the situation, label of the
+    mode, and bus; the buses that may be the place, best first; and the outages without modes, with the reason."""
+
+    case: Case
+    request: SiteRequest
+    situations: tuple[Situation, ...]
+    shifts: Mapping[str, Mapping[str, ByMode]]
+    ranking: tuple[str, ...]
+    not_judged: Mapping[str, str]
+    confirmations: tuple[Confirmation, ...] = ()
+    terminals: tuple[str, ...] = ()  # buses of units that were left out, as nobody asked for them
+
+    @property
+    def intact(self) -> Situation:
+        return self.situations[0]
+
+    @property
+    def prepared(self) -> PreparedScenario:
+        """The scenario without the device, with what is to be asked about the device beside its own questions."""
+        prepared = self.intact.found.prepared
+        question = question_about(self.request.rating, prepared)
+        asked = prepared.questions if question is None else (question, *prepared.questions)
+        return replace(prepared, questions=asked)
+
+    @property
+    def by_coupled(self) -> bool:
+        """Whether the places that are confirmed come first, by the damping that coupled FMUs give: without outages,
+        for which nothing is confirmed, and of at least two places."""
+        return (
+            len(self.situations) == 1 and len([x for x in self.confirmations if not x.failure]) > 1
+        )
+
+    @property
+    def worst_first(self) -> list[Situation]:
+        """The situations by the damping of their least damped mode."""
+        return sorted(self.situations, key=lambda one: one.modes[0].mode.damping_ratio)
+
+    def least(self, bus: str) -> tuple[float, str]:
+        """What the device does there for the least damped mode where it does least [points], and in which situation."""
+        return min(
+            (self.shifts[DEVICE][s.name][s.modes[0].label][bus].damping, s.name)
+            for s in self.situations
+        )
+
+    @property
+    def agrees(self) -> bool:
+        return all(one.agrees for one in self.confirmations)
+
+    @property
+    def breaking(self) -> list[Confirmation]:
+        """The places at which the device makes a stable system unstable."""
+        stable = self.intact.found.stability.stable is True
+        return [one for one in self.confirmations if stable and one.stable is False]
+
+
+def find_sites(
+    case: Case, request: SiteRequest, report: Callable[[int, int], None] = lambda a, b: None
+) -> SiteResult:
+    """Linearise the case with and without outages, shift its modes by a device at every bus, and confirm the best."""
+    if request.is_foreign and not request.name.lower().endswith(".fmu"):
+        raise InputError(
+            f"--device {request.device}: give pod_p, pod_q, droop or the path of an .fmu"
+        )
+    scenario = request.scenario or next(iter(case.scenarios))
+    open_case = replace(case, injections=True)
+    preparation = ItemPreparation(open_case, scenario, request.layers, request.step_size)
+    buses = candidates(request.buses, preparation.base)
+    outages = read_outages(cast("str | None", request.outages), preparation.elements)
+    total = len(outages) + request.confirm
+    situations, not_judged = [], dict[str, str]()
+    for k, outage in enumerate(outages):
+        item = Item(0, k, {}, outage.elements, outage.elements)
+        try:
+            found = preparation.prepared(item).scenario if outage.elements else preparation.base
+            one = situation_of(found, outage.name, request.frequencies, 100 * request.below)
+        except CosimError as error:
+            if not outage.elements:
+                raise
+            not_judged[outage.name] = f"{failure(error, item)[0]}: {error}"
+            continue
+        if one.modes:
+            situations.append(one)
+        elif outage.elements:
+            not_judged[outage.name] = "no oscillation in the range"
+        report(k + 1, total)
+    if not situations or situations[0].name != INTACT:
+        low, high = request.frequencies
+        raise InputError(
+            f"scenario {scenario!r} has no oscillation from {low:g} to {high:g} Hz; give another --range"
+        )
+    result = _shifted(case, request, situations, not_judged, scenario)
+    result = replace(
+        result,
+        ranking=tuple(bus for bus in result.ranking if bus in buses),
+        terminals=() if request.buses else tuple(unit_terminals(preparation.base)),
+    )
+    if not result.ranking:
+        raise InputError(
+            f"--buses: {', '.join(request.buses)}: an outage cuts them off; give others"
+        )
+    return _with_confirmations(result, scenario, lambda done: report(len(outages) + done, total))
+
+
+def _shifted(
+    case: Case,
+    request: SiteRequest,
+    situations: list[Situation],
+    not_judged: dict[str, str],
+    scenario: str,
+) -> SiteResult:
+    shifts = {
+        kind: _all_shifts(situations, _ideal(kind), tuned=True)
+        for kind in (placing.ACTIVE, placing.REACTIVE)
+    }
+    if request.is_foreign:
+        shifts[DEVICE] = _of_foreign(case, request, situations, shifts[placing.ACTIVE], scenario)
+    elif request.device == DROOP:
+        shifts[DEVICE] = _all_shifts(situations, _ideal(placing.ACTIVE), tuned=False)
+    else:
+        shifts[DEVICE] = shifts[PODS[request.name]]
+    found = SiteResult(case, request, tuple(situations), shifts, (), not_judged)
+    buses = [bus for bus in situations[0].voltages if all(bus in s.voltages for s in situations)]
+    return replace(found, ranking=tuple(sorted(buses, key=lambda bus: -found.least(bus)[0])))
+
+
+def _ideal(kind: str) -> Shift:
+    return lambda at, bus, seen: seen.shift(
+        bus, placing.ideal_support(kind, at.voltages[bus], seen.mode.eigenvalue)
+    )
+
+
+def _all_shifts(situations: Sequence[Situation], shift: Shift, *, tuned: bool) -> dict[str, ByMode]:
+    found: dict[str, ByMode] = {}
+    for at in situations:
+        by_mode = dict[str, Mapping[str, SupportShift]]()
+        for seen in at.modes:
+            changes = {bus: shift(at, bus, seen) for bus in at.voltages}
+            most = max(map(abs, changes.values())) or 1.0
+            eigenvalue, before = seen.mode.eigenvalue, seen.mode.damping_percent
+            by_mode[seen.label] = {
+                bus: SupportShift(
+                    c,
+                    damping_percent(eigenvalue + (-abs(c) if tuned else c)) - before,
+                    abs(c) / most,
+                )
+                for bus, c in changes.items()
+            }
+        found[at.name] = by_mode
+    return found
+
+
+def _of_foreign(
+    case: Case,
+    request: SiteRequest,
+    situations: Sequence[Situation],
+    active: Mapping[str, ByMode],
+    scenario: str,
+) -> dict[str, ByMode]:
+    """A foreign device, linearised once at the bus that active power reaches best, and turned to the others."""
+    intact = situations[0]
+    there = active[intact.name][intact.modes[0].label]
+    bus = max(there, key=lambda name: abs(there[name].change))
+    device = placing.foreign(Path(request.device), request.binding_file, request.rating)
+    prepared = _prepared(placing.placed(case, device, [bus]), request, scenario)
+    with running(prepared) as master:
+        find_operating_point(master)
+        model = Blocks(master).components[placing.name_at(bus)]
+
+        def shift(at: Situation, other: str, seen: SeenMode) -> complex:
+            ahead = cmath.phase(at.voltages[other] / intact.voltages[bus])
+            return seen.settled(
+                other,
+                lambda there: placing.turned(placing.response_of(master, model, there), ahead),
+            )
+
+        return _all_shifts(situations, shift, tuned=False)
+
+
+def _prepared(case: Case, request: SiteRequest, scenario: str) -> PreparedScenario:
+    (prepared,) = case.prepare(
+        [scenario], request.overrides, request.step_size, None, request.files
+    )
+    return prepared
+
+
+def _with_confirmations(
+    result: SiteResult, scenario: str, report: Callable[[int], None]
+) -> SiteResult:
+    request, seen = result.request, result.intact.modes[0]
+    device: ComponentTable = (
+        placing.foreign(Path(request.device), request.binding_file, request.rating)
+        if request.is_foreign
+        else placing.converter(
+            result.prepared, request.rating or placing.OURS_MVA, request.controller
+        )
+    )
+    found = []
+    for k, bus in enumerate(result.ranking[: request.confirm]):
+        prepared = _prepared(placing.placed(result.case, device, [bus]), request, scenario)
+        found.append(
+            confirmed(prepared, bus, seen, request.frequencies, request.controller, request.gain)
+        )
+        report(k + 1)
+    result = replace(result, confirmations=tuple(found))
+    return _by_coupled(result) if result.by_coupled else result
+
+
+def _by_coupled(result: SiteResult) -> SiteResult:
+    """The confirmed places first, by the damping with the device there as it is shown; behind them those that break
+    the system, and those without a figure."""
+    ordered = sorted(
+        result.confirmations,
+        key=lambda one: (bool(one.failure), one in result.breaking, -round(one.damping, 2)),
+    )
+    first = [one.bus for one in ordered]
+    rest = [bus for bus in result.ranking if bus not in first]
+    return replace(result, confirmations=tuple(ordered), ranking=(*first, *rest))

@@ -1,0 +1,458 @@
+"""What a study of places found: in Python, in words, as JSON, as rows, and as a page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from orchestrator.core.errors import few
+from orchestrator.core.late import pd
+from orchestrator.core.safe_files import made_folder, write_text
+from orchestrator.linear.spectra.modes import damping_percent
+from orchestrator.output.report.html.elements import Figures, damping, document, table
+from orchestrator.output.report.html.network_map import network_map
+from orchestrator.output.report.notebook import page
+from orchestrator.output.report.tables import make_table, share_text
+from orchestrator.output.results.lock import held
+from orchestrator.output.results.mode_json import eigenvalue_json
+from orchestrator.output.results.staging import new_run_id, staged
+from orchestrator.output.results.storage import save_json, save_table
+from orchestrator.studies.points.code import code_hash
+from orchestrator.studies.siting.confirmation import Confirmation
+from orchestrator.studies.siting.placing import ACTIVE, OURS_MVA, REACTIVE
+from orchestrator.studies.siting.residues import SeenMode
+from orchestrator.studies.siting.study import DEVICE, DROOP, SiteResult, SupportShift
+
+TITLES = {"pod_p": "POD-P", "pod_q": "POD-Q", DROOP: "a droop"}
+# damping [points] by 1 MW/Hz below which no bus reaches a mode: 1000 give a hundredth of a point
+_NONE = 1e-5
+
+_SHOWN, _NAMED = 12, 4
+
+
+class Siting:
+    """How far a device at each bus moves the poorly damped modes, best bus first.
+
+    Attributes
+    ----------
+    result
+        All that was computed.
+    """
+
+    def __init__(self, result: SiteResult) -> None:
+        self.result = result
+
+    @property
+    def ranking(self) -> tuple[str, ...]:
+        """All buses, best first."""
+        return self.result.ranking
+
+    @property
+    def answer(self) -> str:
+        """The best places in one sentence."""
+        return answer(self.result)
+
+    @property
+    def remarks(self) -> list[str]:
+        """Return what coupled FMUs say of the best places, which modes these do not reach, and what was not judged."""
+        return [*sureness(self.result), *remarks(self.result)]
+
+    @property
+    def agrees(self) -> bool:
+        """Return whether the coupled FMUs confirm every place that was tried."""
+        return self.result.agrees
+
+    def table(self) -> pd.DataFrame:
+        """One row for each bus and mode; columns as in ``buses.csv``."""
+        return pd.DataFrame(rows(self.result))
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as ``gfor site --json`` prints, as JSON's types."""
+        return as_json(self.result)
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write ``site.json``, ``buses.csv`` and the page ``site.html``, which has a map, into a folder."""
+        place = made_folder(folder, "folder")
+        with held(place), staged(place, new_run_id()) as staging:
+            save_json(self.as_json(), staging / "site.json")
+            save_table(rows(self.result), staging / "buses.csv")
+            write_text(staging / "site.html", _page(self.result))
+        return [place / name for name in ("site.json", "buses.csv", "site.html")]
+
+    def __repr__(self) -> str:
+        return f"<Siting in {self.result.case.name}: {self.answer}>"
+
+    def _repr_html_(self) -> str:
+        return page(
+            f"Siting in {self.result.case.name}", [self.answer, *self.remarks], self.table()
+        )
+
+
+def unit(result: SiteResult, times: str = "1") -> str:
+    """Of all shifts of the device, ``times`` as much."""
+    if result.request.is_foreign:
+        return "points of damping by the device as it is"
+    quantity = "Mvar/Hz" if result.request.device == "pod_q" else "MW/Hz"
+    phase = "" if result.request.device == DROOP else " with its phase tuned"
+    return f"points of damping by {times} {quantity}{phase}"
+
+
+def shown(result: SiteResult, damping: float) -> str:
+    """A shift for people, in the unit ``unit(result, "100")``."""
+    return f"{damping * (1 if result.request.is_foreign else 100):+.3g}"
+
+
+def device_title(result: SiteResult) -> str:
+    return TITLES.get(result.request.name, Path(result.request.device).name)
+
+
+def answer(result: SiteResult) -> str:
+    best = result.ranking[:3]
+    most, at = result.least(best[0])
+    mode = next(one for one in result.situations if one.name == at).modes[0]
+    after = f" after the outage {at}" if at != result.intact.name else ""
+    if max(result.least(bus)[0] for bus in result.ranking) < (
+        0 if result.request.is_foreign else _NONE
+    ):
+        return f"no bus is a place for {device_title(result)}: it does not help the mode {_called(mode)}{after}"
+    among = " of those asked for" if result.request.buses else ""
+    if result.by_coupled:
+        return _best_confirmed(result, among)
+    others = ", ".join(f"{bus} {100 * result.least(bus)[0] / most:.0f} %" for bus in best[1:])
+    return (
+        f"{best[0]} is the best place for {device_title(result)}{among}: {shown(result, most)} "
+        f"{unit(result, '100')}, for the least damped mode{after} ({_called(mode)})"
+        + (f"; of that {others}" if others else "")
+    )
+
+
+def _best_confirmed(result: SiteResult, among: str) -> str:
+    """The best of the places that coupled FMUs confirm, by the damping of the least damped mode there."""
+    first, *others = [one for one in result.confirmations if not one.failure]
+    mode = _called(result.intact.modes[0])
+    pod = "" if result.request.controller is None else " and its POD"
+    then = ", ".join(f"{one.bus} {one.damping:.2f} %" for one in others)
+    by_support = sorted(result.ranking, key=lambda bus: -result.least(bus)[0])
+    small = ", ".join(f"{bus} {shown(result, result.least(bus)[0])}" for bus in by_support[:3])
+    order = f"the order of the {len(result.confirmations)} places that coupled FMUs computed"
+    reached = f"{first.damping:.2f} % for the least damped mode ({mode}) with {_rated(result)}{pod}"
+    return (
+        f"{first.bus} is the best place for {device_title(result)}{among}: {reached}{_lowered(result, first)}; then "
+        f"{then}: {order}. By {unit(result, '100')} it is {small}"
+    )
+
+
+def _lowered(result: SiteResult, first: Confirmation) -> str:
+    """Return what the best place costs: another mode, less damped than the least was before."""
+    before = result.intact.modes[0].mode.damping_percent
+    if first.other is None or damping_percent(first.other) >= before:
+        return ""
+    return f", but {_least_then(first, before)}"
+
+
+def _called(seen: SeenMode) -> str:
+    hertz = f"{seen.mode.frequency_hz:.3f} Hz"
+    return f"{seen.label if hertz in seen.label else f'{seen.label}, {hertz}'}, {seen.mode.damping_percent:.2f} %"
+
+
+def sureness(result: SiteResult) -> list[str]:
+    before = result.intact.modes[0].mode.damping_percent
+    bad = [
+        f"{at.name} ({_called(at.modes[0])})"
+        for at in result.worst_first
+        if at.found.stability.stable is False
+    ]
+    said = [f"UNSTABLE without the device: {few(bad, _NAMED)}"] if bad else []
+    found = [_confirmed(result, one, before) for one in result.confirmations]
+    return [*said, *(found or ["not confirmed by coupled FMUs"])]
+
+
+def _confirmed(result: SiteResult, one: Confirmation, before: float) -> str:
+    if one.failure:
+        return f"{one.bus}: NOT CONFIRMED: {one.failure}"
+    word = "confirmed" if one.agrees else "NOT CONFIRMED"
+    steps = f"{before:.2f} % → {one.damping_alone:.2f} % with {_rated(result)}"
+    if one.setting is not None:
+        steps += f" → {one.damping:.2f} % with its POD (K {one.setting.gain:g}{_search_end(one)})"
+    if one in result.breaking:
+        word += ", but UNSTABLE with it (`gfor modes` of a case with it tells the cause, often the step)"
+    return (
+        f"{one.bus}: {word} by coupled FMUs: {steps}; {_least_then(one, before)}; predicted and "
+        f"coupled shift differ by {100 * one.error:.2g} %"
+    )
+
+
+def _search_end(one: Confirmation) -> str:
+    """Tell whether the search for the gain ended at its bound, or where more gain brings nothing."""
+    if one.search is None:
+        return ""
+    if one.search.next_gain is None:
+        return ", the largest that --gain allows"
+    least = one.search.next_least
+    if least is None:
+        return f"; with {one.search.next_gain:g} something grows"
+    return f"; with {one.search.next_gain:g} the least damped mode has {100 * least:.2f} %"
+
+
+def _least_then(one: Confirmation, before: float) -> str:
+    """The least damped mode with the device: whether it is another one, and has less than the least before."""
+    if one.other is None:
+        return "it is the least damped then as well"
+    percent = damping_percent(one.other)
+    worse = f", LESS than the least before, {before:.2f} %" if percent < before else ""
+    return f"least damped then is another mode: {one.other.imag / math.tau:.3f} Hz, {percent:.2f} %{worse}"
+
+
+def _rated(result: SiteResult) -> str:
+    given = result.request.rating or (None if result.request.is_foreign else OURS_MVA)
+    return f"the device of {'its own rating' if given is None else f'{given:g} MVA'}"
+
+
+def remarks(result: SiteResult) -> list[str]:
+    """Modes that the best bus, or no bus, reaches; what was not judged."""
+    said, best = [], result.ranking[0]
+    for seen in result.intact.modes:
+        shifts = result.shifts[DEVICE][result.intact.name][seen.label]
+        top = max(shifts, key=lambda bus: abs(shifts[bus].change))
+        reach = max(
+            abs(s.damping) for s in result.shifts[ACTIVE][result.intact.name][seen.label].values()
+        )
+        if reach < _NONE:
+            said.append(
+                f"{_called(seen)}: no bus reaches this mode; it cannot be damped from the network"
+            )
+        elif shifts[best].hardly:
+            said.append(
+                f"{_called(seen)}: not controllable at {best} ({100 * shifts[best].part:.1g} % of {top})"
+            )
+    hidden = result.intact.found.hidden
+    for value in hidden.electromechanical if hidden else ():
+        said.append(
+            f"not judged: {value.imag / math.tau:.3f} Hz, {damping_percent(value):.2f} %, outside of --range"
+        )
+    said += [f"not judged: outage {name}: {why}" for name, why in result.not_judged.items()]
+    if result.terminals:
+        there = few(result.terminals, _NAMED)
+        said.append(f"left out: the terminals of units, {there}; --buses 'bus_*' takes all buses")
+    return said
+
+
+def as_json(result: SiteResult) -> dict[str, Any]:
+    here, stable = result.intact.name, [at.found.stability.stable for at in result.situations]
+    return {
+        **result.prepared.about,
+        "device": result.request.device,
+        "units": {
+            "damping_points": unit(result),
+            "real, imag": "eigenvalue's shift [rad/s] by 1 MW/Hz or 1 Mvar/Hz in phase with the bus's frequency, P "
+            "withdrawn and Q injected while it is high; or by the device",
+            "p, q": "the same for active and for reactive power; 1 pu of gain on 100 MVA is 100 MW by the rated Hz",
+        },
+        "answer": answer(result),
+        "sure": sureness(result),
+        "remarks": remarks(result),
+        "agrees": result.agrees,
+        "ranked_by": "damping with the device, by coupled FMUs"
+        if result.by_coupled
+        else unit(result),
+        "terminals_left_out": list(result.terminals),
+        "stable": False if False in stable else None if None in stable else True,
+        "warnings": list(result.intact.found.warnings),
+        "code": code_hash(),
+        "modes": _modes(result.intact.modes),
+        "buses": [
+            {
+                "bus": bus,
+                "rank": k + 1,
+                "shift": {m: _shift(by[bus]) for m, by in result.shifts[DEVICE][here].items()},
+                "p": {m: _shift(by[bus]) for m, by in result.shifts[ACTIVE][here].items()},
+                "q": {m: _shift(by[bus]) for m, by in result.shifts[REACTIVE][here].items()},
+                "least": dict(zip(("damping_points", "situation"), result.least(bus), strict=True)),
+            }
+            for k, bus in enumerate(result.ranking)
+        ],
+        "outages": [
+            {
+                "outage": at.name,
+                "modes": _modes(at.modes),
+                "best": _best(result, at.name, at.modes[0].label),
+            }
+            for at in result.worst_first
+            if at.name != here
+        ],
+        "not_judged": dict(result.not_judged),
+        "confirmed": [_confirmation(one) for one in result.confirmations],
+    }
+
+
+def _modes(modes: tuple[SeenMode, ...]) -> list[dict[str, Any]]:
+    return [
+        {
+            "mode": seen.label,
+            **eigenvalue_json(seen.mode.eigenvalue, seen.mode.damping_percent),
+            "components": dict(list(seen.mode.by_component.items())[:3]),
+        }
+        for seen in modes
+    ]
+
+
+def _shift(shift: SupportShift) -> dict[str, Any]:
+    return {
+        "damping_points": shift.damping,
+        "real": shift.change.real,
+        "imag": shift.change.imag,
+        "part_of_best": shift.part,
+        "controllable": not shift.hardly,
+    }
+
+
+def _best(result: SiteResult, situation: str, mode: str) -> dict[str, float]:
+    shifts = result.shifts[DEVICE][situation][mode]
+    return {
+        bus: shifts[bus].damping
+        for bus in sorted(result.ranking, key=lambda bus: -shifts[bus].damping)[:3]
+    }
+
+
+def _confirmation(one: Confirmation) -> dict[str, Any]:
+    if one.failure:
+        return {"bus": one.bus, "agrees": False, "failure": one.failure}
+    pod = (
+        {}
+        if one.setting is None
+        else {
+            "K": one.setting.gain,
+            "search_ended_at_bound": one.search is not None and one.search.next_gain is None,
+            "T_S1": one.setting.filters.T_S1,
+            "T_S2": one.setting.filters.T_S2,
+            "N_S": one.setting.filters.N_S,
+        }
+    )
+    device = eigenvalue_json(one.with_device, damping_percent(one.with_device))
+    return {
+        "bus": one.bus,
+        "agrees": one.agrees,
+        "error_percent": 100 * one.error,
+        "predicted": {"real": one.predicted.real, "imag": one.predicted.imag},
+        "coupled": {"real": one.coupled.real, "imag": one.coupled.imag},
+        "with_device": device,
+        "damping_percent_of_device_alone": one.damping_alone,
+        "damping_percent": one.damping,
+        "least_damping_percent": one.least_damping,
+        "least_damped": None
+        if one.least is None
+        else eigenvalue_json(one.least, damping_percent(one.least)),
+        "least_damped_is_another_mode": one.other is not None,
+        "stable": one.stable,
+        "pod": pod,
+    }
+
+
+def rows(result: SiteResult) -> list[dict[str, Any]]:
+    """One row for each bus and mode, best bus first."""
+    content = as_json(result)
+    return [
+        {"bus": bus["bus"], "rank": bus["rank"], "mode": mode, **shift}
+        for bus in content["buses"]
+        for mode, shift in bus["shift"].items()
+    ]
+
+
+def ranking_table(result: SiteResult) -> Table:
+    modes = [f"{seen.label}, {seen.mode.damping_percent:.2f} %" for seen in result.intact.modes]
+    rows = [
+        [bus, *_cells(result, bus), *_confirmed_cells(result, bus)]
+        for bus in result.ranking[:_SHOWN]
+    ]
+    columns = ("Bus", *modes, *_confirmed_headings(result))
+    return make_table(f"{unit(result, '100')}; best first", *columns, rows=rows)
+
+
+def _confirmed_headings(result: SiteResult) -> list[str]:
+    """Of the damping by coupled FMUs; none where nothing is confirmed."""
+    if not result.confirmations:
+        return []
+    label = result.intact.modes[0].label
+    pod = [] if result.request.controller is None else ["with its POD [%]"]
+    return [f"{label} with the device alone [%]", *pod, "least damped then [%]", "at [Hz]"]
+
+
+def _confirmed_cells(result: SiteResult, bus: str) -> list[str]:
+    headings = _confirmed_headings(result)
+    one = next((x for x in result.confirmations if x.bus == bus and not x.failure), None)
+    if one is None:
+        return ["–" for _ in headings]
+    pod = [] if result.request.controller is None else [f"{one.damping:.2f}"]
+    least = "–" if one.least_damping is None else f"{one.least_damping:.2f}"
+    hertz = "–" if one.least is None else f"{one.least.imag / math.tau:.3f}"
+    return [f"{one.damping_alone:.2f}", *pod, least, hertz]
+
+
+def _cells(result: SiteResult, bus: str) -> list[str]:
+    shifts = (
+        result.shifts[DEVICE][result.intact.name][seen.label][bus] for seen in result.intact.modes
+    )
+    return ["hardly" if one.hardly else shown(result, one.damping) for one in shifts]
+
+
+def _page(result: SiteResult) -> str:
+    figures, title = (
+        Figures(),
+        f"{result.case.table.title or result.case.name}: where to put {device_title(result)}",
+    )
+    shade = "good" if result.agrees and result.confirmations else "soft"
+    lines = "".join(f"<li>{escape(text)}</li>" for text in (*sureness(result), *remarks(result)))
+    findings = f'<div class="findings"><p class="{shade}">{escape(answer(result))}</p><ul>{lines}</ul></div>'
+    content = [("Map", "".join(_map(result, seen, figures) for seen in result.intact.modes[:3]))]
+    modes = [f"{seen.label}, {seen.mode.damping_percent:.2f} %" for seen in result.intact.modes]
+    cells = [
+        [escape(bus), *_cells(result, bus), *_confirmed_cells(result, bus)]
+        for bus in result.ranking
+    ]
+    headings = ["Bus", *modes, *_confirmed_headings(result)]
+    content.append(("All buses", table(unit(result, "100"), headings, cells)))
+    outages = [at for at in result.worst_first if at.name != result.intact.name]
+    if outages:
+        best = []
+        for at in outages:
+            mode = at.modes[0]
+            there = ", ".join(
+                f"{bus} {shown(result, x)}" for bus, x in _best(result, at.name, mode.label).items()
+            )
+            best.append(
+                [
+                    escape(at.name),
+                    escape(mode.label),
+                    damping(mode.mode.damping_percent),
+                    escape(there),
+                ]
+            )
+        content.append(
+            (
+                "After outages",
+                table("Worst first", ["Outage", "Mode", "Damping [%]", "Best"], best, left=2),
+            )
+        )
+    return document(title, f"{result.prepared.title}; code {code_hash()[:12]}", findings, content)
+
+
+def _map(result: SiteResult, seen: SeenMode, figures: Figures) -> str:
+    shifts: Mapping[str, SupportShift] = result.shifts[DEVICE][result.intact.name][seen.label]
+    network = result.prepared.network
+    assert network is not None
+    branches = [(line.from_bus, line.to_bus) for line in network.lines]
+    branches += [(x.buses[0], bus) for x in network.transformers for bus in x.buses[1:]]
+    texts = {
+        bus: f"{bus}: {shown(result, one.damping)} {unit(result, '100')}"
+        for bus, one in shifts.items()
+    }
+    who = ", ".join(share_text(entry) for entry in list(seen.mode.by_component.items())[:3])
+    text = f"{_called(seen)} ({who}): the redder and larger a bus, the farther support there moves the mode."
+    return figures.add(
+        network_map(seen.label, branches, {b: one.part for b, one in shifts.items()}, texts), text
+    )[0]

@@ -1,0 +1,75 @@
+"""One point of a sweep: its task and its result."""
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from orchestrator.cases.case import Case
+from orchestrator.cases.plausibility import overloads
+from orchestrator.cases.schema import Value
+from orchestrator.linear.spectra.mode_tracking import ModeSet
+from orchestrator.studies.black_box.coupled_modes import coupled_with_boxes
+from orchestrator.studies.modes.modes import ModesResult, compute_modes
+from orchestrator.studies.points.failure import Failure
+from orchestrator.studies.points.task import Kept, Task, computed
+
+
+@dataclass(frozen=True)
+class PointRecord(Kept):
+    modes: ModeSet | None = None  # least damped first
+    # names that the case gives to some of these modes, by index
+    named: dict[str, int] = field(default_factory=dict)
+    failure: Failure | None = None  # why there are none; None for a point with modes
+    residual: float = float("nan")  # of the steady state, as in `OperatingPoint`
+    warnings: tuple[str, ...] = ()
+    # how the linear model of every component was found
+    linearised: dict[str, str] = field(default_factory=dict)
+    # stability, because: the verdict over the whole spectrum, as `Stability.as_json` gives it, and its figures in
+    # words; empty where the point failed
+    stability: dict[str, Any] = field(default_factory=dict)
+    because: str = ""
+    # units beyond their rating [pu of it]
+    overloads: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class SweepPointTask(Task):
+    record = PointRecord
+    # the varied values by ``component.variable``, which override all layers
+    overrides: dict[str, Value]
+    frequency_range: tuple[float, float]  # of the modes [Hz]
+    black_box: bool = False  # identify the components that hide their states
+
+
+def compute_point(task: SweepPointTask) -> PointRecord:
+    return computed(task, _modes)
+
+
+def _modes(task: SweepPointTask, case: Case) -> PointRecord:
+    prepared = task.study.prepare(case, task.overrides)
+    asked = tuple(
+        question for question in prepared.questions if question not in prepared.idle.values()
+    )
+    # A sweep follows modes from point to point itself, and asks of all scenarios together.
+    find = coupled_with_boxes if task.black_box else compute_modes
+    return _record(find(replace(prepared, beside=None, questions=asked), task.frequency_range))
+
+
+def _record(result: ModesResult) -> PointRecord:
+    modes = result.modes
+    return PointRecord(
+        ModeSet.of(modes, result.model.names),
+        {
+            name: next(i for i, m in enumerate(modes) if m is mode)
+            for name, mode in result.named.items()
+        },
+        residual=result.operating_point.residual,
+        warnings=result.warnings,
+        linearised=result.linearised,
+        stability=result.stability.as_json(),
+        because=result.stability.because(),
+        overloads=overloads(
+            result.prepared.system.components,
+            result.prepared.case.table.meant,
+            result.prepared.base_ratings,
+        ),
+    )

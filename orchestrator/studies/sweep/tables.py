@@ -1,0 +1,164 @@
+"""A sweep on a terminal."""
+
+import math
+
+from rich.markup import escape
+from rich.table import Table
+
+from orchestrator.core.errors import counted
+from orchestrator.output.report.tables import make_table
+from orchestrator.studies.sweep.axes import grid_places
+from orchestrator.studies.sweep.dataset import Samples, warned
+from orchestrator.studies.sweep.limit import Ending
+from orchestrator.studies.sweep.plots import axis_label
+from orchestrator.studies.sweep.sweep import ScenarioSweep
+from orchestrator.studies.sweep.trajectories import GridPlace
+
+_FAILURES_SHOWN, _TURNS = 5, 3
+
+
+def trajectories(samples: Samples) -> Table:
+    """The ends of each trajectory, its least and its most damping, and its least similarity from point to point.
+
+    The table shows the trajectories with a name, or all trajectories if the case names no mode."""
+    title = f"Trajectories over {', '.join(axis_label(axis) for axis in samples.axes)}"
+    table = make_table(
+        title, "Mode", "f [Hz]", "Damping [%]", "Least [%]", "Most [%]", "Points", "Similarity"
+    )
+    anything = any(t.carries for s in samples.result.scenarios for t in s.trajectories)
+    for sweep in samples.result.scenarios:
+        for trajectory in sweep.trajectories:
+            curve = samples.of(sweep, trajectory)
+            if not curve or (anything and trajectory.carries is None):
+                continue
+            (_, first), (_, last) = curve[0], curve[-1]
+            where, least = min(curve, key=lambda entry: float(entry[1]["damping"]))
+            top, most = max(curve, key=lambda entry: float(entry[1]["damping"]))
+            alike = [f["similarity"] for _, f in curve if f["similarity"] == f["similarity"]]
+            named = sum(f["named"] for _, f in curve)
+            table.add_row(
+                f"{sweep.prepared.title}: {trajectory.name}",
+                f"{first['frequency']:.3f} → {last['frequency']:.3f}",
+                f"{first['damping']:.2f} → {last['damping']:.2f}",
+                f"{least['damping']:.2f} at {_values(samples, where)}",
+                f"{most['damping']:.2f} at {_values(samples, top)}",
+                f"{len(curve)}" if named in (0, len(curve)) else f"{len(curve)}, named at {named}",
+                f"{min(alike):.2f}" if alike else "–",
+            )
+        table.add_section()
+    return table
+
+
+def stability(samples: Samples) -> list[str]:
+    """The verdict on every scenario over all its points, as rich markup; an unstable one first."""
+    axes, lines = samples.axes, []
+    order = {False: 0, None: 1, True: 2}
+    total = math.prod(len(axis.values) for axis in axes)
+    for sweep in sorted(samples.result.scenarios, key=lambda s: order[s.stable]):
+        title, places, known = (
+            escape(sweep.prepared.title),
+            sweep.unstable(axes),
+            sweep.counts(axes),
+        )
+        rest = f" ({known[True]} stable, {known[None]} not known)" if known[None] else ""
+        if places:
+            worst = sweep.points[places[0]].because
+            where = escape(
+                f"at {len(places)} of {total} points{rest}; worst at {place_text(samples, places[0])}: {worst}"
+                f"{_turns(samples, sweep)}"
+            )
+            lines.append(f"[bold red]UNSTABLE[/]: {title}: {where}")
+        elif sweep.stable is False:
+            lines.append(
+                f"[bold red]UNSTABLE[/]: {title}: between two points of the grid{rest}; take more points"
+            )
+        elif known[None]:
+            what = f"{known[None]} of {total} points have no verdict, {known[True]} are stable, 0 are unstable"
+            lines.append(f"[bold yellow]not known[/]: {title}: {what}")
+        elif sweep.stable is None:
+            lines.append(
+                f"[bold yellow]not known[/]: {title}: a point between those of the grid has no verdict"
+            )
+        else:
+            lines.append(f"[bold green]stable[/]: {title}: nothing grows at any of {total} points")
+    return lines
+
+
+def limits(samples: Samples) -> list[str]:
+    """How far the parameter may go, as rich markup: of each scenario the first limit, and what follows, a line each."""
+    colours = {Ending.HOLDS: "green", Ending.FAILS: "red"}
+    found = []
+    for limit in samples.result.limits:
+        colour = "yellow" if limit.strained else colours.get(limit.kind, "yellow")
+        found.append(f"[bold {colour}]{escape(limit.title)}[/]: {escape(limit.lines[0])}")
+        found += [f"  then: {escape(line)}" for line in limit.lines[1:]]
+    return found
+
+
+def _turns(samples: Samples, sweep: ScenarioSweep) -> str:
+    if len([axis for axis in samples.axes if len(axis.values) > 1]) != 1:
+        return ""
+    places = sorted(
+        grid_places(samples.axes),
+        key=lambda place: [float(v) for v in samples.setting(place).values()],
+    )
+    words = {True: "stable", False: "unstable", None: "not known"}
+    verdicts = [sweep.points[place].stability.get("stable") for place in places]
+    turns = [
+        f"{words[one]} at {place_text(samples, here)}, {words[other]} at {place_text(samples, there)}"
+        for here, there, one, other in zip(places, places[1:], verdicts, verdicts[1:], strict=False)
+        if one is not other
+    ]
+    more = f"; {len(turns) - _TURNS} more changes" if len(turns) > _TURNS else ""
+    return f"; {'; '.join(turns[:_TURNS])}{more}" if turns else ""
+
+
+def remarks(samples: Samples) -> list[str]:
+    result, texts = (
+        samples.result,
+        [f"question: {question}" for question in samples.result.plan.idle],
+    )
+    texts += [text for limit in result.limits for text in limit.remarks]
+    failures = list(result.failures())
+    if failures:
+        texts.append(f"{counted(len(failures), 'point')} of {result.plan.number_of_points} failed:")
+        texts += [
+            f"  {sweep.prepared.name}, {place_text(samples, place)}: {error}"
+            for sweep, place, error in failures[:_FAILURES_SHOWN]
+        ]
+        more = len(failures) - _FAILURES_SHOWN
+        texts += [f"  … and {more} more, in sweep.csv"] if more > 0 else []
+    breaks = [
+        (sweep, trajectory, place)
+        for sweep in result.scenarios
+        for trajectory in sweep.trajectories
+        for place, point in trajectory.points.items()
+        if point.beginning.name == "BROKEN"
+    ]
+    for sweep, trajectory, place in breaks[:_FAILURES_SHOWN]:
+        texts.append(
+            f"{sweep.prepared.name}: {trajectory.name} begins at {place_text(samples, place)}, not recognised in the "
+            "point before; take more points there"
+        )
+    more = len(breaks) - _FAILURES_SHOWN
+    texts += [f"… and {more} more beginnings, marked 'broken' in sweep.csv"] if more > 0 else []
+    if result.refined and not result.limits:
+        texts.append(
+            f"{counted(result.refined, 'point')} between those of the grid served to recognise modes "
+            "(where, is marked 'refined' in sweep.csv)"
+        )
+    return [*texts, *warned(samples)]
+
+
+def place_text(samples: Samples, place: GridPlace) -> str:
+    """``grid.X_L = 0.1 pu``."""
+    setting = samples.setting(place)
+    return ", ".join(f"{a.key} = {_value(setting[a.key])} {a.unit}".rstrip() for a in samples.axes)
+
+
+def _values(samples: Samples, place: GridPlace) -> str:
+    return ", ".join(_value(value) for value in samples.setting(place).values())
+
+
+def _value(value: float | bool) -> str:
+    return str(value).lower() if isinstance(value, bool) else f"{value:g}"

@@ -1,0 +1,154 @@
+"""A device behind the recorded voltage: where it starts, and what it feeds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
+from orchestrator.core.arrays import Complex, Numbers
+from orchestrator.core.errors import InputError
+from orchestrator.devices.fmi.component import Component, RealBatch
+from orchestrator.devices.fmi.description import FmuDescription
+from orchestrator.devices.fmi.devices import NO_BUS, PORT, is_controller_alone
+from orchestrator.devices.fmi.instance import open_component
+from orchestrator.studies.black_box.bench import drive
+from orchestrator.studies.validation.averaging import averaged
+from orchestrator.studies.validation.record import Recording
+
+_VOLTAGE, _CURRENT = ("v_re", "v_im"), ("i_re", "i_im")
+_NAMES = (_VOLTAGE, _CURRENT)
+_STARTS = ("P_0", "Q_0", "v_0", "theta_0")
+_STILL = 1e-4  # movement of the current in a round [pu of the rating] at which a device is at rest
+_ROUND = 0.5  # time [s] for which it is looked at
+_LONGEST_REST = 20.0  # time [s] after which it is driven, at rest or not
+
+
+@dataclass(frozen=True)
+class OperatingStart:
+    """The operating point before the event: voltage [pu], power [pu of the rating]."""
+
+    voltage: complex
+    power: complex
+
+
+@dataclass(frozen=True)
+class Played:
+    """The power that a device fed at the times of a recording.
+
+    ``current``: [pu of the rating], in the recording's frame; ``settled_after``: time that it needed to come to rest at
+    the operating point before [s]; ``rest``: power with which it stood there [pu of the rating]."""
+
+    power: Complex
+    settled_after: float
+    rest: complex
+    still: bool  # whether it came to rest
+
+
+@dataclass(frozen=True)
+class PlayedDevice:
+    """A device with its values, at a port of ours."""
+
+    name: str
+    description: FmuDescription
+    values: Mapping[str, float | bool]
+    rating: float  # [MVA]
+    rated_hz: float
+    step_size: float = 1e-4  # communication step [s]
+    held: Mapping[str, float] = field(default_factory=dict)  # its other inputs
+    isolated: bool | None = None  # as in `open_component`
+
+    @property
+    def path(self) -> Path:
+        return self.description.path
+
+    def with_values(self, values: Mapping[str, float | bool]) -> PlayedDevice:
+        return replace(self, values={**self.values, **values})
+
+    def value(self, name: str) -> float | bool:
+        """A parameter's value with which it runs."""
+        if name in self.values:
+            return self.values[name]
+        start = self.description.variables[name].start
+        return start if isinstance(start, bool) else float(start or 0.0)
+
+    def check_port(self) -> None:
+        missing = [name for name in PORT if name not in self.description.variables]
+        if not missing:
+            return
+        lacks = f"{self.path.name}: it has no {', '.join(missing)}"
+        if is_controller_alone(self.description):
+            raise InputError(f"{lacks}: {NO_BUS}")
+        raise InputError(
+            f"{lacks}; it is driven at our port, to which a vendor.toml maps another FMU's variables: give it with "
+            "--binding (`gfor fmu bind` drafts one)"
+        )
+
+    def play(self, recording: Recording, start: OperatingStart) -> Played:
+        """Bring it to rest at the operating point, and let the recorded voltage drive it.
+
+        The voltage of a step is that at its begin, as in a coupled run."""
+        values = {**self._start_values(start), **self.values}
+        component = open_component("device", self.description, isolated=self.isolated)
+        try:
+            component.setup(0.0, None)
+            component.set(values)
+            component.enter_initialization_mode()
+            at = (start.voltage.real, start.voltage.imag)
+            component.set({**self.held, **dict(zip(_VOLTAGE, at, strict=True))})
+            component.exit_initialization_mode()
+            begin = RealBatch(component, _CURRENT).read().copy()
+            before = self._rest(component, at, begin)
+            driven = self._driven(component, recording, before)
+        finally:
+            component.close()
+        rest = start.voltage * complex(*before[-1]).conjugate() * SYSTEM_BASE_MVA / self.rating
+        settled_after = (len(before) - 1) * self.step_size
+        return Played(driven, settled_after, rest, still=settled_after < _LONGEST_REST)
+
+    def _start_values(self, start: OperatingStart) -> dict[str, float]:
+        """The power flow's values of a device; those that it does not know are left out."""
+        found = {
+            "P_0": start.power.real,
+            "Q_0": start.power.imag,
+            "v_0": abs(start.voltage),
+            "theta_0": float(np.angle(start.voltage)),
+        }
+        for name in ("P_0", "Q_0", "v_0"):
+            info = self.description.variables.get(name)
+            if info is None:
+                continue
+            low, high = info.minimum, info.maximum
+            if (low is not None and found[name] < low) or (high is not None and found[name] > high):
+                raise InputError(
+                    f"{self.name}: before the event the recording has {name} = {found[name]:.4g} pu, and the device "
+                    f"takes {low} to {high}; is its rating {self.rating:g} MVA (--set S_n=…), and are the recording's "
+                    "units as gfor reads them (--channel)?"
+                )
+        return {name: value for name, value in found.items() if name in self.description.variables}
+
+    def _rest(self, component: Component, at: tuple[float, float], begin: Numbers) -> Numbers:
+        """Currents while the voltage before the event is held, until they are still; the first is that of the start."""
+        each = max(1, round(_ROUND / self.step_size))
+        rows = [begin[None, :]]
+        held = np.tile(at, (each, 1))
+        scale = SYSTEM_BASE_MVA / self.rating
+        for k in range(round(_LONGEST_REST / _ROUND)):
+            rows.append(drive(component, _NAMES, held, self.step_size, k * each))
+            if np.abs(rows[-1] - rows[-2][-1]).max() * scale <= _STILL:
+                break
+        return np.concatenate(rows)
+
+    def _driven(self, component: Component, recording: Recording, before: Numbers) -> Complex:
+        """Power at the recording's times [pu of the rating], as means over as long as the recording's."""
+        steps = int(np.ceil(recording.length / self.step_size - 1e-9))
+        times: Numbers = np.asarray(self.step_size * np.arange(steps + 1))
+        voltage = recording.at(times)
+        rows = np.column_stack([voltage.real, voltage.imag])
+        found = drive(component, _NAMES, rows[:-1], self.step_size, len(before) - 1)
+        currents = np.concatenate([before[-1:], found]) @ np.array([1.0, 1j])
+        power = voltage * currents.conj() * (SYSTEM_BASE_MVA / self.rating)
+        return averaged(times, power, recording.average, recording.times, recording.ahead)

@@ -1,0 +1,235 @@
+"""One recorded event beside a device: the operating point before it, the response, and how far it is off."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from orchestrator.core.arrays import Complex, Numbers
+from orchestrator.studies.validation.device import OperatingStart, Played, PlayedDevice
+from orchestrator.studies.validation.figures import (
+    SIGNALS,
+    ErrorFigures,
+    SignalFigures,
+    SignalNoise,
+    compare_signals,
+    errors_in,
+    noise_in,
+    signals_of,
+)
+from orchestrator.studies.validation.questions import Question, QuestionKind
+from orchestrator.studies.validation.record import Mask, PortBases, Recording, questions_of_level
+from orchestrator.studies.validation.windows import Windows, find_windows
+
+_SHORTEST_BEFORE = 0.1  # a window before the event [s] that shows a steady state
+_MOVES_BEFORE = 0.02  # movement of P or Q before the event [pu] that is no steady state
+_FARTHEST_HZ = 1.0  # from the rated frequency before the event
+_STARTS_ELSEWHERE = 0.02  # power at rest [pu] by which a device misses what was measured
+_NO_NOISE = 2e-6  # scatter of P and Q before the event [pu] that no instrument has
+_TOO_GOOD = 1e-4  # median error [pu] beside a recording without noise, as the model's own
+_MOVED = 2e-3  # rms movement [pu] that is an event
+_OFFSET = 0.015  # error that stays at the end [pu]
+_BACK = 0.005  # deviation of the voltage [pu] that is as before
+_SLOWER_THAN = 0.05  # interval between samples [s] of which is said what it cannot show
+_LAST = 0.15  # part of the window after the event that is its end
+
+
+@dataclass(frozen=True)
+class RecordedEvent:
+    """A recording at the operating point and in the frame in which it drives a device."""
+
+    recording: Recording
+    windows: Windows
+    start: OperatingStart
+    questions: tuple[Question, ...] = ()
+
+
+@dataclass(frozen=True)
+class EventComparison:
+    """The response of a device at an event, beside what was measured."""
+
+    event: RecordedEvent
+    device: PlayedDevice
+    played: Played
+    # window → signal → figures
+    errors: Mapping[str, Mapping[str, ErrorFigures]]
+    noise: Mapping[str, SignalNoise]
+    signals: Mapping[str, SignalFigures]
+    questions: tuple[Question, ...] = field(default=())
+
+    @property
+    def measured(self) -> dict[str, Numbers]:
+        """The measured signals, by name [pu of the rating]."""
+        return signals_of(self.event.recording.power, self.event.recording.voltage)
+
+    @property
+    def simulated(self) -> dict[str, Numbers]:
+        """The device's signals, by name [pu of the rating]."""
+        return signals_of(self.played.power, self.event.recording.voltage)
+
+
+def prepare_event(
+    recording: Recording, bases: PortBases, windows: Windows | None = None
+) -> RecordedEvent:
+    """Find windows and the operating point before the event, and turn the frame with the frequency before it."""
+    windows = windows or find_windows(recording)
+    before = windows.part("before", recording.times) & recording.good
+    hertz = _frequency_before(recording, before)
+    recording = recording.turned(hertz)
+    v, s = recording.voltage[before], recording.power[before]
+    turned = np.angle(v.mean()) if len(v) else 0.0
+    voltage = complex(np.abs(v).mean() * np.exp(1j * turned))
+    start = OperatingStart(voltage, complex(s.mean()))
+    asked = list(recording.questions)
+    if abs(hertz) > _FARTHEST_HZ:
+        seen = bases.rated_hz + hertz
+        asked.append(
+            Question(QuestionKind.RATED_FREQUENCY, {"seen": seen, "rated": bases.rated_hz})
+        )
+    asked += questions_of_level(recording, abs(voltage), start.power, bases)
+    asked += _of_windows(recording, windows, before)
+    unique = {one.kind: one for one in reversed(asked)}
+    return RecordedEvent(recording, windows, start, tuple(reversed(unique.values())))
+
+
+def _frequency_before(recording: Recording, before: Mask) -> float:
+    """By how much the frequency before the event is off the frame's [Hz]."""
+    times, angle = recording.times[before], np.angle(recording.voltage[before])
+    if len(times) < 3:
+        return 0.0
+    slope = np.polyfit(times - times.mean(), np.unwrap(angle), 1)[0]
+    return float(slope / (2 * np.pi))
+
+
+def _of_windows(recording: Recording, windows: Windows, before: Mask) -> list[Question]:
+    found = []
+    if not windows.seen:
+        found.append(Question(QuestionKind.NO_EVENT, {"last": recording.length}))
+    if windows.begin < _SHORTEST_BEFORE:
+        found.append(Question(QuestionKind.SHORT_BEFORE, {"length": windows.begin}))
+    elif windows.seen:
+        moves = _trend(recording, before)
+        if moves > _MOVES_BEFORE:
+            found.append(Question(QuestionKind.NO_STEADY_STATE, {"moves": moves}))
+    if recording.interval > _SLOWER_THAN:
+        figures = {"interval": recording.interval, "fastest": 0.5 / recording.interval}
+        found.append(Question(QuestionKind.SLOW_SAMPLES, figures))
+    return found
+
+
+def _trend(recording: Recording, before: Mask) -> float:
+    """Largest movement of P or Q before the event [pu], without what changes from sample to sample."""
+    most = 0.0
+    for values in (recording.power.real[before], recording.power.imag[before]):
+        width = max(1, len(values) // 10)
+        whole = values[: len(values) // width * width].reshape(-1, width).mean(axis=1)
+        most = max(most, float(np.ptp(whole)) if len(whole) > 1 else 0.0)
+    return most
+
+
+def compare_with(device: PlayedDevice, event: RecordedEvent) -> EventComparison:
+    """Let the recorded voltage drive a device, and count its errors."""
+    return judge_response(device, event, device.play(event.recording, event.start))
+
+
+def judge_response(device: PlayedDevice, event: RecordedEvent, played: Played) -> EventComparison:
+    recording, windows = event.recording, event.windows
+    measured = signals_of(recording.power, recording.voltage)
+    simulated = signals_of(played.power, recording.voltage)
+    error = {name: simulated[name] - measured[name] for name in SIGNALS}
+    # a device that was at rest scatters with the recorded voltage alone
+    scattering = error if played.still else measured
+    noise = {name: noise_in(recording, scattering[name], windows) for name in SIGNALS}
+    errors = {}
+    for name in windows.parts:
+        of_signals = {
+            signal: errors_in(recording, error[signal], windows, name, noise[signal])
+            for signal in SIGNALS
+        }
+        errors[name] = {signal: one for signal, one in of_signals.items() if one is not None}
+    comparison = EventComparison(
+        event=event,
+        device=device,
+        played=played,
+        errors={name: of for name, of in errors.items() if of},
+        noise=noise,
+        signals=compare_signals(recording, played.power, windows),
+    )
+    asked = event.questions + tuple(_of_response(comparison))
+    return replace(comparison, questions=asked)
+
+
+def rms_error(power: Complex, event: RecordedEvent) -> tuple[float, float]:
+    """Rms error of P and Q from the event on [pu of the rating]."""
+    recording = event.recording
+    part = recording.good & (recording.times > event.windows.begin)
+    error = power[part] - recording.power[part]
+    return float(np.sqrt(np.mean(error.real**2))), float(np.sqrt(np.mean(error.imag**2)))
+
+
+def rms_movement(event: RecordedEvent) -> tuple[float, float]:
+    """Rms movement of the measured P and Q from the operating point, from the event on [pu of the rating]."""
+    return rms_error(np.full(len(event.recording.power), event.start.power), event)
+
+
+def _without_noise(comparison: EventComparison) -> list[Question]:
+    """A recording that is a simulation, and one that the model itself may have made."""
+    event = comparison.event
+    measured = [noise_in(event.recording, comparison.measured[s], event.windows) for s in "pq"]
+    scatter = max(one.scatter for one in measured)
+    if scatter > _NO_NOISE:
+        return []
+    error = _usual_error(comparison.played.power, event)
+    figures = {"scatter": scatter, "error": error}
+    if error < _TOO_GOOD and max(rms_movement(event)) > _MOVED:
+        return [Question(QuestionKind.TOO_GOOD, figures)]
+    return [Question(QuestionKind.NO_NOISE, figures)]
+
+
+def _usual_error(power: Complex, event: RecordedEvent) -> float:
+    """The median error of P and Q [pu of the rating]: a few samples of a fast transient do not count."""
+    error = (power - event.recording.power)[event.recording.good]
+    return float(np.median(np.maximum(np.abs(error.real), np.abs(error.imag))))
+
+
+def _of_response(comparison: EventComparison) -> list[Question]:
+    event, played = comparison.event, comparison.played
+    found = []
+    off = played.rest - event.start.power
+    if abs(off) > _STARTS_ELSEWHERE:
+        figures = {
+            "p": played.rest.real,
+            "q": played.rest.imag,
+            "p_measured": event.start.power.real,
+            "q_measured": event.start.power.imag,
+        }
+        found.append(Question(QuestionKind.START, figures))
+    found += _without_noise(comparison)
+    found += _setpoint(comparison)
+    return found
+
+
+def _setpoint(comparison: EventComparison) -> list[Question]:
+    """P or Q that stays elsewhere though the voltage came back to where it was, in magnitude and frequency."""
+    event = comparison.event
+    recording, windows = event.recording, event.windows
+    times = recording.times
+    late = (times > recording.length - _LAST * (recording.length - windows.end)) & recording.good
+    if late.sum() < 4 or not windows.seen:
+        return []
+    level = abs(float(np.abs(recording.voltage[late]).mean()) - abs(event.start.voltage))
+    slope = np.polyfit(times[late], np.unwrap(np.angle(recording.voltage[late])), 1)[0]
+    if level > _BACK or abs(slope) / (2 * np.pi) > _BACK:
+        return []
+    error = comparison.played.power[late] - recording.power[late]
+    found = []
+    for name, offset, spread in (
+        ("p", error.real.mean(), np.ptp(error.real)),
+        ("q", error.imag.mean(), np.ptp(error.imag)),
+    ):
+        if abs(offset) > max(_OFFSET, spread):
+            figures = {"signal": name, "offset": -float(offset)}
+            found.append(Question(QuestionKind.SETPOINT, figures))
+    return found[:1]

@@ -1,0 +1,269 @@
+"""How far a simulated response is from the measured one: errors by windows, delay, steps and ring-down.
+
+The errors are those that published descriptions of IEC 61400-27-2 name: the simulated value less the measured one in
+per unit of the rating, its largest magnitude, its mean, and the mean of its magnitude in each window."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestrator.core.arrays import Complex, Numbers
+from orchestrator.core.errors import CosimError
+from orchestrator.core.late import xr
+from orchestrator.linear.signals.identification import IdentifiedMode
+from orchestrator.output.results.comtrade.reading import LINE_FREQUENCY
+from orchestrator.studies.signals.comparison import strongest_modes
+from orchestrator.studies.validation.record import Recording
+from orchestrator.studies.validation.windows import Windows
+
+SIGNALS = ("p", "q", "i_p", "i_q")
+"""Active and reactive power, active and reactive current, all in pu of the rating and into the grid."""
+
+_MOST_LAG = 0.25  # longest delay that is looked for [s]
+_LEAST_MOVES = 0.005  # movement [pu] that has a delay, a step or a ring-down
+_AS_GOOD = 2.0  # times the least sum of squares, up to which no delay explains the signals as well
+_AT_END = 0.1  # part of a window whose mean is the value that a step ends at
+_SETTLED = 0.05  # part of a step within which it has settled
+_FEW = 20  # samples of a ring-down
+_MOST_SAMPLES = 300  # of which modes are looked for; more take seconds and say little more
+_SLOWEST_PERIODS = 1.5  # periods of a mode that a window has to hold
+_SAME_MODE = 0.3  # part of the frequency by which two modes may differ and be the same
+
+
+@dataclass(frozen=True)
+class ErrorFigures:
+    """Errors of one signal in one window [pu of the rating], and what the recording's scatter alone makes of them."""
+
+    max_error: float
+    max_at: float  # time in the recording's own clock [s]
+    mean_error: float
+    mean_abs_error: float
+    max_of_noise: float
+    mean_of_noise: float
+    mean_abs_of_noise: float
+
+    def as_json(self) -> dict[str, float]:
+        return {
+            "max_error_pu": self.max_error,
+            "max_at_s": self.max_at,
+            "mean_error_pu": self.mean_error,
+            "mean_abs_error_pu": self.mean_abs_error,
+            "max_of_noise_pu": self.max_of_noise,
+            "mean_of_noise_pu": self.mean_of_noise,
+            "mean_abs_of_noise_pu": self.mean_abs_of_noise,
+        }
+
+
+@dataclass(frozen=True)
+class StepFigures:
+    """A signal's way to another value: the step [pu], rise and settling [s], overshoot [part of the step]."""
+
+    step: float
+    rise: float | None
+    overshoot: float
+    settling: float | None
+
+    def as_json(self) -> dict[str, float | None]:
+        return {
+            "step_pu": self.step,
+            "rise_s": self.rise,
+            "overshoot_percent": 100 * self.overshoot,
+            "settling_s": self.settling,
+        }
+
+
+@dataclass(frozen=True)
+class SignalNoise:
+    """Scatter of a signal before the event [pu], and for how long a sample is like the next ones [samples]."""
+
+    scatter: float
+    together: float
+
+
+@dataclass(frozen=True)
+class SignalFigures:
+    """Figures of one signal outside of windows, measured and simulated."""
+
+    delay: float | None  # by which the measured one comes later [s]
+    steps: tuple[StepFigures | None, StepFigures | None]
+    modes: tuple[IdentifiedMode | None, IdentifiedMode | None]
+
+    def as_json(self) -> dict[str, object]:
+        step = [one.as_json() if one else None for one in self.steps]
+        mode = [_mode_json(one) for one in self.modes]
+        return {
+            "delay_s": self.delay,
+            "step": {"measured": step[0], "simulated": step[1]},
+            "ring_down": {"measured": mode[0], "simulated": mode[1]},
+        }
+
+
+def _mode_json(mode: IdentifiedMode | None) -> dict[str, object] | None:
+    if mode is None:
+        return None
+    return {
+        "frequency_hz": mode.frequency_hz,
+        "damping_percent": mode.damping_percent,
+        "amplitude_pu": mode.amplitude,
+        "doubts": list(mode.doubts),
+    }
+
+
+def signals_of(power: Complex, voltage: Complex) -> dict[str, Numbers]:
+    """The compared signals, by name [pu of the rating]."""
+    current = power / np.maximum(np.abs(voltage), 1e-3)
+    values = (power.real, power.imag, current.real, current.imag)
+    return {name: np.asarray(x) for name, x in zip(SIGNALS, values, strict=True)}
+
+
+def noise_in(recording: Recording, values: Numbers, windows: Windows) -> SignalNoise:
+    """From the window before the event, less its straight line.
+
+    Of an error the scatter is that of the measured power and of what the device makes of the voltage's."""
+    part = windows.part("before", recording.times) & recording.good
+    seen = values[part]
+    if len(seen) < 4:
+        return SignalNoise(0.0, 1.0)
+    line = np.polyval(np.polyfit(np.arange(len(seen)), seen, 1), np.arange(len(seen)))
+    rest = seen - line
+    scatter = float(rest.std() * np.sqrt(len(seen) / max(len(seen) - 2, 1)))
+    return SignalNoise(scatter, correlation_length(rest))
+
+
+def correlation_length(values: Numbers) -> float:
+    """1 + 2·Σρ [samples], summed until the correlation is gone (Sokal's window); at least 1."""
+    deviation = values - values.mean()
+    total = float(deviation @ deviation)
+    if total <= 0 or len(values) < 4:
+        return 1.0
+    length = 1.0
+    for lag in range(1, len(values) // 2):
+        length += 2 * float(deviation[lag:] @ deviation[:-lag]) / total
+        if lag >= 5 * length:
+            break
+    return max(1.0, length)
+
+
+def errors_in(
+    recording: Recording, error: Numbers, windows: Windows, name: str, noise: SignalNoise
+) -> ErrorFigures | None:
+    """Figures of one window; None without a sample in it."""
+    part = windows.part(name, recording.times) & recording.good
+    if not part.any():
+        return None
+    inside, times = error[part], recording.times[part]
+    worst = int(np.abs(inside).argmax())
+    independent = max(1.0, len(inside) / noise.together)
+    return ErrorFigures(
+        max_error=float(np.abs(inside).max()),
+        max_at=recording.begin + float(times[worst]),
+        mean_error=float(inside.mean()),
+        mean_abs_error=float(np.abs(inside).mean()),
+        max_of_noise=noise.scatter * float(np.sqrt(2 * np.log(2 * max(independent, 1.0)))),
+        mean_of_noise=2 * noise.scatter / float(np.sqrt(independent)),
+        mean_abs_of_noise=noise.scatter * float(np.sqrt(2 / np.pi)),
+    )
+
+
+def delay_between(
+    recording: Recording, measured: Numbers, simulated: Numbers, windows: Windows
+) -> float | None:
+    """By how much the measured signal comes after the simulated one [s]; None where nothing moves.
+
+    The shift at which the difference's sum of squares is least, with a parabola between samples; 0 where no shift
+    explains the signals better by much."""
+    part = recording.times >= windows.begin - _MOST_LAG
+    times = recording.times[part]
+    y, x = measured[part], simulated[part]
+    if min(np.ptp(x), np.ptp(y)) < _LEAST_MOVES:
+        return None
+    most = max(2, round(_MOST_LAG / recording.interval))
+    shifts = np.arange(-most, most + 1)
+    if len(times) < 4 * most:
+        return None
+    inner = slice(most, len(times) - most)
+    cost = np.array([np.var(y[inner] - np.roll(x, k)[inner]) for k in shifts])
+    best = int(cost.argmin())
+    if best in (0, len(shifts) - 1):
+        return None
+    if cost[most] <= _AS_GOOD * cost[best] + 1e-18:
+        return 0.0
+    left, middle, right = cost[best - 1 : best + 2]
+    curvature = left - 2 * middle + right
+    between = 0.5 * (left - right) / curvature if curvature > 0 else 0.0
+    return float((shifts[best] + between) * recording.interval)
+
+
+def step_of(recording: Recording, values: Numbers, windows: Windows) -> StepFigures | None:
+    """A step from before the event to the end of the recording; None where there is none."""
+    times = recording.times
+    before = float(values[windows.part("before", times)].mean())
+    late = times >= recording.length - _AT_END * (recording.length - windows.begin)
+    step = float(values[late].mean()) - before
+    if abs(step) < _LEAST_MOVES or 2 * abs(step) < np.ptp(values[late]):
+        return None
+    after = times > windows.begin
+    way, since = (values[after] - before) / step, times[after] - windows.begin
+    above = [np.flatnonzero(way >= part) for part in (0.1, 0.9)]
+    rise = float(since[above[1][0]] - since[above[0][0]]) if all(map(len, above)) else None
+    outside = np.flatnonzero(np.abs(way - 1) > _SETTLED)
+    last = int(outside[-1]) + 1 if len(outside) else 0
+    settling = float(since[last]) if last < len(since) else None
+    return StepFigures(step, rise, max(0.0, float(way.max()) - 1), settling)
+
+
+def ring_downs(
+    recording: Recording, measured: Numbers, simulated: Numbers, windows: Windows
+) -> tuple[IdentifiedMode | None, IdentifiedMode | None]:
+    """The mode with which the measured signal rings the most after the event, and the simulated one's same mode."""
+    modes = _modes(recording, measured, windows)
+    if not modes:
+        return None, None
+    strongest = modes[0]
+    others = [
+        one
+        for one in _modes(recording, simulated, windows)
+        if abs(one.frequency_hz - strongest.frequency_hz) < _SAME_MODE * strongest.frequency_hz
+    ]
+    same = min(others, key=lambda one: abs(one.eigenvalue - strongest.eigenvalue), default=None)
+    return strongest, same
+
+
+def _modes(recording: Recording, values: Numbers, windows: Windows) -> list[IdentifiedMode]:
+    part = recording.times > windows.end
+    if part.sum() < _FEW or np.ptp(values[part]) < _LEAST_MOVES:
+        return []
+    thin = max(1, round(part.sum() / _MOST_SAMPLES))
+    times, thinned = (_thinned(x[part], thin) for x in (recording.times, values))
+    curve = xr.DataArray(thinned, {"time": times, LINE_FREQUENCY: 0.0}, ("time",))
+    try:
+        found = strongest_modes(curve, float(times[0]))
+    except CosimError:
+        return []
+    slowest = _SLOWEST_PERIODS / (recording.length - windows.end)
+    fastest = 0.25 / (thin * recording.interval)
+    return [one for one in found if slowest < one.frequency_hz < fastest]
+
+
+def _thinned(values: Numbers, factor: int) -> Numbers:
+    """Means of so many samples after one another."""
+    whole = values[: len(values) // factor * factor]
+    return np.asarray(whole.reshape(-1, factor).mean(axis=1))
+
+
+def compare_signals(
+    recording: Recording, simulated: Complex, windows: Windows
+) -> Mapping[str, SignalFigures]:
+    """Delay, steps and ring-down of P and Q."""
+    measured, own = recording.power, simulated
+    found = {}
+    for name, y, x in (("p", measured.real, own.real), ("q", measured.imag, own.imag)):
+        found[name] = SignalFigures(
+            delay_between(recording, y, x, windows),
+            (step_of(recording, y, windows), step_of(recording, x, windows)),
+            ring_downs(recording, y, x, windows),
+        )
+    return found

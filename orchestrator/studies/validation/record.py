@@ -1,0 +1,430 @@
+"""A recording at a device's port, in per unit and at even times, and what is odd about it by itself."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
+from orchestrator.core.arrays import Complex, Numbers
+from orchestrator.core.errors import InputError
+from orchestrator.studies.validation.averaging import averaged
+from orchestrator.studies.validation.channels import RecordedChannel, channels_in, in_base, unit_of
+from orchestrator.studies.validation.questions import Question, QuestionKind
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_FEWEST = 20  # samples of a recording that can be compared with anything
+_LONGEST_GAP = 0.25  # gap [s] that a straight line bridges in the voltage that drives the device
+_TURN = 2 * np.pi
+_NEAR_A_TURN = 0.2  # part of a turn by which a jump of the angle may miss a whole one
+_HELD = (
+    0.2  # part of the samples whose angle is that of the sample before, from which on it is held
+)
+_FASTEST_PHASOR = (
+    0.0021  # interval [s] below which samples of an angle may be unwrapped at any time
+)
+_VOLTAGES_KV = (0.4, 0.69, 10, 20, 33, 66, 110, 132, 150, 220, 230, 275, 345, 380, 400, 500, 525)
+_NORMAL = (0.8, 1.2)  # magnitude of the voltage before the event [pu] that is not asked about
+_MOST_LOADED = 1.3  # apparent power before the event [pu of the rating] that is not asked about
+_FARTHEST_HZ = 1.0  # a grid's frequency is nearer to the rated one before an event
+Mask = NDArray[np.bool_]
+
+_PHASORS = np.exp(2j * np.pi / 3 * np.arange(3))
+
+
+@dataclass(frozen=True)
+class PortBases:
+    """The meaning of per unit at the port."""
+
+    rating: float  # [MVA]
+    rated_hz: float
+    kilovolt: float | None = None  # rated voltage, line to line, rms [kV]
+    impedance: complex = 0j  # between the meter and the port [pu of the rating]
+    average: float | None = None  # time over which P and Q are averaged [s]; a period where None
+
+    @property
+    def averaging(self) -> float:
+        """Time over which the powers are averaged before they are compared [s]."""
+        return 1 / self.rated_hz if self.average is None else self.average
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Voltage and power at the port, at even times.
+
+    ``voltage``: [pu], in a frame that rotates with ``frame_hz``; ``power``: into the grid [pu of the rating], averaged.
+    ``good``: where no sample is missing."""
+
+    label: str
+    begin: float  # time of the first sample in the recording's own clock [s]
+    interval: float  # [s]
+    voltage: Complex
+    power: Complex
+    good: Mask
+    frame_hz: float
+    instantaneous: bool
+    average: float  # time over which the power is averaged [s], and a response is to be
+    channels: Mapping[str, RecordedChannel]
+    questions: tuple[Question, ...] = ()
+    sha256: str = ""
+
+    @property
+    def times(self) -> Numbers:
+        """Times since the first sample [s]."""
+        return np.asarray(self.interval * np.arange(len(self.voltage)))
+
+    @property
+    def ahead(self) -> float:
+        """By how much a mean's end is after its time [s].
+
+        Means of dense samples end at their time, so that none before an event holds something of it; a phasor of a
+        recorder that sends one a period is of the time around it."""
+        return 0.5 * self.average if 2 * self.interval > self.average else 0.0
+
+    @property
+    def length(self) -> float:
+        return self.interval * (len(self.voltage) - 1)
+
+    @property
+    def current(self) -> Complex:
+        """Active current and reactive current [pu of the rating]: P/|v| + jQ/|v|."""
+        return np.asarray(self.power / np.maximum(np.abs(self.voltage), 1e-3))
+
+    def turned(self, hertz: float) -> Recording:
+        """The same in a frame that rotates faster by ``hertz``."""
+        if not hertz:
+            return self
+        back = np.exp(-1j * _TURN * hertz * self.times)
+        return replace(self, voltage=self.voltage * back, frame_hz=self.frame_hz + hertz)
+
+    def at(self, times: Numbers) -> Complex:
+        """The voltage between samples: instantaneous values along straight lines, phasors by magnitude and angle."""
+        if self.instantaneous:
+            found: Complex = np.interp(times, self.times, self.voltage)
+            return found
+        angle = np.unwrap(np.angle(self.voltage))
+        magnitude = np.interp(times, self.times, np.abs(self.voltage))
+        return np.asarray(magnitude * np.exp(1j * np.interp(times, self.times, angle)))
+
+
+def read_recording(
+    dataset: xr.Dataset,
+    label: str,
+    bases: PortBases,
+    given: Sequence[str] = (),
+    place: str | None = None,
+) -> Recording:
+    """A recording of ours or of somebody else's as voltage and power at the port.
+
+    Raises an `InputError` if channels or units are missing, or it is too short."""
+    if "places" in dataset.attrs and not given:
+        dataset, place = _of_run(dataset, place, label), None
+    channels = channels_in(dataset, place, given, label)
+    reading = _Reading(dataset, label, bases, channels)
+    voltage, power = reading.voltage(), reading.power()
+    return _evened(reading, voltage, power)
+
+
+def _of_run(dataset: xr.Dataset, place: str | None, label: str) -> xr.Dataset:
+    """Voltage, P and Q of one unit of a run of ours, as columns of a recording."""
+    import xarray  # noqa: PLC0415 - imported where a recording is there already
+
+    buses = {
+        name: where
+        for name, where in json.loads(dataset.attrs["places"]).items()
+        if " " not in where and f"{name}.i_re" in dataset and f"{where}.v_re" in dataset
+    }
+    if place is None and len(buses) > 1:
+        place = "gfor" if "gfor" in buses else None
+    if place is None and len(buses) == 1:
+        (place,) = buses
+    if place is None or place not in buses:
+        known = ", ".join(buses) or "none: run it with 'record = [\"*\"]'"
+        raise InputError(
+            f"{label}: it is a run with several units; give --place with one of {known}"
+        )
+
+    def phasor(name: str, what: str) -> Complex:
+        real, imaginary = (dataset[f"{name}.{what}_{part}"].values for part in ("re", "im"))
+        return np.asarray(real + 1j * imaginary)
+
+    v: Complex = phasor(buses[place], "v")
+    s = np.asarray(v * phasor(place, "i").conj() * SYSTEM_BASE_MVA)
+    columns = {
+        "v": (np.abs(v), "pu"),
+        "angle": (np.unwrap(np.angle(v)), "rad"),
+        "p": (s.real, "MW"),
+        "q": (s.imag, "Mvar"),
+    }
+    named = {name: ("time", values, {"units": unit}) for name, (values, unit) in columns.items()}
+    return xarray.Dataset(named, {"time": dataset["time"].values})
+
+
+class _Reading:
+    """The channels of one recording, brought into per unit."""
+
+    def __init__(
+        self,
+        dataset: xr.Dataset,
+        label: str,
+        bases: PortBases,
+        channels: Mapping[str, RecordedChannel],
+    ) -> None:
+        self.dataset, self.label, self.bases, self.channels = dataset, label, bases, channels
+        self.times = np.asarray(dataset["time"].values, dtype=float)
+        self.questions: list[Question] = []
+        if len(self.times) < _FEWEST:
+            raise InputError(
+                f"{label}: it has {len(self.times)} samples; at least {_FEWEST} are compared"
+            )
+
+    @property
+    def instantaneous(self) -> bool:
+        return {"va", "vb", "vc"} <= self.channels.keys()
+
+    def ask(self, kind: QuestionKind, **figures: object) -> None:
+        self.questions.append(Question(kind, figures))
+
+    def voltage(self) -> Complex:
+        """[pu], in a frame that rotates with the rated frequency."""
+        if self.instantaneous:
+            phases = [self._volts(f"v{x}", math.sqrt(2 / 3)) for x in "abc"]
+            turn = np.exp(-1j * _TURN * self.bases.rated_hz * self.times)
+            return np.asarray(2 / 3 * (_PHASORS @ np.array(phases)) * turn)
+        return np.asarray(self._volts("v", 1.0) * np.exp(1j * self._angle()))
+
+    def power(self) -> Complex:
+        """Into the grid [pu of the rating]."""
+        found: Complex
+        if {"p", "q"} <= self.channels.keys():
+            found = self._watts("p") + 1j * self._watts("q")
+        elif self.instantaneous and {"ia", "ib", "ic"} <= self.channels.keys():
+            phases = [self._amperes(f"i{x}", math.sqrt(2)) for x in "abc"]
+            turn = np.exp(-1j * _TURN * self.bases.rated_hz * self.times)
+            current = 2 / 3 * (_PHASORS @ np.array(phases)) * turn
+            found = self.voltage() * current.conj()
+        elif {"i", "i_angle"} <= self.channels.keys():
+            current = self._amperes("i", 1.0) * np.exp(1j * self._values("i_angle")[0])
+            found = self.voltage() * current.conj()
+        else:
+            raise InputError(
+                f"{self.label}: currents of phases need voltages of phases beside them, va, vb and vc; or give p and q"
+            )
+        return np.asarray(found)
+
+    def _values(self, role: str) -> tuple[Numbers, str]:
+        channel = self.channels[role]
+        values = np.asarray(self.dataset[channel.column].values, dtype=float)
+        return in_base(values, unit_of(channel, self.dataset), channel, self.label)
+
+    def _volts(self, role: str, peak: float) -> Numbers:
+        """A voltage [pu]; ``peak``: amplitude of the rated voltage over its rms value between lines."""
+        values, base = self._values(role)
+        channel = self.channels[role]
+        typical = float(np.nanmedian(np.abs(values)))
+        if not base and not 0.3 < typical < 1.6:
+            raise InputError(
+                f"{self.label}: {channel.column!r} says no unit, and is about {typical:.4g}; give it, as in --channel "
+                f"'{channel.changed(unit='kV')}'"
+            )
+        if base == "kV" and self.bases.kilovolt is None:
+            near = min(_VOLTAGES_KV, key=lambda kV: abs(math.log(kV * peak / max(typical, 1e-9))))
+            raise InputError(
+                f"{self.label}: {channel.column!r} is in kV; give the rated voltage between lines, as in --voltage "
+                f"'{near:g} kV', the nearest usual one"
+            )
+        return (
+            values / (self.bases.kilovolt * peak)
+            if base == "kV" and self.bases.kilovolt
+            else values
+        )
+
+    def _amperes(self, role: str, peak: float) -> Numbers:
+        """A current [pu of the rating]."""
+        values, base = self._values(role)
+        if base == "kA" and self.bases.kilovolt is None:
+            raise InputError(
+                f"{self.label}: {self.channels[role].column!r} is in kA; give the rated voltage between lines, as in "
+                "--voltage '400 kV'"
+            )
+        if base == "kA" and self.bases.kilovolt:
+            return values / (peak * self.bases.rating / (math.sqrt(3) * self.bases.kilovolt))
+        return values
+
+    def _watts(self, role: str) -> Numbers:
+        values, base = self._values(role)
+        channel = self.channels[role]
+        unit = "MW" if role == "p" else "Mvar"
+        if not base:
+            raise InputError(
+                f"{self.label}: {channel.column!r} says no unit; give it, as in --channel "
+                f"'{channel.changed(unit=unit)}', or in pu, which is of the rating"
+            )
+        return values if base == "pu" else values / self.bases.rating
+
+    def _angle(self) -> Numbers:
+        """[rad], without wraps; from the frequency where there is no angle."""
+        if "angle" not in self.channels:
+            self.ask(QuestionKind.FREQUENCY_ALONE)
+            return self._integrated()
+        angle, base = self._values("angle")
+        channel = self.channels["angle"]
+        raw = np.asarray(self.dataset[channel.column].values, dtype=float)
+        if not base:
+            raise InputError(
+                f"{self.label}: {channel.column!r} says no unit; give it: --channel '{channel.changed(unit='deg')}', "
+                f"or --channel '{channel.changed(unit='rad')}'"
+            )
+        self._ask_of_wraps(raw, angle, channel)
+        known = np.isfinite(angle)
+        angle = angle.copy()
+        angle[known] = np.unwrap(angle[known])
+        if "f" in self.channels:
+            self._compare_with_frequency(angle)
+        return np.asarray(angle)
+
+    def _ask_of_wraps(self, raw: Numbers, angle: Numbers, channel: RecordedChannel) -> None:
+        steps = np.diff(raw[np.isfinite(raw)])
+        largest = float(np.abs(steps).max(initial=0.0))
+        degrees = unit_of(channel, self.dataset) == "deg"
+        other = "rad" if degrees else "deg"
+        within = abs(largest / _TURN - 1) if degrees else abs(largest / 360 - 1)
+        beyond = not degrees and float(np.nanmax(np.abs(raw[:5]), initial=0.0)) > 1.01 * _TURN
+        if within < _NEAR_A_TURN or beyond:
+            self.ask(
+                QuestionKind.ANGLE_UNIT,
+                jump=largest,
+                remedy=channel.changed(unit=other),
+                unit=other,
+            )
+        held = float(np.mean(np.diff(angle[np.isfinite(angle)]) == 0))
+        moves = float(np.ptp(angle[np.isfinite(angle)])) > 1e-3
+        if moves and held > _HELD:
+            self.ask(QuestionKind.ANGLE_HELD, part=held)
+
+    def _hertz(self) -> Numbers:
+        values, base = self._values("f")
+        hertz = values * self.bases.rated_hz if base == "pu" else values
+        before = float(np.nanmedian(hertz[: max(5, len(hertz) // 10)]))
+        if abs(before - self.bases.rated_hz) > _FARTHEST_HZ:
+            self.ask(QuestionKind.RATED_FREQUENCY, seen=before, rated=self.bases.rated_hz)
+        return np.asarray(hertz)
+
+    def _integrated(self) -> Numbers:
+        deviation = self._hertz() - self.bases.rated_hz
+        middle = 0.5 * (deviation[1:] + deviation[:-1]) * np.diff(self.times)
+        return np.asarray(_TURN * np.concatenate([[0.0], np.nancumsum(middle)]))
+
+    def _compare_with_frequency(self, angle: Numbers) -> None:
+        """An angle that is not the integral of its own frequency has another unit, sign or frame."""
+        known = np.isfinite(angle)
+        line = np.vander(self.times[known], 2)
+        own, other = angle[known], self._integrated()[known]
+        own, other = (x - line @ np.linalg.lstsq(line, x, rcond=None)[0] for x in (own, other))
+        if np.ptp(other) < 1e-3 or np.ptp(own) < 1e-5:
+            return
+        factor = float(own @ other / (other @ other))
+        rest = float(np.std(own - factor * other) / np.std(own))
+        if not 0.5 < factor < 2 and rest < 0.5:
+            self.ask(
+                QuestionKind.ANGLE_AND_FREQUENCY,
+                factor=factor,
+                remedy=self.channels["angle"].changed(factor=round(1 / factor, 6)),
+            )
+
+
+def _evened(reading: _Reading, voltage: Complex, power: Complex) -> Recording:
+    """At even times; short gaps are bridged, and the samples there are not compared."""
+    times = reading.times
+    known = np.isfinite(voltage) & np.isfinite(power)
+    if known.sum() < _FEWEST:
+        raise InputError(
+            f"{reading.label}: {int(known.sum())} samples have voltage, P and Q together; at least {_FEWEST} are "
+            "compared"
+        )
+    first, last = np.flatnonzero(known)[[0, -1]]
+    part = slice(first, last + 1)
+    times, voltage, power, known = times[part], voltage[part], power[part], known[part]
+    interval = float(np.median(np.diff(times)))
+    even = times[0] + interval * np.arange(round((times[-1] - times[0]) / interval) + 1)
+    gaps = np.diff(times[known])
+    longest = float(gaps.max())
+    if longest > max(_LONGEST_GAP, 3 * interval):
+        at = float(times[known][int(gaps.argmax())])
+        raise InputError(
+            f"{reading.label}: samples are missing for {longest:.3g} s from {at:g} s on; what drives the device there "
+            "is not known. Give a part of the recording, with --start and --stop"
+        )
+    angle = np.unwrap(np.angle(voltage[known]))
+    source = times[known]
+    magnitude = np.interp(even, source, np.abs(voltage[known]))
+    v: Complex = np.asarray(magnitude * np.exp(1j * np.interp(even, source, angle)))
+    if reading.instantaneous:
+        v = np.interp(even, source, voltage[known])
+    s: Complex = np.interp(even, source, power[known])
+    nearest = np.clip(np.searchsorted(source, even), 1, len(source) - 1)
+    apart = np.minimum(np.abs(even - source[nearest - 1]), np.abs(source[nearest] - even))
+    good = apart <= 0.51 * interval
+    missing = int((~good).sum())
+    if missing:
+        reading.ask(QuestionKind.MISSING, count=missing, of=len(even), longest=longest)
+    recording = Recording(
+        label=reading.label,
+        begin=float(times[0]),
+        interval=interval,
+        voltage=v,
+        power=s,
+        good=good,
+        frame_hz=reading.bases.rated_hz,
+        instantaneous=reading.instantaneous,
+        average=reading.bases.averaging,
+        channels=reading.channels,
+        questions=tuple(reading.questions),
+    )
+    return _averaged(_at_port(recording, reading.bases.impedance))
+
+
+def _averaged(recording: Recording) -> Recording:
+    """With means of the power where samples are dense; such as come once a period are means already."""
+    if recording.ahead:
+        return recording
+    times = recording.times
+    power = averaged(times, recording.power, recording.average, times)
+    return replace(recording, power=power)
+
+
+def _at_port(recording: Recording, impedance: complex) -> Recording:
+    """The measured voltage and power moved from the meter to the port, which lies behind an impedance [pu]."""
+    if not impedance:
+        return recording
+    current = (recording.power / recording.voltage).conj()
+    voltage = recording.voltage + impedance * current
+    return replace(recording, voltage=voltage, power=np.asarray(voltage * current.conj()))
+
+
+def questions_of_level(before: Recording, v: float, s: complex, bases: PortBases) -> list[Question]:
+    """Questions about voltage and power before the event, each beside its likeliest cause."""
+    found = []
+    level = before.channels.get("v") or before.channels["va"]
+    if not _NORMAL[0] < v < _NORMAL[1]:
+        causes = {
+            1 / math.sqrt(3): ("it is measured to ground", math.sqrt(3)),
+            math.sqrt(3): ("the rated voltage is one to ground", 1 / math.sqrt(3)),
+            math.sqrt(2): ("it is a peak", 1 / math.sqrt(2)),
+            math.sqrt(2 / 3): ("it is the peak to ground", math.sqrt(1.5)),
+        }
+        near = min(causes, key=lambda ratio: abs(math.log(v / ratio)))
+        cause, factor = causes[near] if abs(v / near - 1) < 0.12 else ("", 1 / v)
+        figures = {"v": v, "cause": cause, "remedy": level.changed(factor=round(factor, 6))}
+        found.append(Question(QuestionKind.VOLTAGE_LEVEL, figures))
+    if abs(s) > _MOST_LOADED:
+        found.append(Question(QuestionKind.RATING, {"s": abs(s), "rating": bases.rating}))
+    return found

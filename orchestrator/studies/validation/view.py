@@ -1,0 +1,241 @@
+"""A validation as Python has it, as JSON, and as the tables of the first screen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from rich.console import RenderableType
+from rich.markup import escape
+
+from orchestrator.core.errors import counted
+from orchestrator.core.late import pd
+from orchestrator.output.report.notebook import page
+from orchestrator.output.report.tables import PlainTable, VerdictSentence, make_table
+from orchestrator.studies.validation.event import EventComparison
+from orchestrator.studies.validation.figures import ErrorFigures
+from orchestrator.studies.validation.limits import Criterion, LimitVerdict
+from orchestrator.studies.validation.questions import Question
+from orchestrator.studies.validation.study import ValidationResult
+from orchestrator.studies.validation.words import sentence
+
+_GOOD = {LimitVerdict.MET: True, LimitVerdict.NOT_MET: False, LimitVerdict.OPEN: None}
+_POWERS = ("p", "q")
+_SHOWN = 8  # criteria that are listed on the first screen
+
+
+class Validation:
+    """A device beside recordings of the plant. `validate` makes it.
+
+    Attributes
+    ----------
+    result
+        The comparisons, with measured and simulated signals, criteria and fit.
+    """
+
+    def __init__(self, result: ValidationResult) -> None:
+        self.result = result
+
+    @property
+    def verdict(self) -> str | None:
+        """``met``, ``not met`` or ``open``; None without limits."""
+        return None if self.result.verdict is None else str(self.result.verdict)
+
+    @property
+    def questions(self) -> list[str]:
+        """Doubts about the recordings, in sentences."""
+        return [
+            f"{one.event.recording.label}: {sentence(question)}"
+            for one in self.result.comparisons
+            for question in one.questions
+        ]
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as ``gfor validate --json`` prints, as JSON's types."""
+        device, limits = self.result.request.device, self.result.request.limits
+        events = [_event_json(one) for one in self.result.comparisons]
+        criteria = [one.as_json() for one in self.result.criteria]
+        return {
+            "device": device.name,
+            "model": device.description.model_name,
+            "rating_mva": device.rating,
+            "rated_hz": device.rated_hz,
+            "step_s": device.step_size,
+            "values": dict(device.values),
+            "events": events,
+            "verdict": self.verdict,
+            "limits": None if limits is None else limits.source,
+            "criteria": criteria,
+        }
+
+    def table(self) -> pd.DataFrame:
+        """One row for each recording, window and signal, with its errors [pu of the rating]."""
+        rows = [
+            {"recording": one.event.recording.label, "window": window, "signal": signal}
+            | figures.as_json()
+            for one in self.result.comparisons
+            for window, of in one.errors.items()
+            for signal, figures in of.items()
+        ]
+        return pd.DataFrame(rows)
+
+    def curves(self, number: int = 0) -> pd.DataFrame:
+        """Measured and simulated signals of one recording [pu of the rating], over its time [s]."""
+        one = self.result.comparisons[number]
+        columns = {f"{name}_measured": x for name, x in one.measured.items()}
+        columns |= {f"{name}_simulated": x for name, x in one.simulated.items()}
+        recording = one.event.recording
+        return pd.DataFrame(columns, index=pd.Index(recording.times + recording.begin, name="time"))
+
+    def __repr__(self) -> str:
+        many = counted(len(self.result.comparisons), "recording")
+        return f"<Validation of {self.result.request.device.name} by {many}: {self.verdict or 'no limits'}>"
+
+    def _repr_html_(self) -> str:
+        return page(repr(self).strip("<>"), self.questions, self.table())
+
+
+def _event_json(one: EventComparison) -> dict[str, Any]:
+    event, recording = one.event, one.event.recording
+    start = {
+        "v_pu": abs(event.start.voltage),
+        "p_pu": event.start.power.real,
+        "q_pu": event.start.power.imag,
+        "frequency_hz": recording.frame_hz,
+    }
+    channels = {role: channel.as_text() for role, channel in recording.channels.items()}
+    signals = {name: figures.as_json() for name, figures in one.signals.items()}
+    return {
+        "recording": recording.label,
+        "sha256": recording.sha256,
+        "samples": len(recording.voltage),
+        "interval_s": recording.interval,
+        "channels": channels,
+        "start": start,
+        "settled_after_s": one.played.settled_after,
+        "windows_found": not event.windows.chosen,
+        "windows": [_window_json(one, name) for name in one.errors],
+        "signals": signals,
+        "questions": [_question_json(question) for question in one.questions],
+    }
+
+
+def _window_json(one: EventComparison, name: str) -> dict[str, Any]:
+    low, high = one.event.windows.parts[name]
+    begin = one.event.recording.begin
+    figures = {signal: found.as_json() for signal, found in one.errors[name].items()}
+    return {"name": name, "begin_s": begin + low, "end_s": begin + high} | figures
+
+
+def _question_json(question: Question) -> dict[str, Any]:
+    return {
+        "kind": str(question.kind),
+        "keeps_open": question.keeps_open,
+        "text": sentence(question),
+        "figures": dict(question.figures),
+    }
+
+
+def parts(found: Validation) -> Iterator[RenderableType]:
+    """The first screen: whether it is met, the worst error of each event, the windows, and what is asked."""
+    result = found.result
+    yield _answer(found)
+    yield _events_table(result)
+    for one in result.comparisons:
+        yield _windows_table(one)
+    if result.criteria:
+        yield _criteria_table(result.criteria)
+
+
+def _answer(found: Validation) -> str:
+    result = found.result
+    worst = max((_worst(one) for one in result.comparisons), key=lambda one: one[2].max_error)
+    label, place, figures = worst
+    says = (
+        f"the largest error is {figures.max_error:.3g} pu, of {place[1].upper()} {place[0]} the event of {label}, at "
+        f"{figures.max_at:.4g} s"
+    )
+    if result.verdict is None:
+        return escape(f"{result.request.device.name}: {says}; without --limits there is no verdict")
+    word = {"met": "MET", "not met": "NOT MET", "open": "OPEN"}[str(result.verdict)]
+    return VerdictSentence(_GOOD[result.verdict], word, says).markup(result.request.device.name)
+
+
+def _worst(one: EventComparison) -> tuple[str, tuple[str, str], ErrorFigures]:
+    found = [
+        ((window, signal), figures)
+        for window, of in one.errors.items()
+        for signal, figures in of.items()
+        if signal in _POWERS
+    ]
+    place, figures = max(found, key=lambda pair: pair[1].max_error)
+    return one.event.recording.label, place, figures
+
+
+def _events_table(result: ValidationResult) -> PlainTable:
+    columns = (
+        "Recording",
+        "Event [s]",
+        "P, Q before [pu]",
+        "Worst error [pu]",
+        "at [s]",
+        "Rings",
+        "Model rings",
+    )
+    rows = []
+    for one in result.comparisons:
+        label, place, figures = _worst(one)
+        windows, begin, power = one.event.windows, one.event.recording.begin, one.event.start.power
+        modes = one.signals["p"].modes
+        rows.append(
+            (
+                label,
+                f"{begin + windows.begin:.4g} to {begin + windows.end:.4g}",
+                f"{power.real:.3f}, {power.imag:.3f}",
+                f"{figures.max_error:.4f} of {place[1].upper()}",
+                f"{figures.max_at:.4g}",
+                *(
+                    f"{m.frequency_hz:.3g} Hz, {m.damping_percent:.3g} %" if m else "–"
+                    for m in modes
+                ),
+            )
+        )
+    return make_table("Events", *columns, rows=rows)
+
+
+def _windows_table(one: EventComparison) -> PlainTable:
+    columns: tuple[str, ...] = ("Window", "from [s]", "to [s]")
+    columns += tuple(
+        f"{s.upper()} {what}" for s in _POWERS for what in ("largest", "mean", "mean |e|")
+    )
+    begin, rows = one.event.recording.begin, []
+    for name, of in one.errors.items():
+        low, high = one.event.windows.parts[name]
+        figures = [
+            f"{value:.4f}"
+            for signal in _POWERS
+            for value in (of[signal].max_error, of[signal].mean_error, of[signal].mean_abs_error)
+        ]
+        rows.append((name, f"{begin + low:.4g}", f"{begin + high:.4g}", *figures))
+    title = (
+        f"{one.event.recording.label}: simulated less measured [pu of {one.device.rating:g} MVA]"
+    )
+    return make_table(title, *columns, rows=rows)
+
+
+def _criteria_table(criteria: list[Criterion] | Any) -> PlainTable:
+    order = {LimitVerdict.NOT_MET: 0, LimitVerdict.OPEN: 1, LimitVerdict.MET: 2}
+    worst = sorted(criteria, key=lambda one: (order[one.verdict], -(one.value or 0) / one.limit))
+    rows = [
+        (
+            one.recording,
+            one.name,
+            "–" if one.value is None else f"{one.value:.4g} {one.unit}",
+            f"{one.limit:g} {one.unit}",
+            str(one.verdict),
+        )
+        for one in worst[:_SHOWN]
+    ]
+    met = sum(one.verdict is LimitVerdict.MET for one in criteria)
+    title = f"Limits: {met} of {len(criteria)} met"
+    return make_table(title, "Recording", "Figure", "Value", "Limit", "Verdict", rows=rows, left=2)

@@ -1,0 +1,130 @@
+"""When the event of a recording is: windows before, during and after it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestrator.core.arrays import Complex, Numbers
+from orchestrator.core.errors import InputError
+from orchestrator.studies.validation.record import Mask, Recording
+
+_LAG = 0.02  # time [s] over which a change of the voltage counts as abrupt: a period
+_LEAST = 0.002  # smallest change of the voltage [pu] over that time which is an event
+_ABOVE = 4.0  # times the largest change in the first part, from which on it is an event
+_FIRST = 0.1  # part of the recording that is looked at for what is usual before the event
+_LONGEST_FIRST = 1.0  # [s]
+_BACK = 0.5  # time [s] for which an event's slow begin is looked for before it is abrupt
+_STARTS = 5.0  # times the scatter before, from which on a deviation is the event's begin
+_LEAST_STARTS = 5e-4  # smallest such deviation [pu]
+_EXCURSION = 0.1  # deviation of the magnitude [pu] for which a dip or swell lasts
+_LONGEST_EVENT = 3.0  # dips last no longer [s]; what comes later is another one
+_SHORTEST = 0.1  # an event without a dip lasts so long [s], for its window
+_LASTS = 0.3  # part of the largest change over the lag, from which on a change is still the event
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Begin and end of an event, in seconds from the first sample; ``chosen``: whether the user gave them."""
+
+    begin: float
+    end: float
+    length: float
+    chosen: bool = False
+    seen: bool = True  # whether the voltage shows an event
+
+    @property
+    def parts(self) -> dict[str, tuple[float, float]]:
+        return {
+            "before": (0.0, self.begin),
+            "during": (self.begin, self.end),
+            "after": (self.end, self.length),
+        }
+
+    def part(self, name: str, times: Numbers) -> Mask:
+        """Return which times are in a window; the sample at a border belongs to the window that ends there."""
+        low, high = self.parts[name]
+        small = 1e-9
+        above = times > low + small if low > 0 else times >= low
+        return np.asarray(above & (times <= high + small))
+
+
+def find_windows(recording: Recording) -> Windows:
+    """By the first abrupt change of the voltage, or of the power where the voltage has none."""
+    first = _first(recording)
+    for still in (_without_slope(recording.voltage, first), recording.power):
+        found = _event(recording, still, first)
+        if found is not None:
+            return Windows(*found, recording.length)
+    third = recording.length / 3
+    return Windows(third, 2 * third, recording.length, seen=False)
+
+
+def given_windows(recording: Recording, begin: float, end: float) -> Windows:
+    """Windows that the user gives, in the recording's own clock [s]."""
+    low, high = begin - recording.begin, end - recording.begin
+    if not 0 < low < high < recording.length:
+        last = recording.begin + recording.length
+        raise InputError(
+            f"--event {begin:g}:{end:g}: {recording.label} lasts from {recording.begin:g} to {last:g} s; give begin "
+            "and end of the event within it"
+        )
+    return Windows(low, high, recording.length, chosen=True)
+
+
+def _first(recording: Recording) -> int:
+    """Samples of the first part, which is taken to be before any event."""
+    return max(5, round(min(_LONGEST_FIRST, _FIRST * recording.length) / recording.interval))
+
+
+def _event(recording: Recording, still: Complex, first: int) -> tuple[float, float] | None:
+    interval = recording.interval
+    lag = max(1, round(_LAG / interval))
+    if len(still) < first + 2 * lag:
+        return None
+    change = np.abs(still[lag:] - still[:-lag])
+    usual = float(change[: max(1, first - lag)].max())
+    abrupt = np.flatnonzero(change > max(_ABOVE * usual, _LEAST))
+    if not len(abrupt):
+        return None
+    earliest = max(0, int(abrupt[0]) + lag - round(_BACK / interval))
+    stop = int(abrupt[0]) + lag
+    begin = _begin(still, earliest, stop)
+    end = _end(still, begin, change, lag, interval)
+    return interval * begin, interval * min(end, len(still) - 2)
+
+
+def _without_slope(signal: Complex, first: int) -> Complex:
+    """The signal with the rotation of its first part taken out, as a frequency off its rated value gives it."""
+    angle = np.unwrap(np.angle(signal[:first]))
+    slope = np.polyfit(np.arange(first), angle, 1)[0] if np.abs(signal[:first]).min() > 0.1 else 0.0
+    turns = slope if abs(slope) > 1e-9 else 0.0
+    return np.asarray(signal * np.exp(-1j * turns * np.arange(len(signal))))
+
+
+def _begin(still: Complex, earliest: int, stop: int) -> int:
+    """The last sample that is as before, walking back from an abrupt change."""
+    before = still[: max(earliest, 3)]
+    rest, scatter = (
+        before[-min(len(before), 200) :].mean(),
+        float(np.abs(before - before.mean()).std()),
+    )
+    least = max(_STARTS * scatter, _LEAST_STARTS)
+    for k in range(stop, earliest, -1):
+        if abs(still[k] - rest) <= least:
+            return k
+    return max(earliest, 1)
+
+
+def _end(still: Complex, begin: int, change: Numbers, lag: int, interval: float) -> int:
+    magnitude = np.abs(still)
+    usual = float(magnitude[: begin + 1].mean())
+    within = slice(begin + 1, begin + 1 + round(_LONGEST_EVENT / interval))
+    away = np.flatnonzero(np.abs(magnitude[within] - usual) > _EXCURSION)
+    if len(away):
+        return begin + 2 + int(away[-1])
+    near = change[begin : begin + round(_LONGEST_EVENT / interval)]
+    lasting = np.flatnonzero(near > _LASTS * near.max(initial=0.0))
+    last = int(lasting[-1]) + lag if len(lasting) else 0
+    return begin + max(last if last * interval < 1.0 else 0, round(_SHORTEST / interval), 1)

@@ -1,0 +1,178 @@
+"""Sentences of a validation: questions, and the one that answers what was asked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from orchestrator.studies.validation.questions import Question, QuestionKind
+
+Figures = Mapping[str, Any]
+
+
+def sentence(question: Question) -> str:
+    """A question with its figures and what to type."""
+    return _SENTENCES[question.kind](question.figures)
+
+
+def _voltage_level(x: Figures) -> str:
+    cause = f"{x['cause']}? Then give" if x["cause"] else "is the rated voltage right? Else give"
+    return f"before the event the voltage is {x['v']:.4g} pu: {cause} --channel '{x['remedy']}'"
+
+
+def _rating(x: Figures) -> str:
+    return (
+        f"before the event the plant feeds {x['s']:.3g} pu of its rating of {x['rating']:g} MVA: is the rating that of "
+        "the whole plant? Give it with --set S_n=…, or the power's unit with --channel"
+    )
+
+
+def _rated_frequency(x: Figures) -> str:
+    return (
+        f"before the event the frequency is {x['seen']:.4g} Hz, and the device's is {x['rated']:g} Hz: give its rated "
+        "frequency, as in --set f_n=60, or the channel's unit"
+    )
+
+
+def _angle_unit(x: Figures) -> str:
+    return (
+        f"the angle jumps by {x['jump']:.4g} from one sample to the next, or begins beyond a turn: it looks like "
+        f"{x['unit']}. Give --channel '{x['remedy']}' if it is"
+    )
+
+
+def _angle_held(x: Figures) -> str:
+    return (
+        f"{x['part']:.0%} of the angle's samples are that of the sample before: the recorder holds it, and the device "
+        "sees steps that the plant did not. Give a recording with its own samples"
+    )
+
+
+def _angle_and_frequency(x: Figures) -> str:
+    return (
+        f"the angle turns {x['factor']:.4g} times as fast as the recording's frequency says: unit or sign of one is "
+        f"wrong. If it is the angle's, give --channel '{x['remedy']}'"
+    )
+
+
+def _frequency_alone(x: Figures) -> str:
+    return (
+        "there is no angle, and the voltage's is the integral of the frequency, which recorders filter for 0.1 s and "
+        "longer: steps of the angle are missing. Give the angle where it was recorded"
+    )
+
+
+def _no_steady_state(x: Figures) -> str:
+    return (
+        f"P or Q moves by {x['moves']:.3g} pu before the event: the device starts at the mean, and the event began "
+        "outside of steady state. Give an earlier or longer part, or where the event is, with --event"
+    )
+
+
+def _no_event(x: Figures) -> str:
+    return (
+        f"neither voltage nor power shows an event in {x['last']:.4g} s: the windows are thirds. Give begin and end of "
+        "one, as in --event 2.0:2.15"
+    )
+
+
+def _slow_samples(x: Figures) -> str:
+    return (
+        f"a sample every {1000 * x['interval']:.4g} ms holds nothing faster than {x['fastest']:.3g} Hz: controls that "
+        "act faster are neither confirmed nor refuted by it"
+    )
+
+
+def _missing(x: Figures) -> str:
+    return (
+        f"{x['count']} of {x['of']} samples are missing, for up to {x['longest']:.3g} s: they are bridged in the "
+        "voltage and not compared"
+    )
+
+
+def _start(x: Figures) -> str:
+    return (
+        f"at rest before the event the device feeds P = {x['p']:.4g}, Q = {x['q']:.4g} pu, and the plant fed "
+        f"{x['p_measured']:.4g}, {x['q_measured']:.4g}: it does not start where it is told. Does its binding have "
+        "P_0, Q_0, v_0 and theta_0 (gfor fmu bind), and its rating?"
+    )
+
+
+def _read_otherwise(x: Figures) -> str:
+    given = " ".join(f"--channel '{one}'" for one in x["remedy"])
+    return (
+        f"{x['reading']}? Read so, the error falls from {x['error']:.3g} to {x['left']:.3g} pu (rms). If it is so, "
+        f"give {given}"
+    )
+
+
+def _clocks(x: Figures) -> str:
+    late = "after" if x["delay"] > 0 else "before"
+    both = " by the same time" if x["together"] > 1 else ""
+    return (
+        f"P and Q come {1000 * abs(x['delay']):.3g} ms {late} the model's{both}, and without that the error falls from "
+        f"{x['error']:.3g} to {x['left']:.3g} pu (rms): do the clocks of voltage and power differ, or has the plant a "
+        "delay that the model lacks? gfor shifts nothing"
+    )
+
+
+def _setpoint(x: Figures) -> str:
+    return (
+        f"at the end {x['signal'].upper()} stays {x['offset']:+.3g} pu beside the model's, though the voltage is as "
+        "before the event: did a setpoint change, or does the plant control otherwise?"
+    )
+
+
+def _too_good(x: Figures) -> str:
+    return (
+        f"the model agrees to {x['error']:.1g} pu (median) with a recording that scatters by {x['scatter']:.1g} pu: "
+        "was it made by this model? It proves nothing of a plant then"
+    )
+
+
+def _no_noise(x: Figures) -> str:
+    return (
+        f"before the event P and Q scatter by {x['scatter']:.1g} pu, which is less than an instrument's noise: the "
+        "recording is a simulation"
+    )
+
+
+def _noise(x: Figures) -> str:
+    return (
+        f"the recording's own scatter is {x['scatter']:.2g} pu, more than the largest error allowed: it allows no "
+        "verdict"
+    )
+
+
+def _short_before(x: Figures) -> str:
+    return (
+        f"{x['length']:.3g} s before the event show neither its operating point nor its noise well: figures of noise "
+        "are uncertain"
+    )
+
+
+_SENTENCES: Mapping[QuestionKind, Callable[[Figures], str]] = {
+    QuestionKind.VOLTAGE_LEVEL: _voltage_level,
+    QuestionKind.RATING: _rating,
+    QuestionKind.RATED_FREQUENCY: _rated_frequency,
+    QuestionKind.ANGLE_UNIT: _angle_unit,
+    QuestionKind.ANGLE_HELD: _angle_held,
+    QuestionKind.ANGLE_AND_FREQUENCY: _angle_and_frequency,
+    QuestionKind.FREQUENCY_ALONE: _frequency_alone,
+    QuestionKind.NO_STEADY_STATE: _no_steady_state,
+    QuestionKind.NO_EVENT: _no_event,
+    QuestionKind.SLOW_SAMPLES: _slow_samples,
+    QuestionKind.MISSING: _missing,
+    QuestionKind.START: _start,
+    QuestionKind.READ_OTHERWISE: _read_otherwise,
+    QuestionKind.CLOCKS: _clocks,
+    QuestionKind.SETPOINT: _setpoint,
+    QuestionKind.TOO_GOOD: _too_good,
+    QuestionKind.NOISE: _noise,
+    QuestionKind.NO_NOISE: _no_noise,
+    QuestionKind.SHORT_BEFORE: _short_before,
+}
+
+
+def sentences(questions: Sequence[Question]) -> list[str]:
+    return [sentence(one) for one in questions]

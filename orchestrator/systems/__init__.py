@@ -1,0 +1,1 @@
+"""Coupled systems: devices with their connections, and SSP archives of them."""

@@ -1,0 +1,150 @@
+"""Recording at longer intervals without aliases: every step is read and goes through a low-pass filter."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.systems.coupling.observers import ObservedRun
+from orchestrator.systems.coupling.recorder import Recorder, RowSink
+
+PASS_BAND = 0.4  # frequency up to which the filter lets all pass [1/interval]
+STOP_BAND = 0.5  # frequency from which on it takes all away [1/interval]: half the sampling rate
+_HALF = 25  # the filter reaches so many intervals to both sides
+_BETA = 7.857  # of the Kaiser window: 80 dB
+
+FILTER = (
+    f"symmetric FIR filter over all steps of {_HALF} intervals to both sides, Kaiser window with beta = {_BETA:g}; "
+    f"passes up to {PASS_BAND:g}/interval, stops from {STOP_BAND:g}/interval on (80 dB), no delay"
+)
+"""What a row is made by, in words."""
+
+# steps whose values are kept until they are added to the rows that they are part of
+_MOST_READ = 1024
+
+
+class FilteredRecorder(Recorder):
+    """Records a weighted mean of all steps around each row, by a symmetric filter of finite length.
+
+    Its delay is 0: a row at t is made of what was within 25 intervals before and after t. Before the start and after
+    the end the first and the last values are taken to hold. What jumps shows beforehand, too, as small ripples.
+
+    ``keep``: each ``keep``-th row stays in memory."""
+
+    def __init__(
+        self, names: Sequence[str], interval: int, *, sink: RowSink | None = None, keep: int = 1
+    ) -> None:
+        super().__init__(names, 1, sink=sink, keep=keep)
+        self.interval = interval
+        self._weights, self._sums_of_weights = np.empty(0), np.empty(0)
+        self._input = np.empty((0, 0))
+        self._inputs_before = self._inputs = self._next = 0
+        self._first_values = self._last_values = np.empty(0)
+        self._pending: dict[int, NDArray[np.float64]] = {}
+        self._pending_times: dict[int, float] = {}
+
+    def begin(self, run: ObservedRun, stop_index: int) -> None:
+        resumed = self._position
+        super().begin(run, stop_index)
+        from scipy.signal import firwin  # noqa: PLC0415 - a quarter of a second that few need
+
+        self._half = _HALF * self.interval
+        cutoff = (PASS_BAND + STOP_BAND) / self.interval  # in parts of half the sampling frequency
+        count = 2 * self._half + 1
+        self._weights = (
+            firwin(count, cutoff, window=("kaiser", _BETA))
+            if self.interval > 1
+            else np.zeros(count)
+        )
+        if self.interval == 1:
+            self._weights[self._half] = 1.0
+        self._sums_of_weights = np.concatenate([[0.0], np.cumsum(self._weights)])
+        self._input = np.empty((min(_MOST_READ, max(1, self.interval)), len(self.names)))
+        self._inputs_before = self._inputs = self._next = 0
+        self._pending, self._pending_times = {}, {}
+        if resumed is not None:
+            self._restore(resumed)
+
+    def observe(self, run: ObservedRun) -> None:
+        if run.index == self._last_index:
+            return  # taken up again where this step was read already
+        self._last_index = run.index
+        number = self._inputs_before + self._inputs
+        row = self._input[self._inputs]
+        self._read(row)
+        if number == 0:
+            self._first_values = row.copy()
+        if number % self.interval == 0:
+            self._pending_times[number // self.interval] = run.time
+        self._inputs += 1
+        if self._inputs == len(self._input):
+            self._take_in()
+
+    def _take_in(self) -> None:
+        """Add what was read to the rows that it is part of, and record those that are complete."""
+        first, values = self._inputs_before, self._input[: self._inputs]
+        after = first + len(values)
+        if not len(values):
+            return
+        for number in range(self._next, (after - 1 + self._half) // self.interval + 1):
+            begin = number * self.interval - self._half
+            if number not in self._pending:
+                self._pending[number] = self._first_values * self._sums_of_weights[max(0, -begin)]
+            low, high = max(first, begin), min(after, begin + len(self._weights))
+            if low < high:
+                self._pending[number] += (
+                    self._weights[low - begin : high - begin] @ values[low - first : high - first]
+                )
+        self._last_values = values[-1].copy()
+        self._inputs_before, self._inputs = after, 0
+        while self._next * self.interval + self._half < after:
+            self._record(self._pending.pop(self._next))
+
+    def _record(self, values: NDArray[np.float64]) -> None:
+        self._block[self._filled] = values
+        time = self._pending_times.pop(self._next)
+        self._next += 1
+        self._add(time)
+
+    def end(self, run: ObservedRun) -> None:
+        """Record the last rows, as if the last values went on."""
+        self._take_in()
+        for number in sorted(self._pending_times):
+            missing = number * self.interval + self._half + 1 - self._inputs_before
+            self._record(
+                self._pending.pop(number) + self._last_values * self._sums_of_weights[missing]
+            )
+        super().end(run)
+
+    def position(self) -> dict[str, Any]:
+        """As `Recorder.position`, with the rows that are not complete."""
+        numbers = sorted(self._pending)
+        sums = np.array([self._pending[n] for n in numbers]).reshape(len(numbers), len(self.names))
+        times = np.array([[n, t] for n, t in sorted(self._pending_times.items())]).reshape(-1, 2)
+        return super().position() | {
+            "filter_numbers": np.array(numbers),
+            "filter_sums": sums,
+            "filter_times": times,
+            "filter_next": self._next,
+            "filter_read": self._inputs_before,
+            "filter_input": self._input[: self._inputs].copy(),
+            "filter_first": self._first_values.copy(),
+            "filter_last": self._last_values.copy(),
+        }
+
+    def _restore(self, position: Mapping[str, Any]) -> None:
+        numbers, sums = (
+            np.asarray(position["filter_numbers"]).tolist(),
+            np.asarray(position["filter_sums"]),
+        )
+        self._pending = {int(n): row.copy() for n, row in zip(numbers, sums, strict=True)}
+        self._pending_times = {
+            int(n): float(t) for n, t in np.asarray(position["filter_times"]).reshape(-1, 2)
+        }
+        self._next, self._inputs_before = int(position["filter_next"]), int(position["filter_read"])
+        values = np.asarray(position["filter_input"])
+        self._inputs = len(values)
+        self._input[: self._inputs] = values
+        self._first_values = np.asarray(position["filter_first"])
+        self._last_values = np.asarray(position["filter_last"])

@@ -1,5 +1,0 @@
-"""Fixtures for bindings."""
-
-from tests.acceptance.conftest import gallery
-
-__all__ = ["gallery"]

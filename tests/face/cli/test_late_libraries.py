@@ -1,0 +1,26 @@
+"""Libraries that take a second to import are left out by commands that do without them."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+HEAVY = {"dask", "h5py", "matplotlib", "pandapower", "pandas", "pint", "xarray"}
+
+
+@pytest.mark.parametrize("case", ["two_area", "ieee39"])
+def test_modes_from_kept_fmus_import_no_heavy_library(case, gfor):
+    """Neither does it build a model or read a network anew."""
+    code, _, error = gfor("modes", case, "--scenario", "base", "--json")
+    assert code == 0, error
+    script = (
+        "import sys\nfrom orchestrator.face.cli import main\n"
+        f"assert main(['modes', {case!r}, '--scenario', 'base']) == 0\n"
+        f"found = {HEAVY!r} & set(sys.modules)\nassert not found, found"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False, cwd=ROOT
+    )
+    assert done.returncode == 0, done.stderr

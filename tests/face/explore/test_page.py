@@ -1,0 +1,420 @@
+"""The page of `gfor explore` in a real browser."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import threading
+from contextlib import contextmanager
+
+import pytest
+
+import orchestrator as gfor
+from orchestrator.face.cli import main
+from orchestrator.face.explore.opened import opened as opened_folder
+from orchestrator.face.explore.server import Explorer
+from orchestrator.face.explore.worker import Desk
+from tests.studies.certification.test_issued import issued
+
+__all__ = ["issued"]
+
+pytestmark = pytest.mark.slow
+
+CHROMIUM = (
+    shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+)
+OPTIONS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-quic",
+]
+PATIENCE = 60_000  # [ms]
+needs_chromium = pytest.mark.skipif(
+    CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)"
+)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    if CHROMIUM is None:
+        pytest.skip("needs chromium (Debian: apt-get install chromium)")
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as tools:
+        found = tools.chromium.launch(
+            executable_path=CHROMIUM, args=[*OPTIONS, "--js-flags=--expose-gc"]
+        )
+        yield found
+        found.close()
+
+
+@contextmanager
+def served(case, scenario, values=None):
+    beginning = {"case": case, "scenario": scenario, "values": values or {}, "range": [0.1, 2.0]}
+    explorer = Explorer(case, beginning)
+    threading.Thread(target=explorer.serve, daemon=True).start()
+    yield explorer
+    explorer.close()
+
+
+@pytest.fixture(scope="module")
+def two_area():
+    with served("two_area", "pod_p") as explorer:
+        yield explorer
+
+
+@contextmanager
+def opened(browser, address):
+    """The page, once it has painted exact modes and knows the parameters; no error may be said on the console."""
+    context = browser.new_context(viewport={"width": 1440, "height": 900}, accept_downloads=True)
+    view = context.new_page()
+    view.set_default_timeout(PATIENCE)
+    errors = []
+    view.on("pageerror", lambda error: errors.append(str(error)))
+    view.on(
+        "console", lambda message: errors.append(message.text) if message.type == "error" else None
+    )
+    view.goto(address)
+    computed(view, 1)
+    view.locator("#signal-names option").first.wait_for(state="attached")
+    yield view
+    assert errors == []
+    context.close()
+
+
+@pytest.fixture
+def view(browser, two_area):
+    with opened(browser, two_area.address) as found:
+        yield found
+
+
+def computed(view, count):
+    """Wait until so many exact maps were painted."""
+    view.wait_for_selector(f'body[data-exact-count="{count}"]', state="attached")
+
+
+def add(view, name):
+    view.locator("#search").fill(name)
+    view.locator("#found button").first.click()
+    return view.locator(f'.control[data-name="{name}"]')
+
+
+def of_command(view, capsys):
+    """The modes that the copied command prints."""
+    view.locator("#copy").click()
+    words = view.locator('pre[data-kind="command"]').inner_text().split()
+    view.locator("#dialog p button").click()
+    assert main([*words[1:], "--json"]) == 0
+    return json.loads(capsys.readouterr().out)["scenarios"][0]
+
+
+def rows(view):
+    return [row.locator("td").all_inner_texts() for row in view.locator("#table tbody tr").all()]
+
+
+def shown(modes):
+    return [
+        [f"{m['frequency_hz']:.4f}", f"{m['damping_percent']:.2f}".replace("-", "−")] for m in modes
+    ]
+
+
+@needs_chromium
+def test_map_table_and_verdict_are_those_of_the_command(view, capsys):
+    content = of_command(view, capsys)
+    least = min(content["modes"], key=lambda m: m["damping_percent"])
+    said = f"{least['frequency_hz']:.3f} Hz, {least['damping_percent']:.2f} %"
+    headline = "SG + GFOR POD-P: stable (small-signal); least damped from 0.1 to 2 Hz: "
+    assert view.locator("#verdict").inner_text().startswith(headline)
+    assert said in view.locator("#verdict").inner_text()
+    assert content["stability"]["sentence"] in view.locator("#outside span").inner_text()
+    assert [row[:2] for row in rows(view)] == shown(content["modes"])
+    assert view.locator("#map .mark").count() == len(content["modes"])
+    assert view.locator("#map text", has_text="electromechanical").count() == 1
+    assert "outside 0.1 to 2 Hz" in view.locator("#outside span").inner_text()
+    mark = view.locator("#map .mark").first
+    mark.hover(force=True)
+    assert "hover" in view.locator("#table tbody tr").first.get_attribute("class")
+    mark.click(force=True)
+    assert "sg1 against sg2" in view.locator("#chosen").inner_text()
+    assert view.locator("#chosen .shape .arrow").count() == 2
+    assert view.locator("#chosen meter").count() >= 5
+    count = len(rows(view))
+    view.locator("#wider").click()
+    computed(view, 2)
+    assert len(rows(view)) > count
+
+
+@needs_chromium
+def test_a_drag_estimates_and_its_release_gives_the_figures_of_the_copied_command(view, capsys):
+    control = add(view, "gfor.pod_p.K")
+    slider = control.locator('input[type="range"]')
+    slider.focus()
+    view.wait_for_timeout(200)
+    view.locator("#work", has_text="∂λ/∂p").wait_for(state="detached")
+    box = slider.bounding_box()
+    middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    view.mouse.move(*middle)
+    view.mouse.down()
+    for step in range(1, 6):
+        view.mouse.move(middle[0] - 2 * step, middle[1])
+        view.wait_for_timeout(60)
+    view.wait_for_selector("#map .estimate", state="attached")
+    assert "estimate at gfor.pod_p.K" in view.locator("#verdict").inner_text()
+    assert rows(view)[0][0].startswith("≈")
+    guess = float(rows(view)[0][1].removeprefix("≈ "))
+    view.mouse.up()
+    computed(view, 2)
+    assert view.locator("#map .estimate").count() == 0
+    assert view.locator("#map .trail").count() >= 1
+    content = of_command(view, capsys)
+    assert [row[:2] for row in rows(view)] == shown(content["modes"])
+    assert guess == pytest.approx(content["modes"][0]["damping_percent"], abs=0.5)
+    assert view.evaluate("seen.modes") == content["modes"]  # to the last digit
+
+
+@needs_chromium
+def test_keys_do_all_that_the_pointer_does(view):
+    control = add(view, "gfor.pod_p.K")
+    control.locator('input[type="text"]').press("Tab")
+    view.locator("#map .mark").first.focus()
+    view.keyboard.press("ArrowRight")
+    view.keyboard.press("Enter")
+    assert view.locator("#map .mark.chosen").get_attribute("data-mode") == "1"
+    view.locator("#tab-map").focus()
+    view.keyboard.press("ArrowRight")
+    assert view.locator("#network").is_visible()
+    view.locator('.thing[data-thing="line L"]').focus()
+    view.keyboard.press("Enter")
+    assert "line L" in view.locator("#element").inner_text()
+
+
+@needs_chromium
+def test_a_value_that_cannot_be_is_refused_at_its_control(view, capsys):
+    control = add(view, "gfor.pod_p.K")
+    control.locator('input[type="text"]').fill("-5")
+    control.locator('input[type="text"]').press("Enter")
+    control.locator(".error", has_text="gfor.pod_p.K").wait_for()
+    assert main(["modes", "two_area", "--scenario", "pod_p", "--set", "gfor.pod_p.K=-5"]) == 2
+    said = capsys.readouterr().err.removeprefix("error: ")
+    assert control.locator(".error").inner_text().split() == said.split()
+
+
+@needs_chromium
+def test_a_pinned_state_stays_beside_the_next_ones_and_the_address_holds_all(view, browser):
+    view.locator("#pin").click()
+    control = add(view, "grid.X_L")
+    control.locator('input[type="text"]').fill("0.3")
+    control.locator('input[type="text"]').press("Enter")
+    computed(view, 2)
+    assert view.locator("#map .pinned").count() >= 3
+    assert "Δf from A" in view.locator("#table thead").inner_text()
+    before = rows(view)
+    assert re.fullmatch(r"−?\d+\.\d+", before[0][2])
+    with opened(browser, view.url) as other:  # a colleague's
+        assert rows(other) == before
+        assert other.locator('.control[data-name="grid.X_L"]').count() == 1
+
+
+@needs_chromium
+def test_a_click_on_the_diagram_takes_a_unit_out_and_makes_a_line_longer(view, capsys):
+    view.locator("#tab-network").click()
+    assert view.locator(".bus").count() == 2
+    assert "100 MW" in view.locator("#network").text_content()
+    view.locator('.thing[data-thing="line L"] .hit').click(force=True)
+    slider = view.locator('#element input[type="range"]')
+    slider.focus()
+    for _ in range(5):
+        slider.press("ArrowRight")
+    view.locator("#work", has_text="drawn").wait_for()
+    view.wait_for_timeout(500)
+    content = of_command(view, capsys)
+    assert view.evaluate("state.values['grid.X_L']") > 0.1
+    assert view.evaluate("seen.modes") == content["modes"]
+
+
+@needs_chromium
+def test_responses_are_drawn_and_a_run_is_streamed(browser, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = gfor.load("infinite_bus").file.text
+    (tmp_path / "case.toml").write_text(
+        re.sub(r'stop_time = "[^"]*"', 'stop_time = "1.5 s"', text), encoding="utf-8"
+    )
+    with (
+        served(str(tmp_path / "case.toml"), "load_step") as explorer,
+        opened(browser, explorer.address) as view,
+    ):
+        view.locator("#tab-response").click()
+        view.locator("#linear").click()
+        view.locator("#plots .curve.linear").first.wait_for(state="attached")
+        view.locator("#run").click()
+        view.locator("#run-said", has_text="kept in").wait_for()
+        assert view.locator("#plots .curve:not(.linear)").count() >= 1
+        assert list((tmp_path / "results").rglob("trajectory.nc"))
+
+
+@needs_chromium
+def test_a_worker_that_dies_ends_its_computation_and_not_the_page(view, two_area):
+    os.kill(two_area.computing["modes"]._process.pid, signal.SIGKILL)
+    two_area.computing["modes"]._process.wait()
+    view.locator("#scenario").select_option("gfor")
+    computed(view, 2)  # it was seen to be gone, and begun anew
+    control = add(view, "grid.X_L")
+    os.kill(two_area.computing["modes"]._process.pid, signal.SIGSTOP)
+    control.locator('input[type="text"]').fill("0.2")
+    control.locator('input[type="text"]').press("Enter")
+    view.locator("#cancel").click()
+    control.locator(".error", has_text="cancelled").wait_for()
+    control.locator('input[type="text"]').fill("0.22")
+    control.locator('input[type="text"]').press("Enter")
+    computed(view, 3)
+
+
+HOSTILE = '"><img src=x onerror=document.title=1><script>document.title=2</script>'
+
+
+@needs_chromium
+def test_names_are_never_markup(browser, tmp_path):
+    text = gfor.load("infinite_bus").file.text
+    quoted = json.dumps(HOSTILE)
+    text = re.sub(r"^title = .*$", lambda _: f"title = {quoted}", text, flags=re.MULTILINE)
+    assert text.count(quoted) >= 2
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
+    with (
+        served(str(tmp_path / "case.toml"), "dip") as explorer,
+        opened(browser, explorer.address) as view,
+    ):
+        assert HOSTILE in view.locator("#verdict").inner_text()
+        assert HOSTILE in view.locator("#title").inner_text()
+        assert view.locator("img, section script, header script").count() == 0
+        assert view.title().endswith("gfor explore")
+        with view.expect_download() as got:
+            view.locator("#svg").click()
+        assert "<script" not in got.value.path().read_text(encoding="utf-8")
+
+
+@needs_chromium
+def test_a_saved_page_moves_without_a_server(browser, tmp_path, capsys):
+    page = tmp_path / "page.html"
+    words = [
+        "explore",
+        "two_area",
+        "--scenario",
+        "pod_p",
+        "--vary",
+        "gfor.pod_p.K=100:200:3",
+        "--save",
+        str(page),
+    ]
+    assert main(words) == 0
+    with opened(browser, page.as_uri()) as view:
+        slider = view.locator('.control[data-name="gfor.pod_p.K"] input[type="range"]')
+        slider.focus()
+        slider.press("Home")
+        assert (
+            main(
+                ["modes", "two_area", "--scenario", "pod_p", "--set", "gfor.pod_p.K=100", "--json"]
+            )
+            == 0
+        )
+        out = capsys.readouterr().out
+        content = json.loads(out[out.index("{") :])["scenarios"][0]
+        assert [row[:2] for row in rows(view)] == shown(content["modes"])
+        assert view.locator("#run").is_disabled()
+
+
+@needs_chromium
+def test_a_value_with_a_wanted_damping_is_found(view, capsys):
+    control = add(view, "gfor.pod_p.K")
+    said = control.locator(".finder [role=status]")
+    control.locator('input[size="3"]').fill("15")
+    control.locator("button", has_text="find").click()
+    said.get_by_text("values were tried").wait_for()
+    computed(view, 2)
+    content = of_command(view, capsys)
+    assert 15 <= min(mode["damping_percent"] for mode in content["modes"]) < 15.005
+    # not the other, 550
+    assert view.evaluate("state.values['gfor.pod_p.K']") == pytest.approx(27, abs=0.5)
+    first, other = said.inner_text().split("\n")[:2]
+    assert first.startswith("15.00 % at K 2")
+    assert "below it is less than 15 %" in first
+    assert other.startswith("also 15.00 % at K 55")
+    assert "above it is less than 15 %" in other
+
+
+@needs_chromium
+def test_stability_is_lost_beyond_the_sliders_range_and_said_in_the_sweeps_words(browser):
+    with served("two_area", "gfor") as explorer, opened(browser, explorer.address) as view:
+        control = add(view, "grid.X_L")
+        control.locator("button", has_text="until unstable").click()
+        control.locator(".finder", has_text="values were tried").wait_for()
+        said = control.locator(".finder [role=status]").inner_text().split("\n")[0]
+        holds, fails = map(
+            float,
+            re.match(r"stable up to X_L (\S+), UNSTABLE at (\S+): a mode grows", said).groups(),
+        )
+        desk = Desk("two_area", False)
+        question = {"ask": "modes", "scenario": "gfor"}
+        for value, stable in ((holds, True), (fails, False)):
+            answer = desk.answer({**question, "values": {"grid.X_L": value}}, print)
+            assert answer["modes"]["scenarios"][0]["stable"] is stable
+        assert 0.99 < holds < fails < 1
+
+
+@needs_chromium
+def test_a_refused_outage_and_a_search_that_cannot_act_say_so(browser):
+    with served("two_area", "gfor") as explorer, opened(browser, explorer.address) as view:
+        before = view.locator("#verdict").inner_text()
+        view.locator("#tab-network").click()
+        view.locator('.thing[data-thing="unit sg2"]').click(force=True)
+        view.locator("#element input[type=checkbox]").click()
+        view.locator(
+            "#failure", has_text="not computed; what is shown is the state before"
+        ).wait_for()
+        assert view.locator("#element input[type=checkbox]").is_checked()
+        assert view.locator(".control").count() == 0
+        assert view.evaluate("state.values") == {}
+        assert view.locator("#verdict").inner_text() == before
+        idle = add(view, "gfor.pod_p.K")  # its controller is off
+        idle.locator("button", has_text="find").click()
+        idle.locator(
+            ".finder", has_text="gfor.pod_p.K cannot act: gfor.pod_p.enabled is false"
+        ).wait_for()
+
+
+@needs_chromium
+def test_rows_of_a_certificate_show_their_limits(browser, issued):
+    found = opened_folder(str(issued("fingrid")))
+    study = found[2]["study"]
+    study["columns"][0]["name"] = "<img src=x onerror=alert(1)>"
+    explorer = Explorer(
+        found[0],
+        {"scenario": found[1].scenarios[-1], "values": {}, "range": [0.1, 2.0], "study": study},
+    )
+    threading.Thread(target=explorer.serve, daemon=True).start()
+    with opened(browser, explorer.address) as view:
+        view.locator("#cells").focus()
+        view.keyboard.press("Enter")
+        view.locator("#study-plots .curve.limit").first.wait_for(state="attached")
+        assert view.locator("#study-plots .curve:not(.limit)").count() >= 1
+        assert (
+            study["cells"][0][0]["text"].split("\n")[0] in view.locator("#study-said").inner_text()
+        )
+        assert view.locator("img").count() == 0
+    explorer.close()
+
+
+@needs_chromium
+def test_ten_thousand_drags_leave_the_memory_flat(view, two_area):
+    from tests.benchmarks.explorer import dragged  # noqa: PLC0415 - it imports this module
+
+    add(view, "gfor.pod_p.K").locator('input[type="range"]').focus()
+    view.wait_for_function("() => seen.slopes[slopeKey(state.controls[0])]")
+    worker = two_area.computing["modes"]._process.pid
+    dragged(view, worker, 500)
+    before, after = dragged(view, worker)
+    assert after[0] - before[0] < 2  # [MB]
+    assert after[1] - before[1] < 2

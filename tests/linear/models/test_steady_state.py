@@ -1,0 +1,70 @@
+"""Operating points: verified where the power flow gives them, solved for where it does not."""
+
+import pytest
+
+from orchestrator.cases.case import load_case
+from orchestrator.core.errors import AnalysisError
+from orchestrator.linear.models import steady_state
+from orchestrator.linear.models.steady_state import find_operating_point
+from orchestrator.systems.coupling.master import Master
+
+
+def master_of(scenario="gfor", change=None):
+    (ready,) = load_case("two_area").prepare([scenario])
+    if change:
+        for key, value in change.items():
+            component, _, variable = key.partition(".")
+            parameters = ready.system.components[component].parameters
+            parameters[variable] = parameters[variable] + value
+    return Master(ready.system, ready.schedule, ready.step_size)
+
+
+@pytest.mark.parametrize("scenario", ["base", "gfor", "pod_p", "pod_q", "pod_pq"])
+def test_the_power_flow_gives_the_coupled_steady_state(scenario):
+    with master_of(scenario) as master:
+        point = find_operating_point(master)
+        assert point.iterations == 0
+        assert point.residual < 1e-13
+        master.advance(1000)
+        assert find_operating_point(master).residual < 1e-12
+
+
+def test_a_wrong_start_is_moved_to_the_fixed_point_even_of_an_unstable_system():
+    # an angle that does not belong to the network's voltages: everything moves at first
+    with master_of("base", {"sg2.theta_0": 0.05}) as master:
+        point = find_operating_point(master)
+        assert point.initial_residual > 1e-5
+        assert point.iterations >= 1
+        assert point.residual < 1e-12
+        assert find_operating_point(master).iterations == 0
+
+
+# of the direction that one size of perturbation gives
+@pytest.mark.parametrize("worth", [-1.0, 0.3])
+def test_a_direction_that_a_limit_spoils_is_taken_anew(worth, monkeypatch):
+    exact = steady_state._newton_correction
+
+    def spoilt(*arguments, once):
+        return exact(*arguments, once=once) * (worth if once else 1.0)
+
+    monkeypatch.setattr(steady_state, "_newton_correction", spoilt)
+    with master_of("base", {"sg2.theta_0": 0.05}) as master:
+        assert find_operating_point(master).residual < 1e-12
+
+
+def test_where_power_does_not_balance_at_rated_frequency_there_is_no_fixed_point():
+    with (
+        master_of("gfor", {"sg1.P_0": -0.2}) as master,
+        pytest.raises(AnalysisError, match="no steady state") as error,
+    ):
+        find_operating_point(master)
+    assert "generation and load" in str(error.value)
+
+
+def test_the_error_says_where_a_models_author_looks_first():
+    """The start values of the component that moves; no Newton iteration is counted where none helped."""
+    with master_of("base", {"sg2.theta_0": 0.05}) as master, pytest.raises(AnalysisError) as error:
+        find_operating_point(master, max_iterations=0)
+    said = str(error.value)
+    assert "0 Newton iterations" not in said
+    assert said.index("start values of the component") < said.index("generation and load balance")

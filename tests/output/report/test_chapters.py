@@ -1,0 +1,684 @@
+"""A report of results of any study: its first page, its chapters, what cannot be used, and what changed since."""
+
+import json
+import re
+import shutil
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from orchestrator.core.errors import InputError
+from orchestrator.output.report.html.chapters import chapters_of, of_run, of_sweep
+from orchestrator.output.report.html.least_damped import LeastDamped
+from orchestrator.output.report.html.page import first_page, write_report
+from orchestrator.output.results import origin
+from orchestrator.output.results.manifest import ResultsWarning, read_manifest, write_manifest
+from orchestrator.studies.sweep.limit import Ending, ParameterLimit, Until
+
+SHEET = {
+    "controller": "pod_p",
+    "target_mode": {"real": -0.39, "imag": 3.65},
+    "predicted_mode": {"real": -0.7, "imag": 3.65},
+    "achieved_mode": {"real": -0.8, "imag": 3.6},
+    "sensitivity": {"magnitude": 0.01, "phase_deg": 30.0},
+    "T_S1": 0.2,
+    "T_S2": 0.1,
+    "N_S": 2,
+    "K": 200.0,
+    "K_unbounded": 150.0,
+    "met": False,
+    "verdict": "not met: <b>20 %</b> are wanted",
+    "target_damping_ratio": 0.106,
+    "achieved_damping_ratio": 0.18,
+    "requirement": {"damping_ratio": 0.2},
+    "mode": "electromechanical",
+    "warnings": ["two modes are close"],
+    "questions": ["what are its loads?"],
+}
+SCREENING = {
+    "questions": ["no governor?"],
+    "points": 2,
+    "outages": 3,
+    "items": 8,
+    "stable": None,
+    "counted_at_all_frequencies": False,
+    "modes": [
+        {
+            "worst": {
+                "point": "mon",
+                "outage": "line_1",
+                "frequency_hz": 0.93,
+                "damping_percent": 3.8,
+            }
+        }
+    ],
+    "failures": [
+        {"point": "mon", "outage": "sg3", "status": "no power flow", "why": "sg5 would need 129 %"}
+    ],
+}
+CHECK = {
+    "fmu": "vendor.fmu",
+    "trusted": False,
+    "faults": ["wrong rated frequency"],
+    "not_supported": [],
+    "checks": [
+        {
+            "question": "Is it at rest?",
+            "verdict": "fail",
+            "evidence": "omega is 0.8333",
+            "remedy": "set f_n",
+            "figures": {"not_judged": "anything after it"},
+        }
+    ],
+}
+CERTIFICATE = {
+    "sentence": "It passes at all.",
+    "verdict": "passes",
+    "passed": True,
+    "files": {},
+    "seal": "0",
+    "judged": "9 of 9",
+    "missing": [],
+    "departures": [],
+    "acceptance": {"checks": [{"figures": {"not_judged": "what dips leave behind"}}]},
+    "points": [{"X_L": 0.1, "warnings": {"pod": ["1.2 pu at X_L = 0.1"]}}],
+}
+COMPARISON = [
+    {
+        "expression": "sg1.omega",
+        "unit": "pu",
+        "deviations": [1, 2],
+        "largest": 0.5,
+        "at": 1.2,
+        "rms": 0.1,
+    }
+]
+
+IDENTIFIED = [
+    {
+        "real": -0.3,
+        "imag": 5.8,
+        "frequency_hz": 0.923,
+        "damping_percent": 5.2,
+        "amplitude": 0.1,
+        "doubts": ["it is at the window's edge"],
+    }
+]
+
+SENSITIVITIES = [
+    {
+        "derivative": "total",
+        "scenario": "pod",
+        "stable": True,
+        "warnings": ["beyond its rating: gfor"],
+        "mode": {"frequency_hz": 0.9, "damping_percent": 4.2, "name": None},
+        "sensitivities": [
+            {
+                "parameter": f"gfor.{name}",
+                "value": 1.0,
+                "unit": "pu",
+                "damping_points_per_percent": points,
+                "frequency_hz_per_percent": 0.0,
+                "doubts": "",
+                "reason": "" if points else "it holds no steady state",
+            }
+            for name, points in (("a", 0.01), ("b", -0.2), ("c", None))
+        ],
+    }
+]
+INTERACTIONS = {
+    "interaction_modes": [{}],
+    "worst_pair": ["A", "B"],
+    "unknown_pairs": [],
+    "vendors": ["A", "B"],
+    "stand_in": "x",
+    "pairs": [{"vendors": ["A", "B"], "stable": True, "sentence": "A and B agree"}],
+    "warnings": [],
+    "as_in_the_case": {"stable": False},
+}
+SOURCE = [
+    {
+        "record": "ring",
+        "places": ["N", "S"],
+        "remarks": ["a gap"],
+        "questions": ["is H meant?"],
+        "oscillations": [
+            {
+                "frequency_hz": 0.8,
+                "kind": "forced",
+                "source": "sg2",
+                "reason": "it feeds",
+                "advice": "look there",
+            },
+            {
+                "frequency_hz": 1.1,
+                "kind": "not known",
+                "source": None,
+                "reason": "too short",
+                "advice": "record longer",
+            },
+        ],
+    }
+]
+SCR = {
+    "convention": "from 1 pu",
+    "scenarios": [
+        {
+            "name": name,
+            "buses": [
+                {"bus": "bus_1", "s_sc_mva": 900.0, "scr": 3.0},
+                {"bus": "bus_2", "s_sc_mva": 400.0, "scr": None},
+            ],
+        }
+        for name in ("base", "pod")
+    ],
+}
+
+
+@pytest.fixture
+def folders(tmp_path):
+    """A folder of each study, with its JSON alone."""
+    for name, file, content in (
+        ("design", "pod_p.json", SHEET),
+        ("screen", "screening.json", SCREENING),
+        ("check", "check.json", CHECK),
+        ("certify", "certificate.json", CERTIFICATE),
+        ("compare", "differences.json", COMPARISON),
+        ("ring", "ring.json", IDENTIFIED),
+        ("moved", "sensitivities.json", SENSITIVITIES),
+        ("vendors", "interactions.json", INTERACTIONS),
+        ("source", "source.json", SOURCE),
+        ("scr", "scr.json", SCR),
+    ):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / file).write_text(json.dumps(content), encoding="utf-8")
+    names = (
+        "design",
+        "screen",
+        "check",
+        "certify",
+        "compare",
+        "ring",
+        "moved",
+        "vendors",
+        "source",
+        "scr",
+    )
+    return [tmp_path / name for name in names]
+
+
+def written(folders, tmp_path, **more):
+    return write_report(folders[0], folders[1:], tmp_path / "page.html", **more).read_text(
+        encoding="utf-8"
+    )
+
+
+def test_the_first_page_answers_every_study(folders, tmp_path):
+    text = written(folders, tmp_path)
+    first = text[: text.index("<section")]
+    for said in (
+        "not as required: with K = 200 the mode has 18.00 % of damping, 10.60 % before, 20.00 % wanted",
+        "not known whether stable everywhere: 2 operating points, 3 outages; least damped 0.930 Hz, 3.80 %",
+        "mon, sg3: no power flow: sg5 would need 129 %",
+        "growth outside of the range was counted at some points only",
+        "vendor.fmu: wrong rated frequency",
+        "anything after it",
+        "It passes at all.",
+        "judged: 9 of 9",
+        "what dips leave behind",
+        "1.2 pu at X_L = 0.1",
+        "sg1.omega differs most, by 0.5 pu at 1.200 s",
+        "two modes are close",
+        "strongest: 0.923 Hz, 5.20 %",
+        "what are its loads?",
+        "is H meant?",
+        "no governor?",
+        "0.900 Hz, 4.20 %: most by gfor.b (-0.2), gfor.a (+0.01) points for 1 % more",
+        "it holds no steady state",
+        "0.923 Hz: it is at the window's edge".replace("'", "&#x27;"),
+        "beyond its rating: gfor",
+        "0.800 Hz: forced, from sg2; 1.100 Hz: not known",
+        "1.100 Hz: too short",
+        "a gap",
+        "base, pod: weakest is bus_2 with 400 MVA, SCR 3.00 at bus_1",
+    ):
+        assert said in first
+    assert 'class="bad">not as required' in first
+    assert 'class="bad">UNSTABLE as in the case; 1 mode that vendors share; A and B agree' in first
+    assert first.count("<svg") == 1
+    assert 'class="good">It passes' in first
+    assert "<b>20 %</b>" not in text  # a verdict is text
+
+
+def test_a_chapter_takes_the_sections_of_the_results_own_page(folders, tmp_path):
+    page = '<nav></nav><section id="section-0"><h2>Outages</h2><a href="#figure-1">1</a><i id="figure-1"></i></section>'
+    (folders[1] / "screening.html").write_text(f"<main>{page}</main>", encoding="utf-8")
+    text = written(folders, tmp_path)
+    assert "<h3>Outages</h3>" in text
+    assert 'href="#chapter-2-figure-1"' in text
+    assert 'id="chapter-2-figure-1"' in text
+
+
+def test_provenance_names_command_code_and_date(gfor, tmp_path):
+    code, _, err = gfor(
+        "modes", "two_area_rms", "--scenario", "gfor", "--out", str(tmp_path / "modes")
+    )
+    assert code == 0, err
+    code, _, err = gfor("report", str(tmp_path / "modes"))
+    assert code == 0, err
+    text = (tmp_path / "modes" / "report.html").read_text(encoding="utf-8")
+    manifest = json.loads((tmp_path / "modes" / "manifest.json").read_text())
+    assert manifest["command"].startswith("gfor modes two_area_rms --scenario gfor --out ")
+    assert manifest["code"][:12] in text
+    assert "SG + GFOR: stable, least damped 0.581 Hz, 10.63 %" in text
+    assert "nothing was run" in text
+
+
+def test_a_runs_row_says_what_was_given_and_which_models_were_run(gfor, tmp_path):
+    given = (
+        "--set",
+        "models=emt",
+        "--step",
+        "100 us",
+        "--stop",
+        "10 ms",
+        "--fault",
+        "bus_2, 5 ms, from 2 ms",
+    )
+    assert gfor("run", "two_area_rms", "--scenario", "gfor", *given, "--out", tmp_path)[0] == 0
+    text = write_report(tmp_path, short=True).read_text(encoding="utf-8")
+    assert (
+        "SG + GFOR, with fault &quot;bus_2, 5 ms, from 2 ms&quot;, models = emt: not known" in text
+    )
+    assert "<td>emt models, loads constant impedance" in re.sub("<td[^>]*>", "<td>", text)
+    assert "phasor models; modes" not in text
+
+
+def test_what_changed_since_an_older_page(folders, tmp_path):
+    written(folders, tmp_path)
+    old = shutil.copy(tmp_path / "page.html", tmp_path / "old.html")
+    assert "No answer differs from old.html" in written(
+        folders, tmp_path, against=tmp_path / "old.html"
+    )
+    (folders[0] / "pod_p.json").write_text(
+        json.dumps(SHEET | {"warnings": ["gfor is beyond its rating"]})
+    )
+    text = written(folders, tmp_path, against=old)
+    assert (
+        "not judged: gfor is beyond its rating"
+        in text[text.index("Answers that differ") : text.index("</section>")]
+    )
+    (folders[0] / "pod_p.json").write_text(
+        json.dumps(SHEET | {"met": True, "K": 300.0}), encoding="utf-8"
+    )
+    text = written(folders[:4], tmp_path, against=old)
+    changed = text[text.index("Answers that differ") : text.index("</section>")]
+    assert "not as required: with K = 200" in changed
+    assert "yes: with K = 300" in changed
+    assert "not there any more" in changed
+    assert "It passes" not in changed
+
+
+def test_figures_that_moved_between_two_folders(folders, tmp_path):
+    new = tmp_path / "new" / "inner"
+    shutil.copytree(folders[1], new)
+    worst = {"point": "mon", "outage": "line_1", "frequency_hz": 0.93, "damping_percent": 4.5}
+    (new / "screening.json").write_text(json.dumps(SCREENING | {"modes": [{"worst": worst}]}))
+    text = write_report(new.parent, [], tmp_path / "page.html", folders[1], short=True).read_text(
+        encoding="utf-8"
+    )
+    assert "3.80 to 4.50 (+0.7)" in text
+    both = written([folders[1], new], tmp_path, against=folders[1])
+    assert "not there" in both[both.index("Answers that differ") :]  # its twin is as it was
+    assert "Which operating point and which outage is worst? (inner)" in both
+    written([new, folders[1]], tmp_path)
+    old = shutil.copy(tmp_path / "page.html", tmp_path / "old.html")
+    text = written([folders[1]], tmp_path, against=old)
+    changed = text[text.index("Answers that differ") : text.index("</section>")]
+    assert "not there any more" in changed
+    assert "+0.7" not in changed  # the other folder's answer is no earlier one of this
+
+
+def in_another_folder(folders, tmp_path, **worst):
+    """The screening once more, elsewhere, with another least damped mode; what the page says changed."""
+    new = tmp_path / "new" / "inner"
+    shutil.copytree(folders[1], new)
+    place = {"point": "mon", "outage": "line_1"}
+    shares = worst.pop("participation")
+    mode = {"worst": place | worst, "participation": shares}
+    (new / "screening.json").write_text(json.dumps(SCREENING | {"modes": [mode]}))
+    page = tmp_path / "page.html"
+    text = write_report(new.parent, [], page, folders[1], short=True).read_text(encoding="utf-8")
+    return text[text.index("Answers that differ") : text.index("</section>")]
+
+
+@pytest.mark.parametrize(
+    ("frequency", "shares", "like"),
+    [
+        (0.93, {"sg1": 0.6, "sg2": 0.3}, True),
+        (0.85, {"sg1": 0.5, "sg2": 0.3, "gfor": 0.2}, True),
+        (1.40, {"sg1": 0.6, "sg2": 0.3}, False),  # beyond 30 % of the frequency
+        (0.95, {"sg3": 0.7, "sg1": 0.2}, False),  # a machine's own mode close by
+    ],
+)
+def test_the_least_damped_of_two_results_may_be_two_modes(
+    folders, tmp_path, frequency, shares, like
+):
+    """The swing rose beyond the other mode, which is least damped now: 3.80 to 4.50 is no change of either."""
+    first = SCREENING["modes"][0] | {"participation": {"sg1": 0.6, "sg2": 0.3}}
+    (folders[1] / "screening.json").write_text(json.dumps(SCREENING | {"modes": [first]}))
+    changed = in_another_folder(
+        folders, tmp_path, frequency_hz=frequency, damping_percent=4.5, participation=shares
+    )
+    assert ("3.80 to 4.50 (+0.7)" in changed) is like
+    who = max(shares, key=shares.get)
+    said = (
+        "figures of another mode: 0.930 Hz, 3.80 % (sg1) before, "
+        f"{frequency:.3f} Hz, 4.50 % ({who}) now"
+    )
+    assert (said in changed) is not like
+
+
+def test_a_page_that_keeps_no_modes_tells_no_change_of_one(folders, tmp_path):
+    """As pages were before they kept whose figures they give."""
+    written(folders, tmp_path)
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    old = tmp_path / "old.html"
+    old.write_text(re.sub(r'"least": \[[^]]*\], ', "", page).replace("3.80 %", "3.10 %"))
+    assert '"least"' not in old.read_text(encoding="utf-8")
+    text = written(folders, tmp_path, against=old)
+    changed = text[text.index("Answers that differ") : text.index("</section>")]
+    assert "the older page does not say which modes its figures are of" in changed
+    assert "3.10 to 3.80" not in changed
+
+
+def test_a_design_s_limiting_mode_may_be_another_one():
+    """As a design over points gives it: an eigenvalue and the machine that takes part most."""
+    mode = {"real": -0.35, "imag": 6.9, "damping_ratio": 0.0507, "who": "sg1"}
+    first = LeastDamped.placed(mode)
+    assert first.words == "1.098 Hz, 5.07 % (sg1)"
+    assert first.is_like(LeastDamped.placed(mode | {"real": -0.5}))
+    assert not first.is_like(LeastDamped.placed(mode | {"who": "sg3"}))
+    assert not first.is_like(LeastDamped.placed(mode | {"imag": 3.4}))
+
+
+def test_a_run_tells_whose_modes_its_figures_are_of(folders, tmp_path):
+    """Of a run, and of what its events leave: each figure has its own mode."""
+    least = {"frequency_hz": 0.54, "damping_percent": 3.2, "components": {"sg1": 0.9}}
+    later = {"frequency_hz": 1.1, "damping_percent": 2.1, "components": {"sg3": 0.8}}
+    scenario = {"name": "base", "answer": least | {"stable": True, "after_events": later}}
+    told = of_run(tmp_path, [scenario]).least
+    assert [mode.words for mode in told] == ["0.540 Hz, 3.20 % (sg1)", "1.100 Hz, 2.10 % (sg3)"]
+    assert not told[0].is_like(told[1])
+
+
+def test_what_cannot_be_used_is_named(folders, tmp_path):
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "table.json").write_text('{"a": 1}')
+    (tmp_path / "other" / "notes.html").write_text("a page")
+    with pytest.raises(
+        InputError, match=r"other: nothing in it can be used.*own: notes.html.*run, modes, screen"
+    ):
+        write_report(folders[0], [tmp_path / "other"], tmp_path / "page.html")
+    with pytest.raises(InputError, match="no such file or folder"):
+        write_report(folders[0], [tmp_path / "nowhere"])
+    (folders[2] / "check.json").write_text(json.dumps(CHECK | {"checks": None}))
+    with pytest.raises(InputError, match=r"check.json: it is not as its study writes it"):
+        write_report(folders[2], [], tmp_path / "page.html")
+    with pytest.raises(InputError, match="it is no page of `gfor report`"):
+        write_report(folders[0], [], tmp_path / "page.html", tmp_path / "other" / "notes.html")
+
+
+def test_a_file_that_was_changed_since_is_refused(gfor, tmp_path):
+    code, _, err = gfor(
+        "site", "two_area_rms", "--scenario", "gfor", "--confirm", "0", "--out", str(tmp_path)
+    )
+    assert code == 0, err
+    assert "where to put POD-P" in (tmp_path / "site.html").read_text(encoding="utf-8")
+    write_report(tmp_path)
+    assert "bus_2 is the best place for POD-P" in (tmp_path / "report.html").read_text(
+        encoding="utf-8"
+    )
+    content = (tmp_path / "site.json").read_text().replace("bus_2 is the best", "bus_3 is the best")
+    (tmp_path / "site.json").write_text(content)
+    with pytest.raises(InputError, match="SHA-256 differs"):
+        write_report(tmp_path)
+
+
+def test_a_page_tells_of_the_mode_that_the_name_was_without_the_controller(gfor, tmp_path):
+    """With this gain another mode, at 0.202 Hz, fits the name as well."""
+    planted = "--set", "grid.X_L=0.3", "--set", "gfor.pod_p.K=200"
+    assert (
+        gfor(
+            "modes",
+            "two_area",
+            "--scenario",
+            "gfor",
+            "--scenario",
+            "pod_p",
+            *planted,
+            "--out",
+            tmp_path,
+        )[0]
+        == 0
+    )
+    assert gfor("report", tmp_path, "--out", tmp_path / "page.html")[0] == 0
+    cells = re.sub(r"<[^>]+>", " ", (tmp_path / "page.html").read_text(encoding="utf-8")).split()
+    named = [
+        (cells[k - 3], cells[k - 2]) for k, word in enumerate(cells) if word == "electromechanical"
+    ]
+    assert [pair for pair in named if pair[0] in ("gfor", "pod_p")] == [
+        ("gfor", "0.3502"),
+        ("pod_p", "0.7257"),
+    ]
+
+
+def test_the_answer_of_a_search_for_a_limit_is_on_the_page(tmp_path):
+    tried = [
+        {"value": v, "kind": kind, "damping_percent": 5.0}
+        for v, kind in ((2.0, "fails"), (9.0, "holds"))
+    ]
+    limit = ParameterLimit(
+        "grid.scr",
+        "1",
+        "base",
+        "Base",
+        Until(),
+        Ending.FAILS,
+        6.87,
+        6.86,
+        None,
+        "",
+        tried,
+        (),
+        "",
+        2.0,
+    )
+    (tmp_path / "limits.json").write_text(json.dumps([limit.as_json()]), encoding="utf-8")
+    (chapter,) = chapters_of(tmp_path)
+    swept = xr.Dataset({"damping": ("k", [3.0]), "named": ("k", [1])})
+    assert of_sweep(tmp_path, swept).answer == chapter.answer
+    assert (chapter.question, chapter.answer) == (
+        "How far may grid.scr go?",
+        f"base: {limit.sentence}",
+    )
+    assert "6.87" in chapter.answer
+
+
+def made(folder, name, content, run="r", **inputs):
+    folder.mkdir(exist_ok=True)
+    (folder / f"{name}.json").write_text(json.dumps(content), encoding="utf-8")
+    command = f"gfor {name} --json own.toml --set models=emt --html=p.html --parameters p.toml --out {folder}"
+    origin.said.append(lambda: {"command": command, "inputs": inputs})
+    write_manifest(folder, run, [f"{name}.json"])
+    origin.said.pop()
+    return folder
+
+
+def test_results_of_two_versions_of_a_file_are_not_one_study(tmp_path):
+    first = made(tmp_path / "old", "scr", SCR, **{"own.raw": "1a", "old/ring.csv": "5"})
+    again = made(tmp_path / "again", "scr", SCR, **{"net/own.raw": "1a", "again/ring.csv": "6"})
+    edited = made(tmp_path / "new", "scr", SCR, **{"own.raw": "2b"})
+    assert "one study" not in written([first, again], tmp_path)
+    for code in ("nts", "ercot"):  # each certificate keeps files of the same names
+        sealed = CERTIFICATE | {"made": "2026-01-01", "files": {"converter.fmu": code}}
+        made(tmp_path / code, "certificate", sealed)
+    assert "one study" not in written([tmp_path / "nts", tmp_path / "ercot"], tmp_path)
+    with pytest.warns(
+        ResultsWarning, match=r"own\.raw differs between .*old.*again.*and .*new.*not comparable"
+    ):
+        text = written([first, again, edited], tmp_path, short=True)
+    assert 'class="bad">own.raw differs between' in text
+    kept = json.loads(text[text.index('id="answers">') + 13 :].partition("</script>")[0])
+    assert kept[0]["answer"].startswith("NO: own.raw differs")
+    assert kept[1]["given"] == "gfor scr own.toml --set models=emt --parameters p.toml"
+
+
+def basis(machine="genrou", loads="constant power", network="own.raw"):
+    return {
+        "models": "emt",
+        "basis": {"network": network, "loads": loads, "machines": {"sg1": machine, "sg2": machine}},
+    }
+
+
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [
+        (basis(), ""),
+        ({}, ""),
+        (
+            basis("genrou, emf e''"),
+            "model of sg1 of own.raw and 1 more: genrou in .*one.* and genrou, emf e'' in .*two",
+        ),
+        (
+            basis(loads="constant impedance"),
+            "load model of own.raw: constant power in .*, and constant impedance in ",
+        ),
+        (
+            basis("gencls", network="new.raw"),
+            "network: own.raw in .*one.* and new.raw in .*two.*; figures are not",
+        ),
+    ],
+)
+def test_rows_of_other_networks_or_models_are_told_above_them(tmp_path, other, said):
+    places = [
+        made(tmp_path / "one", "design", SHEET | basis()),
+        made(tmp_path / "two", "screening", SCREENING | other),
+    ]
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        text = written(places, tmp_path, short=True)
+    found = [str(one.message) for one in caught]
+    assert len(found) == bool(said)
+    assert re.search(said, "".join(found))
+    assert ("one study" in text) == bool(said)
+    assert "emt models, loads constant power; " in text
+
+
+def test_a_fault_has_a_question_of_its_own(tmp_path):
+    calm = {"name": "base", "title": "Base", "stable": True, "warnings": ["not solved"]} | basis()
+    hit = calm | {
+        "name": "hit",
+        "title": "Hit",
+        "stable": False,
+        "events": ["t = 1 s: grid.b.fault.R = 0, grid.b.fault.on = 1"],
+    }
+    asked = {
+        s["name"]: of_run(tmp_path, [s]).question
+        for s in (calm, hit, calm | {"events": ["t = 1 s: sg1.P_ref = 1"]})
+    }
+    assert asked == {
+        "base": "Is the network stable, and which swing is damped least?",
+        "hit": "Is the fault survived, and which swing is damped least?",
+    }
+
+
+def test_what_several_rows_do_not_judge_is_told_once(tmp_path):
+    long = "the file is not solved"
+    rows = [
+        replace(chapter, source=tmp_path, not_judged=texts)
+        for chapter, texts in zip(
+            [of_run(tmp_path, [])] * 3, ([long, "own"], ["another"], [long]), strict=True
+        )
+    ]
+    text = first_page(rows)
+    assert (
+        text.count(long),
+        text.count("note 1"),
+        text.count("Note 1: "),
+        text.count("note 2"),
+    ) == (1, 2, 1, 0)
+    assert text.count(">own<") == text.count(">another<") == 1
+
+
+def test_what_is_found_in_a_runs_record_is_of_the_runs_inputs(gfor, tmp_path):
+    t = np.arange(0, 10, 0.02)
+    folders = {
+        run: made(tmp_path / run, "scr", SCR, **{"own.raw": of})
+        for run, of in (("old", "1a"), ("new", "2b"))
+    }
+    for run, folder in folders.items():
+        rows = "".join(f"{x},{np.exp(-0.2 * x) * np.sin(5 * x)}\n" for x in t)
+        (folder / "trajectory.csv").write_text(f"time,sg.w\n{rows}", encoding="utf-8")
+        origin.said.append(lambda of={"old": "1a", "new": "2b"}[run]: {"inputs": {"own.raw": of}})
+        write_manifest(folder, "r", ["scr.json", "trajectory.csv"])
+        origin.said.pop()
+        assert (
+            gfor(
+                "signal",
+                "identify",
+                folder / "trajectory.csv",
+                "sg.w",
+                "--out",
+                tmp_path / f"of_{run}",
+            )[0]
+            == 0
+        )
+    assert "one study" not in written([folders["old"], tmp_path / "of_old"], tmp_path)
+    with pytest.warns(ResultsWarning, match=r"own\.raw differs between .*old.* and .*of_new"):
+        written([folders["old"], tmp_path / "of_new"], tmp_path)
+    both = made(tmp_path / "both", "scr", SCR, **{"old/own.raw": "1a", "new/own.raw": "2b"})
+    assert "one study" not in written([folders["old"], both], tmp_path)
+
+
+def test_every_row_says_what_was_given_and_of_which_models(tmp_path):
+    kinds = {
+        "design": SHEET,
+        "screening": SCREENING,
+        "sensitivities": SENSITIVITIES,
+        "scr": SCR,
+        "source": SOURCE,
+    }
+    places = []
+    for name, content in kinds.items():
+        parts = content if isinstance(content, list) else [content]
+        parts = [one | {"models": "emt", "questions": [f"is {name} meant?"]} for one in parts]
+        places.append(made(tmp_path / name, name, parts if isinstance(content, list) else parts[0]))
+    text = written(places, tmp_path, short=True)
+    for name in kinds:
+        assert f"gfor {name} own.toml --set models=emt --parameters p.toml</span>" in text
+        assert f"is {name} meant?" in text
+    assert text.count("emt models; ") == len(kinds)
+    assert "--out" not in text[: text.index("<section")]
+
+
+def test_a_result_is_not_told_with_the_command_of_a_later_one(tmp_path):
+    place = made(tmp_path / "both", "scr", SCR)
+    origin.said.append(lambda: {"command": "gfor later"})
+    write_manifest(place, "later", [], before=read_manifest(place))
+    origin.said.pop()
+    text = written([place], tmp_path)
+    assert "gfor later" not in text
+    assert "own.toml" not in text
+
+
+def test_a_design_at_the_edge_says_that_there_is_no_margin(tmp_path):
+    thin = SHEET | {"met": True, "thin_margin_damping_ratio": 0.0957}
+    text = written([made(tmp_path / "thin", "design", thin)], tmp_path)
+    assert "20.00 % wanted; no margin: 9.57 % with 20 % more gain" in text
+    assert "no margin" not in written(
+        [made(tmp_path / "wide", "design", SHEET | {"met": True})], tmp_path
+    )

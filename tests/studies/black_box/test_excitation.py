@@ -1,0 +1,65 @@
+"""Excitations and what is read from their responses, on a linear map whose response is known."""
+
+import numpy as np
+import pytest
+
+from orchestrator.studies.black_box.frequency_response import (
+    line_response,
+    multisine,
+    odd_lines,
+    pulse_response,
+)
+
+H = 1e-3
+A = np.array([[0.97, 0.1], [-0.1, 0.95]])
+B = np.array([0.2, 1.0])
+C = np.array([[1.0, 0.3], [0.2, -0.5]])
+PERIOD = 2000
+
+
+def simulate(u, periods=1):
+    """Outputs at the end of every step."""
+    x, y = np.zeros(2), []
+    for value in np.tile(u, periods):
+        x = A @ x + B * value
+        y.append(C @ x)
+    return np.array(y)
+
+
+def exact(frequencies):
+    return np.array(
+        [C @ np.linalg.solve(np.exp(2j * np.pi * f * H) * np.eye(2) - A, B) for f in frequencies]
+    )
+
+
+def test_the_lines_are_odd_distinct_and_reach_both_ends():
+    lines = odd_lines(0.05, 1000.0, 120)
+    assert (lines % 2 == 1).all()
+    assert (np.diff(lines) > 0).all()
+    assert lines[0] == 1
+    assert lines[-1] * 0.05 == pytest.approx(1000.0, abs=0.1)
+    assert 60 < len(lines) <= 120
+
+
+def test_a_multisine_has_its_amplitude_equal_lines_and_nothing_else():
+    lines = odd_lines(1 / (PERIOD * H), 200.0, 40)
+    u = multisine(lines, PERIOD, 0.01)
+    assert np.abs(u).max() == pytest.approx(0.01)
+    spectrum = np.abs(np.fft.rfft(u))
+    assert np.ptp(spectrum[lines]) < 1e-12 * spectrum.max()
+    assert np.delete(spectrum, lines).max() < 1e-12 * spectrum.max()
+    # as a sum in phase it would be the root of twice their number
+    assert np.abs(u).max() / u.std() < 4
+
+
+def test_both_ways_give_the_exact_response():
+    lines = odd_lines(1 / (PERIOD * H), 400.0, 40)
+    frequencies = lines / (PERIOD * H)
+    u = multisine(lines, PERIOD, 1.0)
+    by_lines = line_response(u, simulate(u, 3)[-PERIOD:], lines)
+    pulse = np.zeros(PERIOD * 2)
+    pulse[0] = 1.0
+    by_pulse = pulse_response(simulate(pulse), frequencies, H)
+    wanted = exact(frequencies)
+    assert np.abs(by_lines - wanted).max() < 1e-10
+    assert np.abs(by_pulse - wanted).max() < 1e-10

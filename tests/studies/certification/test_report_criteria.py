@@ -1,0 +1,50 @@
+"""What the pictures of a report tell apart."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from orchestrator.studies.certification import report_criteria
+
+
+def test_marks_of_modes_with_the_converter_are_the_large_ones(monkeypatch):
+    seen = []
+    monkeypatch.setattr(
+        report_criteria, "complex_plane", lambda title, marks, **_: seen.extend(marks) or ""
+    )
+    point = SimpleNamespace(
+        modes=SimpleNamespace(eigenvalues=np.array([-0.1 + 3j, -0.1 + 60j])), components=["a", "b"]
+    )
+    certificate = SimpleNamespace(
+        results={("with", 0.1): point, ("without", 0.1): point}, verdicts=[]
+    )
+    report_criteria.eigenvalues(
+        certificate, SimpleNamespace(add=lambda picture, words: (picture, ""))
+    )
+    assert [(mark.large, mark.text.split()[0]) for mark in seen] == [
+        (False, "without"),
+        (True, "with"),
+    ]
+
+
+def test_the_findings_name_where_each_criterion_is_not_accepted(monkeypatch):
+    monkeypatch.setattr(report_criteria, "converter_model", lambda *_: "")
+    for name in ("_least_and_growth", "_remark"):
+        monkeypatch.setattr(report_criteria, name, lambda c: [])
+    good, bad = (SimpleNamespace(accepted=accepted) for accepted in (True, False))
+    times = {
+        0.1: (True, good),
+        0.2: (True, None),
+        0.3: (True, bad),
+        0.4: (False, bad),
+        0.5: (False, None),
+    }
+    verdicts = [
+        SimpleNamespace(X_L=X, judged=judged, time=time, eigenvalues_accepted=X < 0.3)
+        for X, (judged, time) in times.items()
+    ]
+    c = SimpleNamespace(verdicts=verdicts, results={("with", X): None for X in times})
+    test = SimpleNamespace(pod="none", signal="sg1.p", controllers=SimpleNamespace(source=""))
+    text = "\n".join(report_criteria.damping_findings(c, test))
+    assert "Eigenvalue criterion: not accepted at X_L = 0.3 pu" in text
+    assert "not accepted at X_L = 0.2, 0.3 pu" in text

@@ -1,0 +1,137 @@
+"""What names a point's file."""
+
+import shutil
+
+import pytest
+
+from orchestrator.cases.case import load_case
+from orchestrator.studies.points import code
+from orchestrator.studies.points.code import (
+    LIBRARIES,
+    code_hash,
+    library_versions,
+    needed_modules,
+    numbers_hash,
+)
+from orchestrator.studies.points.key import fingerprint, key_of
+from orchestrator.studies.points.task import Task
+
+SWEEP, ROW = (
+    "orchestrator.studies.sweep.point",
+    "orchestrator.studies.certification.codes.bench_point",
+)
+
+
+@pytest.fixture
+def fresh():
+    yield
+    for one in (code_hash, numbers_hash):
+        one.cache_clear()
+
+
+@pytest.mark.parametrize("library", LIBRARIES)
+def test_another_version_of_a_library_gives_other_names(fresh, monkeypatch, library):
+    case = load_case("two_area")
+    before = key_of({"a": 1}, SWEEP), fingerprint(case)
+    versions = library_versions()
+    assert versions[library]
+    monkeypatch.setattr(code, "library_versions", lambda: versions | {library: "0.0.1"})
+    code_hash.cache_clear()
+    numbers_hash.cache_clear()
+    assert key_of({"a": 1}, SWEEP) != before[0]
+    assert fingerprint(case) != before[1]
+
+
+@pytest.fixture
+def changed(fresh, monkeypatch, tmp_path):
+    """Whether points of a module have other names once a file has another text, as a new process sees it."""
+    files = shutil.ignore_patterns("__pycache__", "*.toml", "*.raw", "*.dyr")
+    root = shutil.copytree(code._ROOT, tmp_path / "orchestrator", ignore=files)
+    monkeypatch.setattr(code, "_ROOT", root)
+
+    def named(module):
+        for one in (code_hash, numbers_hash, code._code):
+            one.cache_clear()
+        return key_of({"a": 1}, module)
+
+    def find(module, file, old, new):
+        before = named(module)
+        assert named(module) == before
+        text = (root / file).read_text(encoding="utf-8")
+        assert text.count(old) == 1
+        (root / file).write_text(text.replace(old, new), encoding="utf-8")
+        return named(module) != before
+
+    return find
+
+
+@pytest.mark.parametrize(
+    ("module", "file", "old", "new"),
+    [
+        (
+            SWEEP,
+            "analysis/modes.py",
+            "return self.eigenvalue.imag / (2 * np.pi)",
+            "return self.eigenvalue.imag / 6",
+        ),
+        (
+            SWEEP,
+            "analysis/modes.py",
+            "ELECTROMECHANICAL_HZ = (0.1, 2.0)",
+            "ELECTROMECHANICAL_HZ = (0.1, 2.1)",
+        ),
+        (SWEEP, "cases/power_flow.py", "complex(p, q)", "complex(q, p)"),
+        (SWEEP, "binding/tables.py", '"50 Hz"', '"60 Hz"'),
+        (ROW, "watch/synchronism.py", "import numpy as np\n", "import numpy as np\nimport math\n"),
+        (SWEEP, "coupling/wires.c", "#include <math.h>", "#include <math.h>\n#define HALF 0.5"),
+    ],
+)
+def test_another_figure_is_computed_anew(changed, module, file, old, new):
+    assert changed(module, file, old, new)
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new"),
+    [
+        ("sweep/point.py", "its task and its result.", "task and result."),
+        ("sweep/tables.py", "import", "import sys\nimport"),
+        ("sweep/trajectories.py", "\n\n\n", "\n\n\nMOST = 3\n\n\n"),
+        (
+            "analysis/steady_state.py",
+            "no steady state found: {changes};",
+            "no steady state found, {changes};",
+        ),
+        ("cases/power_flow.py", "complex(p, q)", "complex(p, q)  # in pu\n"),
+        ("cli/check.py", "import argparse\n", "import argparse\nimport sys\n"),
+    ],
+)
+def test_a_comma_in_a_sentence_keeps_what_is_kept(changed, file, old, new):
+    text = (code._ROOT / file).read_text(encoding="utf-8")
+    if text.count(old) > 1:  # the first of them
+        old, new = text[: text.index(old) + len(old)], text[: text.index(old)] + new
+    assert not changed(SWEEP, file, old, new)
+
+
+def test_code_that_changes_under_a_running_program_gives_other_names(fresh, monkeypatch):
+    before = key_of({"a": 1}, SWEEP)
+    numbers_hash.cache_clear()
+    monkeypatch.setattr(code, "_hash_of_files", lambda: "another")
+    assert key_of({"a": 1}, SWEEP) != before
+
+
+def test_no_point_is_computed_by_what_only_shows_it():
+    showing = ("tables", "words", "report", "files", "view", "plots", "sheet", "summary", "html")
+    for task in _tasks(Task):
+        needed = needed_modules(task.__module__)
+        assert len(needed) > 100
+        assert not [
+            name for name in needed if name.rpartition(".")[2] in showing and name not in _READ
+        ], task
+
+
+_READ = {"orchestrator.devices.binding.tables", "orchestrator.cases.cgmes.files"}
+"""What is read from a binding's file, and files that are read."""
+
+
+def _tasks(kind):
+    return [kind, *(one for own in kind.__subclasses__() for one in _tasks(own))]

@@ -1,0 +1,169 @@
+"""A run whose events leave a line open is judged by the system that is left as well, however short it is."""
+
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+import orchestrator as gfor_api
+from orchestrator.studies.modes.modes import ModesResult
+from orchestrator.studies.runs import answers
+from orchestrator.studies.runs.after_events import lasting_changes, modes_after
+from tests.studies.screening.five_machines import five_machines
+
+pytestmark = pytest.mark.filterwarnings("ignore::orchestrator.face.api.scenario.UnusualDataWarning")
+
+# governors that feed the swing once the ring is open
+FAST = {"R": 0.02, "T_1": 0.3, "T_2": 0.0, "T_3": 0.6}
+VALUES = {f"sg[1235].governor.{name}": value for name, value in FAST.items()} | {
+    "grid.X_line_15_11": 0.5
+}
+FAULT = "bus_14, 60 ms, opens line_13_14, from 0.5 s"
+
+
+@pytest.fixture
+def case(tmp_path):
+    five_machines(tmp_path)
+    return tmp_path / "five.toml"
+
+
+def run(gfor, case, *further, stop="3"):
+    code, out, err = gfor(
+        "run",
+        case,
+        *further,
+        "--stop",
+        stop,
+        "--json",
+        "--fail-unstable",
+        "--out",
+        case.parent / "r",
+    )
+    assert code in (0, 1), err
+    (found,) = json.loads(out)
+    return code, found
+
+
+def test_a_network_that_is_unstable_after_the_fault_is_told(gfor, case):
+    values = [word for key, value in VALUES.items() for word in ("--set", f"{key}={value}")]
+    code, found = run(gfor, case, "--fault", FAULT, *values)
+    by_hand = (
+        gfor_api.load(case).scenario("base", VALUES | {"grid.line_13_14.connected": False}).modes()
+    )
+    least = min(by_hand, key=lambda mode: mode.damping_percent)
+    after, answer = found["answer"]["after_events"], found["answer"]
+    assert least.damping_percent < -1
+    assert (after["frequency_hz"], after["damping_percent"]) == pytest.approx(
+        (least.frequency_hz, least.damping_percent)
+    )
+    assert (code, answer["stable"], answer["verdict"]) == (1, False, "UNSTABLE")
+    assert (
+        "the system that the events leave: grows at" in answer["remark"]
+        or "grows from" in answer["remark"]
+    )
+    assert answer["damping_percent"] > 7
+
+
+def test_modes_after_the_events_that_are_near_zero_leave_the_verdict_to_a_long_run(gfor, case):
+    """A power flow with a line open lets units hold their voltages; the event leaves their references."""
+    values = [word for key, value in VALUES.items() for word in ("--set", f"{key}={value}")]
+    values += ["--set", "sg[1235].governor.R=0.0285"]
+    _, found = run(gfor, case, "--fault", FAULT.replace("60", "5"), *values)
+    assert -0.4 < found["answer"]["after_events"]["damping_percent"] < -0.1
+    assert found["answer"]["stable"] is None
+    assert (
+        "too short to show whether what the events leave settles: --stop 42.6"
+        in found["answer"]["remark"]
+    )
+
+
+DAMPINGS = [
+    (-0.4, 0, 3, True),
+    (0.4, 0, 3, True),
+    (-0.6, 0, 3, False),
+    (-0.6, 0, 60, True),
+    (-0.4, 1, 60, False),
+    (0.6, 1, 60, False),
+]
+
+
+@pytest.mark.parametrize(("damping", "fast", "stop", "good"), DAMPINGS)
+def test_a_whole_run_decides_about_modes_near_zero_and_not_of_others_that_grow(
+    case, monkeypatch, damping, fast, stop, good
+):
+    before = gfor_api.load(case).scenario("base").modes().result
+    least, other = (
+        replace(before.modes[0], eigenvalue=value)
+        for value in (complex(-damping / 20, 5), fast + 300j)
+    )
+    stable = damping > 0 and not fast
+    grows = None if stable else other if fast else least
+    after = replace(
+        before, modes=[least], stability=replace(before.stability, stable=stable, mode=grows)
+    )
+    monkeypatch.setattr(
+        answers,
+        "_by_response",
+        lambda _: answers.ScenarioAnswer("", True, "stable", None, "settles"),
+    )
+    prepared = SimpleNamespace(events=[SimpleNamespace(time=0.5)], stop_time=stop)
+    found = answers.of_run(SimpleNamespace(after=after, modes=SimpleNamespace(prepared=prepared)))
+    assert found.good is good
+    assert ("by a power flow, decides nothing" in found.remark) is (good and damping < 0.5)
+
+
+def test_a_network_that_stays_stable_is_stable(gfor, case):
+    code, found = run(gfor, case, "--fault", FAULT, stop="8")
+    assert (code, found["answer"]["verdict"]) == (0, "stable")
+    assert found["answer"]["after_events"]["damping_percent"] == pytest.approx(10.19, abs=0.05)
+
+
+def test_a_fault_that_opens_nothing_leaves_the_system_as_it_was(gfor, case):
+    _, found = run(gfor, case, "--fault", "bus_14, 60 ms, from 0.5 s")
+    assert "after_events" not in found["answer"]
+    scenario = gfor_api.load(case).scenario("base", fault=FAULT)
+    assert lasting_changes(scenario.prepared) == {"grid.line_13_14.connected": False}
+
+
+def test_settling_is_not_judged_while_something_is_forced(gfor, case):
+    _, found = run(
+        gfor, case, "--fault", "bus_14, 60 ms, from 0.5 s", "--force", "sg1 0.8 Hz 0.1 %", stop="8"
+    )
+    assert found["answer"]["stable"] is None
+    assert (
+        "sg1.governor.delta_P_ref: forced until then, so settling is not judged"
+        in found["answer"]["remark"]
+    )
+
+
+def test_a_run_without_events_says_so(gfor, case):
+    _, found = run(gfor, case)
+    assert found["answer"]["remark"].startswith("no event disturbs it")
+
+
+LOAD = '[[events]]\ntype = "load_change"\ntime = "0.5 s"\ncomponent = "grid"\nload = "load_11"\nscale = 1.5\n'
+TRIP = '[[events]]\ntype = "line_trip"\ntime = "0.5 s"\nline = "line_13_14"\n'
+
+
+@pytest.mark.parametrize(
+    ("events", "kind"),
+    [(LOAD, type(None)), (TRIP, ModesResult), (LOAD + TRIP, str)],
+    ids=("load", "trip", "both"),
+)
+def test_who_feeds_a_load_that_changed_is_for_the_run_to_show(case, events, kind):
+    case.write_text(f"{case.read_text()}\n{events}")
+    after = modes_after(gfor_api.load(case).scenario("base").prepared, (0.1, 2.0))
+    assert isinstance(after, kind), after
+
+
+def test_a_change_whose_modes_are_not_known_is_no_verdict_of_a_short_run(gfor, case):
+    case.write_text(f"{case.read_text()}\n{LOAD.replace('1.5', '0.95')}")
+    short, found = run(gfor, case, stop="3")
+    assert (short, found["answer"]["stable"]) == (1, None)
+    assert (
+        "too short to show whether what the events leave settles: --stop 3.6"
+        in found["answer"]["remark"]
+    )
+    whole, found = run(gfor, case, stop="6")
+    assert (whole, found["answer"]["stable"]) == (0, True)

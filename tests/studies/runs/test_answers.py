@@ -1,0 +1,152 @@
+"""What is read first: verdict and mode of each scenario, and the power flow beside pandapower's."""
+
+import csv
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from orchestrator.cases.schema import KindTable
+from orchestrator.face.cli import main
+from orchestrator.linear.spectra.modes import make_mode
+from orchestrator.linear.spectra.stability import Stability
+from orchestrator.simulation.watch.finding import Finding
+from orchestrator.studies.runs.answers import of_modes, of_run
+from orchestrator.studies.runs.run import RunResult
+
+
+def lines(capsys, *words):
+    assert main([*map(str, words)]) in (0, 1)
+    return capsys.readouterr().out.splitlines()
+
+
+def test_the_first_screen_of_modes_has_one_line_a_scenario(capsys):
+    text = lines(capsys, "modes", "two_area_rms")
+    rows = [[cell.strip() for cell in line.strip("│").split("│")] for line in text[3:8]]
+    assert [row[1] for row in rows] == ["UNSTABLE", "stable", "stable", "stable", "stable"]
+    assert float(rows[1][3]) == pytest.approx(10.6, abs=0.3)
+    assert all("sg1" in row[4] for row in rows)
+    assert not [line for line in text if "largest real part" in line or "a mode grows" in line]
+
+
+SPEEDS = ("sg1.machine.omega", "sg2.machine.omega")
+
+
+def result(findings=(), stable=True, events=(1.0,), failure=None, kind=None):
+    shape = np.array([1.0 + 0j, -0.8 + 0j])
+    mode = make_mode(-0.2 + 5j, shape / 1.64, shape, SPEEDS)
+    case = SimpleNamespace(
+        table=SimpleNamespace(
+            analysis=SimpleNamespace(modes={}), models=kind, emt=KindTable(step_size=1e-4)
+        )
+    )
+    # leaves nothing changed
+    passing = [SimpleNamespace(time=t, changes=dict) for t in events if t < 5]
+    prepared = SimpleNamespace(
+        title="S",
+        subject="S",
+        events=passing,
+        stop_time=5.0,
+        case=case,
+        not_reached=[t for t in events if t >= 5],
+    )
+    prepared.system = SimpleNamespace(components={})
+    modes = SimpleNamespace(
+        prepared=prepared,
+        modes=[mode],
+        hidden=None,
+        named={},
+        unnamed={},
+        misfits={},
+        swing=SPEEDS,
+        stability=Stability(stable, mode, reason="" if stable else "not searched"),
+    )
+    return RunResult(modes, None, findings=list(findings), failure=failure)
+
+
+def finding(kind, **more):
+    return Finding(kind, 1.0, "gfor", "x", "message", **more)
+
+
+@pytest.mark.parametrize(
+    ("findings", "stable", "word", "remark"),
+    [
+        ([], True, "stable", "keeps synchronism and settles until 5 s"),
+        # a limit that the model has
+        ([finding("active_limit")], True, "stable", "keeps synchronism"),
+        ([finding("active_limit", represented=False)], True, "not known", "repeat with EMT models"),
+        ([finding("not_judged")], True, "not known", "not judged"),
+        ([finding("loss_of_synchronism")], True, "UNSTABLE", "gfor: loses synchronism from 1 s"),
+        (
+            [finding("active_limit", represented=False), finding("run_away")],
+            True,
+            "UNSTABLE",
+            "runs away",
+        ),
+        ([], None, "not known", "not searched"),
+    ],
+)
+def test_the_verdict_of_a_run_is_its_own(findings, stable, word, remark):
+    answer = of_run(result(findings, stable))
+    assert (answer.verdict, answer.good) == (word, {"stable": True, "UNSTABLE": False}.get(word))
+    assert remark in answer.remark
+    if remark.startswith("repeat"):
+        assert of_run(result(findings, stable, kind="phasor")).remark.endswith(
+            "repeat with --set models=emt"
+        )
+
+
+@pytest.mark.parametrize(
+    ("events", "good", "remark"),
+    [
+        ((), True, "sg1 against sg2"),
+        ((4.9,), True, "settles until 5 s; sg1"),
+        ((1.0, 6.0), True, "settles until 5 s, before the events at 6 s; sg1"),
+        ((5.0, 6.0), None, "the run ends at 5 s, before its events (t = 5 s, 6 s)"),
+    ],
+)
+def test_a_run_that_ends_before_its_events_has_no_verdict(events, good, remark):
+    """A run has no events at its end; growth that it shows before stays told."""
+    run = result(events=events)
+    answer = of_run(run)
+    assert (answer.good, run.stable_in_simulation) == (good, good)
+    assert remark in answer.remark
+    grows = of_run(result([finding("growth")], events=events))
+    assert (grows.good, grows.verdict) == (False, "UNSTABLE")
+
+
+def test_a_run_that_is_stopped_before_its_event_says_so(tmp_path, capsys):
+    text = lines(
+        capsys, "run", "two_area_rms", "--scenario", "pod_p", "--stop", "0.1", "--out", tmp_path
+    )
+    assert "not known" in text[3]
+    assert "the run ends at 0.1 s, before its events (t = 1 s)" in " ".join(
+        " ".join(text[3:6]).replace("│", " ").split()
+    )
+    assert (
+        json.loads((tmp_path / "summary.json").read_text())["scenarios"][0]["answer"]["stable"]
+        is None
+    )
+
+
+def test_stable_eigenvalues_are_no_verdict_of_a_run_with_a_fault():
+    run = result([finding("active_limit", represented=False)])
+    assert of_modes(run.modes).good is True
+    assert run.stable_in_simulation is None
+
+
+def test_the_power_flow_is_given_and_written(capsys, tmp_path):
+    assert main(["modes", "wscc9", "--scenario", "base", "--json", "--out", str(tmp_path)]) == 0
+    (scenario,) = json.loads(capsys.readouterr().out)["scenarios"]
+    flow = scenario["power_flow"]
+    assert {"name", "v_pu", "angle_deg"} <= set(flow["buses"][0])
+    assert {"name", "p_mw", "q_mvar", "loading_percent"} <= set(flow["machines"][0])
+    assert flow["slack"]["units"] == ["sg1"]
+    # what is fed is drawn by the loads and lost in branches
+    assert flow["generation_mw"] - flow["losses_mw"] == pytest.approx(315.0, abs=1e-6)
+    for machine in flow["machines"]:
+        apparent = abs(complex(machine["p_mw"], machine["q_mvar"]))
+        assert machine["loading_percent"] == pytest.approx(100 * apparent / machine["rating_mva"])
+    with (tmp_path / "power_flow_branches.csv").open(encoding="utf-8", newline="") as file:
+        assert len(list(csv.DictReader(file))) == len(flow["branches"])

@@ -1,0 +1,109 @@
+"""Every figure of a JSON or a page is one of the object that it was made from, in the unit that is said."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from orchestrator.studies.certification import report_criteria
+from orchestrator.studies.modes.step_choice import Allowed, StepChoice, TriedStep, step_choice_json
+from orchestrator.studies.runs.files import _mode_rows
+from tests.support.figures import foreign_in_json, foreign_in_text
+
+# no two of them are a simple multiple of each other
+CRITICAL = np.array([-0.3137 + 3.7193j, -0.9071 + 7.3391j])
+
+
+def test_the_walker_sees_a_unit_and_a_sign():
+    source = {"eigenvalue": -0.3137 + 3.7193j, "share": 0.417}
+    right = {"frequency_hz": 3.7193 / (2 * np.pi), "share_percent": 41.7, "share": 0.417}
+    assert foreign_in_json(right, source) == []
+    for wrong in (3.7193 * 2 * np.pi, -3.7193 / (2 * np.pi), 3.7193 / np.pi):
+        assert foreign_in_json({"frequency_hz": wrong}, source) == [(".frequency_hz", wrong)]
+    assert foreign_in_text("<td>−0.314 ± j3.719</td><td>0.5919</td>", source) == []
+    assert foreign_in_text("<td>0.314</td><td>23.3690</td>", source) == ["0.314", "23.3690"]
+
+
+def test_the_walker_sees_percent_that_are_none_and_a_lost_sign():
+    source = {"share": 0.417, "change": -0.0123, "damping_percent": 8.43}
+    assert foreign_in_json({"share": 41.7, "share_percent": 0.417}, source) == [
+        (".share", 41.7),
+        (".share_percent", 0.417),
+    ]
+    assert foreign_in_json({"change": 0.0123, "damping_percent": 843.0}, source) == [
+        (".change", 0.0123),
+        (".damping_percent", 843.0),
+    ]
+    assert foreign_in_text("41.7 % and 0.417, −0.012", source) == []
+    assert foreign_in_text("41.7 and 0.417 %, 0.012", source) == ["41.7", "0.417", "0.012"]
+    assert foreign_in_text("41.7", source, "Share [%]") == []
+
+
+def test_of_a_choice_of_the_step():
+    seen = CRITICAL + np.array([0.0123 + 0.0411j, -0.0057 + 0.0213j])
+    trial = TriedStep(
+        "gauss-seidel", 1.3e-4, np.array([0.0031, -0.0047]), np.array([0.19, -0.23]), seen, 0.71
+    )
+    choice = StepChoice(
+        prepared=SimpleNamespace(name="base"),
+        allowed=Allowed(0.0013, 0.29),
+        critical=CRITICAL,
+        growth=0.0371,
+        trials=(trial,),
+    )
+    said = step_choice_json(choice)
+    assert [one["frequency_hz"] for one in said["critical"]] == pytest.approx(
+        CRITICAL.imag / (2 * np.pi)
+    )
+    assert foreign_in_json(said, choice) == []
+
+
+def test_of_a_table_of_modes():
+    modes = [
+        SimpleNamespace(
+            eigenvalue=complex(z),
+            frequency_hz=z.imag / (2 * np.pi),
+            damping_percent=-100 * z.real / abs(z),
+            participation=(("a", 0.4173), ("b", 0.2819)),
+        )
+        for z in CRITICAL
+    ]
+    result = SimpleNamespace(
+        prepared=SimpleNamespace(name="base"), name_of=lambda mode: "", modes=modes
+    )
+    for row in _mode_rows([result]):
+        for heading, cell in row.items():
+            assert foreign_in_text(cell, modes, heading) == [], heading
+
+
+def test_of_a_certificates_page(monkeypatch):
+    mode = SimpleNamespace(
+        eigenvalue=complex(CRITICAL[0]),
+        before=complex(CRITICAL[1]),
+        doubt="",
+        similarity=0.871,
+        components="a",
+        accepted=True,
+    )
+    neighbour = SimpleNamespace(
+        eigenvalue=complex(CRITICAL[1]), before=complex(CRITICAL[0]), components="b"
+    )
+    verdict = SimpleNamespace(
+        X_L=0.1, modes=[mode], neighbours=[neighbour], faults=[], unknown="", judged=True
+    )
+    headings = ("Eigenvalue [rad/s]", "f [Hz]", "Damping [%]")
+    for heading, cell in zip(headings, report_criteria._mode(mode.eigenvalue), strict=True):
+        assert foreign_in_text(cell, mode, heading) == []
+    assert foreign_in_text(report_criteria.before(mode.before), mode) == []
+    point = SimpleNamespace(
+        modes=SimpleNamespace(eigenvalues=np.array([mode.eigenvalue])), components=["a"]
+    )
+    marks = []
+    monkeypatch.setattr(
+        report_criteria, "complex_plane", lambda title, shown, **_: marks.extend(shown) or ""
+    )
+    certificate = SimpleNamespace(results={("with", 0.1): point}, verdicts=[])
+    report_criteria.eigenvalues(certificate, SimpleNamespace(add=lambda *_: ("", "")))
+    (mark,) = marks
+    assert "0.592 Hz" in mark.text
+    assert foreign_in_text(mark.text, verdict) == []

@@ -1,0 +1,66 @@
+"""The ring-down table shows the mode, or nothing and why."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from orchestrator.cases.case import load_case
+from orchestrator.studies.runs.run import run_scenario
+from orchestrator.studies.signals import signal_modes
+
+
+def run_of(tmp_path, events, stop):
+    text = load_case("two_area").path.read_text(encoding="utf-8")
+    head, _, tail = text.partition("[[events]]")
+    path = tmp_path / "case.toml"
+    path.write_text(f"{head}{events}{tail[tail.index(chr(10) + '[') :]}", encoding="utf-8")
+    (ready,) = load_case(path).prepare(["gfor"], stop_time=stop)
+    return run_scenario(ready)
+
+
+STEP = '[[events]]\ntype = "load_change"\ntime = "{} s"\ncomponent = "grid"\nload = "load_2"\nscale = {}\n'
+
+
+def test_a_ring_down_is_shown(tmp_path):
+    result = run_of(tmp_path, STEP.format(1, 1.02), 8.0)
+    assert result.ring_down.damping_percent == pytest.approx(10.6, abs=1)
+
+
+@pytest.mark.parametrize(
+    ("events", "stop", "why"),
+    [
+        (STEP.format(1, 1.02), 3.0, "has fewer than 1 periods of the mode"),
+        (
+            STEP.format(1, 1.02) + STEP.format(3, 1.0),
+            6.0,
+            "falls into its window, from t = 2 s to t = 6 s",
+        ),
+    ],
+)
+def test_what_is_no_ring_down_of_the_mode_is_not_shown(tmp_path, events, stop, why):
+    result = run_of(tmp_path, events, stop)
+    assert result.ring_down is None
+    (said,) = [text for text in result.modes.warnings if "no ring-down" in text]
+    assert why in said
+
+
+@pytest.mark.parametrize("hertz", [(0.5,), (0.5, 0.9)])
+def test_how_far_two_modes_are_told_apart_is_said_of_two(hertz):
+    modes = [
+        SimpleNamespace(
+            eigenvalue=complex(-0.2, 2 * np.pi * f),
+            frequency_hz=f,
+            amplitude=1.0,
+            doubts=(),
+            damping_ratio=0.06,
+        )
+        for f in hertz
+    ]
+    own = SimpleNamespace(
+        interval=0.02, modes=modes, start=0.0, stop=20.0, line=None, is_trend=lambda m: False
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(signal_modes, "over_a_trend", lambda *_: "")
+        said = signal_modes.SignalModes.remarks.fget(own)
+    assert sum("tell two modes apart" in text for text in said) == len(hertz) - 1

@@ -1,0 +1,96 @@
+"""What tables and records of a screening take from which place."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from orchestrator.output.report.html.elements import Figures
+from orchestrator.studies.operating_points.item import Status
+from orchestrator.studies.screening import point, view
+from orchestrator.studies.screening.point import _Worker
+from orchestrator.studies.screening.summary import ModeAt
+
+
+def item(**record):
+    return SimpleNamespace(
+        record=SimpleNamespace(**record),
+        point=SimpleNamespace(name="p07"),
+        outage=SimpleNamespace(name="sg2", elements=("sg2",)),
+    )
+
+
+def test_an_outage_without_any_verdict_is_told_by_its_first_point():
+    plan = SimpleNamespace(wanted=SimpleNamespace(damping=0.2), points=("p07",))
+    lost = item(status=Status.POWER_FLOW)
+    table = view.overview(SimpleNamespace(result=SimpleNamespace(plan=plan, items=(lost,))))
+    assert [column.cell(table.rows[0]) for column in table.columns] == [
+        "sg2",
+        "p07",
+        "",
+        "–",
+        "1 of 1",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("residues", "first"),
+    [
+        ({"a": (5.0, 0.1), "b": (1.0, 2.0)}, "a"),
+        ({"a": (0.1, 5.0), "b": (2.0, 1.0)}, "a"),
+        ({"a": (1j, 0), "b": (0, 2)}, "b"),
+    ],
+)
+def test_converters_are_ranked_by_the_larger_of_both_residues(residues, first):
+    at = ModeAt(item(residues={name: np.array([[p], [q]]) for name, (p, q) in residues.items()}), 0)
+    assert at.ranking()[0] == (first, *map(complex, residues[first]))
+
+
+def test_components_are_named_by_their_shares():
+    at = ModeAt(item(shares={"a": np.array([0.2]), "b": np.array([0.7]), "c": np.array([0.1])}), 0)
+    assert at.participation(2) == [("b", 0.7), ("a", 0.2)]
+
+
+def test_a_stretch_is_joined_by_the_modes_of_its_anchor_and_of_its_last_intact_item(monkeypatch):
+    monkeypatch.setattr(point, "_as_kept", lambda modes: modes)
+    results = [
+        SimpleNamespace(found=SimpleNamespace(modes=name), record=name)
+        for name in ("anchor", "one", "out")
+    ]
+    items = [SimpleNamespace(intact=intact) for intact in (True, True, False)]
+    own = SimpleNamespace(
+        _task=SimpleNamespace(anchor=items[0], items=items[1:]),
+        _bench=SimpleNamespace(perturbed=3, reused=5),
+    )
+    made = _Worker._record(own, results)
+    assert (made.first, made.last, made.last_place) == ("anchor", "one", 1)
+    assert (made.items, made.perturbed, made.reused) == (("anchor", "one", "out"), 3, 5)
+
+
+def test_the_page_shows_the_figure_not_its_name():
+    mode = ModeAt(item(eigenvalues=[-0.2 + 5j]), 0)
+    drawn = view._plane(SimpleNamespace(modes=[SimpleNamespace(at=[mode])]), Figures())
+    assert drawn.startswith('<figure id="figure-1">')
+
+
+def test_residues_are_those_of_components_that_show_their_frequency(monkeypatch):
+    """Each at its own states, whatever stands before them."""
+    monkeypatch.setattr(point, "residue", lambda modes, column, row: np.array([column @ row]))
+
+    def component(states, observed):
+        inputs = ["v_re", "v_im", *point.DRIVEN]
+        driven = np.outer(
+            np.ones(states), [0.0] * 2 + [float(k + 1) for k in range(len(point.DRIVEN))]
+        )
+        return SimpleNamespace(
+            states=["x"] * states,
+            observed=observed,
+            inputs=inputs,
+            B_c=driven,
+            C_o=np.full((1, states), 3.0),
+        )
+
+    whole = {"sg1": component(1, ("sg1.v",)), "gfor": component(2, point.OBSERVED)}
+    found = point._residues(SimpleNamespace(eigenvalues=[1j], names=["x"] * 3), whole)
+    assert list(found) == ["gfor"]
+    assert found["gfor"].real.ravel().tolist() == [6.0 * (k + 1) for k in range(len(point.DRIVEN))]

@@ -1,0 +1,127 @@
+"""Modes made from a neighbour's, and the checks that none is lost: with mistakes that are planted."""
+
+import numpy as np
+import pytest
+
+from orchestrator.cases.case import load_case
+from orchestrator.linear.models.linear_model import LinearModel
+from orchestrator.linear.models.slope_linearization import _Point, linearize_slopes
+from orchestrator.linear.spectra.critical_modes import DENSE
+from orchestrator.linear.spectra.mode_refinement import RefinedModes, missed, refine
+from orchestrator.linear.spectra.mode_tracking import ModeSet
+from orchestrator.linear.spectra.modes import find_spectrum
+from orchestrator.linear.spectra.shifted_equations import ShiftedEquations, count_growing
+from orchestrator.studies.modes.modes import running
+from orchestrator.studies.screening.modes import CriticalRegion, find_modes_here
+
+REGION = CriticalRegion(0.1, 2.0, 0.2)
+
+
+def system(pairs, seed=0, n=DENSE + 40):
+    """A model, by itself of more states than are computed densely, with these eigenvalues and their conjugates among
+    others.
+    """
+    rng = np.random.default_rng(seed)
+    A = np.diag(-np.linspace(20.0, 3000.0, n))
+    for k, value in enumerate(pairs):
+        A[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = [
+            [value.real, value.imag],
+            [-value.imag, value.real],
+        ]
+    turn = np.eye(n) + 0.02 * rng.standard_normal((n, n))
+    return LinearModel.from_matrix(
+        turn @ A @ np.linalg.inv(turn), tuple(f"c.x{k}" for k in range(n)), None
+    )
+
+
+KNOWN = [-0.3 + 3j, -0.4 + 5j, -0.5 + 7j, -0.2 + 7.1j, -0.9 + 9j]
+
+
+def modes_of(model):
+    found = find_spectrum(model, 0.1, 2.0).modes
+    return ModeSet.of([mode for mode in found if mode.is_oscillation], model.names)
+
+
+def without(modes, k):
+    parts = (np.delete(x, k, axis=0) for x in (modes.eigenvalues, modes.left, modes.right))
+    return ModeSet(*parts, names=modes.names)
+
+
+def columns(modes):
+    return RefinedModes(modes.eigenvalues, modes.left.T, modes.right.T, settled=True)
+
+
+def test_a_neighbours_modes_become_those_of_the_model():
+    there, here = (
+        modes_of(system(KNOWN)),
+        system([value * (1.02 + 0.01j) for value in KNOWN], seed=1),
+    )
+    start = columns(there)
+    found = refine(here, ShiftedEquations(here), start.values, start.left, start.right)
+    assert found.settled
+    expected = modes_of(here).eigenvalues
+    assert np.sort_complex(found.values) == pytest.approx(np.sort_complex(expected), rel=1e-8)
+
+
+@pytest.mark.parametrize("k", range(5))
+def test_a_mode_that_is_not_known_is_found(k):
+    model = system(KNOWN)
+    modes, equations = modes_of(model), ShiftedEquations(model)
+    assert missed(equations, columns(modes), 0.2 * np.pi, 4 * np.pi, 0.2) == []
+    (found,) = missed(equations, columns(without(modes, k)), 0.2 * np.pi, 4 * np.pi, 0.2)
+    assert found == pytest.approx(modes.eigenvalues[k], rel=1e-2)
+
+
+@pytest.mark.parametrize("lost", [0.2 + 4j, 0.01 + 11j, -0.05 + 0.9j])
+def test_a_lost_mode_is_searched_for(lost):
+    """The neighbour does not have it: it came in between."""
+    before, here = modes_of(system(KNOWN)), system([*KNOWN, lost])
+    found = find_modes_here(here, np.linalg.eigvals(here.A), REGION, before, count=False)
+    assert found.searched
+    assert np.abs(found.modes.eigenvalues - lost).min() < 1e-6
+    assert found.grows == (lost.real > 0)
+
+
+def test_nothing_is_searched_where_nothing_is_lost():
+    found = find_modes_here(
+        system(KNOWN), np.zeros(0), REGION, modes_of(system(KNOWN)), count=False
+    )
+    assert not found.searched
+    assert found.growing_elsewhere is None
+
+
+@pytest.mark.parametrize("outside", [0.5 + 80j, 3 + 0.1j, 2 + 4000j])
+def test_growth_at_other_frequencies_is_counted(outside, monkeypatch):
+    """A full matrix of a few states takes the way of a large sparse one."""
+    monkeypatch.setattr("orchestrator.studies.screening.modes.DENSE", 0)
+    here = system([*KNOWN, outside], n=40)
+    found = find_modes_here(
+        here, -np.linspace(1.0, 900.0, len(here.names)), REGION, modes_of(here), count=True
+    )
+    assert found.growing_elsewhere == 2
+    assert found.grows
+
+
+def test_growing_eigenvalues_are_counted():
+    for seed, growing in ((0, []), (1, [0.1 + 3j]), (2, [0.1 + 3j, 0.02 + 314j, 5 + 20j])):
+        model = system([*KNOWN, *growing], seed, n=40)
+        alone = -np.linspace(1.0, 500.0, len(model.names))
+        assert count_growing(ShiftedEquations(model), alone) == 2 * len(growing)
+
+
+def test_a_pattern_that_does_not_hold_is_noticed():
+    """Planted: an effect that the pattern of another operating point did not have."""
+    (prepared,) = load_case("two_area").prepare(["gfor"])
+    with running(prepared) as master:
+        exchange = master.exchanges["sg1"]
+        full = linearize_slopes(exchange, 0.0, 1e-4)
+        description = exchange.component.description
+        names = (*description.states, *exchange.inputs.names)
+        point = _Point(exchange.component, names, (*description.rates, *exchange.outputs.names))
+        pattern = np.vstack([np.hstack([full.A_c, full.B_c]), np.hstack([full.C, full.D])]) != 0
+        up, down = point.together(pattern)
+        again = np.hstack([full.A_c, full.B_c])
+        assert ((up + down) / 2)[: len(again)] == pytest.approx(again, rel=1e-4, abs=1e-4)
+        i, k = np.argwhere(np.abs(full.A_c) > 1)[0]
+        pattern[i, k] = False
+        assert point.together(pattern) is None

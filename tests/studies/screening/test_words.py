@@ -1,0 +1,188 @@
+"""What is said of growth beside the critical modes, of warnings, and of the scenario."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import orchestrator as face
+from orchestrator.cases.case import load_case
+from orchestrator.output.report.html.chapters import _screening
+from orchestrator.studies.operating_points.item import Status
+from orchestrator.studies.points.executor import Serial
+from orchestrator.studies.points.points import Work
+from orchestrator.studies.points.store import PointStore
+from orchestrator.studies.screening.record import ItemRecord
+from orchestrator.studies.screening.request import ScreeningRequest
+from orchestrator.studies.screening.study import plan_screening, run_screening
+from orchestrator.studies.screening.summary import Summary
+from orchestrator.studies.screening.view import as_json, remarks
+from orchestrator.studies.screening.words import growth_outside, verdict_sentence, what_was_counted
+
+
+@pytest.mark.parametrize(
+    ("eigenvalues", "number", "fastest", "said"),
+    [
+        ([-1 + 5j], 0, None, ""),
+        (
+            [-1 + 5j],
+            1,
+            (0.25, 0.0),
+            "1 eigenvalue grows outside of the range, by 0.25 1/s without an oscillation",
+        ),
+        (
+            [-1 + 5j],
+            2,
+            (0.5, 4 * np.pi),
+            "2 eigenvalues grow outside of the range, by 0.5 1/s at 2 Hz",
+        ),
+        (
+            [-1 + 5j],
+            2,
+            None,
+            "2 eigenvalues grow outside of the range; `gfor modes` shows how fast",
+        ),
+        (
+            [-1 + 5j, 0.1 + 15j],
+            0,
+            None,
+            "2 eigenvalues grow outside of the range, by 0.1 1/s at 2.39 Hz",
+        ),
+        (
+            [-1 + 5j, 0.1 + 15j],
+            2,
+            (0.5, 4 * np.pi),
+            "4 eigenvalues grow outside of the range, the fastest by 0.5 1/s at 2 Hz",
+        ),
+    ],
+)
+def test_growth_outside_has_its_rate(eigenvalues, number, fastest, said):
+    record = ItemRecord(
+        Status.COMPUTED,
+        eigenvalues=np.array(eigenvalues),
+        critical=(0,),
+        growing_elsewhere=number,
+        fastest=fastest,
+    )
+    assert growth_outside(record) == said
+
+
+@pytest.fixture(scope="module")
+def screened(tmp_path_factory):
+    """The growing mode at 0.57 Hz lies below the range."""
+    folder = tmp_path_factory.mktemp("words")
+    path = folder / "points.csv"
+    path.write_text("name,gfor.in_service,grid.load_2.P\nin,1,\nout,0,1250 MW\n")
+    request = ScreeningRequest(path, None, "gfor", frequencies=(1.0, 2.0))
+    plan = plan_screening(load_case("two_area"), request)
+    for _ in range(2):  # computed, and then kept
+        result = run_screening(plan, Work(Serial(), PointStore(folder / "points")))
+    return result
+
+
+def test_the_verdict_says_how_fast_the_worst_point_grows(screened):
+    sentence = verdict_sentence(Summary(screened))
+    assert sentence.startswith(
+        "UNSTABLE: 1 item of 2; worst: out, intact: 2 eigenvalues grow outside of the range, by "
+    )
+    assert sentence.endswith(" 1/s at 0.572 Hz")
+
+
+def test_the_scenario_is_named(screened):
+    assert what_was_counted(Summary(screened)).startswith("Scenario gfor: modes from 1 to 2 Hz")
+
+
+def test_a_warning_names_its_first_point(screened):
+    items = [
+        replace(item, record=replace(item.record, warnings=("a limit is close",)))
+        for item in screened.items
+    ]
+    (text,) = remarks(Summary(replace(screened, items=items)))
+    assert text == "at 2 of 2, first at in, intact: a limit is close"
+
+
+def test_units_beyond_their_rating_are_in_the_verdict_and_the_report():
+    """Where nothing grows, a steady state that no plant bears is no answer."""
+    found = face.load("two_area").screen(
+        {"usual": {}, "heavy": {"gfor.P_mw": 1600}}, scenario="gfor"
+    )
+    usual, heavy = (item.record for item in found.result.items)
+    assert usual.beyond == {}
+    assert heavy.beyond == {
+        "gfor": pytest.approx(1600 / found.result.plan.prepared.values["gfor.S_n"], rel=0.05)
+    }
+    said = f"at 1 of 2 a unit is beyond its rating, most gfor with {100 * heavy.beyond['gfor']:.3g} % (heavy, intact)"
+    assert found.stable
+    assert found.verdict.endswith(f"; {said}")
+    assert found.as_json()["beyond_rating"] == said
+    assert _screening(Path("screening.json"), found.as_json()).not_judged == [said]
+    calm = replace(found.result, items=found.result.items[:1])
+    assert "rating" not in verdict_sentence(Summary(calm))
+
+
+def test_what_was_searched_in_the_range_alone_is_not_stable(screened):
+    """In a large system growth elsewhere is counted at the ends of stretches only."""
+    calm = next(item for item in screened.items if item.record.stable)
+    uncounted = replace(calm, record=replace(calm.record, stable=None, counted=False))
+    summary = Summary(replace(screened, items=[calm, uncounted]))
+    assert summary.stable is None
+    assert "1 were searched only from 1 to 2 Hz above -30 % damping (--whole" in verdict_sentence(
+        summary
+    )
+
+
+@pytest.mark.parametrize(("counted", "stable"), [(True, True), (False, None)])
+def test_an_item_is_stable_only_where_all_growth_was_counted(
+    monkeypatch, tmp_path, counted, stable
+):
+    monkeypatch.setattr("orchestrator.studies.screening.modes.DENSE", 0)
+    if not counted:
+        monkeypatch.setattr("orchestrator.studies.screening.modes._elsewhere", lambda *_: None)
+    path = tmp_path / "points.csv"
+    path.write_text("name,gfor.in_service\nin,1\n")
+    plan = plan_screening(load_case("two_area"), ScreeningRequest(path, None, "gfor"))
+    for _ in range(2):  # computed, and then kept
+        result = run_screening(plan, Work(Serial(), PointStore(tmp_path / "points")))
+    (item,) = result.items
+    assert (item.record.stable, item.record.counted) == (stable, counted)
+    if stable:
+        assert (
+            "what grows slower than 0.002 1/s outside of 0.1 to 2 Hz is seen near 0 Hz only"
+            in verdict_sentence(Summary(result))
+        )
+
+
+def test_where_all_eigenvalues_are_known_nothing_is_left_out(screened):
+    calm = next(item for item in screened.items if item.record.stable)
+    summary = Summary(replace(screened, items=[calm, calm]))
+    assert summary.slowest == 0.0
+    assert verdict_sentence(summary).startswith(
+        "stable: nothing grows at any of 2 points and outages"
+    )
+    assert "slower" not in verdict_sentence(summary)
+    assert as_json(summary)["slowest_growth_counted"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("steps", "said"),
+    [
+        ((0, 0), "damping, of the system without a communication step: "),
+        ((1, 1), "damping, of the map over a communication step: "),
+        (
+            (200, 200),
+            "damping, of the map over 200 communication steps (0.02 s), after which sampled controllers repeat: ",
+        ),
+        (
+            (0, 200),
+            "of the system without a communication step at 1 of 2 items, of the map over 200 communication steps",
+        ),
+    ],
+)
+def test_the_head_says_of_which_system_the_modes_are(screened, steps, said):
+    items = tuple(
+        replace(item, record=replace(item.record, map_steps=n))
+        for item, n in zip(screened.items, steps, strict=True)
+    )
+    assert screened.plan.prepared.step_size == 1e-4
+    assert said in what_was_counted(Summary(replace(screened, items=items)))

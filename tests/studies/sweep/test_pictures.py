@@ -1,0 +1,118 @@
+"""Pictures and remarks of a sweep: which axis has the legend, and what stays at 0."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+
+from orchestrator.studies.sweep import plots, tables
+from orchestrator.studies.sweep.view import ParameterSweep
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """Figures, in place of their files; one named curve from 40 to 60."""
+    figures = []
+    trajectory = SimpleNamespace(name="tie", carries="tie")
+    sweep = SimpleNamespace(prepared=SimpleNamespace(title="SG + GFOR"))
+    monkeypatch.setattr(plots, "_named", lambda samples: [(0, sweep, trajectory, None)])
+    monkeypatch.setattr(plots, "_draw", lambda axis, *_, **__: axis.plot([1, 2], [40, 60]))
+    monkeypatch.setattr(plots, "axis_label", lambda axis: "X_L [pu]")
+    monkeypatch.setattr(plots, "save_figure", lambda figure, path: figures.append(figure))
+    return figures
+
+
+def labelled(figure: Figure):
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["SG + GFOR"]
+    first, *_, last = figure.axes
+    assert first.get_title("left").startswith("Named modes")
+    assert (last.get_xlabel(), last.get_title("left")) == ("X_L [pu]", "")
+
+
+def test_numbers_beside_curves_stand_in_the_legend():
+    places = {"damping": 5.0, "real": -0.2, "frequency": 0.5}
+    trajectories = [SimpleNamespace(name=f"tie {k}", carries="tie") for k in (1, 2)]
+    sweep = SimpleNamespace(
+        trajectories=trajectories,
+        prepared=SimpleNamespace(title="SG + GFOR"),
+        unstable=lambda axes: [],
+    )
+    samples = SimpleNamespace(
+        result=SimpleNamespace(scenarios=[sweep]),
+        axes=[SimpleNamespace(key="grid.X_L", unit="pu", values=(0.1, 0.3))],
+        of=lambda *_: [((0,), places), ((1,), places | {"real": -0.3})],
+    )
+    axes = Figure().subplots()
+    assert plots.draw_trajectories(axes, samples)
+    assert {"1", "2"} <= {text.get_text() for text in axes.texts}
+    assert axes.get_legend_handles_labels()[1] == ["SG + GFOR", "tie 1", "tie 2"]
+
+
+def test_damping_and_frequency_of_named_modes(drawn):
+    assert plots.plot_named(SimpleNamespace(axes=["X_L"]), None)
+    labelled(drawn[0])
+    damping, frequency = drawn[0].axes
+    assert (damping.get_ylabel(), frequency.get_ylabel()) == ("Damping [%]", "Frequency [Hz]")
+    assert frequency.get_ylim()[0] == 0
+    assert [list(line.get_ydata()) for line in damping.lines if len(line.get_ydata()) == 2] == [
+        [40, 60],
+        [0, 0],
+    ]
+
+
+@pytest.mark.parametrize("states", [["sg1.omega"], ["sg1.omega", "sg2.omega"]])
+def test_participation_begins_at_0(drawn, states):
+    assert plots.plot_swing(SimpleNamespace(axes=["X_L"], states=states), None)
+    axes = drawn[0].axes
+    assert [axis.get_ylabel() for axis in axes] == [f"{state} [%]" for state in states]
+    assert {axis.get_ylim()[0] for axis in axes} == {0}
+    assert [text.get_text() for text in drawn[0].legends[0].get_texts()] == ["SG + GFOR"]
+
+
+@pytest.mark.parametrize("beyond", [0, 1])
+def test_failures_are_listed_up_to_a_number_and_the_rest_is_counted(monkeypatch, beyond):
+    monkeypatch.setattr(tables, "place_text", lambda samples, place: str(place))
+    monkeypatch.setattr(tables, "warned", lambda result: [])
+    sweep = SimpleNamespace(prepared=SimpleNamespace(name="base"))
+    failed = [(sweep, place, "no power flow") for place in range(tables._FAILURES_SHOWN + beyond)]
+    result = SimpleNamespace(
+        plan=SimpleNamespace(idle=(), number_of_points=99),
+        limits=(),
+        scenarios=(),
+        refined=0,
+        failures=lambda: iter(failed),
+    )
+    texts = tables.remarks(SimpleNamespace(result=result))
+    assert len(texts) == 1 + tables._FAILURES_SHOWN + beyond
+    assert [text for text in texts if "more" in text] == ["  … and 1 more, in sweep.csv"] * beyond
+
+
+def test_shares_are_shown_in_percent():
+    assert plots._percent_of("a")({"states": {"a": 0.25}}) == 25
+    assert np.isnan(plots._percent_of("a")({"states": {}}))
+
+
+def test_a_curve_stands_over_the_last_axis():
+    axes = [
+        SimpleNamespace(values=[0.0, 1.0], logarithmic=False),
+        SimpleNamespace(values=[5.0, 7.0], logarithmic=False),
+    ]
+    curve = [((1, k), {"named": True, "damping": d}) for k, d in enumerate((40.0, 60.0))]
+    axis = Figure().subplots()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plots, "_rows", lambda given: [given])
+        plots._draw(axis, SimpleNamespace(axes=axes), curve, lambda sample: sample["damping"])
+    assert [(list(line.get_xdata()), list(line.get_ydata())) for line in axis.lines] == [
+        ([5.0, 7.0], [40.0, 60.0])
+    ] * 2
+
+
+def test_a_sweep_shows_itself_under_its_own_name(monkeypatch):
+    plan = SimpleNamespace(case=SimpleNamespace(name="two_area"), number_of_points=2)
+    sweep = ParameterSweep.__new__(ParameterSweep)
+    sweep.result = SimpleNamespace(plan=plan, failures=lambda: iter(()), scenarios=[])
+    sweep.samples = SimpleNamespace(axes=[SimpleNamespace(key="grid.X_L")])
+    monkeypatch.setattr(ParameterSweep, "table", lambda self: pd.DataFrame())
+    assert sweep._repr_html_().startswith("<p><b>ParameterSweep of two_area over grid.X_L</b>")

@@ -1,0 +1,67 @@
+"""One point of a sweep: what comes back from disk, and what a failure that is nobody's fault leaves behind."""
+
+import numpy as np
+import pytest
+
+from orchestrator.cases.case import load_case
+from orchestrator.core.errors import ErrorKind
+from orchestrator.studies.points.store import PointStore
+from orchestrator.studies.sweep import point
+from orchestrator.studies.sweep.axes import parse_vary
+from orchestrator.studies.sweep.point import PointRecord, compute_point
+from orchestrator.studies.sweep.request import SweepRequest
+from orchestrator.studies.sweep.sweep import plan_sweep
+from tests.studies.sweep.sweep_case import two_oscillators
+
+
+@pytest.fixture
+def task(tmp_path):
+    plan = plan_sweep(
+        load_case(two_oscillators(tmp_path)), SweepRequest([parse_vary("a1.gain=3:4:2")])
+    )
+    return plan.task(plan.scenarios[0], (0,))
+
+
+def test_a_point_comes_back_from_disk_as_it_was(task, tmp_path):
+    record = compute_point(task)
+    store = PointStore(tmp_path / "points")
+    store.save(task.key, *record.stored())
+    again = PointRecord.restored(*store.load(task.key))
+    assert again.named == record.named
+    assert again.stability == record.stability
+    assert np.array_equal(again.modes.eigenvalues, record.modes.eigenvalues)
+    assert again.modes.names == record.modes.names
+
+
+def test_a_file_of_another_form_is_computed_anew(task):
+    header, arrays = compute_point(task).stored()
+    assert PointRecord.restored({**header}, {**arrays}) is not None
+    assert PointRecord.restored({**header, "colour": "red"}, {**arrays}) is None
+    assert PointRecord.restored({**header}, {}) is None
+    assert PointRecord.restored({"named": {}}, {}) is None
+
+
+@pytest.mark.parametrize(
+    ("error", "words"), [(RuntimeError("of a library"), "RuntimeError: of a library")]
+)
+def test_what_a_library_does_ends_one_point_only_and_is_tried_again(
+    task, monkeypatch, error, words
+):
+    def fails(*_, **__):
+        raise error
+
+    monkeypatch.setattr(point, "compute_modes", fails)
+    record = compute_point(task)
+    assert (record.error, record.lasting, record.modes) == (words, False, None)
+
+
+def test_what_an_fmu_of_ours_refuses_fails_alone_and_is_kept(tmp_path):
+    plan = plan_sweep(
+        load_case(two_oscillators(tmp_path)), SweepRequest([parse_vary("slow.T=-1,1")])
+    )
+    refused, fine = (compute_point(plan.task(plan.scenarios[0], (k,))) for k in (0, 1))
+    assert "T must exceed 0" in refused.error
+    assert refused.failure.kind is ErrorKind.START
+    assert refused.lasting  # a model of ours refuses the same values again
+    assert fine.error is None
+    assert fine.modes is not None

@@ -1,0 +1,105 @@
+"""``gfor validate``: the forms that have to work, and that a recording of a known plant comes back."""
+
+import json
+
+import pytest
+
+import orchestrator as gfor_in_python
+from orchestrator.studies.validation.limits import EXAMPLE
+from tests.studies.validation.recordings import run, table, with_noise, written
+
+ON = {"pod_p.enabled": True}
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    return written(with_noise(table(run())), tmp_path_factory.mktemp("recording"))
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory):
+    return gfor_in_python.build("gfor", tmp_path_factory.mktemp("fmu"))
+
+
+def kinds(found):
+    return [q["kind"] for event in found.as_json()["events"] for q in event["questions"]]
+
+
+def test_the_form_that_must_work(gfor, fmu, recording):
+    code, out, _ = gfor(
+        "validate", str(fmu), str(recording), "--set", "pod_p.enabled=true", "--json"
+    )
+    content = json.loads(out)
+    assert code == 0
+    assert content["verdict"] is None
+    (event,) = content["events"]
+    assert event["recording"] == str(recording)
+    assert [one["name"] for one in event["windows"]] == ["before", "during", "after"]
+    for window in event["windows"]:
+        for signal in ("p", "q"):
+            figures = window[signal]
+            assert 0 <= figures["mean_abs_error_pu"] <= figures["max_error_pu"] < 0.02
+            assert abs(figures["mean_error_pu"]) <= figures["mean_abs_error_pu"]
+    assert event["questions"] == []
+    assert event["start"]["p_pu"] == pytest.approx(0.9, abs=1e-3)
+    assert event["windows"][1]["begin_s"] == pytest.approx(1.0, abs=0.003)
+
+
+def test_the_device_itself_agrees_and_another_setting_does_not(recording):
+    right = gfor_in_python.validate("gfor", recording, values=ON)
+    wrong = gfor_in_python.validate("gfor", recording, values={**ON, "droop.R_f": 0.02})
+    error = [
+        found.table().query("window == 'after' and signal == 'p'")["mean_abs_error_pu"].item()
+        for found in (right, wrong)
+    ]
+    assert error[0] < 0.002
+    assert error[1] > 10 * error[0]
+
+
+def test_a_run_of_the_same_model_is_too_good():
+    found = gfor_in_python.validate("gfor", run(), values=ON, place="gfor")
+    assert kinds(found) == ["too good"]
+    # the recording's low-pass sees the event a little before it is there
+    assert found.table().query("window == 'before'")["max_error_pu"].max() < 2e-5
+
+
+def test_a_component_of_a_case_is_validated(gfor, recording):
+    options = ("--component", "gfor", "--scenario", "pod_p", "--limits", str(EXAMPLE))
+    code, out, _ = gfor("validate", "two_area", str(recording), *options)
+    assert code == 0
+    assert "MET" in out
+
+
+def test_limits_that_are_not_met_are_named_and_end_with_3(gfor, recording, tmp_path):
+    limits = tmp_path / "limits.toml"
+    limits.write_text('source = "mine"\n[windows.after.p]\nmean_abs_error = 0.005\n')
+    options = ("--set", "droop.R_f=0.02", "--limits", str(limits), "--json")
+    code, out, _ = gfor("validate", "gfor", str(recording), *options)
+    assert code == 3
+    content = json.loads(out)
+    assert content["verdict"] == "not met"
+    assert [one["name"] for one in content["criteria"]] == ["after p mean_abs_error"]
+
+
+def test_a_file_of_limits_says_what_is_wrong_with_it(gfor, recording, tmp_path):
+    limits = tmp_path / "limits.toml"
+    limits.write_text('source = "mine"\n[windows.later.p]\nmax_error = 0.1\n')
+    code, _, err = gfor("validate", "gfor", str(recording), "--limits", str(limits))
+    assert code == 2
+    assert "later" in err
+
+
+def test_windows_are_as_the_user_says(recording):
+    found = gfor_in_python.validate("gfor", recording, values=ON, events=[(2.0, 2.5)]).as_json()
+    (event,) = found["events"]
+    assert not event["windows_found"]
+    assert [(w["begin_s"], w["end_s"]) for w in event["windows"]][1] == pytest.approx((2.0, 2.5))
+
+
+def test_columns_that_are_missing_are_asked_for(gfor, tmp_path):
+    frame = table(run()).rename(columns={"p_mw": "p_left_mw", "v_pu": "v_pu"})
+    path = written(frame, tmp_path)
+    code, _, err = gfor("validate", "gfor", str(path))
+    assert code == 2
+    assert "--channel 'p=COLUMN'" in err
+    assert "p_left_mw" in err
