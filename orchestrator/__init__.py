@@ -10,10 +10,10 @@ Examples
 """
 
 import re
-import sys
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
+
+from orchestrator.former_paths import install
 
 _STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
 _HOMES = {
@@ -29,34 +29,29 @@ __all__ = [*_HOMES]  # noqa: PLE0604 - names all the same
 
 def __getattr__(name: str) -> object:
     if name not in _HOMES:
-        raise AttributeError(
-            f"module {__name__!r} has no attribute {name!r}; it has: {', '.join(_HOMES)}"
-        )
+        raise AttributeError(_absence(name))
     value: object = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
     globals()[name] = value
     return value
+
+
+def _absence(name: str) -> str:
+    """Return why there is no such name: it may be that of a command or of a method of a case."""
+    absent, known = f"module {__name__!r} has no attribute {name!r}", ", ".join(_HOMES)
+    if name.startswith("_"):
+        return absent
+    ways = [f"`gfor {name}` at the terminal"] * (
+        name in import_module(f"{__name__}.face.cli").COMMANDS
+    )
+    if hasattr(__getattr__("Case"), name):
+        ways.insert(0, f"gfor.load('two_area').{name}(…)")
+    if not ways:
+        return f"{absent}; it has: {known}"
+    return f"{absent}: use {', or '.join(ways)}; functions: {known}"
 
 
 def __dir__() -> list[str]:
     return sorted(_HOMES)
 
 
-class _Package(ModuleType):
-    """A package that is called as if it were the study of its name."""
-
-    def __setattr__(self, name: str, value: object) -> None:
-        if type(value) is ModuleType:
-            value.__class__ = _Package
-        super().__setattr__(name, value)
-
-    def __call__(self, *_: object, **__: object) -> None:
-        name = self.__name__.rpartition(".")[2]
-        method = (
-            f"gfor.load('two_area').{name}(…), or " if hasattr(__getattr__("Case"), name) else ""
-        )
-        raise AttributeError(
-            f"{name} is no function: use {method}`gfor {name}` at the terminal; functions: {', '.join(_HOMES)}"
-        )
-
-
-sys.modules[__name__].__class__ = _Package
+install()

@@ -61,7 +61,11 @@ def pytest_collection_finish():
 @pytest.fixture(autouse=True)
 def spelt(request):
     """Errors are read as the command line says them, but in tests of the Python face."""
-    with nullcontext() if Path(__file__).parent / "api" in request.path.parents else as_options():
+    with (
+        nullcontext()
+        if Path(__file__).parent / "face" / "api" in request.path.parents
+        else as_options()
+    ):
         yield
 
 

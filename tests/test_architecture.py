@@ -14,62 +14,36 @@ from orchestrator.studies.points.code import code_files, needed_modules
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("fmus", "gfor_fmu", "orchestrator")
 
-FLOORS = (
-    ("orchestrator.studies.added", "orchestrator.core.spelling"),
-    ("orchestrator.core.arrays", "orchestrator.core.closing", "orchestrator.core.cores"),
-    (
-        "orchestrator.core.errors",
-        "orchestrator.core.late",
-        "orchestrator.core.uncollected",
-        "orchestrator.core.units",
+FLOORS = {
+    "core": (
+        ("arrays", "closing", "cores", "late", "spelling", "threads", "uncollected", "units"),
+        ("errors",),
+        ("asked", "foreign_files", "truth"),
+        ("safe_files", "toml_files"),
     ),
-    ("orchestrator.core.foreign_files",),
-    (
-        "orchestrator.core.asked",
-        "orchestrator.core.safe_files",
-        "orchestrator.core.toml_files",
-        "orchestrator.core.truth",
+    "devices": (("fmi",), ("binding",), ("acceptance",)),
+    "systems": (("coupling",), ("ssp",)),
+    "linear": (("models",), ("spectra",), ("doubts", "signals")),
+    "cases": (),
+    "simulation": (("federation", "interop", "watch"),),
+    "output": (("results", "signatures"), ("report",)),
+    "studies": (
+        ("added", "points", "signals"),
+        ("modes",),
+        ("operating_points", "runs"),
+        ("black_box", "oscillations", "pod_design"),
+        ("immittance", "interactions", "screening", "sensitivities", "sweep"),
+        ("certification", "coordinated_design", "siting", "validation"),
     ),
-    ("orchestrator.devices.fmi", "orchestrator.output.signatures"),
-    ("orchestrator.systems.coupling", "orchestrator.devices.binding"),
-    ("orchestrator.systems.ssp", "orchestrator.devices.acceptance"),
-    ("orchestrator.linear", "orchestrator.cases"),
-    ("orchestrator.simulation.federation",),
-    (
-        "orchestrator.output.results",
-        "orchestrator.studies.points",
-        "orchestrator.simulation.interop",
-        "orchestrator.simulation.watch",
-    ),
-    ("orchestrator.output.report",),
-    ("orchestrator.studies",),
-    ("orchestrator.studies.operating_points",),
-    (
-        "orchestrator.studies.black_box",
-        "orchestrator.studies.oscillations",
-        "orchestrator.studies.pod_design",
-    ),
-    (
-        "orchestrator.studies.screening",
-        "orchestrator.studies.sensitivities",
-        "orchestrator.studies.interactions",
-        "orchestrator.studies.immittance",
-        "orchestrator.studies.sweep",
-    ),
-    (
-        "orchestrator.studies.certification",
-        "orchestrator.studies.coordinated_design",
-        "orchestrator.studies.siting",
-        "orchestrator.studies.validation",
-    ),
-    ("orchestrator.face.api",),
-    ("orchestrator.face.explore",),
-    ("orchestrator.face.cli",),
-)
-"""Lowest first; those on one floor do not know each other."""
+    "face": (("api",), ("explore",), ("cli",)),
+}
+"""Folder of ``orchestrator/`` → its rooms; the lowest floor and the lowest row first.
 
-ADDED = next(k for k, rooms in enumerate(FLOORS) if "orchestrator.studies.certification" in rooms)
-"""The floor of a study that is added in a room of its own, with a module ``command``."""
+A floor imports from lower ones only, a room from lower floors and lower rows; rooms of one row do not know each other.
+A study that is added stands in a room of its own, in the last row, with a module ``command``."""
+
+FORMER = {"former_paths"}
+"""Module beside the floors: where a name of an older version stands now."""
 
 PLAIN_DATA = {"fmus.grid.names", "fmus.toolchain.port_variables", "fmus.toolchain.variables"}
 """Modules of the FMUs that the whole orchestrator may read."""
@@ -112,19 +86,26 @@ def imports():
     return graph
 
 
+def inside():
+    """Modules on the floors of the orchestrator."""
+    return {name for name in modules() if within(name, *(f"orchestrator.{f}" for f in FLOORS))}
+
+
 def within(name, *packages):
     return any(name == package or name.startswith(f"{package}.") for package in packages)
 
 
-def floor(name):
-    """A room that no floor names is a study that was added: it stands beneath the face."""
-    return next((level for level, packages in enumerate(FLOORS) if within(name, *packages)), ADDED)
-
-
 def part(name):
-    """The package of its floor that a module belongs to."""
-    named = (package for packages in FLOORS for package in packages if within(name, package))
-    return next(named, ".".join(name.split(".")[:2]))
+    """The room that a module belongs to; a floor's own ``__init__`` is a room, and so is a floor without rooms."""
+    floor = name.split(".")[1]
+    return ".".join(name.split(".")[: 3 if FLOORS[floor] else 2])
+
+
+def level(name):
+    """Place of a module: its floor, and its room's row there; a room that no row names is a study that was added."""
+    _, floor, *room = part(name).split(".")
+    rows = [row for row, rooms in enumerate(FLOORS[floor]) if room and room[0] in rooms]
+    return list(FLOORS).index(floor), *(rows or [len(FLOORS[floor]) - 1])
 
 
 def breaches(allowed):
@@ -150,11 +131,23 @@ def test_the_imports_are_read():
     assert "pandapower" in imported_names(modules()["orchestrator.cases.network_sources"])
 
 
-def test_every_room_of_the_orchestrator_is_on_a_floor_or_is_a_study():
-    for name in modules():
-        if within(name, "orchestrator") and name != "orchestrator":
-            known = any(within(name, package) for packages in FLOORS for package in packages)
-            assert known or f"{part(name)}.command" in modules(), name
+def test_the_folders_of_the_orchestrator_are_the_floors():
+    folders = {name.split(".")[1] for name in modules() if name.startswith("orchestrator.")}
+    assert folders == {*FLOORS} | FORMER
+
+
+def test_every_room_is_listed_on_its_floor_or_is_a_study():
+    listed = {
+        f"orchestrator.{floor}.{room}"
+        for floor, rows in FLOORS.items()
+        for row in rows
+        for room in row
+    }
+    rooms = {part(name) for name in inside()} - {f"orchestrator.{floor}" for floor in FLOORS}
+    assert listed <= rooms
+    for room in rooms - listed:
+        assert room.startswith("orchestrator.studies."), room
+        assert f"{room}.command" in modules(), room
 
 
 def test_the_toolchain_knows_no_model():
@@ -179,9 +172,9 @@ def test_the_parts_of_converters_know_the_toolchain_alone():
 
 def test_the_orchestrator_imports_downwards_only():
     def downwards(a, b):
-        if not (within(a, "orchestrator") and within(b, "orchestrator")):
+        if not {a, b} <= inside():
             return True
-        return floor(b) < floor(a) or part(a) == part(b)
+        return level(b) < level(a) or part(a) == part(b)
 
     assert not breaches(downwards)
 
@@ -232,22 +225,22 @@ def test_plain_data_are_read_without_symbols(name):
 
 
 FOR_TYPES = {
-    "api.case",
-    "api.results",
+    "face.api.case",
+    "face.api.results",
     "cases.case",
     "cases.definition",
     "cases.given",
     "cases.names",
     "cases.values",
-    "coupling.system",
-    "cli.terminal",
-    "coupling.observers",
-    "oscillations.signs",
-    "oscillations.view",
-    "report.plot_style",
-    "report.tables",
-    "results.recording",
-    "results.storage",
+    "systems.coupling.system",
+    "face.cli.terminal",
+    "systems.coupling.observers",
+    "studies.oscillations.signs",
+    "studies.oscillations.view",
+    "output.report.plot_style",
+    "output.report.tables",
+    "output.results.recording",
+    "output.results.storage",
 }
 """Imported by `signal compare`, `gfor verify` and `load`, which start without what computes; `imports` counts these
 arrows."""
@@ -277,13 +270,13 @@ def _code_of(tree):
 
 
 POINTS = (
-    "sweep.point",
-    "screening.point",
-    "coordinated_design.point",
-    "interactions.point",
-    "certification.point",
-    "certification.codes.bench_point",
-    "certification.codes.change_point",
+    "studies.sweep.point",
+    "studies.screening.point",
+    "studies.coordinated_design.point",
+    "studies.interactions.point",
+    "studies.certification.point",
+    "studies.certification.codes.bench_point",
+    "studies.certification.codes.change_point",
 )
 """What computes a point that is kept."""
 
@@ -359,31 +352,39 @@ def test_a_library_is_used_in_one_place(library, users):
 
 
 ON_THE_FACE = {
-    "admittance": {"api.admittance.admittance"},
-    "bind": {"api.binding.bind"},
-    "build": {"api.models.build", "api.models.catalogue_model"},
-    "check": {"api.acceptance.check"},
-    "compare": {"api.comparison.compare"},
-    "design": {"coordinated_design.one_point.design_controller"},
-    "export_ssp": {"api.export.write_ssp"},
-    "export_comtrade": {"api.comtrade.export_comtrade"},
-    "identify": {"api.identification.identify"},
-    "info": {"api.fmu.info"},
-    "linearize": {"cli.case_arguments.chosen"},
-    "modes": {"cli.case_arguments.chosen"},
-    "run": {"cli.case_arguments.chosen"},
-    "screen": {"screening.command.STUDY"},
+    "admittance": {"face.api.admittance.admittance"},
+    "bind": {"face.api.binding.bind"},
+    "build": {"face.api.models.build", "face.api.models.catalogue_model"},
+    "check": {"face.api.acceptance.check"},
+    "compare": {"face.api.comparison.compare"},
+    "design": {"studies.coordinated_design.one_point.design_controller"},
+    "export_ssp": {"face.api.export.write_ssp"},
+    "export_comtrade": {"face.api.comtrade.export_comtrade"},
+    "identify": {"face.api.identification.identify"},
+    "info": {"face.api.fmu.info"},
+    "linearize": {"face.cli.case_arguments.chosen"},
+    "modes": {"face.cli.case_arguments.chosen"},
+    "run": {"face.cli.case_arguments.chosen"},
+    "screen": {"studies.screening.command.STUDY"},
 }
 """Command → what it calls of the Python face; ``chosen`` gives the face's scenarios."""
 
 COMPUTING = {
-    *("acceptance.runner.check_fmu", "pod_design.design.design_pod", "study.comparison.compare"),
-    *("study.comparison.strongest_modes", "study.linear.linear_model", "study.modes.compute_modes"),
     *(
-        "screening.study.run_screening",
-        "study.run.run_scenario",
-        "sweep.sweep.plan_sweep",
-        "sweep.sweep.run_sweep",
+        "devices.acceptance.runner.check_fmu",
+        "studies.pod_design.design.design_pod",
+        "studies.signals.comparison.compare",
+    ),
+    *(
+        "studies.signals.comparison.strongest_modes",
+        "studies.modes.linear.linear_model",
+        "studies.modes.modes.compute_modes",
+    ),
+    *(
+        "studies.screening.study.run_screening",
+        "studies.runs.run.run_scenario",
+        "studies.sweep.sweep.plan_sweep",
+        "studies.sweep.sweep.run_sweep",
     ),
 }
 """Functions that the face wraps: a command that called one itself would hold a copy of the face's logic."""
@@ -480,7 +481,8 @@ def test_a_path_of_some_machine_is_recognised(text):
 
 
 @pytest.mark.parametrize(
-    "text", ["fmus/toolchain", "https://example.org/home/x", "results/tmp/x", "1/s", "a/work/b"]
+    "text",
+    ["fmus/toolchain", "https://example.org/home/x", "output/results/tmp/x", "1/s", "a/work/b"],
 )
 def test_what_only_looks_like_one(text):
     assert not OF_A_MACHINE.search(text)

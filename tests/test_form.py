@@ -38,7 +38,7 @@ def files():
 
 
 def parsed(text):
-    return SourceFile(ROOT / "orchestrator" / "sweep" / "x.py", text, ast.parse(text))
+    return SourceFile(ROOT / "orchestrator" / "studies" / "sweep" / "x.py", text, ast.parse(text))
 
 
 @pytest.mark.parametrize("rule", RULES)

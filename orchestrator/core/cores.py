@@ -2,7 +2,7 @@
 
 import os
 
-MOST_THREADS = 64  # as ``MOST_MEMBERS`` of ``coupling/team.c``
+MOST_THREADS = 64  # as ``MOST_MEMBERS`` of ``systems/coupling/team.c``
 
 
 def number_of_cores() -> int:

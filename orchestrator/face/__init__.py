@@ -1,1 +1,1 @@
-"""What users type: the Python interface, the command, the browser."""
+"""Everything that users type: the Python interface, the command, the browser."""

@@ -216,7 +216,9 @@ def stages(mistake: Drawn, root: Path = ROOT) -> list[tuple[str, ...]]:
     far = [
         name
         for name in files
-        if name not in near and name not in in_folder and name.split("/")[1] in users
+        if name not in near
+        and name not in in_folder
+        and _room(name.removeprefix("tests/")) in users
     ]
     return [
         (*near, "-m", "not slow"),
@@ -228,18 +230,24 @@ def stages(mistake: Drawn, root: Path = ROOT) -> list[tuple[str, ...]]:
 def _mirror(file: str) -> str:
     package, _, rest = file.partition("/")
     if package == "orchestrator" and "/" in rest:
-        return f"tests/{rest.split('/')[0]}"
+        return f"tests/{_room(rest)}"
     if file.startswith("fmus/toolchain/"):
         return "tests/toolchain"
     return "tests/models" if package in ("fmus", "gfor_fmu") else "tests"
 
 
+def _room(file: str) -> str:
+    """Floor and room of a file of the orchestrator; the floor alone for one that stands on it."""
+    *folders, _ = file.split("/")
+    return "/".join(folders[: 1 if folders[:1] == ["cases"] else 2])
+
+
 def _folders_that_import(module: str, root: Path) -> set[str]:
     """Test folders of the packages that import a module, and those whose tests run commands."""
-    found = {"cli", "study", "reproduction"}
+    found = {"face/cli", "studies/modes", "studies/runs", "reproduction"}
     for path in (root / "orchestrator").rglob("*.py"):
         if module in path.read_text(encoding="utf-8"):
-            found.add(path.relative_to(root / "orchestrator").parts[0])
+            found.add(_room(path.relative_to(root / "orchestrator").as_posix()))
     return found
 
 

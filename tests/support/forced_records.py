@@ -1,7 +1,7 @@
 """Records whose source is known: a case's linear model, forced at any reference, with noise of loads and of measuring.
 
-The model is kept with its slow eigenvalues alone (tests/studies/oscillations/models); `python -m tests.benchmarks.sources
---models` makes them anew.
+The model is kept with its slow eigenvalues alone (tests/studies/oscillations/models); `python -m
+tests.benchmarks.sources --models` makes them anew.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ import orchestrator as gfor
 from orchestrator.studies.oscillations.measurements import Site, made_ready
 from orchestrator.studies.oscillations.models import UnitModel, UnitModels
 
-MODELS = Path(__file__).parents[1] / "oscillations" / "models"
+MODELS = Path(__file__).parents[1] / "studies" / "oscillations" / "models"
 FASTEST = 80.0
 """Largest size of an eigenvalue that is kept [1/s]; of the others their gain at rest."""
 

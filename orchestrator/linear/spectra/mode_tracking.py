@@ -1,8 +1,8 @@
 """Following all modes from one operating point to the next by their eigenvectors.
 
 Sorted lists of eigenvalues lose a mode where two eigenvalues cross; eigenvectors stay the same. The similarity of
-`orchestrator.linear.spectra.mode_tracking` is the magnitude of a product, and these products sum to 1 over all modes b of a
-point. A similarity above a half therefore means that most of mode a is in mode b."""
+two modes is the magnitude of a product, and these products sum to 1 over all modes b of a point. A similarity above a
+half therefore means that most of mode a is in mode b."""
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

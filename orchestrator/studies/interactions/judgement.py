@@ -6,8 +6,8 @@ Trans. Power Delivery 31(2), 2016. The participation of a subsystem is the sum o
 sum to 1.
 
 What a pair does is told by one mode, followed from the system with both vendors to those with one and with none
-(`orchestrator.studies.interactions.following`). Whether any mode falls does not depend on the threshold: all modes that are
-not well damped are looked at."""
+(`orchestrator.studies.interactions.following`). Whether any mode falls does not depend on the threshold: all modes that
+are not well damped are looked at."""
 
 import math
 from collections.abc import Mapping, Sequence

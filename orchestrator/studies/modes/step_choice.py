@@ -34,8 +34,8 @@ TRIED: tuple[ScheduleName, ...] = ("gauss-seidel", "midpoint", "newton")
 LEAST_DAMPED = 6  # so many modes are compared, least damped first
 SWINGING = 0.5  # largest damping ratio of a compared mode
 _COUPLING_FACTOR, _COUPLING_RATE = 2.0, 1.0
-"""As in `orchestrator.linear.spectra.stability`: growth beyond the first figure times the continuous system's plus the second
-[1/s] is the coupling's."""
+"""As in `orchestrator.linear.spectra.stability`: growth beyond the first figure times the continuous system's plus the
+second [1/s] is the coupling's."""
 
 # so many steps in turn that are not within the error end the search with a schedule
 _AFTER_THE_FIRST = 2

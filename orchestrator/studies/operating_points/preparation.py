@@ -25,7 +25,7 @@ from orchestrator.systems.coupling.system import System
 # state
 ACCEPT = 1e-9
 
-_PACKAGE = Path(__file__).parent.parent
+_PACKAGE = Path(__file__).parents[2]
 
 _OPERATING = {"P_0", "Q_0", "v_0", "theta_0", "S_n", "connected"}
 """What a component that refuses others of its values was not given by the power flow."""

@@ -282,7 +282,7 @@ def test_an_fmu_that_leaves_a_process_with_each_instance_gets_a_verdict(tmp_path
 def faults_of(function):
     """Names of faults that calls of a function state, in all modules: one, or one of two by a condition."""
     rooms = ("acceptance", "binding", "fmi")
-    for path in (p for room in rooms for p in Path("orchestrator", room).rglob("*.py")):
+    for path in (p for room in rooms for p in Path("orchestrator", "devices", room).rglob("*.py")):
         for call in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(call, ast.Call) and getattr(call.func, "id", "") == function:
                 inside = [part for a in call.args[1:2] for part in (a, *ast.walk(a))]

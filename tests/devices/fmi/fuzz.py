@@ -1,7 +1,7 @@
 """Mutated FMUs, read and unpacked one after another in a process that may write in one folder only.
 
-Run as ``python -m tests.devices.fmi.fuzz SEED COUNT FOLDER FMU…``; it prints how many were accepted and refused, and ends with
-the first one for which anything else happened.
+Run as ``python -m tests.devices.fmi.fuzz SEED COUNT FOLDER FMU…``; it prints how many were accepted and refused, and
+ends with the first one for which anything else happened.
 """
 
 import io

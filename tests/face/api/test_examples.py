@@ -10,13 +10,16 @@ import orchestrator
 
 MODULES = (
     *(
-        f"api.{name}"
+        f"face.api.{name}"
         for name in ("acceptance", "admittance", "binding", "case", "certification", "comparison")
     ),
-    *(f"api.{name}" for name in ("comtrade", "export", "fmu", "identification", "linear")),
-    *(f"api.{name}" for name in ("models", "nyquist", "results", "saved", "scenario", "source")),
+    *(f"face.api.{name}" for name in ("comtrade", "export", "fmu", "identification", "linear")),
     *(
-        f"{name}.view"
+        f"face.api.{name}"
+        for name in ("models", "nyquist", "results", "saved", "scenario", "source")
+    ),
+    *(
+        f"studies.{name}.view"
         for name in (
             "coordinated_design",
             "interactions",
@@ -25,7 +28,7 @@ MODULES = (
             "sensitivities",
         )
     ),
-    *("siting.view", "sweep.view"),
+    *("studies.siting.view", "studies.sweep.view"),
 )
 
 

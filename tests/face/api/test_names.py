@@ -79,19 +79,19 @@ def test_a_name_that_does_not_exist_is_refused_with_those_that_do():
         _ = orchestrator.laod
 
 
-def test_a_study_that_is_called_without_a_case_is_told_where_it_is():
-    import orchestrator.output.report  # noqa: PLC0415 - one that is for the terminal alone
-    import orchestrator.studies.sweep  # noqa: PLC0415 - the package, which hides that there is no such name
+@pytest.mark.parametrize(
+    ("name", "ways"),
+    [
+        ("sweep", r"use gfor.load\('two_area'\).sweep\(…\), or `gfor sweep` at the terminal"),
+        ("report", "use `gfor report` at the terminal"),
+    ],
+)
+def test_a_study_that_is_called_without_a_case_is_told_where_it_is(name, ways):
+    with pytest.raises(AttributeError, match=rf"{ways}; functions: .*load"):
+        getattr(orchestrator, name)("two_area")
 
-    with pytest.raises(
-        AttributeError,
-        match=r"use gfor.load\('two_area'\).sweep\(…\), or `gfor sweep` at .*: .*load",
-    ):
-        orchestrator.studies.sweep("two_area")
-    with pytest.raises(
-        AttributeError, match=r"use `gfor report` at the terminal; functions: .*load"
-    ):
-        orchestrator.output.report("results")
+
+def test_a_case_lists_its_studies():
     assert {"sweep", "screen"} <= {*dir(orchestrator.load("two_area"))}
 
 

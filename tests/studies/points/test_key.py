@@ -70,20 +70,30 @@ def changed(fresh, monkeypatch, tmp_path):
     [
         (
             SWEEP,
-            "analysis/modes.py",
+            "linear/spectra/modes.py",
             "return self.eigenvalue.imag / (2 * np.pi)",
             "return self.eigenvalue.imag / 6",
         ),
         (
             SWEEP,
-            "analysis/modes.py",
+            "linear/spectra/modes.py",
             "ELECTROMECHANICAL_HZ = (0.1, 2.0)",
             "ELECTROMECHANICAL_HZ = (0.1, 2.1)",
         ),
         (SWEEP, "cases/power_flow.py", "complex(p, q)", "complex(q, p)"),
-        (SWEEP, "binding/tables.py", '"50 Hz"', '"60 Hz"'),
-        (ROW, "watch/synchronism.py", "import numpy as np\n", "import numpy as np\nimport math\n"),
-        (SWEEP, "coupling/wires.c", "#include <math.h>", "#include <math.h>\n#define HALF 0.5"),
+        (SWEEP, "devices/binding/tables.py", '"50 Hz"', '"60 Hz"'),
+        (
+            ROW,
+            "simulation/watch/synchronism.py",
+            "import numpy as np\n",
+            "import numpy as np\nimport math\n",
+        ),
+        (
+            SWEEP,
+            "systems/coupling/wires.c",
+            "#include <math.h>",
+            "#include <math.h>\n#define HALF 0.5",
+        ),
     ],
 )
 def test_another_figure_is_computed_anew(changed, module, file, old, new):
@@ -93,16 +103,16 @@ def test_another_figure_is_computed_anew(changed, module, file, old, new):
 @pytest.mark.parametrize(
     ("file", "old", "new"),
     [
-        ("sweep/point.py", "its task and its result.", "task and result."),
-        ("sweep/tables.py", "import", "import sys\nimport"),
-        ("sweep/trajectories.py", "\n\n\n", "\n\n\nMOST = 3\n\n\n"),
+        ("studies/sweep/point.py", "its task and its result.", "task and result."),
+        ("studies/sweep/tables.py", "import", "import sys\nimport"),
+        ("studies/sweep/trajectories.py", "\n\n\n", "\n\n\nMOST = 3\n\n\n"),
         (
-            "analysis/steady_state.py",
+            "linear/models/steady_state.py",
             "no steady state found: {changes};",
             "no steady state found, {changes};",
         ),
         ("cases/power_flow.py", "complex(p, q)", "complex(p, q)  # in pu\n"),
-        ("cli/check.py", "import argparse\n", "import argparse\nimport sys\n"),
+        ("face/cli/check.py", "import argparse\n", "import argparse\nimport sys\n"),
     ],
 )
 def test_a_comma_in_a_sentence_keeps_what_is_kept(changed, file, old, new):

@@ -459,7 +459,7 @@ def test_an_error_of_ours_is_no_failure_of_an_fmu(gfor, day, tmp_path, monkeypat
     said = " ".join(error.split())
     assert code == 1
     assert "internal error: 3 of 5:" in said
-    assert "IndexError at operating_points/bench.py, line" in said
+    assert "IndexError at studies/operating_points/bench.py, line" in said
     assert "please report it" in said
     assert "FMU failed" not in out + error
 

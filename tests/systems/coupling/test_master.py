@@ -262,7 +262,7 @@ def told_time(tmp_path_factory):
         Variable(name, k, "output", unit="s") for k, name in enumerate(("time", "step"), start=1)
     ]
     variables += [Variable("held", 3, "output", unit="1")]
-    source = Source("told_time", "../../coupling/told_time.c", {}, tuple(variables))
+    source = Source("told_time", "../../../systems/coupling/told_time.c", {}, tuple(variables))
     return read_description(build(source, tmp_path_factory.mktemp("told_time")))
 
 

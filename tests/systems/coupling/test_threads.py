@@ -50,7 +50,7 @@ def busy(tmp_path_factory):
         Variable("u", 0, "input", 0, "1"),
         *(Variable(n, k, "output") for k, n in enumerate(("thread", "sum"), 1)),
     )
-    source = Source("busy", "../../coupling/busy.c", {}, variables)
+    source = Source("busy", "../../../systems/coupling/busy.c", {}, variables)
     return read_description(build(source, tmp_path_factory.mktemp("busy")))
 
 

@@ -1,0 +1,136 @@
+"""Names of modules before the rooms stood on floors: ``orchestrator.errors`` is `orchestrator.core.errors`.
+
+They go on working, with a notice, for programs of others and for what was pickled. A finder at the end of Python's
+list is asked only for modules that nothing else finds: imports of the present names do not pass here.
+"""
+
+import sys
+import warnings
+from collections.abc import Sequence
+from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from importlib.util import find_spec
+from types import CodeType, ModuleType
+
+_ROOMS = {
+    "core": "arrays asked closing cores errors foreign_files late safe_files spelling toml_files "
+    "truth uncollected units",
+    "devices": "acceptance binding fmi",
+    "systems": "coupling ssp",
+    "simulation": "federation interop watch",
+    "output": "report results",
+    "studies": "added black_box certification coordinated_design immittance interactions "
+    "operating_points oscillations pod_design points screening sensitivities siting sweep",
+    "face": "api cli explore",
+}
+"""Floor → its rooms and modules that stood directly in ``orchestrator``."""
+
+_PARTED = {
+    "analysis": {
+        "core": "threads",
+        "linear.models": "apart blocks component_linearization coupled_state delays device_start "
+        "differences held_inputs hub_elimination linear_model linearization periodic perturbation "
+        "remembered response_check sampled slope_linearization state_access state_space "
+        "steady_state",
+        "linear.spectra": "block_arnoldi continuation critical_modes growth_search mode_names "
+        "mode_refinement mode_tracking modes presence real_schur shifted_equations stability",
+        "linear.doubts": "coupled_response coupling_growth examination external_exciters linearity",
+        "linear.signals": "ambient identification mode_doubts",
+    },
+    "study": {
+        "studies.modes": "all_modes beside linear linear_model_files load_model_weight "
+        "mode_identity modes naming request start_errors step_choice",
+        "studies.runs": "after_events answers checkpoint_mark checkpoints files like mode_plots "
+        "ring_down run run_request tables",
+        "studies.signals": "ambient comparison measured signal_modes",
+    },
+}
+"""Former room → present rooms → the modules that went there."""
+
+_HERE = __package__
+
+
+def present_name(name: str) -> str | None:
+    """Return the present name of a module by its former one; the same for a room that was parted; None for others."""
+    top, _, rest = name.partition(".")
+    room, _, inside = rest.partition(".")
+    if top != _HERE:
+        return None
+    if room in _PARTED and not inside:
+        return name
+    if room in _PARTED:
+        homes = [home for home, names in _PARTED[room].items() if inside in names.split()]
+        return f"{_HERE}.{homes[0]}.{inside}" if homes else None
+    floors = [floor for floor, rooms in _ROOMS.items() if room in rooms.split()]
+    return f"{_HERE}.{floors[0]}.{rest}" if floors else None
+
+
+def _notice(former: str, present: str) -> None:
+    warnings.warn(f"{former} is now {present}; import it there", DeprecationWarning, stacklevel=3)
+
+
+class _Room(ModuleType):
+    """A room under its former name: it holds no module, and looks its names up in the present room."""
+
+    def __getattr__(self, name: str) -> object:
+        present = present_name(self.__name__)
+        if name.startswith("__") or present in (None, self.__name__):
+            raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
+        assert present is not None
+        value: object = getattr(import_module(present), name)
+        _notice(f"{self.__name__}.{name}", f"{present}.{name}")
+        return value
+
+
+class _Former(Loader):
+    """Gives the present module under its former name: one module, not a second copy with classes of its own."""
+
+    def __init__(self, former: str, present: str, room: bool) -> None:
+        self._former, self._present, self._room = former, present, room
+        self._spec: ModuleSpec | None = None
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        if self._room:
+            return _Room(spec.name)
+        module = import_module(self._present)
+        self._spec = module.__spec__  # which the import system is about to replace
+        return module
+
+    def exec_module(self, module: ModuleType) -> None:
+        if not self._room:
+            module.__spec__ = self._spec
+
+    def get_code(self, _: str) -> CodeType | None:
+        """Return the code, for ``python -m`` with the former name."""
+        spec = find_spec(self._present)
+        loader = spec.loader if spec is not None else None
+        code: CodeType | None = loader.get_code(self._present) if loader is not None else None  # type: ignore[attr-defined]
+        return code
+
+
+class FormerPaths(MetaPathFinder):
+    """Finds modules by their former names."""
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        present = present_name(fullname)
+        if present is None:
+            return None
+        if present == fullname:  # a room that was parted
+            return ModuleSpec(fullname, _Former(fullname, present, room=True), is_package=True)
+        found = find_spec(present)
+        if found is None:
+            return None
+        room = found.submodule_search_locations is not None
+        if not room:
+            _notice(fullname, present)
+        loader = _Former(fullname, present, room)
+        return ModuleSpec(fullname, loader, origin=found.origin, is_package=room)
+
+
+def install() -> None:
+    """Let former names be found, after all others."""
+    if not any(isinstance(finder, FormerPaths) for finder in sys.meta_path):
+        sys.meta_path.append(FormerPaths())
