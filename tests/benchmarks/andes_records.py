@@ -2,8 +2,9 @@
 
 Needs the extra ``peers``; writes ``andes_records.json``. One machine (GENROU) at an infinite bus; eigenvalues in rad/s,
 of a pair the upper one. Where the source depends on the terminal (IEEET3, ESST3A) ANDES' eigenvalues hold it constant,
-so the voltage after a step of the reference is compared. Not comparable in ANDES 2.0.0: IEEEVC, whose voltage control
-stays open; EXAC2, whose reference at the start has K_L in the place of K_H. `tests.models.test_andes_records` has
+so the voltage after a step of the reference is compared. In ANDES 2.0.0 EXAC2, ESDC2A and EXDC2 regulate the voltage
+itself, without T_R, which is 0 here; EXAC2's reference at the start has K_L in the place of K_H, so they are equal here;
+IEEEVC leaves the voltage control open, so that it is not compared. `tests.models.test_andes_records` has
 ours from the same records. Knows nothing of our models.
 """
 
@@ -41,13 +42,17 @@ _NAMES = (
 )
 
 SEXS = "TATB=0.1 TB=10 K=100 TE=0.1 EMIN=-9 EMAX=9"
-CURVE = "E1=3 SE1=0.1 E2=4 SE2=0.4"
+CURVE = "E1=2 SE1=0.1 E2=3 SE2=0.4"
 RECORDS: dict[str, tuple[str, ...]] = {
+    "EXAC2": (
+        "EXAC2 TR=0 TB=2 TC=0.5 KA=80 TA=0.02 VAMAX=50 VAMIN=-50 KB=3 VRMAX=50 VRMIN=-50 TE=0.8 KL=0.4 KH=0.4 "
+        f"KF=0.03 TF=1 KC=0.2 KD=0.3 KE=1 VLR=99 {CURVE}",
+    ),
     "ESDC2A": (
-        f"ESDC2A TR=0.02 KA=40 TA=0.1 TB=1 TC=0.2 VRMAX=9 VRMIN=-9 KE=1 TE=0.5 KF=0.1 TF1=0.9 Switch=0 {CURVE}",
+        f"ESDC2A TR=0 KA=40 TA=0.1 TB=1 TC=0.2 VRMAX=9 VRMIN=-9 KE=1 TE=0.5 KF=0.1 TF1=0.9 Switch=0 {CURVE}",
     ),
     "EXDC2": (
-        f"EXDC2 TR=0.02 KA=40 TA=0.1 TB=1 TC=0.2 VRMAX=9 VRMIN=-9 KE=1 TE=0.5 KF1=0.1 TF1=0.9 Switch=0 {CURVE}",
+        f"EXDC2 TR=0 KA=40 TA=0.1 TB=1 TC=0.2 VRMAX=9 VRMIN=-9 KE=1 TE=0.5 KF1=0.1 TF1=0.9 Switch=0 {CURVE}",
     ),
     "AC8B": (
         "AC8B TR=0.02 kP=20 kI=5 kD=2 Td=0.1 VPMAX=99 VPMIN=-99 VRMAX=50 VRMIN=0 VFEMAX=99 VEMIN=0 TA=0.02 "
