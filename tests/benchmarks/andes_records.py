@@ -3,7 +3,7 @@
 Needs the extra ``peers``; writes ``andes_records.json``. One machine (GENROU) at an infinite bus; eigenvalues in rad/s,
 of a pair the upper one. Where the source depends on the terminal (IEEET3, ESST3A) ANDES' eigenvalues hold it constant,
 so the voltage after a step of the reference is compared. In ANDES 2.0.0 EXAC2, ESDC2A and EXDC2 regulate the voltage
-itself, without T_R, which is 0 here; EXAC2's reference at the start has K_L in the place of K_H, so they are equal here;
+itself, without T_R, which is 0 here; EXAC2's reference at the start has K_L for K_H, so they are equal here;
 IEEEVC leaves the voltage control open, so that it is not compared. `tests.models.test_andes_records` has
 ours from the same records. Knows nothing of our models.
 """
