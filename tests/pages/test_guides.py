@@ -33,6 +33,7 @@ ANYWHERE = (
     "how-to/faults-and-outages",
     "how-to/own-network",
     "how-to/audit-a-study",
+    "how-to/sign-a-certificate",
     *(pytest.param(guide, marks=pytest.mark.nightly) for guide in HEAVY),
 )
 SECONDS = 1800.0

@@ -148,8 +148,8 @@ def _show(found: Verified, console: Console, *, norm: bool) -> None:
             f"signature     {found.signature.state}: {escape(found.signature.sentence)}",
             soft_wrap=True,
         )
-    for name in found.unproved:
-        console.print(f"not proved    {escape(name)}: the certificate does not cover it")
+    for text in found.unproved:
+        console.print(f"not proved    {escape(text)}", soft_wrap=True)
     console.print("")
     one, every = found.parts.one, found.content["points" if norm else "rows"]
     if found.chosen and not found.computed:

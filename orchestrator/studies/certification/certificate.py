@@ -11,23 +11,17 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from orchestrator.cases.schema import Value
-from orchestrator.core.errors import CaseError, Problem
-from orchestrator.devices.fmi.description import FmuDescription
-from orchestrator.devices.fmi.values import as_text
-from orchestrator.studies.certification.acceptance import Acceptance
-from orchestrator.studies.certification.case_file import BINDING, FMU
-from orchestrator.studies.certification.codes.row import GridCode
-from orchestrator.studies.certification.damping_controllers import DampingControllers
-from orchestrator.studies.certification.details import Details
-from orchestrator.studies.certification.judgement import watched
-from orchestrator.studies.certification.margins import CriterionMargin
-from orchestrator.studies.certification.point import CONVERTER
-from orchestrator.studies.certification.request import (
-    REACTANCES,
-    CertificationRequest,
-    same_reactance,
-)
-from orchestrator.studies.certification.verdict import (
+from orchestrator.certification.acceptance import Acceptance
+from orchestrator.certification.case_file import BINDING, FMU
+from orchestrator.certification.codes.row import GridCode
+from orchestrator.certification.damping_controllers import DampingControllers
+from orchestrator.certification.details import Details
+from orchestrator.certification.environment import environment
+from orchestrator.certification.judgement import watched
+from orchestrator.certification.margins import CriterionMargin
+from orchestrator.certification.point import CONVERTER
+from orchestrator.certification.request import REACTANCES, CertificationRequest, same_reactance
+from orchestrator.certification.verdict import (
     FAILS,
     INCOMPLETE,
     PASSES,
@@ -52,8 +46,19 @@ class Certificate:
     damping: DampingTest | None = field(default=None, kw_only=True)
     stored: int = field(default=0, kw_only=True)  # number of rows that an earlier start had kept
     details: Details = field(default_factory=Details, kw_only=True)
+    # of a record that is read again: names of the FMU and the binding as they were given, and where it was computed
+    names: Mapping[str, str] = field(default_factory=dict, kw_only=True)
+    computed_on: Mapping[str, str] = field(default_factory=environment, kw_only=True)
     # of the FMU; None where they were not run
     acceptance: Acceptance | None = field(default=None, kw_only=True)
+
+    @property
+    def fmu_name(self) -> str:
+        return self.names.get(FMU, self.request.fmu.name)
+
+    @property
+    def binding_name(self) -> str | None:
+        return self.names.get(BINDING, self.request.binding.name) if self.request.binding else None
 
     @property
     def departures(self) -> tuple[str, ...]:

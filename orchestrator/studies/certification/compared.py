@@ -33,6 +33,8 @@ Compared = Iterator[tuple[str, str]]
 class Verification(NoTruth, ask=".holds"):
     faults: list[str] = field(default_factory=list)
     agreed: list[str] = field(default_factory=list)
+    # what shows a certificate and could not be made anew here
+    views: list[str] = field(default_factory=list)
 
     @property
     def holds(self) -> bool:

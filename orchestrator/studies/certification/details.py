@@ -1,6 +1,7 @@
 """Details of a test, from a file of the user: client, laboratory, date and place."""
 
 import datetime
+from collections.abc import Mapping
 from pathlib import Path
 
 from pydantic import ConfigDict, ValidationError
@@ -38,6 +39,13 @@ class Details(Table):
 
     def rows(self) -> list[tuple[str, str]]:
         return [(_LABELS[name], text) for name, text in self.texts().items()]
+
+
+def details_of(texts: Mapping[str, str]) -> Details:
+    """Return the details that a record states; the inverse of `Details.texts`."""
+    given = {name: text for name, text in texts.items() if name in _LABELS and text}
+    date = given.pop("date", None)
+    return Details(**given, date=None if date is None else datetime.date.fromisoformat(date))
 
 
 def read_details(path: Path) -> Details:

@@ -9,21 +9,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from orchestrator.devices.fmi.archive import read_origin
-from orchestrator.devices.fmi.description import FmuDescription, VariableInfo
-from orchestrator.devices.fmi.port import START, BoundDescription, without_binding
-from orchestrator.devices.fmi.values import Scalar
-from orchestrator.linear.spectra.modes import damping_ratio
-from orchestrator.output.results.mode_json import eigenvalue_json
-from orchestrator.studies.certification.case_file import CASE, WITH, WITHOUT
-from orchestrator.studies.certification.certificate import Certificate, DampingTest, missing_of
-from orchestrator.studies.certification.criteria import ModeVerdict
-from orchestrator.studies.certification.environment import environment
-from orchestrator.studies.certification.form import NORM
-from orchestrator.studies.certification.judgement import PointVerdict, TimeVerdict
-from orchestrator.studies.certification.point import COMPUTED, CONVERTER
-from orchestrator.studies.certification.request import REACTANCES
-from orchestrator.studies.certification.swings import RecordedSwing, SwingTest
+from orchestrator.analysis.modes import damping_ratio
+from orchestrator.certification.case_file import CASE, WITH, WITHOUT
+from orchestrator.certification.certificate import Certificate, DampingTest, missing_of
+from orchestrator.certification.criteria import ModeVerdict
+from orchestrator.certification.form import NORM
+from orchestrator.certification.judgement import PointVerdict, TimeVerdict
+from orchestrator.certification.point import COMPUTED, CONVERTER
+from orchestrator.certification.request import REACTANCES
+from orchestrator.certification.swings import RecordedSwing, SwingTest
+from orchestrator.fmi.archive import read_origin
+from orchestrator.fmi.description import FmuDescription, VariableInfo
+from orchestrator.fmi.port import START, BoundDescription, without_binding
+from orchestrator.fmi.values import Scalar
+from orchestrator.results.mode_json import eigenvalue_json
 
 _FLOW = ("Q_0", "theta_0")
 _STUDY = ("S_n", "P_0", "v_0")
@@ -125,12 +124,12 @@ def damping_json(c: Certificate, test: DampingTest) -> dict[str, Any]:
         "departures": list(c.request.departures),
         "details": c.details.texts(),
         "fmu": {
-            "file": c.request.fmu.name,
+            "file": c.fmu_name,
             "model": c.description.model_name,
             "guid": c.description.guid,
             **read_origin(c.description.path),
         },
-        "binding": c.request.binding.name if c.request.binding else None,
+        "binding": c.binding_name,
         "values": dict(c.request.values),
         "study_values": dict(c.request.study_values),
         "black_box": c.request.black_box,
@@ -143,7 +142,7 @@ def damping_json(c: Certificate, test: DampingTest) -> dict[str, Any]:
         "event_time": test.event_time,
         "linearised": linearised_of(c),
         "fit_errors": fit_errors_of(c),
-        "environment": environment(),
+        "environment": dict(c.computed_on),
         "points": [_point_json(c, v) for v in c.verdicts],
     }
 

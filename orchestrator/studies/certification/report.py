@@ -4,18 +4,13 @@ from collections.abc import Mapping
 from datetime import datetime
 from html import escape
 
-from orchestrator.devices.binding.binding import read_table
-from orchestrator.devices.fmi.archive import read_origin
-from orchestrator.devices.fmi.port import BoundDescription
-from orchestrator.devices.fmi.values import Scalar, as_text
-from orchestrator.output.report.html.elements import Figures, document, listed, table
-from orchestrator.studies.certification.case_file import BINDING, FMU, WITH
-from orchestrator.studies.certification.certificate import Certificate, missing_of
-from orchestrator.studies.certification.codes.record import row_chapters
-from orchestrator.studies.certification.environment import environment
-from orchestrator.studies.certification.figures import commands, parameter_rows
-from orchestrator.studies.certification.point import FREQUENCY
-from orchestrator.studies.certification.report_criteria import (
+from orchestrator.binding.binding import read_table
+from orchestrator.certification.case_file import BINDING, FMU, WITH
+from orchestrator.certification.certificate import Certificate, missing_of
+from orchestrator.certification.codes.record import row_chapters
+from orchestrator.certification.figures import commands, parameter_rows
+from orchestrator.certification.point import FREQUENCY
+from orchestrator.certification.report_criteria import (
     damping_chapters,
     damping_findings,
     told_of_damping,
@@ -41,7 +36,7 @@ def converter(c: Certificate, hashes: Hashes) -> str:
     switched = {} if c.damping is None else c.damping.controllers.settings
     values = {**c.request.values, **switched, **c.request.study_values}
     given = {
-        "FMU": c.request.fmu.name,
+        "FMU": c.fmu_name,
         "Model": c.description.model_name,
         "Description": origin["description"],
         "Author": origin["author"],
@@ -55,7 +50,7 @@ def converter(c: Certificate, hashes: Hashes) -> str:
         "SHA-256": hashes[FMU],
         "Rating": _rating(c),
         "Voltage": _voltage(c),
-        "Binding": c.request.binding.name if c.request.binding else "none: the port is ours",
+        "Binding": c.binding_name or "none: the port is ours",
         "Values set": ", ".join(f"{k} = {as_text(v)}" for k, v in values.items()) or "none",
         **({} if c.damping is None else told_of_damping(c, c.damping)),
     }
@@ -116,7 +111,7 @@ def binding(c: Certificate, hashes: Hashes) -> str:
     if c.request.binding is None:
         return "<p>None: the FMU has the variables of our port.</p>"
     text = escape(c.request.binding.read_text(encoding="utf-8"))
-    return f"<p>{escape(c.request.binding.name)}, SHA-256 {hashes[BINDING]}</p><pre>{text}</pre>"
+    return f"<p>{escape(str(c.binding_name))}, SHA-256 {hashes[BINDING]}</p><pre>{text}</pre>"
 
 
 def acceptance(c: Certificate) -> str:
@@ -141,7 +136,7 @@ def acceptance(c: Certificate) -> str:
 
 def provenance(c: Certificate, hashes: Hashes) -> str:
     machine = table(
-        "Computed on", ["", ""], [[escape(k), escape(v)] for k, v in environment().items()], left=2
+        "Computed on", ["", ""], [[escape(k), escape(v)] for k, v in c.computed_on.items()], left=2
     )
     files = table(
         "SHA-256 of the files beside this page",

@@ -32,9 +32,10 @@ from orchestrator.studies.certification.files import (
     seal_of,
     signatures_of,
 )
-from orchestrator.studies.certification.form import case_files, check_form
-from orchestrator.studies.certification.kinds import Parts, parts_of, rebuilt
-from orchestrator.studies.certification.signed import (
+from orchestrator.certification.form import case_files, check_form
+from orchestrator.certification.kinds import Parts, parts_of, rebuilt
+from orchestrator.certification.page_again import PageSeen, look_at_page, views_beside
+from orchestrator.certification.signed import (
     Asked,
     SignatureSeen,
     look_at_signature,
@@ -85,7 +86,7 @@ def verify_files(folder: Path, content: dict[str, Any]) -> Verification:
     if any((folder / name).is_symlink() for name in names):
         return found
     _compare_page(folder / HTML, content, found)
-    faults = _judged_again(folder, content, found.agreed)
+    faults = _judged_again(folder, content, found.agreed, found.views)
     found.faults += faults
     found.agreed += (
         []
@@ -109,9 +110,13 @@ def _compare_page(page: Path, content: dict[str, Any], found: Verification) -> N
         found.agreed.append(f"{HTML}: the hash of the figures that it shows")
 
 
-def _judged_again(folder: Path, content: dict[str, Any], said: list[str]) -> list[str]:
+def _judged_again(
+    folder: Path, content: dict[str, Any], said: list[str], views: list[str]
+) -> list[str]:
     try:
         with xr.open_dataset(folder / RESPONSES, engine="scipy") as data:
+            seen = look_at_page(folder, content, data) if (folder / HTML).is_file() else PageSeen()
+            views += [seen.unproved] if seen.unproved else []
             again = json.loads(json.dumps(figures_of(rebuilt(folder, content, data))))
             if not of_one_program(content, again):
                 said.append(
@@ -119,6 +124,7 @@ def _judged_again(folder: Path, content: dict[str, Any], said: list[str]) -> lis
                     "rows' titles are not compared"
                 )
             return [
+                *([seen.fault] if seen.fault else []),
                 *faults_of(content, again),
                 *parts_of(content).again.faults(folder, content, data),
             ]
@@ -209,7 +215,8 @@ def verified(
         computed=chosen if files.holds else [],
         later=parts.later(content),
         signature=signature,
-        unproved=_unproved(folder, content),
+        views=files.views,
+        unproved=[*files.views, *views_beside(content), *_unproved(folder, content)],
     )
     if found.later:
         found.agreed.append(
@@ -229,6 +236,5 @@ def verified(
 def _unproved(folder: Path, content: Content) -> list[str]:
     """Files in the folder of which the certificate has no hash."""
     known = {JSON, *content["files"], *signatures_of(folder).names()}
-    return sorted(
-        path.name for path in folder.iterdir() if path.is_file() and path.name not in known
-    )
+    others = [path.name for path in folder.iterdir() if path.is_file() and path.name not in known]
+    return [f"{name}: the certificate does not cover it" for name in sorted(others)]

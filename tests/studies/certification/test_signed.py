@@ -103,7 +103,8 @@ def seen(gfor, folder, *arguments):
 
 def test_a_certificate_is_good_with_its_signer_and_unknown_without(certificate, signers, gfor):
     code, found = verified(gfor, certificate, "--signers", signers())
-    assert (code, found["holds"], found["unproved"]) == (3, True, [])
+    (view,) = found["unproved"]
+    assert (code, found["holds"], "a view, not proved" in view) == (3, True, True)
     assert (found["signature"]["state"], found["signature"]["signer"]) == ("good", LAB)
     code, found = verified(gfor, certificate)
     assert (code, found["signature"]["state"]) == (3, "unknown signer")
@@ -526,3 +527,69 @@ def test_a_report_and_an_fmu_are_signed_by_themselves(fmu_path, keys, signers, g
             more.write(b"\n")
         code, text, _ = gfor("verify", file, "--json", "--signers", signers())
         assert (code, json.loads(text)["signature"]["state"]) == (5, "changed")
+
+
+FORGED_PAGES = {
+    "hidden": lambda text: text.replace("</style>", "tr{display:none}</style>"),
+    "shown": lambda text: text.replace("</style>", "h1::after{content:' PASSES'}</style>"),
+    "scripted": lambda text: text.replace("</script>", ";document.title='passes'</script>"),
+    "added": lambda text: text.replace("</main>", "<b>approved</b></main>"),
+}
+
+
+@pytest.fixture
+def of_rows(tmp_path, tmp_path_factory, fmu_path, gfor):
+    """A certificate of a code, computed once for the module."""
+    kept = tmp_path_factory.getbasetemp() / "of_rows"
+    if not kept.exists():
+        words = ["certify", fmu_path("gfor"), "--code", "fingrid", "--no-check", "--workers", 1]
+        assert gfor(*words, "--out", kept)[0] in (0, 1, 3)
+    return shutil.copytree(kept, tmp_path / "of_rows")
+
+
+@pytest.mark.slow
+def test_the_page_of_a_code_is_made_anew(of_rows, gfor):
+    found = json.loads(gfor("verify", of_rows, "--json", "--files-only")[1])
+    assert (found["holds"], found["unproved"]) == (True, []), found["faults"]
+    (of_rows / "approval.txt").write_text("approved")
+    found = json.loads(gfor("verify", of_rows, "--json", "--files-only")[1])
+    assert found["unproved"] == ["approval.txt: the certificate does not cover it"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FORGED_PAGES)
+def test_a_page_that_shows_something_else_does_not_hold(of_rows, gfor, name):
+    """Unsigned, and with every hash made anew."""
+    page = of_rows / "certificate.html"
+    text = page.read_text("utf-8")
+    assert FORGED_PAGES[name](text) != text
+    page.write_text(FORGED_PAGES[name](text), "utf-8")
+    edited(of_rows, lambda content: None)
+    code, said, _ = gfor("verify", of_rows, "--json", "--files-only")
+    assert code == 5
+    assert any("is not the page that comes out" in fault for fault in json.loads(said)["faults"])
+
+
+def a_file_elsewhere(folder):
+    (folder.parent / "elsewhere").write_text("x")
+    path = folder / "certificate.json"
+    content = json.loads(path.read_text("utf-8"))
+    content["files"]["../elsewhere"] = file_hash(folder.parent / "elsewhere")
+    del content["seal"]
+    write_sealed(content, path)
+
+
+def a_linked_fmu(folder):
+    (folder / "converter.fmu").rename(folder.parent / "out.fmu")
+    (folder / "converter.fmu").symlink_to(folder.parent / "out.fmu")
+
+
+def a_linked_record(folder):
+    (folder / "certificate.json").rename(folder.parent / "record.json")
+    (folder / "certificate.json").symlink_to(folder.parent / "record.json")
+
+
+@pytest.mark.parametrize("change", [a_file_elsewhere, a_linked_fmu, a_linked_record])
+def test_no_file_leaves_the_folder_and_no_link_is_followed(certificate, gfor, change):
+    change(certificate)
+    assert gfor("verify", certificate, "--files-only")[0] in (2, 5)

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from html import escape
+from zlib import crc32
 
 import numpy as np
 
@@ -80,7 +81,7 @@ class Frame:
             f'<text class="label" transform="translate(13 {middle}) rotate(-90)" text-anchor="middle">'
             f"{escape(self.y_label)}</text>"
         )
-        clip = f"clip-{abs(hash((name, self.y_label))) % 10**9}"
+        clip = f"clip-{crc32(f'{name} {self.y_label}'.encode())}"
         window = f'<rect x="{_LEFT}" y="{_TOP}" width="{right - _LEFT}" height="{bottom - _TOP}"/>'
         return (
             f'<svg class="chart" viewBox="0 0 {_WIDTH} {self.height}" role="img" aria-label="{escape(name)}"{extra}>'

@@ -8,18 +8,17 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from orchestrator.core.arrays import Numbers
-from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart
-from orchestrator.output.report.html.elements import Figures, colour, listed, table
-from orchestrator.studies.certification.certificate import Certificate
-from orchestrator.studies.certification.codes.bench_point import BenchResult
-from orchestrator.studies.certification.codes.criteria import POWER_SHOWN
-from orchestrator.studies.certification.codes.measured import MeasuredRow
-from orchestrator.studies.certification.codes.row import Band, Bounded, RowFinding
-from orchestrator.studies.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED, RowVerdict
-from orchestrator.studies.certification.environment import environment
-from orchestrator.studies.certification.form import CODE
-from orchestrator.studies.certification.margins import margin_of
+from orchestrator.arrays import Numbers
+from orchestrator.certification.certificate import Certificate
+from orchestrator.certification.codes.bench_point import BenchResult
+from orchestrator.certification.codes.criteria import POWER_SHOWN
+from orchestrator.certification.codes.measured import MeasuredRow
+from orchestrator.certification.codes.row import Band, Bounded, RowFinding
+from orchestrator.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED, RowVerdict
+from orchestrator.certification.form import CODE
+from orchestrator.certification.margins import margin_of
+from orchestrator.report.html.charts import ChartCurve, legend, line_chart
+from orchestrator.report.html.elements import Figures, colour, listed, table
 
 
 def code_responses(certificate: Certificate) -> xr.Dataset:
@@ -44,7 +43,9 @@ def code_json(c: Certificate) -> dict[str, Any]:
         "verdict": c.verdict,
         "sentence": c.sentence(),
         "model": c.description.model_name,
-        "binding": c.request.binding.name if c.request.binding else None,
+        "file": c.fmu_name,
+        "binding": c.binding_name,
+        "details": c.details.texts(),
         "values": dict(c.request.values),
         "declared": dict(c.code.declared),
         "left_out": list(c.code.left_out),
@@ -53,7 +54,7 @@ def code_json(c: Certificate) -> dict[str, Any]:
         "missing": list(c.missing),
         "rows": [_row(v, c) for v in c.verdicts],
         "acceptance": c.acceptance.report if c.acceptance else None,
-        "environment": environment(),
+        "environment": dict(c.computed_on),
     }
 
 

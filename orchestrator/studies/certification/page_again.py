@@ -1,0 +1,71 @@
+"""The page of a certificate, made anew and compared as a document: what it hides or adds is seen."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from orchestrator.cases.case import load_case
+from orchestrator.certification.case_file import BINDING, FMU
+from orchestrator.certification.details import details_of
+from orchestrator.certification.environment import CODE, environment
+from orchestrator.certification.files import HTML, JSON, PDF, figures_hash
+from orchestrator.certification.form import NORM
+from orchestrator.certification.kinds import rebuilt
+from orchestrator.certification.report import page
+
+_VIEW = "a view, not proved"
+_NUMBER = re.compile(r"[-+]?\d[\d.,]*(?:[eE][-+]?\d+)?")
+
+
+@dataclass(frozen=True)
+class PageSeen:
+    """A page: what is wrong with it, or why it proves nothing; both empty where it is what comes out."""
+
+    fault: str = ""
+    unproved: str = ""
+
+
+def look_at_page(folder: Path, content: dict[str, Any], data: xr.Dataset) -> PageSeen:
+    """Make the page anew from the record, and compare it to the last character.
+
+    Another version of this program has other words, and another machine rounds otherwise: then it is a view."""
+    if content["format"] == NORM:
+        return PageSeen(
+            unproved=f"{HTML}: {_VIEW}: it shows shapes of modes, which the record does not keep"
+        )
+    stated = dict(content.get("environment") or {})
+    if stated.get(CODE) != environment()[CODE] or "details" not in content:
+        return PageSeen(unproved=f"{HTML}: {_VIEW}: another version of this program wrote it")
+    there = (folder / HTML).read_text(encoding="utf-8", errors="replace")
+    again = _made_anew(folder, content, data)
+    if there == again:
+        return PageSeen()
+    same_words = _NUMBER.sub("#", there) == _NUMBER.sub("#", again)
+    if same_words and stated != environment():
+        return PageSeen(
+            unproved=f"{HTML}: {_VIEW}: made on another machine, and digits differ from what comes out here"
+        )
+    place = next(k for k, pair in enumerate(zip(there, again, strict=False)) if pair[0] != pair[1])
+    shown = " ".join(there[max(place - 20, 0) : place + 40].split())
+    return PageSeen(f"{HTML}: it is not the page that comes out of {JSON}; first at {shown!r}")
+
+
+def views_beside(content: Mapping[str, Any]) -> list[str]:
+    """Name what shows the certificate and cannot be made anew."""
+    return [f"{PDF}: {_VIEW}: print {HTML} to have it anew"] if PDF in content["files"] else []
+
+
+def _made_anew(folder: Path, content: dict[str, Any], data: xr.Dataset) -> str:
+    again = rebuilt(folder, content, data)
+    again.values = load_case(again.case).prepare()[0].values
+    again.details = details_of(content["details"])
+    again.computed_on = content["environment"]
+    again.names = {FMU: content["file"], BINDING: content["binding"] or ""}
+    hashes = {name: of for name, of in content["files"].items() if name not in (HTML, PDF)}
+    hashes[f"{JSON}, its figures"] = figures_hash(content)
+    return page(again, hashes, datetime.fromisoformat(content["made"]))
