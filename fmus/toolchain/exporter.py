@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Protocol
 
 from fmus.toolchain.archive import packed, write_archive
+from fmus.toolchain.bill import BILL, bill_of
 from fmus.toolchain.cache import cache_directory, intact, keep
 from fmus.toolchain.compiler import host_platform
 from fmus.toolchain.model import Model
@@ -38,12 +39,12 @@ def export(
 
     ``platforms``: FMI 2.0 names of those to compile for; by default all of them for a native FMU, and this machine's
     for a Python-backed one, which elsewhere evaluates the same equations in pure Python. ``darwin64`` of a native FMU
-    holds code for both kinds of Mac. ``extra``: further members of the archive, by path. Errors are those of
-    `compile_library`."""
+    holds code for both kinds of Mac. ``extra``: further members of the archive, by path; a bill of all of them goes
+    with them. Errors are those of `compile_library`."""
     chosen = recipe.default_platforms() if platforms is None else platforms
-    return write_archive(
-        destination / f"{recipe.model.name}.fmu", recipe.contents(chosen) | dict(extra or {})
-    )
+    members = recipe.contents(chosen) | dict(extra or {})
+    members[BILL] = bill_of(recipe.model.name, recipe.digest, members)
+    return write_archive(destination / f"{recipe.model.name}.fmu", members)
 
 
 def kept_at(recipe: Recipe) -> Path:

@@ -142,9 +142,9 @@ def anchors(page: Path) -> set[str]:
 
 
 def commands(block: Block) -> list[str]:
-    """The single commands of a shell block: without comments and ``> file``, and parted at ``&&``."""
+    """The single commands of a shell block: without comments and ``> file``, and parted at ``&&`` and ``||``."""
     found = []
     for line in block.text.replace("\\\n", " ").splitlines():
         text = re.sub(r"(^|\s)#.*|\s> \S+$", "", line).strip()
-        found += [part.strip() for part in text.split("&&") if part.strip()]
+        found += [part.strip() for part in re.split(r"&&|\|\|", text) if part.strip()]
     return found

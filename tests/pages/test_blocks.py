@@ -13,7 +13,22 @@ from orchestrator.face import cli
 from tests.pages.markdown import ROOT, blocks, commands, name_of, pages
 
 PAGES = [page for page in pages() if blocks(page)]
-OTHERS = {"cd", "git", "grep", "mkdir", "mkdocs", "mv", "mypy", "pip", "pytest", "ruff", "tail"}
+OTHERS = {
+    "cd",
+    "echo",
+    "git",
+    "grep",
+    "mkdir",
+    "mkdocs",
+    "mv",
+    "mypy",
+    "pip",
+    "pytest",
+    "ruff",
+    "ssh-keygen",
+    "tail",
+    "test",
+}
 """Commands that pages use beside ``gfor`` and ``python``."""
 ADDED = {"least-damped", "example"}
 """Commands and codes of ``gfor`` that guides add."""
@@ -48,6 +63,10 @@ def test_shell_blocks_parse(page, capsys):
                 words.pop(0)  # a variable of the environment
             if words[0] == "gfor":
                 parses(words[1:], block.place, capsys)
+            elif words[0] in ("python", "python3") and words[1].endswith(".py"):
+                assert any(one.path == words[1] for one in blocks(page)), (
+                    f"{block.place}: {command}"
+                )
             elif words[0] in ("python", "python3"):
                 assert words[1] == "-m", f"{block.place}: {command}"
                 assert find_spec(words[2]), f"{block.place}: there is no module {words[2]}"

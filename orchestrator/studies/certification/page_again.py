@@ -17,6 +17,7 @@ from orchestrator.certification.files import HTML, JSON, PDF, figures_hash
 from orchestrator.certification.form import NORM
 from orchestrator.certification.kinds import rebuilt
 from orchestrator.certification.report import page
+from orchestrator.foreign_files import read_text
 
 _VIEW = "a view, not proved"
 _NUMBER = re.compile(r"[-+]?\d[\d.,]*(?:[eE][-+]?\d+)?")
@@ -41,7 +42,7 @@ def look_at_page(folder: Path, content: dict[str, Any], data: xr.Dataset) -> Pag
     stated = dict(content.get("environment") or {})
     if stated.get(CODE) != environment()[CODE] or "details" not in content:
         return PageSeen(unproved=f"{HTML}: {_VIEW}: another version of this program wrote it")
-    there = (folder / HTML).read_text(encoding="utf-8", errors="replace")
+    there = read_text(folder / HTML, errors="replace")
     again = _made_anew(folder, content, data)
     if there == again:
         return PageSeen()
