@@ -11,17 +11,24 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from orchestrator.cases.schema import Value
-from orchestrator.certification.acceptance import Acceptance
-from orchestrator.certification.case_file import BINDING, FMU
-from orchestrator.certification.codes.row import GridCode
-from orchestrator.certification.damping_controllers import DampingControllers
-from orchestrator.certification.details import Details
-from orchestrator.certification.environment import environment
-from orchestrator.certification.judgement import watched
-from orchestrator.certification.margins import CriterionMargin
-from orchestrator.certification.point import CONVERTER
-from orchestrator.certification.request import REACTANCES, CertificationRequest, same_reactance
-from orchestrator.certification.verdict import (
+from orchestrator.core.errors import CaseError, Problem
+from orchestrator.devices.fmi.description import FmuDescription
+from orchestrator.devices.fmi.values import as_text
+from orchestrator.studies.certification.acceptance import Acceptance
+from orchestrator.studies.certification.case_file import BINDING, FMU
+from orchestrator.studies.certification.codes.row import GridCode
+from orchestrator.studies.certification.damping_controllers import DampingControllers
+from orchestrator.studies.certification.details import Details
+from orchestrator.studies.certification.environment import environment
+from orchestrator.studies.certification.judgement import watched
+from orchestrator.studies.certification.margins import CriterionMargin
+from orchestrator.studies.certification.point import CONVERTER
+from orchestrator.studies.certification.request import (
+    REACTANCES,
+    CertificationRequest,
+    same_reactance,
+)
+from orchestrator.studies.certification.verdict import (
     FAILS,
     INCOMPLETE,
     PASSES,

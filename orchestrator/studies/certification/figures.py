@@ -9,20 +9,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from orchestrator.analysis.modes import damping_ratio
-from orchestrator.certification.case_file import CASE, WITH, WITHOUT
-from orchestrator.certification.certificate import Certificate, DampingTest, missing_of
-from orchestrator.certification.criteria import ModeVerdict
-from orchestrator.certification.form import NORM
-from orchestrator.certification.judgement import PointVerdict, TimeVerdict
-from orchestrator.certification.point import COMPUTED, CONVERTER
-from orchestrator.certification.request import REACTANCES
-from orchestrator.certification.swings import RecordedSwing, SwingTest
-from orchestrator.fmi.archive import read_origin
-from orchestrator.fmi.description import FmuDescription, VariableInfo
-from orchestrator.fmi.port import START, BoundDescription, without_binding
-from orchestrator.fmi.values import Scalar
-from orchestrator.results.mode_json import eigenvalue_json
+from orchestrator.devices.fmi.archive import read_origin
+from orchestrator.devices.fmi.description import FmuDescription, VariableInfo
+from orchestrator.devices.fmi.port import START, BoundDescription, without_binding
+from orchestrator.devices.fmi.values import Scalar
+from orchestrator.linear.spectra.modes import damping_ratio
+from orchestrator.output.results.mode_json import eigenvalue_json
+from orchestrator.studies.certification.case_file import CASE, WITH, WITHOUT
+from orchestrator.studies.certification.certificate import Certificate, DampingTest, missing_of
+from orchestrator.studies.certification.criteria import ModeVerdict
+from orchestrator.studies.certification.form import NORM
+from orchestrator.studies.certification.judgement import PointVerdict, TimeVerdict
+from orchestrator.studies.certification.point import COMPUTED, CONVERTER
+from orchestrator.studies.certification.request import REACTANCES
+from orchestrator.studies.certification.swings import RecordedSwing, SwingTest
 
 _FLOW = ("Q_0", "theta_0")
 _STUDY = ("S_n", "P_0", "v_0")

@@ -10,14 +10,14 @@ from typing import Any
 import xarray as xr
 
 from orchestrator.cases.case import load_case
-from orchestrator.certification.case_file import BINDING, FMU
-from orchestrator.certification.details import details_of
-from orchestrator.certification.environment import CODE, environment
-from orchestrator.certification.files import HTML, JSON, PDF, figures_hash
-from orchestrator.certification.form import NORM
-from orchestrator.certification.kinds import rebuilt
-from orchestrator.certification.report import page
-from orchestrator.foreign_files import read_text
+from orchestrator.core.foreign_files import read_text
+from orchestrator.studies.certification.case_file import BINDING, FMU
+from orchestrator.studies.certification.details import details_of
+from orchestrator.studies.certification.environment import CODE, environment
+from orchestrator.studies.certification.files import HTML, JSON, PDF, figures_hash
+from orchestrator.studies.certification.form import NORM
+from orchestrator.studies.certification.kinds import rebuilt
+from orchestrator.studies.certification.report import page
 
 _VIEW = "a view, not proved"
 _NUMBER = re.compile(r"[-+]?\d[\d.,]*(?:[eE][-+]?\d+)?")

@@ -4,13 +4,17 @@ from collections.abc import Mapping
 from datetime import datetime
 from html import escape
 
-from orchestrator.binding.binding import read_table
-from orchestrator.certification.case_file import BINDING, FMU, WITH
-from orchestrator.certification.certificate import Certificate, missing_of
-from orchestrator.certification.codes.record import row_chapters
-from orchestrator.certification.figures import commands, parameter_rows
-from orchestrator.certification.point import FREQUENCY
-from orchestrator.certification.report_criteria import (
+from orchestrator.devices.binding.binding import read_table
+from orchestrator.devices.fmi.archive import read_origin
+from orchestrator.devices.fmi.port import BoundDescription
+from orchestrator.devices.fmi.values import Scalar, as_text
+from orchestrator.output.report.html.elements import Figures, document, listed, table
+from orchestrator.studies.certification.case_file import BINDING, FMU, WITH
+from orchestrator.studies.certification.certificate import Certificate, missing_of
+from orchestrator.studies.certification.codes.record import row_chapters
+from orchestrator.studies.certification.figures import commands, parameter_rows
+from orchestrator.studies.certification.point import FREQUENCY
+from orchestrator.studies.certification.report_criteria import (
     damping_chapters,
     damping_findings,
     told_of_damping,

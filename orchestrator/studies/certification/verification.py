@@ -32,10 +32,10 @@ from orchestrator.studies.certification.files import (
     seal_of,
     signatures_of,
 )
-from orchestrator.certification.form import case_files, check_form
-from orchestrator.certification.kinds import Parts, parts_of, rebuilt
-from orchestrator.certification.page_again import PageSeen, look_at_page, views_beside
-from orchestrator.certification.signed import (
+from orchestrator.studies.certification.form import case_files, check_form
+from orchestrator.studies.certification.kinds import Parts, parts_of, rebuilt
+from orchestrator.studies.certification.page_again import PageSeen, look_at_page, views_beside
+from orchestrator.studies.certification.signed import (
     Asked,
     SignatureSeen,
     look_at_signature,

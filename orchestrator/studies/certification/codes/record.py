@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from orchestrator.arrays import Numbers
-from orchestrator.certification.certificate import Certificate
-from orchestrator.certification.codes.bench_point import BenchResult
-from orchestrator.certification.codes.criteria import POWER_SHOWN
-from orchestrator.certification.codes.measured import MeasuredRow
-from orchestrator.certification.codes.row import Band, Bounded, RowFinding
-from orchestrator.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED, RowVerdict
-from orchestrator.certification.form import CODE
-from orchestrator.certification.margins import margin_of
-from orchestrator.report.html.charts import ChartCurve, legend, line_chart
-from orchestrator.report.html.elements import Figures, colour, listed, table
+from orchestrator.core.arrays import Numbers
+from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart
+from orchestrator.output.report.html.elements import Figures, colour, listed, table
+from orchestrator.studies.certification.certificate import Certificate
+from orchestrator.studies.certification.codes.bench_point import BenchResult
+from orchestrator.studies.certification.codes.criteria import POWER_SHOWN
+from orchestrator.studies.certification.codes.measured import MeasuredRow
+from orchestrator.studies.certification.codes.row import Band, Bounded, RowFinding
+from orchestrator.studies.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED, RowVerdict
+from orchestrator.studies.certification.form import CODE
+from orchestrator.studies.certification.margins import margin_of
 
 
 def code_responses(certificate: Certificate) -> xr.Dataset:
