@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,10 @@ def validate(
     events: Sequence[tuple[Time, Time]] = (),
     average: Time | None = None,
     limits: str | Path | None = None,
+    fit: str | Sequence[str] = (),
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    hold_back: Recorded | Sequence[Recorded] = (),
+    explain: bool = False,
     start: Time | None = None,
     stop: Time | None = None,
     step: Time = 1e-4,
@@ -77,6 +82,15 @@ def validate(
         Time over which P and Q are averaged before they are compared [s]; a period by default, 0 for none.
     limits
         File of limits; without it there is no verdict.
+    fit
+        Parameters that are fitted, such as ``"droop.R_f, pod_p.K"``; switches are tried on and off. What the recordings
+        cannot tell is left where it is.
+    bounds
+        Of fitted parameters, in their units; by default what the device declares.
+    hold_back
+        Recordings that are not fitted, and confirm the fit.
+    explain
+        Whether to look for one parameter that would explain the errors.
     start, stop
         The part of each recording that is used [s].
     step
@@ -110,7 +124,7 @@ def validate(
         kilovolt = number_in(voltage, "kV", "voltage", "a voltage in kV, such as 230")
     mean = None if average is None else moment(average, "average")
     bases = PortBases(found.rating, found.rated_hz, kilovolt, read_impedance(transformer), mean)
-    given = [_read_given(one, k, start, stop) for k, one in enumerate(_as_list(recordings), 1)]
+    given = _all_given(_as_list(recordings), hold_back, start, stop)
     request = ValidationRequest(
         found,
         given,
@@ -119,6 +133,9 @@ def validate(
         place=place,
         events=[_window(one) for one in events],
         limits=None if limits is None else read_limits(path_of(limits, "limits")),
+        fit=_names_of(fit),
+        bounds=bounds or {},
+        explain=explain,
     )
     return Validation(validate_device(request, report))
 
@@ -128,6 +145,20 @@ def _as_list(recordings: Any) -> list[Any]:
     if not found:
         raise InputError("recordings = []; give at least one recording")
     return found
+
+
+def _names_of(fit: str | Sequence[str]) -> list[str]:
+    """Names that are listed, or stand in one text with commas."""
+    return [one.strip() for text in names(fit, "fit") for one in text.split(",") if one.strip()]
+
+
+def _all_given(
+    recordings: Sequence[Any], hold_back: Any, start: Time | None, stop: Time | None
+) -> list[GivenRecording]:
+    kept = list(hold_back) if isinstance(hold_back, list | tuple) else [hold_back]
+    found = [_read_given(one, k, start, stop) for k, one in enumerate(recordings, 1)]
+    others = [_read_given(one, k, start, stop) for k, one in enumerate(kept, len(found) + 1)]
+    return found + [replace(one, held_back=True) for one in others]
 
 
 def _window(given: Any) -> tuple[float, float]:

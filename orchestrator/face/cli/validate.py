@@ -5,6 +5,7 @@ from typing import Any
 
 from orchestrator.core.asked import as_number
 from orchestrator.core.errors import INTERRUPTED, NOT_MET
+from orchestrator.core.safe_files import made_folder
 from orchestrator.core.units import read_value, to_unit
 from orchestrator.face.api.validation import validate
 from orchestrator.face.cli.arguments import add_options
@@ -21,7 +22,14 @@ from orchestrator.studies.validation.view import Validation, parts
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    add_options(parser, "validate", event=_read_event, moment=_moment, INTERRUPTED=INTERRUPTED)
+    add_options(
+        parser,
+        "validate",
+        event=_read_event,
+        moment=_moment,
+        bounds=_bounds,
+        INTERRUPTED=INTERRUPTED,
+    )
 
 
 def run(options: argparse.Namespace) -> int:
@@ -29,6 +37,8 @@ def run(options: argparse.Namespace) -> int:
     with saying_warnings(), said_stages() as report:
         found = validate(options.device, options.recordings, report=report, **_keywords(options))
     say("question", found.questions)
+    if options.out:
+        found.save(made_folder(options.out, "--out"))
     if options.json:
         print_json(found.as_json())
     else:
@@ -49,6 +59,10 @@ def _keywords(options: argparse.Namespace) -> dict[str, Any]:
         "events": options.event,
         "average": options.average,
         "limits": options.limits,
+        "fit": options.fit,
+        "bounds": dict(options.bounds),
+        "hold_back": options.hold_back,
+        "explain": options.explain,
         "start": options.start,
         "stop": options.stop,
         "step": options.step,
@@ -56,6 +70,8 @@ def _keywords(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _exit_code(found: Validation) -> int:
+    if found.result.fit is not None and not found.result.fit.finished:
+        return INTERRUPTED
     return 0 if found.result.verdict in (None, LimitVerdict.MET) else NOT_MET
 
 
@@ -68,6 +84,16 @@ def _read_event(text: str) -> tuple[float, float]:
             f"{text!r} is no event; write BEGIN:END in seconds of the recording, such as 2.0:2.15"
         )
     return begin, end
+
+
+def _bounds(text: str) -> tuple[str, tuple[float, float]]:
+    """``NAME=LO:HI``."""
+    name, sign, rest = text.partition("=")
+    low, colon, high = rest.partition(":")
+    limits = as_number(low), as_number(high)
+    if not (sign and colon and limits[0] < limits[1]):
+        raise ValueError(f"{text!r} are no bounds; write NAME=LO:HI, such as pod_p.K=50:400")
+    return name.strip(), limits
 
 
 def _moment(text: str) -> float:

@@ -30,10 +30,11 @@ _STARTS_ELSEWHERE = 0.02  # power at rest [pu] by which a device misses what was
 _NO_NOISE = 2e-6  # scatter of P and Q before the event [pu] that no instrument has
 _TOO_GOOD = 1e-4  # median error [pu] beside a recording without noise, as the model's own
 _MOVED = 2e-3  # rms movement [pu] that is an event
-_OFFSET = 0.015  # error that stays at the end [pu]
-_BACK = 0.005  # deviation of the voltage [pu] that is as before
+_OFFSET = 0.015  # error that stays [pu]
+_BACK = 0.005  # deviation of the voltage [pu] that is none of an event
 _SLOWER_THAN = 0.05  # interval between samples [s] of which is said what it cannot show
-_LAST = 0.15  # part of the window after the event that is its end
+_SETPOINT_WITHIN = 0.1  # time [s] within which a setpoint moves P or Q by most of its step
+_ABRUPT = 6.0  # times the usual change over that time
 
 
 @dataclass(frozen=True)
@@ -212,24 +213,26 @@ def _of_response(comparison: EventComparison) -> list[Question]:
 
 
 def _setpoint(comparison: EventComparison) -> list[Question]:
-    """P or Q that stays elsewhere though the voltage came back to where it was, in magnitude and frequency."""
+    """P or Q that leaves the model's at once and for good while the voltage does nothing."""
     event = comparison.event
-    recording, windows = event.recording, event.windows
+    recording = event.recording
+    width = max(1, round(_SETPOINT_WITHIN / recording.interval))
+    error = comparison.played.power - recording.power
     times = recording.times
-    late = (times > recording.length - _LAST * (recording.length - windows.end)) & recording.good
-    if late.sum() < 4 or not windows.seen:
-        return []
-    level = abs(float(np.abs(recording.voltage[late]).mean()) - abs(event.start.voltage))
-    slope = np.polyfit(times[late], np.unwrap(np.angle(recording.voltage[late])), 1)[0]
-    if level > _BACK or abs(slope) / (2 * np.pi) > _BACK:
-        return []
-    error = comparison.played.power[late] - recording.power[late]
+    first = int(np.searchsorted(times, event.windows.end + _SETPOINT_WITHIN))
     found = []
-    for name, offset, spread in (
-        ("p", error.real.mean(), np.ptp(error.real)),
-        ("q", error.imag.mean(), np.ptp(error.imag)),
-    ):
-        if abs(offset) > max(_OFFSET, spread):
-            figures = {"signal": name, "offset": -float(offset)}
+    for name, values in (("p", error.real), ("q", error.imag)):
+        means = np.convolve(values, np.ones(width) / width, mode="valid")
+        steps = np.abs(means[width:] - means[:-width])[first:]
+        if len(steps) < 4 * width:
+            continue
+        at = first + int(steps.argmax())
+        before, after = values[max(0, at - 2 * width) : at], values[at + 2 * width :]
+        offset = float(after.mean() - before.mean())
+        abrupt = float(steps.max()) > _ABRUPT * float(np.median(steps)) + _OFFSET
+        around = recording.voltage[at : at + 2 * width]
+        if abrupt and abs(offset) > _OFFSET and np.ptp(np.abs(around)) < _BACK:
+            moment = recording.begin + float(times[at + width])
+            figures = {"signal": name, "offset": -offset, "at": moment}
             found.append(Question(QuestionKind.SETPOINT, figures))
     return found[:1]

@@ -70,8 +70,6 @@ READINGS = (
     Reading("Q counts into the plant", ("q",), -1, _power(1, -1)),
     Reading("P and Q count into the plant", ("p", "q"), -1, _power(-1, -1)),
     Reading("P and Q are of one phase", ("p", "q"), 3, _power(3, 3)),
-    Reading("P is of one phase", ("p",), 3, _power(3, 1)),
-    Reading("Q is of one phase", ("q",), 3, _power(1, 3)),
     Reading("the angle is in radians", ("angle",), _RADIAN, _angle(_RADIAN)),
     Reading("the angle is in degrees", ("angle",), 1 / _RADIAN, _angle(1 / _RADIAN)),
     Reading("the angle has the other sign", ("angle",), -1, _angle(-1)),
@@ -85,9 +83,7 @@ def question_readings(comparison: EventComparison, bases: PortBases) -> list[Que
     scatter = (comparison.noise["p"].scatter, comparison.noise["q"].scatter)
     excess = [max(e * e - (_NOISY * n) ** 2, 0) ** 0.5 for e, n in zip(error, scatter, strict=True)]
     off = [one > max(_LEAST_OFF, _OFF * way) for one, way in zip(excess, moved, strict=True)]
-    if not any(off):
-        return []
-    named = _likeliest(comparison, bases, math.hypot(*error))
+    named = _likeliest(comparison, bases, math.hypot(*error)) if any(off) else []
     return named or _clock(comparison, math.hypot(*error))
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
-from orchestrator.core.errors import InputError
+from orchestrator.core.errors import CosimError, InputError
 from orchestrator.core.late import xr
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import (
@@ -13,7 +15,10 @@ from orchestrator.studies.validation.event import (
     RecordedEvent,
     compare_with,
     prepare_event,
+    rms_error,
 )
+from orchestrator.studies.validation.explain import Explanation, explain_errors
+from orchestrator.studies.validation.fit import Fit, fit_parameters
 from orchestrator.studies.validation.hypotheses import question_readings
 from orchestrator.studies.validation.limits import (
     Criterion,
@@ -22,8 +27,10 @@ from orchestrator.studies.validation.limits import (
     judge_limits,
     verdict_of,
 )
+from orchestrator.studies.validation.parameters import wanted_parameters
 from orchestrator.studies.validation.record import PortBases, read_recording
 from orchestrator.studies.validation.windows import given_windows
+from orchestrator.studies.validation.words import sentence
 
 Report = Callable[[str], None]
 
@@ -50,6 +57,27 @@ class ValidationRequest:
     # begin and end of the event [s], one for all recordings or one for each; none where they are found
     events: Sequence[tuple[float, float]] = ()
     limits: LimitTables | None = None
+    fit: Sequence[str] = ()  # parameters that are fitted
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    explain: bool = False  # whether it is asked which one parameter would explain the errors
+
+
+@dataclass(frozen=True)
+class FitCheck:
+    """Errors of one recording before and after a fit: rms of P and Q together [pu of the rating]."""
+
+    recording: str
+    fitted: bool  # False for an event that was kept back
+    before: float
+    after: float
+
+    def as_json(self) -> dict[str, Any]:
+        return {
+            "recording": self.recording,
+            "fitted": self.fitted,
+            "rms_before_pu": self.before,
+            "rms_after_pu": self.after,
+        }
 
 
 @dataclass(frozen=True)
@@ -60,6 +88,9 @@ class ValidationResult:
     comparisons: Sequence[EventComparison]
     criteria: Sequence[Criterion] = field(default=())
     verdict: LimitVerdict | None = None
+    fit: Fit | None = None
+    confirmations: Sequence[FitCheck] = field(default=())
+    explanations: Sequence[Explanation] = field(default=())
 
 
 def events_of(request: ValidationRequest) -> list[RecordedEvent]:
@@ -97,10 +128,47 @@ def validate_device(
     comparisons = []
     for event in events_of(request):
         report(f"{event.recording.label}: driving {request.device.name}")
-        comparison = compare_with(request.device, event)
+        comparison = _compare(request.device, event)
         asked = question_readings(comparison, request.bases)
         comparisons.append(replace(comparison, questions=comparison.questions + tuple(asked)))
-    return add_verdict(ValidationResult(request, comparisons))
+    result = add_verdict(ValidationResult(request, comparisons))
+    if request.explain:
+        events = [one.event for one in result.comparisons]
+        found = explain_errors(request.device, events, report)
+        result = replace(result, explanations=found)
+    return add_fit(result, report) if request.fit else result
+
+
+def add_fit(result: ValidationResult, report: Report) -> ValidationResult:
+    """The result with a fit to the events that were not kept back, and what all events say of it."""
+    request = result.request
+    device = request.device
+    kept = [given.held_back for given in request.recordings]
+    events = [one.event for one in result.comparisons]
+    taken = [event for event, held in zip(events, kept, strict=True) if not held]
+    if not taken:
+        raise InputError("--hold-back: all recordings are kept back from the fit; leave one to it")
+    wanted = wanted_parameters(device, request.fit, request.bounds)
+    fit = fit_parameters(device, taken, wanted, report)
+    other = device.with_values(fit.values)
+    confirmations = []
+    for one, held in zip(result.comparisons, kept, strict=True):
+        event = one.event
+        after = other.play(event.recording, event.start).power if fit.values else one.played.power
+        errors = [math.hypot(*rms_error(power, event)) for power in (one.played.power, after)]
+        confirmations.append(FitCheck(event.recording.label, not held, *errors))
+    return replace(result, fit=fit, confirmations=confirmations)
+
+
+def _compare(device: PlayedDevice, event: RecordedEvent) -> EventComparison:
+    """The comparison; where the device refuses to run, what was asked of the recording is said with it."""
+    try:
+        return compare_with(device, event)
+    except CosimError as error:
+        asked = [sentence(one) for one in event.questions if one.keeps_open]
+        if not asked:
+            raise
+        raise InputError(f"{event.recording.label}: {'; '.join(asked)}. {error}") from error
 
 
 def add_verdict(result: ValidationResult) -> ValidationResult:

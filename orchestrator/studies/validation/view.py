@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.console import RenderableType
@@ -10,14 +11,19 @@ from rich.markup import escape
 
 from orchestrator.core.errors import counted
 from orchestrator.core.late import pd
+from orchestrator.core.safe_files import made_folder
 from orchestrator.output.report.notebook import page
 from orchestrator.output.report.tables import PlainTable, VerdictSentence, make_table
+from orchestrator.output.results.staging import new_run_id, staged
+from orchestrator.output.results.storage import save_json, save_table
 from orchestrator.studies.validation.event import EventComparison
+from orchestrator.studies.validation.explain import Explanation
 from orchestrator.studies.validation.figures import ErrorFigures
+from orchestrator.studies.validation.fit import Fit
 from orchestrator.studies.validation.limits import Criterion, LimitVerdict
 from orchestrator.studies.validation.questions import Question
-from orchestrator.studies.validation.study import ValidationResult
-from orchestrator.studies.validation.words import sentence
+from orchestrator.studies.validation.study import FitCheck, ValidationResult
+from orchestrator.studies.validation.words import fit_sentence, sentence, untold_words
 
 _GOOD = {LimitVerdict.MET: True, LimitVerdict.NOT_MET: False, LimitVerdict.OPEN: None}
 _POWERS = ("p", "q")
@@ -66,7 +72,53 @@ class Validation:
             "verdict": self.verdict,
             "limits": None if limits is None else limits.source,
             "criteria": criteria,
+            **self._fit_json(),
+            **self._explained_json(),
         }
+
+    def _explained_json(self) -> dict[str, Any]:
+        if not self.result.request.explain:
+            return {}
+        return {"explanations": [one.as_json() for one in self.result.explanations]}
+
+    def _fit_json(self) -> dict[str, Any]:
+        fit = self.result.fit
+        if fit is None:
+            return {}
+        parameters = [one.as_json() for one in fit.parameters]
+        checks = [one.as_json() for one in self.result.confirmations]
+        return {
+            "fit": parameters,
+            "fit_finished": fit.finished,
+            "fit_runs": fit.runs,
+            "fit_events": checks,
+        }
+
+    def html(self) -> str:
+        """A page with the model, the recordings, errors, pictures, limits, fit, and what was not judged."""
+        from orchestrator.studies.validation.page import validation_page  # noqa: PLC0415 - only where it is asked for
+
+        return validation_page(self.result)
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write figures, curves and the page into a folder; returns their paths."""
+        place = made_folder(folder, "folder")
+        with staged(place, new_run_id()) as staging:
+            save_json(self.as_json(), staging / "validation.json")
+            for k in range(len(self.result.comparisons)):
+                save_table(self._rows(k), staging / f"curves_{k + 1}.csv")
+            (staging / "validation.html").write_text(self.html(), encoding="utf-8")
+        names = ["validation.json", "validation.html"]
+        names += [f"curves_{k + 1}.csv" for k in range(len(self.result.comparisons))]
+        return [place / name for name in names]
+
+    def _rows(self, number: int) -> list[dict[Any, Any]]:
+        rows: list[dict[Any, Any]] = self.curves(number).reset_index().to_dict("records")
+        return rows
+
+    def fitted(self) -> pd.DataFrame:
+        """One row for each fitted parameter: start, value, interval of 95 %, and whether the recordings can tell it."""
+        return pd.DataFrame(self._fit_json().get("fit", []))
 
     def table(self) -> pd.DataFrame:
         """One row for each recording, window and signal, with its errors [pu of the rating]."""
@@ -145,6 +197,14 @@ def parts(found: Validation) -> Iterator[RenderableType]:
         yield _windows_table(one)
     if result.criteria:
         yield _criteria_table(result.criteria)
+    if result.explanations:
+        yield _explanation_table(result.explanations)
+    if result.fit is not None:
+        yield _fit_table(result.fit)
+        yield _confirmation_table(result.confirmations)
+        yield escape(
+            fit_sentence(result.fit, [c.recording for c in result.confirmations if not c.fitted])
+        )
 
 
 def _answer(found: Validation) -> str:
@@ -221,6 +281,60 @@ def _windows_table(one: EventComparison) -> PlainTable:
         f"{one.event.recording.label}: simulated less measured [pu of {one.device.rating:g} MVA]"
     )
     return make_table(title, *columns, rows=rows)
+
+
+def _explanation_table(explanations: Sequence[Explanation]) -> PlainTable:
+    rows = [
+        (
+            one.parameter,
+            _as_text(one.now),
+            _as_text(one.value),
+            f"{one.left:.4g} of {one.error:.4g}",
+            "yes" if one.explains else "no",
+        )
+        for one in explanations[:_SHOWN]
+    ]
+    columns = ("Parameter", "Now", "Instead", "rms error left [pu]", "Explains most of it")
+    return make_table("One parameter that would explain the error", *columns, rows=rows)
+
+
+def _fit_table(fit: Fit) -> PlainTable:
+    rows = []
+    for one in fit.parameters:
+        both = "–"
+        if one.low is not None and one.high is not None and one.low is not one.high:
+            both = f"{one.low:.4g} to {one.high:.4g}"
+        rows.append(
+            (
+                f"{one.name} [{one.unit}]" if one.unit else one.name,
+                _as_text(one.start),
+                _as_text(one.value),
+                both,
+                untold_words(one),
+            )
+        )
+    columns = ("Parameter", "Now", "Fitted", "95 %", "Can the recordings tell it?")
+    table = make_table("Fit", *columns, rows=rows)
+    table.columns[4].justify = "left"
+    return table
+
+
+def _as_text(value: float | bool) -> str:
+    return str(value).lower() if isinstance(value, bool) else f"{value:.4g}"
+
+
+def _confirmation_table(confirmations: Sequence[FitCheck]) -> PlainTable:
+    rows = [
+        (
+            one.recording,
+            "fitted" if one.fitted else "kept back",
+            f"{one.before:.4g}",
+            f"{one.after:.4g}",
+        )
+        for one in confirmations
+    ]
+    columns = ("Recording", "", "rms error now [pu]", "fitted [pu]")
+    return make_table("The error with the fitted values", *columns, rows=rows, left=2)
 
 
 def _criteria_table(criteria: list[Criterion] | Any) -> PlainTable:

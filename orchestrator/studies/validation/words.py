@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from orchestrator.studies.validation.fit import Fit, FittedParameter, Untold
 from orchestrator.studies.validation.questions import Question, QuestionKind
 
 Figures = Mapping[str, Any]
@@ -118,8 +119,8 @@ def _clocks(x: Figures) -> str:
 
 def _setpoint(x: Figures) -> str:
     return (
-        f"at the end {x['signal'].upper()} stays {x['offset']:+.3g} pu beside the model's, though the voltage is as "
-        "before the event: did a setpoint change, or does the plant control otherwise?"
+        f"at {x['at']:.4g} s {x['signal'].upper()} leaves the model's by {x['offset']:+.3g} pu and stays, and the "
+        "voltage does nothing then: did a setpoint change? No parameter explains it; give the part before, with --stop"
     )
 
 
@@ -176,3 +177,34 @@ _SENTENCES: Mapping[QuestionKind, Callable[[Figures], str]] = {
 
 def sentences(questions: Sequence[Question]) -> list[str]:
     return [sentence(one) for one in questions]
+
+
+def untold_words(one: FittedParameter) -> str:
+    """Say if the recordings can tell a parameter, and why not."""
+    match one.untold:
+        case None:
+            return "yes"
+        case Untold.ALIKE:
+            return f"no: not apart from {', '.join(one.alike)}"
+        case Untold.NO_EFFECT:
+            return "no: it moves nothing that the recordings hold"
+        case Untold.TOO_FAST:
+            return "no: it acts faster than the samples"
+        case Untold.AT_BOUND:
+            return "no: it ends at its bound"
+        case Untold.WIDE:
+            return "no: its interval is as large as itself"
+
+
+def fit_sentence(fit: Fit, kept_back: Sequence[str]) -> str:
+    """Say on what a fit rests, and if an event that it did not see confirms it."""
+    seen = ", ".join(fit.fitted_to)
+    said = f"Fitted to {seen} in {fit.runs} runs"
+    if not fit.finished:
+        said += ", interrupted: the best values so far, without intervals"
+    if kept_back:
+        return f"{said}; {', '.join(kept_back)} was kept back from it, and the table says whether it agrees."
+    return (
+        f"{said}; no other event confirms it: give one with --hold-back. Intervals hold where the model has the right "
+        "form."
+    )

@@ -1,0 +1,314 @@
+"""Which values of a device's parameters bring it to what was recorded, how sure that is, and which cannot be told."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+from scipy.stats import t as student
+
+from orchestrator.core.arrays import Matrix, Numbers
+from orchestrator.core.late import optimize
+from orchestrator.studies.validation.device import PlayedDevice
+from orchestrator.studies.validation.event import RecordedEvent
+from orchestrator.studies.validation.parameters import Adjustable, Wanted
+from orchestrator.studies.validation.residuals import (
+    Report,
+    Residuals,
+    covariance,
+    independent_samples,
+    stretches_of,
+)
+
+_TELLS = 4.0
+"""Least singular value of errors in scatters by parameters in their reach: below it the interval is the reach."""
+
+_TAKES_PART = (
+    0.4  # part of a direction that cannot be told, from which on a parameter is named with it
+)
+_SURE = 0.95  # of an interval
+_SWITCH_TELLS = 10.0  # by so much of independent scatter the wrong position of a switch is worse
+_TOLERANCE = 1e-6
+_MOST_RUNS = 60  # of the residuals in one fit, beside those of the sensitivities
+
+
+class Untold(StrEnum):
+    """Why a parameter cannot be told from the recordings."""
+
+    NO_EFFECT = "no effect"
+    ALIKE = "alike"
+    TOO_FAST = "too fast"
+    AT_BOUND = "at its bound"
+    WIDE = "wide"
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """One parameter after a fit; ``low`` and ``high`` bound its interval of 95 %, and are None if it is not known."""
+
+    name: str
+    unit: str
+    start: float | bool
+    value: float | bool
+    low: float | bool | None
+    high: float | bool | None
+    untold: Untold | None = None
+    alike: tuple[str, ...] = ()  # with which others it cannot be told apart
+
+    @property
+    def identifiable(self) -> bool:
+        return self.untold is None
+
+    def as_json(self) -> dict[str, Any]:
+        return {
+            "parameter": self.name,
+            "unit": self.unit,
+            "start": self.start,
+            "value": self.value,
+            "low": self.low,
+            "high": self.high,
+            "identifiable": self.identifiable,
+            "why_not": None if self.untold is None else str(self.untold),
+            "alike": list(self.alike),
+        }
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The outcome of a fit; errors are rms values in the recordings' scatter."""
+
+    parameters: Sequence[FittedParameter]
+    fitted_to: Sequence[str]
+    error_before: float
+    error_after: float
+    runs: int
+    finished: bool = True
+
+    @property
+    def values(self) -> dict[str, float | bool]:
+        """The fitted values; what cannot be told is left where it is."""
+        return {one.name: one.value for one in self.parameters if one.value != one.start}
+
+
+@dataclass
+class _Best:
+    """The best values so far, for whoever interrupts the fit."""
+
+    cost: float = float("inf")
+    values: dict[str, float | bool] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """A fit with the switches in one position."""
+
+    switches: Mapping[str, bool]
+    told: Sequence[Adjustable]
+    untold: Mapping[str, tuple[Untold, tuple[str, ...]]]
+    values: Mapping[str, float | bool]
+    errors: Numbers
+    slopes: Matrix | None
+    finished: bool = True
+
+    @property
+    def cost(self) -> float:
+        return float(self.errors @ self.errors)
+
+
+def fit_parameters(
+    device: PlayedDevice,
+    events: Sequence[RecordedEvent],
+    wanted: Wanted,
+    report: Report = lambda text: None,
+) -> Fit:
+    """Least squares over all events; parameters that they cannot tell are left where they are, and named before.
+
+    Raises a `CosimError` if the device does not run with its own values."""
+    stretches = stretches_of(device, events)
+    residuals = Residuals(device, stretches, report)
+    starts = {name: bool(device.value(name)) for name in wanted.switches}
+    before = residuals.at({})
+    trials = []
+    for position in itertools.product((False, True), repeat=len(wanted.switches)):
+        switches = dict(zip(wanted.switches, position, strict=True))
+        trials.append(_trial(residuals, wanted.numbers, switches))
+        if not trials[-1].finished:
+            break
+    best = min(trials, key=lambda one: one.cost)
+    found = [*_switches(best, trials, starts, residuals), *_numbers(best, wanted, residuals)]
+    return Fit(
+        parameters=found,
+        fitted_to=[one.recording.label for one in events],
+        error_before=_rms(before),
+        error_after=_rms(best.errors),
+        runs=residuals.runs,
+        finished=all(one.finished for one in trials),
+    )
+
+
+def _rms(errors: Numbers) -> float:
+    return float(np.sqrt(np.mean(errors**2)))
+
+
+def _trial(
+    residuals: Residuals, numbers: Sequence[Adjustable], switches: Mapping[str, bool]
+) -> _Trial:
+    told, untold = identifiable(residuals, numbers, switches)
+    if not told:
+        return _Trial(switches, [], untold, dict(switches), residuals.at(switches), None)
+    best = _Best()
+    finished = True
+    try:
+        _least_squares(residuals, told, switches, best)
+    except KeyboardInterrupt:
+        finished = False
+        if not best.values:
+            raise
+    errors = residuals.at(best.values)
+    slopes = None
+    if finished:
+        at = [replace(one, start=float(best.values[one.name])) for one in told]
+        slopes = residuals.slopes(best.values, {one.name: one.step for one in at})
+    return _Trial(switches, told, untold, best.values, errors, slopes=slopes, finished=finished)
+
+
+def _least_squares(
+    residuals: Residuals, told: Sequence[Adjustable], switches: Mapping[str, bool], best: _Best
+) -> None:
+    reach = np.array([one.reach for one in told])
+
+    def values(x: Numbers) -> dict[str, float | bool]:
+        own = {one.name: float(v) for one, v in zip(told, x * reach, strict=True)}
+        return {**switches, **own}
+
+    def errors(x: Numbers) -> Numbers:
+        given = values(x)
+        found = residuals.at(given)
+        cost = float(found @ found)
+        if cost < best.cost:
+            best.cost, best.values = cost, given
+            said = ", ".join(f"{name} = {v:.4g}" for name, v in given.items())
+            residuals.report(f"fit: rms {_rms(found):.4g} scatters with {said}")
+        return found
+
+    def slopes(x: Numbers) -> Matrix:
+        given = values(x)
+        at = [replace(one, start=float(given[one.name])) for one in told]
+        return np.asarray(residuals.slopes(given, {one.name: one.step for one in at}) * reach)
+
+    bounds = np.array([(one.low, one.high) for one in told]) / reach[:, None]
+    begin = np.array([one.inside() for one in told]) / reach
+    optimize.least_squares(
+        errors,
+        begin,
+        jac=slopes,
+        bounds=(bounds[:, 0], bounds[:, 1]),
+        xtol=_TOLERANCE,
+        ftol=_TOLERANCE,
+        gtol=None,
+        max_nfev=_MOST_RUNS,
+    )
+
+
+def identifiable(
+    residuals: Residuals, numbers: Sequence[Adjustable], switches: Mapping[str, bool]
+) -> tuple[list[Adjustable], dict[str, tuple[Untold, tuple[str, ...]]]]:
+    """Which parameters the recordings can tell, and why not the others: by singular values, before anything is fitted.
+
+    The errors' slopes are in scatters, a sample counts as often as it is unlike those beside it, and a parameter is
+    moved by its reach. A direction whose singular value is small moves nothing that can be seen: the parameter with the
+    largest part in it is left where it is."""
+    untold: dict[str, tuple[Untold, tuple[str, ...]]] = {}
+    interval = min(one.event.recording.interval for one in residuals.stretches)
+    told = []
+    for one in numbers:
+        if one.unit == "s" and 0 < one.start < interval:
+            untold[one.name] = (Untold.TOO_FAST, ())
+        else:
+            told.append(one)
+    if not told:
+        return told, untold
+    base = {**switches, **{one.name: one.inside() for one in told}}
+    at = [replace(one, start=float(base[one.name])) for one in told]
+    slopes = residuals.slopes(base, {one.name: one.step for one in at})
+    errors = residuals.at(base)
+    alike = len(errors) / max(independent_samples(errors, residuals.stretches), 1.0)
+    scaled = slopes * np.array([one.reach for one in told]) / np.sqrt(max(alike, 1.0))
+    while told:
+        _, singular, right = np.linalg.svd(scaled, full_matrices=False)
+        if singular[-1] >= _TELLS:
+            break
+        direction = np.abs(right[-1])
+        out = int(direction.argmax())
+        names = [one.name for one in told]
+        others = [n for n, part in zip(names, direction, strict=True) if part > _TAKES_PART]
+        others.remove(names[out])
+        why = Untold.ALIKE if others else Untold.NO_EFFECT
+        untold[names[out]] = (why, tuple(others))
+        told.pop(out)
+        scaled = np.delete(scaled, out, axis=1)
+    return told, untold
+
+
+def _numbers(best: _Trial, wanted: Wanted, residuals: Residuals) -> list[FittedParameter]:
+    widths = _half_widths(best, residuals)
+    found = []
+    for one in wanted.numbers:
+        if one.name in best.untold:
+            why, alike = best.untold[one.name]
+            nothing = FittedParameter(one.name, one.unit, one.start, one.start, None, None)
+            found.append(replace(nothing, untold=why, alike=alike))
+            continue
+        value, width = float(best.values[one.name]), widths.get(one.name)
+        fitted = FittedParameter(one.name, one.unit, one.start, value, None, None)
+        if width is not None:
+            fitted = replace(fitted, low=value - width, high=value + width)
+            fitted = replace(fitted, untold=_doubt(one, value, width))
+        found.append(fitted)
+    return found
+
+
+def _doubt(one: Adjustable, value: float, width: float) -> Untold | None:
+    if width > max(one.reach, abs(value)):
+        return Untold.WIDE
+    near = 1e-6 * (one.high - one.low)
+    at_bound = min(value - one.low, one.high - value) <= near
+    return Untold.AT_BOUND if at_bound else None
+
+
+def _half_widths(best: _Trial, residuals: Residuals) -> dict[str, float]:
+    """Half widths of the intervals of 95 %, with what the voltage between samples may shift.
+
+    None if the fit was interrupted."""
+    if best.slopes is None:
+        return {}
+    spread = np.sqrt(np.diag(covariance(best.slopes, best.errors, residuals.stretches)))
+    free = independent_samples(best.errors, residuals.stretches) - len(best.told)
+    quantile = float(student.ppf(0.5 + _SURE / 2, max(free, 3.0)))
+    between = residuals.between_samples(best.values)
+    shift = np.linalg.lstsq(best.slopes, between, rcond=None)[0]
+    widths = quantile * spread + np.abs(shift)
+    return {one.name: float(width) for one, width in zip(best.told, widths, strict=True)}
+
+
+def _switches(
+    best: _Trial, trials: Sequence[_Trial], starts: Mapping[str, bool], residuals: Residuals
+) -> list[FittedParameter]:
+    """Each switch: its position, told where every trial with the other one is clearly worse."""
+    count = len(best.errors)
+    variance = max(best.cost / count, 1.0)
+    alike = count / max(independent_samples(best.errors, residuals.stretches), 1.0)
+    found = []
+    for name, start in starts.items():
+        value = best.switches[name]
+        others = [one.cost for one in trials if one.switches[name] != value]
+        worse = (min(others) - best.cost) / (variance * alike) if others else 0.0
+        untold = None if worse > _SWITCH_TELLS else Untold.NO_EFFECT
+        kept = value if untold is None else start
+        sure = kept if untold is None else None
+        found.append(FittedParameter(name, "", start, kept, sure, sure, untold=untold))
+    return found

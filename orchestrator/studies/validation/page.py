@@ -1,0 +1,147 @@
+"""A validation as a page that an owner can hand to a planner."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+
+from orchestrator.core.safe_files import file_hash
+from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart, thinned
+from orchestrator.output.report.html.elements import Figures, colour, document, listed, table
+from orchestrator.studies.validation.event import EventComparison
+from orchestrator.studies.validation.study import ValidationResult
+from orchestrator.studies.validation.words import fit_sentence, sentence, untold_words
+
+_POWERS = ("p", "q")
+_NAMES = {"p": "P", "q": "Q", "i_p": "active current", "i_q": "reactive current"}
+_PROCEDURE = (
+    "The recorded voltage alone drives the model, which starts at the operating point before the event. Errors are the "
+    "simulated less the measured value in pu of the rating, by windows before, during and after the event. Windows and "
+    "errors follow published descriptions of the play-back procedure of IEC 61400-27-2; the standard itself was not at "
+    "hand when this was written, and nothing here says that it is met."
+)
+
+
+def validation_page(result: ValidationResult) -> str:
+    """The whole page."""
+    figures = Figures()
+    device = result.request.device
+    chapters = [("Model", _model(result))]
+    chapters += [(one.event.recording.label, _event(one, figures)) for one in result.comparisons]
+    if result.criteria:
+        chapters.append(("Limits", _limits(result)))
+    if result.fit is not None:
+        chapters.append(("Fit", _fit(result)))
+    chapters.append(("Procedure, and what was not judged", _not_judged(result)))
+    verdict = "no verdict: no limits were given" if result.verdict is None else str(result.verdict)
+    findings = f'<div class="findings"><ul><li>Limits: {escape(verdict)}.</li></ul></div>'
+    return document(f"Validation of {device.name}", "by recordings", findings, chapters)
+
+
+def _model(result: ValidationResult) -> str:
+    device = result.request.device
+    rows = [
+        ["File", escape(device.path.name)],
+        ["SHA-256", file_hash(device.path) or ""],
+        ["Model", escape(device.description.model_name)],
+        ["Rating", f"{device.rating:g} MVA, {device.rated_hz:g} Hz"],
+        ["Communication step", f"{1e6 * device.step_size:g} µs"],
+    ]
+    rows += [[escape(name), escape(str(value))] for name, value in device.values.items()]
+    return table("The model and the values that it was given", ["", ""], rows, left=2)
+
+
+def _event(one: EventComparison, figures: Figures) -> str:
+    return "".join(
+        [
+            _recording(one),
+            *_charts(one, figures),
+            _errors(one),
+            listed(map(sentence, one.questions)),
+        ]
+    )
+
+
+def _recording(one: EventComparison) -> str:
+    recording, start = one.event.recording, one.event.start
+    channels = ", ".join(channel.as_text() for channel in recording.channels.values())
+    rows = [
+        ["SHA-256", recording.sha256 or "not a file"],
+        ["Samples", f"{len(recording.voltage)}, every {1000 * recording.interval:.4g} ms"],
+        ["Channels", escape(channels)],
+        ["Before the event", f"{abs(start.voltage):.4f} pu, {recording.frame_hz:.4f} Hz"],
+        ["P and Q before", f"{start.power.real:.4f} pu, {start.power.imag:.4f} pu"],
+    ]
+    return table("The recording", ["", ""], rows, left=2)
+
+
+def _charts(one: EventComparison, figures: Figures) -> Iterator[str]:
+    times = one.event.recording.times + one.event.recording.begin
+    for signal in _POWERS:
+        curves = [
+            ChartCurve(name, colour(k), *thinned(times, values[signal]))
+            for k, (name, values) in enumerate(
+                [("measured", one.measured), ("simulated", one.simulated)]
+            )
+        ]
+        chart = legend((c.label, c.colour) for c in curves)
+        chart += line_chart(f"{signal}", "Time [s]", f"{_NAMES[signal]} [pu]", curves)
+        yield figures.add(chart, f"{_NAMES[signal]}, measured and simulated.")[0]
+
+
+def _errors(one: EventComparison) -> str:
+    begin = one.event.recording.begin
+    rows = []
+    for window, of in one.errors.items():
+        low, high = one.event.windows.parts[window]
+        for signal, found in of.items():
+            figures = (found.max_error, found.mean_error, found.mean_abs_error, found.max_of_noise)
+            place = f"{window}, {begin + low:.4g} to {begin + high:.4g} s"
+            rows.append([place, _NAMES[signal], *(f"{x:.4f}" for x in figures)])
+    columns = ["Window", "Signal", "Largest", "Mean", "Mean magnitude", "Largest by noise alone"]
+    return table("Errors [pu of the rating]", columns, rows, left=2)
+
+
+def _limits(result: ValidationResult) -> str:
+    limits = result.request.limits
+    rows = [
+        [
+            escape(one.recording),
+            escape(one.name),
+            "–" if one.value is None else f"{one.value:.4g} {one.unit}",
+            f"{one.limit:g} {one.unit}",
+            str(one.verdict),
+        ]
+        for one in result.criteria
+    ]
+    source = limits.source if limits else ""
+    columns = ["Recording", "Figure", "Value", "Limit", "Verdict"]
+    return table(f"Limits: {source}", columns, rows, left=2)
+
+
+def _fit(result: ValidationResult) -> str:
+    fit = result.fit
+    if fit is None:
+        return ""
+    rows = [
+        [
+            escape(one.name),
+            str(one.start),
+            f"{one.value:.5g}",
+            "–" if one.low is None else f"{one.low:.5g} to {one.high:.5g}",
+            escape(untold_words(one)),
+        ]
+        for one in fit.parameters
+    ]
+    columns = ["Parameter", "In the model", "Fitted", "95 %", "Can the recordings tell it?"]
+    kept = [one.recording for one in result.confirmations if not one.fitted]
+    return table("Fitted parameters", columns, rows) + f"<p>{escape(fit_sentence(fit, kept))}</p>"
+
+
+def _not_judged(result: ValidationResult) -> str:
+    texts = [_PROCEDURE]
+    if result.request.limits is None:
+        texts.append("No limit was given, and nothing was judged.")
+    if result.fit is None:
+        texts.append("No parameter was fitted.")
+    return listed(texts)
