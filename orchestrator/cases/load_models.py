@@ -1,7 +1,7 @@
 """How loads follow voltage and frequency: each load's own keys, then those of ``[network.load_model]``, and parts of
 constant impedance and current that a source tells apart."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 from fmus.grid.element_data import LAWS, Load, Zip
@@ -52,8 +52,14 @@ def _named(law: Zip | None) -> str:
     )
 
 
-def open_question(table: NetworkTable | None, loads: Sequence[Load], place: str) -> list[Problem]:
-    return [Problem(place, _OPEN)] if is_open(table) and any(x.p_mw > 0 for x in loads) else []
+def open_question(
+    table: NetworkTable | None, loads: Sequence[Load], recorded: Collection[str], place: str
+) -> list[Problem]:
+    """Ask how loads follow the voltage of which neither the case nor a record says it.
+
+    ``recorded``: names of loads with a record."""
+    asked = is_open(table) and any(x.p_mw > 0 and x.name not in recorded for x in loads)
+    return [Problem(place, _OPEN)] if asked else []
 
 
 def device_laws(table: NetworkTable) -> LoadModelTable:

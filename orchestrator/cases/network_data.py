@@ -27,7 +27,7 @@ from orchestrator.cases.network_import import Generation, ImportedNetwork, bus_o
 from orchestrator.cases.network_sources import read_matpower, read_pandapower
 from orchestrator.cases.psse.device_flow import solved_devices
 from orchestrator.cases.psse.device_notes import device_notes
-from orchestrator.cases.psse.raw import Machine, read_raw
+from orchestrator.cases.psse.raw import FileLoad, Machine, read_raw
 from orchestrator.cases.psse.solution import stated_voltages
 from orchestrator.cases.psse.synchronous_parts import synchronous_part
 from orchestrator.cases.record_use import RecordUse
@@ -51,6 +51,7 @@ class _Source:
     misfit: str = ""
     records: tuple[RecordUse, ...] = ()
     device_loads: tuple[Load, ...] = ()  # in the place of DC lines and the like
+    file_loads: tuple[FileLoad, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,10 @@ class NetworkData:
     # ratings and bands of a RAW or MATPOWER file; those of other sources are not meant
     limits: FileLimits = field(default_factory=FileLimits)
     titles: Mapping[str, str] = field(default_factory=dict)  # names in the source's file, by bus
+    # file_loads: loads one by one, where the source is of PSS/E; recorded_loads: names of those whose laws are of
+    # records of dynamics data
+    file_loads: tuple[FileLoad, ...] = ()
+    recorded_loads: frozenset[str] = frozenset()
 
 
 def network_data(table: NetworkTable, directory: Path) -> NetworkData:
@@ -149,6 +154,7 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
         records=found.records,
         titles=source.titles,
         device_loads=tuple(x.name for x in found.device_loads),
+        file_loads=found.file_loads,
     )
 
 
@@ -250,6 +256,7 @@ def _from_raw(path: Path, table: NetworkTable) -> _Source:
             replace(x, why=solved.words_of(x.kind, x.line) or x.why) for x in raw.records
         ),
         device_loads=solved.loads,
+        file_loads=raw.loads,
     )
 
 

@@ -425,10 +425,7 @@ class _Text:
             lines[-1] += (
                 f"; slack {self._wanted.slack}, {self._wanted.frequency} (--slack, --frequency)"
             )
-        asked = "impedance until [network] load_model says otherwise; `gfor modes` tells what power would change"
-        lines.append(
-            f"loads: constant {asked if not self._tables() else 'power; [network] load_model changes it'}"
-        )
+        lines.append(f"loads: {self._loads()}")
         lines.append(
             f"models: {self._wanted.kind}; stray_B of EMT models: {self._stray:g} pu{self._stray_why}"
         )
@@ -437,6 +434,22 @@ class _Text:
             lines.append(line + " (--details lists them)" * any(details(self._base.records)))
         more = f"{questions} question{'s' * (questions != 1)} about the data: comments at their lines in the file"
         return [*lines, more] if questions else lines
+
+    def _loads(self) -> str:
+        """How the loads follow the voltage."""
+        if self._tables():
+            return "constant power; [network] load_model changes it"
+        asked = (
+            "constant impedance until [network] load_model says otherwise; `gfor modes` tells what power would "
+            "change"
+        )
+        base = self._base
+        if base is None or not base.recorded_loads:
+            return asked
+        recorded, network = base.recorded_loads, base.network
+        names = {load.name for load in network.loads} if network else set()
+        rest = f"; the others: {asked}" if names - recorded else ""
+        return f"{len(recorded)} as their records in the DYR file say; [network] load_model goes before{rest}"
 
     def _path(self, path: Path) -> str:
         """As the file names it: relative where that is possible, with slashes everywhere."""

@@ -93,6 +93,7 @@ class PreparedScenario:
     source_slack: str | None = None  # reference bus of the network's source
     file_limits: FileLimits = field(default_factory=FileLimits)  # of the network's source
     titles: Mapping[str, str] = field(default_factory=dict)  # names in the network's file, by bus
+    recorded_loads: frozenset[str] = frozenset()  # loads whose laws are of records of dynamics data
     # likely ratings [MVA] of units whose S_n is only the base of their data
     base_ratings: Mapping[str, float] = field(default_factory=dict)
     following_loads: tuple[str, ...] = ()  # loads that follow the voltage in an outage's power flow
@@ -260,7 +261,10 @@ class Preparer:
         record, left_out = recorded(draft)
         loads = draft.network.loads if draft.network else ()
         draft.found.questions += open_question(
-            draft.given.case.network, loads, draft.given.place("network")
+            draft.given.case.network,
+            loads,
+            draft.data.recorded_loads if draft.data else (),
+            draft.given.place("network"),
         )
         draft.found.questions += [
             *doubts(draft.given.case, draft.given.place),
@@ -293,6 +297,7 @@ class Preparer:
             source_slack=draft.data.slack if draft.data else None,
             file_limits=draft.data.limits if draft.data else FileLimits(),
             titles=draft.data.titles if draft.data else {},
+            recorded_loads=draft.data.recorded_loads if draft.data else frozenset(),
             base_ratings=draft.base_ratings,
             following_loads=tuple(draft.data.flow_laws) if draft.data else (),
             device_loads=draft.data.device_loads if draft.data else (),

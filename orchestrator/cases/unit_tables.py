@@ -18,6 +18,7 @@ from orchestrator.cases.csv_rows import (
     seen_from_here,
 )
 from orchestrator.cases.draft import Draft, UnitOrigin
+from orchestrator.cases.load_models import is_open
 from orchestrator.cases.names import close_names
 from orchestrator.cases.network_data import bus_name
 from orchestrator.cases.network_import import Generation
@@ -33,7 +34,9 @@ from orchestrator.cases.psse.dyr_units import (
     with_records,
     without_idle_controls,
 )
+from orchestrator.cases.psse.load_records import recorded_laws, with_recorded_laws
 from orchestrator.cases.psse.unused_models import unused_models
+from orchestrator.cases.record_use import UseOfRecord
 from orchestrator.cases.schema import ComponentTable, UnitsTable
 from orchestrator.cases.source_changes import Changes
 from orchestrator.cases.source_ratings import with_needed_ratings
@@ -324,8 +327,37 @@ def _account(draft: Draft, table: UnitsTable, records: Sequence[DynamicRecord]) 
         approximate=table.dyr_approximate,
         exciter=table.exciter,
     )
+    taken = _with_recorded_loads(draft, records)
+    uses = [
+        replace(use, use=UseOfRecord.USED, why="", of_no_machine=False)
+        if (use.file, use.line) in taken
+        else use
+        for use in uses
+    ]
     draft.found.records += uses
     draft.found.questions += unused_models(records, uses)
+
+
+def _with_recorded_loads(
+    draft: Draft, records: Sequence[DynamicRecord]
+) -> frozenset[tuple[str, int]]:
+    """Give the loads the laws of their records, where the case leaves them open; return the places of those records."""
+    data = draft.data
+    if data is None or not is_open(draft.given.case.network):
+        return frozenset()
+    recorded = recorded_laws(records, data.file_loads)
+    draft.data = replace(
+        data,
+        loads=tuple(
+            with_recorded_laws(load, recorded.laws[load.name])
+            if load.name in recorded.laws and load.p_mw >= 0
+            else load
+            for load in data.loads
+        ),
+        recorded_loads=frozenset(recorded.laws),
+    )
+    draft.found.questions += recorded.remarks
+    return recorded.places
 
 
 def _parts_of(table: UnitsTable) -> dict[str, str]:

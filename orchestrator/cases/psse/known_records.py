@@ -7,9 +7,11 @@ from fmus.grid_following.dyr_fields import CONVERTER, FIELDS, MODEL
 from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
 from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS, DyrRecord
+from orchestrator.cases.psse.load_records import LOAD_RECORDS
 
 _LIBRARY = "PSS/E's model library as PowerWorld's and NEPLAN's guides and ANDES' reader describe it"
 _REGFM = "WECC's specification of REGFM_A1"
+_LOADS = "GridPACK's reader and model"
 _GENERIC = (
     "WECC's generic converters: fields as ANDES and GridPACK read them, diagrams of WECC's guide"
 )
@@ -39,6 +41,10 @@ def known_records() -> list[KnownRecord]:
     found += [
         KnownRecord(name, "device", record.part, _LIBRARY, "; ".join(_limits(record)))
         for name, record in STATIC_VAR_RECORDS.items()
+    ]
+    found += [
+        KnownRecord(name, "load", "load_model", _LOADS, "an exponent other than 0, 1, 2 near v_0")
+        for name in LOAD_RECORDS
     ]
     asked = "only with dyr_approximate = true; each case lists what that leaves out"
     found += [

@@ -81,6 +81,22 @@ class Machine:
 
 
 @dataclass(frozen=True)
+class FileLoad:
+    """One load in service [MW, Mvar], by what a record of dynamics data may name it.
+
+    ``load``: name of the case's load, which all loads of a bus are together."""
+
+    load: str
+    bus: int
+    name: str
+    area: int
+    zone: int
+    owner: int
+    p_mw: float
+    q_mvar: float
+
+
+@dataclass(frozen=True)
 class RawNetwork:
     """A file's tables, its machines in service, and what was taken over in another form.
 
@@ -93,6 +109,7 @@ class RawNetwork:
     idle: frozenset[tuple[int, str]] = frozenset()
     records: tuple[RecordUse, ...] = ()
     devices: tuple[HeldDevice, ...] = ()
+    loads: tuple[FileLoad, ...] = ()
 
 
 def read_raw(
@@ -120,6 +137,7 @@ class _Reading:
         # active power that the loads at a bus draw together, as far as they are read [MW]
         self._drawn: dict[int, float] = {}
         self._devices = FoundDevices((), {})
+        self._file_loads: list[FileLoad] = []
         self._same: dict[int, int] = {}  # bus that PSS/E takes as one with another → the other
         self._merged: set[int] = set()  # lines of the records that make them one
         # least reactance that our network can have [pu of the system]
@@ -171,6 +189,7 @@ class _Reading:
             frozenset(self._idle),
             records=records,
             devices=self._devices.devices,
+            loads=tuple(self._file_loads),
         )
 
     def _bus(self, record: Record, index: int = 0) -> int:
@@ -300,6 +319,18 @@ class _Reading:
                 )
                 self._changes.note(record.line, text)
             self._drawn[bus] = self._drawn.get(bus, 0.0) + drawn
+            self._file_loads.append(
+                FileLoad(
+                    f"load_{self._labels[bus]}",
+                    self._own(record),
+                    record.text(1, "1").strip(),
+                    record.whole(3, "AREA", 1),
+                    record.whole(4, "ZONE", 1),
+                    record.whole(11, "OWNER", 1),
+                    drawn,
+                    ql + current.imag - admittance.imag * v**2,
+                )
+            )
             self._add(bus, 2, complex(pl, ql) + current - own)
             if self._keep_load_parts and (current or admittance):
                 # YQ is positive where it generates, as with shunts

@@ -46,7 +46,9 @@ def _weight(
 ) -> tuple[float, str]:
     """The least damping [%] with either load model, and the question; "" where there is none to ask."""
     network = result.prepared.case.table.network
-    if not is_open(network) or result.prepared.network is None or not result.prepared.network.loads:
+    prepared = result.prepared
+    loads = prepared.network.loads if prepared.network else ()
+    if not is_open(network) or not {load.name for load in loads} - prepared.recorded_loads:
         return 0.0, ""
     states = result.model.number_of_states
     if states > _MOST_STATES:
