@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from fmus.toolchain.cache import CacheError, cache_directory, intact, keep
 from fmus.toolchain.extras import installed_version
+from orchestrator.cases.bus_loads import LoadSum
 from orchestrator.core.arrays import Matrix
 
 
@@ -37,6 +38,8 @@ class SourceTables:
     # tells them apart; the rest of the bus' load is as the case says
     load_parts: dict[int, tuple[complex, complex]] = field(default_factory=dict)
     titles: dict[int, str] = field(default_factory=dict)  # number of a bus → its name in the file
+    # number of a bus whose loads have both signs → those below zero, which the bus' row and its parts hold as well
+    feeding: dict[int, LoadSum] = field(default_factory=dict)
 
 
 LIBRARIES = ("pandapower", "numpy", "scipy", "pandas", "lightsim2grid")
@@ -63,7 +66,7 @@ def kept_tables(name: str, content: bytes, make: Callable[[], SourceTables]) -> 
     tables = make()
     with suppress(CacheError):  # as slow as before, but right
         if (
-            not tables.load_parts
+            not (tables.load_parts or tables.feeding)
             and "".join(file.read_text(encoding="utf-8") for file in _FILES) == _CODE
         ):
             keep(path, json.dumps(_as_json(tables)).encode())

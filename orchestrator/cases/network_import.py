@@ -107,8 +107,8 @@ def import_network(
         bus_of(labels[reference[0]]) if reference else None,
         source.frequency,
         tuple(transformers),
-        {f"load_{labels[n]}": parts for n, parts in source.load_parts.items() if n in labels},
-        {bus_of(labels[n]): float(row[2]) for n, row in rows.items() if row[2] < -_NEGLIGIBLE},
+        _load_parts(source, labels),
+        {bus_of(labels[n]): p for n, p in _fed(source, rows).items() if p < -_NEGLIGIBLE},
         {bus_of(labels[n]): float(row[5]) for n, row in rows.items() if row[5] > _NEGLIGIBLE},
         FileLimits(ratings, _bands(rows, labels)),
         {bus_of(labels[n]): title for n, title in source.titles.items() if title and n in labels},
@@ -205,16 +205,38 @@ def _loads(
     source: SourceTables, rows: dict[int, Matrix], at_bus: dict[int, list[_Member]]
 ) -> list[Load]:
     """Loads; a negative one is static generation. At a generator's bus it is added to the generators there, unless it
-    has parts that follow the voltage."""
+    has parts that follow the voltage. At a bus with loads of both signs those below zero are an element of their own,
+    ``static_<bus>``."""
     loads = []
     for number, row in rows.items():
         label, p, q = source.labels[number], float(row[2]), float(row[3])
         parts = source.load_parts.get(number, ())
+        if number in source.feeding:
+            fed = source.feeding[number].power
+            p, q = p - fed.real, q - fed.imag
+            loads.append(Load(f"static_{label}", bus_of(label), _clean(fed.real), _clean(fed.imag)))
         if p < -_NEGLIGIBLE and number in at_bus and not parts:
             at_bus[number].append(_Member(-p, at_bus[number][0].v_pu, -p / _POWER_FACTOR))
         elif max(map(abs, (p, q, *parts))) > _NEGLIGIBLE:
             loads.append(Load(f"load_{label}", bus_of(label), _clean(p), _clean(q)))
     return loads
+
+
+def _fed(source: SourceTables, rows: Mapping[int, Matrix]) -> dict[int, float]:
+    """Return the active power of loads by bus [MW], of those below zero alone at a bus with both signs."""
+    drawn = {number: float(row[2]) for number, row in rows.items()}
+    return drawn | {n: fed.power.real for n, fed in source.feeding.items() if n in rows}
+
+
+def _load_parts(
+    source: SourceTables, labels: Mapping[int, str]
+) -> dict[str, tuple[complex, complex]]:
+    """Return the parts of constant impedance and current by the names of the loads [MW, Mvar]."""
+    parts = {f"load_{labels[n]}": x for n, x in source.load_parts.items() if n in labels}
+    for number, fed in source.feeding.items():
+        if number in labels and any(fed.parts):
+            parts[f"static_{labels[number]}"] = fed.parts
+    return parts
 
 
 def _generation(label: str, members: list[_Member]) -> Generation:

@@ -59,9 +59,15 @@ def _negative_loads(draft: Draft, grid: str, where: str) -> Iterator[UnusualValu
     table, found = draft.given.case.network, draft.data
     if table is None or found is None or table.generation_model.active is not None:
         return
+    names = {load.name for load in found.loads}
     for bus, p_mw in found.feeding.items():
-        text = f"the load at {bus} is {p_mw:g} MW, below zero: it feeds in, as static generation; is its sign right?"
-        yield UnusualValue(f"{grid}.load_{bus.removeprefix('bus_')}.P", where, text)
+        number = bus.removeprefix("bus_")
+        apart = f"static_{number}" in names
+        beside = " beside what loads draw there" if apart else ""
+        text = f"the load at {bus} is {p_mw:g} MW, below zero{beside}: it feeds in, as static generation; is its "
+        yield UnusualValue(
+            f"{grid}.{'static' if apart else 'load'}_{number}.P", where, f"{text}sign right?"
+        )
 
 
 def _hundredths(

@@ -1,7 +1,7 @@
 """A PSS/E RAW file of revision 29 to 36 as tables of a network source."""
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ import numpy as np
 
 from fmus.grid.element_data import SMALLEST_REACTANCE
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
+from orchestrator.cases.bus_loads import BusLoads
 from orchestrator.cases.network_sources import SourceTables
 from orchestrator.cases.psse.device_records import (
     FoundDevices,
@@ -84,7 +85,7 @@ class Machine:
 class FileLoad:
     """One load in service [MW, Mvar], by what a record of dynamics data may name it.
 
-    ``load``: name of the case's load, which all loads of a bus are together."""
+    ``load``: name of the case's load, which all loads of a bus are together that draw, or that feed."""
 
     load: str
     bus: int
@@ -133,11 +134,10 @@ class _Reading:
         self._ohms: list[tuple[int, float, float]] = []
         self._idle: set[tuple[int, str]] = set()
         self._lines_of: dict[tuple[Any, ...], int] = {}
-        self._load_parts: dict[int, tuple[complex, complex]] = {}
-        # active power that the loads at a bus draw together, as far as they are read [MW]
-        self._drawn: dict[int, float] = {}
+        self._at_buses: dict[int, BusLoads] = {}
         self._devices = FoundDevices((), {})
-        self._file_loads: list[FileLoad] = []
+        # with the bus at which it stands, and whether it feeds
+        self._file_loads: list[tuple[FileLoad, int, bool]] = []
         self._same: dict[int, int] = {}  # bus that PSS/E takes as one with another → the other
         self._merged: set[int] = set()  # lines of the records that make them one
         # least reactance that our network can have [pu of the system]
@@ -169,6 +169,7 @@ class _Reading:
                 1,
                 m.rating_mva,
             )
+        at_buses = {bus: x.apart() for bus, x in self._at_buses.items()}
         tables = SourceTables(
             self._raw.place,
             self._raw.base_mva,
@@ -178,8 +179,9 @@ class _Reading:
             np.array(self._to_earth, dtype=complex).reshape(-1, 2),
             self._labels,
             self._raw.frequency,
-            self._load_parts,
+            {bus: x.drawing.parts for bus, x in at_buses.items() if any(x.drawing.parts)},
             self._titles,
+            {bus: x.feeding for bus, x in at_buses.items() if x.feeding.power},
         )
         records = record_uses(self._raw, self._merged, leaving_out, self._devices.unused)
         return RawNetwork(
@@ -189,7 +191,7 @@ class _Reading:
             frozenset(self._idle),
             records=records,
             devices=self._devices.devices,
-            loads=tuple(self._file_loads),
+            loads=tuple(self._named_loads(tables)),
         )
 
     def _bus(self, record: Record, index: int = 0) -> int:
@@ -310,36 +312,32 @@ class _Reading:
                     self._changes.note(
                         record.line, "distributed generation: taken away from its load"
                     )
-            drawn = pl + current.real + admittance.real * v**2
-            if drawn * self._drawn.get(bus, 0.0) < 0:
-                text = (
-                    f"loads of both signs at bus {bus}, {self._drawn[bus]:g} and {drawn:g} MW: one load of their sum "
-                    "here, which 'load' and 'static' cannot scale apart; give generation a bus of its own, or a "
-                    "machine's record"
-                )
-                self._changes.note(record.line, text)
-            self._drawn[bus] = self._drawn.get(bus, 0.0) + drawn
-            self._file_loads.append(
-                FileLoad(
-                    f"load_{self._labels[bus]}",
-                    self._own(record),
-                    record.text(1, "1").strip(),
-                    record.whole(3, "AREA", 1),
-                    record.whole(4, "ZONE", 1),
-                    record.whole(11, "OWNER", 1),
-                    drawn,
-                    ql + current.imag - admittance.imag * v**2,
-                )
-            )
-            self._add(bus, 2, complex(pl, ql) + current - own)
-            if self._keep_load_parts and (current or admittance):
+            power, parts = complex(pl, ql) + current - own, (0j, 0j)
+            if self._keep_load_parts:
                 # YQ is positive where it generates, as with shunts
-                impedance = admittance.conjugate() * v**2
-                self._add(bus, 2, impedance)
-                z, i = self._load_parts.get(bus, (0j, 0j))
-                self._load_parts[bus] = (z + impedance, i + current)
+                parts = (admittance.conjugate() * v**2, current)
+                power += parts[0]
             else:
                 self._add(bus, 4, admittance)
+            self._add(bus, 2, power)
+            self._at_buses.setdefault(bus, BusLoads()).add(power, parts)
+            one = FileLoad(
+                f"load_{self._labels[bus]}",
+                self._own(record),
+                record.text(1, "1").strip(),
+                record.whole(3, "AREA", 1),
+                record.whole(4, "ZONE", 1),
+                record.whole(11, "OWNER", 1),
+                pl + current.real + admittance.real * v**2,
+                ql + current.imag - admittance.imag * v**2,
+            )
+            self._file_loads.append((one, bus, power.real < 0))
+
+    def _named_loads(self, tables: SourceTables) -> Iterator[FileLoad]:
+        """Give the loads by the names of the elements of which they are a part."""
+        for load, bus, feeds in self._file_loads:
+            apart = feeds and bus in tables.feeding
+            yield replace(load, load=f"static_{tables.labels[bus]}") if apart else load
 
     def _shunts(self) -> None:
         for record in self._raw.of("fixed shunt"):

@@ -1,5 +1,7 @@
 """Parts of loads of constant current and admittance: the format's own formula, P = PL + IP·v + YP·v²."""
 
+from dataclasses import replace
+
 import pytest
 
 from orchestrator.cases.network_data import network_data
@@ -99,7 +101,48 @@ def test_the_key_is_for_psse(tmp_path):
         network_data(NetworkTable(pandapower="case9", keep_load_parts=True), tmp_path)
 
 
-def test_loads_of_both_signs_at_a_bus_are_asked_about(written):
-    data = written("5,'W ',1,1,1,-300,0,0,0,0,0,1,1,0", keep_load_parts=True)
-    (question,) = [str(change) for change in data.changes if "both signs" in str(change)]
-    assert "loads of both signs at bus 5, 125 and -300 MW" in question
+FED = "5,'W ',1,1,1,-300,20,0,0,{yp},0,1,1,0"
+
+
+@pytest.mark.parametrize("keep", [True, False])
+def test_loads_of_both_signs_at_a_bus_are_two_elements(written, keep):
+    data = written(FED.format(yp=0), keep_load_parts=keep, **POWER)
+    at_bus = {x.name: x for x in data.loads if x.bus == "bus_5"}
+    assert {name: (x.p_mw, x.q_mvar) for name, x in at_bus.items()} == {
+        "load_5": (125, 50),
+        "static_5": (-300, 20),
+    }
+    assert at_bus["load_5"].active.p == 1, "constant power, as the case says of loads"
+    assert at_bus["static_5"].active.i == 1, "a constant current, as generation without a word is"
+    assert not [change for change in data.changes if "sign" in str(change)]
+    assert data.feeding == {"bus_5": -300}
+
+
+def test_each_sign_keeps_its_own_parts(written):
+    """A feeding record's admittance (here YP = -40 MW) is no part of what the others draw."""
+    fed = FED.format(yp=-40)
+    current = "5,'3 ',1,1,1,10,0,20,0,0,0,1,1,0"
+    data = written(fed, current, keep_load_parts=True, **POWER)
+    loads = {x.name: x for x in data.loads if x.bus == "bus_5"}
+    # the file's voltage at bus 5 is 1 pu
+    assert (loads["load_5"].p_mw, loads["static_5"].p_mw) == (155, -340)
+    assert loads["load_5"].active.i == pytest.approx(20 / 155)
+    assert loads["static_5"].active.z == pytest.approx(40 / 340)
+    assert set(data.flow_laws) == {"load_5", "static_5"}
+
+
+def test_loads_of_one_sign_and_reactive_power_alone_are_one_element(written):
+    data = written("5,'2 ',1,1,1,7,0,0,0,0,0", "5,'C ',1,1,1,0,-30,0,0,0,0,1,1,0")
+    (load,) = [x for x in data.loads if x.bus == "bus_5"]
+    assert (load.name, load.p_mw, load.q_mvar) == ("load_5", 132, 20)
+
+
+def test_both_signs_draw_as_one_sum_in_the_power_flow(written):
+    """Two elements draw what one of their sum does, so the flow's voltages are the same."""
+    apart = solved(written(FED.format(yp=0), **POWER)).voltages
+    one = written(FED.format(yp=0).replace("-300", "0").replace(",20,", ",0,"), **POWER)
+    (netted,) = [x for x in one.loads if x.bus == "bus_5"]
+    others = tuple(x for x in one.loads if x.bus != "bus_5")
+    whole = replace(one, loads=(*others, replace(netted, p_mw=-175, q_mvar=70)))
+    for bus, v in solved(whole).voltages.items():
+        assert v == pytest.approx(apart[bus], abs=1e-9)
