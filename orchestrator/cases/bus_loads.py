@@ -23,7 +23,7 @@ class BusLoads:
     feeding: LoadSum = field(default_factory=LoadSum)
     reactive: LoadSum = field(default_factory=LoadSum)
 
-    def add(self, power: complex, parts: tuple[complex, complex]) -> None:
+    def add(self, power: complex, parts: tuple[complex, complex] = (0j, 0j)) -> None:
         """Add a load that draws a power, of which parts are constant impedance and current [MW, Mvar]."""
         load = LoadSum(power, parts)
         if power.real > 0:

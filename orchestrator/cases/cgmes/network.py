@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.cases.bus_loads import BusLoads
 from orchestrator.cases.cgmes.branches import (
     BASE_MVA,
     Branch,
@@ -100,6 +101,7 @@ class _Reading:
         self._volts: dict[str, float] = {}
         self._rows: list[list[float]] = []
         self._branches: list[Branch] = []
+        self._loads: dict[int, BusLoads] = {}
 
     def network(self, leaving_out: Sequence[str]) -> CgmesNetwork:
         self._refuse(leaving_out)
@@ -126,6 +128,7 @@ class _Reading:
             gen,
             np.array([b.to_earth for b in self._branches], dtype=complex).reshape(-1, 2),
             {number: self._labels[bus] for bus, number in numbers.items()},
+            feeding={n: fed for n, x in self._loads.items() if (fed := x.apart().feeding).power},
         )
         ratings: dict[str, float] = {}
         for row in gen:
@@ -261,7 +264,10 @@ class _Reading:
     def _injections(self) -> None:
         for row in self._source.get_loads(all_attributes=True).itertuples():
             if row.connected and row.bus_id in self._numbers:
-                self._add(row.bus_id, 2, complex(row.p0, row.q0))
+                drawn = complex(row.p0, row.q0)
+                self._add(row.bus_id, 2, drawn)
+                at_bus = self._loads.setdefault(self._numbers[row.bus_id], BusLoads())
+                at_bus.add(drawn)
         for row in self._source.get_shunt_compensators(all_attributes=True).itertuples():
             if row.connected and row.bus_id in self._numbers:
                 if row.voltage_regulation_on:

@@ -137,6 +137,21 @@ def test_factory_networks_as_cgmes_have_the_voltages_from_before_the_export(
     assert max(abs(v * cmath.exp(1j * turn) - theirs[ids[bus]]) for bus, v in ours.items()) < 1e-9
 
 
+def test_loads_of_both_signs_at_a_bus_are_two_elements(powsybl):
+    network = powsybl.network.create_ieee14()
+    (level,) = network.get_loads().loc[["B4-L"]].voltage_level_id
+    network.create_loads(id="W", voltage_level_id=level, bus_id="B4", p0=-60.0, q0=5.0, name="wind")
+    before = {
+        x.name: x
+        for x in import_network(convert("m", powsybl.network.create_ieee14()).tables).loads
+    }
+    loads = {x.name: x for x in import_network(convert("model", network).tables).loads}
+    (name,) = loads.keys() - before.keys()
+    drawing = loads[name.replace("static_", "load_")]
+    assert (loads[name].p_mw, loads[name].q_mvar) == (-60, 5)
+    assert drawing.p_mw == before[drawing.name].p_mw
+
+
 def test_a_line_between_two_nominal_voltages_is_said(powsybl, tmp_path):
     """Its charging is the same at both ends in CGMES, which a transformer that was written as a line has not."""
     path = tmp_path / "model.zip"
