@@ -131,6 +131,12 @@ def test_each_sign_keeps_its_own_parts(written):
     assert set(data.flow_laws) == {"load_5", "static_5"}
 
 
+def test_records_of_dynamics_data_find_each_sign_by_its_own_name(written):
+    data = written(FED.format(yp=0), "5,'2 ',1,1,1,10,0,0,0,0,0,1,1,0")
+    found = [(x.load, x.name) for x in data.file_loads if x.bus == 5]
+    assert found == [("load_5", "1"), ("static_5", "W"), ("load_5", "2")]
+
+
 def test_loads_of_one_sign_and_reactive_power_alone_are_one_element(written):
     data = written("5,'2 ',1,1,1,7,0,0,0,0,0", "5,'C ',1,1,1,0,-30,0,0,0,0,1,1,0")
     (load,) = [x for x in data.loads if x.bus == "bus_5"]
