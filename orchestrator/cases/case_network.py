@@ -37,7 +37,8 @@ def read_network(draft: Draft) -> None:
         return
     source = given[0] if given else None
     try:
-        draft.data = network_data(table, draft.given.directory)
+        flow = draft.given.case.power_flow
+        draft.data = network_data(table, draft.given.directory, flow.slack if flow else None)
         draft.found.questions += draft.data.changes
         draft.found.records += draft.data.records
     except InputError as error:

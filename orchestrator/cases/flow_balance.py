@@ -131,7 +131,7 @@ def check_connected(buses: Sequence[str], lines: Sequence[FlowLine], slack_bus: 
         remedy = f"close {', '.join(opened[:5])}, " if opened else ""
         raise InputError(
             f"power flow: no way leads to the slack bus {slack_bus!r} from: {', '.join(map(repr, islands[:10]))}; "
-            f"{remedy}connect them with a line, or remove them"
+            f"{remedy}connect them with a line, or remove them (in a RAW file by IDE = 4 at these buses)"
         )
 
 

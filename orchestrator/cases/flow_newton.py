@@ -55,18 +55,18 @@ def solve_once(equations: FlowEquations) -> NewtonResult:
 
 
 def solve(equations: FlowEquations) -> NewtonResult:
-    """Solve from the DC angles, or else from a flat start, or else step by step from a network without load and
-    generation; the first of these that converges."""
-    first = _newton(equations, _start(equations, equations.dc_angles()))
-    if first.converged:
-        return first
-    flat = _newton(equations, _start(equations, np.zeros(len(equations.buses))))
-    if flat.converged:
-        return flat
+    """Solve from the DC angles, or else from a flat start, or else from the voltages of the network without load, or
+    else step by step from a network without load and generation; the first of these that converges."""
+    failed: list[NewtonResult] = []
+    for begin in (_with_dc_angles, _flat, _unloaded):
+        found = _newton(equations, begin(equations))
+        if found.converged:
+            return found
+        failed.append(found)
     share, grown = grow(equations)
     if grown is not None and share == 1:
         return grown
-    return min(first, flat, key=lambda result: result.history[-1][0])
+    return min(failed, key=lambda result: result.history[-1][0])
 
 
 def solve_from(equations: FlowEquations, voltages: NDArray[np.complex128]) -> NewtonResult:
@@ -78,7 +78,10 @@ def solve_from(equations: FlowEquations, voltages: NDArray[np.complex128]) -> Ne
 def grow(equations: FlowEquations) -> tuple[float, NewtonResult | None]:
     """The largest share of all given powers, loads and units alike, with a solution that is reached from no power at
     all, and this solution; (0, None) where there is none without power."""
-    found = _newton(scaled(equations, 0.0), _start(equations, np.zeros(len(equations.buses))))
+    empty = scaled(equations, 0.0)
+    found = _newton(empty, _flat(equations))
+    if not found.converged:
+        found = _newton(empty, _unloaded(equations))
     if not found.converged:
         return 0.0, None
     share, step = 0.0, 0.25
@@ -105,6 +108,33 @@ def _start(equations: FlowEquations, angles: NDArray[np.float64]) -> NDArray[np.
     usable = angles if np.isfinite(angles).all() else np.zeros(len(angles))
     start: NDArray[np.complex128] = equations.magnitudes * np.exp(1j * usable)
     return start
+
+
+def _with_dc_angles(equations: FlowEquations) -> NDArray[np.complex128]:
+    return _start(equations, equations.dc_angles())
+
+
+def _flat(equations: FlowEquations) -> NDArray[np.complex128]:
+    return _start(equations, np.zeros(len(equations.buses)))
+
+
+def _unloaded(equations: FlowEquations) -> NDArray[np.complex128]:
+    """Return the voltages that the held ones, at their DC angles, give elsewhere without any current drawn.
+
+    They have the ratios and shifts of all transformers, which near reactances of 0 no step of Newton's finds."""
+    voltages = _with_dc_angles(equations)
+    free = np.flatnonzero(~equations.held)
+    held = np.flatnonzero(equations.held)
+    if not len(free):
+        return voltages
+    rows = equations.matrix.tocsr()[free]
+    drawn = -rows[:, held] @ voltages[held]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", MatrixRankWarning)
+        found = np.atleast_1d(spsolve(rows[:, free].tocsc(), drawn))
+    if np.isfinite(found).all() and (np.abs(found) > _LEAST_VOLTAGE).all():
+        voltages[free] = found
+    return voltages
 
 
 def _newton(equations: FlowEquations, start: NDArray[np.complex128]) -> NewtonResult:

@@ -1,13 +1,11 @@
 """Parts of a network that events leave without any unit: nothing holds their voltages and frequency."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import groupby
 
-import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-
 from fmus.grid.network import Network
+from orchestrator.cases.connected import connected_parts
 from orchestrator.cases.draft import Draft
 from orchestrator.core.errors import Problem, few
 from orchestrator.systems.coupling.events import Event
@@ -52,7 +50,6 @@ def question_islands(draft: Draft, events: Sequence[tuple[Event, str]]) -> None:
 def _without_unit(
     network: Network, units: Mapping[str, str], values: Mapping[str, object]
 ) -> list[list[str]]:
-    row = {bus: k for k, bus in enumerate(network.buses)}
     ends = [
         (line.from_bus, line.to_bus)
         for line in network.lines
@@ -61,17 +58,24 @@ def _without_unit(
     for winding in network.transformers:
         if values.get(f"{winding.name}.connected", True):
             ends += [(winding.buses[0], bus) for bus in winding.buses[1:]]
-    starts, stops = ([row[end[k]] for end in ends] for k in (0, 1))
-    links = coo_array((np.ones(len(ends)), (starts, stops)), shape=(len(row), len(row)))
-    _, part_of = connected_components(links, directed=False)
-    fed = {
-        part_of[row[bus]] for unit, bus in units.items() if values.get(f"{unit}.connected", True)
-    }
+    part_of = connected_parts(network.buses, ends)
+    fed = {part_of[bus] for unit, bus in units.items() if values.get(f"{unit}.connected", True)}
     drawn = {
-        part_of[row[load.bus]]
+        part_of[load.bus]
         for load in network.loads
         if (load.p_mw or load.q_mvar) and values.get(f"{load.name}.scale", 1.0)
     }
-    return [
-        [bus for bus in network.buses if part_of[row[bus]] == part] for part in sorted(drawn - fed)
-    ]
+    return [[bus for bus in network.buses if part_of[bus] == part] for part in sorted(drawn - fed)]
+
+
+def likely_reference(network: Network, units: Mapping[str, float]) -> str:
+    """Return the largest unit in the largest part of a network.
+
+    ``units``: ratings [MVA]."""
+    ends = [(line.from_bus, line.to_bus) for line in network.lines]
+    for winding in network.transformers:
+        ends += [(winding.buses[0], bus) for bus in winding.buses[1:]]
+    part_of = connected_parts(network.buses, ends)
+    size = Counter(part_of.values())
+    at = {port.name: port.bus for port in network.ports}
+    return max(units, key=lambda name: (size[part_of[at[name]]], units[name]))

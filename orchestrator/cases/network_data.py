@@ -91,12 +91,14 @@ class NetworkData:
     recorded_loads: frozenset[str] = frozenset()
 
 
-def network_data(table: NetworkTable, directory: Path) -> NetworkData:
+def network_data(table: NetworkTable, directory: Path, slack: str | None = None) -> NetworkData:
     """Buses, lines, loads and shunts of a network table, its files and its source included.
+
+    ``slack``: the unit or bus that the case names as the reference.
 
     Raises an `InputError` if a file is missing, lacks a column, holds something that is not a number, or a source holds
     something that the grid model does not have."""
-    found = _source(table, directory)
+    found = _source(table, directory, slack)
     source = found.network
     lines = [
         Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B, t.tap, t.shift, t.X_C)
@@ -169,10 +171,10 @@ def bus_name(label: str) -> str:
     return f"bus_{label}" if label[:1].isdigit() else label
 
 
-def _source(table: NetworkTable, directory: Path) -> _Source:
+def _source(table: NetworkTable, directory: Path, slack: str | None) -> _Source:
     imported = ImportedNetwork()
     if table.raw is not None:
-        return _from_raw(directory / table.raw, table)
+        return _from_raw(directory / table.raw, table, slack)
     if table.keep_load_parts:
         raise InputError(
             "keep_load_parts is for networks of PSS/E; remove the key, or give the file as 'raw'"
@@ -198,9 +200,14 @@ def _source(table: NetworkTable, directory: Path) -> _Source:
     return _Source(imported)
 
 
-def _from_raw(path: Path, table: NetworkTable) -> _Source:
+def _from_raw(path: Path, table: NetworkTable, slack: str | None) -> _Source:
     """A network of PSS/E; the ratings of the machines are those of the file."""
-    raw = read_raw(seen_from_here(path), table.leave_out, keep_load_parts=table.keep_load_parts)
+    raw = read_raw(
+        seen_from_here(path),
+        table.leave_out,
+        keep_load_parts=table.keep_load_parts,
+        slack=slack,
+    )
     if not raw.machines:
         raise InputError(
             f"{raw.tables.name}: no generator is in service, so nothing feeds the network and nothing can swing; "

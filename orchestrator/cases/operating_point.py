@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.flow_units import note_contradictions, undecided_units
+from orchestrator.cases.islands import likely_reference
 from orchestrator.cases.names import close_names
 from orchestrator.cases.plausibility import question
 from orchestrator.cases.power_flow import PowerFlow
@@ -26,9 +27,11 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
     wanted = table.slack or (draft.data.slack if draft.data else None)
     if wanted is None:
         raw = draft.given.case.network.raw if draft.given.case.network else None
-        none = f"no bus of {raw} is the reference (IDE = 3), and " if raw is not None else ""
+        where = f"no bus of {raw}, or of the part of it that is studied, is the reference (IDE = 3)"
+        none = f"{where}, and " if raw is not None else ""
         text = f"{none}the key 'slack' is missing; name a unit or a bus with one that feeds what is left"
-        one = next(iter(units.values()), "bus_1")
+        ratings = {name: draft.system.components[name].number("S_n") for name in units}
+        one = likely_reference(draft.network, ratings) if units else "sg1"
         draft.note(
             draft.given.place("power_flow"), f'{text}, such as slack = "{one}" (`gfor new --slack`)'
         )
@@ -39,10 +42,8 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
         text = f"{wanted!r} is neither a unit of this scenario nor a bus with one; {known}"
         if draft.data is not None and draft.data.slack == wanted:
             text = (
-                f"the reference {wanted!r} (IDE = 3 in PSS/E) has no machine in service, so nothing feeds what is "
-                "left: PSS/E does not solve such a file. Add the machine or the infinite bus that is meant there (in "
-                "PSS/E a machine with GENCLS and H = 0), or name a unit that is to feed it, such as slack = "
-                f'"{next(iter(units), "sg1")}" (`gfor new --slack`)'
+                f"the reference {wanted!r} of the network's source has no unit in this scenario, so nothing feeds "
+                f'what is left: name a unit that is to feed it, such as slack = "{next(iter(units), "sg1")}"'
             )
         draft.note(draft.given.place("power_flow", "slack"), text)
         return None

@@ -151,9 +151,7 @@ def _doubts(draft: Draft) -> Iterator[UnusualValue]:
     for name, plan in draft.system.components.items():
         for variable in plan.description.parameters:
             wanted, value = plan.description.variables[variable].usual, value_of(plan, variable)
-            winding = _OF_WINDINGS.get(variable)
-            has_effect = winding is None or not _is_missing(plan, *winding)
-            if wanted is not None and value is not None and has_effect:
+            if wanted is not None and value is not None and _has_effect(plan, variable):
                 scale, bases = _to_rating(draft, name, variable)
                 yield from outside(draft, name, variable, value, wanted, scale=scale, bases=bases)
         for own, of_lead, of_lag in _LEADS:
@@ -324,6 +322,14 @@ _OF_WINDINGS = {
     "machine.T_q20": ("machine.X_q1", "machine.X_q2"),
 }
 """Time constants of a winding that is missing where two reactances are equal."""
+
+
+def _has_effect(plan: ComponentPlan, variable: str) -> bool:
+    """Return whether a value is one of a machine: an infinite bus has a small reactance on purpose."""
+    if variable == "machine.X_d1" and value_of(plan, "machine.H") == 0:
+        return False
+    winding = _OF_WINDINGS.get(variable)
+    return winding is None or not _is_missing(plan, *winding)
 
 
 def _is_missing(plan: ComponentPlan, transient: str, subtransient: str) -> bool:

@@ -43,6 +43,9 @@ class UnitRow:
     p_max_mw: float = math.inf
     # likely rating [MVA] if rating_mva is only the base of the machine's data; otherwise None
     likely_mva: float | None = None
+    is_infinite: bool = (
+        False  # whether the source has no such unit, and an infinite bus stands there
+    )
 
 
 def checked(row: UnitRow, place: str, *, is_base: bool = False) -> UnitRow:

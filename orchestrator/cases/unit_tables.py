@@ -31,6 +31,7 @@ from orchestrator.cases.psse.dyr_units import (
     missing_records,
     rows_of_machines,
     with_choices,
+    with_infinite_buses,
     with_records,
     without_idle_controls,
 )
@@ -66,6 +67,8 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
             if table.dyr is None
             else _rows_of_dyr(draft, table)
         )
+        if table.dyr is None and table.file is None and draft.data is not None:
+            rows = with_infinite_buses(rows, draft.data.machines)
     except InputError as error:
         if draft.found.network_failed:
             return {}  # figures that the source would have given are missing
@@ -99,10 +102,13 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
                 values = {**common, **row.parameters.get(kind, {}), **own}
                 name = f"{kind}{row.label}"
                 parts: dict[str, Any] = {**_parts_of(table), **row.parts} if kind == "sg" else {}
-                if row.converter is not None:  # its record says all
+                if row.converter is not None or row.is_infinite:  # the row says all
                     values = {**row.parameters.get(kind, {}), **own}
                 components[name] = ComponentTable(
-                    model=row.converter or model, bus=row.bus, parameters=values, **parts
+                    model=_of_parts(model) if row.is_infinite else row.converter or model,
+                    bus=row.bus,
+                    parameters=values,
+                    **parts,
                 )
                 of_row = frozenset((*row.parameters.get(kind, {}), *own))
                 likely = None if row.likely_mva is None else share * row.likely_mva
@@ -111,6 +117,11 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
                 )
                 draft.active_limits[name] = share * row.p_min_mw, share * row.p_max_mw
     return components
+
+
+def _of_parts(generator: str) -> str:
+    """Return the generator of parts in the form of a generator's model."""
+    return f"synchronous_generator{'_phasor' if generator.endswith('_phasor') else ''}"
 
 
 def _generation(draft: Draft, table: UnitsTable) -> Mapping[str, Generation]:

@@ -2,6 +2,9 @@
 is no solution.
 """
 
+import cmath
+import math
+
 import numpy as np
 import pytest
 
@@ -212,3 +215,18 @@ def test_a_collapsed_voltage_is_no_solution():
     assert abs(result.voltages[1]) == pytest.approx(low, abs=1e-9)
     assert not result.converged
     assert "collapsed voltages, 0.101 pu at bus 'b'" in explain(equations, result, None)
+
+
+def test_a_transformer_with_a_leg_near_zero_and_a_shift_is_found():
+    """From 1 pu everywhere no step of Newton's leads to the ratio behind a reactance of 8e-6 pu."""
+    lines = [
+        FlowLine("one", "a", "star", X=0.06, R=0.001, B=0.0, tap=400 / 380, shift=0.0),
+        FlowLine("two", "b", "star", X=-8e-6, R=0.0, B=0.0, tap=120 / 110, shift=0.0),
+        FlowLine("three", "c", "star", X=0.14, R=0.003, B=0.0, tap=1.0, shift=-math.pi / 6),
+    ]
+    units = [FlowUnit("u", "a", S_n=100, P_0=0.0, v_0=1.0)]
+    flow = solve_power_flow(["a", "b", "c", "star"], lines, [FlowLoad("c", 5.0, 0.0)], units, "a")
+    star = flow.voltages["star"]
+    assert abs(star) == pytest.approx(380 / 400, abs=1e-3)
+    assert flow.voltages["b"] == pytest.approx(star * 120 / 110, abs=1e-9)
+    assert math.degrees(cmath.phase(flow.voltages["c"] / star)) == pytest.approx(-30.44, abs=0.01)

@@ -9,11 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from fmus.grid.network import Load
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
+from orchestrator.cases.connected import connected_parts
 from orchestrator.cases.flow_balance import FlowLine, inner_buses
 from orchestrator.cases.flow_equations import FlowEquations
 from orchestrator.cases.flow_newton import solve, solve_from
@@ -61,8 +60,7 @@ def solved_devices(
         state = solution.at_the_files_voltages()
         text = (
             "the power flow with DC lines, FACTS devices and the like has no solution: they feed what they do at the "
-            "file's voltages, and what holds a voltage feeds no reactive power; leave_out (gfor new --leave-out) lets "
-            "a kind of them go"
+            f"file's voltages, and what holds a voltage feeds no reactive power; {_remedy(devices, network, stated)}"
         )
         doubts.append((devices[0], text))
     loads, words, seen, standing = [], [], Counter[str](), set(network.buses)
@@ -76,6 +74,30 @@ def solved_devices(
         doubts += [(device, text) for text in device.doubts(state.voltages)]
         doubts += [(device, ending.doubt) for ending in own if ending.doubt]
     return SolvedDevices(tuple(loads), tuple(words), tuple(doubts))
+
+
+def _remedy(
+    devices: Sequence[HeldDevice], network: ImportedNetwork, stated: Mapping[int, complex]
+) -> str:
+    """Return without which kinds of devices the power flow has a solution."""
+    kinds = list(dict.fromkeys(device.section for device in devices))
+    for gone in dict.fromkeys([*((kind,) for kind in kinds), tuple(kinds)]):
+        rest = [device for device in devices if device.section not in gone]
+        if _has_solution(rest, network, stated):
+            options = " ".join(f'--leave-out "{kind}"' for kind in gone)
+            return (
+                f"without {' and '.join(gone)} it has one: look at what these records feed and draw, or let them go "
+                f"(`gfor new {options}`)"
+            )
+    return "it has none without them either: look at the rest of the network first"
+
+
+def _has_solution(
+    devices: Sequence[HeldDevice], network: ImportedNetwork, stated: Mapping[int, complex]
+) -> bool:
+    if not devices:
+        return solve(_equations(network)).converged
+    return _Solution.of(devices, network, stated).state() is not None
 
 
 def _in_words(device: HeldDevice, endings: Sequence["_Fed"]) -> str:
@@ -331,9 +353,5 @@ def _equations(network: ImportedNetwork) -> FlowEquations:
 
 def _reached(buses: Sequence[str], lines: Sequence[FlowLine], slack: str) -> set[str]:
     """Return the buses to which a way leads from the slack."""
-    row = {bus: k for k, bus in enumerate(buses)}
-    starts = [row[line.from_bus] for line in lines]
-    ends = [row[line.to_bus] for line in lines]
-    links = coo_array((np.ones(len(lines)), (starts, ends)), shape=(len(row), len(row)))
-    _, part = connected_components(links, directed=False)
-    return {bus for bus in buses if part[row[bus]] == part[row[slack]]}
+    part = connected_parts(buses, [(line.from_bus, line.to_bus) for line in lines])
+    return {bus for bus in buses if part[bus] == part[slack]}

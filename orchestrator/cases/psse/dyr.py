@@ -28,6 +28,10 @@ _COUPLED = {record.part for record in REGFM_A1_RECORDS.values()}
 MANUAL = "manual"
 """The exciter without a regulator, on which neither a stabiliser nor a compensator acts."""
 
+CLASSICAL = "classical"
+WITHOUT_INERTIA = {"machine.H": 0.0, "machine.D": 0.0}
+"""Parameters with which a classical machine is an infinite bus."""
+
 COMPENSATION = ("exciter.R_C", "exciter.X_C")
 """Parameters of an exciter that a compensator's record sets."""
 
@@ -105,6 +109,9 @@ def machine_models(
                 lines[key] |= dict.fromkeys(own, record.line)
             except InputError as error:
                 problems.append(str(error))
+    for key in (key for key, machine in at.items() if machine.is_infinite and not of[key]):
+        parts[key]["machine"] = CLASSICAL
+        values[key] |= WITHOUT_INERTIA
     following = _followed(of, left, problems) if approximate else {}
     for key in following:
         parts[key]["converter"] = MODEL
@@ -300,7 +307,7 @@ def _model(
             own = {"RL": machine.source.real, "XL": machine.source.imag, **values}
         return MachineModel({}, own, parts["converter"])
     source = {"machine.R_s": machine.source.real}
-    if parts["machine"] == "classical":
+    if parts["machine"] == CLASSICAL:
         source["machine.X_d1"] = machine.source.imag
     step_up = {"transformer.X_t": 0.0, "transformer.R_t": 0.0}  # the network has them
     made_of = {kind: part for kind, part in parts.items() if kind != "compensator"}

@@ -9,7 +9,13 @@ from dataclasses import replace
 from fmus.synchronous_generator.dyr_fields import MACHINE_VARIANTS
 from orchestrator.cases.network_data import bus_name
 from orchestrator.cases.plausible_values import UnusualValue
-from orchestrator.cases.psse.dyr import COMPENSATION, MANUAL, machine_models
+from orchestrator.cases.psse.dyr import (
+    CLASSICAL,
+    COMPENSATION,
+    MANUAL,
+    WITHOUT_INERTIA,
+    machine_models,
+)
 from orchestrator.cases.psse.dyr_records import DynamicRecord
 from orchestrator.cases.psse.raw import Machine
 from orchestrator.cases.unit_row import UnitRow, checked
@@ -168,6 +174,22 @@ def rows_of_machines(machines: Sequence[Machine], place: str) -> list[UnitRow]:
         )
         rows.append(checked(row, place, is_base=True))
     return rows
+
+
+def with_infinite_buses(rows: Sequence[UnitRow], machines: Sequence[Machine]) -> list[UnitRow]:
+    """The units of a network without dynamics data, those in the place of missing machines as infinite buses."""
+    infinite = {bus_name(str(machine.bus)): machine for machine in machines if machine.is_infinite}
+    return [
+        replace(
+            row,
+            is_infinite=True,
+            parts={"machine": CLASSICAL, **_WITHOUT},
+            parameters={"sg": {**WITHOUT_INERTIA, "machine.X_d1": infinite[row.bus].source.imag}},
+        )
+        if row.bus in infinite
+        else row
+        for row in rows
+    ]
 
 
 def with_records(

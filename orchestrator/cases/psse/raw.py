@@ -22,6 +22,10 @@ from orchestrator.cases.psse.devices import HeldDevice
 from orchestrator.cases.psse.raw_accounts import record_uses
 from orchestrator.cases.psse.raw_file import read_file
 from orchestrator.cases.psse.records import NODES, SWITCHING_DEVICES, RawFile, Record, leave_out
+from orchestrator.cases.psse.references import (
+    INFINITE_REACTANCE,
+    references_without_machine,
+)
 from orchestrator.cases.psse.solution import fits, reactive_needs, stated_voltages
 from orchestrator.cases.psse.transformers import Transformer, star, transformers
 from orchestrator.cases.psse.zero_impedances import merged_buses, threshold
@@ -32,7 +36,9 @@ from orchestrator.core.errors import Problem
 _BUS_COLUMNS, _BRANCH_COLUMNS, _GEN_COLUMNS = 13, 11, 10
 _VM, _VA = 7, 8  # columns of the table of buses
 _BAND = slice(11, 13)  # columns of the most and the least voltage there; 0 where the file has none
-_REFERENCE, _OUT = 3, 4  # codes IDE of a bus
+_ORDINARY, _REFERENCE, _OUT = 1, 3, 4  # codes IDE of a bus
+_DRAWN = slice(2, 6)  # columns of the table of buses: powers of loads and shunts
+_STATE = 10  # column of the table of branches: 0 if out of service
 _POWER_FACTOR = 0.9  # with which a power tells a rating that is not known
 _NO_LIMIT = 9999.0  # MW or Mvar by which PSS/E says that a generator has no limit
 _APART = 0.01  # voltage of a file beside what a generator within its limits is to hold [pu]
@@ -68,6 +74,8 @@ class Machine:
     p_min_mw: float = -math.inf
     p_max_mw: float = math.inf
     q_mvar: float = 0.0
+    # whether the file has no such machine, and an infinite bus has to feed what is left at its reference
+    is_infinite: bool = False
 
     @property
     def likely_mva(self) -> float:
@@ -114,10 +122,18 @@ class RawNetwork:
 
 
 def read_raw(
-    path: Path, leaving_out: Sequence[str] = (), *, keep_load_parts: bool = False
+    path: Path,
+    leaving_out: Sequence[str] = (),
+    *,
+    keep_load_parts: bool = False,
+    slack: str | None = None,
 ) -> RawNetwork:
+    """Read a file.
+
+    ``slack``: the unit or bus that a case names as the reference: nothing then stands at the file's own one where no
+    machine is in service."""
     raw = read_file(path)
-    return _Reading(raw, Changes(raw.place), keep_load_parts).network(leaving_out)
+    return _Reading(raw, Changes(raw.place), keep_load_parts).network(leaving_out, slack)
 
 
 class _Reading:
@@ -143,7 +159,7 @@ class _Reading:
         # least reactance that our network can have [pu of the system]
         self._least = 1.1 * SMALLEST_REACTANCE * raw.base_mva / SYSTEM_BASE_MVA
 
-    def network(self, leaving_out: Sequence[str]) -> RawNetwork:
+    def network(self, leaving_out: Sequence[str], slack: str | None = None) -> RawNetwork:
         for line, section in self._raw.guessed.items():
             text = f"does not say which data begin, as other lines do: taken as {section} data, which are next in order"
             self._changes.note(line, text)
@@ -158,6 +174,8 @@ class _Reading:
         self._transformers()
         self._read_devices(leaving_out)
         machines = self._machines()
+        machines = (*machines, *self._infinite_buses(machines, slack))
+        self._leave_out_bare_buses(machines)
         gen = np.zeros((len(machines), _GEN_COLUMNS))
         for row, m in zip(gen, machines, strict=True):
             row[[0, 1, 3, 4, 5, 7, 8]] = (
@@ -454,6 +472,9 @@ class _Reading:
         if t.small_loss:
             text = "R below 1 is a load loss in W by CZ = 3, as good as none: is it in pu, so that CZ = 2 is right?"
             self._changes.note(t.record.line, text)
+        if t.large_resistance:
+            text = "R is more than 1000 times X: is it a load loss in W, so that CZ = 3 is right?"
+            self._changes.note(t.record.line, text)
         if t.corrected:
             self._changes.note(t.record.line, "impedance correction table: not applied")
         if t.off == (0, 1, 2):
@@ -615,6 +636,70 @@ class _Reading:
                     f"with a power factor of {_POWER_FACTOR:g}. Is the rating such, or is a power wrong?",
                 )
         return tuple(machines)
+
+    def _infinite_buses(self, machines: Sequence[Machine], slack: str | None) -> list[Machine]:
+        """Return what feeds what is left at references without a machine, which are ordinary buses otherwise."""
+        named = {bus: {f"bus_{bus}", f"sg{bus}"} for bus, row in self._rows.items()}
+        references = [bus for bus, row in self._rows.items() if row[1] == _REFERENCE]
+        found = references_without_machine(
+            references, {machine.bus for machine in machines}, self._rows, self._branches_in_service
+        )
+        for bus, why in found.ordinary.items():
+            self._rows[bus][1] = _ORDINARY
+            text = f"reference bus (IDE = 3) without a machine in service: {why}"
+            self._changes.note(self._lines_of["bus", bus], text)
+        if not machines:
+            return []
+        stands = [bus for bus in found.infinite if slack is None or slack in named[bus]]
+        return [self._infinite_bus(bus, machines) for bus in stands]
+
+    @property
+    def _branches_in_service(self) -> list[tuple[int, int]]:
+        """Return the buses of each branch that is closed at both ends."""
+        ends = [(int(row[0]), int(row[1])) for row in self._branches if row[_STATE]]
+        return [pair for pair in ends if not any(map(self._is_out, pair))]
+
+    def _leave_out_bare_buses(self, machines: Sequence[Machine]) -> None:
+        """Take buses with nothing at them out of service: PSS/E finds nothing to solve there."""
+        needed = {machine.bus for machine in machines}
+        needed.update(*self._branches_in_service)
+        needed.update(*(device.places for device in self._devices.devices))
+        for bus, row in self._rows.items():
+            if (
+                bus not in needed
+                and row[1] != _OUT
+                and not any(row[_DRAWN])
+                and bus in self._titles
+            ):
+                row[1] = _OUT
+                self._changes.note(
+                    self._lines_of["bus", bus], "nothing is connected to the bus: left out"
+                )
+
+    def _infinite_bus(self, bus: int, machines: Sequence[Machine]) -> Machine:
+        VM, idle = self._magnitudes[bus], {name for place, name in self._idle if place == bus}
+        text = (
+            f"reference bus (IDE = 3) without a machine in service: an infinite bus holds its VM = {VM:g} pu there and "
+            f"feeds what is left, as a source behind {INFINITE_REACTANCE:g} pu (in PSS/E GENCLS with H = 0). If a "
+            "machine is meant, add its record to the file; if another is to feed what is left, name it, such as "
+            f'slack = "sg{machines[0].bus}" (`gfor new --slack`)'
+        )
+        line = self._lines_of["bus", bus]
+        self._changes.note(line, text)
+        moved = sum(abs(machine.p_mw) for machine in machines)
+        moved += sum(abs(complex(row[2], row[3])) for row in self._rows.values())
+        return Machine(
+            bus,
+            "inf" if "1" in idle else "1",
+            line,
+            0.0,
+            VM,
+            max(self._raw.base_mva, math.ceil(moved)),
+            INFINITE_REACTANCE * 1j,
+            -math.inf,
+            math.inf,
+            is_infinite=True,
+        )
 
 
 def _limits(

@@ -4,9 +4,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
+from orchestrator.cases.connected import connected_parts
 from orchestrator.cases.network_import import ImportedNetwork, bus_of
 from orchestrator.cases.psse.devices import HeldDevice
 
@@ -53,10 +52,6 @@ def synchronous_part(
 
 def _parts(network: ImportedNetwork) -> dict[str, int]:
     """Return the number of the connected part of each bus."""
-    row = {bus: k for k, bus in enumerate(network.buses)}
-    ends = [(row[line.from_bus], row[line.to_bus]) for line in network.lines]
-    ends += [(row[x.buses[0]], row[bus]) for x in network.transformers for bus in x.buses[1:]]
-    starts, stops = (np.array([end[k] for end in ends], dtype=int) for k in (0, 1))
-    links = coo_array((np.ones(len(ends)), (starts, stops)), shape=(len(row), len(row)))
-    _, part = connected_components(links, directed=False)
-    return {bus: int(part[k]) for bus, k in row.items()}
+    ends = [(line.from_bus, line.to_bus) for line in network.lines]
+    ends += [(x.buses[0], bus) for x in network.transformers for bus in x.buses[1:]]
+    return connected_parts(network.buses, ends)

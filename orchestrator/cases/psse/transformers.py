@@ -26,6 +26,10 @@ class Winding:
     rating_mva: float = 0.0
 
 
+_FAR = 1000.0
+"""Times its reactance from which a transformer's resistance may be its load loss in W."""
+
+
 @dataclass(frozen=True)
 class Transformer:
     record: Record  # its first line
@@ -39,6 +43,8 @@ class Transformer:
     corrected: bool
     # whether a load loss, which CZ = 3 gives in W, is so small that pu may be meant
     small_loss: bool = False
+    # whether a resistance is so large that a load loss in W may be meant
+    large_resistance: bool = False
 
 
 def transformers(raw: RawFile, voltages: Mapping[int, float]) -> Iterator[Transformer]:
@@ -95,12 +101,17 @@ def _transformer(
         any(line.whole(control, "COD", 0) for line in windings_lines),
         any(line.whole(table, "TAB", 0) for line in windings_lines),
         codes["CZ"] == _LOSSES and _has_tiny_losses(rest[0], len(pairs)),
+        codes["CZ"] != _LOSSES and _has_large_resistance(impedances),
     )
 
 
 def _has_tiny_losses(line: Record, pairs: int) -> bool:
     """Return whether a load loss between two windings is below 1 W, so that R was perhaps meant in pu."""
     return any(0 < line.number(3 * k, "R", 0.0) < 1 for k in range(pairs))
+
+
+def _has_large_resistance(impedances: Sequence[complex]) -> bool:
+    return any(z.real > _FAR * abs(z.imag) for z in impedances)
 
 
 def _winding(line: Record, bus: int, base: float, code: int) -> Winding:

@@ -4,10 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-
+from orchestrator.cases.connected import connected_parts
 from orchestrator.cases.names import close_names
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.core.errors import InputError, few
@@ -86,7 +83,9 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
     values = grid.parameters
     branches = [(x.name, x.from_bus, x.to_bus) for x in network.lines]
     branches += [(x.name, x.buses[0], bus) for x in network.transformers for bus in x.buses[1:]]
-    part = _parts(network.buses, [ends for name, *ends in branches if _closed(name, out, values)])
+    part = connected_parts(
+        network.buses, [(a, b) for name, a, b in branches if _closed(name, out, values)]
+    )
     power = {
         x.name: grid.number(f"{x.name}.scale") * grid.number(f"{x.name}.P") for x in network.loads
     }
@@ -144,14 +143,6 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
         ties=tuple(dict.fromkeys(ties)),
         dead=tuple(dead),
     )
-
-
-def _parts(buses: Sequence[str], ends: Sequence[Sequence[str]]) -> dict[str, int]:
-    row = {bus: k for k, bus in enumerate(buses)}
-    starts, stops = ([row[end[k]] for end in ends] for k in (0, 1))
-    links = coo_array((np.ones(len(ends)), (starts, stops)), shape=(len(row), len(row)))
-    _, part_of = connected_components(links, directed=False)
-    return {bus: int(part_of[k]) for bus, k in row.items()}
 
 
 def _closed(name: str, out: Sequence[str], values: Mapping[str, float | bool]) -> bool:
