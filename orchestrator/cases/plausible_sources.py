@@ -73,17 +73,18 @@ def _negative_loads(draft: Draft, grid: str, where: str) -> Iterator[UnusualValu
 def _hundredths(
     grid: str, what: str, unit: str, found: Mapping[str, float], where: str
 ) -> Iterator[UnusualValue]:
-    for bus, b in found.items():
-        others = [other for name, other in found.items() if name != bus]
-        if others and b < min(others) / _FAR and 0.2 * min(others) < 100 * b < 5 * max(others):
-            number = bus.removeprefix("bus_")
-            text = (
-                f"the {what} at bus_{number} has {b:g} {unit}, where the others have {min(others):g} to "
-                f"{max(others):g} {unit}: is {100 * b:g} {unit} meant?"
-            )
-            yield UnusualValue(
-                f"{grid}.{what}_{number}.{'B' if what == 'shunt' else 'P'}", where, text
-            )
+    """Ask about one that is much smaller than all others, of which only the smallest can be one."""
+    if len(found) < 2:
+        return
+    bus = min(found, key=lambda name: found[name])
+    b, others = found[bus], [other for name, other in found.items() if name != bus]
+    if b < min(others) / _FAR and 0.2 * min(others) < 100 * b < 5 * max(others):
+        number = bus.removeprefix("bus_")
+        text = (
+            f"the {what} at bus_{number} has {b:g} {unit}, where the others have {min(others):g} to "
+            f"{max(others):g} {unit}: is {100 * b:g} {unit} meant?"
+        )
+        yield UnusualValue(f"{grid}.{what}_{number}.{'B' if what == 'shunt' else 'P'}", where, text)
 
 
 def _step_up(draft: Draft, name: str, grid: ComponentPlan, where: str) -> Iterator[UnusualValue]:

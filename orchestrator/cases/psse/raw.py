@@ -692,12 +692,12 @@ class _Reading:
             bus,
             "inf" if "1" in idle else "1",
             line,
-            0.0,
-            VM,
-            max(self._raw.base_mva, math.ceil(moved)),
-            INFINITE_REACTANCE * 1j,
-            -math.inf,
-            math.inf,
+            p_mw=0.0,
+            v_pu=VM,
+            rating_mva=max(self._raw.base_mva, math.ceil(moved)),
+            source=INFINITE_REACTANCE * 1j,
+            q_min_mvar=-math.inf,
+            q_max_mvar=math.inf,
             is_infinite=True,
         )
 

@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_matrix, diags_array
 from scipy.sparse.linalg import spsolve
 
 from orchestrator.core.arrays import Matrix
@@ -34,7 +34,7 @@ def reactive_needs(
         return {}
     place = {number: k for k, number in enumerate(rows)}
     matrix = _admittances(np.array(branches), np.array(to_earth), place)
-    matrix += coo_matrix(np.diag((table[:, 4] + 1j * table[:, 5]) / base_mva)).tocsr()
+    matrix += diags_array((table[:, 4] + 1j * table[:, 5]) / base_mva).tocsr()
     voltages = table[:, 7] * np.exp(1j * np.radians(table[:, 8]))
     inner, outer = np.flatnonzero(table[:, 7] == 0), np.flatnonzero(table[:, 7])
     if inner.size:
