@@ -18,7 +18,9 @@ ONE_BY_ONE = [
 
 
 def with_part(kind, name):
-    """A generator with a part, beside others that it fits."""
+    """A generator with a part, beside others that it fits; what a compensator sets, the exciter has."""
+    if kind == "compensator":
+        return synchronous_generator(exciter="st1a")
     return synchronous_generator(
         **({"exciter": "st1a"} if kind == "stabilizer" else {}) | {kind: name}
     )
@@ -137,6 +139,8 @@ def test_every_field_of_a_dyr_record_sets_a_parameter_of_its_part(name):
         ("PIDGOV", 21),
         ("WPIDHY", 21),
         ("WSHYGP", 30),
+        ("COMP", 1),
+        ("IEEEVC", 2),
         ("STAB1", 7),
         ("IEEEST", 19),
         ("PSS2A", 23),
