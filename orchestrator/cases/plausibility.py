@@ -24,12 +24,16 @@ from orchestrator.systems.coupling.system import ComponentPlan
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """The parameter ``larger`` must exceed ``smaller``, or at least reach it."""
+    """The parameter ``larger`` must exceed ``smaller``, or at least reach it.
+
+    ``needed_with``: a variable that marks the machines whose equations need the rule; at other machines a broken rule
+    is a question."""
 
     larger: str
     smaller: str
     why: str
     may_be_equal: bool = False
+    needed_with: str = ""
 
     def holds(self, larger: float, smaller: float) -> bool:
         return larger > smaller or (self.may_be_equal and larger == smaller)
@@ -48,6 +52,11 @@ _SLOWER = (
     "the transient is by definition the slower one; check the units and whether the two are swapped"
 )
 
+_CONVERSION = "machine.exact_conversion"
+"""Of the machines whose FMU converts the data of a data sheet and requires the order of the time constants.
+
+GENROU and its kin hold without it: each winding has an equation with its own time constant, and PSS/E only warns."""
+
 _LIMITS = "the lower limit exceeds the upper one, or equals it; are the two swapped?"
 LIMITS = (
     ("exciter.E_MAX", "exciter.E_MIN"),
@@ -63,8 +72,8 @@ RULES = (
     Rule("machine.X_q", "machine.X_q1", _SCREENS, may_be_equal=True),
     Rule("machine.X_q1", "machine.X_q2", _SCREENS, may_be_equal=True),
     Rule("machine.X_q2", "machine.X_l", _LEAKAGE),
-    Rule("machine.T_d10", "machine.T_d20", _SLOWER),
-    Rule("machine.T_q10", "machine.T_q20", _SLOWER),
+    Rule("machine.T_d10", "machine.T_d20", _SLOWER, needed_with=_CONVERSION),
+    Rule("machine.T_q10", "machine.T_q20", _SLOWER, needed_with=_CONVERSION),
     Rule(
         "machine.s_12",
         "machine.s_10",
@@ -101,12 +110,13 @@ _SHOWN = 3  # largest number of components that a question names; the others are
 
 
 def check_plausibility(draft: Draft) -> None:
-    for name, plan in draft.system.components.items():
-        for rule in RULES:
-            _check_rule(draft, name, plan, rule)
+    broken = list(_broken_rules(draft))
+    for name, rule, text in broken:
+        if _is_needed(rule, draft.system.components[name]):
+            draft.note(place_of(draft, name, rule.smaller, rule.larger), text)
     _check_frequencies(draft)
     _check_meant(draft)
-    doubts = list(_doubts(draft))
+    doubts = [*_doubts(draft), *_broken_orders(draft, broken)]
     # one question about a value is enough, and a range says more
     ranges = {doubt.name for doubt in doubts}
     draft.found.questions += _long_step(draft)
@@ -340,18 +350,39 @@ def _is_missing(plan: ComponentPlan, transient: str, subtransient: str) -> bool:
     return X1 is not None and X1 == X2
 
 
-def _check_rule(draft: Draft, name: str, plan: ComponentPlan, rule: Rule) -> None:
+def _broken_rules(draft: Draft) -> Iterator[tuple[str, Rule, str]]:
+    """Yield the component, the rule that its data break, and both values in words."""
+    for name, plan in draft.system.components.items():
+        for rule in RULES:
+            if _breaks(plan, rule):
+                values = (_value_text(plan, v) for v in (rule.larger, rule.smaller))
+                yield name, rule, rule.text(*values)
+
+
+def _breaks(plan: ComponentPlan, rule: Rule) -> bool:
     larger, smaller = value_of(plan, rule.larger), value_of(plan, rule.smaller)
     if larger is None or smaller is None or rule.holds(larger, smaller):
-        return
+        return False
     winding = _OF_WINDINGS.get(rule.smaller)
-    if winding is not None and _is_missing(plan, *winding):
-        return
-    texts = [
-        f"{v} = {x:g}{f' {unit_of(plan, v)}'.removesuffix(' 1')}{'' if v in plan.parameters else ' (the default)'}"
-        for v, x in ((rule.larger, larger), (rule.smaller, smaller))
-    ]
-    draft.note(place_of(draft, name, rule.smaller, rule.larger), rule.text(*texts))
+    return winding is None or not _is_missing(plan, *winding)
+
+
+def _is_needed(rule: Rule, plan: ComponentPlan) -> bool:
+    return not rule.needed_with or rule.needed_with in plan.description.variables
+
+
+def _value_text(plan: ComponentPlan, variable: str) -> str:
+    unit = f" {unit_of(plan, variable)}".removesuffix(" 1")
+    default = "" if variable in plan.parameters else " (the default)"
+    return f"{variable} = {value_of(plan, variable):g}{unit}{default}"
+
+
+def _broken_orders(draft: Draft, broken: Iterable[tuple[str, Rule, str]]) -> Iterator[UnusualValue]:
+    """Ask about rules that are broken at machines whose equations hold without them."""
+    for name, rule, text in broken:
+        if not _is_needed(rule, draft.system.components[name]):
+            place = place_of(draft, name, rule.smaller, rule.larger)
+            yield UnusualValue(f"{name}.{rule.smaller}", place, text)
 
 
 # -- several components ------------------------------------------------------------------------------

@@ -4,7 +4,6 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.new_case import WantedCase, write_case
-from orchestrator.core.errors import CaseError
 from orchestrator.studies.modes.modes import compute_modes
 from tests.cases.psse.test_machine_bases import dynamics, network
 
@@ -39,8 +38,8 @@ def test_a_time_constant_without_a_winding_moves_nothing_and_is_not_judged(prepa
 
 
 def test_the_time_constant_of_a_winding_is_judged(prepared):
-    with pytest.raises(CaseError, match="T_d20 = 999 s must be less than"):
-        prepared(fast=999.0, X2=0.25)
+    questions = " ".join(question.text for question in prepared(fast=999.0, X2=0.25).questions)
+    assert "T_d20 = 999 s must be less than" in questions
 
 
 def test_a_leakage_reactance_of_zero_is_asked_about(prepared):
