@@ -69,7 +69,9 @@ def chosen(options: argparse.Namespace) -> list[Scenario]:
     request = ScenariosRequest(**asked)
     scenarios = choose(file, options.scenario, request, stop)
     print_questions(
-        [scenario.prepared for scenario in scenarios], as_json=getattr(options, "json", True)
+        [scenario.prepared for scenario in scenarios],
+        as_json=getattr(options, "json", True),
+        whole=getattr(options, "details", False),
     )
     return scenarios
 

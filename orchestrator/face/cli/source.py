@@ -45,7 +45,9 @@ def run(options: argparse.Namespace) -> int:
             found = contest_sources(options.contest)
         else:
             scenario = load(options.case).scenario(options.scenario) if options.case else None
-            print_questions([scenario.prepared] if scenario else [], as_json=options.json)
+            print_questions(
+                [scenario.prepared] if scenario else [], as_json=options.json, whole=options.details
+            )
             found = [source(options.run, options.start, options.stop, scenario)]
     records = [one.as_json() for one in found]
     keep_json(records, options.out, "source")

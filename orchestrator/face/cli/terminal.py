@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, RenderableType
@@ -14,6 +15,7 @@ from rich.markup import escape
 
 from orchestrator.core.errors import Problem
 from orchestrator.core.safe_files import made_folder
+from orchestrator.face.cli.known_questions import new_questions
 from orchestrator.output.report.linearised import exceptions_in_words
 from orchestrator.output.results.manifest import ResultsWarning
 from orchestrator.output.results.staging import new_run_id, staged
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
     from orchestrator.cases.prepare import PreparedScenario
     from orchestrator.studies.modes.modes import ModesResult
     from orchestrator.studies.runs.run import RunResult
+
+_FEW = 2  # known questions from which one line stands for them
 
 
 def make_console(*, stderr: bool = False) -> Console:
@@ -90,15 +94,38 @@ def print_sources(console: Console, results: Sequence[ModesResult]) -> None:
         )
 
 
-def print_questions(scenarios: Sequence[PreparedScenario], *, as_json: bool) -> None:
+def print_questions(
+    scenarios: Sequence[PreparedScenario], *, as_json: bool, whole: bool = False
+) -> None:
     """Before anything is computed: what the network's files come to, and on standard error, once, questions about data
-    that are most unusual."""
-    from orchestrator.cases.facts import facts_of  # noqa: PLC0415 - imports the reading of cases
+    that are most unusual.
+
+    Of a case file that has not changed, questions that an earlier command has shown are counted in one line.
+
+    ``whole``: whether these are shown again; with ``as_json`` they are."""
+    from orchestrator.cases.case import BUILT_IN  # noqa: PLC0415 - imports the reading of cases
+    from orchestrator.cases.facts import facts_of  # noqa: PLC0415 - as well
 
     facts = facts_of(scenarios[0]) if scenarios and not as_json else None
     if facts is not None:
         make_console().print(facts.sentence(), soft_wrap=True, highlight=False, markup=False)
-    ask(q for prepared in scenarios for q in prepared.questions)
+    asked = list(dict.fromkeys(str(q) for prepared in scenarios for q in prepared.questions))
+    path = scenarios[0].case.path if asked else None
+    if path is None or path.is_relative_to(BUILT_IN):
+        say("question", asked)
+        return
+    fresh = new_questions(path, asked)
+    known = len(asked) - len(fresh)
+    if as_json or whole or known < _FEW:
+        say("question", asked)
+        return
+    say("question", fresh)
+    others = "other " if fresh else ""
+    text = f"{known} {others}questions about {path.name} are those of an earlier command"
+    say(
+        "question",
+        [f"{text}; `gfor modes {quote(str(path))} --details` shows them, and --json has them"],
+    )
 
 
 def ask(questions: Iterable[Problem]) -> None:

@@ -1,0 +1,49 @@
+"""Questions about a case file that has not changed are shown whole by the first command, and then counted."""
+
+import json
+import re
+import shlex
+
+import pytest
+
+from tests.cases.psse.test_questions import CASE, DYR, RAW
+
+
+@pytest.fixture
+def case(tmp_path):
+    """A case of a RAW file with several questions, which no command has shown."""
+    (tmp_path / "areas.raw").write_text(RAW)
+    (tmp_path / "areas.dyr").write_text(DYR)
+    (tmp_path / "case.toml").write_text(CASE)
+    return tmp_path / "case.toml"
+
+
+def asked(gfor, *words):
+    code, out, err = gfor(*words)
+    assert code == 0, err
+    return out, [line for line in err.splitlines() if line.startswith("question: ")]
+
+
+def test_the_second_command_counts_what_the_first_has_shown(gfor, case):
+    _, first = asked(gfor, "modes", case)
+    assert len(first) >= 2
+    _, (line,) = asked(gfor, "scr", case)
+    assert line.startswith(f"question: {len(first)} questions about case.toml are those of an ")
+    (typed,) = re.findall("`gfor (.*?)`", line)
+    assert asked(gfor, *shlex.split(typed))[1] == first, "the remedy works as it is typed"
+    out, told = asked(gfor, "modes", case, "--json")
+    assert told == first
+    assert {x.removeprefix("question: ") for x in first} <= {*json.loads(out)["questions"]}
+
+
+def test_a_question_of_another_value_is_shown_beside_the_count(gfor, case):
+    _, first = asked(gfor, "modes", case)
+    _, (fresh, line) = asked(gfor, "modes", case, "--set", "sg1.P_0=0.5")
+    assert "sg1.P_0 cannot act" in fresh
+    assert f"{len(first)} other questions" in line
+
+
+def test_a_changed_file_is_asked_about_anew(gfor, case):
+    _, first = asked(gfor, "modes", case)
+    case.write_text(CASE + "# looked at\n")
+    assert asked(gfor, "modes", case)[1] == first
