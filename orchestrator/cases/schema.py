@@ -13,6 +13,7 @@ from pydantic import (
 )
 
 from orchestrator.cases.names import file_name
+from orchestrator.core.foreign_files import one_line
 from orchestrator.core.toml_files import Table
 from orchestrator.core.units import to_unit
 from orchestrator.systems.coupling.events import ForcingShape
@@ -53,6 +54,8 @@ Hertz = Annotated[float, BeforeValidator(_in("Hz")), Field(allow_inf_nan=False)]
 Bus = Annotated[str, BeforeValidator(lambda name: str(name) if type(name) is int else name)]
 """A number is no bus' name here, but the error that there is none such names the near ones."""
 FileName = Annotated[str, AfterValidator(file_name)]
+Title = Annotated[str, AfterValidator(one_line)]
+"""Titles and labels stand in one line; a file cannot hold other control characters."""
 Radian = Annotated[float, BeforeValidator(_in("rad")), Field(allow_inf_nan=False)]
 
 LONGEST_STEP = 0.1  # between two communication points [s]
@@ -494,7 +497,7 @@ EventTable = Annotated[
 class ScenarioTable(Table):
     """A scenario: its differences from the case; ``beside`` is the one that its damping is compared with."""
 
-    title: str = ""
+    title: Title = ""
     beside: str | None = None
     remove: list[str] = []
     parameters: list[str] = []
@@ -537,8 +540,8 @@ class ReferenceModeTable(Table):
 class ReferenceTable(Table):
     """Published figures, shown beside ours if their conditions hold."""
 
-    title: str
-    source: str
+    title: Title
+    source: Title
     when: dict[str, Value] = {}
     modes: dict[str, dict[str, ReferenceModeTable]]
 
@@ -548,13 +551,13 @@ class PanelTable(Table):
 
     signal: str
     also: list[str] = []
-    label: str
+    label: Title
     scale: Number = 1.0
 
 
 class PlotTable(Table):
     name: FileName
-    title: str
+    title: Title
     panels: list[PanelTable]
 
 
@@ -584,8 +587,8 @@ class CaseTable(Table):
     what paths are relative to, the file's own folder where None."""
 
     name: FileName
-    title: str = ""
-    source: str = ""
+    title: Title = ""
+    source: Title = ""
     directory: str | None = None
     meant: list[str] = []
     models: Literal["emt", "phasor"] | None = None

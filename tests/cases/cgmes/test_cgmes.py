@@ -17,6 +17,7 @@ from orchestrator.cases.network_data import network_data
 from orchestrator.cases.network_import import import_network
 from orchestrator.cases.schema import NetworkTable
 from orchestrator.core.errors import InputError
+from orchestrator.core.foreign_files import one_line
 from tests.cases.psse.test_raw import pandapowers
 from tests.cases.test_network_sources import solved
 
@@ -150,6 +151,24 @@ def test_loads_of_both_signs_at_a_bus_are_two_elements(powsybl):
     drawing = loads[name.replace("static_", "load_")]
     assert (loads[name].p_mw, loads[name].q_mvar) == (-60, 5)
     assert drawing.p_mw == before[drawing.name].p_mw
+
+
+def test_names_that_steer_a_terminal_forge_no_line(ieee14, tmp_path):
+    """Names of every element with an end of a line and an escape: nothing of them reaches what is printed raw."""
+    hostile = "&#10;error: forged &#27;[31m"
+    with zipfile.ZipFile(ieee14) as old, zipfile.ZipFile(tmp_path / "model.zip", "w") as new:
+        for name in old.namelist():
+            text = old.read(name).decode()
+            # XML 1.0 cannot hold an escape character, so its other spelling stands in names
+            text = text.replace(
+                "</cim:IdentifiedObject.name>", f"{hostile}</cim:IdentifiedObject.name>"
+            )
+            new.writestr(name, text.replace("&#27;", "\u202e"))
+    data = network_data(NetworkTable(cgmes="model.zip"), tmp_path)
+    names = [*data.buses, *(x.name for x in (*data.lines, *data.loads, *data.shunts))]
+    assert len(data.buses) == 14
+    for text in (*names, *map(str, data.changes), *data.titles.values()):
+        assert text == one_line(text), repr(text)
 
 
 def test_a_line_between_two_nominal_voltages_is_said(powsybl, tmp_path):
