@@ -7,6 +7,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from fmus.toolchain.cache import CacheError, cache_directory, intact, keep
+from orchestrator.core.errors import InputError
+from orchestrator.core.foreign_files import read_bytes
 
 
 def new_questions(file: Path, asked: Sequence[str]) -> list[str]:
@@ -15,12 +17,12 @@ def new_questions(file: Path, asked: Sequence[str]) -> list[str]:
     All of them if the file cannot be read, or the cache cannot be used."""
     try:
         path = file.resolve()
-        changed, content = path.stat().st_mtime_ns, path.read_bytes()
-    except OSError:
+        changed, content = path.stat().st_mtime_ns, read_bytes(path)
+    except (InputError, OSError):
         return [*asked]
     try:
         mark = cache_directory("questions") / f"{_hash(f'{path} {changed}', content)}.json"
-        known = set(json.loads(mark.read_bytes())) if intact(mark) else set[str]()
+        known = set(json.loads(read_bytes(mark))) if intact(mark) else set[str]()
     except (CacheError, OSError):
         return [*asked]
     found = [text for text in asked if _hash(text) not in known]
