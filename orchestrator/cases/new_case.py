@@ -10,11 +10,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 
+from fmus.grid.network import Load
 from fmus.toolchain.port_variables import I_IM, I_RE, SYSTEM_BASE_MVA, V_IM, V_RE
 from orchestrator.cases.case import Case, case_of_text
 from orchestrator.cases.csv_rows import number, rows_of
 from orchestrator.cases.names import close_names
-from orchestrator.cases.network_data import bus_name
+from orchestrator.cases.network_data import bus_name, network_data
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.psse.raw_file import read_file
 from orchestrator.cases.record_use import RecordUse, details, in_one_line
@@ -154,7 +155,8 @@ def write_case(wanted: WantedCase) -> NewCase:
         wanted = replace(
             wanted, slack=wanted.slack or largest, frequency=wanted.frequency or "50 Hz"
         )
-    base = _prepared(_Text(wanted, sources).text, wanted, ["base"])[0]
+    first = _Text(wanted, sources, fault_bus=_largest_load(_Text(wanted, sources).text, wanted))
+    base = _prepared(first.text, wanted, ["base"])[0]
     places: list[_Place] = []
     for converter in wanted.converters:
         places.append(_placed(converter, base, _called(wanted.files), places))
@@ -164,6 +166,26 @@ def write_case(wanted: WantedCase) -> NewCase:
     text = _commented(draft.text, list(questions), sources)
     black_box = device is not None and not device.can_save_state
     return NewCase(text, tuple(draft.assumed(len(questions))), tuple(scenarios), black_box)
+
+
+def _largest_load(text: str, wanted: WantedCase) -> str:
+    """Return the bus of the largest load, which is faulted; "" if the network cannot be read, which is told later.
+
+    With the fault the network of the first pass is that of the case, and its model is described once."""
+    table = case_of_text(text, tomllib.loads(text), wanted.out).table
+    if table.network is None:
+        return ""
+    try:
+        slack = table.power_flow.slack if table.power_flow else None
+        data = network_data(table.network, wanted.out.absolute().parent, slack)
+    except InputError:
+        return ""
+    return _bus_of_largest(data.loads, data.buses) if data.buses else ""
+
+
+def _bus_of_largest(loads: Sequence[Load], buses: Sequence[str]) -> str:
+    largest = max(loads, key=lambda load: load.p_mw, default=None)
+    return largest.bus if largest else buses[0]
 
 
 def _switched(device: FmuDescription | None) -> dict[str, bool]:
@@ -386,20 +408,17 @@ class _Text:
         base: PreparedScenario | None = None,
         places: Sequence[_Place] = (),
         pods: Mapping[str, bool] = MappingProxyType({}),
+        fault_bus: str = "",
     ) -> None:
         self._pods = pods
         self._wanted, self._sources, self._base, self._places = wanted, sources, base, places
         self._stray, self._stray_why = _stray_capacitance(base) if base else (0.05, "")
         self._network = base.network if base else None
-        largest = max(
-            self._network.loads if self._network else (), key=lambda load: load.p_mw, default=None
-        )
-        buses = self._network.buses if self._network else ("",)
-        self._fault_bus = buses[0]
+        self._fault_bus = fault_bus
         if places:
             self._fault_bus = places[0].bus
-        elif largest:
-            self._fault_bus = largest.bus
+        elif self._network:
+            self._fault_bus = _bus_of_largest(self._network.loads, self._network.buses)
 
     def assumed(self, questions: int) -> list[str]:
         lines, device = [], self._wanted.device
@@ -571,7 +590,7 @@ class _Text:
         removed = [f"remove = {_listed(devices)}"] if devices else []
         found = [["[scenarios.base]", 'title = "As in the files"', *removed]]
         if self._base is None or self._network is None:
-            return found
+            return [*found, self._fault()] if self._fault_bus else found
         if self._places:
             without = "the device" if len(self._places) == 1 else "the devices"
             found.append(self._scenario("dispatch", f"Dispatch without {without}", beside=""))
@@ -580,9 +599,12 @@ class _Text:
                 self._scenario(f"pod_{x}", f"POD-{x.upper()}", f"pod_{x}.enabled")
                 for x in self._pods
             ]
+        return [*found, self._fault()]
+
+    def _fault(self) -> list[str]:
         fault = f'type = "bus_fault", time = "1 s", bus = "{self._fault_bus}", duration = "100 ms"'
         lines = sorted(
-            self._network.lines,
+            self._network.lines if self._network else (),
             key=lambda x: (x.has_ratio, self._fault_bus not in (x.from_bus, x.to_bus)),
         )
         opening = (
@@ -590,8 +612,8 @@ class _Text:
         )
         events = f"events = [{{ {fault} }}]{opening}"
         return [
-            *found,
-            [*self._scenario("fault", f"Fault of 100 ms at {self._fault_bus}", beside=""), events],
+            *self._scenario("fault", f"Fault of 100 ms at {self._fault_bus}", beside=""),
+            events,
         ]
 
     def _scenario(
