@@ -8,7 +8,9 @@ import sys
 import warnings
 from collections.abc import Sequence
 from importlib import import_module
-from importlib.machinery import ModuleSpec, PathFinder
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from importlib.util import find_spec
 from types import CodeType, ModuleType
 
 _ROOMS = {
@@ -68,15 +70,6 @@ def _notice(former: str, present: str) -> None:
     warnings.warn(f"{former} is now {present}; import it there", DeprecationWarning, stacklevel=3)
 
 
-def _locate(present: str) -> ModuleSpec | None:
-    """Return where a present module is, without running it; ``importlib.util`` would slow every start."""
-    home, _, _ = present.rpartition(".")
-    try:
-        return PathFinder.find_spec(present, import_module(home).__path__)
-    except (ModuleNotFoundError, AttributeError):  # its home is absent, or is no package
-        return None
-
-
 class _Room(ModuleType):
     """A room under its former name: it holds no module, and looks its names up in the present room."""
 
@@ -90,7 +83,7 @@ class _Room(ModuleType):
         return value
 
 
-class _Former:
+class _Former(Loader):
     """Gives the present module under its former name: one module, not a second copy with classes of its own."""
 
     def __init__(self, former: str, present: str, room: bool) -> None:
@@ -110,19 +103,13 @@ class _Former:
 
     def get_code(self, _: str) -> CodeType | None:
         """Return the code, for ``python -m`` with the former name."""
-        spec = _locate(self._present)
+        spec = find_spec(self._present)
         loader = spec.loader if spec is not None else None
         code: CodeType | None = loader.get_code(self._present) if loader is not None else None  # type: ignore[attr-defined]
         return code
 
 
-def _spec(former: str, present: str, origin: str | None, room: bool) -> ModuleSpec:
-    # without the base class `Loader`, which would bring importlib.abc into every start
-    loader = _Former(former, present, room)
-    return ModuleSpec(former, loader, origin=origin, is_package=room)  # type: ignore[arg-type]
-
-
-class FormerPaths:
+class FormerPaths(MetaPathFinder):
     """Finds modules by their former names."""
 
     def find_spec(
@@ -132,14 +119,15 @@ class FormerPaths:
         if present is None:
             return None
         if present == fullname:  # a room that was parted
-            return _spec(fullname, present, None, room=True)
-        found = _locate(present)
+            return ModuleSpec(fullname, _Former(fullname, present, room=True), is_package=True)
+        found = find_spec(present)
         if found is None:
             return None
         room = found.submodule_search_locations is not None
         if not room:
             _notice(fullname, present)
-        return _spec(fullname, present, found.origin, room)
+        loader = _Former(fullname, present, room)
+        return ModuleSpec(fullname, loader, origin=found.origin, is_package=room)
 
 
 def install() -> None:

@@ -35,7 +35,7 @@ FLOORS = {
         ("immittance", "interactions", "screening", "sensitivities", "sweep"),
         ("certification", "coordinated_design", "siting", "validation"),
     ),
-    "face": (("api",), ("explore",), ("cli",)),
+    "face": (("api",), ("agents", "explore"), ("cli",)),
 }
 """Folder of ``orchestrator/`` → its rooms; the lowest floor and the lowest row first.
 

@@ -12,6 +12,7 @@ EXTRAS = {
     "distributed": "cluster",
     "helics": "federation",
     "cryptography": "sign",
+    "mcp": "mcp",
 }
 """Name of a library in an import → extra of this distribution that installs it."""
 

@@ -134,9 +134,10 @@ def test_the_readme_lists_every_command():
     assert listed == list(cli.COMMANDS)
 
 
-def test_the_readme_is_short():
+def test_the_readme_is_read_at_once():
+    """In five minutes: what else there is to say has a page."""
     words = (ROOT / "README.md").read_text(encoding="utf-8").split()
-    assert 700 <= len([word for word in words if any(map(str.isalnum, word))]) <= 900
+    assert 700 <= len([word for word in words if any(map(str.isalnum, word))]) <= 1200
 
 
 @pytest.mark.parametrize("page", [p for p in PAGES if any(b.path for b in blocks(p))], ids=name_of)

@@ -8,7 +8,6 @@ from rich.markup import escape
 
 from orchestrator.core.errors import INTERRUPTED, InputError
 from orchestrator.core.foreign_files import check_regular
-from orchestrator.core.safe_files import inputs
 from orchestrator.face.cli.arguments import add_options
 from orchestrator.face.cli.terminal import make_console, print_json
 from orchestrator.output.signatures.signing import Made, check_key
@@ -50,7 +49,6 @@ def _sign(what: Path, key: Path) -> tuple[Made, list[Path]]:
         made = sign_folder(folder, content, key)
         return made, [folder / name for name in signatures_of(folder).names()]
     if what.suffix.lower() == ".fmu" and holds_certificates(what):
-        inputs.discard(what.resolve())  # it is read and written: the signature goes into it
         first, *_ = sign_inside(what, key, _check)
         return first, [what]
     made = sign_file(what, key)

@@ -46,7 +46,7 @@ NAMES = {
         "Siting",
         "Sources",
     ),
-    *("StepChoice", "Verification"),
+    *("StepChoice", "Validation", "Verification", "validate"),
     *("BusStrength", "Mode", "Stability"),
     *("CheckpointWarning", "RunEndedWarning", "UnusualDataWarning"),
     *(

@@ -9,11 +9,8 @@ import zipfile
 from dataclasses import replace
 
 import pytest
-from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
-from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 
 import orchestrator as gfor
-from orchestrator.output.signatures.public_key import public_key_of
 from orchestrator.studies.certification.codes.all_codes import CODES, ERCOT, FINGRID
 from orchestrator.studies.certification.files import spare_another
 from orchestrator.studies.certification.inside import FOLDER, taken_out
@@ -256,22 +253,3 @@ def test_what_cannot_take_a_certificate_is_refused_before_anything_is_computed(
     code, _, said = gfor_command("verify", other)
     assert code == 2
     assert "there is no certificate in it" in " ".join(said.split())
-
-
-def test_a_certificate_inside_is_signed_and_what_is_not_the_tested_fmu_does_not_hold(
-    certified, tmp_path, gfor_command
-):
-    signed, key = shutil.copy(certified, tmp_path / "signed.fmu"), tmp_path / "key"
-    private = Ed25519PrivateKey.generate()
-    key.write_bytes(private.private_bytes(Encoding.PEM, PrivateFormat.OpenSSH, NoEncryption()))
-    key.chmod(0o600)
-    (tmp_path / "allowed").write_text(f"lab@example.org {public_key_of(private).line}\n", "ascii")
-    assert gfor_command("sign", signed, "--sign", key)[0] == 0
-    words = ["verify", signed, "--files-only", "--json", "--signers", tmp_path / "allowed"]
-    (found,) = json.loads(gfor_command(*words)[1])["certificates"]
-    assert (found["holds"], found["signature"]["state"]) == (True, "good")
-    with zipfile.ZipFile(signed, "a") as archive:
-        archive.writestr("resources/further.py", "a library that was not tested")
-    code, _, said = gfor_command(*words)
-    assert code in (2, 5)
-    assert "is not the FMU that was tested: resources/further.py" in " ".join(said.split())

@@ -1,0 +1,156 @@
+"""What an agent gets: the figures that decide, each with its unit; their JSON Schema is made from these classes."""
+
+from pydantic import BaseModel, Field
+
+Part = dict[str, float]
+
+
+class ModeAnswer(BaseModel):
+    """An eigenvalue of the coupled system, with its eigenvector and what takes part."""
+
+    name: str | None = Field(description="the field's name of the mode, if it has one")
+    frequency_hz: float = Field(description="Im λ / 2π [Hz]")
+    damping_percent: float = Field(
+        description="damping ratio −Re λ / |λ| [%]; negative if it grows"
+    )
+    real: float = Field(description="Re λ [1/s]")
+    imag: float = Field(description="Im λ [rad/s]")
+    participation: Part = Field(
+        description="state: magnitude of its participation factor; the largest first"
+    )
+    shape: dict[str, tuple[float, float]] = Field(
+        description="machine: magnitude and angle [deg] of its speed in the right eigenvector, the largest at 1 and 0"
+    )
+
+
+class ScenarioModesAnswer(BaseModel):
+    """The modes of one scenario between 0.1 and 2 Hz, and whether all of its eigenvalues are damped."""
+
+    scenario: str
+    stable: bool | None = Field(description="of all eigenvalues; null if it is not known")
+    verdict: str = Field(description="the verdict in one sentence, with its cause")
+    eigenvalues: int = Field(description="how many eigenvalues the verdict rests on")
+    modes: list[ModeAnswer] = Field(description="oscillatory modes, the least damped first")
+    left_out: int = Field(description="modes that are not listed, all better damped")
+
+
+class ModesAnswer(BaseModel):
+    """Modes of a case's scenarios, from its coupled FMUs linearised around their steady state."""
+
+    case: str
+    scenarios: list[ScenarioModesAnswer]
+    questions: list[str] = Field(
+        description="what in the input deserves a look before the figures are believed"
+    )
+
+
+class CasesAnswer(BaseModel):
+    """Cases that can be asked about."""
+
+    built_in: dict[str, str] = Field(description="name: title")
+    files: list[str] = Field(description="case files in the given folders")
+
+
+class RunSummaryAnswer(BaseModel):
+    """What a run of a scenario ends in."""
+
+    scenario: str
+    stable: bool | None = Field(description="null if the run does not tell")
+    verdict: str
+    remark: str = Field(description="why the verdict is what it is")
+    frequency_hz: float | None = Field(description="of the mode that decides [Hz]")
+    damping_percent: float | None = Field(description="its damping ratio [%]")
+    components: Part = Field(description="who takes part in that mode")
+    stop_time_s: float
+
+
+class ScreenedModeAnswer(BaseModel):
+    """A mode followed over operating points and outages, where it is damped least."""
+
+    name: str
+    frequency_hz: float
+    damping_percent: float
+    point: str
+    outage: str
+    participation: Part
+
+
+class ScreeningAnswer(BaseModel):
+    """The worst of a case's operating points and outages."""
+
+    scenario: str
+    stable: bool | None = Field(description="of all points and outages; null if some is not known")
+    computed: int = Field(description="points and outages that were computed")
+    unstable: list[str] = Field(description="points and outages that are unstable")
+    failures: list[str] = Field(description="those without a result, with the reason")
+    worst: list[ScreenedModeAnswer] = Field(description="the least damped modes, worst first")
+
+
+class CheckRowAnswer(BaseModel):
+    """One acceptance check of an FMU."""
+
+    check: str
+    question: str
+    verdict: str
+    evidence: str
+
+
+class CheckAnswer(BaseModel):
+    """Whether an FMU can be trusted in a co-simulation."""
+
+    fmu: str
+    faults: list[str] = Field(description="what was found wrong; empty if nothing was")
+    not_judged: list[str] = Field(description="checks without a verdict, with the reason")
+    checks: list[CheckRowAnswer]
+
+
+class BusStrengthAnswer(BaseModel):
+    """Short-circuit strength of a bus, and SCR of a converter there."""
+
+    bus: str
+    s_sc_mva: float = Field(description="initial three-phase short-circuit power [MVA]")
+    scr: float | None = Field(
+        description="short-circuit ratio of the converters there; null without one"
+    )
+
+
+class StrengthsAnswer(BaseModel):
+    """Short-circuit strength, weakest bus first."""
+
+    scenario: str
+    convention: str = Field(description="by which convention the short-circuit power is computed")
+    buses: list[BusStrengthAnswer]
+
+
+class InfluenceAnswer(BaseModel):
+    """How a parameter of a running FMU moves a mode."""
+
+    parameter: str
+    value: float
+    unit: str | None = Field(description="unit of the value; null if it has none")
+    damping_points_per_unit: float | None = Field(
+        description="change of the damping ratio [percentage points] for each unit by which the parameter grows"
+    )
+    damping_points_per_percent: float | None = Field(
+        description="the same for each percent of its value; null if the value is 0"
+    )
+
+
+class SensitivitiesAnswer(BaseModel):
+    """Which parameters move a mode, the strongest first."""
+
+    scenario: str
+    mode_frequency_hz: float
+    mode_damping_percent: float
+    influences: list[InfluenceAnswer]
+
+
+class ExplanationAnswer(BaseModel):
+    """Why a scenario has the verdict that it has."""
+
+    scenario: str
+    stable: bool | None
+    verdict: str
+    because: list[str] = Field(
+        description="one sentence each: what decides, who takes part, what else to know"
+    )

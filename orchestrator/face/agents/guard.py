@@ -1,0 +1,105 @@
+"""What a process may open that answers an agent: the given folders to read, one to write."""
+
+import mimetypes
+import os
+import sys
+import sysconfig
+import tempfile
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+_WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+
+_PACKAGES = ("fmus", "gfor_fmu", "orchestrator")
+"""Ours, which may lie elsewhere than Python's packages: a checkout that is being worked on."""
+
+_CHANGES = frozenset(
+    {"os.remove", "os.rename", "os.rmdir", "os.link", "os.symlink", "os.truncate", "shutil.rmtree"}
+)
+"""Events of Python's audit hook, other than ``open``, by which files are changed."""
+
+_SYSTEM = (
+    "/proc",
+    "/sys/fs/cgroup",
+    "/dev",
+    "/usr",
+    "/lib",
+    "/lib64",
+    "/etc/ld.so.cache",
+    "/etc/localtime",
+    *mimetypes.knownfiles,
+)
+"""What libraries read on Linux to find their like, the number of cores and the time."""
+
+
+def keep_within(roots: Sequence[Path], results: Path) -> None:
+    """Refuse, from now on and in this process, to open files outside of folders that an agent may use.
+
+    Python's own folders, gfor's, its cache and the folder of temporary files stay open. A library that opens files
+    without Python is not seen; foreign FMUs run in a sandbox of their own.
+
+    Parameters
+    ----------
+    roots
+        Folders that may be read, with all that is in them.
+    results
+        The folder that may be written.
+    """
+    own = [
+        Path(sys.prefix),
+        Path(sys.base_prefix),
+        *(Path(p) for p in sysconfig.get_paths().values()),
+        *(Path(p) for p in sys.path if p),
+        *(_folder(package) for package in _PACKAGES),
+        *(Path(p) for p in _SYSTEM),
+    ]
+    written = [
+        results,
+        Path(tempfile.gettempdir()),
+        Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")),
+        Path("/dev"),
+        Path("/proc"),
+    ]
+    readable = _resolved([*roots, *own, *written])
+    writable = _resolved(written)
+
+    def watch(event: str, arguments: tuple[Any, ...]) -> None:
+        if event == "open":
+            path, mode, flags = arguments
+            writes = bool(flags & _WRITING) or any(c in str(mode or "") for c in "wax+")
+            _check(path, writable if writes else readable, writes=writes)
+        elif event in _CHANGES:
+            _check(arguments[0], writable, writes=True)
+
+    sys.addaudithook(watch)
+
+
+def is_within(path: Path, folders: Sequence[Path]) -> bool:
+    """Return whether a path, with its links followed, is in one of the folders or is one of them."""
+    place = path.resolve()
+    return any(place.is_relative_to(folder) for folder in folders)
+
+
+def _folder(package: str) -> Path:
+    spec = find_spec(package)
+    if spec is None or not spec.submodule_search_locations:
+        raise ModuleNotFoundError(f"{package} is a part of gfor-cosim and is not installed")
+    return Path(next(iter(spec.submodule_search_locations)))
+
+
+def _resolved(paths: Sequence[Path]) -> tuple[Path, ...]:
+    return tuple(path.resolve() for path in paths)
+
+
+def _check(path: object, folders: Sequence[Path], *, writes: bool) -> None:
+    if not isinstance(path, str | bytes | os.PathLike):
+        return  # the number of a file that is open
+    place = Path(os.fsdecode(path))
+    if not is_within(place, folders):
+        does = "written" if writes else "read"
+        raise PermissionError(
+            f"{place}: it lies outside of the folders that may be {does} here; "
+            "start gfor mcp with --root (to read) or --results (to write) for that folder"
+        )

@@ -1,0 +1,303 @@
+"""The eight verbs: each asks one command, and gives of its JSON what an agent needs."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from orchestrator.cases.case import BUILT_IN, built_in_cases
+from orchestrator.core.errors import InputError
+from orchestrator.face.agents.answers import (
+    BusStrengthAnswer,
+    CasesAnswer,
+    CheckAnswer,
+    CheckRowAnswer,
+    ExplanationAnswer,
+    InfluenceAnswer,
+    ModeAnswer,
+    ModesAnswer,
+    RunSummaryAnswer,
+    ScenarioModesAnswer,
+    ScreenedModeAnswer,
+    ScreeningAnswer,
+    SensitivitiesAnswer,
+    StrengthsAnswer,
+)
+from orchestrator.face.agents.guard import is_within
+from orchestrator.face.agents.question import Allowance, NoAnswerError, ask
+
+MOST_ROWS = 20
+"""Modes, buses, parameters or states that an answer lists: more than a reader compares, and few enough for an agent."""
+
+MOST_FILES = 200
+"""Case files that `cases` lists."""
+
+Values = Mapping[str, float | bool | str]
+
+
+class Verbs:
+    """The verbs, within allowance.
+
+    Parameters
+    ----------
+    allowance
+        Folders that may be read, the folder of results, and how long a question may take.
+    """
+
+    def __init__(self, allowance: Allowance) -> None:
+        self._limits = allowance
+
+    def cases(self) -> CasesAnswer:
+        """List the cases that can be asked about: the built-in ones, and case files in the given folders."""
+        titles = {name: _title(BUILT_IN / name / "case.toml") for name in built_in_cases()}
+        files = [str(path) for root in self._limits.roots for path in _case_files(root)]
+        return CasesAnswer(built_in=titles, files=files[:MOST_FILES])
+
+    def modes(
+        self, case: str, scenario: str | None = None, values: Values | None = None
+    ) -> ModesAnswer:
+        """Compute modes of a case: frequency, damping, participation factors and mode shape, each with its own mode.
+
+        ``values`` sets parameters first, such as {"grid.X_L": 0.3}.
+        """
+        found = self._asked("modes", case, scenario, values)
+        return ModesAnswer(
+            case=found["case"],
+            scenarios=[_scenario_modes(one) for one in found["scenarios"]],
+            questions=[str(one) for one in found["questions"]],
+        )
+
+    def run_summary(
+        self, case: str, scenario: str, stop: float | None = None, values: Values | None = None
+    ) -> RunSummaryAnswer:
+        """Simulate a scenario in time, with its events, up to ``stop`` [s], and tell what the run ends in."""
+        further = [] if stop is None else ["--stop", repr(float(stop))]
+        further += ["--no-csv", "--out", str(self._limits.results / "run")]
+        (found,) = self._asked("run", case, scenario, values, *further)
+        answer = found["answer"]
+        return RunSummaryAnswer(
+            scenario=found["name"],
+            stable=answer["stable"],
+            verdict=answer["verdict"],
+            remark=answer.get("remark") or "",
+            frequency_hz=answer.get("frequency_hz"),
+            damping_percent=answer.get("damping_percent"),
+            components=_largest(answer.get("components") or {}),
+            stop_time_s=found["stop_time"],
+        )
+
+    def screen_worst(
+        self, case: str, scenario: str, points: str | None = None, outages: str = "n-1"
+    ) -> ScreeningAnswer:
+        """Compute a case's modes at operating points and after outages, and tell the worst.
+
+        ``points`` is a table (CSV) in a given folder; ``outages`` is "n-1", "lines", "units" or names.
+        """
+        further = ["--outages", _plain(outages, "outages")]
+        if points is not None:
+            further += ["--points", self._file(points)]
+        further += ["--out", str(self._limits.results / "screen")]
+        found = self._asked("screen", case, scenario, None, *further)
+        modes = sorted(found["modes"], key=lambda mode: mode["worst"]["damping_percent"])
+        return ScreeningAnswer(
+            scenario=found["scenario"],
+            stable=found["stable"],
+            computed=found["counts"].get("computed", 0),
+            unstable=[_place(one) for one in found["unstable"]],
+            failures=[f"{_place(one)}: {one['why']}" for one in found["failures"]],
+            worst=[_screened(mode) for mode in modes[:MOST_ROWS]],
+        )
+
+    def check(self, fmu: str, binding: str | None = None) -> CheckAnswer:
+        """Check whether an FMU can be trusted in a co-simulation; it runs in a sandbox.
+
+        ``fmu`` and ``binding`` are files in a given folder.
+        """
+        words = ["fmu", "check", self._file(fmu), "--json"]
+        if binding is not None:
+            words += ["--binding", self._file(binding)]
+        found = ask(words, self._limits)
+        rows = found["checks"]
+        return CheckAnswer(
+            fmu=Path(found["fmu"]).name,
+            faults=found["faults"],
+            not_judged=[
+                f"{row['check']}: {row['evidence']}"
+                for row in rows
+                if row["verdict"] not in ("pass", "fail", "remark")
+            ],
+            checks=[CheckRowAnswer.model_validate(row) for row in rows],
+        )
+
+    def scr(self, case: str, scenario: str | None = None) -> StrengthsAnswer:
+        """Compute the short-circuit power of every bus, and the SCR of converters; the weakest bus stands first."""
+        found = self._asked("scr", case, scenario, None)
+        (one, *_) = found["scenarios"]
+        buses = sorted(one["buses"], key=lambda bus: bus["s_sc_mva"])
+        return StrengthsAnswer(
+            scenario=one["name"],
+            convention=found["convention"],
+            buses=[BusStrengthAnswer.model_validate(bus) for bus in buses[:MOST_ROWS]],
+        )
+
+    def sensitivities(self, case: str, scenario: str) -> SensitivitiesAnswer:
+        """Compute which parameters of the running FMUs move a scenario's critical mode, the strongest first."""
+        (found,) = self._asked("sensitivities", case, scenario, None)
+        rows = sorted(found["sensitivities"], key=_strength, reverse=True)
+        return SensitivitiesAnswer(
+            scenario=found["scenario"],
+            mode_frequency_hz=found["mode"]["frequency_hz"],
+            mode_damping_percent=found["mode"]["damping_percent"],
+            influences=[InfluenceAnswer.model_validate(row) for row in rows[:MOST_ROWS]],
+        )
+
+    def explain(self, case: str, scenario: str, values: Values | None = None) -> ExplanationAnswer:
+        """Explain a scenario's verdict: what decides, who takes part, and what to look at before it is believed."""
+        found = self._asked("modes", case, scenario, values)
+        (one,) = found["scenarios"]
+        because = [_told(mode) for mode in one["modes"][:3]]
+        because += [*one["warnings"], *(f"question: {text}" for text in found["questions"])]
+        stability = one["stability"]
+        return ExplanationAnswer(
+            scenario=one["name"],
+            stable=one["stable"],
+            verdict=stability["sentence"],
+            because=[text for text in [stability["reason"], *because] if text],
+        )
+
+    def _asked(
+        self, command: str, case: str, scenario: str | None, values: Values | None, *further: str
+    ) -> Any:
+        words = [command, self._case(case), "--json", *further]
+        if scenario is not None:
+            words += ["--scenario", _plain(scenario, "scenario")]
+        for name, value in (values or {}).items():
+            written = str(value).lower() if isinstance(value, bool) else str(value)
+            words += ["--set", f"{_plain(name, 'values')}={written}"]
+        return ask(words, self._limits)
+
+    def _case(self, case: str) -> str:
+        if case in built_in_cases():
+            return case
+        try:
+            return self._file(case)
+        except InputError as error:
+            raise NoAnswerError(
+                f"{error}; or name a built-in case: {', '.join(built_in_cases())}"
+            ) from None
+
+    def _file(self, name: str) -> str:
+        """Return the path of a file in a given folder; a relative one starts in the first of them that has it."""
+        given = Path(_plain(name, "file"))
+        for root in self._limits.roots:
+            path = (root / given).resolve()
+            if path.is_file() and is_within(path, self._limits.roots):
+                return str(path)
+        folders = ", ".join(str(root) for root in self._limits.roots)
+        raise NoAnswerError(
+            f"{name}: there is no such file in the folders that may be read: {folders}"
+        )
+
+
+def _plain(text: str, what: str) -> str:
+    """Return a text that a command takes for a value, not for an option."""
+    if not text or text.startswith("-") or not text.isprintable():
+        raise NoAnswerError(
+            f"{what} = {text!r}: give a name or a path, which does not begin with '-'"
+        )
+    return text
+
+
+def _case_files(root: Path) -> Iterable[Path]:
+    return sorted(
+        path
+        for path in root.glob("**/*.toml")
+        if path.is_file() and "[components" in _beginning(path)
+    )
+
+
+def _beginning(path: Path) -> str:
+    """Return the first 100,000 characters of a file, in which a case names its components."""
+    with path.open(encoding="utf-8", errors="replace") as file:
+        return file.read(100_000)
+
+
+def _title(path: Path) -> str:
+    for line in path.read_text(encoding="utf-8").splitlines():
+        key, _, value = line.partition("=")
+        if key.strip() == "title":
+            return value.strip().strip('"')
+    return ""
+
+
+def _largest(parts: Mapping[str, float]) -> dict[str, float]:
+    ordered = sorted(parts.items(), key=lambda part: part[1], reverse=True)
+    return dict(ordered[:MOST_ROWS])
+
+
+def _scenario_modes(one: Mapping[str, Any]) -> ScenarioModesAnswer:
+    modes = sorted(one["modes"], key=lambda mode: mode["damping_percent"])
+    return ScenarioModesAnswer(
+        scenario=one["name"],
+        stable=one["stable"],
+        verdict=one["stability"]["sentence"],
+        eigenvalues=one["stability"]["eigenvalues"],
+        modes=[_mode(mode) for mode in modes[:MOST_ROWS]],
+        left_out=max(0, len(modes) - MOST_ROWS),
+    )
+
+
+def _mode(mode: Mapping[str, Any]) -> ModeAnswer:
+    return ModeAnswer(
+        name=mode["name"],
+        frequency_hz=mode["frequency_hz"],
+        damping_percent=mode["damping_percent"],
+        real=mode["real"],
+        imag=mode["imag"],
+        participation=_largest({row["state"]: row["factor"] for row in mode["participation"]}),
+        shape=_shape(mode["shape"]),
+    )
+
+
+def _shape(rows: Iterable[Mapping[str, Any]]) -> dict[str, tuple[float, float]]:
+    """Return speeds of machines relative to the largest one: magnitude, and angle [deg] within ±180."""
+    speeds = [row for row in rows if row["state"].endswith("machine.omega")]
+    if not speeds:
+        return {}
+    largest = max(speeds, key=lambda row: float(row["magnitude"]))
+    return {
+        row["state"].partition(".")[0]: (
+            row["magnitude"] / largest["magnitude"],
+            (row["angle_deg"] - largest["angle_deg"] + 180) % 360 - 180,
+        )
+        for row in speeds
+    }
+
+
+def _place(item: Mapping[str, Any]) -> str:
+    return f"{item['point']}, {item['outage']}"
+
+
+def _screened(mode: Mapping[str, Any]) -> ScreenedModeAnswer:
+    worst = mode["worst"]
+    return ScreenedModeAnswer(
+        name=mode["name"],
+        frequency_hz=worst["frequency_hz"],
+        damping_percent=worst["damping_percent"],
+        point=worst["point"],
+        outage=worst["outage"],
+        participation=_largest(mode["participation"]),
+    )
+
+
+def _strength(row: Mapping[str, Any]) -> float:
+    """Return by how much a percent of the value moves the damping; values of 0 come last."""
+    return abs(float(row["damping_points_per_percent"] or 0.0))
+
+
+def _told(mode: Mapping[str, Any]) -> str:
+    parts = list(_largest(mode["components"]).items())[:4]
+    who = ", ".join(f"{name} {share:.0%}" for name, share in parts)
+    return (
+        f"the mode of {mode['frequency_hz']:.3f} Hz has a damping of {mode['damping_percent']:.2f} %; "
+        f"in it take part {who}"
+    )

@@ -1,0 +1,112 @@
+"""A question's process reads and writes where it may, and ends in time."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from orchestrator.face.agents.question import Allowance, NoAnswerError, ask
+from orchestrator.face.agents.verbs import Verbs
+
+WITHIN = """
+import json, os, sys
+from pathlib import Path
+from orchestrator.face.agents.guard import keep_within
+root, results, outside = map(Path, sys.argv[1:])
+keep_within([root], results)
+def tried(do):
+    try:
+        do()
+    except PermissionError:
+        return "refused"
+    return "done"
+print(json.dumps({
+    "read inside": tried(lambda: (root / "a").read_text()),
+    "read outside": tried(lambda: (outside / "a").read_text()),
+    "read by a link": tried(lambda: (root / "link").read_text()),
+    "write inside": tried(lambda: (root / "b").write_text("b")),
+    "write results": tried(lambda: (results / "b").write_text("b")),
+    "remove": tried(lambda: os.remove(root / "a")),
+    "remove result": tried(lambda: os.remove(results / "b")),
+}))
+"""
+
+
+def test_files_are_read_in_roots_and_written_in_results_alone(tmp_path, monkeypatch):
+    # the folder of temporary files may be written, and this test stands in it
+    elsewhere = tmp_path / "temporary"
+    folders = [tmp_path / name for name in ("root", "results", "outside")]
+    for folder in [elsewhere, *folders]:
+        folder.mkdir()
+    root, _, outside = folders
+    for folder in (root, outside):
+        (folder / "a").write_text("a", encoding="utf-8")
+    (root / "link").symlink_to(outside / "a")
+    monkeypatch.setenv("TMPDIR", str(elsewhere))
+    done = subprocess.run(
+        [sys.executable, "-c", WITHIN, *map(str, folders)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert json.loads(done.stdout) == {
+        "read inside": "done",
+        "read outside": "refused",
+        "read by a link": "refused",
+        "write inside": "refused",
+        "write results": "done",
+        "remove": "refused",
+        "remove result": "done",
+    }
+
+
+def allowance(folder, seconds=60.0):
+    return Allowance((folder,), folder / "results", seconds)
+
+
+def test_a_case_cannot_read_what_lies_outside(tmp_path, monkeypatch):
+    elsewhere, root = tmp_path / "temporary", tmp_path / "root"
+    for folder in (elsewhere, root):
+        folder.mkdir()
+    monkeypatch.setenv("TMPDIR", str(elsewhere))
+    (tmp_path / "secret.csv").write_text("bus,rating_mva\nA,1\n", encoding="utf-8")
+    (root / "case.toml").write_text(
+        """
+name = "curious"
+[solver]
+step_size = "5 ms"
+[power_flow]
+grid = "grid"
+[components.grid]
+model = "phasor_grid"
+[network]
+pandapower = "case9"
+[units]
+file = "../secret.csv"
+alpha = 0.25
+generator = "synchronous_generator_ac4a_phasor"
+converter = "gfor_phasor"
+[scenarios.base]
+""",
+        encoding="utf-8",
+    )
+    with pytest.raises(NoAnswerError, match=r"secret\.csv: it lies outside"):
+        Verbs(allowance(root)).modes("case.toml")
+
+
+def test_a_question_ends_in_time(tmp_path):
+    with pytest.raises(NoAnswerError, match=r"no answer within 0\.05 s"):
+        ask(["modes", "two_area", "--json"], allowance(tmp_path, 0.05))
+
+
+def test_an_error_is_the_commands_own(tmp_path):
+    with pytest.raises(NoAnswerError, match="scenario"):
+        Verbs(allowance(tmp_path)).modes("two_area", "no_such")
+
+
+def test_an_explanation_names_who_swings(tmp_path):
+    told = Verbs(allowance(tmp_path)).explain("two_area", "base")
+    assert told.stable is False
+    assert told.verdict.startswith("UNSTABLE")
+    assert "sg1" in told.because[0] or "sg1" in told.because[1]

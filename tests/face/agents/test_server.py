@@ -1,0 +1,93 @@
+"""``gfor mcp``, asked by the client of the official library, over the standard streams of a process."""
+
+import sys
+
+import anyio
+import pytest
+from mcp import Client, StdioServerParameters
+from mcp.client.stdio import stdio_client
+
+import orchestrator as gfor
+
+VERBS = {
+    "cases",
+    "modes",
+    "run_summary",
+    "screen_worst",
+    "check",
+    "scr",
+    "sensitivities",
+    "explain",
+}
+
+
+def ask(folder, *questions):
+    """Return the server's tools, and its result for each question (verb, arguments)."""
+
+    async def talk():
+        server = StdioServerParameters(
+            command=sys.executable,
+            args=["-m", "orchestrator.face.cli", "mcp", "--root", str(folder)],
+        )
+        async with Client(stdio_client(server)) as client:
+            tools = (await client.list_tools()).tools
+            return tools, [await client.call_tool(verb, given) for verb, given in questions]
+
+    return anyio.run(talk)
+
+
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory):
+    """A session with what agents get wrong elsewhere: modes without shapes, or sorted apart from participations."""
+    folder = tmp_path_factory.mktemp("agents")
+    (folder.parent / "secret.toml").write_text(
+        "[components.a]\nmodel = 'secret'\n", encoding="utf-8"
+    )
+    return folder, ask(
+        folder,
+        ("cases", {}),
+        ("modes", {"case": "kundur", "scenario": "manual"}),
+        ("modes", {"case": "../secret.toml"}),
+        ("explain", {"case": "kundur", "scenario": "--out=x"}),
+    )
+
+
+def test_every_verb_only_reads_and_has_a_schema_with_units(answers):
+    _, (tools, _) = answers
+    assert {tool.name for tool in tools} == VERBS
+    assert all(tool.annotations.read_only_hint and tool.description for tool in tools)
+    (modes,) = [tool for tool in tools if tool.name == "modes"]
+    assert "[Hz]" in str(modes.output_schema)
+
+
+def test_the_built_in_cases_are_listed_with_their_titles(answers):
+    _, (_, (listed, *_)) = answers
+    found = listed.structured_content["built_in"]
+    assert set(found) == set(gfor.built_in_cases())
+    assert all(found.values())
+
+
+def test_each_mode_of_kundurs_system_has_its_own_shape_and_participations(answers):
+    """The question of a regulator to another server, which answered with empty vectors (PowerMCP, issue 52)."""
+    _, (_, (_, result, *_)) = answers
+    (scenario,) = result.structured_content["scenarios"]
+    expected = gfor.load("kundur").scenario("manual").modes()
+    for mode, own in zip(scenario["modes"], expected, strict=True):
+        assert mode["frequency_hz"] == pytest.approx(own.frequency_hz, abs=1e-9)
+        assert mode["damping_percent"] == pytest.approx(own.damping_percent, abs=1e-7)
+        assert next(iter(mode["participation"])) == own.participation[0][0]
+        assert set(mode["shape"]) == {"sg1", "sg2", "sg3", "sg4"}
+    inter_area = min(scenario["modes"], key=lambda mode: mode["frequency_hz"])
+    angles = {name: angle for name, (_, angle) in inter_area["shape"].items()}
+    assert abs(angles["sg1"] - angles["sg3"]) == pytest.approx(180, abs=40)
+    assert abs(angles["sg1"] - angles["sg2"]) < 20
+
+
+def test_hostile_arguments_are_refused_in_words(answers):
+    folder, (_, (_, _, outside, option)) = answers
+    assert outside.is_error
+    assert "no such file in the folders that may be read" in outside.content[0].text
+    assert "secret" not in outside.content[0].text.replace("../secret.toml", "")
+    assert option.is_error
+    assert "does not begin with '-'" in option.content[0].text
+    assert not (folder / "x").exists()
