@@ -1,4 +1,4 @@
-"""What an agent gets: the figures that decide, each with its unit; their JSON Schema is made from these classes."""
+"""The answers that an agent gets: the figures that decide, each with its unit; their JSON Schema is made from these classes."""
 
 from pydantic import BaseModel, Field
 
@@ -52,7 +52,7 @@ class CasesAnswer(BaseModel):
 
 
 class RunSummaryAnswer(BaseModel):
-    """What a run of a scenario ends in."""
+    """The end of a run of a scenario."""
 
     scenario: str
     stable: bool | None = Field(description="null if the run does not tell")
@@ -96,7 +96,7 @@ class CheckRowAnswer(BaseModel):
 
 
 class CheckAnswer(BaseModel):
-    """Whether an FMU can be trusted in a co-simulation."""
+    """The verdict of the checks on an FMU: can it be trusted in a co-simulation?"""
 
     fmu: str
     faults: list[str] = Field(description="what was found wrong; empty if nothing was")

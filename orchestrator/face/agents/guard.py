@@ -1,4 +1,4 @@
-"""What a process may open that answers an agent: the given folders to read, one to write."""
+"""Files that a process may open which answers an agent: the given folders to read, one to write."""
 
 import mimetypes
 import os
@@ -31,7 +31,7 @@ _SYSTEM = (
     "/etc/localtime",
     *mimetypes.knownfiles,
 )
-"""What libraries read on Linux to find their like, the number of cores and the time."""
+"""Files and folders that libraries read on Linux to find their like, the number of cores and the time."""
 
 
 def keep_within(roots: Sequence[Path], results: Path) -> None:

@@ -22,7 +22,7 @@ class NoAnswerError(InputError):
 
 @dataclass(frozen=True)
 class Allowance:
-    """What questions may use.
+    """The folders and the time that questions may use.
 
     Attributes
     ----------

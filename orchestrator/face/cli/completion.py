@@ -1,4 +1,4 @@
-"""``gfor completion``: what a shell needs to complete commands, options, cases and files."""
+"""``gfor completion``: the text that a shell needs to complete commands, options, cases and files."""
 
 import argparse
 
