@@ -1,4 +1,4 @@
-"""The answers that an agent gets: the figures that decide, each with its unit; their JSON Schema is made from these classes."""
+"""The answers that an agent gets: figures with units. Their JSON Schema is made from these classes."""
 
 from pydantic import BaseModel, Field
 
