@@ -37,8 +37,8 @@ _SYSTEM = (
 def keep_within(roots: Sequence[Path], results: Path) -> None:
     """Refuse, from now on and in this process, to open files outside of folders that an agent may use.
 
-    Python's own folders, gfor's, its cache and the folder of temporary files stay open. A library that opens files
-    without Python is not seen; foreign FMUs run in a sandbox of their own.
+    Python's own folders, gfor's, its cache and the folder of temporary files (``TMPDIR``) stay open. A library that
+    opens files without Python is not seen; foreign FMUs run in a sandbox of their own.
 
     Parameters
     ----------
@@ -47,14 +47,9 @@ def keep_within(roots: Sequence[Path], results: Path) -> None:
     results
         The folder that may be written.
     """
-    own = [
-        Path(sys.prefix),
-        Path(sys.base_prefix),
-        *(Path(p) for p in sysconfig.get_paths().values()),
-        *(Path(p) for p in sys.path if p),
-        *(_folder(package) for package in _PACKAGES),
-        *(Path(p) for p in _SYSTEM),
-    ]
+    places = [sys.prefix, sys.base_prefix, *sysconfig.get_paths().values(), *sys.path, *_SYSTEM]
+    own = [Path(place) for place in places if place]
+    own += [_folder(package) for package in _PACKAGES]
     written = [
         results,
         Path(tempfile.gettempdir()),

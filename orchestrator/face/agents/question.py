@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,23 +66,8 @@ def ask(words: Sequence[str], allowance: Allowance) -> Any:
         "results": str(allowance.results),
         "words": list(words),
     }
-    process = subprocess.Popen(
-        [sys.executable, "-m", "orchestrator.face.cli.within", json.dumps(task)],
-        cwd=allowance.results,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        start_new_session=True,
-    )
-    try:
-        out, err = process.communicate(timeout=allowance.seconds)
-    except subprocess.TimeoutExpired:
-        raise NoAnswerError(
-            f"gfor {' '.join(words)}: no answer within {allowance.seconds:g} s; ask for less (one scenario, fewer "
-            "points), or start gfor mcp with a larger --seconds"
-        ) from None
-    finally:
-        _end(process)
+    with tempfile.TemporaryDirectory(prefix="gfor-") as own:
+        out, err = _run(task, allowance, Path(own))
     if len(out) > LARGEST_ANSWER:
         raise NoAnswerError(
             f"gfor {' '.join(words)}: the answer has {len(out)} bytes, more than {LARGEST_ANSWER}; ask for less"
@@ -91,6 +77,28 @@ def ask(words: Sequence[str], allowance: Allowance) -> Any:
     except ValueError:
         said = err.decode(errors="replace").strip().removeprefix("error: ")
         raise NoAnswerError(said or f"gfor {' '.join(words)} printed no JSON") from None
+
+
+def _run(task: dict[str, Any], allowance: Allowance, temporary: Path) -> tuple[bytes, bytes]:
+    """Run a task in a process of its own; returns what it printed and what it said."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "orchestrator.face.cli.within", json.dumps(task)],
+        cwd=allowance.results,
+        env=os.environ | {"TMPDIR": str(temporary), "TEMP": str(temporary)},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    )
+    try:
+        return process.communicate(timeout=allowance.seconds)
+    except subprocess.TimeoutExpired:
+        raise NoAnswerError(
+            f"gfor {' '.join(task['words'])}: no answer within {allowance.seconds:g} s; ask for less (one "
+            "scenario, fewer points), or start gfor mcp with a larger --seconds"
+        ) from None
+    finally:
+        _end(process)
 
 
 def _end(process: "subprocess.Popen[bytes]") -> None:

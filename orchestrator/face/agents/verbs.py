@@ -44,12 +44,12 @@ class Verbs:
     """
 
     def __init__(self, allowance: Allowance) -> None:
-        self._limits = allowance
+        self._allowance = allowance
 
     def cases(self) -> CasesAnswer:
         """List the cases that can be asked about: the built-in ones, and case files in the given folders."""
         titles = {name: _title(BUILT_IN / name / "case.toml") for name in built_in_cases()}
-        files = [str(path) for root in self._limits.roots for path in _case_files(root)]
+        files = [str(path) for root in self._allowance.roots for path in _case_files(root)]
         return CasesAnswer(built_in=titles, files=files[:MOST_FILES])
 
     def modes(
@@ -59,7 +59,7 @@ class Verbs:
 
         ``values`` sets parameters first, such as {"grid.X_L": 0.3}.
         """
-        found = self._asked("modes", case, scenario, values)
+        found = self._ask("modes", case, scenario, values)
         return ModesAnswer(
             case=found["case"],
             scenarios=[_scenario_modes(one) for one in found["scenarios"]],
@@ -71,8 +71,8 @@ class Verbs:
     ) -> RunSummaryAnswer:
         """Simulate a scenario in time, with its events, up to ``stop`` [s], and tell what the run ends in."""
         further = [] if stop is None else ["--stop", repr(float(stop))]
-        further += ["--no-csv", "--out", str(self._limits.results / "run")]
-        (found,) = self._asked("run", case, scenario, values, *further)
+        further += ["--no-csv", "--out", str(self._allowance.results / "run")]
+        (found,) = self._ask("run", case, scenario, values, *further)
         answer = found["answer"]
         return RunSummaryAnswer(
             scenario=found["name"],
@@ -95,15 +95,16 @@ class Verbs:
         further = ["--outages", _plain(outages, "outages")]
         if points is not None:
             further += ["--points", self._file(points)]
-        further += ["--out", str(self._limits.results / "screen")]
-        found = self._asked("screen", case, scenario, None, *further)
+        further += ["--out", str(self._allowance.results / "screen")]
+        found = self._ask("screen", case, scenario, None, *further)
         modes = sorted(found["modes"], key=lambda mode: mode["worst"]["damping_percent"])
+        failures = [f"{_place(one)}: {one['why']}" for one in found["failures"]]
         return ScreeningAnswer(
             scenario=found["scenario"],
             stable=found["stable"],
             computed=found["counts"].get("computed", 0),
             unstable=[_place(one) for one in found["unstable"]],
-            failures=[f"{_place(one)}: {one['why']}" for one in found["failures"]],
+            failures=failures,
             worst=[_screened(mode) for mode in modes[:MOST_ROWS]],
         )
 
@@ -115,7 +116,7 @@ class Verbs:
         words = ["fmu", "check", self._file(fmu), "--json"]
         if binding is not None:
             words += ["--binding", self._file(binding)]
-        found = ask(words, self._limits)
+        found = ask(words, self._allowance)
         rows = found["checks"]
         return CheckAnswer(
             fmu=Path(found["fmu"]).name,
@@ -130,7 +131,7 @@ class Verbs:
 
     def scr(self, case: str, scenario: str | None = None) -> StrengthsAnswer:
         """Compute the short-circuit power of every bus, and the SCR of converters; the weakest bus stands first."""
-        found = self._asked("scr", case, scenario, None)
+        found = self._ask("scr", case, scenario, None)
         (one, *_) = found["scenarios"]
         buses = sorted(one["buses"], key=lambda bus: bus["s_sc_mva"])
         return StrengthsAnswer(
@@ -141,7 +142,7 @@ class Verbs:
 
     def sensitivities(self, case: str, scenario: str) -> SensitivitiesAnswer:
         """Compute which parameters of the running FMUs move a scenario's critical mode, the strongest first."""
-        (found,) = self._asked("sensitivities", case, scenario, None)
+        (found,) = self._ask("sensitivities", case, scenario, None)
         rows = sorted(found["sensitivities"], key=_strength, reverse=True)
         return SensitivitiesAnswer(
             scenario=found["scenario"],
@@ -152,9 +153,9 @@ class Verbs:
 
     def explain(self, case: str, scenario: str, values: Values | None = None) -> ExplanationAnswer:
         """Explain a scenario's verdict: what decides, who takes part, and what to look at before it is believed."""
-        found = self._asked("modes", case, scenario, values)
+        found = self._ask("modes", case, scenario, values)
         (one,) = found["scenarios"]
-        because = [_told(mode) for mode in one["modes"][:3]]
+        because = [_sentence(mode) for mode in one["modes"][:3]]
         because += [*one["warnings"], *(f"question: {text}" for text in found["questions"])]
         stability = one["stability"]
         return ExplanationAnswer(
@@ -164,7 +165,7 @@ class Verbs:
             because=[text for text in [stability["reason"], *because] if text],
         )
 
-    def _asked(
+    def _ask(
         self, command: str, case: str, scenario: str | None, values: Values | None, *further: str
     ) -> Any:
         words = [command, self._case(case), "--json", *further]
@@ -173,7 +174,7 @@ class Verbs:
         for name, value in (values or {}).items():
             written = str(value).lower() if isinstance(value, bool) else str(value)
             words += ["--set", f"{_plain(name, 'values')}={written}"]
-        return ask(words, self._limits)
+        return ask(words, self._allowance)
 
     def _case(self, case: str) -> str:
         if case in built_in_cases():
@@ -188,11 +189,11 @@ class Verbs:
     def _file(self, name: str) -> str:
         """Return the path of a file in a given folder; a relative one starts in the first of them that has it."""
         given = Path(_plain(name, "file"))
-        for root in self._limits.roots:
+        for root in self._allowance.roots:
             path = (root / given).resolve()
-            if path.is_file() and is_within(path, self._limits.roots):
+            if path.is_file() and is_within(path, self._allowance.roots):
                 return str(path)
-        folders = ", ".join(str(root) for root in self._limits.roots)
+        folders = ", ".join(str(root) for root in self._allowance.roots)
         raise NoAnswerError(
             f"{name}: there is no such file in the folders that may be read: {folders}"
         )
@@ -294,7 +295,7 @@ def _strength(row: Mapping[str, Any]) -> float:
     return abs(float(row["damping_points_per_percent"] or 0.0))
 
 
-def _told(mode: Mapping[str, Any]) -> str:
+def _sentence(mode: Mapping[str, Any]) -> str:
     parts = list(_largest(mode["components"]).items())[:4]
     who = ", ".join(f"{name} {share:.0%}" for name, share in parts)
     return (
