@@ -140,6 +140,7 @@ OWN = {
     "studies.certification.case_file": "our own case",
     "studies.certification.study": "our own case",
     "studies.certification.verification": "is_file before it",
+    "face.agents.verbs": "our own cases",
     "face.cli.certificate": "results",
     "face.cli.design": "is_file before it",
     "face.cli.run_request": "results",

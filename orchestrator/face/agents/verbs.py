@@ -212,7 +212,7 @@ def _case_files(root: Path) -> Iterable[Path]:
     return sorted(
         path
         for path in root.glob("**/*.toml")
-        if path.is_file() and "[components" in _beginning(path)
+        if path.is_file() and is_within(path, [root]) and "[components" in _beginning(path)
     )
 
 
