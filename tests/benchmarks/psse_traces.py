@@ -99,7 +99,7 @@ UNREACHED = {
     "MultiGen": "several machines and converters: `gfor new` and `gfor run`",
     "PSS2A, PSS2B, PSS2C": "no DYR record of the stabiliser",
     "RENA": "converters: REGCA1 and REECB1",
-    "STAB1": "a machine at a transformer of its own network: `gfor new` and `gfor run`",
+    "STAB1": "a step of the reference: tests.models.test_psse_traces",
     "Test01": "GENCLS: only its decay is comparable, by PSS/E's step (tests.models.test_psse_traces)",
 }
 

@@ -33,10 +33,14 @@ OF_POWER = "1 GENROU 1 7.0 0.03 0.4 0.05 4.0 0 2.2 2.2 0.3 0.3 0.3 0.2 0 0 /\n1 
 DUAL = "1 0 3 0 5 1 1.5 1.5 0 1.5 0 1.5 0.1875 1.0 0.5 0.1 2.0 0.59451 0.0447 0.59451 0.0447"
 INPUTS = "0.00035 -0.00055 0.915 0.895"
 REFERENCE = 1.04691  # that the voltage's reference becomes [pu]
-TWO_BUSES = Network(
-    {1: np.exp(1j * np.radians(25.085)), 2: 0.95512 + 0j}, ((1, 2, 0.45j),), infinite=2, machine=1
+OF_SPEED = (
+    "1 GENROU 1 7 999 0.4 999 4 0 2.2 2.2 0.3 0.3 0.3 0.2 0 0 /\n1 SEXS 1 1 1 130 0.4 -10 10 /\n"
 )
-"""The buses of PowerSimulationsDynamics.jl's OMIB.raw of PSS2A, PSS2B and PSS2C."""
+_OF_90_MW = np.arcsin(0.9 * 0.45 / 0.95512)  # angle of the power flow, which the files round [rad]
+TWO_BUSES = Network(
+    {1: np.exp(1j * _OF_90_MW), 2: 0.95512 + 0j}, ((1, 2, 0.45j),), infinite=2, machine=1
+)
+"""The buses of PowerSimulationsDynamics.jl's OMIB.raw and OMIB_SSS.raw of STAB1, PSS2A, PSS2B and PSS2C."""
 
 
 def delta(device, buses):
@@ -103,6 +107,7 @@ RECORDED = {
         four=True,
     ),
     "exst1": Recorded(HYDRO + "2 EXST1 1 0.01 5 -5 10 20 200 0.1 6 0 0 0 0.1 /", four=True),
+    "stab1": Recorded(f"{OF_SPEED}1 STAB1 1 6 1.5 13.3 0.0447 13.3 0.0447 0.2 /", reference=1.0472),
     "pss2a": Recorded(f"{OF_POWER}1 PSS2A 1 {DUAL} 0.1 -0.1 /", reference=REFERENCE),
     "pss2b": Recorded(f"{OF_POWER}1 PSS2B 1 {DUAL} 0 0 {INPUTS} 0.1 -0.1 /", reference=REFERENCE),
     "pss2c": Recorded(
