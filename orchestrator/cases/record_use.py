@@ -50,5 +50,17 @@ def details(records: Sequence[RecordUse]) -> list[str]:
     ]
 
 
+def in_full(records: Sequence[RecordUse]) -> list[str]:
+    """Return the details under their heading, or a line that tells why there are none."""
+    lines = details(records)
+    if lines:
+        return ["Records that are not used as they stand:", *lines]
+    return [
+        "Every record of the files is used as it stands."
+        if records
+        else "gfor lists no records of files of this format."
+    ]
+
+
 def as_json(records: Sequence[RecordUse]) -> list[dict[str, Any]]:
     return [asdict(record) for record in records]

@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from orchestrator.cases.new_case import WantedCase, read_converter, sources_of, write_case
 from orchestrator.cases.psse.known_records import known_records
-from orchestrator.cases.record_use import as_json, details
+from orchestrator.cases.record_use import as_json, in_full
 from orchestrator.core.errors import InputError, ResultsError
 from orchestrator.core.safe_files import write_text
 from orchestrator.devices.fmi.vendor_files import is_vendor_file
@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
     names = ", ".join(prepared.name for prepared in made.scenarios)
     lines = [f"{wanted.out}: scenarios {names}. Assumed:", *(f"- {line}" for line in made.assumed)]
     if options.details:
-        lines += ["Records that are not used as they stand:", *details(made.records)]
+        lines += in_full(made.records)
     print_parts(console, map(escape, lines))
     for prepared in made.scenarios:
         if prepared.name in ("base", "converter"):

@@ -137,8 +137,11 @@ class ParameterLimit:
             return [f"{holding} over the whole range, {self.key} from {start} to {stop}{worst}"]
         what = self.until.failing if self.kind is Ending.FAILS else str(self.kind)
         if self.holds_at is None:
-            return [f"{what} already at the start, {self.key} = {at}{self._again('at')}{mode}{why}"]
-        up_to = f"{holding} up to {self.key} = {self._value(self.holds_at)}{self._dip()}"
+            at_start = f"{what} already at the start, {self.key} = {at}{self._later()}"
+            return [f"{at_start}{mode}{why}{self._nowhere()}"]
+        falls = self.tried[-1]["value"] < self.tried[0]["value"]
+        direction = "down to" if falls else "up to"
+        up_to = f"{holding} {direction} {self.key} = {self._value(self.holds_at)}{self._dip()}"
         if self.kind is Ending.FAILS:
             return [f"{up_to}, {what} at {at}{self._again()}{mode}"]
         no_limit = "which is no limit of stability"
@@ -159,13 +162,29 @@ class ParameterLimit:
             return ""
         return f" (on the way {least['damping_percent']:.2f} % at {self._value(least['value'])})"
 
-    def _again(self, how: str = "again at") -> str:
-        shown = few(map(self._value, self.again), 2)
-        return (
-            f" ({self.until.holding} {how} {shown}: the range is not of one piece)"
-            if self.again
-            else ""
-        )
+    def _again(self) -> str:
+        return self._in_pieces(f"again at {self._places_again}") if self.again else ""
+
+    def _later(self) -> str:
+        """Where a range that does not hold at its start holds."""
+        if not self.again:
+            return ""
+        values = [x["value"] for x in self.tried]
+        first = values.index(self.again[0])
+        between = " and ".join(self._value(values[k]) for k in (first - 1, first))
+        return self._in_pieces(f"at {self._places_again}, first reached between {between}")
+
+    def _in_pieces(self, where: str) -> str:
+        return f" ({self.until.holding} {where}: the range is not of one piece)"
+
+    @property
+    def _places_again(self) -> str:
+        return few(map(self._value, self.again), 2)
+
+    def _nowhere(self) -> str:
+        """Tell that no value of the grid holds, if all of them are known to fail."""
+        fails = all(x["kind"] == str(Ending.FAILS) for x in self.tried)
+        return f"; and nowhere in the range {self.until.holding}" if fails else ""
 
     @property
     def remarks(self) -> list[str]:

@@ -78,6 +78,34 @@ def test_damping_that_is_least_on_the_way_is_told():
     assert "on the way" not in limit(3.98, 3.06, 2.9)
 
 
+def limit_along(values, kinds, holds_at, beyond):
+    """The sentence for a grid of values that come to these kinds, with a damping of 11 % asked for."""
+    tried = tuple(
+        {"value": x, "kind": str(kind), "damping_percent": 10.0}
+        for x, kind in zip(values, kinds, strict=True)
+    )
+    held = [x for x, kind in zip(values, kinds, strict=True) if kind is H and x != values[0]]
+    again = tuple(held) if holds_at is None else ()
+    found = ParameterLimit(
+        "K", "", "s", "S", Until(11), F, holds_at, beyond, None, "", tried, again, "", beyond
+    )
+    return found.sentence
+
+
+def test_a_range_is_told_in_the_direction_in_which_it_runs():
+    kinds = [H, H, F]
+    assert "11 % or more down to K = 81, " in limit_along([400, 200, 0], kinds, 81.0, 80.0)
+    assert "11 % or more up to K = 320, " in limit_along([0, 200, 400], kinds, 320.0, 321.0)
+
+
+def test_a_range_that_fails_from_its_start_tells_where_it_holds():
+    nowhere = limit_along([0, 100, 200], [F, F, F], None, 0.0)
+    assert nowhere.endswith("at the start, K = 0; and nowhere in the range damped by 11 % or more")
+    later = limit_along([0, 100, 200], [F, F, H], None, 0.0)
+    assert "damped by 11 % or more at 200, first reached between 100 and 200: the r" in later
+    assert "nowhere" not in limit_along([0, 100], [F, U], None, 0.0)
+
+
 # -- coupled FMUs --------------------------------------------------------------------------------------
 
 
@@ -216,7 +244,7 @@ def test_on_the_terminal_the_answer_comes_first(gfor, loop):
     )
     assert code == 1
     first = text.splitlines()[0]
-    assert first.startswith("Loop: stable up to k.gain = -")
+    assert first.startswith("Loop: stable down to k.gain = -")
     assert "'swing', 1.5" in first
 
 
