@@ -6,11 +6,13 @@ from dataclasses import replace
 from fmus.grid.network import Network, Port
 from fmus.toolchain.catalogue import model_names, needs_arguments, network_of
 from orchestrator.cases.draft import Draft
+from orchestrator.cases.element_names import ElementNames, names_without_units
 from orchestrator.cases.names import close_names
 from orchestrator.cases.network_data import network_data
 from orchestrator.cases.schema import (
     BusFaultTable,
     ComponentTable,
+    EventTable,
     ShuntReconnectionTable,
     ShuntTripTable,
 )
@@ -39,11 +41,36 @@ def read_network(draft: Draft) -> None:
     try:
         flow = draft.given.case.power_flow
         draft.data = network_data(table, draft.given.directory, flow.slack if flow else None)
+        _name_in_events(draft, names_without_units(draft.data))
         draft.found.questions += draft.data.changes
         draft.found.records += draft.data.records
     except InputError as error:
         where = draft.given.place("network", source) if source else draft.given.place("network")
         draft.note_network(where, str(error))
+
+
+def _name_in_events(draft: Draft, names: ElementNames) -> None:
+    """Let events name buses and lines as the network's file does."""
+    if not names.meant or draft.data is None:
+        return
+    buses = draft.data.buses
+    lines = [*(x.name for x in draft.data.lines), *(x.name for x in draft.data.transformers)]
+
+    def identified(table: EventTable) -> EventTable:
+        known = {"bus": buses, "line": lines, "cleared_by": lines}
+        given = {key: getattr(table, key, None) for key in known}
+        meant = {
+            key: names.identifier(value, known[key], table.place or key)
+            for key, value in given.items()
+            if isinstance(value, str)
+        }
+        return table.model_copy(update={k: v for k, v in meant.items() if v != given[k]})
+
+    given = draft.given
+    given.case = given.case.model_copy(update={"events": [*map(identified, given.case.events)]})
+    if given.scenario.events is not None:
+        events = [*map(identified, given.scenario.events)]
+        given.scenario = given.scenario.model_copy(update={"events": events})
 
 
 def check_network_is_used(draft: Draft, everything: Tables) -> None:

@@ -25,7 +25,7 @@ _FORMS = {
         BusFaultTable,
         "bus_fault",
         re.compile(
-            r"(bus )?(?P<bus>[^\s,]+)\s*,\s*(?P<duration>[^\s,]+\s*[mu]?s)(\s*,\s*opens\s+(?P<cleared_by>[^\s,]+))?"
+            r"(bus )?(?P<bus>[^,]+?)\s*,\s*(?P<duration>[^\s,]+\s*[mu]?s)(\s*,\s*opens\s+(?P<cleared_by>[^,]+?))?"
             r"(\s*,?\s*from\s+(?P<time>\S+\s*[mu]?s))?"
         ),
         "'BUS, DURATION', such as 'bus_9, 150 ms'; the line that clears it ('opens line_7_9')",
@@ -66,7 +66,7 @@ def event_of(option: str, text: str) -> ForcingTable | BusFaultTable:
     given = {key: word for key, word in parts.groupdict().items() if word is not None}
     try:
         time = to_unit(given.pop("time", _BEGIN), "s")
-        given |= {"bus": bus_name(given["bus"])} if "bus" in given else {}
+        given |= {"bus": bus_name(given["bus"])} if " " not in given.get("bus", " ") else {}
         table: ForcingTable | BusFaultTable = kind(type=name, time=time, **given)
         return table.asked_as(f"--{option} {text!r}")
     except ValueError as error:  # pydantic's and ours

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from fmus.toolchain.cache import CacheError, cache_directory, intact, keep
 from fmus.toolchain.extras import installed_version
 from orchestrator.cases.bus_loads import LoadSum
+from orchestrator.cases.element_names import BranchName
 from orchestrator.core.arrays import Matrix
 
 
@@ -40,6 +41,7 @@ class SourceTables:
     titles: dict[int, str] = field(default_factory=dict)  # number of a bus → its name in the file
     # number of a bus whose loads have both signs → those below zero, which the bus' row and its parts hold as well
     feeding: dict[int, LoadSum] = field(default_factory=dict)
+    branch_names: tuple[BranchName, ...] = ()  # one for each branch, where the file names them
 
 
 LIBRARIES = ("pandapower", "numpy", "scipy", "pandas", "lightsim2grid")
@@ -83,7 +85,9 @@ def _as_json(tables: SourceTables) -> dict[str, Any]:
     """Every number as the shortest text that gives it back to the last bit."""
     arrays = {name: getattr(tables, name) for name in ("bus", "branch", "gen")}
     arrays |= {"real": tables.branch_to_earth.real, "imag": tables.branch_to_earth.imag}
-    return {
+    names = [[one.name, one.circuit] for one in tables.branch_names]
+    given = {"titles": list(tables.titles.items()), "branch_names": names}
+    return {key: value for key, value in given.items() if value} | {
         "name": tables.name,
         "base_mva": tables.base_mva,
         "labels": list(tables.labels.items()),
@@ -109,4 +113,6 @@ def _from_json(kept: Mapping[str, Any]) -> SourceTables:
         to_earth,
         labels,
         kept["frequency"],
+        titles={int(number): str(title) for number, title in kept.get("titles", ())},
+        branch_names=tuple(BranchName(*names) for names in kept.get("branch_names", ())),
     )

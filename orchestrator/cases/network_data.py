@@ -20,6 +20,7 @@ from orchestrator.cases.csv_rows import (
     rows_of,
     seen_from_here,
 )
+from orchestrator.cases.element_names import BranchName
 from orchestrator.cases.flow_balance import inner_buses
 from orchestrator.cases.imported_flow import imported_equations
 from orchestrator.cases.load_models import FlowLaws, device_laws, flow_laws, with_laws
@@ -85,6 +86,7 @@ class NetworkData:
     # ratings and bands of a RAW or MATPOWER file; those of other sources are not meant
     limits: FileLimits = field(default_factory=FileLimits)
     titles: Mapping[str, str] = field(default_factory=dict)  # names in the source's file, by bus
+    branch_names: Mapping[str, BranchName] = field(default_factory=dict)  # as the source has them
     # file_loads: loads one by one, where the source is of PSS/E; recorded_loads: names of those whose laws are of
     # records of dynamics data
     file_loads: tuple[FileLoad, ...] = ()
@@ -155,6 +157,7 @@ def network_data(table: NetworkTable, directory: Path, slack: str | None = None)
         limits=source.limits if table.raw or table.matpower else FileLimits(),
         records=found.records,
         titles=source.titles,
+        branch_names=source.branch_names,
         device_loads=tuple(x.name for x in found.device_loads),
         file_loads=found.file_loads,
     )

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from fmus.grid.network import SMALLEST_REACTANCE, Line, Load, Shunt, ThreeWinding
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.branch_limits import FileLimits, Rating
+from orchestrator.cases.element_names import BranchName
 from orchestrator.cases.network_sources import SourceTables
 from orchestrator.core.arrays import Matrix
 
@@ -65,6 +66,7 @@ class ImportedNetwork:
     capacitors: dict[str, float] = field(default_factory=dict)
     limits: FileLimits = field(default_factory=FileLimits)  # by branch and by bus
     titles: dict[str, str] = field(default_factory=dict)  # names in the file, by bus
+    branch_names: dict[str, BranchName] = field(default_factory=dict)  # as the file has them
 
 
 def import_network(
@@ -76,7 +78,7 @@ def import_network(
     ``needed``: numbers of buses at which something else stands, which stay."""
     rows = {int(row[0]): row for row in source.bus if int(row[1]) != _OUT}
     labels = {number: source.labels[number] for number in rows}
-    lines, to_earth, ratings = _lines(source, labels)
+    lines, to_earth, ratings, names = _lines(source, labels)
     at_bus = _generators(source, labels)
     loads = _loads(source, rows, at_bus if joined else {})
     earthed = {n for n, y in to_earth.items() if abs(y) > _NEGLIGIBLE} | {
@@ -86,9 +88,10 @@ def import_network(
     lines, merged = without_negative_reactances(lines, kept)
     legs = _ratings_of_legs(lines, ratings)
     lines, transformers, stars = without_star_points(lines, kept)
+    names |= _names_of_stars(transformers, names)
     for transformer in transformers:
-        names = [f"{transformer.name}.leg_{k + 1}" for k in range(3)]
-        ratings |= {name: legs[name] for name in names if name in legs}
+        windings = [f"{transformer.name}.leg_{k + 1}" for k in range(3)]
+        ratings |= {name: legs[name] for name in windings if name in legs}
     merged |= stars
     for number, row in rows.items():
         to_earth[number] = to_earth.get(number, 0j) + complex(row[4], row[5]) / source.base_mva
@@ -112,6 +115,7 @@ def import_network(
         {bus_of(labels[n]): float(row[5]) for n, row in rows.items() if row[5] > _NEGLIGIBLE},
         FileLimits(ratings, _bands(rows, labels)),
         {bus_of(labels[n]): title for n, title in source.titles.items() if title and n in labels},
+        names,
     )
 
 
@@ -144,18 +148,20 @@ def _ratings_of_legs(lines: list[Line], ratings: Mapping[str, Rating]) -> dict[s
 
 def _lines(
     source: SourceTables, labels: dict[int, str]
-) -> tuple[list[Line], dict[int, complex], dict[str, Rating]]:
+) -> tuple[list[Line], dict[int, complex], dict[str, Rating], dict[str, BranchName]]:
     """Branches, for each bus the part of their admittance to earth that our π section cannot hold [pu of the
-    source], and the ratings that the source has.
+    source], and the ratings and names that the source has.
 
     A π section has one capacitance for both ends; a conductance, a difference between the ends and an inductive
     part (magnetisation) go to the buses."""
     lines: list[Line] = []
     to_earth: dict[int, complex] = {}
     ratings: dict[str, Rating] = {}
+    names: dict[str, BranchName] = {}
+    called = source.branch_names or [BranchName() for _ in source.branch]
     seen: Counter[str] = Counter()
     scale = SYSTEM_BASE_MVA / source.base_mva
-    for row, (y_from, y_to) in zip(source.branch, source.branch_to_earth, strict=True):
+    for row, (y_from, y_to), own in zip(source.branch, source.branch_to_earth, called, strict=True):
         start, end = int(row[0]), int(row[1])
         if row[10] == 0 or start not in labels or end not in labels:
             continue
@@ -166,6 +172,7 @@ def _lines(
         for bus, rest in ((start, (y_from - 0.5j * b) / tap**2), (end, y_to - 0.5j * b)):
             to_earth[bus] = to_earth.get(bus, 0j) + complex(rest)
         name = name if seen[name] == 1 else f"{name}_{seen[name]}"
+        names[name] = own
         if 0 < row[_RATE_A] < math.inf:
             ratings[name] = Rating(float(row[_RATE_A]), by_current=row[8] == 0)
         lines.append(
@@ -180,7 +187,36 @@ def _lines(
                 shift=math.radians(float(row[9])),
             )
         )
-    return lines, to_earth, ratings
+    return lines, to_earth, ratings, _circuits_of_parallel(lines, names)
+
+
+def _circuits_of_parallel(
+    lines: list[Line], names: Mapping[str, BranchName]
+) -> dict[str, BranchName]:
+    """Names of branches; the circuit only if another branch joins the same buses, as it tells them apart."""
+    joining = Counter(frozenset((line.from_bus, line.to_bus)) for line in lines)
+    found = {}
+    for line in lines:
+        own = names[line.name]
+        is_parallel = joining[frozenset((line.from_bus, line.to_bus))] > 1
+        kept = BranchName(own.name, own.circuit if is_parallel else "")
+        if kept != BranchName():
+            found[line.name] = kept
+    return found
+
+
+def _names_of_stars(
+    transformers: list[ThreeWinding], names: Mapping[str, BranchName]
+) -> dict[str, BranchName]:
+    """Names of the transformers that stand in the place of three branches, which are those of its windings."""
+    found = {}
+    for transformer in transformers:
+        star = transformer.name.removeprefix("transformer_")
+        for bus in transformer.buses:
+            own = names.get(f"line_{bus.removeprefix('bus_')}_{star}", BranchName())
+            if own.name:
+                found[transformer.name] = BranchName(own.name)
+    return found
 
 
 def _generators(source: SourceTables, labels: dict[int, str]) -> dict[int, list[_Member]]:

@@ -22,6 +22,7 @@ from orchestrator.cases.catalogue_fmus import PlannedFmu, build_fmu, plan_fmu
 from orchestrator.cases.contradictions import doubts
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.draft import Draft, DraftInput
+from orchestrator.cases.element_names import ElementNames, names_of
 from orchestrator.cases.event_tables import scenario_events
 from orchestrator.cases.idle_values import Idle, idle_values
 from orchestrator.cases.imperfection_tables import disturb_connections
@@ -93,6 +94,7 @@ class PreparedScenario:
     source_slack: str | None = None  # reference bus of the network's source
     file_limits: FileLimits = field(default_factory=FileLimits)  # of the network's source
     titles: Mapping[str, str] = field(default_factory=dict)  # names in the network's file, by bus
+    names: ElementNames = field(default_factory=ElementNames)  # of the network's file, for people
     recorded_loads: frozenset[str] = frozenset()  # loads whose laws are of records of dynamics data
     # likely ratings [MVA] of units whose S_n is only the base of their data
     base_ratings: Mapping[str, float] = field(default_factory=dict)
@@ -297,6 +299,9 @@ class Preparer:
             source_slack=draft.data.slack if draft.data else None,
             file_limits=draft.data.limits if draft.data else FileLimits(),
             titles=draft.data.titles if draft.data else {},
+            names=names_of(draft.network, draft.data)
+            if draft.data and draft.network
+            else ElementNames(),
             recorded_loads=draft.data.recorded_loads if draft.data else frozenset(),
             base_ratings=draft.base_ratings,
             following_loads=tuple(draft.data.flow_laws) if draft.data else (),

@@ -11,6 +11,7 @@ import numpy as np
 from fmus.grid.element_data import SMALLEST_REACTANCE
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.bus_loads import BusLoads
+from orchestrator.cases.element_names import BranchName
 from orchestrator.cases.network_sources import SourceTables
 from orchestrator.cases.psse.device_records import (
     FoundDevices,
@@ -144,6 +145,7 @@ class _Reading:
         self._magnitudes: dict[int, float] = {}
         self._branches: list[list[float]] = []
         self._to_earth: list[tuple[complex, complex]] = []
+        self._names: list[BranchName] = []
         self._labels: dict[int, str] = {}
         self._titles: dict[int, str] = {}
         # line of the record, X, and kV of each branch
@@ -200,6 +202,7 @@ class _Reading:
             {bus: x.drawing.parts for bus, x in at_buses.items() if any(x.drawing.parts)},
             self._titles,
             {bus: x.feeding for bus, x in at_buses.items() if x.feeding.power},
+            tuple(self._names),
         )
         records = record_uses(self._raw, self._merged, leaving_out, self._devices.unused)
         return RawNetwork(
@@ -399,7 +402,10 @@ class _Reading:
             # a name stands before the ratings from revision 34 on
             column = 6 if self._raw.revision < SWITCHING_DEVICES else 7
             rating = record.number(column, "RATEA [MVA]", 0.0)
-            self._branch(start, end, z, state, to_earth, rating=rating)
+            name = BranchName(
+                record.text(6, "").strip() if column == 7 else "", record.text(2, "1").strip()
+            )
+            self._branch(start, end, z, state, to_earth, rating=rating, name=name)
         for record in self._raw.of("system switching device"):
             if not self._in_service(record, 16, "STAT"):
                 continue
@@ -431,6 +437,7 @@ class _Reading:
         tap: float = 0.0,
         shift: float = 0.0,
         rating: float = 0.0,
+        name: BranchName = BranchName(),  # noqa: B008 - frozen
     ) -> None:
         if abs(z.imag) < self._least:
             text = f"reactance of almost 0: taken as {self._least:.2g} pu, the least that the network can have"
@@ -443,6 +450,7 @@ class _Reading:
             [start, end, z.real, z.imag, 0.0, rating, 0.0, 0.0, tap, shift, float(state != 0)]
         )
         self._to_earth.append(to_earth)
+        self._names.append(name)
 
     def _within_bus(
         self, bus: int, z: complex, to_earth: tuple[complex, complex], tap: float, shift: float
@@ -460,7 +468,7 @@ class _Reading:
             self._transformer(replace(t, windings=moved))
 
     def _transformer(self, t: Transformer) -> None:
-        windings = t.windings
+        windings, name = t.windings, BranchName(t.name, t.circuit.strip())
         if t.controlled:
             self._changes.note(
                 t.record.line, "tap changer or phase-shift control: held at its position"
@@ -491,6 +499,7 @@ class _Reading:
                 tap=first.ratio / second.ratio,
                 shift=first.shift - second.shift,
                 rating=first.rating_mva,
+                name=name,
             )
             return
         inner = max(self._rows) + 1
@@ -498,6 +507,7 @@ class _Reading:
         self._labels[inner] = "_".join(
             map(str, (*(w.bus for w in windings), t.circuit.strip() or "1", "star"))
         )
+        self._titles[inner] = f"{t.name} star" if t.name else ""
         for k, (winding, z) in enumerate(zip(windings, star(t.impedances), strict=True)):
             self._branch(
                 winding.bus,
@@ -507,6 +517,7 @@ class _Reading:
                 tap=winding.ratio,
                 shift=winding.shift,
                 rating=winding.rating_mva,
+                name=name,
             )
 
     def _read_devices(self, leaving_out: Sequence[str]) -> None:

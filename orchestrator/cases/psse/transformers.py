@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from orchestrator.cases.psse.records import SWITCHING_DEVICES, RawFile, Record
 
+_NAME = 10  # column of NAME in the first line
 _LOSSES = 3  # CZ by which R is a load loss [W]
 _CONTROL = {33: 6}
 _TABLE = {33: 13, 34: 22}
@@ -45,6 +46,7 @@ class Transformer:
     small_loss: bool = False
     # whether a resistance is so large that a load loss in W may be meant
     large_resistance: bool = False
+    name: str = ""  # NAME, which is 40 characters at most
 
 
 def transformers(raw: RawFile, voltages: Mapping[int, float]) -> Iterator[Transformer]:
@@ -102,6 +104,7 @@ def _transformer(
         any(line.whole(table, "TAB", 0) for line in windings_lines),
         codes["CZ"] == _LOSSES and _has_tiny_losses(rest[0], len(pairs)),
         codes["CZ"] != _LOSSES and _has_large_resistance(impedances),
+        first.text(_NAME, "").strip(),
     )
 
 

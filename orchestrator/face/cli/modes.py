@@ -111,7 +111,7 @@ def _compute(
     if options.json:
         terminal.print_json(modes_json(results, weights, said))
         return exit_code(options, [r.stability for r in results])
-    console = terminal.make_console()
+    console = terminal.make_console(names=results[0].prepared.names if results else None)
     print_answers(console, [of_modes(r) for r in results], results, said)
     terminal.print_warnings(results)
     terminal.say("question", weights)

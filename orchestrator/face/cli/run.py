@@ -113,7 +113,8 @@ def _run_all(
         require_results(folder / scenario.name)
     if options.resume is None:
         _say_unfinished(folder)
-    console = terminal.make_console(stderr=options.json)
+    names = scenarios[0].prepared.names
+    console = terminal.make_console(stderr=options.json, names=names)
     kept = checkpoints.StudyCheckpoints(
         [scenario.prepared for scenario in scenarios], folder, options
     )

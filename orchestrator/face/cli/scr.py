@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    convention, console = CONVENTION.format(options.converter_current), make_console()
+    convention = CONVENTION.format(options.converter_current)
     found = {
         s: weakest_first(s.strengths(options.converter_current, options.rating))
         for s in chosen(options)
@@ -43,6 +43,8 @@ def run(options: argparse.Namespace) -> int:
     for scenario, buses in found.items():
         with_titles = [_with_title(scenario.prepared.titles, bus) for bus in buses]
         alike.setdefault(json.dumps(with_titles), []).append(scenario.title)
+    names = next(iter(found)).prepared.names
+    console = make_console(names=names)
     for rows, titles in alike.items():
         table = make_table(
             ", ".join(titles), "Bus", "S_sc [MVA]", "SCR", "of [MVA]", "X/R", "Converters"
@@ -55,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
                 (x["x_r"], ".1f"),
             )
             figures = ["–" if value is None else f"{value:{form}}" for value, form in numbers]
-            table.add_row(f"{x['bus']} {x['title']}".strip(), *figures, ", ".join(x["converters"]))
+            table.add_row(x["bus"], *figures, ", ".join(x["converters"]))
         console.print(table, "")
     console.print(escape(f"Convention: {convention}."), soft_wrap=True, highlight=False)
     return 0

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from rich.console import Console, RenderableType
 from rich.markup import escape
 
+from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.core.safe_files import made_folder
 from orchestrator.face.api.progress import shown_progress
 from orchestrator.face.cli import arguments
@@ -109,9 +110,10 @@ def add_study_arguments(
 def run_study(name: str, study: AnyStudy | Simple, options: argparse.Namespace) -> int:
     if isinstance(study, StudyAtOnce):
         return _run_at_once(name, study, options)
-    with working_in(options, name, study) as (_, compute, folder):
+    with working_in(options, name, study) as (planned, compute, folder):
         found = compute()
-        return shown(options, study, found, folder, found.save(folder))
+        written, prepared = found.save(folder), study.prepared(planned)
+        return shown(options, study, found, folder, written, prepared=prepared)
 
 
 def _run_at_once(name: str, study: Simple, options: argparse.Namespace) -> int:
@@ -123,7 +125,8 @@ def _run_at_once(name: str, study: Simple, options: argparse.Namespace) -> int:
     written = found.save(folder) if folder else []
     end = f"Written: {', '.join(map(str, written))}" if written else ""
     say("warning", study.warnings(found))
-    present(options, found.as_json, study.parts(found), study.remarks(found), end)
+    prepared = study.prepared(found)
+    present(options, found.as_json, study.parts(found), study.remarks(found), end, prepared)
     return study.code(found, False)
 
 
@@ -167,6 +170,8 @@ def shown(
     folder: Path,
     written: Sequence[Path],
     end: str = "",
+    *,
+    prepared: Sequence[PreparedScenario] = (),
 ) -> int:
     """Print what was found, by default with a line on its files at the end; returns the exit code."""
     result = found.result
@@ -175,7 +180,7 @@ def shown(
         files = ", ".join(path.name for path in written)
         end = f"{result.computed} {study.counted} computed{stored}. Results in {folder}: {files}"
     say("warning", study.warnings(found))
-    present(options, found.as_json, study.parts(found), study.remarks(found), end)
+    present(options, found.as_json, study.parts(found), study.remarks(found), end, prepared)
     return study.code(found, options.fail_unstable)
 
 
@@ -185,9 +190,13 @@ def present(
     parts: Iterable[RenderableType],
     remarks: Iterable[str] = (),
     end: str = "",
+    prepared: Sequence[PreparedScenario] = (),
 ) -> None:
-    """Print a study: JSON, or its parts and then its last line; remarks on standard error in either case."""
-    console = make_console(stderr=options.json)
+    """Print a study: JSON, or its parts and then its last line; remarks on standard error in either case.
+
+    ``prepared``: its scenarios, whose names of buses and branches are shown."""
+    names = prepared[0].names if prepared else None
+    console = make_console(stderr=options.json, names=names)
     if options.json:
         print_json(as_json())
     else:

@@ -6,6 +6,7 @@ import json
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
@@ -17,11 +18,14 @@ from orchestrator.core.errors import Problem
 from orchestrator.core.safe_files import made_folder
 from orchestrator.face.cli.known_questions import new_questions
 from orchestrator.output.report.linearised import exceptions_in_words
+from orchestrator.output.report.table import ColumnTable
+from orchestrator.output.report.tables import PlainTable
 from orchestrator.output.results.manifest import ResultsWarning
 from orchestrator.output.results.staging import new_run_id, staged
 from orchestrator.output.results.storage import save_json
 
 if TYPE_CHECKING:
+    from orchestrator.cases.element_names import ElementNames
     from orchestrator.cases.prepare import PreparedScenario
     from orchestrator.studies.modes.modes import ModesResult
     from orchestrator.studies.runs.run import RunResult
@@ -29,10 +33,31 @@ if TYPE_CHECKING:
 _FEW = 2  # known questions from which one line stands for them
 
 
-def make_console(*, stderr: bool = False) -> Console:
-    """A terminal's own width; elsewhere one that lets no table wrap."""
-    console = Console(stderr=stderr)
-    return console if console.is_terminal else Console(stderr=stderr, width=160)
+class NamingConsole(Console):
+    """A console that shows the names of the network's file beside identifiers, in sentences and in tables."""
+
+    def __init__(self, names: ElementNames, **options: Any) -> None:
+        super().__init__(**options)
+        self._names = names
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print sentences and tables, each with the names."""
+        super().print(*(self._with_names(one) for one in objects), **options)
+
+    def _with_names(self, one: Any) -> Any:
+        if isinstance(one, str):
+            return self._names.in_text(one, escape)
+        shown = one.__rich__() if isinstance(one, ColumnTable) else one
+        return shown.with_texts(self._names.in_text) if isinstance(shown, PlainTable) else shown
+
+
+def make_console(*, stderr: bool = False, names: ElementNames | None = None) -> Console:
+    """A terminal's own width; elsewhere one that lets no table wrap.
+
+    ``names``: of the network's file, which are then shown."""
+    make = partial(NamingConsole, names) if names is not None and names.shown else Console
+    console = make(stderr=stderr)
+    return console if console.is_terminal else make(stderr=stderr, width=160)
 
 
 def make_errors() -> Console:

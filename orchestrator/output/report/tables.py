@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich.markup import escape
@@ -57,6 +58,23 @@ class PlainTable(Table):
         super().add_row(
             *(Text(cell) if isinstance(cell, str) else cell for cell in cells), **options
         )
+
+    def with_texts(self, write: Callable[[str], str]) -> PlainTable:
+        """Return the table with every cell and caption written otherwise, as with the names of a network's file."""
+        found = copy(self)
+        found.columns = [replace(column, _cells=[]) for column in self.columns]
+        for column, other in zip(self.columns, found.columns, strict=True):
+            cells = [_written(cell, write) for cell in column.cells]
+            other._cells.extend(cells)
+        if isinstance(self.caption, str):
+            found.caption = write(self.caption)
+        return found
+
+
+def _written(cell: Any, write: Callable[[str], str]) -> Any:
+    return (
+        Text(write(cell.plain), cell.style) if isinstance(cell, Text) and not cell.spans else cell
+    )
 
 
 def make_table(

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from orchestrator.cases.build_choices import STAND_IN
+from orchestrator.cases.element_names import ElementNames
 from orchestrator.cases.names import SERVICE, STATES, close_names
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
@@ -34,6 +35,7 @@ class Elements:
     balancing: tuple[str, ...] = ()  # units at the slack bus that feed what is left
     # branch whose loss is that of a unit alone → the unit
     step_ups: Mapping[str, str] = field(default_factory=dict)
+    file: ElementNames = field(default_factory=ElementNames)  # names in the network's file
 
     @classmethod
     def of(cls, prepared: PreparedScenario) -> "Elements":
@@ -56,6 +58,7 @@ class Elements:
             units.get(wanted, wanted),
             prepared.power_flow.balancing if prepared.power_flow else (),
             _step_ups(prepared, units),
+            prepared.names,
         )
 
     @property

@@ -34,13 +34,21 @@ def read_outages(text: str | None, elements: Elements) -> list[Outage]:
 
     ``text``: ``n-1`` (each line, transformer and unit; a unit with its own transformer is one outage), ``lines``,
     ``units``, or names with commas between them; None for none. ``line_1_2+sg3`` loses two elements together, and so
-    does ``sg3 (line_6_1)``, as a unit with its own transformer is called."""
+    does ``sg3 (line_6_1)``, as a unit with its own transformer is called.
+    Names in the network's file mean their elements."""
     names: list[str] = []
     for part in (part.strip() for part in (text or "").split(",") if part.strip()):
-        names += _of_kind(part.lower(), elements) if part.lower() in _KINDS else [part]
+        names += (
+            _of_kind(part.lower(), elements)
+            if part.lower() in _KINDS
+            else [elements.file.identifier(part, elements.names, "--outages")]
+        )
     found = [Outage(INTACT)]
     for name in names:
-        lost = tuple(one.strip() for one in _WITH_TRANSFORMER.sub(r"\1+\2", name).split("+"))
+        parts = _WITH_TRANSFORMER.sub(r"\1+\2", name).split("+")
+        lost = tuple(
+            elements.file.identifier(one.strip(), elements.names, "--outages") for one in parts
+        )
         for one in lost:
             if one not in elements.names:
                 hint = close_names(

@@ -22,7 +22,10 @@ def candidates(wanted: Sequence[str], prepared: PreparedScenario) -> list[str]:
     Raises `InputError` if a pattern names no bus."""
     known = list(prepared.network.buses) if prepared.network is not None else []
     found = {
-        name: fnmatch.filter(known, name) or fnmatch.filter(known, f"bus_{name}") for name in wanted
+        name: fnmatch.filter(known, name)
+        or fnmatch.filter(known, f"bus_{name}")
+        or fnmatch.filter(known, prepared.names.identifier(name, known, "--buses"))
+        for name in wanted
     }
     unknown = [name for name, there in found.items() if not there]
     if unknown:

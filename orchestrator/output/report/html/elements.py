@@ -8,6 +8,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from orchestrator.cases.element_names import ElementNames
+
 COLOURS = ("#4d4d4d", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Distinguishable with any colour vision (Okabe and Ito); a scenario keeps its colour everywhere."""
 
@@ -88,7 +90,12 @@ def document(
     findings: str,
     content: Sequence[tuple[str, str]],
     moment: datetime | None = None,
+    names: ElementNames | None = None,
 ) -> str:
+    """A page; ``names``: of the network's file, shown beside the identifiers of elements."""
+    if names is not None:
+        findings = names.in_page(findings)
+        content = [(name, names.in_page(text)) for name, text in content]
     links = "".join(
         f'<a href="#section-{k}">{escape(name)}</a>' for k, (name, _) in enumerate(content)
     )
