@@ -132,8 +132,9 @@ class ElementNames:
             )
         return found[0] if found else name
 
-    def as_json(self) -> dict[str, str]:
-        return dict(self.shown)
+    def as_json(self) -> dict[str, dict[str, str]]:
+        """Return the key ``names`` of a result: what is shown for each identifier; without names, no key."""
+        return {"names": dict(self.shown)} if self.shown else {}
 
 
 def _plain(name: str) -> str:

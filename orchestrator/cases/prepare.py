@@ -136,6 +136,7 @@ class PreparedScenario:
             "models": self.models,
             "basis": self.basis,
             "questions": [*map(str, self.questions)],
+            **self.names.as_json(),
         }
 
     @property

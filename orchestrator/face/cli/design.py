@@ -43,7 +43,7 @@ def run_over_points(options: argparse.Namespace, path: Path) -> int:
         "modes": () if ALL in options.mode else tuple(options.mode),
     }
     with working_in(options, "design", STUDY, path.with_suffix(".points"), **several) as (
-        _,
+        planned,
         compute,
         folder,
     ):
@@ -51,7 +51,8 @@ def run_over_points(options: argparse.Namespace, path: Path) -> int:
         written = design.save(path, as_typed())
     files = ", ".join(one.name for one in written[1:])
     end = f"Parameter file {path}, beside it {files}; points are kept in {folder}"
-    return shown(options, STUDY, design, folder, written, end)
+    prepared = STUDY.prepared(planned)
+    return shown(options, STUDY, design, folder, written, end, prepared=prepared)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -112,6 +113,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print_json(controller.as_json(path))
         return ends
+    console = make_console(names=design.prepared.names)
     print_parts(console, first_screen(design))
     print_stability(
         console,

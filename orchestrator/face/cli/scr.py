@@ -34,7 +34,8 @@ def run(options: argparse.Namespace) -> int:
     ]
     about = next(iter(found)).prepared.about
     kept = {key: about[key] for key in ("case", "models", "basis", "questions")}
-    content = kept | {"convention": convention, "scenarios": told}
+    names = next(iter(found)).prepared.names
+    content = kept | names.as_json() | {"convention": convention, "scenarios": told}
     keep_json(content, options.out, "scr")
     if options.json:
         print_json(content)
@@ -43,7 +44,6 @@ def run(options: argparse.Namespace) -> int:
     for scenario, buses in found.items():
         with_titles = [_with_title(scenario.prepared.titles, bus) for bus in buses]
         alike.setdefault(json.dumps(with_titles), []).append(scenario.title)
-    names = next(iter(found)).prepared.names
     console = make_console(names=names)
     for rows, titles in alike.items():
         table = make_table(

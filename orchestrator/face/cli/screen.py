@@ -35,7 +35,8 @@ def run(options: argparse.Namespace) -> int:
         _merge(options.merge, folder / POINTS)
         found, shard = compute(options.shard), options.shard
         if shard is None:
-            return shown(options, STUDY, found, folder, found.save(folder))
+            written, prepared = found.save(folder), STUDY.prepared(planned)
+            return shown(options, STUDY, found, folder, written, prepared=prepared)
         part, whole = len(found.result.items), planned.number_of_items
         text = f"part {shard.number} of {shard.total}: {part} of {whole} items are kept in {folder}"
         print_parts(make_console(stderr=options.json), [escape(text)])

@@ -58,7 +58,7 @@ def _compute(
     if options.json:
         print_json([one.as_json() for one in found])
     else:
-        console = make_console()
+        console = make_console(names=scenarios[0].prepared.names)
         print_verdicts(console, results)
         print_warnings(results)
         for one in found:

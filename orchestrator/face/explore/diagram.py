@@ -17,7 +17,7 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
     network, grid = prepared.network, prepared.grid
     if network is None:
         return None
-    units = prepared.system.components
+    units, shown = prepared.system.components, prepared.names.of
     plan = units[grid]
     has = plan.description.variables
 
@@ -27,6 +27,7 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
     lines: list[dict[str, Any]] = [
         {
             "name": line.name,
+            "title": shown(line.name),
             "from": line.from_bus,
             "to": line.to_bus,
             "kind": "branch" if line.has_ratio else "line",
@@ -40,6 +41,7 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
     lines += [
         {
             "name": x.name,
+            "title": shown(x.name),
             "from": x.buses[0],
             "to": bus,
             "kind": "branch",
@@ -63,12 +65,14 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
         "width": WIDTH,
         "height": HEIGHT,
         "buses": [
-            {"name": bus, "x": x, "y": y} for bus, (x, y) in zip(network.buses, at, strict=True)
+            {"name": bus, "title": shown(bus), "x": x, "y": y}
+            for bus, (x, y) in zip(network.buses, at, strict=True)
         ],
         "lines": lines,
         "loads": [
             {
                 "name": load.name,
+                "title": shown(load.name),
                 "bus": load.bus,
                 "scale": of_grid(f"{load.name}.scale"),
                 "p_mw": plan.number(power) if (power := f"{load.name}.P") in has else load.p_mw,
@@ -78,6 +82,7 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
         "units": [
             {
                 "name": port.name,
+                "title": shown(port.name),
                 "bus": port.bus,
                 "machine": any(
                     state.endswith("machine.omega") for state in units[port.name].description.states

@@ -407,7 +407,8 @@ def _page(found: Interactions) -> str:
         )
     title = f"{plan.case.table.title or plan.case.name}: interactions"
     kind = f"{plan.prepared.title}, {len(plan.vendors)} vendors at {len(plan.places)} places"
-    return document(title, kind, paragraphs(found.stable, found.sentences), content)
+    names, findings = plan.prepared.names, paragraphs(found.stable, found.sentences)
+    return document(title, kind, findings, content, names=names)
 
 
 def _pairs(judgement: JudgedInteractions, figures: Figures) -> str:

@@ -513,6 +513,7 @@ def _scenario_json(r: ModesResult) -> dict[str, Any]:
         "subject": r.prepared.subject,
         "models": r.prepared.models,
         "basis": r.prepared.basis,
+        **r.prepared.names.as_json(),
         "residual": r.operating_point.residual,
         "states": r.model.number_of_states,
         "stable": r.stability.stable,

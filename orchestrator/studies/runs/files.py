@@ -219,6 +219,7 @@ def summary_of(result: RunResult) -> dict[str, Any]:
         "subject": modes.prepared.subject,
         "models": modes.prepared.models,
         "basis": modes.prepared.basis,
+        **modes.prepared.names.as_json(),
         "residual": None
         if math.isnan(modes.operating_point.residual)
         else modes.operating_point.residual,

@@ -398,7 +398,7 @@ def _page(summary: Summary) -> str:
     kind = f"{plan.prepared.title}, {len(plan.points)} operating points, {len(plan.outages) - 1} outages"
     told = [verdict_sentence(summary), limits_sentence(summary), what_was_counted(summary)]
     findings = paragraphs(summary.stable, [text for text in told if text])
-    return document(title, kind, findings, content)
+    return document(title, kind, findings, content, names=plan.prepared.names)
 
 
 def _durations(summary: Summary, figures: Figures) -> str:

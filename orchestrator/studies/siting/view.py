@@ -438,7 +438,8 @@ def _page(result: SiteResult) -> str:
                 table("Worst first", ["Outage", "Mode", "Damping [%]", "Best"], best, left=2),
             )
         )
-    return document(title, f"{result.prepared.title}; code {code_hash()[:12]}", findings, content)
+    kind, names = f"{result.prepared.title}; code {code_hash()[:12]}", result.prepared.names
+    return document(title, kind, findings, content, names=names)
 
 
 def _map(result: SiteResult, seen: SeenMode, figures: Figures) -> str:
@@ -448,11 +449,18 @@ def _map(result: SiteResult, seen: SeenMode, figures: Figures) -> str:
     branches = [(line.from_bus, line.to_bus) for line in network.lines]
     branches += [(x.buses[0], bus) for x in network.transformers for bus in x.buses[1:]]
     texts = {
-        bus: f"{bus}: {shown(result, one.damping)} {unit(result, '100')}"
+        bus: f"{result.prepared.names.of(bus)}: {shown(result, one.damping)} {unit(result, '100')}"
         for bus, one in shifts.items()
     }
     who = ", ".join(share_text(entry) for entry in list(seen.mode.by_component.items())[:3])
     text = f"{_called(seen)} ({who}): the redder and larger a bus, the farther support there moves the mode."
     return figures.add(
-        network_map(seen.label, branches, {b: one.part for b, one in shifts.items()}, texts), text
+        network_map(
+            seen.label,
+            branches,
+            {b: one.part for b, one in shifts.items()},
+            texts,
+            labels=result.prepared.names.of,
+        ),
+        text,
     )[0]

@@ -52,7 +52,7 @@ function paintNetwork() {
     const closed = isOn(line.open) && (f?.closed ?? true), bend = nth ? 14 * Math.ceil(nth / 2) * (nth % 2 ? 1 : -1) : 0;
     const length = Math.hypot(b.x - a.x, b.y - a.y) || 1, mx = (a.x + b.x) / 2 - bend * (b.y - a.y) / length, my = (a.y + b.y) / 2 + bend * (b.x - a.x) / length;
     const path = `M${a.x} ${a.y}Q${mx} ${my} ${b.x} ${b.y}`, p = f ? f.p_from_mw : null;
-    const label = `${line.kind} ${line.name}, ${line.from} to ${line.to}: ${closed ? (f ? `${fixed(p, 1)} MW, ${fixed(f.q_from_mvar, 1)} Mvar` : "closed") : "open"}`;
+    const label = `${line.kind} ${line.title}, ${line.from} to ${line.to}: ${closed ? (f ? `${fixed(p, 1)} MW, ${fixed(f.q_from_mvar, 1)} Mvar` : "closed") : "open"}`;
     const wire = draw("path", { class: `wire${closed ? "" : " open"}`, d: path });
     if (p !== null && closed) wire.style.strokeWidth = (1.2 + 4 * Math.abs(p) / most).toFixed(2);
     const group = things("line", line.name, label, draw("path", { class: "hit", d: path }), wire);
@@ -77,23 +77,23 @@ function paintNetwork() {
       const m = machines[thing.name], on = isOn(thing.out);
       seen.unitPlaces[thing.name] = p;
       keepFree(p.x, p.y, 10);
-      ofUnits.push({ x: p.x, y: p.y, r: 12, look: "flow", words: [thing.name] });
-      const label = `unit ${thing.name} at ${name}: ${on ? (m ? `${fixed(m.p_mw, 1)} MW, ${fixed(m.q_mvar, 1)} Mvar, ${fixed(m.loading_percent, 0)} % of ${fixed(m.rating_mva, 0)} MVA` : "in service") : "out of service"}`;
+      ofUnits.push({ x: p.x, y: p.y, r: 12, look: "flow", words: [thing.title, thing.name] });
+      const label = `unit ${thing.title} at ${name}: ${on ? (m ? `${fixed(m.p_mw, 1)} MW, ${fixed(m.q_mvar, 1)} Mvar, ${fixed(m.loading_percent, 0)} % of ${fixed(m.rating_mva, 0)} MVA` : "in service") : "out of service"}`;
       parts.push(things(kind, thing.name, label, stub, thing.machine ? draw("circle", { class: `unit${on ? "" : " out"}`, cx: p.x, cy: p.y, r: 10 }) : draw("rect", { class: `unit${on ? "" : " out"}`, x: p.x - 9, y: p.y - 9, width: 18, height: 18 }), draw("path", { class: "wire", d: `M${p.x - 5} ${p.y}q2.5 -6 5 0t5 0` })));
     } else {
       keepFree(p.x, p.y, 6);
       const scale = thing.scale ? state.values[thing.scale] ?? 1 : 1;
-      const label = `load ${thing.name} at ${name}: ${fixed(thing.p_mw * scale, 1)} MW${scale !== 1 ? `, ${number(scale)} times the case's` : ""}`;
+      const label = `load ${thing.title} at ${name}: ${fixed(thing.p_mw * scale, 1)} MW${scale !== 1 ? `, ${number(scale)} times the case's` : ""}`;
       parts.push(things(kind, thing.name, label, stub, draw("path", { class: "load", d: `M${p.x - 6} ${p.y - 4}H${p.x + 6}L${p.x} ${p.y + 7}z` })));
     }
   });
   for (const bus of d.buses) {
-    const v = volts[bus.name]?.v_pu, label = `bus ${bus.name}${v ? `: ${fixed(v, 4)} pu, ${fixed(volts[bus.name].angle_deg, 2)}°` : ""}`;
+    const v = volts[bus.name]?.v_pu, label = `bus ${bus.title}${v ? `: ${fixed(v, 4)} pu, ${fixed(volts[bus.name].angle_deg, 2)}°` : ""}`;
     const dot = things("bus", bus.name, label, draw("circle", { class: `bus${v < 0.95 ? " low" : v > 1.05 ? " high" : ""}`, cx: bus.x, cy: bus.y, r: few ? 6 : 4.5 }));
     dot.addEventListener("pointerdown", event => dragBus(event, bus));
     parts.push(dot);
     keepFree(bus.x, bus.y, 5);
-    names.labels.push({ x: bus.x, y: bus.y, r: 8, look: "flow", words: v ? [`${bus.name} ${fixed(v, 3)}`, bus.name] : [bus.name] });
+    names.labels.push({ x: bus.x, y: bus.y, r: 8, look: "flow", words: v ? [`${bus.title} ${fixed(v, 3)}`, bus.title, bus.name] : [bus.title, bus.name] });
   }
   names.labels.push(...ofUnits, ...flows.sort((a, b) => b.size - a.size));
   parts.push(draw("g", { id: "names" }), draw("g", { id: "arrows" }));

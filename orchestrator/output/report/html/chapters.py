@@ -5,7 +5,7 @@ import json
 import re
 from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
 from itertools import chain
@@ -48,6 +48,7 @@ class Chapter:
     page: str = ""
     title: str = ""
     bases: Sequence[Mapping[str, Any]] = ()  # what figures rest on: `PreparedScenario.basis`
+    names: Mapping[str, str] = field(default_factory=dict)  # `ElementNames.shown`
     least: Sequence[LeastDamped] = ()  # the modes whose figures the answer gives, in its order
 
     @cached_property
@@ -213,6 +214,7 @@ def _with_models(chapter: Chapter, content: Any) -> Chapter:
         sure=sure,
         not_judged=list(dict.fromkeys([*chapter.not_judged, *more])),
         bases=bases,
+        names={name: shown for one in records for name, shown in one.get("names", {}).items()},
     )
 
 

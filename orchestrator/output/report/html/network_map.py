@@ -1,6 +1,6 @@
 """A network as a picture: buses where their connections put them, coloured by a figure."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 
 import numpy as np
@@ -23,9 +23,11 @@ def network_map(
     heat: Mapping[str, float],
     texts: Mapping[str, str],
     flows: Mapping[tuple[str, str], float] = {},
+    *,
+    labels: Callable[[str], str] = str,
 ) -> str:
     """The picture as SVG: branches by their two buses; by bus its heat from 0 (pale) to 1 (red), and what the pointer
-    shows; by branch what flows along it, from 0 to 1, as an arrow as wide."""
+    shows; by branch what flows along it, from 0 to 1, as an arrow as wide; ``labels``: what stands beside a bus."""
     buses = list(heat)
     at = dict(zip(buses, places(buses, branches).tolist(), strict=True))
     parts = [
@@ -59,7 +61,9 @@ def network_map(
             f'data-tip="{escape(texts[bus])}"/>'
         )
         if len(buses) <= _LABELS:
-            parts.append(f'<text x="{x + 8 + 6 * share:.1f}" y="{y - 6:.1f}">{escape(bus)}</text>')
+            parts.append(
+                f'<text x="{x + 8 + 6 * share:.1f}" y="{y - 6:.1f}">{escape(labels(bus))}</text>'
+            )
     return (
         f'<svg class="chart" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(name)}">'
         f"{''.join(parts)}</svg>"

@@ -9,6 +9,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from orchestrator.cases.element_names import ElementNames
 from orchestrator.core.errors import InputError, few
 from orchestrator.core.safe_files import file_hash, write_page
 from orchestrator.output.report.html import sections, studies
@@ -105,7 +106,20 @@ def page(
     # for `changes` of a later page
     answers = held_data("answers", [*[of_all] * bool(differ), *_answers(chapters)])
     above = "".join(paragraphs(False, [text]) for text in (differ, changed) if text)
-    return document(title, kind, above + first_page(chapters) + picture + found + answers, content)
+    findings = above + first_page(chapters) + picture + found + answers
+    return document(title, kind, findings, content, names=_names_of(chapters, runs))
+
+
+def _names_of(chapters: Sequence[Chapter], runs: Sequence[Results]) -> ElementNames:
+    """Return the names of the networks' files, as far as all results have one name for an identifier."""
+    said = [scenario.get("names", {}) for run in runs for scenario in run.scenarios]
+    said += [chapter.names for chapter in chapters]
+    shown: dict[str, str] = {}
+    for name in {name for names in said for name in names}:
+        found = {names[name] for names in said if name in names}
+        if len(found) == 1:
+            shown[name] = found.pop()
+    return ElementNames(shown)
 
 
 def _told(
