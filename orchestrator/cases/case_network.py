@@ -56,7 +56,7 @@ def _name_in_events(draft: Draft, names: ElementNames) -> None:
     buses = draft.data.buses
     lines = [*(x.name for x in draft.data.lines), *(x.name for x in draft.data.transformers)]
 
-    def identified(table: EventTable) -> EventTable:
+    def with_identifiers(table: EventTable) -> EventTable:
         known = {"bus": buses, "line": lines, "cleared_by": lines}
         given = {key: getattr(table, key, None) for key in known}
         meant = {
@@ -67,9 +67,11 @@ def _name_in_events(draft: Draft, names: ElementNames) -> None:
         return table.model_copy(update={k: v for k, v in meant.items() if v != given[k]})
 
     given = draft.given
-    given.case = given.case.model_copy(update={"events": [*map(identified, given.case.events)]})
+    given.case = given.case.model_copy(
+        update={"events": [*map(with_identifiers, given.case.events)]}
+    )
     if given.scenario.events is not None:
-        events = [*map(identified, given.scenario.events)]
+        events = [*map(with_identifiers, given.scenario.events)]
         given.scenario = given.scenario.model_copy(update={"events": events})
 
 

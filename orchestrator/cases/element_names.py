@@ -42,7 +42,7 @@ class NamedData(Protocol):
 
 @dataclass(frozen=True)
 class BranchName:
-    """What a network's file calls a branch: its name, and its circuit among parallel ones; "" for none."""
+    """Name of a branch in a network's file: its name, and its circuit among parallel ones; "" for none."""
 
     name: str = ""
     circuit: str = ""
@@ -54,7 +54,7 @@ class BranchName:
 
 @dataclass(frozen=True)
 class ElementNames:
-    """What people read for an identifier; without names in the file, the identifier itself.
+    """Texts that people read for identifiers; without names in the file, the identifiers themselves.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class ElementNames:
             return write(self.shown[text])
         seen: set[str] = set()
 
-        def named(match: re.Match[str]) -> str:
+        def show(match: re.Match[str]) -> str:
             identifier = match["name"]
             if identifier is None or identifier in seen:
                 return match[0]
@@ -94,7 +94,7 @@ class ElementNames:
                 seen.add(identifier)
             return shown
 
-        return self._pattern.sub(named, text)
+        return self._pattern.sub(show, text)
 
     @cached_property
     def _pattern(self) -> re.Pattern[str]:

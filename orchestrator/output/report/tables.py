@@ -64,14 +64,14 @@ class PlainTable(Table):
         found = copy(self)
         found.columns = [replace(column, _cells=[]) for column in self.columns]
         for column, other in zip(self.columns, found.columns, strict=True):
-            cells = [_written(cell, write) for cell in column.cells]
+            cells = [_rewrite(cell, write) for cell in column.cells]
             other._cells.extend(cells)
         if isinstance(self.caption, str):
             found.caption = write(self.caption)
         return found
 
 
-def _written(cell: Any, write: Callable[[str], str]) -> Any:
+def _rewrite(cell: Any, write: Callable[[str], str]) -> Any:
     return (
         Text(write(cell.plain), cell.style) if isinstance(cell, Text) and not cell.spans else cell
     )
