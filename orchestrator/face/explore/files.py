@@ -15,6 +15,7 @@ SCRIPTS = (
     "network.js",
     "response.js",
     "study.js",
+    "first.js",
     "page.js",
 )
 STYLE = "page.css"

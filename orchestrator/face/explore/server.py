@@ -18,11 +18,14 @@ LOOPBACK = "127.0.0.1"
 LINGER = 60.0  # how long the server goes on after the last page was closed [s]
 _MOST_BYTES = 1_000_000  # of a question
 _BEAT = 2.0  # between two signs of life to a page [s]
+# questions that other processes answer than that of the modes, which a slider waits for
+_BESIDE = {"slopes": "slopes", "run": "run", "movers": "first", "first": "first"}
 _POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data: blob:"
 
 
 class Explorer:
-    """The server, its pages, and the processes that compute: for what is asked, and beside it for slopes and for runs.
+    """The server, its pages, and the processes that compute: for what is asked, and beside it for slopes, for runs, and
+    for what the first screen has besides the modes.
 
     ``beginning``: what the page begins with, as JSON's types."""
 
@@ -36,7 +39,7 @@ class Explorer:
         linger: float = LINGER,
     ) -> None:
         self.beginning, self.token = beginning, secrets.token_urlsafe(24)
-        kinds, recorded = ("modes", "slopes", "run"), beginning.get("recorded")
+        kinds, recorded = {"modes", *_BESIDE.values()}, beginning.get("recorded")
         self.computing = {
             kind: Computing(case, trust_fmus=trust_fmus, recorded=recorded) for kind in kinds
         }
@@ -96,7 +99,7 @@ class Explorer:
             for computing in self.computing.values():
                 computing.cancel(page, question["number"])
             return {"answer": {}}
-        computing = self.computing.get(str(question.get("ask")), self.computing["modes"])
+        computing = self.computing[_BESIDE.get(str(question.get("ask")), "modes")]
         return computing.ask(
             page, question, lambda part: self.tell(page, {"of": question.get("ask"), **part})
         )

@@ -29,6 +29,7 @@ from orchestrator.face.api.results import Modes
 from orchestrator.face.api.scenario import Scenario
 from orchestrator.face.explore.copied import copied, events_of, explored, saved
 from orchestrator.face.explore.diagram import diagram
+from orchestrator.face.explore.movers import movers
 from orchestrator.face.explore.responses import linear, plotted, recorded, simulated
 from orchestrator.studies.modes.modes import modes_of
 from orchestrator.studies.operating_points.bench import PointBench
@@ -128,13 +129,24 @@ class Desk:
         self._bench, self._files = PointBench(), dict[Path, list[float]]()
 
     def answer(self, question: Mapping[str, Any], say: Say) -> dict[str, Any]:
-        """What is asked for under ``ask``: open, cell, parameters, modes, slopes, response, recorded, run, save."""
+        """What is asked for under ``ask``: open, cell, parameters, modes, movers, slopes, first, response,
+        recorded, run, save."""
         ask = str(question["ask"])
         case = self._read()
         if ask == "open":
             titles = {name: table.title or name for name, table in case.file.scenarios.items()}
             named = case.file.table.title or case.name
-            return {"case": case.name, "title": named, "scenarios": titles, "stamp": self._stamp}
+            systems = {
+                name: table.model_dump_json(exclude={"title", "events"})
+                for name, table in case.file.scenarios.items()
+            }
+            return {
+                "case": case.name,
+                "title": named,
+                "scenarios": titles,
+                "systems": systems,  # equal where scenarios differ in their events alone
+                "stamp": self._stamp,
+            }
         events, original = question.get("events"), case
         if events is not None:
             case = case.with_(scenarios={question["scenario"]: {"events": events}})
@@ -151,7 +163,15 @@ class Desk:
             "slopes": lambda: slopes(
                 scenario, values, str(question["parameter"]), (low, high), say, self._computed
             ),
+            "movers": lambda: movers(
+                scenario(values),
+                question.get("components") or {},
+                (low, high),
+                question.get("names") or (),
+                say,
+            ),
             "response": lambda: linear(scenario(values), signals),
+            "first": lambda: linear(scenario(values), ()),
             "recorded": lambda: recorded(
                 self._recorded.get(name, self._recorded.get("", "")), scenario(values), signals
             ),

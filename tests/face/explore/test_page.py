@@ -81,6 +81,8 @@ def opened(browser, address):
     view.goto(address)
     computed(view, 1)
     view.locator("#signal-names option").first.wait_for(state="attached")
+    if view.locator("#tab-network").get_attribute("aria-selected") == "true" and "#" not in address:
+        view.locator("#tab-map").click()
     yield view
     assert errors == []
     context.close()
@@ -146,6 +148,36 @@ def test_map_table_and_verdict_are_those_of_the_command(view, capsys):
     view.locator("#wider").click()
     computed(view, 2)
     assert len(rows(view)) > count
+
+
+@needs_chromium
+def test_the_first_screen_has_the_answer_its_shape_five_sliders_and_a_response(browser, two_area):
+    context = browser.new_context(viewport={"width": 1440, "height": 900})
+    view = context.new_page()
+    view.set_default_timeout(PATIENCE)
+    view.goto(two_area.address)
+    computed(view, 1)
+    assert "0.763 Hz, 22.55 %" in view.locator("#verdict").inner_text()
+    assert view.locator("#table tr.chosen td").first.inner_text() == "0.7633"
+    view.locator("#first-plot .curve").wait_for(state="attached")
+    view.locator("#movers .control").first.wait_for()
+    assert view.locator("#network #arrows .arrow").count() == 2
+    assert view.locator("#movers input[type=range]").count() == 5
+    gain = view.locator('#movers .control[data-name="gfor.pod_p.K"]')
+    assert gain.locator(".effect").inner_text().startswith("+20 pu → −0.46 points of damping")
+    view.locator("#questions button", has_text="converter").click()
+    view.locator("#else-said", has_text="Base (only SG): UNSTABLE").wait_for()
+    view.locator("#questions button", has_text="twice as long").click()
+    view.locator("#else-said", has_text="Now: stable").wait_for()
+    assert view.evaluate("state.values") == {}  # a question changes nothing
+    gain.locator("input[type=text]").fill("100")
+    gain.locator("input[type=text]").press("Enter")
+    computed(view, 2)
+    view.wait_for_function("() => seen.moversAgain && !seen.moversStale")
+    before = gain.locator(".effect").inner_text()
+    assert before.startswith("+10 pu → ")
+    assert "How these move it" in view.locator("#movers-title").inner_text()
+    context.close()
 
 
 @needs_chromium
@@ -327,6 +359,30 @@ def test_a_saved_page_moves_without_a_server(browser, tmp_path, capsys):
 
 
 @needs_chromium
+def test_a_saved_page_has_the_five_sliders_each_of_which_moves_alone(browser, tmp_path, capsys):
+    page = tmp_path / "page.html"
+    assert main(["explore", "two_area", "--scenario", "pod_p", "--save", str(page)]) == 0
+    with opened(browser, page.as_uri()) as view:
+        assert view.locator("#movers input[type=range]").count() == 5
+        assert view.locator("#first-plot .curve").count() == 1
+        gain, length = (
+            view.locator(f'.control[data-name="{name}"] input[type=range]')
+            for name in ("gfor.pod_p.K", "grid.X_L")
+        )
+        length.focus()
+        length.press("End")
+        assert view.evaluate("state.values") == {"grid.X_L": 0.5}
+        gain.focus()
+        gain.press("Home")
+        assert view.evaluate("state.values") == {"gfor.pod_p.K": 40}
+        words = ["modes", "two_area", "--scenario", "pod_p", "--set", "gfor.pod_p.K=40", "--json"]
+        capsys.readouterr()
+        assert main(words) == 0
+        content = json.loads(capsys.readouterr().out)["scenarios"][0]
+        assert [row[:2] for row in rows(view)] == shown(content["modes"])
+
+
+@needs_chromium
 def test_a_value_with_a_wanted_damping_is_found(view, capsys):
     control = add(view, "gfor.pod_p.K")
     said = control.locator(".finder [role=status]")
@@ -375,7 +431,7 @@ def test_a_refused_outage_and_a_search_that_cannot_act_say_so(browser):
             "#failure", has_text="not computed; what is shown is the state before"
         ).wait_for()
         assert view.locator("#element input[type=checkbox]").is_checked()
-        assert view.locator(".control").count() == 0
+        assert view.locator("#controls .control").count() == 0
         assert view.evaluate("state.values") == {}
         assert view.locator("#verdict").inner_text() == before
         idle = add(view, "gfor.pod_p.K")  # its controller is off

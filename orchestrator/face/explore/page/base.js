@@ -6,10 +6,10 @@ const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9
 const SVG = "http://www.w3.org/2000/svg";
 
 // What the address holds; everything else follows from it.
-const state = { scenario: "", values: {}, range: [0.1, 2], controls: [], mode: null, pin: null, tab: "map", signals: "", events: null, places: {} };
+const state = { scenario: "", values: {}, range: [0.1, 2], controls: [], mode: null, pin: null, tab: "", signals: "", events: null, places: {} };
 const theCase = () => ({ scenario: state.scenario, values: state.values, events: state.events, places: state.places, step: seen.beginning?.step ?? null });
 // What was answered to it.
-const seen = { titles: {}, answer: null, modes: [], info: null, pinned: null, estimate: null, slopes: {}, trails: [], curves: {}, pinnedCurves: {}, stamp: null, timing: {}, finders: {}, cancels: 0 };
+const seen = { titles: {}, answer: null, modes: [], info: null, pinned: null, estimate: null, slopes: {}, trails: [], movers: null, firstCurves: null, curves: {}, pinnedCurves: {}, stamp: null, timing: {}, finders: {}, cancels: 0 };
 
 const $ = id => document.getElementById(id);
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
@@ -83,7 +83,7 @@ setInterval(tick, 200);
 // The answer; undefined where a newer question took its place, null where it failed, which is said at `place` or at the top.
 let questions = 0;  // a question that a cancel overtakes on its way is known by its number
 async function ask(what, question, place = null) {
-  if (SAVED) return savedAnswer(question);
+  if (SAVED) return savedAnswer(question);  // nothing is computed
   working(what, true);
   const begin = performance.now(), mine = atWork.get(what);
   let found;
@@ -120,7 +120,7 @@ function readState(beginning) {
   Object.assign(state, { scenario: beginning.scenario, values: beginning.values, range: beginning.range, controls: Object.keys(beginning.values) });
   try {
     const kept = JSON.parse(decodeURIComponent(location.hash.slice(1)));
-    Object.assign(state, { scenario: String(kept.s), values: kept.v ?? {}, range: kept.r ?? [0.1, 2], controls: kept.c ?? [], mode: kept.m ?? null, tab: kept.t ?? "map", signals: kept.g ?? "", pin: kept.p ?? null, events: kept.e ?? null, places: kept.d ?? {} });
+    Object.assign(state, { scenario: String(kept.s), values: kept.v ?? {}, range: kept.r ?? [0.1, 2], controls: kept.c ?? [], mode: kept.m ?? null, tab: kept.t ?? "", signals: kept.g ?? "", pin: kept.p ?? null, events: kept.e ?? null, places: kept.d ?? {} });
   } catch { /* no state, or none that can be read: that of the command */ }
 }
 

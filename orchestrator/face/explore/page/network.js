@@ -5,9 +5,17 @@ let element = null;  // kind and name of what was clicked
 
 function fitNetwork() {
   const d = seen.info?.diagram;
-  if (d) Object.assign(lens, { x: -30, y: -30, w: d.width + 60, h: d.height + 60 });
+  if (d) Object.assign(lens, wholeOf(d));
   paintNetwork();
 }
+// All buses, with room for what hangs at them and for the arrows; a flat network has a flat picture.
+function wholeOf(d) {
+  const of = key => d.buses.map(b => state.places[b.name]?.[key === "x" ? 0 : 1] ?? b[key]), room = 30 + hangOf(d) + 70;
+  const x = Math.min(...of("x")) - room, y = Math.min(...of("y")) - room, w = Math.max(...of("x")) + room - x, h = Math.max(...of("y")) + room - y;
+  $("network").style.aspectRatio = `${w} / ${h}`;
+  return { x, y, w, h };
+}
+const hangOf = d => (d.buses.length <= 12 ? 52 : 30);  // from a bus to what hangs at it
 function zoomNetwork(factor, x = lens.x + lens.w / 2, y = lens.y + lens.h / 2) {
   Object.assign(lens, { x: x + (lens.x - x) * factor, y: y + (lens.y - y) * factor, w: lens.w * factor, h: lens.h * factor });
   paintLabels();
@@ -36,7 +44,7 @@ function paintNetwork() {
   if (state.tab !== "network") return;
   const svg = $("network"), d = seen.info?.diagram, flow = flowOf(), focused = document.activeElement?.dataset?.thing;
   if (!d) { svg.replaceChildren(draw("text", { x: 20, y: 30 }, seen.info ? "this case has no network behind a power flow" : "loading …")); svg.setAttribute("viewBox", "0 0 500 300"); return; }
-  if (!lens.w) Object.assign(lens, { x: -30, y: -30, w: d.width + 60, h: d.height + 60 });
+  if (!lens.w) Object.assign(lens, wholeOf(d));
   svg.setAttribute("viewBox", `${lens.x} ${lens.y} ${lens.w} ${lens.h}`);
   d.buses.forEach(b => { if (state.places[b.name]) [b.x, b.y] = state.places[b.name]; });
   const at = Object.fromEntries(d.buses.map(b => [b.name, b])), volts = Object.fromEntries((flow?.buses ?? []).map(b => [b.name, b]));
@@ -67,12 +75,12 @@ function paintNetwork() {
   const perBus = {};
   const hang = (bus, k, all) => {  // around the bus, away from the middle of the picture
     const out = Math.atan2(bus.y - middle.y, bus.x - middle.x), a = out + (k - (all - 1) / 2) * 0.75;
-    return { x: bus.x + 30 * Math.cos(a), y: bus.y + 30 * Math.sin(a) };
+    return { x: bus.x + hangOf(d) * Math.cos(a), y: bus.y + hangOf(d) * Math.sin(a) };
   };
   for (const one of [...d.units.map(u => ["unit", u]), ...d.loads.map(l => ["load", l])]) (perBus[one[1].bus] ??= []).push(one);
   seen.unitPlaces = {};
   for (const [name, all] of Object.entries(perBus)) all.forEach(([kind, thing], k) => {
-    const bus = at[name], p = hang(bus, k, all.length), stub = draw("path", { class: "wire", d: `M${bus.x} ${bus.y}L${p.x} ${p.y}` });
+    const bus = at[name], p = hang(bus, k, all.length), way = `M${bus.x} ${bus.y}L${p.x} ${p.y}`, stub = draw("g", {}, draw("path", { class: "hit", d: way }), draw("path", { class: "wire", d: way }));
     if (kind === "unit") {
       const m = machines[thing.name], on = isOn(thing.out);
       seen.unitPlaces[thing.name] = p;
@@ -120,8 +128,9 @@ function paintArrows(part) {
   const group = document.getElementById("arrows"), m = seen.modes[chosenIndex()];
   if (!group) return;
   const largest = Math.max(...(m?.shape ?? []).map(s => s.magnitude), 1e-12);
+  const length = seen.info.diagram.buses.length <= 45 ? 95 : 60;
   group.replaceChildren(...(m?.shape ?? []).flatMap((s, k) => {
-    const p = seen.unitPlaces?.[s.state.split(".")[0]], a = s.angle_deg * Math.PI / 180, r = 46 * s.magnitude / largest * part;
+    const p = seen.unitPlaces?.[s.state.split(".")[0]], a = s.angle_deg * Math.PI / 180, r = length * s.magnitude / largest * part;
     return p && Math.abs(r) > 1 ? [draw("path", { class: "arrow", stroke: COLOURS[k % COLOURS.length], d: arrow(p.x, p.y, p.x + r * Math.cos(a), p.y - r * Math.sin(a)) })] : [];
   }));
 }
@@ -129,7 +138,7 @@ const isOn = name => (name ? (state.values[name] ?? parameterOf(name)?.value ?? 
 
 function paintElement() {
   const place = $("element"), d = seen.info?.diagram;
-  if (!element || !d) { place.replaceChildren(make("p", { class: "soft" }, "Click a bus, a line, a unit or a load; drag a bus to where it belongs. Zoom in for all names and flows. Buses: pink above 1.05 pu, orange below 0.95. Dashed red: open or out. Circles are machines, squares converters, arrows the chosen mode's shape.")); return; }
+  if (!element || !d) { place.replaceChildren(make("p", { class: "soft", title: "Drag a bus to where it belongs; zoom in for all names and flows. Buses: pink above 1.05 pu, orange below 0.95. Dashed red: open or out." }, "Arrows: how the chosen mode swings. Circles are machines, squares converters. Click a bus, line, unit or load to change it.")); return; }
   const error = make("p", { class: "bad", role: "alert" }), parts = [make("h3", {}, `${element.kind} ${element.name}`)];
   const onOff = (name, text) => {
     const tick = make("input", { type: "checkbox" });

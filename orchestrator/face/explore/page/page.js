@@ -27,6 +27,7 @@ async function compute(place = null) {
   });
   const first = !seen.answer || seen.trailOf !== state.scenario || !same(seen.fittedRange, state.range);
   Object.assign(seen, { answer: found, modes: after, trails, trailOf: state.scenario, fittedRange: state.range, estimate: null });
+  if (first) state.mode ??= nameOrPlace(leastOf(after));
   if (first || (inView(leastOf(before)) && !inView(leastOf(after)))) fitMap();
   paintVerdict();
   paintMap(); paintTable(); paintChosen(); paintNetwork();
@@ -34,6 +35,7 @@ async function compute(place = null) {
   keepState();
   painted(begin, "exact");
   if (seen.infoOf !== state.scenario) await loadInfo();
+  firstScreen();
   return true;
 }
 const leastOf = modes => [...modes].sort((a, b) => a.damping_percent - b.damping_percent)[0];
@@ -53,6 +55,8 @@ async function loadInfo() {
   seen.originals = Object.fromEntries(empty.parameters.map(p => [p.parameter, p.value]));
   seen.infoOf = asked;
   lens.w = 0;
+  $("tab-network").hidden = !empty.diagram;
+  if (state.tab === "network" && !empty.diagram) openTab("map");
   paintControls(); paintFound(); paintSignals(); paintNetwork(); paintElement();
 }
 async function pin() {
@@ -90,6 +94,7 @@ function openTab(name) {
     $(`tab-${one}`).tabIndex = one === name ? 0 : -1;
   }
   $("trails-label").hidden = name !== "map";
+  $("first-response").hidden = name === "response" || name === "study";
   for (const id of ["fit", "in", "out"]) $(id).hidden = name === "response" || name === "study";
   keepState();
   if (name === "network") { paintNetwork(); paintElement(); }
@@ -108,13 +113,14 @@ function listen() {
   source.onmessage = event => {
     const told = JSON.parse(event.data);
     if (told.part) streamed(told.part);
-    if (told.progress) seen.timing["said ∂λ/∂p"] = told.progress;
+    if (told.progress) seen.timing[`said ${{ movers: MOVERS_WORK }[told.of] ?? "∂λ/∂p"}`] = told.progress;
   };
 }
 // Of a saved page, the answer that lies nearest in its grid.
 function savedAnswer(question) {
   if (question.ask === "open") return SAVED.open;
   if (question.ask === "parameters") return SAVED.parameters[question.scenario];
+  if (question.ask === "movers" || question.ask === "first") return SAVED[question.ask] ?? null;
   if (question.ask !== "modes") return null;
   const snapped = {};
   for (const [name, values] of Object.entries(SAVED.grid)) {
@@ -122,14 +128,15 @@ function savedAnswer(question) {
     snapped[name] = values.reduce((best, v) => (Math.abs(v - wanted) < Math.abs(best - wanted) ? v : best));
     if (name in state.values) state.values[name] = snapped[name];
   }
+  if (SAVED.movers) keepOneMoved(snapped);
   return SAVED.answers.find(one => one.scenario === question.scenario && Object.entries(snapped).every(([n, v]) => one.values[n] === v))?.answer ?? null;
 }
 
 async function begin() {
-  beginMap(); beginNetwork(); beginResponse();
+  beginMap(); beginNetwork(); beginResponse(); beginFirst();
   seen.beginning = SAVED ? SAVED.beginning : await (await fetch("beginning")).json();
   readState(seen.beginning);
-  if (!SAVED) listen(); else for (const name of Object.keys(SAVED.grid)) if (!state.controls.includes(name)) state.controls.push(name);
+  if (!SAVED) listen(); else if (!SAVED.movers) for (const name of Object.keys(SAVED.grid)) if (!state.controls.includes(name)) state.controls.push(name);
   $("low").value = state.range[0]; $("high").value = state.range[1];
   for (const id of ["low", "high"]) { $(id).disabled = Boolean(SAVED); $(id).addEventListener("change", () => setRange(+$("low").value, +$("high").value)); }
   $("wider").addEventListener("click", () => setRange(0, 1000));
@@ -151,11 +158,12 @@ async function begin() {
   }
   beginStudy();
   if (seen.beginning.recorded && !SAVED && !location.hash) state.tab = "response";
-  openTab(TABS.includes(state.tab) && !$(`tab-${state.tab}`).hidden ? state.tab : "map");
+  openTab(TABS.includes(state.tab) && !$(`tab-${state.tab}`).hidden ? state.tab : "network");
   paintControls(); paintChosen(); paintPlots(); paintPin();
   const opened = await ask("case", { ask: "open" });
   if (!opened) { $("verdict").textContent = ""; return; }
   seen.titles = opened.scenarios;
+  seen.systems = opened.systems;
   $("title").textContent = $("title").title = opened.title;
   document.title = `${opened.case}: gfor explore`;
   if (!(state.scenario in opened.scenarios)) state.scenario = seen.beginning.scenario;

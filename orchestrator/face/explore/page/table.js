@@ -20,6 +20,7 @@ function choose(k) {
   keepState();
   paintMap(); paintTable(); paintChosen(); paintNetwork();
 }
+const nameOrPlace = mode => (mode ? mode.name ?? seen.modes.indexOf(mode) : null);
 function highlight(k) {
   for (const element of document.querySelectorAll("#map .mark, #table tbody tr")) element.classList.toggle("hover", k !== null && element.dataset.mode === String(k));
 }

@@ -35,57 +35,63 @@ function scaleOf(p) {
 
 function paintControls() {
   const focused = document.activeElement?.closest?.(".control")?.dataset.name, kind = document.activeElement?.type;
-  $("controls").replaceChildren(...state.controls.map(name => {
-    const p = parameterOf(name);
-    const box = make("div", { class: "control", "data-name": name });
-    const value = state.values[name] ?? p?.value;
-    const error = make("span", { class: "error", role: "alert" });
-    const away = make("button", { title: "back to the case's value", "aria-label": `take ${name} back` }, "×");
-    away.addEventListener("click", () => { state.controls = state.controls.filter(n => n !== name); setValue(name, null); paintControls(); });
-    const unit = p && p.unit !== "1" ? p.unit : "";
-    box.append(make("div", { class: "row" }, make("b", {}, name), make("span", { class: "grow" }), away));
-    if (p?.type === "Boolean") {
-      const tick = make("input", { type: "checkbox", "aria-label": name });
-      tick.checked = value === true;
-      tick.addEventListener("change", () => setValue(name, tick.checked, error));
-      box.append(make("label", { class: "row" }, tick, " on"));
-    } else {
-      const field = make("input", { type: "text", value: value ?? "", "aria-label": `${name} in ${unit || "1"}`, inputmode: "decimal" });
-      field.addEventListener("change", () => {
-        const given = field.value.trim().replace(",", ".").replace("−", "-"), x = Number(given);
-        setValue(name, given !== "" && Number.isFinite(x) ? x : field.value.trim(), error);
-      });
-      const row = make("div", { class: "row" }, field, make("span", { class: "soft" }, unit));
-      if (p && typeof p.value === "number" && p.type === "Real") {
-        const held = SAVED?.grid[name], least = held && Math.min(...held), most = held && Math.max(...held);
-        const scale = held ? { low: least, high: most, to: x => least + x * (most - least), from: v => (v - least) / (most - least) } : scaleOf({ ...p, value: original(name) });
-        const slider = make("input", { type: "range", min: 0, max: 1000, step: 1, "aria-label": `${name}, from ${number(scale.low)} to ${number(scale.high)} ${unit}` });
-        slider.value = typeof value === "number" ? Math.round(1000 * Math.min(1, Math.max(0, scale.from(value)))) : 0;
-        const at = () => +scale.to(slider.value / 1000).toPrecision(4);
-        for (const begin of ["pointerdown", "focus"]) slider.addEventListener(begin, () => wantSlopes(name));
-        slider.addEventListener("input", () => { field.value = at(); estimateAt(name, at()); });
-        slider.addEventListener("change", () => setValue(name, at(), error));
-        row.prepend(slider);
-      }
-      box.append(row);
-      if (p && typeof p.value === "number" && p.type === "Real" && !SAVED) {
-        box.append(finderOf(`${state.scenario} ${name}`, {
-          now: () => state.values[name] ?? original(name), bounds: () => [p.minimum ?? -Infinity, p.maximum ?? Infinity],
-          valuesAt: x => ({ [name]: x }), apply: x => setValue(name, x), words: name.split(".").at(-1),
-        }));
-      }
-    }
-    const bounds = p && (p.minimum !== null || p.maximum !== null) ? `, from ${p.minimum === null ? "any" : number(p.minimum)} to ${p.maximum === null ? "any" : number(p.maximum)}` : "";
-    box.append(make("small", {}, p ? `${p.description}${p.description ? "; " : ""}${p.variability}${bounds}; ${number(original(name))} in the case` : "this scenario has no such parameter"), error);
-    for (const off of (p?.switches ?? []).filter(one => (state.values[one] ?? original(one)) === false)) {
-      const on = make("button", {}, `switch ${off} on`);
-      on.addEventListener("click", () => setValue(off, true, error));
-      box.append(make("small", { class: "idle" }, `${name} cannot act: ${off} is off. `, SAVED ? "" : on));
-    }
-    if (SAVED && !SAVED.grid[name]) box.querySelectorAll("input").forEach(input => { input.disabled = true; });
-    return box;
-  }));
+  $("controls").replaceChildren(...state.controls.map(name => controlOf(name)));
+  paintMovers(true);
   if (focused) document.querySelector(`.control[data-name="${CSS.escape(focused)}"] input[type="${kind === "range" ? "range" : kind === "text" ? "text" : "checkbox"}"]`)?.focus({ preventScroll: true });
+}
+// A value's slider or switch; `mover` tells what it does to the mode, where it is one of those that move it most.
+function controlOf(name, mover = null) {
+  const p = parameterOf(name);
+  const box = make("div", { class: "control", "data-name": name });
+  const value = state.values[name] ?? p?.value;
+  const error = make("span", { class: "error", role: "alert" });
+  const away = make("button", { title: "back to the case's value", "aria-label": `take ${name} back` }, "×");
+  away.addEventListener("click", () => { state.controls = state.controls.filter(n => n !== name); setValue(name, null); paintControls(); });
+  const unit = p && p.unit !== "1" ? p.unit : "";
+  box.append(make("div", { class: "row" }, make("b", {}, name), make("span", { class: "grow" }), mover && !(name in state.values) ? null : away));
+  if (mover) box.append(make("p", { class: "effect" }, effectOf(mover)));
+  if (p?.type === "Boolean") {
+    const tick = make("input", { type: "checkbox", "aria-label": name });
+    tick.checked = value === true;
+    tick.addEventListener("change", () => setValue(name, tick.checked, error));
+    box.append(make("label", { class: "row" }, tick, " on"));
+  } else {
+    const field = make("input", { type: "text", value: value ?? "", "aria-label": `${name} in ${unit || "1"}`, inputmode: "decimal" });
+    field.addEventListener("change", () => {
+      const given = field.value.trim().replace(",", ".").replace("−", "-"), x = Number(given);
+      setValue(name, given !== "" && Number.isFinite(x) ? x : field.value.trim(), error);
+    });
+    const row = make("div", { class: "row" }, field, make("span", { class: "soft" }, unit));
+    if (p && typeof p.value === "number" && p.type === "Real") {
+      const held = SAVED?.grid[name], least = held && Math.min(...held), most = held && Math.max(...held);
+      const scale = held ? { low: least, high: most, to: x => least + x * (most - least), from: v => (v - least) / (most - least) } : scaleOf({ ...p, value: original(name) });
+      const slider = make("input", { type: "range", min: 0, max: 1000, step: 1, "aria-label": `${name}, from ${number(scale.low)} to ${number(scale.high)} ${unit}` });
+      slider.value = typeof value === "number" ? Math.round(1000 * Math.min(1, Math.max(0, scale.from(value)))) : 0;
+      const at = () => +scale.to(slider.value / 1000).toPrecision(4);
+      for (const begin of ["pointerdown", "focus"]) slider.addEventListener(begin, () => wantSlopes(name));
+      slider.addEventListener("input", () => { field.value = at(); estimateAt(name, at()); });
+      slider.addEventListener("change", () => { if (!SAVED?.movers) setValue(name, at(), error); });
+      row.prepend(slider);
+    }
+    box.append(row);
+    if (p && typeof p.value === "number" && p.type === "Real" && !SAVED) {
+      const finder = finderOf(`${state.scenario} ${name}`, {
+        now: () => state.values[name] ?? original(name), bounds: () => [p.minimum ?? -Infinity, p.maximum ?? Infinity],
+        valuesAt: x => ({ [name]: x }), apply: x => setValue(name, x), words: name.split(".").at(-1),
+      });
+      box.append(mover ? make("details", { open: seen.unfolded === name ? "" : null }, make("summary", {}, "find a value"), finder) : finder);
+    }
+  }
+  const bounds = p && (p.minimum !== null || p.maximum !== null) ? `, from ${p.minimum === null ? "any" : number(p.minimum)} to ${p.maximum === null ? "any" : number(p.maximum)}` : "";
+  if (mover) box.append(make("small", { class: "short", title: p?.description }, p?.description ?? ""));
+  box.append(make("small", { hidden: mover ? "" : null }, p ? `${p.description}${p.description ? "; " : ""}${p.variability}${bounds}; ${number(original(name))} in the case` : "this scenario has no such parameter"), error);
+  for (const off of (p?.switches ?? []).filter(one => (state.values[one] ?? original(one)) === false)) {
+    const on = make("button", {}, `switch ${off} on`);
+    on.addEventListener("click", () => setValue(off, true, error));
+    box.append(make("small", { class: "idle" }, `${name} cannot act: ${off} is off. `, SAVED ? "" : on));
+  }
+  if (SAVED && !SAVED.grid[name]) box.querySelectorAll("input").forEach(input => { input.disabled = true; });
+  return box;
 }
 
 // -- a value that is looked for -----------------------------------------------------------------------------------
@@ -114,6 +120,7 @@ function finder({ now, bounds, valuesAt, apply, words }) {
   const wanted = make("input", { value: 5, size: 3, inputmode: "decimal", "aria-label": `damping in % that ${words} is looked for` }), said = make("span", { class: "soft block", role: "status" }), begin = make("button", {}, "find"), until = make("button", { title: "the whole spectrum, aperiodic growth too" }, "until unstable");
   const say = text => { said.textContent = text; };
   const search = async percent => {  // null: until unstable
+    if (percent !== null && Number.isFinite(percent)) wanted.value = percent;
     if (!(percent === null || (percent > -100 && percent < 100))) { say("give a damping in percent"); return; }
     const here = now(), [least, most] = bounds(), error = make("span"), cancels = seen.cancels, tried = [];
     const holds = one => { const damping = Math.min(100, ...one.modes.map(m => m.damping_percent)); return { damping, f: percent === null ? { true: 1, false: -1 }[one.stable] ?? null : (one.stable === false ? Math.min(damping, -1e-9) : damping) - percent }; };
@@ -187,12 +194,13 @@ function finder({ now, bounds, valuesAt, apply, words }) {
   begin.addEventListener("click", () => search(Number(wanted.value.trim().replace(",", ".") || NaN)));
   until.addEventListener("click", () => search(null));
   const names = Object.keys(valuesAt(1)), others = () => JSON.stringify([state.scenario, state.range, Object.entries(state.values).filter(([name]) => !names.includes(name)).sort()]);
-  return { said, others, of: others(), box: make("div", { class: "finder" }, make("label", {}, "least damped at ", wanted, " % "), begin, " or ", until, said) };
+  return { said, search, others, of: others(), box: make("div", { class: "finder" }, make("label", {}, "least damped at ", wanted, " % "), begin, " or ", until, said) };
 }
 
 async function setValue(name, value, place = null) {
   const before = copyOf(state.values);
   if (value === null || (same(value, original(name)) && !(name in (seen.beginning?.values ?? {})))) delete state.values[name]; else state.values[name] = value;
+  seen.moved = name;
   if (same(before, state.values)) { seen.estimate = null; paintMap(); paintTable(); return; }
   keepState();
   paintControls();
@@ -214,7 +222,7 @@ async function wantSlopes(name) {
 }
 function estimateAt(name, value) {
   const begin = performance.now(), found = seen.slopes[slopeKey(name)];
-  if (SAVED) { state.values[name] = value; compute(); return; }
+  if (SAVED) { seen.moved = name; state.values[name] = value; compute(); keepState(); return; }
   if (!found || found.eigenvalues.length !== seen.modes.length) { wantSlopes(name); return; }
   const modes = found.eigenvalues.map(([re, im], k) => {
     const slope = found.slopes[k];
