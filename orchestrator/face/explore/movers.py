@@ -49,7 +49,7 @@ def movers(
     Returns
     -------
     dict
-        ``movers`` (see `_told`; at most `MOST`, largest effect first), ``frequency_hz`` and ``damping_percent`` of
+        ``movers`` (see `_as_json`; at most `MOST`, largest effect first), ``frequency_hz`` and ``damping_percent`` of
         the mode, ``looked_at`` and ``of``: how many values were looked at, and how many could be.
 
     Raises
@@ -73,7 +73,7 @@ def movers(
     acting = [row for row in found.rows if row.derivative is not None and row.effect > least]
     trusted = sorted(acting, key=lambda row: bool(row.doubts))  # the order by effect stays
     return {
-        "movers": [_told(row) for row in trusted[:MOST]],
+        "movers": [_as_json(row) for row in trusted[:MOST]],
         "frequency_hz": found.mode.frequency_hz,
         "damping_percent": found.mode.damping_percent,
         "looked_at": len(wanted),
@@ -123,7 +123,7 @@ def _near(scenario: Scenario, shares: Mapping[str, float], names: Sequence[str])
     return sorted(names, key=lambda name: -beside.get(name.partition(".")[2], -1.0))
 
 
-def _told(row: Sensitivity) -> dict[str, Any]:
+def _as_json(row: Sensitivity) -> dict[str, Any]:
     """``parameter``, its ``value`` and ``unit``, a round ``step`` within its bounds with the ``points`` of damping and
     the ``hertz`` that this step moves the mode by to first order, the declared bounds, and ``doubts``."""
     parameter = row.parameter

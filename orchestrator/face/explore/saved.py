@@ -71,7 +71,7 @@ def save_page(
         "beginning": beginning,
         "open": {**opened, "scenarios": {name: opened["scenarios"][name]}},
         "parameters": {name: parameters},
-        "grid": grid if varied else _computed(grid, own, answers),
+        "grid": grid if varied else _values_with_answers(grid, own, answers),
         "answers": answers,
         **first,
     }
@@ -99,7 +99,7 @@ def _first_screen(desk: Desk, asked: Mapping[str, Any]) -> tuple[dict[str, Any],
     return first, max(2, min(_STEPS, fitting))
 
 
-def _computed(
+def _values_with_answers(
     grid: Mapping[str, Sequence[float]],
     own: Mapping[str, float],
     answers: Sequence[Mapping[str, Any]],
