@@ -6,8 +6,9 @@ Trans. Power Delivery 31(2), 2016. The participation of a subsystem is the sum o
 sum to 1.
 
 What a pair does is told by one mode, followed from the system with both vendors to those with one and with none
-(`orchestrator.studies.interactions.following`). Whether any mode falls does not depend on the threshold: all modes that
-are not well damped are looked at."""
+(`orchestrator.studies.interactions.following`). If the least damped one cannot be followed to either vendor alone, the
+least dampings of the systems are compared, and said to be no figures of one mode. The threshold does not decide if any
+followed mode falls: all modes that are not well damped are looked at."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -104,16 +105,44 @@ class JudgedPair:
     @property
     def mode(self) -> FollowedMode | None:
         """The mode that tells what the pair does: the one that falls furthest, else the least damped that counts."""
-        falling = [one for one in self.modes if one.fall is not None and one.fall > SAME]
-        critical = self.joint.critical
+        falling = [one for one in self.modes if (self._fall_of(one) or 0.0) > SAME]
         if falling and self.joint.stable is not False:
-            return max(falling, key=lambda one: one.fall or 0.0)
-        return next((one for one in self.modes if one.together == critical), None)
+            return max(falling, key=lambda one: self._fall_of(one) or 0.0)
+        return self._critical_mode
 
     @property
     def fall(self) -> float | None:
-        """How far [points] the damping of `mode` lies below the lesser one with a vendor alone; None if not known."""
-        return None if self.mode is None else self.mode.fall
+        """How far [points] the damping of `mode` lies below the lesser one with a vendor alone; None if not known.
+
+        It is `least_fall` if the mode cannot be followed to either vendor alone."""
+        return None if self.mode is None else self._fall_of(self.mode)
+
+    @property
+    def least_fall(self) -> float | None:
+        """How far [points] the least damping together lies below the lesser one of the vendors alone.
+
+        It compares the least damped of the modes that count, which need not be one mode. None if none counts."""
+        alone = [mode.damping_percent for one in self.alone if (mode := one.critical) is not None]
+        together = self.joint.critical
+        return None if together is None or not alone else min(alone) - together.damping_percent
+
+    @property
+    def falls_unfollowed(self) -> bool:
+        """Return whether `fall` is `least_fall`, for want of a mode that can be followed."""
+        return self.mode is not None and self.mode.fall is None and self.fall is not None
+
+    @property
+    def is_compared(self) -> bool:
+        """Return whether something tells if the pair is damped less together; so it is if no mode of both counts."""
+        return self._critical_mode is None or self._fall_of(self._critical_mode) is not None
+
+    def _fall_of(self, mode: FollowedMode) -> float | None:
+        return self.least_fall if mode.fall is None and mode is self._critical_mode else mode.fall
+
+    @property
+    def _critical_mode(self) -> FollowedMode | None:
+        critical = self.joint.critical
+        return next((one for one in self.modes if one.together == critical), None)
 
     @property
     def unfollowed(self) -> list[FollowedMode]:
@@ -149,18 +178,35 @@ class JudgedPair:
         if self.fall is None:
             return f"{self.text}: stable{figures}"
         word = "lower together" if self.fall > SAME else "no lower together"
-        return f"{self.text}: stable, {word}{figures}"
+        by = ", by the least damping" * self.falls_unfollowed
+        return f"{self.text}: stable, {word}{by}{figures}"
 
     def _figures(self) -> str:
         mode = self.mode
         if mode is None:
             return ""
         head = f": {place_of(mode.together)} has {mode.together.damping_percent:.2f} % together"
+        neither = mode.neither_percent
+        figures = [
+            head,
+            *map(_alone_text, self.vendors, mode.alone_percent, self.alone),
+            "nor to the system with neither"
+            if neither is None
+            else f"{neither:.2f} % with neither",
+        ]
         if mode.unknown:
-            return f"{head}; without one of them it cannot be followed: {mode.unknown}"
-        with_one = zip(self.vendors, mode.alone_percent, strict=True)
-        each = ", ".join(f"{_percent_text(x)} with {vendor} alone" for vendor, x in with_one)
-        return f"{head}, {each}, {_percent_text(mode.neither_percent)} with neither"
+            figures[-1] = f"because {mode.unknown}"
+        elif neither is None and None not in mode.alone_percent:
+            figures[-1] = "cannot be followed to the system with neither"
+        return ", ".join(figures) + self._least_text()
+
+    def _least_text(self) -> str:
+        if self.fall is None:
+            return "; there is no mode alone to compare it with"
+        if not self.falls_unfollowed:
+            return ""
+        way = f"falls by {self.fall:.2f} points" if self.fall > SAME else "does not fall"
+        return f"; the least damping of the vendors' modes, which need not be of one mode, {way}"
 
     def _missing(self) -> str:
         systems = zip(
@@ -175,8 +221,16 @@ def _is_at(one: complex, other: complex) -> bool:
     return abs(one - other) <= _AT_ONE_PLACE * abs(other)
 
 
-def _percent_text(percent: float | None) -> str:
-    return "none" if percent is None else f"{percent:.2f} %"
+def _alone_text(vendor: str, percent: float | None, alone: JudgedSystem) -> str:
+    if percent is not None:
+        return f"{percent:.2f} % with {vendor} alone"
+    least = alone.critical
+    figure = (
+        "no vendor's mode counts there"
+        if least is None
+        else f"the least damped vendor's mode there: {least.damping_percent:.2f} % at {place_of(least)}"
+    )
+    return f"cannot be followed to {vendor} alone ({figure})"
 
 
 def place_of(mode: SharedMode) -> str:
@@ -304,6 +358,10 @@ class JudgedInteractions:
     @property
     def unknown_pairs(self) -> list[JudgedPair]:
         return [pair for pair in self.pairs if not pair.is_known]
+
+    @property
+    def uncompared_pairs(self) -> list[JudgedPair]:
+        return [pair for pair in self.pairs if pair.is_known and not pair.is_compared]
 
     @property
     def assignments(self) -> list[JudgedSystem]:

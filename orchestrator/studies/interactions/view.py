@@ -43,6 +43,9 @@ from orchestrator.studies.interactions.words import (
 MODES, PAIRS, ASSIGNMENTS = "modes.csv", "pairs.csv", "assignments.csv"
 SUMMARY, PAGE = "interactions.json", "interactions.html"
 
+_UNFOLLOWED = "not followed"
+_LEAST = "; least: of the vendors' modes, if it cannot be followed"
+
 _LEAST_SHARE = 0.005
 _CELL, _MARGIN = 96, 120
 _LONGEST = 13  # characters that fit above a square, and left of it
@@ -251,9 +254,24 @@ def pairs_table(judgement: JudgedInteractions) -> ColumnTable[JudgedPair]:
 
     def column(title: str, of: Callable[[FollowedMode], float | None]) -> Column[JudgedPair]:
         def text(pair: JudgedPair) -> str:
-            return _percent_cell(None if pair.mode is None else of(pair.mode))
+            return "none" if pair.mode is None else _followed_cell(of(pair.mode))
 
         return Column(title, text)
+
+    def alone(title: str, k: int) -> Column[JudgedPair]:
+        def text(pair: JudgedPair) -> str:
+            percent = None if pair.mode is None else pair.mode.alone_percent[k]
+            least = pair.alone[k].critical
+            if pair.falls_unfollowed and percent is None and least is not None:
+                return f"{_UNFOLLOWED}; least {least.damping_percent:.2f}"
+            return "none" if pair.mode is None else _followed_cell(percent)
+
+        return Column(title, text)
+
+    def fall(pair: JudgedPair) -> str:
+        if pair.fall is None:
+            return "–"
+        return f"{'least ' * pair.falls_unfollowed}{pair.fall:+.2f}"
 
     columns = (
         Column[JudgedPair]("Pair", lambda pair: pair.text),
@@ -261,14 +279,18 @@ def pairs_table(judgement: JudgedInteractions) -> ColumnTable[JudgedPair]:
             "Mode", lambda pair: "" if pair.mode is None else place_of(pair.mode.together)
         ),
         column("Neither [%]", lambda mode: mode.neither_percent),
-        column("First alone [%]", lambda mode: mode.alone_percent[0]),
-        column("Second alone [%]", lambda mode: mode.alone_percent[1]),
+        alone("First alone [%]", 0),
+        alone("Second alone [%]", 1),
         column("Together [%]", lambda mode: mode.together.damping_percent),
-        Column[JudgedPair](
-            "Falls by [points]", lambda pair: "–" if pair.fall is None else f"{pair.fall:+.2f}"
-        ),
+        Column[JudgedPair]("Falls by [points]", fall),
     )
-    return ColumnTable("One mode of each pair, followed", columns, judgement.pairs)
+    least = any(pair.falls_unfollowed for pair in judgement.pairs)
+    title = f"One mode of each pair, followed{_LEAST * least}"
+    return ColumnTable(title, columns, judgement.pairs)
+
+
+def _followed_cell(percent: float | None) -> str:
+    return _UNFOLLOWED if percent is None else f"{percent:.2f}"
 
 
 def assignments_table(judgement: JudgedInteractions) -> ColumnTable[JudgedSystem]:
@@ -315,6 +337,7 @@ def _pair(pair: JudgedPair) -> dict[str, Any]:
         "mode_neither_percent": None if mode is None else mode.neither_percent,
         "mode_not_followed": None if mode is None else mode.unknown or None,
         "falls_by_points": pair.fall,
+        "falls_by_least_damping": pair.falls_unfollowed,
         "unstable_though_stable_alone": pair.fights,
         **{
             f"{which}_alone_{key}": value
@@ -346,7 +369,9 @@ def as_json(judgement: JudgedInteractions) -> dict[str, Any]:
             for pair in judgement.pairs
         ],
         "worst_pair": None if worst is None else list(worst.vendors),
-        "unknown_pairs": [list(pair.vendors) for pair in judgement.unknown_pairs],
+        "unknown_pairs": [
+            list(pair.vendors) for pair in (*judgement.unknown_pairs, *judgement.uncompared_pairs)
+        ],
     }
     if plan.swapped:
         found["assignments"] = [

@@ -82,6 +82,9 @@ def pairs_sentence(judgement: JudgedInteractions) -> str:
         return f"worst pair{among}: {worst.sentence()}{rest}"
     if not known:
         return f"worst pair: not known: {'; '.join(pair.sentence() for pair in unknown)}"
+    apart = [pair.sentence() for pair in judgement.uncompared_pairs]
+    if apart:
+        return f"worst pair: not known: {'; '.join(apart)}{rest}"
     if len(judgement.pairs) == 1:
         return f"no worst pair: {judgement.pairs[0].sentence()}{rest}"
     return (

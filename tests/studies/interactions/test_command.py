@@ -118,7 +118,7 @@ def test_the_guides_followed_modes_are_those_that_are_computed():
         mode = pair.mode
         assert row[1] == f"{mode.together.frequency_hz:.4g} Hz"
         dampings = (mode.neither_percent, *mode.alone_percent, mode.together.damping_percent)
-        assert row[2:6] == ["none" if x is None else f"{x:.2f}" for x in dampings]
+        assert row[2:6] == ["not followed" if x is None else f"{x:.2f}" for x in dampings]
         assert row[6] == f"{pair.fall:+.2f}"
 
 

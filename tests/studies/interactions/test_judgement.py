@@ -9,7 +9,7 @@ from orchestrator.core.errors import ErrorKind
 from orchestrator.studies.interactions.judgement import JudgedSystem, doubts_of
 from orchestrator.studies.interactions.point import SharedMode, SystemRecord
 from orchestrator.studies.interactions.systems import NONE, WHOLE, Kind, SystemName
-from orchestrator.studies.interactions.view import Interactions, systems_table
+from orchestrator.studies.interactions.view import Interactions, pairs_table, systems_table
 from orchestrator.studies.points.failure import Failure
 from tests.studies.interactions.park import park, studied, swapped, written
 
@@ -88,6 +88,50 @@ def test_where_no_pair_falls_there_is_no_worst_one():
     found = judged(**ALL | {"A_B": system(mode(8.005)), "A_C": system(mode(7.995))})
     assert found.worst_pair is None
     assert "no worst pair: no mode of 3 pairs is damped less together" in " ".join(found.sentences)
+
+
+def lost_alone(worst):
+    """The pair A and B with 16.79 %, whose mode cannot be followed; the modes of each alone are given."""
+    records = ALL | {"A": system(*worst[:1]), "B": system(*worst[1:]), "A_B": system(mode(16.79))}
+    result = judged(**records).result
+
+    def follow(eigenvalue, begin, end):
+        return None if begin.names == ("A", "B") else by_place(result)(eigenvalue, begin, end)
+
+    return Interactions(result, follow)
+
+
+def test_a_mode_that_is_lost_alone_leaves_the_fall_of_the_least_damping():
+    found = lost_alone((mode(19.63), mode(18.85)))
+    pair = next(one for one in found.judgement.pairs if one.vendors == ("A", "B"))
+    assert pair.mode.alone_percent == (None, None)
+    assert pair.fall == pytest.approx(18.85 - 16.79)
+    assert found.worst_pair == ("A", "B")
+    told = " ".join(found.sentences)
+    assert "worst pair of 3 pairs: A + B: stable, lower together, by the least damping" in told
+    assert "cannot be followed to A alone (the least damped vendor's mode there: 19.63 % at" in told
+    assert "need not be of one mode, falls by 2.06 points" in told
+    assert "none with" not in told
+    (row,) = [row for row in found.as_json()["pairs"] if row["vendors"] == ["A", "B"]]
+    assert (row["falls_by_least_damping"], row["mode_first_alone_percent"]) == (True, None)
+    (cells,) = [
+        [column.cell(one) for column in pairs_table(found.judgement).shown]
+        for one in found.judgement.pairs
+        if one is pair
+    ]
+    assert cells[3:] == [
+        "not followed; least 19.63",
+        "not followed; least 18.85",
+        "16.79",
+        "least +2.06",
+    ]
+
+
+def test_a_pair_without_any_mode_alone_to_compare_is_not_said_to_have_no_fall():
+    found = lost_alone(())
+    assert found.worst_pair is None
+    assert "worst pair: not known: A + B: stable" in " ".join(found.sentences)
+    assert found.as_json()["unknown_pairs"] == [["A", "B"]]
 
 
 def test_a_pair_that_one_of_them_spoils_alone_is_no_fight():
