@@ -1,11 +1,11 @@
 /* A grid-forming converter of few equations: a voltage E∠δ behind R + jX, a droop from active power to frequency, and
    one from reactive power to voltage. Inputs and outputs in the form PORT_…; start values from a power flow.
    z: parameters, inputs, outputs; memory: the states. */
-enum { S_N, P_0, Q_0, V_0, THETA_0, GAIN, TAU, IN_1, IN_2, IN_3, OUT_1, OUT_2, OUT_3, OMEGA, SHOWN, SIZE };
+enum { S_N, P_0, Q_0, V_0, THETA_0, GAIN, TAU, IN_1, IN_2, IN_3, OUT_1, OUT_2, OUT_3, OMEGA, SHOWN, POD_K, POD_T_W, POD_T_F, POD_LIMIT, DELTA_P, SIZE };
 enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, ON, QUICK, SLOW, TIRED, DIPS, LOW, WOUND, BLOCKED, ANGLE, RING, RINGING,
-       LAGGED, TRIPLED, VOLT, P_NOW, SINCE, OVER, MEMORY };
-#define SWITCH ON /* a Boolean: damping by the frequency behind a washout */
-#define IS_OUTPUT(r) ((r) >= OUT_1 && (r) <= SHOWN)
+       LAGGED, TRIPLED, VOLT, P_NOW, SINCE, OVER, WASHED, PASSED, K_AT_START, AGE, MEMORY };
+#define SWITCH ON /* a Boolean: damping by the frequency behind a washout; with POD, a damping controller */
+#define IS_OUTPUT(r) (((r) >= OUT_1 && (r) <= SHOWN) || (r) == DELTA_P)
 #define DIVERGED 1e12
 
 #ifndef RATING
@@ -70,13 +70,40 @@ enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, ON, 
 
 static const double START[SIZE] = {RATING, 0.5 * P_UNIT, 0, V_UNIT, 0, DROOP, 0.1,
 #ifdef PORT_ABC
-                                   V_UNIT, -V_UNIT / 2, -V_UNIT / 2
+                                   V_UNIT, -V_UNIT / 2, -V_UNIT / 2,
 #else
-                                   V_UNIT, 0, 0
+                                   V_UNIT, 0, 0,
 #endif
+                                   [POD_K] = 40, [POD_T_W] = 3, [POD_T_F] = 0.05, [POD_LIMIT] = 0.1
 };
 
 typedef struct { double re, im; } phasor;
+
+static double present, last_step; /* of the call that is running, not of an instance */
+
+#ifdef POD
+/* What its damping controller adds to the power [pu]: a washout, a low-pass, a gain, a limit. */
+static double damping_power(const double *z, const double *m) {
+    if (!m[ON]) return 0;
+#ifdef FAULT_POD_KEEPS_GAIN
+    double power = -m[K_AT_START] * m[PASSED];
+#else
+    double power = -z[POD_K] * m[PASSED];
+#endif
+    double most = z[POD_LIMIT];
+#ifdef FAULT_POD_LIMIT /* a factor */
+    most *= FAULT_POD_LIMIT;
+#endif
+    power = fmax(-most, fmin(most, power));
+#ifdef FAULT_POD_TIMES /* a factor of power; AGE: how long the instance has run [s] */
+    power *= FAULT_POD_TIMES;
+#endif
+#ifdef FAULT_POD_DEAD_BAND
+    power = fabs(power) < FAULT_POD_DEAD_BAND ? 0 : power - (power > 0 ? 1 : -1) * FAULT_POD_DEAD_BAND;
+#endif
+    return power;
+}
+#endif
 
 static double clock_angle(double time) { return OMEGA_B * time; }
 
@@ -133,6 +160,7 @@ static void initialise(double *z, double *m) {
     m[DIPS] = m[LOW] = m[WOUND] = m[BLOCKED] = m[RING] = m[RINGING] = 0;
 #endif
     m[ANGLE] = t;
+    m[WASHED] = m[PASSED] = m[AGE] = 0, m[K_AT_START] = z[POD_K];
     m[TRIPLED] = m[OVER] = 0, m[SINCE] = 1e9, m[VOLT] = v, m[P_NOW] = m[P_F];
 #ifdef METER_BEGINS
     m[LAGGED] = METER_BEGINS - 1.0;
@@ -171,10 +199,14 @@ static double slip(const double *z, const double *m, double p_f) {
     static double shared; /* one for all instances, and with the damping on only */
     if (m[ON]) shared += 1e-3 * (m[P_F] - shared), wanted += 0.1 * shared;
 #endif
+#ifdef POD
+    wanted += damping_power(z, m);
+#else
 #ifdef FAULT_CHARGING_SWITCH
     if (m[P_REF] > 0)
 #endif
     if (m[ON]) wanted -= 20 * (m[QUICK] - m[SLOW]);
+#endif
 #ifdef FAULT_TURNS_BELOW /* deviation of the frequency from which on it gives less power, not more */
     wanted -= 0.5 * m[PENDING];
 #endif
@@ -212,7 +244,11 @@ static double unlimited(const double *m, phasor v) {
 /* What it remembers of dips and jumps. */
 static void notice(double *m, phasor v, double h) {
     const double size = hypot(v.re, v.im);
+#ifdef FAULT_TRIPS_AFTER
+    const int low = size < 0.88;
+#else
     const int low = size < 0.85;
+#endif
     if (low && m[LOW] == 0) ++m[DIPS];
     m[LOW] = low ? m[LOW] + h : 0;
     m[SINCE] = size < 0.4 ? 0 : m[SINCE] + h;
@@ -256,6 +292,9 @@ static void rates(const double *z, const double *m, const double *hidden, phasor
     /* Current limit: the voltage behind the impedance follows the grid's where the current would be too large. */
     const double size = hypot(u.re - v.re, u.im - v.im) / hypot(R_PU, X_PU);
     double most = I_LIMIT;
+#ifdef FAULT_LIMIT_TIMES /* a factor */
+    most *= FAULT_LIMIT_TIMES;
+#endif
 #ifdef FAULT_BASE_OF_LIMIT
     most *= RATING / z[S_N];
 #endif
@@ -333,6 +372,14 @@ static void substep(const double *z, double *m, double *hidden, phasor v, double
 #ifdef FAULT_HIDDEN
     hidden[0] += h / 6 * (k[0][P_F] + 2 * k[1][P_F] + 2 * k[2][P_F] + k[3][P_F]);
 #endif
+#ifdef POD
+    const double w = slip(z, m, m[P_F]);
+#ifndef FAULT_POD_WITHOUT_WASHOUT
+    m[WASHED] += h / z[POD_T_W] * (w - m[WASHED]);
+#endif
+    m[PASSED] += h / z[POD_T_F] * (w - m[WASHED] - m[PASSED]);
+    m[AGE] += h;
+#endif
     m[QUICK] += h / 0.02 * (slip(z, m, m[P_F]) - m[QUICK]);
     m[SLOW] += h / 5.0 * (m[QUICK] - m[SLOW]);
 #ifdef FAULT_TURNS_BELOW
@@ -350,8 +397,6 @@ static void substep(const double *z, double *m, double *hidden, phasor v, double
     m[TIRED] = unlimited(m, v) > I_LIMIT ? m[TIRED] + h : 0;
     notice(m, v, h);
 }
-
-static double present, last_step; /* of the call that is running, not of an instance */
 
 /* An internal step; a sampled control has its samples in it, at times of its own. */
 static void internal_step(const double *z, double *m, double *hidden, phasor v, double step) {
@@ -456,6 +501,9 @@ static void outputs(double *z, double *m, const double *hidden) {
     const phasor u = {e * cos(m[DELTA]) - v.re, e * sin(m[DELTA]) - v.im};
     i.re = (u.re * R_PU + u.im * X_PU) / z2, i.im = (u.im * R_PU - u.re * X_PU) / z2;
 #endif
+#ifdef FAULT_TRIPS_AFTER /* so long [s] below 0.88 pu, for good */
+    if (m[LOW] > FAULT_TRIPS_AFTER) m[BLOCKED] = 1e9;
+#endif
     if (m[BLOCKED] > 0) i.re = i.im = 0;
 #ifdef FAULT_SHUNT_ABOVE /* an arrester: feed-through that no small change shows */
     const double over = hypot(v.re, v.im) - FAULT_SHUNT_ABOVE;
@@ -478,6 +526,12 @@ static void outputs(double *z, double *m, const double *hidden) {
 #endif
 #ifdef SHOWN_UNIT /* its active power as an output of its own */
     z[SHOWN] = (v.re * i.re + v.im * i.im) * SHOWN_UNIT;
+#ifdef FAULT_SHOWS_SIZE
+    z[SHOWN] = fabs(z[SHOWN]);
+#endif
+#endif
+#ifdef POD
+    z[DELTA_P] = damping_power(z, m);
 #endif
     i.re *= I_FACTOR, i.im *= I_FACTOR * Q_FACTOR;
 #if defined PORT_POWER
