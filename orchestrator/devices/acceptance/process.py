@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import ComponentError, InputError
+from orchestrator.devices.acceptance.shifted_clock import with_shift
 from orchestrator.devices.fmi import answers
 from orchestrator.devices.fmi.component import RealBatch
 from orchestrator.devices.fmi.confined import ConfinedProcess, ProcessFault
@@ -44,10 +45,13 @@ class ProcessEndedError(Exception):
 class FmuProcess:
     """A process with instances of one FMU.
 
+    ``clock_shift``: by how many seconds date and time of day are later than they are.
     ``deadline``: `time.monotonic` after which no answer is waited for.
     ``protections``: What keeps it from the rest of the machine."""
 
-    def __init__(self, description: FmuDescription, directory: Path, limits: Limits) -> None:
+    def __init__(
+        self, description: FmuDescription, directory: Path, limits: Limits, clock_shift: int = 0
+    ) -> None:
         self.description, self.limits = description, limits
         self.deadline = inf
         self.time = 0.0
@@ -65,6 +69,7 @@ class FmuProcess:
             [fmu, directory],
             limits,
             windows=runs_under_wine(description),
+            variables=with_shift(clock_shift) if clock_shift else None,
         )
         try:
             self.box = self._process.box

@@ -5,6 +5,8 @@ measurements come. So it reaches no verdict."""
 
 import hashlib
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -261,6 +263,7 @@ class _Runner:
         self._asked: list[str] = []
         self._deadline = 0.0
         subject.process = self.process
+        subject.process_at = self._process_at
 
     def process(self) -> FmuProcess:
         """The FMU's process; a new one where it has ended the last one."""
@@ -272,6 +275,17 @@ class _Runner:
             self._report.protections = self._process.protections
         self._process.deadline = self._deadline
         return self._process
+
+    @contextmanager
+    def _process_at(self, clock_shift: int) -> Iterator[FmuProcess]:
+        """A process of its own with another date and time of day."""
+        subject = self._subject
+        process = FmuProcess(subject.description, subject.directory, self._limits, clock_shift)
+        process.deadline = self._deadline
+        try:
+            yield process
+        finally:
+            process.close()
 
     def run(self, names: list[str]) -> None:
         results = self._report.results

@@ -142,6 +142,7 @@ _LOOK = 0.01  # time [s] after which it is looked whether a process has ended
 class ConfinedProcess:
     """A worker, started behind a supervisor (`supervisor`); it is the function ``main`` of a module.
 
+    ``variables``: further variables of its environment, until the FMU is loaded.
     ``protections``: What keeps it from the rest of the machine; empty until the worker has told."""
 
     def __init__(
@@ -152,6 +153,7 @@ class ConfinedProcess:
         limits: Limits,
         *,
         windows: bool = False,
+        variables: Mapping[str, str] | None = None,
     ) -> None:
         self._limits, self.protections = limits, tuple[Protection, ...]()
         if windows:
@@ -187,7 +189,7 @@ class ConfinedProcess:
                     stdout=output,
                     stderr=output,
                     start_new_session=True,
-                    env=environment(),
+                    env={**environment(), **(variables or {})},
                     pass_fds=(memory,) if isinstance(memory, int) else (),
                 )
         except BaseException:

@@ -55,6 +55,7 @@ def checked(path, binding=None, only=()):
         ("droop_of_q_while_charging", "signs"),
         ("refused_in_the_run", "tunables"),
         ("ignored_in_the_run", "tunables"),
+        ("current_of_the_minute", "clock"),
         ("feedthrough_of_high_voltage", "feedthrough"),
         ("hidden_state", "state"),
         ("order_of_start_values", "repeatability"),
@@ -95,6 +96,7 @@ def test_a_check_finds_its_fault_and_leaves_the_good_one_alone(name, only, galle
             "P_meas is declared in MW and shows 1000 times the P that flows",
         ),
         ("shows_pu_as_mw", "wrong units", "shows 0.0006667 times the P that flows (1/S_n)"),
+        ("shows_size_of_power", "wrong sign", "P_meas shows the size of the P that flows"),
         ("converter_shows_mw", "", "no wrong unit is seen"),
         ("converter_shows_pu", "", "no wrong unit is seen"),
     ],
@@ -127,6 +129,8 @@ def test_a_sum_of_times_in_single_precision_shows_after_a_rest(gallery):
         ("limit_of_three_dips", "limits", "after a series of events"),
         ("limit_until_overvoltage", "limits", "in a voltage that lasts"),
         ("blocks_after_deep_dips", "limits", "it gives no current for"),
+        ("trips_below_088", "limits", "it gives no current any more after the dip to 0.8"),
+        ("limit_that_latches", "limits", "pu in the same dip at the start"),
     ],
 )
 def test_the_verdict_says_what_happened(name, only, words, gallery):

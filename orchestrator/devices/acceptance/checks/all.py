@@ -3,6 +3,8 @@
 from orchestrator.devices.acceptance.checks import (
     aftermath,
     base,
+    clock,
+    damping,
     evenness,
     extremes,
     file,
@@ -21,8 +23,8 @@ from orchestrator.devices.acceptance.checks import (
 )
 
 MODULES = (
-    *(file, loading, running, instances, state, sampling, timing, tuning),
-    *(port, points, signs, evenness, ride_through, aftermath, extremes, resources),
+    *(file, loading, running, instances, clock, state, sampling, timing, tuning),
+    *(port, points, signs, evenness, damping, ride_through, aftermath, extremes, resources),
 )
 """Importing them enters their checks."""
 
@@ -41,6 +43,7 @@ ORDER = (
     "reading",
     "reset",
     "reinstantiation",
+    "clock",
     "state",
     "settable_states",
     "state_size",
@@ -60,6 +63,7 @@ ORDER = (
     "ratings",
     "signs",
     "evenness",
+    "pod",
     "limits",
     "after_dips",
     "nan_input",

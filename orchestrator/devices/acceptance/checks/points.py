@@ -341,6 +341,16 @@ def shown_power(subject: Subject) -> CheckResult:
                 ),
                 "",
             )
+            size = np.abs(flows) * np.abs(row).max() / np.abs(flows).max()
+            rectified = (
+                variables[name].unit != "MVA"
+                and flows.min() < 0 < flows.max()
+                and np.abs(np.abs(row) - size).max() <= _NEAR * np.abs(row).max()
+                and np.unique(np.sign(row)).size == 1
+            )
+            if rectified:
+                says = f"{name} shows the size of the {word} that flows, and one sign whichever way it flows"
+                return failed("shown_power", "wrong sign", says)
             if fits and factor:
                 says = f"{name} is declared in {variables[name].unit} and shows {abs(ratio):.4g} times the {word}"
                 return failed(

@@ -22,6 +22,7 @@ def elsewhere(subject: Subject, *, switches: bool = True) -> dict[str, float | b
         flag = (
             info.type == "Real"
             and value == round(value)
+            and abs(value) <= _MOST_MODES
             and (info.unit or "").strip().lower() in _NO_UNIT
         )
         if flag or info.type == "Integer":
@@ -42,10 +43,11 @@ def elsewhere(subject: Subject, *, switches: bool = True) -> dict[str, float | b
 
 
 _NO_UNIT = ("", "1", "-", "n/a", "na", "none", "unitless", "flag", "bool", "mode")
+_MOST_MODES = 16  # a larger whole number is a gain or a time rather than a mode
 _MOST_SWITCHES = 3  # switches that are tried one by one; where there are more, all together as well
 
 
-def _settings(subject: Subject) -> list[dict[str, float | bool]]:
+def settings(subject: Subject) -> list[dict[str, float | bool]]:
     """Parameters to look at it with: as they are, and with its tunable Booleans the other way."""
     variables = subject.description.variables.values()
     names = [
@@ -72,7 +74,7 @@ def with_each_setting(
     """Return what a look gives with one setting after another, and the setting in words.
 
     A setting with which the FMU does not work is passed over."""
-    for setting in _settings(subject):
+    for setting in settings(subject):
         try:
             found = look(setting)
         except ComponentError:

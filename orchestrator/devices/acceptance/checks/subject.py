@@ -2,7 +2,7 @@
 
 from cmath import rect
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -59,6 +59,8 @@ class Subject:
 
     # gives the process in which it runs, a new one after its end; whoever runs checks sets it.
     process: Callable[[], FmuProcess]
+    # gives a process whose clock is so many seconds later; whoever runs checks sets it.
+    process_at: Callable[[int], AbstractContextManager[FmuProcess]]
 
     def __init__(
         self, description: FmuDescription, directory: Path, use: Use | None = None, seed: int = 1
@@ -97,6 +99,17 @@ class Subject:
 
     def open(self, name: str = "fmu") -> HostedComponent:
         return HostedComponent(name, self.process())
+
+    @contextmanager
+    def with_clock(self, shift: int) -> Iterator[None]:
+        """Open instances in a process whose date and time of day are so many seconds later."""
+        usual = self.process
+        with self.process_at(shift) as other:
+            self.process = lambda: other
+            try:
+                yield
+            finally:
+                self.process = usual
 
     @contextmanager
     def while_doing(self, what: str) -> Iterator[None]:

@@ -81,6 +81,10 @@ typedef struct { double re, im; } phasor;
 
 static double present, last_step; /* of the call that is running, not of an instance */
 
+#include <time.h>
+/* Seconds of the machine's clock. */
+static inline long wall_clock(void) { return (long)time(NULL); }
+
 #ifdef POD
 /* What its damping controller adds to the power [pu]: a washout, a low-pass, a gain, a limit. */
 static double damping_power(const double *z, const double *m) {
@@ -508,6 +512,9 @@ static void outputs(double *z, double *m, const double *hidden) {
 #ifdef FAULT_SHUNT_ABOVE /* an arrester: feed-through that no small change shows */
     const double over = hypot(v.re, v.im) - FAULT_SHUNT_ABOVE;
     if (over > 0) i.re -= 5 * over * v.re, i.im -= 5 * over * v.im;
+#endif
+#ifdef FAULT_CLOCK_CURRENT /* in odd minutes */
+    if (wall_clock() / 60 % 2) i.re *= FAULT_CLOCK_CURRENT, i.im *= FAULT_CLOCK_CURRENT;
 #endif
 #ifdef FAULT_RINGS
     i.re += m[RING];

@@ -55,6 +55,7 @@ def converter(
     omega=("omega", "pu"),
     switch=False,
     shown=None,
+    pod=False,
     **defines,
 ):
     """The converter of converter.c; ``units`` are those of voltage, current, power."""
@@ -102,6 +103,9 @@ def converter(
         variables += [
             Variable("damping", 0, "parameter", 0, "", variability="tunable", type="Boolean")
         ]
+    if pod:
+        variables += DAMPING_CONTROLLER
+        defines = {"POD": 1, **defines}
     return Source(
         name,
         "converter.c",
@@ -112,6 +116,15 @@ def converter(
         state,
     )
 
+
+DAMPING_CONTROLLER = (
+    Variable("pod_p.enabled", 0, "parameter", 0, "", variability="tunable", type="Boolean"),
+    Variable("pod_p.K", 15, "parameter", 40.0, "pu", variability="tunable"),
+    Variable("pod_p.T_W", 16, "parameter", 3.0, "s", variability="tunable"),
+    Variable("pod_p.T_f", 17, "parameter", 0.05, "s", variability="tunable"),
+    Variable("pod_p.limit", 18, "parameter", 0.1, "pu", variability="tunable"),
+    Variable("delta_p_pod", 19, "output", None, "pu"),
+)
 
 START = "\n".join(f'[start.{n}]\nvariable = "{n}"' for n in ("P_0", "Q_0", "v_0", "theta_0"))
 
@@ -284,6 +297,7 @@ def good():
         Member(converter("converter_that_forbidden_calls_crash", FAULT_NO_ORDER=1)),
         Member(small("tank", "TANK", TANK, step_size="1e-2", stop_time="20")),
         Member(converter("converter_with_damping", switch=True)),
+        Member(converter("converter_with_pod", pod=True)),
         Member(_open_lag("open_lag")),
         Member(converter("converter_with_dip_memory", DIP_MEMORY=1)),
         Member(converter("converter_that_wraps", WRAPS_BY="(2 * 3.14159265358979323846)")),
@@ -410,6 +424,80 @@ def faulty():
         *tampering(),
         *late_outputs(),
         *large_signals(),
+        *damping(),
+    ]
+
+
+POD_ASKED = ("runs", "independence", "repeatability", "steady_state", "power_balance")
+"""What must be known before a damping controller is tried."""
+
+
+def damping():
+    """What is wrong with a damping controller alone; each beside `converter_with_pod`, which is good."""
+
+    def one(name, fault, *only, **defines):
+        source = converter(name, pod=True, **defines)
+        return Member(source, fault, only=(*POD_ASKED, *(only or ("pod",))))
+
+    return [
+        one("pod_of_dead_band", "POD with a dead band", FAULT_POD_DEAD_BAND=0.01),
+        one("pod_of_one_side", "POD of one side", FAULT_POD_TIMES="(power > 0)"),
+        one(
+            "pod_off_above_power",
+            "POD of some points only",
+            FAULT_POD_TIMES="(m[P_REF] < 0.8)",
+        ),
+        one(
+            "pod_off_below_voltage",
+            "POD of some points only",
+            FAULT_POD_TIMES="(m[VOLT] > 0.97)",
+        ),
+        one(
+            "pod_reversed_while_charging",
+            "POD of some points only",
+            FAULT_POD_TIMES="(m[P_REF] < 0 ? -1 : 1)",
+        ),
+        one(
+            "pod_reversed_for_large_swings",
+            "POD reversed",
+            FAULT_POD_TIMES="(fabs(power) > 0.07 ? -1 : 1)",
+        ),
+        one(
+            "pod_gain_of_step",
+            "POD follows the step",
+            FAULT_POD_TIMES="(last_step > 1.5e-4 ? 0.5 : 1)",
+        ),
+        one("pod_dead_after_a_while", "POD changes with time", FAULT_POD_TIMES="(m[AGE] < 50)"),
+        one(
+            "pod_that_fades",
+            "POD changes with time",
+            FAULT_POD_TIMES="exp(-m[AGE] / 30)",
+        ),
+        one(
+            "pod_of_the_minute",
+            "follows the clock",
+            "clock",
+            FAULT_POD_TIMES="(wall_clock() / 60 % 2 ? 0.5 : 1)",
+        ),
+        one(
+            "pod_dead_after_a_date",
+            "follows the clock",
+            "clock",
+            FAULT_POD_TIMES="(wall_clock() > 1900000000 ? 0 : 1)",
+        ),
+        one("current_of_the_minute", "follows the clock", "clock", FAULT_CLOCK_CURRENT=0.98),
+        one("pod_without_washout", "POD without washout", FAULT_POD_WITHOUT_WASHOUT=1),
+        one("pod_above_its_limit", "POD limit not as declared", FAULT_POD_LIMIT=2.0),
+        one("pod_below_its_limit", "POD limit not as declared", FAULT_POD_LIMIT=0.6),
+        one("pod_latched_by_dips", "POD changed by a disturbance", FAULT_POD_TIMES="(m[DIPS] < 1)"),
+        one("pod_that_does_nothing", "POD without effect", FAULT_POD_TIMES="0"),
+        one(
+            "pod_gain_of_the_start",
+            "parameter not taken",
+            "reading",
+            "tunables",
+            FAULT_POD_KEEPS_GAIN=1,
+        ),
     ]
 
 
@@ -503,6 +591,16 @@ def large_signals():
                 ("pu_as_mw", "MW", "1.0"),
             )
         ],
+        Member(
+            converter(
+                "shows_size_of_power",
+                shown=("P_meas", "MW"),
+                SHOWN_UNIT="z[S_N]",
+                FAULT_SHOWS_SIZE=1,
+            ),
+            "wrong sign",
+            only=("steady_state", "power_balance", "shown_power"),
+        ),
         one("leaking_in_dips", "memory leak", "after_dips", FAULT_LEAK_IN_DIPS=4096),
         one(
             "feedthrough_of_high_voltage",
@@ -590,6 +688,13 @@ def points_and_ratings():
         ),
         one("limit_of_a_short_time", "no current limit", "limits", FAULT_LIMIT_TIRES=1.5),
         one("droop_of_q_while_charging", "uneven droop", "signs", FAULT_CHARGING_Q_DROOP=-1),
+        one("trips_below_088", "trips", "limits", FAULT_TRIPS_AFTER=3.0),
+        one(
+            "limit_that_latches",
+            "changed by a disturbance",
+            "limits",
+            FAULT_LIMIT_TIMES="(m[DIPS] > 1 ? 0.6 : 1)",
+        ),
         one("refused_in_the_run", "parameter not taken", "tunables", FAULT_REFUSES_IN_RUN=1),
         one("ignored_in_the_run", "parameter not taken", "tunables", FAULT_IGNORES_IN_RUN=1),
         one("resonance", "keeps moving", "signs", FAULT_RINGS=7),

@@ -1,0 +1,298 @@
+"""Whether a damping controller (POD) works for every size, direction, point, step and time as it does for one."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import exp
+from typing import Any
+
+import numpy as np
+
+from orchestrator.core.errors import ComponentError
+from orchestrator.devices.acceptance.checks.base import (
+    SAME,
+    CheckResult,
+    check,
+    failed,
+    not_applicable,
+    passed,
+)
+from orchestrator.devices.acceptance.checks.damping_swings import (
+    DampingBench,
+    Effect,
+    FrequencySwing,
+    answer_size,
+    controllers,
+    likeness,
+    ratio,
+)
+from orchestrator.devices.acceptance.checks.port import WHY, cannot_import
+from orchestrator.devices.acceptance.checks.subject import OperatingAt, Subject
+
+_POINT = OperatingAt(1.0, 0.0, 0.4, 0.05)
+# peak of the output in the usual swing [pu, S_n], and in parts of a limit that is known
+_USUAL, _OF_LIMIT = 0.03, 0.25
+_SIZES = (
+    1e-4,
+    1e-3,
+    5e-3,
+)  # swings of the frequency [pu] of which the first that shows an answer is taken
+_SMALL, _LARGE, _BEYOND = 0.1, 3.0, 12.0  # other swings, in parts of the usual one
+_LARGEST = 0.006  # largest swing of the frequency [pu] in which its output is compared
+_EVEN = 0.1  # part of the answer by which it may differ where nothing but size or direction differs
+_ALIKE = 0.8  # correlation of two courses of one controller at different points
+_LEAST, _MOST = 0.5, 2.0  # how much smaller or larger an answer may be at another point
+_SAME_TIME = 0.05  # part of the answer by which it may differ at another time or step
+_DAMAGED = 0.4  # part of the answer by which it may differ soon after events
+_LIMIT = 0.03  # part of the declared limit by which the output's peak may differ from it
+_HELD = 0.93  # part of its answer to a lasting deviation that a controller without a washout keeps
+_RESTS = 60.0  # time at rest after which it is asked again [s]
+_SOON, _LATE = 2.0, 15.0  # times after events [s]
+
+_PLACES = (
+    ((1.0, 1.0), (0.84, 0.95)),
+    ((1.0, 1.0), (0.6, 0.75)),
+    ((1.0, 1.0), (0.05, 0.2)),
+    ((1.0, 1.0), (-0.2, -0.05)),
+    ((1.0, 1.0), (-0.6, -0.4)),
+    ((1.0, 1.0), (-0.9, -0.75)),
+    ((0.9, 0.93), (0.3, 0.6)),
+    ((0.94, 0.965), (0.3, 0.6)),
+    ((1.035, 1.06), (0.3, 0.6)),
+    ((1.08, 1.1), (0.3, 0.6)),
+)
+"""Bounds of voltage and power [pu] between which the points are drawn."""
+
+
+@dataclass(frozen=True)
+class _Fault:
+    name: str
+    words: str
+
+
+@check(
+    "pod",
+    "Does its damping controller work for every size, direction, point, step and time?",
+    needs=(*SAME, "steady_state", "power_balance"),
+)
+def pod(subject: Subject) -> CheckResult:
+    """FrequencySwing the network's frequency with the damping controllers on and off; what differs is theirs."""
+    if not subject.starts:
+        return not_applicable("pod", WHY["no start" if subject.port else "no port"])
+    names = controllers(subject)
+    if not names:
+        return not_applicable(
+            "pod",
+            "because no damping controller is known: bind its switch as "
+            '[signals."pod_p.enabled"] or [signals."pod_q.enabled"]',
+        )
+    bench = DampingBench(subject, names, _POINT)
+    trial = _Trial(bench)
+    tried = 0
+    for fault in trial.faults():
+        if fault is not None:
+            return failed("pod", fault.name, fault.words)
+        tried += 1
+    says = f"{' and '.join(bench.titles)}: {tried} comparisons of sizes, directions, points, steps "
+    says += f"and times are alike, in a swing of {bench.hertz:.3g} Hz"
+    says += f"; {len(trial.passed_over)} points were not tried" if trial.passed_over else ""
+    figures: dict[str, Any] = {"tried": tried}
+    if trial.moved_on:
+        figures["not_judged"] = "what events leave in its damping controller"
+    return passed("pod", says, **figures)
+
+
+class _Trial:
+    """The comparisons, from the one that explains most to the one that explains least."""
+
+    def __init__(self, bench: DampingBench) -> None:
+        self._bench = bench
+        self._size = 0.0
+        self._usual: tuple[Effect, ...] = ()
+        self.passed_over: list[OperatingAt] = []
+        self.moved_on = False  # whether it came back from no events
+
+    def faults(self) -> Iterator[_Fault | None]:
+        """Yield one answer for each comparison: a fault, or None where it is alike."""
+        silent = self._find_size()
+        yield silent
+        if silent is not None:
+            return
+        yield self._other_direction()
+        yield self._smaller()
+        yield self._larger()
+        yield from self._limits()
+        yield from self._elsewhere()
+        yield from self._other_steps()
+        yield self._later_start()
+        yield self._after_rest()
+        yield self._after_events()
+        yield from self._lasting()
+
+    def _find_size(self) -> _Fault | None:
+        """Choose the usual swing by what it brings; a controller that brings nothing in any is dead."""
+        bench = self._bench
+        known = [x for x in map(bench.declared_limit, bench.names) if x]
+        wanted = min([_USUAL, *(_OF_LIMIT * limit for limit in known)])
+        seen: tuple[Effect, ...] = ()
+        for size in _SIZES:
+            seen = bench.effects(FrequencySwing(size))
+            least = min(effect.least_peak for effect in seen)
+            if least > answer_size(size):
+                self._size = size * min(10.0, wanted / max(effect.peak for effect in seen))
+                self._usual = bench.effects(FrequencySwing(self._size))
+                return None
+        dead = min(seen, key=lambda effect: effect.least_peak)
+        says = f"{dead.title} changes nothing in a swing of {100 * _SIZES[-1]:g} % of the frequency"
+        return _Fault("POD without effect", f"{says} at {bench.hertz:.3g} Hz")
+
+    def _other_direction(self) -> _Fault | None:
+        for usual, other in zip(self._usual, self._bench.effects(FrequencySwing(-self._size)), strict=True):
+            apart = usual.apart(other)
+            if apart > _EVEN:
+                says = f"{usual.title} answers a swing that begins with less frequency by "
+                says += f"{100 * apart:.3g} % otherwise than one that begins with more"
+                return _Fault("POD of one side", says)
+        return None
+
+    def _smaller(self) -> _Fault | None:
+        for usual, other in zip(
+            self._usual, self._bench.effects(FrequencySwing(_SMALL * self._size)), strict=True
+        ):
+            apart = usual.apart(other)
+            if apart > _EVEN:
+                part = ratio(usual, other)
+                says = f"{usual.title} answers a swing of {1e6 * _SMALL * self._size:.3g}e-6 pu of the frequency by "
+                says += f"{100 * part:.3g} % of what one of {1e6 * self._size:.3g}e-6 pu brings in proportion"
+                return _Fault("POD with a dead band" if part < 1 else "POD uneven", says)
+        return None
+
+    def _larger(self) -> _Fault | None:
+        for times in (_LARGE, _BEYOND):
+            size = min(times * self._size, _LARGEST)
+            for usual, other in zip(self._usual, self._bench.effects(FrequencySwing(size)), strict=True):
+                alike = likeness(usual, other)
+                if alike < _ALIKE and (usual.shown or times == _LARGE):
+                    says = (
+                        f"{usual.title} answers a swing of {1e6 * size:.3g}e-6 pu of the frequency "
+                    )
+                    says += f"with another course (correlation {alike:.2f}) than a smaller one"
+                    return _Fault("POD reversed" if alike < 0.5 else "POD uneven", says)
+        return None
+
+    def _limits(self) -> Iterator[_Fault | None]:
+        """Compare the output that is shown with the limit that is declared, in a swing far beyond it."""
+        for number, name in enumerate(self._bench.names):
+            limit, usual = self._bench.declared_limit(name), self._usual[number]
+            if not limit or not usual.shown:
+                continue
+            size = self._size * 4.0 * limit / max(usual.peak, 1e-9)
+            seen = self._bench.effects(FrequencySwing(size))[number]
+            peak = seen.peak
+            if abs(peak / limit - 1) > _LIMIT:
+                word = "more" if peak > limit else "no more"
+                says = f"{usual.title} gives {word} than {peak:.4g} pu where {limit:g} pu is declared as its limit"
+                yield _Fault("POD limit not as declared", says)
+            else:
+                yield None
+
+    def _places(self) -> Iterator[OperatingAt]:
+        draw = self._bench.subject.random("pod, points")
+        for v, P in _PLACES:
+            yield OperatingAt(
+                round(float(draw.uniform(*v)), 3), 0.0, round(float(draw.uniform(*P)), 3), 0.0
+            )
+
+    def _elsewhere(self) -> Iterator[_Fault | None]:
+        for point in self._places():
+            if cannot_import(self._bench.subject, point):
+                self.passed_over.append(point)
+                continue
+            try:
+                found = self._bench.effects(FrequencySwing(self._size, point=point))
+            except ComponentError:
+                self.passed_over.append(point)
+                continue
+            yield self._at(point, found)
+
+    def _at(self, point: OperatingAt, found: tuple[Effect, ...]) -> _Fault | None:
+        where = f"at P_0 = {point.P:g}, v_0 = {point.v:g}"
+        for usual, other in zip(self._usual, found, strict=True):
+            part, alike = ratio(usual, other), likeness(usual, other)
+            if _LEAST < part < _MOST and alike > _ALIKE:
+                continue
+            says = f"{usual.title} gives {100 * part:.3g} % of its answer {where} that it gives "
+            says += f"at P_0 = {_POINT.P:g}, v_0 = {_POINT.v:g}, and its course has a correlation of {alike:.2f}"
+            return _Fault("POD of some points only", says)
+        return None
+
+    def _other_steps(self) -> Iterator[_Fault | None]:
+        h = self._bench.subject.step_size
+        for times, words in ((2.0, "twice"), (0.5, "half of")):
+            try:
+                found = self._bench.effects(FrequencySwing(self._size, step_size=times * h))
+            except ComponentError:
+                continue
+            yield _compare(
+                self._usual,
+                found,
+                "POD follows the step",
+                f"at {words} the communication step of {h:g} s",
+            )
+
+    def _later_start(self) -> _Fault | None:
+        begin = float(round(self._bench.subject.random("pod, start").uniform(1e3, 1e5)))
+        found = self._bench.effects(FrequencySwing(self._size, begin=begin))
+        return _compare(
+            self._usual, found, "POD changes with time", f"where the run begins at {begin:g} s"
+        )
+
+    def _after_rest(self) -> _Fault | None:
+        ends = [self._bench.subject.memory.get(end) for end in ("ended_at", "stops_at")]
+        rests = min([_RESTS, *(0.9 * end - self._bench.lasts for end in ends if end)])
+        if rests <= 0:
+            return None
+        usual = self._bench.together(FrequencySwing(self._size))
+        found = self._bench.together(FrequencySwing(self._size, rest=rests))
+        return _compare(usual, found, "POD changes with time", f"after {rests:.3g} s at rest")
+
+    def _after_events(self) -> _Fault | None:
+        """Look soon after dips, jumps and an overvoltage; what is only on its way back has more time."""
+        fault = None
+        for wait in (_SOON, _LATE):
+            parts = self._bench.apart_after_events(self._size, wait)
+            if parts is None:
+                self.moved_on = True
+                return None
+            worst = int(np.argmax(parts))
+            if parts[worst] < _DAMAGED:
+                return None
+            says = f"{self._usual[worst].title} answers by {100 * parts[worst]:.3g} % otherwise {wait:g} s after "
+            fault = _Fault(
+                "POD changed by a disturbance", f"{says}a dip, a jump, an overvoltage and a dip"
+            )
+        return fault
+
+    def _lasting(self) -> Iterator[_Fault | None]:
+        """Hold another frequency: a washout lets go of it."""
+        for title, name, early, late, between in self._bench.lasting(self._size):
+            T_W = self._bench.declared(f"{name}.T_W")
+            if early < 0.2 * self._usual[self._bench.names.index(name)].peak:
+                yield None
+                continue
+            kept = late / early
+            most = max(_HELD, exp(-between / T_W) + 0.02) if T_W else _HELD
+            if kept > most:
+                says = f"{title} keeps {100 * kept:.3g} % of its answer to a lasting deviation of the frequency "
+                yield _Fault("POD without washout", f"{says}over {between:.3g} s")
+            else:
+                yield None
+
+
+def _compare(
+    usual: tuple[Effect, ...], found: tuple[Effect, ...], fault: str, where: str
+) -> _Fault | None:
+    for one, other in zip(usual, found, strict=True):
+        apart = one.apart(other)
+        if apart > _SAME_TIME:
+            return _Fault(fault, f"{one.title} answers by {100 * apart:.3g} % otherwise {where}")
+    return None

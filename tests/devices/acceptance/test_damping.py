@@ -1,0 +1,97 @@
+"""A damping controller is tried for what it does, and each fault of it is told by its cause."""
+
+from dataclasses import replace
+
+import pytest
+
+from orchestrator.devices.acceptance.runner import check_fmu
+from orchestrator.devices.fmi.limits import Limits
+from tests.devices.acceptance.gallery.build import build
+from tests.devices.acceptance.gallery.members import START, binding, converter, faulty
+
+LIMITS = Limits(seconds=6.0)
+QUICK = ("pod_of_dead_band", "pod_of_one_side", "pod_off_above_power", "pod_below_its_limit")
+OTHERS = tuple(m.name for m in faulty() if m.name.startswith("pod_") and m.only[-1] == "pod")
+SLOW = tuple(name for name in OTHERS if name not in QUICK)
+
+UNITS = """
+[signals."pod_p.enabled"]
+variable = "pod_on"
+[signals."pod_p.K"]
+variable = "pod_gain"
+unit = "pu"
+[signals."pod_p.limit"]
+variable = "pod_most"
+unit = "pu"
+"""
+"""A controller under other names than ours, and without an output that shows what it does."""
+
+
+def told(gallery, name):
+    member = next(m for m in faulty() if m.name == name)
+    found = check_fmu(*gallery(name), LIMITS, (member.only[-1],), run_for=0.3)
+    assert found.faults == [member.fault]
+    return found.failures[0]
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_a_fault_of_a_damping_controller_is_told_by_its_cause(name, gallery):
+    assert "POD-P" in told(gallery, name).evidence
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SLOW)
+def test_what_takes_longer_to_show_is_told_as_well(name, gallery):
+    assert "POD-P" in told(gallery, name).evidence
+
+
+@pytest.mark.parametrize("name", ["pod_of_the_minute", "pod_dead_after_a_date"])
+def test_a_controller_that_follows_the_clock_is_found(name, gallery):
+    assert "the clock of its process" in told(gallery, name).evidence
+
+
+def test_a_gain_that_is_taken_at_the_start_only_is_found_with_the_controller_on(gallery):
+    says = told(gallery, "pod_gain_of_the_start").evidence
+    assert "pod_p.K is declared as tunable; set to 44 while it runs with pod_p.enabled" in says
+
+
+@pytest.mark.slow
+def test_a_good_controller_passes(gallery):
+    only = ("pod", "clock", "tunables")
+    found = check_fmu(*gallery("converter_with_pod"), LIMITS, only, run_for=0.3)
+    assert [r.verdict for r in found.results[1:]] == ["pass"] * 3
+    assert "6 of 6 tunable parameters act" in str([r.evidence for r in found.results])
+
+
+def behind_a_binding(tmp_path, **defines):
+    source = converter("foreign", pod=True, **defines)
+    names = {"pod_p.enabled": "pod_on", "pod_p.K": "pod_gain", "pod_p.limit": "pod_most"}
+    text = binding("rectangular", current='base = "100 MVA"', start=START) + UNITS
+    path = tmp_path / "foreign.toml"
+    path.write_text(text, encoding="utf-8")
+
+    def renamed(description):
+        for ours, its in names.items():
+            description = description.replace(f'"{ours}"'.encode(), f'"{its}"'.encode())
+        return description.replace(b'"delta_p_pod"', b'"x_17"')
+
+    return build(replace(source, change=renamed), tmp_path), path
+
+
+def test_a_controller_whose_output_is_not_shown_is_judged_by_the_power(tmp_path):
+    file, bound = behind_a_binding(tmp_path, FAULT_POD_TIMES="(m[P_REF] < 0.8)")
+    found = check_fmu(file, bound, LIMITS, ("pod",), run_for=0.3)
+    assert found.faults == ["POD of some points only"]
+
+
+def test_a_parameter_under_another_name_is_tried_like_any_other(tmp_path):
+    file, bound = behind_a_binding(tmp_path, FAULT_POD_KEEPS_GAIN=1)
+    found = check_fmu(file, bound, LIMITS, ("tunables",), run_for=0.3)
+    assert found.faults == ["parameter not taken"]
+    assert "pod_p.K" in found.failures[0].evidence
+
+
+def test_without_a_known_switch_the_remedy_is_a_signal_of_the_binding(gallery):
+    (*_, found) = check_fmu(*gallery("converter"), LIMITS, ("pod",), run_for=0.3).results
+    assert found.verdict == "not applicable"
+    assert '[signals."pod_p.enabled"]' in found.evidence
