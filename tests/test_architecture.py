@@ -188,6 +188,7 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
         "orchestrator.studies.black_box.bench",
         "orchestrator.systems.coupling.compiled_loop",
         "orchestrator.systems.coupling.wire_bank",
+        "orchestrator.devices.acceptance.shifted_clock",
         "orchestrator.devices.fmi.bound",
         "orchestrator.devices.fmi.fmi3",
         "orchestrator.devices.fmi.mailbox",

@@ -20,7 +20,10 @@ from orchestrator.devices.fmi.description import runs_under_wine
 from orchestrator.devices.fmi.port import without_binding
 
 _STEPS = 2000
-_MINUTE, _HOUR, _DAY, _YEAR = 60, 3600, 86400, 31_557_600  # [s]
+_MINUTE = 60  # [s]
+_HOUR = 3600  # [s]
+_DAY = 86400  # [s]
+_YEAR = 31_557_600  # [s]
 _SHIFTS = (
     (_MINUTE, _MINUTE, "a minute"),
     (_HOUR, 23 * _HOUR, "some hours"),

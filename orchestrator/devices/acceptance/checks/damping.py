@@ -29,24 +29,28 @@ from orchestrator.devices.acceptance.checks.port import WHY, cannot_import
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Subject
 
 _POINT = OperatingAt(1.0, 0.0, 0.4, 0.05)
-# peak of the output in the usual swing [pu, S_n], and in parts of a limit that is known
-_USUAL, _OF_LIMIT = 0.03, 0.25
+_USUAL = 0.03  # peak of the output in the usual swing [pu, S_n]
+_OF_LIMIT = 0.25  # the same in parts of a limit that is known
 _SIZES = (
     1e-4,
     1e-3,
     5e-3,
 )  # swings of the frequency [pu] of which the first that shows an answer is taken
-_SMALL, _LARGE, _BEYOND = 0.1, 3.0, 12.0  # other swings, in parts of the usual one
+_SMALL = 0.1  # other swings, in parts of the usual one
+_LARGE = 3.0
+_BEYOND = 12.0
 _LARGEST = 0.006  # largest swing of the frequency [pu] in which its output is compared
 _EVEN = 0.1  # part of the answer by which it may differ where nothing but size or direction differs
 _ALIKE = 0.8  # correlation of two courses of one controller at different points
-_LEAST, _MOST = 0.5, 2.0  # how much smaller or larger an answer may be at another point
+_LEAST = 0.5  # how much smaller an answer may be at another point
+_MOST = 2.0  # how much larger
 _SAME_TIME = 0.05  # part of the answer by which it may differ at another time or step
 _DAMAGED = 0.4  # part of the answer by which it may differ soon after events
 _LIMIT = 0.03  # part of the declared limit by which the output's peak may differ from it
 _HELD = 0.93  # part of its answer to a lasting deviation that a controller without a washout keeps
 _RESTS = 60.0  # time at rest after which it is asked again [s]
-_SOON, _LATE = 2.0, 15.0  # times after events [s]
+_SOON = 2.0  # time after events [s]
+_LATE = 15.0  # time after events of a second look [s]
 
 _PLACES = (
     ((1.0, 1.0), (0.84, 0.95)),
@@ -146,7 +150,9 @@ class _Trial:
         return _Fault("POD without effect", f"{says} at {bench.hertz:.3g} Hz")
 
     def _other_direction(self) -> _Fault | None:
-        for usual, other in zip(self._usual, self._bench.effects(FrequencySwing(-self._size)), strict=True):
+        for usual, other in zip(
+            self._usual, self._bench.effects(FrequencySwing(-self._size)), strict=True
+        ):
             apart = usual.apart(other)
             if apart > _EVEN:
                 says = f"{usual.title} answers a swing that begins with less frequency by "
@@ -169,7 +175,9 @@ class _Trial:
     def _larger(self) -> _Fault | None:
         for times in (_LARGE, _BEYOND):
             size = min(times * self._size, _LARGEST)
-            for usual, other in zip(self._usual, self._bench.effects(FrequencySwing(size)), strict=True):
+            for usual, other in zip(
+                self._usual, self._bench.effects(FrequencySwing(size)), strict=True
+            ):
                 alike = likeness(usual, other)
                 if alike < _ALIKE and (usual.shown or times == _LARGE):
                     says = (

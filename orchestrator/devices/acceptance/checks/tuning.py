@@ -26,7 +26,8 @@ from orchestrator.devices.fmi.port import START
 _MOST = 24  # parameters that are tried, drawn at random where there are more
 _STEPS = 200
 _SHOWN = 4  # idle parameters that are named
-_LARGE, _LARGE_STEPS = 0.2, 4000  # duration of larger changes [s], in steps at most
+_LARGE = 0.2  # duration of larger changes [s]
+_LARGE_STEPS = 4000  # the most steps of them
 _DEVIATION = 0.01  # of the frequency meanwhile [pu]: a damping controller reaches its limit
 # part of an output's range by which a parameter that is set before the run changes it, if it acts
 # at all
