@@ -27,7 +27,7 @@ unit = "pu"
 """A controller under other names than ours, and without an output that shows what it does."""
 
 
-def told(gallery, name):
+def failure_of(gallery, name):
     member = next(m for m in faulty() if m.name == name)
     found = check_fmu(*gallery(name), LIMITS, (member.only[-1],), run_for=0.3)
     assert found.faults == [member.fault]
@@ -36,22 +36,22 @@ def told(gallery, name):
 
 @pytest.mark.parametrize("name", QUICK)
 def test_a_fault_of_a_damping_controller_is_told_by_its_cause(name, gallery):
-    assert "POD-P" in told(gallery, name).evidence
+    assert "POD-P" in failure_of(gallery, name).evidence
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SLOW)
 def test_what_takes_longer_to_show_is_told_as_well(name, gallery):
-    assert "POD-P" in told(gallery, name).evidence
+    assert "POD-P" in failure_of(gallery, name).evidence
 
 
 @pytest.mark.parametrize("name", ["pod_of_the_minute", "pod_dead_after_a_date"])
 def test_a_controller_that_follows_the_clock_is_found(name, gallery):
-    assert "the clock of its process" in told(gallery, name).evidence
+    assert "the clock of its process" in failure_of(gallery, name).evidence
 
 
 def test_a_gain_that_is_taken_at_the_start_only_is_found_with_the_controller_on(gallery):
-    says = told(gallery, "pod_gain_of_the_start").evidence
+    says = failure_of(gallery, "pod_gain_of_the_start").evidence
     assert "pod_p.K is declared as tunable; set to 44 while it runs with pod_p.enabled" in says
 
 

@@ -1,4 +1,4 @@
-"""Whether an FMU answers alike at another time of day and on another date."""
+"""The check of an FMU's answers at another time of day and on another date."""
 
 import sys
 

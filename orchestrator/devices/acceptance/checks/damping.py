@@ -1,4 +1,4 @@
-"""Whether a damping controller (POD) works for every size, direction, point, step and time as it does for one."""
+"""The check of a damping controller (POD) in swings of every size and direction, at other points, steps and times."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

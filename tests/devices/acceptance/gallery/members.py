@@ -429,11 +429,11 @@ def faulty():
 
 
 POD_ASKED = ("runs", "independence", "repeatability", "steady_state", "power_balance")
-"""What must be known before a damping controller is tried."""
+"""Checks that come before a damping controller is tried."""
 
 
 def damping():
-    """What is wrong with a damping controller alone; each beside `converter_with_pod`, which is good."""
+    """Give faults of a damping controller alone, each beside `converter_with_pod`, which is good."""
 
     def one(name, fault, *only, **defines):
         source = converter(name, pod=True, **defines)
