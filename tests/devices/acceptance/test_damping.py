@@ -70,12 +70,12 @@ def behind_a_binding(tmp_path, **defines):
     path = tmp_path / "foreign.toml"
     path.write_text(text, encoding="utf-8")
 
-    def renamed(description):
+    def rename(description):
         for ours, its in names.items():
             description = description.replace(f'"{ours}"'.encode(), f'"{its}"'.encode())
         return description.replace(b'"delta_p_pod"', b'"x_17"')
 
-    return build(replace(source, change=renamed), tmp_path), path
+    return build(replace(source, change=rename), tmp_path), path
 
 
 def test_a_controller_whose_output_is_not_shown_is_judged_by_the_power(tmp_path):

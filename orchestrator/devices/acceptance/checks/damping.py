@@ -283,7 +283,7 @@ class _Trial:
     def _lasting(self) -> Iterator[_Fault | None]:
         """Hold another frequency: a washout lets go of it."""
         for title, name, early, late, between in self._bench.lasting(self._size):
-            T_W = self._bench.declared(f"{name}.T_W")
+            T_W = self._bench.value_of(f"{name}.T_W")
             if early < 0.2 * self._usual[self._bench.names.index(name)].peak:
                 yield None
                 continue

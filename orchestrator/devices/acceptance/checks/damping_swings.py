@@ -122,7 +122,7 @@ class DampingBench:
     def titles(self) -> list[str]:
         return [f"POD-{name[-1].upper()}" for name in self.names]
 
-    def declared(self, name: str) -> float | None:
+    def value_of(self, name: str) -> float | None:
         """A parameter's value, as used; None where there is no such parameter."""
         info = self.subject.description.variables.get(name)
         if info is None or info.type != "Real" or info.start is None:
@@ -131,9 +131,9 @@ class DampingBench:
 
     def declared_limit(self, name: str) -> float | None:
         """The limit of a controller's output [pu, S_n]."""
-        return self.declared(f"{name}.limit")
+        return self.value_of(f"{name}.limit")
 
-    def _shown(self, name: str) -> int | None:
+    def _place(self, name: str) -> int | None:
         """Place of a controller's output among the outputs."""
         wanted = f"delta_{name[-1]}_pod"
         return self.subject.outputs.index(wanted) if wanted in self.subject.outputs else None
@@ -160,7 +160,7 @@ class DampingBench:
     def _effect(self, name: str, swing: FrequencySwing, on: Numbers, off: Numbers) -> Effect:
         h = swing.step_size or self.subject.step_size
         time: Numbers = h * np.arange(1, len(on) + 1, dtype=np.float64)
-        power, shown = _part(on - off, name), self._shown(name)
+        power, shown = _part(on - off, name), self._place(name)
         course = power if shown is None else on[:, 2 + shown]
         return Effect(f"POD-{name[-1].upper()}", swing.size, time, course, power, shown is not None)
 
@@ -207,7 +207,7 @@ class DampingBench:
         moved = with_swing - still - (usual - rest)
         found = []
         for name, effect in zip(self.names, effects, strict=True):
-            shown = self._shown(name)
+            shown = self._place(name)
             change = _part(moved, name) if shown is None else moved[:, 2 + shown]
             found.append(float(np.abs(change).max()) / effect.peak)
         return found
