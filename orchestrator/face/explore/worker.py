@@ -254,7 +254,9 @@ class Desk:
                 for key, one, _, name in parts
                 if one in system.components
             },
-            "swings": [modes.result.swing_of(mode) for mode in modes],
+            "swings": [
+                [*modes.result.swing_of(mode), modes.result.in_between(mode)] for mode in modes
+            ],
             "copied": copied(
                 case.file,
                 self._word,

@@ -141,7 +141,7 @@ def test_map_table_and_verdict_are_those_of_the_command(view, capsys):
     mark.hover(force=True)
     assert "hover" in view.locator("#table tbody tr").first.get_attribute("class")
     mark.click(force=True)
-    assert "sg1 against sg2" in view.locator("#chosen").inner_text()
+    assert "sg1; sg2 at +127°" in view.locator("#chosen").inner_text()
     assert view.locator("#chosen .shape .arrow").count() == 2
     assert view.locator("#chosen meter").count() >= 5
     count = len(rows(view))

@@ -163,8 +163,13 @@ def test_the_terminals_mode_shapes(gfor):
             for name, share in shown.items():
                 assert int(share) == pytest.approx(100 * mode[of][name], abs=0.5)
         turned = {entry["state"].split(".")[0]: entry["angle_deg"] for entry in mode["shape"]}
-        opposed = abs(turned[row["Swing together"]] - turned[row["Against"]])
-        assert 135 <= opposed <= 225
+        other, *angle = (row["Against"] or row["In between"]).split()
+        apart = (turned[other] - turned[row["Swing together"]] + 180) % 360 - 180
+        if angle:
+            assert float(angle[0].rstrip("°")) == pytest.approx(apart, abs=0.5)
+            assert 45 < abs(apart) < 135
+        else:
+            assert abs(apart) >= 135
 
 
 # -- the page -----------------------------------------------------------------------------------

@@ -69,7 +69,8 @@ function paintChosen() {
   if (!m) { place.replaceChildren(make("p", { class: "soft" }, "Choose a mode in the map or the table: participation and shape.")); return; }
   const swing = seen.answer.swings?.[chosenIndex()] ?? [[], []];
   const some = units => `${units.slice(0, 6).join(", ")}${units.length > 6 ? ` and ${units.length - 6} more` : ""}`;
-  const who = swing[0].length ? `${some(swing[0])}${swing[1].length ? ` against ${some(swing[1])}` : ""}` : "";
+  const between = some(Object.entries(swing[2] ?? {}).map(([name, angle]) => `${name} at ${angle > 0 ? "+" : ""}${fixed(angle, 0)}°`));
+  const who = [swing[0], swing[1]].filter(side => side.length).map(some).join(" against ") + (between ? `; ${between}` : "");
   const moving = make("input", { type: "checkbox", id: "moving" });
   const shape = draw("svg", { class: "shape", viewBox: "-150 -105 300 210", role: "img", "aria-label": `Mode shape: ${m.shape.map(s => `${s.state} ${number(s.magnitude, 2)} at ${fixed(s.angle_deg, 0)}°`).join("; ")}` });
   const largest = Math.max(...m.shape.map(s => s.magnitude), 1e-12);
