@@ -104,17 +104,26 @@ def _stand_ins(case: CaseTable, place: Locate) -> Iterator[Problem]:
         for name, table in case.components.items()
         if (power := _power(table)) is not None
     }
+    stills = [name for name in fed if (case.components[name].model or "").startswith(STAND_IN)]
     for name, other in permutations(fed, 2):
         device, still = case.components[name], case.components[other]
         apart = all({name, other} & set(scenario.remove) for scenario in case.scenarios.values())
+        beside = [one for one in stills if case.components[one].bus == device.bus]
         if (
-            (still.model or "").startswith(STAND_IN)
+            other in stills
+            and name not in stills
             and device.bus == still.bus
             and apart
+            and (len(beside) == 1 or _is_named_alike(name, other))
             and fed[name] != fed[other]
         ):
             text = f"{name} feeds {fed[name]:.4g} MW, and {other}, which stands for it, {fed[other]:.4g} MW"
             yield Problem(place("components", other), f"{text}: give both the same S_n and P_0")
+
+
+def _is_named_alike(device: str, still: str) -> bool:
+    """Compare what follows the first words of two names, as in gfor_13_2 and injection_13_2."""
+    return device.partition("_")[2] == still.partition("_")[2]
 
 
 def _power(table: ComponentTable) -> float | None:

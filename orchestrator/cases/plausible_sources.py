@@ -1,6 +1,7 @@
 """What a network's source holds that is most unusual beside its own other data."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
 
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.plausible_values import (
@@ -19,6 +20,8 @@ _PARTS = {"machine": "machine", "exciter": "exciter", "governor": "governor", "p
 _SHOWN = 3  # machines beyond which one is compared with the others
 # loading that is questioned [pu], and part by which two powers may differ
 _LITTLE, _SAME = 0.05, 0.05
+_ROUNDING = 1e-3  # part of the converters' power by which six digits of P_0 differ at most
+_COMPARED = 8  # converters from which on chance would make some of them fit
 _ALIKE, _UNLIKE = 2.0, 5.0  # factors within which machines are alike, and from which one is not
 _FAR = 20.0
 """A capacitor or a load that is smaller than the next one by this factor is questioned where 100 times as much is
@@ -211,9 +214,19 @@ def _own_converters(draft: Draft) -> Iterator[UnusualValue]:
         and not draft.given.from_outside
         and abs(less) > _SAME * abs(fed)
         and abs(fed - less) > _SAME * abs(fed)
+        and not _is_of_some(less, [*own.values()])
     ):
         text = (
             f"with P_0 and S_n the case's converters feed {fed:.4g} MW, and the file's units {less:.4g} MW less than "
             "in the file; the slack takes the difference: is one of them wrong?"
         )
         yield from (UnusualValue(f"{name}.P_0", place_of(draft, name, "P_0"), text) for name in own)
+
+
+def _is_of_some(less: float, powers: Sequence[float]) -> bool:
+    """Tell whether some of the converters feed just what the units feed less [MW]; the slack makes room for the others,
+    as ``gfor new`` writes it for one that names the slack or no unit."""
+    if len(powers) > _COMPARED:
+        return False
+    groups = (group for n in range(1, len(powers)) for group in combinations(powers, n))
+    return any(abs(sum(group) - less) <= _ROUNDING * abs(sum(powers)) for group in groups)

@@ -50,6 +50,37 @@ def test_two_at_one_bus_have_two_names(made):
     assert {"gfor_13", "gfor_13_2"} <= set(both.system.components)
 
 
+def test_two_at_one_bus_are_compared_each_with_its_own_stand_in(made):
+    case, new = made(A, A.replace("60", "20"))
+
+    def asked(text):
+        case.path.write_text(text, encoding="utf-8")
+        (base,) = load_case(case.path).prepare(["base"])
+        return [str(q) for q in base.questions if "which stands for it" in str(q)]
+
+    assert asked(new.text) == []
+    (question,) = asked(new.text.replace("P_0 = 0.2", "P_0 = 0.3", 1))  # of gfor_13_2
+    assert "gfor_13_2 feeds 30 MW, and injection_13_2, which stands for it, 20 MW" in question
+
+
+@pytest.mark.parametrize("less", ["", ", less {slack}"])
+def test_what_the_slack_feeds_less_for_one_of_two_is_not_asked_about(made, less):
+    first, _ = made(A)
+    (base,) = first.prepare(["base"])
+    at_slack = [port.name for port in base.network.ports if port.bus == base.power_flow.slack]
+    (slack,) = (name for name in at_slack if name in base.system.components)
+    case, new = made(A, "bus 15, 80 MVA, 30 MW" + less.format(slack=slack))
+    assert f"the slack ({slack}) feeds 30 MW less" in "".join(new.assumed)
+
+    def asked(text):
+        case.path.write_text(text, encoding="utf-8")
+        (both,) = load_case(case.path).prepare(["converter"])
+        return [str(q) for q in both.questions if "the slack takes the difference" in str(q)]
+
+    assert asked(new.text) == []
+    assert asked(new.text.replace("P_0 = 0.6", "P_0 = 0.8"))  # of gfor_13: nothing makes room
+
+
 def test_one_converter_is_gfor_as_before(made):
     case, _ = made(A)
     assert "gfor" in case.prepare(["converter"])[0].system.components

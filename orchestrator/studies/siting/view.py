@@ -134,13 +134,15 @@ def answer(result: SiteResult) -> str:
 def _best_confirmed(result: SiteResult, among: str) -> str:
     """The best of the places that coupled FMUs confirm, by the damping of the least damped mode there."""
     first, *others = [one for one in result.confirmations if not one.failure]
-    mode = _called(result.intact.modes[0])
+    seen = result.intact.modes[0]
     pod = "" if result.request.controller is None else " and its POD"
     then = ", ".join(f"{one.bus} {one.damping:.2f} %" for one in others)
     by_support = sorted(result.ranking, key=lambda bus: -result.least(bus)[0])
     small = ", ".join(f"{bus} {shown(result, result.least(bus)[0])}" for bus in by_support[:3])
     order = f"the order of the {len(result.confirmations)} places that coupled FMUs computed"
-    reached = f"{first.damping:.2f} % for the least damped mode ({mode}) with {_rated(result)}{pod}"
+    steps = f"{seen.mode.damping_percent:.2f} % → {first.damping:.2f} %"
+    mode = f"the mode {_named(seen)}, the least damped without it"
+    reached = f"{steps} for {mode}, with {_rated(result)}{pod}"
     return (
         f"{first.bus} is the best place for {device_title(result)}{among}: {reached}{_lowered(result, first)}; then "
         f"{then}: {order}. By {unit(result, '100')} it is {small}"
@@ -148,16 +150,19 @@ def _best_confirmed(result: SiteResult, among: str) -> str:
 
 
 def _lowered(result: SiteResult, first: Confirmation) -> str:
-    """Return what the best place costs: another mode, less damped than the least was before."""
+    """Return the least damped mode of all at the best place, which may have less than the least before."""
     before = result.intact.modes[0].mode.damping_percent
-    if first.other is None or damping_percent(first.other) >= before:
-        return ""
-    return f", but {_least_then(first, before)}"
+    lower = first.other is not None and damping_percent(first.other) < before
+    return f"{', but' if lower else ';'} {_least_then(first, before)}"
+
+
+def _named(seen: SeenMode) -> str:
+    hertz = f"{seen.mode.frequency_hz:.3f} Hz"
+    return seen.label if hertz in seen.label else f"{seen.label}, {hertz}"
 
 
 def _called(seen: SeenMode) -> str:
-    hertz = f"{seen.mode.frequency_hz:.3f} Hz"
-    return f"{seen.label if hertz in seen.label else f'{seen.label}, {hertz}'}, {seen.mode.damping_percent:.2f} %"
+    return f"{_named(seen)}, {seen.mode.damping_percent:.2f} %"
 
 
 def sureness(result: SiteResult) -> list[str]:

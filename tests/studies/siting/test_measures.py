@@ -81,7 +81,11 @@ def test_the_headline_ranks_as_the_confirmation_does(five, monkeypatch):
     assert found.ranking == ("bus_15", "bus_12", "bus_11", "bus_13", "bus_14")
     assert [text.partition(":")[0] for text in sureness(found)] == list(found.ranking)
     said = answer(found)
-    assert said.startswith("bus_15 is the best place for POD-P of those asked for: 9.64 %")
+    seen = found.intact.modes[0].mode
+    at, before = f"{seen.frequency_hz:.3f} Hz", f"{seen.damping_percent:.2f} %"
+    assert said.startswith("bus_15 is the best place for POD-P of those asked for: ")
+    assert f"for: {before} → 9.64 % for the mode {at}, the least damped without it, " in said
+    assert "least damped then is another mode: 1.746 Hz, 7.50 %" in said.partition("; then ")[0]
     assert "then bus_12 9.30 %, bus_11 8.13 %" in said
     assert said.rpartition("it is ")[2].startswith("bus_11 +")
     assert [bus["bus"] for bus in as_json(found)["buses"]] == list(found.ranking)
