@@ -141,7 +141,7 @@ def _best_confirmed(result: SiteResult, among: str) -> str:
     small = ", ".join(f"{bus} {shown(result, result.least(bus)[0])}" for bus in by_support[:3])
     order = f"the order of the {len(result.confirmations)} places that coupled FMUs computed"
     steps = f"{seen.mode.damping_percent:.2f} % → {first.damping:.2f} %"
-    mode = f"the mode {_named(seen)}, the least damped without it"
+    mode = f"the mode {_title(seen)}, the least damped without it"
     reached = f"{steps} for {mode}, with {_rated(result)}{pod}"
     return (
         f"{first.bus} is the best place for {device_title(result)}{among}: {reached}{_lowered(result, first)}; then "
@@ -156,13 +156,13 @@ def _lowered(result: SiteResult, first: Confirmation) -> str:
     return f"{', but' if lower else ';'} {_least_then(first, before)}"
 
 
-def _named(seen: SeenMode) -> str:
+def _title(seen: SeenMode) -> str:
     hertz = f"{seen.mode.frequency_hz:.3f} Hz"
     return seen.label if hertz in seen.label else f"{seen.label}, {hertz}"
 
 
 def _called(seen: SeenMode) -> str:
-    return f"{_named(seen)}, {seen.mode.damping_percent:.2f} %"
+    return f"{_title(seen)}, {seen.mode.damping_percent:.2f} %"
 
 
 def sureness(result: SiteResult) -> list[str]:
