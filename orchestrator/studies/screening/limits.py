@@ -104,7 +104,7 @@ def _branches_in_words(summary: Summary) -> str:
         return ""
     worst, item = max(rated, key=lambda entry: entry[0].part)
     most = f"{worst.branch} with {100 * worst.part:.4g} % ({_where(item)})"
-    over, total = sum(one.beyond for one, _ in rated), len(summary.result.items)
+    over, total = sum(one.beyond for one, _ in rated), len(rated)
     if not over:
         return f"No branch is beyond its rating{_without_flow(summary)}; {most} is loaded most."
     text = f"At {over} of {total} items a branch is beyond its rating, most {most}."
@@ -124,9 +124,10 @@ def _voltages_in_words(summary: Summary) -> str:
             return ""
         return f"All bus voltages are within their bands{_without_flow(summary)}."
     worst, item = max(found, key=lambda entry: abs(entry[0].voltage - entry[0].limit))
+    known = sum(x.record.has_flow for x in summary.result.items)
     side = "below" if worst.voltage < worst.limit else "above"
     return (
-        f"At {len(found)} of {len(summary.result.items)} items a bus voltage is outside of its band, furthest "
+        f"At {len(found)} of {known} items a bus voltage is outside of its band, furthest "
         f"{worst.bus} with {worst.voltage:.4f} pu, {side} {worst.limit:g} pu ({_where(item)})."
     )
 
@@ -134,7 +135,7 @@ def _voltages_in_words(summary: Summary) -> str:
 def _without_flow(summary: Summary) -> str:
     """Say of how many items that is not known; "" where it is known of all."""
     number = sum(not item.record.has_flow for item in summary.result.items)
-    return f", except for {counted(number, 'item')} without a power flow" if number else ""
+    return f", except for {counted(number, 'item')} not judged" if number else ""
 
 
 def _has_bands(summary: Summary) -> bool:

@@ -1,7 +1,7 @@
 """A screening in words: its verdict, what it rests on, what it could not judge, and its outages, worst first."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,50 +75,76 @@ def load_of(plan: ScreeningPlan, point: OperatingCase) -> float:
     )
 
 
+@dataclass(frozen=True)
+class _Property:
+    """What items have in common, in words, and which items have it."""
+
+    text: str
+    holds: Callable[[ScreenedItem], bool]
+
+
 def not_judged(summary: Summary) -> str:
-    """How many items have no modes, and what they have in common: what is out, and a high or a low load."""
+    """How many items have no modes, and what two or more of them have in common that no judged item has."""
     items = list(summary.failures())
     if not items:
         return ""
-    which = "all" if len(items) > 1 else "it is"
-    common = [text for text in (_out(summary, items), _loading(summary, items)) if text]
     kinds = ", ".join(
         f"{number} {status}" for status, number in Counter(i.record.status for i in items).items()
     )
-    return f"{len(items)} not judged ({kinds})" + (
-        f", {which} {' '.join(common)}" if common else ""
-    )
+    common = _cause(summary, items) if len(items) > 1 else ""
+    return f"{len(items)} not judged ({kinds})" + (f", all {common}" if common else "")
 
 
-def _out(summary: Summary, items: Sequence[ScreenedItem]) -> str:
+def _cause(summary: Summary, items: Sequence[ScreenedItem]) -> str:
+    """The outage or the load, else both, that separate items from all judged ones; "" if they do not."""
+    judged = [x for x in summary.result.items if x.record.status is Status.COMPUTED]
+    found = [one for one in (_out(summary, items), _loading(summary, items)) if one]
+    for one in found:
+        if not any(map(one.holds, judged)):
+            return one.text
+    if any(all(one.holds(item) for one in found) for item in judged):
+        return ""
+    return " ".join(one.text for one in found)
+
+
+def _out(summary: Summary, items: Sequence[ScreenedItem]) -> _Property | None:
     elements = Elements.of(summary.result.plan.prepared)
     names = {item.outage.name for item in items}
     if len(names) == 1:
         (name,) = names
-        return f"with {name} out" if items[0].outage.elements else "of the intact network"
+        text = f"with {name} out" if items[0].outage.elements else "of the intact network"
+        return _Property(text, lambda item: item.outage.name == name)
     for kind, known in (
         ("unit", set(elements.units)),
         ("line or transformer", set(elements.lines)),
     ):
         if all(known & set(item.outage.elements) for item in items):
-            return f"with a {kind} out"
-    return ""
+            return _Property(f"with a {kind} out", _takes(known))
+    return None
 
 
-def _loading(summary: Summary, items: Sequence[ScreenedItem]) -> str:
+def _takes(known: set[str]) -> Callable[[ScreenedItem], bool]:
+    return lambda item: not known.isdisjoint(item.outage.elements)
+
+
+def _loading(summary: Summary, items: Sequence[ScreenedItem]) -> _Property | None:
     plan = summary.result.plan
     loads = {point.name: load_of(plan, point) for point in plan.points}
-    if len(loads) == 2 and len(at := {item.point.name for item in items}) == 1:
-        return f"at {at.pop()}"
-    middle, here = (
-        float(np.median(list(loads.values()))),
-        [loads[item.point.name] for item in items],
-    )
-    if min(here) > middle:
-        return f"at high load (from {min(here):.4g} MW on; half of the points have at most {middle:.4g} MW)"
-    if max(here) < middle:
-        return f"at low load (up to {max(here):.4g} MW; half of the points have at least {middle:.4g} MW)"
-    return ""
+    points = {item.point.name for item in items}
+    if len(loads) == 2 and len(points) == 1:
+        (name,) = points
+        return _Property(f"at {name}", lambda item: item.point.name == name)
+    middle, here = float(np.median(list(loads.values()))), [loads[name] for name in points]
+    least, most = min(here), max(here)
+    if least > middle:
+        text = f"at high load (from {least:.4g} MW on; half of the points have at most {middle:.4g} MW)"
+        return _Property(text, lambda item: loads[item.point.name] >= least)
+    if most < middle:
+        text = (
+            f"at low load (up to {most:.4g} MW; half of the points have at least {middle:.4g} MW)"
+        )
+        return _Property(text, lambda item: loads[item.point.name] <= most)
+    return None
 
 
 def verdict_sentence(summary: Summary) -> str:

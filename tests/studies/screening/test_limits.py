@@ -120,8 +120,19 @@ def test_nothing_is_said_to_hold_where_there_is_no_power_flow(tmp_path):
         item.record = ItemRecord(Status.POWER_FLOW)
     assert limits_sentence(summary) == ""
     summary.result.items[0].record = ItemRecord(Status.COMPUTED, has_flow=True)
-    said = "All bus voltages are within their bands, except for 1 item without a power flow."
+    said = "All bus voltages are within their bands, except for 1 item not judged."
     assert limits_sentence(summary) == said
+
+
+def test_items_without_a_power_flow_are_not_counted(tmp_path):
+    summary = screened(tmp_path)
+    lost = SimpleNamespace(
+        record=ItemRecord(Status.STEADY_STATE),
+        outage=SimpleNamespace(name="lost", elements=("lost",)),
+        point=SimpleNamespace(name="base"),
+    )
+    summary.result.items.append(lost)
+    assert limits_sentence(summary).startswith("At 2 of 2 items a branch is beyond its rating")
 
 
 def test_a_file_without_ratings_and_bands_has_nothing_said(tmp_path):
