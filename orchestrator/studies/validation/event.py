@@ -35,6 +35,7 @@ _BACK = 0.005  # deviation of the voltage [pu] that is none of an event
 _SLOWER_THAN = 0.05  # interval between samples [s] of which is said what it cannot show
 _SETPOINT_WITHIN = 0.1  # time [s] within which a setpoint moves P or Q by most of its step
 _ABRUPT = 6.0  # times the usual change over that time
+_BESIDE = 0.4  # part of the step by which the signal moves just before or after, as a swing does
 
 
 @dataclass(frozen=True)
@@ -140,9 +141,7 @@ def judge_response(device: PlayedDevice, event: RecordedEvent, played: Played) -
     measured = signals_of(recording.power, recording.voltage)
     simulated = signals_of(played.power, recording.voltage)
     error = {name: simulated[name] - measured[name] for name in SIGNALS}
-    # a device that was at rest scatters with the recorded voltage alone
-    scattering = error if played.still else measured
-    noise = {name: noise_in(recording, scattering[name], windows) for name in SIGNALS}
+    noise = noise_before(event, played)
     errors = {}
     for name in windows.parts:
         of_signals = {
@@ -160,6 +159,16 @@ def judge_response(device: PlayedDevice, event: RecordedEvent, played: Played) -
     )
     asked = event.questions + tuple(_of_response(comparison))
     return replace(comparison, questions=asked)
+
+
+def noise_before(event: RecordedEvent, played: Played) -> dict[str, SignalNoise]:
+    """The scatter of each signal's error before the event; of a device that was not at rest, the recording's alone."""
+    recording = event.recording
+    scattering = signals_of(recording.power, recording.voltage)
+    if played.still:
+        simulated = signals_of(played.power, recording.voltage)
+        scattering = {name: simulated[name] - scattering[name] for name in SIGNALS}
+    return {name: noise_in(recording, scattering[name], event.windows) for name in SIGNALS}
 
 
 def rms_error(power: Complex, event: RecordedEvent) -> tuple[float, float]:
@@ -212,6 +221,14 @@ def _of_response(comparison: EventComparison) -> list[Question]:
     return found
 
 
+def _alone(steps: Numbers, width: int) -> bool:
+    """Return whether the largest change stands alone: a swing changes as fast before or after."""
+    at = int(steps.argmax())
+    low, high = 3 * width // 2, 4 * width
+    beside = [steps[max(0, at - high) : max(0, at - low)], steps[at + low : at + high]]
+    return float(np.concatenate(beside).max(initial=0.0)) < _BESIDE * float(steps[at])
+
+
 def _setpoint(comparison: EventComparison) -> list[Question]:
     """P or Q that leaves the model's at once and for good while the voltage does nothing."""
     event = comparison.event
@@ -230,6 +247,7 @@ def _setpoint(comparison: EventComparison) -> list[Question]:
         before, after = values[max(0, at - 2 * width) : at], values[at + 2 * width :]
         offset = float(after.mean() - before.mean())
         abrupt = float(steps.max()) > _ABRUPT * float(np.median(steps)) + _OFFSET
+        abrupt = abrupt and _alone(steps, width)
         around = recording.voltage[at : at + 2 * width]
         if abrupt and abs(offset) > _OFFSET and np.ptp(np.abs(around)) < _BACK:
             moment = recording.begin + float(times[at + width])

@@ -28,7 +28,7 @@ _AS_GOOD = 2.0  # times the least sum of squares, up to which no delay explains 
 _AT_END = 0.1  # part of a window whose mean is the value that a step ends at
 _SETTLED = 0.05  # part of a step within which it has settled
 _FEW = 20  # samples of a ring-down
-_MOST_SAMPLES = 300  # of which modes are looked for; more take seconds and say little more
+_MOST_SAMPLES = 150  # of which modes are looked for; more take seconds and say little more
 _SLOWEST_PERIODS = 1.5  # periods of a mode that a window has to hold
 _SAME_MODE = 0.3  # part of the frequency by which two modes may differ and be the same
 

@@ -20,6 +20,7 @@ from orchestrator.studies.validation.residuals import (
     Report,
     Residuals,
     covariance,
+    gain_errors,
     independent_samples,
     stretches_of,
 )
@@ -32,7 +33,7 @@ _TAKES_PART = (
 )
 _SURE = 0.95  # of an interval
 _SWITCH_TELLS = 10.0  # by so much of independent scatter the wrong position of a switch is worse
-_TOLERANCE = 1e-6
+_TOLERANCE = 1e-5  # relative: less of the sum of squares is far within an interval
 _MOST_RUNS = 60  # of the residuals in one fit, beside those of the sensitivities
 
 
@@ -161,28 +162,29 @@ def _trial(
     if not told:
         return _Trial(switches, [], untold, dict(switches), residuals.at(switches), None)
     best = _Best()
-    finished = True
+    finished, slopes = True, None
     try:
         _least_squares(residuals, told, switches, best)
+        at = [replace(one, start=float(best.values[one.name])) for one in told]
+        own = residuals.slopes(best.values, {one.name: one.step for one in at})
+        slopes = np.column_stack([own, residuals.hidden_slopes(best.values)])
     except KeyboardInterrupt:
         finished = False
         if not best.values:
             raise
     errors = residuals.at(best.values)
-    slopes = None
-    if finished:
-        at = [replace(one, start=float(best.values[one.name])) for one in told]
-        slopes = residuals.slopes(best.values, {one.name: one.step for one in at})
     return _Trial(switches, told, untold, best.values, errors, slopes=slopes, finished=finished)
 
 
 def _least_squares(
     residuals: Residuals, told: Sequence[Adjustable], switches: Mapping[str, bool], best: _Best
 ) -> None:
-    reach = np.array([one.reach for one in told])
+    hidden = residuals.hidden
+    names = [*(one.name for one in told), *(one.name for one in hidden)]
+    reach = np.array([*(one.reach for one in told), *(one.scale for one in hidden)])
 
     def values(x: Numbers) -> dict[str, float | bool]:
-        own = {one.name: float(v) for one, v in zip(told, x * reach, strict=True)}
+        own = {name: float(v) for name, v in zip(names, x * reach, strict=True)}
         return {**switches, **own}
 
     def errors(x: Numbers) -> Numbers:
@@ -191,22 +193,25 @@ def _least_squares(
         cost = float(found @ found)
         if cost < best.cost:
             best.cost, best.values = cost, given
-            said = ", ".join(f"{name} = {v:.4g}" for name, v in given.items())
+            said = ", ".join(f"{one.name} = {given[one.name]:.4g}" for one in told)
             residuals.report(f"fit: rms {_rms(found):.4g} scatters with {said}")
         return found
 
     def slopes(x: Numbers) -> Matrix:
         given = values(x)
         at = [replace(one, start=float(given[one.name])) for one in told]
-        return np.asarray(residuals.slopes(given, {one.name: one.step for one in at}) * reach)
+        own = residuals.slopes(given, {one.name: one.step for one in at})
+        return np.asarray(np.column_stack([own, residuals.hidden_slopes(given)]) * reach)
 
-    bounds = np.array([(one.low, one.high) for one in told]) / reach[:, None]
-    begin = np.array([one.inside() for one in told]) / reach
+    free = len(hidden)
+    low = np.array([*(one.low for one in told), *[-np.inf] * free]) / reach
+    high = np.array([*(one.high for one in told), *[np.inf] * free]) / reach
+    begin = np.array([*(one.inside() for one in told), *[0.0] * free]) / reach
     optimize.least_squares(
         errors,
         begin,
         jac=slopes,
-        bounds=(bounds[:, 0], bounds[:, 1]),
+        bounds=(low, high),
         xtol=_TOLERANCE,
         ftol=_TOLERANCE,
         gtol=None,
@@ -237,6 +242,8 @@ def identifiable(
     slopes = residuals.slopes(base, {one.name: one.step for one in at})
     errors = residuals.at(base)
     alike = len(errors) / max(independent_samples(errors, residuals.stretches), 1.0)
+    hidden = residuals.hidden_slopes(base)
+    slopes = slopes - hidden @ np.linalg.lstsq(hidden, slopes, rcond=None)[0]
     scaled = slopes * np.array([one.reach for one in told]) / np.sqrt(max(alike, 1.0))
     while told:
         _, singular, right = np.linalg.svd(scaled, full_matrices=False)
@@ -281,18 +288,21 @@ def _doubt(one: Adjustable, value: float, width: float) -> Untold | None:
 
 
 def _half_widths(best: _Trial, residuals: Residuals) -> dict[str, float]:
-    """Half widths of the intervals of 95 %, with what the voltage between samples may shift.
+    """Half widths of the intervals of 95 %; the voltage between samples is one of the unknowns, and its moment a doubt.
 
     None if the fit was interrupted."""
     if best.slopes is None:
         return {}
     spread = np.sqrt(np.diag(covariance(best.slopes, best.errors, residuals.stretches)))
-    free = independent_samples(best.errors, residuals.stretches) - len(best.told)
+    free = independent_samples(best.errors, residuals.stretches) - len(spread)
     quantile = float(student.ppf(0.5 + _SURE / 2, max(free, 3.0)))
-    between = residuals.between_samples(best.values)
-    shift = np.linalg.lstsq(best.slopes, between, rcond=None)[0]
-    widths = quantile * spread + np.abs(shift)
-    return {one.name: float(width) for one, width in zip(best.told, widths, strict=True)}
+    later = residuals.hidden_later(best.values)
+    shift = np.linalg.lstsq(best.slopes, later, rcond=None)[0]
+    gains = np.linalg.lstsq(best.slopes, gain_errors(residuals.stretches, len(later)), rcond=None)[
+        0
+    ]
+    widths = quantile * spread + np.abs(shift) + np.abs(gains).sum(axis=1)
+    return {one.name: float(widths[k]) for k, one in enumerate(best.told)}
 
 
 def _switches(

@@ -105,12 +105,6 @@ class Recording:
         back = np.exp(-1j * _TURN * hertz * self.times)
         return replace(self, voltage=self.voltage * back, frame_hz=self.frame_hz + hertz)
 
-    def coarser(self) -> Recording:
-        """The same with the voltage of every second sample alone, and straight lines between these."""
-        every = slice(None, None, 2)
-        half = replace(self, voltage=self.voltage[every], interval=2 * self.interval)
-        return replace(self, voltage=half.at(np.minimum(self.times, half.length)))
-
     def at(self, times: Numbers) -> Complex:
         """The voltage between samples: instantaneous values along straight lines, phasors by magnitude and angle."""
         if self.instantaneous:

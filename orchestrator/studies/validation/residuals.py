@@ -10,13 +10,20 @@ import numpy as np
 from orchestrator.core.arrays import Complex, Matrix, Numbers, Vector
 from orchestrator.core.errors import CosimError, InputError
 from orchestrator.studies.validation.device import PlayedDevice
-from orchestrator.studies.validation.event import RecordedEvent, judge_response
+from orchestrator.studies.validation.event import RecordedEvent, noise_before
 from orchestrator.studies.validation.figures import correlation_length
+from orchestrator.studies.validation.hidden import (
+    HiddenVoltage,
+    hidden_voltages,
+    likelihoods,
+    with_hidden,
+)
 
 Values = Mapping[str, float | bool]
 Report = Callable[[str], None]
 
 _LEAST_SCATTER = 2e-4  # [pu]: a recording is not trusted more than an instrument of the best class
+_GAIN = 1e-3  # gain error of instruments of the best usual class, 0.1: no mean over samples takes it away
 _REFUSED = 1e3  # error, in scatters, of values with which the device does not run
 
 
@@ -37,26 +44,36 @@ class ErrorRows:
 class Residuals:
     """Errors of one device at some events; a run is made for each event and each set of values.
 
-    ``runs``: how many were made."""
+    ``hidden``: parts of the voltage that no sample holds, unknowns whose likelihoods are the last rows; ``runs``: how
+    many were made."""
 
     device: PlayedDevice
     stretches: Sequence[ErrorRows]
     report: Report = lambda text: None
     runs: int = 0
+    hidden: Sequence[HiddenVoltage] = field(init=False)
     _kept: dict[tuple[tuple[str, float | bool], ...], Numbers] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.hidden = hidden_voltages([one.event for one in self.stretches])
 
     def at(self, values: Values) -> Numbers:
         """Errors with other values, in scatters; those of values with which the device does not run are large."""
         key = tuple(sorted(values.items()))
         if key not in self._kept:
-            device = self.device.with_values(values)
-            self._kept[key] = np.concatenate([self._of(device, one) for one in self.stretches])
+            unknown = {one.name for one in self.hidden}
+            own = {name: value for name, value in values.items() if name not in unknown}
+            device = self.device.with_values(own)
+            parts = [self._of(device, k, values) for k in range(len(self.stretches))]
+            self._kept[key] = np.concatenate([*parts, likelihoods(self.hidden, values)])
         return self._kept[key]
 
-    def _of(self, device: PlayedDevice, stretch: ErrorRows) -> Numbers:
+    def _of(self, device: PlayedDevice, number: int, values: Values) -> Numbers:
+        stretch = self.stretches[number]
         event = stretch.event
+        unknown = [one for one in self.hidden if one.event == number]
         try:
-            power = device.play(event.recording, event.start).power
+            power = device.play(with_hidden(event.recording, unknown, values), event.start).power
         except InputError:
             raise
         except CosimError:
@@ -65,16 +82,12 @@ class Residuals:
             self.runs += 1
         return weighted(power - event.recording.power, stretch)
 
-    def between_samples(self, values: Values) -> Numbers:
-        """By how much the errors change where every second sample of the voltage is missing.
-
-        No less is due to what the voltage did between the samples that there are."""
-        device = self.device.with_values(values)
-        coarse = [
-            replace(one, event=replace(one.event, recording=one.event.recording.coarser()))
-            for one in self.stretches
-        ]
-        return np.concatenate([self._of(device, one) for one in coarse]) - self.at(values)
+    def hidden_later(self, values: Values) -> Numbers:
+        """By how much the errors change if all hidden parts of the voltage are one sample later."""
+        other = Residuals(self.device, self.stretches, self.report)
+        other.hidden = [replace(one, sample=one.sample + 1) for one in self.hidden]
+        self.runs += len(self.stretches)
+        return other.at(values) - self.at(values)
 
     def slopes(self, values: Values, steps: Mapping[str, float]) -> Matrix:
         """How the errors move with each parameter, a column each, by differences to both sides."""
@@ -85,6 +98,15 @@ class Residuals:
             high, low = (self.at({**values, name: at + side * step}) for side in (1, -1))
             columns.append((high - low) / (2 * step))
         return np.column_stack(columns)
+
+    def hidden_slopes(self, values: Values) -> Matrix:
+        """How the errors move with each hidden part of the voltage, a column each [1/pu]."""
+        here = self.at(values)
+        columns = []
+        for one in self.hidden:
+            other = {**values, one.name: float(values.get(one.name, 0.0)) + one.scale}
+            columns.append((self.at(other) - here) / one.scale)
+        return np.column_stack(columns) if columns else np.empty((len(here), 0))
 
 
 def weighted(error: Complex, stretch: ErrorRows) -> Numbers:
@@ -97,19 +119,34 @@ def stretches_of(device: PlayedDevice, events: Sequence[RecordedEvent]) -> list[
     found = []
     for event in events:
         recording = event.recording
-        compared = judge_response(device, event, device.play(recording, event.start))
-        weights = [1 / max(compared.noise[s].scatter, _LEAST_SCATTER) for s in ("p", "q")]
+        noise = noise_before(event, device.play(recording, event.start))
+        weights = [1 / max(noise[s].scatter, _LEAST_SCATTER) for s in ("p", "q")]
         thin = max(1, int(0.5 * recording.average / recording.interval))
         rows = np.flatnonzero(recording.good)[::thin]
         found.append(ErrorRows(event, rows, (weights[0], weights[1])))
     return found
 
 
+def gain_errors(stretches: Sequence[ErrorRows], count: int) -> Matrix:
+    """The errors that a wrong gain of the instruments makes, a column each for P and for Q, in scatters."""
+    found = []
+    for unit in (1.0, 1j):
+        parts = []
+        for one in stretches:
+            way = one.event.recording.power - one.event.start.power
+            seen = way.real if unit == 1.0 else 1j * way.imag
+            parts.append(weighted(_GAIN * np.asarray(seen, dtype=complex), one))
+        column = np.concatenate(parts)
+        found.append(np.pad(column, (0, count - len(column))))
+    return np.column_stack(found)
+
+
 def covariance(slopes: Matrix, errors: Numbers, stretches: Sequence[ErrorRows]) -> Matrix:
     """Covariance of the parameters, with errors that are alike from sample to sample.
 
     The larger of two: errors as one stationary noise of their own correlation, and errors as they are, with their size
-    where the parameter acts (Newey and West, Econometrica 55, 1987). Both weigh lags by a triangle."""
+    where the parameter acts (Newey and West, Econometrica 55, 1987). Both weigh lags by a triangle. Neither counts
+    errors as smaller than the scatter before the event."""
     bread = np.linalg.inv(slopes.T @ slopes)
     stationary, plain = np.zeros_like(bread), np.zeros_like(bread)
     begin = 0
@@ -121,7 +158,11 @@ def covariance(slopes: Matrix, errors: Numbers, stretches: Sequence[ErrorRows]) 
         for part in parts:
             stationary += _toeplitz(slopes[part], errors[part])
         begin += 2 * count
+    likely = slopes[begin:].T @ slopes[begin:]
+    stationary, plain = stationary + likely, plain + likely
     factor = len(errors) / max(len(errors) - slopes.shape[1], 1)
+    # errors that are smaller than the scatter before the event are luck, or a scatter that no instrument has
+    factor *= max(1.0, len(errors) / float(errors @ errors))
     found = [factor * bread @ meat @ bread for meat in (stationary, plain)]
     scale = np.sqrt(np.maximum(np.diag(found[1]) / np.diag(found[0]), 1.0))
     return np.asarray(found[0] * np.outer(scale, scale))
