@@ -34,6 +34,7 @@ _TAKES_PART = (
 _SURE = 0.95  # of an interval
 _SWITCH_TELLS = 10.0  # by so much of independent scatter the wrong position of a switch is worse
 _TOLERANCE = 1e-5  # relative: less of the sum of squares is far within an interval
+_REACHED = 3.0  # rms error in scatters: a larger one is the model's, or a fit that ended elsewhere
 _MOST_RUNS = 60  # of the residuals in one fit, beside those of the sensitivities
 
 
@@ -88,6 +89,11 @@ class Fit:
     error_after: float
     runs: int
     finished: bool = True
+
+    @property
+    def reached(self) -> bool:
+        """Return whether the device comes near to the recordings with the fitted values."""
+        return self.error_after <= _REACHED
 
     @property
     def values(self) -> dict[str, float | bool]:
@@ -162,7 +168,8 @@ def _trial(
     if not told:
         return _Trial(switches, [], untold, dict(switches), residuals.at(switches), None)
     best = _Best()
-    finished, slopes = True, None
+    finished = True
+    slopes = None
     try:
         _least_squares(residuals, told, switches, best)
         at = [replace(one, start=float(best.values[one.name])) for one in told]

@@ -159,7 +159,8 @@ def covariance(slopes: Matrix, errors: Numbers, stretches: Sequence[ErrorRows]) 
             stationary += _toeplitz(slopes[part], errors[part])
         begin += 2 * count
     likely = slopes[begin:].T @ slopes[begin:]
-    stationary, plain = stationary + likely, plain + likely
+    stationary = stationary + likely
+    plain = plain + likely
     factor = len(errors) / max(len(errors) - slopes.shape[1], 1)
     # errors that are smaller than the scatter before the event are luck, or a scatter that no instrument has
     factor *= max(1.0, len(errors) / float(errors @ errors))

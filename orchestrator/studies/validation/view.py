@@ -90,6 +90,8 @@ class Validation:
         return {
             "fit": parameters,
             "fit_finished": fit.finished,
+            "fit_reached": fit.reached,
+            "fit_error_scatters": fit.error_after,
             "fit_runs": fit.runs,
             "fit_events": checks,
         }

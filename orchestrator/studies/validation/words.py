@@ -202,6 +202,11 @@ def fit_sentence(fit: Fit, kept_back: Sequence[str]) -> str:
     said = f"Fitted to {seen} in {fit.runs} runs"
     if not fit.finished:
         said += ", interrupted: the best values so far, without intervals"
+    if not fit.reached:
+        said += (
+            f"; the error that is left is {fit.error_after:.3g} times the scatter: another parameter is wrong, or the "
+            "fit ended at the wrong values. The intervals do not hold: start elsewhere, with --set"
+        )
     if kept_back:
         return f"{said}; {', '.join(kept_back)} was kept back from it, and the table says whether it agrees."
     return (
