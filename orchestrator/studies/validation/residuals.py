@@ -130,12 +130,12 @@ def stretches_of(device: PlayedDevice, events: Sequence[RecordedEvent]) -> list[
 def gain_errors(stretches: Sequence[ErrorRows], count: int) -> Matrix:
     """The errors that a wrong gain of the instruments makes, a column each for P and for Q, in scatters."""
     found = []
-    for unit in (1.0, 1j):
+    for p, q in ((1.0, 0.0), (0.0, 1.0)):
         parts = []
         for one in stretches:
-            way = one.event.recording.power - one.event.start.power
-            seen = way.real if unit == 1.0 else 1j * way.imag
-            parts.append(weighted(_GAIN * np.asarray(seen, dtype=complex), one))
+            way: Complex = one.event.recording.power - one.event.start.power
+            gained: Complex = _GAIN * (p * way.real + 1j * q * way.imag)
+            parts.append(weighted(gained, one))
         column = np.concatenate(parts)
         found.append(np.pad(column, (0, count - len(column))))
     return np.column_stack(found)
