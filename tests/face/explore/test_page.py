@@ -79,7 +79,7 @@ def opened(browser, address):
         "console", lambda message: errors.append(message.text) if message.type == "error" else None
     )
     view.goto(address)
-    computed(view, 1)
+    view.wait_for_selector("body[data-exact-count]", state="attached")
     view.locator("#signal-names option").first.wait_for(state="attached")
     if view.locator("#tab-network").get_attribute("aria-selected") == "true" and "#" not in address:
         view.locator("#tab-map").click()

@@ -117,7 +117,7 @@ function keepState() {
   history.replaceState(null, "", `#${encodeURIComponent(JSON.stringify(kept))}`);
 }
 function readState(beginning) {
-  Object.assign(state, { scenario: beginning.scenario, values: beginning.values, range: beginning.range, controls: Object.keys(beginning.values) });
+  Object.assign(state, { scenario: beginning.scenario, values: copyOf(beginning.values), range: beginning.range, controls: Object.keys(beginning.values) });
   try {
     const kept = JSON.parse(decodeURIComponent(location.hash.slice(1)));
     Object.assign(state, { scenario: String(kept.s), values: kept.v ?? {}, range: kept.r ?? [0.1, 2], controls: kept.c ?? [], mode: kept.m ?? null, tab: kept.t ?? "", signals: kept.g ?? "", pin: kept.p ?? null, events: kept.e ?? null, places: kept.d ?? {} });
