@@ -134,7 +134,8 @@ def gain_errors(stretches: Sequence[ErrorRows], count: int) -> Matrix:
         parts = []
         for one in stretches:
             way: Complex = one.event.recording.power - one.event.start.power
-            gained: Complex = _GAIN * (p * way.real + 1j * q * way.imag)
+            gained = np.empty_like(way)
+            gained.real, gained.imag = _GAIN * p * way.real, _GAIN * q * way.imag
             parts.append(weighted(gained, one))
         column = np.concatenate(parts)
         found.append(np.pad(column, (0, count - len(column))))
