@@ -134,8 +134,7 @@ def gain_errors(stretches: Sequence[ErrorRows], count: int) -> Matrix:
         parts = []
         for one in stretches:
             way: Complex = one.event.recording.power - one.event.start.power
-            gained = np.empty_like(way)
-            gained.real, gained.imag = _GAIN * p * way.real, _GAIN * q * way.imag
+            gained = np.asarray(_GAIN * (p * way.real + 1j * q * way.imag), dtype=np.complex128)
             parts.append(weighted(gained, one))
         column = np.concatenate(parts)
         found.append(np.pad(column, (0, count - len(column))))

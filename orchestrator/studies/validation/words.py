@@ -209,7 +209,5 @@ def fit_sentence(fit: Fit, kept_back: Sequence[str]) -> str:
         )
     if kept_back:
         return f"{said}; {', '.join(kept_back)} was kept back from it, and the table says whether it agrees."
-    return (
-        f"{said}; no other event confirms it: give one with --hold-back. Intervals hold where the model has the right "
-        "form."
-    )
+    said += "; no other event confirms it: give one with --hold-back."
+    return f"{said} Intervals hold if the model has the right form." if fit.reached else said
