@@ -149,7 +149,7 @@ def print_questions(
     text = f"{known} {others}questions about {path.name} are those of an earlier command"
     say(
         "question",
-        [f"{text}; `gfor modes {quote(str(path))} --details` shows them, and --json has them"],
+        [f"{text}; gfor modes {quote(str(path))} --details shows them, and --json has them"],
     )
 
 

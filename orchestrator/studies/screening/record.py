@@ -1,4 +1,4 @@
-"""What is kept of a stretch of a screening."""
+"""The record of a stretch of a screening."""
 
 from dataclasses import dataclass, field
 

@@ -143,7 +143,7 @@ def test_the_fmu_is_valid_and_the_same_beside_it(fmu, fmu_path):
         assert {
             n: with_model.read(n) for n in with_model.namelist() if not n.startswith("extra/")
         } == plain
-        assert {n for n in with_model.namelist() if n.startswith("extra/")} == {
+        assert {n for n in with_model.namelist() if n.startswith(FOLDER)} == {
             f"{FOLDER}/{name}"
             for name in ("fmi-ls-manifest.xml", "linear_model.json", "linear_model.mat")
         }

@@ -16,7 +16,7 @@ MODULES = (
     *(f"face.api.{name}" for name in ("comtrade", "export", "fmu", "identification", "linear")),
     *(
         f"face.api.{name}"
-        for name in ("models", "nyquist", "results", "saved", "scenario", "source")
+        for name in ("models", "nyquist", "results", "saved", "scenario", "source", "validation")
     ),
     *(
         f"studies.{name}.view"
@@ -67,6 +67,7 @@ RESULTS = (
     "SignalModes",
     "Sources",
     "StepChoice",
+    "Validation",
     "Verification",
 )
 """Types of results, named for annotations; the functions that return them have the examples."""

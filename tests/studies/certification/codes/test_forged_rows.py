@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from orchestrator.cases.case import load_case
 from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import file_hash
 from orchestrator.devices.binding.binding import bound_fmu
@@ -52,7 +53,9 @@ def fails(tmp_path, fmu_path):
         write_row(request, row.name, row.title, programme, 50.0, tmp_path)
     verdicts = [judge_row(row, results[row.name], 50.0) for row in CODE.rows]
     case = tmp_path / case_name(CODE.rows[0].name)
-    save(Certificate(request, bound_fmu(fmu), CODE, 50.0, verdicts, results, case), tmp_path)
+    issued = Certificate(request, bound_fmu(fmu), CODE, 50.0, verdicts, results, case)
+    issued.values = load_case(case).prepare()[0].values
+    save(issued, tmp_path)
     assert verify_files(*read_certificate(tmp_path)).holds
     return tmp_path
 
@@ -94,7 +97,7 @@ def test_a_failed_row_that_was_taken_out_is_named(fails, request):
 
 
 def issued_by(content, version):
-    content["environment"]["gfor-cosim"] = version
+    content["environment"] |= {"gfor-cosim": version, "Code": f"that of {version or 'no version'}"}
     return content
 
 
