@@ -25,7 +25,7 @@ from orchestrator.devices.acceptance.checks.damping_swings import (
     likeness,
     ratio,
 )
-from orchestrator.devices.acceptance.checks.port import WHY, cannot_import
+from orchestrator.devices.acceptance.checks.port import cannot_import, without_start
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Subject
 
 _POINT = OperatingAt(1.0, 0.0, 0.4, 0.05)
@@ -79,9 +79,9 @@ class _Fault:
     needs=(*SAME, "steady_state", "power_balance"),
 )
 def pod(subject: Subject) -> CheckResult:
-    """FrequencySwing the network's frequency with the damping controllers on and off; what differs is theirs."""
+    """Swing the network's frequency with the damping controllers on and off; what differs is theirs."""
     if not subject.starts:
-        return not_applicable("pod", WHY["no start" if subject.port else "no port"])
+        return without_start("pod", subject)
     names = controllers(subject)
     if not names:
         return not_applicable(

@@ -12,13 +12,12 @@ from orchestrator.devices.acceptance.checks.base import (
     CheckResult,
     check,
     failed,
-    not_applicable,
     passed,
     remarked,
 )
 from orchestrator.devices.acceptance.checks.droop import FREQUENCY
 from orchestrator.devices.acceptance.checks.events import scale
-from orchestrator.devices.acceptance.checks.port import WHY, cannot_import, followed
+from orchestrator.devices.acceptance.checks.port import cannot_import, followed, without_start
 from orchestrator.devices.acceptance.checks.settings import Setting, with_each_setting
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Subject
 
@@ -75,7 +74,7 @@ def _points(subject: Subject) -> list[OperatingAt]:
 def evenness(subject: Subject) -> CheckResult:
     """The course of its active power after a small change, at several points, and with each of its switches at two."""
     if not subject.starts:
-        return not_applicable("evenness", WHY["no start" if subject.port else "no port"])
+        return without_start("evenness", subject)
     found: dict[OperatingAt, Complex] = {}
     for point in _points(subject):
         try:

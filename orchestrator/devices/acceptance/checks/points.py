@@ -77,9 +77,7 @@ def _points(subject: Subject) -> Iterator[tuple[str, OperatingAt]]:
 )
 def operating_points(subject: Subject) -> CheckResult:
     if not subject.starts:
-        return not_applicable(
-            "operating_points", port.WHY["no start" if subject.port else "no port"]
-        )
+        return port.without_start("operating_points", subject)
     tried, left_out, found = 0, [], []
     for words, point in _points(subject):
         reason = port.cannot_import(subject, point)
@@ -281,7 +279,7 @@ def _differs(first: Numbers, late: Numbers, least: Numbers | float) -> float:
 def angles(subject: Subject) -> CheckResult:
     """The network turns it by two turns either way, from two angles; the second run is the first, turned."""
     if not subject.starts:
-        return not_applicable("angles", WHY["no start" if subject.port else "no port"])
+        return port.without_start("angles", subject)
     h, found = subject.step_size, []
     steps = max(3, round(scale(subject, _LASTS) * _LASTS / h))
     rates = np.where(np.arange(steps) < steps / 3, _FASTER, -_FASTER)

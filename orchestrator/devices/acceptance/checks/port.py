@@ -51,6 +51,11 @@ WHY = {
 }
 
 
+def without_start(name: str, subject: Subject) -> CheckResult:
+    """Return the result of a check at the port for an FMU that cannot start from a power flow there."""
+    return not_applicable(name, WHY["no start" if subject.port else "no port"])
+
+
 def rating_of(running: Running) -> float:
     """S_n [MVA] with which it runs."""
     set_to = running.parameters.get("S_n", running.subject.use.values.get("S_n"))
@@ -130,7 +135,7 @@ def cannot_import(subject: Subject, point: OperatingAt) -> str:
 @check("steady_state", "Does it hold the steady state of a power flow?", needs=SAME)
 def steady_state(subject: Subject) -> CheckResult:
     if not subject.starts:
-        return not_applicable("steady_state", WHY["no start" if subject.port else "no port"])
+        return without_start("steady_state", subject)
     steps, worst = affordable(subject, 5000), 0.0
     refused = []
     rest: _Rest | None = None
@@ -217,7 +222,7 @@ def _rest(subject: Subject, running: Running, begin: complex, steps: int) -> _Re
 def power_balance(subject: Subject) -> CheckResult:
     """Fit x = a·x_0 + b·conj(x_0) + c over several operating points, for powers and for currents."""
     if not subject.starts:
-        return not_applicable("power_balance", WHY["no start" if subject.port else "no port"])
+        return without_start("power_balance", subject)
     best: CheckResult | None = None
     settle = 0 if subject.memory.get("drift", 0.0) <= DRIFT else affordable(subject, 20000)
     for steps in dict.fromkeys((0, settle)):
