@@ -19,7 +19,7 @@ IEEET3 adds the regulator's voltage to that of the source, behind a commutating 
 V_E and V_B are those of `sources`. Sources: OpenIPSL at 2be0558a (ESST2A), ANDES 2.0.0 (ESST3A, IEEET3), Opal-RT's
 library of phasor models at 6dc8ca5 (ESST3A, IEEET3), IEEE 421.5."""
 
-from fmus.synchronous_generator.data_lines import declared, pu, seconds
+from fmus.synchronous_generator.data_lines import Given, declared, pu, seconds
 from fmus.synchronous_generator.excitation.common import (
     SOURCE,
     Measurement,
@@ -62,6 +62,12 @@ ESST3A = (
 )
 
 
+def _amplifier(m: ModelBuilder, p: Given, error: Expr, initial: Expr) -> Expr:
+    """Declare the amplifier with its lag and limits, and return what it gives [pu]."""
+    signal = p.K_A * error
+    return limited_low_pass(m, "amplifier", signal, p.T_A, p.V_RMIN, p.V_RMAX, initial=initial)
+
+
 def esst2a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
@@ -75,15 +81,7 @@ def esst2a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         E_fd = clamp(x, 0, high)
         V_F, _ = rate_feedback(m, E_fd, E_0, 0.05, 1.0)
         measured = Measurement(m, seen)
-        V_A = limited_low_pass(
-            m,
-            "amplifier",
-            p.K_A * (measured.error(V_A0 / p.K_A) - V_F),
-            p.T_A,
-            p.V_RMIN,
-            p.V_RMAX,
-            initial=V_A0,
-        )
+        V_A = _amplifier(m, p, measured.error(V_A0 / p.K_A) - V_F, V_A0)
         rate = (V_A * source.available(seen.terminal(E_fd)) - p.K_E * E_fd) / p.T_E
         m.derivative(x, held_at_limits(x, rate, 0, high))
         return measured.close(E_fd)
@@ -104,9 +102,7 @@ def esst3a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         measured = Measurement(m, seen)
         error = clamp(measured.error(V_I0), inner.V_IMIN, inner.V_IMAX)
         compensated = lead_lag_stage(m, error, V_I0, lead=1.0)
-        V_R = limited_low_pass(
-            m, "amplifier", p.K_A * compensated, p.T_A, p.V_RMIN, p.V_RMAX, initial=V_R0
-        )
+        V_R = _amplifier(m, p, compensated, V_R0)
         x = m.state("inner", V_M0, "pu", "first-order lag with limits", base="E_fd")
         V_M = clamp(x, inner.V_MMIN, inner.V_MMAX)
         first = V_M * source.available(seen.terminal(seen.I_fd))
@@ -138,15 +134,7 @@ def ieeet3(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         E_fd = m.state("E", E_0, "pu", "Field voltage", base="E_fd")
         V_F, _ = rate_feedback(m, E_fd, E_0, 0.05, 1.0)
         measured = Measurement(m, seen)
-        V_R = limited_low_pass(
-            m,
-            "amplifier",
-            p.K_A * (measured.error(V_R0 / p.K_A) - V_F),
-            p.T_A,
-            p.V_RMIN,
-            p.V_RMAX,
-            initial=V_R0,
-        )
+        V_R = _amplifier(m, p, measured.error(V_R0 / p.K_A) - V_F, V_R0)
         V_E = source.voltage(seen.terminal(E_fd), seen.i)
         added = clamp(V_R + behind_commutation(V_E, seen.I_fd), 0, V_BMAX)
         drawn = _COMMUTATION * seen.I_fd
