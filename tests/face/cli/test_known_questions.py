@@ -29,7 +29,7 @@ def test_the_second_command_counts_what_the_first_has_shown(gfor, case):
     assert len(first) >= 2
     _, (line,) = asked(gfor, "scr", case)
     assert line.startswith(f"question: {len(first)} questions about case.toml are those of an ")
-    (typed,) = re.findall("`gfor (.*?)`", line)
+    (typed,) = re.findall("; gfor (.*?) shows them", line)
     assert asked(gfor, *shlex.split(typed))[1] == first, "the remedy works as it is typed"
     out, told = asked(gfor, "modes", case, "--json")
     assert told == first
