@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from orchestrator.core.errors import CosimError, InputError
 from orchestrator.linear.doubts.coupled_response import confirmed
-from orchestrator.linear.doubts.linearity import Doubt, doubts
+from orchestrator.linear.doubts.linearity import Doubt, doubts, tell
 from orchestrator.linear.models.apart import standing_apart
 from orchestrator.linear.models.delays import (
     LARGEST_ERROR,
@@ -308,11 +308,11 @@ def examine(
         stability = replace(stability, stable=None, reason="; ".join(long))
     turning = _turning(blocks, master, model, stability, found, rightmost)
     if turning:
-        stability = replace(stability, stable=None, reason="; ".join(map(str, turning)))
+        stability = replace(stability, stable=None, reason="; ".join(tell(turning)))
         found = [doubt for doubt in found if doubt not in turning]
-        return Examination(stability, (*verdict_warnings(stability), *map(str, found), *wires))
+        return Examination(stability, (*verdict_warnings(stability), *tell(found), *wires))
     step = check_resolution(master, model, system, shown, frequency_range, stability)
-    return Examination(stability, (*step, *map(str, found), *wires))
+    return Examination(stability, (*step, *tell(found), *wires))
 
 
 def _has_delays(blocks: Blocks, model: LinearModel, modes: Sequence[Mode]) -> bool:

@@ -12,6 +12,7 @@ import numpy as np
 import scipy.linalg
 
 from orchestrator.core.arrays import Vector
+from orchestrator.core.errors import few
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.linearization import Blocks, compose
 from orchestrator.linear.spectra.modes import Mode
@@ -36,6 +37,7 @@ _WHY = (
 )
 """The meaning of a difference in each of `ComponentLinearization.variants`, in their order."""
 
+_NAMED = 3  # components that a sentence names
 _EDGE = 1  # index of the variant at an edge, where there is no linear model at all
 _SMALL_ONLY = 2  # index of the variant in which the model is right for small changes
 
@@ -55,14 +57,37 @@ class Doubt:
     # Whether the shift leaves open on which side of the stability limit a mode is. It does not if the model is right
     # for small changes.
     turns: bool = False
+    kind: int = 0  # the row of `_WHY` that it belongs to
 
     def __str__(self) -> str:
+        return f"component {self.component!r} is not linear at the operating point: {self.reason}"
+
+    @property
+    def reason(self) -> str:
+        """Why, and how far that moves which mode."""
         m = self.mode
         return (
-            f"component {self.component!r} is not linear at the operating point: {self.why}. That moves the mode at "
-            f"{m.frequency_hz:.3f} Hz with {m.damping_percent:.2f} % damping by {100 * self.shift:.2g} % of its "
-            f"eigenvalue, and its damping by up to {100 * self.shift:.2g} points; {100 * LARGEST_SHIFT:g} % is normal"
+            f"{self.why}. That moves the mode at {m.frequency_hz:.3f} Hz with {m.damping_percent:.2f} % damping by "
+            f"{100 * self.shift:.2g} % of its eigenvalue, and its damping by up to {100 * self.shift:.2g} points; "
+            f"{100 * LARGEST_SHIFT:g} % is normal"
         )
+
+
+def tell(found: Sequence[Doubt]) -> tuple[str, ...]:
+    """Sentences about doubts, one for each kind of reason: several components are counted, and the worst is told."""
+    said = []
+    for kind in dict.fromkeys(doubt.kind for doubt in found):
+        alike = [doubt for doubt in found if doubt.kind == kind]
+        worst = max(alike, key=lambda doubt: doubt.shift)
+        if len(alike) == 1:
+            said.append(str(worst))
+            continue
+        named = few([repr(doubt.component) for doubt in alike], _NAMED)
+        said.append(
+            f"{len(alike)} components are not linear at the operating point ({named}); the worst, "
+            f"{worst.component!r}: {worst.reason}"
+        )
+    return tuple(said)
 
 
 def doubts(
@@ -92,7 +117,7 @@ def doubts(
             alone = each[name].max() > LARGEST_SHIFT
             shifts = each[name] if alone else together
             worst = int(shifts.argmax())
-            found.append(Doubt(name, modes[worst], float(shifts[worst]), text, turns))
+            found.append(Doubt(name, modes[worst], float(shifts[worst]), text, turns, kind))
     return found
 
 

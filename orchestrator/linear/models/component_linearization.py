@@ -16,7 +16,7 @@ from orchestrator.devices.fmi.linear_model import EmbeddedModel
 from orchestrator.linear.models.differences import PerturbedStep
 from orchestrator.linear.models.held_inputs import over_held_inputs
 from orchestrator.linear.models.linear_model import DIRECTIONAL, PACKED, PERTURBED
-from orchestrator.linear.models.perturbation import perturb
+from orchestrator.linear.models.perturbation import perturb, straightened
 from orchestrator.linear.models.response_check import ContinuousModel, check_response
 from orchestrator.linear.models.state_access import (
     StateAccess,
@@ -60,8 +60,8 @@ class ComponentLinearization:
     # origin of the model: ``perturbed``, ``directional``, ``packed`` or ``identified``
     source: str = PERTURBED
     # The same matrices, computed in other ways, which should hardly differ: with the other perturbation size, and with
-    # a perturbation to one side only. Where some columns have a smaller size, also with twice the usual size. Empty for
-    # a model that was not perturbed.
+    # perturbations of both sizes to one side only, their curvature taken out. Where some columns have a smaller size,
+    # also with twice the usual size. Empty for a model that was not perturbed.
     variants: tuple[StepMap, ...] = ()
     # size of the perturbation, relative to max(1, |value|), by the name of each state or input that needed a smaller
     # size than usual
@@ -133,7 +133,11 @@ def linearize_component(
         ),
         variants=(
             other,
-            step_map(small.after_up, small.outputs_up),
+            step_map(
+                *straightened(
+                    (small.after_up, small.outputs_up), (large.after_up, large.outputs_up)
+                )
+            ),
             *([step_map(found.usual.after, found.usual.outputs)] if found.narrow else []),
         ),
         narrow=found.narrow,

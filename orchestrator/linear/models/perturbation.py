@@ -78,6 +78,17 @@ def perturb(step: PerturbedStep, rates: Sequence[str], *, once: bool = False) ->
     return PerturbationResult(*found, usual, narrow, doubtful)
 
 
+def straightened(
+    once: tuple[Matrix, Matrix], twice: tuple[Matrix, Matrix]
+) -> tuple[Matrix, Matrix]:
+    """Answers to one side without their curvature, from two sizes of which the second is twice the first.
+
+    The curvature of something smooth adds a part that grows with the size, and it is gone here; a corner, or a limit
+    within the sizes, stays."""
+    after, outputs = (2 * a - b for a, b in zip(once, twice, strict=True))
+    return after, outputs
+
+
 def _take_over(
     kept: Differences,
     new: Differences,

@@ -14,7 +14,7 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.core.errors import AnalysisError, InputError
 from orchestrator.devices.fmi.component import Component
 from orchestrator.linear.doubts.examination import Examination
-from orchestrator.linear.doubts.linearity import doubts
+from orchestrator.linear.doubts.linearity import doubts, tell
 from orchestrator.linear.models.component_linearization import ComponentLinearization
 from orchestrator.linear.models.device_start import misfits_of, sentences
 from orchestrator.linear.models.linear_model import IDENTIFIED, LinearModel
@@ -103,7 +103,7 @@ def linearize_with_box(
         identified,
         model,
         max(moved, residual),
-        (*misfits, *map(str, doubtful)),
+        (*misfits, *tell(doubtful)),
         misfits,
     )
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.core.errors import AnalysisError, CosimError, InputError
-from orchestrator.linear.doubts.linearity import doubts
+from orchestrator.linear.doubts.linearity import doubts, tell
 from orchestrator.linear.models.blocks import Blocks
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.linearization import compose, continuous_model
@@ -283,7 +283,7 @@ def _doubts(blocks: Blocks, schedule: Schedule, model: LinearModel) -> tuple[str
     if not any(component.doubtful for component in blocks.components.values()):
         return ()
     modes = [mode for mode in find_spectrum(model).modes if mode.is_oscillation]
-    return tuple(str(doubt) for doubt in doubts(blocks, schedule, model, modes))
+    return tell(doubts(blocks, schedule, model, modes))
 
 
 def step_choice_json(choice: StepChoice) -> dict[str, Any]:
