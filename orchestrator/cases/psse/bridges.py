@@ -8,7 +8,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 _NO_LOAD = (
     3 * math.sqrt(2) / math.pi
@@ -68,6 +67,8 @@ class Bridges:
         return math.acos(min(1.0, max(-1.0, cosine)))
 
     def _angle_with_capacitors(self, v_pu: float, current: float, kilovolts: float) -> float:
+        from scipy.optimize import brentq  # noqa: PLC0415 - what only reads files starts without it
+
         def excess(angle: float) -> float:
             return self.voltage(v_pu, current, angle) - kilovolts
 
@@ -97,6 +98,8 @@ def _power_with_capacitors(bridges: Bridges, E: float, current: float, angle: fl
 
     Each capacitor's voltage swings by what a valve's current of 120 degrees brings.  While valves commutate, the
     transformers' reactances and the capacitors of two phases are one circuit of second order."""
+    from scipy.optimize import brentq  # noqa: PLC0415 - what only reads files starts without it
+
     x, c = bridges.x_ohm, bridges.capacitor_ohm
     rate, forced = math.sqrt(c / x), math.sqrt(2) * E / (2 * (c - x))
     peak, moved, overlap = current * c * math.pi / 3, 0.0, 0.0

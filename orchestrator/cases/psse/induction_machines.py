@@ -4,7 +4,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from orchestrator.cases.psse.devices import DeviceEnd, HeldDevice, Voltages
 from orchestrator.core.errors import InputError
@@ -99,4 +98,6 @@ class InductionMachine(HeldDevice):
         if above == 0:
             return direction * float(_SLIPS[0])
         low, high = direction * _SLIPS[above - 1], direction * _SLIPS[above]
+        from scipy.optimize import brentq  # noqa: PLC0415 - what only reads files starts without it
+
         return float(brentq(excess, low, high, xtol=1e-15))

@@ -37,7 +37,7 @@ Report = Callable[[str], None]
 
 @dataclass(frozen=True)
 class GivenRecording:
-    """A recording as it was given."""
+    """A data set, its label in tables, and the hash of its file."""
 
     dataset: xr.Dataset
     label: str
