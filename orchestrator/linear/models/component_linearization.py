@@ -16,7 +16,7 @@ from orchestrator.devices.fmi.linear_model import EmbeddedModel
 from orchestrator.linear.models.differences import PerturbedStep
 from orchestrator.linear.models.held_inputs import over_held_inputs
 from orchestrator.linear.models.linear_model import DIRECTIONAL, PACKED, PERTURBED
-from orchestrator.linear.models.perturbation import perturb, straightened
+from orchestrator.linear.models.perturbation import perturb, without_curvature
 from orchestrator.linear.models.response_check import ContinuousModel, check_response
 from orchestrator.linear.models.state_access import (
     StateAccess,
@@ -134,7 +134,7 @@ def linearize_component(
         variants=(
             other,
             step_map(
-                *straightened(
+                *without_curvature(
                     (small.after_up, small.outputs_up), (large.after_up, large.outputs_up)
                 )
             ),

@@ -78,7 +78,7 @@ def perturb(step: PerturbedStep, rates: Sequence[str], *, once: bool = False) ->
     return PerturbationResult(*found, usual, narrow, doubtful)
 
 
-def straightened(
+def without_curvature(
     once: tuple[Matrix, Matrix], twice: tuple[Matrix, Matrix]
 ) -> tuple[Matrix, Matrix]:
     """Answers to one side without their curvature, from two sizes of which the second is twice the first.
