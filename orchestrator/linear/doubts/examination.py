@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from orchestrator.core.errors import CosimError, InputError
 from orchestrator.linear.doubts.coupled_response import confirmed
 from orchestrator.linear.doubts.linearity import Doubt, doubts, tell
+from orchestrator.linear.doubts.slow_modes import tell_slow_modes
 from orchestrator.linear.models.apart import standing_apart
 from orchestrator.linear.models.delays import (
     LARGEST_ERROR,
@@ -312,7 +313,8 @@ def examine(
         found = [doubt for doubt in found if doubt not in turning]
         return Examination(stability, (*verdict_warnings(stability), *tell(found), *wires))
     step = check_resolution(master, model, system, shown, frequency_range, stability)
-    return Examination(stability, (*step, *tell(found), *wires))
+    slow = tell_slow_modes(model, system, shown)
+    return Examination(stability, (*step, *slow, *tell(found), *wires))
 
 
 def _has_delays(blocks: Blocks, model: LinearModel, modes: Sequence[Mode]) -> bool:

@@ -1,8 +1,13 @@
 """A slow eigenvalue beside the free angle is no edge of a limit; a governor at its limit still is."""
 
+import numpy as np
 import pytest
+import scipy.linalg
 
 from orchestrator.cases.case import load_case
+from orchestrator.linear.doubts.slow_modes import tell_slow_modes
+from orchestrator.linear.models.linear_model import LinearModel
+from orchestrator.linear.spectra.modes import find_modes
 from orchestrator.studies.modes.modes import compute_modes
 from tests.cases.psse.test_questions import CASE, DYR, RAW
 
@@ -45,3 +50,17 @@ def test_a_governor_at_its_limit_leaves_the_verdict_open(stability):
 
 def test_a_governor_away_from_its_limit_is_judged(stability):
     assert stability(AT_LIMIT.format(limit=0.9)).stable is True
+
+
+def test_slow_modes_that_the_step_splits_are_told_beside_the_exact_ones():
+    """A step map with ±j·0.005 where the system has a double zero: the figures say nothing, and both are shown."""
+    A = np.array([[0.0, 1.0], [0.0, 0.0]])
+    split = np.array([[0.0, 1.0], [-2.5e-5, 0.0]])
+    step = 1e-3
+    seen = LinearModel.from_matrix(scipy.linalg.expm(split * step), ("a.x", "a.y"), step)
+    modes = find_modes(seen, 0.0, 1.0)
+    (said,) = tell_slow_modes(seen, LinearModel.from_matrix(A, ("a.x", "a.y"), None), modes)
+    assert "it has +0.0000 ± j0.0050, " in said
+    assert "there are +0.0000, +0.0000" in said
+    assert tell_slow_modes(seen, LinearModel.from_matrix(split, ("a.x", "a.y"), None), modes) == ()
+    assert tell_slow_modes(seen, None, modes) == ()
