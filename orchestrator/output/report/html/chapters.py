@@ -21,6 +21,7 @@ from orchestrator.output.report.html.charts import Mark, bar_chart, complex_plan
 from orchestrator.output.report.html.elements import colour, damping, table
 from orchestrator.output.report.html.least_damped import LeastDamped
 from orchestrator.output.report.html.origins import origin_of
+from orchestrator.output.report.html.verdict_lines import VerdictLine
 from orchestrator.output.report.tables import short
 from orchestrator.output.results.manifest import read_manifest
 
@@ -50,6 +51,8 @@ class Chapter:
     bases: Sequence[Mapping[str, Any]] = ()  # what figures rest on: `PreparedScenario.basis`
     names: Mapping[str, str] = field(default_factory=dict)  # `ElementNames.shown`
     least: Sequence[LeastDamped] = ()  # the modes whose figures the answer gives, in its order
+    lines: Sequence[VerdictLine] = ()  # of a study of scenarios: the answer by scenario
+    beside: Sequence[str] = ()  # of such a study: the answer's part that is of no scenario
 
     @cached_property
     def origin(self) -> dict[str, Any]:
@@ -102,44 +105,20 @@ def of_run(
     folder: Path, scenarios: Sequence[Content], content: str = "", beside: Sequence[str] = ()
 ) -> Chapter:
     """Of a run's summary, or the same of `gfor modes`; ``beside``: what devices bring."""
-    said, open_, sure, told = [], [], [], list[LeastDamped]()
-    for s in scenarios:
-        answer: Content = s.get("answer") or {}
-        stability: Content = s.get("stability") or {}
-        listed: Any = s.get("modes")
-        stable = answer.get("stable", stability.get("stable", s.get("stable")))
-        word = answer.get("verdict") or _STABLE[stable]
-        title = s.get("subject") or s.get("title", s["name"])
-        modes = [m for m in (listed if isinstance(listed, list) else [answer]) if m]
-        least = min(
-            (m for m in modes if m.get("damping_percent") is not None),
-            key=lambda m: m["damping_percent"],
-            default=None,
-        )
-        figures = (
-            f", least damped {least['frequency_hz']:.3f} Hz, {least['damping_percent']:.2f} %"
-            if least
-            else ""
-        )
-        told += [] if least is None else [LeastDamped.of(least)]
-        later = answer.get("after_events")
-        if later:
-            figures += f", after the events {later['frequency_hz']:.3f} Hz, {later['damping_percent']:.2f} %"
-            told.append(LeastDamped.of(later))
-        remark = f" ({answer['remark']})" if answer.get("remark") else ""
-        said.append((stable, f"{title}: {word}{figures}{remark}"))
+    open_ = []
+    lines = [VerdictLine.of(scenario) for scenario in scenarios]
+    for line, s in zip(lines, scenarios, strict=True):
         open_ += [
-            f"{title}: {f['message']}" for f in s.get("findings", []) if f["kind"] == "not_judged"
+            f"{line.scenario}: {f['message']}"
+            for f in s.get("findings", [])
+            if f["kind"] == "not_judged"
         ]
-        open_ += [f"{title}: {s['failure']}"] if s.get("failure") else []
-        open_ += [f"{title}: {stability.get('reason') or 'stability'}"] if stable is None else []
-        ring = s.get("ring_down")
-        if ring:
-            sure.append(
-                f"{title} rings with {ring['frequency_hz']:.3f} Hz, {ring['damping_percent']:.2f} % in time"
-            )
+        open_ += [f"{line.scenario}: {s['failure']}"] if s.get("failure") else []
+        if line.stable is None and not line.remark:
+            reason = (s.get("stability") or {}).get("reason")
+            open_.append(f"{line.scenario}: {reason or 'stability'}")
     open_ += dict.fromkeys(text for s in scenarios for text in s.get("warnings", []))
-    verdicts = [stable for stable, _ in said]
+    verdicts = [line.stable for line in lines]
     good = False if False in verdicts else None if None in verdicts else True
     basis = (
         "modes of the FMUs that were simulated"
@@ -150,13 +129,15 @@ def of_run(
     return Chapter(
         folder,
         f"{asked}, and which swing is damped least?",
-        "; ".join([*(text for _, text in said), *beside]),
+        "; ".join([*(line.words for line in lines), *beside]),
         good,
-        "; ".join([*_kinds(scenarios), basis, *sure]),
+        "; ".join([*_kinds(scenarios), basis]),
         open_,
         content,
         bases=_bases(scenarios),
-        least=told,
+        least=[mode for line in lines for mode in line.modes],
+        lines=lines,
+        beside=beside,
     )
 
 

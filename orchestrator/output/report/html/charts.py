@@ -197,10 +197,13 @@ def thinned(x: Numbers, y: Numbers) -> tuple[Numbers, Numbers]:
     return x[chosen], y[chosen]
 
 
-def legend(entries: Iterable[tuple[str, str]]) -> str:
+def legend(entries: Iterable[tuple[str, str]], circles: str = "") -> str:
+    """Name the colours; ``circles``: whose figures the circles are, if there are any."""
     items = "".join(
         f'<li><i style="background:{colour}"></i>{escape(label)}</li>' for label, colour in entries
     )
+    if circles:
+        items += f'<li><i class="ring"></i>{escape(circles)}</li>'
     return f'<ul class="legend">{items}</ul>'
 
 

@@ -3,7 +3,6 @@
 import json
 import re
 import warnings
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
@@ -22,10 +21,10 @@ from orchestrator.output.report.html.chapters import (
 )
 from orchestrator.output.report.html.chapters import sections as sections_of
 from orchestrator.output.report.html.elements import Figures, document, held_data, paragraphs, table
+from orchestrator.output.report.html.first_page import first_page
 from orchestrator.output.report.html.folder import SUMMARY, Results, read_results, sweeps_of
 from orchestrator.output.report.html.least_damped import LeastDamped, other_modes
 from orchestrator.output.report.html.origins import given_in, made_of
-from orchestrator.output.report.tables import short
 from orchestrator.output.results.manifest import MANIFEST, ResultsWarning
 
 USED = (
@@ -270,38 +269,6 @@ def _of_run(run: Results, figures: Figures) -> Sections:
 
 
 _RECORDS = {".nc", ".csv", ".cfg", ".dat"}  # of which each folder has one of the same name
-_NOTHING = "nothing that is known of"
-_OPEN = 4  # sentences on the first page about what was not judged
-_LONGEST = 240  # characters of each of them
-
-
-def first_page(chapters: Sequence[Chapter]) -> str:
-    rows, open_ = [], Counter(text for one in chapters for text in dict.fromkeys(one.not_judged))
-    notes = {
-        text: f"note {k}" for k, text in enumerate((t for t, n in open_.items() if n > 1), start=1)
-    }
-    for one in chapters:
-        shade = {True: "good", False: "bad", None: "soft"}[one.good]
-        lost = [escape(notes.get(text) or short(text, _LONGEST)) for text in one.not_judged[:_OPEN]]
-        more = f"<br>and {len(one.not_judged) - _OPEN} more" if len(one.not_judged) > _OPEN else ""
-        answer = f'<span class="{shade}">{escape(one.answer)}</span>'
-        given = "".join(
-            f"<br>{escape(text)}" for text in (str(one.source), given_in(one.origin)) if text
-        )
-        asked = f'{escape(one.question)}<span class="soft">{given}</span>'
-        rows.append(
-            [
-                asked,
-                answer,
-                escape(short(one.sure, 2 * _LONGEST)),
-                "<br>".join(lost or [_NOTHING]) + more,
-            ]
-        )
-    said = "".join(
-        f"<p>{name[0].upper()}{name[1:]}: {escape(short(text, _LONGEST))}</p>"
-        for text, name in notes.items()
-    )
-    return table("In short", ["Question", "Answer", "How sure", "Not judged"], rows, left=4) + said
 
 
 def _origins(chapters: Sequence[Chapter]) -> dict[Path, dict[str, Any]]:

@@ -53,8 +53,8 @@ def titles(results: Results) -> dict[str, str]:
     return {s["name"]: s["title"] for s in results.scenarios}
 
 
-def scenario_legend(results: Results) -> str:
-    return legend((s["title"], colour(k)) for k, s in enumerate(results.scenarios))
+def scenario_legend(results: Results, circles: str = "") -> str:
+    return legend(((s["title"], colour(k)) for k, s in enumerate(results.scenarios)), circles)
 
 
 def findings(results: Results) -> str:
@@ -92,45 +92,12 @@ def findings(results: Results) -> str:
         if (v := s.get("stability"))
     )
     details = f"<details><summary>By the modes at the operating point</summary><ul>{by_modes}</ul></details>"
-    return f'<div class="findings">{_answers(results)}{found}{details if by_modes else ""}</div>{warnings}'
+    told = found + (details if by_modes else "")
+    return (f'<div class="findings">{told}</div>' if told else "") + warnings
 
 
 def _verdict_shade(stable: bool | None) -> str:
     return {True: "good", False: "bad"}.get(stable, "soft")  # type: ignore[arg-type]
-
-
-def _answers(results: Results) -> str:
-    least = dict(_least_damped(results))
-    rows = []
-    for s in results.scenarios:
-        answer = s.get("answer") or {**s.get("stability", {"stable": None}), "remark": ""}
-        row = least.get(s["title"])
-        figures = (
-            ["–", "–"]
-            if row is None
-            else [f"{float(row['frequency [Hz]']):.3f}", damping(float(row["damping [%]"]))]
-        )
-        word = answer.get("verdict") or {True: "stable", False: "UNSTABLE"}.get(
-            answer["stable"], "not known"
-        )
-        shade = _verdict_shade(answer["stable"])
-        told = [escape(s.get("subject", s["title"])), f'<b class="{shade}">{escape(word)}</b>']
-        rows.append([*told, escape(answer["remark"]), *figures])
-    return table(
-        "Verdicts",
-        ["Scenario", "Verdict", "Remark", "Least damped: f [Hz]", "Damping [%]"],
-        rows,
-        left=3,
-    )
-
-
-def _least_damped(results: Results) -> list[tuple[str, dict[str, str]]]:
-    found = []
-    for name, title in titles(results).items():
-        rows = [r for r in results.modes if r["scenario"] == name]
-        if rows:
-            found.append((title, min(rows, key=lambda r: float(r["damping [%]"]))))
-    return found
 
 
 def studied(results: Results) -> str:
@@ -265,7 +232,7 @@ def modes(results: Results, figures: Figures) -> str:
     if reference and compared:
         parts.append(f'<p class="soft">{escape(reference.title)}: {escape(reference.source)}</p>')
     picture, link = figures.add(
-        scenario_legend(results)
+        scenario_legend(results, reference.title if reference and compared else "")
         + complex_plane("Eigenvalue map", _marks(results), highest_hz=_highest(results)),
         "Modes from 0.1 Hz up with rays of equal damping; modes with a name are large"
         + (f", circles are the figures of: {reference.title}." if reference and compared else "."),

@@ -1,0 +1,75 @@
+"""The first page of a report: the answer of every study, how sure it is and what it does not judge."""
+
+from collections import Counter
+from collections.abc import Sequence
+from html import escape
+
+from orchestrator.output.report.html.chapters import Chapter
+from orchestrator.output.report.html.elements import table
+from orchestrator.output.report.html.origins import given_in
+from orchestrator.output.report.html.verdict_lines import verdicts
+from orchestrator.output.report.tables import short
+
+_NOTHING = "nothing that is known of"
+
+_OPEN = 4
+"""So many sentences about what a study did not judge stand on the first page; the others are counted."""
+
+_LONGEST = 240
+"""Characters of each of them: three lines of the page."""
+
+_SHADES = {True: "good", False: "bad", None: "soft"}
+
+
+def first_page(chapters: Sequence[Chapter]) -> str:
+    """Return the verdicts by scenario, then the answers of all other studies in one table."""
+    open_ = Counter(text for one in chapters for text in dict.fromkeys(one.not_judged))
+    shared = [text for text, count in open_.items() if count > 1]
+    notes = {text: f"note {k}" for k, text in enumerate(shared, start=1)}
+    by_scenario = "".join(_of_scenarios(one, notes) for one in chapters if one.lines)
+    others = [_row(one, notes) for one in chapters if not one.lines]
+    columns = ["Question", "Answer", "How sure", "Not judged"]
+    in_short = table("In short", columns, others, left=4) if others else ""
+    below = "".join(
+        f"<p>{name[0].upper()}{name[1:]}: {escape(short(text, _LONGEST))}</p>"
+        for text, name in notes.items()
+    )
+    return f'<div class="answers">{by_scenario}{in_short}{below}</div>'
+
+
+def _of_scenarios(chapter: Chapter, notes: dict[str, str]) -> str:
+    """Return a study of scenarios: its question, the verdicts, and in short notes below how sure they are."""
+    beside = "".join(f"<p>{escape(text)}</p>" for text in chapter.beside)
+    below = [
+        ("How sure", escape(short(chapter.sure, 2 * _LONGEST))),
+        ("Not judged", "; ".join(_not_judged(chapter, notes))),
+        ("Results", escape(", ".join(_places_and_options(chapter)))),
+    ]
+    told = "".join(f"<li>{name}: {text}</li>" for name, text in below)
+    question = f'<p class="question">{escape(chapter.question)}</p>'
+    return f'{question}{verdicts(chapter.lines)}{beside}<ul class="soft">{told}</ul>'
+
+
+def _row(chapter: Chapter, notes: dict[str, str]) -> list[str]:
+    given = "".join(f"<br>{escape(text)}" for text in _places_and_options(chapter))
+    return [
+        f'{escape(chapter.question)}<span class="soft">{given}</span>',
+        f'<span class="{_SHADES[chapter.good]}">{escape(chapter.answer)}</span>',
+        escape(short(chapter.sure, 2 * _LONGEST)),
+        "<br>".join(_not_judged(chapter, notes)),
+    ]
+
+
+def _places_and_options(chapter: Chapter) -> list[str]:
+    """List where the results lie and what the command was given."""
+    return [text for text in (str(chapter.source), given_in(chapter.origin)) if text]
+
+
+def _not_judged(chapter: Chapter, notes: dict[str, str]) -> list[str]:
+    """List what the study did not judge; a sentence of several studies is a note below them."""
+    told = [escape(notes.get(text) or short(text, _LONGEST)) for text in chapter.not_judged]
+    return [*told[:_OPEN], *_more(len(told))] or [_NOTHING]
+
+
+def _more(count: int) -> list[str]:
+    return [f"and {count - _OPEN} more"] if count > _OPEN else []

@@ -1,0 +1,147 @@
+"""The verdict on each scenario of a run, a line each, and one sentence above them for somebody who reads no table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+from orchestrator.core.errors import few
+from orchestrator.output.report.html.elements import damping, number, table
+from orchestrator.output.report.html.least_damped import LeastDamped
+
+_STABLE: Mapping[bool | None, str] = {
+    True: "stable",
+    False: "UNSTABLE",
+    None: "not known whether stable",
+}
+
+_SHADES: Mapping[bool | None, str] = {True: "good", False: "bad", None: "soft"}
+"""The class in the page's style sheet for what is good, bad or not known."""
+
+_WORST_FIRST: Mapping[bool | None, int] = {False: 0, None: 1, True: 2}
+
+_NAMES_IN_A_SENTENCE = 4
+"""So many scenarios are named in the sentence, the others are counted: the lines below name all."""
+
+_NONE = "–"
+
+
+@dataclass(frozen=True)
+class VerdictLine:
+    """The verdict on one scenario.
+
+    ``least``: its least damped mode, ``after``: the one after the events, ``in_time``: how the run rings."""
+
+    scenario: str
+    stable: bool | None
+    verdict: str
+    remark: str
+    least: LeastDamped | None
+    after: LeastDamped | None
+    in_time: LeastDamped | None
+
+    @classmethod
+    def of(cls, scenario: Mapping[str, Any]) -> VerdictLine:
+        """Read the line from a scenario of a run's or of `gfor modes`' summary."""
+        answer = scenario.get("answer") or {}
+        stability = scenario.get("stability") or {}
+        stable = answer.get("stable", stability.get("stable", scenario.get("stable")))
+        listed = scenario.get("modes")
+        modes = listed if isinstance(listed, list) else [answer]
+        judged = [mode for mode in modes if mode.get("damping_percent") is not None]
+        least = min(judged, key=lambda mode: mode["damping_percent"], default=None)
+        return cls(
+            scenario=scenario.get("subject") or scenario.get("title", scenario["name"]),
+            stable=stable,
+            verdict=answer.get("verdict") or _STABLE[stable],
+            remark=answer.get("remark") or "",
+            least=_mode(least),
+            after=_mode(answer.get("after_events")),
+            in_time=_mode(scenario.get("ring_down")),
+        )
+
+    @property
+    def modes(self) -> list[LeastDamped]:
+        """Return the modes whose figures `words` gives, in their order."""
+        return [mode for mode in (self.least, self.after) if mode]
+
+    @property
+    def words(self) -> str:
+        figures = f", least damped {_figures(self.least)}" if self.least else ""
+        figures += f", after the events {_figures(self.after)}" if self.after else ""
+        remark = f" ({self.remark})" if self.remark else ""
+        return f"{self.scenario}: {self.verdict}{figures}{remark}"
+
+
+def _mode(record: Mapping[str, Any] | None) -> LeastDamped | None:
+    return LeastDamped.of(record) if record else None
+
+
+def _figures(mode: LeastDamped) -> str:
+    return f"{mode.frequency_hz:.3f} Hz, {mode.damping_percent:.2f} %"
+
+
+def verdicts(lines: Sequence[VerdictLine]) -> str:
+    """Return the sentence over all scenarios and the table of their lines, as a page has them."""
+    columns = ["Scenario", "Verdict", "Least damped: f [Hz]", "Damping [%]"]
+    after = any(line.after for line in lines)
+    in_time = any(line.in_time for line in lines)
+    columns += ["After the events: f [Hz]", "Damping [%]"] if after else []
+    columns += ["In the run: f [Hz]", "Damping [%]"] if in_time else []
+    columns.append("Remark")
+    rows = []
+    for line in lines:
+        row = [escape(line.scenario), _in_colour(line.verdict, line.stable)]
+        row += _cells(line.least)
+        row += _cells(line.after) if after else []
+        row += _cells(line.in_time) if in_time else []
+        row.append(f'<span class="remark">{escape(line.remark)}</span>')
+        rows.append(row)
+    return f'<p class="verdict">{_sentence(lines)}</p>{table("Verdicts", columns, rows, left=2)}'
+
+
+def _cells(mode: LeastDamped | None) -> list[str]:
+    if mode is None:
+        return [_NONE, _NONE]
+    return [f"{mode.frequency_hz:.3f}", damping(mode.damping_percent)]
+
+
+def _sentence(lines: Sequence[VerdictLine]) -> str:
+    """Join the scenarios of one verdict, the worst verdict first, each in its own colour."""
+    alike: dict[tuple[bool | None, str], list[VerdictLine]] = {}
+    for line in sorted(lines, key=lambda one: _WORST_FIRST[one.stable]):
+        alike.setdefault((line.stable, line.verdict), []).append(line)
+    parts = [
+        _in_colour(
+            f"{few(_scenarios(found), _NAMES_IN_A_SENTENCE)}: {verdict}{_worst(found)}", stable
+        )
+        for (stable, verdict), found in alike.items()
+    ]
+    return "; ".join(parts) + "."
+
+
+def _scenarios(lines: Sequence[VerdictLine]) -> list[str]:
+    return [line.scenario for line in lines]
+
+
+def _worst(lines: Sequence[VerdictLine]) -> str:
+    """Name the least damped swing of scenarios that have one verdict; where they are several, the best as well."""
+    known = sorted(
+        ((line.least, line.scenario) for line in lines if line.least),
+        key=lambda pair: pair[0].damping_percent,
+    )
+    if not known:
+        return ""
+    (worst, where), (best, there) = known[0], known[-1]
+    if len(known) == 1:
+        return f", its least damped swing has {number(worst.damping_percent, 2)} %"
+    return (
+        f", the least damped swing has {number(worst.damping_percent, 2)} % ({where}) "
+        f"to {number(best.damping_percent, 2)} % ({there})"
+    )
+
+
+def _in_colour(text: str, stable: bool | None) -> str:
+    return f'<b class="{_SHADES[stable]}">{escape(text)}</b>'
