@@ -159,14 +159,14 @@ def studies() -> str:
     from orchestrator.face.api.certification import certify  # noqa: PLC0415 - as above
     from orchestrator.face.api.scenario import Scenario  # noqa: PLC0415 - as above
     from orchestrator.face.api.studies import of_study  # noqa: PLC0415 - as above
-    from orchestrator.studies.added import rooms, study_in  # noqa: PLC0415 - only the page of Python needs the package
+    from orchestrator.studies.added import STUDIES  # noqa: PLC0415 - only the page of Python needs the package
 
     of_case = [
         (
             f"Case.{name}",
-            getattr(Case, name, None) or of_study(name, study_in(rooms()[name])),
+            getattr(Case, name, None) or of_study(name, STUDIES[name]),
         )  # an added study has none
-        for name in ("scenario", "choose", *sorted({*rooms(), "design_over_points"}))
+        for name in ("scenario", "choose", *sorted({*STUDIES, "design_over_points"}))
     ]
     of_scenario = [
         (f"Scenario.{name}", getattr(Scenario, name))

@@ -28,8 +28,8 @@ FLOORS = {
     "simulation": (("federation", "interop", "watch"),),
     "output": (("results", "signatures"), ("report",)),
     "studies": (
-        ("added", "points", "signals"),
-        ("modes",),
+        ("points", "signals"),
+        ("added", "modes"),
         ("operating_points", "runs"),
         ("black_box", "oscillations", "pod_design"),
         ("immittance", "interactions", "screening", "sensitivities", "sweep"),
@@ -47,6 +47,11 @@ FORMER = {"former_paths"}
 
 PLAIN_DATA = {"fmus.grid.names", "fmus.toolchain.port_variables", "fmus.toolchain.variables"}
 """Modules of the FMUs that the whole orchestrator may read."""
+
+
+SHARED_TOOLS = {f"fmus.toolchain.{name}" for name in ("extras", "plugins", "removal", "temporary")}
+"""Modules of the FMUs that the whole orchestrator may use: they say which library is missing, find what is installed,
+and keep folders."""
 
 
 @cache  # not while tests are collected: each worker of each run collects all
@@ -200,8 +205,8 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
             return True
         if b in PLAIN_DATA:
             return True
-        if b in ("fmus.toolchain.extras", "fmus.toolchain.removal", "fmus.toolchain.temporary"):
-            return True  # the first says which library is missing
+        if b in SHARED_TOOLS:
+            return True
         if a in borrowers:
             return b == "fmus.toolchain.compiler"
         if a in ("orchestrator.devices.fmi.vendor_files", "orchestrator.devices.fmi.dll_reading"):

@@ -2,9 +2,10 @@
 
 import inspect
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from typing import Any
 
+from fmus.toolchain import plugins
 from fmus.toolchain.model import Model
 from fmus.toolchain.notes import noted
 
@@ -12,7 +13,7 @@ GROUP = "gfor_cosim.models"
 
 
 def model_names() -> tuple[str, ...]:
-    return tuple(sorted(_entries()))
+    return tuple(sorted(plugins.entries_of(GROUP)))
 
 
 def needs_arguments(name: str) -> bool:
@@ -28,10 +29,9 @@ def parts_of(name: str) -> dict[str, str]:
 
 def entry_of(name: str) -> EntryPoint:
     """The catalogue's entry of a model, whose code need not be loaded."""
-    found = _entries().get(name)
-    if found is None:
+    if name not in plugins.entries_of(GROUP):
         raise KeyError(f"there is no model {name!r}; there are: {', '.join(model_names())}")
-    return found
+    return plugins.entry_of(GROUP, name)
 
 
 def build_model(name: str, **arguments: Any) -> Model:
@@ -46,12 +46,6 @@ def network_of(name: str) -> Any | None:
     if not _signature(name)["has_network"]:
         return None
     return inspect.signature(_factory(name)).parameters["network"].default
-
-
-@cache
-def _entries() -> dict[str, EntryPoint]:
-    """By name; looking through all installed distributions takes tens of milliseconds."""
-    return {entry.name: entry for entry in entry_points(group=GROUP)}
 
 
 @cache

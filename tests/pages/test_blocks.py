@@ -30,7 +30,7 @@ OTHERS = {
     "test",
 }
 """Commands that pages use beside ``gfor`` and ``python``."""
-ADDED = {"least-damped", "example"}
+ADDED = {"least-damped", "example", "harbour"}
 """Commands and codes of ``gfor`` that guides add."""
 
 FMUS = (

@@ -34,6 +34,7 @@ ANYWHERE = (
     "how-to/own-network",
     "how-to/audit-a-study",
     "how-to/sign-a-certificate",
+    "how-to/ship-plug-ins",
     *(pytest.param(guide, marks=pytest.mark.nightly) for guide in HEAVY),
 )
 SECONDS = 1800.0

@@ -22,7 +22,6 @@ from orchestrator.core.errors import InputError
 from orchestrator.core.late import pd
 from orchestrator.output.report.notebook import page
 from orchestrator.output.results import origin
-from orchestrator.studies.added import rooms, study_in
 
 if TYPE_CHECKING:
     from orchestrator.face.api import studies
@@ -200,11 +199,10 @@ class Case:
             _Late() for _ in range(8)
         )
 
-    if not TYPE_CHECKING:  # a study that was added; a line as those above shows it to type checkers
+    if not TYPE_CHECKING:  # a study of another distribution
 
         def __getattr__(self, name: str) -> Any:
-            room = rooms().get(name)
-            if room is None or name.startswith("_"):
+            if name.startswith("_") or name not in _studies():
                 scenario = (
                     None
                     if name.startswith("_")
@@ -220,10 +218,10 @@ class Case:
                 )
             from orchestrator.face.api.studies import of_study  # noqa: PLC0415 - as `_Late`
 
-            return MethodType(of_study(name, study_in(room)), self)
+            return MethodType(of_study(name, _studies()[name]), self)
 
     def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *rooms()})
+        return sorted({*super().__dir__(), *_studies()})
 
     def __repr__(self) -> str:
         return f"<Case {self.name}: {', '.join(self.scenarios)}>"
@@ -232,6 +230,12 @@ class Case:
         titles = [table.title or name for name, table in self.file.scenarios.items()]
         table = pd.DataFrame({"scenario": self.scenarios, "title": titles})
         return page(f"{self.name}: {self.file.table.title or self.name}", table=table)
+
+
+def _studies() -> Mapping[str, Any]:
+    from orchestrator.studies.added import STUDIES  # noqa: PLC0415 - as `_Late`
+
+    return STUDIES
 
 
 _PATHS = frozenset(

@@ -19,16 +19,12 @@ from orchestrator.core.spelling import as_options
 from orchestrator.devices.fmi.interrupts import calls
 from orchestrator.face.cli.interrupted import ending, is_interrupt
 from orchestrator.output.results import origin
-from orchestrator.studies.added import rooms, study_in, words_of
 
 _ESCAPE = "gfor_escape"
 
 _LISTED = Path(__file__).with_name("commands.txt").read_text(encoding="utf-8").splitlines()
 COMMANDS = {name: words for name, _, words in (line.partition(": ") for line in _LISTED)}
 """Commands, with what they are for; those of a group follow its name."""
-
-_ROOMS = rooms()
-COMMANDS |= {n.replace("_", "-"): words_of(room) for n, room in _ROOMS.items() if n not in COMMANDS}
 
 GROUPS = {
     "fmu": "An FMU, DLL or device by itself",
@@ -89,7 +85,9 @@ def _done(words: Sequence[str]) -> int:
     try:
         words = _spelt_today(words)
         with calls:  # libraries take an interrupt in their import for an error of their own
-            parser = _parser({_command_in(words)})
+            # others' studies are looked for only where the command is none of ours: it takes a moment
+            listed = COMMANDS if _command_in(words) else commands()
+            parser = _parser({_command_in(words, listed)}, listed)
         options = parser.parse_args(words)
         origin.check_named(vars(options))
         files = origin.files_read(vars(options))
@@ -122,9 +120,23 @@ def _spelt_today(words: Sequence[str]) -> list[str]:
     return [*words[:place], *today.split(), *words[place + 1 :]]
 
 
-def _command_in(words: Sequence[str]) -> str | None:
+def commands() -> dict[str, str]:
+    """Return our commands and the studies of other distributions, with what each is for."""
+    from orchestrator.studies.added import others  # noqa: PLC0415 - imports what all studies need
+
+    added = {name.replace("_", "-"): words for name, words in others().items()}
+    for name in added.keys() & {name.partition(" ")[0] for name in COMMANDS}:
+        print(
+            f"note: the study {name!r} is not used, as gfor {name} is a command of gfor-cosim: {added[name]}; "
+            f"give it another name",
+            file=sys.stderr,
+        )
+    return added | COMMANDS
+
+
+def _command_in(words: Sequence[str], listed: Collection[str] = COMMANDS) -> str | None:
     named = [word for word in words if not word.startswith("-")][:2]
-    return next((name for name in (" ".join(named), *named[:1]) if name in COMMANDS), None)
+    return next((name for name in (" ".join(named), *named[:1]) if name in listed), None)
 
 
 def _origin(words: Sequence[str], files: Mapping[str, Path]) -> dict[str, Any]:
@@ -257,7 +269,7 @@ class _Command(argparse.ArgumentParser):
 def _commands_with(option: str) -> list[str]:
     """The commands that have an option, as they are typed."""
     found = []
-    for name in COMMANDS:
+    for name in commands():
         command = argparse.ArgumentParser(add_help=False)
         module_of(name).add_arguments(command)
         if option in command._option_string_actions:
@@ -268,20 +280,24 @@ def _commands_with(option: str) -> list[str]:
 def module_of(command: str) -> Any:
     """Return what has a command's ``add_arguments`` and ``run``: its module, or its study where that is all."""
     name = _MODULES.get(command, command).replace("-", "_")
-    if name not in _ROOMS or (Path(__file__).parent / f"{name}.py").exists():
+    if command in COMMANDS and (Path(__file__).parent / f"{name}.py").exists():
         return import_module(f"orchestrator.face.cli.{name}")
     from orchestrator.face.cli.study import StudyCommand  # noqa: PLC0415 - imports what all studies need
+    from orchestrator.studies.added import STUDIES  # noqa: PLC0415 - as above
 
-    return StudyCommand(command, study_in(_ROOMS[name]))
+    return StudyCommand(command, STUDIES[name])
 
 
 def whole_parser() -> argparse.ArgumentParser:
     """Return the parser with the arguments of every command, which imports all of them."""
-    return _parser(COMMANDS)
+    listed = commands()
+    return _parser(listed, listed)
 
 
-def _parser(chosen: Collection[str | None]) -> argparse.ArgumentParser:
-    """The parser, with the arguments of the commands that were chosen: the others' imports would take seconds."""
+def _parser(
+    chosen: Collection[str | None], listed: Mapping[str, str] = COMMANDS
+) -> argparse.ArgumentParser:
+    """The parser of listed commands, with the arguments of the chosen ones: the others' imports would take seconds."""
     parser = _Parser(
         prog="gfor",
         description="Co-simulation of grid-forming converters: run, linearise, build FMUs.",
@@ -289,7 +305,7 @@ def _parser(chosen: Collection[str | None]) -> argparse.ArgumentParser:
     parser.set_defaults(command=lambda _: _print(QUESTIONS))
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     lists = {"": parser.add_subparsers(metavar="COMMAND", parser_class=_Command)}
-    for name, words in COMMANDS.items():
+    for name, words in listed.items():
         group, _, last = name.rpartition(" ")
         if group not in lists:
             whole = lists[""].add_parser(group, help=GROUPS[group], description=GROUPS[group])

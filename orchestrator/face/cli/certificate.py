@@ -34,7 +34,7 @@ from orchestrator.simulation.watch.finding import MISFIT
 from orchestrator.studies.certification.acceptance import read_checks, run_checks
 from orchestrator.studies.certification.certificate import Certificate, DampingTest
 from orchestrator.studies.certification.codes import frequency_domain
-from orchestrator.studies.certification.codes.all_codes import NTS631
+from orchestrator.studies.certification.codes.nts631 import NTS631
 from orchestrator.studies.certification.codes.row import checked, in_words, like
 from orchestrator.studies.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED
 from orchestrator.studies.certification.details import Details, read_details

@@ -23,7 +23,7 @@ from orchestrator.face.cli.certify_sensitivities import (
     add_sensitivity_arguments,
     check_sensitivity_options,
 )
-from orchestrator.studies.certification.codes.all_codes import NTS631
+from orchestrator.studies.certification.codes.nts631 import NTS631
 from orchestrator.studies.certification.details import TEMPLATE
 from orchestrator.studies.certification.kinds import CertifyRequest
 

@@ -25,8 +25,9 @@ from orchestrator.output.report.tables import PlainTable, make_table
 from orchestrator.output.results.lock import held
 from orchestrator.studies.certification.acceptance import KEPT
 from orchestrator.studies.certification.certificate import Certificate
-from orchestrator.studies.certification.codes.all_codes import BY_DECLARATION, NTS631
 from orchestrator.studies.certification.codes.frequency_domain import stiffness_in_words
+from orchestrator.studies.certification.codes.known import codes_by_declaration
+from orchestrator.studies.certification.codes.nts631 import NTS631
 from orchestrator.studies.certification.codes.row import checked
 from orchestrator.studies.certification.matrix import (
     FIGURES,
@@ -44,7 +45,7 @@ from orchestrator.studies.points.failure import failure_kept
 def run_matrix(options: argparse.Namespace, devices: Sequence[Device]) -> int:
     codes, left_out = codes_of(options.code), tuple[str, ...]()
     if options.code == ALL and not options.declare:
-        left_out = tuple(BY_DECLARATION)
+        left_out = tuple(codes_by_declaration())
         codes = tuple(key for key in codes if key not in left_out)
     codes += (GB,) if options.code == ALL else ()
     several = len(devices) > 1
@@ -66,7 +67,7 @@ def run_matrix(options: argparse.Namespace, devices: Sequence[Device]) -> int:
             own = argparse.Namespace(**vars(options))
             for key in codes:
                 own.declare = (
-                    options.declare if options.code != ALL or key in BY_DECLARATION else []
+                    options.declare if options.code != ALL or key in codes_by_declaration() else []
                 )
                 place = f"{device.name}/{key}" if several else key
                 cells[device.name, key] = _tested(

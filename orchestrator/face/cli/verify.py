@@ -14,7 +14,7 @@ from orchestrator.face.cli.terminal import make_console, print_json
 from orchestrator.output.report.progress import progress_bar
 from orchestrator.output.signatures.allowed_signers import read_signers, read_time
 from orchestrator.output.signatures.checking import State
-from orchestrator.studies.certification.codes.all_codes import NTS631
+from orchestrator.studies.certification.codes.nts631 import NTS631
 from orchestrator.studies.certification.compared import (
     THIS,
     TOLERANCE,

@@ -17,8 +17,8 @@ from orchestrator.output.signatures.beside import Beside
 from orchestrator.studies.certification.acceptance import KEPT
 from orchestrator.studies.certification.case_file import BINDING, CASE, FMU
 from orchestrator.studies.certification.certificate import Certificate
-from orchestrator.studies.certification.codes.all_codes import NTS631
 from orchestrator.studies.certification.codes.bench_point import case_name
+from orchestrator.studies.certification.codes.nts631 import NTS631
 from orchestrator.studies.certification.codes.record import code_json, code_responses
 from orchestrator.studies.certification.figures import damping_json, damping_responses
 from orchestrator.studies.certification.form import NORM, case_files

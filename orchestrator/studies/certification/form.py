@@ -9,8 +9,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from orchestrator.core.errors import InputError
 from orchestrator.studies.certification.case_file import CASE
-from orchestrator.studies.certification.codes.all_codes import BY_DECLARATION, CODES
 from orchestrator.studies.certification.codes.bench_point import case_name
+from orchestrator.studies.certification.codes.known import KNOWN
 
 _SHOWN = 60  # characters of a wrong value that are shown
 
@@ -109,7 +109,7 @@ class _CodeCertificate(_Certified):
     @field_validator("code")
     @classmethod
     def _known(cls, code: str) -> str:
-        if code not in {*CODES, *BY_DECLARATION}:
+        if code not in KNOWN:
             raise ValueError(code)
         return code
 

@@ -27,8 +27,8 @@ from orchestrator.devices.fmi.bound import BoundComponent
 from orchestrator.devices.fmi.component import Component
 from orchestrator.output.signatures.signing import Made
 from orchestrator.studies.certification.case_file import CASE, FMU, WITH
-from orchestrator.studies.certification.codes.all_codes import NTS631
 from orchestrator.studies.certification.codes.bench_point import case_name
+from orchestrator.studies.certification.codes.nts631 import NTS631
 from orchestrator.studies.certification.files import JSON, read_record, signatures_of
 from orchestrator.studies.certification.form import NORM
 from orchestrator.studies.certification.point import CONVERTER

@@ -17,14 +17,10 @@ from orchestrator.studies.certification import points_again
 from orchestrator.studies.certification.acceptance import KEPT, Acceptance
 from orchestrator.studies.certification.certificate import Certificate
 from orchestrator.studies.certification.codes import rows_again
-from orchestrator.studies.certification.codes.all_codes import (
-    BY_DECLARATION,
-    CODES,
-    NTS631,
-    code_for,
-)
 from orchestrator.studies.certification.codes.bench_point import BenchTask, compute_row
 from orchestrator.studies.certification.codes.certificate import certify_code
+from orchestrator.studies.certification.codes.known import KNOWN, code_for, codes_by_declaration
+from orchestrator.studies.certification.codes.nts631 import NTS631
 from orchestrator.studies.certification.compared import Content, Verification
 from orchestrator.studies.certification.files import RESPONSES
 from orchestrator.studies.certification.form import NORM
@@ -114,7 +110,7 @@ def rebuilt(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Cer
     return certificate
 
 
-WITH_VERDICT = (NTS631, *CODES, *BY_DECLARATION)  # codes that a converter passes or fails
+WITH_VERDICT = (NTS631, *KNOWN)  # codes that a converter passes or fails
 
 
 def _reactances(given: Any, argument: str) -> tuple[float, ...]:
@@ -233,7 +229,7 @@ class CertifyRequest:
         if self.declared:
             raise InputError(
                 f"--declare {next(iter(self.declared))}: the damping test takes no declared value; leave "
-                f"it out, or choose --code {', '.join(BY_DECLARATION)}"
+                f"it out, or choose --code {', '.join(codes_by_declaration())}"
             )
         study = {name: value for name, value in values.items() if name.split(".")[0] in STUDY}
         own = {name: value for name, value in values.items() if name not in study}

@@ -18,7 +18,7 @@ from orchestrator.linear.spectra.mode_tracking import ModeSet
 from orchestrator.linear.spectra.modes import damping_ratio
 from orchestrator.studies.certification.case_file import BASE, CASE, WITH, WITHOUT
 from orchestrator.studies.certification.certificate import Certificate, DampingTest
-from orchestrator.studies.certification.codes.all_codes import NTS
+from orchestrator.studies.certification.codes.nts631 import NTS
 from orchestrator.studies.certification.compared import (
     TOLERANCE,
     TOLERANCE_IDENTIFIED,

@@ -9,7 +9,8 @@ from orchestrator.core.errors import InputError
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.studies.certification.case_file import BASE, WITH, WITHOUT, write_case
 from orchestrator.studies.certification.certificate import Certificate, DampingTest, refusing
-from orchestrator.studies.certification.codes.all_codes import CODES, NTS
+from orchestrator.studies.certification.codes.known import tables
+from orchestrator.studies.certification.codes.nts631 import NTS
 from orchestrator.studies.certification.damping_controllers import (
     DampingControllers,
     damping_controllers,
@@ -38,7 +39,8 @@ def certify(
     own = rated_frequency(request, NTS.f_n)
     if own != NTS.f_n:
         others = (
-            ", ".join(f"--code {key}" for key, code in CODES.items() if code.f_n == own) or "none"
+            ", ".join(f"--code {key}" for key, code in tables().items() if code.f_n == own)
+            or "none"
         )
         raise InputError(
             f"{request.fmu}: it is rated at {own:g} Hz, and NTS 631 is a code of {NTS.f_n:g} Hz; of {own:g} Hz are "

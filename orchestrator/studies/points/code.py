@@ -3,10 +3,11 @@
 import hashlib
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib.machinery import SourceFileLoader
 from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from types import CodeType
 
@@ -55,25 +56,28 @@ def code_files() -> list[Path]:
 
 
 @cache
-def numbers_hash(module: str) -> str:
-    """Hash of the versions and of what computes the points of a module: it, and all that it imports.
+def numbers_hash(*modules: str) -> str:
+    """Hash of the versions and of what computes points: some modules, and all that these import.
 
     Comments, docstrings and sentences do not count, and no module that is not imported. Where the files are others than
-    those that this process has loaded, it is the hash of what was loaded, to the last comma."""
+    those that this process has loaded, it is the hash of what was loaded, to the last comma.
+
+    ``modules``: of this package, or of a plug-in, whose own package then counts as well."""
     if _hash_of_files() != code_hash():
         return code_hash()
-    hasher, files = _of_versions(), _module_files()
-    needed = needed_modules(module)
+    hasher, files = _of_versions(), _module_files(modules)
+    needed = needed_modules(*modules)
     for name in sorted(needed):
         hasher.update(repr((name, list(_computing(_code(name, files[name]))))).encode())
     for file in sorted({c for name in needed for c in files[name].parent.glob("*.[ch]")}):
-        hasher.update(file.relative_to(_ROOT).as_posix().encode() + b"\0" + file.read_bytes())
+        place = file.relative_to(_ROOT) if file.is_relative_to(_ROOT) else Path(file.name)
+        hasher.update(place.as_posix().encode() + b"\0" + file.read_bytes())
     return hasher.hexdigest()
 
 
-def needed_modules(module: str) -> set[str]:
-    """A module and all of this package that it imports, anywhere."""
-    files, needed, pending = _module_files(), set[str](), [module]
+def needed_modules(*modules: str) -> set[str]:
+    """Some modules and all of their packages and of this one that they import, anywhere."""
+    files, needed, pending = _module_files(modules), set[str](), [*modules]
     while pending:
         name = pending.pop()
         if name not in needed:
@@ -82,10 +86,23 @@ def needed_modules(module: str) -> set[str]:
     return needed
 
 
-def _module_files() -> dict[str, Path]:
+def _module_files(modules: Iterable[str]) -> dict[str, Path]:
+    """Files of this package, and of the packages of other modules, by the modules' names."""
+    found = _files_of_package(_ROOT.name, _ROOT)
+    for package in {module.partition(".")[0] for module in modules} - {_ROOT.name}:
+        spec = find_spec(package)
+        assert spec is not None
+        for folder in spec.submodule_search_locations or ():
+            found |= _files_of_package(package, Path(folder))
+        if spec.submodule_search_locations is None and spec.origin is not None:
+            found[package] = Path(spec.origin)
+    return found
+
+
+def _files_of_package(package: str, folder: Path) -> dict[str, Path]:
     parts = {
-        file: (_ROOT.name, *file.relative_to(_ROOT).with_suffix("").parts)
-        for file in _ROOT.rglob("*.py")
+        file: (package, *file.relative_to(folder).with_suffix("").parts)
+        for file in folder.rglob("*.py")
     }
     return {".".join(names).removesuffix(".__init__"): file for file, names in parts.items()}
 

@@ -23,9 +23,9 @@ def digest(content: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
 
 
-def key_of(content: Mapping[str, Any], module: str) -> str:
-    """Name of a point whose result depends on the content [JSON's types], and on what a module computes."""
-    return digest({**content, "code": numbers_hash(module)})
+def key_of(content: Mapping[str, Any], *modules: str) -> str:
+    """Name of a point whose result depends on the content [JSON's types], and on what modules compute."""
+    return digest({**content, "code": numbers_hash(*modules)})
 
 
 def scenario_content(prepared: PreparedScenario) -> dict[str, Any]:

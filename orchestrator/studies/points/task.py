@@ -117,7 +117,11 @@ class Task:
     @cached_property
     def key(self) -> str:
         """Name of the point's file: a hash of everything that the result depends on."""
-        return key_of({"study": self.study.mark, "point": self.content()}, type(self).__module__)
+        return key_of({"study": self.study.mark, "point": self.content()}, *self.modules())
+
+    def modules(self) -> tuple[str, ...]:
+        """Modules whose code computes the point: with all that they import, they count in its key."""
+        return (type(self).__module__,)
 
     def content(self) -> Any:
         """The fields in which points differ; fields that are not compared only follow from the others."""

@@ -1,74 +1,9 @@
-"""All checks in the order in which they run: what others need comes before them."""
+"""All checks in the order in which they run: ours, then those of other distributions."""
 
-from orchestrator.devices.acceptance.checks import (
-    aftermath,
-    base,
-    clock,
-    damping,
-    evenness,
-    extremes,
-    file,
-    instances,
-    loading,
-    points,
-    port,
-    resources,
-    ride_through,
-    running,
-    sampling,
-    signs,
-    state,
-    timing,
-    tuning,
-)
+from fmus.toolchain.plugins import import_modules
+from orchestrator.devices.acceptance.checks import base
 
-MODULES = (
-    *(file, loading, running, instances, clock, state, sampling, timing, tuning),
-    *(port, points, signs, evenness, damping, ride_through, aftermath, extremes, resources),
-)
-"""Importing them enters their checks."""
+import_modules("gfor_cosim.checks")  # enters their checks
 
-ORDER = (
-    "fmi_validity",
-    "units",
-    "declared_starts",
-    "declared_dependencies",
-    "loads",
-    "runs",
-    "start_values",
-    "initial_outputs",
-    "call_order",
-    "independence",
-    "repeatability",
-    "reading",
-    "reset",
-    "reinstantiation",
-    "clock",
-    "state",
-    "settable_states",
-    "state_size",
-    "tunables",
-    "feedthrough",
-    "sample_time",
-    "delay",
-    "step_invariance",
-    "internal_step",
-    "steady_state",
-    "later_times",
-    "angles",
-    "rated_frequency",
-    "power_balance",
-    "shown_power",
-    "operating_points",
-    "ratings",
-    "signs",
-    "evenness",
-    "pod",
-    "limits",
-    "after_dips",
-    "nan_input",
-    "extreme_inputs",
-    "memory",
-)
-
-CHECKS = {name: base.CHECKS[name] for name in ORDER}  # by name
+CHECKS = base.CHECKS  # by name
+ORDER = tuple(CHECKS)

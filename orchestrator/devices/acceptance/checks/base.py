@@ -1,7 +1,7 @@
 """What a check is, and what it answers."""
 
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from math import isfinite
@@ -90,10 +90,28 @@ def check(
     name: str, question: str, needs: tuple[str, ...] = ()
 ) -> Callable[[Callable[[Subject], CheckResult]], Callable[[Subject], CheckResult]]:
     def enter(function: Callable[[Subject], CheckResult]) -> Callable[[Subject], CheckResult]:
+        if name in CHECKS:
+            raise ValueError(f"there is a check {name!r} already; give this one another name")
         CHECKS[name] = Check(name, question, needs, function)
         return function
 
     return enter
+
+
+def add_remedies(remedies: Mapping[str, str]) -> None:
+    """Enter the remedies of faults that another distribution's checks find, by the fault's name."""
+    known = [fault for fault, remedy in remedies.items() if REMEDIES.get(fault, remedy) != remedy]
+    if known:
+        raise ValueError(f"the fault {known[0]!r} has a remedy already; give yours another name")
+    REMEDIES.update(remedies)
+
+
+def put_in_order(names: Sequence[str]) -> None:
+    """Sort the checks that were entered until now; those that come later run after them."""
+    entered = {name: CHECKS[name] for name in names}
+    assert entered.keys() == CHECKS.keys()
+    CHECKS.clear()
+    CHECKS.update(entered)
 
 
 def passed(name: str, evidence: str, **figures: Any) -> CheckResult:

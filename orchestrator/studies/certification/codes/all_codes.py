@@ -1,11 +1,8 @@
-"""The codes that `gfor certify --code` knows, each a table of rows; their words stand in ``codes.toml``.
+"""Our grid codes for `gfor certify --code`, each a table of rows; their words stand in ``codes.toml``.
 
 MISO's appendix H, AEMO's test framework, ERCOT's AGS-ESR and NOGRR245, Fingrid's SJV2024, NERC's PRC-029-1 and
 Energinet's TR 3.3.1; RTE's rows have a module of their own."""
 
-from collections.abc import Callable, Mapping, Sequence
-
-from orchestrator.core.errors import InputError
 from orchestrator.studies.certification.codes import criteria as c
 from orchestrator.studies.certification.codes import rte
 from orchestrator.studies.certification.codes.programme import (
@@ -15,15 +12,7 @@ from orchestrator.studies.certification.codes.programme import (
     voltage,
     weakening,
 )
-from orchestrator.studies.certification.codes.row import (
-    CodeRow,
-    Declaration,
-    GridCode,
-    Judge,
-    Row,
-    checked,
-)
-from orchestrator.studies.certification.request import REACTANCES, row_of
+from orchestrator.studies.certification.codes.row import CodeRow, DeclaredCode, GridCode, Judge
 
 RATIOS = (10.0, 3.0, 2.0, 1.5, 1.25)
 """Short-circuit ratios, down from 20: MISO BPM-015 r32 appendix H, AEMO's test framework of January 2024."""
@@ -56,10 +45,6 @@ NOGRR_SWELLS = ((1.15, 1.0), (1.175, 0.5), (1.2, 0.2))
 # NOGRR245, PRC-029: time after which the power is back once the voltage is within 0.90 and 1.05 pu
 # [s]
 RECOVERY = 1.0
-
-NTS631 = "nts631"
-NTS = GridCode.of(NTS631, tuple(Row(row_of(X), "the line's reactance", "5.10") for X in REACTANCES))
-"""Spain's damping test: a case of its own, at each of the norm's line reactances."""
 
 # TR 3.3.1's profile of a dip
 NONE = 0.15  # time at no voltage [s]
@@ -367,15 +352,5 @@ TR331 = GridCode.of(
 # by what ``--code`` takes
 CODES = {code.key: code for code in (MISO, AEMO, ERCOT, NOGRR245, FINGRID, PRC029, TR331)}
 
-BY_DECLARATION: dict[
-    str, tuple[Sequence[Declaration], Callable[[Mapping[str, float]], GridCode[CodeRow]]]
-] = {"rte": (rte.DECLARED, rte.rte_code)}
-"""Codes whose rows depend on what the applicant declares: what that is, and the code for it."""
-
-
-def code_for(key: str, given: Mapping[str, object]) -> GridCode[CodeRow]:
-    wanted, made = BY_DECLARATION.get(key) or ((), lambda _: CODES[key])
-    code = made(checked(wanted, given, key))
-    if code.fault:
-        raise InputError(code.fault)
-    return code
+ALL = CODES | {"rte": DeclaredCode("rte", rte.DECLARED, rte.rte_code)}
+"""By name, as the entry-point group `gfor_cosim.codes` declares them."""

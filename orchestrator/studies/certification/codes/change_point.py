@@ -9,8 +9,8 @@ import numpy as np
 
 from orchestrator.cases.case import Case
 from orchestrator.simulation.watch.finding import UNSTABLE
-from orchestrator.studies.certification.codes.all_codes import code_for
 from orchestrator.studies.certification.codes.bench_point import BenchResult, BenchTask, row_result
+from orchestrator.studies.certification.codes.known import KNOWN, code_for
 from orchestrator.studies.certification.codes.row_verdict import RowVerdict, judge_row
 from orchestrator.studies.points.failure import Failure
 from orchestrator.studies.points.task import Kept, computed
@@ -45,6 +45,10 @@ class ChangeTask(BenchTask):
     code: str = ""
     f_n: float = 0.0
     declared: tuple[tuple[str, float], ...] = ()
+
+    def modules(self) -> tuple[str, ...]:
+        """The code's table judges the point, and a plug-in may hold it."""
+        return (*super().modules(), KNOWN.module_of(self.code))
 
     def failed(self, failure: Failure) -> Any:
         return ChangeResult(failure=failure)

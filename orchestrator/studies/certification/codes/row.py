@@ -174,8 +174,8 @@ def _plain(text: str) -> str:
     return re.sub(r"\W|_", "", text.lower())
 
 
-def _fault_of_words(key: str) -> str:
-    place, words = f"{_FILE}, [{key}]", _WORDS.get(key)
+def _fault_of_words(key: str, place: str) -> str:
+    words = _WORDS.get(key)
     if words is None:
         return f"{_FILE} has no section [{key}]; a code has its words there: {', '.join(_KINDS)}"
     strange = [name for name in words if name not in _KINDS]
@@ -190,15 +190,17 @@ def _fault_of_words(key: str) -> str:
 def _fault_of_rows(key: str, rows: Sequence[Row]) -> str:
     names = [row.name for row in rows]
     if not rows:
-        return f"all_codes.py: code {key!r} has no row; give it one at least"
+        return f"code {key!r} has no row; give it one at least"
     twice = [name for name in names if names.count(name) > 1]
     if twice:
-        return f"all_codes.py, code {key!r}: two rows are named {twice[0]!r}, and would be judged as one; rename one"
+        return (
+            f"code {key!r}: two rows are named {twice[0]!r}, and would be judged as one; rename one"
+        )
     for row in (row for row in rows if isinstance(row, CodeRow)):
         if not re.fullmatch(r"\w+", row.name, re.ASCII):
-            return f"all_codes.py, code {key!r}, row {row.name!r}: a file is named so; take letters, digits and _"
+            return f"code {key!r}, row {row.name!r}: a file is named so; take letters, digits and _"
         if not row.criteria:
-            return f"all_codes.py, code {key!r}, row {row.name!r} asks for nothing; give it a criterion"
+            return f"code {key!r}, row {row.name!r} asks for nothing; give it a criterion"
     return ""
 
 
@@ -229,8 +231,16 @@ class GridCode(Generic[AnyRow]):
         key: str,
         rows: tuple[AnyRow, ...],
         declared: Mapping[str, float] = MappingProxyType({}),
+        words: Mapping[str, Any] | None = None,
     ) -> "GridCode[AnyRow]":
-        fault = _fault_of_words(key) or _fault_of_rows(key, rows)
+        """A code with its words.
+
+        ``words``: those of a code that another distribution brings, as a section of ``codes.toml`` has them."""
+        place = f"{_FILE}, [{key}]"
+        if words is not None:
+            place = f"the words of code {key!r}"
+            _WORDS[key] = dict(words)
+        fault = _fault_of_words(key, place) or _fault_of_rows(key, rows)
         if fault:
             return cls(key, rows, fault=fault)
         texts: dict[str, Any] = {
@@ -247,6 +257,17 @@ class GridCode(Generic[AnyRow]):
     def of_version(self, version: str) -> "GridCode[AnyRow]":
         later = self.later(version)
         return replace(self, rows=tuple(row for row in self.rows if row.name not in later))
+
+
+@dataclass(frozen=True)
+class DeclaredCode:
+    """A code whose rows depend on what the applicant declares of the converter.
+
+    ``declared``: what that is; ``make``: the code for declared values by name."""
+
+    key: str
+    declared: Sequence[Declaration]
+    make: Callable[[Mapping[str, float]], GridCode[CodeRow]]
 
 
 def _number(version: str) -> tuple[int, ...]:

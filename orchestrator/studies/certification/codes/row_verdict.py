@@ -66,9 +66,7 @@ def try_criteria(code: GridCode[CodeRow], f_n: float) -> None:
                     f_n,
                 )
         except InputError as error:
-            raise InputError(
-                f"all_codes.py, code {code.key!r}, row {row.name!r}: {error}"
-            ) from error
+            raise InputError(f"code {code.key!r}, row {row.name!r}: {error}") from error
 
 
 def judge_row(

@@ -15,13 +15,13 @@ from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.simulation.watch.finding import UNSTABLE
 from orchestrator.studies.certification.case_file import lay_files
 from orchestrator.studies.certification.certificate import Certificate
-from orchestrator.studies.certification.codes.all_codes import CODES, code_for
 from orchestrator.studies.certification.codes.bench_point import (
     BenchResult,
     BenchTask,
     case_name,
     write_row,
 )
+from orchestrator.studies.certification.codes.known import code_for, tables
 from orchestrator.studies.certification.codes.row import CodeRow, GridCode
 from orchestrator.studies.certification.codes.row_verdict import judge_row
 from orchestrator.studies.certification.compared import (
@@ -89,7 +89,7 @@ def faults(folder: Path, content: dict[str, Any], data: xr.Dataset) -> list[str]
 
     Row files of another code may lie in the folder, from an earlier certificate; those of the record's files may not.
     """
-    codes = [*CODES.values(), code := _table(content)]
+    codes = [*tables().values(), code := _table(content)]
     recorded, table = [row["row"] for row in content["rows"]], [row.name for row in code.rows]
     own = {*content["files"], *(case_name(row.name) for code in codes for row in code.rows)}
     files = [

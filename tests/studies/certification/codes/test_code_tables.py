@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from orchestrator.core.errors import InputError
-from orchestrator.studies.certification.codes import all_codes, row
 from orchestrator.studies.certification.codes import criteria as c
-from orchestrator.studies.certification.codes.all_codes import CODES, MISO, NTS, code_for
+from orchestrator.studies.certification.codes import known, row
+from orchestrator.studies.certification.codes.all_codes import CODES, MISO
 from orchestrator.studies.certification.codes.bench_point import INTERVAL, BenchResult
+from orchestrator.studies.certification.codes.known import KNOWN, code_for
+from orchestrator.studies.certification.codes.nts631 import NTS
 from orchestrator.studies.certification.codes.row import CodeRow, GridCode
 from orchestrator.studies.certification.codes.row_verdict import judge_row, try_criteria
 
@@ -42,7 +44,7 @@ def without(name):
 def test_words_that_are_not_as_they_should_be_are_told_and_help_lives(monkeypatch, words, said):
     monkeypatch.setattr(row, "_WORDS", {**row._WORDS, **({"cei": words} if words else {})})
     # no error yet: help and other codes live on
-    monkeypatch.setitem(CODES, "cei", GridCode.of("cei", MISO.rows))
+    monkeypatch.setattr(known, "KNOWN", {**KNOWN, "cei": GridCode.of("cei", MISO.rows)})
     with pytest.raises(InputError, match=re.escape(said)):
         code_for("cei", {})
     assert "cei" in row.in_words("cei")
@@ -67,7 +69,7 @@ def test_words_that_are_not_as_they_should_be_are_told_and_help_lives(monkeypatc
     ],
 )
 def test_rows_that_cannot_be_are_told(monkeypatch, rows, said):
-    monkeypatch.setitem(CODES, "miso", GridCode.of("miso", rows))
+    monkeypatch.setattr(known, "KNOWN", {**KNOWN, "miso": GridCode.of("miso", rows)})
     with pytest.raises(InputError, match=re.escape(said)):
         code_for("miso", {})
 
@@ -162,7 +164,7 @@ def test_the_page_has_the_codes_that_there_are():
     assert said == {
         key: (row._WORDS[key]["where"], f"{row._WORDS[key]['f_n']:g}") for key in row._WORDS
     }
-    assert set(row._WORDS) == {*CODES, *all_codes.BY_DECLARATION, NTS.key, "gb"}
+    assert set(row._WORDS) == {*KNOWN, NTS.key, "gb"}
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,9 @@ from scipy.integrate import solve_ivp
 from orchestrator.core.errors import InputError
 from orchestrator.face.cli import certify_matrix
 from orchestrator.studies.certification.codes import envelope as e
-from orchestrator.studies.certification.codes.all_codes import BY_DECLARATION, CODES, code_for
+from orchestrator.studies.certification.codes.all_codes import CODES
 from orchestrator.studies.certification.codes.bench_point import BenchResult
+from orchestrator.studies.certification.codes.known import code_for, codes_by_declaration
 from orchestrator.studies.certification.codes.row_verdict import judge_row
 from orchestrator.studies.certification.codes.rte import DECLARED, Envelope, rte_code
 from orchestrator.studies.certification.matrix import MatrixCell
@@ -382,7 +383,7 @@ def test_a_declaration_that_cannot_be_used_is_one_error(given, said):
 def test_a_code_without_declarations_takes_none():
     with pytest.raises(InputError, match="--declare D: --code miso knows no such value"):
         code_for("miso", {"D": 3.0})
-    assert set(BY_DECLARATION).isdisjoint(CODES)
+    assert set(codes_by_declaration()).isdisjoint(CODES)
 
 
 def test_every_row_of_rte_is_named_for_a_file_and_told_in_words():

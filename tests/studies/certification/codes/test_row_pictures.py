@@ -7,8 +7,9 @@ import pytest
 
 from orchestrator.output.report.html.charts import legend
 from orchestrator.output.report.html.elements import Figures, colour
-from orchestrator.studies.certification.codes.all_codes import CODES, code_for
+from orchestrator.studies.certification.codes.all_codes import CODES
 from orchestrator.studies.certification.codes.bench_point import BenchResult
+from orchestrator.studies.certification.codes.known import code_for
 from orchestrator.studies.certification.codes.record import LIMIT, row_pictures
 from orchestrator.studies.certification.codes.row_verdict import judge_row
 

@@ -9,12 +9,13 @@ import orchestrator as gfor
 from orchestrator.core.errors import ComponentError
 from orchestrator.studies.black_box.frequency_response import Excitation
 from orchestrator.studies.certification.codes import bench_point, frequency_domain
-from orchestrator.studies.certification.codes.all_codes import ERCOT, code_for
+from orchestrator.studies.certification.codes.all_codes import ERCOT
 from orchestrator.studies.certification.codes.certificate import certify_code
 from orchestrator.studies.certification.codes.frequency_domain import (
     asked_stiffness,
     measure_stiffness,
 )
+from orchestrator.studies.certification.codes.known import code_for
 from orchestrator.studies.certification.files import save
 from orchestrator.studies.certification.request import CertificationRequest
 from orchestrator.studies.certification.verification import read_certificate, verify_files
