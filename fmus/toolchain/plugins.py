@@ -156,7 +156,7 @@ class Collections(Mapping[str, Kind], Generic[Kind]):
         self._kind = kind
 
     @cached_property
-    def _found(self) -> dict[str, tuple[EntryPoint, Kind]]:
+    def _objects(self) -> dict[str, tuple[EntryPoint, Kind]]:
         found: dict[str, tuple[EntryPoint, Kind]] = {}
         for name in entries_of(self.group):
             entry = entry_of(self.group, name)
@@ -178,17 +178,17 @@ class Collections(Mapping[str, Kind], Generic[Kind]):
             )
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._found)
+        return iter(self._objects)
 
     def __len__(self) -> int:
-        return len(self._found)
+        return len(self._objects)
 
     def __getitem__(self, name: str) -> Kind:
-        return self._found[name][1]
+        return self._objects[name][1]
 
     def module_of(self, name: str) -> str:
         """Give the module that declares an object: what depends on the object depends on it."""
-        return self._found[name][0].module
+        return self._objects[name][0].module
 
 
 def import_modules(group: str) -> None:
