@@ -20,6 +20,7 @@ from orchestrator.cases.psse.device_records import (
     series_impedances,
 )
 from orchestrator.cases.psse.devices import HeldDevice
+from orchestrator.cases.psse.impedance_corrections import correction_tables
 from orchestrator.cases.psse.raw_accounts import record_uses
 from orchestrator.cases.psse.raw_file import read_file
 from orchestrator.cases.psse.records import NODES, SWITCHING_DEVICES, RawFile, Record, leave_out
@@ -29,7 +30,7 @@ from orchestrator.cases.psse.references import (
 )
 from orchestrator.cases.psse.solution import fits, reactive_needs, stated_voltages
 from orchestrator.cases.psse.transformers import Transformer, star, transformers
-from orchestrator.cases.psse.zero_impedances import merged_buses, threshold
+from orchestrator.cases.psse.zero_impedances import is_joining, merged_buses, threshold
 from orchestrator.cases.record_use import RecordUse
 from orchestrator.cases.source_changes import Changes
 from orchestrator.core.errors import Problem
@@ -55,6 +56,7 @@ _SMALL_LOSS = 10.0  # MW that a fixed shunt may draw unasked
 _RADIANS, _NEAR = math.pi / 6, 0.01
 # of a switched shunt: columns of STAT, MODSW and BINIT up to revision 31, up to 34, and after
 _SWITCHED: tuple[tuple[int | None, int, int], ...] = ((None, 1, 7), (3, 1, 9), (4, 2, 11))
+_SWITCH_STATE = 16  # column of STAT of a switching device
 _SAME_VOLTAGE = 0.1  # part by which the nominal voltages at a line's ends may differ
 
 
@@ -157,7 +159,10 @@ class _Reading:
         # with the bus at which it stands, and whether it feeds
         self._file_loads: list[tuple[FileLoad, int, bool]] = []
         self._same: dict[int, int] = {}  # bus that PSS/E takes as one with another → the other
-        self._merged: set[int] = set()  # lines of the records that make them one
+        # lines of the records that make them one, and of those that would if both had no machine
+        self._merged: set[int] = set()
+        self._lossless: set[int] = set()
+        self._corrections = correction_tables(raw)
         # least reactance that our network can have [pu of the system]
         self._least = 1.1 * SMALLEST_REACTANCE * raw.base_mva / SYSTEM_BASE_MVA
 
@@ -280,14 +285,25 @@ class _Reading:
 
     def _merge(self) -> None:
         """Make one bus of those that a line without impedance joins."""
-        least, joins = threshold(self._raw), []
-        for record in self._raw.of("branch"):
-            z = complex(record.number(3, "R", 0.0), record.number(4, "X", 0.0))
-            ends = [abs(record.whole(k, "the bus' number")) for k in (0, 1)]
-            if abs(z) >= least or not record.whole(self._ends + 4, "ST", 1):
-                continue
-            if all(bus in self._rows and self._rows[bus][1] != _OUT for bus in ends):
-                joins.append((record, ends[0], ends[1]))
+        least = threshold(self._raw)
+        zero = [
+            *(
+                record
+                for record in self._raw.of("branch")
+                if is_joining(record, least) and record.whole(self._ends + 4, "ST", 1)
+            ),
+            *(
+                record
+                for record in self._raw.of("system switching device")
+                if _reactance_of_switch(record) <= least and record.whole(_SWITCH_STATE, "STAT", 1)
+            ),
+        ]
+        joins = [
+            (record, start, end)
+            for record in zero
+            for start, end in [(self._own(record), self._own(record, 1))]
+            if all(bus in self._rows and self._rows[bus][1] != _OUT for bus in (start, end))
+        ]
         status = 14 if self._raw.revision < NODES else 15
         held = {
             record.whole(0, "the bus' number")
@@ -300,12 +316,27 @@ class _Reading:
             self._rows.pop(bus)
             self._changes.note(
                 f"bus {bus} into {standing}",
-                f"zero impedance lines (below THRSHZ = {least:g} pu): the buses are one, as in PSS/E",
+                f"zero impedance lines (X up to THRSHZ = {least:g} pu): the buses are one, as in PSS/E",
             )
         self._merged = {record.line for record in gone}
+        lines = {record.line for record in self._raw.of("branch")}
+        for record in (record for record in gone if record.line in lines):
+            self._add(self._bus(record), 4, self._line_to_earth(record) * self._raw.base_mva)
+            resistance = record.number(3, "R", 0.0)
+            if abs(resistance) > least:
+                text = f"zero impedance line: its R of {resistance:g} pu has no effect, as in PSS/E"
+                self._changes.note(record.line, text)
+        self._lossless = {record.line for record in kept}
         for record in kept:
             text = "zero impedance line between two buses with machines: a branch of the least reactance"
             self._changes.note(record.line, text)
+
+    def _line_to_earth(self, record: Record) -> complex:
+        """Return all admittances to earth of a line: its charging, and its shunts at both ends [pu of the system]."""
+        gi, bi, gj, bj = (
+            record.number(self._ends + k, n, 0.0) for k, n in enumerate(("GI", "BI", "GJ", "BJ"))
+        )
+        return complex(gi + gj, record.number(5, "B", 0.0) + bi + bj)
 
     def _in_service(self, record: Record, status: int | None, name: str) -> bool:
         """Return whether an element counts; one out of service may point to a bus that is not there, as in PSS/E."""
@@ -388,6 +419,7 @@ class _Reading:
             pair = frozenset((self._own(record), self._own(record, 1)))
             self._once(record, "branch", pair, record.text(2, "1").strip())
             z = complex(record.number(3, "R", 0.0), record.number(4, "X"))
+            z = 1j * self._least if record.line in self._lossless else z
             charging = 0.5j * record.number(5, "B", 0.0)
             gi, bi, gj, bj = (
                 record.number(ends + k, n, 0.0) for k, n in enumerate(("GI", "BI", "GJ", "BJ"))
@@ -407,13 +439,11 @@ class _Reading:
             )
             self._branch(start, end, z, state, to_earth, rating=rating, name=name)
         for record in self._raw.of("system switching device"):
-            if not self._in_service(record, 16, "STAT"):
+            if record.line in self._merged or not self._in_service(record, _SWITCH_STATE, "STAT"):
                 continue
             start, end = self._bus(record), self._bus(record, 1)
-            closed = record.whole(16, "STAT", 1)
-            if closed:
-                self._changes.note(record.line, "switching device: a branch of its reactance")
-            self._branch(start, end, complex(0.0, record.number(3, "X", 1e-4)), closed)
+            self._changes.note(record.line, "switching device: a branch of its reactance")
+            self._branch(start, end, complex(0.0, _reactance_of_switch(record)), 1)
         if self._raw.base_mva != _SBASE:
             text = f"SBASE is {self._raw.base_mva:g} MVA, on which all impedances count; nearly all files have"
             self._changes.note(1, f"{text} {_SBASE:g} MVA: is it meant?")
@@ -483,10 +513,9 @@ class _Reading:
         if t.large_resistance:
             text = "R is more than 1000 times X: is it a load loss in W, so that CZ = 3 is right?"
             self._changes.note(t.record.line, text)
-        if t.corrected:
-            self._changes.note(t.record.line, "impedance correction table: not applied")
         if t.off == (0, 1, 2):
             return
+        factors = self._corrections_of(t)
         if 0 not in t.off:
             self._add(windings[0].bus, 4, t.magnetisation * self._raw.base_mva)
         if len(windings) == 2:
@@ -494,7 +523,7 @@ class _Reading:
             self._branch(
                 first.bus,
                 second.bus,
-                t.impedances[0] * second.ratio**2,
+                t.impedances[0] * second.ratio**2 * factors[0],
                 1,
                 tap=first.ratio / second.ratio,
                 shift=first.shift - second.shift,
@@ -512,13 +541,30 @@ class _Reading:
             self._branch(
                 winding.bus,
                 inner,
-                z,
+                z * factors[k],
                 k not in t.off,
                 tap=winding.ratio,
                 shift=winding.shift,
                 rating=winding.rating_mva,
                 name=name,
             )
+
+    def _corrections_of(self, t: Transformer) -> tuple[complex, ...]:
+        """Return the factor of each winding's impedance by its correction table; 1 where it has none."""
+        if t.corrects_pairs and any(winding.table for winding in t.windings):
+            text = "impedance correction tables of the impedances between windings (ZCOD = 1): not applied"
+            self._changes.note(t.record.line, text)
+            return (1.0 + 0j,) * len(t.windings)
+        for number in dict.fromkeys(w.table for w in t.windings if w.table):
+            if number not in self._corrections:
+                text = f"TAB is {number}, and the file has no such impedance correction table: not corrected"
+                self._changes.note(t.record.line, text)
+        return tuple(
+            self._corrections[w.table].factor(w.ratio, w.shift)
+            if w.table in self._corrections
+            else 1.0 + 0j
+            for w in t.windings
+        )
 
     def _read_devices(self, leaving_out: Sequence[str]) -> None:
         """Read DC lines, FACTS devices and the like; series parts of FACTS devices may be branches."""
@@ -711,6 +757,11 @@ class _Reading:
             q_max_mvar=math.inf,
             is_infinite=True,
         )
+
+
+def _reactance_of_switch(record: Record) -> float:
+    """X of a switching device [pu of the system], which is 1e-4 where the file does not say it."""
+    return record.number(3, "X", 1e-4)
 
 
 def _limits(

@@ -17,9 +17,10 @@ _SHUNT_STATUS = 32  # first revision with STAT of a switched shunt
 _IREG = 7  # column of the bus whose voltage a machine controls
 _USED = (UseOfRecord.USED, "")
 _NO_EFFECT = (UseOfRecord.NOT_USED, "no effect on the network")
+_JOINING = ("branch", "system switching device")  # that may be zero impedance lines
 _OF_SECTION = {
     "area": (UseOfRecord.HELD, "interchange is not controlled: the machines feed PG"),
-    "impedance correction": (UseOfRecord.NOT_USED, "not applied"),
+    "impedance correction": _USED,
     "multi-section line": (UseOfRecord.NOT_USED, "its sections are branches of their own"),
     "system-wide": (UseOfRecord.NOT_USED, "settings of PSS/E's solution, beside THRSHZ"),
     "substation": (UseOfRecord.NOT_USED, "its nodes and switches are passed over"),
@@ -40,7 +41,7 @@ def record_uses(
     for section, records in raw.sections.items():
         for k, lines in enumerate(elements(section, records)):
             use, why = _use(raw, section, lines, leaving_out)
-            if section == "branch" and lines[0].line in merged:
+            if section in _JOINING and lines[0].line in merged:
                 use, why = UseOfRecord.NOT_USED, "zero impedance: its buses are one"
             if (section, k) in unused:
                 use, why = UseOfRecord.NOT_USED, unused[section, k]

@@ -175,6 +175,8 @@ _MULTI_TERMINAL = {
 }
 """Tables of multi-terminal DC networks, each with the network's name first, and their fields in RAW's order."""
 
+_END_OF_CORRECTIONS = ("0", "0", "0")  # behind the last point of a table in a RAW file
+
 _SYNONYMS = {"scode": "sc", "dcode": "dc", "tcode": "tc", "bcode": "bc"}
 
 _WITHOUT_EFFECT = {
@@ -182,7 +184,6 @@ _WITHOUT_EFFECT = {
     "owner": "owner",
     "iatrans": "inter-area transfer",
     "iatransfer": "inter-area transfer",
-    "impcor": "impedance correction",
     "msline": "multi-section line",
     "sub": "substation",
     "subnode": "substation",
@@ -191,7 +192,7 @@ _WITHOUT_EFFECT = {
 }
 """Table of RAWX → section of RAW, where nothing reads the fields."""
 
-_READ = {"caseid", "general", "transformer", *_LAYOUTS}
+_READ = {"caseid", "general", "transformer", "impcor", *_LAYOUTS}
 """Tables whose values have a meaning here; only in them a row must fit its fields."""
 
 _SOLUTION = {"gauss", "newton", "adjust", "tysl", "solver", "rating"}
@@ -225,7 +226,7 @@ def read_rawx(path: Path, text: str) -> RawFile:
     for table in tables.values():
         for section, records in _records(path, table):
             sections.setdefault(section, []).extend(records)
-    sections |= _multi_terminal(path, tables)
+    sections |= _multi_terminal(path, tables) | _corrections(path, tables)
     if "bus" not in sections:
         raise InputError(f"{path}: network.bus has no rows; export the case once more")
     return RawFile(str(path), REVISION, base, frequency or None, sections)
@@ -261,7 +262,7 @@ def _records(path: Path, table: _Table) -> Iterator[tuple[str, list[Record]]]:
             yield "system-wide", [Record(place, line, ["GENERAL", *settings])]
     elif table.name == "gne":
         yield "gne", [line for row in table.rows for line in _gne_lines(place, table, row)]
-    elif table.name not in {"caseid", *_SOLUTION, *_MULTI_TERMINAL}:
+    elif table.name not in {"caseid", "impcor", *_SOLUTION, *_MULTI_TERMINAL}:
         section = _WITHOUT_EFFECT.get(table.name, table.name)
         yield section, [Record(place, line, row) for line, row in table.rows]
 
@@ -285,6 +286,22 @@ def _multi_terminal(path: Path, tables: Mapping[str, _Table]) -> dict[str, list[
                 if given.get("name", "") == own
             ]
     return {"multi-terminal dc": records} if records else {}
+
+
+def _corrections(path: Path, tables: Mapping[str, _Table]) -> dict[str, list[Record]]:
+    """Return the impedance correction tables, whose points are rows here; in a RAW file each table is a record."""
+    table = tables.get("impcor", _Table("impcor", (), ()))
+    points: dict[str, list[str]] = {}
+    lines: dict[str, int] = {}
+    for line, row in table.rows:
+        number, *point = _in_order(_by_field(table, row), ("itable", "tap", "refact", "imfact"))
+        lines.setdefault(number, line)
+        points.setdefault(number, []).extend(point)
+    records = [
+        Record(str(path), lines[number], [number, *found, *_END_OF_CORRECTIONS])
+        for number, found in points.items()
+    ]
+    return {"impedance correction": records} if records else {}
 
 
 def _gne_lines(place: str, table: _Table, row: tuple[int, tuple[str, ...]]) -> Iterator[Record]:

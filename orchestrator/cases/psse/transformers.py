@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from orchestrator.cases.psse.records import SWITCHING_DEVICES, RawFile, Record
 
 _NAME = 10  # column of NAME in the first line
+_ZCOD = 21  # of ZCOD there, from revision 35 on
 _LOSSES = 3  # CZ by which R is a load loss [W]
 _CONTROL = {33: 6}
 _TABLE = {33: 13, 34: 22}
@@ -17,14 +18,15 @@ _OPEN = {0: (0, 1, 2), 1: (), 2: (1,), 3: (2,), 4: (0,)}  # STAT → windings th
 
 @dataclass(frozen=True)
 class Winding:
-    """One winding: bus, ratio [pu of the bus' base voltage], shift [degrees], nominal voltage by that of its bus, and
-    RATA, 0 where the file has none [MVA]."""
+    """One winding: bus, ratio [pu of the bus' base voltage], shift [degrees], nominal voltage by that of its bus, RATA,
+    0 where the file has none [MVA], and TAB, the impedance correction table, 0 where there is none."""
 
     bus: int
     ratio: float
     shift: float
     nominal: float
     rating_mva: float = 0.0
+    table: int = 0
 
 
 _FAR = 1000.0
@@ -39,14 +41,14 @@ class Transformer:
     impedances: tuple[complex, ...]  # between windings 1-2, or 1-2, 2-3 and 3-1 [pu of the system]
     magnetisation: complex  # at the bus of winding 1 [pu of the system]
     off: tuple[int, ...]  # windings that are out of service
-    # controlled, corrected: whether a tap changer acts on it, and whether its impedance depends on its tap
-    controlled: bool
-    corrected: bool
+    controlled: bool  # whether a tap changer acts on it
     # whether a load loss, which CZ = 3 gives in W, is so small that pu may be meant
     small_loss: bool = False
     # whether a resistance is so large that a load loss in W may be meant
     large_resistance: bool = False
     name: str = ""  # NAME, which is 40 characters at most
+    # whether correction tables act on the impedances between windings, and not on those to the star point (ZCOD = 1)
+    corrects_pairs: bool = False
 
 
 def transformers(raw: RawFile, voltages: Mapping[int, float]) -> Iterator[Transformer]:
@@ -78,19 +80,19 @@ def _transformer(
     for bus in buses:
         if bus not in voltages:
             raise first.error(f"there is no bus {bus}")
+    control, table = (
+        (_CONTROL[33], _TABLE[33])
+        if raw.revision < SWITCHING_DEVICES
+        else (15, _TABLE[34] + (raw.revision > 34))
+    )
     windings = tuple(
-        _winding(line, bus, voltages[bus], codes["CW"])
+        _winding(line, bus, voltages[bus], codes["CW"], table)
         for line, bus in zip(rest[1:], buses, strict=True)
     )
     pairs = ((0, 1), (1, 2), (2, 0))[: 1 if count == 2 else 3]
     impedances = tuple(
         _impedance(raw, rest[0], 3 * k, codes["CZ"], windings[a].nominal)
         for k, (a, _) in enumerate(pairs)
-    )
-    control, table = (
-        (_CONTROL[33], _TABLE[33])
-        if raw.revision < SWITCHING_DEVICES
-        else (15, _TABLE[34] + (raw.revision > 34))
     )
     windings_lines = [line for line in rest[1:] if len(line.fields) > 3]
     return Transformer(
@@ -101,10 +103,10 @@ def _transformer(
         _magnetisation(raw, first, rest[0], codes["CM"], windings[0]),
         _OPEN[state],
         any(line.whole(control, "COD", 0) for line in windings_lines),
-        any(line.whole(table, "TAB", 0) for line in windings_lines),
         codes["CZ"] == _LOSSES and _has_tiny_losses(rest[0], len(pairs)),
         codes["CZ"] != _LOSSES and _has_large_resistance(impedances),
         first.text(_NAME, "").strip(),
+        bool(count > 2 and first.whole(_ZCOD, "ZCOD", 0)),
     )
 
 
@@ -117,7 +119,8 @@ def _has_large_resistance(impedances: Sequence[complex]) -> bool:
     return any(z.real > _FAR * abs(z.imag) for z in impedances)
 
 
-def _winding(line: Record, bus: int, base: float, code: int) -> Winding:
+def _winding(line: Record, bus: int, base: float, code: int, table: int) -> Winding:
+    """A winding by its line; ``table``: column of TAB."""
     nominal = line.number(1, "NOMV [kV]", 0.0)
     ratio = line.number(0, "WINDV", base if code == 2 else 1.0)
     if code != 1 and not base > 0 and (code == 2 or nominal):
@@ -129,7 +132,7 @@ def _winding(line: Record, bus: int, base: float, code: int) -> Winding:
     if not ratio > 0:
         raise line.error(f"WINDV comes to {ratio:g} pu of the bus' base voltage; it must exceed 0")
     shift, rating = line.number(2, "ANG [degrees]", 0.0), line.number(3, "RATA [MVA]", 0.0)
-    return Winding(bus, ratio, shift, by_base, rating)
+    return Winding(bus, ratio, shift, by_base, rating, line.whole(table, "TAB", 0))
 
 
 def _impedance(raw: RawFile, line: Record, index: int, code: int, nominal: float) -> complex:

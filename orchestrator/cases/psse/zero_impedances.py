@@ -1,8 +1,10 @@
 """Buses that PSS/E takes as one, because a line of (nearly) no impedance joins them.
 
-PSS/E treats a branch that is no transformer as a zero impedance line if its impedance is below the threshold THRSHZ,
-1e-4 pu unless the record GENERAL of a revision from 34 on says otherwise (PSS/E's Program Operation Manual, "Zero
-impedance lines"); PowSyBl's reader merges or keeps such branches likewise."""
+PSS/E treats a branch that is no transformer as a zero impedance line if its reactance is not above the threshold
+THRSHZ, 1e-4 pu unless the record GENERAL of a revision from 34 on says otherwise, and it has no charging (PSS/E's
+Program Operation Manual, "Zero impedance lines").  Its resistance does not count: in cases that PSS/E solved, such as
+NREL-Sienna/PowerSystemsTestData, psse_raw/case8_voltage_wind_correction.raw, the voltages at both ends of such lines
+are alike to the last digit with R = 0.012 pu, and they are not where the line has charging."""
 
 import re
 from collections.abc import Collection, Iterable, Mapping
@@ -10,6 +12,9 @@ from collections.abc import Collection, Iterable, Mapping
 from orchestrator.cases.psse.records import RawFile, Record
 
 USUAL_THRESHOLD = 1e-4  # THRSHZ of a file that does not say it [pu of the system]
+_SMALLEST = (
+    2e-5  # impedance that a line with charging may have [pu]: twice the least of our network
+)
 
 
 def threshold(raw: RawFile) -> float:
@@ -20,6 +25,16 @@ def threshold(raw: RawFile) -> float:
             if found:
                 return float(found[1].replace("D", "E").replace("d", "e"))
     return USUAL_THRESHOLD
+
+
+def is_joining(record: Record, least: float) -> bool:
+    """Return whether a branch makes one bus of its two.
+
+    One with charging does so only if its whole impedance is too small for a branch of ours.  ``least``: THRSHZ [pu]."""
+    z = complex(record.number(3, "R", 0.0), record.number(4, "X", 0.0))
+    if record.number(5, "B", 0.0):
+        return abs(z) < min(least, _SMALLEST)
+    return abs(z.imag) <= least
 
 
 def merged_buses(

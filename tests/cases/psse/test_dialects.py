@@ -133,6 +133,42 @@ def test_zero_impedance_makes_one_bus(read):
     assert "the buses are one" in texts(data)
 
 
+@pytest.mark.parametrize(("line", "is_one"), [("0.012,1e-4,0", True), ("0.012,1e-4,0.02", False)])
+def test_resistance_does_not_keep_buses_apart_and_charging_does(read, line, is_one):
+    """So PSS/E's solution has it of psse_raw/case8_voltage_wind_correction.raw (NREL-Sienna/PowerSystemsTestData).
+
+    Its buses 101 and 102 have one voltage with R = 0.012 pu between them, and 101 and 105 two, with charging."""
+    found = records(33)
+    found["BUS"].append("10,'TIED',230.0,1,1,1,1,1.0,0.0,1.1,0.9,1.1,0.9")
+    found["BRANCH"].append(f"8,10,'1 ',{line},0,0,0,0,0,0,0,1,1,0,1,1")
+    data = read(raw(33, found))
+    assert ("bus_10" not in data.buses) is is_one
+    assert ("R of 0.012 pu has no effect" in texts(data)) is is_one
+
+
+def test_a_closed_switching_device_makes_one_bus(read):
+    found = records(34)
+    found["BUS"] += [f"{n},'TIED',230.0,1,1,1,1,1.0,0.0,1.1,0.9,1.1,0.9" for n in (10, 11)]
+    found["SYSTEM SWITCHING DEVICE"] = [
+        f"8,{n},'1 ',1e-4,{','.join(['0'] * 12)},{state},1,1,2,'S'"
+        for n, state in ((10, 1), (11, 0))
+    ]
+    found["BRANCH"].append("9,11,'1 ',0,0.1,0,'',0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,1,1,0,1,1")
+    data = read(raw(34, found))
+    assert "bus_10" not in data.buses
+    assert "bus_11" in data.buses
+    assert not [line for line in data.lines if {line.from_bus, line.to_bus} == {"bus_8", "bus_11"}]
+
+
+def test_charging_of_a_line_without_impedance_stays(read):
+    found = records(33)
+    found["BUS"].append("10,'TIED',230.0,1,1,1,1,1.0,0.0,1.1,0.9,1.1,0.9")
+    found["BRANCH"].append("8,10,'1 ',0,1e-6,0.2,0,0,0,0.01,0.03,0,0.05,1,1,0,1,1")
+    data = read(raw(33, found))
+    (shunt,) = [x for x in data.shunts if x.bus == "bus_8"]
+    assert (shunt.g_mw, shunt.b_mvar) == pytest.approx((1, 28))
+
+
 def test_two_machines_stay_at_their_buses(read):
     found = records(33)
     found["BRANCH"].append("2,3,'9 ',0,1e-6,0,0,0,0,0,0,0,0,1,1,0,1,1")
