@@ -417,6 +417,10 @@ class _Reading:
                 continue
             start, end = self._bus(record), self._bus(record, 1)
             pair = frozenset((self._own(record), self._own(record, 1)))
+            if len(pair) == 1:
+                text = "a line from a bus to itself: not used, as the file's own solution has it"
+                self._changes.note(record.line, text)
+                continue
             self._once(record, "branch", pair, record.text(2, "1").strip())
             z = complex(record.number(3, "R", 0.0), record.number(4, "X"))
             z = 1j * self._least if record.line in self._lossless else z

@@ -62,6 +62,8 @@ def _use(
     status = _status(raw.revision).get(section)
     if status is not None and not record.whole(status, "the status", 1):
         return _out_of_service("its status is 0")
+    if section == "branch" and len({abs(record.whole(k, "the bus' number")) for k in (0, 1)}) == 1:
+        return UseOfRecord.NOT_USED, "from a bus to itself"
     if section == "switched shunt" and record.whole(_mode(raw.revision), "MODSW", 1):
         return UseOfRecord.HELD, "at BINIT"
     if section == "transformer" and _is_controlled(raw.revision, lines):

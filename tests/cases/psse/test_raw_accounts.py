@@ -66,3 +66,14 @@ def test_a_line_between_merged_buses_is_what_it_draws_to_earth(read):
     (four,) = (row for row in network.tables.bus if row[0] == 4)
     assert four[4:6] == pytest.approx([0.0, 30.0], abs=1e-9)
     assert not any({int(row[0]), int(row[1])} == {4} for row in network.tables.branch)
+
+
+def test_a_line_from_a_bus_to_itself_is_no_element(read):
+    """So the solution has it of powsybl-core's ExampleVersion32.raw: what its charging would feed fits nowhere."""
+    found = records(33)
+    found["BRANCH"].append("4,4,'1 ',0.01,0.1,0.3")
+    network = read(33, found)
+    (four,) = (row for row in network.tables.bus if row[0] == 4)
+    assert not any(four[4:6])
+    assert [x.text for x in network.changes if "to itself" in x.text]
+    assert ("branch", "from a bus to itself") in {(x.kind, x.why) for x in network.records}
