@@ -3,6 +3,7 @@
 import cmath
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -203,13 +204,34 @@ def _source(table: NetworkTable, directory: Path, slack: str | None) -> _Source:
     return _Source(imported)
 
 
+@dataclass(frozen=True)
+class _Asked:
+    """A question to a RAW file: the file as it is now, and all that a case says of the network."""
+
+    path: Path
+    version: tuple[int, int]  # time of its last change [ns], and size [bytes]
+    slack: str | None
+    text: str  # the case's table as JSON, by which it is told from others
+    table: NetworkTable = field(compare=False)
+
+
 def _from_raw(path: Path, table: NetworkTable, slack: str | None) -> _Source:
+    """A network of PSS/E, which every scenario of a case asks for."""
+    path = seen_from_here(path)
+    state = path.stat() if path.is_file() else None
+    version = (state.st_mtime_ns, state.st_size) if state else (0, 0)
+    return _read_from_raw(_Asked(path, version, slack, table.model_dump_json(), table))
+
+
+@lru_cache(maxsize=2)
+def _read_from_raw(asked: _Asked) -> _Source:
     """A network of PSS/E; the ratings of the machines are those of the file."""
+    table = asked.table
     raw = read_raw(
-        seen_from_here(path),
+        asked.path,
         table.leave_out,
         keep_load_parts=table.keep_load_parts,
-        slack=slack,
+        slack=asked.slack,
     )
     if not raw.machines:
         raise InputError(

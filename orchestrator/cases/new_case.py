@@ -161,7 +161,11 @@ def write_case(wanted: WantedCase) -> NewCase:
     for converter in wanted.converters:
         places.append(_placed(converter, base, _called(wanted.files), places))
     draft = _Text(wanted, sources, base, _with_names(places), _switched(device))
-    scenarios = _prepared(draft.text, wanted, [])
+    if not places and wanted.kind == "phasor" and draft.fault_bus == first.fault_bus:
+        # nothing of the scenario ``base`` has changed, and a large network takes seconds to prepare
+        scenarios = [base, *_prepared(draft.text, wanted, ["fault"])]
+    else:
+        scenarios = _prepared(draft.text, wanted, [])
     questions = dict.fromkeys(q for prepared in scenarios for q in prepared.questions)
     text = _commented(draft.text, list(questions), sources)
     black_box = device is not None and not device.can_save_state
@@ -419,6 +423,11 @@ class _Text:
             self._fault_bus = places[0].bus
         elif self._network:
             self._fault_bus = _bus_of_largest(self._network.loads, self._network.buses)
+
+    @property
+    def fault_bus(self) -> str:
+        """Return the bus of the scenario ``fault``; "" while it is not known."""
+        return self._fault_bus
 
     def assumed(self, questions: int) -> list[str]:
         lines, device = [], self._wanted.device

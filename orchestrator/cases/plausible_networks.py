@@ -112,21 +112,27 @@ def _line(draft: Draft, name: str, grid: ComponentPlan, line: Line) -> Iterator[
     """Reactance, charging, ratio, shift, R/X and X_C/X."""
     variables = {q: line.variable(q) for q in ("X", "R", "B", "tap", "shift", "X_C")}
     found = {q: value_of(grid, variable) for q, variable in variables.items()}
-    place = {q: _place(draft, "lines", line.name, q, variable) for q, variable in variables.items()}
+
+    def place(quantity: str) -> str:  # few lines have a doubt that needs one
+        return _place(draft, "lines", line.name, quantity, variables[quantity])
+
     for quantity, usual in {"X": LINE_X, "B": LINE_B, "tap": LINE_RATIO}.items():
         value = found[quantity]
-        if value is not None and not (quantity == "X" and line.X < 0):
-            yield from outside(draft, name, variables[quantity], value, usual, place[quantity])
-    yield from _shift(name, variables["shift"], found["shift"], place["shift"])
+        if value is None or usual.fits(value) or (quantity == "X" and line.X < 0):
+            continue
+        yield from outside(draft, name, variables[quantity], value, usual, place(quantity))
+    for doubt in _shift(name, variables["shift"], found["shift"], ""):
+        yield replace(doubt, place=place("shift"))
     R, X, X_C = found["R"], found["X"], found["X_C"]
     if R is not None and X is not None:
-        yield from _swapped(name, variables["R"], variables["X"], R, X, place["R"])
+        for doubt in _swapped(name, variables["R"], variables["X"], R, X, ""):
+            yield replace(doubt, place=place("R"))
     if X is not None and X_C is not None and not COMPENSATION.fits(X_C / X):
         text = (
             f"{variables['X_C']} = {X_C:g} pu is {X_C / X:.3g} of {variables['X']} = {X:g} pu, outside of "
             f"{COMPENSATION.low:g} to {COMPENSATION.high:g} ({COMPENSATION.why})"
         )
-        yield UnusualValue(f"{name}.{variables['X_C']}", place["X_C"], text)
+        yield UnusualValue(f"{name}.{variables['X_C']}", place("X_C"), text)
 
 
 def _transformer(

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 
+from fmus.grid.network import Line
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.plausible_values import (
     UnusualValue,
@@ -101,14 +102,14 @@ def _step_up(draft: Draft, name: str, grid: ComponentPlan, where: str) -> Iterat
         if plan is not None and (S_n := value_of(plan, "S_n")) is not None:
             ratings[port.bus] = ratings.get(port.bus, 0.0) + S_n
     low, high = _STEP_UP
+    at_bus: dict[str, list[Line]] = {bus: [] for bus in ratings}
+    for line in draft.network.lines:
+        for bus in {line.from_bus, line.to_bus} & at_bus.keys():
+            at_bus[bus].append(line)
+    with_three = {bus for x in draft.network.transformers for bus in x.buses}
     for bus, rating in ratings.items():
-        branches = [line for line in draft.network.lines if bus in (line.from_bus, line.to_bus)]
-        if (
-            len(branches) != 1
-            or branches[0].B
-            or branches[0].name in written
-            or any(bus in x.buses for x in draft.network.transformers)
-        ):
+        branches = at_bus[bus]
+        if len(branches) != 1 or branches[0].B or branches[0].name in written or bus in with_three:
             continue
         variable = branches[0].variable("X")
         X = value_of(grid, variable)

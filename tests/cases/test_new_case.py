@@ -8,9 +8,11 @@ from functools import partial
 
 import pytest
 
+from orchestrator.cases import network_data
 from orchestrator.cases.case import case_of_text, load_case
 from orchestrator.cases.new_case import WantedCase, _switched, read_converter, write_case
 from orchestrator.cases.parameter_files import read_parameter_file
+from orchestrator.cases.psse.raw import read_raw
 from orchestrator.core.errors import CaseError, InputError
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.linear.spectra.continuation import ModesMeetError
@@ -221,6 +223,39 @@ def test_without_a_converter(files):
     )
     (fault,) = case.prepare(["fault"])
     assert [event.time for event in fault.events] == [1.0, 1.1]
+
+
+def test_scenarios_are_those_of_the_written_case(files):
+    """The scenario ``base`` is prepared once, before its file's text is complete."""
+    case, new = made(files, converter=None)
+    for ours, again in zip(new.scenarios, case.prepare(), strict=True):
+        assert ours.name == again.name
+        assert ours.values == again.values
+        assert ours.events == again.events
+        assert ours.power_flow.voltages == again.power_flow.voltages
+        assert ours.records == again.records
+        # comments above move the lines that their places name
+        assert [q.text for q in ours.questions] == [q.text for q in again.questions]
+
+
+def test_a_network_is_read_once_for_all_scenarios_and_again_if_it_changes(files, monkeypatch):
+    asked = []
+
+    def read(*arguments, **more):
+        asked.append(arguments)
+        return read_raw(*arguments, **more)
+
+    monkeypatch.setattr(network_data, "read_raw", read)
+    case, _ = made(files)
+    assert len(asked) == 1
+    load = case.prepare(["base"])[0].network.loads[0]
+    text = files[0].read_text()
+    drawn = next(line for line in text.splitlines() if line.startswith(f"{load.bus[4:]},'1"))
+    shown = f",{load.p_mw:g},"
+    assert shown in drawn
+    files[0].write_text(text.replace(drawn, drawn.replace(shown, f",{load.p_mw + 1:g},", 1)))
+    assert case.prepare(["base"])[0].network.loads[0].p_mw == load.p_mw + 1
+    assert len(asked) == 2
 
 
 def test_the_slack_needs_no_new_power(files):

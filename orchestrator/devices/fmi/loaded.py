@@ -2,6 +2,7 @@
 
 import ctypes
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,17 @@ from orchestrator.devices.fmi.wine_program import WineProgram, proxy_path
 # why one thread alone steps an FMU: Python's lock lets one thread run at a time
 PYTHON_BACKED = "Python-backed"
 _LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3  # kinds of ``fmi2Get…Status``
+
+
+@lru_cache(maxsize=64)
+def _identity_in(path: Path, version: int) -> str:
+    """The guid of an FMI 2.0 description or the token of an FMI 3.0 one; ``version`` keeps newer contents apart.
+
+    A network may have hundreds of instances of one FMU."""
+    with path.open("rb") as file:
+        # the rest of it takes milliseconds
+        root = next(ElementTree.iterparse(file, events=("start",)))[1]
+    return root.get("guid") or root.get("instantiationToken") or ""
 
 
 class LoadedComponent(Derived):
@@ -141,10 +153,8 @@ class LoadedComponent(Derived):
 
     def _compare_guid(self, directory: Path) -> None:
         """What was described and what was extracted must be the same FMU; not every binary checks that itself."""
-        with (directory / MODEL_DESCRIPTION).open("rb") as file:
-            # the rest of it takes milliseconds
-            root = next(ElementTree.iterparse(file, events=("start",)))[1]
-        if self.description.guid not in (root.get("guid") or root.get("instantiationToken") or ""):
+        path = directory / MODEL_DESCRIPTION
+        if self.description.guid not in _identity_in(path, path.stat().st_mtime_ns):
             raise InputError(
                 f"the guid {self.description.guid} is not that of the FMU; read its description again"
             )
