@@ -19,6 +19,7 @@ from gfor_fmu.droop import declare_droop
 from gfor_fmu.inner_loops import inner_loops
 from gfor_fmu.three_phases import V_N
 from gfor_fmu.usual import FORMING
+from gfor_fmu.virtual_impedance import declare_virtual_impedance
 
 # parameter with which the bridge voltage makes up for the time until it is applied
 LEAD = "output_lead"
@@ -71,7 +72,8 @@ def grid_forming_control() -> Model:
 
     point = declare_operating_point(m, P_0)
     m.derivative(angle, point.omega_b)
-    data = declare_filter_data(m, point)
+    virtual = declare_virtual_impedance(m)
+    data = declare_filter_data(m, point, virtual.rated)
     theta = m.algebraic("theta")
     seen = [of_phases(value, angle).rotated(-theta) for value in (u, i_s, i_g)]
     scaled = seen[0] / volt, seen[1] / ampere, seen[2] / ampere
@@ -80,7 +82,7 @@ def grid_forming_control() -> Model:
     droop = declare_droop(m, data.initial, Phasor(P, Q))
     m.close(theta, droop.theta)
     control = outer_control(m, droop, point.omega_b)
-    bridge, limited = inner_loops(m, measured, point.omega_b, control.omega, control.u_ref)
+    bridge, limited = inner_loops(m, measured, point.omega_b, control.omega, control.u_ref, virtual)
     felt = power(measured.u + limited.informed, measured.i_g.value)
     m.close(P, felt.re)
     m.close(Q, felt.im)

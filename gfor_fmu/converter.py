@@ -12,6 +12,7 @@ from gfor_fmu.droop import Droop, declare_droop, frequency, voltage_reference
 from gfor_fmu.inner_loops import inner_loops
 from gfor_fmu.pod import pod
 from gfor_fmu.usual import FORMING
+from gfor_fmu.virtual_impedance import declare_virtual_impedance
 
 S_N, P_0 = 1500.0, 0.9  # default rating [MVA] and dispatch [pu]: the two-area system's converter
 
@@ -54,11 +55,12 @@ def grid_forming_converter() -> Model:
 
 def declare_converter(m: ModelBuilder, port: DevicePort, measured: Expr | None = None) -> Converter:
     """Everything behind a port, whatever its inputs are; ``measured`` as `outer_control`."""
-    electrical = declare_filter(m, port)
+    virtual = declare_virtual_impedance(m)
+    electrical = declare_filter(m, port, virtual.rated)
     P, Q = m.algebraic("P"), m.algebraic("Q")
     droop = declare_droop(m, electrical.initial, Phasor(P, Q))
     control = outer_control(m, droop, port.omega_b, measured)
-    v_c, limited = inner_loops(m, electrical, port.omega_b, control.omega, control.u_ref)
+    v_c, limited = inner_loops(m, electrical, port.omega_b, control.omega, control.u_ref, virtual)
     # Exactly the power at the capacitor while nothing is limited.
     s = power(electrical.u + limited.informed, electrical.i_g.value)
     m.close(P, s.re)

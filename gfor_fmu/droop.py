@@ -55,7 +55,11 @@ def declare_droop(m: ModelBuilder, start: SteadyState, measured: Phasor) -> Droo
             "Q_ref", start.s.im, "pu", "Reactive-power reference of the operating point", base="S_n"
         )
         U_0 = m.calculated(
-            "U_ref", start.u.re, "pu", "Voltage reference of the operating point", base="S_n"
+            "U_ref",
+            start.u.re + start.drop.re,
+            "pu",
+            "Voltage reference of the operating point",
+            base="S_n",
         )
         p_f = m.state("P_f", P_0, "pu", "Measured active power", base="S_n")
         q_f = m.state("Q_f", Q_0, "pu", "Measured reactive power", base="S_n")

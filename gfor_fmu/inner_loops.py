@@ -12,10 +12,16 @@ from gfor_fmu.current_limit import (
     declare_current_limit,
     limited_current,
 )
+from gfor_fmu.virtual_impedance import VirtualImpedance, declare_inductive_voltage
 
 
 def inner_loops(
-    m: ModelBuilder, f: MeasuredFilter, omega_b: Expr, w: Expr, u_ref: Phasor
+    m: ModelBuilder,
+    f: MeasuredFilter,
+    omega_b: Expr,
+    w: Expr,
+    u_ref: Phasor,
+    virtual: VirtualImpedance,
 ) -> tuple[Phasor, LimitedCurrent]:
     """Declare both loops; return the voltage that the converter applies [pu, S_n], and the limit at work.
 
@@ -30,10 +36,13 @@ def inner_loops(
     w
         Frequency of the converter [pu, f_n].
     u_ref
-        Reference of the voltage across the capacitor branch, converter's frame [pu, S_n].
+        Reference of the voltage across the capacitor branch and the virtual impedance, converter's frame [pu, S_n].
+    virtual
+        The virtual impedance.
     """
     start = f.initial
-    u_lagged, i_g_lagged = _feed_forwards(m, f)
+    u_lagged, i_g_lagged, slope = _feed_forwards(m, f)
+    drop = virtual.drop(w, f.i_g.value) + declare_inductive_voltage(m, virtual, omega_b, slope)
     with m.scope("voltage_control"):
         tau = m.parameter(
             "tau", 0.05, "s", "Response time of the AC-voltage loop", minimum=1e-3, source=APPENDIX
@@ -41,9 +50,18 @@ def inner_loops(
         xi = m.parameter(
             "xi", 0.707, "1", "Damping ratio of the AC-voltage loop", minimum=0.1, source=APPENDIX
         )
+        factor = m.parameter(
+            "factor",
+            100.0,
+            "1",
+            "Factor of the proportional gain: 100 in the paper, 1 where both gains place the same poles",
+            minimum=0.1,
+            maximum=1000.0,
+            source=APPENDIX,
+        )
         C_c = f.B_c / omega_b
         omega_n = 4 / (tau * xi)
-        k_p = 2 * xi * omega_n * C_c * 100  # the factor 100 is the paper's
+        k_p = 2 * xi * omega_n * C_c * factor
         k_i = omega_n**2 * C_c
         x = qd_state(
             m,
@@ -51,7 +69,7 @@ def inner_loops(
             start.i_s - Phasor(0, f.B_c) * start.u - start.i_g,
             "Integrator of the voltage loop",
         )
-        error = u_ref - f.u
+        error = u_ref - drop - f.u
         demanded = k_p * error + x.value + Phasor(0, w * f.B_c) * f.u + i_g_lagged
     limit = declare_current_limit(m, start)
     found = limited_current(limit, demanded, k_p)
@@ -59,8 +77,8 @@ def inner_loops(
     return current_control(m, f, omega_b, w, found.allowed, u_lagged), found
 
 
-def _feed_forwards(m: ModelBuilder, f: MeasuredFilter) -> tuple[Phasor, Phasor]:
-    """Lagged capacitor voltage, and lagged grid current."""
+def _feed_forwards(m: ModelBuilder, f: MeasuredFilter) -> tuple[Phasor, Phasor, Phasor]:
+    """Lagged capacitor voltage, lagged grid current, and the latter's derivative [pu/s]."""
     with m.scope("feed_forward"):
         tau = m.parameter(
             "tau", 1e-4, "s", "Lag of both feed-forwards", minimum=1e-5, source=APPENDIX
@@ -72,8 +90,9 @@ def _feed_forwards(m: ModelBuilder, f: MeasuredFilter) -> tuple[Phasor, Phasor]:
         u = qd_state(m, "u", f.initial.u, "Lagged capacitor voltage")
         i_g = qd_state(m, "i_g", f.initial.i_g, "Lagged grid current")
         u.set_derivative(m, (f.u - u.value) / tau)
-        i_g.set_derivative(m, (f.i_g.value - i_g.value) / tau)
-    return u.value, i_g.value
+        slope = (f.i_g.value - i_g.value) / tau
+        i_g.set_derivative(m, slope)
+    return u.value, i_g.value, slope
 
 
 def _integrate_what_is_left(

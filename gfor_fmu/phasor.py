@@ -1,8 +1,9 @@
 """The converter without network transients, for RMS tools with steps of milliseconds: an emf behind the transformer.
 
 Filter, inner loops, feed-forwards and transformer settle within a few milliseconds, and are algebraic here: the
-voltage control holds u = u_ref, so that the emf is u_ref·e^{jθ}, a function of the droops' and the POD controllers'
-states alone. The current limit is not represented; ``current_limit`` shows when it would act."""
+voltage control holds u = u_ref − Z_v·i_g, so that the emf behind virtual impedance and transformer is u_ref·e^{jθ}, a
+function of the droops' and the POD controllers' states alone. The current limit is not represented; ``current_limit``
+shows when it would act."""
 
 from fmus.converter_parts.filter import FilterData, declare_filter_data
 from fmus.toolchain.frames import Phasor, power
@@ -15,6 +16,7 @@ from gfor_fmu.converter import P_0, S_N, Converter, declare_converter_outputs, o
 from gfor_fmu.current_limit import declare_box_limits
 from gfor_fmu.droop import declare_droop
 from gfor_fmu.usual import FORMING
+from gfor_fmu.virtual_impedance import declare_virtual_impedance
 
 
 def grid_forming_converter_phasor() -> Model:
@@ -22,19 +24,23 @@ def grid_forming_converter_phasor() -> Model:
     title = "Grid-forming converter with P-f and Q-V droop, POD-P and POD-Q (phasor type)"
     m = phasor_builder("gfor_phasor", title, kind="converter", usual=FORMING)
     port = device_port(m, S_n=S_N, P_0=P_0)
-    electrical = declare_filter_data(m, port)
+    virtual = declare_virtual_impedance(m)
+    electrical = declare_filter_data(m, port, virtual.rated)
     P, Q = m.algebraic("P"), m.algebraic("Q")
     droop = declare_droop(m, electrical.initial, Phasor(P, Q))
     control = outer_control(m, droop, port.omega_b)
 
-    u, impedance = control.u_ref, Phasor(electrical.R_t, electrical.X_t)
+    impedance = Phasor(electrical.R_t, electrical.X_t) + virtual.rated
 
-    i_g = (u - port.v.rotated(-droop.theta)) / impedance * port.connected
+    i_g = (control.u_ref - port.v.rotated(-droop.theta)) / impedance * port.connected
+    u = control.u_ref - virtual.rated * i_g
     s = power(u, i_g)
     m.close(P, s.re)
     m.close(Q, s.im)
 
-    emf = source_emf(m, u, electrical.initial.u, droop.theta, port.omega_b * (control.omega - 1))
+    start = electrical.initial.u + electrical.initial.drop
+    turning = port.omega_b * (control.omega - 1)
+    emf = source_emf(m, control.u_ref, start, droop.theta, turning)
     declare_phasor_outputs(m, port, emf, impedance)
     i_s = i_g + _capacitor_current(electrical, u)
     declare_converter_outputs(

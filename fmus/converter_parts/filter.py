@@ -4,7 +4,7 @@ Everything is complex, f = f_q − j·f_d, per unit on the rating S_n; w is the 
 
 from dataclasses import dataclass
 
-from fmus.toolchain.frames import Phasor, QdState, power, qd_state
+from fmus.toolchain.frames import ZERO, Phasor, QdState, power, qd_state
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import BREAKER_TIME, DevicePort, OperatingPoint
 from fmus.toolchain.symbols import Expr
@@ -15,7 +15,9 @@ STAMP = "STAMP toolbox of the paper's group"
 
 @dataclass(frozen=True)
 class SteadyState:
-    """The operating point of the electrical side, in the converter's frame, from the power flow."""
+    """The operating point of the electrical side, in the converter's frame, from the power flow.
+
+    ``u`` is across the capacitor branch; ``drop`` the voltage over a virtual impedance, behind which the frame lies."""
 
     theta: Expr
     u: Phasor
@@ -23,6 +25,7 @@ class SteadyState:
     i_g: Phasor
     v_c: Phasor
     s: Phasor
+    drop: Phasor = ZERO
 
 
 @dataclass(frozen=True)
@@ -56,8 +59,12 @@ class Filter(MeasuredFilter):
     u_c: QdState
 
 
-def declare_filter_data(m: ModelBuilder, port: OperatingPoint) -> FilterData:
-    """Declare parameters alone; the power flow gives the operating point."""
+def declare_filter_data(
+    m: ModelBuilder, port: OperatingPoint, virtual: Phasor = ZERO
+) -> FilterData:
+    """Declare parameters alone; the power flow gives the operating point.
+
+    ``virtual``: impedance in the control between the frame's own voltage and the capacitor [pu, S_n]."""
     with m.scope("filter"):
         R_c = m.parameter(
             "R_c", 0.005, "pu", "Inductor resistance", base="S_n", minimum=0.0, source=APPENDIX
@@ -76,14 +83,13 @@ def declare_filter_data(m: ModelBuilder, port: OperatingPoint) -> FilterData:
 
     # In series with the capacitor, 1/(3·10·ω_b·C_c) as the paper has it: the factor 3·10 is dimensionless.
     R_cap = 1 / (30 * B_c)
-    return FilterData(
-        R_c, X_c, B_c, R_t, X_t, R_cap, _steady_state(port, R_c, X_c, B_c, R_t, X_t, R_cap)
-    )
+    given = port, Phasor(R_c, X_c), Phasor(R_t, X_t), B_c, R_cap
+    return FilterData(R_c, X_c, B_c, R_t, X_t, R_cap, _steady_state(*given, virtual))
 
 
-def declare_filter(m: ModelBuilder, port: DevicePort) -> Filter:
+def declare_filter(m: ModelBuilder, port: DevicePort, virtual: Phasor = ZERO) -> Filter:
     """Declare parameters and states; the equations follow once the control has formed v_c."""
-    data = declare_filter_data(m, port)
+    data = declare_filter_data(m, port, virtual)
     start = data.initial
     u_c_start = start.u - (start.i_s - start.i_g) * data.R_cap
     with m.scope("filter"):
@@ -124,13 +130,14 @@ def filter_equations(
 
 
 def _steady_state(
-    port: OperatingPoint, R_c: Expr, X_c: Expr, B_c: Expr, R_t: Expr, X_t: Expr, R_cap: Expr
+    port: OperatingPoint, Z_c: Phasor, Z_t: Phasor, B_c: Expr, R_cap: Expr, virtual: Phasor
 ) -> SteadyState:
-    u_network = port.v_0 + Phasor(R_t, X_t) * port.i_0
-    theta = u_network.angle()
-    u = Phasor(u_network.magnitude(), 0)
+    own = port.v_0 + (Z_t + virtual) * port.i_0
+    theta = own.angle()
     i_g = port.i_0.rotated(-theta)
+    drop = virtual * i_g
+    u = Phasor(own.magnitude(), 0) - drop
     u_c = u / Phasor(1, R_cap * B_c)
     i_s = i_g + Phasor(0, B_c) * u_c
-    v_c = u + Phasor(R_c, X_c) * i_s
-    return SteadyState(theta, u, i_s, i_g, v_c, power(u, i_g))
+    v_c = u + Z_c * i_s
+    return SteadyState(theta, u, i_s, i_g, v_c, power(u, i_g), drop)

@@ -60,6 +60,14 @@ OTHERWISE = {
     "pod_q.K": 170.0,
     "pod_q.limit": 0.25,
 }
+REFERENCES_AT_REST = dict.fromkeys((f"droop.delta_{x}_ref" for x in "PQU"), 0.0)
+VIRTUAL = {"virtual_impedance.R_v": 0.02, "virtual_impedance.X_v": 0.14}
+VARIANTS = {
+    "the paper's": {},
+    "algebraic": VIRTUAL | {"voltage_control.factor": 40.0},
+    "dynamic": VIRTUAL | {"virtual_impedance.dynamic": 1},
+}
+"""Virtual impedances, and another gain of the voltage control with one of them."""
 
 
 # -- the droops ---------------------------------------------------------------------------------
@@ -174,8 +182,11 @@ def _inner_loops(p, x, qd, rates, u, u_ref, w):
     i_s, i_g = qd("filter.i_s"), qd("transformer.i_g")
     tau, xi, C = p["voltage_control.tau"], p["voltage_control.xi"], p["filter.B_c"] / omega_b
     omega_n = 4 / (tau * xi)
-    error = u_ref - u
-    demanded = 200 * xi * omega_n * C * error + qd("voltage_control.x")
+    R_v, X_v = p["virtual_impedance.R_v"], p["virtual_impedance.X_v"]
+    slope = (i_g - qd("feed_forward.i_g")) / p["feed_forward.tau"]
+    induced = p["virtual_impedance.dynamic"] * X_v / omega_b * slope
+    error = u_ref - (R_v + 1j * w * X_v) * i_g - induced - u
+    demanded = 2 * p["voltage_control.factor"] * xi * omega_n * C * error + qd("voltage_control.x")
     demanded += 1j * w * p["filter.B_c"] * u + qd("feed_forward.i_g")
     i_q_max, i_d_max = p["voltage_control.i_q_max"], p["voltage_control.i_d_max"]
     i_ref = complex(
@@ -253,6 +264,80 @@ def test_every_rate_and_output_is_that_of_the_equations_written_by_hand(size):
         clamped.add((rates["voltage_control.x_q"] == 0, rates["voltage_control.x_d"] == 0))
     # Neither axis is clamped, then one of them, then each without the other and both.
     assert len(clamped) == {0.003: 1, 0.05: 2, 0.3: 4}[size]
+
+
+@pytest.mark.parametrize("variant", list(VARIANTS))
+def test_the_converter_starts_at_rest_whatever_its_virtual_impedance(variant):
+    device = Evaluated(build_model("gfor"), OTHERWISE | VARIANTS[variant] | REFERENCES_AT_REST)
+    v = 1.03 * exp(0.6j)
+    assert max(map(abs, device.rates([v.real, v.imag]).values())) < 1e-9
+    out = device.outputs([v.real, v.imag])
+    assert (out["p"], out["q"]) == pytest.approx((0.55, 0.12), abs=1e-12)
+
+
+@pytest.mark.parametrize("variant", ["algebraic", "dynamic"])
+def test_a_virtual_impedance_takes_from_the_voltage_reference(variant):
+    device = Evaluated(build_model("gfor"), OTHERWISE | VARIANTS[variant])
+    for seed in range(6):
+        x = scattered(device, seed, 0.003)
+        v = 1.03 * exp(0.6j)
+        rates, outputs = by_hand(device.parameters, x, v)
+        assert device.rates([v.real, v.imag], device.vector(x)) == pytest.approx(
+            rates, rel=1e-9, abs=1e-9
+        )
+        assert device.outputs([v.real, v.imag], device.vector(x)) == pytest.approx(
+            outputs, rel=1e-9, abs=1e-9
+        )
+
+
+# θ [rad] of a droop converter in PSCAD by the time after P_ref rises from 0.5 to 0.7 pu [ms], at 60 Hz: test 23 of
+# PowerSimulationsDynamics.jl (NREL-Sienna), benchmarks/pscad/Test23/Test23_theta.csv
+PSCAD_THETA = {
+    0: 0.19721, 10: 0.23420, 20: 0.26657, 30: 0.29061, 40: 0.30660, 55: 0.31521, 70: 0.31070, 85: 0.29904,
+    100: 0.28609, 120: 0.27309, 140: 0.26765, 160: 0.26842, 180: 0.27208, 200: 0.27573, 240: 0.27827, 280: 0.27673,
+    340: 0.27580, 400: 0.27630, 500: 0.27619, 1000: 0.27621,
+}  # fmt: skip
+DROOP_AT_STIFF_BUS = {
+    "S_n": 2.75, "f_n": 60.0, "P_0": 0.5, "Q_0": -0.075 * 0.0275 * 0.25,  # 0 at the converter's bus
+    "filter.R_c": 0.003, "filter.X_c": 0.08, "filter.B_c": 0.074,
+    "transformer.R_t": 0.01,
+    "transformer.X_t": 0.2 + 0.075 * 2.75 / 100,  # with the line to the source
+    "virtual_impedance.X_v": 0.2, "droop.R_f": 0.05, "droop.R_V": 0.2, "droop.tau_P": 1 / (2 * np.pi * 5),
+    "droop.tau_Q": 1e-3,
+}  # fmt: skip
+INNER_GAINS = {
+    "voltage_control.factor": 1.0, "voltage_control.tau": 3.193e-3, "voltage_control.xi": 0.7086,  # 0.59 and 736
+    "current_control.tau": 2.005e-4,  # 1.27
+    "feed_forward.tau": 1000.0,  # none
+    "internal_step": 2e-5,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("model", "values", "step", "most_rms", "most"),
+    [("gfor", INNER_GAINS, 2e-4, 0.4, 0.8), ("gfor_phasor", {}, 1e-3, 0.6, 1.4)],
+)
+def test_a_virtual_reactance_gives_pscads_angle_of_a_droop(
+    fmu_path, model, values, step, most_rms, most
+):
+    """Deviations are in percent of the swing, 0.2 of them from the start on, in PSCAD's steady state."""
+    found = []
+    with LoadedComponent("device", read_description(fmu_path(model))) as device:
+        device.set(DROOP_AT_STIFF_BUS | values)
+        device.setup(0.0, None)
+        device.enter_initialization_mode()
+        device.set({"v_re": 1.0, "v_im": 0.0})
+        device.exit_initialization_mode()
+        device.set({"droop.delta_P_ref": 0.7 - device.get(["droop.P_ref"])["droop.P_ref"]})
+        theta = RealBatch(device, ["droop.theta"])
+        for k in range(round(1.0 / step) + 1):
+            found.append(float(theta.read()[0]))
+            device.step(k * step, step)
+    ours = np.array([found[round(at * 1e-3 / step)] for at in PSCAD_THETA])
+    wanted = np.array(list(PSCAD_THETA.values()))
+    off = 100 * (ours - wanted) / np.ptp(wanted)
+    assert np.sqrt(np.mean(off**2)) < most_rms
+    assert abs(off).max() < most
 
 
 @pytest.mark.parametrize("axis", ["q", "d"])
