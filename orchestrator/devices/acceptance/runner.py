@@ -82,8 +82,13 @@ class AcceptanceReport:
         return any(r.whose is base.Whose.BINDING for r in self.failures)
 
     @property
+    def reasons(self) -> list[str]:
+        """Reasons not to accept it although nothing failed: what an honest one shows and this one did not, in words."""
+        return [str(r.figures["not_judged"]) for r in self.results if r.figures.get("reason")]
+
+    @property
     def trusted(self) -> bool:
-        return not self.failures and not self.not_supported
+        return not self.failures and not self.not_supported and not self.reasons
 
     @property
     def sentence(self) -> str:
@@ -92,6 +97,8 @@ class AcceptanceReport:
             return f"no check failed; not judged: {', and '.join(self.not_judged)}".removesuffix(
                 "; not judged: "
             )
+        if self.reasons and not self.failures and not self.not_supported:
+            return f"no check failed, and not to be accepted as it is: not judged: {', and '.join(self.not_judged)}"
         if not self.failures:
             return f"not supported here: {', '.join(self.not_supported)}; that says nothing about the FMU"
         if self.binding_fails and self.binding is not None:
@@ -108,6 +115,7 @@ class AcceptanceReport:
             "sha256": {"fmu": file_hash(self.fmu), "binding": file_hash(self.binding)},
             "trusted": self.trusted,
             "faults": self.faults,
+            "reasons": self.reasons,
             "not_supported": self.not_supported,
             "not_limited": missing(self.protections),
             "protections": [asdict(protection) for protection in self.protections],

@@ -111,6 +111,7 @@ class _Reader:
                     settings,
                     self._current_limit(),
                     bases.voltage,
+                    self._frequency_range(bases),
                 )
                 self._check_once(port)
         if self._problems or port is None:
@@ -158,6 +159,19 @@ class _Reader:
                     f"I_max = {declared}; it must be above 0 and below 100, in pu of the rated current"
                 )
             return limit
+        return None
+
+    def _frequency_range(self, bases: Bases) -> float | None:
+        declared = self._table.rating.frequency_range
+        if declared is None:
+            return None
+        with self._at("rating"):
+            found = amount(declared, "Hz", "frequency_range") / bases.frequency
+            if not 0 < found < 1:
+                raise ValueError(
+                    f'frequency_range = {declared}; it must be above 0 and below f_n, such as "0.2 Hz"'
+                )
+            return found
         return None
 
     def _phasor(

@@ -32,12 +32,15 @@ class FileTable(DraftedTable):
 
 
 class RatingTable(DraftedTable):
-    """The FMU as delivered: rating, rated line-to-line voltage at its port, rated frequency, largest current."""
+    """The FMU as delivered: rating, rated line-to-line voltage at its port, rated frequency, largest current.
+
+    ``frequency_range``: deviation of the frequency up to which its active power answers it; any where left out."""
 
     S_n: str | float
     V_n: str | float | None = None
     f_n: str | float = "50 Hz"
     I_max: str | float | None = None
+    frequency_range: str | float | None = None
 
 
 class QuantityTable(DraftedTable):

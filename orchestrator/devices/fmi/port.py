@@ -92,6 +92,8 @@ class PortMap:
     current_limit: float | None = None
     # the voltage of one of them, line to line [kV]; None where nothing needs it
     V_n: float | None = None
+    # deviation of the frequency up to which its power answers it, as somebody declares it [pu]
+    frequency_range: float | None = None
 
     @classmethod
     def of_dict(cls, values: Mapping[str, Any]) -> Self:

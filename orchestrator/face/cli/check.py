@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Check, print, and write what is asked for; 1 if a check failed, 2 if the FMU is not supported here."""
+    """Check, print, and write what is asked for; 1 if it is not to be accepted, 2 if it is not supported here."""
     found = check(
         options.file,
         options.binding,
@@ -52,7 +52,9 @@ def run(options: argparse.Namespace) -> int:
         print_json(found.as_json())
     else:
         _print(found.report)
-    return 1 if found.faults else NOT_SUPPORTED if found.not_supported else 0
+    if found.faults or found.report.reasons:
+        return 1
+    return NOT_SUPPORTED if found.not_supported else 0
 
 
 def _each_once(results: list[CheckResult]) -> list[CheckResult]:

@@ -1,7 +1,7 @@
 """The acceptance tests of the FMU that is certified: run, or read from a report of `gfor fmu check --json`."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
@@ -39,7 +39,8 @@ def run_checks(fmu: Path, binding: Path | None, folder: Path) -> Acceptance:
     from orchestrator.devices.acceptance.runner import check_fmu  # noqa: PLC0415 - `gfor verify` runs no checks
 
     report = check_fmu(fmu, binding)
-    found = Acceptance(report.trusted, tuple(report.faults), report.as_dict())
+    faults = tuple(report.faults) or _unknown(report.reasons)
+    found = Acceptance(report.trusted, faults, report.as_dict())
     found.keep(folder)
     return found
 
@@ -53,6 +54,9 @@ def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
             bool(report["trusted"]),
             [(r["verdict"], r["fault"], r["check"]) for r in report["checks"]],
         )
+        reasons = [
+            str(r["figures"]["not_judged"]) for r in report["checks"] if r["figures"].get("reason")
+        ]
         tool = report["tool"]
     except OSError as error:
         raise InputError(
@@ -67,7 +71,7 @@ def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
     if tool != _tool():
         raise InputError(f"--check {path}: it was made by {tool}, this is {_tool()}; {remedy}")
     faults = tuple(dict.fromkeys(fault for verdict, fault, _ in found if verdict == "fail"))
-    if said != (not faults):
+    if said != (not faults and not reasons):
         raise InputError(f"--check {path}: its checks say otherwise than its 'trusted'; {remedy}")
     from orchestrator.devices.acceptance.checks.all import CHECKS  # noqa: PLC0415 - as above
 
@@ -78,7 +82,11 @@ def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
         raise InputError(
             f"--check {path}: none of its checks was passed, so that it says nothing of the FMU; {remedy}"
         )
-    return Acceptance(not faults, faults, report)
+    return Acceptance(not faults and not reasons, faults or _unknown(reasons), report)
+
+
+def _unknown(reasons: Sequence[str]) -> tuple[str, ...]:
+    return tuple(f"not judged: {reason}" for reason in reasons)
 
 
 def _tool() -> str:

@@ -1,6 +1,8 @@
 """Whether a converter answers the frequency alike at other operating points, and its switches act alike there."""
 
+from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import dataclass
 from math import pi
 
 import numpy as np
@@ -20,6 +22,7 @@ from orchestrator.devices.acceptance.checks.events import scale
 from orchestrator.devices.acceptance.checks.port import cannot_import, followed, without_start
 from orchestrator.devices.acceptance.checks.settings import Setting, with_each_setting
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Subject
+from orchestrator.devices.fmi.port import BoundDescription
 
 _LASTS = 2.0  # time [s] for which its answer to 0.1 % less frequency is looked at
 _SOME = 5e-3  # answer [pu, S_n] from which it is compared
@@ -36,6 +39,12 @@ _PARTS = 10  # parts of an answer whose means are compared
 _RESTS = 2.0  # time before an answer in which the device comes to rest [s]
 # what an answer changes by from one place to the next, in parts of the largest and beyond its slope
 _JUMP = 0.08
+# the same on the line of frequencies from which no datasheet's droop holds
+_BROKEN = 0.4
+_MIDDLE = 0.0015  # distance from the rated frequency [pu] of a place that may be on either side
+_DRIFTS = 0.03  # movement of the current at another frequency [pu, S_n] that is no rest
+# part of the answer in one direction that is left in the other one where it has no power to give
+_NOTHING_LEFT = 0.1
 _LINES = (
     ("v_0", 0.87, 1.1, 9),
     ("P_0", -0.85, 1.0, 11),
@@ -43,6 +52,9 @@ _LINES = (
     ("frequency", -0.008, 0.008, 7),
 )
 """What differs along a line of places, from where to where [pu], and at how many."""
+_REACH = (
+    1.2  # how much farther out the last place of a line may be drawn, and the change from there
+)
 
 # how much more of the frequency changes, and where
 _LARGER, _MILD = 5, OperatingAt(1.0, 0.0, 0.3, 0.05)
@@ -97,10 +109,13 @@ def evenness(subject: Subject) -> CheckResult:
             says += f"by {abs(end.mean()):.2g} pu, and not after a smaller change"
             return failed("evenness", "wrong sign", says)
     jump = _jump(subject)
-    if jump:
+    if jump is not None and jump.breaks_its_droop:
+        says = f"{jump}: less is left of its answer to the frequency farther out, or the other way"
+        return failed("evenness", "droop of one range", says, jump=jump.beyond)
+    if jump is not None:
         return remarked(
             "evenness",
-            jump,
+            str(jump),
             "ask what it switches there: what holds at one place does not at the other",
         )
     if _TAKES not in found:
@@ -137,28 +152,59 @@ def _course(subject: Subject, point: OperatingAt, setting: Setting, times: float
     return power
 
 
-def _jump(subject: Subject) -> str:
-    """Where its answer to a small change is another one from one place to the next; "" where it is nowhere."""
+@dataclass(frozen=True)
+class _Jump:
+    """Two neighbours on a line between which the answer to a small change jumps.
+
+    ``beyond``: By which part of the largest answer, beyond the usual slope.
+    ``sizes``: Answers at both places [pu, S_n].
+    ``moving``: Movement of the current there before the small change [pu, S_n]."""
+
+    line: str
+    places: tuple[float, float]
+    beyond: float
+    sizes: tuple[float, float]
+    moving: float
+
+    def __str__(self) -> str:
+        ends = f"{self.line} = {self.places[0]:.3g} and {self.places[1]:.3g}"
+        return f"its answer to a small change jumps by {100 * self.beyond:.2g} % between {ends}"
+
+    @property
+    def breaks_its_droop(self) -> bool:
+        """Tell if a part of its droop is gone away from the rated frequency, which no datasheet's droop has.
+
+        A dead band is the other way round; what has no power left in one direction gives nothing there."""
+        if self.line != "frequency" or self.beyond < _BROKEN:
+            return False
+        by_distance = sorted(zip(map(abs, self.places), self.sizes, strict=True))
+        (_, inner), (_, outer) = by_distance
+        if self.moving > _DRIFTS:
+            return True  # its own frequency stays behind
+        one_sided = self.places[0] * self.places[1] < 0 or min(map(abs, self.places)) < _MIDDLE
+        if one_sided:
+            return min(self.sizes) > _NOTHING_LEFT * max(self.sizes)
+        return outer < inner
+
+
+def _jump(subject: Subject) -> _Jump | None:
+    """Find where its answer to a small change is another one from one place to the next; None where it is nowhere."""
     draw, times = subject.random("lines"), scale(subject, 30 * _ANSWERS)
-    for name, least, most, number in _LINES:
+    for name, least, most, number in _lines(subject):
         at = np.linspace(least, most, number) + draw.uniform(-0.25, 0.25, number) * (
             most - least
         ) / (number - 1)
-        places, answers = [], []
+        places, answers, moves = [], [], list[float]()
         for place in at:
             v, P, Q = (
                 place if name == n else usual
                 for n, usual in (("v_0", 1.0), ("P_0", 0.3), ("Q_0", 0.05))
             )
             with suppress(ComponentError):  # which 'operating_points' tells
-                answers.append(
-                    _small(
-                        subject,
-                        OperatingAt(v, 0, P, Q),
-                        place if name == "frequency" else 0.0,
-                        times,
-                    )
-                )
+                offset = place if name == "frequency" else 0.0
+                answer, moving = _small(subject, OperatingAt(v, 0, P, Q), offset, times)
+                answers.append(answer)
+                moves.append(moving)
                 places.append(place)
         if len(places) < 4:
             continue
@@ -174,13 +220,30 @@ def _jump(subject: Subject) -> str:
         )
         beyond = np.abs(slopes[k] - usual[k]).max() * gaps[k]
         if beyond > _JUMP:
-            ends = f"{name} = {places[k]:.3g} and {places[k + 1]:.3g}"
-            return f"its answer to a small change jumps by {100 * beyond:.2g} % between {ends}"
-    return ""
+            ends = (float(places[k]), float(places[k + 1]))
+            sizes = (float(np.abs(answers[k]).max()), float(np.abs(answers[k + 1]).max()))
+            return _Jump(name, ends, float(beyond), sizes, max(moves[k : k + 2]))
+    return None
 
 
-def _small(subject: Subject, point: OperatingAt, offset: float, times: float) -> Numbers:
-    """Change of the current in its voltage's frame after a little less voltage and more frequency, as means."""
+def _lines(subject: Subject) -> Iterator[tuple[str, float, float, int]]:
+    """The lines, that of frequencies as far as the binding says that it answers them."""
+    described = subject.description
+    declared = described.port.frequency_range if isinstance(described, BoundDescription) else None
+    for name, least, most, number in _LINES:
+        if name != "frequency" or declared is None:
+            yield name, least, most, number
+            continue
+        reach = min(most, max(0.2 * declared, (declared - FREQUENCY) / _REACH))
+        yield name, -reach, reach, number
+
+
+def _small(
+    subject: Subject, point: OperatingAt, offset: float, times: float
+) -> tuple[Numbers, float]:
+    """Change of the current in its voltage's frame after a little less voltage and more frequency, as means.
+
+    Beside it the movement of that current before [pu, S_n], over a twentieth of the time at rest."""
     h = subject.step_size
     before, steps = (
         max(_PARTS, round(times * lasts / h)) for lasts in (_RESTS if offset else h, _ANSWERS)
@@ -193,7 +256,8 @@ def _small(subject: Subject, point: OperatingAt, offset: float, times: float) ->
     means = np.array(
         [part.mean() for part in np.array_split(seen[before:] - seen[before - 1], _PARTS)]
     )
-    return np.concatenate([means.real, means.imag])
+    still = seen[before - max(1, before // 20) - 1 : before]
+    return np.concatenate([means.real, means.imag]), float(np.abs(still - seen[before - 1]).max())
 
 
 def _effects(

@@ -18,6 +18,7 @@ from orchestrator.devices.acceptance.checks.running import EQUAL, affordable
 from orchestrator.devices.acceptance.checks.subject import Subject
 
 _STEPS = 50
+_HIDDEN = ("no error, and finite outputs", False)
 _SILENT = "outputs that are no numbers, and no error"
 
 
@@ -36,6 +37,9 @@ def nan_input(subject: Subject) -> CheckResult:
         says = f"{subject.watched[place]} of a new instance differs by {apart:.3g} after another one was given NaN"
         return failed("nan_input", "not a number stays", says, difference=apart)
     seen = "; ".join(f"{bad}: {answer}" for bad, (answer, _) in answers.items())
+    if answers[str(np.nan)] == _HIDDEN:
+        says = f"{seen}: what it puts in the place of an input that is no number is invented"
+        return failed("nan_input", "not a number hidden", says)
     if not all(told for _, told in answers.values()):
         return remarked(
             "nan_input",
@@ -58,10 +62,7 @@ def _answer(subject: Subject, deviation: Numbers) -> tuple[str, bool]:
     except EndedError:
         return "it ends its simulation", True
     finite = np.isfinite(values).all()
-    return (
-        "no error, and finite outputs" if finite else "no error, and outputs that are no numbers",
-        False,
-    )
+    return _HIDDEN if finite else ("no error, and outputs that are no numbers", False)
 
 
 @check("extreme_inputs", "Does it give numbers, or an error, where its inputs are extreme?")

@@ -20,11 +20,12 @@ from orchestrator.devices.acceptance.checks import (
     state,
     timing,
     tuning,
+    windup,
 )
 
 MODULES = (
     *(file, loading, running, instances, clock, state, sampling, timing, tuning),
-    *(port, points, signs, evenness, damping, ride_through, aftermath, extremes, resources),
+    *(port, points, signs, evenness, damping, ride_through, windup, aftermath, extremes, resources),
 )
 """Importing them enters their checks."""
 
@@ -65,6 +66,7 @@ ORDER = (
     "evenness",
     "pod",
     "limits",
+    "anti_windup",
     "after_dips",
     "nan_input",
     "extreme_inputs",

@@ -284,6 +284,9 @@ EXPORT int fmi2SetReal(void *c, const unsigned *references, size_t n, const doub
 #ifdef FAULT_SHARED_PARAMETERS
         if (references[k] == GAIN) shared_gain = values[k];
 #endif
+#ifdef FAULT_HIDES_NAN
+        if (isnan(values[k])) continue;
+#endif
         S->z[references[k]] = values[k];
 #ifdef FAULT_CLEARS_NEXT /* setting this variable sets the one after it back */
         if (references[k] == FAULT_CLEARS_NEXT) S->z[references[k] + 1] = 0;

@@ -202,6 +202,82 @@ def _si(form):
     return value, current
 
 
+def device(name, kind, form="rectangular", **options):
+    """A converter of another kind, of devices.c: MATCHING, MACHINE, OSCILLATOR, DROOPING or FOLLOWING."""
+    return replace(converter(name, form, KIND=kind, **options), file="devices.c")
+
+
+def other_kinds():
+    """Ten honest converters that share no control with `converter`, three of them at other ratings."""
+
+    def at_rating(name, kind, rating, kV):
+        units = {
+            "V_UNIT": repr(kV * sqrt(2 / 3)),
+            "I_UNIT": f"(RATING / ({kV} * sqrt(3.0)) * sqrt(2.0))",
+            "P_UNIT": repr(float(rating)),
+            "RATING": repr(float(rating)),
+        }
+        source = device(name, kind, "qd", units=("kV", "kA", "MW"), **units)
+        value, current = _si("qd")
+        start = START.replace('variable = "v_0"', 'variable = "v_0"\nvalue = "phase peak"')
+        bound = binding("qd", rating=rating, voltage=value, current=current, start=start)
+        return Member(source, binding=bound.replace("230 kV", f"{kV} kV"))
+
+    return [
+        Member(device("matching", "MATCHING")),
+        Member(device("matching_with_loop", "MATCHING", VOLTAGE_LOOP=60.0)),
+        Member(device("battery_of_slow_link", "MATCHING", T_DC=1.5, T_SOURCE=0.05)),
+        Member(device("virtual_machine", "MACHINE")),
+        Member(device("virtual_oscillator", "OSCILLATOR")),
+        Member(device("droop_of_impedance", "DROOPING", VOLTAGE_LOOP=60.0, R_V=0.15, X_V=0.45)),
+        Member(device("droop_of_soft_limit", "DROOPING", SOFT_LIMIT=1.05, I_LIMIT=1.3)),
+        Member(device("following_with_fast_frequency", "FOLLOWING")),
+        at_rating("matching_of_2_mva", "MATCHING", 2.5, 0.69),
+        at_rating("virtual_machine_of_900_mva", "MACHINE", 900, 220),
+    ]
+
+
+def faults_of_other_kinds():
+    """Give devices that wind up, have a droop of one range, or pass over an input that is no number in silence."""
+
+    def winds_up(name, kind, **defines):
+        only = (*COMPARING, "steady_state", "power_balance", "anti_windup")
+        return Member(device(name, kind, **defines), "winds up", only=only)
+
+    def one(name, fault, check, **defines):
+        only = (*COMPARING, "steady_state", "power_balance", check)
+        return Member(device(name, **defines), fault, only=only)
+
+    loop = {"VOLTAGE_LOOP": 60.0}
+    return [
+        winds_up("oscillator_that_winds_up", "OSCILLATOR", FAULT_ANTI_WINDUP=0, **loop),
+        winds_up("matching_that_winds_up", "MATCHING", FAULT_ANTI_WINDUP=0, **loop),
+        winds_up("winds_up_absorbing", "MATCHING", FAULT_ANTI_WINDUP="(own.re < e)", **loop),
+        winds_up("following_that_winds_up", "FOLLOWING", FAULT_Q_WINDS_UP=6.0),
+        one(
+            "slip_within_a_range",
+            "droop of one range",
+            "evenness",
+            kind="DROOPING",
+            FAULT_SLIP_WITHIN=0.004,
+        ),
+        one(
+            "power_within_a_range",
+            "droop of one range",
+            "evenness",
+            kind="FOLLOWING",
+            FAST_WITHIN=0.2,
+        ),
+        one(
+            "hides_what_is_no_number",
+            "not a number hidden",
+            "nan_input",
+            kind="MACHINE",
+            FAULT_HIDES_NAN=1,
+        ),
+    ]
+
+
 COMPARING = ("runs", "independence", "repeatability", "reading", "feedthrough")
 """What must be known before two runs are compared."""
 
@@ -302,6 +378,7 @@ def good():
         Member(converter("converter_with_dip_memory", DIP_MEMORY=1)),
         Member(converter("converter_that_wraps", WRAPS_BY="(2 * 3.14159265358979323846)")),
         Member(converter("converter_of_two_droops", FAULT_CHARGING_DROOP=2)),
+        *other_kinds(),
     ]
     for form in ("polar", "abc", "qd", "power"):
         value, current = _si(form)
@@ -425,6 +502,7 @@ def faulty():
         *late_outputs(),
         *large_signals(),
         *damping(),
+        *faults_of_other_kinds(),
     ]
 
 
