@@ -25,7 +25,7 @@ FLOORS = {
     "systems": (("coupling",), ("ssp",)),
     "linear": (("models",), ("spectra",), ("doubts", "signals")),
     "cases": (),
-    "simulation": (("federation", "interop", "watch"),),
+    "simulation": (("engine",), ("federation", "interop", "watch")),
     "output": (("results", "signatures"), ("report",)),
     "studies": (
         ("points", "signals"),

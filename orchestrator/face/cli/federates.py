@@ -6,7 +6,7 @@ from orchestrator.core.asked import read_whole
 from orchestrator.core.errors import InputError
 from orchestrator.face.cli.arguments import add_options
 from orchestrator.face.cli.terminal import make_errors
-from orchestrator.simulation.federation.choice import ENGINES, PATIENCE, TO_JOIN, Federates
+from orchestrator.simulation.engine import ENGINES, PATIENCE, TO_JOIN, Federates
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -14,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_options(
         group,
         "federates",
-        engines=ENGINES,
+        engines=("local", *ENGINES),
         names=names,
         none=(),
         port=read_whole(1, 65534, "a port"),
@@ -51,11 +51,12 @@ def choice(options: argparse.Namespace, number_of_scenarios: int) -> Federates |
         return None
     if options.like is not None:
         raise InputError(
-            "--like emulates another master on this machine; leave out either --like or --engine helics"
+            "--like emulates another master on this machine; leave out either --like or --engine "
+            f"{options.engine}"
         )
     if options.resume is not None or options.require_checkpoint or options.checkpoint:
         raise InputError(
-            "a run with federates keeps no checkpoints; leave out --engine helics, or --resume, "
+            f"a run with federates keeps no checkpoints; leave out --engine {options.engine}, or --resume, "
             "--checkpoint and --require-checkpoint"
         )
     if options.external and number_of_scenarios > 1:
@@ -68,4 +69,8 @@ def choice(options: argparse.Namespace, number_of_scenarios: int) -> Federates |
         console.print(
             "a run with federates keeps no checkpoints: if it is interrupted, it cannot be resumed"
         )
-    return Federates(**given, announce=lambda text: console.print(text, markup=False))
+    return Federates(
+        **given,
+        announce=lambda text: console.print(text, markup=False),
+        engine=options.engine,
+    )

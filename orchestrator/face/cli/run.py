@@ -47,7 +47,7 @@ from orchestrator.output.results.staging import (
     unfinished,
 )
 from orchestrator.output.results.storage import save_dataset
-from orchestrator.simulation.federation.choice import Federates
+from orchestrator.simulation.engine import Federates
 from orchestrator.simulation.interop.rules import MASTERS, MasterRules, master_rules
 from orchestrator.studies.modes import beside
 from orchestrator.studies.modes.all_modes import all_ours

@@ -13,8 +13,7 @@ from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
 from orchestrator.output.report.cells import CELLS, check_case, found_from, read_cells
 from orchestrator.output.report.html.charts import ChartCurve, thinned
 from orchestrator.output.report.html.folder import SUMMARY
-from orchestrator.output.results.comtrade.reading import is_comtrade
-from orchestrator.output.results.csv_recording import SUFFIXES
+from orchestrator.output.results.readers import has_reader
 from orchestrator.output.results.recording import TRAJECTORY
 from orchestrator.studies.certification.case_file import CASE
 from orchestrator.studies.certification.certificate import Certificate
@@ -147,7 +146,7 @@ def opened(given: str, *, trust_fmus: bool = False) -> Opened:
         check_case(study, case.file, path)
         kept = {key: study.get(key) for key in ("scenario", "step", "values", "range")}
         return study["case"], case, {"study": study, **kept}
-    if is_comtrade(path) or path.suffix.lower() in SUFFIXES:
+    if has_reader(path):
         raise InputError(
             f"{given}: a recording is shown beside a simulation: gfor explore CASE --beside {given}"
         )

@@ -16,10 +16,9 @@ from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import MOST_TEXT, read_bytes
 from orchestrator.core.late import pd, xr
-from orchestrator.output.results.comtrade.reading import LINE_FREQUENCY
+from orchestrator.output.results.readers import LINE_FREQUENCY
 
 EXCEL = (".xlsx", ".xlsm")
-SUFFIXES = (".csv", ".tsv", *EXCEL)
 _HEADING = re.compile(r"\s*(.*?)\s*(?:[\[(]([^])]*)[])])?\s*")
 _SECONDS = {
     "": 1.0,
@@ -43,6 +42,8 @@ def read_table(path: Path) -> xr.Dataset:
     """Read signals; headings such as ``f north [Hz]``, or a row of units below the names, give names and units.
 
     Lines above the headings, and columns without numbers, are left out."""
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file; give the path of a recording")
     table = _table(path)
     first = str(table.columns[0]) if table.shape[1] else ""
     name, unit = _parts(first)

@@ -1,56 +1,21 @@
-"""What a user chooses about a federation: which components are federates, who starts them, and where they meet."""
+"""Figures and names that all processes of a federation share."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from orchestrator.simulation.engine import PATIENCE, TO_JOIN, Federates, address_of
 
-from orchestrator.core.errors import InputError
-
-ENGINES = ("local", "helics")
 OWN_NAME = "gfor_cosim"  # name of the federate of gfor itself
 OVER = "the run is over"
 """Reason with which gfor ends a federation at a broker that is not its own: otherwise time goes on without it."""
 
 PROTOCOL = 1  # changes whenever a federate of the version before would misunderstand
 FIRST_NS = 1  # when gfor reads what federates published before their first step [ns]
-PATIENCE = 30.0  # how long a federate may take for one step, or one answer [s]
-TO_JOIN = 60.0  # how long is waited for all federates to join [s]
-DEFAULT_PORT = 23405  # of a HELICS broker whose address names none
 
-
-@dataclass(frozen=True, slots=True)
-class Federates:
-    # components that gfor starts as federates on this machine, each in a process of its own
-    names: tuple[str, ...] = ()
-    # components that somebody else starts as federates: `gfor master federate`, or a HELICS program of their own
-    external: tuple[str, ...] = ()
-    # address of a broker that runs already, such as ``tcp://host:23405``; None has gfor start one
-    broker: str | None = None
-    # where a broker that gfor starts listens on all network interfaces; None takes a free port of this machine alone
-    port: int | None = None
-    # patience, to_join: time for one step or answer, and for all to join [s]
-    patience: float = PATIENCE
-    to_join: float = TO_JOIN
-    # takes sentences that the user should read meanwhile: who is waited for, and how long the run will take
-    announce: Callable[[str], None] | None = field(default=None, compare=False)
-
-    def __post_init__(self) -> None:
-        if self.broker is not None and self.port is not None:
-            raise InputError(
-                "--broker names a broker that runs, --broker-port has gfor start one; give only one of them"
-            )
-        both = sorted(set(self.names) & set(self.external))
-        if both:
-            raise InputError(
-                f"{', '.join(both)}: a federate is either started by gfor or external; name it only once"
-            )
-        if self.broker is not None:
-            address_of(self.broker)
-
-
-def address_of(broker: str) -> tuple[str, int]:
-    host, colon, port = broker.removeprefix("tcp://").partition(":")
-    if not host or "/" in host or (colon and not (port.isdigit() and 0 < int(port) < 65536)):
-        raise InputError(
-            f"broker {broker!r}: an address has the form tcp://host:port, such as tcp://10.0.0.5:23405"
-        )
-    return host, int(port) if colon else DEFAULT_PORT
+__all__ = [
+    "FIRST_NS",
+    "OVER",
+    "OWN_NAME",
+    "PATIENCE",
+    "PROTOCOL",
+    "TO_JOIN",
+    "Federates",
+    "address_of",
+]

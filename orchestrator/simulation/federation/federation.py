@@ -29,7 +29,7 @@ from orchestrator.devices.fmi.interrupts import calls
 from orchestrator.devices.fmi.limits import Limits
 from orchestrator.simulation.federation import frames
 from orchestrator.simulation.federation.choice import PROTOCOL, Federates
-from orchestrator.simulation.federation.component import FederatedComponent
+from orchestrator.simulation.federation.component import FederatedComponent, obstacle_of
 from orchestrator.simulation.federation.frames import Door, Frames
 from orchestrator.simulation.federation.layout import (
     Layout,
@@ -38,6 +38,7 @@ from orchestrator.simulation.federation.layout import (
     make_layout,
     require_broker,
 )
+from orchestrator.simulation.federation.pace import Pace
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.system import ComponentPlan, System
 
@@ -343,6 +344,14 @@ class Federation(Closing):
             )
         self._opened.append(own)
         return own
+
+    def observers(self) -> list[Pace]:
+        """Tell the expected time, if somebody takes sentences."""
+        return [] if self._choice.announce is None else [Pace(self._choice.announce)]
+
+    def obstacle(self, component: Component) -> str | None:
+        """Return why a federate keeps the system from being linearised; None where it does not."""
+        return obstacle_of(component)
 
     def begin(self, master: Master) -> None:
         """Hand the initialised components over to their federates."""

@@ -1,12 +1,10 @@
-"""The choices by which masters differ, each of which changes the digits of a result, and the masters whose choices are
-known: each was driven with the probe pair and with whole systems (tests/simulation/interop)."""
+"""The choices by which masters differ, each of which changes the digits of a result, and the masters that are known."""
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
+from fmus.toolchain.plugins import Collections
 from orchestrator.core.errors import InputError
 from orchestrator.systems.coupling.schedule import FirstInputs, Schedule
 
@@ -79,12 +77,8 @@ class MasterRules:
         return steps + bool(ahead)
 
 
-MASTERS = {
-    name: MasterRules(name, **rules)
-    for name, rules in tomllib.loads(
-        Path(__file__).with_name("masters.toml").read_text(encoding="utf-8")
-    ).items()
-}
+MASTERS: Collections[MasterRules] = Collections("gfor_cosim.masters", (MasterRules,))
+"""Masters by the word on the command line, ours first."""
 
 
 def master_rules(name: str) -> MasterRules:

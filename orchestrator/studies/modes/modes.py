@@ -36,7 +36,7 @@ from orchestrator.linear.spectra.critical_modes import find_critical_modes
 from orchestrator.linear.spectra.mode_names import Naming
 from orchestrator.linear.spectra.stability import Hidden, Stability, hidden, whole_spectrum
 from orchestrator.output.results.mode_json import eigenvalue_json
-from orchestrator.simulation.federation.federation import Federation
+from orchestrator.simulation.engine import Engine
 from orchestrator.studies.modes.mode_identity import NamedSystem, settled
 from orchestrator.studies.modes.naming import named_modes
 from orchestrator.studies.modes.start_errors import start_error
@@ -142,10 +142,10 @@ def compute_modes(
 
 
 def running(
-    prepared: PreparedScenario, federation: Federation | None = None, threads: int | None = 1
+    prepared: PreparedScenario, engine: Engine | None = None, threads: int | None = 1
 ) -> Master:
-    """The scenario's FMUs, initialised; those of a federation still in this process."""
-    opener = open_plan if federation is None else federation.open
+    """The scenario's FMUs, initialised; those of an engine still in this process."""
+    opener = open_plan if engine is None else engine.open
     try:
         return Master(
             prepared.system,

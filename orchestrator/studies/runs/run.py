@@ -16,6 +16,7 @@ from orchestrator.core.errors import (
     ResultsError,
     RunInterruptedError,
 )
+from orchestrator.devices.fmi.component import Component
 from orchestrator.devices.fmi.instance import is_isolated, protections_of
 from orchestrator.devices.fmi.interrupts import calls
 from orchestrator.devices.fmi.protection import Protection, missing
@@ -30,10 +31,7 @@ from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
 from orchestrator.output.results.recorded import open_whole
 from orchestrator.output.results.recording import ENDED_EARLY, TRAJECTORY, RecordingFolder
 from orchestrator.output.results.storage import trajectory_dataset
-from orchestrator.simulation.federation.choice import Federates
-from orchestrator.simulation.federation.component import obstacle_of
-from orchestrator.simulation.federation.federation import Federation
-from orchestrator.simulation.federation.pace import Pace
+from orchestrator.simulation.engine import ENGINES, Engine, Federates
 from orchestrator.simulation.watch.finding import NOT_JUDGED, UNSTABLE, Finding
 from orchestrator.simulation.watch.watch import Watch
 from orchestrator.studies.modes.linear import NoLinearResponseError, linear_response
@@ -137,31 +135,42 @@ def run_scenario(
     ``checkpoints``: keep the run while it goes on, and go on from the newest where one was left; not with federates.
     ``boxes``: finds the modes where components hide their states."""
     if federates is not None:
-        if federates.announce is not None:
-            observers = [*observers, Pace(federates.announce)]
-        with Federation(prepared, federates) as federation:
-            ready = federation.prepared
+        with ENGINES[federates.engine](prepared, federates) as engine:
             return _run(
-                ready,
+                engine.prepared,
                 frequency_range,
-                observers,
-                linear,
-                recording,
-                None,
-                threads,
-                boxes,
-                federation,
+                [*observers, *engine.observers()],
+                linear=linear,
+                recording=recording,
+                checkpoints=None,
+                threads=threads,
+                boxes=boxes,
+                engine=engine,
             )
     try:
         return _run(
-            prepared, frequency_range, observers, linear, recording, checkpoints, threads, boxes
+            prepared,
+            frequency_range,
+            observers,
+            linear=linear,
+            recording=recording,
+            checkpoints=checkpoints,
+            threads=threads,
+            boxes=boxes,
         )
     except NotTakenUpError as error:
         if checkpoints is None:
             raise
         checkpoints.forget(str(error))
         return _run(
-            prepared, frequency_range, observers, linear, recording, checkpoints, threads, boxes
+            prepared,
+            frequency_range,
+            observers,
+            linear=linear,
+            recording=recording,
+            checkpoints=checkpoints,
+            threads=threads,
+            boxes=boxes,
         )
 
 
@@ -169,24 +178,24 @@ def _run(
     prepared: PreparedScenario,
     frequency_range: tuple[float, float],
     observers: Sequence[Observer],
+    *,
     linear: bool,
     recording: RecordingFolder | None,
     checkpoints: Checkpoints | None,
     threads: int | None,
     boxes: Callable[..., ModesResult] | None,
-    federation: Federation | None = None,
+    engine: Engine | None = None,
 ) -> RunResult:
+    obstacle_of = obstacle if engine is None else _with_obstacles(engine)
     watch = Watch(prepared, recording)
     statistics = None
     failure: CosimError | None = None
     after = modes_after(prepared, frequency_range)
-    with running(prepared, federation, threads) as master:
+    with running(prepared, engine, threads) as master:
         protections = {
             name: found for name, c in master.components.items() if (found := protections_of(c))
         }
-        reasons = [
-            text for c in master.components.values() if (text := obstacle_of(c) or obstacle(c))
-        ]
+        reasons = [text for c in master.components.values() if (text := obstacle_of(c))]
         if reasons and boxes is not None:
             modes = boxes(prepared, master, frequency_range)
         elif reasons:
@@ -196,14 +205,14 @@ def _run(
         else:
             modes = modes_of(prepared, master, frequency_range)
         if reasons and not (
-            boxes or federation
+            boxes or engine
         ):  # a look is in steps, which a foreign federate cannot take back
             modes = replace(modes, warnings=(*modes.warnings, *_diverging(master)))
         shifts = _shifts(master, modes)
         follows = _response_of(master, prepared) if linear else None
         try:
-            if federation is not None:
-                federation.begin(master)
+            if engine is not None:
+                engine.begin(master)
             statistics = master.run(
                 prepared.stop_time,
                 prepared.events,
@@ -254,6 +263,11 @@ def _run(
         protections,
         after,
     )
+
+
+def _with_obstacles(engine: Engine) -> Callable[[Component], str | None]:
+    """Why a component keeps a system from being linearised: by its engine, or by itself."""
+    return lambda component: engine.obstacle(component) or obstacle(component)
 
 
 def _response_of(master: Master, prepared: PreparedScenario) -> xr.Dataset:

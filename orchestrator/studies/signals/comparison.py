@@ -26,9 +26,8 @@ from orchestrator.linear.signals.mode_doubts import (
     with_doubts,
     worth_showing,
 )
-from orchestrator.output.results.comtrade.reading import is_comtrade, read_comtrade
-from orchestrator.output.results.csv_recording import SUFFIXES, read_table
 from orchestrator.output.results.manifest import MANIFEST, ResultsWarning, checked
+from orchestrator.output.results.readers import reader_of
 from orchestrator.output.results.recorded import open_recording, open_whole
 from orchestrator.output.results.recording import FOLDER, TRAJECTORY, parts_of
 from orchestrator.output.results.signals import signal
@@ -60,11 +59,10 @@ class Comparison:
 def open_trajectory(path: Path) -> xr.Dataset:
     """A recorded run: ``trajectory.nc``, or the scenario's folder that holds it; also one that is not finished.
 
-    A path to ``.cfg``, ``.dat`` or ``.cff`` is a measured recording in COMTRADE; CSV and Excel are read as well."""
-    if is_comtrade(path):
-        return read_comtrade(path)
-    if path.suffix.lower() in SUFFIXES and path.is_file():
-        return read_table(path)
+    A file whose ending has a reader is a measured recording: COMTRADE, CSV, Excel, and what plug-ins read."""
+    read = None if path.is_dir() else reader_of(path)
+    if read is not None:
+        return read(path)
     if parts_of(path / FOLDER):
         dataset = open_recording(path / FOLDER)
         if not dataset.sizes["time"]:

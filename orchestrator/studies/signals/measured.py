@@ -14,7 +14,7 @@ from orchestrator.linear.signals.identification import (
     identify_modes,
     sampling,
 )
-from orchestrator.output.results.comtrade.reading import LINE_FREQUENCY
+from orchestrator.output.results.readers import LINE_FREQUENCY
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -14,7 +14,7 @@ from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.errors import CosimError
 from orchestrator.core.late import xr
 from orchestrator.linear.signals.identification import IdentifiedMode
-from orchestrator.output.results.comtrade.reading import LINE_FREQUENCY
+from orchestrator.output.results.readers import LINE_FREQUENCY
 from orchestrator.studies.signals.comparison import strongest_modes
 from orchestrator.studies.validation.record import Recording
 from orchestrator.studies.validation.windows import Windows

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from orchestrator.output.results.comtrade.reading import LINE_FREQUENCY
+from orchestrator.output.results.readers import LINE_FREQUENCY
 from orchestrator.studies.signals.measured import measured_modes
 
 

@@ -16,6 +16,7 @@ from orchestrator.core.foreign_files import read_bytes
 from orchestrator.core.late import pd, xr
 from orchestrator.output.results.comtrade.configuration import Configuration, read_configuration
 from orchestrator.output.results.manifest import ResultsWarning
+from orchestrator.output.results.readers import LINE_FREQUENCY
 
 _STAMP_MISSING = 0xFFFFFFFF
 _TYPES = {"BINARY": ("<i2", -0x8000), "BINARY32": ("<i4", -0x80000000), "FLOAT32": ("<f4", None)}
@@ -141,10 +142,6 @@ def _check_numbers(numbers: Numbers, configuration: Configuration, place: str) -
         )
 
 
-SUFFIXES = (".cfg", ".cff", ".dat")  # files by which a recording is named, in small letters
-LINE_FREQUENCY = "line_frequency_hz"
-"""Coordinate of a recording's signals: frequency of the line [Hz], 0 where the file leaves it open."""
-
 MOST_BYTES = 2_000_000_000  # of a file of samples: an hour of forty channels at 5 kHz
 _MOST_TEXT = 20_000_000
 _SECTION = re.compile(
@@ -153,10 +150,6 @@ _SECTION = re.compile(
 )
 # part of the whole time by which time stamps may differ from the sampling rates before it is said
 _TIMES_DIFFER = 0.01
-
-
-def is_comtrade(path: Path) -> bool:
-    return path.suffix.lower() in SUFFIXES
 
 
 def read_comtrade(path: Path) -> xr.Dataset:
