@@ -205,3 +205,47 @@ def test_a_collection_holds_objects_of_one_kind_under_one_name(
     codes = Collections("gfor_cosim.codes", (kind, GridCode, DeclaredCode))
     with pytest.raises(PlugInError, match=says):
         dict(codes)
+
+
+def test_a_reader_an_engine_and_a_master_of_a_colleague_are_used(installed):
+    code = (
+        "import numpy as np, xarray as xr\n"
+        "from orchestrator.simulation.interop.rules import MasterRules\n"
+        "from orchestrator.systems.coupling.observers import Observer\n"
+        "def read(path):\n"
+        "    times = np.arange(0, 10, 0.01)\n"
+        "    wave = 60 + np.exp(-0.5 * times) * np.sin(2 * np.pi * times)\n"
+        "    return xr.Dataset({'f': ('time', wave, {'units': 'Hz'})},\n"
+        "                      {'time': times, 'line_frequency_hz': 60.0})\n"
+        "class Told:\n"
+        "    def __init__(self, prepared, federates):\n"
+        "        self.prepared, self.open = prepared, None\n"
+        "    def __enter__(self):\n"
+        "        print('engine begins')\n"
+        "        from orchestrator.systems.coupling.coupled import open_plan\n"
+        "        self.open = open_plan\n"
+        "        return self\n"
+        "    def __exit__(self, *error): print('engine ends')\n"
+        "    def observers(self): return []\n"
+        "    def obstacle(self, component): return None\n"
+        "    def begin(self, master): print('run begins', sorted(master.components))\n"
+        "OURS = {'house': MasterRules('house', 'House 1', 'in turn', source='its manual')}\n"
+    )
+    groups = {
+        "gfor_cosim.readers": {"rec": "vendor_files:read"},
+        "gfor_cosim.engines": {"told": "vendor_files:Told"},
+        "gfor_cosim.masters": {"vendor": "vendor_files:OURS"},
+    }
+    installed.install("vendor", {"vendor_files.py": code}, groups)
+    (installed.site.parent / "a.rec").write_bytes(b"")
+    heard = installed(*GFOR, "signal", "identify", "a.rec", "f", "--json")
+    assert heard.returncode == 0, heard.stderr
+    assert '"frequency_hz": 1.0' in heard.stdout or '"frequency_hz": 0.99' in heard.stdout
+    short = ("run", "infinite_bus", "--scenario", "dip", "--stop", "0.01")
+    ran = installed(*GFOR, *short, "--engine", "told")
+    assert ran.returncode == 0, ran.stderr
+    for line in ("engine begins", "run begins ['gfor', 'grid']", "engine ends"):
+        assert line in ran.stdout
+    like = installed(*GFOR, *short, "--like", "house", "--out", "like")
+    assert like.returncode == 0, like.stderr
+    assert "like House 1" in like.stdout
