@@ -10,6 +10,7 @@ Examples
 """
 
 import re
+from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
 
@@ -29,7 +30,10 @@ __all__ = [*_HOMES]  # noqa: PLE0604 - names all the same
 
 def __getattr__(name: str) -> object:
     if name not in _HOMES:
-        raise AttributeError(_absence(name))
+        if name.startswith("_"):
+            raise AttributeError(_absence(name))
+        errors = import_module(f"{__name__}.core.attributes")  # a notebook shows its sentence alone
+        raise errors.NoSuchAttributeError(_absence(name))
     value: object = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
     globals()[name] = value
     return value
@@ -46,7 +50,9 @@ def _absence(name: str) -> str:
     if hasattr(__getattr__("Case"), name):
         ways.insert(0, f"gfor.load('two_area').{name}(…)")
     if not ways:
-        return f"{absent}; it has: {known}"
+        near = get_close_matches(name, _HOMES, 1)
+        meant = f"; did you mean {near[0]}?" if near else ""
+        return f"{absent}; it has: {known}{meant}"
     return f"{absent}: use {', or '.join(ways)}; functions: {known}"
 
 

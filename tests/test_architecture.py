@@ -18,8 +18,8 @@ FLOORS = {
     "core": (
         ("arrays", "closing", "cores", "late", "spelling", "threads", "uncollected", "units"),
         ("errors",),
-        ("asked", "foreign_files", "truth"),
-        ("safe_files", "toml_files"),
+        ("asked", "attributes", "foreign_files"),
+        ("safe_files", "toml_files", "truth"),
     ),
     "devices": (("fmi",), ("binding",), ("acceptance",)),
     "systems": (("coupling",), ("ssp",)),

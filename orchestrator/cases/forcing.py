@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from orchestrator.cases.case import Case
 from orchestrator.cases.network_data import bus_name
@@ -55,6 +56,15 @@ def with_events(case: Case, forcings: Sequence[str], faults: Sequence[str]) -> C
     return replace(case, table=table, events_given=tuple(said))
 
 
+def _reason(detail: Any) -> str:
+    """A mistake of one part of an event in words: which part, the rule, and the value seen."""
+    said = str(detail["msg"]).removeprefix("Value error, ")
+    if not said.startswith("Input should be"):
+        return said
+    place = ".".join(map(str, detail["loc"]))
+    return f"{place} = {detail['input']!r}; {said.replace('Input should be', 'it must be')}"
+
+
 def event_of(option: str, text: str) -> ForcingTable | BusFaultTable:
     """An event in words: ``sg35.exciter.V_ref 0.8 Hz 0.02 pu square from 2 s``, ``bus_9, 150 ms, opens line_7_9``."""
     kind, name, form, how = _FORMS[option]
@@ -70,9 +80,6 @@ def event_of(option: str, text: str) -> ForcingTable | BusFaultTable:
         table: ForcingTable | BusFaultTable = kind(type=name, time=time, **given)
         return table.asked_as(f"--{option} {text!r}")
     except ValueError as error:  # pydantic's and ours
-        reasons = (
-            [str(e["msg"]) for e in error.errors()] if hasattr(error, "errors") else [str(error)]
-        )
-        raise InputError(
-            f"--{option} {text!r}: {'; '.join(reasons).removeprefix('Value error, ')}"
-        ) from error
+        details = error.errors() if hasattr(error, "errors") else []
+        reasons = [_reason(one) for one in details] or [str(error)]
+        raise InputError(f"--{option} {text!r}: {'; '.join(reasons)}") from error

@@ -25,13 +25,25 @@ if TYPE_CHECKING:
 Time = float | str  # A time: a number of seconds, or text with a unit such as ``"200 us"``
 Paths = str | Path | Iterable[str | Path]  # one path, or several
 
+_TABLE_KINDS = {
+    ".toml": "file, or its tables",
+    ".csv": "file, or a DataFrame with a row for each operating point",
+}
+"""What may stand in the place of a file's path."""
+
 _CASE_VALUE = re.compile(r"[^.\s]+\.\S+")
 
 
-def plain(values: Mapping[str, Any] | None, argument: str = "values") -> dict[str, Value]:
-    """Values by name, with NumPy's numbers as Python's own; a mapping in a mapping is read as a name with a point."""
+def plain(
+    values: Mapping[str, Any] | None, argument: str = "values", otherwise: str = ""
+) -> dict[str, Value]:
+    """Values by name, with NumPy's numbers as Python's own; a mapping in a mapping is read as a name with a point.
+
+    ``otherwise``: where several values of one name belong."""
     if values is None:
         return {}
+    if not isinstance(values, Mapping) and type(values).__name__ == "Series":
+        values = dict(values)  # of pandas: by its index
     from orchestrator.cases.values import flatten, given_twice  # noqa: PLC0415 - a record needs no case
 
     if not isinstance(values, Mapping):
@@ -54,9 +66,7 @@ def plain(values: Mapping[str, Any] | None, argument: str = "values") -> dict[st
         if hasattr(value, "__len__") and not isinstance(value, str)
     ]
     if several:
-        raise InputError(
-            f"{argument}: {several[0]} is given several values; give one, or vary it with case.sweep(…)"
-        )
+        raise InputError(f"{argument}: {several[0]} is given several values; give one{otherwise}")
     return found
 
 
@@ -71,7 +81,7 @@ def _users_level() -> int:
 
 def case_values(values: Mapping[str, Any] | None, argument: str = "values") -> dict[str, Value]:
     """Values by ``component.variable``; otherwise as `plain`."""
-    read = plain(values, argument)
+    read = plain(values, argument, ", or vary it with case.sweep(…)")
     for name in read:
         check_case_name(name, argument)
     return read
@@ -102,7 +112,7 @@ def kept(given: Any, name: str, argument: str) -> Path:
     """The path of a file that is given, or of one in the cache with what is given: for ``.toml`` a mapping, for
     ``.csv`` a table, or rows by the names of operating points."""
     if not isinstance(given, Mapping) and not hasattr(given, "to_csv"):
-        return path(given, argument)
+        return path(given, argument, _TABLE_KINDS[Path(name).suffix])
     if name.endswith(".toml"):
         import tomli_w  # noqa: PLC0415 - a path needs none
 
@@ -193,6 +203,10 @@ def in_megabytes(given: Any, argument: str, least: float) -> float:
 def parameter_files(paths: Paths) -> list[ParameterFile]:
     from orchestrator.cases.parameter_files import read_parameter_file  # noqa: PLC0415 - a record needs no case
 
+    if isinstance(paths, Mapping):
+        raise InputError(
+            "parameters: it takes the paths of parameter files; give values by name as values={…}"
+        )
     listed = (
         [paths] if isinstance(paths, str | Path) or not isinstance(paths, Iterable) else list(paths)
     )

@@ -352,6 +352,14 @@ def whole_number(given: Any, argument: str, least: int, most: int) -> int:
     return own
 
 
+def check_callable(given: Any, argument: str) -> Any:
+    """Return a function that is told of the work, or None."""
+    if given is not None and not callable(given):
+        raise InputError(f"{argument} = {given!r}; give what can be called, such as print")
+    return given
+
+
+CALLED = FieldKind("", str, check_callable)
 FLAG = FieldKind("", None, flag)
 NAME = FieldKind("NAME", str, text_or_none)
 NAMES = FieldKind("NAME", str, names, several=True)

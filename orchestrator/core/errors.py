@@ -1,6 +1,7 @@
 """The errors a user can meet. Each message says what failed, where, the value seen, the rule and the remedy."""
 
 import copyreg
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -146,6 +147,15 @@ MOST_PROBLEMS = 200
 TOO_MANY = Problem("", "there are more problems than are listed; mend these first")
 
 
+_GIVEN = re.compile(r"--(set|step|stop|vary|scenario|fault|force)\b")
+"""Places of problems that lie in what a call was given."""
+
+
+def _for_python(problem: Problem) -> str:
+    text = str(problem)
+    return f"values: {text.removeprefix('values ')}" if problem.place.startswith("--set ") else text
+
+
 class CaseError(InputError):
     """A case cannot be used; all its mistakes are listed together. Mistakes of several kinds make it `VALUES`."""
 
@@ -157,9 +167,9 @@ class CaseError(InputError):
         super().__init__(message, kind=kinds.pop() if len(kinds) == 1 else ErrorKind.VALUES)
 
     def __str__(self) -> str:
-        """As always; where what Python gave as ``values`` is all that is wrong, the file is not blamed."""
-        if for_python() and all(one.place.startswith("--set ") for one in self.problems):
-            return "\n".join(f"values: {str(one).removeprefix('values ')}" for one in self.problems)
+        """As always; where what Python gave is all that is wrong, the file is not blamed."""
+        if for_python() and all(_GIVEN.match(one.place) for one in self.problems):
+            return "\n".join(_for_python(one) for one in self.problems)
         return super().__str__()
 
 

@@ -3,6 +3,7 @@ system's."""
 
 from typing import ClassVar, NoReturn
 
+from orchestrator.core.attributes import KnownNames
 from orchestrator.core.errors import InputError
 
 
@@ -10,8 +11,10 @@ class NoTruthError(InputError, TypeError):
     """A result was taken for true or false."""
 
 
-class NoTruth:
-    """Refuses to be true or false; ``ask`` says what has the verdict, such as ``.stable``."""
+class NoTruth(KnownNames):
+    """Refuses to be true or false, and to be compared by ``==`` with another of its kind, which compares no figures.
+
+    ``ask`` says what has the verdict, such as ``.stable``."""
 
     ask: ClassVar[str] = ".stable, which is True, False, or None where it is not known"
 
@@ -25,3 +28,14 @@ class NoTruth:
         raise NoTruthError(
             f"{name} is neither true nor false, as that could be mistaken for its verdict; ask {self.ask}"
         )
+
+    def __eq__(self, other: object) -> bool:
+        if self is other or type(self) is not type(other):
+            return self is other
+        name = type(self).__name__
+        raise NoTruthError(
+            f"== does not compare the figures of two {name} objects; compare their tables or values, such as "
+            "a.table().equals(b.table()), or runs by compare(a, b)"
+        )
+
+    __hash__ = object.__hash__

@@ -18,6 +18,7 @@ from orchestrator.cases.names import close_names
 from orchestrator.cases.schema import CaseTable
 from orchestrator.core.asked import flag
 from orchestrator.core.asked import path as path_of
+from orchestrator.core.attributes import NoSuchAttributeError, Unchanged
 from orchestrator.core.errors import InputError
 from orchestrator.core.late import pd
 from orchestrator.output.report.notebook import page
@@ -93,10 +94,6 @@ def load(case: str | Path | Mapping[str, Any], *, trust_fmus: bool = False) -> "
     return Case(load_case(case, trust_fmus=trusted))
 
 
-class NoSuchAttributeError(InputError, AttributeError):
-    """A case has nothing of that name."""
-
-
 class _Late:
     """A method of `studies`, which is imported where one is first asked for: it takes a second, and `load` none."""
 
@@ -110,7 +107,7 @@ class _Late:
         return getattr(owner if instance is None else instance, self._name)
 
 
-class Case:
+class Case(Unchanged):
     """A case: its scenarios, and the studies that concern all of it. `load` makes one.
 
     Attributes
@@ -127,6 +124,9 @@ class Case:
     >>> case
     <Case two_area: base, gfor, pod_p, pod_q, pod_pq>
     """
+
+    own = frozenset({"file"})
+    instead = "with_(…) makes a case with other tables"
 
     def __init__(self, file: CaseFile) -> None:
         if not isinstance(file, CaseFile):

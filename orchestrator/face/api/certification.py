@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.core.asked import path as path_of
+from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import made_folder
 from orchestrator.core.truth import NoTruth
 from orchestrator.face.api.methods import function
@@ -126,6 +127,10 @@ def verify(
     ...     print(type(error).__name__)
     InputError
     """
+    if isinstance(anew, str) or not isinstance(anew, Iterable | None):
+        raise InputError(
+            f"anew = {anew!r}; give a list of line reactances [pu], or of names of rows, such as [0.1]"
+        )
     found, wanted = Verification(), None if anew is None else tuple(anew)
     with laid_out(path_of(certificate, "certificate")) as places:
         for place in places:

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import xarray as xr
 
-from orchestrator.core.asked import Names, names
+from orchestrator.core.asked import Names, names, positive
+from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError
 from orchestrator.face.api.identification import opened
 from orchestrator.face.api.results import Run
@@ -63,9 +64,13 @@ def export_comtrade(
             raise InputError("path = None; give the path of the .cfg to be written")
         folder = Path(run) if Path(run).is_dir() else Path(run).parent
         path = folder / "trajectory.cfg"
-    rated = _rated_frequency(dataset) if frequency is None else frequency
+    if frequency is None:
+        rated = _rated_frequency(dataset)
+    else:
+        rated = positive(frequency, "frequency", "give a rated frequency above 0 in Hz, such as 50")
+    target = path_of(path, "path")
     return write_comtrade(
-        xr.Dataset(curves, attrs=dataset.attrs), list(curves), Path(path), form, rated
+        xr.Dataset(curves, attrs=dataset.attrs), list(curves), target, form, rated
     )
 
 

@@ -6,6 +6,7 @@ from typing import Any
 from fmus.toolchain.archive import write_archive
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.core.asked import path as path_of
+from orchestrator.core.asked import require_known
 from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import made_folder
 from orchestrator.face.api.comtrade import export_comtrade
@@ -25,6 +26,15 @@ _TABLES: dict[str, Any] = {
     "solver": {"record_interval", "record", "record_filter"},
 }
 """Tables of a case file that go into our annotation as they are, as SSP has no place for them."""
+
+
+_KEYWORDS: dict[str, tuple[str, ...]] = {
+    "linear": ("inputs", "outputs", "continuous", "black_box"),
+    "ssp": (),
+    "comtrade": ("signals", "form", "frequency"),
+    "dll": ("platforms", "sample_time", "values"),
+}
+"""Further keywords of each kind."""
 
 
 def export(what: Any, kind: str, out: str | Path | None = None, **how: Any) -> list[Path]:
@@ -58,6 +68,7 @@ def export(what: Any, kind: str, out: str | Path | None = None, **how: Any) -> l
     """
     if kind not in KINDS:
         raise InputError(f"kind = {kind!r}; choose from {', '.join(KINDS)}")
+    require_known(how, _KEYWORDS[kind], f"an export of kind {kind!r}")
     if kind == "comtrade":
         return list(export_comtrade(what, path=out, **how))
     if kind == "dll":

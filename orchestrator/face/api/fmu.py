@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NoReturn, Self
 
 import pandas as pd
 
@@ -11,6 +11,7 @@ from orchestrator.cases.values import convert
 from orchestrator.core.asked import Names
 from orchestrator.core.asked import names as names_given
 from orchestrator.core.asked import path as path_of
+from orchestrator.core.attributes import Unchanged
 from orchestrator.core.closing import Closing
 from orchestrator.core.errors import InputError
 from orchestrator.devices.binding.binding import bound_fmu
@@ -21,7 +22,7 @@ from orchestrator.devices.fmi.linear_model import EmbeddedModel, read_embedded_m
 from orchestrator.output.report.notebook import page
 
 
-class Fmu(Closing):
+class Fmu(Unchanged, Closing):
     """A running FMU at its time 0, initialised with what it was given. `open_fmu` makes it; leaving ``with`` ends it.
 
     Attributes
@@ -31,6 +32,9 @@ class Fmu(Closing):
     time
         Where it stands [s].
     """
+
+    own = frozenset({"description", "time"})
+    instead = "set({…}) gives its variables values"
 
     def __init__(
         self, description: FmuDescription, values: Mapping[str, Any], stop: float | None
@@ -138,6 +142,12 @@ class Fmu(Closing):
             }
         except ValueError as error:
             raise InputError(f"{self.description.model_name}: {error}") from error
+
+    def __reduce_ex__(self, protocol: object) -> NoReturn:
+        raise InputError(
+            f"{self.description.model_name}: a running FMU has no copy, and goes to no other process; open it again "
+            "with open_fmu"
+        )
 
     def __enter__(self) -> Self:
         self._open()

@@ -1,5 +1,6 @@
 """The modes in a recorded signal."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,8 +11,10 @@ import pandas as pd
 import xarray as xr
 
 from orchestrator.cases.given import Time, moment, part_of_record
-from orchestrator.core.asked import text_or_none
+from orchestrator.core.asked import names as names_given
+from orchestrator.core.asked import number_between, positive, text_or_none
 from orchestrator.core.errors import AnalysisError, InputError
+from orchestrator.core.units import to_unit
 from orchestrator.face.api.results import Run
 from orchestrator.linear.signals.ambient import ambient_modes
 from orchestrator.linear.signals.identification import sampling
@@ -31,6 +34,7 @@ Recorded = Any
 """`Run`, `xarray.Dataset`, `xarray.DataArray`, `pandas.DataFrame`, or a path; pandas is imported late."""
 
 _SHOWN = 60  # characters of a wrong argument that an error shows
+_IN_BRACKETS = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
 _ONE_SIGNAL = "give one signal, 'a.b' or the difference 'a.b - c.d' of two"
 
 
@@ -115,8 +119,11 @@ def ambient(
     AnalysisError
         If no part is long and even enough.
     """
+    rule = "a damping in percent from 0 to 100, such as 3.0"
+    alarm = number_between(level, "%", "level", 0.0, 100.0, rule)
+    highest_hz = positive(highest_hz, "highest_hz", "give a frequency above 0 in Hz, such as 2.5")
     dataset, label = opened(run, "run")
-    names = [signals] if isinstance(signals, str) else list(signals)
+    names = list(names_given(signals, "signals"))
     if not names:
         raise InputError(f"signals = {signals!r}; {_ONE_SIGNAL}, or several")
     begin, end = part_of_record(dataset["time"].values, start, stop, label)
@@ -147,7 +154,7 @@ def ambient(
             found.append(AmbientWindow(first, first + length, (), str(error)))
     if all(one.failure for one in found):
         raise AnalysisError(f"{label}: {found[0].failure}")
-    return AmbientModes(label, names, found, level)
+    return AmbientModes(label, names, found, alarm)
 
 
 def as_dataset(given: Any, otherwise: str) -> Any:
@@ -187,9 +194,31 @@ def _seconds(index: Any, otherwise: str) -> Any:
     rule = "give numbers in seconds, dates, or time differences that ascend"
     if index.dtype.kind not in "fiu":
         raise InputError(f"{otherwise}: its index is no time; {rule}")
+    if (
+        isinstance(index, pd.RangeIndex)
+        and index.name is None
+        and (index.start, index.step) == (0, 1)
+    ):
+        raise InputError(
+            f"{otherwise}: its index counts the rows, and is no time; give the times in seconds as index or as a "
+            "column 'time', such as frame.set_index(0.01 * frame.index)"
+        )
     if not index.is_monotonic_increasing or not index.is_unique:
         raise InputError(f"{otherwise}: the times of its index do not ascend; {rule}")
-    return index.to_numpy(dtype=float)
+    return index.to_numpy(dtype=float) * _second(str(index.name), otherwise)
+
+
+def _second(name: str, otherwise: str) -> float:
+    """How many seconds the unit is that the name of an index has in brackets; 1 without one."""
+    unit = _IN_BRACKETS.search(name)
+    if unit is None:
+        return 1.0
+    try:
+        return to_unit(f"1 {unit[1]}", "s")
+    except ValueError as error:
+        raise InputError(
+            f"{otherwise}: its index is named {name!r}, and a time is in s, ms or us; name its unit so"
+        ) from error
 
 
 def _kind(given: Any) -> str:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
+
+import numpy as np
 
 from orchestrator.core.asked import flag
 from orchestrator.core.asked import path as path_of
+from orchestrator.core.attributes import KnownNames
 from orchestrator.core.errors import InputError
 from orchestrator.core.late import pd, signal
 from orchestrator.linear.models.state_space import StateSpace
@@ -20,14 +23,16 @@ from orchestrator.linear.models.steady_state import OperatingPoint
 from orchestrator.linear.spectra.stability import Stability
 from orchestrator.output.report.notebook import page
 
+_MATRICES = ("A", "B", "C", "D")
+
 UNKNOWN = OperatingPoint(math.nan, math.nan, math.nan, 0, {})
 """That of a model which was read from an FMU."""
 
 NOT_JUDGED = Stability(None, reason="the model is that of one FMU by itself")
 
 
-@dataclass(frozen=True, repr=False)
-class LinearSystem(StateSpace):
+@dataclass(frozen=True, repr=False, eq=False)
+class LinearSystem(KnownNames, StateSpace):
     """x⁺ = A·x + B·u and y = C·x + D·u in deviations from an operating point. `Scenario.linearize` makes it.
 
     Attributes
@@ -46,6 +51,25 @@ class LinearSystem(StateSpace):
     stability: Stability = NOT_JUDGED
     warnings: tuple[str, ...] = ()
     continuous_form: Callable[[], LinearSystem] | None = field(default=None, compare=False)
+
+    elsewhere: ClassVar[Mapping[str, str]] = {"poles": "numpy.linalg.eigvals(model.continuous().A)"}
+
+    def __post_init__(self) -> None:
+        """Protect the matrices, which the verdict is of."""
+        for name in _MATRICES:
+            shown = np.asarray(getattr(self, name)).view()
+            shown.flags.writeable = False
+            object.__setattr__(self, name, shown)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, LinearSystem):
+            return NotImplemented
+        named = ("states", "inputs", "outputs", "step_size")
+        return all(getattr(self, one) == getattr(other, one) for one in named) and all(
+            np.array_equal(getattr(self, one), getattr(other, one)) for one in _MATRICES
+        )
+
+    __hash__ = None  # type: ignore[assignment]  # its matrices have none
 
     def table(self, matrix: str) -> pd.DataFrame:
         """One of the matrices ``"A"``, ``"B"``, ``"C"``, ``"D"`` with the names of its rows and columns.
@@ -120,10 +144,10 @@ class LinearSystem(StateSpace):
         model = self._of_kind(step_map)
         try:
             control = import_module("control")
-        except ImportError as error:
+        except ImportError:
             raise InputError(
                 "the package control is missing; install it with `pip install control`"
-            ) from error
+            ) from None
         kinds = ("states", "inputs", "outputs")
         names = {
             kind: [re.sub(r"\W+", "_", name) for name in getattr(model, kind)] for kind in kinds

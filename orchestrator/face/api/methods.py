@@ -10,6 +10,7 @@ from textwrap import indent
 from typing import Any, Concatenate, ParamSpec, TypeVar, cast
 
 from orchestrator.core.asked import Asked, asked_of, checked, require_known
+from orchestrator.core.errors import InputError
 from orchestrator.devices.fmi.turn import turn
 
 Asks = ParamSpec("Asks")
@@ -39,13 +40,33 @@ def _made(request: Any, before: list[Parameter], call: Callable[..., Any], who: 
 
     def studied(*given: Any, **wanted: Any) -> Any:
         require_known(wanted, asked_of(request), who)
-        bound = signature.bind(*given, **wanted).arguments
+        bound = _bind(signature, given, wanted, who)
         with turn:
             return call(*given[: len(before)], request(**checked(request, bound)))
 
     studied.__signature__ = signature  # type: ignore[attr-defined] # what `help` and notebooks show
     studied.__doc__ = _documentation(request)
     return studied
+
+
+class WrongCallError(InputError, TypeError):
+    """A function was called with too many arguments, or with too few."""
+
+
+def _bind(
+    signature: Signature, given: tuple[Any, ...], wanted: dict[str, Any], who: str
+) -> dict[str, Any]:
+    """Arguments by name; too many, too few or one given twice is one sentence of ours."""
+    try:
+        return signature.bind(*given, **wanted).arguments
+    except TypeError as error:
+        every = [one for one in signature.parameters.values() if one.name != "self"]
+        by_place = [one.name for one in every if one.kind is Parameter.POSITIONAL_OR_KEYWORD]
+        others = [one.name for one in every if one.kind is Parameter.KEYWORD_ONLY]
+        by_name = f", and by name alone {', '.join(others)}" if others else ""
+        raise WrongCallError(
+            f"{who}: {error}; it takes by place {', '.join(by_place) or 'nothing'}{by_name}"
+        ) from None
 
 
 def in_turn(function: Callable[Asks, Shown]) -> Callable[Asks, Shown]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from orchestrator.cases.given import case_values, plain
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.core.asked import number_in
+from orchestrator.core.asked import names, number_in
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError
 from orchestrator.core.toml_files import read_toml
@@ -103,7 +103,7 @@ def nyquist(
         compensation=share,
         angle=angle,
         bus=bus,
-        components=tuple(components),
+        components=names(components, "components"),
         scr=scr,
         x_r=x_r,
         rating_mva=rated,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -36,6 +36,17 @@ _STATES = 3
 """States with the largest participation that stand in a table."""
 
 
+_OF_EACH = (
+    "eigenvalue",
+    "frequency_hz",
+    "damping_percent",
+    "damping_ratio",
+    "shape",
+    "by_component",
+)
+"""What each mode has, and all of them together do not."""
+
+
 class Modes(NoTruth, ask=".stability.stable, or len() for the number of modes in range"):
     """Steady state and modes of one scenario. `Scenario.modes` makes it.
 
@@ -54,6 +65,12 @@ class Modes(NoTruth, ask=".stability.stable, or len() for the number of modes in
     >>> print(f"{mode.frequency_hz:.3f} Hz, {mode.damping_percent:.1f} %")
     0.582 Hz, 10.6 %
     """
+
+    elsewhere: ClassVar[Mapping[str, str]] = {
+        "stable": ".stability.stable",
+        "verdict": ".stability.verdict",
+        **{name: f"modes[0].{name}, or a column of .table()" for name in _OF_EACH},
+    }
 
     def __init__(self, result: ModesResult) -> None:
         self.result = result
@@ -82,6 +99,10 @@ class Modes(NoTruth, ask=".stability.stable, or len() for the number of modes in
     def __getitem__(self, index: int | str) -> Mode:
         if isinstance(index, str):
             return self.named[index]
+        if isinstance(index, bool) or not isinstance(index, int | np.integer | slice):
+            raise InputError(
+                f"modes[{index!r}]: give a place in the range, such as 0, or a mode's name"
+            )
         try:
             return self.result.modes[index]
         except IndexError:

@@ -14,6 +14,10 @@ from orchestrator.output.results.manifest import MANIFEST, checked
 from orchestrator.output.results.recorded import open_whole
 
 
+class NoSuchFileError(InputError, KeyError):
+    """A folder of results holds no file of a name."""
+
+
 class Saved(Mapping[str, Any]):
     """What a folder of results holds, by file; each is read, and compared with its manifest, where it is asked for.
 
@@ -36,7 +40,9 @@ class Saved(Mapping[str, Any]):
 
     def __getitem__(self, name: str) -> Any:
         if name not in list(self):
-            raise InputError(f"{self.folder}: it holds no {name!r}; it holds: {', '.join(self)}")
+            raise NoSuchFileError(
+                f"{self.folder}: it holds no {name!r}; it holds: {', '.join(self)}"
+            )
         file = self.folder / name
         if (file.parent / MANIFEST).is_file():
             checked(file.parent, [file.name])

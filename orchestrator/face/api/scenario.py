@@ -10,7 +10,7 @@ from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Self, cast
+from typing import Any, ClassVar, Self, cast
 
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.given import Time, case_values, in_seconds
@@ -22,6 +22,7 @@ from orchestrator.cases.short_circuit import BusStrength, ShortCircuit
 from orchestrator.core.asked import Names, flag, frequency_range, number_between
 from orchestrator.core.asked import names as names_given
 from orchestrator.core.asked import path as path_of
+from orchestrator.core.attributes import Unchanged
 from orchestrator.core.errors import InputError, Problem
 from orchestrator.core.late import pd, xr
 from orchestrator.face.api.linear import LinearSystem
@@ -133,7 +134,11 @@ def steps_of(scenario: Scenario, request: StepsRequest) -> StepChoice:
     return choose_step(scenario.prepared, allowed, steps, schedules, request.frequencies)
 
 
-class Scenario:
+_STUDIES = ("sweep", "screen", "site", "interactions", "design", "design_over_points", "choose")
+"""What is asked of the case that a scenario is of."""
+
+
+class Scenario(Unchanged):
     """A scenario that is ready to run. `Case.scenario` makes one.
 
     Attributes
@@ -150,6 +155,16 @@ class Scenario:
     >>> scenario.values["gfor.P_0"]
     0.5
     """
+
+    own = frozenset({"prepared"})
+    instead = (
+        "case.scenario(…) makes a scenario with other values, another step or another schedule"
+    )
+    elsewhere: ClassVar[Mapping[str, str]] = {
+        **{name: f"asked of the case: case.{name}(…)" for name in _STUDIES},
+        "plot": "run().plot(…), or modes().plot()",
+        "stable": "modes().stability.stable, or run().stable",
+    }
 
     def __init__(self, prepared: PreparedScenario, file: CaseFile, asked: Preparing) -> None:
         self.prepared = prepared
@@ -404,6 +419,10 @@ class Scenario:
 
         inputs = names_given(inputs, "inputs") or default_inputs(self.prepared)
         outputs = names_given(outputs, "outputs") or default_outputs(self.prepared)
+        for argument, chosen in (("inputs", inputs), ("outputs", outputs)):
+            twice = [name for name in chosen if list(chosen).count(name) > 1]
+            if twice:
+                raise InputError(f"{argument}: {twice[0]!r} stands in the list twice; give it once")
         if continuous and black_box:
             raise InputError("black_box identifies a step map; leave out continuous, or black_box")
         model, point, examined = linear_model(

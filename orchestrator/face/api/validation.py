@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.given import Time, binding_path, case_values, in_seconds, moment, plain
-from orchestrator.core.asked import names, number_in
+from orchestrator.core.asked import check_callable, names, number_in
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError
 from orchestrator.devices.binding.binding import bound_fmu
@@ -114,6 +114,11 @@ def validate(
     True
     """
     step_size = in_seconds(step, "step") or 1e-4
+    check_callable(report, "report")
+    if bounds and not fit:
+        raise InputError(
+            f"bounds = {bounds!r}: they are of parameters that are fitted; give fit={', '.join(bounds)!r}"
+        )
     if component is not None:
         found = _of_case(str(device), component, scenario, values, step_size)
     else:
@@ -131,7 +136,7 @@ def validate(
         bases,
         channels=names(channels, "channels"),
         place=place,
-        events=[_window(one) for one in events],
+        events=_windows(events),
         limits=None if limits is None else read_limits(path_of(limits, "limits")),
         fit=_names_of(fit),
         bounds=bounds or {},
@@ -159,6 +164,14 @@ def _all_given(
     found = [_read_given(one, k, start, stop) for k, one in enumerate(recordings, 1)]
     others = [_read_given(one, k, start, stop) for k, one in enumerate(kept, len(found) + 1)]
     return found + [replace(one, held_back=True) for one in others]
+
+
+def _windows(given: Any) -> list[tuple[float, float]]:
+    """Begin and end of each event; two times alone are one event."""
+    if isinstance(given, str) or not isinstance(given, Sequence):
+        raise InputError(f"events = {given!r}; give begin and end of each, such as [(2.0, 2.15)]")
+    is_one = len(given) == 2 and all(isinstance(one, float | int | str) for one in given)
+    return [_window(given)] if is_one else [_window(one) for one in given]
 
 
 def _window(given: Any) -> tuple[float, float]:

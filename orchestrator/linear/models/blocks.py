@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 import numpy as np
 
 from orchestrator.core.errors import AnalysisError, InputError
+from orchestrator.core.spelling import for_python
 from orchestrator.linear.models.component_linearization import (
     ComponentLinearization,
     linearize_by_derivatives,
@@ -292,11 +293,12 @@ def _by_component(master: Master, names: Sequence[str]) -> dict[str, list[str]]:
                 for own in one.description.variables
             ]
             near = difflib.get_close_matches(full, known, 3)
-            hint = (
-                f"did you mean {' or '.join(near)}?"
-                if near
+            where = (
+                "scenario.parameters() and run.dataset list names"
+                if for_python()
                 else "`gfor fmu info` lists the variables of an FMU"
             )
+            hint = f"did you mean {' or '.join(near)}?" if near else where
             raise InputError(f"linear model: there is no variable {full!r}; {hint}")
         found[component].append(variable)
     return found

@@ -3,15 +3,30 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from orchestrator.core.arrays import Matrix
+from orchestrator.core.arrays import Matrix, Numbers
 from orchestrator.core.errors import InputError
 from orchestrator.devices.fmi.linear_model import read_embedded_model
 from orchestrator.linear.models.held_inputs import over_held_inputs
 from orchestrator.linear.models.linearization import Blocks, compose, continuous
 from orchestrator.systems.coupling.schedule import Schedule
+
+_ON_THE_STEP = 1e-6
+"""How far a time may be from a step [steps]: more than rounding in a long record, and no time that was meant."""
+
+
+def _numbers(given: Any, argument: str) -> Numbers:
+    """Finite numbers in one row."""
+    try:
+        found = np.atleast_1d(np.asarray(given, dtype=float))
+    except (TypeError, ValueError):
+        found = np.array([np.nan])
+    if not np.isfinite(found).all():
+        raise InputError(f"{argument} = {given!r}; give finite numbers")
+    return found
 
 
 @dataclass(frozen=True)
@@ -37,7 +52,7 @@ class StateSpace:
         """Deviations of the outputs, shape (k, p), after a step of the inputs at t = 0.
 
         ``times``: [s], not before 0 and in equal distances; of a step map, multiples of its step."""
-        u, times = (np.atleast_1d(np.asarray(one, dtype=float)) for one in (change, times))
+        u, times = _numbers(change, "change"), _numbers(times, "times")
         if u.shape != (len(self.inputs),):
             raise InputError(
                 f"change = {change!r}; give one number for each input: {', '.join(self.inputs)}"
@@ -47,12 +62,25 @@ class StateSpace:
             raise InputError(
                 "times: give one or more, from 0 on and in equal distances, such as np.arange(0, 5, 0.01)"
             )
+        self._check_on_the_step(times)
         A, B = self._over(distances[0])
         x, rows = self._over(times[0])[1] @ u, []
         for _ in times:
             rows.append(self.C @ x + self.D @ u)
             x = A @ x + B @ u
         return np.array(rows)
+
+    def _check_on_the_step(self, times: Numbers) -> None:
+        """Refuse times between the steps of a step map, which says nothing of them."""
+        if self.step_size is None:
+            return
+        steps = times / self.step_size
+        between = np.flatnonzero(np.abs(steps - np.round(steps)) > _ON_THE_STEP)
+        if len(between):
+            raise InputError(
+                f"times: {times[between[0]]:.6g} s lies between the steps of the step map, each {self.step_size:g} s "
+                "long; give multiples of the step, or ask the model of continuous=True"
+            )
 
     def _over(self, duration: float) -> tuple[Matrix, Matrix]:
         """The map over a time [s] with the input held."""

@@ -29,7 +29,7 @@ Content = Mapping[str, Any]
 Compared = Iterator[tuple[str, str]]
 
 
-@dataclass
+@dataclass(repr=False)
 class Verification(NoTruth, ask=".holds"):
     faults: list[str] = field(default_factory=list)
     agreed: list[str] = field(default_factory=list)
@@ -39,6 +39,10 @@ class Verification(NoTruth, ask=".holds"):
     @property
     def holds(self) -> bool:
         return not self.faults
+
+    def __repr__(self) -> str:
+        what = "; ".join(self.faults) if self.faults else f"{len(self.agreed)} things agree"
+        return f"<Verification: {'holds' if self.holds else 'does not hold'}: {what}>"
 
 
 def issued_by(content: Content) -> str:

@@ -117,7 +117,10 @@ def _reactances(given: Any, argument: str) -> tuple[float, ...]:
     rule = "line reactances in pu, such as (0.1, 0.2)"
     if isinstance(given, str) or not isinstance(given, Iterable):
         raise InputError(f"{argument} = {given!r}; give {rule}")
-    return tuple(number_in(x, "pu", argument, rule) for x in given)
+    found = tuple(number_in(x, "pu", argument, rule) for x in given)
+    if not found:
+        raise InputError(f"{argument} = {given!r}; give {rule}, or leave it out for the norm's")
+    return found
 
 
 @dataclass(frozen=True)

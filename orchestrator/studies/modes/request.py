@@ -9,6 +9,7 @@ from orchestrator.cases.given import Time, in_seconds
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.core.asked import (
+    CALLED,
     DAMPING,
     FLAG,
     FREQUENCIES,
@@ -181,7 +182,7 @@ class ModesRequest:
     )
     black_box: bool = of_black_box()
     report: Callable[[str], None] | None = asked(
-        ANYTHING,
+        CALLED,
         None,
         "called with a sentence before each run of an identification, which may take minutes; such as "
         "``print``",

@@ -76,7 +76,7 @@ class TriedStep:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class StepChoice:
     """What communication steps do to a scenario's critical modes."""
 
@@ -105,6 +105,14 @@ class StepChoice:
                 break
             found = trial
         return found
+
+    def __repr__(self) -> str:
+        found = []
+        for name in self.schedules:
+            best = self.largest(name)
+            found.append(f"{name} {f'up to {best.step_size:g} s' if best else 'none'}")
+        of = f"{self.prepared.name} of {self.prepared.case.name}"
+        return f"<StepChoice of scenario {of}: steps within the error: {', '.join(found)}>"
 
     def islands(self, schedule: ScheduleName) -> list[TriedStep]:
         """Steps within the error that do not count, because a shorter one is not."""

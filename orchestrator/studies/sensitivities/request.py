@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass
 
-from orchestrator.core.asked import FLAG, NAME, NAMES, Names, asked
+from orchestrator.core.asked import CALLED, FLAG, NAME, NAMES, Names, asked
 from orchestrator.studies.points.points import nobody
-from orchestrator.studies.points.request import ANYTHING, of_frequencies
+from orchestrator.studies.points.request import of_frequencies
 
 
 @dataclass(frozen=True)
@@ -60,5 +60,5 @@ class SensitivitiesRequest:
         "linearise with the FMUs' own directional derivatives instead of by perturbation (with --native)",
     )
     report: Callable[[int, int], None] = asked(
-        ANYTHING, nobody, "called with how many parameters are done, of how many", option=None
+        CALLED, nobody, "called with how many parameters are done, of how many", option=None
     )

@@ -72,6 +72,10 @@ def open_trajectory(path: Path) -> xr.Dataset:
         warnings.warn(text, ResultsWarning, stacklevel=2)
         return dataset
     file = path / TRAJECTORY if path.is_dir() else path
+    if not path.exists() and path.suffix and not path.name.endswith(TRAJECTORY):
+        raise InputError(
+            f"{path}: there is no such file; give a recording's file, or the folder of a scenario's results"
+        )
     if not file.is_file():
         raise InputError(f"{path}: there is no trajectory.nc; {_hint(path)}")
     if path.is_dir() or (path.parent / MANIFEST).is_file():

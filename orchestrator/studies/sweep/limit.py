@@ -83,7 +83,7 @@ def search(
     return low if first else None, high, again
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ParameterLimit:
     key: str
     unit: str
@@ -110,6 +110,9 @@ class ParameterLimit:
     def limit(self) -> float | None:
         """The last value that holds before the first that fails; None where nothing fails, or nothing is known."""
         return self.holds_at if self.kind is Ending.FAILS else None
+
+    def __repr__(self) -> str:
+        return f"<ParameterLimit of {self.scenario}: {'; '.join(self.lines)}>"
 
     @property
     def sentence(self) -> str:

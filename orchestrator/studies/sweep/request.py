@@ -58,6 +58,11 @@ def _varied(vary: Any, argument: str) -> tuple[Vary, ...]:
                 f"{', '.join(empty)}: a sweep needs values, such as {{'grid.X_L': [0.1, 0.3]}}"
             )
         vary = [Vary(key, None, len(values), False, values) for key, values in lists.items()]
+    if hasattr(vary, "columns"):
+        raise InputError(
+            f"{argument}: a {type(vary).__name__} is no grid; give lists by name, {_HOW}; a row for each operating "
+            "point is what case.screen takes as points"
+        )
     given: list[Any] = (
         [vary] if isinstance(vary, str) else list(vary) if isinstance(vary, Iterable) else [None]
     )

@@ -305,7 +305,10 @@ class _Reading:
                 remedy=channel.changed(unit=other),
                 unit=other,
             )
-        held = float(np.mean(np.diff(angle[np.isfinite(angle)]) == 0))
+        # an angle that has not begun to move is not held: the first sample that differs begins the count
+        known = angle[np.isfinite(angle)]
+        begin = int(np.argmax(known != known[0])) if len(known) else 0
+        held = float(np.mean(np.diff(known[begin:]) == 0))
         moves = float(np.ptp(angle[np.isfinite(angle)])) > 1e-3
         if moves and held > _HELD:
             self.ask(QuestionKind.ANGLE_HELD, part=held)

@@ -9,6 +9,7 @@ from typing import Any
 from rich.console import RenderableType
 from rich.markup import escape
 
+from orchestrator.core.asked import whole_number
 from orchestrator.core.errors import counted
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder
@@ -135,7 +136,8 @@ class Validation:
 
     def curves(self, number: int = 0) -> pd.DataFrame:
         """Measured and simulated signals of one recording [pu of the rating], over its time [s]."""
-        one = self.result.comparisons[number]
+        most = len(self.result.comparisons) - 1
+        one = self.result.comparisons[whole_number(number, "number", 0, most)]
         columns = {f"{name}_measured": x for name, x in one.measured.items()}
         columns |= {f"{name}_simulated": x for name, x in one.simulated.items()}
         recording = one.event.recording

@@ -43,7 +43,8 @@ TOLERANCES = (1e-8, 0.1)  # smallest and largest tolerance of a step's error
 
 def check_tolerance(tolerance: float) -> None:
     least, most = TOLERANCES
-    if isinstance(tolerance, bool) or not least <= tolerance <= most:
+    is_number = isinstance(tolerance, int | float) and not isinstance(tolerance, bool)
+    if not is_number or not least <= tolerance <= most:
         raise InputError(
             f"tolerance = {tolerance!r}: give a number from {least:g} to {most:g}, such as 1e-4"
         )
