@@ -9,7 +9,7 @@ from fmus.grid_following.dyr_fields import CONVERTER, FIELDS, MODEL, PLANT, appr
 from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
 from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS, DyrField, DyrRecord
-from orchestrator.cases.psse.dyr_records import DynamicRecord, given_values
+from orchestrator.cases.psse.dyr_records import EVENT, DynamicRecord, given_values
 from orchestrator.cases.psse.missing_models import (
     MACHINE,
     MissingModel,
@@ -208,6 +208,9 @@ def _use_of(
         return UseOfRecord.USED, stand_in, False
     if key in idle:
         return UseOfRecord.NOT_USED, "its machine is out of service", False
+    if record.name == EVENT:
+        told = f"an event of ANDES, of {record.machine}; [scenarios] has events"
+        return UseOfRecord.NOT_USED, told, False
     kind = kind_of(record.name)
     what = {"load": "a load model", "device": "a model of an SVC or a DC line", "relay": "a relay"}
     return (

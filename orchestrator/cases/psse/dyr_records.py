@@ -13,6 +13,7 @@ from orchestrator.core.units import LARGEST
 
 MOST_BYTES = 100_000_000  # of a file
 _TOKEN = re.compile(r"""(?P<quoted>'[^']*'|"[^"]*")|(?P<plain>[^\s,'"/]+)|(?P<slash>/)|,""")
+EVENT = "TOGGLE"  # an event of ANDES, which writes some into its files of dynamics data
 _OWN_MODEL = "USRMDL"  # a user's model, whose name is the first value
 
 
@@ -61,6 +62,8 @@ def read_dyr(path: Path) -> list[DynamicRecord]:
 
 
 def _record(file: str, line: int, tokens: Sequence[str]) -> DynamicRecord:
+    if len(tokens) > 2 and tokens[1].upper() == EVENT:
+        return DynamicRecord(file, line, 0, EVENT, tokens[2], tuple(tokens[3:]))
     if len(tokens) < 3 or not re.fullmatch(r"\d{1,9}", tokens[0]):
         raise InputError(
             f"{file}, line {line}: {' '.join(tokens[:4])!r} is no record; one is bus 'MODEL' id values … /"

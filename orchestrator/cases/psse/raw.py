@@ -3,6 +3,7 @@
 import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -154,6 +155,8 @@ class _Reading:
         self._ohms: list[tuple[int, float, float]] = []
         self._idle: set[tuple[int, str]] = set()
         self._lines_of: dict[tuple[Any, ...], int] = {}
+        # line of the first record and its first bus by the buses and the identifier of lines
+        self._circuits: dict[tuple[frozenset[int], str], tuple[int, int]] = {}
         self._at_buses: dict[int, BusLoads] = {}
         self._devices = FoundDevices((), {})
         # with the bus at which it stands, and whether it feeds
@@ -246,6 +249,31 @@ class _Reading:
             raise record.error(
                 f"the {what} {shown} stands in line {first} as well; remove one of them, or rename it"
             )
+
+    def _circuit(self, record: Record, pair: frozenset[int]) -> str:
+        """Return a line's identifier, or another one where a line before has the same, from the same end."""
+        own, start = record.text(2, "1").strip(), self._own(record)
+        first, its = self._circuits.setdefault((pair, own), (record.line, start))
+        if first == record.line or its != start:
+            self._once(record, "branch", pair, own)
+            return own
+        given = {
+            other.text(2, "1").strip()
+            for other in self._raw.of("branch")
+            if {self._own(other), self._own(other, 1)} == pair
+        }
+        free = next(
+            name
+            for name in map(str, count(2))
+            if name not in given and (pair, name) not in self._circuits
+        )
+        self._circuits[pair, free] = (record.line, start)
+        text = (
+            f"the branch {sorted(pair)} {own} stands in line {first} as well: a parallel circuit, {free}, is taken. "
+            "PSS/E keeps one of both; if one is meant, remove the other"
+        )
+        self._changes.note(record.line, text)
+        return free
 
     def _add(self, bus: int, column: int, value: complex) -> None:
         """Add to the active and the reactive part [MW, Mvar], which stand side by side."""
@@ -421,7 +449,7 @@ class _Reading:
                 text = "a line from a bus to itself: not used, as the file's own solution has it"
                 self._changes.note(record.line, text)
                 continue
-            self._once(record, "branch", pair, record.text(2, "1").strip())
+            circuit = self._circuit(record, pair)
             z = complex(record.number(3, "R", 0.0), record.number(4, "X"))
             z = 1j * self._least if record.line in self._lossless else z
             charging = 0.5j * record.number(5, "B", 0.0)
@@ -438,9 +466,7 @@ class _Reading:
             # a name stands before the ratings from revision 34 on
             column = 6 if self._raw.revision < SWITCHING_DEVICES else 7
             rating = record.number(column, "RATEA [MVA]", 0.0)
-            name = BranchName(
-                record.text(6, "").strip() if column == 7 else "", record.text(2, "1").strip()
-            )
+            name = BranchName(record.text(6, "").strip() if column == 7 else "", circuit)
             self._branch(start, end, z, state, to_earth, rating=rating, name=name)
         for record in self._raw.of("system switching device"):
             if record.line in self._merged or not self._in_service(record, _SWITCH_STATE, "STAT"):
@@ -507,6 +533,9 @@ class _Reading:
             self._changes.note(
                 t.record.line, "tap changer or phase-shift control: held at its position"
             )
+        if not all(w.has_ratio for w in windings):
+            text = "WINDV is 0, which MATPOWER writes where a ratio is not given: the nominal ratio is taken"
+            self._changes.note(t.record.line, text)
         for turned in (w.shift / _RADIANS for w in windings if 0 < abs(w.shift) < 2 * math.pi):
             if abs(turned - round(turned)) < _NEAR * abs(turned):
                 text = f"ANG is {turned * _RADIANS:g} degrees: is it in radians? {round(turned) * 30} degrees are usual"

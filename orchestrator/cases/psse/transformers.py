@@ -27,6 +27,7 @@ class Winding:
     nominal: float
     rating_mva: float = 0.0
     table: int = 0
+    has_ratio: bool = True  # whether WINDV is not 0
 
 
 _FAR = 1000.0
@@ -128,11 +129,15 @@ def _winding(line: Record, bus: int, base: float, code: int, table: int) -> Wind
             f"WINDV is given by voltages (CW = {code}), and bus {bus} has no base voltage"
         )
     by_base = nominal / base if nominal and base else 1.0
+    is_given = ratio != 0
+    if not is_given:
+        ratio = base if code == 2 else 1.0
     ratio = {1: ratio, 2: ratio / base if base else 0.0, 3: ratio * by_base}[code]
     if not ratio > 0:
         raise line.error(f"WINDV comes to {ratio:g} pu of the bus' base voltage; it must exceed 0")
     shift, rating = line.number(2, "ANG [degrees]", 0.0), line.number(3, "RATA [MVA]", 0.0)
-    return Winding(bus, ratio, shift, by_base, rating, line.whole(table, "TAB", 0))
+    number = line.whole(table, "TAB", 0)
+    return Winding(bus, ratio, shift, by_base, rating_mva=rating, table=number, has_ratio=is_given)
 
 
 def _impedance(raw: RawFile, line: Record, index: int, code: int, nominal: float) -> complex:

@@ -191,3 +191,28 @@ def test_a_negative_conductance_is_taken(read):
 
 def test_data_for_another_case_are_read_as_a_whole(read):
     assert "IC = 1" in texts(read(raw().replace("0,100.0,33", "1,100.0,33", 1)))
+
+
+def test_a_line_that_stands_twice_is_a_parallel_circuit(read):
+    """So the solutions have it of the IEEE's 118 and 57 buses as Illinois publishes them: each line is there."""
+    found = records(33)
+    found["BRANCH"] += [
+        "7,8,'1 ',0.01,0.08,0.1,0,0,0,0,0,0,0,1,1,0,1,1",
+        "7,8,'2 ',0.02,0.09,0.1,0,0,0,0,0,0,0,1,1,0,1,1",
+    ]
+    data = read(raw(33, found))
+    between = [x for x in data.lines if {x.from_bus, x.to_bus} == {"bus_7", "bus_8"}]
+    assert [line.X for line in between] == [0.072, 0.08, 0.09]
+    circuits = {data.branch_names[line.name].circuit for line in between}
+    assert circuits == {"1", "2", "3"}
+    assert "the branch [7, 8] 1 stands in line" in texts(data)
+    assert "a parallel circuit, 3, is taken" in texts(data)
+
+
+def test_a_ratio_of_0_is_the_nominal_one(read):
+    """MATPOWER's ``save2psse`` writes 0 for a ratio that its case does not give."""
+    found = records(33)
+    found["TRANSFORMER"][2] = found["TRANSFORMER"][2].replace("1.0,", "0,", 1)
+    data, usual = read(raw(33, found)), read(raw())
+    assert data.lines == usual.lines
+    assert "WINDV is 0" in texts(data)

@@ -182,3 +182,18 @@ def test_a_compensator_is_an_impedance_of_the_exciter(record, wanted, tmp_path):
     model = machine_models(read_dyr(place), [machine])[1, "1"]
     assert {name: x for name, x in model.parameters.items() if name in COMPENSATION} == wanted
     assert model.parts == {"machine": "genrou", "exciter": "sexs"}
+
+
+def test_an_event_of_andes_is_no_record_and_told(tmp_path):
+    """ANDES writes events, such as a line that trips, behind the records of its example cases."""
+    place = tmp_path / "one.dyr"
+    place.write_text("1 GENCLS 1 4 0 /\n  Line  'Toggle'  Line_1  1.0 /\n")
+    records = read_dyr(place)
+    told = [(one.use, one.why) for one in record_uses(records, {(1, "1")}, ())]
+    assert told[0] == (UseOfRecord.USED, "")
+    assert told[1] == (
+        UseOfRecord.NOT_USED,
+        "an event of ANDES, of Line_1; [scenarios] has events",
+    )
+    machine = Machine(1, "1", 1, 80.0, 1.0, 100.0, 0.25j, -9e3, 9e3)
+    assert machine_models(records, [machine])[1, "1"].parts == {"machine": "classical"}
