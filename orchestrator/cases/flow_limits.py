@@ -94,7 +94,8 @@ def solve_with_limits(
         result = solve(current)
     raise PowerFlowError(
         f"power flow: the buses at a limit of reactive power do not settle in {_ROUNDS} rounds: "
-        f"{', '.join(map(repr, list(at_limit)[:5]))}; widen their limits, or set reactive_limits = false"
+        f"{', '.join(map(repr, list(at_limit)[:5]))}; widen their limits, or write "
+        "reactive_limits = false in [power_flow]"
     )
 
 

@@ -5,6 +5,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 from fmus.grid.element_data import LAWS, Load, Zip
+from orchestrator.cases.remedies import WITHOUT_PARTS
 from orchestrator.cases.schema import LoadLaw, LoadModelTable, NetworkTable
 from orchestrator.core.errors import InputError, Problem
 
@@ -16,7 +17,8 @@ _OPEN = (
     "the load model is open: the file's loads (constant powers in its power flow) are taken as constant impedances, as "
     "ANDES does by itself (in eigenvalues since 1.9; before, they are constant powers there) and stability studies in "
     "PSS/E after a conversion to them; it can decide about the damping, "
-    'so say which in [network]: load_model = { active = "impedance", reactive = "impedance" }, "power" or "current"'
+    'so write which, such as load_model = { active = "power", reactive = "power" } in [network]; "impedance" and '
+    '"current" are the others'
 )
 
 
@@ -143,7 +145,7 @@ def _mixed(load: Load, quantity: str, rest: Zip, total: float, parts: tuple[floa
         raise InputError(
             f"{load.name} at {load.bus}: its {quantity} is {total:g}, the sum of {others:g}, {current:g} of constant "
             f"current and {impedance:g} of constant impedance [MW, Mvar]; a load that cancels itself has no shares: "
-            "remove keep_load_parts, or give the parts in [network.loads]"
+            f"write {WITHOUT_PARTS}, or give the parts in [network.loads]"
         )
     z, i, p = (share / total for share in (impedance, current, others))
     return Zip(z + rest.z * p, i + rest.i * p, rest.p * p)

@@ -33,6 +33,7 @@ from orchestrator.cases.psse.raw import FileLoad, Machine, read_raw
 from orchestrator.cases.psse.solution import stated_voltages
 from orchestrator.cases.psse.synchronous_parts import synchronous_part
 from orchestrator.cases.record_use import RecordUse
+from orchestrator.cases.remedies import with_frequency
 from orchestrator.cases.schema import NetworkTable
 from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import InputError, Problem, few
@@ -196,7 +197,7 @@ def _source(table: NetworkTable, directory: Path, slack: str | None) -> _Source:
         misfit = misfit_of(imported, tables.bus, tables.labels)
         if table.frequency is None:
             text = "MATPOWER's cases hold no frequency: every model keeps its own, usually 50 Hz"
-            text += '; write it in [network], such as frequency = "60 Hz"'
+            text += f"; write it, such as {with_frequency(_FREQUENCY)}"
             return _Source(imported, (Problem(str(path), text),), misfit=misfit)
         return _Source(imported, misfit=misfit)
     if table.pandapower is not None:
@@ -244,7 +245,7 @@ def _read_from_raw(asked: _Asked) -> _Source:
         changes.append(
             Problem(
                 f"{raw.tables.name}, line 1",
-                f'{text}; write frequency = "50 Hz" into [network] (`gfor new --frequency`) if it is another',
+                f"{text}; if it is another, write it, such as {with_frequency(50.0)}",
             )
         )
     if table.frequency is not None and own is not None and own != table.frequency:

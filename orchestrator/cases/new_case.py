@@ -77,6 +77,9 @@ class WantedCase:
     leave_out: tuple[str, ...] = ()
     dyr_leave_out: tuple[str, ...] = ()
     reactive_limits: bool = False
+    dyr_approximate: bool = False
+    replace: tuple[str, ...] = ()
+    load_parts: bool = True
     command: str = "gfor new"
 
     @property
@@ -384,8 +387,8 @@ def _placed(
     if wanted.replaces:
         if wanted.less in at_slack:
             raise InputError(
-                f"--converter: instead of {wanted.less}: it is at the slack; replace another, or write "
-                "another slack into the files"
+                f"--converter: instead of {wanted.less}: it is at the slack; replace another, or name "
+                "another slack by --slack"
             )
         return replace(found, less=wanted.less, before_mw=power, rating_mva=rating)
     if wanted.less not in at_slack and abs(wanted.p_mw - power) < 1e-6:
@@ -528,13 +531,15 @@ class _Text:
             + "\nreactive_limits = true" * w.reactive_limits,
             grid="grid" if kind == "emt" else "phasor_grid",
             network=self._tables()
-            or f"{key} = {self._path(self._sources[key])}" + kept * (key == "raw"),
+            or f"{key} = {self._path(self._sources[key])}" + kept * (key == "raw" and w.load_parts),
             loads="" if self._tables() else "# ",
             more=(f"frequency = {_quoted(w.frequency)}\n" if w.frequency else "")
             + stray["emt"] * (kind == "emt")
             + (f"leave_out = {_listed(w.leave_out)}\n" if w.leave_out else ""),
             units=dyr
-            + (f"\ndyr_leave_out = {_listed(w.dyr_leave_out)}" if w.dyr_leave_out else ""),
+            + (f"\ndyr_leave_out = {_listed(w.dyr_leave_out)}" if w.dyr_leave_out else "")
+            + "\ndyr_approximate = true" * w.dyr_approximate
+            + (f"\nreplace = {_listed(w.replace)}" if w.replace else ""),
             generator="" if "dyr" in self._sources else "_st1",
             suffix="" if kind == "emt" else "_phasor",
             converter=self._converter(),

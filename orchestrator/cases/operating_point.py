@@ -9,6 +9,7 @@ from orchestrator.cases.islands import likely_reference
 from orchestrator.cases.names import close_names
 from orchestrator.cases.plausibility import question
 from orchestrator.cases.power_flow import PowerFlow
+from orchestrator.cases.remedies import KEEPING_LIMITS, with_slack
 from orchestrator.cases.schema import UnitReconnectionTable
 from orchestrator.cases.start_values import FollowingLoad, is_connected, start_from_power_flow
 from orchestrator.core.errors import ErrorKind, InputError, Problem, few
@@ -29,12 +30,11 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
         raw = draft.given.case.network.raw if draft.given.case.network else None
         where = f"no bus of {raw}, or of the part of it that is studied, is the reference (IDE = 3)"
         none = f"{where}, and " if raw is not None else ""
-        text = f"{none}the key 'slack' is missing; name a unit or a bus with one that feeds what is left"
+        text = f"{none}the key 'slack' is missing"
         ratings = {name: draft.system.components[name].number("S_n") for name in units}
         one = likely_reference(draft.network, ratings) if units else "sg1"
-        draft.note(
-            draft.given.place("power_flow"), f'{text}, such as slack = "{one}" (`gfor new --slack`)'
-        )
+        remedy = f"name a unit or a bus with one that feeds what is left, such as {with_slack(one)}"
+        draft.note(draft.given.place("power_flow"), f"{text}; {remedy}")
         return None
     slack = units.get(wanted, wanted)
     if slack not in units.values():
@@ -43,7 +43,7 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
         if draft.data is not None and draft.data.slack == wanted:
             text = (
                 f"the reference {wanted!r} of the network's source has no unit in this scenario, so nothing feeds "
-                f'what is left: name a unit that is to feed it, such as slack = "{next(iter(units), "sg1")}"'
+                f"what is left: name a unit that is to feed it, such as {with_slack(next(iter(units), 'sg1'))}"
             )
         draft.note(draft.given.place("power_flow", "slack"), text)
         return None
@@ -163,7 +163,7 @@ def _limit_questions(draft: Draft, flow: PowerFlow) -> list[Problem]:
         remedy = (
             "the slack bus keeps no limit; take another slack"
             if kept
-            else "write reactive_limits = true to keep the limits, or false if the voltages are meant"
+            else f"to keep the limits, write {KEEPING_LIMITS}; false there if the voltages are meant"
         )
         found.append(Problem(where, f"limits of reactive power are exceeded: {told}; {remedy}"))
     return found

@@ -204,6 +204,7 @@ class UnitsTable(Table):
     dyr: str | None = None
     dyr_leave_out: list[str] = []
     dyr_approximate: Annotated[bool, Field(strict=True)] = False
+    replace: list[str] = []
     alpha: Number = Field(default=0.0, ge=0, le=1)
     generator: str
     converter: str

@@ -16,6 +16,7 @@ from orchestrator.cases.flow_limits import Limits
 from orchestrator.cases.flow_units import flow_unit
 from orchestrator.cases.load_models import FlowLaws
 from orchestrator.cases.power_flow import FlowUnit, PowerFlow, solve_power_flow
+from orchestrator.cases.remedies import KEEPING_LIMITS
 from orchestrator.cases.sharing import Dispatch, Room, shared_flow
 from orchestrator.core.errors import ErrorKind, InputError
 from orchestrator.systems.coupling.system import ComponentPlan, System
@@ -244,10 +245,7 @@ def _start_unit(
         declared = plan.description.variables[variable].maximum
         most = math.inf if declared is None else min(declared, usual)
         if abs(start[variable]) > most:
-            kept = (
-                ", or keep its limits ([power_flow] reactive_limits, gfor new --reactive-limits)"
-                * (variable == "Q_0")
-            )
+            kept = f", or keep its limits: {KEEPING_LIMITS}" * (variable == "Q_0")
             raise InputError(
                 f"{name} would have to feed {variable} = {start[variable]:.4g} pu of its rating, more than {most:g}; "
                 f"raise its S_n, or move load and generation{kept}",

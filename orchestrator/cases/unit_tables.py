@@ -3,7 +3,7 @@ share each unit."""
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -271,16 +271,18 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
     replaced = [row.label for row in rows if alphas[row.label] == 1]
     idle = draft.data.idle_machines if draft.data else ()
     records = read_dyr(path)
+    keys = [(machine.bus, machine.name.strip()) for machine in machines]
+    ours = {key for key, row in zip(keys, rows, strict=True) if row.label in table.replace}
     rows = with_records(
         rows,
         machines,
-        records,
+        [record for record in records if (record.bus, record.machine) not in ours],
         table.dyr_leave_out,
         replaced,
         idle,
         approximate=table.dyr_approximate,
     )
-    _account(draft, table, records)
+    _account(draft, table, records, ours)
     rows = with_choices(rows, replaced, _parts_of(table))
     rows = without_idle_controls(rows, str(path))
     machine_rows = [row for row in rows if row.label not in replaced]
@@ -306,7 +308,8 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
         raise InputError(
             f"{path}: the unit at bus {phasors[0].label} is the phasor model {phasors[0].converter}, and the generator "
             f"{table.generator!r} is none; phasor models go together: write generator = "
-            "'synchronous_generator_phasor', a converter that ends in _phasor, and model = 'phasor_grid' for the grid"
+            "'synchronous_generator_phasor' in [units], converter = 'gfor_phasor' in [units], and model = "
+            "'phasor_grid' in [components.grid] (`gfor new --models phasor`)"
         )
     return rows
 
@@ -327,8 +330,15 @@ def _parameters(entry: Row, kind: str) -> dict[str, Any]:
     return values
 
 
-def _account(draft: Draft, table: UnitsTable, records: Sequence[DynamicRecord]) -> None:
-    """Note what became of each record of a DYR file, and ask about those of no machine that could matter."""
+def _account(
+    draft: Draft,
+    table: UnitsTable,
+    records: Sequence[DynamicRecord],
+    ours: Collection[tuple[int, str]],
+) -> None:
+    """Note what became of each record of a DYR file, and ask about those of no machine that could matter.
+
+    ``ours``: machines that a converter of the case replaces."""
     machines = draft.data.machines if draft.data else ()
     uses = record_uses(
         records,
@@ -337,6 +347,7 @@ def _account(draft: Draft, table: UnitsTable, records: Sequence[DynamicRecord]) 
         table.dyr_leave_out,
         approximate=table.dyr_approximate,
         exciter=table.exciter,
+        ours=ours,
     )
     taken = _with_recorded_loads(draft, records)
     uses = [
@@ -346,7 +357,9 @@ def _account(draft: Draft, table: UnitsTable, records: Sequence[DynamicRecord]) 
         for use in uses
     ]
     draft.found.records += uses
-    draft.found.questions += unused_models(records, uses)
+    network = draft.given.case.network
+    said = network.load_model if network else None
+    draft.found.questions += unused_models(records, uses, said)
 
 
 def _with_recorded_loads(
@@ -380,6 +393,12 @@ def _alphas(draft: Draft, table: UnitsTable, rows: Sequence[UnitRow]) -> dict[st
 
     Within a layer, a choice for this unit goes before the one for all."""
     alphas = {row.label: table.alpha if row.alpha is None else row.alpha for row in rows}
+    for label in table.replace:
+        if label not in alphas:
+            hint = close_names(label, alphas, f"there are: {', '.join(alphas)}")
+            draft.note(draft.given.place("units", "replace"), f"there is no unit {label!r}; {hint}")
+            continue
+        alphas[label] = 1.0
     converters = {row.label: row.converter for row in rows if row.converter is not None}
     for choice in (choice for layer in draft.given.layers for choice in layer.shares):
         label = choice.label

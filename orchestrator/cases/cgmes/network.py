@@ -24,6 +24,7 @@ from orchestrator.cases.cgmes.branches import (
 from orchestrator.cases.cgmes.files import load_cgmes, profiles_of
 from orchestrator.cases.cgmes.reference import Reference, dynamics_of, reference_of
 from orchestrator.cases.network_sources import SourceTables
+from orchestrator.cases.remedies import without_kinds
 from orchestrator.cases.source_changes import Changes
 from orchestrator.core.errors import InputError, Problem, few
 
@@ -151,8 +152,8 @@ class _Reading:
         if refused:
             listed = "; ".join(f"{kind} ({few(names, 8)})" for kind, names in refused.items())
             raise InputError(
-                f"{self._place}: the network has no such elements: {listed}; to go on without them, write leave_out = "
-                f"{[*refused]} in [network], and put what they feed or draw into loads"
+                f"{self._place}: the network has no such elements: {listed}; to go on without them, write "
+                f"{without_kinds([*refused])}, and put what they feed or draw into loads"
             )
 
     def _buses(self, leaving_out: Sequence[str]) -> None:
@@ -173,7 +174,7 @@ class _Reading:
             sizes = ", ".join(str(len(members)) for members in live)
             raise InputError(
                 f"{self._place}: {len(live)} parts of the network with generators are not joined by lines (buses: "
-                f"{sizes}); study each on its own: write leave_out = ['island'] in [network] to keep the largest"
+                f"{sizes}); study each on its own: to keep the largest, write {without_kinds(['island'])}"
             )
         kept = {*live[0]}
         named = self._bus_names(buses)

@@ -19,6 +19,7 @@ from orchestrator.cases.flow_newton import solve, solve_from
 from orchestrator.cases.imported_flow import flow_lines, imported_equations
 from orchestrator.cases.network_import import ImportedNetwork
 from orchestrator.cases.psse.devices import DeviceEnd, HeldDevice
+from orchestrator.cases.remedies import without_kinds
 from orchestrator.core.errors import InputError
 
 _ROUNDS = 100
@@ -84,10 +85,9 @@ def _remedy(
     for gone in dict.fromkeys([*((kind,) for kind in kinds), tuple(kinds)]):
         rest = [device for device in devices if device.section not in gone]
         if _has_solution(rest, network, stated):
-            options = " ".join(f'--leave-out "{kind}"' for kind in gone)
             return (
-                f"without {' and '.join(gone)} it has one: look at what these records feed and draw, or let them go "
-                f"(`gfor new {options}`)"
+                f"without {' and '.join(gone)} it has one: look at what these records feed and draw, or let them go: "
+                f"write {without_kinds(gone)}"
             )
     return "it has none without them either: look at the rest of the network first"
 
@@ -227,7 +227,7 @@ class _Solution:
                 f"line {device.line}: the file does not hold what the {device.section.upper()} device {device.name!r} "
                 f"feeds at bus {ending.bus}: its model is the user's, and "
                 + ("something else stands there" if is_solved else "the file is not solved")
-                + f"; write leave_out = [{device.section!r}] in [network], and put what it feeds or draws into loads"
+                + f"; write {without_kinds([device.section])}, and put what it feeds or draws into loads"
             )
         voltages = np.array(
             [self._stated.get(self._number(bus), 1 + 0j) for bus in self._equations.buses]

@@ -18,8 +18,8 @@ _NAMES = {
 }
 _OPEN = (
     ". How they follow the voltage is open: constant powers are taken, which fast controls of DC lines give; it can "
-    'decide about the damping, so say which in [network]: device_model = { active = "power", reactive = "power" }, '
-    '"current" or "impedance"'
+    'decide about the damping, so write which, such as device_model = { active = "power", reactive = "power" } in '
+    '[network]; "current" and "impedance" are the others'
 )
 
 

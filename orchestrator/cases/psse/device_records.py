@@ -13,6 +13,7 @@ from orchestrator.cases.psse.records import NODES, RawFile, Record, elements, fi
 from orchestrator.cases.psse.two_terminal import TwoTerminal
 from orchestrator.cases.psse.unknown_devices import UnknownDevice
 from orchestrator.cases.psse.vsc_lines import Converter, VscLine
+from orchestrator.cases.remedies import without_kinds
 
 _KILO = 1000.0
 _NO_LIMIT = 9999.0  # Mvar by which PSS/E says that a converter has no limit
@@ -94,7 +95,7 @@ def _status(section: str, record: Record) -> int:
     if not record.text(2).isdigit():
         raise record.error(
             f"no record of a GNE, whose third value is NTERM, a number; here it is {record.text(2)!r}. Export the case "
-            "once more, or write leave_out = ['gne'] in [network]"
+            f"once more, or write {without_kinds(['gne'])}"
         )
     return record.whole(first_of_gne(record) + 3, "STATUS", 1)
 
@@ -234,7 +235,7 @@ def _multi_terminal(raw: RawFile, lines: Sequence[Record], places: Places) -> Mu
     if len(lines) != 1 + converters + buses + links or not (converters and buses and links):
         raise head.error(
             f"NCONV, NDCBS and NDCLN are {converters}, {buses} and {links}, which do not fit the lines that follow, "
-            "or leave no DC network; export the case once more, or write leave_out = ['multi-terminal dc'] in [network]"
+            f"or leave no DC network; export the case once more, or write {without_kinds(['multi-terminal dc'])}"
         )
     at_converters = lines[1 : 1 + converters]
     at_buses, at_links = (
@@ -260,8 +261,8 @@ def _multi_terminal(raw: RawFile, lines: Sequence[Record], places: Places) -> Mu
     for line in at_buses:
         if line.whole(5, "IDC2", 0):
             raise line.error(
-                "a converter between two DC buses (IDC2) is not read; write leave_out = ['multi-terminal dc'] in "
-                "[network], and put what the converters draw into loads"
+                "a converter between two DC buses (IDC2) is not read; write "
+                f"{without_kinds(['multi-terminal dc'])}, and put what the converters draw into loads"
             )
     voltage = abs(head.whole(5, "VCONV", 0))
     numbers = [abs(line.whole(0, "IB")) for line in at_converters]
@@ -297,8 +298,8 @@ def _facts(raw: RawFile, lines: Sequence[Record], places: Places) -> FactsDevice
     mode, far = record.whole(3, "MODE", 1), record.whole(2, "J", 0)
     if far and mode not in (NORMAL, BYPASSED, IMPEDANCE):
         raise record.error(
-            f"MODE is {mode}: a series voltage or one of several linked devices; 1 to 3 are read. Write leave_out = "
-            "['facts device'] in [network], and put what it feeds or draws into loads"
+            f"MODE is {mode}: a series voltage or one of several linked devices; 1 to 3 are read. Write "
+            f"{without_kinds(['facts device'])}, and put what it feeds or draws into loads"
         )
     held = record.number(6, "VSET", 1.0)
     if not 0 < held < 2:

@@ -17,8 +17,9 @@ from orchestrator.cases.psse.missing_models import (
     kind_of,
     missing_models,
 )
-from orchestrator.cases.psse.raw import Machine
+from orchestrator.cases.psse.raw import Machine, unit_labels
 from orchestrator.cases.record_use import RecordUse, UseOfRecord
+from orchestrator.cases.remedies import APPROXIMATING, replacement_of, without_models
 from orchestrator.core.errors import InputError
 
 _KNOWN = DYR_RECORDS | REGFM_A1_RECORDS | STATIC_VAR_RECORDS
@@ -77,6 +78,7 @@ def machine_models(
     values: dict[tuple[int, str], dict[str, float]] = {key: {} for key in at}
     lines: dict[tuple[int, str], dict[str, int]] = {key: {} for key in at}
     left = {name.upper() for name in leaving_out}
+    labels = unit_labels(machines)
     of: dict[tuple[int, str], list[DynamicRecord]] = {key: [] for key in at}
     # machines whose own record no part stands for
     lacking: set[tuple[int, str]] = set()
@@ -92,7 +94,7 @@ def machine_models(
             continue
         known = _KNOWN.get(record.name)
         if known is None:
-            remedy = remedy_for(record.name, approximate=approximate)
+            remedy = remedy_for(record.name, labels[key], approximate=approximate)
             if remedy:
                 problems.append(f"no part of ours stands for {record.name}{remedy}")
                 first.setdefault(problems[-1], record.place)
@@ -112,19 +114,19 @@ def machine_models(
     for key in (key for key, machine in at.items() if machine.is_infinite and not of[key]):
         parts[key]["machine"] = CLASSICAL
         values[key] |= WITHOUT_INERTIA
-    following = _followed(of, left, problems) if approximate else {}
+    following = _followed(of, left, problems, labels) if approximate else {}
     for key in following:
         parts[key]["converter"] = MODEL
     passed = {*_KNOWN, *without, *(left - _own_machines(records, left))}
     missing = missing_models(records, at, {*passed, *(FIELDS if approximate else ())})
     lacking |= {key for model in missing for key in _machines_of(model) if not model.may_go}
     missing = [model for model in missing if model.may_go or not _machines_of(model) <= {*replaced}]
-    problems += _unfit(parts, {*replaced, *lacking})
+    problems += _unfit(parts, {*replaced, *lacking}, labels)
     if problems or missing:
         counted_once = [*_count_repeats(problems, first)]
         hidden = len(counted_once) - _MOST_SHOWN
         more = f"\n  and {hidden} more" if hidden > 0 else ""
-        shown = [*in_words(missing), *counted_once[:_MOST_SHOWN]]
+        shown = [*in_words(missing, labels), *counted_once[:_MOST_SHOWN]]
         raise InputError(
             "the dynamics data cannot be taken over; correct them, or name models that may go in [units] "
             "dyr_leave_out:\n  " + "\n  ".join(shown) + more
@@ -168,10 +170,12 @@ def record_uses(
     *,
     approximate: bool = False,
     exciter: str | None = None,
+    ours: Collection[tuple[int, str]] = (),
 ) -> list[RecordUse]:
     """Return what becomes of each record, of which none that stops the reading is there.
 
-    ``exciter``: what machines without a record of one get, where the case says so."""
+    ``exciter``: what machines without a record of one get, where the case says so; ``ours``: machines that a converter
+    of the case replaces."""
     left = {name.upper() for name in leaving_out}
     excited = {
         (record.bus, record.machine)
@@ -183,7 +187,11 @@ def record_uses(
             record.file,
             record.line,
             record.name,
-            *_use_of(record, machines, idle, left, approximate, excited),
+            *(
+                (UseOfRecord.NOT_USED, "a converter of ours replaces its machine", False)
+                if (record.bus, record.machine) in ours
+                else _use_of(record, machines, idle, left, approximate, excited)
+            ),
         )
         for record in records
     ]
@@ -221,15 +229,20 @@ def _use_of(
 
 
 def _unfit(
-    parts: Mapping[tuple[int, str], Mapping[str, str]], replaced: Collection[tuple[int, str]]
+    parts: Mapping[tuple[int, str], Mapping[str, str]],
+    replaced: Collection[tuple[int, str]],
+    labels: Mapping[tuple[int, str], str],
 ) -> Iterator[str]:
-    """Machines whose records are too many or too few."""
+    """Machines whose records are too many or too few; ``labels`` are of their units."""
     for (bus, name), own in parts.items():
         if "converter" in own and len(own) > 1:
             others = ", ".join(kind for kind in own if kind != "converter")
             yield f"machine {name!r} at bus {bus} is a converter, and has records of its {others}; remove them"
         elif not {"machine", "converter"} & {*own} and (bus, name) not in replaced:
-            yield f"machine {name!r} at bus {bus} has no record of a machine"
+            yield (
+                f"machine {name!r} at bus {bus} has no record of a machine; add one, or write "
+                f"{replacement_of(labels[bus, name])}, and a converter of ours stands there"
+            )
 
 
 def _of_nobody(record: DynamicRecord, machines: Collection[tuple[int, str]]) -> str:
@@ -249,13 +262,16 @@ def _followed(
     of: Mapping[tuple[int, str], Sequence[DynamicRecord]],
     left: Collection[str],
     problems: list[str],
+    labels: Mapping[tuple[int, str], str],
 ) -> dict[tuple[int, str], MachineModel]:
-    """Models of the machines that are grid-following converters; ``problems`` takes what speaks against one."""
+    """Models of the machines that are grid-following converters; ``problems`` takes what speaks against one.
+
+    ``labels``: of the machines' units."""
     found = {}
     for key, own in of.items():
         if any(record.name in FIELDS and record.name not in left for record in own):
             try:
-                parameters, replaced = followed(own, left)
+                parameters, replaced = followed(own, left, labels[key])
             except InputError as error:
                 problems.append(str(error))
                 parameters, replaced = {}, []
@@ -351,23 +367,22 @@ _FAMILIES = ("REGC", "REEC", "REPC", "WTG", "WT4", "WT3", "PVGU", "PVEU", "PLNTB
 """How the names of grid-following converters and their controls begin."""
 
 
-def remedy_for(name: str, *, approximate: bool) -> str:
-    """Return what to do about a record that no part stands for; empty where it is of no grid-following converter."""
+def remedy_for(name: str, unit: str, *, approximate: bool) -> str:
+    """Return what to do about a record that no part stands for; empty where it is of no grid-following converter.
+
+    ``unit``: label of its machine's unit."""
     if not name.startswith(_FAMILIES):
         return ""
     if name == PLANT:
         return (
-            f", the controller of a plant; name it in dyr_leave_out = ['{PLANT}'], and the references of its converter "
-            "are constant"
+            f", the controller of a plant; write {without_models([PLANT])}, and the references of its "
+            "converter are constant"
         )
     if approximate or name not in FIELDS:
-        return (
-            ", a grid-following converter; name its records in dyr_leave_out, and give its unit alpha = 1 with a "
-            "converter of ours"
-        )
+        return f", a grid-following converter; write {replacement_of(unit)}, and a converter of ours stands there"
     return (
-        f", a grid-following converter; write dyr_approximate = true for {MODEL} in its place, with a list of what "
-        "that leaves out, or name its records in dyr_leave_out, and give its unit alpha = 1 with a converter of ours"
+        f", a grid-following converter; write {APPROXIMATING} for {MODEL} in its place, with a list of what that "
+        f"leaves out, or {replacement_of(unit)}, and a converter of ours stands there"
     )
 
 
@@ -375,9 +390,9 @@ def remedy_for(name: str, *, approximate: bool) -> str:
 
 
 def followed(
-    records: Sequence[DynamicRecord], left: Collection[str]
+    records: Sequence[DynamicRecord], left: Collection[str], unit: str
 ) -> tuple[Mapping[str, float], list[tuple[int, str]]]:
-    """The approximation of a grid-following converter by its records.
+    """The approximation of a grid-following converter by its records; ``unit`` is the label of its unit.
 
     Returns parameters of the model, and what it leaves out, with the lines that say it."""
     own = [record for record in records if record.name in FIELDS and record.name not in left]
@@ -394,8 +409,8 @@ def followed(
         parameters, texts = approximation(values)
     except ValueError as error:
         raise InputError(
-            f"{own[0].place}: the converter at bus {own[0].bus} cannot be approximated: {error}; name its records in "
-            "dyr_leave_out, and give its unit alpha = 1 with a converter of ours"
+            f"{own[0].place}: the converter at bus {own[0].bus} cannot be approximated: {error}; write "
+            f"{replacement_of(unit)}, and a converter of ours stands there"
         ) from None
     replaced = [(own[0].line, text) for text in texts]
     for record in (record for record in records if record.name == PLANT and PLANT in left):

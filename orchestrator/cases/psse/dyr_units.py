@@ -2,7 +2,6 @@
 
 Parts of machines without a record are what [units] chooses for them, else what PSS/E assumes."""
 
-import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -17,7 +16,7 @@ from orchestrator.cases.psse.dyr import (
     machine_models,
 )
 from orchestrator.cases.psse.dyr_records import DynamicRecord
-from orchestrator.cases.psse.raw import Machine
+from orchestrator.cases.psse.raw import Machine, unit_labels
 from orchestrator.cases.unit_row import UnitRow, checked
 from orchestrator.core.errors import InputError
 
@@ -155,12 +154,12 @@ def rows_of_machines(machines: Sequence[Machine], place: str) -> list[UnitRow]:
     at_bus: dict[int, list[Machine]] = {}
     for machine in machines:
         at_bus.setdefault(machine.bus, []).append(machine)
+    labels = unit_labels(machines)
     rows = []
     for machine in machines:
         here = at_bus[machine.bus]
-        name = re.sub(r"\W", "_", machine.name.strip())
         row = UnitRow(
-            str(machine.bus) if len(here) == 1 else f"{machine.bus}_{name}",
+            labels[machine.bus, machine.name.strip()],
             bus_name(str(machine.bus)),
             machine.rating_mva,
             machine.p_mw,

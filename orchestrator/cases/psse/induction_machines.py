@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.cases.psse.devices import DeviceEnd, HeldDevice, Voltages
+from orchestrator.cases.remedies import without_kinds
 from orchestrator.core.errors import InputError
 
 ABSENT = 999.0  # value of a resistance or a reactance that is not given
@@ -92,8 +93,8 @@ class InductionMachine(HeldDevice):
         if above is None:
             raise InputError(
                 f"{self.place}, line {self.line}: the induction machine at bus {self.bus} cannot give PSET = "
-                f"{self.power_mw:g} MW at {v:.3g} pu: its circuit allows less; mend the record, or write leave_out = "
-                f"[{self.section!r}] in [network]"
+                f"{self.power_mw:g} MW at {v:.3g} pu: its circuit allows less; mend the record, or write "
+                f"{without_kinds([self.section])}"
             )
         if above == 0:
             return direction * float(_SLIPS[0])

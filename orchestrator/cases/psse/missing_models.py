@@ -8,6 +8,7 @@ from pathlib import Path
 
 from orchestrator.cases.psse.dyr_records import DynamicRecord
 from orchestrator.cases.psse.raw import Machine
+from orchestrator.cases.remedies import replacement_of, without_models
 
 MACHINE = "machine"
 UNKNOWN = "unknown"
@@ -112,8 +113,10 @@ def _power(
 _HEAD = ("model", "count", "MW", "first", "in its place, if it is left out", "moves these modes")
 
 
-def in_words(missing: Sequence[MissingModel]) -> list[str]:
-    """The table as lines, and what may be done, in the words that are typed."""
+def in_words(missing: Sequence[MissingModel], labels: Mapping[tuple[int, str], str]) -> list[str]:
+    """The table as lines, and what may be done, in the words that are typed.
+
+    ``labels``: of the machines' units, by bus and identifier."""
     if not missing:
         return []
     rows = [_HEAD, *(model.row for model in missing if model.may_go)]
@@ -122,14 +125,15 @@ def in_words(missing: Sequence[MissingModel]) -> list[str]:
     if len(rows) > 1:
         lines.append("no part of ours stands for these models:")
         lines += ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
-        options = " ".join(f"--dyr-leave-out {model.name}" for model in missing if model.may_go)
-        lines.append(f"to go on without them, type: {options}")
+        names = [model.name for model in missing if model.may_go]
+        lines.append(f"to go on without them, write {without_models(names)}")
     for model in missing:
         if not model.may_go:
-            place = model.records[0].place
+            first = model.records[0]
+            unit = labels[first.bus, first.machine]
             lines.append(
-                f"{place}: no part of ours stands for {model.name}, the machine itself ({len(model.records)} of "
-                f"{model.p_mw:.0f} MW); it cannot be left out: write another record of a machine, or give its unit "
-                "alpha = 1 with a converter of ours"
+                f"{first.place}: no part of ours stands for {model.name}, the machine itself ({len(model.records)} of "
+                f"{model.p_mw:.0f} MW); it cannot be left out: write another record of a machine, or "
+                f"{replacement_of(unit)}, and a converter of ours stands there"
             )
     return lines

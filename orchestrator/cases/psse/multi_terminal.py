@@ -7,6 +7,7 @@ import numpy as np
 
 from orchestrator.cases.psse.bridges import Bridges
 from orchestrator.cases.psse.devices import DeviceEnd, HeldDevice, Voltages
+from orchestrator.cases.remedies import without_kinds
 from orchestrator.core.errors import InputError
 
 CURRENT = 2  # MDC
@@ -98,7 +99,7 @@ class MultiTerminal(HeldDevice):
                 return [(terminal, float(v), float(i)) for terminal, v, i in rows]
         raise InputError(
             f"{self.place}, line {self.line}: the DC network {self.name!r} has no solution with these settings "
-            f"(SETVL) and resistances; mend the record, or write leave_out = [{self.section!r}] in [network]"
+            f"(SETVL) and resistances; mend the record, or write {without_kinds([self.section])}"
         )
 
     def _currents(self, kilovolts: np.ndarray) -> np.ndarray:

@@ -1,7 +1,9 @@
 """A PSS/E RAW file of revision 29 to 36 as tables of a network source."""
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+import re
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
@@ -33,6 +35,7 @@ from orchestrator.cases.psse.solution import fits, reactive_needs, stated_voltag
 from orchestrator.cases.psse.transformers import Transformer, star, transformers
 from orchestrator.cases.psse.zero_impedances import is_joining, merged_buses, threshold
 from orchestrator.cases.record_use import RecordUse
+from orchestrator.cases.remedies import with_slack
 from orchestrator.cases.source_changes import Changes
 from orchestrator.core.errors import Problem
 
@@ -58,6 +61,7 @@ _RADIANS, _NEAR = math.pi / 6, 0.01
 # of a switched shunt: columns of STAT, MODSW and BINIT up to revision 31, up to 34, and after
 _SWITCHED: tuple[tuple[int | None, int, int], ...] = ((None, 1, 7), (3, 1, 9), (4, 2, 11))
 _SWITCH_STATE = 16  # column of STAT of a switching device
+_NO_LETTER = re.compile(r"\W")
 _SAME_VOLTAGE = 0.1  # part by which the nominal voltages at a line's ends may differ
 
 
@@ -91,6 +95,16 @@ class Machine:
             return self.rating_mva
         most = self.p_max_mw if math.isfinite(self.p_max_mw) else 0.0
         return max(fed, most) / _POWER_FACTOR
+
+
+def unit_labels(machines: Iterable[Machine]) -> dict[tuple[int, str], str]:
+    """Return labels of the machines' units by bus and identifier: the bus, with the identifier where it has several."""
+    keys = [(machine.bus, machine.name.strip()) for machine in machines]
+    at_bus = Counter(bus for bus, _ in keys)
+    return {
+        (bus, name): str(bus) if at_bus[bus] == 1 else f"{bus}_{_NO_LETTER.sub('_', name)}"
+        for bus, name in keys
+    }
 
 
 @dataclass(frozen=True)
@@ -772,7 +786,7 @@ class _Reading:
             f"reference bus (IDE = 3) without a machine in service: an infinite bus holds its VM = {VM:g} pu there and "
             f"feeds what is left, as a source behind {INFINITE_REACTANCE:g} pu (in PSS/E GENCLS with H = 0). If a "
             "machine is meant, add its record to the file; if another is to feed what is left, name it, such as "
-            f'slack = "sg{machines[0].bus}" (`gfor new --slack`)'
+            f"{with_slack(f'bus_{machines[0].bus}')}"
         )
         line = self._lines_of["bus", bus]
         self._changes.note(line, text)

@@ -10,6 +10,7 @@ from itertools import chain
 from pathlib import Path
 
 from orchestrator.cases.psse.titles import section_of
+from orchestrator.cases.remedies import without_kinds
 from orchestrator.cases.source_changes import Changes
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import read_bytes, visible
@@ -383,6 +384,5 @@ def leave_out(raw: RawFile, allowed: Sequence[str], changes: Changes) -> None:
     if refused:
         raise InputError(
             f"{raw.place}: the network has no such elements: {'; '.join(refused)}; to go on without them, write "
-            f"leave_out = [{', '.join(repr(text.split(' (line')[0]) for text in refused)}] in [network], and put what "
-            "they feed or draw into loads"
+            f"{without_kinds([text.split(' (line')[0] for text in refused])}, and put what they feed or draw into loads"
         )

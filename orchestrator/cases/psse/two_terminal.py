@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from orchestrator.cases.psse.bridges import Bridges
 from orchestrator.cases.psse.devices import DeviceEnd, HeldDevice, Voltages
+from orchestrator.cases.remedies import without_kinds
 from orchestrator.core.errors import InputError
 
 _CURRENT = 2  # MDC of a line that holds its current
@@ -97,7 +98,7 @@ class TwoTerminal(HeldDevice):
         raise InputError(
             f"{self.place}, line {self.line}: the DC line {self.name!r} cannot carry SETVL = {self.setting:g} with "
             f"VSCHD = {self.scheduled_kv:g} kV and RDC = {self.r_ohm:g} ohm at its buses' voltages; mend the record, "
-            f"or write leave_out = [{self.section!r}] in [network]"
+            f"or write {without_kinds([self.section])}"
         )
 
     def _order(self, rectifier_kv: float, inverter_kv: float) -> float:

@@ -1,10 +1,12 @@
 """Questions about records of a DYR file that are of no machine: models of loads, of SVCs, of DC lines."""
 
+import tomllib
 from collections.abc import Iterator, Sequence
 
 from orchestrator.cases.psse.dyr_records import DynamicRecord
 from orchestrator.cases.psse.missing_models import kind_of
 from orchestrator.cases.record_use import RecordUse, UseOfRecord
+from orchestrator.cases.schema import LoadModelTable
 from orchestrator.cases.source_changes import Changes
 from orchestrator.core.errors import Problem, few
 
@@ -22,8 +24,14 @@ _SUM = 1e-3  # by which shares may miss 1
 _MOST_BUSES = 8
 
 
-def unused_models(records: Sequence[DynamicRecord], uses: Sequence[RecordUse]) -> list[Problem]:
-    """One question for each model that matters, with the lines of all its records."""
+def unused_models(
+    records: Sequence[DynamicRecord],
+    uses: Sequence[RecordUse],
+    said: LoadModelTable | None = None,
+) -> list[Problem]:
+    """One question for each model that matters, with the lines of all its records.
+
+    ``said``: how the case's loads follow the voltage; records that say the same are not asked about."""
     if not records:
         return []
     changes = Changes(records[0].file)
@@ -35,16 +43,21 @@ def unused_models(records: Sequence[DynamicRecord], uses: Sequence[RecordUse]) -
     for name in dict.fromkeys(record.name for record in unused):
         own = [record for record in unused if record.name == name]
         kind = kind_of(name)
-        if kind in _MATTER:
+        law = _law(own)
+        is_said = bool(law) and said == LoadModelTable.model_validate(
+            tomllib.loads(law)["load_model"]
+        )
+        if kind in _MATTER and not is_said:
+            remedy = f"; to take it for all loads, write {law} in [network]" if law else ""
             buses = few(dict.fromkeys(str(record.bus) for record in own), _MOST_BUSES)
             text = f"{name} (bus {buses}) is of no machine and not used: {_MATTER[kind]}"
             for record in own:
-                changes.note(record.line, text + _remedy(own))
+                changes.note(record.line, text + remedy)
     return changes.listed()
 
 
-def _remedy(records: Sequence[DynamicRecord]) -> str:
-    """Return what to write in the case so that loads follow the records; empty where that is not exact."""
+def _law(records: Sequence[DynamicRecord]) -> str:
+    """Return what to write in the case, as TOML, so that loads follow the records; empty where that is not exact."""
     if records[0].name not in _EXPONENTIAL or len({record.values for record in records}) > 1:
         return ""
     try:
@@ -58,10 +71,7 @@ def _remedy(records: Sequence[DynamicRecord]) -> str:
     if len(laws) < 2:
         return ""
     active, reactive = laws
-    return (
-        f"; to take it for all loads, write load_model = {{ active = {active}, reactive = {reactive}, k_pf = {k_pf:g}, "
-        f"k_qf = {k_qf:g} }} in [network]"
-    )
+    return f"load_model = {{ active = {active}, reactive = {reactive}, k_pf = {k_pf:g}, k_qf = {k_qf:g} }}"
 
 
 def _laws(shares: Sequence[float], powers: Sequence[float]) -> Iterator[str]:

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from orchestrator.cases.psse.devices import DeviceEnd, HeldDevice, Hold, Voltages
+from orchestrator.cases.remedies import without_kinds
 from orchestrator.core.errors import InputError
 
 # TYPE: out of service, holds the DC voltage, or sets a power
@@ -124,6 +125,6 @@ class VscLine(HeldDevice):
             current = (current + wanted) / 2
         raise InputError(
             f"{self.place}, line {self.line}: the DC line {self.name!r} cannot carry DCSET = {power.dc_setting:g} MW "
-            f"with {voltage:g} kV and RDC = {self.r_ohm:g} ohm; mend the record, or write leave_out = "
-            f"[{self.section!r}] in [network]"
+            f"with {voltage:g} kV and RDC = {self.r_ohm:g} ohm; mend the record, or write "
+            f"{without_kinds([self.section])}"
         )

@@ -124,7 +124,10 @@ def _wanted(options: argparse.Namespace) -> WantedCase:
         tuple(options.leave_out),
         tuple(options.dyr_leave_out),
         options.reactive_limits,
-        f"gfor {shlex.join(sys.argv[1:])}" if sys.argv[1:2] == ["new"] else "gfor new",
+        dyr_approximate=options.dyr_approximate,
+        replace=tuple(options.replace),
+        load_parts=not options.no_load_parts,
+        command=f"gfor {shlex.join(sys.argv[1:])}" if sys.argv[1:2] == ["new"] else "gfor new",
     )
 
 

@@ -292,7 +292,7 @@ def test_a_device_at_a_bus_that_is_not_there_is_not_used_and_told(section, read)
 def test_the_case_says_how_devices_follow_the_voltage(read):
     section = {"TWO-TERMINAL DC": lines_of("TWO-TERMINAL DC", 33)}
     usual = read(section)
-    assert "say which in [network]: device_model" in texts(usual)
+    assert "write which, such as device_model" in texts(usual)
     assert {x.active.p for x in usual.loads if x.name.startswith("dc_")} == {1.0}
     chosen = read(section, device_model={"active": "current", "reactive": "impedance"})
     assert "device_model" not in texts(chosen)

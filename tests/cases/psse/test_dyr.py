@@ -102,7 +102,7 @@ def test_records_over_lines_with_commas_or_blanks(tmp_path):
         (
             "'SEXS'",
             "'OLDEXC'",
-            r"(?s)for these models.*\n +OLDEXC +1 +72 +line 6 .*type: --dyr-leave-out OLDEXC",
+            r"(?s)for these models.*\n +OLDEXC +1 +72 +line 6 .*gfor new --dyr-leave-out OLDEXC",
         ),
         ("3 'GENCLS'", "8 'GENCLS'", r"machine '1' at bus 3 has no record of a machine"),
         ("9.55", "x", r"line 2: GENROU has H = 'x'; it must be a number"),

@@ -92,7 +92,7 @@ def test_every_field_sets_a_parameter_of_the_model():
         (
             "'REGFMA1'",
             "'WT4G1'",
-            r"stands for WT4G1, a grid-following converter; name its .* alpha = 1",
+            r"stands for WT4G1, a grid-following converter; write replace = ",
         ),
     ],
 )

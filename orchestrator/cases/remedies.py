@@ -1,0 +1,39 @@
+"""Remedies that stand in messages: a key of a case, and the option of ``gfor new`` that writes it into a new one."""
+
+from collections.abc import Sequence
+
+
+def without_kinds(kinds: Sequence[str]) -> str:
+    """Return ``leave_out = ['gne'] in [network] (`gfor new --leave-out "gne"`)``, without the devices of some kinds."""
+    options = " ".join(f'--leave-out "{kind}"' for kind in kinds)
+    return f"leave_out = {_listed(kinds)} in [network] (`gfor new {options}`)"
+
+
+def without_models(names: Sequence[str]) -> str:
+    """Return the same for records of dynamics data, by the names of their models."""
+    options = " ".join(f"--dyr-leave-out {name}" for name in names)
+    return f"dyr_leave_out = {_listed(names)} in [units] (`gfor new {options}`)"
+
+
+def replacement_of(unit: str) -> str:
+    """Return what puts a converter of the case in the place of a machine, by the label of its unit."""
+    return f"replace = {_listed([unit])} in [units] (`gfor new --replace {unit}`)"
+
+
+def with_frequency(hertz: float) -> str:
+    """Return what gives a network's rated frequency [Hz]."""
+    return f'frequency = "{hertz:g} Hz" in [network] (`gfor new --frequency "{hertz:g} Hz"`)'
+
+
+def with_slack(name: str) -> str:
+    """Return what names the unit or bus that feeds what is left."""
+    return f'slack = "{name}" in [power_flow] (`gfor new --slack {name}`)'
+
+
+APPROXIMATING = "dyr_approximate = true in [units] (`gfor new --dyr-approximate`)"
+WITHOUT_PARTS = "keep_load_parts = false in [network] (`gfor new --no-load-parts`)"
+KEEPING_LIMITS = "reactive_limits = true in [power_flow] (`gfor new --reactive-limits`)"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return f"[{', '.join(map(repr, names))}]"
