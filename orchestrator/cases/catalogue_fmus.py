@@ -45,12 +45,12 @@ def plan_fmu(
     """FMU of a catalogue's model, described and not yet built."""
     from fmus.toolchain.cache import cache_directory, intact  # noqa: PLC0415 - needs the extra `build`
 
-    place = known(entry_of(model), _asked(model, network, native, parts))
+    place = known(entry_of(model), _cache_key(model, network, native, parts))
     if place is not None and intact(path := cache_directory("fmus").joinpath(*place)):
         return PlannedFmu(model, network, native, parts, read_description(path), is_there=True)
     name, text = noted(
         entry_of(model),
-        f"sketch of {_asked(model, network, native, parts)}",
+        f"sketch of {_cache_key(model, network, native, parts)}",
         partial(_sketch, model, network, native, parts),
     )
     path = cache_directory("fmus") / _TO_COME / f"{name}.fmu"
@@ -71,11 +71,11 @@ def _sketch(
     text = model_description(
         sketch, _TO_COME, sketch.name, "", native=native, listed=False
     ).decode()
-    _described[_asked(model, network, native, parts)] = sketch, text
+    _described[_cache_key(model, network, native, parts)] = sketch, text
     return sketch.name, text
 
 
-def _asked(
+def _cache_key(
     model: str, network: Network | None, native: bool, parts: tuple[tuple[str, str], ...]
 ) -> str:
     return f"fmu {model} {native} {parts!r} {network!r}"
@@ -90,7 +90,7 @@ def _recipe(planned: PlannedFmu) -> Any:
     from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - needs the extra `build`
     from fmus.toolchain.python_fmu import PythonFmu  # noqa: PLC0415 - as above
 
-    kept = _described.get(_asked(planned.model, planned.network, planned.native, planned.parts))
+    kept = _described.get(_cache_key(planned.model, planned.network, planned.native, planned.parts))
     made = (
         kept[0]
         if kept
@@ -119,7 +119,7 @@ def build_fmu(planned: PlannedFmu) -> FmuDescription:
         recipes.append(_recipe(planned))
         return _place(recipes[0])
 
-    asked = _asked(planned.model, planned.network, planned.native, planned.parts)
+    asked = _cache_key(planned.model, planned.network, planned.native, planned.parts)
     noted(entry_of(planned.model), asked, find)
     recipe = recipes[0] if recipes else _recipe(planned)
     path, told, (_, text) = (

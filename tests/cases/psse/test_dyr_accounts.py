@@ -62,7 +62,9 @@ def test_models_that_are_missing_are_one_table(tmp_path):
     assert "not: it acts at limits only" in text
     assert "not known: gfor does not know what this model is" in text
     typed = "--dyr-leave-out URST5T --dyr-leave-out OWNGOV --dyr-leave-out OEL1B"
-    assert text.splitlines()[-1].strip().startswith("to go on without them, write dyr_leave_out = [")
+    assert (
+        text.splitlines()[-1].strip().startswith("to go on without them, write dyr_leave_out = [")
+    )
     assert f"(`gfor new {typed}`)" in text.splitlines()[-1]
     machine_models(
         read(tmp_path, CLASSICAL + many), MACHINES, typed.replace("--dyr-leave-out ", "").split()
