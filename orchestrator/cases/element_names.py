@@ -38,6 +38,8 @@ class NamedData(Protocol):
     def titles(self) -> Mapping[str, str]: ...
     @property
     def branch_names(self) -> Mapping[str, BranchName]: ...
+    @property
+    def unit_names(self) -> Mapping[str, str]: ...
 
 
 @dataclass(frozen=True)
@@ -147,6 +149,7 @@ def element_names(
     ends: Mapping[str, Sequence[str]],
     at_bus: Mapping[str, str],
     units: Mapping[str, str],
+    generators: Mapping[str, str] | None = None,
 ) -> ElementNames:
     """Names of a network's buses and branches, and of what stands at its buses.
 
@@ -162,15 +165,22 @@ def element_names(
         Bus of every load and shunt.
     units
         Bus of every unit; a bus' name means its unit where units are asked for.
+    generators
+        Names of generators in the file, by their bus.
     """
-    if not (titles or branches):
+    if not (titles or branches or generators):
         return ElementNames()
-    shown = {bus: f"{bus} {title}" for bus, title in titles.items()}
+    shown = {bus: f"{bus} {title}" for bus, title in titles.items() if not _is_in(bus, title)}
+    known = generators or {}
+    own_names = {name: known[bus] for name, bus in units.items() if bus in known}
     for name, bus in {**at_bus, **units}.items():
-        if bus in titles:
-            shown[name] = f"{name} ({titles[bus]})"
+        words = [own_names.get(name, "")]
+        words += [titles[bus]] if bus in titles and not _is_in(bus, titles[bus]) else []
+        if told := ", ".join(filter(None, words)):
+            shown[name] = f"{name} ({told})"
     meant = [(title, bus) for bus, title in titles.items()]
     meant += [(titles.get(bus, ""), name) for name, bus in units.items()]
+    meant += [(own, name) for name, own in own_names.items()]
     for branch, buses in ends.items():
         own = branches.get(branch, BranchName())
         between = [titles.get(bus, "") for bus in buses]
@@ -182,6 +192,14 @@ def element_names(
         by_name.setdefault(_plain(name), {})[identifier] = None
     by_name.pop("", None)
     return ElementNames(shown, {name: tuple(found) for name, found in by_name.items()})
+
+
+def _is_in(bus: str, title: str) -> bool:
+    """Return whether an identifier says a name already, as ``bus_North_1`` says ``North 1``."""
+    return re.sub(r"\W+", "_", title).strip("_").casefold() in (
+        bus.casefold(),
+        bus.removeprefix("bus_").casefold(),
+    )
 
 
 def _shown_of_branch(branch: str, own: BranchName, between: Sequence[str]) -> dict[str, str]:
@@ -213,7 +231,7 @@ def names_of(network: Network, data: NamedData) -> ElementNames:
     units = {port.name: port.bus for port in network.ports}
     ends = _ends(network.lines, network.transformers)
     at_bus = _at_bus(network.loads, network.shunts)
-    return element_names(data.titles, data.branch_names, ends, at_bus, units)
+    return element_names(data.titles, data.branch_names, ends, at_bus, units, data.unit_names)
 
 
 def names_without_units(data: NamedData) -> ElementNames:

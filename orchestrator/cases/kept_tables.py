@@ -42,6 +42,9 @@ class SourceTables:
     # number of a bus whose loads have both signs → those below zero, which the bus' row and its parts hold as well
     feeding: dict[int, LoadSum] = field(default_factory=dict)
     branch_names: tuple[BranchName, ...] = ()  # one for each branch, where the file names them
+    unit_names: dict[int, str] = field(
+        default_factory=dict
+    )  # of the generators at a bus, by its number
 
 
 LIBRARIES = ("pandapower", "numpy", "scipy", "pandas", "lightsim2grid")

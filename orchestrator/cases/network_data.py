@@ -89,6 +89,7 @@ class NetworkData:
     limits: FileLimits = field(default_factory=FileLimits)
     titles: Mapping[str, str] = field(default_factory=dict)  # names in the source's file, by bus
     branch_names: Mapping[str, BranchName] = field(default_factory=dict)  # as the source has them
+    unit_names: Mapping[str, str] = field(default_factory=dict)  # of the generators, by bus
     # file_loads: loads one by one, where the source is of PSS/E; recorded_loads: names of those whose laws are of
     # records of dynamics data
     file_loads: tuple[FileLoad, ...] = ()
@@ -160,6 +161,7 @@ def network_data(table: NetworkTable, directory: Path, slack: str | None = None)
         records=found.records,
         titles=source.titles,
         branch_names=source.branch_names,
+        unit_names=source.unit_names,
         device_loads=tuple(x.name for x in found.device_loads),
         file_loads=found.file_loads,
     )

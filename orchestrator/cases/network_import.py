@@ -16,6 +16,7 @@ from orchestrator.cases.branch_limits import FileLimits, Rating
 from orchestrator.cases.element_names import BranchName
 from orchestrator.cases.network_sources import SourceTables
 from orchestrator.core.arrays import Matrix
+from orchestrator.core.foreign_files import one_line
 
 _REFERENCE, _OUT = 3, 4
 _POWER_FACTOR = 0.9
@@ -67,6 +68,7 @@ class ImportedNetwork:
     limits: FileLimits = field(default_factory=FileLimits)  # by branch and by bus
     titles: dict[str, str] = field(default_factory=dict)  # names in the file, by bus
     branch_names: dict[str, BranchName] = field(default_factory=dict)  # as the file has them
+    unit_names: dict[str, str] = field(default_factory=dict)  # of the generators, by bus
 
 
 def import_network(
@@ -114,8 +116,9 @@ def import_network(
         {bus_of(labels[n]): p for n, p in _fed(source, rows).items() if p < -_NEGLIGIBLE},
         {bus_of(labels[n]): float(row[5]) for n, row in rows.items() if row[5] > _NEGLIGIBLE},
         FileLimits(ratings, _bands(rows, labels)),
-        {bus_of(labels[n]): title for n, title in source.titles.items() if title and n in labels},
+        {bus_of(labels[n]): one_line(x) for n, x in source.titles.items() if x and n in labels},
         names,
+        {bus_of(labels[n]): one_line(x) for n, x in source.unit_names.items() if n in labels},
     )
 
 
@@ -172,7 +175,7 @@ def _lines(
         for bus, rest in ((start, (y_from - 0.5j * b) / tap**2), (end, y_to - 0.5j * b)):
             to_earth[bus] = to_earth.get(bus, 0j) + complex(rest)
         name = name if seen[name] == 1 else f"{name}_{seen[name]}"
-        names[name] = own
+        names[name] = BranchName(one_line(own.name), one_line(own.circuit))
         if 0 < row[_RATE_A] < math.inf:
             ratings[name] = Rating(float(row[_RATE_A]), by_current=row[8] == 0)
         lines.append(

@@ -6,6 +6,7 @@ everything out of service are dealt with there."""
 import logging
 import re
 import warnings
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,9 @@ from numpy.typing import NDArray
 
 from fmus.toolchain.extras import require
 from orchestrator.cases.csv_rows import seen_from_here
+from orchestrator.cases.element_names import BranchName
 from orchestrator.cases.kept_tables import SourceTables, kept_tables, tables_beside
-from orchestrator.cases.matpower.program import case_tables
+from orchestrator.cases.matpower.program import NAMES, CaseProgram, case_tables
 from orchestrator.cases.names import close_names
 from orchestrator.cases.pandapower_json import network_text
 from orchestrator.core.errors import InputError
@@ -41,13 +43,14 @@ def read_matpower(path: Path) -> SourceTables:
             f"{path}: a MATPOWER case ends in .m or .mat, and this file in {path.suffix!r}"
         )
     try:
-        tables = case_tables(path) if path.suffix == ".m" else _mat_file(path)
+        program = case_tables(path) if path.suffix == ".m" else _mat_file(path)
     except InputError:
         raise
     except Exception as error:  # scipy lets all kinds of errors through
         raise InputError(
             f"{path}: it cannot be read as a MATPOWER case: {error or type(error).__name__}"
         ) from error
+    tables = program.tables
     missing = [name for name in ("baseMVA", *_COLUMNS) if tables.get(name) is None]
     if missing:
         raise InputError(
@@ -73,6 +76,11 @@ def read_matpower(path: Path) -> SourceTables:
     gen[np.isinf(gen[:, _PMAX]), _PMAX] = 0.0  # no limit; what follows takes 0 for not known
     branch = tables["branch"]
     numbers = tables["bus"][:, 0].astype(int)
+    names = {
+        field: own
+        for field, own in program.names.items()
+        if len(own) == len(tables[field.removesuffix("_name")])
+    }
     return SourceTables(
         path.name,
         base.item(),
@@ -81,7 +89,19 @@ def read_matpower(path: Path) -> SourceTables:
         gen,
         np.repeat(0.5j * branch[:, [4]], 2, axis=1),
         {int(n): str(n) for n in numbers},
+        titles=dict(zip(numbers.tolist(), names.get("bus_name", ()), strict=False)),
+        branch_names=tuple(map(BranchName, names.get("branch_name", ()))),
+        unit_names=_joined(gen[:, 0].astype(int).tolist(), names.get("gen_name", ())),
     )
+
+
+def _joined(buses: Sequence[int], names: Sequence[str]) -> dict[int, str]:
+    """Names of the generators at each bus, which are one unit."""
+    found: dict[int, list[str]] = {}
+    for bus, name in zip(buses, names, strict=False):
+        if name and name not in found.setdefault(bus, []):
+            found[bus].append(name)
+    return {bus: ", ".join(own) for bus, own in found.items() if own}
 
 
 def read_pandapower(name: str, directory: Path) -> SourceTables:
@@ -122,16 +142,24 @@ def _made_by_pandapower(name: str, path: Path) -> SourceTables:
     return _pandapower_tables(name, net)
 
 
-def _mat_file(path: Path) -> dict[str, Any]:
+def _mat_file(path: Path) -> CaseProgram:
     from scipy.io import loadmat  # noqa: PLC0415
 
     mpc = loadmat(str(path), squeeze_me=False, struct_as_record=True).get("mpc")
     if mpc is None:
-        return {}
+        return CaseProgram({}, {})
     found = {
         name: mpc[0, 0][name] for name in ("baseMVA", *_COLUMNS) if name in (mpc.dtype.names or ())
     }
-    return {n: t.item() if n == "baseMVA" else np.asarray(t, dtype=float) for n, t in found.items()}
+    tables = {
+        n: t.item() if n == "baseMVA" else np.asarray(t, dtype=float) for n, t in found.items()
+    }
+    names = {
+        name: tuple("".join(map(str, np.ravel(cell))).strip() for cell in np.ravel(mpc[0, 0][name]))
+        for name in NAMES
+        if name in (mpc.dtype.names or ())
+    }
+    return CaseProgram(tables, names)
 
 
 def _pandapower_named(name: str) -> Any:
@@ -198,7 +226,45 @@ def _pandapower_tables(name: str, net: Any) -> SourceTables:
                 gen[(gen[:, 0] == numbers[bus]) & (gen[:, 8] == 0), 8] = most
     to_earth: NDArray[np.complex128] = np.stack([start, end], axis=1).astype(np.complex128) / 2
     base, frequency = float(ppc["baseMVA"]), float(net.f_hz)
-    return SourceTables(name, base, ppc["bus"].real, branch, gen, to_earth, labels, frequency)
+    return SourceTables(
+        name,
+        base,
+        ppc["bus"].real,
+        branch,
+        gen,
+        to_earth,
+        labels,
+        frequency,
+        titles=_titles(net, numbers),
+        branch_names=_branch_names(net, len(branch)),
+    )
+
+
+def _titles(net: Any, numbers: Mapping[Any, int]) -> dict[int, str]:
+    """Names of the buses by number; of several that a closed switch joins the first counts."""
+    found: dict[int, str] = {}
+    for index, name in net.bus.name.items():
+        found.setdefault(int(numbers[index]), _text(name))
+    return {number: name for number, name in found.items() if name}
+
+
+def _branch_names(net: Any, count: int) -> tuple[BranchName, ...]:
+    """Names of lines and transformers in the order of pandapower's table of branches; none if no element has one.
+
+    A transformer of three windings has three rows, which stand in three blocks."""
+    found = [""] * count
+    for element, (start, end) in net._pd2ppc_lookups["branch"].items():
+        table = getattr(net, element, None)
+        if table is None or "name" not in table:
+            continue
+        names = [_text(name) for name in table.name]
+        if names and (end - start) % len(names) == 0:
+            found[start:end] = names * ((end - start) // len(names))
+    return tuple(map(BranchName, found)) if any(found) else ()
+
+
+def _text(name: Any) -> str:
+    return name.strip() if isinstance(name, str) else ""
 
 
 def _labels(net: Any, numbers: dict[Any, int], count: int) -> dict[int, str]:

@@ -8,6 +8,7 @@ import pytest
 from orchestrator.cases.case import load_case
 from orchestrator.cases.element_names import BranchName, ElementNames, element_names
 from orchestrator.cases.forcing import with_events
+from orchestrator.cases.network_sources import read_matpower, read_pandapower
 from orchestrator.core.errors import CosimError, InputError
 from orchestrator.studies.operating_points.columns import Elements
 from orchestrator.studies.operating_points.outages import read_outages
@@ -121,6 +122,76 @@ def test_a_transformer_has_its_name_and_windings():
     assert names.of("transformer_4") == "transformer_4 (T9, HIGH – LOW – THIRD)"
     assert names.of("transformer_4.leg_3") == "transformer_4.leg_3 (winding at THIRD)"
     assert names.identifier("t7 step-up", ends) == "line_1_2"
+
+
+MPC = """\
+function mpc = town
+mpc.version = '2';
+mpc.baseMVA = 100;
+mpc.bus = [7 3 0 0 0 0 1 1.02 0 20 1 1.1 0.9; 9 1 50 10 0 0 1 1.0 -2 20 1 1.1 0.9; 8 2 0 0 0 0 1 1.01 -1 20 1 1.1 0.9];
+mpc.gen = [7 20 0 99 -99 1.02 100 1 99 0; 8 30 0 99 -99 1.01 100 1 99 0; 8 1 0 99 -99 1.01 100 1 99 0];
+mpc.branch = [7 9 0.01 0.1 0 0 0 0 0 0 1 -360 360; 9 8 0.01 0.1 0 0 0 0 0 0 1 -360 360];
+mpc.bus_name = {'WEST'; 'O''NEILL'; "EAST"};
+mpc.branch_name = {'Tie 1'; ''};
+mpc.gen_name = {'HYDRO A'; 'COAL 1'; 'COAL 2'};
+"""
+
+
+def test_a_matpower_case_has_its_names(tmp_path):
+    (tmp_path / "town.m").write_text(MPC)
+    case = _CASE.replace('raw = "areas.raw"', 'matpower = "town.m"').replace(
+        'dyr = "areas.dyr"', ""
+    )
+    (tmp_path / "case.toml").write_text(case.replace('_phasor"\nconv', '_st1_phasor"\nconv'))
+    (ready,) = load_case(tmp_path / "case.toml").prepare()
+    shown = {
+        name: ready.names.of(name) for name in ("bus_9", "line_7_9", "line_9_8", "sg8", "load_9")
+    }
+    assert shown == {
+        "bus_9": "bus_9 O'NEILL",
+        "line_7_9": "line_7_9 (Tie 1, WEST – O'NEILL)",
+        "line_9_8": "line_9_8 (O'NEILL – EAST)",
+        "sg8": "sg8 (COAL 1, COAL 2, EAST)",
+        "load_9": "load_9 (O'NEILL)",
+    }
+    assert ready.names.identifier("tie 1", ["line_7_9"]) == "line_7_9"
+    assert ready.names.identifier("hydro a", ["sg7", "sg8"]) == "sg7"
+
+
+@pytest.mark.parametrize("names", ["{'WEST'; 'EAST'}", "cellstr(x)"])
+def test_names_that_do_not_fit_the_rows_are_none(names, tmp_path):
+    (tmp_path / "town.m").write_text(MPC.replace("{'WEST'; 'O''NEILL'; \"EAST\"}", names))
+    assert read_matpower(tmp_path / "town.m").titles == {}
+
+
+def test_a_pandapower_network_has_its_names(tmp_path):
+    pp = pytest.importorskip("pandapower")
+    net = pp.create_empty_network()
+    buses = [pp.create_bus(net, 110.0, name=name) for name in ("Nord/1", "Nord 1", "Süd")]
+    low = pp.create_bus(net, 20.0, name="Süd 20")
+    pp.create_ext_grid(net, buses[0])
+    pp.create_load(net, low, 10.0, 2.0)
+    kind = "149-AL1/24-ST1A 110.0"
+    pp.create_line(net, buses[0], buses[1], 10.0, kind, name="Leitung A")
+    pp.create_line(net, buses[1], buses[2], 10.0, kind)
+    pp.create_transformer(net, buses[2], low, "25 MVA 110/20 kV", name="T 1")
+    pp.to_json(net, str(tmp_path / "net.json"))
+    tables = read_pandapower("net.json", tmp_path)
+    assert [tables.titles[n] for n in (0, 2, 3)] == ["Nord/1", "Süd", "Süd 20"]
+    assert [one.name for one in tables.branch_names] == ["Leitung A", "", "T 1"]
+
+
+def test_a_name_that_an_identifier_says_is_not_repeated():
+    ends = {"line_a": ("bus_North_1", "bus_3")}
+    names = element_names(
+        {"bus_North_1": "North 1", "bus_3": "EAST"}, {}, ends, {}, {"sg": "bus_North_1"}
+    )
+    assert [names.of(one) for one in ("bus_North_1", "sg", "bus_3")] == [
+        "bus_North_1",
+        "sg",
+        "bus_3 EAST",
+    ]
+    assert names.identifier("north 1", ["bus_North_1"]) == "bus_North_1"
 
 
 def test_a_case_without_names_is_shown_as_it_is():

@@ -125,4 +125,4 @@ def test_a_function_with_several_results(tmp_path):
         "function [baseMVA, bus, gen, branch] = old\nbaseMVA = 100;\nbus = [1 3 0 0 0 0 1 1 0];\n"
         "gen = [1 0 0 9 -9 1 100 1 10 0];\nbranch = [];\nbus(1, 3) = 7;\n"
     )
-    assert case_tables(path)["bus"][0, 2] == 7
+    assert case_tables(path).tables["bus"][0, 2] == 7

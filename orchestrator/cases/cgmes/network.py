@@ -23,6 +23,7 @@ from orchestrator.cases.cgmes.branches import (
 )
 from orchestrator.cases.cgmes.files import load_cgmes, profiles_of
 from orchestrator.cases.cgmes.reference import Reference, dynamics_of, reference_of
+from orchestrator.cases.element_names import BranchName
 from orchestrator.cases.network_sources import SourceTables
 from orchestrator.cases.remedies import without_kinds
 from orchestrator.cases.source_changes import Changes
@@ -99,6 +100,8 @@ class _Reading:
         self._nominal: dict[str, float] = {}
         self._numbers: dict[str, int] = {}
         self._labels: dict[str, str] = {}
+        self._titles: dict[str, str] = {}
+        self._tables_of_names: dict[str, dict[str, str]] = {}
         self._volts: dict[str, float] = {}
         self._rows: list[list[float]] = []
         self._branches: list[Branch] = []
@@ -129,6 +132,8 @@ class _Reading:
             gen,
             np.array([b.to_earth for b in self._branches], dtype=complex).reshape(-1, 2),
             {number: self._labels[bus] for bus, number in numbers.items()},
+            titles={numbers[bus]: title for bus, title in self._titles.items() if bus in numbers},
+            branch_names=tuple(BranchName(self._named(b.name)) for b in self._branches),
             feeding={n: fed for n, x in self._loads.items() if (fed := x.apart().feeding).power},
         )
         ratings: dict[str, float] = {}
@@ -233,10 +238,24 @@ class _Reading:
             }
             if all(found.values()) and max(Counter(found.values()).values(), default=0) <= 1:
                 break
+        self._titles = {
+            bus: str(of_bus[bus][0] if len(of_bus.get(bus, ())) == 1 else buses.name[bus]).strip()
+            for bus in buses.index
+        }
         return {
             bus: re.sub(r"^bus_+(?=\w)", "", name, flags=re.IGNORECASE)
             for bus, name in found.items()
         }
+
+    def _named(self, branch: str) -> str:
+        """Return the name (IdentifiedObject.name) of a line or transformer; "" if the model has none."""
+        for getter in ("get_lines", "get_2_windings_transformers", "get_boundary_lines"):
+            table = self._tables_of_names.setdefault(
+                getter, dict(getattr(self._source, getter)()["name"])
+            )
+            if branch in table:
+                return str(table[branch] or "").strip()
+        return ""
 
     def _add_bus(self, bus: str, label: str) -> None:
         self._numbers[bus] = number = len(self._numbers)

@@ -7,7 +7,8 @@ could change what gfor reads; a field that gfor does not read may hold what it l
 Source of the names of columns: MATPOWER's manual, appendix on the case format."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -45,10 +46,22 @@ _FUNCTION = re.compile(r"function\b\s*(?:(?P<given>\[[^\]]*\]|\w+)\s*=)?\s*\w+\s
 _HARMLESS = re.compile(
     r"(return|end|endfunction|clc|format\b.*|(disp|fprintf|printf|warning)\s*\(.*\))", re.DOTALL
 )
+NAMES = ("bus_name", "branch_name", "gen_name")
+"""Fields with the names of the rows of ``bus``, ``branch`` and ``gen``."""
+
+_CELL = re.compile(r"""'((?:[^'\n]|'')*)'|"([^"\n]*)\"""")
 _MOST_SHOWN = 80  # characters of a statement in a message
 
 
-def case_tables(path: Path) -> dict[str, Value]:
+@dataclass(frozen=True)
+class CaseProgram:
+    """What a case's program leaves: tables by the fields that gfor reads, and names of their rows where it has them."""
+
+    tables: Mapping[str, Value]
+    names: Mapping[str, tuple[str, ...]]
+
+
+def case_tables(path: Path) -> CaseProgram:
     """What a case's program leaves in the fields that gfor reads, by their names; a field that it lacks is not there.
 
     Raises `InputError` with the line of the first statement that is not understood."""
@@ -59,7 +72,7 @@ def case_tables(path: Path) -> dict[str, Value]:
             program.carry_out(statement)
     except UnendedError as error:
         raise InputError(f"{path}, line {error.line}: {error}; the file is cut short") from error
-    return program.tables
+    return CaseProgram(program.tables, program.names)
 
 
 class _Program:
@@ -68,6 +81,7 @@ class _Program:
         self._case = "mpc"
         self._results: tuple[str, ...] = ()  # of a function that gives its tables one by one
         self._values: dict[str, Value] = {}
+        self._texts: dict[str, tuple[str, ...]] = {}  # cells of the fields that name rows
         # of each `if` that is open: whether its branch is carried out, and whether one of them was
         self._branches: list[tuple[bool, bool]] = []
 
@@ -75,6 +89,12 @@ class _Program:
     def tables(self) -> dict[str, Value]:
         names = {field: field if self._results else f"{self._case}.{field}" for field in READ}
         return {field: self._values[name] for field, name in names.items() if name in self._values}
+
+    @property
+    def names(self) -> dict[str, tuple[str, ...]]:
+        """Return names of rows by field: ``bus_name``, ``branch_name``, ``gen_name``."""
+        keys = {field: field if self._results else f"{self._case}.{field}" for field in NAMES}
+        return {field: self._texts[key] for field, key in keys.items() if key in self._texts}
 
     def carry_out(self, statement: Statement) -> None:
         try:
@@ -157,6 +177,10 @@ class _Program:
         return name in fields
 
     def _assign(self, name: str, part: str, text: str, line: int) -> None:
+        if name.rpartition(".")[2] in NAMES:
+            cells = text.startswith("{") and not part
+            self._texts[name] = tuple(_texts_in(text)) if cells else ()
+            return
         try:
             if name == self._case and not self._results and re.fullmatch(r"struct\(\s*\)", text):
                 return
@@ -188,6 +212,12 @@ class _Program:
         except (IndexError, ValueError) as error:
             raise UnknownError("what is assigned does not fit the part of the table") from error
         return table
+
+
+def _texts_in(cells: str) -> Iterator[str]:
+    """Yield the texts of a cell array, ``{'WEST 7'; 'O''NEILL'}``."""
+    for found in _CELL.finditer(cells):
+        yield (found[1] if found[1] is not None else found[2]).replace("''", "'").strip()
 
 
 def _columns(function: str) -> dict[str, Value]:

@@ -52,7 +52,9 @@ def run(options: argparse.Namespace) -> int:
         write_text(wanted.out, made.text)
     except ResultsError as error:
         raise InputError(f"--out {error}") from error
-    console = make_console(stderr=options.json)
+    console = make_console(
+        stderr=options.json, names=made.scenarios[0].names if made.scenarios else None
+    )
     names = ", ".join(prepared.name for prepared in made.scenarios)
     lines = [f"{wanted.out}: scenarios {names}. Assumed:", *(f"- {line}" for line in made.assumed)]
     if options.details:

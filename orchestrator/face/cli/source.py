@@ -6,6 +6,7 @@ from warnings import catch_warnings, simplefilter
 from rich.console import RenderableType
 from rich.markup import escape
 
+from orchestrator.cases.element_names import ElementNames
 from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import write_page
 from orchestrator.face.api.case import load
@@ -41,6 +42,7 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("--scenario: it is one of a case; give --case as well")
     with saying_warnings(), catch_warnings():
         simplefilter("ignore", UnusualDataWarning)  # they are printed
+        scenario = None
         if options.contest is not None:
             found = contest_sources(options.contest)
         else:
@@ -60,12 +62,13 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print_json(records if options.contest else records[0])
         return 0
-    _print(found, details=options.details)
+    names = scenario.prepared.names if scenario is not None else None
+    _print(found, names, details=options.details)
     return 0
 
 
-def _print(found: list[Sources], *, details: bool) -> None:
-    console = make_console()
+def _print(found: list[Sources], names: ElementNames | None, *, details: bool) -> None:
+    console = make_console(names=names)
     print_parts(
         console, (escape(f"{one.label}: {remark}") for one in found for remark in one.remarks)
     )

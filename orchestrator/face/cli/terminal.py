@@ -141,10 +141,11 @@ def print_questions(
         return
     fresh = new_questions(path, asked)
     known = len(asked) - len(fresh)
+    named = str if as_json else scenarios[0].names.in_text
     if as_json or whole or known < _FEW:
-        say("question", asked)
+        say("question", map(named, asked))
         return
-    say("question", fresh)
+    say("question", map(named, fresh))
     others = "other " if fresh else ""
     text = f"{known} {others}questions about {path.name} are those of an earlier command"
     say(
