@@ -91,11 +91,11 @@ def read_matpower(path: Path) -> SourceTables:
         {int(n): str(n) for n in numbers},
         titles=dict(zip(numbers.tolist(), names.get("bus_name", ()), strict=False)),
         branch_names=tuple(map(BranchName, names.get("branch_name", ()))),
-        unit_names=_joined(gen[:, 0].astype(int).tolist(), names.get("gen_name", ())),
+        unit_names=_names_by_bus(gen[:, 0].astype(int).tolist(), names.get("gen_name", ())),
     )
 
 
-def _joined(buses: Sequence[int], names: Sequence[str]) -> dict[int, str]:
+def _names_by_bus(buses: Sequence[int], names: Sequence[str]) -> dict[int, str]:
     """Names of the generators at each bus, which are one unit."""
     found: dict[int, list[str]] = {}
     for bus, name in zip(buses, names, strict=False):

@@ -55,14 +55,14 @@ _MOST_SHOWN = 80  # characters of a statement in a message
 
 @dataclass(frozen=True)
 class CaseProgram:
-    """What a case's program leaves: tables by the fields that gfor reads, and names of their rows where it has them."""
+    """Tables that a case's program leaves, by the fields that gfor reads, and names of their rows where it has them."""
 
     tables: Mapping[str, Value]
     names: Mapping[str, tuple[str, ...]]
 
 
 def case_tables(path: Path) -> CaseProgram:
-    """What a case's program leaves in the fields that gfor reads, by their names; a field that it lacks is not there.
+    """Return what a case's program leaves in the fields that gfor reads, by their names; a field that it lacks is not there.
 
     Raises `InputError` with the line of the first statement that is not understood."""
     source = visible(read_text(path, errors="replace"))
