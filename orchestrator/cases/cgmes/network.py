@@ -133,7 +133,7 @@ class _Reading:
             np.array([b.to_earth for b in self._branches], dtype=complex).reshape(-1, 2),
             {number: self._labels[bus] for bus, number in numbers.items()},
             titles={numbers[bus]: title for bus, title in self._titles.items() if bus in numbers},
-            branch_names=tuple(BranchName(self._named(b.name)) for b in self._branches),
+            branch_names=tuple(BranchName(self._title_of(b.name)) for b in self._branches),
             feeding={n: fed for n, x in self._loads.items() if (fed := x.apart().feeding).power},
         )
         ratings: dict[str, float] = {}
@@ -247,7 +247,7 @@ class _Reading:
             for bus, name in found.items()
         }
 
-    def _named(self, branch: str) -> str:
+    def _title_of(self, branch: str) -> str:
         """Return the name (IdentifiedObject.name) of a line or transformer; "" if the model has none."""
         for getter in ("get_lines", "get_2_windings_transformers", "get_boundary_lines"):
             table = self._tables_of_names.setdefault(

@@ -62,7 +62,7 @@ class CaseProgram:
 
 
 def case_tables(path: Path) -> CaseProgram:
-    """Return what a case's program leaves in the fields that gfor reads, by their names; a field that it lacks is not there.
+    """Return what a case's program leaves in the fields that gfor reads; one that it lacks is not there.
 
     Raises `InputError` with the line of the first statement that is not understood."""
     source = visible(read_text(path, errors="replace"))
