@@ -20,6 +20,7 @@ from fmus.synchronous_generator.excitation.rotating import (
     ieeet2,
 )
 from fmus.synchronous_generator.excitation.static import scrx, sexs, st1a, st4b
+from fmus.synchronous_generator.excitation.two_limits import bbsex1
 from fmus.synchronous_generator.excitation.without_regulator import external, manual
 from fmus.synchronous_generator.machine import FluxDeclaration, Machine
 from fmus.synchronous_generator.machines.classical import classical
@@ -96,6 +97,7 @@ EXCITERS: dict[str, Exciter] = {
     "st6b": st6b,
     "st7b": st7b,
     "st8c": st8c,
+    "bbsex1": bbsex1,
     "external": external,
 }
 GOVERNORS: dict[str, Governor] = {

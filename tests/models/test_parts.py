@@ -105,6 +105,7 @@ def test_every_field_of_a_dyr_record_sets_a_parameter_of_its_part(name):
         ("IEEET1", 14),
         ("IEEEX1", 16),
         ("SCRX", 8),
+        ("BBSEX1", 11),
         ("EXPIC1", 24),
         ("DC4B", 20),
         ("AC7B", 27),

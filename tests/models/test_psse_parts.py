@@ -104,6 +104,7 @@ EXCITERS = {
 }
 
 EXCITERS |= {
+    "bbsex1": {"K": 80.0, "T_1": 5.0, "T_2": 0.9, "T_3": 0.06, "T_4": 0.02, "T_R": 0.03},
     "expic1": {
         "K_A": 30.0,
         "T_A1": 0.2,
@@ -161,6 +162,8 @@ def exciter_by_hand(name, p, s):
     """E_fd over the stabiliser's signal."""
     if name == "scrx":
         return V_T * p["K"] * lead(p, s, "T_A", "T_B") / (1 + p["T_E"] * s)
+    if name == "bbsex1":
+        return p["K"] * lead(p, s, "T_2", "T_1") * lead(p, s, "T_3", "T_4")
     if name in ("dc2a", "ieeet2"):
         points = {"dc2a": ((3.0, 0.41), (4.0, 1.96)), "ieeet2": ((2.85, 0.3), (3.8, 0.6))}[name]
         field = p["K_E"] + slope(lambda E: saturated(E, points), E_FD) + s * p["T_E"]
@@ -250,6 +253,39 @@ def test_scrx_sends_a_negative_field_current_through_a_resistance_where_there_is
     alone = exciter("scrx", {"r_C_over_r_FD": 10.0})
     assert alone.outputs([V_T, -0.2, 0.0])["E_fd"] == pytest.approx(2.0)
     assert exciter("scrx").outputs([V_T, -0.2, 0.0])["E_fd"] == pytest.approx(E_FD)
+
+
+@pytest.mark.parametrize(
+    ("values", "upper", "lower"),
+    [
+        ({"V_RMAX": 4.0, "V_RMIN": -1.0}, 4.0, -1.0),
+        ({"E_FDMAX": 4.0, "E_FDMIN": -1.0}, 4.0 * V_T, -1.0 * V_T),
+    ],
+)
+def test_bbsex1_stops_at_its_regulators_limits_and_at_the_terminals(values, upper, lower):
+    alone = exciter("bbsex1", values)
+    for side, wanted in ((1, upper), (-1, lower)):
+        found, _ = integrated(alone, lambda t, side=side: [V_T, E_FD, 0.5 * side], 2.0)
+        assert found[-1]["E_fd"] == pytest.approx(wanted, rel=1e-9)
+
+
+def test_the_regulator_of_bbsex1_does_not_wind_up_at_its_limit():
+    """After 10 s at V_RMAX its slow state is V_RMAX: E_fd is T_2/T_1 of the way down at once as the error goes."""
+    p = {"V_RMAX": 4.0, "T_1": 5.0, "T_2": 0.9, "T_3": 0.0, "T_4": 0.0, "K": 80.0}
+    alone = exciter("bbsex1", p)
+    found, x = integrated(alone, lambda t: [V_T, E_FD, 0.5], 10.0)
+    assert found[-1]["E_fd"] == pytest.approx(4.0, rel=1e-9)
+    back, _ = integrated(alone, lambda t: REST, 1e-3, x=x)
+    assert back[0]["E_fd"] == pytest.approx(4.0 + 0.9 / 5.0 * (E_FD - 4.0), rel=1e-3)
+
+
+def test_the_stabilisers_signal_of_bbsex1_may_go_behind_the_regulator():
+    """With SWITCH = 1 it passes as it is, at every frequency; the voltage's way stays the same."""
+    p, s = EXCITERS["bbsex1"], 2j * np.pi * 0.7
+    response = exciter("bbsex1", p | {"signal_at_output": 1}).response(s, REST)
+    assert response["E_fd", "v_s"] == pytest.approx(1.0, rel=1e-6)
+    voltage = -exciter_by_hand("bbsex1", p, s) / (1 + p["T_R"] * s)
+    assert response["E_fd", "v_t"] == pytest.approx(voltage, rel=1e-6)
 
 
 @pytest.mark.parametrize(("v_t", "factor"), [(V_T, V_T), (0.6, 0.6)])
