@@ -14,6 +14,7 @@ from tests.pages.markdown import ROOT, blocks
 DOCS = ROOT / ".docs"
 IN_A_CHECKOUT = (
     "how-to/add-an-exciter",
+    "how-to/add-a-record",
     "how-to/add-an-acceptance-check",
     "how-to/add-a-study",
     "how-to/add-a-code",

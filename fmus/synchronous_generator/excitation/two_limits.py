@@ -55,7 +55,7 @@ def bbsex1(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
         V_R = clamp(slow + p.T_2 / p.T_1 * (p.K * before - slow), p.V_RMIN, p.V_RMAX)
         m.derivative(slow, (V_R - slow) / p.T_2)
 
-        def held(v_t: Expr) -> Expr:
+        def bound(v_t: Expr) -> Expr:
             return clamp(V_R + signal, v_t * p.E_FDMIN, v_t * p.E_FDMAX)
 
-        return measured.close(held(seen.terminal_voltage(held(measured.nearly))))
+        return measured.close(bound(seen.terminal_voltage(bound(measured.nearly))))
