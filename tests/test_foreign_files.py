@@ -149,6 +149,7 @@ OWN = {
     "devices.fmi.brought_modules": "what an FMU's archive held",
     "devices.fmi.dll_reading": "is_file before it",
     "devices.fmi.vendor_files": "is_file before it",
+    "studies.added": "the code of an installed distribution",
     "studies.points.code": "our own code",
     "studies.points.key": "check_regular before it",
     "output.report.cells": "results",
