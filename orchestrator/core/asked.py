@@ -1,4 +1,4 @@
-"""What a study can be asked: the fields of its request, from which options and keywords come.
+"""Requests of studies: the fields of its request, from which options and keywords come.
 
 A `FieldKind` says twice what a field may be: ``read`` takes the text of an option, ``check`` what Python gives."""
 
@@ -235,7 +235,7 @@ def frequency_range(given: Any, argument: str = "frequencies") -> tuple[float, f
 
 
 def read_part(rule: str, least: float, most: float) -> Callable[[str], float]:
-    """What reads percent, ``20`` or ``20%``, as a ratio; a bare number below 1 looks like a ratio and is refused."""
+    """Give what reads percent, ``20`` or ``20%``, as a ratio; it refuses a bare number below 1, like a ratio."""
 
     def read(text: str) -> float:
         number = as_number(text.strip().removesuffix("%"))

@@ -31,7 +31,7 @@ def counted(number: int, what: str) -> str:
 
 
 class ErrorKind(StrEnum):
-    """What is wrong. Programs decide by the kind; the text is for people."""
+    """Kind of a mistake. Programs decide by the kind; the text is for people."""
 
     INPUT = "input"
     VALUES = "values"
@@ -167,7 +167,7 @@ class CaseError(InputError):
         super().__init__(message, kind=kinds.pop() if len(kinds) == 1 else ErrorKind.VALUES)
 
     def __str__(self) -> str:
-        """As always; where what Python gave is all that is wrong, the file is not blamed."""
+        """Give the message; where what Python gave is all that is wrong, the file is not blamed."""
         if for_python() and all(_GIVEN.match(one.place) for one in self.problems):
             return "\n".join(_for_python(one) for one in self.problems)
         return super().__str__()

@@ -78,7 +78,7 @@ def _check_characters(source: str, table: dict[str, Any]) -> None:
 
 
 def parsed(text: str) -> dict[str, Any]:
-    """What a text in TOML says; ValueError and RecursionError where it cannot be read, or not be computed with."""
+    """Read a text in TOML; ValueError and RecursionError where it cannot be read, or not be computed with."""
     found = tomllib.loads(text)
     _check_whole_numbers(found)
     return found

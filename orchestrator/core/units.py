@@ -117,17 +117,17 @@ def _kind(unit: str) -> str:
 
 
 def _counts_alike(given: str, needed: str) -> bool:
-    """Whether two units of one dimension both count cycles, both count angles, or neither; pint takes a cycle and a
+    """Tell if two units of one dimension both count cycles, both count angles, or neither; pint takes a cycle and a
     radian for 1 both, and would lose the 2π between them."""
     one, other = (_registry().Quantity(1, unit) for unit in (given, needed))
     (cycles, angles, turns), (cycles_needed, angles_needed, turns_needed) = map(
-        _counted, (one, other)
+        _count_cycles, (one, other)
     )
     turned = (turns and not angles_needed) or (turns_needed and not angles)
     return cycles == cycles_needed and not turned
 
 
-def _counted(quantity: Any) -> tuple[float, bool, bool]:
+def _count_cycles(quantity: Any) -> tuple[float, bool, bool]:
     """Power of the hertz in a unit, and whether it has angles, and whole turns."""
     powers = {str(name): float(power) for name, power in quantity.unit_items()}
     cycles = sum(power for name, power in powers.items() if name.endswith("hertz"))

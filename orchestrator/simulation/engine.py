@@ -20,7 +20,7 @@ DEFAULT_PORT = 23405  # of a HELICS broker whose address names none
 
 @dataclass(frozen=True, slots=True)
 class Federates:
-    """What a user chooses about a run on an engine: which components are federates, who starts them, and where."""
+    """Choices of a user for a run on an engine: which components are federates, who starts them, and where."""
 
     # components that gfor starts as federates on this machine, each in a process of its own
     names: tuple[str, ...] = ()

@@ -153,7 +153,7 @@ class FmuProcess:
         return status, 0, length, values
 
     def number(self, call: str, instance: int, command: str, *arguments: Any) -> int:
-        """As `talk`, where the answer must be a whole number."""
+        """Talk, and take a whole number alone for an answer."""
         return self.typed(answers.number, self.talk(call, instance, command, *arguments))
 
     def typed(self, form: Callable[..., Form], answer: Any, *wanted: Any) -> Form:

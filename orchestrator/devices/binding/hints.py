@@ -1,4 +1,4 @@
-"""What a variable's description tells of its meaning, where the declaration does not."""
+"""Hints in a variable's description on its meaning, where the declaration has none."""
 
 import re
 

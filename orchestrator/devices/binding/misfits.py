@@ -1,5 +1,5 @@
-"""Whether a device and its binding fit together, by what it gives at an operating point: one verdict, in one place's
-words, for every command."""
+"""Judgement of how a device and its binding fit together, by what it gives at an operating point: one verdict for every
+command, in the same words."""
 
 import tomllib
 from cmath import phase

@@ -14,7 +14,7 @@ _MOST_TEXT = 4000  # characters of a text that are passed on
 
 
 class NotAnAnswerError(ValueError):
-    """What stands where an answer should be."""
+    """Something else stands where an answer should be."""
 
 
 def content_of(answer: Any, component: str) -> Any:

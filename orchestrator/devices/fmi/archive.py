@@ -165,7 +165,9 @@ def check_xml(path: Path, name: str, text: bytes) -> None:
     try:
         parser.Parse(text, True)
     except (expat.ExpatError, ValueError, LookupError) as error:  # the latter two: encodings
-        raise FmuFileError(f"{path}: {name} is not XML: {told(error)}; export it again") from error
+        raise FmuFileError(
+            f"{path}: {name} is not XML: {error_text(error)}; export it again"
+        ) from error
 
 
 @contextmanager
@@ -190,7 +192,7 @@ def _opened(
             yield archive
     except DAMAGE as error:
         raise FmuFileError(
-            f"{path}: the archive is damaged ({told(error)}); export it again, or get the file anew"
+            f"{path}: the archive is damaged ({error_text(error)}); export it again, or get the file anew"
         ) from error
     except OSError as error:
         raise FmuFileError(f"{path}: the file cannot be read: {error.strerror or error}") from error
@@ -214,7 +216,7 @@ def _check_entries(path: Path, archive: zipfile.ZipFile) -> None:
             fault = f"the same file as {seen[key].filename!r}{differs}"
         if fault is not None:
             raise HostileFmuError(
-                f"{path}: the archive has an entry {_shown(entry.orig_filename)}, which is {fault}; do not trust this "
+                f"{path}: the archive has an entry {_quote(entry.orig_filename)}, which is {fault}; do not trust this "
                 "file, or ask for it to be packed again",
                 "path traversal" if fault in _OUTSIDE else "hostile archive",
             )
@@ -224,7 +226,7 @@ def _check_entries(path: Path, archive: zipfile.ZipFile) -> None:
             above = seen.get(unicodedata.normalize("NFC", str(parent)).casefold())
             if above is not None and not above.is_dir():
                 raise HostileFmuError(
-                    f"{path}: the archive has {_shown(above.filename)} as a file and as a folder; pack it again"
+                    f"{path}: the archive has {_quote(above.filename)} as a file and as a folder; pack it again"
                 )
 
 
@@ -288,13 +290,13 @@ def _fault_of(entry: zipfile.ZipInfo) -> str | None:
     return None
 
 
-def told(error: Exception) -> str:
+def error_text(error: Exception) -> str:
     """An error's own text, cut where a file's contents made it long."""
     text = str(error) or type(error).__name__
     return text if len(text) <= 200 else text[:200] + "…"
 
 
-def _shown(name: str) -> str:
+def _quote(name: str) -> str:
     return repr(name if len(name) <= 80 else name[:77] + "...")
 
 

@@ -116,7 +116,7 @@ class BoundComponent(Derived):
             field.references[place] = self.description.inner.variables[variable].reference
 
     def _scale(self) -> None:
-        """What depends on the rating: several units in parallel, or one that was given another rating."""
+        """Set what depends on the rating: several units in parallel, or one that was given another rating."""
         S_n, current = self._start["S_n"], self._port.current
         factor = S_n / self._port.rating if current.per_rating else 1.0
         self._adapter.current.matrix[:] = [factor * element for element in current.matrix]

@@ -88,7 +88,7 @@ class BroughtModules:
             self._names = {name for name in offered if not self._stays(name)}
 
     def _stays(self, top: str) -> bool:
-        """Whether the installed one serves: no process can load compiled modules twice, and equal ones need not be."""
+        """Tell if the installed one serves: no process can load compiled modules twice, and equal ones need not be."""
         if top in sys.builtin_module_names:
             return True
         files = [

@@ -1,4 +1,4 @@
-"""What every running FMU offers, wherever it runs, and its Real variables in batches.
+"""Calls that every running FMU offers, wherever it runs, and its Real variables in batches.
 
 An instance is loaded into this process (`loaded`), runs in one of its own (`isolation`) or stands behind a binding
 (`bound`); the acceptance tests have a fourth kind. They share this form and no data."""
@@ -100,7 +100,7 @@ class Component(Protocol):
 
 
 class Derived(Closing):
-    """What a component does by its other methods alone; it holds no data."""
+    """Methods of a component that use its other methods alone; it holds no data."""
 
     @property
     def one_thread(self) -> str | None:

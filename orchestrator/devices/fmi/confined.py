@@ -121,7 +121,7 @@ PASSED_ON = "GFOR_COSIM_FMU_ENVIRONMENT"
 
 
 def environment(of: Mapping[str, str] | None = None) -> dict[str, str]:
-    """What is kept of an environment, by default of this process's own: a short list without keys or passwords."""
+    """Keep part of an environment, by default of this process's own: a short list without keys or passwords."""
     own = os.environ if of is None else of
     more = [name.strip() for name in own.get(PASSED_ON, "").split(",")]
     return {

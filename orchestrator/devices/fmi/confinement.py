@@ -1,4 +1,4 @@
-"""What the process of a foreign FMU may touch: closed once, by itself, before it has a second thread or any library.
+"""Confinement of the process of a foreign FMU: closed once, by itself, before it has a second thread or any library.
 
 Several means of Linux overlap: namespaces (`namespaces`), Landlock, a filter of system calls (`seccomp`), and no
 capabilities. Each is used where the machine has it; `protections` says what they come to.
@@ -25,8 +25,12 @@ from orchestrator.devices.fmi.linux import (
 )
 from orchestrator.devices.fmi.seccomp import filter_calls
 
-_CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446
-_ASK_VERSION, _PATH_BENEATH = 1, 1
+# numbers of Landlock's system calls, from linux/unistd.h: the same on all architectures since Linux 5.13
+_CREATE_RULESET = 444
+_ADD_RULE = 445
+_RESTRICT_SELF = 446
+_ASK_VERSION = 1  # flag LANDLOCK_CREATE_RULESET_VERSION
+_PATH_BENEATH = 1  # kind LANDLOCK_RULE_PATH_BENEATH
 
 _EXECUTE, _WRITE_FILE, _READ_FILE, _READ_FOLDER = 1 << 0, 1 << 1, 1 << 2, 1 << 3
 _ALL_OF_FIRST = (1 << 13) - 1
@@ -37,7 +41,7 @@ _SCOPES = 0b11  # abstract UNIX sockets and signals reach only what is bound lik
 
 
 def landlock_version() -> int:
-    """Of the kernel's interface; 0 where there is none."""
+    """Ask for the version of the kernel's interface; 0 if there is none."""
     if sys.platform != "linux":
         return 0
     try:

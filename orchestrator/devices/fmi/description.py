@@ -24,9 +24,9 @@ from orchestrator.devices.fmi.archive import (
     BACKSLASHES,
     MODEL_DESCRIPTION,
     PACK_AGAIN,
+    error_text,
     names_in,
     read_model_description_text,
-    told,
 )
 from orchestrator.devices.fmi.clocks import FmiClock, clocks_of, special_variables
 from orchestrator.devices.fmi.values import Scalar, typed
@@ -240,7 +240,7 @@ def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> Fmu
         raise
     except Exception as error:  # fmpy raises whatever its parsers raise
         raise FmuFileError(
-            f"{path}: modelDescription.xml cannot be read: {told(error)}; run `fmpy validate` on the file"
+            f"{path}: modelDescription.xml cannot be read: {error_text(error)}; run `fmpy validate` on the file"
         ) from error
     if described is None:
         kinds = [words for name, words in _OTHER_KINDS.items() if root.find(name) is not None]
@@ -357,14 +357,14 @@ def _sampling(
     listed = root.find(f"{_OURS}/DiscreteStates")
     if listed is None:
         return {}
-    frequency, told = listed.get("frequency", ""), listed.get("sampleTime")
+    frequency, error_text = listed.get("frequency", ""), listed.get("sampleTime")
     try:
-        sample_time = _positive(told)
+        sample_time = _positive(error_text)
     except ValueError:
         sample_time = None
-    if (told and sample_time is None) or (frequency and frequency not in variables):
+    if (error_text and sample_time is None) or (frequency and frequency not in variables):
         raise FmuFileError(
-            f"{path}: DiscreteStates under VendorAnnotations has sampleTime {(told or '')[:20]!r} and frequency "
+            f"{path}: DiscreteStates under VendorAnnotations has sampleTime {(error_text or '')[:20]!r} and frequency "
             f"{frequency[:40]!r}; a time above 0 and a variable's name are needed: export it again"
         )
     kept = {"kept_in": listed.get("keptIn", "")[:20], "kept_why": listed.get("why", "")[:500]}
@@ -440,7 +440,7 @@ def _check_names(path: Path, md: ModelDescription) -> None:
         )
     if not md.guid:
         raise FmuFileError(
-            f"{path}: modelDescription.xml has no guid, which the binary is told; export it again"
+            f"{path}: modelDescription.xml has no guid, which the binary is error_text; export it again"
         )
     first: dict[str, Any] = {}
     for v in md.modelVariables:

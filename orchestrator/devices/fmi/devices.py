@@ -1,4 +1,4 @@
-"""Whether an FMU stands at a bus: a vendor's controller alone does not."""
+"""Recognition of FMUs that stand at a bus: a vendor's controller alone does not."""
 
 from pathlib import Path
 

@@ -136,7 +136,7 @@ class _Calls:
 
     @property
     def asked_address(self) -> int:
-        """Of an int that is 1 while a signal waits for the end of a call."""
+        """Address of an int that is 1 while a signal waits for the end of a call."""
         return ctypes.addressof(self._asked)
 
     def watch(self) -> None:

@@ -1,4 +1,4 @@
-"""What the process of an isolated FMU does: loads it within limits, then answers the mailbox; `supervisor` calls it."""
+"""Process of an isolated FMU, which loads it within limits, then answers the mailbox; `supervisor` calls it."""
 
 import ctypes
 import itertools
@@ -126,13 +126,13 @@ class Worker:
     def do_jacobian(self, unknowns: list[str], knowns: list[str]) -> Any:
         return self._instance().jacobian(unknowns, knowns).tolist()
 
-    def _kept(self, state: Any) -> int:
+    def _keep_state(self, state: Any) -> int:
         number = next(self._next)
         self._states[number] = state
         return number
 
     def do_save_state(self) -> int:
-        return self._kept(self._instance().save_state())
+        return self._keep_state(self._instance().save_state())
 
     def do_restore_state(self, number: int) -> None:
         self._instance().restore_state(self._states[number])
@@ -144,7 +144,7 @@ class Worker:
         return self._instance().serialize_state(self._states[number]).hex()
 
     def do_deserialize_state(self, content: str) -> int:
-        return self._kept(self._instance().deserialize_state(bytes.fromhex(content)))
+        return self._keep_state(self._instance().deserialize_state(bytes.fromhex(content)))
 
 
 def main(request: dict[str, Any]) -> None:

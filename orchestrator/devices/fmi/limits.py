@@ -1,4 +1,4 @@
-"""What a process that runs a foreign FMU may take; called once, in that process, before the FMU is loaded.
+"""Limits of a process that runs a foreign FMU; called once, in that process, before the FMU is loaded.
 
 These are the limits that the kernel keeps for each process. Those on all of an FMU's processes together are kept by
 `supervisor`, what they may touch by `confinement`. On Windows, only time and messages are limited."""
@@ -19,7 +19,9 @@ TO_BEGIN = 60.0
 # with less [MB] the worker itself cannot load an FMU and answer; another unit was meant
 LEAST_MEMORY = 32.0
 
-TOO_MUCH_MEMORY, TOO_MANY_TASKS, TOO_MUCH_DISK = 93, 94, 95
+TOO_MUCH_MEMORY = 93
+TOO_MANY_TASKS = 94
+TOO_MUCH_DISK = 95
 """Exit codes of a supervisor that ended an FMU's processes for what they took together."""
 
 

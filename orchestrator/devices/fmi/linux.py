@@ -16,7 +16,11 @@ NEW_USER, NEW_PROCESSES, NEW_NETWORK, NEW_MOUNTS, NEW_IPC = (
 )
 """Flags of ``unshare`` and ``clone``, one for each namespace."""
 
-_DIES_WITH_PARENT, _DROP_CAPABILITY, _NO_NEW_PRIVILEGES, _SUBREAPER = 1, 24, 38, 36
+# options of prctl, from linux/prctl.h
+_DIES_WITH_PARENT = 1
+_DROP_CAPABILITY = 24
+_NO_NEW_PRIVILEGES = 38
+_SUBREAPER = 36
 _CAPABILITIES = 64  # more than any kernel has
 
 
@@ -36,7 +40,7 @@ def call(number: int, *arguments: Any) -> int:
     return found
 
 
-def _done(found: int) -> None:
+def _check_result(found: int) -> None:
     if found:
         error = ctypes.get_errno()
         raise OSError(error, os.strerror(error))
@@ -52,14 +56,14 @@ def on_known_machine() -> bool:
 
 
 def unshare(flags: int) -> None:
-    _done(libc().unshare(flags))
+    _check_result(libc().unshare(flags))
 
 
 def mount(
     source: str | None, target: str, kind: str | None, flags: int = 0, data: str | None = None
 ) -> None:
     texts = [None if text is None else os.fsencode(text) for text in (source, target, kind, data)]
-    _done(libc().mount(texts[0], texts[1], texts[2], ctypes.c_ulong(flags), texts[3]))
+    _check_result(libc().mount(texts[0], texts[1], texts[2], ctypes.c_ulong(flags), texts[3]))
 
 
 def die_with_parent(signal: int) -> None:
@@ -74,11 +78,11 @@ def adopt_orphans() -> bool:
 
 def no_new_privileges() -> None:
     """Give up what set-uid programs would grant; Landlock and seccomp ask for it."""
-    _done(libc().prctl(_NO_NEW_PRIVILEGES, ctypes.c_ulong(1), 0, 0, 0))
+    _check_result(libc().prctl(_NO_NEW_PRIVILEGES, ctypes.c_ulong(1), 0, 0, 0))
 
 
 def drop_capabilities() -> None:
     for number in range(_CAPABILITIES):
         libc().prctl(_DROP_CAPABILITY, ctypes.c_ulong(number), 0, 0, 0)
     header = (ctypes.c_uint32 * 2)(0x20080522, 0)
-    _done(libc().capset(header, (ctypes.c_uint32 * 6)()))
+    _check_result(libc().capset(header, (ctypes.c_uint32 * 6)()))

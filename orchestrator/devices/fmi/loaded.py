@@ -36,7 +36,9 @@ from orchestrator.devices.fmi.wine_program import WineProgram, proxy_path
 
 # why one thread alone steps an FMU: Python's lock lets one thread run at a time
 PYTHON_BACKED = "Python-backed"
-_LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3  # kinds of ``fmi2Get…Status``
+# kinds of ``fmi2Get…Status``, as fmi2StatusKind numbers them
+_LAST_SUCCESSFUL_TIME = 2
+_TERMINATED = 3
 
 
 @lru_cache(maxsize=64)
@@ -152,7 +154,7 @@ class LoadedComponent(Derived):
         )
 
     def _compare_guid(self, directory: Path) -> None:
-        """What was described and what was extracted must be the same FMU; not every binary checks that itself."""
+        """Refuse another FMU than was described; not every binary checks that itself."""
         path = directory / MODEL_DESCRIPTION
         if self.description.guid not in _identity_in(path, path.stat().st_mtime_ns):
             raise InputError(
@@ -192,11 +194,11 @@ class LoadedComponent(Derived):
 
     def progress_of_step(self) -> tuple[bool, float | None]:
         flag, number = ctypes.c_int(0), ctypes.c_double(0.0)
-        ended = self._asked("fmi2GetBooleanStatus", _TERMINATED, flag) and bool(flag.value)
-        reached = self._asked("fmi2GetRealStatus", _LAST_SUCCESSFUL_TIME, number)
+        ended = self._ask_status("fmi2GetBooleanStatus", _TERMINATED, flag) and bool(flag.value)
+        reached = self._ask_status("fmi2GetRealStatus", _LAST_SUCCESSFUL_TIME, number)
         return ended, number.value if reached and isfinite(number.value) else None
 
-    def _asked(self, function: str, kind: int, answer: Any) -> bool:
+    def _ask_status(self, function: str, kind: int, answer: Any) -> bool:
         try:
             with calls:
                 getattr(self._fmu, function)(self._fmu.component, kind, ctypes.byref(answer))

@@ -17,11 +17,18 @@ from orchestrator.devices.fmi.interrupts import calls
 _SOURCE = Path(__file__).with_name("mailbox.c")
 _TEXT, _LOG = 1 << 24, 8192
 MOST, ROOM = 16384, 1 << 18  # references of one question; numbers of a question for many steps
-SET, STEP, GET = 1, 2, 4
-TALK, RUN = 2, 3
+SET = 1
+STEP = 2
+GET = 4
+TALK = 2
+RUN = 3
 OK = 0
 # answers that no FMU gives; as in mailbox.c
-DIED, HUNG, NOT_A_NUMBER, INTERRUPTED, TAMPERED = 64, 65, 66, 67, 68
+DIED = 64
+HUNG = 65
+NOT_A_NUMBER = 66
+INTERRUPTED = 67
+TAMPERED = 68
 
 
 class Head(ctypes.Structure):
@@ -58,7 +65,7 @@ class Client(ctypes.Structure):
 
 
 class MailboxRun(ctypes.Structure):
-    """What one question for many steps says, behind the log in ``struct mailbox``."""
+    """Content of one question for many steps, behind the log in ``struct mailbox``."""
 
     _fields_ = (
         ("instance", ctypes.c_int64),
@@ -108,7 +115,7 @@ def mailbox_library() -> Any:
 
 @cache
 def unlocked_library() -> Any:
-    """Of the same functions those that ask without running an FMU here: they leave Python's lock to other threads."""
+    """Give those of the functions that ask without running an FMU here: they leave Python's lock to other threads."""
     library = ctypes.CDLL(mailbox_library()._name)
     library.mailbox_post.argtypes = [ctypes.c_void_p, ctypes.c_int32, ctypes.c_int32]
     library.mailbox_post.restype = None

@@ -1,4 +1,4 @@
-"""What FMUs say: the callbacks that they are given, and the newest messages of each."""
+"""Messages of FMUs: the callbacks that they are given, and the newest messages of each."""
 
 import ctypes
 import itertools
@@ -21,7 +21,7 @@ except (ImportError, OSError):
 class Messages(list[tuple[int, str]]):
     def __init__(self) -> None:
         super().__init__()
-        self.streak, self.step = 0, 0
+        self.streak = self.step = 0
 
 
 def texts(messages: Iterable[tuple[int, str]], least: int = 0) -> list[str]:

@@ -121,7 +121,7 @@ class PortMap:
         return 2 * pi * self.f_n
 
     @property
-    def taken(self) -> frozenset[str]:
+    def taken_variables(self) -> frozenset[str]:
         starts = {m.variable for maps in self.start.values() for m in maps}
         signals = {m.variable for m in self.signals.values()}
         return frozenset(
@@ -189,7 +189,9 @@ class BoundDescription(FmuDescription):
         ):
             if bound is None:
                 continue
-            for info in (v for v in own if v.unit and v.start and v.name not in self.port.taken):
+            for info in (
+                v for v in own if v.unit and v.start and v.name not in self.port.taken_variables
+            ):
                 with suppress(ValueError):
                     value = (
                         to_unit(f"{info.start_number} {info.unit}", unit)
@@ -219,7 +221,7 @@ class BoundDescription(FmuDescription):
     def of(cls, inner: FmuDescription, port: PortMap) -> Self:
         inner_names = {name: m.variable for name, m in port.signals.items()}
         for name in inner.variables:
-            if name not in port.taken:
+            if name not in port.taken_variables:
                 inner_names[f"native.{name}" if name in (*PORT, *START, *inner_names) else name] = (
                     name
                 )

@@ -17,7 +17,7 @@ MOST_FILES = 20_000  # files and folders below a folder beyond which it counts a
 
 @dataclass(frozen=True, slots=True)
 class Usage:
-    """What processes have in use: memory [bytes], and how many tasks, which are processes and threads."""
+    """Use of processes: memory [bytes], and how many tasks, which are processes and threads."""
 
     memory: int
     tasks: int

@@ -1,4 +1,4 @@
-"""What keeps a foreign FMU from the rest of a machine, and whether this machine has it."""
+"""Protections that keep a foreign FMU from the rest of a machine, and whether this machine has it."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What a component says when it refuses a call, as the error that a user sees: the FMU's own words, or FMI's."""
+"""Refusal of a call by a component, as the error that a user sees: the FMU's own words, or FMI's."""
 
 from collections.abc import Callable
 
@@ -8,7 +8,11 @@ from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.fmi3 import in_words_of_3
 
 STATUS = ("fmi2OK", "fmi2Warning", "fmi2Discard", "fmi2Error", "fmi2Fatal", "fmi2Pending")
-DISCARD, ERROR, FATAL, PENDING = 2, 3, 4, 5
+# fmi2Status beyond OK and warning
+DISCARD = 2
+ERROR = 3
+FATAL = 4
+PENDING = 5
 
 _SILENT = {
     DISCARD: "by FMI it has no answer to this call",

@@ -1,4 +1,4 @@
-"""What every component whose FMU runs in another process passes on alike."""
+"""Calls that every component whose FMU runs in another process passes on alike."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping

@@ -15,14 +15,22 @@ from orchestrator.devices.fmi.linux import call, no_new_privileges
 
 _ARCHITECTURES = {"x86_64": 0xC000003E, "aarch64": 0xC00000B7}
 _SECCOMP = {"x86_64": 317, "aarch64": 277}
-_SET_FILTER, _ALL_THREADS = 1, 1
+_SET_FILTER = 1
+_ALL_THREADS = 1
 
-_LOAD, _EQUAL, _ANY_BIT, _AND, _RETURN = 0x20, 0x15, 0x45, 0x54, 0x06
-_ALLOW, _ERROR = 0x7FFF0000, 0x00050000
-_NUMBER, _ARCHITECTURE = 0, 4
+_LOAD = 0x20
+_EQUAL = 0x15
+_ANY_BIT = 0x45
+_AND = 0x54
+_RETURN = 0x06
+_ALLOW = 0x7FFF0000
+_ERROR = 0x00050000
+_NUMBER = 0
+_ARCHITECTURE = 4
 # numbers from here on are those of x32, a second way to every call on x86
 _32_BIT_CALLS = 0x40000000
-_DATAGRAM, _RAW = 2, 3
+_DATAGRAM = 2
+_RAW = 3
 _TYPE_OF_SOCKET = 0xF
 _NEW_NAMESPACES = 0x7E020000
 
@@ -40,7 +48,8 @@ yet."""
 _NEW, _AT_LEAST = _NEWEST + 1, 0x35
 _SOCKETPAIR, _CLONE, _CLONE3, _PRCTL = (53, 199), (56, 220), (435, 435), (157, 167)
 _FCNTL, _OF_FCNTL = (72, 25), 1  # by its second argument
-_SET_LEASE, _NOTIFY = 1024, 1026  # hold up whoever opens a file, and tell of a folder's changes
+_SET_LEASE = 1024
+_NOTIFY = 1026  # hold up whoever opens a file, and tell of a folder's changes
 _SET_DUMPABLE = 4  # an option of prctl by which a process hides what it has in use
 
 

@@ -35,7 +35,8 @@ from orchestrator.devices.fmi.process_tree import (
 
 _MOUNT_SETATTR, _HERE, _RECURSIVE, _READ_ONLY = 442, -100, 0x8000, 0x1
 _PRIVATE, _ALL_BELOW = 1 << 18, 1 << 14
-_NO_SETUID, _NO_DEVICES = 0x2, 0x4
+_NO_SETUID = 0x2
+_NO_DEVICES = 0x4
 # the smallest number of process numbers that the kernel lets a namespace have
 _FEWEST_NUMBERS = 301
 _MOST_FILES = 4096

@@ -1,4 +1,4 @@
-"""Whether an FMU keeps to the FMI standard, as FMPy's validator sees it."""
+"""Validation of an FMU against the FMI standard, as FMPy's validator sees it."""
 
 from pathlib import Path
 from threading import Lock

@@ -96,7 +96,7 @@ def _noted(kept: Path) -> Path:
 
 
 def _unchanged(kept: Path, path: Path) -> bool:
-    """Whether it was made in the same folder, from the same files; what was not there then must not be there now."""
+    """Tell if it was made in the same folder, from the same files; what was not there then must not be there now."""
     if not _noted(kept).exists():
         return True
     noted: dict[str, str | None] = json.loads(_noted(kept).read_text(encoding="utf-8"))

@@ -111,7 +111,7 @@ def make_prefix(folder: Path) -> Path:
 
 
 def environment(prefix: Path, given: Mapping[str, str]) -> dict[str, str]:
-    """Of a program in a prefix, from a process's own without what belongs to another Wine."""
+    """Give the environment of a program in a prefix, from a process's own without what belongs to another Wine."""
     kept = {
         name: value
         for name, value in given.items()

@@ -149,10 +149,10 @@ class WineProgram:
                 passing=True,
             )
         return WineEndedError(
-            f"its process under Wine ends: {self._said() or 'it crashes or ends its own process'}"
+            f"its process under Wine ends: {self._last_words() or 'it crashes or ends its own process'}"
         )
 
-    def _said(self) -> str:
+    def _last_words(self) -> str:
         """Last words of the program, in the mailbox's log: the crash."""
         at = mailbox_library().mailbox_offset(1)
         size = int.from_bytes(self._memory[at + 4 : at + 8], sys.byteorder)
@@ -199,14 +199,14 @@ class WineLibrary:
         try:
             self._program = WineProgram(path, note=self._now)
         except WineEndedError as error:
-            raise self._named(error) from error
+            raise self._with_name(error) from error
         self._functions: dict[str, int] = {}
 
     def _now(self, doing: str) -> None:
         self._doing = doing
         self._note(doing)
 
-    def _named(self, error: WineEndedError) -> WineEndedError:
+    def _with_name(self, error: WineEndedError) -> WineEndedError:
         if error.passing:
             return WineEndedError(f"while {self._doing}, {error}", passing=True)
         remedy = "ask its author for a DLL that does not"
@@ -220,7 +220,7 @@ class WineLibrary:
         try:
             return self._program.ask(command, *arguments, data=data, answer=answer)
         except WineEndedError as error:
-            raise self._named(error) from error
+            raise self._with_name(error) from error
 
     def _function(self, name: str) -> int:
         if name not in self._functions:

@@ -141,11 +141,11 @@ def _departure(master: Master, model: LinearModel, foreign: Sequence[str]) -> tu
     return (
         f"{whose} does not answer as its linear model does: {found.time:.3g} s after a small disturbance {found.state} "
         f"differs by {100 * found.error:.3g} % of the response, where {100 * LARGEST_ERROR:g} % is allowed. "
-        f"{_asked(master, [of] if of in foreign else foreign)} Simulate it with `gfor run`"
+        f"{_likely_reason(master, [of] if of in foreign else foreign)} Simulate it with `gfor run`"
     ), ""
 
 
-def _asked(master: Master, foreign: Sequence[str]) -> str:
+def _likely_reason(master: Master, foreign: Sequence[str]) -> str:
     """Return what may explain a departure; a control that is declared as sampled declares what it keeps as well."""
     if all(master.components[name].description.sample_time is not None for name in foreign):
         return "It declares its samples and its states: does it reach a limit, a dead band or another mode so soon?"
@@ -265,7 +265,7 @@ def _predicted(model: LinearModel, z: Matrix, every: int, times: int) -> Matrix:
 
 @dataclass(frozen=True)
 class _Departure:
-    """What differs between the response and the model's, shape (times, states)."""
+    """Difference between the response and the model's, shape (times, states)."""
 
     size: float
     difference: Matrix

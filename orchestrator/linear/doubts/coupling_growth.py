@@ -1,4 +1,4 @@
-"""Whether what components exchange grows from one communication step to the next, beside black boxes.
+"""Growth of what components exchange from one communication step to the next, beside black boxes.
 
 A device whose current follows its voltage at once, such as i = (E − v)/Z, closes a loop with the network's voltage
 that goes around once in a communication step. With a gain above 1 it diverges within milliseconds, and another

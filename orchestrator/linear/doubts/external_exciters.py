@@ -1,4 +1,4 @@
-"""Whether exciters outside of their machines hold what the machines were started for, and what to type if not.
+"""Check that exciters outside of their machines hold what the machines were started for, and what to type if not.
 
 A machine with ``exciter = "external"`` computes the field voltage and the terminal voltage of its operating point. Its
 exciter is another component, whose start and reference nobody but the user knows by name."""
@@ -41,7 +41,7 @@ def _outside(master: Master) -> Iterator[_Outside]:
 
 
 def start_warnings(master: Master) -> tuple[str, ...]:
-    """Of exciters that give another field voltage at the start than their machine needs; for a master at its start."""
+    """Warn of exciters that give another field voltage than their machine needs; for a master at its start."""
     said = []
     for one in _outside(master):
         given = master.components[one.exciter].values([one.output])[one.output]
@@ -61,7 +61,7 @@ def start_warnings(master: Master) -> tuple[str, ...]:
 
 
 def settled_warnings(master: Master) -> tuple[str, ...]:
-    """Of exciters that hold another voltage than their machine was started for; for a master in steady state."""
+    """Warn of exciters that hold another voltage than their machine was started for; for a master in steady state."""
     said = []
     for one in _outside(master):
         voltage = master.components[one.machine].values([_VOLTAGE])[_VOLTAGE]

@@ -1,4 +1,4 @@
-"""What does not fit between foreign devices and their bindings, seen at the start of a coupled system."""
+"""Misfits between foreign devices and their bindings, seen at the start of a coupled system."""
 
 from cmath import rect
 from collections.abc import Iterator, Mapping

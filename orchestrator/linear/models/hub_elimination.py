@@ -193,7 +193,7 @@ def hub_equations(
 ) -> HubEquations | None:
     """The equations with their hub; None where there is no hub worth setting apart."""
     n = F.shape[0]
-    taken = _taken(G, K)
+    taken = _places_taken(G, K)
     G, H, K = G[:, taken], H[taken], K[taken][:, taken]
     whole = sp.block_array([[F, G], [H, K - sp.eye_array(len(taken))]], format="csr")
     busy = np.diff(whole.indptr) > BUSY
@@ -202,7 +202,7 @@ def hub_equations(
     return HubEquations(whole, n, np.flatnonzero(busy), np.flatnonzero(~busy))
 
 
-def _taken(G: sp.csr_array, K: sp.csr_array) -> Places:
+def _places_taken(G: sp.csr_array, K: sp.csr_array) -> Places:
     """Places in w of what reaches a next state, at once or through other values."""
     reached = np.asarray(abs(G).sum(axis=0)).ravel() > 0
     while True:

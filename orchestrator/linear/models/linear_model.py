@@ -22,7 +22,10 @@ DELAYED = " (delayed"  # in the name of a state that stands for what is on its w
 # with fewer states, one vector at a time, which keeps the last digits of modes
 LEAST_IN_BLOCKS = 4_000
 
-PERTURBED, DIRECTIONAL, PACKED, IDENTIFIED = "perturbed", "directional", "packed", "identified"
+PERTURBED = "perturbed"
+DIRECTIONAL = "directional"
+PACKED = "packed"
+IDENTIFIED = "identified"
 """Origins of a component's linear model: perturbation of its running FMU, directional derivatives of the FMU, a model
 in the FMU's file, or a model fitted to measurements at its inputs and outputs."""
 
@@ -131,7 +134,7 @@ class LinearModel:
 
     @property
     def is_searched_in_blocks(self) -> bool:
-        """Whether a search takes many vectors at once: in large models with a hub, whose dense rest is read once for
+        """Tell if a search takes many vectors at once: in large models with a hub, whose dense rest is read once for
         all of them."""
         return len(self.names) >= LEAST_IN_BLOCKS and self._hub is not None
 

@@ -111,7 +111,7 @@ class _Period:
         self._master.y[self._held] = x[self._first_held :]
 
     def change(self, x: Matrix) -> Matrix:
-        """Of all states over a period from ``x``, shape (n,)."""
+        """Change of all states over a period from ``x``, shape (n,)."""
         return self._run(x, [self._steps])[-1] - x
 
     def _run(self, x: Matrix, parts: list[int]) -> list[Matrix]:

@@ -116,7 +116,7 @@ def _prepared(times: Numbers, values: Numbers, highest_hz: float) -> tuple[float
 
 
 def _covariances(y: Numbers, lags: int) -> Numbers:
-    """Of signals some lags apart, shape (parts, lags, m, m), each from one part of the record."""
+    """Covariances of signals some lags apart, shape (parts, lags, m, m), each from one part of the record."""
     n = len(y) - lags
     edges = np.linspace(0, n, _PARTS + 1).astype(int)
     return np.array(

@@ -56,7 +56,7 @@ class _Sector:
         return np.concatenate([*arcs, *rays])
 
     def holds(self, value: complex) -> bool:
-        """Whether a point lies in the sector, which includes its lower edges but not the upper ones. The last sector of
+        """Tell if a point lies in the sector, which includes its lower edges but not the upper ones. The last sector of
         a ring includes the imaginary axis."""
         angle = float(np.angle(value))
         return self.inner <= abs(value) < self.outer and self.low <= angle < self.high

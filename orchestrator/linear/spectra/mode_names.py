@@ -94,7 +94,7 @@ def name_modes(modes: Sequence[Mode], measures: Mapping[str, Measure]) -> Naming
         k = column.get(row)
         if k is None or fit[row, k] < LEFT_OVER * fit[row, best]:
             owner = next(row for row, k in column.items() if k == best)
-            reasons[name] = _taken(name, modes[best], names[owner])
+            reasons[name] = _describe_taken(name, modes[best], names[owner])
             continue
         fits[name] = (modes[k], measures[name])
         # such a one is not taken for one without resonance
@@ -106,7 +106,7 @@ def name_modes(modes: Sequence[Mode], measures: Mapping[str, Measure]) -> Naming
             contested.append(name)
         if rival is not None and fit[row, rival] >= CLEAR * fit[row, k]:
             reasons[name] = (
-                f"no mode is named {name!r}: those at {shown(modes[k])} and {shown(modes[rival])} fit it about "
+                f"no mode is named {name!r}: those at {at_hertz(modes[k])} and {at_hertz(modes[rival])} fit it about "
                 f"equally (measures {fit[row, k]:.3g} and {fit[row, rival]:.3g}); look at their shapes, or describe it "
                 "by other states"
             )
@@ -142,13 +142,13 @@ def _is_one_to_one(columns: Sequence[int | None]) -> bool:
     return len(set(taken)) == len(taken)
 
 
-def _taken(name: str, mode: Mode, owner: str) -> str:
+def _describe_taken(name: str, mode: Mode, owner: str) -> str:
     return (
-        f"no mode is named {name!r}: the one that fits it best, at {shown(mode)}, is {owner!r}; describe one of both "
-        "by other states"
+        f"no mode is named {name!r}: the one that fits it best, at {at_hertz(mode)}, is {owner!r}; describe one of "
+        "both by other states"
     )
 
 
-def shown(mode: Mode) -> str:
+def at_hertz(mode: Mode) -> str:
     """Its frequency, as sentences tell which mode is meant."""
     return f"{mode.frequency_hz:.4g} Hz"

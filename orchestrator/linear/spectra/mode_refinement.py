@@ -114,7 +114,7 @@ enough."""
 _ROUGH = 1e-3  # accuracy of what is found: enough to say whether something is there
 
 
-def missed(
+def misses_modes(
     equations: ShiftedEquations, known: RefinedModes, lowest: float, highest: float, damping: float
 ) -> list[complex]:
     """Eigenvalues [rad/s] of a region beside the known ones.

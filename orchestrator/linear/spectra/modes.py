@@ -47,7 +47,7 @@ def damping_percent(eigenvalue: complex) -> float:
 
 
 class OfEigenvalue:
-    """What has an eigenvalue λ [rad/s]."""
+    """Figures of an eigenvalue λ [rad/s]."""
 
     __slots__ = ()
     eigenvalue: complex

@@ -20,14 +20,14 @@ def exceptions_in_words(
     for source, how in _HOW.items():
         names = [name for name, found in sources.items() if found == source]
         if names:
-            parts.append(f"{_named(names, fit_errors or {})} {how}")
+            parts.append(f"{_names_with_errors(names, fit_errors or {})} {how}")
     if not parts:
         return None
     rest = "; all others by perturbing the running FMUs" if PERTURBED in sources.values() else ""
     return f"Linear models: {'; '.join(parts)}{rest}."
 
 
-def _named(names: list[str], fit_errors: Mapping[str, float]) -> str:
+def _names_with_errors(names: list[str], fit_errors: Mapping[str, float]) -> str:
     shown = [
         f"{n} (fitting error {fit_errors[n]:.1e})" if n in fit_errors else n for n in names[:_SHOWN]
     ]

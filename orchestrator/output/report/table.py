@@ -57,29 +57,35 @@ class ColumnTable(Generic[Row]):
     file: str = "the files"  # where all of them stand
 
     @property
-    def shown(self) -> list[Column[Row]]:
+    def shown_columns(self) -> list[Column[Row]]:
         return [column for column in self.columns if column.heading]
 
     def __rich__(self) -> PlainTable:
-        rows = [[column.cell(row) for column in self.shown] for row in self.rows[: self.most]]
+        rows = [
+            [column.cell(row) for column in self.shown_columns] for row in self.rows[: self.most]
+        ]
         cells = [
             [c if isinstance(c, str) else Text(c.text, _ON_TERMINALS[c.mark]) for c in row]
             for row in rows
         ]
         table = make_table(
-            self.title, *(column.heading for column in self.shown), left=self.left, rows=cells
+            self.title,
+            *(column.heading for column in self.shown_columns),
+            left=self.left,
+            rows=cells,
         )
         table.caption = self._rest or None
-        for column, shown in zip(self.shown, table.columns, strict=True):
+        for column, shown in zip(self.shown_columns, table.columns, strict=True):
             shown.justify = "left" if column.text else shown.justify
         return table
 
     def html(self) -> str:
         cells = [
-            [_on_page(column.cell(row)) for column in self.shown] for row in self.rows[: self.most]
+            [_on_page(column.cell(row)) for column in self.shown_columns]
+            for row in self.rows[: self.most]
         ]
         text = table_of_page(
-            self.title, [column.heading for column in self.shown], cells, self.left
+            self.title, [column.heading for column in self.shown_columns], cells, self.left
         )
         return f"{text}<p>{escape(self._rest)}</p>" if self._rest else text
 

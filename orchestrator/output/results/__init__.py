@@ -1,1 +1,1 @@
-"""What a study leaves behind: its signals, and the files that hold them."""
+"""Results that a study leaves behind: its signals, and the files that hold them."""

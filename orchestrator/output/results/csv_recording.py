@@ -131,7 +131,7 @@ def _sheet(path: Path) -> list[list[str]]:
 
 
 def _text(content: bytes) -> str:
-    """As Excel and recorders write it: with a mark of the code, in UTF-8, or in Windows' own."""
+    """Decode text as Excel and recorders write it: with a mark of the code, in UTF-8, or in Windows' own."""
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         return content.decode("utf-16")
     with suppress(UnicodeDecodeError):

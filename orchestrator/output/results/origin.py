@@ -1,4 +1,4 @@
-"""What the command line says of itself in the manifests of results."""
+"""Origin of results, as the command line gives it for the manifests of results."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping

@@ -1,4 +1,4 @@
-"""What was recorded, read from the disk: a run's whole recording, or one that grows."""
+"""Recordings, read from the disk: a run's whole recording, or one that grows."""
 
 from __future__ import annotations
 

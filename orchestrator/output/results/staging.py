@@ -221,7 +221,7 @@ def _foreign(path: Path, remedy: str) -> InputError:
 
 
 def _readable(folder: Path) -> Manifest | None:
-    """What earlier commands said of a folder's files, without those that are gone; nothing where that is damaged."""
+    """Read what commands noted of a folder's files, without those that are gone; nothing where that is damaged."""
     try:
         found = read_manifest(folder)
     except InputError:

@@ -210,7 +210,7 @@ class Federation(Closing):
             return content
 
     def _look_patiently(self, deadline: float) -> None:
-        """As `_look`; a process that has just ended may have left its reason at the hub."""
+        """Look at the processes; one that has just ended may have left its reason at the hub."""
         try:
             self._look(deadline)
         except ComponentError:

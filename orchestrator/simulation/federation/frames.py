@@ -9,7 +9,12 @@ from typing import Self
 
 _HEAD = struct.Struct("<cI")
 
-JOIN, COMMAND, FIRST, STEP, END, FAULT = b"J", b"C", b"1", b"S", b"E", b"F"
+JOIN = b"J"
+COMMAND = b"C"
+FIRST = b"1"
+STEP = b"S"
+END = b"E"
+FAULT = b"F"
 """Kinds: wait for all federates; a command to one of them; outputs before the first step; a step; the end; an error."""
 
 

@@ -12,8 +12,10 @@ from orchestrator.simulation.federation.choice import address_of
 
 # HELICS's own default, and the only core of its packages that always works between machines
 CORE = "zmq"
-_TRIES, _PAUSE = 2, 0.5  # before the last try to join a broker, and between two tries [s]
-FAULT_MARK, OURS_MARK = "fault", "gfor-cosim"
+_TRIES = 2  # before the last try to join a broker
+_PAUSE = 0.5  # between two tries [s]
+FAULT_MARK = "fault"
+OURS_MARK = "gfor-cosim"
 """Texts that a federate publishes as ``component/fault`` and ``component/gfor-cosim``."""
 
 

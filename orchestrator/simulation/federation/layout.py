@@ -107,7 +107,7 @@ _TO_CONNECT = 5.0  # how long a broker's address is tried [s]
 def broker_port(wanted: int | None) -> int:
     """The port of a broker that is about to be started; the one after it is free as well, which HELICS takes too."""
     if wanted is not None:
-        taken = _taken(wanted, "")
+        taken = _take_port(wanted, "")
         if taken is not None:
             raise InputError(
                 f"--broker-port {wanted}: port {taken} is in use (a broker takes two ports, {wanted} and {wanted + 1})"
@@ -117,14 +117,14 @@ def broker_port(wanted: int | None) -> int:
     for _ in range(_TRIES):
         with socket.create_server(("127.0.0.1", 0)) as server:
             port: int = server.getsockname()[1]
-        if port < 65000 and _taken(port, "127.0.0.1") is None:
+        if port < 65000 and _take_port(port, "127.0.0.1") is None:
             return port
     raise InputError(
         "this machine has no two free ports one after the other for a broker; give one with --broker-port"
     )
 
 
-def _taken(port: int, host: str) -> int | None:
+def _take_port(port: int, host: str) -> int | None:
     with ExitStack() as stack:
         for number in (port, port + 1):
             try:

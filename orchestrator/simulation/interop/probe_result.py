@@ -1,5 +1,5 @@
-"""What the probe pair would show in each schedule that a master may have, and what it showed in a foreign tool, however
-that names and separates its columns."""
+"""Signals that the probe pair would show in each schedule of a master, and those that it showed in a foreign tool,
+however that names and separates its columns."""
 
 import csv
 import re

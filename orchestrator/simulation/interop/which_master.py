@@ -17,7 +17,8 @@ from orchestrator.simulation.interop.probe_result import (
 )
 from orchestrator.simulation.interop.rules import MASTERS, MasterRules
 
-STEP_SIZE, STOP_TIME = 0.1, 2.0  # step size and stop time that the instructions ask for [s]
+STEP_SIZE = 0.1  # that the instructions ask for [s]
+STOP_TIME = 2.0  # that the instructions ask for [s]
 
 _LEAST_ROWS = 4
 _ON_POINT = 1e-3  # how far a label may be from a communication point, in steps

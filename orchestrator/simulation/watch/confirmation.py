@@ -1,4 +1,4 @@
-"""Whether the whole response confirms an oscillation that does not decay at its end.
+"""Confirmation by the whole response of an oscillation that does not decay at its end.
 
 Over a few periods two decaying oscillations that beat, or the harmonics that a large swing has in magnitudes of
 voltages and currents, look like one that grows. An eigenvalue belongs to the system: a true growth has one rate in
@@ -54,11 +54,13 @@ class Swing:
         """Return whether modes that the model knows to decay make a fast swing that does not grow far."""
         first, *_, last = (float(part.mean()) for part in np.array_split(self.signal, 3))
         swing_still = (
-            self.turns_hz is not None and self.known.holds and self.times[-1] < self.gone(hertz)
+            self.turns_hz is not None
+            and self.known.holds
+            and self.times[-1] < self.decay_end(hertz)
         )
         return swing_still and last < _FAR * first
 
-    def gone(self, hertz: float) -> float:
+    def decay_end(self, hertz: float) -> float:
         """Time from which on nothing is left of modes that decay at a frequency [s]; 0 if there are none."""
         rate = self.known.rate(hertz)
         return float(self.response[0][0]) + _GONE / -rate if rate is not None and rate < 0 else 0.0
@@ -145,7 +147,9 @@ def _fast_doubt(swing: Swing, hertz: float, *, grows: bool) -> str:
     first, *_, last = (float(part.mean()) for part in np.array_split(swing.signal, 3))
     if last <= (1.0 if grows else KEPT) * first:
         return "it was larger before"
-    if (swing.known.rate(hertz) or 0.0) > 0 or (not grows and swing.times[-1] >= swing.gone(hertz)):
+    if (swing.known.rate(hertz) or 0.0) > 0 or (
+        not grows and swing.times[-1] >= swing.decay_end(hertz)
+    ):
         return ""
     sizes = np.array([np.median(part) for part in np.array_split(swing.response[1][1:], 5)])
     rates = np.diff(np.log(sizes)) if (sizes > 0).all() else np.zeros(1)
@@ -181,7 +185,7 @@ def needed_end(swing: Swing, oscillation: Oscillation | None = None) -> float:
     return max(
         longer,
         begin + 1.2 * PERIODS / oscillation.frequency_hz,
-        swing.gone(oscillation.frequency_hz),
+        swing.decay_end(oscillation.frequency_hz),
     )
 
 

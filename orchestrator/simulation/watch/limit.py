@@ -153,6 +153,6 @@ _READ = frozenset(name for limit in MACHINE_LIMITS for name in limit.variables()
 
 
 def is_inner(name: str, system: System) -> bool:
-    """Whether a signal is an inner state of a machine that is read for its limits alone, and judged by nothing else."""
+    """Tell if a signal is an inner state of a machine that is read for its limits alone, and judged by nothing else."""
     component, _, variable = name.partition(".")
     return variable in _READ and variable not in system.components[component].description.outputs

@@ -100,14 +100,20 @@ def unsettled_response(
     ]
     if noisy:
         grown = [s for s in swings if swing_findings.swing_rises(s)]
-        told = _told(grown[:_TRIED], system, stretch, irregular_as_well=not stretch.breaks)
+        told = _describe_swings(
+            grown[:_TRIED], system, stretch, irregular_as_well=not stretch.breaks
+        )
         smooth = sorted((s for s in swings if s.turns_hz is None), key=_roughness)[:_SMOOTHEST]
-        return told or _told(smooth, system, stretch, irregular_as_well=False, clean=True)
-    told = _told(quick[:_TRIED], system, stretch, irregular_as_well=False)
+        return told or _describe_swings(
+            smooth, system, stretch, irregular_as_well=False, clean=True
+        )
+    told = _describe_swings(quick[:_TRIED], system, stretch, irregular_as_well=False)
     if judgements(told):
         return told
     return (
-        _told(others[:_TRIED], system, stretch, irregular_as_well=not quick and not stretch.breaks)
+        _describe_swings(
+            others[:_TRIED], system, stretch, irregular_as_well=not quick and not stretch.breaks
+        )
         or told
     )
 
@@ -126,7 +132,7 @@ def _judged_from(stretch: Stretch) -> float:
     return stretch.begin + (stretch.end - stretch.begin) / 4
 
 
-def _told(
+def _describe_swings(
     swings: Sequence[Swing],
     system: System,
     stretch: Stretch,

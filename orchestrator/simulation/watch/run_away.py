@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Numbers
 from orchestrator.simulation.watch.finding import Finding
-from orchestrator.simulation.watch.seen import Seen, shown, unit
+from orchestrator.simulation.watch.seen import Seen, shown_name, unit
 from orchestrator.simulation.watch.settings import Settings
 from orchestrator.simulation.watch.stretches import Stretch
 from orchestrator.systems.coupling.system import System
@@ -86,7 +86,7 @@ class _Drift:
 
     @property
     def time_constant(self) -> float:
-        """Of the exponential with these two rates [s]; infinite if it does not slow down."""
+        """Time constant of the exponential with these two rates [s]; infinite if it does not slow down."""
         return (
             self.apart / float(np.log(self.third / self.fourth))
             if abs(self.fourth) < abs(self.third)
@@ -105,7 +105,7 @@ class _Drift:
 
     @property
     def near(self) -> bool:
-        """Whether less of its way lies before it than it made in the second half of the stretch: else its rest is a
+        """Tell if less of its way lies before it than it made in the second half of the stretch: else its rest is a
         guess."""
         return abs(self.rest - self.value) < abs(self.third + self.fourth) * self.apart
 
@@ -317,7 +317,7 @@ def _finding(
     )
     well = f"; so {'does' if others == 1 else 'do'} {others} more" if others else ""
     message = (
-        f"the {course.what} runs away from t = {begin:.4g} s on: {shown(course.name)} is {value:.4g} {unit} at "
+        f"the {course.what} runs away from t = {begin:.4g} s on: {shown_name(course.name)} is {value:.4g} {unit} at "
         f"t = {times[row]:.4g} s and moves at {rate:+.3g} {unit}/s{left}{well}"
     )
     component, _, variable = course.name.partition(".")

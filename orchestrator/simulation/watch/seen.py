@@ -91,7 +91,7 @@ def unit(name: str, system: System) -> str:
     return system.components[component].description.variables[variable].unit
 
 
-def shown(name: str) -> str:
+def shown_name(name: str) -> str:
     """A pair of real and imaginary part is shown as its magnitude."""
     return f"|{name[:-3]}|" if name.endswith(("_re", "_im")) else name
 

@@ -83,7 +83,7 @@ class Settings:
         return sorted(found)
 
     def as_at_start(self, time: float) -> bool:
-        """Whether all that was set until a time [s] has its start value again, as after a fault that opens nothing."""
+        """Tell if all that was set until a time [s] has its start value again, as after a fault that opens nothing."""
         return not left_changed(self._system, self._events, time) and all(
             fault > time for fault in self._faults
         )
@@ -94,7 +94,7 @@ class Settings:
         )
 
     def connected(self, component: str) -> Numbers:
-        """Whether a component is on the grid, from its own breaker and the grid's port for it: 1 or 0, shape (n,)."""
+        """Tell if a component is on the grid, from its own breaker and the grid's port for it: 1 or 0, shape (n,)."""
         held = np.ones(len(self._times))
         for name, plan in self._system.components.items():
             switch = "connected" if name == component else f"{component}.connected"

@@ -1,4 +1,4 @@
-"""What is said of a swing that does not decay, and since when it swings like that."""
+"""Findings on a swing that does not decay, and since when it swings like that."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from orchestrator.simulation.watch.confirmation import (
 )
 from orchestrator.simulation.watch.finding import NOT_JUDGED, Finding, Kind
 from orchestrator.simulation.watch.oscillation import Oscillation, too_fast
-from orchestrator.simulation.watch.seen import shown
+from orchestrator.simulation.watch.seen import shown_name
 from orchestrator.simulation.watch.stretches import Stretch
 
 _PARTS = 40  # pieces in which an oscillation is searched, at most
@@ -42,7 +42,7 @@ def _since(swing: Swing, frequency: float | None) -> float:
 
 def growing(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretch) -> Finding:
     message = (
-        f"the response grows from t = {stretch.begin:.4g} s on: {shown(swing.name)} swings at "
+        f"the response grows from t = {stretch.begin:.4g} s on: {shown_name(swing.name)} swings at "
         f"{oscillation.frequency_hz:.4g} Hz and grows at {oscillation.rate:+.3g} 1/s; at {_end(stretch)} its amplitude "
         f"is {oscillation.amplitude:.3g} {unit}"
     )
@@ -53,7 +53,7 @@ def sustained(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretc
     since = _since(swing, oscillation.frequency_hz)
     message = (
         f"the response neither decays nor grows, as in a limit cycle: from t = {since:.4g} s to {_end(stretch)} "
-        f"{shown(swing.name)} swings at {oscillation.frequency_hz:.4g} Hz with an amplitude of "
+        f"{shown_name(swing.name)} swings at {oscillation.frequency_hz:.4g} Hz with an amplitude of "
         f"{oscillation.amplitude:.3g} {unit}"
     )
     return _finding("sustained_oscillation", since, swing, message, oscillation, stretch)
@@ -65,7 +65,7 @@ def doubtful_swing(swing: Swing, oscillation: Oscillation, why: str, stretch: St
     ``why``: the reason; see `confirmation.doubt`."""
     seems = "grow" if change(swing, oscillation.rate) > STEADY else "last"
     message = (
-        f"whether the response to t = {stretch.begin:.4g} s settles is not judged: {shown(swing.name)} swings at "
+        f"whether the response to t = {stretch.begin:.4g} s settles is not judged: {shown_name(swing.name)} swings at "
         f"{oscillation.frequency_hz:.4g} Hz and seems to {seems} ({oscillation.rate:+.3g} 1/s until {_end(stretch)}), "
         f"but {why}; {_remedy(swing, oscillation, stretch)}"
     )
@@ -85,7 +85,7 @@ def irregular_swing(swing: Swing, unit: str, stretch: Stretch) -> Finding:
     grows = swing_rises(swing)
     message = (
         f"the response {'grows' if grows else 'does not settle'}: from t = {since:.4g} s to {_end(stretch)} "
-        f"{shown(swing.name)} swings by about {amplitude:.3g} {unit}, at no single frequency{fast}"
+        f"{shown_name(swing.name)} swings by about {amplitude:.3g} {unit}, at no single frequency{fast}"
     )
     kind: Kind = "growing_oscillation" if grows else "sustained_oscillation"
     figures = {"amplitude": amplitude}
@@ -98,7 +98,7 @@ def doubtful_irregular_swing(swing: Swing, why: str, unit: str, stretch: Stretch
     ``why``: the reason; see `confirmation.irregular_doubt`."""
     amplitude = _irregular_amplitude(swing)
     message = (
-        f"whether the response to t = {stretch.begin:.4g} s settles is not judged: {shown(swing.name)} swings by "
+        f"whether the response to t = {stretch.begin:.4g} s settles is not judged: {shown_name(swing.name)} swings by "
         f"about {amplitude:.3g} {unit} at {_end(stretch)}, at no single frequency, but {why}; "
         f"{_remedy(swing, None, stretch)}"
     )

@@ -65,7 +65,7 @@ def lost_synchronism(seen: Seen, system: System, settings: Settings) -> Iterator
 
 
 def _on_the_grid(system: System, settings: Settings, name: str) -> NDArray[np.bool_]:
-    """Whether a unit is on the grid, shape (n,). A source inside a grid has a breaker of its own beside its angle."""
+    """Tell if a unit is on the grid, shape (n,). A source inside a grid has a breaker of its own beside its angle."""
     on = settings.connected(name) > 0
     scope = (_angle_variable(system, name) or "").rpartition(".")[0]
     breaker = f"{scope}.connected"

@@ -163,7 +163,7 @@ class Watch:
         whole = failure is None
         system = self._prepared.system
         told = (
-            judged(seen, system, self._prepared.events, modes, later, whole=whole)
+            judge_run(seen, system, self._prepared.events, modes, later, whole=whole)
             if len(seen.times) > 1
             else ()
         )
@@ -173,7 +173,7 @@ class Watch:
         return sorted(found, key=lambda finding: finding.time)
 
 
-def judged(
+def judge_run(
     seen: Seen,
     system: System,
     events: Sequence[Event],
@@ -211,7 +211,7 @@ def judged(
     modes, later = ((), ()) if at_a_limit else (modes, later)
     known = partial(_known, settings, modes, later, max(happened, default=0.0))
     responses = _Responses(seen, system, units, disturbances(system, events, end), settings, known)
-    told = _first_of_each(chain.from_iterable(responses.found(part) for part in parts))
+    told = _first_of_each(chain.from_iterable(responses.findings_in(part) for part in parts))
     if happened and not enough_looks(seen, parts[-1]):
         responses.short.append(parts[-1])
     found = [*found, *told, *not_judged(responses.masked)]
@@ -258,7 +258,7 @@ class _Responses:
         self.short: list[Stretch] = []
         self.clear: list[Stretch] = []
 
-    def found(self, part: Stretch) -> list[Finding]:
+    def findings_in(self, part: Stretch) -> list[Finding]:
         """Findings in a stretch as a whole, or, if it shows no findings, between its unnoticed events."""
         pieces = list(part.parts())
         told = self._one(part, told=len(pieces) == 1)

@@ -9,7 +9,7 @@ from orchestrator.core.arrays import Vector
 from orchestrator.core.errors import AnalysisError
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.critical_modes import DENSE, find_critical_modes, nearest_pairs
-from orchestrator.linear.spectra.mode_refinement import RefinedModes, missed, refine
+from orchestrator.linear.spectra.mode_refinement import RefinedModes, misses_modes, refine
 from orchestrator.linear.spectra.mode_tracking import ModeSet
 from orchestrator.linear.spectra.modes import ZERO, damping_ratio, find_spectrum
 from orchestrator.linear.spectra.shifted_equations import GROWING, ShiftedEquations, count_growing
@@ -115,7 +115,7 @@ def _from_search(
     found = ModeSet.of(
         find_critical_modes(model, wide.lowest_hz, wide.highest_hz, wide.damping), model.names
     )
-    if missed(equations, _columns(found), *_radians(wanted), wanted.damping):
+    if misses_modes(equations, _columns(found), *_radians(wanted), wanted.damping):
         return _whole(model, wanted).modes
     return found
 
@@ -129,7 +129,9 @@ def _from_neighbour(
     start = _columns(_with_names(neighbour, model.names))
     try:
         refined = refine(model, equations, start.values, start.left, start.right)
-        if not refined.settled or missed(equations, refined, *_radians(wanted), wanted.damping):
+        if not refined.settled or misses_modes(
+            equations, refined, *_radians(wanted), wanted.damping
+        ):
             return None
     except (AnalysisError, np.linalg.LinAlgError):
         return None

@@ -63,7 +63,7 @@ def test_after_a_dip_that_it_does_not_survive_a_third_of_it_for_half_as_long_is_
     monkeypatch.setattr(aftermath, "_Look", lambda subject: SimpleNamespace(after=after))
     monkeypatch.setattr(aftermath, "_drawn", lambda subject: iter([[(0.4, 0.3), (1.3, 0.2)]]))
     monkeypatch.setattr(aftermath, "_wrong", lambda found: None)
-    monkeypatch.setattr(aftermath, "_judged", len)
+    monkeypatch.setattr(aftermath, "_judge", len)
     assert aftermath.after_dips(SimpleNamespace(port=True, memory={})) == 2
     (_, milder) = tried
     assert np.ravel(milder) == pytest.approx([0.8, 0.15, 1.1, 0.1])

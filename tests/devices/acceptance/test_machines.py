@@ -29,7 +29,7 @@ def limits(kind, variables=None, **answer):
     ]
     described = SimpleNamespace(kind=kind, variables=variables or {})
     subject = SimpleNamespace(description=described, is_machine=kind == "machine")
-    return ride_through._judged(subject, answers, [], 0)
+    return ride_through._judge(subject, answers, [], 0)
 
 
 def test_a_machines_current_has_no_limit_unless_it_declares_one():

@@ -399,11 +399,11 @@ def test_a_page_that_keeps_no_modes_tells_no_change_of_one(folders, tmp_path):
 def test_a_design_s_limiting_mode_may_be_another_one():
     """As a design over points gives it: an eigenvalue and the machine that takes part most."""
     mode = {"real": -0.35, "imag": 6.9, "damping_ratio": 0.0507, "who": "sg1"}
-    first = LeastDamped.placed(mode)
+    first = LeastDamped.of_design_mode(mode)
     assert first.words == "1.098 Hz, 5.07 % (sg1)"
-    assert first.is_like(LeastDamped.placed(mode | {"real": -0.5}))
-    assert not first.is_like(LeastDamped.placed(mode | {"who": "sg3"}))
-    assert not first.is_like(LeastDamped.placed(mode | {"imag": 3.4}))
+    assert first.is_like(LeastDamped.of_design_mode(mode | {"real": -0.5}))
+    assert not first.is_like(LeastDamped.of_design_mode(mode | {"who": "sg3"}))
+    assert not first.is_like(LeastDamped.of_design_mode(mode | {"imag": 3.4}))
 
 
 def test_a_run_tells_whose_modes_its_figures_are_of(folders, tmp_path):

@@ -8,7 +8,7 @@ from orchestrator.simulation.watch.finding import Finding
 from orchestrator.simulation.watch.run_away import still_moving_away
 from orchestrator.simulation.watch.settings import Settings
 from orchestrator.simulation.watch.stretches import Stretch
-from orchestrator.simulation.watch.watch import judged
+from orchestrator.simulation.watch.watch import judge_run
 from orchestrator.systems.coupling.events import ParameterChange
 from tests.simulation.watch.seen import seen_of, units
 
@@ -29,7 +29,7 @@ def found(speed=None, voltage=None, events=(), stop=STOP, event=EVENT, **others)
     }
     signals |= {"a.v_im": lambda t: 0 * t, "a.delta": lambda t: 0 * t, "b.delta": lambda t: 0 * t}
     happened = [ParameterChange(event, "a", "S_n", 99.0), *events]
-    return judged(seen_of(signals, stop), units(a=100, b=100), happened)
+    return judge_run(seen_of(signals, stop), units(a=100, b=100), happened)
 
 
 @pytest.mark.parametrize(

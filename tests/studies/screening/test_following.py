@@ -7,7 +7,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.slope_linearization import _Point, linearize_slopes
 from orchestrator.linear.spectra.critical_modes import DENSE
-from orchestrator.linear.spectra.mode_refinement import RefinedModes, missed, refine
+from orchestrator.linear.spectra.mode_refinement import RefinedModes, misses_modes, refine
 from orchestrator.linear.spectra.mode_tracking import ModeSet
 from orchestrator.linear.spectra.modes import find_spectrum
 from orchestrator.linear.spectra.shifted_equations import ShiftedEquations, count_growing
@@ -67,8 +67,8 @@ def test_a_neighbours_modes_become_those_of_the_model():
 def test_a_mode_that_is_not_known_is_found(k):
     model = system(KNOWN)
     modes, equations = modes_of(model), ShiftedEquations(model)
-    assert missed(equations, columns(modes), 0.2 * np.pi, 4 * np.pi, 0.2) == []
-    (found,) = missed(equations, columns(without(modes, k)), 0.2 * np.pi, 4 * np.pi, 0.2)
+    assert misses_modes(equations, columns(modes), 0.2 * np.pi, 4 * np.pi, 0.2) == []
+    (found,) = misses_modes(equations, columns(without(modes, k)), 0.2 * np.pi, 4 * np.pi, 0.2)
     assert found == pytest.approx(modes.eigenvalues[k], rel=1e-2)
 
 

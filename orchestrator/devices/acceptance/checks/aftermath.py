@@ -1,4 +1,4 @@
-"""What dips, overvoltages and jumps leave behind: another answer to small changes, another rest, memory."""
+"""Traces of dips, overvoltages and jumps: another answer to small changes, another rest, memory."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import nullcontext
@@ -70,7 +70,7 @@ _BENT = 0.5  # by what more an answer may differ there, per pu of the distance
 
 
 class _End(Enum):
-    """What became of a device after a disturbance."""
+    """State of a device after a disturbance."""
 
     BACK = auto()
     MOVES = auto()
@@ -120,7 +120,7 @@ def after_dips(subject: Subject) -> CheckResult:
             return result
         if found[-1].end is not _End.BACK:
             unknown.append(found[-1])
-    return _judged(found, unknown)
+    return _judge(found, unknown)
 
 
 def _drawn(subject: Subject) -> Iterator[list[Segment]]:
@@ -144,7 +144,7 @@ def _wrong(after: _After) -> CheckResult | None:
     return None
 
 
-def _judged(found: list[_After], unknown: list[_After]) -> CheckResult:
+def _judge(found: list[_After], unknown: list[_After]) -> CheckResult:
     """Tell what was compared; what was not, with little power and a third of it either, is a reason not to accept."""
     back = [after for after in found if after.end is _End.BACK]
     lost = [after for after in found if after.end is not _End.BACK]

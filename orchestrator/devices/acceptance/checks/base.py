@@ -1,4 +1,4 @@
-"""What a check is, and what it answers."""
+"""Checks, and their results."""
 
 import tomllib
 from collections.abc import Callable, Mapping, Sequence

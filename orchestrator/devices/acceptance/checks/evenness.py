@@ -1,4 +1,4 @@
-"""Whether a converter answers the frequency alike at other operating points, and its switches act alike there."""
+"""Checks that a converter answers the frequency alike at other operating points, and its switches act alike there."""
 
 from collections.abc import Iterator
 from contextlib import suppress

@@ -1,4 +1,4 @@
-"""What an FMU does with inputs that it should never get."""
+"""Checks with inputs that an FMU should never get."""
 
 import numpy as np
 
@@ -73,7 +73,7 @@ def extreme_inputs(subject: Subject) -> CheckResult:
     wild, silent, texts = list[str](), list[str](), list[str]()
     for size in (3.0, 10.0, 100.0, 1e6):
         for name, deviation in _deviations(subject, size):
-            answer = _held(subject, deviation)
+            answer = _hold_inputs(subject, deviation)
             if answer is None:
                 (wild if size <= 100.0 else silent).append(f"{name} moved by {size:g}")
             elif answer:
@@ -105,7 +105,7 @@ def _deviations(subject: Subject, size: float) -> list[tuple[str, Numbers]]:
     return [(name, np.clip(deviation, low, high)) for name, deviation in found]
 
 
-def _held(subject: Subject, deviation: Numbers) -> str | None:
+def _hold_inputs(subject: Subject, deviation: Numbers) -> str | None:
     """Hold inputs: "" where all stays finite, the FMU's words where it refuses, None where it gives no numbers."""
     try:
         with subject.running() as running:

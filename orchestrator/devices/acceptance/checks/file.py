@@ -1,4 +1,4 @@
-"""What an FMU declares: the standard, units, start values, dependencies."""
+"""Checks of what an FMU declares: the standard, units, start values, dependencies."""
 
 from math import isfinite
 from pathlib import Path

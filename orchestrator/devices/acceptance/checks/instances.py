@@ -1,4 +1,4 @@
-"""Whether instances of one FMU leave each other alone, and begin anew as new ones do."""
+"""Checks that instances of one FMU leave each other alone, and begin anew as new ones do."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Whether an FMU's binary can be loaded here and gives an instance, how that initialises, and what it does
+"""Checks that an FMU's binary can be loaded here and gives an instance; how that initialises, and what it does
 with calls that FMI forbids."""
 
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Whether a converter works where a case may put it: without power, with full power either way, at another rating."""
+"""Checks of a converter where a case may put it: without power, with full power either way, at another rating."""
 
 import re
 from collections.abc import Iterator

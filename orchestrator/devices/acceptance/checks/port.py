@@ -1,4 +1,4 @@
-"""Whether a converter at its port does what a power flow expects of it."""
+"""Checks that a converter at its port does what a power flow expects of it."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -232,7 +232,7 @@ def power_balance(subject: Subject) -> CheckResult:
                 "power_balance",
                 f"because it starts at {len(asked)} of {len(_points(subject)) + len(IMPORTING)} operating points only",
             )
-        result = _judged(asked, found, voltages, steps * subject.step_size)
+        result = _judge(asked, found, voltages, steps * subject.step_size)
         if left_out and not result.fault:
             remedy = "nothing is known of it as a load or a charging store: do not use it so, or ask how it starts"
             result = remarked(
@@ -268,7 +268,7 @@ def _powers(
     return asked, found, voltages, left_out
 
 
-def _judged(
+def _judge(
     asked: Sequence[complex], found: Sequence[complex], voltages: Sequence[complex], after: float
 ) -> CheckResult:
     s_0, s = np.array(asked), np.array(found)

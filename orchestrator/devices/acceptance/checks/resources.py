@@ -1,4 +1,4 @@
-"""Whether an FMU gives back the memory that it takes."""
+"""Checks that an FMU gives back the memory that it takes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What a converter does in voltage dips, overvoltages and phase jumps, early and late."""
+"""Checks in voltage dips, overvoltages and phase jumps, early and late."""
 
 from cmath import rect
 from collections.abc import Iterator
@@ -96,7 +96,7 @@ class Disturbance:
 
 @dataclass(frozen=True)
 class Answer:
-    """What an event brought [pu, S_n]."""
+    """Response of a device to an event [pu, S_n]."""
 
     event: Disturbance
     peak: float  # the largest current
@@ -192,7 +192,7 @@ def limits(subject: Subject) -> CheckResult:
             if bad is not None:
                 says = f"its current is no number in {bad}, and fmi2DoStep returned OK"
                 return failed("limits", "not a number", says, case=str(bad))
-    result = _judged(subject, answers, refused, left_out)
+    result = _judge(subject, answers, refused, left_out)
     if longest < _OVERLOAD:
         result.figures["not_judged"] = f"whether its limit lasts for more than {longest:.2g} s"
     if other_way and not result.fault:
@@ -279,7 +279,7 @@ def _blocked(before: complex, current: Complex, h: float) -> tuple[float, bool]:
     ] > _BLOCKS_FOR / h
 
 
-def _judged(
+def _judge(
     subject: Subject, answers: list[Answer], refused: list[str], left_out: int
 ) -> CheckResult:
     if not answers:

@@ -1,4 +1,4 @@
-"""Whether an FMU runs at all, and gives the same answer twice."""
+"""Checks that an FMU runs at all, and gives the same answer twice."""
 
 from collections.abc import Callable
 from math import isnan
@@ -105,7 +105,7 @@ def _wanders(subject: Subject, seen: Numbers) -> int:
 
 
 def spent_since() -> Callable[[], float]:
-    """What a run has taken since now [s]: what it computed, so that other programs on the machine take none of it.
+    """Measure what a run takes from now on [s]: what it computes, so that other programs take none of it.
 
     What waits rather than computes is counted as well, by a part of the time that passes."""
     wall, own = perf_counter(), process_time()
@@ -145,7 +145,7 @@ def _not_finite(subject: Subject, values: Numbers, time: float) -> CheckResult:
 
 
 def affordable(subject: Subject, steps: int, step_size: float | None = None) -> int:
-    """As many steps, or as many as fit into half a second and into half of the experiment that the file declares."""
+    """Give these steps, or as many as fit into half a second and half of the experiment that the file declares."""
     fit = max(40, 0.5 / subject.memory.get("seconds_per_step", 1e-6))
     ends = subject.ends
     return int(

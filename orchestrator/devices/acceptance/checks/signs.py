@@ -1,4 +1,4 @@
-"""Whether a converter answers voltage and frequency with the right signs, and rests at its frequency."""
+"""Checks that a converter answers voltage and frequency with the right signs, and rests at its frequency."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -139,7 +139,7 @@ def signs(subject: Subject) -> CheckResult:
             if point is droops.CHARGING:
                 continue
             refused.append(
-                f"small changes of voltage or frequency at {_named(point)} end with an error: {error}"
+                f"small changes of voltage or frequency at {_name_of(point)} end with an error: {error}"
             )
             continue
         if result.fault:
@@ -179,7 +179,7 @@ def _evenly(giving: CheckResult, taking: CheckResult) -> CheckResult:
     return taking
 
 
-def _named(point: OperatingAt) -> str:
+def _name_of(point: OperatingAt) -> str:
     turned = f", theta_0 = {point.theta:g} rad" if point.theta else ""
     return f"P_0 = {point.P:.3g}, Q_0 = {point.Q:.3g}{turned}" + (
         f", v_0 = {point.v:g}" if point.v != 1 else ""
@@ -208,9 +208,9 @@ def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
         figures |= misfit.figures
     if not wrong:
         wrong, unknown = _wrong_droop(subject, steps, point, voltage, frequency)
-    said = f"{_said(point, voltage, frequency)}, {steps * subject.step_size:.2g} s later"
+    said = f"{_describe(point, voltage, frequency)}, {steps * subject.step_size:.2g} s later"
     if subject.starts:
-        said += f", at {_named(point)}"
+        said += f", at {_name_of(point)}"
     if unknown:
         said += f"; {unknown}"
         figures["not_judged"] = _DROOP_OF_Q
@@ -449,7 +449,9 @@ def _wrong_droop(
     return ("wrong sign", f"{says}: look for the sign of Q in its droop"), ""
 
 
-def _said(point: OperatingAt, voltage: droops.DroopAnswer, frequency: droops.DroopAnswer) -> str:
+def _describe(
+    point: OperatingAt, voltage: droops.DroopAnswer, frequency: droops.DroopAnswer
+) -> str:
     q, p = voltage.power.imag, frequency.power.real
     first = f"{100 * droops.VOLTAGE:g} % less voltage gives {q:+.3g} pu of reactive power"
     second = f"{100 * droops.FREQUENCY:g} % less frequency {p:+.3g} pu of active power"

@@ -1,4 +1,4 @@
-"""Whether a saved state is all of the state."""
+"""Checks that a saved state is all of the state."""
 
 from contextlib import ExitStack
 from time import perf_counter
@@ -247,8 +247,8 @@ def _brought_back(subject: Subject, setting: Setting, moved: Setting) -> tuple[s
 
 
 def _serialised(running: Running, h: float, stimulus: Stimulus) -> str | None:
-    """What is wrong with a state that went through bytes and back, or into another instance: a pointer may have been
-    saved. None if nothing is."""
+    """Tell what is wrong with a state that went through bytes and back, or into another instance: it may hold a
+    pointer. None if nothing is."""
     at, subject = running.time, running.subject
     with saved(running) as kept:
         content = running.component.serialize_state(kept)

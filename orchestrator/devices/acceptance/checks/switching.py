@@ -1,4 +1,4 @@
-"""Whether runs differ only in the moments at which something switches.
+"""Comparison of runs that may differ only in the moments at which something switches.
 
 A relay that is looked at once a step switches up to a step late, and a level that it controls turns around that much
 later: of a signal with two values this makes a difference of its whole range, although nothing is wrong. So runs are

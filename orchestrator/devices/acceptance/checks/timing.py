@@ -1,4 +1,4 @@
-"""Whether an FMU's answer depends on how a master steps it, and comes when it is due."""
+"""Checks that an FMU's answer does not depend on how a master steps it, and comes when it is due."""
 
 from collections.abc import Iterator
 from contextlib import suppress

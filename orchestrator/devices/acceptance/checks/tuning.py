@@ -1,4 +1,4 @@
-"""Whether tunable parameters act where they are set while it runs."""
+"""Checks that tunable parameters act where they are set while it runs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

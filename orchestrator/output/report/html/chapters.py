@@ -36,7 +36,7 @@ _STABLE: Mapping[bool | None, str] = {
 
 @dataclass(frozen=True)
 class Chapter:
-    """What one result says; ``page`` is the name of its own page, whose sections are the chapter, in the place of
+    """Content of one result; ``page`` is the name of its own page, whose sections are the chapter, in the place of
     ``content``; ``title`` is its heading, in the place of the question."""
 
     source: Path
@@ -306,7 +306,9 @@ def _coordinated(file: Path, c: Content) -> Chapter:
         bool(c["met"]),
         f"checked at {c['items']} points and outages",
         lost,
-        least=[LeastDamped.placed(limiting["mode"])] if limiting and limiting.get("mode") else [],
+        least=[LeastDamped.of_design_mode(limiting["mode"])]
+        if limiting and limiting.get("mode")
+        else [],
     )
 
 

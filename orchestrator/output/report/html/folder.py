@@ -1,4 +1,4 @@
-"""What a report is made from: the folders that `gfor run` and `gfor sweep` leave."""
+"""Sources of a report: the folders that `gfor run` and `gfor sweep` leave."""
 
 import csv
 import json

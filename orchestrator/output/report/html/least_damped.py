@@ -33,8 +33,8 @@ class LeastDamped:
         return cls(mode["frequency_hz"], mode["damping_percent"], dict(shares))
 
     @classmethod
-    def placed(cls, mode: Mapping[str, Any]) -> LeastDamped:
-        """Of a mode that a design over points gives: an eigenvalue [rad/s] and who takes part most."""
+    def of_design_mode(cls, mode: Mapping[str, Any]) -> LeastDamped:
+        """Take a mode that a design over points gives: an eigenvalue [rad/s] and who takes part most."""
         value, who = complex(mode["real"], mode["imag"]), mode.get("who")
         shares = {who: 1.0} if who else {}
         return cls(value.imag / math.tau, damping_percent(value), shares)

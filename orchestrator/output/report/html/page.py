@@ -63,7 +63,7 @@ def page(
     *,
     short: bool = False,
 ) -> str:
-    told, runs = _told(places, Figures())
+    told, runs = _tell_origins(places, Figures())
     chapters = [chapter for chapter, _ in told]
     differ = _of_several_studies(chapters)
     if differ:
@@ -87,7 +87,9 @@ def page(
     )
     if against is not None:
         before = (
-            [chapter for chapter, _ in _told([against], Figures())[0]] if against.is_dir() else None
+            [chapter for chapter, _ in _tell_origins([against], Figures())[0]]
+            if against.is_dir()
+            else None
         )
         content.insert(0, ("What changed since", changes(against, before, chapters)))
     content.append(("Provenance", origins(chapters) + "".join(map(sections.provenance, runs))))
@@ -121,7 +123,7 @@ def _names_of(chapters: Sequence[Chapter], runs: Sequence[Results]) -> ElementNa
     return ElementNames(shown)
 
 
-def _told(
+def _tell_origins(
     places: Sequence[Path], figures: Figures
 ) -> tuple[list[tuple[Chapter, Sections]], list[Results]]:
     """The chapters of all places with their sections, and the runs among them."""
@@ -276,7 +278,7 @@ def _origins(chapters: Sequence[Chapter]) -> dict[Path, dict[str, Any]]:
 
 
 def origins(chapters: Sequence[Chapter]) -> str:
-    """Of each result when it was made, by which version and code, from what, and the command that makes it again."""
+    """Tell of each result when it was made, by which version and code, from what, and the command to repeat it."""
     rows = [
         [escape(cell) for cell in made_of(source, origin)]
         for source, origin in _origins(chapters).items()

@@ -59,7 +59,9 @@ def sweep(sweep: xr.Dataset, scenarios: Sequence[Mapping[str, Any]], figures: Fi
     ):
         curves = []
         for s in names:
-            for rank, (name, points) in enumerate(_named(shown, s, axis, quantity).items()):
+            for rank, (name, points) in enumerate(
+                _curves_by_name(shown, s, axis, quantity).items()
+            ):
                 label_of = title.get(s, s) if rank == 0 else f"{title.get(s, s)}: {name}"
                 curves.append(ChartCurve(label_of, shades[s], *points, dashed=rank > 0))
         if curves:
@@ -138,7 +140,7 @@ def _highest(shown: xr.Dataset) -> float:
     return min(1.25 * found, float(shown["frequency"].max()))
 
 
-def _named(
+def _curves_by_name(
     shown: xr.Dataset, scenario: str, axis: str, quantity: str
 ) -> dict[str, tuple[Any, Any]]:
     one, found = shown.sel(scenario=scenario), {}
@@ -176,7 +178,7 @@ def _states(
     charts = []
     for s in names:
         shares = {
-            state: _named(
+            state: _curves_by_name(
                 shown.assign(share=shown["participation"].sel(state=state)), s, axis, "share"
             )
             for state in states
