@@ -19,8 +19,10 @@ from orchestrator.studies.validation.figures import (
     noise_in,
     signals_of,
 )
+from orchestrator.studies.validation.filled import Mask, runs_of
+from orchestrator.studies.validation.parameters import NEVER
 from orchestrator.studies.validation.questions import Question, QuestionKind
-from orchestrator.studies.validation.record import Mask, PortBases, Recording, questions_of_level
+from orchestrator.studies.validation.record import PortBases, Recording, questions_of_level
 from orchestrator.studies.validation.windows import Windows, find_windows
 
 _SHORTEST_BEFORE = 0.1  # a window before the event [s] that shows a steady state
@@ -32,7 +34,10 @@ _TOO_GOOD = 1e-4  # median error [pu] beside a recording without noise, as the m
 _MOVED = 2e-3  # rms movement [pu] that is an event
 _OFFSET = 0.015  # error that stays [pu]
 _BACK = 0.005  # deviation of the voltage [pu] that is none of an event
-_SLOWER_THAN = 0.05  # interval between samples [s] of which is said what it cannot show
+_SLOWER_THAN = 0.015  # interval between samples [s] of which is said what it cannot show
+_SUCH = 3  # times of a device that are named, which the samples do not show
+_SHORT_GAP = 0.02  # [s]: over a period voltages are means, and a gap hides little
+_IN_GAP = 0.3  # part of the largest change of the voltage, from which on a gap hides an event
 _SETPOINT_WITHIN = 0.1  # time [s] within which a setpoint moves P or Q by most of its step
 _ABRUPT = 6.0  # times the usual change over that time
 _BESIDE = 0.4  # part of the step by which the signal moves just before or after, as a swing does
@@ -115,10 +120,61 @@ def _of_windows(recording: Recording, windows: Windows, before: Mask) -> list[Qu
         moves = _trend(recording, before)
         if moves > _MOVES_BEFORE:
             found.append(Question(QuestionKind.NO_STEADY_STATE, {"moves": moves}))
-    if recording.interval > _SLOWER_THAN:
-        figures = {"interval": recording.interval, "fastest": 0.5 / recording.interval}
-        found.append(Question(QuestionKind.SLOW_SAMPLES, figures))
-    return found
+    return found + _gaps(recording, windows)
+
+
+def _gaps(recording: Recording, windows: Windows) -> list[Question]:
+    """The gap of the voltage in which the event begins, or much of it happens."""
+    lag = max(1, round(_SHORT_GAP / recording.interval))
+    voltage = recording.voltage
+    largest = float(np.abs(voltage[lag:] - voltage[:-lag]).max(initial=0.0))
+    for low, high in runs_of(~recording.driven):
+        begin, end = (recording.interval * k for k in (low - 1, high))
+        if end - begin <= _SHORT_GAP + 0.5 * recording.interval or not windows.seen:
+            continue
+        inside = begin - recording.interval <= windows.begin <= end
+        if inside or _jump_within(voltage, low, high) > _IN_GAP * largest:
+            figures = {"length": end - begin, "at": recording.begin + begin}
+            return [Question(QuestionKind.GAP_AT_EVENT, figures)]
+    return []
+
+
+def _jump_within(voltage: Complex, low: int, high: int) -> float:
+    """By how much the lines before and after a gap, each as long as it, miss each other in its middle [pu]."""
+    length = high - low + 1
+    before, after = voltage[max(0, low - length) : low], voltage[high : high + length]
+    if min(len(before), len(after)) < 3:
+        return 0.0
+    middle = 0.5 * (low + high - 1)
+    places = np.arange(low - len(before), low) - middle, np.arange(len(after)) + high - middle
+    ends = [
+        np.polyfit(at, values, 1)[1] for at, values in zip(places, (before, after), strict=True)
+    ]
+    return float(abs(ends[1] - ends[0]))
+
+
+def _slow_samples(comparison: EventComparison) -> list[Question]:
+    """A question that names the shortest times of a device, which few samples do not show."""
+    interval = comparison.event.recording.interval
+    if interval <= _SLOWER_THAN:
+        return []
+    device = comparison.device
+    times = {
+        info.name: float(device.value(info.name))
+        for info in device.description.variables.values()
+        if info.causality == "parameter"
+        and info.type == "Real"
+        and info.unit == "s"
+        and info.name not in NEVER
+    }
+    fast = sorted(name for name, value in times.items() if 0 < value < 2 * interval)
+    such = ", ".join(f"{name} = {times[name]:g} s" for name in fast[:_SUCH])
+    figures = {
+        "interval": interval,
+        "fastest": 0.5 / interval,
+        "such": f" ({such})" if such else "",
+    }
+    return [Question(QuestionKind.SLOW_SAMPLES, figures)]
 
 
 def _trend(recording: Recording, before: Mask) -> float:
@@ -216,6 +272,7 @@ def _of_response(comparison: EventComparison) -> list[Question]:
             "q_measured": event.start.power.imag,
         }
         found.append(Question(QuestionKind.START, figures))
+    found += _slow_samples(comparison)
     found += _without_noise(comparison)
     found += _setpoint(comparison)
     return found
@@ -245,6 +302,8 @@ def _setpoint(comparison: EventComparison) -> list[Question]:
             continue
         at = first + int(steps.argmax())
         before, after = values[max(0, at - 2 * width) : at], values[at + 2 * width :]
+        if not len(after):
+            continue
         offset = float(after.mean() - before.mean())
         abrupt = float(steps.max()) > _ABRUPT * float(np.median(steps)) + _OFFSET
         abrupt = abrupt and _alone(steps, width)

@@ -6,7 +6,7 @@ per unit of the rating, its largest magnitude, its mean, and the mean of its mag
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,12 +30,18 @@ _SETTLED = 0.05  # part of a step within which it has settled
 _FEW = 20  # samples of a ring-down
 _MOST_SAMPLES = 150  # of which modes are looked for; more take seconds and say little more
 _SLOWEST_PERIODS = 1.5  # periods of a mode that a window has to hold
+_LATER = (
+    0.03,
+    0.06,
+)  # parts of a ring-down that are left out at its begin, to see what that changes
 _SAME_MODE = 0.3  # part of the frequency by which two modes may differ and be the same
 
 
 @dataclass(frozen=True)
 class ErrorFigures:
-    """Errors of one signal in one window [pu of the rating], and what the recording's scatter alone makes of them."""
+    """Errors of one signal in one window [pu of the rating], and what the recording alone may make of them.
+
+    That is its scatter, and what is not known between its samples."""
 
     max_error: float
     max_at: float  # time in the recording's own clock [s]
@@ -44,6 +50,16 @@ class ErrorFigures:
     max_of_noise: float
     mean_of_noise: float
     mean_abs_of_noise: float
+
+    def doubted(self, doubt: Numbers) -> ErrorFigures:
+        """The same with a doubt of each sample's error counted as noise [pu]."""
+        most, usual = float(doubt.max(initial=0.0)), float(doubt.mean())
+        return replace(
+            self,
+            max_of_noise=self.max_of_noise + most,
+            mean_of_noise=self.mean_of_noise + usual,
+            mean_abs_of_noise=self.mean_abs_of_noise + usual,
+        )
 
     def as_json(self) -> dict[str, float]:
         return {
@@ -90,6 +106,10 @@ class SignalFigures:
     delay: float | None  # by which the measured one comes later [s]
     steps: tuple[StepFigures | None, StepFigures | None]
     modes: tuple[IdentifiedMode | None, IdentifiedMode | None]
+    modes_doubt: tuple[float, float] = (
+        0.0,
+        0.0,
+    )  # of how far these are apart: [%], [points of percent]
 
     def as_json(self) -> dict[str, object]:
         step = [one.as_json() if one else None for one in self.steps]
@@ -97,7 +117,12 @@ class SignalFigures:
         return {
             "delay_s": self.delay,
             "step": {"measured": step[0], "simulated": step[1]},
-            "ring_down": {"measured": mode[0], "simulated": mode[1]},
+            "ring_down": {
+                "measured": mode[0],
+                "simulated": mode[1],
+                "frequency_doubt_percent": self.modes_doubt[0],
+                "damping_doubt_points": self.modes_doubt[1],
+            },
         }
 
 
@@ -232,6 +257,38 @@ def ring_downs(
     return strongest, same
 
 
+def modes_apart(
+    modes: tuple[IdentifiedMode | None, IdentifiedMode | None],
+) -> tuple[float, float] | None:
+    """By how much the simulated mode is off: frequency [%], damping [points of percent]; None without both."""
+    measured, own = modes
+    if measured is None or own is None:
+        return None
+    frequency = (own.frequency_hz / measured.frequency_hz - 1) * 100
+    return frequency, own.damping_percent - measured.damping_percent
+
+
+def _doubt_of_modes(
+    recording: Recording,
+    signals: tuple[Numbers, Numbers],
+    windows: Windows,
+    found: tuple[IdentifiedMode | None, IdentifiedMode | None],
+) -> tuple[float, float]:
+    """How far the difference of two modes moves if the ring-down is looked at from a little later on."""
+    here = modes_apart(found)
+    if here is None:
+        return 0.0, 0.0
+    rest = recording.length - windows.end
+    others = []
+    for part in _LATER:
+        later = replace(windows, end=windows.end + part * rest)
+        there = modes_apart(ring_downs(recording, *signals, later))
+        others += [] if there is None else [there]
+    seen = np.array([here, *others])
+    frequency, damping = 0.5 * np.ptp(seen, axis=0)
+    return float(frequency), float(damping)
+
+
 def _modes(recording: Recording, values: Numbers, windows: Windows) -> list[IdentifiedMode]:
     part = recording.times > windows.end
     if part.sum() < _FEW or np.ptp(values[part]) < _LEAST_MOVES:
@@ -261,9 +318,11 @@ def compare_signals(
     measured, own = recording.power, simulated
     found = {}
     for name, y, x in (("p", measured.real, own.real), ("q", measured.imag, own.imag)):
+        modes = ring_downs(recording, y, x, windows)
         found[name] = SignalFigures(
             delay_between(recording, y, x, windows),
             (step_of(recording, y, windows), step_of(recording, x, windows)),
-            ring_downs(recording, y, x, windows),
+            modes,
+            modes_doubt=_doubt_of_modes(recording, (y, x), windows, modes),
         )
     return found

@@ -36,12 +36,12 @@ def hidden_voltages(events: Sequence[RecordedEvent]) -> list[HiddenVoltage]:
     return [
         HiddenVoltage(f"voltage {axis.real:g} at {sample} of {k}", k, sample, axis, _LIKELY * jump)
         for k, event in enumerate(events)
-        for sample, jump in _jumps(event)
+        for sample, jump in jumps_of(event)
         for axis in (1 + 0j, 1j)
     ]
 
 
-def _jumps(event: RecordedEvent) -> list[tuple[int, float]]:
+def jumps_of(event: RecordedEvent) -> list[tuple[int, float]]:
     """Samples before the largest changes of the voltage, with these changes [pu], from the event's begin on."""
     recording = event.recording
     change = np.abs(np.diff(recording.voltage))

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.errors import CosimError
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import (
@@ -20,6 +21,7 @@ from orchestrator.studies.validation.event import (
     rms_error,
     rms_movement,
 )
+from orchestrator.studies.validation.lost_jump import lost_jump
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import PortBases, Recording
 
@@ -29,6 +31,10 @@ _OFF = (
 _NOISY = 1.5  # times the scatter before the event, which is not the response's
 _LEAST_OFF = 0.003  # rms error [pu] below which nothing is tried
 _EXPLAINS = 0.35  # part of the error that a reading may leave, to be named
+_AS_GOOD = 1.15  # times the least error left, up to which the reading that comes first in the list is named
+_LEAVES = 0.25  # part of the error that another scale may leave: parameters change a size as well
+_MOST_FACTOR = 2000
+_NEAR_PREFIX = 0.1  # part by which a factor may miss one of ten and be it
 _RADIAN = 180 / math.pi  # [deg]
 _LEAST_CLOCK = 0.004  # delay [s] that is named, and at least
 _SAMPLES_CLOCK = 0.6  # so many samples
@@ -44,6 +50,15 @@ class Reading:
     roles: tuple[str, ...]
     factor: float
     change: Callable[[Recording], Recording]
+    of_unit: str = ""  # of the angle, where only one in that unit may be meant so
+    leaves: float = _EXPLAINS  # part of the error that it may leave, to be named
+
+    def fits(self, recording: Recording) -> bool:
+        """Return whether a recording may be meant so: it has the channels, in the unit."""
+        channels = recording.channels
+        if not set(self.roles) <= channels.keys():
+            return False
+        return self.of_unit in ("", recording.angle_unit)
 
 
 def _power(p: float, q: float) -> Callable[[Recording], Recording]:
@@ -70,8 +85,8 @@ READINGS = (
     Reading("Q counts into the plant", ("q",), -1, _power(1, -1)),
     Reading("P and Q count into the plant", ("p", "q"), -1, _power(-1, -1)),
     Reading("P and Q are of one phase", ("p", "q"), 3, _power(3, 3)),
-    Reading("the angle is in radians", ("angle",), _RADIAN, _angle(_RADIAN)),
-    Reading("the angle is in degrees", ("angle",), 1 / _RADIAN, _angle(1 / _RADIAN)),
+    Reading("the angle is in radians", ("angle",), _RADIAN, _angle(_RADIAN), of_unit="deg"),
+    Reading("the angle is in degrees", ("angle",), 1 / _RADIAN, _angle(1 / _RADIAN), of_unit="rad"),
     Reading("the angle has the other sign", ("angle",), -1, _angle(-1)),
 )
 
@@ -84,27 +99,73 @@ def question_readings(comparison: EventComparison, bases: PortBases) -> list[Que
     excess = [max(e * e - (_NOISY * n) ** 2, 0) ** 0.5 for e, n in zip(error, scatter, strict=True)]
     off = [one > max(_LEAST_OFF, _OFF * way) for one, way in zip(excess, moved, strict=True)]
     named = _likeliest(comparison, bases, math.hypot(*error)) if any(off) else []
-    return named or _clock(comparison, math.hypot(*error))
+    if named:
+        return named
+    explained = [*lost_jump(comparison), *_clock(comparison, math.hypot(*error))]
+    return [min(explained, key=lambda one: one[0])[1]] if explained else []
 
 
 def _likeliest(comparison: EventComparison, bases: PortBases, error: float) -> list[Question]:
     """The one reading that explains the most, where it explains enough."""
     event, device = comparison.event, comparison.device
+    readings = [*READINGS, *_scalings(comparison)]
     tried = [
         (left, reading)
-        for reading in READINGS
-        if set(reading.roles) <= event.recording.channels.keys()
+        for reading in readings
+        if reading.fits(event.recording)
         for left in _error_left(device, event, reading, bases)
+        if left <= reading.leaves * error
     ]
     if not tried:
         return []
-    left, best = min(tried, key=lambda one: one[0])
-    if left > _EXPLAINS * error:
-        return []
+    least = min(left for left, _ in tried)
+    left, best = next(one for one in tried if one[0] <= _AS_GOOD * least)
     channels = event.recording.channels
     remedy = [channels[role].changed(factor=round(best.factor, 6)) for role in best.roles]
     figures = {"reading": best.name, "error": error, "left": left, "remedy": remedy}
     return [Question(QuestionKind.READ_OTHERWISE, figures)]
+
+
+def _scalings(comparison: EventComparison) -> Iterator[Reading]:
+    """Whole factors by which the device moves more than the recording, or less: of P and Q, or a prefix of one."""
+    event = comparison.event
+    part = event.recording.good & (event.recording.times > event.windows.begin)
+    way: Complex = (event.recording.power - event.start.power)[part]
+    own: Complex = (comparison.played.power - comparison.played.rest)[part]
+    both = np.concatenate([way.real, way.imag]), np.concatenate([own.real, own.imag])
+    factor = _whole_factor(*both)
+    if factor:
+        change = _power(factor, factor)
+        yield Reading(_scale_name("P and Q are", factor), ("p", "q"), factor, change, "", _LEAVES)
+    p, q = _whole_factor(way.real, own.real), _whole_factor(way.imag, own.imag)
+    if _is_prefix(p) and not _is_prefix(q):
+        yield Reading(_scale_name("P is", p), ("p",), p, _power(p, 1), "", _LEAVES)
+    if _is_prefix(q) and not _is_prefix(p):
+        yield Reading(_scale_name("Q is", q), ("q",), q, _power(1, q), "", _LEAVES)
+
+
+def _scale_name(which: str, factor: float) -> str:
+    said = f"1/{factor:g} of" if factor > 1 else f"{1 / factor:g} times"
+    return f"{which} {said} the plant's: another prefix of the unit, or so many units"
+
+
+def _whole_factor(way: Numbers, own: Numbers) -> float:
+    """By what a movement is to be multiplied to be the device's: a whole number or its inverse; 0 where it is none."""
+    size = float(way @ way)
+    ratio = float(way @ own) / size if size > 0 else 0.0
+    if ratio <= 0:
+        return 0.0
+    count = max(ratio, 1 / ratio)
+    power = 10 ** round(np.log10(count))
+    whole = power if abs(count / power - 1) < _NEAR_PREFIX else round(count)
+    if not 2 <= whole <= _MOST_FACTOR:
+        return 0.0
+    return float(whole) if ratio > 1 else 1 / whole
+
+
+def _is_prefix(factor: float) -> bool:
+    """Return whether a factor is of tens or thousands, as units have it."""
+    return factor > 0 and factor != 1 and float(np.log10(factor)).is_integer()
 
 
 def _error_left(
@@ -119,25 +180,25 @@ def _error_left(
         played = device.play(changed.recording, changed.start)
     except CosimError:
         return
-    scale = abs(reading.factor) if reading.factor == 3 else 1.0
+    scale = abs(reading.factor) if "p" in reading.roles or "q" in reading.roles else 1.0
     yield math.hypot(*rms_error(played.power, changed)) / scale
 
 
-def _clock(comparison: EventComparison, error: float) -> list[Question]:
-    """P and Q that come later than the model's by one time, which takes most of the error away."""
+def _clock(comparison: EventComparison, error: float) -> Iterator[tuple[float, Question]]:
+    """P and Q that come later than the model's by one time, and the part of the error that this leaves."""
     event = comparison.event
     interval = event.recording.interval
     delays = [one.delay for one in comparison.signals.values() if one.delay is not None]
     if not delays:
-        return []
+        return
     delay = float(np.mean(delays))
     least = max(_LEAST_CLOCK, _SAMPLES_CLOCK * interval)
     if abs(delay) < least or np.ptp(delays) > max(_ALIKE * abs(delay), interval):
-        return []
+        return
     times = event.recording.times
     shifted = np.interp(times - delay, times, comparison.played.power)
     left = math.hypot(*rms_error(np.asarray(shifted), event))
     if left > _CLOCK_LEAVES * error:
-        return []
+        return
     figures = {"delay": delay, "error": error, "left": left, "together": len(delays)}
-    return [Question(QuestionKind.CLOCKS, figures)]
+    yield left / error, Question(QuestionKind.CLOCKS, figures)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -13,7 +13,7 @@ from pydantic import Field, ValidationError
 from orchestrator.core.errors import InputError
 from orchestrator.core.toml_files import Table, fault_of, read_toml
 from orchestrator.studies.validation.event import EventComparison
-from orchestrator.studies.validation.figures import ErrorFigures
+from orchestrator.studies.validation.figures import ErrorFigures, modes_apart
 
 Signal = Literal["p", "q", "i_p", "i_q"]
 Window = Literal["before", "during", "after"]
@@ -167,25 +167,19 @@ def _of_delay(limits: LimitTables, comparison: EventComparison) -> Iterator[Crit
 def _of_ring_down(limits: LimitTables, comparison: EventComparison) -> Iterator[Criterion]:
     label = comparison.event.recording.label
     for signal, limit in limits.ring_down.items():
-        measured, own = comparison.signals[signal].modes
-        both = measured is not None and own is not None
-        figures: Mapping[str, tuple[float | None, float | None, str]] = {
-            "frequency": (
-                abs(own.frequency_hz / measured.frequency_hz - 1) * 100
-                if measured and own
-                else None,
-                limit.frequency_percent,
-                "%",
-            ),
-            "damping": (
-                abs(own.damping_percent - measured.damping_percent) if measured and own else None,
-                limit.damping_points,
-                "points",
-            ),
-        }
-        for name, (value, most, unit) in figures.items():
+        figures = comparison.signals[signal]
+        apart = modes_apart(figures.modes)
+        rows = (
+            ("frequency", limit.frequency_percent, "%"),
+            ("damping", limit.damping_points, "points"),
+        )
+        for k, (name, most, unit) in enumerate(rows):
             if most is None:
                 continue
-            verdict = _verdict(value or 0.0, 0.0, most, grows=False) if both else LimitVerdict.OPEN
+            value = None if apart is None else abs(apart[k])
+            noise = figures.modes_doubt[k]
+            verdict = LimitVerdict.OPEN
+            if value is not None:
+                verdict = _verdict(value, noise, most, grows=False)
             place = f"ring-down {signal} {name}"
-            yield Criterion(label, place, unit, value, most, noise=0.0, verdict=verdict)
+            yield Criterion(label, place, unit, value, most, noise=noise, verdict=verdict)

@@ -20,6 +20,9 @@ class QuestionKind(StrEnum):
     NO_EVENT = "no event"
     SLOW_SAMPLES = "slow samples"
     MISSING = "missing samples"
+    FILLED = "filled samples"
+    GAP_AT_EVENT = "gap at the event"
+    LOST_JUMP = "angle lacks a jump"
     START = "starts elsewhere"
     READ_OTHERWISE = "read otherwise"
     CLOCKS = "clocks"
@@ -31,8 +34,8 @@ class QuestionKind(StrEnum):
 
 
 FIGURES_HOLD = {
-    QuestionKind.FREQUENCY_ALONE,
     QuestionKind.MISSING,
+    QuestionKind.FILLED,
     QuestionKind.SLOW_SAMPLES,
     QuestionKind.NOISE,
     QuestionKind.NO_NOISE,

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.errors import InputError
 from orchestrator.studies.validation.averaging import averaged
 from orchestrator.studies.validation.channels import RecordedChannel, channels_in, in_base, unit_of
+from orchestrator.studies.validation.filled import Mask, filled_samples
 from orchestrator.studies.validation.questions import Question, QuestionKind
 
 if TYPE_CHECKING:
@@ -35,8 +35,9 @@ _VOLTAGES_KV = (0.4, 0.69, 10, 20, 33, 66, 110, 132, 150, 220, 230, 275, 345, 38
 _NORMAL = (0.8, 1.2)  # magnitude of the voltage before the event [pu] that is not asked about
 _MOST_LOADED = 1.3  # apparent power before the event [pu of the rating] that is not asked about
 _FARTHEST_HZ = 1.0  # a grid's frequency is nearer to the rated one before an event
-Mask = NDArray[np.bool_]
 
+_VOLTAGES = {"v", "angle", "f", "va", "vb", "vc"}
+_POWERS = {"p", "q", "i", "i_angle", "ia", "ib", "ic"}
 _PHASORS = np.exp(2j * np.pi / 3 * np.arange(3))
 
 
@@ -69,12 +70,16 @@ class Recording:
     voltage: Complex
     power: Complex
     good: Mask
+    driven: Mask  # where no sample of the voltage is missing
     frame_hz: float
     instantaneous: bool
     average: float  # time over which the power is averaged [s], and a response is to be
     channels: Mapping[str, RecordedChannel]
     questions: tuple[Question, ...] = ()
     sha256: str = ""
+    angle_unit: str = ""  # that it is said to have
+    # sample before a jump → part of the interval after which the voltage jumps; a straight line where none is given
+    jumps: Mapping[int, float] = field(default_factory=dict)
 
     @property
     def times(self) -> Numbers:
@@ -107,6 +112,11 @@ class Recording:
 
     def at(self, times: Numbers) -> Complex:
         """The voltage between samples: instantaneous values along straight lines, phasors by magnitude and angle."""
+        for sample, part in self.jumps.items():
+            low, high = self.interval * sample, self.interval * (sample + 1)
+            inside = (times > low) & (times < high)
+            jumped = np.where(times < low + part * self.interval, low, high)
+            times = np.where(inside, jumped, times)
         if self.instantaneous:
             found: Complex = np.interp(times, self.times, self.voltage)
             return found
@@ -190,8 +200,21 @@ class _Reading:
     def instantaneous(self) -> bool:
         return {"va", "vb", "vc"} <= self.channels.keys()
 
+    @property
+    def angle_unit(self) -> str:
+        return unit_of(self.channels["angle"], self.dataset) if "angle" in self.channels else ""
+
     def ask(self, kind: QuestionKind, **figures: object) -> None:
         self.questions.append(Question(kind, figures))
+
+    def filled(self, roles: Collection[str]) -> Mask:
+        """Return which samples of these channels a recorder filled with the last value."""
+        columns = [
+            np.asarray(self.dataset[one.column].values, dtype=float)
+            for role, one in self.channels.items()
+            if role in roles
+        ]
+        return filled_samples(columns) if columns else np.zeros(len(self.times), dtype=bool)
 
     def voltage(self) -> Complex:
         """[pu], in a frame that rotates with the rated frequency."""
@@ -347,37 +370,31 @@ class _Reading:
 def _evened(reading: _Reading, voltage: Complex, power: Complex) -> Recording:
     """At even times; short gaps are bridged, and the samples there are not compared."""
     times = reading.times
-    known = np.isfinite(voltage) & np.isfinite(power)
-    if known.sum() < _FEWEST:
+    filled = [reading.filled(roles) for roles in (_VOLTAGES, _POWERS)]
+    driven = np.isfinite(voltage) & ~filled[0]
+    known = np.isfinite(power) & ~filled[1]
+    if (driven & known).sum() < _FEWEST:
         raise InputError(
-            f"{reading.label}: {int(known.sum())} samples have voltage, P and Q together; at least {_FEWEST} are "
-            "compared"
+            f"{reading.label}: {int((driven & known).sum())} samples have voltage, P and Q together; at least "
+            f"{_FEWEST} are compared"
         )
-    first, last = np.flatnonzero(known)[[0, -1]]
+    first, last = np.flatnonzero(driven & known)[[0, -1]]
     part = slice(first, last + 1)
-    times, voltage, power, known = times[part], voltage[part], power[part], known[part]
+    times, voltage, power = times[part], voltage[part], power[part]
+    driven, known = driven[part], known[part]
     interval = float(np.median(np.diff(times)))
     even = times[0] + interval * np.arange(round((times[-1] - times[0]) / interval) + 1)
-    gaps = np.diff(times[known])
-    longest = float(gaps.max())
-    if longest > max(_LONGEST_GAP, 3 * interval):
-        at = float(times[known][int(gaps.argmax())])
-        raise InputError(
-            f"{reading.label}: samples are missing for {longest:.3g} s from {at:g} s on; what drives the device there "
-            "is not known. Give a part of the recording, with --start and --stop"
-        )
-    angle = np.unwrap(np.angle(voltage[known]))
-    source = times[known]
-    magnitude = np.interp(even, source, np.abs(voltage[known]))
-    v: Complex = np.asarray(magnitude * np.exp(1j * np.interp(even, source, angle)))
-    if reading.instantaneous:
-        v = np.interp(even, source, voltage[known])
-    s: Complex = np.interp(even, source, power[known])
-    nearest = np.clip(np.searchsorted(source, even), 1, len(source) - 1)
-    apart = np.minimum(np.abs(even - source[nearest - 1]), np.abs(source[nearest] - even))
-    good = apart <= 0.51 * interval
+    longest = _longest_gap(reading.label, times[driven], interval)
+    v = _voltage_at(even, times[driven], voltage[driven], instantaneous=reading.instantaneous)
+    s: Complex = np.interp(even, times[known], power[known])
+    drives = _near(even, times[driven], interval)
+    good = drives & _near(even, times[known], interval)
+    stale = sum(int(one[part].sum()) for one in filled)
     missing = int((~good).sum())
-    if missing:
+    if stale:
+        at = float(times[np.flatnonzero(filled[0][part] | filled[1][part])[0]])
+        reading.ask(QuestionKind.FILLED, count=stale, of=len(even), at=at, longest=longest)
+    elif missing:
         reading.ask(QuestionKind.MISSING, count=missing, of=len(even), longest=longest)
     recording = Recording(
         label=reading.label,
@@ -386,13 +403,46 @@ def _evened(reading: _Reading, voltage: Complex, power: Complex) -> Recording:
         voltage=v,
         power=s,
         good=good,
+        driven=drives,
         frame_hz=reading.bases.rated_hz,
         instantaneous=reading.instantaneous,
         average=reading.bases.averaging,
         channels=reading.channels,
         questions=tuple(reading.questions),
+        angle_unit=reading.angle_unit,
     )
     return _averaged(_at_port(recording, reading.bases.impedance))
+
+
+def _longest_gap(label: str, times: Numbers, interval: float) -> float:
+    """The longest time between two samples of the voltage [s].
+
+    Raises an `InputError` if it is too long for a straight line."""
+    gaps = np.diff(times)
+    longest = float(gaps.max())
+    if longest > max(_LONGEST_GAP, 3 * interval):
+        at = float(times[int(gaps.argmax())])
+        raise InputError(
+            f"{label}: samples of the voltage are missing, or hold the last value, for {longest:.3g} s from {at:g} s "
+            "on; what drives the device there is not known. Give a part of the recording, with --start and --stop"
+        )
+    return longest
+
+
+def _voltage_at(even: Numbers, times: Numbers, voltage: Complex, *, instantaneous: bool) -> Complex:
+    if instantaneous:
+        found: Complex = np.interp(even, times, voltage)
+        return found
+    angle = np.unwrap(np.angle(voltage))
+    magnitude = np.interp(even, times, np.abs(voltage))
+    return np.asarray(magnitude * np.exp(1j * np.interp(even, times, angle)))
+
+
+def _near(even: Numbers, times: Numbers, interval: float) -> Mask:
+    """Return at which even times there is a sample."""
+    nearest = np.clip(np.searchsorted(times, even), 1, len(times) - 1)
+    apart = np.minimum(np.abs(even - times[nearest - 1]), np.abs(times[nearest] - even))
+    return np.asarray(apart <= 0.51 * interval)
 
 
 def _averaged(recording: Recording) -> Recording:

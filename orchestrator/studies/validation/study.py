@@ -9,6 +9,7 @@ from typing import Any
 
 from orchestrator.core.errors import CosimError, InputError
 from orchestrator.core.late import xr
+from orchestrator.studies.validation.between import with_doubt_between
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import (
     EventComparison,
@@ -163,7 +164,7 @@ def add_fit(result: ValidationResult, report: Report) -> ValidationResult:
 def _compare(device: PlayedDevice, event: RecordedEvent) -> EventComparison:
     """The comparison; where the device refuses to run, what was asked of the recording is said with it."""
     try:
-        return compare_with(device, event)
+        return with_doubt_between(compare_with(device, event))
     except CosimError as error:
         asked = [sentence(one) for one in event.questions if one.keeps_open]
         if not asked:

@@ -8,7 +8,8 @@ import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.errors import InputError
-from orchestrator.studies.validation.record import Mask, Recording
+from orchestrator.studies.validation.filled import Mask
+from orchestrator.studies.validation.record import Recording
 
 _LAG = 0.02  # time [s] over which a change of the voltage counts as abrupt: a period
 _LEAST = 0.002  # smallest change of the voltage [pu] over that time which is an event

@@ -80,7 +80,7 @@ def _no_event(x: Figures) -> str:
 def _slow_samples(x: Figures) -> str:
     return (
         f"a sample every {1000 * x['interval']:.4g} ms holds nothing faster than {x['fastest']:.3g} Hz: controls that "
-        "act faster are neither confirmed nor refuted by it"
+        f"act faster{x['such']} are neither confirmed nor refuted by it"
     )
 
 
@@ -88,6 +88,29 @@ def _missing(x: Figures) -> str:
     return (
         f"{x['count']} of {x['of']} samples are missing, for up to {x['longest']:.3g} s: they are bridged in the "
         "voltage and not compared"
+    )
+
+
+def _filled(x: Figures) -> str:
+    return (
+        f"{x['count']} samples stand still while those before and after move, from {x['at']:.4g} s on: the recorder "
+        "filled a gap with the last value. They are taken as missing: bridged in the voltage and not compared"
+    )
+
+
+def _gap_at_event(x: Figures) -> str:
+    return (
+        f"samples are missing for {x['length']:.3g} s from {x['at']:.4g} s on, where the voltage changes: what drove "
+        "the plant there is not known, and the event is not judged. Give a recording without the gap, or another event"
+    )
+
+
+def _lost_jump(x: Figures) -> str:
+    return (
+        f"the angle lacks up to {x['jump']:.3g} deg from {x['at']:.4g} s on, as one that is smoothed over "
+        f"{1000 * x['length']:.3g} ms does; without that the error falls from {x['error']:.3g} to "
+        f"{x['left']:.3g} pu (rms): was the angle integrated from a filtered frequency, or filtered by itself? Give "
+        "the angle as it was measured, with --channel 'angle=COLUMN'"
     )
 
 
@@ -164,6 +187,9 @@ _SENTENCES: Mapping[QuestionKind, Callable[[Figures], str]] = {
     QuestionKind.NO_EVENT: _no_event,
     QuestionKind.SLOW_SAMPLES: _slow_samples,
     QuestionKind.MISSING: _missing,
+    QuestionKind.FILLED: _filled,
+    QuestionKind.GAP_AT_EVENT: _gap_at_event,
+    QuestionKind.LOST_JUMP: _lost_jump,
     QuestionKind.START: _start,
     QuestionKind.READ_OTHERWISE: _read_otherwise,
     QuestionKind.CLOCKS: _clocks,

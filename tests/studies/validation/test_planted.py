@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import orchestrator as gfor_in_python
+from orchestrator.studies.validation.limits import EXAMPLE
 from tests.studies.validation.recordings import run, table, with_noise
 
 ON = {"pod_p.enabled": True}
@@ -29,7 +31,43 @@ def held(frame, samples=10):
     return frame.assign(angle_deg=frame.angle_deg.to_numpy()[first])
 
 
+def of_filtered_frequency(frame, seconds=0.1):
+    """The angle as the integral of a frequency behind a first-order lag."""
+    turns = 2 * np.pi * np.diff(frame.angle_deg / 360, prepend=frame.angle_deg[0] / 360) / 1e-3
+    part = 1e-3 / seconds
+    filtered = lfilter([part], [1, part - 1], turns)
+    return frame.assign(angle_deg=np.rad2deg(np.cumsum(filtered) * 1e-3))
+
+
+def filled(frame, low, high, columns=("v_pu", "angle_deg", "p_mw", "q_mvar")):
+    """A gap that the recorder filled with the last value."""
+    gap = (frame.time > low) & (frame.time <= high)
+    return frame.assign(**{c: frame[c].mask(gap).ffill() for c in columns})
+
+
+def without(frame, low, high):
+    return frame[(frame.time <= low) | (frame.time > high)]
+
+
+def of_pmu(frame, every=20, mean=40):
+    """Means over two periods around each sample, as a PMU gives them."""
+    angle = np.unwrap(np.deg2rad(frame.angle_deg))
+    smooth = frame.assign(angle_deg=np.rad2deg(angle)).rolling(mean, center=True, min_periods=1)
+    return smooth.mean().assign(time=frame.time).iloc[::every]
+
+
 PLANTED = {
+    "P and Q are 1/10 of the plant's: another prefix of the unit, or so many units": (
+        lambda f: f.assign(p_mw=f.p_mw / 10, q_mvar=f.q_mvar / 10),
+        "read otherwise",
+    ),
+    "Q is 1/1000 of the plant's: another prefix of the unit, or so many units": (
+        lambda f: f.assign(q_mvar=f.q_mvar / 1000),
+        "read otherwise",
+    ),
+    "the angle is of a filtered frequency": (of_filtered_frequency, "angle lacks a jump"),
+    "samples are missing at the event": (lambda f: without(f, 0.98, 1.06), "gap at the event"),
+    "a gap at the event is filled": (lambda f: filled(f, 0.98, 1.06), "gap at the event"),
     "P counts into the plant": (lambda f: f.assign(p_mw=-f.p_mw), "read otherwise"),
     "Q counts into the plant": (lambda f: f.assign(q_mvar=-f.q_mvar), "read otherwise"),
     "P and Q are of one phase": (
@@ -80,3 +118,52 @@ def test_a_voltage_to_ground_is_named_though_the_device_does_not_start(good):
 def test_an_angle_that_is_wrapped_is_the_same(good):
     wrapped = good.assign(angle_deg=(good.angle_deg + 350) % 360 - 180)
     assert asked(wrapped) == []
+
+
+HONEST = {
+    "a PMU's means over two periods": of_pmu,
+    "a twentieth of the samples is missing": lambda f: f.sample(
+        frac=0.95, random_state=1
+    ).sort_index(),
+    "samples are missing after the event": lambda f: without(f, 2.0, 2.1),
+    "a recorder of four digits": lambda f: f.round({"v_pu": 4, "angle_deg": 2, "p_mw": 1}),
+}
+
+
+@pytest.mark.parametrize("name", HONEST)
+def test_an_honest_recording_is_not_accused(good, name):
+    assert not [one for one in asked(HONEST[name](good)) if one["keeps_open"]]
+
+
+def test_a_filled_gap_is_told_and_counts_as_missing(good):
+    gap = 1.6, 1.8
+    (question,) = asked(filled(good, *gap))
+    assert question["kind"] == "filled samples"
+    assert question["figures"]["at"] == pytest.approx(gap[0], abs=0.0015)
+    found = gfor_in_python.validate("gfor", filled(good, *gap).set_index("time"), values=ON)
+    after = found.table().query("window == 'after' and signal == 'p'")
+    assert after["max_error_pu"].item() < 0.006
+
+
+def test_a_gap_at_the_event_leaves_no_verdict(good):
+    gaps = {"missing": without(good, 0.98, 1.06), "none": good}
+    verdicts = {
+        name: gfor_in_python.validate(
+            "gfor", frame.set_index("time"), values=ON, limits=EXAMPLE
+        ).verdict
+        for name, frame in gaps.items()
+    }
+    assert verdicts == {"missing": "open", "none": "met"}
+
+
+def test_samples_that_are_too_slow_name_the_controls_that_they_do_not_show(good):
+    questions = asked(good.iloc[::40])
+    (found,) = [one for one in questions if one["kind"] == "slow samples"]
+    assert "voltage_control.tau = 0.05 s" in found["text"]
+
+
+def test_slow_samples_end_no_right_model_with_not_met(good):
+    for every in (20, 100):
+        frame = good.iloc[::every].set_index("time")
+        found = gfor_in_python.validate("gfor", frame, values=ON, limits=EXAMPLE)
+        assert found.verdict != "not met", every

@@ -1,0 +1,144 @@
+"""An angle that a recorder smoothed: integrated from a filtered frequency it lacks the jump that the plant felt.
+
+The smoothing is taken back, by the derivative of the recorded angle, and the device runs again with the sharper one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from orchestrator.core.arrays import Numbers
+from orchestrator.core.errors import CosimError
+from orchestrator.studies.validation.device import PlayedDevice
+from orchestrator.studies.validation.event import (
+    EventComparison,
+    RecordedEvent,
+    rms_error,
+    rms_movement,
+)
+from orchestrator.studies.validation.questions import Question, QuestionKind
+from orchestrator.studies.validation.record import Recording
+
+_AFTER = 2.0  # part of the recording after the event's begin that is looked at [s]
+_LEAST = 0.003  # rms error in that part [pu] below which nothing is tried
+_OFF = 0.06  # part of the movement there that the error is at least
+_EXPLAINS = 0.4  # part of the error that a sharper angle may leave, to be named
+_ABRUPT = 0.005  # time [s] within which an angle jumps, and over which its derivative is taken
+_TIMES = 2.0  # times the recorded angle's fastest change, from which on the sharper one has a jump of its own
+_SHORTEST = 0.01  # smoothing over less [s] is none that matters
+
+
+@dataclass(frozen=True)
+class Smoothing:
+    """A way to smooth an angle over a time [s], and what it took away from the recorded one [rad]."""
+
+    length: float
+    lost: Callable[[Recording], Numbers]
+
+
+def _lost_by_lag(length: float) -> Callable[[Recording], Numbers]:
+    """A first-order lag: the time constant times the derivative."""
+    return lambda recording: length * _slope(recording)
+
+
+def _lost_by_mean(length: float, ahead: float) -> Callable[[Recording], Numbers]:
+    """A mean over so long, of which a part ``ahead`` comes after its time.
+
+    Its derivative is the difference of the angle at both ends over the length, so that each end gives the other."""
+
+    def lost(recording: Recording) -> Numbers:
+        count = max(1, round(length / recording.interval))
+        shift = round(ahead * count)
+        angle = np.unwrap(np.angle(recording.voltage))
+        moves = count * recording.interval * _slope(recording)
+        sharp = angle.copy()
+        for k in range(count, len(angle)):
+            at = k - shift
+            sharp[k] = sharp[k - count] + moves[at] if at < len(angle) else angle[k]
+        return np.asarray(sharp - angle)
+
+    return lost
+
+
+SMOOTHINGS = (
+    Smoothing(0.1, _lost_by_lag(0.1)),
+    *(Smoothing(length, _lost_by_mean(length, 0.0)) for length in (0.05, 0.1, 0.2)),
+    *(Smoothing(length, _lost_by_mean(length, 0.5)) for length in (0.05, 0.1, 0.2)),
+)
+
+
+def lost_jump(comparison: EventComparison) -> Iterator[tuple[float, Question]]:
+    """A sharper angle that explains most of the error around the event's begin, with the part that it leaves."""
+    near = _near_event(comparison.event)
+    if near.recording.instantaneous:
+        return
+    power = comparison.played.power[: len(near.recording.voltage)]
+    error, moved = math.hypot(*rms_error(power, near)), math.hypot(*rms_movement(near))
+    if error < max(_LEAST, _OFF * moved):
+        return
+    found = [one for smoothing in SMOOTHINGS for one in _tried(comparison.device, near, smoothing)]
+    left, length, lost = min(found, key=lambda one: one[0], default=(error, 0.0, np.zeros(2)))
+    angle = np.unwrap(np.angle(near.recording.voltage))
+    jumps = _fastest(angle + lost, near.recording) > _TIMES * _fastest(angle, near.recording)
+    if left > _EXPLAINS * error or length < _SHORTEST or not jumps:
+        return
+    figures = {
+        "at": near.recording.begin + near.windows.begin,
+        "length": length,
+        "jump": math.degrees(float(np.abs(lost).max())),
+        "error": error,
+        "left": left,
+    }
+    yield left / error, Question(QuestionKind.LOST_JUMP, figures)
+
+
+def _near_event(event: RecordedEvent) -> RecordedEvent:
+    """The event without what comes long after its begin."""
+    whole = event.recording
+    count = int((event.windows.begin + _AFTER) / whole.interval) + 2
+    cut = {name: getattr(whole, name)[:count] for name in ("voltage", "power", "good", "driven")}
+    return replace(event, recording=replace(whole, **cut))
+
+
+def _tried(
+    device: PlayedDevice, near: RecordedEvent, smoothing: Smoothing
+) -> Iterator[tuple[float, float, Numbers]]:
+    """The rms error left [pu], the likeliest length of the smoothing [s] and the lost angle; none if it cannot run."""
+    recording = near.recording
+    lost = smoothing.lost(recording)
+    try:
+        base = device.play(recording, near.start).power
+        moves = device.play(_turned(recording, lost), near.start).power - base
+        off = recording.power - base
+        part = recording.good
+        size = float(np.sum(np.abs(moves[part]) ** 2))
+        scale = float(np.real(np.vdot(moves[part], off[part]))) / size if size > 0 else 0.0
+        power = device.play(_turned(recording, scale * lost), near.start).power
+    except CosimError:
+        return
+    yield math.hypot(*rms_error(power, near)), scale * smoothing.length, scale * lost
+
+
+def _turned(recording: Recording, angle: Numbers) -> Recording:
+    return replace(recording, voltage=np.asarray(recording.voltage * np.exp(1j * angle)))
+
+
+def _lag(recording: Recording) -> int:
+    return max(1, round(_ABRUPT / recording.interval))
+
+
+def _slope(recording: Recording) -> Numbers:
+    """The derivative of the recorded angle [rad/s], over a few milliseconds around each sample."""
+    angle = np.unwrap(np.angle(recording.voltage))
+    lag = _lag(recording)
+    low = np.clip(np.arange(len(angle)) - lag // 2, 0, len(angle) - 1)
+    high = np.clip(low + lag, 0, len(angle) - 1)
+    return np.asarray((angle[high] - angle[low]) / (lag * recording.interval))
+
+
+def _fastest(angle: Numbers, recording: Recording) -> float:
+    lag = _lag(recording)
+    return float(np.abs(angle[lag:] - angle[:-lag]).max(initial=0.0))
