@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import partial
 from typing import Any
 
 import numpy as np
+from scipy.stats import qmc
 from scipy.stats import t as student
 
 from orchestrator.core.arrays import Matrix, Numbers
@@ -22,6 +24,7 @@ from orchestrator.studies.validation.residuals import (
     covariance,
     gain_errors,
     independent_samples,
+    means_over,
     stretches_of,
 )
 
@@ -36,6 +39,12 @@ _SWITCH_TELLS = 10.0  # by so much of independent scatter the wrong position of 
 _TOLERANCE = 1e-5  # relative: less of the sum of squares is far within an interval
 _REACHED = 3.0  # rms error in scatters: a larger one is the model's, or a fit that ended elsewhere
 _MOST_RUNS = 60  # of the residuals in one fit, beside those of the sensitivities
+_COARSE = (
+    0.1  # mean over so long [s] in which a fast ringing's phase, which has many minima, is not seen
+)
+_COARSE_TOLERANCE = 1e-3  # relative
+_STARTS = 4  # from which a fit begins, one after the other, until the recordings are reached
+_FARTHEST = 0.5  # part of a parameter's reach by which a start is off the value in the model
 
 
 class Untold(StrEnum):
@@ -106,6 +115,7 @@ class _Best:
     """The best values so far, for whoever interrupts the fit."""
 
     cost: float = float("inf")
+    rms: float = float("inf")  # of the errors, in scatters
     values: dict[str, float | bool] = field(default_factory=dict)
 
 
@@ -171,7 +181,10 @@ def _trial(
     finished = True
     slopes = None
     try:
-        _least_squares(residuals, told, switches, best)
+        for begin in _starts(told):
+            _least_squares(residuals, begin, switches, best)
+            if best.rms <= _REACHED:
+                break
         at = [replace(one, start=float(best.values[one.name])) for one in told]
         own = residuals.slopes(best.values, {one.name: one.step for one in at})
         slopes = np.column_stack([own, residuals.hidden_slopes(best.values)])
@@ -183,9 +196,21 @@ def _trial(
     return _Trial(switches, told, untold, best.values, errors, slopes=slopes, finished=finished)
 
 
+def _starts(told: Sequence[Adjustable]) -> Iterator[list[Adjustable]]:
+    """The parameters as the model has them, and then at other points, spread evenly and always the same."""
+    yield list(told)
+    points = qmc.Halton(len(told), seed=1).random(_STARTS - 1)
+    for point in points:
+        yield [
+            replace(one, start=one.start + (2 * part - 1) * _FARTHEST * one.reach)
+            for one, part in zip(told, map(float, point), strict=True)
+        ]
+
+
 def _least_squares(
     residuals: Residuals, told: Sequence[Adjustable], switches: Mapping[str, bool], best: _Best
 ) -> None:
+    """From one start: by means over some time first, whose minimum is wide, then by the samples."""
     hidden = residuals.hidden
     names = [*(one.name for one in told), *(one.name for one in hidden)]
     reach = np.array([*(one.reach for one in told), *(one.scale for one in hidden)])
@@ -199,7 +224,7 @@ def _least_squares(
         found = residuals.at(given)
         cost = float(found @ found)
         if cost < best.cost:
-            best.cost, best.values = cost, given
+            best.cost, best.rms, best.values = cost, _rms(found), given
             said = ", ".join(f"{one.name} = {given[one.name]:.4g}" for one in told)
             residuals.report(f"fit: rms {_rms(found):.4g} scatters with {said}")
         return found
@@ -213,17 +238,19 @@ def _least_squares(
     free = len(hidden)
     low = np.array([*(one.low for one in told), *[-np.inf] * free]) / reach
     high = np.array([*(one.high for one in told), *[np.inf] * free]) / reach
-    begin = np.array([*(one.inside() for one in told), *[0.0] * free]) / reach
-    optimize.least_squares(
-        errors,
-        begin,
-        jac=slopes,
-        bounds=(low, high),
-        xtol=_TOLERANCE,
-        ftol=_TOLERANCE,
-        gtol=None,
-        max_nfev=_MOST_RUNS,
-    )
+    at = np.array([*(one.inside() for one in told), *[0.0] * free]) / reach
+    for length, tolerance in ((_COARSE, _COARSE_TOLERANCE), (0.0, _TOLERANCE)):
+        mean = partial(means_over, residuals.stretches, length)
+        at = optimize.least_squares(
+            lambda x, mean=mean: mean(errors(x)),
+            at,
+            jac=lambda x, mean=mean: mean(slopes(x)),
+            bounds=(low, high),
+            xtol=tolerance,
+            ftol=tolerance,
+            gtol=None,
+            max_nfev=_MOST_RUNS,
+        ).x
 
 
 def identifiable(

@@ -127,6 +127,23 @@ def stretches_of(device: PlayedDevice, events: Sequence[RecordedEvent]) -> list[
     return found
 
 
+def means_over(stretches: Sequence[ErrorRows], length: float, errors: Matrix) -> Matrix:
+    """Means of errors, or of their slopes, over a time [s], half of it apart; the rows of hidden voltages as they are.
+
+    Each counts as the independent samples in it would, so that the hidden voltages keep their weight."""
+    found = []
+    begin = 0
+    for one in stretches:
+        interval = float(np.median(np.diff(one.rows))) * one.event.recording.interval
+        width, apart = max(1, round(length / interval)), max(1, round(0.5 * length / interval))
+        for _ in range(2):
+            part = errors[begin : begin + len(one.rows)]
+            total = np.cumsum(np.concatenate([np.zeros_like(part[:1]), part]), axis=0)
+            found.append((total[width:] - total[:-width])[::apart] / width * np.sqrt(apart))
+            begin += len(one.rows)
+    return np.concatenate([*found, errors[begin:]])
+
+
 def gain_errors(stretches: Sequence[ErrorRows], count: int) -> Matrix:
     """The errors that a wrong gain of the instruments makes, a column each for P and for Q, in scatters."""
     found = []
