@@ -14,14 +14,16 @@ TRUTH = {"pod_p.K": 120.0, "droop.R_V": 0.067, "transformer.X_t": 0.15}
 _FARTHEST = 0.3  # part by which a start may be off
 
 
+def starts_of(seed):
+    """Values from which a fit begins, each off by its own part."""
+    off = np.random.default_rng(seed).uniform(-_FARTHEST, _FARTHEST, len(TRUTH))
+    return {name: value * (1 + way) for (name, value), way in zip(TRUTH.items(), off, strict=True)}
+
+
 def draw(clean, seed):
     """One fit from a start that is off; for each parameter whether the truth lies inside, None if it is not told."""
-    off = np.random.default_rng(seed).uniform(-_FARTHEST, _FARTHEST, len(TRUTH))
-    starts = {
-        name: value * (1 + way) for (name, value), way in zip(TRUTH.items(), off, strict=True)
-    }
     recording = with_noise(clean, seed).set_index("time")
-    values = {"pod_p.enabled": True, **starts}
+    values = {"pod_p.enabled": True, **starts_of(seed)}
     found = gfor.validate("gfor", recording, values=values, fit=list(TRUTH)).fitted()
     inside = {}
     for row in found.itertuples():

@@ -5,6 +5,8 @@ import json
 import pytest
 
 import orchestrator as gfor_in_python
+from orchestrator.core.errors import INTERRUPTED
+from tests.benchmarks.validation_draws import TRUTH, starts_of
 from tests.studies.validation.recordings import run, table, with_noise, written
 
 ON = {"pod_p.enabled": True}
@@ -52,3 +54,60 @@ def test_names_and_bounds_that_do_not_fit_are_refused(gfor, recording):
     code, _, err = gfor("validate", "gfor", str(recording), *options)
     assert code == 2
     assert "0 to 100000" in err.replace("1e+05", "100000")
+
+
+def test_three_parameters_are_found_from_a_start_at_which_the_ringing_is_out_of_phase():
+    frame = with_noise(table(run("pod_p", gfor__pod_p__K=120.0)), 0).set_index("time")
+    values = ON | starts_of(0)
+    found = gfor_in_python.validate("gfor", frame, values=values, fit=list(TRUTH))
+    assert found.result.fit.reached
+    for row in found.fitted().itertuples():
+        assert row.low < TRUTH[row.parameter] < row.high
+        assert row.high - row.low < 0.05 * TRUTH[row.parameter]
+
+
+def test_an_event_that_is_kept_back_confirms_the_fit(gfor, recording, tmp_path):
+    other = with_noise(table(run("pod_p", scale=0.95, gfor__pod_p__K=120.0)), 2)
+    kept = written(other, tmp_path, "other.csv")
+    options = ("--set", "pod_p.enabled=true", "--set", "pod_p.K=60", "--fit", "pod_p.K")
+    code, out, _ = gfor(
+        "validate", "gfor", str(recording), *options, "--hold-back", str(kept), "--json"
+    )
+    assert code == 0
+    fitted, held = json.loads(out)["fit_events"]
+    assert (fitted["fitted"], held["fitted"]) == (True, False)
+    assert held["recording"] == str(kept)
+    assert held["rms_after_pu"] < 0.2 * held["rms_before_pu"]
+
+
+def test_an_interrupted_fit_keeps_the_best_values_so_far(recording):
+    said = []
+
+    def report(text):
+        said.append(text)
+        if sum(one.startswith("fit:") for one in said) == 2:
+            raise KeyboardInterrupt
+
+    values = ON | {"pod_p.K": 60.0}
+    found = gfor_in_python.validate("gfor", recording, values=values, fit="pod_p.K", report=report)
+    content = found.as_json()
+    assert content["fit_finished"] is False
+    (one,) = content["fit"]
+    assert one["value"] != 60
+    assert (one["low"], one["high"]) == (None, None)
+    (check,) = content["fit_events"]
+    assert check["rms_after_pu"] < check["rms_before_pu"]
+
+
+def test_the_command_ends_an_interrupted_fit_with_its_figures(gfor, recording, monkeypatch):
+    from orchestrator.studies.validation import fit  # noqa: PLC0415 - its solver is replaced
+
+    def stopped(residuals, told, switches, best):
+        best.values = {"pod_p.K": 100.0}
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(fit, "_least_squares", stopped)
+    options = ("--set", "pod_p.enabled=true", "--fit", "pod_p.K", "--json")
+    code, out, _ = gfor("validate", "gfor", str(recording), *options)
+    assert code == INTERRUPTED
+    assert json.loads(out)["fit"][0]["value"] == 100

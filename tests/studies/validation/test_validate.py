@@ -2,6 +2,7 @@
 
 import json
 
+import pandas as pd
 import pytest
 
 import orchestrator as gfor_in_python
@@ -19,6 +20,16 @@ def recording(tmp_path_factory):
 @pytest.fixture(scope="module")
 def fmu(tmp_path_factory):
     return gfor_in_python.build("gfor", tmp_path_factory.mktemp("fmu"))
+
+
+@pytest.fixture(scope="module")
+def phasor(tmp_path_factory):
+    """Both kinds of file: one with Python in it, and a compiled one."""
+    folder = tmp_path_factory.mktemp("phasor")
+    return {
+        native: gfor_in_python.build("gfor_phasor", folder / str(native), native=native)
+        for native in (False, True)
+    }
 
 
 def kinds(found):
@@ -43,6 +54,57 @@ def test_the_form_that_must_work(gfor, fmu, recording):
     assert event["questions"] == []
     assert event["start"]["p_pu"] == pytest.approx(0.9, abs=1e-3)
     assert event["windows"][1]["begin_s"] == pytest.approx(1.0, abs=0.003)
+
+
+@pytest.mark.parametrize("native", [False, True])
+def test_the_form_works_with_a_phasor_fmu_compiled_or_not(gfor, phasor, recording, native):
+    options = ("--set", "pod_p.enabled=true", "--json")
+    code, out, _ = gfor("validate", str(phasor[native]), str(recording), *options)
+    assert code == 0
+    content = json.loads(out)
+    assert content["verdict"] is None
+    after = content["events"][0]["windows"][2]
+    assert after["p"]["max_error_pu"] < 0.003
+    assert after["q"]["max_error_pu"] < 0.003
+
+
+def test_a_machine_is_driven_by_its_own_voltage(gfor, tmp_path):
+    bus = {"time": 0.5, "component": "grid", "type": "load_change", "load": "load_7", "scale": 1.1}
+    case = gfor_in_python.load("k2a").with_(
+        events=[bus], solver={"record": ["*"], "record_interval": "5 ms"}
+    )
+    ran = case.scenario("no_pss").run(stop=3.0).dataset
+    frame = with_noise(table(ran, unit="sg1", bus="grid.bus_1"))
+    path = written(frame, tmp_path)
+    options = ("--component", "sg1", "--scenario", "no_pss", "--step", "1 ms", "--json")
+    code, out, _ = gfor("validate", "k2a", str(path), *options)
+    assert code == 0
+    (event,) = json.loads(out)["events"]
+    assert event["questions"] == []
+    after = event["windows"][2]
+    assert max(after[signal]["max_error_pu"] for signal in "pq") < 0.005
+
+
+def test_an_excel_file_and_comtrade_give_the_same_figures(recording, tmp_path):
+    frame = pd.read_csv(recording)
+    frame.to_excel(tmp_path / "rec.xlsx", index=False)
+    tables = [
+        gfor_in_python.validate("gfor", path, values=ON).table().drop(columns="recording")
+        for path in (recording, tmp_path / "rec.xlsx")
+    ]
+    pd.testing.assert_frame_equal(*tables)
+
+
+def test_the_folder_holds_figures_curves_and_the_page(gfor, recording, tmp_path):
+    out = tmp_path / "out"
+    options = ("--set", "pod_p.enabled=true", "--limits", str(EXAMPLE), "--out", str(out))
+    code, _, _ = gfor("validate", "gfor", str(recording), *options)
+    assert code == 0
+    assert json.loads((out / "validation.json").read_text())["verdict"] == "met"
+    assert len(pd.read_csv(out / "curves_1.csv")) == 6001
+    page = (out / "validation.html").read_text(encoding="utf-8")
+    assert "of no standard" in page
+    assert "nothing here says that it is met" in page
 
 
 def test_the_device_itself_agrees_and_another_setting_does_not(recording):
