@@ -95,16 +95,18 @@ def doubts(
 ) -> list[Doubt]:
     """Components whose perturbation leaves the modes in doubt; empty for a smooth system."""
     found = []
+    comparison: _Comparison | None = None
     for kind, why in enumerate(_WHY):
         perturbed = [name for name, c in blocks.components.items() if len(c.variants) > kind]
         if not perturbed or not modes:
             continue
-        together = _shifts(blocks, schedule, model, modes, perturbed, kind)
+        comparison = comparison or _Comparison(model, modes)
+        together = comparison.shifts(blocks, schedule, perturbed, kind)
         if together.max() <= LARGEST_SHIFT:
             continue
         turns = kind != _SMALL_ONLY and _may_turn(modes, together)
         turns = turns or (kind == _EDGE and bool(together.max() > _EDGE_SHIFT))
-        each = {name: _shifts(blocks, schedule, model, modes, [name], kind) for name in perturbed}
+        each = {name: comparison.shifts(blocks, schedule, [name], kind) for name in perturbed}
         most = max(each, key=lambda name: float(each[name].max()))
         # A single component may shift a mode less than all components together.
         guilty = [name for name, shifts in each.items() if shifts.max() > LARGEST_SHIFT] or [most]
@@ -121,32 +123,38 @@ def doubts(
     return found
 
 
-def _shifts(
-    blocks: Blocks,
-    schedule: Schedule,
-    model: LinearModel,
-    modes: Sequence[Mode],
-    names: Sequence[str],
-    kind: int,
-) -> Vector:
-    """Relative shift of every mode if some components are replaced by one of their variants."""
-    other = copy.copy(blocks)
-    other.components = dict(blocks.components)
-    for name in names:
-        component = blocks.components[name]
-        other.components[name] = replace(component, **component.variants[kind]._asdict())
-    varied = compose(other, schedule)
-    if varied.names != model.names:  # even the pattern of direct feed-through differs
-        return np.full(len(modes), np.inf)
-    left = np.array([[mode.left[name] for mode in modes] for name in model.names])
-    right = np.array([[mode.shape[name] for mode in modes] for name in model.names])
-    values = np.array([mode.eigenvalue for mode in modes])
-    moved = eigenvalue_shifts(model, varied, values, left, right)
-    shifts: Vector = np.abs(moved) / np.maximum(np.abs(values), _SLOWEST)
-    slow = np.array([abs(mode.eigenvalue) <= SLOW for mode in modes])
-    if len(model.names) <= _DENSE and (shifts[slow] > LARGEST_SHIFT).any():
-        shifts[slow] = np.minimum(shifts[slow], shift_of_slowest(model, varied, SLOW) / _SLOWEST)
-    return shifts
+class _Comparison:
+    """A model and its modes as arrays, with which each of its variants is compared.
+
+    A large system has thousands of states and a dozen variants: what does not change is computed once."""
+
+    def __init__(self, model: LinearModel, modes: Sequence[Mode]) -> None:
+        self._model = model
+        self._left = np.array([[mode.left[name] for mode in modes] for name in model.names])
+        self._right = np.array([[mode.shape[name] for mode in modes] for name in model.names])
+        self._values = np.array([mode.eigenvalue for mode in modes])
+        self._slow = np.abs(self._values) <= SLOW
+        self._image = _image(model, self._right)
+
+    def shifts(self, blocks: Blocks, schedule: Schedule, names: Sequence[str], kind: int) -> Vector:
+        """Relative shift of every mode if some components are replaced by one of their variants."""
+        other = copy.copy(blocks)
+        other.components = dict(blocks.components)
+        for name in names:
+            component = blocks.components[name]
+            other.components[name] = replace(component, **component.variants[kind]._asdict())
+        model, varied = self._model, compose(other, schedule)
+        if varied.names != model.names:  # even the pattern of direct feed-through differs
+            return np.full(len(self._values), np.inf)
+        difference = _image(varied, self._right) - self._image
+        moved = _movement(self._values, self._left, difference, model.step_size)
+        shifts: Vector = np.abs(moved) / np.maximum(np.abs(self._values), _SLOWEST)
+        slow = self._slow
+        if len(model.names) <= _DENSE and (shifts[slow] > LARGEST_SHIFT).any():
+            shifts[slow] = np.minimum(
+                shifts[slow], shift_of_slowest(model, varied, SLOW) / _SLOWEST
+            )
+        return shifts
 
 
 def _may_turn(modes: Sequence[Mode], shifts: Vector) -> bool:
@@ -160,12 +168,23 @@ def eigenvalue_shifts(
 ) -> Vector:
     """Δλ = lᴴ·(A' − A)·r [rad/s] of each mode, a column of ``left`` and ``right``; of a step map divided by μ·H, as
     λ = ln μ / H."""
+    difference = _image(varied, right) - _image(model, right)
+    return _movement(eigenvalues, left, difference, model.step_size)
+
+
+def _image(model: LinearModel, right: Vector) -> Vector:
+    """A·r for columns r, the real parts and then the imaginary ones, as the factors inside are real."""
+    return model.apply(np.hstack([right.real, right.imag]))
+
+
+def _movement(
+    eigenvalues: Vector, left: Vector, difference: Vector, step_size: float | None
+) -> Vector:
+    """lᴴ·d of each mode [rad/s], where d are real parts and then imaginary ones."""
     n = len(eigenvalues)
-    both = np.hstack([right.real, right.imag])  # the factors inside are real
-    difference = varied.apply(both) - model.apply(both)
     moved = (left.conj() * (difference[:, :n] + 1j * difference[:, n:])).sum(axis=0)
-    if model.step_size is not None:
-        moved = moved / (np.exp(eigenvalues * model.step_size) * model.step_size)
+    if step_size is not None:
+        moved = moved / (np.exp(eigenvalues * step_size) * step_size)
     return np.asarray(moved)
 
 
