@@ -220,6 +220,8 @@ class ConnectionTable(Table):
     source: str = Field(alias="from")
     target: str = Field(alias="to")
     ignore_units: bool = False  # whether the value is taken as it is, in whatever unit
+    # factor and offset that convert the value on its way, as the reader of an SSP finds them
+    converted: tuple[float, float] | None = None
 
 
 class WireTable(Table):

@@ -1,5 +1,6 @@
 """Connections of a case: those written in the file, and those of every component that names its bus."""
 
+from dataclasses import dataclass
 from difflib import get_close_matches
 
 from fmus.toolchain.catalogue import model_names
@@ -9,12 +10,24 @@ from orchestrator.core.errors import InputError, Problem, few
 _PHASOR_PORT = ("e_re", "e_im", "y_re", "y_im")  # what a device gives to a network of phasors
 
 
+@dataclass(frozen=True)
+class _Way:
+    """Handling of a value by its connection; fields as in `System.connect`."""
+
+    ignore_units: bool = False
+    converted: tuple[float, float] | None = None
+
+
+_PLAIN = _Way()
+
+
 def connect(draft: Draft) -> None:
     for index, wire in enumerate(draft.given.case.connections):
         ends = {wire.source.partition(".")[0], wire.target.partition(".")[0]}
         if not ends & set(draft.given.scenario.remove):
             place = draft.given.place("connections", index)
-            _try_connect(draft, wire.source, wire.target, place, ignore_units=wire.ignore_units)
+            way = _Way(wire.ignore_units, wire.converted)
+            _try_connect(draft, wire.source, wire.target, place, way)
     at_buses = [
         n
         for n, table in draft.tables.items()
@@ -140,14 +153,12 @@ def _connect_to_bus(draft: Draft, name: str, bus: str, taken: list[str]) -> None
             _try_connect(draft, f"{name}.{variable}", f"{draft.grid}.{name}.{variable}", where)
 
 
-def _try_connect(
-    draft: Draft, source: str, target: str, where: str, *, ignore_units: bool = False
-) -> None:
+def _try_connect(draft: Draft, source: str, target: str, where: str, way: _Way = _PLAIN) -> None:
     ends = source.partition(".")[0], target.partition(".")[0]
     if any(end in draft.known and end not in draft.system.components for end in ends):
         return  # the problem of this end is noted already
     try:
-        draft.system.connect(source, target, ignore_units=ignore_units)
+        draft.system.connect(source, target, ignore_units=way.ignore_units, converted=way.converted)
     except InputError as error:
         draft.note(where, str(error))
         draft.found.refused_inputs.add(_meant_input(draft, target))

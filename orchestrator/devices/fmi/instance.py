@@ -6,6 +6,7 @@ from pathlib import Path
 from fmus.toolchain.cache import cache_directory, intact
 from orchestrator.devices.fmi.bound import BoundComponent, compiled_adapter
 from orchestrator.devices.fmi.component import Component
+from orchestrator.devices.fmi.converted import ConvertedComponent, ConvertedDescription, native
 from orchestrator.devices.fmi.description import FmuDescription, runs_under_wine
 from orchestrator.devices.fmi.fmi3 import adapter_path
 from orchestrator.devices.fmi.isolation import IsolatedComponent
@@ -31,6 +32,7 @@ def is_ours(path: Path) -> bool:
 
 def compile_adapters(description: FmuDescription) -> None:
     """Compile what an FMU runs behind, or find it compiled: a process with limits does not see the cache."""
+    description = native(description)
     if isinstance(description, BoundDescription):
         compiled_adapter()
         description = description.inner
@@ -44,8 +46,7 @@ def is_isolated(description: FmuDescription, isolated: bool | None) -> bool:
     """Return whether an FMU runs in a process of its own: as asked, else where it is not one of ours."""
     if isolated is not None:
         return isolated
-    native = description.inner if isinstance(description, BoundDescription) else description
-    return not is_ours(native.path)
+    return not is_ours(description.path)
 
 
 def open_component(
@@ -55,11 +56,16 @@ def open_component(
     *,
     isolated: bool | None = None,
 ) -> Component:
-    """Instantiate an FMU; behind a `BoundDescription` it speaks our port.
+    """Instantiate an FMU; behind a `BoundDescription` it speaks our port, and behind a `ConvertedDescription` it takes
+    and gives what its connections carry.
 
     ``directory``: where its archive is extracted; by default a new temporary folder of its own.
     ``isolated``: whether it runs in a process of its own; by default all but our own FMUs do."""
     compile_adapters(description)
+    if isinstance(description, ConvertedDescription):
+        return ConvertedComponent(
+            open_component(name, description.inner, directory, isolated=isolated), description
+        )
     if isinstance(description, BoundDescription):
         return BoundComponent(
             open_component(name, description.inner, directory, isolated=isolated), description
@@ -71,6 +77,6 @@ def open_component(
 
 def protections_of(component: Component) -> tuple[Protection, ...]:
     """Return what keeps a component's FMU from the rest of the machine; nothing where it runs in this process."""
-    if isinstance(component, BoundComponent):
+    if isinstance(component, BoundComponent | ConvertedComponent):
         return protections_of(component.inner)
     return component.protections if isinstance(component, IsolatedComponent) else ()

@@ -6,6 +6,7 @@ for one set of parameters, so both are compared with the running FMU before it i
 from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import AnalysisError, ErrorKind
 from orchestrator.devices.fmi.component import Component, RealBatch
+from orchestrator.devices.fmi.converted import ConvertedDescription
 from orchestrator.devices.fmi.linear_model import EmbeddedModel, read_embedded_model
 from orchestrator.devices.fmi.port import BoundDescription
 
@@ -17,7 +18,7 @@ def embedded_model(component: Component) -> EmbeddedModel | None:
     """The model inside a component's FMU; None if the component can be perturbed, or its FMU has no model inside."""
     description = component.description
     if description.states_are_settable or isinstance(
-        description, BoundDescription
+        description, BoundDescription | ConvertedDescription
     ):  # it has the FMU's own names
         return None
     return read_embedded_model(description.path)

@@ -13,6 +13,7 @@ from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import check_regular
+from orchestrator.devices.fmi.converted import ConvertedDescription, native
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.port import BoundDescription
 from orchestrator.studies.points.code import code_hash, numbers_hash
@@ -41,9 +42,11 @@ def scenario_content(prepared: PreparedScenario) -> dict[str, Any]:
 
 def component_content(description: FmuDescription) -> list[str]:
     """What a key contains for an FMU: a hash of its file, because a vendor may keep the guid of an older file, and the
-    effect of its binding."""
-    port = repr(description.port) if isinstance(description, BoundDescription) else ""
-    return [sha256_of(description.path), port]
+    effect of its binding and of its connections' conversions."""
+    own = native(description)
+    port = repr(own.port) if isinstance(own, BoundDescription) else ""
+    ways = repr(description.conversions) if isinstance(description, ConvertedDescription) else ""
+    return [sha256_of(description.path), port + ways]
 
 
 def fingerprint(case: CaseDefinition) -> str:

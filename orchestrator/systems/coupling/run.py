@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from orchestrator.core.errors import ComponentError, InputError, NotFiniteError, NotTakenUpError
 from orchestrator.devices.fmi.bound import BoundComponent
 from orchestrator.devices.fmi.component import Component
+from orchestrator.devices.fmi.converted import ConvertedComponent
 from orchestrator.devices.fmi.interrupts import calls
 from orchestrator.devices.fmi.isolation import IsolatedComponent
 from orchestrator.systems.coupling.events import Event, NotANumber, Silence, WireFault, WireRecovery
@@ -32,7 +33,7 @@ from orchestrator.systems.coupling.stepping import Stepper
 
 def silence(component: Component) -> None:
     """Stop the processes of an isolated component, so that the limit on its answers ends it as it ends a hang."""
-    while isinstance(component, BoundComponent):
+    while isinstance(component, BoundComponent | ConvertedComponent):
         component = component.inner
     if not isinstance(component, IsolatedComponent):
         raise InputError(

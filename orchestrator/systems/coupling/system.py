@@ -7,12 +7,24 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from orchestrator.core.errors import InputError
+from orchestrator.devices.fmi.converted import Conversion, ConvertedDescription, native
 from orchestrator.devices.fmi.values import Scalar
 from orchestrator.systems.coupling.imperfections import Imperfection, WirePlan
 
 if TYPE_CHECKING:
     from orchestrator.devices.fmi.description import FmuDescription, VariableInfo
 
+
+_CARRIED = {
+    ("Real", "Real"),
+    ("Integer", "Integer"),
+    ("Boolean", "Boolean"),
+    ("Enumeration", "Enumeration"),
+    ("Integer", "Real"),  # every whole number is a real one
+}
+"""Types of an output and of the input that it may feed. SSP leaves connections between types to the importer; those
+that could lose a part of the value are none here.
+"""
 
 # types of inputs that nobody can feed or give a value here
 _KEPT = ("String", "Binary")
@@ -104,10 +116,18 @@ class System:
             description, dict(parameters or {}), dict(inputs or {}), isolated
         )
 
-    def connect(self, source: str, target: str, *, ignore_units: bool = False) -> None:
+    def connect(
+        self,
+        source: str,
+        target: str,
+        *,
+        ignore_units: bool = False,
+        converted: tuple[float, float] | None = None,
+    ) -> None:
         """Connect an output to an input, both written ``component.variable``.
 
-        ``ignore_units``: take the value as it is, in whatever unit."""
+        ``ignore_units``: take the value as it is, in whatever unit.
+        ``converted``: factor and offset by which the value is converted on its way."""
         label = f"connection {source} → {target}"
         start, out = self._resolve(source, label)
         end, into = self._resolve(target, label)
@@ -119,11 +139,15 @@ class System:
             raise InputError(
                 f"{label}: {target} is of causality {into.causality}; a connection ends at an input"
             )
-        if out.type != "Real" or into.type != "Real":
+        kinds = self._declared_type(start), self._declared_type(end)
+        if kinds not in _CARRIED:
             raise InputError(
-                f"{label}: {source} is {out.type} and {target} is {into.type}; only Real variables are coupled"
+                f"{label}: {source} is {kinds[0]} and {target} is {kinds[1]}; a connection carries Real, Integer, "
+                "Boolean and Enumeration to the same type, and Integer to Real: correct the wrong end, or let a "
+                "component convert"
             )
-        if out.unit and into.unit and out.unit != into.unit and not ignore_units:
+        as_it_is = ignore_units or converted is not None
+        if out.unit and into.unit and out.unit != into.unit and not as_it_is:
             raise InputError(
                 f"{label}: {source} is in {out.unit} and {target} in {into.unit}; units must be equal, since "
                 "none is converted on the way: correct the wrong one, or let a component convert"
@@ -133,8 +157,22 @@ class System:
             raise InputError(
                 f"{label}: {target} is already fed by {feeding}; an input takes one connection"
             )
+        if kinds[0] != "Real":
+            self._carry(start, Conversion())
+        factor, offset = converted or (1.0, 0.0)
+        if kinds[1] != "Real" or (factor, offset) != (1.0, 0.0):
+            self._carry(end, Conversion(factor, offset, out.unit))
         self.connections.append(Connection(start, end))
         self._feeding[end] = start
+
+    def _declared_type(self, end: Endpoint) -> str:
+        """The type that the FMU itself declares for a variable."""
+        return native(self.components[end.component].description).variables[end.variable].type
+
+    def _carry(self, end: Endpoint, conversion: Conversion) -> None:
+        """Have a component take or give a variable as the number that its connection carries."""
+        plan = self.components[end.component]
+        plan.description = ConvertedDescription.of(plan.description, end.variable, conversion)
 
     def _sources(self) -> dict[Endpoint, Endpoint]:
         """The source of each connected input; collected anew where the list of connections was changed from outside."""

@@ -1,6 +1,6 @@
 """An SSP archive as the tables of a case file."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,9 +12,9 @@ from orchestrator.devices.fmi.values import Scalar
 from orchestrator.systems.ssp.archive import SspArchive
 from orchestrator.systems.ssp.names import STUDY_TYPE, SYSTEM_FILE, children, plain_name, tag
 from orchestrator.systems.ssp.parameter_sets import SspValue
-from orchestrator.systems.ssp.structure import Owner, Structure, read_structure
+from orchestrator.systems.ssp.structure import Node, Owner, Structure, read_structure
 from orchestrator.systems.ssp.study import SspStudy, foreign_step, read_study
-from orchestrator.systems.ssp.units import between, contradiction, defined
+from orchestrator.systems.ssp.units import between, contradiction, conversion, defined
 
 
 @dataclass(frozen=True)
@@ -55,15 +55,16 @@ def read_ssp(path: Path, cache: Path) -> SspCase:
     folder = cache / archive.digest[:32]
     fmus = {owner: archive.unpack(member, folder) for owner, member in structure.sources.items()}
     descriptions = {owner: _description(fmu) for owner, fmu in fmus.items()}
-    tables["connections"] = [
-        {
-            "from": f"{names[source[0]]}.{source[1]}",
-            "to": f"{names[sink[0]]}.{sink[1]}",
-            "ignore_units": sink in structure.unconverted,
-        }
-        for source, sink in structure.connections
-    ]
-    problems += _odd_connectors(structure, descriptions)
+    tables["connections"] = []
+    for source, sink in structure.connections:
+        try:
+            converted = _conversion(structure, (source, sink), descriptions)
+        except InputError as error:
+            place = f"connection {_text(source)} - {_text(sink)}"
+            problems.append(Problem(place, str(error)))
+            continue
+        ends = {"from": f"{names[source[0]]}.{source[1]}", "to": f"{names[sink[0]]}.{sink[1]}"}
+        tables["connections"].append({**ends, "converted": converted})
     given, questions = {}, list[Problem]()
     for owner in structure.sources:
         given[owner] = _values(structure, owner, descriptions[owner], problems, questions)
@@ -121,20 +122,52 @@ def _description(fmu: Path) -> FmuDescription | None:
         return None
 
 
-def _odd_connectors(
-    structure: Structure, fmus: Mapping[Owner, FmuDescription | None]
-) -> Iterator[Problem]:
-    """Connected connectors in another unit than their FMU's variable, whose values would have to be converted."""
-    for source, sink in structure.connections:
-        for node in () if sink in structure.unconverted else (source, sink):
-            fmu, stated = fmus[node[0]], structure.units.get(node, "")
-            info = None if fmu is None else fmu.variables.get(node[1])
-            if info is not None and stated and info.unit and stated != info.unit:
-                yield Problem(
-                    f"connector {'.'.join((*node[0], node[1]))}",
-                    f"it is in {stated}, and its FMU has the variable in {info.unit}; gfor converts no units on a "
-                    "connection: state the FMU's, or suppressUnitConversion if the value is meant as it is",
-                )
+def _conversion(
+    structure: Structure, ends: tuple[Node, Node], fmus: Mapping[Owner, FmuDescription | None]
+) -> tuple[float, float]:
+    """Factor and offset of a value on its way from an FMU's output to another's input.
+
+    Each connector that states a unit has the value in that unit. Without a statement at either side of a stretch, and
+    over a connection that suppresses the conversion, the value stays as it is."""
+    factor, offset, unit = 1.0, 0.0, _unit_inside(structure, ends[0], fmus)
+    for step in structure.ways[ends]:
+        name = structure.units.get(step.connector, "")
+        stated = name, structure.definitions.get(name)
+        if step.as_it_is:
+            # whatever arrives counts in the next unit that somebody states
+            unit = stated
+        elif name:
+            (factor, offset), unit = _then((factor, offset), unit, stated), stated
+    return _then((factor, offset), unit, _unit_inside(structure, ends[1], fmus))
+
+
+_Unit = tuple[str, Mapping[str, str] | None]  # name and definition; no name where none is stated
+
+
+def _then(way: tuple[float, float], unit: _Unit, needed: _Unit) -> tuple[float, float]:
+    """A conversion, followed by that into the next unit where both are stated."""
+    if not unit[0] or not needed[0]:
+        return way
+    try:
+        factor, offset = conversion(unit, needed)
+    except InputError as error:
+        raise InputError(
+            f"{error}; correct the unit of one end, or state suppressUnitConversion if the value is meant as it is"
+        ) from error
+    return factor * way[0], factor * way[1] + offset
+
+
+def _unit_inside(
+    structure: Structure, node: Node, fmus: Mapping[Owner, FmuDescription | None]
+) -> _Unit:
+    """The unit that an FMU has a variable in."""
+    fmu = fmus[node[0]]
+    info = None if fmu is None else fmu.variables.get(node[1])
+    return ("", None) if fmu is None or info is None else (info.unit, fmu.units.get(info.unit))
+
+
+def _text(node: Node) -> str:
+    return ".".join((*node[0], node[1]))
 
 
 def _values(

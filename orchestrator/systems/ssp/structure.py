@@ -31,16 +31,26 @@ _REFUSED = {
 }
 
 
+@dataclass(frozen=True)
+class Step:
+    """A connector on the way of a value; ``as_it_is``: whether the value gets there without a conversion."""
+
+    connector: Node
+    as_it_is: bool = False
+
+
 @dataclass
 class Structure:
     """Components and their connections, without the systems that they were nested in."""
 
     sources: dict[Owner, str] = field(default_factory=dict)
     connections: list[tuple[Node, Node]] = field(default_factory=list)
-    # those whose value is taken as it is though the units differ, by their input
-    unconverted: set[Node] = field(default_factory=set)
+    # the way of each connection, from its output to its input
+    ways: dict[tuple[Node, Node], tuple[Step, ...]] = field(default_factory=dict)
     # the unit that a connector states
     units: dict[Node, str] = field(default_factory=dict)
+    # attributes of ``BaseUnit`` of each unit that the description defines
+    definitions: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     values: dict[Owner, dict[str, SspValue]] = field(default_factory=dict)
 
 
@@ -64,7 +74,7 @@ class _Reader:
         units: Mapping[str, Mapping[str, str]],
     ) -> None:
         self._archive, self._note, self._units = archive, note, units
-        self._structure = Structure()
+        self._structure = Structure(definitions=units)
         self._elements: dict[Owner, list[str]] = {}
         self._kinds: dict[Node, str] = {}
         self._feeding: dict[Node, Node] = {}
@@ -186,8 +196,8 @@ class _Reader:
             ends.append(source)
             last, source = source, self._feeding.get(source)
         if source is not None:
-            if self._unconverted.issuperset(ends):
-                self._structure.unconverted.add(sink)
+            way = [Step(node, node in self._unconverted) for node in reversed(ends)]
+            self._structure.ways[source, sink] = (Step(source), *way)
             self._structure.connections.append((source, sink))
         elif last in self._given:
             self._structure.values[sink[0]].setdefault(sink[1], self._given[last])

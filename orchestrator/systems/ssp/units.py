@@ -6,7 +6,7 @@ from math import isclose
 from xml.etree.ElementTree import Element
 
 from orchestrator.core.errors import InputError
-from orchestrator.core.units import base_exponents, base_offset
+from orchestrator.core.units import base_exponents, base_offset, to_unit
 from orchestrator.systems.ssp.names import children
 
 _EQUAL = 1e-5  # relative, of two factors; people round those of degrees and of inches
@@ -95,6 +95,41 @@ def between(
             f"FMU has it, {what}; give the value in that unit"
         )
     return float(f"{(value * own.factor + own.offset - target.offset) / target.factor:.15g}")
+
+
+def conversion(
+    given: tuple[str, Mapping[str, str] | None], needed: tuple[str, Mapping[str, str] | None]
+) -> tuple[float, float]:
+    """Factor and offset from one unit to another, for a value on a connection.
+
+    ``given``, ``needed``: name of a unit, and the attributes of ``BaseUnit`` that define it where its file does.
+
+    Raises
+    ------
+    InputError
+        If the two are no units of one quantity, or one is not known."""
+    (name, base), (target_name, target_base) = given, needed
+    own, target = defined(name, base), defined(target_name, target_base)
+    if name == target_name and (own is None or target is None or own.equals(target, angles=False)):
+        return 1.0, 0.0
+    if _by_name(name, own) and _by_name(target_name, target) and not name[:1].isdigit():
+        try:
+            offset = to_unit(f"0 {name}", target_name)
+            return float(f"{to_unit(f'1 {name}', target_name) - offset:.15g}"), offset
+        except ValueError as error:
+            raise InputError(f"{name} and {target_name} are no units of one quantity") from error
+    own, target = own or usual(name), target or usual(target_name)
+    for unit, meaning in ((name, own), (target_name, target)):
+        if meaning is None:
+            raise InputError(f"the unit {unit!r} is not known, and no file defines it")
+    if own is None or target is None or own.exponents != target.exponents:
+        raise InputError(
+            f"{name} ({own}) and {target_name} ({target}) are no units of one quantity"
+        )
+    return (
+        float(f"{own.factor / target.factor:.15g}"),
+        float(f"{(own.offset - target.offset) / target.factor:.15g}"),
+    )
 
 
 def contradiction(name: str, base: Mapping[str, str] | None) -> str:

@@ -7,6 +7,7 @@ from urllib.parse import quote
 from xml.etree.ElementTree import Element, SubElement
 
 from orchestrator.core.errors import InputError
+from orchestrator.devices.fmi.converted import native
 from orchestrator.systems.coupling.imperfections import described
 from orchestrator.systems.coupling.system import ComponentPlan, Connection, System
 from orchestrator.systems.ssp.names import (
@@ -131,12 +132,15 @@ def _component(
     fed = [c.target.variable for c in system.connections if c.target.component == name]
     kinds = [(v, "input") for v in fed] + [(v, "output") for v in plan.description.outputs]
     kinds = [(v, kind) for v, kind in kinds if plan.description.variables[v].type == "Real"]
+    declared = native(plan.description).variables
     if kinds:
         connectors = SubElement(component, tag("ssd:Connectors"))
         for variable, kind in kinds:
-            unit = plan.description.variables[variable].unit
+            unit, form = plan.description.variables[variable].unit, declared[variable].type
             connector = SubElement(connectors, tag("ssd:Connector"), name=variable, kind=kind)
-            SubElement(connector, tag("ssc:Real"), {"unit": unit} if unit else {})
+            if form != "Enumeration":  # whose name SSP would ask for
+                stated = {"unit": unit} if unit and form == "Real" else {}
+                SubElement(connector, tag(f"ssc:{form}"), stated)
     if values is not None:
         bindings = SubElement(component, tag("ssd:ParameterBindings"))
         SubElement(
