@@ -4,6 +4,8 @@ from collections.abc import Mapping
 
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.core.errors import CosimError
+from orchestrator.linear.spectra.mode_tracking import ModeSet, match
+from orchestrator.linear.spectra.modes import Mode
 from orchestrator.simulation.watch.settings import left_changed
 from orchestrator.studies.modes.modes import ModesResult, compute_modes
 
@@ -12,6 +14,15 @@ def lasting_changes(prepared: PreparedScenario) -> Mapping[str, float | bool]:
     """Values by ``component.variable`` that the events leave changed; a fault at the end of the run is none."""
     left = left_changed(prepared.system, prepared.events)
     return {name: value for name, value in left.items() if ".fault." not in name}
+
+
+def same_mode(before: ModesResult, mode: Mode, after: ModesResult) -> Mode | None:
+    """The mode that a mode of before the events is after them, by its shape; None where none is clearly the same."""
+    if not all(known.left for result in (before, after) for known in result.modes):
+        return None  # without left eigenvectors no shape is compared
+    one, two = (ModeSet.of(r.modes, tuple(r.model.names)) for r in (before, after))
+    links = (link for link in match(one, two) if before.modes[link.source] is mode)
+    return next((after.modes[link.target] for link in links), None)
 
 
 def modes_after(

@@ -15,7 +15,7 @@ from orchestrator.output.report.tables import COLOURS, first_few, make_table, sh
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.simulation.watch.confirmation import PERIODS
 from orchestrator.studies.modes.modes import ModesResult
-from orchestrator.studies.runs.after_events import lasting_changes
+from orchestrator.studies.runs.after_events import lasting_changes, same_mode
 from orchestrator.studies.runs.run import RunResult
 from orchestrator.systems.coupling.events import Forcing
 
@@ -46,7 +46,11 @@ class ScenarioAnswer:
     verdict: str
     mode: Mode | None  # the least damped mode of the range
     remark: str
-    after: Mode | None = None  # the same where the events leave something switched
+    # the least damped mode where the events leave something switched, and who swings in it
+    after: Mode | None = None
+    after_swing: str = ""
+    # ``mode`` where the events leave something switched; None where no mode is clearly the same
+    became: Mode | None = None
 
     def as_json(self) -> dict[str, Any]:
         mode = self.mode
@@ -63,7 +67,17 @@ class ScenarioAnswer:
         if self.after is None:
             return found
         after = eigenvalue_json(self.after.eigenvalue, self.after.damping_percent)
-        return found | {"after_events": {**after, "components": _shares(self.after)}}
+        became = self.became
+        same = (
+            None if became is None else eigenvalue_json(became.eigenvalue, became.damping_percent)
+        )
+        whole = {**after, "components": _shares(self.after), "same_mode": same}
+        return found | {"after_events": whole}
+
+    @property
+    def another_after(self) -> Mode | None:
+        """The least damped mode after the events, where it is not, or not clearly, the one before them."""
+        return None if self.after is self.became else self.after
 
 
 def _shares(mode: Mode | None) -> dict[str, float]:
@@ -125,11 +139,22 @@ def of_run(result: RunResult) -> ScenarioAnswer:
         and (swing.damping_percent > -_NEAR or _settles(result, answer, swing))
     ):
         told = f"{answer.remark}; {swing.damping_percent:+.2f} % after the events, by a power flow, decides nothing"
-        return replace(answer, after=swing, remark=told if answer.good else answer.remark)
+        remark = told if answer.good else answer.remark
+        return _with_after(replace(answer, remark=remark), result.modes, after, swing)
     if left.good is False and answer.good is not False:
         remark = short(f"the system that the events leave: {left.remark}", _LONGEST)
         answer = replace(answer, good=False, verdict="UNSTABLE", remark=remark)
-    return replace(answer, after=left.mode)
+    return _with_after(answer, result.modes, after, left.mode)
+
+
+def _with_after(
+    answer: ScenarioAnswer, before: ModesResult, after: ModesResult, least: Mode | None
+) -> ScenarioAnswer:
+    """The answer with the least damped mode after the events, beside what became of the one before them."""
+    if least is None:
+        return answer
+    became = None if answer.mode is None else same_mode(before, answer.mode, after)
+    return replace(answer, after=least, after_swing=_swing(after, least), became=became)
 
 
 def _by_response(result: RunResult) -> ScenarioAnswer:
@@ -252,23 +277,27 @@ def answers_table(answers: Sequence[ScenarioAnswer], frequency_range: tuple[floa
     low, high = frequency_range
     table = make_table("", "Scenario", "Verdict", "f [Hz]", "Damping [%]", left=2)
     table.title = None
-    when = ", before → after the events" if any(answer.after for answer in answers) else ""
+    when = ", before → after the events" if any(answer.became for answer in answers) else ""
     table.add_column(
         f"Least damped mode from {low:g} to {high:g} Hz{when}: who swings; remark", overflow="fold"
     )
     for answer in answers:
-        mode = answer.mode
-        modes = [one for one in (mode, answer.after) if one]
-        figures = [
-            " → ".join(found) or "–"
-            for found in (
-                [f"{m.frequency_hz:.3f}" for m in modes],
-                [f"{m.damping_percent:.2f}" for m in modes],
-            )
-        ]
         word = Text(answer.verdict, style=f"bold {COLOURS[answer.good]}")
+        figures = _figures([mode for mode in (answer.mode, answer.became) if mode])
         table.add_row(answer.subject, word, *figures, answer.remark)
+        if another := answer.another_after:
+            which = "another mode" if answer.became else "not clearly the same mode"
+            who = f": {answer.after_swing}" if answer.after_swing else ""
+            remark = f"least damped after the events, {which}{who}"
+            table.add_row("", "", *_figures([another]), short(remark, _LONGEST))
     return table
+
+
+def _figures(modes: Sequence[Mode]) -> tuple[str, str]:
+    """Frequency and damping of one mode, before and after the events."""
+    hertz = " → ".join(f"{mode.frequency_hz:.3f}" for mode in modes)
+    percent = " → ".join(f"{mode.damping_percent:.2f}" for mode in modes)
+    return hertz or "–", percent or "–"
 
 
 def outside(results: Sequence[ModesResult]) -> str:

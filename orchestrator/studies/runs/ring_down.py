@@ -13,6 +13,7 @@ from orchestrator.linear.signals.identification import (
     nearest,
     sampling,
 )
+from orchestrator.linear.spectra.modes import Mode
 from orchestrator.output.results.signals import signal
 from orchestrator.simulation.watch.finding import Finding, Kind
 from orchestrator.studies.modes.modes import ModesResult
@@ -31,10 +32,16 @@ _SAME = 0.2
 
 
 def ring_down_of(
-    modes: ModesResult, dataset: xr.Dataset, findings: Sequence[Finding]
+    modes: ModesResult,
+    dataset: xr.Dataset,
+    findings: Sequence[Finding],
+    after: ModesResult | str | None = None,
 ) -> tuple[IdentifiedMode | None, str]:
-    """The case's first mode as the simulated response shows it; else None and why, where that is to be said."""
-    table, mode = modes.prepared.case.table.analysis.ring_down, modes.electromechanical
+    """The case's first mode as the simulated response shows it; else None and why, where that is to be said.
+
+    ``after``: the modes of what the events leave, as `modes_after` has them; the response rings in these."""
+    table = modes.prepared.case.table.analysis.ring_down
+    mode = (after if isinstance(after, ModesResult) else modes).electromechanical
     recorded = None if table is None else signal(dataset, table.signal)
     if table is None or mode is None or recorded is None:
         return None, ""
@@ -48,7 +55,7 @@ def ring_down_of(
             f"of {1 / mode.frequency_hz:.3g} s of the mode at {mode.frequency_hz:.4g} Hz, which it would show at "
             f"another frequency; {used.remedy}"
         )
-    why = _obstacle(modes, times, findings)
+    why = after if isinstance(after, str) else _obstacle(modes, mode, times, findings)
     if why:
         return None, f"no ring-down of {table.signal} is shown: {why}"
     try:
@@ -57,13 +64,17 @@ def ring_down_of(
         return None, ""
     if seen is not None and not seen.frequency_hz:
         return None, f"no ring-down of {table.signal} is shown: it does not swing"
+    if seen is not None and abs(seen.frequency_hz - mode.frequency_hz) > _SAME * mode.frequency_hz:
+        return None, (
+            f"no ring-down of {table.signal} is shown: it swings at {seen.frequency_hz:.4g} Hz, and the mode at "
+            f"{mode.frequency_hz:.4g} Hz"
+        )
     return seen, ""
 
 
-def _obstacle(modes: ModesResult, times: Numbers, findings: Sequence[Finding]) -> str:
+def _obstacle(modes: ModesResult, mode: Mode, times: Numbers, findings: Sequence[Finding]) -> str:
     """Why a swing in a window is not the mode, if that is known; else empty."""
-    mode = modes.electromechanical
-    if mode is None or len(times) < 2:
+    if len(times) < 2:
         return ""
     lost = next((finding for finding in findings if finding.kind in _ENDS), None)
     if lost is not None:

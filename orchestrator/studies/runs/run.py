@@ -93,6 +93,11 @@ class RunResult:
         return [finding for finding in self.findings if not finding.represented]
 
     @property
+    def ringing(self) -> ModesResult:
+        """The modes of the system that rings after the events: of what they leave, where they leave a change."""
+        return self.after if isinstance(self.after, ModesResult) else self.modes
+
+    @property
     def before_its_events(self) -> bool:
         return bool(self.modes.prepared.not_reached) and not self.modes.prepared.events
 
@@ -231,7 +236,7 @@ def _run(
         for r in (modes, after)
     )
     findings = watch.findings(failure, master.late_starts, modes.misfits, known, later)
-    ring_down, why_none = (None, "") if failure else ring_down_of(modes, dataset, findings)
+    ring_down, why_none = (None, "") if failure else ring_down_of(modes, dataset, findings, after)
     unprotected = tuple(
         f"{name} runs in a process of its own, and this system lacks: {'; '.join(lacking)}"
         for name, found in protections.items()

@@ -134,7 +134,7 @@ def ring_downs(results: Sequence[RunResult]) -> Table:
             f"{mode.damping_percent:.2f}",
         )
         for r in results
-        if (mode := r.modes.electromechanical) and (seen := r.ring_down)
+        if (mode := r.ringing.electromechanical) and (seen := r.ring_down)
     ]
     return make_table(
         "Ring-down of the simulated response against the eigenvalue", *columns, rows=rows

@@ -84,17 +84,17 @@ class Summary:
 
     @property
     def beyond(self) -> str:
-        """At how many items a unit is beyond its rating or its reactive power, and which one; "" where none is."""
-        total, fed = (
-            len(self.result.items),
-            [one for item in self.result.items if (one := item.record.reactive)],
-        )
+        """At how many judged items a unit is beyond its rating or its reactive power, and which one; "" where none
+        is."""
+        judged = [item for item in self.result.items if item.record.status is Status.COMPUTED]
+        total = f"{len(judged)}{'' if len(judged) == len(self.result.items) else ' judged'}"
+        fed = [one for item in judged if (one := item.record.reactive)]
         worst = [
             max(
                 (load, name, item.point.name, item.outage.name)
                 for name, load in item.record.beyond.items()
             )
-            for item in self.result.items
+            for item in judged
             if item.record.beyond
         ]
         told = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 from rich.markup import escape as escape_markup
 
 from orchestrator.cases.layers import joined_values
+from orchestrator.core.errors import Problem, few
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder, write_text
 from orchestrator.core.truth import NoTruth
@@ -48,6 +50,7 @@ from orchestrator.studies.screening.words import (
 ITEMS, MODES, SUMMARY, PAGE = "items.csv", "modes.csv", "screening.json", "screening.html"
 
 _SHOWN, _FEW = 4, 6
+_NAMED = 40  # outages of one cause that are named: a planner looks for each; items.csv has them all
 _CURVES = 6
 _MOST_MARKS = 4000
 
@@ -313,6 +316,31 @@ def modes_table(
     )
 
 
+def _cause(summary: Summary, item: ScreenedItem) -> str:
+    """Why an item has no modes, without the questions that the base asks already."""
+    text = item.record.text
+    for question in summary.result.plan.prepared.questions:
+        text = text.replace(
+            f"; {Problem(question.place, f'questioned besides: {question.text}')}", ""
+        )
+    return text
+
+
+def _places(items: Sequence[ScreenedItem]) -> str:
+    """The items of one cause: the first in full, the outages and the points of all."""
+    if len(items) == 1:
+        return where(items[0])
+    outages, points = (
+        list(dict.fromkeys(names))
+        for names in (
+            [item.outage.name for item in items],
+            [item.point.name for item in items],
+        )
+    )
+    at = f" at {few(points, _FEW)}" if len(points) > 1 else ""
+    return f"{len(items)} items ({few(outages, _NAMED)}{at}), first {where(items[0])}"
+
+
 def remarks(summary: Summary) -> list[str]:
     texts = []
     for status, number in summary.counts.items():
@@ -320,8 +348,8 @@ def remarks(summary: Summary) -> list[str]:
             continue
         named = [item for item in summary.failures() if item.record.status is status]
         texts.append(f"{status}: {number} of {len(summary.result.items)}:")
-        texts += [f"  {where(item)}: {item.record.text}" for item in named[:_SHOWN]]
-        texts += [f"  … and {number - _SHOWN} more, in items.csv"] if number > _SHOWN else []
+        causes = kinds_of((item, [_cause(summary, item)]) for item in named)
+        texts += [f"  {_places(items)}: {text}" for text, items in causes]
     every = summary.result.items
     kinds = kinds_of((item, item.record.warnings) for item in every)
     texts += [

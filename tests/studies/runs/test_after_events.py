@@ -1,10 +1,13 @@
 """A run whose events leave a line open is judged by the system that is left as well, however short it is."""
 
+import io
 import json
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
+from rich.console import Console
 
 import orchestrator as gfor_api
 from orchestrator.studies.modes.modes import ModesResult
@@ -108,9 +111,53 @@ def test_a_whole_run_decides_about_modes_near_zero_and_not_of_others_that_grow(
         lambda _: answers.ScenarioAnswer("", True, "stable", None, "settles"),
     )
     prepared = SimpleNamespace(events=[SimpleNamespace(time=0.5)], stop_time=stop)
-    found = answers.of_run(SimpleNamespace(after=after, modes=SimpleNamespace(prepared=prepared)))
+    modes = SimpleNamespace(prepared=prepared, modes=before.modes, model=before.model)
+    found = answers.of_run(SimpleNamespace(after=after, modes=modes))
     assert found.good is good
     assert ("by a power flow, decides nothing" in found.remark) is (good and damping < 0.5)
+
+
+def of_two_modes(case, monkeypatch, moved, other):
+    """The table and the JSON of a run whose least damped mode goes to ``moved`` and whose next one to ``other``."""
+    before = gfor_api.load(case).scenario("base").modes().result
+    least, next_one = sorted(before.modes, key=lambda mode: mode.damping_percent)[:2]
+    left = [replace(least, eigenvalue=moved), replace(next_one, eigenvalue=other)]
+    after = replace(before, modes=left, stability=replace(before.stability, stable=True, mode=None))
+    first = answers.ScenarioAnswer("", True, "stable", least, "settles")
+    monkeypatch.setattr(answers, "_by_response", lambda _: first)
+    found = answers.of_run(SimpleNamespace(after=after, modes=before))
+    console = Console(width=200, record=True, file=io.StringIO())
+    console.print(answers.answers_table([found], (0.1, 2.5)))
+    return found, console.export_text(), least, after
+
+
+def test_an_arrow_leads_from_a_mode_to_itself(case, monkeypatch):
+    """The least damped mode before the events is well damped after them, and another one is the least damped."""
+    found, table, least, after = of_two_modes(case, monkeypatch, -2.0 + 8.0j, -0.3 + 6.0j)
+    assert (found.became, found.after) == tuple(after.modes)
+    assert f"{least.frequency_hz:.3f} → {8 / 2 / np.pi:.3f}" in table
+    assert f"{6 / 2 / np.pi:.3f}" in table
+    assert "least damped after the events, another mode: " in table
+    told = found.as_json()["after_events"]
+    assert told["frequency_hz"] == pytest.approx(6 / 2 / np.pi)
+    assert told["same_mode"]["frequency_hz"] == pytest.approx(8 / 2 / np.pi)
+
+
+def test_the_same_mode_after_the_events_is_one_row(case, monkeypatch):
+    found, table, least, _ = of_two_modes(case, monkeypatch, -0.3 + 6.0j, -2.0 + 8.0j)
+    assert found.became is found.after
+    assert f"{least.frequency_hz:.3f} → {6 / 2 / np.pi:.3f}" in table
+    assert "least damped after" not in table
+
+
+def test_no_arrow_leads_to_a_mode_that_is_not_clearly_the_same(case, monkeypatch):
+    monkeypatch.setattr(answers, "same_mode", lambda *_: None)
+    found, table, least, _ = of_two_modes(case, monkeypatch, -0.3 + 6.0j, -2.0 + 8.0j)
+    assert "→" not in table
+    assert f"{least.frequency_hz:.3f}" in table
+    assert f"{6 / 2 / np.pi:.3f}" in table
+    assert "least damped after the events, not clearly the same mode: " in table
+    assert found.as_json()["after_events"]["same_mode"] is None
 
 
 def test_a_network_that_stays_stable_is_stable(gfor, case):

@@ -1,11 +1,14 @@
 """The ring-down table shows the mode, or nothing and why."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from orchestrator.cases.case import load_case
+from orchestrator.studies.runs import tables
+from orchestrator.studies.runs.ring_down import ring_down_of
 from orchestrator.studies.runs.run import run_scenario
 from orchestrator.studies.signals import signal_modes
 
@@ -43,6 +46,22 @@ def test_what_is_no_ring_down_of_the_mode_is_not_shown(tmp_path, events, stop, w
     assert result.ring_down is None
     (said,) = [text for text in result.modes.warnings if "no ring-down" in text]
     assert why in said
+
+
+@pytest.mark.parametrize(("moved", "shown"), [(1.0, True), (1.15, True), (1.5, False)])
+def test_the_mode_beside_a_ring_down_is_that_of_the_system_that_rings(tmp_path, moved, shown):
+    """With a mode of what the events leave that lies elsewhere, the swing is not called that mode."""
+    result = run_of(tmp_path, STEP.format(1, 1.02), 8.0)
+    (name, mode), *_ = result.modes.named.items()
+    at = complex(mode.eigenvalue.real, moved * mode.eigenvalue.imag)
+    after = replace(result.modes, named={name: replace(mode, eigenvalue=at)})
+    seen, why = ring_down_of(result.modes, result.dataset, [], after)
+    assert (seen is not None) is shown
+    assert shown or "it swings at 0." in why
+    table = tables.ring_downs([replace(result, ring_down=result.ring_down, after=after)])
+    assert [str(cell) for cell in table.columns[2].cells] == [f"{moved * mode.frequency_hz:.4f}"]
+    seen, why = ring_down_of(result.modes, result.dataset, [], "the modes after are not known: x")
+    assert (seen, why.endswith("is shown: the modes after are not known: x")) == (None, True)
 
 
 @pytest.mark.parametrize("hertz", [(0.5,), (0.5, 0.9)])

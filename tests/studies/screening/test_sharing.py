@@ -21,6 +21,8 @@ from orchestrator.studies.points.points import Work
 from orchestrator.studies.points.store import PointStore
 from orchestrator.studies.screening.request import ScreeningRequest
 from orchestrator.studies.screening.study import plan_screening, run_screening
+from orchestrator.studies.screening.summary import Summary
+from orchestrator.studies.screening.view import as_json, remarks
 from tests.studies.screening.five_machines import DROOPS, POWERS, RATINGS, five_machines
 
 
@@ -282,6 +284,29 @@ def test_the_files_most_power_is_a_limit_of_sharing(tmp_path):
     )
     assert item.record.status is Status.STEADY_STATE
     assert re.search(r"sg\d would need \d+ % of its 195 MW", item.record.text)
+
+
+def test_all_that_cannot_be_shared_is_named(tmp_path):
+    """15 items of one kind are one line with all their outages and points; JSON has each item's own reason."""
+    case = five_machines(tmp_path, most={1: 200, 2: 140, 3: 170, 4: 112, 5: 155})
+    (tmp_path / "points.csv").write_text(
+        "name,load,generation\nlow,0.9,0.9\nhigh,1.1,1.1\nhigher,1.2,1.2\n"
+    )
+    outages = ",".join(f"sg{n}" for n in RATINGS)
+    plan = plan_screening(case, ScreeningRequest(tmp_path / "points.csv", outages, "base"))
+    found = Summary(run_screening(plan, Work(Serial(), PointStore(tmp_path / "points"))))
+    head, *lines = (line for line in remarks(found) if "would need" in line or "of 18:" in line)
+    assert head == "no steady state: 15 of 18:"
+    # one line a kind: sg2 would need most, or sg5 where sg2 is out
+    assert [line.partition(", first")[0] for line in lines] == [
+        "  12 items (sg1, sg3, sg4, sg5 at low, high, higher)",
+        "  3 items (sg2 at low, high, higher)",
+    ]
+    assert "sg2 would need 128 % of its 140 MW" in lines[0]
+    assert not any(word in "".join(lines) for word in ("…", "questioned besides"))
+    failures = as_json(found)["failures"]
+    assert len(failures) == 15
+    assert all("would need" in one["why"] for one in failures)
 
 
 def test_what_cannot_be_shared_says_who_would_need_how_much(five, tmp_path):

@@ -74,6 +74,19 @@ def test_units_beyond_their_reactive_power_stand_in_the_first_line():
         assert preparation.reactive(at(a=-0.3)) == ""
 
 
+def test_units_beyond_their_limits_are_counted_where_the_item_was_judged():
+    """Of a point without modes nothing is known: it is in neither number."""
+    found = summary(True, True, None)
+    for item, load in zip(found.result.items, (1.04, 0.0, 1.3), strict=True):
+        item.point, item.outage = SimpleNamespace(name="noon"), SimpleNamespace(name="line")
+        item.record.beyond, item.record.reactive = {"a": load} if load else {}, ""
+    found.result.items[2].record.status = Status.STEADY_STATE
+    assert (
+        found.beyond
+        == "at 1 of 2 judged a unit is beyond its rating, most a with 104 % (noon, line)"
+    )
+
+
 def test_modes_are_followed_beyond_the_range_at_both_ends_and_above_the_damping():
     wanted = CriticalRegion(0.1, 2.0, 0.2)
     assert wanted.wider.lowest_hz < wanted.lowest_hz
