@@ -22,6 +22,7 @@ from orchestrator.linear.signals.mode_doubts import straight_line
 from orchestrator.output.results.recorded import warn_of_early_end
 from orchestrator.studies.oscillations.verdict import forced_frequencies
 from orchestrator.studies.signals.ambient import AmbientModes, AmbientWindow
+from orchestrator.studies.signals.angle_units import doubtful_angles
 from orchestrator.studies.signals.comparison import (
     open_trajectory,
     recorded,
@@ -82,7 +83,10 @@ def identify(
     require_numbers(window, signal, label)
     modes = strongest_modes(curve, begin, end)
     times, line = window["time"].values, straight_line(window["time"].values, window.values)
-    return SignalModes(signal, float(times[0]), float(times[-1]), modes, sampling(times), line)
+    about = [text for text in doubtful_angles(dataset, signal) if "places" not in dataset.attrs]
+    return SignalModes(
+        signal, float(times[0]), float(times[-1]), modes, sampling(times), line, tuple(about)
+    )
 
 
 def ambient(

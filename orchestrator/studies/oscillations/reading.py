@@ -16,6 +16,7 @@ from orchestrator.core.foreign_files import check_regular
 from orchestrator.core.units import to_unit
 from orchestrator.studies.oscillations.measurements import Kind, Measurements, Site, made_ready
 from orchestrator.studies.oscillations.unused_columns import COLUMN, remarks_on_unused
+from orchestrator.studies.signals.angle_units import doubtful_angles
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,7 +34,6 @@ _FORM = (
     "'NORTH.ia' of the current in pu): voltage of a bus and what a unit feeds into it; 'NORTH->SOUTH.p' is what leaves "
     "NORTH towards SOUTH"
 )
-_A_TURN = 2 * np.pi * 1.01  # [rad]
 CONTEST_FILES = ("BusVolMag.txt", "BusVolAng.txt", "LinCurMag.txt", "LinCurAng.txt")
 
 
@@ -50,28 +50,8 @@ def measurements_of(dataset: xr.Dataset, label: str) -> Measurements:
             f"{label}: no place has voltage, P and Q; {more if 'places' in dataset.attrs else _FORM}"
             + "".join(f"; {remark}" for remark in unused)
         )
-    said = [*unused, *_large_angles(dataset)]
+    said = [*unused, *([] if "places" in dataset.attrs else doubtful_angles(dataset))]
     return replace(made_ready(label, times, places, said), base=base)
-
-
-def _large_angles(dataset: xr.Dataset) -> list[str]:
-    """A remark where angles that are labelled rad begin beyond a turn: radians are wrapped, or begin within one."""
-    largest: dict[str, float] = {}
-    for name in map(str, dataset.data_vars):
-        parts = COLUMN.fullmatch(name)
-        if parts is None or parts["what"].lower() not in ("va", "ia"):
-            continue
-        values = np.asarray(dataset[name].values, dtype=np.float64)
-        seen = values[np.isfinite(values)]
-        if str(dataset[name].attrs.get("units", "")).strip() == "rad" and len(seen):
-            largest[name] = abs(float(seen[0]))
-    worst = max(largest, key=lambda name: largest[name], default="")
-    if largest.get(worst, 0.0) <= _A_TURN:
-        return []
-    return [
-        f"angles are labelled rad, and {worst} begins with {largest[worst]:.4g}, more than a turn: are they in "
-        "degrees? Write [deg] behind the names"
-    ]
 
 
 def _of_run(dataset: xr.Dataset) -> list[Site]:

@@ -38,6 +38,8 @@ class SignalModes:
         Which samples of the record were used.
     line
         By how much the straight line through the samples changes from start to stop [unit of the signal].
+    about
+        Questions on the recording itself, such as a unit that its values contradict.
     """
 
     signal: str
@@ -46,6 +48,7 @@ class SignalModes:
     modes: Sequence[IdentifiedMode]
     used: Sampling
     line: float = 0.0
+    about: tuple[str, ...] = ()
 
     def __iter__(self) -> Iterator[IdentifiedMode]:
         return iter(self.modes)
@@ -92,7 +95,8 @@ class SignalModes:
             over_a_trend(self.modes, length, self.line),
         ]
         doubtful = [m for m in self.modes if m.doubts and not self.is_trend(m)]
-        return [*texts, *filter(None, about), *(f"? {doubt_text(m)}." for m in doubtful)]
+        asked = [f"{text}." for text in self.about]
+        return [*asked, *texts, *filter(None, about), *(f"? {doubt_text(m)}." for m in doubtful)]
 
     def table(self) -> pd.DataFrame:
         """One row for every mode: eigenvalue [1/s, rad/s], frequency, damping ratio, amplitude [unit of the signal]."""
