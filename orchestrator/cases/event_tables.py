@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
+from math import isinf
 from typing import Any
 
 from fmus.grid.names import lines_among
@@ -12,6 +13,7 @@ from orchestrator.cases.draft import Draft, Findings
 from orchestrator.cases.fault_tables import component_events, note_conflicts, wire_events
 from orchestrator.cases.islands import question_islands
 from orchestrator.cases.names import close_names, hint_at
+from orchestrator.cases.sharing import power_limits
 from orchestrator.core.errors import InputError, Problem
 from orchestrator.systems.coupling import events as coupled
 from orchestrator.systems.coupling.clock import Clock
@@ -21,6 +23,7 @@ from orchestrator.systems.coupling.system import ComponentPlan, Endpoint
 _POWERS = ("P_ref", "Pref")
 # product of the frequency of a forcing and the communication step up to which it is followed
 _FASTEST = 0.05
+_TOUCHED = 1e-3  # power [pu, S_n] beyond a limit that does not count
 _LONG_FAULT = 10.0  # duration of a fault [s] above which one without a unit is questioned
 
 
@@ -207,6 +210,10 @@ def forcing_events(
                 where, f"end = {end:g} s is not after time = {table.time:g} s; give a later end"
             )
         return []
+    is_power = wanted.rpartition(".")[2] in _POWERS
+    draft.found.questions += [
+        Problem(where, text) for text in _large_forcing(plan, table, wanted, is_power=is_power)
+    ]
     return [
         coupled.Forcing(
             table.time,
@@ -218,6 +225,35 @@ def forcing_events(
             table.end,
         )
     ]
+
+
+def _large_forcing(
+    plan: ComponentPlan, table: schema.ForcingTable, reference: str, *, is_power: bool
+) -> Iterator[str]:
+    """Questions about a swing that no plant makes: beyond its base, or beyond what the unit can feed."""
+    share = 100 * table.amplitude
+    swing = f"{table.component}.{reference} swings by {share:.4g} % to both sides"
+    if table.amplitude > 1:
+        base = "its rated power" if is_power else "its base"
+        yield f"{swing}, more than {base}: if {table.amplitude:.4g} % is meant, write '{table.amplitude:.4g} %'"
+        return
+    if not is_power or not {"P_0", "S_n"} <= set(plan.description.variables):
+        return
+    least, most = power_limits(
+        plan, plan.number("Q_0") if "Q_0" in plan.description.variables else 0.0
+    )
+    P_0, S_n = plan.number("P_0"), plan.number("S_n")
+    if P_0 <= 1:
+        most = min(most, 1.0)
+    if plan.kind == "machine" and P_0 >= 0:
+        least = max(least, 0.0)
+    low, high = P_0 - table.amplitude, P_0 + table.amplitude
+    if low < least - _TOUCHED or high > most + _TOUCHED:
+        ends = " to ".join("no limit" if isinf(x) else f"{x * S_n:.4g} MW" for x in (least, most))
+        yield (
+            f"{swing}: its power would go from {low * S_n:.4g} to {high * S_n:.4g} MW, beyond what it feeds ({ends}): "
+            "give less, or another dispatch"
+        )
 
 
 def _reference_of(variable: str) -> str:

@@ -1,5 +1,7 @@
 """References that swing: in a case file, by ``--force`` and in a run."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -84,6 +86,42 @@ def test_a_unit_that_only_another_scenario_has_is_asked_about():
         "--force 'gfor 0.6 Hz 2 %' cannot act: the scenario has no gfor"
     ]
     assert not asked["gfor"]
+
+
+@pytest.mark.parametrize(
+    ("force", "asked"),
+    [
+        (
+            "sg1 0.8 Hz 200 %",
+            r"200 % to both sides, more than its rated power: if 2 % is meant, write '2 %'",
+        ),
+        ("sg1.exciter.V_ref 0.8 Hz 3 pu", "300 % to both sides, more than its base"),
+        (
+            "sg1 0.8 Hz 95 %",
+            r"its power would go from -\d+ to \d+ MW, beyond what it feeds \(0 MW to ",
+        ),
+        ("gfor 0.8 Hz 40 %", r"its power would go from \d+ to \d+ MW, beyond what it feeds"),
+        ("sg1 0.8 Hz 2 %", ""),
+        ("gfor 0.8 Hz 2 %", ""),
+        ("sg1.exciter.V_ref 0.8 Hz 50 %", ""),
+    ],
+)
+def test_a_swing_beyond_what_a_unit_can_do_is_asked_about(force, asked):
+    questions = gfor.load("two_area_rms").scenario("gfor", force=force).prepared.questions
+    assert len(questions) == bool(asked)
+    if asked:
+        (question,) = questions
+        assert question.place == f"--force '{force}'"
+        assert re.search(asked, question.text)
+
+
+def test_the_power_that_is_questioned_is_that_of_the_power_flow():
+    """850 MVA at 0.8 pu, say: 25 % more goes beyond the rating, as the unit's own figures have it."""
+    prepared = gfor.load("two_area_rms").scenario("gfor", force="gfor 0.8 Hz 40 %").prepared
+    plan = prepared.system.components["gfor"]
+    P, S_n = prepared.power_flow.powers["gfor"].real, plan.number("S_n")
+    (question,) = prepared.questions
+    assert f"from {(P - 0.4) * S_n:.4g} to {(P + 0.4) * S_n:.4g} MW" in question.text
 
 
 def test_two_forcings_of_one_reference_are_refused():

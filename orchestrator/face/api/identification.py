@@ -84,9 +84,8 @@ def identify(
     modes = strongest_modes(curve, begin, end)
     times, line = window["time"].values, straight_line(window["time"].values, window.values)
     about = [text for text in doubtful_angles(dataset, signal) if "places" not in dataset.attrs]
-    return SignalModes(
-        signal, float(times[0]), float(times[-1]), modes, sampling(times), line, tuple(about)
-    )
+    begin, end = float(times[0]), float(times[-1])
+    return SignalModes(signal, begin, end, modes, sampling(times), line=line, about=tuple(about))
 
 
 def ambient(

@@ -50,7 +50,7 @@ def doubtful_angles(dataset: xr.Dataset, signal: str | None = None) -> list[str]
 
 
 def _contradiction(dataset: xr.Dataset, name: str, unit: str) -> str:
-    """What an angle does that it does not in its unit; "" where nothing speaks against it."""
+    """The motion of an angle that its unit cannot have; "" where nothing speaks against the unit."""
     values = np.asarray(dataset[name].values, dtype=np.float64)
     known = np.isfinite(values)
     seen = values[known]
