@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from fmus.grid_following.dyr_fields import CONVERTER, FIELDS, MODEL, PLANT, approximation
@@ -20,7 +20,7 @@ from orchestrator.cases.psse.missing_models import (
 from orchestrator.cases.psse.raw import Machine, unit_labels
 from orchestrator.cases.record_use import RecordUse, UseOfRecord
 from orchestrator.cases.remedies import APPROXIMATING, replacement_of, without_models
-from orchestrator.core.errors import InputError
+from orchestrator.core.errors import InputError, few
 
 _KNOWN = DYR_RECORDS | REGFM_A1_RECORDS | STATIC_VAR_RECORDS
 _COUPLED = {record.part for record in REGFM_A1_RECORDS.values()}
@@ -38,6 +38,12 @@ COMPENSATION = ("exciter.R_C", "exciter.X_C")
 
 _MOST_SHOWN = 20
 _SAME = 1e-3  # part by which two figures for one reactance may differ: files round them
+
+_STRANGE = (
+    2  # machines that one file has alone, in each, from which on the files may be of two networks
+)
+_NAMED = 8  # buses that one problem names
+_NO_RECORD = "has no record of a machine"
 
 
 @dataclass(frozen=True)
@@ -84,10 +90,14 @@ def machine_models(
     lacking: set[tuple[int, str]] = set()
     without: set[str] = set()  # names of converters' records, which have a remedy of their own
     first: dict[str, str] = {}  # place of the first record, by the problem
+    there = {*at, *idle}
+    strange = [
+        record
+        for record in records
+        if (record.bus, record.machine) not in there and record.name in _KNOWN
+    ]
     for record in records:
         key = (record.bus, record.machine)
-        if key not in at and key not in idle and record.name in _KNOWN:
-            problems.append(_of_nobody(record, {*at, *idle}))
         if key in at:
             of[key].append(record)
         if key not in at or record.name in left or (approximate and record.name in FIELDS):
@@ -121,7 +131,13 @@ def machine_models(
     missing = missing_models(records, at, {*passed, *(FIELDS if approximate else ())})
     lacking |= {key for model in missing for key in _machines_of(model) if not model.may_go}
     missing = [model for model in missing if model.may_go or not _machines_of(model) <= {*replaced}]
-    problems += _unfit(parts, {*replaced, *lacking}, labels)
+    unfit = list(_unfit(parts, {*replaced, *lacking}, labels))
+    bare = [key for key in _without_machine(parts) if key not in {*replaced, *lacking}]
+    places = {(record.bus, record.machine) for record in strange}
+    if min(len(places), len(bare)) >= _STRANGE:
+        problems = [_other_network(strange, records, bare, len(at)), *problems]
+        strange, unfit = [], [text for text in unfit if _NO_RECORD not in text]
+    problems = [*(_of_nobody(record, there) for record in strange), *problems, *unfit]
     if problems or missing:
         counted_once = [*_count_repeats(problems, first)]
         hidden = len(counted_once) - _MOST_SHOWN
@@ -238,11 +254,41 @@ def _unfit(
         if "converter" in own and len(own) > 1:
             others = ", ".join(kind for kind in own if kind != "converter")
             yield f"machine {name!r} at bus {bus} is a converter, and has records of its {others}; remove them"
-        elif not {"machine", "converter"} & {*own} and (bus, name) not in replaced:
+    for bus, name in _without_machine(parts):
+        if (bus, name) not in replaced:
             yield (
-                f"machine {name!r} at bus {bus} has no record of a machine; add one, or write "
+                f"machine {name!r} at bus {bus} {_NO_RECORD}; add one, or write "
                 f"{replacement_of(labels[bus, name])}, and a converter of ours stands there"
             )
+
+
+def _without_machine(
+    parts: Mapping[tuple[int, str], Mapping[str, str]],
+) -> list[tuple[int, str]]:
+    """Machines in service with neither a machine's record nor a converter's."""
+    return [key for key, own in parts.items() if not {"machine", "converter"} & {*own}]
+
+
+def _other_network(
+    strange: Sequence[DynamicRecord],
+    records: Sequence[DynamicRecord],
+    bare: Sequence[tuple[int, str]],
+    machines: int,
+) -> str:
+    """One problem for two files that do not belong together, with what each has alone."""
+    places = dict.fromkeys((record.bus, record.machine) for record in strange)
+
+    def named(keys: Iterable[tuple[int, str]]) -> str:
+        return few((f"{bus} {name!r}" for bus, name in keys), _NAMED)
+
+    known = sum(record.name in _KNOWN for record in records)
+    return (
+        f"{strange[0].file} and the RAW file do not belong together, as it seems: {len(strange)} of {known} records of "
+        f"machines stand at buses or identifiers that the RAW file has no generator at ({named(places)}; first "
+        f"{strange[0].name} in line {strange[0].line}), and {len(bare)} of {machines} machines have no record "
+        f"({named(bare)}): give the DYR file of this network; if it is that one, correct these buses and identifiers, "
+        "or remove the records"
+    )
 
 
 def _of_nobody(record: DynamicRecord, machines: Collection[tuple[int, str]]) -> str:
