@@ -1,10 +1,12 @@
 """A case file from a network's files: scenarios, plots and comments that a person can read and change."""
 
+import itertools
 import math
 import os
 import re
 import textwrap
 import tomllib
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -312,16 +314,28 @@ class _Place:
 
 
 def _with_names(places: Sequence[_Place]) -> tuple[_Place, ...]:
-    """Several converters bear the names of their buses, ``gfor_9``; one is ``gfor``."""
+    """Several converters bear the names of their buses, ``gfor_9``, those at one bus with numbers, ``gfor_9_1``; one
+    is ``gfor``."""
     if len(places) < 2:
         return tuple(places)
+    at = Counter(place.bus for place in places)
+    seen: Counter[str] = Counter()
+    # a bus may be called as a numbered converter of another one is
+    taken = {_of_bus(bus) for bus, count in at.items() if count == 1}
     found: list[_Place] = []
     for place in places:
-        name = place.bus.removeprefix("bus_")
-        same = sum(one.bus == place.bus for one in found)
-        name += f"_{same + 1}" if same else ""
+        name = _of_bus(place.bus)
+        if at[place.bus] > 1:
+            numbers = itertools.count(seen[place.bus] + 1)
+            seen[place.bus] = next(k for k in numbers if f"{name}_{k}" not in taken)
+            name = f"{name}_{seen[place.bus]}"
+            taken.add(name)
         found.append(replace(place, name=f"{_CONVERTER}_{name}", injection=f"{_INJECTION}_{name}"))
     return tuple(found)
+
+
+def _of_bus(bus: str) -> str:
+    return bus.removeprefix("bus_")
 
 
 def _called(files: Sequence[Path]) -> dict[str, list[str]]:

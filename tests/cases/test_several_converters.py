@@ -3,7 +3,7 @@
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.new_case import WantedCase, read_converter, write_case
+from orchestrator.cases.new_case import WantedCase, _Place, _with_names, read_converter, write_case
 from orchestrator.core.errors import InputError
 from orchestrator.studies.coordinated_design.study import PointsDesignRequest, plan_points_design
 from orchestrator.studies.modes.modes import compute_modes
@@ -47,7 +47,7 @@ def test_two_converters_bear_the_names_of_their_buses_and_share_what_a_machine_f
 def test_two_at_one_bus_have_two_names(made):
     case, _ = made(A, A.replace("60", "20"))
     (both,) = case.prepare(["converter"])
-    assert {"gfor_13", "gfor_13_2"} <= set(both.system.components)
+    assert {"gfor_13_1", "gfor_13_2"} <= set(both.system.components)
 
 
 def test_two_at_one_bus_are_compared_each_with_its_own_stand_in(made):
@@ -84,6 +84,25 @@ def test_what_the_slack_feeds_less_for_one_of_two_is_not_asked_about(made, less)
 def test_one_converter_is_gfor_as_before(made):
     case, _ = made(A)
     assert "gfor" in case.prepare(["converter"])[0].system.components
+
+
+@pytest.mark.parametrize(
+    ("buses", "names"),
+    [
+        (["bus_13"], ["gfor"]),
+        (["bus_13", "bus_15"], ["gfor_13", "gfor_15"]),
+        (["bus_13", "bus_13"], ["gfor_13_1", "gfor_13_2"]),
+        (["bus_13", "bus_15", "bus_13"], ["gfor_13_1", "gfor_15", "gfor_13_2"]),
+        # a bus that is called as a numbered converter would be
+        (["bus_13", "bus_13_1", "bus_13"], ["gfor_13_2", "gfor_13_1", "gfor_13_3"]),
+        (["NORTH", "SOUTH"], ["gfor_NORTH", "gfor_SOUTH"]),
+    ],
+)
+def test_converters_are_called_alike(buses, names):
+    """One has a plain name; several have those of their buses, and numbers where a bus has several."""
+    found = _with_names([_Place(None, bus, 1.0, "") for bus in buses])
+    assert [place.name for place in found] == names
+    assert len({place.injection for place in found}) == len(buses)
 
 
 @pytest.mark.parametrize(

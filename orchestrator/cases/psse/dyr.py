@@ -278,15 +278,15 @@ def _other_network(
     """One problem for two files that do not belong together, with what each has alone."""
     places = dict.fromkeys((record.bus, record.machine) for record in strange)
 
-    def named(keys: Iterable[tuple[int, str]]) -> str:
+    def names_of(keys: Iterable[tuple[int, str]]) -> str:
         return few((f"{bus} {name!r}" for bus, name in keys), _NAMED)
 
     known = sum(record.name in _KNOWN for record in records)
     return (
         f"{strange[0].file} and the RAW file do not belong together, as it seems: {len(strange)} of {known} records of "
-        f"machines stand at buses or identifiers that the RAW file has no generator at ({named(places)}; first "
+        f"machines stand at buses or identifiers that the RAW file has no generator at ({names_of(places)}; first "
         f"{strange[0].name} in line {strange[0].line}), and {len(bare)} of {machines} machines have no record "
-        f"({named(bare)}): give the DYR file of this network; if it is that one, correct these buses and identifiers, "
+        f"({names_of(bare)}): give the DYR file of this network; if it is that one, correct these buses, "
         "or remove the records"
     )
 
