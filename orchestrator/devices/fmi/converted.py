@@ -136,15 +136,15 @@ class ConvertedComponent(Derived):
         if key not in self._parts:
             names = [self._names[r] for r in np.frombuffer(key, dtype=np.uintc)]
             own = self.description.inner.variables
-            reals = [k for k, name in enumerate(names) if own[name].type == "Real"]
+            kinds = [own[name].type for name in names]
+            reals = [k for k, kind in enumerate(kinds) if kind == "Real"]
+            whole = [(k, names[k], kind) for k, kind in enumerate(kinds) if kind != "Real"]
             ways = [self.description.conversions.get(names[k], Conversion()) for k in reals]
-            self._parts[key] = _Parts(
-                np.array(reals, dtype=np.int64),
-                np.array([way.factor for way in ways]),
-                np.array([way.offset for way in ways]),
-                RealBatch(self.inner, [names[k] for k in reals]),
-                [(k, name, own[name].type) for k, name in enumerate(names) if k not in reals],
-            )
+            factors = np.array([way.factor for way in ways])
+            offsets = np.array([way.offset for way in ways])
+            batch = RealBatch(self.inner, [names[k] for k in reals])
+            places = np.array(reals, dtype=np.int64)
+            self._parts[key] = _Parts(places, factors, offsets, batch, whole)
         return self._parts[key]
 
     def _write(self, parts: _Parts, numbers: NDArray[np.float64]) -> int:
