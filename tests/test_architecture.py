@@ -18,7 +18,7 @@ FLOORS = {
     "core": (
         ("arrays", "closing", "cores", "late", "spelling", "threads", "uncollected", "units"),
         ("errors",),
-        ("asked", "attributes", "foreign_files"),
+        ("asked", "attributes", "foreign_files", "question_kinds"),
         ("safe_files", "toml_files", "truth"),
     ),
     "devices": (("fmi",), ("binding",), ("acceptance",)),

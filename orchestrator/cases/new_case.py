@@ -23,6 +23,7 @@ from orchestrator.cases.psse.raw_file import read_file
 from orchestrator.cases.record_use import RecordUse, details, in_one_line
 from orchestrator.cases.short_circuit import source_impedance
 from orchestrator.core.errors import InputError, Problem, few
+from orchestrator.core.question_kinds import by_kind
 from orchestrator.core.units import to_unit
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.devices.fmi.description import FmuDescription
@@ -740,12 +741,15 @@ def _commented(text: str, questions: Sequence[Problem], sources: dict[str, Path]
     """The text with every question as a comment above the line that it is about."""
     lines = text.splitlines()
     above: dict[int, list[str]] = {}
-    for question in questions:
-        place = _line_of(question, lines, sources)
-        where = "" if question.place.startswith("line ") else f"{question.place}: "
+    told = {
+        ("" if one.place.startswith("line ") else f"{one.place}: ") + one.text: one
+        for one in questions
+    }
+    for first, shown in by_kind(told, "`gfor modes CASE --details`").items():
+        place = _line_of(told[first], lines, sources)
         above.setdefault(place, []).extend(
             textwrap.wrap(
-                f"question: {where}{question.text}",
+                f"question: {shown}",
                 116,
                 initial_indent="# ",
                 subsequent_indent="#   ",

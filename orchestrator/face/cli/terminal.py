@@ -15,6 +15,7 @@ from rich.console import Console, RenderableType
 from rich.markup import escape
 
 from orchestrator.core.errors import Problem
+from orchestrator.core.question_kinds import by_kind
 from orchestrator.core.safe_files import made_folder
 from orchestrator.face.cli.known_questions import new_questions
 from orchestrator.output.report.linearised import exceptions_in_words
@@ -141,16 +142,20 @@ def print_questions(
         return
     fresh = new_questions(path, asked)
     known = len(asked) - len(fresh)
-    named = str if as_json else scenarios[0].names.in_text
-    if as_json or whole or known < _FEW:
-        say("question", map(named, asked))
+    command = f"gfor modes {quote(str(path))} --details"
+    if as_json or whole:
+        say("question", asked)
         return
-    say("question", map(named, fresh))
+    named = scenarios[0].names.in_text
+    shown = asked if known < _FEW else fresh
+    say("question", map(named, by_kind(shown, command).values()))
+    if known < _FEW:
+        return
     others = "other " if fresh else ""
     text = f"{known} {others}questions about {path.name} are those of an earlier command"
     say(
         "question",
-        [f"{text}; gfor modes {quote(str(path))} --details shows them, and --json has them"],
+        [f"{text}; {command} shows them, and --json has them"],
     )
 
 
