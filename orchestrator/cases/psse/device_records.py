@@ -293,12 +293,20 @@ def _link(line: Record) -> tuple[int, int, float]:
     return line.whole(0, "IDC"), line.whole(1, "JDC"), ohm
 
 
+_SERIES_MODES = {4: "a constant series voltage"} | dict.fromkeys(
+    range(5, 9), "one of several devices that are linked (IPFC)"
+)
+"""Modes of a FACTS device's series part that are not read."""
+
+_MODES = 9  # of PSS/E, from 0
+
+
 def _facts(raw: RawFile, lines: Sequence[Record], places: Places) -> FactsDevice:
     (record,) = lines
     mode, far = record.whole(3, "MODE", 1), record.whole(2, "J", 0)
-    if far and mode not in (NORMAL, BYPASSED, IMPEDANCE):
+    if mode not in ((NORMAL, BYPASSED, IMPEDANCE) if far else range(_MODES)):
         raise record.error(
-            f"MODE is {mode}: a series voltage or one of several linked devices; 1 to 3 are read. Write "
+            f"MODE is {mode}: {_SERIES_MODES.get(mode, 'no mode of PSS/E')}; 0 to 3 are read. Write "
             f"{without_kinds(['facts device'])}, and put what it feeds or draws into loads"
         )
     held = record.number(6, "VSET", 1.0)

@@ -200,6 +200,23 @@ def test_what_a_series_part_cannot_be_is_refused_with_a_remedy_that_works(read):
     assert not fed(read(voltage, leave_out=["facts device"]))
 
 
+@pytest.mark.parametrize(
+    ("mode", "far", "words"),
+    [
+        (4, 10, "a constant series voltage"),
+        (5, 10, "one of several devices that are linked"),
+        (8, 10, "one of several devices that are linked"),
+        (9, 10, "no mode of PSS/E"),
+        (9, 0, "no mode of PSS/E"),
+    ],
+)
+def test_a_mode_that_is_not_read_is_named(mode, far, words, read):
+    buses = {"BUS": ["10,'FAR',230,1,1,1,1,1,0"], "BRANCH": ["10,5,'1 ',0.01,0.085,0"]}
+    record = UPFC[0].replace("{node}", "").replace("4,10,1", f"4,{far},{mode}")
+    with pytest.raises(InputError, match=f"MODE is {mode}: {words}"):
+        read({**buses, "FACTS DEVICE": [record]})
+
+
 def test_an_induction_machine_draws_what_its_circuit_does(read):
     """Electrical power of 15 MW at the solved voltage: a slip, and with it Q."""
     data = read({"INDUCTION MACHINE": MOTOR})
