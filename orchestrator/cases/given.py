@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.cases.locate import FROM_TABLES
-from orchestrator.core.asked import Value, number_between, number_in, path, plain_value
+from orchestrator.core.asked import Value, number_between, number_in, path, plain_value, seen
 from orchestrator.core.errors import InputError
 from orchestrator.core.late import pd
 
@@ -48,7 +48,7 @@ def plain(
 
     if not isinstance(values, Mapping):
         raise InputError(
-            f"{argument} = {values!r}; give values by name, such as {{'grid.X_L': 0.3}}"
+            f"{argument} = {seen(values)}; give values by name, such as {{'grid.X_L': 0.3}}"
         )
     wrong = [key for key in _keys(values) if not isinstance(key, str)]
     if wrong:

@@ -22,6 +22,7 @@ _FOR_COMMANDS = re.compile(
     r" \((default: [^ ;()]+(; with [^()]*)?|repeatable|[\d.:]+)\)|repeatable; (?=default)"
 )
 _SHOWN = 60  # characters of an overlong path that an error shows
+_SEEN = 120  # characters of a wrong value that an error shows
 _LARGEST = 10**308  # of a whole number that a floating-point number can hold
 
 
@@ -110,6 +111,13 @@ def checked(request: type, wanted: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
+def seen(given: Any) -> str:
+    """A value as an error shows it: written out where that is one short line, or its type."""
+    text = repr(given)
+    is_short = len(text) <= _SEEN and "\n" not in text
+    return text if is_short else f"something of type {type(given).__name__}"
+
+
 def require_known(wanted: Iterable[str], known: Iterable[str], who: str) -> None:
     """Refuse keywords that a study does not have; ``who`` is such as ``a design``."""
     unknown = [name for name in wanted if name not in known]
@@ -138,7 +146,7 @@ def plain_value(value: Any) -> Value:
 def number_in(given: Any, unit: str, argument: str, rule: str) -> float:
     own = plain_value(given)
     if isinstance(own, bool) or not isinstance(own, int | float | str):
-        raise InputError(f"{argument} = {given!r}; give {rule.removeprefix('give ')}")
+        raise InputError(f"{argument} = {seen(given)}; give {rule.removeprefix('give ')}")
     try:
         return to_unit(own, unit)
     except ValueError as error:
@@ -154,7 +162,7 @@ def number_between(
 ) -> float:
     number = number_in(given, unit, argument, rule)
     if not least <= number <= most:
-        raise InputError(f"{argument} = {given!r}; it must be {rule}")
+        raise InputError(f"{argument} = {seen(given)}; it must be {rule}")
     return number
 
 
@@ -172,7 +180,7 @@ def _is_number(value: Any) -> bool:
 def flag(given: Any, argument: str) -> bool:
     own = plain_value(given)
     if not isinstance(own, bool):
-        raise InputError(f"{argument} = {given!r}; give True or False")
+        raise InputError(f"{argument} = {seen(given)}; give True or False")
     return own
 
 
@@ -181,7 +189,7 @@ def names(given: Names, argument: str) -> tuple[str, ...]:
         return (given,)
     listed: tuple[Any, ...] = tuple(given) if isinstance(given, Iterable) else (None,)
     if isinstance(given, bytes) or not all(isinstance(name, str) for name in listed):
-        raise InputError(f"{argument} = {given!r}; give a name, or a list of names")
+        raise InputError(f"{argument} = {seen(given)}; give a name, or a list of names")
     return listed
 
 
@@ -189,13 +197,13 @@ def text_or_none(
     given: Any, argument: str, rule: str = "give one name, or leave it out"
 ) -> str | None:
     if given is not None and (not isinstance(given, str) or not given):
-        raise InputError(f"{argument} = {given!r}; {rule}")
+        raise InputError(f"{argument} = {seen(given)}; {rule}")
     return given
 
 
 def path(given: Any, argument: str, kind: str = "file") -> Path:
     if not isinstance(given, str | Path) or not str(given):
-        raise InputError(f"{argument} = {given!r}; give the path of a {kind}")
+        raise InputError(f"{argument} = {seen(given)}; give the path of a {kind}")
     _check_length(Path(given), argument)
     return Path(given)
 
@@ -227,10 +235,10 @@ def frequency_range(given: Any, argument: str = "frequencies") -> tuple[float, f
     """Two frequencies [Hz], the lower one first."""
     rule = "give two in Hz, the lower one first, such as (0.1, 2.0)"
     if isinstance(given, str) or not isinstance(given, Sequence | tuple) or len(given) != 2:
-        raise InputError(f"{argument} = {given!r}; {rule}")
+        raise InputError(f"{argument} = {seen(given)}; {rule}")
     low, high = (number_in(one, "Hz", argument, rule) for one in given)
     if not 0 <= low < high:
-        raise InputError(f"{argument} = {given!r}; {rule}")
+        raise InputError(f"{argument} = {seen(given)}; {rule}")
     return low, high
 
 
@@ -266,7 +274,7 @@ def percent(given: Any, argument: str, most: float = 90) -> float:
             else ""
         )
         raise InputError(
-            f"{argument} = {given!r}; it is in percent between 1 and {most:g}, such as 20{ratio}"
+            f"{argument} = {seen(given)}; it is in percent between 1 and {most:g}, such as 20{ratio}"
         )
     return float(own) / 100
 
@@ -275,7 +283,7 @@ def share(given: Any, argument: str) -> float:
     own: Any = plain_value(given)
     if not _is_number(own) or not 0 < own <= 0.5:
         raise InputError(
-            f"{argument} = {given!r}; it must be a share above 0, and at most 0.5: 0.05 is 5 %"
+            f"{argument} = {seen(given)}; it must be a share above 0, and at most 0.5: 0.05 is 5 %"
         )
     return float(own)
 
@@ -292,7 +300,7 @@ def positive(
 ) -> float:
     own: Any = plain_value(given)
     if not _is_number(own) or not 0 < own < 1e300:
-        raise InputError(f"{argument} = {given!r}; {rule}")
+        raise InputError(f"{argument} = {seen(given)}; {rule}")
     return float(own)
 
 
@@ -307,7 +315,7 @@ def one_of(values: Iterable[str]) -> "FieldKind":
 
     def check(given: Any, argument: str) -> str | None:
         if given is not None and (not isinstance(given, str) or given not in words):
-            raise InputError(f"{argument} = {given!r}; give one of {known}")
+            raise InputError(f"{argument} = {seen(given)}; give one of {known}")
         return None if given is None else words[given]
 
     return FieldKind("RULE", read, check)
@@ -332,7 +340,7 @@ def bounds(given: Any, argument: str) -> tuple[float, float]:
     pair: list[Any] = [plain_value(one) for one in given] if isinstance(given, tuple | list) else []
     if len(pair) != 2 or not _are_bounds(*pair):
         rule = "give the lowest and the highest gain in pu, such as (200, 400), with 0 ≤ lowest ≤ highest"
-        raise InputError(f"{argument} = {given!r}; {rule}")
+        raise InputError(f"{argument} = {seen(given)}; {rule}")
     return float(pair[0]), float(pair[1])
 
 
@@ -348,14 +356,14 @@ def read_whole(least: int, most: int, what: str = "a whole number") -> Callable[
 def whole_number(given: Any, argument: str, least: int, most: int) -> int:
     own = plain_value(given)
     if isinstance(own, bool) or not isinstance(own, int) or not least <= own <= most:
-        raise InputError(f"{argument} = {given!r}; give a whole number from {least} to {most}")
+        raise InputError(f"{argument} = {seen(given)}; give a whole number from {least} to {most}")
     return own
 
 
 def check_callable(given: Any, argument: str) -> Any:
     """Return a function that is told of the work, or None."""
     if given is not None and not callable(given):
-        raise InputError(f"{argument} = {given!r}; give what can be called, such as print")
+        raise InputError(f"{argument} = {seen(given)}; give what can be called, such as print")
     return given
 
 

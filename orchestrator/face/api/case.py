@@ -213,6 +213,9 @@ class Case(Unchanged):
                     if hasattr(scenario, name)
                     else ""
                 )
+                if not of and not name.startswith("_"):
+                    is_scenario = name in self.file.scenarios
+                    of = f"; it is case.scenario({name!r})" if is_scenario else self._hint(name)
                 raise NoSuchAttributeError(
                     f"{type(self).__name__!r} object has no attribute {name!r}{of}"
                 )

@@ -12,6 +12,7 @@ from orchestrator.cases.given import binding_path, plain
 from orchestrator.cases.schema import Value
 from orchestrator.core.asked import FILE, FLAG, FieldKind, asked, number_in, one_of, path
 from orchestrator.core.errors import InputError
+from orchestrator.core.spelling import for_python
 from orchestrator.devices.fmi.devices import as_device
 from orchestrator.studies.certification import points_again
 from orchestrator.studies.certification.acceptance import KEPT, Acceptance
@@ -59,10 +60,11 @@ class Parts:
         named = any(isinstance(one, str) for one in wanted)
         if wanted and named != (self is ROWS):
             kind = "a grid code" if self is ROWS else "a damping test"
-            given = "--rows" if named else "--points"
+            given, rule = ("--rows" if named else "--points"), self.option
+            if for_python():
+                given, rule = "anew", self.option.partition(", with ")[2]
             raise InputError(
-                f"{given}: {folder} is the certificate of {kind}, which has {self.one}s; give "
-                f"{self.option}"
+                f"{given}: {folder} is the certificate of {kind}, which has {self.one}s; give {rule}"
             )
         return list(self.again.choose(content, wanted, every=every))
 

@@ -202,7 +202,7 @@ def choose(content: Content, wanted: Sequence[float] = (), *, every: bool = Fals
         match = [p["X_L"] for p in points if same_reactance(p["X_L"], X_L)]
         if not match:
             there = ", ".join(f"{p['X_L']:g}" for p in points)
-            raise InputError(f"--points: the certificate has no X_L = {X_L:g} pu; it has: {there}")
+            raise InputError(f"the certificate has no point X_L = {X_L:g} pu; it has: {there}")
         chosen += match
     return chosen
 

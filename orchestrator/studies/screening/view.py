@@ -109,7 +109,8 @@ class Screening(NoTruth):
         return [place / name for name in (ITEMS, MODES, SUMMARY, CELLS, PAGE)]
 
     def __repr__(self) -> str:
-        head = f"Screening of {self.result.plan.case.name}: {self.verdict}"
+        plan = self.result.plan
+        head = f"Screening of {plan.case.name}, {plan.prepared.name}: {self.verdict}"
         return f"<{head}; all points stand in items(), the worst of each outage in table()>"
 
     def _repr_html_(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -124,12 +125,21 @@ def recorded(dataset: xr.Dataset, expression: str, label: str) -> xr.DataArray:
     found = signal(dataset, expression)
     if found is None:
         known = list(map(str, dataset.data_vars))
-        hint = close_names(expression, known)
+        hint = _spaced(expression, known) or close_names(expression, known)
         raise InputError(
             f"{label}: signal {expression!r} was not recorded; there are: {few(known, _SHOWN)}; "
             f"{hint + ' ' if hint else ''}a signal is 'a.b', or the difference 'a.b - c.d' of two"
         )
     return found
+
+
+def _spaced(expression: str, known: Sequence[str]) -> str:
+    """A hint at the blanks around the minus of a difference of two signals."""
+    for place in (k for k, letter in enumerate(expression) if letter == "-"):
+        one, other = expression[:place].strip(), expression[place + 1 :].strip()
+        if one in known and other in known:
+            return f"write {f'{one} - {other}'!r}, with blanks around the minus;"
+    return ""
 
 
 def strongest_modes(

@@ -25,6 +25,8 @@ _FEWEST = 20  # samples of a recording that can be compared with anything
 _LONGEST_GAP = 0.25  # gap [s] that a straight line bridges in the voltage that drives the device
 _TURN = 2 * np.pi
 _NEAR_A_TURN = 0.2  # part of a turn by which a jump of the angle may miss a whole one
+_MOVES = 1e-6
+"""Part of its range from which on an angle moves: more than rounding makes of an angle at rest."""
 _HELD = (
     0.2  # part of the samples whose angle is that of the sample before, from which on it is held
 )
@@ -328,9 +330,10 @@ class _Reading:
                 remedy=channel.changed(unit=other),
                 unit=other,
             )
-        # an angle that has not begun to move is not held: the first sample that differs begins the count
+        # an angle that has not begun to move is not held: the count begins with the first that moves
         known = angle[np.isfinite(angle)]
-        begin = int(np.argmax(known != known[0])) if len(known) else 0
+        moved = np.abs(known - known[:1]) > _MOVES * np.ptp(known) if len(known) else known > 0
+        begin = int(np.argmax(moved)) if moved.any() else 0
         held = float(np.mean(np.diff(known[begin:]) == 0))
         moves = float(np.ptp(angle[np.isfinite(angle)])) > 1e-3
         if moves and held > _HELD:

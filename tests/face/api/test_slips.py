@@ -284,3 +284,37 @@ def test_what_is_shown_is_short(case, scenario):
     (limit,) = case.sweep(["grid.X_L=0.1:0.3"], ["gfor"], until="5 %").limits
     assert len(repr(limit)) < 200
     assert "'holds'" not in repr(limit)
+
+
+def test_a_difference_without_blanks_is_told_how_it_is_written(run):
+    with pytest.raises(
+        InputError, match=r"write 'gfor\.p - gfor\.q', with blanks around the minus"
+    ):
+        run.signal("gfor.p-gfor.q")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("pod_p", r"it is case\.scenario\('pod_p'\)"),
+        ("swep", r"did you mean \.sweep\?"),
+        ("modes", r"it belongs to a scenario: case\.scenario\(…\)\.modes"),
+    ],
+)
+def test_a_name_that_a_case_lacks_is_told(case, name, words):
+    with pytest.raises(NoSuchAttributeError, match=words):
+        getattr(case, name)
+
+
+def test_a_screening_says_which_scenario_it_is_of(case):
+    assert repr(case.screen()).startswith("<Screening of two_area_rms, base: UNSTABLE")
+
+
+def test_a_wrong_value_that_is_long_is_named_by_its_type(case):
+    frame = pd.DataFrame({"gfor.pod_p.K": [100.0]})
+    with pytest.raises(
+        InputError, match="values = something of type DataFrame; give values by name"
+    ):
+        case.scenario("pod_p", frame)
+    with pytest.raises(InputError, match="stop = something of type ndarray; give a time above 0"):
+        case.scenario("gfor").run(stop=np.zeros(100))

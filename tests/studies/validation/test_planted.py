@@ -102,6 +102,16 @@ def test_a_good_recording_is_not_asked_about(good):
     assert asked(good) == []
 
 
+def test_an_angle_at_rest_before_the_event_is_not_held(good):
+    """A recording of a plant at rest has an angle that stays, but for rounding, until the event comes."""
+    short = good[good.time < 3.0]
+    rest = short.time.to_numpy() < 0.9
+    angle = short.angle_deg.to_numpy().copy()
+    angle[rest] = angle[rest][0] * (1 + 1e-15 * (np.arange(rest.sum()) % 17 == 3))
+    assert np.mean(np.diff(angle) == 0) > 0.2
+    assert "angle held" not in [one["kind"] for one in asked(short.assign(angle_deg=angle))]
+
+
 def test_the_remedy_that_is_printed_works_when_it_is_given(good):
     turned = good.assign(p_mw=-good.p_mw)
     (question,) = asked(turned)

@@ -145,9 +145,7 @@ def choose(content: Content, wanted: Sequence[str] = (), *, every: bool = False)
     known = [stated["row"] for stated in content["rows"] if not stated["unknown"]]
     unknown = [name for name in wanted if name not in known]
     if unknown:
-        raise InputError(
-            f"--rows: the certificate has no row {unknown[0]!r}; it has: {', '.join(known)}"
-        )
+        raise InputError(f"the certificate has no row {unknown[0]!r}; it has: {', '.join(known)}")
     if every or wanted:
         return list(wanted) or known
     margins = [
