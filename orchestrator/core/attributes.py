@@ -16,9 +16,8 @@ class NoSuchAttributeError(InputError, AttributeError):
 class KnownNames:
     """Refuses names that it lacks, with the nearest of its own or the place where the name is."""
 
-    elsewhere: ClassVar[
-        Mapping[str, str]
-    ] = {}  # how a name is written that stands at another place
+    # how a name is written that stands at another place
+    _elsewhere: ClassVar[Mapping[str, str]] = {}
 
     if not TYPE_CHECKING:  # type checkers would take every name for known
 
@@ -31,8 +30,8 @@ class KnownNames:
             raise NoSuchAttributeError(f"{absent}{self._hint(name)}")
 
     def _hint(self, name: str) -> str:
-        if name in self.elsewhere:
-            return f"; it is {self.elsewhere[name]}"
+        if name in self._elsewhere:
+            return f"; it is {self._elsewhere[name]}"
         own = [known for known in dir(self) if not known.startswith("_")]
         near = difflib.get_close_matches(name, own, 1)
         return f"; did you mean .{near[0]}?" if near else f"; it has {', '.join(own)}"
@@ -41,12 +40,12 @@ class KnownNames:
 class Unchanged(KnownNames):
     """Refuses that a public name is set which it does not have: nothing would read it."""
 
-    own: ClassVar[frozenset[str]] = frozenset()  # names that it sets itself
-    instead: ClassVar[str] = ""  # how it is changed
+    _own: ClassVar[frozenset[str]] = frozenset()  # names that it sets itself
+    _instead: ClassVar[str] = ""  # how it is changed
 
     def __setattr__(self, name: str, value: object) -> None:
-        if name not in self.own and not name.startswith("_"):
+        if name not in self._own and not name.startswith("_"):
             raise NoSuchAttributeError(
-                f"{type(self).__name__}.{name} cannot be set, and nothing was changed; {self.instead}"
+                f"{type(self).__name__}.{name} cannot be set, and nothing was changed; {self._instead}"
             )
         super().__setattr__(name, value)

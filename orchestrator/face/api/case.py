@@ -125,8 +125,8 @@ class Case(Unchanged):
     <Case two_area: base, gfor, pod_p, pod_q, pod_pq>
     """
 
-    own = frozenset({"file"})
-    instead = "with_(…) makes a case with other tables"
+    _own = frozenset({"file"})
+    _instead = "with_(…) makes a case with other tables"
 
     def __init__(self, file: CaseFile) -> None:
         if not isinstance(file, CaseFile):

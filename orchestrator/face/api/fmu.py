@@ -33,8 +33,8 @@ class Fmu(Unchanged, Closing):
         Where it stands [s].
     """
 
-    own = frozenset({"description", "time"})
-    instead = "set({…}) gives its variables values"
+    _own = frozenset({"description", "time"})
+    _instead = "set({…}) gives its variables values"
 
     def __init__(
         self, description: FmuDescription, values: Mapping[str, Any], stop: float | None

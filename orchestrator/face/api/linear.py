@@ -52,7 +52,9 @@ class LinearSystem(KnownNames, StateSpace):
     warnings: tuple[str, ...] = ()
     continuous_form: Callable[[], LinearSystem] | None = field(default=None, compare=False)
 
-    elsewhere: ClassVar[Mapping[str, str]] = {"poles": "numpy.linalg.eigvals(model.continuous().A)"}
+    _elsewhere: ClassVar[Mapping[str, str]] = {
+        "poles": "numpy.linalg.eigvals(model.continuous().A)"
+    }
 
     def __post_init__(self) -> None:
         """Protect the matrices, which the verdict is of."""

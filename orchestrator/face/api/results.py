@@ -66,13 +66,15 @@ class Modes(NoTruth, ask=".stability.stable, or len() for the number of modes in
     0.582 Hz, 10.6 %
     """
 
-    elsewhere: ClassVar[Mapping[str, str]] = {
+    _elsewhere: ClassVar[Mapping[str, str]] = {
         "stable": ".stability.stable",
         "verdict": ".stability.verdict",
         **{name: f"modes[0].{name}, or a column of .table()" for name in _OF_EACH},
     }
 
     def __init__(self, result: ModesResult) -> None:
+        if not hasattr(result, "prepared"):
+            raise InputError(f"Modes({result!r}): modes come from load(…).scenario(…).modes()")
         self.result = result
 
     @property
@@ -312,6 +314,10 @@ class Run(NoTruth):
     """
 
     def __init__(self, result: RunResult) -> None:
+        if not hasattr(result, "modes"):
+            raise InputError(
+                f"Run({result!r}): a run comes from load(…).scenario(…).run(); recorded runs are opened by open(…)"
+            )
         self.result = result
 
     @property

@@ -156,11 +156,11 @@ class Scenario(Unchanged):
     0.5
     """
 
-    own = frozenset({"prepared"})
-    instead = (
+    _own = frozenset({"prepared"})
+    _instead = (
         "case.scenario(…) makes a scenario with other values, another step or another schedule"
     )
-    elsewhere: ClassVar[Mapping[str, str]] = {
+    _elsewhere: ClassVar[Mapping[str, str]] = {
         **{name: f"asked of the case: case.{name}(…)" for name in _STUDIES},
         "plot": "run().plot(…), or modes().plot()",
         "stable": "modes().stability.stable, or run().stable",

@@ -318,3 +318,15 @@ def test_a_wrong_value_that_is_long_is_named_by_its_type(case):
         case.scenario("pod_p", frame)
     with pytest.raises(InputError, match="stop = something of type ndarray; give a time above 0"):
         case.scenario("gfor").run(stop=np.zeros(100))
+
+
+@pytest.mark.parametrize("kind", [gfor.Modes, gfor.Run])
+def test_a_result_is_not_made_by_hand(kind):
+    with pytest.raises(InputError, match=r"from load\(…\)\.scenario\(…\)"):
+        kind("two_area")
+
+
+def test_the_tab_key_offers_no_more_than_before(case, scenario, modes):
+    """What errors are made of is not the user's."""
+    for shown in (case, scenario, modes):
+        assert not {"elsewhere", "own", "instead"} & {*dir(shown)}
