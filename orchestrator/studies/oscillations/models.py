@@ -1,4 +1,4 @@
-"""What each unit of a case does by its own linear model: one whose current does something else drives the oscillation.
+"""Comparison of each unit with its own linear model: one whose current does something else drives the oscillation.
 
 Chevalier, Vorobev and Turitsyn, "Using effective generator impedance for forced oscillation source location", IEEE
 Trans. Power Systems 33(6), 2018, with the linear models of the case's own components in the place of fitted ones."""
@@ -70,112 +70,165 @@ def own_models(
             else "no unit of the case is in the record"
         )
         return Opinion(OWN_MODEL, None, False, f"{why} (units: {', '.join(models.units)})", ())
-    names = [p.name for p in places]
-    s, known = 2j * np.pi * found.frequency, [units[name.casefold()] for name in names]
-    means = np.array([complex(p.p.mean(), p.q.mean()) / measured.base for p in places])
-    own = [_frame(u.voltage).T @ u.admittance(s) @ _frame(u.voltage) for u in known]
-    size = np.array([abs(unit.voltage) for unit in known])
+    known = [units[place.name.casefold()] for place in places]
+    currents = _UnexplainedCurrents(models, places, known, 2j * np.pi * found.frequency)
+    currents.measure(measured, found, others)
+    rivals = _Rivals(models, currents)
+    opinion = _opinion_on_a_unit(currents, rivals) or _opinion_on_a_rival(currents, rivals)
+    if opinion is not None:
+        return opinion
+    both = ", ".join(f"{n} {100 * x:.0f} %" for n, x in currents.ranking[:3])
+    why = f"no place alone deviates from its model and explains the voltages (deviations: {both})"
+    return Opinion(OWN_MODEL, None, True, why, currents.ranking)
 
-    def driven(blocks: Complex) -> Complex:
-        """Of each unit the current that its model does not explain, and the voltage, along the mean one and across."""
+
+class _UnexplainedCurrents:
+    """Currents of the observed units that their models do not explain, and the voltages that these bring about.
+
+    ``s``: of the oscillation [rad/s]; ``places`` and ``known``: the units in the record and in the case."""
+
+    def __init__(
+        self, models: UnitModels, places: Sequence[Site], known: Sequence[UnitModel], s: complex
+    ) -> None:
+        self._models = models
+        self._places = places
+        self._s = s
+        self.known = known
+        self.names = [place.name for place in places]
+        self.rows = [models.buses.index(unit.bus) for unit in known]
+        self._size = np.array([abs(unit.voltage) for unit in known])
+        self._own = [_frame(u.voltage).T @ u.admittance(s) @ _frame(u.voltage) for u in known]
+
+    def measure(self, measured: Measurements, found: SpectralLine, others: Sequence[float]) -> None:
+        """Take the currents and voltages of a record, and judge which currents are beyond their errors."""
+        self._base = measured.base
+        self._means = np.array(
+            [complex(p.p.mean(), p.q.mean()) / measured.base for p in self._places]
+        )
+        self.swings = block_phasors(self._places, measured.times, found, others)
+        whole, errors = jackknife(self.swings, self.split)
+        extra, self.voltages = whole[0], whole[1].ravel()
+        self._voltage_errors = errors[1].ravel()
+        amount = np.linalg.norm(extra, axis=1)
+        self.ranking = tuple(
+            (self.names[k], float(amount[k] ** 2 / ((amount**2).sum() or 1.0)))
+            for k in np.argsort(-amount)
+        )
+        beyond_errors = amount > _CERTAIN * np.linalg.norm(errors[0], axis=1)
+        self.sure = np.where(beyond_errors, amount, 0.0)
+        self.effects = [
+            self.reach(unit.reach, unit.voltage) @ extra[k] * (self.sure[k] > 0)
+            for k, unit in enumerate(self.known)
+        ]
+        self.parts = [self.left(effect) for effect in self.effects]
+
+    def split(self, blocks: Complex) -> Complex:
+        """Give of each unit the current that its model does not explain, and the voltage, along the mean and across."""
         p, q, angle, lnv = blocks.reshape(-1, 4).T
-        voltage = size * np.array([lnv, angle])
+        voltage = self._size * np.array([lnv, angle])
+        means = self._means
         turned = means.real * np.array([-lnv, angle]) + means.imag * np.array([angle, lnv])
-        current = (np.array([p, -q]) / measured.base + turned) / size
-        unlike = [current[:, k] - own[k] @ voltage[:, k] for k in range(len(places))]
+        current = (np.array([p, -q]) / self._base + turned) / self._size
+        unlike = [current[:, k] - self._own[k] @ voltage[:, k] for k in range(len(self._places))]
         return np.array([unlike, voltage.T])
 
-    swings = block_phasors(places, measured.times, found, others)
-    whole, errors = jackknife(swings, driven)
-    extra, voltages = whole[0], whole[1].ravel()
-    rows = [models.buses.index(unit.bus) for unit in known]
-
-    def reach(response: Response, frame: complex = 1.0) -> Complex:
-        """To the voltages of the observed units, each in its own frame, from a current in a frame."""
-        parts = response(s).reshape(len(models.buses), 2, -1)
+    def reach(self, response: Response, frame: complex = 1.0) -> Complex:
+        """Give the voltages of the observed units, each in its own frame, for a current in a frame."""
+        parts = response(self._s).reshape(len(self._models.buses), 2, -1)
         there = np.concatenate(
-            [_frame(unit.voltage).T @ parts[b] for b, unit in zip(rows, known, strict=True)]
+            [
+                _frame(unit.voltage).T @ parts[b]
+                for b, unit in zip(self.rows, self.known, strict=True)
+            ]
         )
         return np.asarray(there @ _frame(frame) if there.shape[1] == 2 else there)
 
-    def left(rest: Complex | Numbers) -> float:
-        return float(np.linalg.norm(rest) / (np.linalg.norm(voltages) or 1.0))
+    def left(self, rest: Complex | Numbers) -> float:
+        """Part of all voltages' swing."""
+        return float(np.linalg.norm(rest) / (np.linalg.norm(self.voltages) or 1.0))
 
-    def beyond(effect: Complex) -> float:
-        return left(np.maximum(np.abs(voltages - effect) - _CERTAIN * errors[1].ravel(), 0.0))
+    def beyond(self, effect: Complex) -> float:
+        """Part that an effect leaves unexplained beyond the voltages' errors."""
+        beside = np.abs(self.voltages - effect) - _CERTAIN * self._voltage_errors
+        return self.left(np.maximum(beside, 0.0))
 
-    amount = np.linalg.norm(extra, axis=1)
-    ranking = tuple(
-        (names[k], float(amount[k] ** 2 / ((amount**2).sum() or 1.0))) for k in np.argsort(-amount)
-    )
-    sure = np.where(amount > _CERTAIN * np.linalg.norm(errors[0], axis=1), amount, 0.0)
-    effects = [
-        reach(unit.reach, unit.voltage) @ extra[k] * (sure[k] > 0) for k, unit in enumerate(known)
-    ]
+    def fit(self, there: Complex) -> Complex:
+        """Give the voltages that a current of any size and phase explains best."""
+        return np.asarray(there @ np.linalg.lstsq(there, self.voltages, rcond=None)[0])
+
+    def best(self, there: Complex) -> float:
+        """Part that such a current leaves at least."""
+        return self.left(self.voltages - self.fit(there))
+
+
+class _Rivals:
+    """Places that are not observed, units' buses and loads, with what the best current of each leaves."""
+
+    def __init__(self, models: UnitModels, currents: _UnexplainedCurrents) -> None:
+        observed = {name.casefold() for name in currents.names}
+        self.units = {n: u for n, u in models.units.items() if n.casefold() not in observed}
+        places: dict[str, Response] = {u.bus: u.reach for u in self.units.values()}
+        places = {**places, **models.loads} if len(set(currents.rows)) > 1 else {}
+        self.swung = {name: currents.reach(response) for name, response in places.items()}
+        self.loads = [self.swung[name] for name in models.loads if name in self.swung]
+        self.left = {name: currents.best(there) for name, there in self.swung.items()}
+
+
+def _opinion_on_a_unit(currents: _UnexplainedCurrents, rivals: _Rivals) -> Opinion | None:
+    """Name the observed unit that alone deviates from its model, where that explains the voltages."""
+    known, names, parts, sure = currents.known, currents.names, currents.parts, currents.sure
     top = int(sure.argmax())
-
-    def fitted(there: Complex) -> Complex:
-        return np.asarray(there @ np.linalg.lstsq(there, voltages, rcond=None)[0])
-
-    def best(there: Complex) -> float:
-        return left(voltages - fitted(there))
-
-    unseen = {
-        n: u
-        for n, u in models.units.items()
-        if n.casefold() not in {name.casefold() for name in names}
-    }
-    further = (
-        {**{u.bus: u.reach for u in unseen.values()}, **models.loads} if len(set(rows)) > 1 else {}
-    )
-    swung = {name: reach(response) for name, response in further.items()}
-    rivals = {name: best(there) for name, there in swung.items()}
-    beside = min((x for name, x in rivals.items() if name != known[top].bus), default=1.0)
-    rest, parts = left(voltages - effects[top]), [left(effect) for effect in effects]
+    beside = min((x for name, x in rivals.left.items() if name != known[top].bus), default=1.0)
+    rest = currents.left(currents.voltages - currents.effects[top])
     most = sure[top] > 0 and sure[top] ** 2 >= _SHARE * (sure**2).sum()
     alone = most and max([*parts[:top], *parts[top + 1 :], 0.0]) < _CONTRARY
-    away = np.repeat([unit.bus != known[top].bus for unit in known], 2)
+    if not alone:
+        return None
+    if not _follows(currents, rivals, top):
+        clear = currents.best(currents.reach(known[top].reach)) <= beside
+        if rest >= _EXPLAINED or not clear:
+            return None
+    noisy = ", the rest being noise" if rest > _EXPLAINED else ""
+    why = (
+        f"{names[top]} gives a current that its own linear model does not, and that explains "
+        f"{100 * (1 - rest):.0f} % of what the voltages do{noisy}"
+    )
+    also = [names[k] for k, part in enumerate(parts) if k != top and part > _NOTED]
+    sole = not also and currents.beyond(currents.effects[top]) < _UNEXPLAINED
+    why += "; less so " + ", ".join(also) if also else ""
+    return Opinion(OWN_MODEL, names[top], True, why, currents.ranking, sole)
 
-    def follows(effect: Complex) -> bool:
-        """Whether the voltages elsewhere have an effect in its size and phase, beside what loads do to them all."""
-        loads = np.column_stack(
-            [1e-12 * np.eye(len(voltages)), *(swung[x] for x in models.loads if x in swung)]
-        )
-        noise = loads @ loads.conj().T
-        noise += _OWN_NOISE * np.trace(noise).real / len(noise) * np.eye(len(noise))
-        there = np.linalg.solve(noise[np.ix_(away, away)], effect[away])
-        there /= np.vdot(effect[away], there).real or 1.0
-        factor, error = jackknife(
-            swings, lambda mean: np.vdot(there, driven(mean)[1].ravel()[away])
-        )
-        near = abs(factor) > 2 * _CERTAIN * error and abs(factor - 1) < _EXPLAINED
-        return bool(near and beyond(effect) < _EXPLAINED)
 
-    if alone and (
-        follows(effects[top]) or (rest < _EXPLAINED and best(reach(known[top].reach)) <= beside)
-    ):
-        noisy = ", the rest being noise" if rest > _EXPLAINED else ""
-        why = (
-            f"{names[top]} gives a current that its own linear model does not, and that explains "
-            f"{100 * (1 - rest):.0f} % of what the voltages do{noisy}"
-        )
-        also = [names[k] for k, part in enumerate(parts) if k != top and part > _NOTED]
-        sole = not also and beyond(effects[top]) < _UNEXPLAINED
-        why += "; less so " + ", ".join(also) if also else ""
-        return Opinion(OWN_MODEL, names[top], True, why, ranking, sole)
-    order = sorted(rivals, key=rivals.__getitem__)
-    first, second, *_ = [*(rivals[name] for name in order), 1.0, 1.0]
-    if first < min(_EXPLAINED, _CLEARER * second) and max(parts) < _CONTRARY:
-        name = " or ".join(n for n, u in unseen.items() if u.bus == order[0]) or order[0]
-        why = (
-            f"the units that are observed do as their models, and a current of {name} explains "
-            f"{100 * (1 - first):.0f} % of what the voltages do"
-        )
-        sole = max(parts) < _NOTED and beyond(fitted(swung[order[0]])) < _UNEXPLAINED
-        return Opinion(OWN_MODEL, name, True, why, ranking, sole)
-    both = ", ".join(f"{n} {100 * x:.0f} %" for n, x in ranking[:3])
-    why = f"no place alone deviates from its model and explains the voltages (deviations: {both})"
-    return Opinion(OWN_MODEL, None, True, why, ranking)
+def _follows(currents: _UnexplainedCurrents, rivals: _Rivals, top: int) -> bool:
+    """Tell if the voltages elsewhere have a unit's effect in its size and phase, beside what loads do to them all."""
+    effect, size = currents.effects[top], len(currents.voltages)
+    away = np.repeat([unit.bus != currents.known[top].bus for unit in currents.known], 2)
+    loads = np.column_stack([1e-12 * np.eye(size), *rivals.loads])
+    noise = loads @ loads.conj().T
+    noise += _OWN_NOISE * np.trace(noise).real / len(noise) * np.eye(len(noise))
+    there = np.linalg.solve(noise[np.ix_(away, away)], effect[away])
+    there /= np.vdot(effect[away], there).real or 1.0
+    factor, error = jackknife(
+        currents.swings, lambda mean: np.vdot(there, currents.split(mean)[1].ravel()[away])
+    )
+    near = abs(factor) > 2 * _CERTAIN * error and abs(factor - 1) < _EXPLAINED
+    return bool(near and currents.beyond(effect) < _EXPLAINED)
+
+
+def _opinion_on_a_rival(currents: _UnexplainedCurrents, rivals: _Rivals) -> Opinion | None:
+    """Name the unit or load that is not observed and whose current explains the voltages, where one is clearer."""
+    order = sorted(rivals.left, key=rivals.left.__getitem__)
+    first, second, *_ = [*(rivals.left[name] for name in order), 1.0, 1.0]
+    if first >= min(_EXPLAINED, _CLEARER * second) or max(currents.parts) >= _CONTRARY:
+        return None
+    name = " or ".join(n for n, u in rivals.units.items() if u.bus == order[0]) or order[0]
+    why = (
+        f"the units that are observed do as their models, and a current of {name} explains "
+        f"{100 * (1 - first):.0f} % of what the voltages do"
+    )
+    unexplained = currents.beyond(currents.fit(rivals.swung[order[0]]))
+    sole = max(currents.parts) < _NOTED and unexplained < _UNEXPLAINED
+    return Opinion(OWN_MODEL, name, True, why, currents.ranking, sole)
 
 
 def power_there(place: Site, base: float) -> complex:
