@@ -122,9 +122,9 @@ def _spelt_today(words: Sequence[str]) -> list[str]:
 
 def commands() -> dict[str, str]:
     """Return our commands and the studies of other distributions, with what each is for."""
-    from orchestrator.studies.added import others  # noqa: PLC0415 - imports what all studies need
+    from orchestrator.studies.added import unlisted  # noqa: PLC0415 - imports what all studies need
 
-    added = {name.replace("_", "-"): words for name, words in others().items()}
+    added = unlisted(COMMANDS)
     for name in added.keys() & {name.partition(" ")[0] for name in COMMANDS}:
         print(
             f"note: the study {name!r} is not used, as gfor {name} is a command of gfor-cosim: {added[name]}; "
