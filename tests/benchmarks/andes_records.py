@@ -1,4 +1,4 @@
-"""Exciters, stabilisers and a compensator at one machine, in ANDES: ``python -m tests.benchmarks.andes_records``.
+"""Exciters, stabilisers, governors and compensators in ANDES: ``python -m tests.benchmarks.andes_records``.
 
 Needs the extra ``peers``; writes ``andes_records.json``. One machine (GENROU) at an infinite bus; eigenvalues in rad/s,
 of a pair the upper one. Where the source depends on the terminal (IEEET3, ESST3A) ANDES' eigenvalues hold it constant,
@@ -71,6 +71,10 @@ RECORDS: dict[str, tuple[str, ...]] = {
         "IEEEST MODE=3 busr=0 A1=0.06 A2=0.0017 A3=0.02 A4=0.001 A5=0.03 A6=0.001 T1=0.2 T2=0.05 T3=0.1 T4=0.03 T5=1.4 "
         "T6=1.1 KS=-0.5 LSMAX=0.3 LSMIN=-0.3 VCU=0 VCL=0",
     ),
+    "SEXS, IEESGO": (
+        f"SEXS {SEXS}",
+        "IEESGO T1=0.12 T2=0.3 T3=0.5 T4=0.25 T5=7 T6=0.4 K1=20 K2=0.7 K3=0.4 PMAX=1.5 PMIN=0",
+    ),
 }
 """By what is compared: records with ANDES' names of the parameters, in the order of PSS/E's records."""
 
@@ -85,6 +89,7 @@ RUNS: dict[str, tuple[str, ...]] = {
 }
 """Those of which the machine's voltage after a step of the reference is compared."""
 
+GOVERNORS = ("IEESGO",)
 STEP_OF_REFERENCE, UNTIL, EVERY = 0.01, 5.0, 0.1  # pu, and s after the step
 _BEFORE = 1.0  # s before it
 _FREQUENCY_POLES = (
@@ -118,7 +123,7 @@ def _system(records: tuple[str, ...]) -> Any:
         values: dict[str, Any] = dict(pair.split("=") for pair in given)
         numbers = {name: float(text) for name, text in values.items() if name not in _REMOTE}
         is_exciter = record is records[0]
-        at = {"syn": "G"} if is_exciter else {"avr": "X"}
+        at = {"syn": "G"} if is_exciter or kind in GOVERNORS else {"avr": "X"}
         made.add(kind, idx="X" if is_exciter else "Y", **at, **numbers)
     made.setup()
     made.PFlow.run()
