@@ -95,7 +95,7 @@ UNREACHED = {
     "DEGOV": "the recordings are PowerWorld's, not PSS/E's",
     "DERA": "no part stands for DERA",
     "GAST (14 buses)": "several machines: `gfor new` and `gfor run`",
-    "LOAD": "loads of constant power and current: `gfor new` and `gfor run`",
+    "LOAD": "loads of constant power and current, by `gfor run`: page of conventions",
     "MultiGen": "several machines and converters: `gfor new` and `gfor run`",
     "PSS2A, PSS2B, PSS2C": "no DYR record of the stabiliser",
     "RENA": "converters: REGCA1 and REECB1",
