@@ -20,7 +20,7 @@ from orchestrator.cases.new_case import WantedCase, write_case
 from orchestrator.studies.modes.modes import ModesResult, compute_modes
 from tests.benchmarks.second_computation import read, spectrum
 
-STEP = "0.5 ms"  # constant powers follow the voltage by a lag of about a step: 2 ms move Brazil's modes by 0.3 points
+STEP = "0.5 ms"  # 2 ms, which take the loads' laws explicitly, move a mode of Brazil by 0.3 points
 BAND = 0.2, 2.5  # of the modes that are compared [Hz]
 SWINGS = 50.0  # damping up to which an oscillation is compared [%]
 MOST_HERTZ, MOST_POINTS = 0.005, 0.1
