@@ -31,6 +31,7 @@ from orchestrator.devices.fmi.remote_calls import Form, RemoteCalls
 _STAGES = {SET: "fmi2SetReal", STEP: "fmi2DoStep", GET: "fmi2GetReal"}
 _GRACE = 1.0  # time [s] in which what an instance started may end after it
 _SHOWN = 3  # processes that an error names
+_SLOW = 5e-3  # time [s] that a step may take of an FMU that is slow and does not hang
 _LOOK = 0.05  # time [s] after which it is looked whether the process is still there
 
 
@@ -143,7 +144,9 @@ class FmuProcess:
             self._into[: len(into)], self._out[: len(out)] = into, out
             self._room[: some.size] = some.ravel()
             self.time = head.time
+            asked_at = monotonic()
             status = self._ask(RUN, "")
+            self.deadline += min(monotonic() - asked_at, _SLOW * min(count, steps))
             done = min(max(0, asked.done), count)
             self.time = time + (begin + done) * step_size
             read = self._room[some.size : some.size + count * len(out)]

@@ -110,7 +110,7 @@ def after_dips(subject: Subject) -> CheckResult:
         return remarked("after_dips", f"small changes end with an error: {error}", "ask why")
     found: list[_After] = []
     unknown: list[_After] = []
-    spent, budget = spent_since(), _PART * subject.memory.get("run_for", RUN_FOR)
+    spent, budget = spent_since(subject), _PART * subject.memory.get("run_for", RUN_FOR)
     for number, segments in enumerate(_drawn(subject)):
         if number >= len(_ALWAYS) and spent() > budget:
             break

@@ -7,14 +7,14 @@ from math import pi
 import numpy as np
 
 from orchestrator.core.arrays import Numbers
-from orchestrator.devices.acceptance.checks.running import EQUAL
+from orchestrator.devices.acceptance.checks.running import EQUAL, STEP_TAKES
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Subject
 
 # duration of an episode [s]: time for a deep dip of 0.45 s; a slow FMU gets a shorter one
 EPISODE = 1.2
 _HOLD = 10  # steps for which a small step beside the events stays
 _WIGGLE = 0.3  # height of a small step, in parts of the usual one
-_SPENT = 1.0  # time [s] that events may take
+_SPENT = 1.0  # time that events may take [s of a usual FMU]
 # relative difference of two runs with events that counts where they differ slightly without
 _FAINT = 1e-3
 
@@ -61,11 +61,11 @@ def in_words(voltage: complex) -> str:
 
 
 def scale(subject: Subject, seconds: float) -> float:
-    """By what the durations of so many seconds of events are multiplied: less than 1 where it computes slowly or ends.
+    """By what the durations of so many seconds of events are multiplied: below 1 where steps are short or it ends.
 
     An experiment that is declared to be shorter is no bound: limits and signs are looked at for longer as well."""
     steps = seconds / subject.step_size
-    fit = max(200.0, _SPENT / subject.memory.get("seconds_per_step", 1e-6))
+    fit = max(200.0, _SPENT / STEP_TAKES)
     ends = [subject.memory.get(end, seconds) / seconds for end in ("ended_at", "stops_at")]
     return float(min(1.0, fit / steps, *(0.9 * end for end in ends if end < 1)))
 

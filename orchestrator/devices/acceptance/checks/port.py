@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from math import isinf
-from time import perf_counter
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from orchestrator.devices.acceptance.checks.base import (
     passed,
     remarked,
 )
-from orchestrator.devices.acceptance.checks.running import LONGEST, RUN_FOR, affordable
+from orchestrator.devices.acceptance.checks.running import LONGEST, RUN_FOR, affordable, spent_since
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Running, Subject
 from orchestrator.devices.binding.misfits import BALANCE, diagnosis, power_seen
 from orchestrator.devices.fmi.component import RealBatch
@@ -38,7 +37,7 @@ IMPORTING = (OperatingAt(1.0, 0.3, -0.5, 0.15), OperatingAt(1.02, -0.4, -0.3, -0
 # movement of the current in steady state [pu, S_n] that is a fault; 1e-6 is worth a remark
 DRIFT = 1e-3
 ANSWER = 400  # steps of the answer that is compared at several times
-# wall-clock time to spend on a long rest, in parts of the time for which an FMU is made to run
+# steps to spend on a long rest, in parts of the time for which an FMU is made to run
 _PART = 0.75
 _LATER = 10.0  # time [s] for which it is left at rest after the time at which it wandered in 'runs'
 # part of a movement that its second half has where it goes on; of a ramp it is a half
@@ -196,12 +195,12 @@ class _Rest:
 
 def _rest(subject: Subject, running: Running, begin: complex, steps: int) -> _Rest:
     """Leave it at rest until enough was seen, it moves too much, or there is no more time."""
-    until, clock = subject.description.stop_time or 10.0, perf_counter()
+    until, spent = subject.description.stop_time or 10.0, spent_since(subject)
     wanders_at = subject.memory.get("wanders_at", 0.0)
     budget = _PART * subject.memory.get("run_for", RUN_FOR)
     ends, moved = [(0.0, begin), (running.time, present_current(running))], 0.0
     while running.time < LONGEST and moved <= DRIFT:
-        over = perf_counter() - clock > (budget if running.time >= until else 4 * budget)
+        over = spent() > (budget if running.time >= until else 4 * budget)
         if over and (not wanders_at or running.time > wanders_at + _LATER):
             break
         try:

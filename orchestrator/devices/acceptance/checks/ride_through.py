@@ -4,7 +4,6 @@ from cmath import rect
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import pi
-from time import perf_counter
 
 import numpy as np
 
@@ -26,6 +25,7 @@ from orchestrator.devices.acceptance.checks.port import (
     current_limit,
     currents,
 )
+from orchestrator.devices.acceptance.checks.running import RUN_FOR, spent_since
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.devices.binding.misfits import NO_LIMIT
 
@@ -74,9 +74,11 @@ _IN_VOLTAGE = 1.4
 
 # distance of the current from where it was [pu, S_n] from which the next one hits a new instance
 _BACK = 0.3
-# runs, however long they take: at all times, dips that stay, after what lasts, with imported power
+# runs, however many steps they take: at all times, dips that stay, after what lasts, with imported power
 _AT_LEAST = 16
-_PART = 1.5  # wall-clock time to spend, in parts of the time for which an FMU is made to run
+_PART = (
+    2.5  # steps to spend, in parts of those for which an FMU is made to run: of a usual step all
+)
 
 
 @dataclass(frozen=True)
@@ -174,7 +176,7 @@ def limits(subject: Subject) -> CheckResult:
     """Disturb it at several times; a run goes on while it comes back, and begins anew where it does not."""
     if not subject.port:
         return not_applicable("limits", WHY["no port"])
-    begin, budget = perf_counter(), _PART * subject.memory.get("run_for", 2.0)
+    spent, budget = spent_since(subject), _PART * subject.memory.get("run_for", RUN_FOR)
     answers, refused = list[Answer](), list[str]()
     other_way = ""
     left_out = 0
@@ -185,7 +187,7 @@ def limits(subject: Subject) -> CheckResult:
             other_way = cannot_import(subject, rest[0].point) if subject.starts else ""
             rest = rest if subject.starts and not other_way else []
         while rest:
-            if number >= _AT_LEAST and perf_counter() - begin > budget:
+            if number >= _AT_LEAST and spent() > budget:
                 left_out += len(rest)
                 break
             bad = _disturbed(subject, rest, answers, refused)
@@ -292,7 +294,7 @@ def _judge(
         f"{worst.mean:.3g} pu of its rating over a cycle, from {1000 * _LASTS:g} ms on, in {worst.event}, "
         f"peak {highest.peak:.3g} pu in {highest.event}"
     )
-    seen += f"; {left_out} more were left out for time" if left_out else ""
+    seen += f"; {left_out} more were left out, for their steps" if left_out else ""
     figures = {
         "peak": highest.peak,
         "mean": worst.mean,

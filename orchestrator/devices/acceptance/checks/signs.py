@@ -20,7 +20,7 @@ from orchestrator.devices.acceptance.checks.base import (
     remarked,
 )
 from orchestrator.devices.acceptance.checks.port import WHY, cannot_import, of_current
-from orchestrator.devices.acceptance.checks.running import affordable
+from orchestrator.devices.acceptance.checks.running import STEP_TAKES, affordable
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.devices.binding.misfits import (
     SLIGHT,
@@ -33,6 +33,7 @@ from orchestrator.devices.binding.misfits import (
 from orchestrator.devices.fmi.port import BoundDescription
 
 _LASTS = 3.0  # time in which an answer settles [s]
+_MOST_TIME = 1.0  # of one answer [s of a usual FMU]
 _SHORTER = 0.67  # part of that time at other voltages
 
 _EARLY = (0.005, 0.025)
@@ -109,7 +110,7 @@ def signs(subject: Subject) -> CheckResult:
     """Small changes while it gives reactive power, while it takes some, and where a case uses it."""
     if not subject.port:
         return not_applicable("signs", WHY["no port"])
-    fit = 1.0 / subject.memory.get("seconds_per_step", 1e-6)
+    fit = _MOST_TIME / STEP_TAKES
     steps = int(min(_LASTS / subject.step_size, fit))
     if steps * subject.step_size < 0.5:
         return not_applicable(

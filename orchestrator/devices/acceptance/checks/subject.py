@@ -55,6 +55,7 @@ class Subject:
     ``step_size``: Communication step of the tests [s].
     ``step_is_given``: Whether the file declares it or the user asks for it.
     ``memory``: Results that several checks share.
+    ``steps_made``: How many steps its instances have made.
     ``start_time``: At which its instances begin [s]."""
 
     # gives the process in which it runs, a new one after its end; whoever runs checks sets it.
@@ -68,6 +69,7 @@ class Subject:
         self.description, self.directory, self.doing, self.seed = description, directory, "", seed
         self.use, self.start_time = use or Use(), 0.0
         self.memory: dict[str, Any] = {}
+        self.steps_made = 0
         variables = description.variables
         self.inputs = tuple(n for n in description.inputs if variables[n].type == "Real")
         self.outputs = tuple(n for n in description.outputs if variables[n].type == "Real")
@@ -291,6 +293,7 @@ class Running(Closing):
 
     def step(self, step_size: float) -> None:
         self.component.step(self.time, step_size)
+        self.subject.steps_made += 1
         self.time += step_size
 
     def record(self, steps: int, step_size: float, stimulus: Stimulus) -> Numbers:
@@ -315,6 +318,7 @@ class Running(Closing):
             rows = np.ascontiguousarray((self.rest + deviations)[:, self.order])
         values = self.component.run(self._in, rows, self._out, steps, begin, step_size)
         self.time = begin + steps * step_size
+        self.subject.steps_made += steps
         return values
 
     def save(self) -> Any:
