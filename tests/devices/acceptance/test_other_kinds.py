@@ -79,3 +79,17 @@ def test_a_range_of_the_frequency_is_below_the_rated_one(tmp_path):
     (*_, found) = check_fmu(file, path, LIMITS, ("binding",)).results
     assert found.verdict == "fail"
     assert "frequency_range = 60 Hz; it must be above 0 and below f_n" in found.evidence
+
+
+def test_a_phasor_model_without_a_current_loop_is_told_as_such_and_not_failed(fmu_path):
+    """Its current is a function of the voltage, and of whatever size; a device's is not, and must be limited."""
+    (_, found) = check_fmu(fmu_path("gfor_phasor"), None, LIMITS, ("limits",), run_for=0.3).results
+    assert found.verdict == "remark"
+    assert "a phasor model without a current loop" in found.evidence
+    assert found.figures["not_judged"].startswith("what limits its current")
+
+
+def test_a_current_that_nothing_limits_is_told_in_these_words(gallery):
+    (failure,) = check_fmu(*gallery("no_limit"), LIMITS, ("limits",), run_for=0.3).failures
+    assert failure.fault == "no current limit"
+    assert failure.evidence.startswith("nothing limits its current: ")

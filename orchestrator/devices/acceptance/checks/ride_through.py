@@ -4,6 +4,7 @@ from cmath import rect
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import pi
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from orchestrator.devices.acceptance.checks.port import (
     cannot_import,
     current_limit,
     currents,
+    present_current,
 )
 from orchestrator.devices.acceptance.checks.running import RUN_FOR, spent_since
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Subject
@@ -54,6 +56,10 @@ _STAY = (
 _ABOVE = 1.05  # part of a limit that a current may reach over a cycle
 _SERIES = 4  # events before one that are a series
 _KEPT = 0.8  # part of the current in a dip that a limit gives after a series of events, at least
+_LESS = 0.02  # voltage [pu] by which it is lowered to see if its current follows at once
+_MOST_OF_IT = (
+    0.5  # part of the answer over a period that a current gives at once which is algebraic
+)
 _BLOCKED = 0.02  # current of a device that blocks [pu, S_n]
 _GIVES = 0.1  # current of a device that gives any [pu, S_n]
 
@@ -254,6 +260,19 @@ def _disturbed(
     return None
 
 
+def _follows_at_once(subject: Subject) -> bool:
+    """Return whether its current is a function of the voltage: it answers a change of it before any step."""
+    names = subject.inputs
+    with subject.running() as running:
+        before = present_current(running)
+        change = np.zeros(len(names))
+        change[names.index("v_re")] = -_LESS
+        running.feed(change)
+        at_once = present_current(running) - before
+        settled = currents(running, -_LESS, max(1, round(_CYCLE / subject.step_size)))[-1] - before
+    return bool(abs(at_once) > _MOST_OF_IT * abs(settled))
+
+
 def _lower_limit(answers: list[Answer]) -> str:
     """Say that its limit is lower after a series of events than before; "" if it is not."""
     late = next((a for a in answers if len(a.event.before) > _SERIES), None)
@@ -287,7 +306,6 @@ def _judge(
     if not answers:
         return remarked("limits", "; ".join(refused[:2]), "ask how it rides through")
     worst, highest = max(answers, key=lambda a: a.mean), max(answers, key=lambda a: a.peak)
-    lost = [a for a in answers if a.away > _BACK]
     declared = current_limit(subject)
     seen = (
         f"{len(answers)} dips, overvoltages and jumps at {_TIMES[0]:g} to {_TIMES[-1]:g} s, drawn at random: at most "
@@ -295,7 +313,7 @@ def _judge(
         f"peak {highest.peak:.3g} pu in {highest.event}"
     )
     seen += f"; {left_out} more were left out, for their steps" if left_out else ""
-    figures = {
+    figures: dict[str, Any] = {
         "peak": highest.peak,
         "mean": worst.mean,
         "declared": declared,
@@ -311,8 +329,15 @@ def _judge(
     seen += (
         "; it is a machine, whose current nothing limits" if machine and declared is None else ""
     )
+    if unsaid and worst.mean > NO_LIMIT and _follows_at_once(subject):
+        seen += "; nothing limits its current, which follows the voltage at once: a phasor model without a current loop"
+        figures["not_judged"] = "what limits its current, which a phasor model without a loop lacks"
+        machine, unsaid = True, False
     if unsaid and worst.mean > NO_LIMIT:
-        return failed("limits", "no current limit", seen, **figures)
+        says = f"nothing limits its current: {worst.mean:.3g} pu in {worst.event}, where no converter gives more "
+        return failed(
+            "limits", "no current limit", f"{says}than {NO_LIMIT:g} pu; {seen}", **figures
+        )
     turned = [a for a in answers if a.event.factor.imag]
     late = max((a for a in turned if a.event.before), key=lambda a: a.early, default=None)
     alike = [
@@ -342,6 +367,15 @@ def _judge(
             f"a limit that acts in some dips only: {says}; {seen}",
             **figures,
         )
+    return _return_of(answers, refused, seen, figures)
+
+
+def _return_of(
+    answers: list[Answer], refused: list[str], seen: str, figures: dict[str, Any]
+) -> CheckResult:
+    """Judge if it stays on and comes back."""
+    highest = max(answers, key=lambda a: a.peak)
+    lost = [a for a in answers if a.away > _BACK]
     longest = max(answers, key=lambda a: a.blocked)
     if longest.blocked > _BLOCKS_FOR:
         says = f"it gives no current for {1000 * longest.blocked:.0f} ms at a healthy voltage around {longest.event}"
@@ -362,7 +396,7 @@ def _judge(
         seen += f"; it is {lost[0].away:.2g} pu away after {lost[0].event}" + (
             f", and after {len(lost) - 1} more" if len(lost) > 1 else ""
         )
-    if lost or refused or gone or highest.peak > 10:
+    if lost or refused or gone or highest.peak > 10 or "not_judged" in figures:
         return remarked(
             "limits", seen, "ask how it limits its current and rides through", **figures
         )
