@@ -332,7 +332,8 @@ def _judge(
     if unsaid and worst.mean > NO_LIMIT and _follows_at_once(subject):
         seen += "; nothing limits its current, which follows the voltage at once: a phasor model without a current loop"
         figures["not_judged"] = "what limits its current, which a phasor model without a loop lacks"
-        machine, unsaid = True, False
+        machine = True
+        unsaid = False
     if unsaid and worst.mean > NO_LIMIT:
         says = f"nothing limits its current: {worst.mean:.3g} pu in {worst.event}, where no converter gives more "
         return failed(

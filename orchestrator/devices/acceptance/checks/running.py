@@ -45,7 +45,8 @@ def runs(subject: Subject) -> CheckResult:
     h, ends = subject.step_size, subject.description.stop_time or 10.0
     stimulus, least = subject.steps(hold=_HELD * h), subject.memory.get("run_for", RUN_FOR)
     with subject.running() as running:
-        spent, k = spent_since(subject), 0
+        spent = spent_since(subject)
+        k = 0
         sizes = subject.memory["bytes"] = []
         seen, taken = list[Numbers](), list[float]()
         while k * h < max(ends, LONGEST) and spent() < (
