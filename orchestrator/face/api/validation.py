@@ -48,6 +48,7 @@ def validate(
     fit: str | Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
     hold_back: Recorded | Sequence[Recorded] = (),
+    beside: str | Path | None = None,
     explain: bool = False,
     start: Time | None = None,
     stop: Time | None = None,
@@ -89,6 +90,9 @@ def validate(
         Of fitted parameters, in their units; by default what the device declares.
     hold_back
         Recordings that are not fitted, and confirm the fit.
+    beside
+        Another model of the same plant, such as its EMT model beside the phasor model: driven, compared and judged in
+        the same way. It takes those ``values`` that it knows.
     explain
         Whether to look for one parameter that would explain the errors.
     start, stop
@@ -140,6 +144,7 @@ def validate(
         limits=None if limits is None else read_limits(path_of(limits, "limits")),
         fit=_names_of(fit),
         bounds=bounds or {},
+        beside=None if beside is None else _other(beside, found, values, step_size),
         explain=explain,
     )
     return Validation(validate_device(request, report))
@@ -204,6 +209,21 @@ def _alone(
     else:
         rated_hz = float(own.get("f_n", _declared(description, "f_n", _RATED_HZ)))
     return PlayedDevice(path.stem, description, own, rating, rated_hz, step)
+
+
+def _other(
+    device: str | Path, first: PlayedDevice, values: Mapping[str, Any] | None, step: float
+) -> PlayedDevice:
+    """Another model with the values that it knows, and the rating of the first."""
+    path = path_of(device, "beside")
+    of_ours = not path.exists() and path.suffix.lower() not in _FMUS
+    description = _of_ours(str(device)) if of_ours else bound_fmu(path, None)
+    given = {"S_n": first.rating, **first.values, **plain(values)}
+    known = {name: value for name, value in given.items() if name in description.variables}
+    own = values_for(description, known)
+    rating = float(own.get("S_n", _declared(description, "S_n", 100.0)))
+    name = path.stem if path.stem != first.name else f"{path.parent.name}/{path.stem}"
+    return PlayedDevice(name, description, own, rating, first.rated_hz, step)
 
 
 def _declared(description: FmuDescription, name: str, otherwise: float) -> float:

@@ -62,6 +62,7 @@ def _keywords(options: argparse.Namespace) -> dict[str, Any]:
         "fit": options.fit,
         "bounds": dict(options.bounds),
         "hold_back": options.hold_back,
+        "beside": options.beside,
         "explain": options.explain,
         "start": options.start,
         "stop": options.stop,

@@ -65,9 +65,16 @@ class Criterion:
     limit: float
     noise: float
     verdict: LimitVerdict
+    device: str = ""
+
+    @property
+    def place(self) -> str:
+        """The recording, and which model was driven by it."""
+        return f"{self.recording}, {self.device}"
 
     def as_json(self) -> dict[str, Any]:
         return {
+            "device": self.device,
             "recording": self.recording,
             "name": self.name,
             "unit": self.unit,

@@ -10,7 +10,12 @@ from orchestrator.output.report.html.charts import ChartCurve, legend, line_char
 from orchestrator.output.report.html.elements import Figures, colour, document, listed, table
 from orchestrator.studies.validation.event import EventComparison
 from orchestrator.studies.validation.study import ValidationResult
-from orchestrator.studies.validation.words import fit_sentence, sentence, untold_words
+from orchestrator.studies.validation.words import (
+    difference_sentence,
+    fit_sentence,
+    sentence,
+    untold_words,
+)
 
 _POWERS = ("p", "q")
 _NAMES = {"p": "P", "q": "Q", "i_p": "active current", "i_q": "reactive current"}
@@ -28,6 +33,8 @@ def validation_page(result: ValidationResult) -> str:
     device = result.request.device
     chapters = [("Model", _model(result))]
     chapters += [(one.event.recording.label, _event(one, figures)) for one in result.comparisons]
+    if result.others:
+        chapters.append(("Two models of one plant", _beside(result)))
     if result.criteria:
         chapters.append(("Limits", _limits(result)))
     if result.fit is not None:
@@ -102,11 +109,29 @@ def _errors(one: EventComparison) -> str:
     return table("Errors [pu of the rating]", columns, rows, left=2)
 
 
+def _beside(result: ValidationResult) -> str:
+    first, second = result.comparisons[0].device.name, result.others[0].device.name
+    rows = [
+        [
+            escape(one.recording),
+            one.window,
+            one.signal.upper(),
+            *(f"{x:.4f}" for x in (one.first, one.second, one.apart, one.largest)),
+        ]
+        for one in result.apart
+    ]
+    columns = ["Recording", "Window", "", escape(first), escape(second), "Apart", "Most apart"]
+    places = [one for one in result.apart if one.more_than_from_record]
+    said = f"<p>{escape(difference_sentence(places))}</p>" if places else ""
+    title = "Rms from the recording, and from each other [pu of the rating]"
+    return said + table(title, columns, rows, left=3)
+
+
 def _limits(result: ValidationResult) -> str:
     limits = result.request.limits
     rows = [
         [
-            escape(one.recording),
+            escape(one.place),
             escape(one.name),
             "–" if one.value is None else f"{one.value:.4g} {one.unit}",
             f"{one.limit:g} {one.unit}",

@@ -9,6 +9,7 @@ from typing import Any
 
 from orchestrator.core.errors import CosimError, InputError
 from orchestrator.core.late import xr
+from orchestrator.studies.validation.beside import WindowApart, models_apart
 from orchestrator.studies.validation.between import with_doubt_between
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import (
@@ -60,6 +61,7 @@ class ValidationRequest:
     limits: LimitTables | None = None
     fit: Sequence[str] = ()  # parameters that are fitted
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    beside: PlayedDevice | None = None  # another model of the same plant
     explain: bool = False  # whether it is asked which one parameter would explain the errors
 
 
@@ -92,6 +94,13 @@ class ValidationResult:
     fit: Fit | None = None
     confirmations: Sequence[FitCheck] = field(default=())
     explanations: Sequence[Explanation] = field(default=())
+    others: Sequence[EventComparison] = field(default=())  # of the other model, in the same order
+
+    @property
+    def apart(self) -> list[WindowApart]:
+        """How far two models are from the recordings and from each other; empty where there is one."""
+        pairs = zip(self.comparisons, self.others, strict=False)
+        return [one for first, second in pairs for one in models_apart(first, second)]
 
 
 def events_of(request: ValidationRequest) -> list[RecordedEvent]:
@@ -132,12 +141,33 @@ def validate_device(
         comparison = _compare(request.device, event)
         asked = question_readings(comparison, request.bases)
         comparisons.append(replace(comparison, questions=comparison.questions + tuple(asked)))
-    result = add_verdict(ValidationResult(request, comparisons))
+    others = _others(request, [one.event for one in comparisons], report)
+    result = add_verdict(ValidationResult(request, comparisons, others=others))
     if request.explain:
         events = [one.event for one in result.comparisons]
         found = explain_errors(request.device, events, report)
         result = replace(result, explanations=found)
     return add_fit(result, report) if request.fit else result
+
+
+def _others(
+    request: ValidationRequest, events: Sequence[RecordedEvent], report: Report
+) -> list[EventComparison]:
+    """The comparisons of the other model of the plant, where there is one."""
+    device = request.beside
+    if device is None:
+        return []
+    device.check_port()
+    if not math.isclose(device.rating, request.device.rating, rel_tol=1e-9):
+        raise InputError(
+            f"--beside {device.name}: its rating is {device.rating:g} MVA, and that of {request.device.name} is "
+            f"{request.device.rating:g} MVA; give both the plant's, with --set S_n=…"
+        )
+    found = []
+    for event in events:
+        report(f"{event.recording.label}: driving {device.name}")
+        found.append(_compare(device, event))
+    return found
 
 
 def add_fit(result: ValidationResult, report: Report) -> ValidationResult:
@@ -177,7 +207,10 @@ def add_verdict(result: ValidationResult) -> ValidationResult:
     limits = result.request.limits
     if limits is None:
         return result
+    comparisons = [*result.comparisons, *result.others]
     criteria = [
-        one for comparison in result.comparisons for one in judge_limits(limits, comparison)
+        replace(one, device=comparison.device.name)
+        for comparison in comparisons
+        for one in judge_limits(limits, comparison)
     ]
-    return replace(result, criteria=criteria, verdict=verdict_of(criteria, result.comparisons))
+    return replace(result, criteria=criteria, verdict=verdict_of(criteria, comparisons))

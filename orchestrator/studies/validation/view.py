@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,12 @@ from orchestrator.studies.validation.fit import Fit
 from orchestrator.studies.validation.limits import Criterion, LimitVerdict
 from orchestrator.studies.validation.questions import Question
 from orchestrator.studies.validation.study import FitCheck, ValidationResult
-from orchestrator.studies.validation.words import fit_sentence, sentence, untold_words
+from orchestrator.studies.validation.words import (
+    difference_sentence,
+    fit_sentence,
+    sentence,
+    untold_words,
+)
 
 _GOOD = {LimitVerdict.MET: True, LimitVerdict.NOT_MET: False, LimitVerdict.OPEN: None}
 _POWERS = ("p", "q")
@@ -51,11 +57,14 @@ class Validation:
     @property
     def questions(self) -> list[str]:
         """Doubts about the recordings, in sentences."""
-        return [
-            f"{one.event.recording.label}: {sentence(question)}"
-            for one in self.result.comparisons
-            for question in one.questions
-        ]
+        found = []
+        for one in self.result.comparisons:
+            found += [f"{one.event.recording.label}: {sentence(asked)}" for asked in one.questions]
+        for one in self.result.others:
+            place = f"{one.event.recording.label}, {one.device.name}"
+            own = one.questions[len(one.event.questions) :]
+            found += [f"{place}: {sentence(asked)}" for asked in own]
+        return found
 
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor validate --json`` prints, as JSON's types."""
@@ -73,9 +82,18 @@ class Validation:
             "verdict": self.verdict,
             "limits": None if limits is None else limits.source,
             "criteria": criteria,
+            **self._beside_json(),
             **self._fit_json(),
             **self._explained_json(),
         }
+
+    def _beside_json(self) -> dict[str, Any]:
+        other = self.result.request.beside
+        if other is None:
+            return {}
+        events = [_event_json(one) for one in self.result.others]
+        apart = [one.as_json() for one in self.result.apart]
+        return {"beside": {"device": other.name, "events": events, "apart": apart}}
 
     def _explained_json(self) -> dict[str, Any]:
         if not self.result.request.explain:
@@ -195,10 +213,13 @@ def _question_json(question: Question) -> dict[str, Any]:
 def parts(found: Validation) -> Iterator[RenderableType]:
     """The first screen: whether it is met, the worst error of each event, the windows, and what is asked."""
     result = found.result
+    yield from _differences(result)
     yield _answer(found)
     yield _events_table(result)
     for one in result.comparisons:
         yield _windows_table(one)
+    if result.others:
+        yield _beside_table(result)
     if result.criteria:
         yield _criteria_table(result.criteria)
     if result.explanations:
@@ -209,6 +230,29 @@ def parts(found: Validation) -> Iterator[RenderableType]:
         yield escape(
             fit_sentence(result.fit, [c.recording for c in result.confirmations if not c.fitted])
         )
+
+
+def _differences(result: ValidationResult) -> Iterator[str]:
+    """Where two models differ from each other more than from the recording."""
+    places = [one for one in result.apart if one.more_than_from_record]
+    if places:
+        yield escape(difference_sentence(places))
+
+
+def _beside_table(result: ValidationResult) -> PlainTable:
+    first, second = result.comparisons[0].device.name, result.others[0].device.name
+    rows = [
+        (
+            one.recording,
+            one.window,
+            one.signal.upper(),
+            *(f"{x:.4f}" for x in (one.first, one.second, one.apart, one.largest)),
+        )
+        for one in result.apart
+    ]
+    columns = ("Recording", "Window", "", first, second, "apart", "most apart")
+    title = "Two models of one plant: rms from the recording, and from each other [pu]"
+    return make_table(title, *columns, rows=rows, left=3)
 
 
 def _answer(found: Validation) -> str:
@@ -342,11 +386,12 @@ def _confirmation_table(confirmations: Sequence[FitCheck]) -> PlainTable:
 
 
 def _criteria_table(criteria: list[Criterion] | Any) -> PlainTable:
+    named = attrgetter("place" if len({one.device for one in criteria}) > 1 else "recording")
     order = {LimitVerdict.NOT_MET: 0, LimitVerdict.OPEN: 1, LimitVerdict.MET: 2}
     worst = sorted(criteria, key=lambda one: (order[one.verdict], -(one.value or 0) / one.limit))
     rows = [
         (
-            one.recording,
+            named(one),
             one.name,
             "–" if one.value is None else f"{one.value:.4g} {one.unit}",
             f"{one.limit:g} {one.unit}",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from orchestrator.studies.validation.beside import WindowApart
 from orchestrator.studies.validation.fit import Fit, FittedParameter, Untold
 from orchestrator.studies.validation.questions import Question, QuestionKind
 
@@ -220,6 +221,17 @@ def untold_words(one: FittedParameter) -> str:
             return "no: it ends at its bound"
         case Untold.WIDE:
             return "no: its interval is as large as itself"
+
+
+def difference_sentence(places: Sequence[WindowApart]) -> str:
+    """Say that two models of a plant differ from each other more than from the recording, and where the most."""
+    worst = max(places, key=lambda one: one.apart)
+    many = "" if len(places) == 1 else f", and in {len(places) - 1} more of the table's rows"
+    return (
+        f"The two models differ from each other more than from the record: {worst.signal.upper()} {worst.window} the "
+        f"event of {worst.recording} by {worst.apart:.3g} pu (rms), from the record by {worst.first:.3g} and "
+        f"{worst.second:.3g} pu{many}."
+    )
 
 
 def fit_sentence(fit: Fit, kept_back: Sequence[str]) -> str:

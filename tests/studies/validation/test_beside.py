@@ -1,0 +1,44 @@
+"""Two models of one plant beside one recording: the phasor model and the EMT model."""
+
+import json
+
+import orchestrator as gfor_in_python
+from orchestrator.studies.validation.beside import models_apart
+from orchestrator.studies.validation.limits import EXAMPLE
+from orchestrator.studies.validation.words import difference_sentence
+from tests.studies.validation.recordings import run, table, with_noise, written
+
+ON = {"pod_p.enabled": True}
+
+
+def test_the_phasor_and_the_emt_model_come_out_of_one_command(gfor, tmp_path):
+    path = written(with_noise(table(run())), tmp_path)
+    options = ("--set", "pod_p.enabled=true", "--beside", "gfor", "--limits", str(EXAMPLE))
+    code, out, _ = gfor("validate", "gfor_phasor", str(path), *options, "--json")
+    assert code == 0
+    content = json.loads(out)
+    assert content["verdict"] == "met"
+    assert {one["device"] for one in content["criteria"]} == {"gfor_phasor", "gfor"}
+    beside = content["beside"]
+    assert beside["device"] == "gfor"
+    rows = {(one["window"], one["signal"]): one for one in beside["apart"]}
+    assert len(rows) == 6
+    assert rows["after", "p"]["apart_max_pu"] < 0.01
+    assert all(
+        abs(one["apart_rms_pu"]) <= one["first_rms_pu"] + one["second_rms_pu"]
+        for one in beside["apart"]
+    )
+
+
+def test_models_that_differ_more_from_each_other_than_from_the_record_are_told():
+    # the plant's gain lies between those of its two models
+    recording = with_noise(table(run("pod_p", gfor__pod_p__K=120.0))).set_index("time")
+    first, second = (
+        gfor_in_python.validate("gfor", recording, values=ON | {"pod_p.K": gain}).result
+        for gain in (60.0, 180.0)
+    )
+    apart = models_apart(first.comparisons[0], second.comparisons[0])
+    places = [one for one in apart if one.more_than_from_record]
+    assert ("after", "p") in {(one.window, one.signal) for one in places}
+    assert "differ from each other more than from the record" in difference_sentence(places)
+    assert not any(one.more_than_from_record for one in models_apart(*2 * first.comparisons))
