@@ -4,7 +4,7 @@ import argparse
 from typing import Any
 
 from orchestrator.core.asked import as_number
-from orchestrator.core.errors import INTERRUPTED, NOT_MET
+from orchestrator.core.errors import INTERRUPTED, NOT_MET, InputError
 from orchestrator.core.safe_files import made_folder
 from orchestrator.core.units import read_value, to_unit
 from orchestrator.face.api.validation import validate
@@ -34,11 +34,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print how far the device is off, and whether limits are met; returns the exit code that the help tells."""
+    if options.pdf and not options.out:
+        raise InputError("--pdf: the page that is printed is written into a folder; give --out DIR")
     with saying_warnings(), said_stages() as report:
         found = validate(options.device, options.recordings, report=report, **_keywords(options))
     say("question", found.questions)
     if options.out:
-        found.save(made_folder(options.out, "--out"))
+        found.save(made_folder(options.out, "--out"), pdf=options.pdf)
     if options.json:
         print_json(found.as_json())
     else:

@@ -37,6 +37,8 @@ def validation_page(result: ValidationResult) -> str:
         chapters.append(("Two models of one plant", _beside(result)))
     if result.criteria:
         chapters.append(("Limits", _limits(result)))
+    if result.explanations:
+        chapters.append(("One parameter that would explain the error", _explained(result)))
     if result.fit is not None:
         chapters.append(("Fit", _fit(result)))
     chapters.append(("Procedure, and what was not judged", _not_judged(result)))
@@ -160,7 +162,34 @@ def _fit(result: ValidationResult) -> str:
     ]
     columns = ["Parameter", "In the model", "Fitted", "95 %", "Can the recordings tell it?"]
     kept = [one.recording for one in result.confirmations if not one.fitted]
-    return table("Fitted parameters", columns, rows) + f"<p>{escape(fit_sentence(fit, kept))}</p>"
+    checks = [
+        [
+            escape(one.recording),
+            "fitted" if one.fitted else "kept back",
+            f"{one.before:.4g}",
+            f"{one.after:.4g}",
+        ]
+        for one in result.confirmations
+    ]
+    errors = ["Recording", "", "In the model", "Fitted"]
+    said = f"<p>{escape(fit_sentence(fit, kept))}</p>"
+    title = "Rms error of P and Q [pu of the rating]"
+    return table("Fitted parameters", columns, rows) + said + table(title, errors, checks, left=2)
+
+
+def _explained(result: ValidationResult) -> str:
+    rows = [
+        [
+            escape(one.parameter),
+            f"{one.now:.5g}",
+            f"{one.value:.5g}",
+            f"{one.left:.4g} of {one.error:.4g}",
+            "yes" if one.explains else "no",
+        ]
+        for one in result.explanations
+    ]
+    columns = ["Parameter", "In the model", "Instead", "Rms error left [pu]", "Explains most of it"]
+    return table("Each parameter changed by itself", columns, rows)
 
 
 def _not_judged(result: ValidationResult) -> str:

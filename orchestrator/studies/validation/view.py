@@ -15,6 +15,7 @@ from orchestrator.core.errors import counted
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder
 from orchestrator.output.report.notebook import page
+from orchestrator.output.report.pdf import print_pdf
 from orchestrator.output.report.tables import PlainTable, VerdictSentence, make_table
 from orchestrator.output.results.staging import new_run_id, staged
 from orchestrator.output.results.storage import save_json, save_table
@@ -121,8 +122,10 @@ class Validation:
 
         return validation_page(self.result)
 
-    def save(self, folder: str | Path) -> list[Path]:
-        """Write figures, curves and the page into a folder; returns their paths."""
+    def save(self, folder: str | Path, *, pdf: bool = False) -> list[Path]:
+        """Write figures, curves and the page into a folder; returns their paths.
+
+        ``pdf``: whether an installed browser prints the page as well; an `InputError` is raised where there is none."""
         place = made_folder(folder, "folder")
         with staged(place, new_run_id()) as staging:
             save_json(self.as_json(), staging / "validation.json")
@@ -131,7 +134,10 @@ class Validation:
             (staging / "validation.html").write_text(self.html(), encoding="utf-8")
         names = ["validation.json", "validation.html"]
         names += [f"curves_{k + 1}.csv" for k in range(len(self.result.comparisons))]
-        return [place / name for name in names]
+        files = [place / name for name in names]
+        if pdf:
+            files.append(print_pdf(place / "validation.html", place / "validation.pdf"))
+        return files
 
     def _rows(self, number: int) -> list[dict[Any, Any]]:
         rows: list[dict[Any, Any]] = self.curves(number).reset_index().to_dict("records")

@@ -102,6 +102,7 @@ def test_the_folder_holds_figures_curves_and_the_page(gfor, recording, tmp_path)
     assert code == 0
     assert json.loads((out / "validation.json").read_text())["verdict"] == "met"
     assert len(pd.read_csv(out / "curves_1.csv")) == 6001
+    assert not (out / "validation.pdf").exists()
     page = (out / "validation.html").read_text(encoding="utf-8")
     assert "of no standard" in page
     assert "nothing here says that it is met" in page
@@ -165,3 +166,21 @@ def test_columns_that_are_missing_are_asked_for(gfor, tmp_path):
     assert code == 2
     assert "--channel 'p=COLUMN'" in err
     assert "p_left_mw" in err
+
+
+def test_the_page_holds_the_fit_and_what_explains_the_error(recording, tmp_path):
+    frame = pd.read_csv(recording)[::5].set_index("time")
+    values = ON | {"pod_p.K": 60.0}
+    found = gfor_in_python.validate(
+        "gfor_phasor", frame, values=values, fit="pod_p.K", explain=True
+    )
+    page = found.html()
+    assert "Fitted parameters" in page
+    assert "Each parameter changed by itself" in page
+    assert "Rms error of P and Q" in page
+
+
+def test_a_page_is_printed_only_where_a_folder_is_given(gfor, recording):
+    code, _, err = gfor("validate", "gfor", str(recording), "--pdf")
+    assert code == 2
+    assert "--out DIR" in err
