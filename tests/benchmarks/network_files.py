@@ -35,6 +35,7 @@ LOADS, REFUSED, CRASHES, TOO_LONG = "loads", "refused", "crashes", "takes too lo
 SUFFIXES = (".raw", ".rawx")
 CLOSE = 1e-4  # deviation of a voltage that needs no cause [pu]
 _VM, _VA = 7, 8  # columns of a source's table of buses: magnitude [pu], angle [degrees]
+_MISFIT = re.compile(r"beyond what the network takes away, (.*?); look at")
 _BUS_OF_POWSYBL = re.compile(r"B(\d+)")
 
 
@@ -43,7 +44,8 @@ class Trial:
     """What became of one file.
 
     ``words``: the message of a refusal; ``voltages``, ``stated``: by the bus' name, as computed here and as the file
-    has them [pu]; ``beside_file``, ``beside_powsybl``: largest deviation of a voltage [pu], and the bus."""
+    has them [pu]; ``beside_file``, ``beside_powsybl``: largest deviation of a voltage [pu], and the bus; ``misfit``:
+    powers that the file's voltages leave, where these are no solution of its data."""
 
     path: Path
     outcome: str
@@ -55,6 +57,7 @@ class Trial:
     stated: Mapping[str, complex] = field(default_factory=dict)
     beside_file: tuple[float, str] | None = None
     beside_powsybl: tuple[float, str] | None = None
+    misfit: str = ""
 
     @property
     def cause(self) -> str:
@@ -122,7 +125,9 @@ def _loaded(path: Path, base: PreparedScenario) -> Trial:
     is_solved = bool(tables.bus[:, _VA].any())
     beside = deviation(voltages, stated, slack) if is_solved else None
     questions = len(base.questions)
-    return Trial(path, LOADS, "", questions, 0.0, slack, voltages, stated, beside)
+    found = Trial(path, LOADS, "", questions, 0.0, slack, voltages, stated, beside)
+    left = (_MISFIT.search(question.text) for question in base.questions)
+    return replace(found, misfit=next((words[1] for words in left if words), ""))
 
 
 def deviation(
@@ -174,9 +179,9 @@ def table(trials: Sequence[Trial], folder: Path) -> str:
     lines += [f"| {n} | {cause} |" for cause, n in causes.most_common()]
     lines += [
         "",
-        "| File | Outcome | Questions | Beside the file [pu] | Beside pypowsybl [pu] | s |",
+        "| File | Outcome | Questions | Beside the file [pu] | Beside pypowsybl [pu] | Left by its voltages | s |",
     ]
-    lines += ["|---|---|---|---|---|---|"]
+    lines += ["|---|---|---|---|---|---|---|"]
     lines += [_row(trial, folder) for trial in trials]
     return "\n".join(lines) + "\n"
 
@@ -186,9 +191,8 @@ def _row(trial: Trial, folder: Path) -> str:
     outcome = outcome.replace(str(trial.path), "").replace("|", "/").replace("\n", " ")
     beside = (_shown(x) for x in (trial.beside_file, trial.beside_powsybl))
     name = trial.path.relative_to(folder)
-    return (
-        f"| {name} | {outcome} | {trial.questions} | {' | '.join(beside)} | {trial.seconds:.1f} |"
-    )
+    shown = (name, outcome, trial.questions, *beside, trial.misfit, f"{trial.seconds:.1f}")
+    return f"| {' | '.join(map(str, shown))} |"
 
 
 def _shown(found: tuple[float, str] | None) -> str:
