@@ -115,3 +115,34 @@ def foreign_in_text(text, source, heading=""):
         if not (np.abs(figures - value) <= 0.5000001 * 10.0**-decimals).any():
             found.append(word)
     return found
+
+
+def unseen_slips(said, source):
+    """Figures in JSON that a factor of 100 or a lost sign would pass unseen, with the slip; empty where none would.
+
+    Counts, and numbers that are 0, have no unit and no sign to lose."""
+    found = []
+    for place, value in _numbers(said, ""):
+        slips = {"100 times": 100 * value, "a hundredth": value / 100, "lost sign": -value}
+        if value == 0 or (value == int(value) and not _PERCENT.search(place)):
+            continue
+        found += [
+            (place, slip)
+            for slip, wrong in slips.items()
+            if not foreign_in_json(_with(said, place.split(".")[1:], wrong), source)
+        ]
+    return found
+
+
+def _with(said, keys, value):
+    """JSON's types with another number at a place."""
+    if not keys:
+        return value
+    if isinstance(said, Mapping):
+        # a key may hold dots itself
+        names = [key for key in said if ".".join(keys).startswith(str(key))]
+        key = max(names, key=len)
+        rest = ".".join(keys)[len(str(key)) :].removeprefix(".")
+        return {**said, key: _with(said[key], rest.split(".") if rest else [], value)}
+    place = int(keys[0])
+    return [*said[:place], _with(said[place], keys[1:], value), *said[place + 1 :]]

@@ -5,10 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from orchestrator.linear.spectra.modes import Mode
+from orchestrator.linear.spectra.stability import Cause, Hidden, Stability
 from orchestrator.studies.certification import report_criteria
+from orchestrator.studies.certification.criteria import PodEffect
 from orchestrator.studies.modes.step_choice import Allowed, StepChoice, TriedStep, step_choice_json
+from orchestrator.studies.runs.answers import ScenarioAnswer, answers_table
 from orchestrator.studies.runs.files import _mode_rows
-from tests.support.figures import foreign_in_json, foreign_in_text
+from tests.support.figures import foreign_in_json, foreign_in_text, unseen_slips
 
 # no two of them are a simple multiple of each other
 CRITICAL = np.array([-0.3137 + 3.7193j, -0.9071 + 7.3391j])
@@ -107,3 +111,64 @@ def test_of_a_certificates_page(monkeypatch):
     (mark,) = marks
     assert "0.592 Hz" in mark.text
     assert foreign_in_text(mark.text, verdict) == []
+
+
+def modes_of_figures():
+    return [
+        Mode(complex(z), (("sg1.omega", a), ("gfor.theta", b)), {"sg1.omega": 1.0 + 0j})
+        for z, a, b in zip(CRITICAL, (0.4173, 0.3911), (0.2819, 0.2333), strict=True)
+    ]
+
+
+def test_of_a_runs_answer():
+    """Before and after the events, in JSON and in the first table."""
+    before, after = modes_of_figures()
+    became = Mode(-0.1319 + 3.1171j, before.participation, before.shape)
+    for same in (became, None):
+        answer = ScenarioAnswer("gfor", True, "stable", before, "settles", after, "sg1", same)
+        source = [before, after, became, before.by_component, after.by_component]
+        said = answer.as_json()
+        assert foreign_in_json(said, source) == []
+        assert unseen_slips(said, source) == []
+        table = answers_table([answer], (0.1, 2.5))
+        for column in table.columns[2:4]:
+            for cell in column.cells:
+                assert foreign_in_text(str(cell), source, str(column.header)) == []
+                wrong = str(cell).replace(".", "")
+                assert foreign_in_text(wrong, source, str(column.header))
+
+
+def test_of_a_stability_block():
+    (mode, _) = modes_of_figures()
+    stability = Stability(False, mode, 1, 1, 7, Cause.SYSTEM, -0.2719, 1.3e-3)
+    said = stability.as_json()
+    assert said["frequency_hz"] == pytest.approx(CRITICAL[0].imag / (2 * np.pi))
+    assert foreign_in_json(said, stability) == []
+    assert unseen_slips(said, stability) == []
+
+
+def test_of_modes_outside_of_the_range():
+    hidden = Hidden((0.13, 2.57), 3, complex(CRITICAL[1]), (complex(CRITICAL[0]),))
+    said = hidden.as_json()
+    assert foreign_in_json(said, hidden) == []
+    assert unseen_slips(said, hidden) == []
+
+
+def test_a_slip_that_would_pass_is_told():
+    """An object that holds a figure and 100 times of it shows that the walker would not see that slip."""
+    assert unseen_slips({"share": 0.417}, {"share": 0.417, "other": 41.7}) == [
+        (".share", "100 times")
+    ]
+    assert unseen_slips({"share": 0.417}, {"share": 0.417}) == []
+
+
+def test_of_a_certificates_damping_controller():
+    """Modes without and with it, by how much it raises the damping, and what the response shows."""
+    off, on = CRITICAL[0], CRITICAL[0] - 0.4177
+    effect = PodEffect(CRITICAL, {"off": off, "on": on, "response": on + 0.0291j}, 0.0713)
+    raised = 100 * (-on.real / abs(on) + off.real / abs(off))
+    source = [effect, raised]
+    said = effect.as_json()
+    assert said["modal"]["raised"] == pytest.approx(raised)
+    assert foreign_in_json(said, source) == []
+    assert unseen_slips(said, source) == []
