@@ -77,7 +77,13 @@ def test_how_far_two_modes_are_told_apart_is_said_of_two(hertz):
         for f in hertz
     ]
     own = SimpleNamespace(
-        interval=0.02, modes=modes, start=0.0, stop=20.0, line=None, is_trend=lambda m: False
+        interval=0.02,
+        modes=modes,
+        about=(),
+        start=0.0,
+        stop=20.0,
+        line=None,
+        is_trend=lambda m: False,
     )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(signal_modes, "over_a_trend", lambda *_: "")
