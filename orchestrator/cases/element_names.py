@@ -184,7 +184,8 @@ def element_names(
     for branch, buses in ends.items():
         own = branches.get(branch, BranchName())
         between = [titles.get(bus, "") for bus in buses]
-        shown |= _shown_of_branch(branch, own, between)
+        is_new = any(not _is_in(bus, titles.get(bus, "")) for bus in buses)
+        shown |= _shown_of_branch(branch, own, between if is_new else [""] * len(buses))
         meant += [(name, branch) for name in _names_of_branch(branch, own, between)]
     meant += [(name, identifier) for identifier, name in shown.items()]
     by_name: dict[str, dict[str, None]] = {}

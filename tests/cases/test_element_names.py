@@ -192,6 +192,11 @@ def test_a_name_that_an_identifier_says_is_not_repeated():
         "bus_3 EAST",
     ]
     assert names.identifier("north 1", ["bus_North_1"]) == "bus_North_1"
+    numbered = element_names(
+        {"bus_1": "1", "bus_2": "2"}, {}, {"line_1_2": ("bus_1", "bus_2")}, {}, {}
+    )
+    assert numbered.of("line_1_2") == "line_1_2"
+    assert numbered.identifier("2 – 1", ["line_1_2"]) == "line_1_2"
 
 
 def test_a_case_without_names_is_shown_as_it_is():
