@@ -29,18 +29,16 @@ class Fmu(Unchanged, Closing):
     ----------
     description
         What it declares.
-    time
-        Where it stands [s].
     """
 
-    _own = frozenset({"description", "time"})
+    _own = frozenset({"description"})
     _instead = "set({…}) gives its variables values"
 
     def __init__(
         self, description: FmuDescription, values: Mapping[str, Any], stop: float | None
     ) -> None:
         self.description = description
-        self.time = 0.0
+        self._time = 0.0
         start = self._converted(values)
         component: Component = open_component(description.model_name, description)
         try:
@@ -52,6 +50,11 @@ class Fmu(Unchanged, Closing):
             component.close()
             raise
         self._component: Component | None = component
+
+    @property
+    def time(self) -> float:
+        """The time [s] that it has come to."""
+        return self._time
 
     def set(self, values: Mapping[str, Any]) -> None:
         """Set inputs and tunable parameters: numbers, truth values, or text with a unit such as ``"30 MW"``.
@@ -106,8 +109,8 @@ class Fmu(Unchanged, Closing):
             raise InputError(
                 "step_size = None; give a communication step above 0 s, such as 1e-4 or '100 us'"
             )
-        component.step(self.time, seconds)
-        self.time += seconds
+        component.step(self._time, seconds)
+        self._time += seconds
 
     def close(self) -> None:
         """End it, and remove what was extracted for it; a second call does nothing."""

@@ -230,6 +230,8 @@ def test_a_running_fmu_is_neither_copied_nor_given_away(tmp_path):
                 way(fmu)
         with pytest.raises(NoSuchAttributeError, match=r"Fmu\.v_0 cannot be set.*set\(\{…\}\)"):
             fmu.v_0 = 1.0
+        with pytest.raises(NoSuchAttributeError, match=r"Fmu\.time cannot be set"):
+            fmu.time = 3.0
         with pytest.raises(InputError, match=r"v_0 is given several values; give one$"):
             fmu.set({"v_0": [1.0, 1.0]})
         assert fmu.get("v") == pytest.approx(1.0)
