@@ -94,7 +94,7 @@ UNREACHED = {
     "CSVGN1": "a static var system, no machine",
     "DEGOV": "the recordings are PowerWorld's, not PSS/E's",
     "DERA": "no part stands for DERA",
-    "GAST (14 buses)": "several machines: `gfor new` and `gfor run`",
+    "GAST (14 buses)": "several machines, by `gfor new` and `gfor run`: page of conventions",
     "LOAD": "loads of constant power and current, by `gfor run`: page of conventions",
     "MultiGen": "several machines and converters: `gfor new` and `gfor run`",
     "PSS2A, PSS2B, PSS2C": "no DYR record of the stabiliser",
