@@ -17,6 +17,7 @@ from orchestrator.studies.certification.kinds import ROWS
 from orchestrator.studies.certification.request import CertificationRequest
 from orchestrator.studies.certification.verification import read_certificate, verify_files
 from orchestrator.studies.points.executor import Serial
+from tests.support.grid_codes import replace_code
 
 pytestmark = pytest.mark.slow
 
@@ -30,7 +31,7 @@ def converter(tmp_path_factory):
 def one_row(monkeypatch):
     """ERCOT's table with its jumps alone: a certificate that holds has all rows of the table."""
     code = replace(ERCOT, rows=tuple(row for row in ERCOT.rows if row.name == "phase_jumps"))
-    monkeypatch.setitem(CODES, "ercot", code)
+    replace_code(monkeypatch, code)
     return code
 
 

@@ -17,6 +17,7 @@ from orchestrator.output.results.storage import save_netcdf
 from orchestrator.studies.certification.certificate import Certificate
 from orchestrator.studies.certification.codes.all_codes import CODES
 from orchestrator.studies.certification.codes.bench_point import BenchResult, case_name, write_row
+from orchestrator.studies.certification.codes.known import KNOWN
 from orchestrator.studies.certification.codes.row_verdict import judge_row
 from orchestrator.studies.certification.files import (
     HTML,
@@ -28,6 +29,7 @@ from orchestrator.studies.certification.files import (
 )
 from orchestrator.studies.certification.request import CertificationRequest
 from orchestrator.studies.certification.verification import read_certificate, verify_files
+from tests.support.grid_codes import replace_code
 
 CODE = CODES["fingrid"]
 
@@ -121,7 +123,7 @@ def without_jumps(fails):
 
 def since(monkeypatch, version):
     rows = tuple(replace(row, since=version if row.name == "jumps" else "") for row in CODE.rows)
-    monkeypatch.setitem(CODES, "fingrid", replace(CODE, rows=rows))
+    replace_code(monkeypatch, replace(CODE, rows=rows))
 
 
 @pytest.mark.parametrize(
@@ -153,7 +155,7 @@ def test_what_passed_before_a_row_came_is_incomplete(without_jumps, monkeypatch,
     """So nobody gets a pass by an older version than the one that wrote the record."""
     folder, content = without_jumps
     since(monkeypatch, "0.4.0")
-    monkeypatch.setitem(CODES, "fingrid", replace(CODES["fingrid"], left_out=()))
+    replace_code(monkeypatch, replace(KNOWN["fingrid"], left_out=()))
     content |= {"left_out": [], "missing": [], "verdict": "passes"}
     content["sentence"] = (
         f"The converter 'gfor' passes {CODE.title}: 3 of 3 judged rows are accepted."
