@@ -55,7 +55,9 @@ def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
             [(r["verdict"], r["fault"], r["check"]) for r in report["checks"]],
         )
         reasons = [
-            str(r["figures"]["not_judged"]) for r in report["checks"] if r["figures"].get("reason")
+            str(r["figures"]["not_judged"])
+            for r in report["checks"]
+            if r.get("figures", {}).get("reason")
         ]
         tool = report["tool"]
     except OSError as error:

@@ -65,10 +65,10 @@ def memory(subject: Subject) -> CheckResult:
         figures[what] = growth
         if growth > least:
             said = f"{growth:.0f} bytes with every {what}"
-            if what == "instance" and growth <= _SLIGHT:
-                slight = f"it keeps {said}"
-            elif what == "instance" and wrapped and growth <= _OF_WRAPPER:
+            if what == "instance" and wrapped and growth <= _OF_WRAPPER:
                 slight = f"{subject.description.generation_tool}, which wraps it, keeps {said}"
+            elif what == "instance" and growth <= _SLIGHT:
+                slight = f"it keeps {said}"
             else:
                 texts.append(said)
     files = _of_files(subject)
