@@ -53,18 +53,18 @@ def test_on_a_crowded_machine_an_answer_is_waited_for_up_to_eight_times_as_long(
     assert limits.crowded() == wanted
 
 
-def test_after_a_dip_that_it_does_not_survive_a_third_of_it_for_half_as_long_is_tried(monkeypatch):
+def test_after_a_dip_that_it_does_not_survive_a_third_of_it_for_half_as_long_is_tried():
     tried = []
 
-    def after(segments, soon):
-        tried.append(segments)
-        return SimpleNamespace(end=aftermath._End.NOTHING)
+    class Lost(aftermath._Look):
+        def __init__(self):
+            self._subject = SimpleNamespace(starts=False)
 
-    monkeypatch.setattr(aftermath, "_Look", lambda subject: SimpleNamespace(after=after))
-    monkeypatch.setattr(aftermath, "_drawn", lambda subject: iter([[(0.4, 0.3), (1.3, 0.2)]]))
-    monkeypatch.setattr(aftermath, "_wrong", lambda found: None)
-    monkeypatch.setattr(aftermath, "_judge", len)
-    assert aftermath.after_dips(SimpleNamespace(port=True, memory={})) == 2
+        def after(self, segments, soon):
+            tried.append(segments)
+            return SimpleNamespace(end=aftermath._End.NOTHING)
+
+    assert len(Lost().until_back([(0.4, 0.3), (1.3, 0.2)], False)) == 2
     (_, milder) = tried
     assert np.ravel(milder) == pytest.approx([0.8, 0.15, 1.1, 0.1])
 
