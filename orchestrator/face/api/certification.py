@@ -2,23 +2,27 @@
 
 from collections.abc import Iterable
 from contextlib import closing
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from orchestrator.core.asked import path as path_of
+from orchestrator.core.asked import seen
 from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import made_folder
 from orchestrator.core.truth import NoTruth
 from orchestrator.face.api.methods import function
 from orchestrator.face.api.progress import shown_progress
 from orchestrator.output.results.lock import held
+from orchestrator.output.signatures.checking import State
 from orchestrator.output.signatures.signing import check_key
 from orchestrator.studies.certification.acceptance import run_checks
 from orchestrator.studies.certification.compared import Verification
 from orchestrator.studies.certification.files import JSON, read_record, save, spare_another
 from orchestrator.studies.certification.inside import check_target, laid_out, put_inside
 from orchestrator.studies.certification.kinds import CertifyRequest, usual_folder
-from orchestrator.studies.certification.signed import sign_folder
+from orchestrator.studies.certification.signed import Asked, sign_folder
+from orchestrator.studies.certification.signed_file import is_signed_alone, look_at_file
 from orchestrator.studies.certification.verification import verified
 from orchestrator.studies.points.study import choose_executor
 
@@ -91,13 +95,18 @@ def verify(
     *,
     every: bool = False,
     workers: int | None = 1,
+    signers: str | Path | None = None,
+    revoked: str | Path | None = None,
+    at: str | datetime | None = None,
 ) -> Verification:
-    """Return whether a certificate still holds: hashes, its judgement made again, and points or rows computed anew.
+    """Return whether a certificate still holds, and who signed it: hashes and signature, its judgement made again, and
+    points or rows computed anew.
 
     Parameters
     ----------
     certificate
-        Its folder, its ``certificate.json``, or an FMU with certificates in it, which are all verified.
+        Its folder, its ``certificate.json``, or an FMU with certificates in it, which are all verified. Of another FMU
+        or a report with a signature beside it only the signature is verified.
     anew
         Line reactances [pu], or names of rows, that are computed anew; the least damped point, or the row with the
         narrowest margin and one by chance, where None; none where empty.
@@ -105,22 +114,32 @@ def verify(
         Compute all of them anew.
     workers
         Processes; one for each core where None.
+    signers
+        The file of those who may have signed it, as OpenSSH's allowed_signers; then it holds only with a good signature
+        of one of them.
+    revoked
+        A file of keys that count no longer: public keys, one a line, or a list of ``ssh-keygen -k``.
+    at
+        The time at which the signers' validity is judged, as YYYYMMDD[HHMM[SS]][Z] or a datetime, of this machine's
+        zone where it names none; now where None.
 
     Returns
     -------
     Verification
-        ``holds``, with what agreed and what did not.
+        ``holds``, with what agreed and what did not, and ``signature``, with its ``state`` and ``signer``.
 
     Raises
     ------
     InputError
-        If it is no certificate, or has no such point or row.
+        If it is no certificate, has no such point or row, or a file of signers or keys cannot be read.
 
     Examples
     --------
     >>> import orchestrator as gfor
     >>> gfor.verify("certificate", anew=()).holds  # doctest: +SKIP
     True
+    >>> gfor.verify("certificate", anew=(), signers="allowed").signature.state  # doctest: +SKIP
+    'good'
     >>> try:
     ...     gfor.verify("nowhere")
     ... except gfor.CosimError as error:
@@ -132,12 +151,46 @@ def verify(
             f"anew = {anew!r}; give a list of line reactances [pu], or of names of rows, such as [0.1]"
         )
     found, wanted = Verification(), None if anew is None else tuple(anew)
-    with laid_out(path_of(certificate, "certificate")) as places:
+    file, asked = path_of(certificate, "certificate"), _asked(signers, revoked, at)
+    if is_signed_alone(file):
+        return _verify_signature(file, asked)
+    with laid_out(file) as places:
         for place in places:
             one = verified(
-                place, wanted, lambda imports: choose_executor(workers, None, imports), every=every
+                place,
+                wanted,
+                lambda imports: choose_executor(workers, None, imports),
+                every=every,
+                asked=asked,
             )
             prefix = f"{place.name}: " if len(places) > 1 else ""
             found.faults += [prefix + text for text in one.faults]
             found.agreed += [prefix + text for text in one.agreed]
+            found.signatures |= one.signatures
+    return found
+
+
+def _asked(
+    signers: str | Path | None, revoked: str | Path | None, at: str | datetime | None
+) -> Asked:
+    if not isinstance(at, str | datetime | None):
+        raise InputError(
+            f"at = {seen(at)}; give a time, as YYYYMMDD[HHMM[SS]][Z] or a datetime, such as '20261130Z'"
+        )
+    files = [
+        None if given is None else path_of(given, name)
+        for name, given in (("signers", signers), ("revoked", revoked))
+    ]
+    return Asked.of_files(files[0], files[1], at)
+
+
+def _verify_signature(file: Path, asked: Asked) -> Verification:
+    """Verify the signature of a file that has no figures to compute anew."""
+    signature = look_at_file(file, asked)
+    said = [f"signature: {signature.sentence}"]
+    found = Verification(signatures={file.name: signature})
+    if signature.state is State.GOOD:
+        found.agreed = said
+    else:
+        found.faults = said
     return found

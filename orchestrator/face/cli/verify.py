@@ -8,11 +8,11 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
-from orchestrator.core.errors import INTERRUPTED, InputError
+from orchestrator.core.errors import INTERRUPTED
 from orchestrator.face.cli.arguments import add_executor_arguments, add_options, choose_executor
 from orchestrator.face.cli.terminal import make_console, print_json
 from orchestrator.output.report.progress import progress_bar
-from orchestrator.output.signatures.allowed_signers import read_signers, read_time
+from orchestrator.output.signatures.allowed_signers import read_time
 from orchestrator.output.signatures.checking import State
 from orchestrator.studies.certification.codes.nts631 import NTS631
 from orchestrator.studies.certification.compared import (
@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Verify and print; returns the exit code of the certificate's verdict where it holds, else 5."""
-    asked = _signers_of(options)
+    asked = Asked.of_files(options.signers, options.revoked, options.at)
     if is_signed_alone(options.certificate):
         return _verify_file(options, asked)
     with laid_out(options.certificate) as places:
@@ -62,15 +62,6 @@ def run(options: argparse.Namespace) -> int:
         )
     codes = [code for _, code in found]
     return DOES_NOT_HOLD if DOES_NOT_HOLD in codes else next(filter(None, codes), 0)
-
-
-def _signers_of(options: argparse.Namespace) -> Asked:
-    if options.signers is None and (options.revoked or options.at):
-        raise InputError(
-            "--revoked, --at: they say more of the signers of --signers; give that file as well"
-        )
-    signers = read_signers(options.signers, options.revoked) if options.signers else None
-    return Asked(signers) if options.at is None else Asked(signers, options.at)
 
 
 def _verify_file(options: argparse.Namespace, asked: Asked) -> int:

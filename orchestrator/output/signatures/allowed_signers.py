@@ -200,11 +200,11 @@ def _read_time(place: str, text: str | None) -> datetime | None:
     digits = text.removesuffix("Z")
     try:
         time = datetime.strptime(digits, _FORMS[len(digits)])
-    except (KeyError, ValueError) as error:
+        return time.replace(tzinfo=UTC) if text.endswith("Z") else time.astimezone()
+    except (KeyError, ValueError, OverflowError) as error:
         raise InputError(
             f"{place}: {text!r} is no time; write YYYYMMDD or YYYYMMDDHHMM[SS], with Z for UTC"
         ) from error
-    return time.replace(tzinfo=UTC) if text.endswith("Z") else time.astimezone()
 
 
 def read_time(text: str) -> datetime:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
 from importlib.util import find_spec
+from typing import Any
 
 from fmus.toolchain.extras import MissingLibraryError
 from orchestrator.output.signatures import ssh_keygen
@@ -39,6 +40,24 @@ class Signatory:
             "signer": self.signer,
             "key": self.key,
             "sentence": self.sentence,
+        }
+
+
+@dataclass(frozen=True)
+class SignatureSeen:
+    """The signatures of a certificate, looked at."""
+
+    state: State
+    sentence: str
+    signer: str | None = None
+    signatures: Sequence[Signatory] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        return {
+            "state": self.state,
+            "signer": self.signer,
+            "sentence": self.sentence,
+            "signatures": [one.as_json() for one in self.signatures],
         }
 
 

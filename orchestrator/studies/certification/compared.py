@@ -12,6 +12,7 @@ import numpy as np
 
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.truth import NoTruth
+from orchestrator.output.signatures.checking import SignatureSeen, State
 from orchestrator.studies.certification.case_file import BINDING, FMU
 from orchestrator.studies.certification.request import CertificationRequest
 
@@ -31,18 +32,42 @@ Compared = Iterator[tuple[str, str]]
 
 @dataclass(repr=False)
 class Verification(NoTruth, ask=".holds"):
+    """The findings on a certificate. `verify` makes it.
+
+    Attributes
+    ----------
+    faults
+        Sentences on what does not agree.
+    agreed
+        Sentences on what agrees.
+    views
+        Sentences on pages that show the certificate and could not be made anew here, so that they prove nothing.
+    signatures
+        The signature of each certificate by its folder's name, with ``state`` (``good``, ``unsigned``, ``changed`` or
+        ``unknown signer``), ``signer`` (None where nobody known signed), ``sentence``, and ``signatures``, the same of
+        each of several keys.
+    """
+
     faults: list[str] = field(default_factory=list)
     agreed: list[str] = field(default_factory=list)
-    # what shows a certificate and could not be made anew here
     views: list[str] = field(default_factory=list)
+    signatures: dict[str, SignatureSeen] = field(default_factory=dict)
 
     @property
     def holds(self) -> bool:
         return not self.faults
 
+    @property
+    def signature(self) -> SignatureSeen:
+        """The signature; of several certificates in an FMU that of the least worth."""
+        return min(self.signatures.values(), key=lambda one: _LEAST_WORTH.index(one.state))
+
     def __repr__(self) -> str:
         what = "; ".join(self.faults) if self.faults else f"{len(self.agreed)} things agree"
         return f"<Verification: {'holds' if self.holds else 'does not hold'}: {what}>"
+
+
+_LEAST_WORTH = (State.CHANGED, State.UNSIGNED, State.UNKNOWN, State.GOOD)
 
 
 def issued_by(content: Content) -> str:

@@ -7,9 +7,15 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from orchestrator.output.signatures.allowed_signers import Signers
+from orchestrator.core.errors import InputError
+from orchestrator.output.signatures.allowed_signers import Signers, read_signers, read_time
 from orchestrator.output.signatures.beside import NAMESPACE, Beside
-from orchestrator.output.signatures.checking import Signatory, State, check_signatures, worst_of
+from orchestrator.output.signatures.checking import (
+    SignatureSeen,
+    State,
+    check_signatures,
+    worst_of,
+)
 from orchestrator.output.signatures.dsse import SignedEnvelope, read_once
 from orchestrator.output.signatures.signing import Made
 from orchestrator.output.signatures.wire import WireError
@@ -19,6 +25,10 @@ from orchestrator.studies.certification.statement import as_bytes, differences_o
 
 _CLOCKS = timedelta(minutes=5)
 """By so much two clocks may differ."""
+
+_YEARS = (1980, 9998)
+"""First and last year at which a signature may be asked for: those that archives and clocks have, with room for a time
+zone."""
 
 Differences = Callable[[Mapping[str, Any]], Sequence[str]]
 """Gives, of a signed statement, what it says otherwise than what lies there."""
@@ -31,23 +41,31 @@ class Asked:
     signers: Signers | None = None
     at: datetime = field(default_factory=lambda: datetime.now(UTC))
 
+    @classmethod
+    def of_files(
+        cls, signers: Path | None, revoked: Path | None, at: datetime | str | None
+    ) -> "Asked":
+        """Read who may sign from OpenSSH's files.
 
-@dataclass(frozen=True)
-class SignatureSeen:
-    """The signatures of a certificate, looked at."""
-
-    state: State
-    sentence: str
-    signer: str | None = None
-    signatures: Sequence[Signatory] = ()
-
-    def as_json(self) -> dict[str, Any]:
-        return {
-            "state": self.state,
-            "signer": self.signer,
-            "sentence": self.sentence,
-            "signatures": [one.as_json() for one in self.signatures],
-        }
+        Raises
+        ------
+        InputError
+            If a file cannot be read, ``at`` is no time, or the signers are missing to whom the others belong."""
+        if signers is None:
+            if revoked is not None or at is not None:
+                raise InputError(
+                    "--revoked, --at: they say more of the signers of --signers; give that file as well"
+                )
+            return cls()
+        listed = read_signers(signers, revoked)
+        if at is None:
+            return cls(listed)
+        time = read_time(at) if isinstance(at, str) else at
+        if not _YEARS[0] <= time.year <= _YEARS[1]:
+            raise InputError(
+                f"--at {time:%Y-%m-%d}: no certificate is of that time; give a year from {_YEARS[0]} to {_YEARS[1]}"
+            )
+        return cls(listed, time.astimezone(UTC))
 
 
 def sign_folder(folder: Path, content: Content, key: Path) -> Made:

@@ -9,10 +9,11 @@ from typing import Any
 from orchestrator.core.errors import FmuFileError
 from orchestrator.core.foreign_files import read_bytes
 from orchestrator.output.signatures.beside import Beside
+from orchestrator.output.signatures.checking import SignatureSeen
 from orchestrator.output.signatures.signing import Made
 from orchestrator.studies.certification.files import JSON
 from orchestrator.studies.certification.inside import holds_certificates
-from orchestrator.studies.certification.signed import Asked, SignatureSeen, look_beside
+from orchestrator.studies.certification.signed import Asked, look_beside
 from orchestrator.studies.certification.statement import as_bytes, as_statement, libraries_in
 
 _FILE = "tag:gfor-cosim,2026:file/v1"

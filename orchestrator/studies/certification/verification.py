@@ -35,11 +35,7 @@ from orchestrator.studies.certification.files import (
 from orchestrator.studies.certification.form import case_files, check_form
 from orchestrator.studies.certification.kinds import Parts, parts_of, rebuilt
 from orchestrator.studies.certification.page_again import PageSeen, look_at_page, views_beside
-from orchestrator.studies.certification.signed import (
-    Asked,
-    SignatureSeen,
-    look_at_signature,
-)
+from orchestrator.studies.certification.signed import Asked, look_at_signature
 from orchestrator.studies.certification.verdict import INCOMPLETE, PASSES
 from orchestrator.studies.points.executor import Executor
 from orchestrator.studies.points.points import CountReport, nobody
@@ -170,7 +166,6 @@ class Verified(Verification):
     chosen: list[Any]
     computed: list[Any]
     later: tuple[str, ...]  # rows that the table had not in the version that issued the certificate
-    signature: SignatureSeen
     unproved: list[str]  # files in the folder that nothing vouches for
 
     @property
@@ -214,7 +209,7 @@ def verified(
         chosen=chosen,
         computed=chosen if files.holds else [],
         later=parts.later(content),
-        signature=signature,
+        signatures={folder.name: signature},
         views=files.views,
         unproved=[*files.views, *views_beside(content), *_unproved(folder, content)],
     )
