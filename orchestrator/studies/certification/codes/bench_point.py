@@ -157,6 +157,8 @@ class BenchResult(Kept):
     findings: list[dict[str, Any]] = field(default_factory=list)
     # processor time of the run, that of FMUs in processes of their own included [s]
     seconds: float = 0.0
+    # what the binding declares of the plant [pu of its rating]; None where it declares none
+    current_limit: float | None = None
     failure: Failure | None = None
 
     keeps_failures = False
@@ -173,6 +175,11 @@ class BenchTask(Task):
         return BenchResult(self.row, failure=failure)
 
 
+def declared_limit(description: FmuDescription) -> float | None:
+    """Return the current that a binding declares as a converter's limit [pu of its rating]; None where none does."""
+    return description.port.current_limit if isinstance(description, BoundDescription) else None
+
+
 def compute_row(task: BenchTask) -> BenchResult:
     return computed(task, row_result)
 
@@ -181,6 +188,7 @@ def row_result(task: BenchTask, case: Case) -> BenchResult:
     result, begin = BenchResult(task.row), _processor_time()
     with failure_kept(result):
         prepared = task.study.prepare(case, dict(task.changes))
+        result.current_limit = declared_limit(prepared.system.components[PLANT].description)
         watch = Watch(prepared)
         ended: CosimError | None = None
         with running(prepared) as master:

@@ -99,7 +99,11 @@ def carries() -> Judge:
         mean = over_a_period(size, row.times, row.f_n)[row.within(row.event(0), np.inf)]
         lasts = min(len(mean), round(LASTS / float(row.times[1] - row.times[0])))
         held = float(np.lib.stride_tricks.sliding_window_view(mean, lasts).min(axis=1).max())
-        return _finding(CURRENT, rule, READING, held, NO_LIMIT, f"{held:.3g} pu of its rating")
+        text = f"{held:.3g} pu of its rating"
+        if row.current_limit is None:
+            return _finding(CURRENT, rule, READING, held, NO_LIMIT, text)
+        text += f"; its binding declares {row.current_limit:g} pu"
+        return _finding(CURRENT, rule, READING, held, ABOVE * row.current_limit, text)
 
     return judge
 

@@ -61,6 +61,8 @@ class MeasuredRow:
     # of the watch over the run, in the form of `Finding.as_json`
     findings: tuple[Mapping[str, Any], ...] = ()
     declared: Mapping[str, float] = field(default_factory=dict)
+    # what the plant's binding declares [pu]; None where it declares none
+    current_limit: float | None = None
     # of the source against one that turns at the rated frequency [rad], shape (n,); None where there is no source.
     source_angle: Numbers | None = None
 

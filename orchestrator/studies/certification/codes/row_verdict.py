@@ -88,6 +88,7 @@ def judge_row(
         f_n,
         programme.times,
         tuple(result.findings),
+        current_limit=result.current_limit,
         source_angle=programme.source_angle(result.times, f_n),
     )
     if len(result.times) < 2 or result.times[-1] < programme.stop - 2e-3:

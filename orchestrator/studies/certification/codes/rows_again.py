@@ -19,6 +19,7 @@ from orchestrator.studies.certification.codes.bench_point import (
     BenchResult,
     BenchTask,
     case_name,
+    declared_limit,
     write_row,
 )
 from orchestrator.studies.certification.codes.known import code_for, tables
@@ -58,12 +59,14 @@ def rebuilt(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Cer
         raise InputError(
             f"the table of {code.key} has none of the rows that the record and {RESPONSES} have"
         )
+    description = bound_fmu(request.fmu, request.binding)
     results = {row.name: _response(row.name, stated.get(row.name), responses) for row in rows}
+    for result in results.values():
+        result.current_limit = declared_limit(description)
     verdicts = [
         judge_row(row, results[row.name], content["f_n"], stated.get(row.name, {}).get("criteria"))
         for row in rows
     ]
-    description = bound_fmu(request.fmu, request.binding)
     case = folder / case_name(rows[0].name)
     return Certificate(request, description, code, content["f_n"], verdicts, results, case)
 

@@ -14,9 +14,15 @@ from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import file_hash
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.output.results.storage import save_netcdf
+from orchestrator.studies.certification.case_file import BINDING
 from orchestrator.studies.certification.certificate import Certificate
 from orchestrator.studies.certification.codes.all_codes import CODES
-from orchestrator.studies.certification.codes.bench_point import BenchResult, case_name, write_row
+from orchestrator.studies.certification.codes.bench_point import (
+    BenchResult,
+    case_name,
+    declared_limit,
+    write_row,
+)
 from orchestrator.studies.certification.codes.known import KNOWN
 from orchestrator.studies.certification.codes.row_verdict import judge_row
 from orchestrator.studies.certification.files import (
@@ -29,6 +35,7 @@ from orchestrator.studies.certification.files import (
 )
 from orchestrator.studies.certification.request import CertificationRequest
 from orchestrator.studies.certification.verification import read_certificate, verify_files
+from tests.support.bindings import GFOR
 from tests.support.grid_codes import replace_code
 
 CODE = CODES["fingrid"]
@@ -37,9 +44,19 @@ CODE = CODES["fingrid"]
 @pytest.fixture
 def fails(tmp_path, fmu_path):
     """A certificate of Fingrid's table on powers that never move: jumps are not opposed, and the rest is met."""
-    results, fmu = {}, tmp_path / "converter.fmu"
-    shutil.copyfile(fmu_path("gfor"), fmu)
-    request = CertificationRequest(fmu)
+    return issued_in(tmp_path, fmu_path("gfor"))
+
+
+def issued_in(folder, tested, declared=None):
+    """Issue that certificate; ``declared``: the limit of the current in the converter's binding [pu]."""
+    results, fmu, binding = {}, folder / "converter.fmu", None
+    shutil.copyfile(tested, fmu)
+    if declared is not None:
+        binding = folder / BINDING
+        binding.write_text(GFOR.replace("[rating]", f"[rating]\nI_max = {declared}"), "utf-8")
+    description = bound_fmu(fmu, binding)
+    assert declared_limit(description) == declared
+    request = CertificationRequest(fmu, binding)
     for row in CODE.rows:
         programme = row.programme(50.0)
         times = np.arange(0, programme.stop + 1e-3, 1e-3)
@@ -51,15 +68,16 @@ def fails(tmp_path, fmu_path):
             "v_re": np.cos(angle),
             "v_im": np.sin(angle),
         }
-        results[row.name] = BenchResult(row.name, times, signals)
-        write_row(request, row.name, row.title, programme, 50.0, tmp_path)
+        results[row.name] = BenchResult(row.name, times, signals, current_limit=declared)
+        write_row(request, row.name, row.title, programme, 50.0, folder)
     verdicts = [judge_row(row, results[row.name], 50.0) for row in CODE.rows]
-    case = tmp_path / case_name(CODE.rows[0].name)
-    issued = Certificate(request, bound_fmu(fmu), CODE, 50.0, verdicts, results, case)
+    case = folder / case_name(CODE.rows[0].name)
+    issued = Certificate(request, description, CODE, 50.0, verdicts, results, case)
     issued.values = load_case(case).prepare()[0].values
-    save(issued, tmp_path)
-    assert verify_files(*read_certificate(tmp_path)).holds
-    return tmp_path
+    save(issued, folder)
+    found = verify_files(*read_certificate(folder))
+    assert found.holds, found.faults
+    return folder
 
 
 def sealed(folder, content):
@@ -85,6 +103,19 @@ def without(content, name):
         "The converter 'gfor': 3 of 3 judged rows are accepted."
     )
     return content
+
+
+def test_verify_knows_the_declared_limit_of_the_current(tmp_path, fmu_path):
+    """The margin is that to 1.05 times the binding's I_max, of a current of hypot(0.5, 0.1) pu; nobody widens it."""
+    folder = issued_in(tmp_path, fmu_path("gfor"), 1.3)
+    _, content = read_certificate(folder)
+    told = [c for row in content["rows"] for c in row["criteria"] if c["criterion"] == "current"]
+    assert told
+    for current in told:
+        assert current["limit"] == pytest.approx(1.365)
+        assert current["margin"] == pytest.approx(1 - np.hypot(0.5, 0.1) / 1.365)
+        current |= {"limit": 3.3, "margin": 1 - np.hypot(0.5, 0.1) / 3.3}
+    assert "'criteria" in sealed(folder, content)
 
 
 def test_a_failed_row_that_was_taken_out_is_named(fails, request):

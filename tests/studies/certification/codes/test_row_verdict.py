@@ -215,6 +215,20 @@ def test_a_declared_limit_takes_the_place_of_the_widest():
     assert judge_row(row, beside, 50.0).findings[-1].limit == 3.3
 
 
+def test_the_margin_of_a_current_is_that_to_the_declared_limit():
+    """The current is 1.2 pu, of equal P and Q at a voltage of 1 pu, beside 1.05 times each declared limit."""
+    row = next(row for row in CODES["aemo"].rows if row.name == "jump_30")
+    part = np.full(TIMES.shape, 1.2 * np.sqrt(0.5))
+    signals = {"p": part, "q": part, "v": np.ones(TIMES.shape)}
+    for declared, margin in ((1.3, 1 - 1.2 / 1.365), (1.1, 1 - 1.2 / 1.155), (None, 1 - 1.2 / 3.3)):
+        result = BenchResult(row.name, TIMES, signals, current_limit=declared)
+        current = next(f for f in judge_row(row, result, 50.0).findings if f.criterion == "current")
+        assert current.value == pytest.approx(1.2)
+        assert current.margin == pytest.approx(margin)
+        assert current.accepted == (margin > 0)
+        assert ("declares" in current.text) == (declared is not None)
+
+
 def test_a_certificate_without_that_criterion_holds_where_it_is_met():
     row = next(row for row in CODES["aemo"].rows if row.name == "jump_30")
     stated = [{"criterion": "stable"}]
