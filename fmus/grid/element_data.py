@@ -13,7 +13,7 @@ class Line:
 
     ``tap``·e^{j·``shift``} is an ideal ratio at the from side, ``shift`` in rad: MATPOWER's convention, in which
     series impedance and charging lie behind the ratio. ``X_C`` is the reactance of a capacitor in series [pu, 100 MVA].
-    """
+    ``adjustable``: whether the ratio may move, so that it is a parameter also where it is 1 at first."""
 
     name: str
     from_bus: str
@@ -24,11 +24,12 @@ class Line:
     tap: float = 1.0
     shift: float = 0.0
     X_C: float = 0.0
+    adjustable: bool = False
 
     @property
     def has_ratio(self) -> bool:
         """Return whether an ideal ratio stands at the from side."""
-        return self.tap != 1.0 or self.shift != 0.0
+        return self.adjustable or self.tap != 1.0 or self.shift != 0.0
 
     def variable(self, quantity: str) -> str:
         """Name of one of its variables in the grid's FMU, such as ``X`` or ``connected``."""

@@ -111,7 +111,7 @@ class Case(CaseDefinition):
         prepared, questions, named = [], [*self.questions], mentions.Named()
         for name in scenarios or self.scenarios:
             preparer = self._preparer(name, overrides, parameters)
-            follow = voltages_before is None and preparer.draft.loads_follow
+            follow = voltages_before is None and preparer.draft.reacts
             shares = dispatch is None and not any(k.endswith(".P_0") for k in overrides or {})
             before = (
                 self._before_outage(name, overrides or {}, parameters) if follow or shares else None

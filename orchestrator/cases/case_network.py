@@ -153,6 +153,12 @@ def _from_table(draft: Draft, grid: ComponentTable, everything: Tables) -> Netwo
         return None
     if draft.found.network_failed:
         return None
+    is_moving = draft.given.case.network is not None and draft.given.case.network.move_controls
+    if is_moving and grid.model != "phasor_grid":
+        text = f"taps and shunts move in phasor models, and the grid's model is {grid.model!r}"
+        place = draft.given.place("network", "move_controls")
+        draft.note_network(place, f'{text}; write models = "phasor" at the top, or remove the key')
+        return None
     held = {table.bus for table in everything.values()}
     idle = [bus for bus in data.generation if bus not in held]
     if idle:

@@ -105,9 +105,9 @@ class Draft:
     loads_as_given: frozenset[str] = frozenset()
 
     @property
-    def loads_follow(self) -> bool:
-        """Return whether there are loads that follow the voltage in an outage's power flow."""
-        return self.data is not None and bool(self.data.flow_laws)
+    def reacts(self) -> bool:
+        """Return whether there are loads or controls that follow the voltage in an outage's power flow."""
+        return self.data is not None and bool(self.data.flow_laws or self.data.controls)
 
     def note(self, place: str, text: str, kind: ErrorKind = ErrorKind.VALUES) -> None:
         problem = Problem(place, text, kind)

@@ -23,6 +23,7 @@ from orchestrator.cases.csv_rows import (
 )
 from orchestrator.cases.element_names import BranchName
 from orchestrator.cases.flow_balance import inner_buses
+from orchestrator.cases.flow_controls import Control, with_controls
 from orchestrator.cases.imported_flow import imported_equations
 from orchestrator.cases.load_models import FlowLaws, device_laws, flow_laws, with_laws
 from orchestrator.cases.network_import import Generation, ImportedNetwork, bus_of, import_network
@@ -55,6 +56,8 @@ class _Source:
     records: tuple[RecordUse, ...] = ()
     device_loads: tuple[Load, ...] = ()  # in the place of DC lines and the like
     file_loads: tuple[FileLoad, ...] = ()
+    controls: tuple[Control, ...] = ()  # taps and shunts that move after an outage
+    counted_controls: str = ""  # how many could move, in words
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,8 @@ class NetworkData:
     # records of dynamics data
     file_loads: tuple[FileLoad, ...] = ()
     recorded_loads: frozenset[str] = frozenset()
+    controls: tuple[Control, ...] = ()  # taps and shunts that move in the power flow of an outage
+    counted_controls: str = ""  # how many could move, in words
 
 
 def network_data(table: NetworkTable, directory: Path, slack: str | None = None) -> NetworkData:
@@ -164,6 +169,8 @@ def network_data(table: NetworkTable, directory: Path, slack: str | None = None)
         unit_names=source.unit_names,
         device_loads=tuple(x.name for x in found.device_loads),
         file_loads=found.file_loads,
+        controls=found.controls,
+        counted_controls=found.counted_controls,
     )
 
 
@@ -185,6 +192,10 @@ def _source(table: NetworkTable, directory: Path, slack: str | None) -> _Source:
     if table.keep_load_parts:
         raise InputError(
             "keep_load_parts is for networks of PSS/E; remove the key, or give the file as 'raw'"
+        )
+    if table.move_controls:
+        raise InputError(
+            "move_controls is for networks of PSS/E; remove the key, or give the file as 'raw'"
         )
     if table.cgmes is not None:
         return _from_cgmes(directory / table.cgmes, table)
@@ -270,6 +281,11 @@ def _read_from_raw(asked: _Asked) -> _Source:
             "left out; the DC lines feed here what they do at the file's voltages there"
         )
         changes.append(Problem(raw.tables.name, text))
+    moving = with_controls(raw, imported)
+    if table.move_controls:
+        imported = moving.network
+        text = moving.in_words if moving.counted else "no tap and no switched shunt can move"
+        changes.append(Problem(raw.tables.name, text))
     solved = solved_devices(raw.devices, imported, stated_voltages(raw.tables.bus))
     changes += device_notes(solved, table, raw.tables.name)
     with_devices = replace(imported, loads=(*imported.loads, *solved.loads))
@@ -292,6 +308,8 @@ def _read_from_raw(asked: _Asked) -> _Source:
         ),
         device_loads=solved.loads,
         file_loads=raw.loads,
+        controls=moving.controls if table.move_controls else (),
+        counted_controls=moving.counted,
     )
 
 

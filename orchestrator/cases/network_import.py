@@ -149,6 +149,22 @@ def _ratings_of_legs(lines: list[Line], ratings: Mapping[str, Rating]) -> dict[s
     return found
 
 
+def branch_names(source: SourceTables) -> list[str | None]:
+    """Return the names of the lines that the rows of branches become; None for one out of service."""
+    labels = {int(row[0]): source.labels[int(row[0])] for row in source.bus if row[1] != _OUT}
+    found: list[str | None] = []
+    seen: Counter[str] = Counter()
+    for row in source.branch:
+        start, end = int(row[0]), int(row[1])
+        if row[10] == 0 or start not in labels or end not in labels:
+            found.append(None)
+            continue
+        name = f"line_{labels[start]}_{labels[end]}"
+        seen[name] += 1
+        found.append(name if seen[name] == 1 else f"{name}_{seen[name]}")
+    return found
+
+
 def _lines(
     source: SourceTables, labels: dict[int, str]
 ) -> tuple[list[Line], dict[int, complex], dict[str, Rating], dict[str, BranchName]]:
@@ -162,19 +178,17 @@ def _lines(
     ratings: dict[str, Rating] = {}
     names: dict[str, BranchName] = {}
     called = source.branch_names or [BranchName() for _ in source.branch]
-    seen: Counter[str] = Counter()
     scale = SYSTEM_BASE_MVA / source.base_mva
-    for row, (y_from, y_to), own in zip(source.branch, source.branch_to_earth, called, strict=True):
-        start, end = int(row[0]), int(row[1])
-        if row[10] == 0 or start not in labels or end not in labels:
+    for row, (y_from, y_to), own, name in zip(
+        source.branch, source.branch_to_earth, called, branch_names(source), strict=True
+    ):
+        if name is None:
             continue
-        name = f"line_{labels[start]}_{labels[end]}"
-        seen[name] += 1
+        start, end = int(row[0]), int(row[1])
         tap = float(row[8]) or 1.0
         b = max(0.0, 2 * min(y_from.imag, y_to.imag))
         for bus, rest in ((start, (y_from - 0.5j * b) / tap**2), (end, y_to - 0.5j * b)):
             to_earth[bus] = to_earth.get(bus, 0j) + complex(rest)
-        name = name if seen[name] == 1 else f"{name}_{seen[name]}"
         names[name] = BranchName(one_line(own.name), one_line(own.circuit))
         if 0 < row[_RATE_A] < math.inf:
             ratings[name] = Rating(float(row[_RATE_A]), by_current=row[8] == 0)

@@ -2,8 +2,10 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from fnmatch import fnmatchcase
 
 from orchestrator.cases.draft import Draft
+from orchestrator.cases.flow_controls import Control
 from orchestrator.cases.flow_units import note_contradictions, undecided_units
 from orchestrator.cases.islands import likely_reference
 from orchestrator.cases.names import close_names
@@ -71,6 +73,7 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
             active=draft.active_limits,
             following=_following(draft),
             ratings=draft.base_ratings,
+            controls=_moving(draft, table.grid),
         )
     except InputError as error:
         kind = ErrorKind.VALUES if error.kind is ErrorKind.INPUT else error.kind
@@ -93,6 +96,18 @@ def _following(draft: Draft) -> dict[str, FollowingLoad]:
         for name, laws in draft.data.flow_laws.items()
         if name in buses and name not in draft.loads_as_given
     }
+
+
+def _moving(draft: Draft, grid: str) -> list[Control]:
+    """Taps and shunts that move in the power flow of an outage; one whose position is given does not."""
+    if draft.data is None or not draft.voltages_before:
+        return []
+    given = draft.given.from_outside
+    return [
+        control
+        for control in draft.data.controls
+        if not any(fnmatchcase(f"{grid}.{control.variable}", name) for name in given)
+    ]
 
 
 def _leftover(draft: Draft, flow: PowerFlow) -> Iterator[Problem]:

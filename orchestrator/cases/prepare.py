@@ -99,6 +99,9 @@ class PreparedScenario:
     # likely ratings [MVA] of units whose S_n is only the base of their data
     base_ratings: Mapping[str, float] = field(default_factory=dict)
     following_loads: tuple[str, ...] = ()  # loads that follow the voltage in an outage's power flow
+    # variables of the grid that move in an outage's power flow: taps and switched shunts
+    moving: tuple[str, ...] = ()
+    counted_controls: str = ""  # how many taps and switched shunts could move, in words
     device_loads: tuple[
         str, ...
     ] = ()  # loads in the place of DC lines and the like, which no load factor scales
@@ -306,6 +309,8 @@ class Preparer:
             recorded_loads=draft.data.recorded_loads if draft.data else frozenset(),
             base_ratings=draft.base_ratings,
             following_loads=tuple(draft.data.flow_laws) if draft.data else (),
+            moving=tuple(x.variable for x in draft.data.controls) if draft.data else (),
+            counted_controls=draft.data.counted_controls if draft.data else "",
             device_loads=draft.data.device_loads if draft.data else (),
             idle=idle_values(
                 draft.system, draft.given.from_outside, draft.places, events, draft.found.absent

@@ -180,6 +180,7 @@ class NetworkTable(Table):
     cgmes: str | None = None
     leave_out: list[str] = []
     keep_load_parts: Annotated[bool, Field(strict=True)] = False
+    move_controls: Annotated[bool, Field(strict=True)] = False
     frequency: Hertz | None = Field(default=None, gt=0)
     stray_B: PerUnit = 0.0
 

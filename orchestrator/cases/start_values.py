@@ -12,6 +12,7 @@ from fmus.toolchain.port_variables import (
     SYSTEM_BASE_MVA,
 )
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt, inner_buses, legs_of
+from orchestrator.cases.flow_controls import Control, settled
 from orchestrator.cases.flow_limits import Limits
 from orchestrator.cases.flow_units import flow_unit
 from orchestrator.cases.load_models import FlowLaws
@@ -49,6 +50,7 @@ def start_from_power_flow(
     active: Mapping[str, tuple[float, float]] | None = None,
     following: Mapping[str, FollowingLoad] | None = None,
     ratings: Mapping[str, float] | None = None,
+    controls: Sequence[Control] = (),
 ) -> PowerFlow:
     """Solve the power flow and set the start values of the grid and of all units.
 
@@ -60,6 +62,7 @@ def start_from_power_flow(
     ``returning``: units that an event connects; a limit of theirs must stay.
     ``active``: least and most active power of units that share [MW], beside their models' own limits.
     ``following``: loads that follow the voltage, by name; they are set to what they draw in the solution.
+    ``controls``: taps and shunts that move until voltages are in their bands; the grid gets their positions.
     ``ratings``: likely ratings [MVA] of units whose S_n is only the base of their data; they may feed more than twice
     S_n."""
     loads = _loads(network, system.components[grid], following or {})
@@ -80,12 +83,14 @@ def start_from_power_flow(
             keep_limits=keep_limits,
         )
 
-    if dispatch is None:
-        flow = solve(feeding)
-    else:
+    def find() -> PowerFlow:
+        if dispatch is None:
+            return solve(feeding)
         plans = system.components
         above = {n: mva for n, mva in (ratings or {}).items() if mva > plans[n].number("S_n")}
-        flow = shared_flow(solve, feeding, plans, slack, dispatch, Room(active or {}, above))
+        return shared_flow(solve, feeding, plans, slack, dispatch, Room(active or {}, above))
+
+    flow = settled(find, system.components[grid], _acting(controls, feeding, system, grid))
     for bus, voltage in ((bus, flow.voltages[bus]) for bus in network.buses):
         system.components[grid].parameters |= {
             f"{bus}.v_0": abs(voltage),
@@ -100,6 +105,18 @@ def start_from_power_flow(
     ):
         _let_idle(system.components[name])
     return flow
+
+
+def _acting(
+    controls: Sequence[Control], units: Sequence[FlowUnit], system: System, grid: str
+) -> list[Control]:
+    """Return the controls in service whose bus no unit holds."""
+    held = {unit.bus for unit in units if unit.connected and unit.Q_0 is None}
+    return [
+        x
+        for x in controls
+        if x.bus not in held and is_connected(system.components[grid], f"{x.element}.connected")
+    ]
 
 
 def _lines(network: Network, grid: ComponentPlan) -> list[FlowLine]:

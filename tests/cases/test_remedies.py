@@ -202,6 +202,11 @@ GALLERY = {
         files={"three.m": MPC},
         key=("network", "keep_load_parts = true"),
     ),
+    "moving controls in MATPOWER": Broken(
+        "move_controls is for networks of PSS/E",
+        files={"three.m": MPC},
+        key=("network", "move_controls = true"),
+    ),
     "devices left out of MATPOWER": Broken(
         "leave_out is for networks of PSS/E",
         files={"three.m": MPC},

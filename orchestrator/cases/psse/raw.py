@@ -3,8 +3,8 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.bus_loads import BusLoads
 from orchestrator.cases.element_names import BranchName
 from orchestrator.cases.network_sources import SourceTables
+from orchestrator.cases.psse.controls import ShuntRecord, TapRecord, shunt_record
 from orchestrator.cases.psse.device_records import (
     FoundDevices,
     Places,
@@ -137,6 +138,9 @@ class RawNetwork:
     records: tuple[RecordUse, ...] = ()
     devices: tuple[HeldDevice, ...] = ()
     loads: tuple[FileLoad, ...] = ()
+    # what holds a voltage step by step: ratios by the row of their branch, and switched shunts
+    taps: Mapping[int, TapRecord] = field(default_factory=dict)
+    shunts: tuple[ShuntRecord, ...] = ()
 
 
 def read_raw(
@@ -179,6 +183,9 @@ class _Reading:
         # lines of the records that make them one, and of those that would if both had no machine
         self._merged: set[int] = set()
         self._lossless: set[int] = set()
+        # what holds a voltage step by step: ratios by the branch's place, and shunts
+        self._taps: dict[int, TapRecord] = {}
+        self._stepping: list[ShuntRecord] = []
         self._corrections = correction_tables(raw)
         # least reactance that our network can have [pu of the system]
         self._least = 1.1 * SMALLEST_REACTANCE * raw.base_mva / SYSTEM_BASE_MVA
@@ -235,6 +242,8 @@ class _Reading:
             records=records,
             devices=self._devices.devices,
             loads=tuple(self._named_loads(tables)),
+            taps=self._taps,
+            shunts=tuple(self._stepping),
         )
 
     def _bus(self, record: Record, index: int = 0) -> int:
@@ -451,6 +460,10 @@ class _Reading:
             if record.whole(mode, "MODSW", 1):
                 self._changes.note(record.line, "switched shunt: held at BINIT")
             self._add(bus, 4, complex(0.0, record.number(initial, "BINIT", 0.0)))
+            control = shunt_record(record, self._raw.revision, self._own(record))
+            seen = self._standing(control.bus) if control else None
+            if control and seen is not None:
+                self._stepping.append(control.at(bus, seen))
 
     def _lines(self) -> None:
         ends = self._ends
@@ -577,6 +590,9 @@ class _Reading:
                 rating=first.rating_mva,
                 name=name,
             )
+            seen = self._standing(t.tap.bus) if t.tap else None
+            if t.tap and seen is not None and first.bus != second.bus:
+                self._taps[len(self._branches) - 1] = replace(t.tap, bus=seen)
             return
         inner = max(self._rows) + 1
         self._rows[inner] = [inner, 1, *[0.0] * (_BUS_COLUMNS - 2)]

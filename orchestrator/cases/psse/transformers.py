@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from orchestrator.cases.psse.records import SWITCHING_DEVICES, RawFile, Record
+from orchestrator.cases.psse.controls import TapRecord, tap_record
+from orchestrator.cases.psse.records import NODES, SWITCHING_DEVICES, RawFile, Record
 
 _NAME = 10  # column of NAME in the first line
 _ZCOD = 21  # of ZCOD there, from revision 35 on
@@ -50,6 +51,7 @@ class Transformer:
     name: str = ""  # NAME, which is 40 characters at most
     # whether correction tables act on the impedances between windings, and not on those to the star point (ZCOD = 1)
     corrects_pairs: bool = False
+    tap: TapRecord | None = None  # a ratio that holds a voltage in a band, at winding 1 of two
 
 
 def transformers(raw: RawFile, voltages: Mapping[int, float]) -> Iterator[Transformer]:
@@ -108,6 +110,15 @@ def _transformer(
         codes["CZ"] != _LOSSES and _has_large_resistance(impedances),
         first.text(_NAME, "").strip(),
         bool(count > 2 and first.whole(_ZCOD, "ZCOD", 0)),
+        tap_record(
+            rest[1],
+            control,
+            (buses[0], buses[1]),
+            _by_base(codes["CW"], voltages[buses[0]], windings[0].nominal) / windings[1].ratio,
+            has_node=raw.revision >= NODES,
+        )
+        if count == 2
+        else None,
     )
 
 
@@ -132,12 +143,17 @@ def _winding(line: Record, bus: int, base: float, code: int, table: int) -> Wind
     is_given = ratio != 0
     if not is_given:
         ratio = base if code == 2 else 1.0
-    ratio = {1: ratio, 2: ratio / base if base else 0.0, 3: ratio * by_base}[code]
+    ratio *= _by_base(code, base, by_base)
     if not ratio > 0:
         raise line.error(f"WINDV comes to {ratio:g} pu of the bus' base voltage; it must exceed 0")
     shift, rating = line.number(2, "ANG [degrees]", 0.0), line.number(3, "RATA [MVA]", 0.0)
     number = line.whole(table, "TAB", 0)
     return Winding(bus, ratio, shift, by_base, rating_mva=rating, table=number, has_ratio=is_given)
+
+
+def _by_base(code: int, base: float, nominal: float) -> float:
+    """Return the factor from a ratio as CW has it to one of the bus' base voltage."""
+    return {1: 1.0, 2: 1 / base if base else 0.0, 3: nominal}[code]
 
 
 def _impedance(raw: RawFile, line: Record, index: int, code: int, nominal: float) -> complex:

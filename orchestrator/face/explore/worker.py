@@ -203,6 +203,12 @@ class Desk:
         if not own and not lost:
             return values
         rule, base, step = question.get("sharing"), question.get("base"), question.get("step")
+        network = case.file.table.network
+        if question.get("move_controls") and lost and not (network and network.move_controls):
+            raise InputError(
+                "the study let taps and switched shunts move (--move-controls), and the case holds them; write "
+                "move_controls = true in [network] of the case, and compute the study anew"
+            )
         key = json.dumps([self._stamp, question["scenario"], rule, base, step])
         if (
             self._prepared is None or self._prepared[0] != key

@@ -57,6 +57,8 @@ class Cells:
     values: Mapping[str, Value] = field(default_factory=dict)  # that hold in all cells
     step: float | None = None  # communication step [s], where it is not the case's
     sharing: str | None = None  # who feeds what an outage takes, where it is not as the case says
+    # whether taps and switched shunts move after an outage, where the case does not say so
+    move_controls: bool = False
     followed: bool = False  # whether a row is a mode that is followed over the columns
 
     def save(self, staging: Path, folder: Path) -> Path:
@@ -71,6 +73,7 @@ class Cells:
             "hash": _hash(self.case),
             "values": dict(self.values),
             "sharing": self.sharing,
+            "move_controls": self.move_controls,
             "step": self.step,
             "followed": self.followed,
             "left_out": max(0, len(self.rows) - fit),
@@ -134,6 +137,7 @@ class _Kept:
     columns: Annotated[list[CellLine], Field(min_length=1)]
     cells: list[list[Cell | None]]
     step: float | None = None
+    move_controls: bool = False
 
 
 def read_cells(folder: Path) -> dict[str, Any]:

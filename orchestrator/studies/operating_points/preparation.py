@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.cases.case import Case
+from orchestrator.cases.flow_controls import moves_in_words
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.plausibility import overloads
 from orchestrator.cases.prepare import PreparedScenario
@@ -49,6 +50,19 @@ class PreparedItem:
     dead: tuple[str, ...] = ()
 
 
+def with_moving_controls(case: Case) -> Case:
+    """Return the case whose taps and switched shunts move in the power flow after an outage.
+
+    Raises an `InputError` if its network is not of PSS/E."""
+    network = case.table.network
+    if network is None or network.raw is None:
+        raise InputError(
+            "move_controls (--move-controls) is for networks of PSS/E, which [network] has as raw; leave it out"
+        )
+    moving = network.model_copy(update={"move_controls": True})
+    return replace(case, table=case.table.model_copy(update={"network": moving}))
+
+
 class ItemPreparation:
     def __init__(
         self,
@@ -57,7 +71,10 @@ class ItemPreparation:
         layers: Sequence[ParameterFile],
         step_size: float | None = None,
         sharing: SharingRule | None = None,
+        *,
+        move_controls: bool = False,
     ) -> None:
+        case = with_moving_controls(case) if move_controls else case
         self._case, self._scenario, self._layers, self._step_size = (
             case,
             scenario,
@@ -81,7 +98,7 @@ class ItemPreparation:
         without = what_remains(valued, self.elements, own)
         units, loads = ({*getattr(remains, k)} - {*getattr(without, k)} for k in ("units", "loads"))
         dispatch, text, voltages_before = None, "", {}
-        if item.lost and self.base.following_loads:
+        if item.lost and (self.base.following_loads or self.base.moving):
             flow_before = self._before_outage(item, own, without).power_flow
             assert flow_before is not None
             voltages_before = flow_before.voltages
@@ -104,7 +121,16 @@ class ItemPreparation:
                 load_of(loads, valued.system.components[self.elements.grid]),
             )
             text = in_words(dispatch, found.power_flow.powers, plans, units, lost_load(load))
+        if item.lost and self.base.moving:
+            text = "; ".join(filter(None, (text, self._moved(found))))
         return PreparedItem(without_units(found, remains.units), text, remains.dead)
+
+    def _moved(self, found: PreparedScenario) -> str:
+        """Return which taps and shunts have moved from where the case has them, and how far."""
+        grid = self.elements.grid
+        before, now = (x.system.components[grid] for x in (self.base, found))
+        moves = moves_in_words(self.base.moving, before, now)
+        return few([f"{name} {move}" for name, move in moves.items()], _SHOWN) if moves else ""
 
     def live(self, item: Item) -> dict[str, Value]:
         """Values by which the case alone is at an item: what is off, and what each unit feeds where others share it.
@@ -123,6 +149,8 @@ class ItemPreparation:
             }
         if item.lost:
             found |= self._as_followed(scenario)
+            plan = scenario.system.components[self.elements.grid]
+            found |= {f"{self.elements.grid}.{x}": plan.number(x) for x in scenario.moving}
         return found
 
     def _as_followed(self, scenario: PreparedScenario) -> dict[str, Value]:

@@ -43,6 +43,8 @@ class StretchTask(Task):
     # whether growing eigenvalues are counted at all items, rather than at the ends
     whole: bool = False
     sharing: SharingRule | None = None  # how units share an outage; as the case says where None
+    # whether taps and switched shunts move after an outage, whatever the case says
+    move_controls: bool = False
 
     def content(self) -> Any:
         """Where the points stand in their file does not count."""
@@ -51,7 +53,7 @@ class StretchTask(Task):
             [item.point - self.anchor.point, item.intact, item.values, item.out, item.lost]
             for item in chain
         ]
-        return plain([said, self.wanted, self.whole, self.sharing])
+        return plain([said, self.wanted, self.whole, self.sharing, self.move_controls])
 
     def failed(self, failure: Failure) -> StretchRecord:
         one = ItemRecord(Status.of(failure), failure.text, lasting=failure.lasting)
@@ -78,7 +80,12 @@ class _Worker:
         self._task, self._bench = task, bench
         study = task.study
         self._preparation = ItemPreparation(
-            case, study.scenario, study.layers, study.step_size, task.sharing
+            case,
+            study.scenario,
+            study.layers,
+            study.step_size,
+            task.sharing,
+            move_controls=task.move_controls,
         )
         self._alone: dict[Any, Any] = {}
 

@@ -76,6 +76,13 @@ class ScreeningRequest(OverCluster):
         "who feeds what an outage takes: droop (units by droop and rating, the default), "
         "rating, or slack (the slack alone)",
     )
+    move_controls: bool = asked(
+        FLAG,
+        False,
+        "after an outage, taps and switched shunts of a RAW file move step by step to hold voltages in their bands",
+        python="whether taps and switched shunts of a RAW file move after an outage until voltages are in their bands, "
+        "rather than being held",
+    )
     frequencies: tuple[float, float] = of_frequencies(
         "modes from the first to the second are critical [Hz], where they are damped less than ``damping``"
     )

@@ -12,6 +12,7 @@ from orchestrator.studies.operating_points.item import Item
 from orchestrator.studies.operating_points.outages import Outage
 from orchestrator.studies.operating_points.plan import OperatingPoints, read_operating_points
 from orchestrator.studies.operating_points.points_file import OperatingCase
+from orchestrator.studies.operating_points.preparation import with_moving_controls
 from orchestrator.studies.points.points import Work
 from orchestrator.studies.points.task import StudyCase
 from orchestrator.studies.screening.modes import CriticalRegion
@@ -55,6 +56,7 @@ class ScreeningPlan(OperatingPoints):
 
 def plan_screening(case: Case, request: ScreeningRequest) -> ScreeningPlan:
     region, sharing = request.region, cast("SharingRule | None", request.sharing)
+    case = with_moving_controls(case) if request.move_controls else case
     read = read_operating_points(case, request, request.points, request.outages, request.scenario)
     study = StudyCase.of(read.prepared, read.layers, request.step_size)
     tasks = []
@@ -62,7 +64,9 @@ def plan_screening(case: Case, request: ScreeningRequest) -> ScreeningPlan:
         part = read.items[first : first + STRETCH]
         point = read.points[part[0].point]
         anchor = Item(part[0].point, 0, point.values, point.out)
-        tasks.append(StretchTask(study, region, anchor, part, request.whole, sharing))
+        tasks.append(
+            StretchTask(study, region, anchor, part, request.whole, sharing, request.move_controls)
+        )
     return ScreeningPlan(**vars(read), wanted=region, tasks=tuple(tasks))
 
 

@@ -190,6 +190,7 @@ def _cells(summary: Summary) -> Cells:
         joined_values(plan.layers),
         plan.tasks[0].study.step_size,
         plan.tasks[0].sharing,
+        plan.tasks[0].move_controls,
     )
 
 
@@ -342,8 +343,19 @@ def _places(items: Sequence[ScreenedItem]) -> str:
     return f"{len(items)} items ({few(outages, _NAMED)}{at}), first {where(items[0])}"
 
 
+def _of_controls(summary: Summary) -> str:
+    """Tell whether taps and switched shunts move after outages; "" where there is none, or no outage."""
+    plan = summary.result.plan
+    counted = plan.prepared.counted_controls
+    if not counted or not any(outage.elements for outage in plan.outages):
+        return ""
+    if plan.prepared.moving:
+        return f"after outages {counted} move until voltages are in their bands"
+    return f"after outages {counted} are held; --move-controls lets them move"
+
+
 def remarks(summary: Summary) -> list[str]:
-    texts = []
+    texts = [*filter(None, [_of_controls(summary)])]
     for status, number in summary.counts.items():
         if status is Status.COMPUTED:
             continue
@@ -367,6 +379,7 @@ def as_json(summary: Summary) -> dict[str, Any]:
         **result.plan.prepared.about,
         "points": len(result.plan.points),
         "outages": len(result.plan.outages) - 1,
+        "controls": _of_controls(summary) or None,
         "items": len(result.items),
         "complete": result.complete,
         "stable": summary.stable,

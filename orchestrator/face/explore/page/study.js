@@ -72,7 +72,7 @@ async function openCell(at) {
   if (judging()) return showPictures(at);
   if (SAVED || !row.values || !column.values || !s.cells[at.row][at.column]) return;
   const scenario = row.scenario || column.scenario || s.scenario, values = { ...s.values, ...row.values, ...column.values };
-  const found = await ask("the cell", { ask: "cell", scenario, values, base: s.values, step: s.step, own: column.out, lost: row.out, sharing: s.sharing }, $("study-said"));
+  const found = await ask("the cell", { ask: "cell", scenario, values, base: s.values, step: s.step, own: column.out, lost: row.out, sharing: s.sharing, move_controls: s.move_controls }, $("study-said"));
   if (!found) return;
   Object.assign(state, { scenario, events: null, values: found.values, controls: Object.keys(found.values).slice(0, 8), range: s.range });
   $("scenario").value = scenario;
