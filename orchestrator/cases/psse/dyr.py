@@ -12,6 +12,7 @@ from fmus.synchronous_generator.dyr_fields import DYR_RECORDS, DyrField, DyrReco
 from orchestrator.cases.psse.dyr_records import EVENT, DynamicRecord, given_values
 from orchestrator.cases.psse.missing_models import (
     MACHINE,
+    OF_MACHINES,
     MissingModel,
     in_words,
     kind_of,
@@ -137,7 +138,7 @@ def machine_models(
     if min(len(places), len(bare)) >= _STRANGE:
         problems = [_other_network(strange, records, bare, len(at)), *problems]
         strange, unfit = [], [text for text in unfit if _NO_RECORD not in text]
-    problems = [*(_of_nobody(record, there) for record in strange), *problems, *unfit]
+    problems = [*(_may_be_meant(strange) if bare else ()), *problems, *unfit]
     if problems or missing:
         counted_once = [*_count_repeats(problems, first)]
         hidden = len(counted_once) - _MOST_SHOWN
@@ -236,6 +237,9 @@ def _use_of(
         told = f"an event of ANDES, of {record.machine}; [scenarios] has events"
         return UseOfRecord.NOT_USED, told, False
     kind = kind_of(record.name)
+    if kind in OF_MACHINES:
+        told = f"the RAW file has no machine {record.machine!r} at bus {record.bus}"
+        return UseOfRecord.NOT_USED, told, True
     what = {"load": "a load model", "device": "a model of an SVC or a DC line", "relay": "a relay"}
     return (
         UseOfRecord.NOT_USED,
@@ -257,7 +261,7 @@ def _unfit(
     for bus, name in _without_machine(parts):
         if (bus, name) not in replaced:
             yield (
-                f"machine {name!r} at bus {bus} {_NO_RECORD}; add one, or write "
+                f"machine {name!r} at bus {bus} has no record of a machine; add one, or write "
                 f"{replacement_of(labels[bus, name])}, and a converter of ours stands there"
             )
 
@@ -291,17 +295,17 @@ def _other_network(
     )
 
 
-def _of_nobody(record: DynamicRecord, machines: Collection[tuple[int, str]]) -> str:
-    ids = sorted(name for bus, name in machines if bus == record.bus)
-    there = (
-        f"which has {', '.join(map(repr, ids))}"
-        if ids
-        else "which has no generator in the RAW file"
-    )
-    return (
-        f"{record.place}: {record.name} is of machine {record.machine!r} at bus {record.bus}, {there}; correct its bus "
-        "or identifier, or remove the record"
-    )
+def _may_be_meant(strange: Sequence[DynamicRecord]) -> Iterator[str]:
+    """Yield one problem with the machines that the RAW file lacks, where another machine has no record: a slip."""
+    own = [record for record in strange if _KNOWN[record.name].kind in ("machine", "converter")]
+    if own:
+        named = (
+            f"{record.name} of machine {record.machine!r} at bus {record.bus}" for record in own
+        )
+        yield (
+            f"{own[0].place}: the RAW file does not have {few(named, _NAMED)}; if one of them is meant for a machine "
+            "without a record, correct its bus or identifier"
+        )
 
 
 def _followed(

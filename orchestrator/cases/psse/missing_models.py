@@ -12,6 +12,17 @@ from orchestrator.cases.remedies import replacement_of, without_models
 
 MACHINE = "machine"
 UNKNOWN = "unknown"
+OF_MACHINES = (
+    MACHINE,
+    "exciter",
+    "governor",
+    "stabilizer",
+    "compensator",
+    "limiter",
+    "plant",
+    "converter",
+)
+"""Kinds of models that belong to a machine of the network."""
 
 _STANDS = {
     "exciter": "a constant field voltage, or [units] exciter",

@@ -1,14 +1,14 @@
-"""Questions about records of a DYR file that are of no machine: models of loads, of SVCs, of DC lines."""
+"""Questions about records of a DYR file that are of no machine: models of loads, of SVCs, of DC lines, and strays."""
 
 import tomllib
 from collections.abc import Iterator, Sequence
 
 from orchestrator.cases.psse.dyr_records import DynamicRecord
-from orchestrator.cases.psse.missing_models import kind_of
+from orchestrator.cases.psse.missing_models import OF_MACHINES, kind_of
 from orchestrator.cases.record_use import RecordUse, UseOfRecord
 from orchestrator.cases.schema import LoadModelTable
 from orchestrator.cases.source_changes import Changes
-from orchestrator.core.errors import Problem, few
+from orchestrator.core.errors import Problem, counted, few
 
 _MATTER = {
     "load": "loads follow [network] load_model",
@@ -53,7 +53,32 @@ def unused_models(
             text = f"{name} (bus {buses}) is of no machine and not used: {_MATTER[kind]}"
             for record in own:
                 changes.note(record.line, text + remedy)
-    return changes.listed()
+    return [*_strays(records, unused), *changes.listed()]
+
+
+def _strays(records: Sequence[DynamicRecord], unused: Sequence[DynamicRecord]) -> Iterator[Problem]:
+    """Yield one question about all records of machines that the RAW file lacks, which PSS/E passes over too.
+
+    ``unused``: the records of no machine, among ``records``."""
+    strays = [record for record in unused if kind_of(record.name) in OF_MACHINES]
+    if not strays:
+        return
+    apart = {(record.bus, record.machine) for record in unused}
+    ids: dict[int, set[str]] = {}
+    for bus, machine in {(record.bus, record.machine) for record in records} - apart:
+        ids.setdefault(bus, set()).add(machine)
+    places = dict.fromkeys((record.bus, record.machine) for record in strays)
+    named = [
+        f"{bus} {machine!r}"
+        + (f", whose bus has {', '.join(map(repr, sorted(ids[bus])))}" if bus in ids else "")
+        for bus, machine in places
+    ]
+    yield Problem(
+        strays[0].place,
+        f"{counted(len(strays), 'record')} of {counted(len(places), 'machine')} that the RAW file does not have "
+        f"({few(named, _MOST_BUSES, '; ')}; first {strays[0].name}) are passed over, as PSS/E does; --details "
+        "lists them; if one is meant for a machine of the RAW file, correct its bus or identifier",
+    )
 
 
 def _law(records: Sequence[DynamicRecord]) -> str:

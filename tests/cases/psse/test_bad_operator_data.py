@@ -65,7 +65,7 @@ DYRS = {
     "another identifier": (
         DYR.replace("2,'GENROU','1'", "2,'GENROU','7'"),
         CASE,
-        r"(?s)GENROU is of machine '7' at bus 2, which has '1'; .*machine '1' at bus 2 has no record of a machine",
+        r"(?s)does not have GENROU of machine '7' at bus 2; .*machine '1' at bus 2 has no record of a machine",
     ),
     "no number": (
         DYR.replace("9.55", "nan"),

@@ -115,16 +115,6 @@ def test_records_over_lines_with_commas_or_blanks(tmp_path):
             "2.35 0.0",
             r"line 5: the record GENCLS has no slash at its end, and runs into the next, SEXS",
         ),
-        (
-            "1 'SEXS' 1",
-            "1 'SEXS' 2",
-            r"line 6: SEXS is of machine '2' at bus 1, which has '1'; correct",
-        ),
-        (
-            "1 'SEXS'",
-            "4 'SEXS'",
-            r"SEXS is of machine '1' at bus 4, which has no generator in the RAW file",
-        ),
         ("1 'TGOV1'", "1 'SEXS'", r"line 7: a second exciter of machine '1' at bus 1"),
     ],
 )

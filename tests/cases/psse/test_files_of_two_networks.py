@@ -1,4 +1,4 @@
-"""A RAW and a DYR file that do not belong together are one problem with counts, and a slip at one machine is not."""
+"""A RAW and a DYR file that do not belong together are one problem; machines too many are passed over."""
 
 import pytest
 
@@ -41,5 +41,26 @@ def test_files_of_two_networks_are_one_problem(tmp_path, machines, records, plac
 def test_a_slip_at_one_machine_names_its_records(tmp_path):
     said = renumbered(tmp_path, {4})
     assert "do not belong together" not in said
-    assert "GENROU is of machine '1' at bus 104, which has no generator in the RAW file" in said
+    assert "the RAW file does not have GENROU of machine '1' at bus 104; if one of them" in said
     assert "machine '1' at bus 4 has no record of a machine" in said
+
+
+def test_machines_that_the_network_lacks_are_passed_over_in_one_question(tmp_path):
+    """PSS/E passes models of machines that are not in the network over; so a file of a larger network serves."""
+    five_machines(tmp_path)
+    path = tmp_path / "five.dyr"
+    own = path.read_text(encoding="utf-8")
+    sexs = "'SEXS' {} 0.1 10.0 100.0 0.05 -5.0 5.0 /\n"
+    strange = f"104 'GENCLS' 1 4 0 /\n104 {sexs.format(1)}3 {sexs.format(7)}105 'GENCLS' 1 4 0 /\n"
+    path.write_text(own + strange, encoding="utf-8")
+    found = load_case(tmp_path / "five.toml").prepare(["base"])[0]
+    (asked,) = [str(one) for one in found.questions if "does not have" in str(one)]
+    line = len(own.splitlines()) + 1
+    assert (
+        f"five.dyr, line {line}: 4 records of 3 machines that the RAW file does not have" in asked
+    )
+    assert "(104 '1'; 3 '7', whose bus has '1'; 105 '1'; first GENCLS) are passed over" in asked
+    passed = [one for one in found.records if one.line >= line and one.file.endswith("dyr")]
+    assert [one.why for one in passed][1] == "the RAW file has no machine '1' at bus 104"
+    assert {one.use.value for one in passed} == {"not used"}
+    assert len(passed) == len(strange.splitlines())
