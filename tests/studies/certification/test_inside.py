@@ -11,10 +11,11 @@ from dataclasses import replace
 import pytest
 
 import orchestrator as gfor
-from orchestrator.studies.certification.codes.all_codes import CODES, ERCOT, FINGRID
+from orchestrator.studies.certification.codes.all_codes import ERCOT, FINGRID
 from orchestrator.studies.certification.files import spare_another
 from orchestrator.studies.certification.inside import FOLDER, taken_out
 from tests.pages.markdown import ROOT, blocks
+from tests.support.grid_codes import replace_code
 
 pytestmark = pytest.mark.slow
 
@@ -22,13 +23,11 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module", autouse=True)
 def one_row():
     """Two tables with their jumps alone."""
-    kept = dict(CODES)
-    for key, code in (("ercot", ERCOT), ("fingrid", FINGRID)):
-        CODES[key] = replace(
-            code, rows=tuple(row for row in code.rows if row.name.endswith("jumps"))[:1]
-        )
-    yield
-    CODES.update(kept)
+    with pytest.MonkeyPatch.context() as patch:
+        for code in (ERCOT, FINGRID):
+            jumps = [row for row in code.rows if row.name.endswith("jumps")]
+            replace_code(patch, replace(code, rows=tuple(jumps[:1])))
+        yield
 
 
 @pytest.fixture(scope="module")
