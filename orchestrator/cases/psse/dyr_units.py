@@ -140,10 +140,10 @@ def _can_have(kind: str, row: UnitRow) -> bool:
 
 
 def completed(rows: Sequence[UnitRow], replaced: Collection[str]) -> list[UnitRow]:
-    """The units with what PSS/E assumes for every part that nothing says; a record that is left out stays open."""
+    """The units with what PSS/E assumes for every part that nothing says, also where a record of it is left out."""
     return [
         row
-        if row.converter or row.partial or row.label in replaced
+        if row.converter or row.label in replaced
         else replace(row, parts={**_WITHOUT, **row.parts})
         for row in rows
     ]

@@ -132,6 +132,13 @@ def test_a_model_goes_at_the_users_word(tables):
     assert found["sg3"].exciter == "manual"  # a classical machine has no field winding
 
 
+def test_a_governor_that_goes_leaves_the_power_constant(tables):
+    """As the table of missing models says, and as where the file has no record of one."""
+    case = CASE.replace("[units]", '[units]\ndyr_leave_out = ["OLDGOV"]')
+    found = tables(DYR.replace("'TGOV1'", "'OLDGOV'"), case)
+    assert found["sg1"].governor == found["sg2"].governor == "constant_power"
+
+
 @pytest.mark.slow
 def test_the_machines_swing(tables, tmp_path, gfor):
     tables()
