@@ -179,13 +179,13 @@ def _unlike_others(draft: Draft) -> Iterator[UnusualValue]:
 
 def _own_converters(draft: Draft) -> Iterator[UnusualValue]:
     """Converters of the case in another program's network: their power beside their rating, and beside what the file's
-    units feed less than in the file. Values from outside are tried on purpose."""
+    units feed less than in the file. Values from outside are tried on purpose.
+
+    A source that stands in for a converter, as in systems of `gfor interactions`, feeds as well."""
     if draft.network is None or draft.data is None or not draft.data.generation:
         return
-    own, left = (
-        {},
-        {bus: g.p_mw for bus, g in draft.data.generation.items() if bus != draft.data.slack},
-    )
+    own, beside = dict[str, float](), 0.0
+    left = {bus: g.p_mw for bus, g in draft.data.generation.items() if bus != draft.data.slack}
     for port in draft.network.ports:
         plan = draft.system.components.get(port.name)
         P, S_n = (value_of(plan, v) if plan else None for v in ("P_0", "S_n"))
@@ -209,7 +209,9 @@ def _own_converters(draft: Draft) -> Iterator[UnusualValue]:
                 yield UnusualValue(
                     f"{port.name}.P_0", place, f"P_0 = {P:g} pu: it {said}; is it so?"
                 )
-    less, fed = sum(left.values()), sum(own.values())
+        elif plan.kind != "converter":
+            beside += P * S_n
+    less, fed = sum(left.values()), sum(own.values()) + beside
     if (
         own
         and not draft.given.from_outside
