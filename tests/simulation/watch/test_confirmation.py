@@ -6,7 +6,7 @@ import pytest
 from orchestrator.simulation.watch.confirmation import Swing, doubt
 from orchestrator.simulation.watch.oscillation import Oscillation, strongest_oscillation
 from orchestrator.simulation.watch.seen import Seen
-from orchestrator.simulation.watch.watch import judged
+from orchestrator.simulation.watch.watch import judge_run
 from orchestrator.systems.coupling.events import ParameterChange
 from tests.simulation.watch.seen import seen_of, system
 
@@ -16,7 +16,7 @@ EVENT = 1.0
 def found(course, lasts, event=EVENT):
     """``course`` of the time since the event."""
     y = lambda t: 0.9 + (t > event) * course(np.maximum(t - event, 0.0))  # noqa: E731
-    return judged(
+    return judge_run(
         seen_of({"a.y": y}, event + lasts),
         system("a"),
         [ParameterChange(event, "a", "offset", 1.0)],
@@ -126,7 +126,7 @@ def seen_by_looks(course, lasts):
     y = lambda t: 0.9 + (t > EVENT) * course(np.maximum(t - EVENT, 0.0))  # noqa: E731
     seen = seen_of({"a.y": y}, EVENT + lasts)
     only = Seen(seen.times, seen.values, {}, {}, {}, {})
-    return judged(only, system("a"), [ParameterChange(EVENT, "a", "offset", 1.0)])
+    return judge_run(only, system("a"), [ParameterChange(EVENT, "a", "offset", 1.0)])
 
 
 @pytest.mark.parametrize(("rate", "lasts"), [(-0.27, 4.0), (-0.1, 2.2), (-0.03, 8.0)])

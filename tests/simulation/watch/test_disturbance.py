@@ -5,7 +5,7 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.simulation.watch.undisturbed import disturbances
-from orchestrator.simulation.watch.watch import judged
+from orchestrator.simulation.watch.watch import judge_run
 from orchestrator.studies.runs.files import summary_of
 from orchestrator.studies.runs.run import run_scenario
 from orchestrator.systems.coupling.events import WireFault, WireRecovery
@@ -32,7 +32,7 @@ def rough(size, seed=1):
 
 
 def found(y, made, happened=()):
-    return judged(seen_of({"a.y": y}, STOP), made, list(happened))
+    return judge_run(seen_of({"a.y": y}, STOP), made, list(happened))
 
 
 @pytest.mark.parametrize("size", [1e-5, 1e-3, 0.1])

@@ -49,7 +49,7 @@ def test_what_runs_away_is_looked_for_from_the_start_on(events, begins, monkeypa
     )
     monkeypatch.setattr(watch, "run_away", stop)
     with pytest.raises(PartsError) as found:
-        watch.judged(SimpleNamespace(times=np.arange(3.0)), None, ())
+        watch.judge_run(SimpleNamespace(times=np.arange(3.0)), None, ())
     assert found.value.args == (begins,)
 
 

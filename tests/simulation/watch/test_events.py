@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from orchestrator.simulation.watch.watch import judged
+from orchestrator.simulation.watch.watch import judge_run
 from orchestrator.systems.coupling.events import ParameterChange
 from tests.simulation.watch.seen import seen_of, system
 
@@ -38,7 +38,7 @@ def events(*times, values=None):
 
 
 def found(y, happened, stop=15.0):
-    return judged(seen_of({"a.y": y}, stop), system("a"), happened)
+    return judge_run(seen_of({"a.y": y}, stop), system("a"), happened)
 
 
 GROWING = both(step(0.05, EVENT), swing(0.12))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.simulation.watch.settings import Settings
-from orchestrator.simulation.watch.watch import judged
+from orchestrator.simulation.watch.watch import judge_run
 from orchestrator.systems.coupling.events import BusFault, ParameterChange
 from orchestrator.systems.coupling.system import System
 from tests.simulation.watch.seen import seen_of, system
@@ -27,7 +27,7 @@ def found(course, lasts, eigenvalues=(), *, passes=True):
         ParameterChange(EVENT, "a", "offset", 0.0),
     ]
     y = lambda t: 0.9 + (t > EVENT) * course(np.maximum(t - EVENT, 0.0))  # noqa: E731
-    return judged(
+    return judge_run(
         seen_of({"a.y": y}, EVENT + lasts), system("a"), events[: 1 + passes], eigenvalues
     )
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.simulation.watch.watch import judged
+from orchestrator.simulation.watch.watch import judge_run
 from orchestrator.studies.runs.files import summary_of
 from orchestrator.studies.runs.run import run_scenario
 from orchestrator.systems.coupling.events import ParameterChange
@@ -20,7 +20,7 @@ def after(late, course):
 
 def found(late, course, stop=STOP):
     event = ParameterChange(late, "a", "offset", 1.0)
-    return judged(seen_of({"a.y": after(late, course)}, stop), system("a"), [event])
+    return judge_run(seen_of({"a.y": after(late, course)}, stop), system("a"), [event])
 
 
 def many(rate):
@@ -105,7 +105,7 @@ def test_growth_of_less_than_two_periods_is_not_judged_and_not_healthy(rate, ang
 def test_growth_that_an_event_ends_is_not_healthy():
     events = [ParameterChange(t, "a", "offset", t) for t in (8.0, 9.8)]
     y = lambda t: 0.9 + np.where(t > 9.8, 0.0, (t > 8) * grows(5.0, 6.0)(np.maximum(t - 8, 0)))  # noqa: E731
-    (finding,) = judged(seen_of({"a.y": y}, STOP), system("a"), events)
+    (finding,) = judge_run(seen_of({"a.y": y}, STOP), system("a"), events)
     assert (finding.kind, finding.time, finding.until) == ("not_judged", 8.0, 9.8)
 
 

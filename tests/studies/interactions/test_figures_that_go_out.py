@@ -49,7 +49,7 @@ def test_a_unit_and_a_sign_are_seen():
 def test_of_the_tables():
     source, tables = own_figures(), (pairs_table(park().judgement),)
     for table in tables:
-        for column in table.shown[1:]:
+        for column in table.shown_columns[1:]:
             for row in table.rows:
                 cell = column.cell(row)
                 assert foreign_in_text(cell, source, column.heading) == [], column.heading

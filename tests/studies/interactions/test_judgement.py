@@ -115,7 +115,7 @@ def test_a_mode_that_is_lost_alone_leaves_the_fall_of_the_least_damping():
     (row,) = [row for row in found.as_json()["pairs"] if row["vendors"] == ["A", "B"]]
     assert (row["falls_by_least_damping"], row["mode_first_alone_percent"]) == (True, None)
     (cells,) = [
-        [column.cell(one) for column in pairs_table(found.judgement).shown]
+        [column.cell(one) for column in pairs_table(found.judgement).shown_columns]
         for one in found.judgement.pairs
         if one is pair
     ]

@@ -74,7 +74,7 @@ def test_all_eigenvalues_are_computed_where_a_search_does_not_converge(case, tmp
     assert critical(out) == pytest.approx(critical(switch), rel=1e-6)
 
 
-@pytest.mark.parametrize("search", ["find_critical_modes", "missed"])
+@pytest.mark.parametrize("search", ["find_critical_modes", "misses_modes"])
 def test_a_search_without_an_end_gives_way_to_all_eigenvalues(tmp_path, monkeypatch, search):
     def without_an_end(*_):
         raise AnalysisError("the search does not converge")
