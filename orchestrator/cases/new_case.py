@@ -745,7 +745,7 @@ def _commented(text: str, questions: Sequence[Problem], sources: dict[str, Path]
         ("" if one.place.startswith("line ") else f"{one.place}: ") + one.text: one
         for one in questions
     }
-    for first, shown in by_kind(told, "`gfor modes CASE --details`").items():
+    for first, shown in by_kind(told, "gfor modes CASE --details").items():
         place = _line_of(told[first], lines, sources)
         above.setdefault(place, []).extend(
             textwrap.wrap(

@@ -161,7 +161,7 @@ GALLERY = {
         "it cannot be left out", NINE, DYR.replace("3 'GENCLS'", "3 'GENTPJ1'")
     ),
     "machine without a record": Broken(
-        "has no record of a machine", NINE, changed(DYR, (GENCLS + "\n", ""))
+        "and a converter of ours stands there", NINE, changed(DYR, (GENCLS + "\n", ""))
     ),
     "converter": Broken("a grid-following converter", NINE, following()),
     "converter that is not known": Broken(

@@ -38,11 +38,14 @@ _L2EP_OPEN = {
     "current_limit.I_max": 0.85,
 }
 # Settings under which every declared path of a model carries a signal.
+# without it the voltage at the filter is the droop's alone
+_VIRTUAL_OPEN = {"virtual_impedance.R_v": 0.02, "virtual_impedance.X_v": 0.1}
+
 ALL_PATHS_OPEN = {
     "gfor": _CONVERTER_OPEN,
     "gfor_abc": _CONVERTER_OPEN,
     "gfor_pod_input": _CONVERTER_OPEN,
-    "gfor_phasor": _PODS_OPEN | _BOX_OPEN | {"communication_step": 5e-3},
+    "gfor_phasor": _PODS_OPEN | _BOX_OPEN | _VIRTUAL_OPEN | {"communication_step": 5e-3},
     "synchronous_generator": {"transformer.X_t": 0.1},  # without it v_t is the bus voltage
     "synchronous_generator_phasor": {"communication_step": 5e-3, "transformer.X_t": 0.1},
     "gfl": _FOLLOWING_OPEN,

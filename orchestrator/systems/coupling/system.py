@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from orchestrator.core.errors import InputError
-from orchestrator.devices.fmi.converted import Conversion, ConvertedDescription, native
 from orchestrator.devices.fmi.values import Scalar
 from orchestrator.systems.coupling.imperfections import Imperfection, WirePlan
 
@@ -158,20 +157,27 @@ class System:
                 f"{label}: {target} is already fed by {feeding}; an input takes one connection"
             )
         if kinds[0] != "Real":
-            self._carry(start, Conversion())
+            self._carry(start, 1.0, 0.0, "")
         factor, offset = converted or (1.0, 0.0)
         if kinds[1] != "Real" or (factor, offset) != (1.0, 0.0):
-            self._carry(end, Conversion(factor, offset, out.unit))
+            self._carry(end, factor, offset, out.unit)
         self.connections.append(Connection(start, end))
         self._feeding[end] = start
 
     def _declared_type(self, end: Endpoint) -> str:
         """The type that the FMU itself declares for a variable."""
+        from orchestrator.devices.fmi.converted import native  # noqa: PLC0415 - imports FMPy
+
         return native(self.components[end.component].description).variables[end.variable].type
 
-    def _carry(self, end: Endpoint, conversion: Conversion) -> None:
-        """Have a component take or give a variable as the number that its connection carries."""
-        plan = self.components[end.component]
+    def _carry(self, end: Endpoint, factor: float, offset: float, unit: str) -> None:
+        """Have a component take or give a variable as the number, in this unit, that its connection carries."""
+        from orchestrator.devices.fmi.converted import (  # noqa: PLC0415 - as above
+            Conversion,
+            ConvertedDescription,
+        )
+
+        plan, conversion = self.components[end.component], Conversion(factor, offset, unit)
         plan.description = ConvertedDescription.of(plan.description, end.variable, conversion)
 
     def _sources(self) -> dict[Endpoint, Endpoint]:
