@@ -4,13 +4,17 @@ Each axis is a magnetising reactance with two rotor branches beside it: branch 1
 q damper), branch 2 fast (damper). Reactances and resistances are per unit on the stator base.
 
 X' = X means that the slow branch is missing, X'' = X' that the fast one is missing. A missing branch has 1/`_NOTHING`
-times the reactance X_m: its state exists but has no effect."""
+times the reactance X_m: its state exists but has no effect. Data in another order, X'' > X' or X_l > X'', give the
+textbook formulas a branch with a negative reactance, which is defined too, as stability programs have it."""
 
 from dataclasses import dataclass
 
 from fmus.toolchain.symbols import Expr, fabs, fmax, fmin, if_else, sqrt
 
 _NOTHING = 1e-9  # admittance of a missing branch, as a part of 1/X_m
+LEAST_LEAKAGE = 1e-6
+"""Part of X' or X'' by which X_l differs from it at least; a branch without leakage is the limit of one with a small
+leakage, and this near to it no figure differs by more."""
 
 
 @dataclass(frozen=True)
@@ -36,14 +40,23 @@ class RotorBranches:
 
 
 def classical(a: AxisData, omega_b: Expr) -> RotorBranches:
-    """Textbook formulas, which assume that the branches act one after the other."""
+    """Textbook formulas, which assume that the branches act one after the other.
+
+    They hold for X_m > X' − X_l. Of two branches, X' − X_l must not be 0."""
     X_m = a.X - a.X_l
-    X_1 = X_m * (a.X1 - a.X_l) / fmax(X_m - a.X1 + a.X_l, _NOTHING * (a.X1 - a.X_l))
+    beside_1 = _apart(a.X1 - a.X_l, LEAST_LEAKAGE * a.X1)
+    beside_2 = _apart(a.X2 - a.X_l, LEAST_LEAKAGE * a.X2)
+    X_1 = X_m * beside_1 / fmax(X_m - a.X1 + a.X_l, _NOTHING * fabs(beside_1))
     R_1 = (X_m + X_1) / (omega_b * a.T10)
-    left = X_m * X_1 - (X_m + X_1) * (a.X2 - a.X_l)
-    X_2 = (a.X2 - a.X_l) * X_m * X_1 / fmax(left, _NOTHING * (a.X2 - a.X_l) * X_1)
+    left = X_m * X_1 - (X_m + X_1) * beside_2
+    X_2 = beside_2 * X_m * X_1 / _apart(left, fabs(_NOTHING * beside_2 * X_1))
     R_2 = (X_2 + X_m * X_1 / (X_m + X_1)) / (omega_b * a.T20)
     return RotorBranches(X_1, R_1, X_2, R_2)
+
+
+def _apart(x: Expr, least: Expr) -> Expr:
+    """x, not nearer to 0 than ``least``."""
+    return if_else(x < -least, x, fmax(x, least))
 
 
 def exact(a: AxisData, omega_b: Expr) -> RotorBranches:

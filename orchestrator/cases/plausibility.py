@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
+from fmus.synchronous_generator.conversion import LEAST_LEAKAGE
 from orchestrator.cases.build_choices import PARTS
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.names import close_names
@@ -24,22 +25,27 @@ from orchestrator.systems.coupling.system import ComponentPlan
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """The parameter ``larger`` must exceed ``smaller``, or at least reach it.
+    """The parameter ``larger`` must exceed ``smaller``, or at least reach it, or differ from it.
 
     ``needed_with``: a variable that marks the machines whose equations need the rule; at other machines a broken rule
-    is a question."""
+    is a question. ``only_without``: a variable of machines that the rule is not about."""
 
     larger: str
     smaller: str
     why: str
     may_be_equal: bool = False
     needed_with: str = ""
+    only_without: str = ""
+    may_be_smaller: bool = False
 
     def holds(self, larger: float, smaller: float) -> bool:
+        if self.may_be_smaller:
+            return abs(larger - smaller) > LEAST_LEAKAGE * larger
         return larger > smaller or (self.may_be_equal and larger == smaller)
 
     def text(self, larger: str, smaller: str) -> str:
         must = "must not exceed" if self.may_be_equal else "must be less than"
+        must = "must differ from" if self.may_be_smaller else must
         return f"{smaller} {must} {larger}: {self.why}"
 
 
@@ -48,6 +54,7 @@ _SCREENS = (
     "a winding that reacts can only lower the reactance; equal says that there is no such winding"
 )
 _LEAKAGE = "the leakage reactance is what no rotor winding can screen"
+_SINGULAR = "the windings' data divide by the difference; write a smaller machine.X_l, such as half of this one"
 _SLOWER = (
     "the transient is by definition the slower one; check the units and whether the two are swapped"
 )
@@ -55,7 +62,8 @@ _SLOWER = (
 _CONVERSION = "machine.exact_conversion"
 """Of the machines whose FMU converts the data of a data sheet and requires the order of the time constants.
 
-GENROU and its kin hold without it: each winding has an equation with its own time constant, and PSS/E only warns."""
+GENROU and its kin hold without it: each winding has an equation with its own time constant, and X'' > X' or X_l > X''
+give it a negative reactance. PSS/E only warns."""
 
 _LIMITS = "the lower limit exceeds the upper one, or equals it; are the two swapped?"
 LIMITS = (
@@ -67,10 +75,24 @@ LIMITS = (
 
 RULES = (
     Rule("machine.X_d", "machine.X_d1", _FIELD),
-    Rule("machine.X_d1", "machine.X_d2", _SCREENS, may_be_equal=True),
-    Rule("machine.X_d2", "machine.X_l", _LEAKAGE),
+    Rule("machine.X_d1", "machine.X_d2", _SCREENS, may_be_equal=True, needed_with=_CONVERSION),
+    Rule("machine.X_d2", "machine.X_l", _LEAKAGE, needed_with=_CONVERSION),
+    Rule("machine.X_d", "machine.X_l", _LEAKAGE),
+    Rule("machine.X_q", "machine.X_l", _LEAKAGE),
+    *(
+        Rule(X1, "machine.X_l", _SINGULAR, only_without=_CONVERSION, may_be_smaller=True)
+        for X1 in ("machine.X_d1", "machine.X_q1")
+    ),
     Rule("machine.X_q", "machine.X_q1", _SCREENS, may_be_equal=True),
     Rule("machine.X_q1", "machine.X_q2", _SCREENS, may_be_equal=True),
+    Rule(
+        "machine.X_q1",
+        "machine.X_d2",
+        _SCREENS,
+        may_be_equal=True,
+        needed_with=_CONVERSION,
+        only_without=_CONVERSION,
+    ),
     Rule("machine.X_q2", "machine.X_l", _LEAKAGE),
     Rule("machine.T_d10", "machine.T_d20", _SLOWER, needed_with=_CONVERSION),
     Rule("machine.T_q10", "machine.T_q20", _SLOWER, needed_with=_CONVERSION),
@@ -363,6 +385,8 @@ def _breaks(plan: ComponentPlan, rule: Rule) -> bool:
     larger, smaller = value_of(plan, rule.larger), value_of(plan, rule.smaller)
     if larger is None or smaller is None or rule.holds(larger, smaller):
         return False
+    if rule.only_without and rule.only_without in plan.description.variables:
+        return False
     winding = _OF_WINDINGS.get(rule.smaller)
     return winding is None or not _is_missing(plan, *winding)
 
@@ -382,7 +406,8 @@ def _broken_orders(draft: Draft, broken: Iterable[tuple[str, Rule, str]]) -> Ite
     for name, rule, text in broken:
         if not _is_needed(rule, draft.system.components[name]):
             place = place_of(draft, name, rule.smaller, rule.larger)
-            yield UnusualValue(f"{name}.{rule.smaller}", place, text)
+            warned = f"{text}; PSS/E only warns, and the equations hold with it"
+            yield UnusualValue(f"{name}.{rule.smaller}", place, warned)
 
 
 # -- several components ------------------------------------------------------------------------------

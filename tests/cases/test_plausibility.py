@@ -540,17 +540,31 @@ ROUND_ROTOR = (
             "machine.T_d10 = 0.02",
             "machine.T_d20 = 0.03 s (the default) must be less than machine.T_d10 = 0.02 s",
         ),
+        (
+            "machine.X_d2 = 0.35",
+            "machine.X_d2 = 0.35 pu must not exceed machine.X_d1 = 0.3 pu (the default)",
+        ),
+        (
+            "machine.X_l = 0.27",
+            "machine.X_l = 0.27 pu must be less than machine.X_d2 = 0.25 pu (the default)",
+        ),
     ],
 )
-def test_time_constants_in_the_other_order_are_questioned_at_machines_that_hold_them(
-    questions, line, said
-):
+def test_data_in_another_order_are_questioned_at_machines_that_hold_them(questions, line, said):
     """PSS/E warns of them and runs; the answer takes the question away."""
     about_both = [q for q in questions(machine(line), ROUND_ROTOR) if said in q]
     assert len(about_both) == 1
     answer = re.search(r"meant = .*", about_both[0])[0]
     answered = (CASE.splitlines()[0], f"{CASE.splitlines()[0]}\n{answer}")
     assert not [q for q in questions(machine(line), ROUND_ROTOR, answered) if said in q]
+
+
+def test_a_leakage_reactance_that_makes_a_round_rotor_singular_is_refused(questions):
+    """The remedy works as it is typed."""
+    problems = refused(questions, machine("machine.X_l = 0.3"), ROUND_ROTOR)
+    said = "machine.X_l = 0.3 pu must differ from machine.X_d1 = 0.3 pu (the default): "
+    assert any(said in one and "such as half of this one" in one for one in problems)
+    assert not [q for q in questions(machine("machine.X_l = 0.15"), ROUND_ROTOR) if "X_l" in q]
 
 
 @pytest.mark.parametrize(

@@ -62,12 +62,24 @@ REVERSED = {"T_d10": 0.02, "T_q10": 0.01}
 """Transient time constants below the subtransient ones, as New England's generator 30 of the IEEE PES has them."""
 
 
-@pytest.mark.parametrize("times", [{}, REVERSED], ids=["usual", "reversed"])
+IN_ANOTHER_ORDER = {
+    "usual": {},
+    "reversed": REVERSED,
+    "X'' > X'd": {"X_d2": 0.4},
+    "X'' > X'q": {"X_d1": 0.6, "X_d2": 0.55},
+    "X_l > X''": {"X_l": 0.3},
+    "X_l > X'": {"X_l": 0.4},
+}
+"""Data of GENROU that PSS/E warns of, and computes with."""
+
+
+@pytest.mark.parametrize("order", IN_ANOTHER_ORDER)
 @pytest.mark.parametrize("seed", range(5))
-def test_genrou_is_the_model_of_stability_programs_with_saturation(seed, times):
+def test_genrou_is_the_model_of_stability_programs_with_saturation(seed, order):
     """Sauer and Pai's two-winding axes in E'_q, ψ_1d, E'_d, ψ_2q; saturation as PSS/E's diagram adds it."""
-    values = {f"machine.{name}": x for name, x in times.items()}
-    device, p = machine("genrou", **values), DATA | times
+    changes = IN_ANOTHER_ORDER[order]
+    values = {f"machine.{name}": x for name, x in changes.items()}
+    device, p = machine("genrou", **values), DATA | changes
     assert not refused(device)
     x = shifted(device, seed)
     i_d, i_q = current(device, x)
@@ -239,11 +251,25 @@ def test_a_q_axis_without_a_slow_winding_is_allowed(name):
     assert max(pole.real for pole in poles) < 0
 
 
+@pytest.mark.parametrize("name", ["genrou", "gensal"])
+def test_a_leakage_reactance_of_the_subtransient_ones_size_is_the_limit_of_smaller_ones(name):
+    """The stability programs' equations have no division by X'' − X_l."""
+    poles = []
+    for X_l in (DATA["X_d2"], DATA["X_d2"] * (1 - 1e-4)):
+        device = machine(name, **{"machine.X_l": X_l})
+        assert not refused(device)
+        assert max(map(abs, device.rates([BUS.real, BUS.imag]).values())) < 1e-6
+        poles.append(sorted(np.linalg.eigvals(device.blocks([BUS.real, BUS.imag])[0]), key=abs))
+    assert poles[0] == pytest.approx(poles[1], rel=1e-3)
+
+
 @pytest.mark.parametrize(
     ("name", "values", "rule"),
     [
         ("genrou", {"machine.X_q1": 1.8}, "machine.X_q1 must not exceed machine.X_q"),
-        ("genrou", {"machine.X_d2": 0.15}, "machine.X_d2 must exceed machine.X_l"),
+        ("genrou", {"machine.X_l": 0.36}, "machine.X_l must differ from machine.X_d1"),
+        ("genrou", {"machine.X_l": 0.52}, "machine.X_l must differ from machine.X_q1"),
+        ("gensal", {"machine.X_l": 1.8}, "machine.X_q must exceed machine.X_l"),
         ("gensal", {"machine.X_d": 0.3}, "machine.X_d must exceed machine.X_d1"),
         ("two_axis", {"machine.X_d1": 1.9}, "machine.X_d must exceed machine.X_d1"),
         ("gensal", {"machine.s_12": 0.05}, "saturation must rise"),

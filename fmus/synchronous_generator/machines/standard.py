@@ -10,7 +10,8 @@
 Their stator is that of `machine`: with stator transients EMT-type, algebraic in the phasor model. As in stability
 programs' models of these names X''_q = X''_d, and saturation adds a current of the iron, S·ψ/X_md, beside the slowest
 winding of an axis. X'_q = X_q (genrou, two_axis) says that the slow winding of the q axis is missing.
-The equations of these names hold for T''_0 ≥ T'_0 too, as each winding has its own time constant.
+The equations of these names hold for T''_0 ≥ T'_0 too, as each winding has its own time constant, and for X'' > X' and
+X_l ≥ X'', where a winding has a negative reactance; only X_l = X' of an axis with two windings is singular.
 
     ψ̇_f/ω_b = (R_f/X_md)·(E_fd − X_md·i_f − S·ψ_d)        ψ̇_1q/ω_b = −R_1q·(i_1q + S·ψ_q/X_md)"""
 
@@ -19,7 +20,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from fmus.synchronous_generator.axis import Axis, Winding
-from fmus.synchronous_generator.conversion import AxisData, RotorBranches
+from fmus.synchronous_generator.conversion import LEAST_LEAKAGE, AxisData, RotorBranches
 from fmus.synchronous_generator.conversion import classical as classical_branches
 from fmus.synchronous_generator.declarations import exponential_part, require_rising, saturated_part
 from fmus.synchronous_generator.machine import FluxDeclaration, Machine, Start, flux_state
@@ -27,7 +28,7 @@ from fmus.synchronous_generator.machines.base import Common, declare_common, rea
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort
-from fmus.toolchain.symbols import Expr, fmax, fmin, if_else, logic_and
+from fmus.toolchain.symbols import Expr, fabs, fmax, fmin, if_else, logic_and
 
 
 @dataclass(frozen=True)
@@ -244,10 +245,7 @@ def genrou(
         T_q20 = _of_winding(T_q20, T_q10, X_q1 - X_2)
         q = AxisData(k * X_q, k * X_q1, k * X_2, k * X_l, T_q10, T_q20)
         _require_order(m, d, q, "X_q1")
-        m.require(
-            if_else(q.X2 <= q.X1, 1, -1),
-            "machine.X_d2, which is X''_q too, must not exceed machine.X_q1",
-        )
+        _require_apart(m, X_l, X_q1, "X_q1")
         saturation = _saturation(m, both_axes=True, exponential=exponential)
     return declare_wound_machine(
         m,
@@ -298,8 +296,8 @@ def _d_axis(m: ModelBuilder, common: Common) -> tuple[Expr, Expr, AxisData]:
     X2 = reactance(m, "X_d2", 0.25, "Subtransient reactance X''_d = X''_q")
     T_10 = _time_1(m, "d")
     T_20 = time(m, "T_d20", 0.03, "Open-circuit subtransient time constant T''_d0")
-    m.require(if_else(X2 <= X1, 1, -1), "machine.X_d2 must not exceed machine.X_d1")
-    m.require(X2 - X_l, "machine.X_d2 must exceed machine.X_l")
+    m.require(X - X_l, "machine.X_d must exceed machine.X_l")
+    _require_apart(m, X_l, X1, "X_d1")
     T_20 = _of_winding(T_20, T_10, X1 - X2)
     k = common.scale
     return X_l, X2, AxisData(k * X, k * X1, k * X2, k * X_l, T_10, T_20)
@@ -307,11 +305,17 @@ def _d_axis(m: ModelBuilder, common: Common) -> tuple[Expr, Expr, AxisData]:
 
 def _of_winding(fast: Expr, slow: Expr, screened: Expr) -> Expr:
     """T''_0 of an axis, or, where X'' = X' says that it has no such winding, less than T'_0: it then has no effect."""
-    return if_else(screened <= 0, fmin(fast, _OF_NO_WINDING * slow), fast)
+    return if_else(fabs(screened) <= 0, fmin(fast, _OF_NO_WINDING * slow), fast)
+
+
+def _require_apart(m: ModelBuilder, X_l: Expr, X1: Expr, name: str) -> None:
+    """Refuse X_l = X', with which the field's or the slow winding's flux is the air gap's."""
+    m.require(fabs(X1 - X_l) - LEAST_LEAKAGE * X1, f"machine.X_l must differ from machine.{name}")
 
 
 def _require_order(m: ModelBuilder, d: AxisData, q: AxisData, lower: str) -> None:
     m.require(d.X - d.X1, "machine.X_d must exceed machine.X_d1")
+    m.require(q.X - q.X_l, "machine.X_q must exceed machine.X_l")
     m.require(if_else(q.X1 <= q.X, 1, -1), f"machine.{lower} must not exceed machine.X_q")
 
 
