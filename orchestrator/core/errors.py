@@ -2,7 +2,9 @@
 
 import copyreg
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -12,6 +14,25 @@ from orchestrator.core.spelling import for_python, spelled
 NOT_MET = 3  # exit code where a requirement is not met, or is not known to be
 INTERRUPTED = 130  # exit code after Ctrl-C
 TERMINATED = 143  # exit code after SIGTERM
+
+
+_IN_FULL = ContextVar("lists in messages are complete", default=False)
+
+
+@contextmanager
+def listing_all(*, in_full: bool = True) -> Iterator[None]:
+    """Have the lists of refusals complete while it lasts, where they would end with a count of the others."""
+    before = _IN_FULL.set(in_full)
+    try:
+        yield
+    finally:
+        _IN_FULL.reset(before)
+
+
+def first_of(lines: Sequence[str], most: int, how: str) -> list[str]:
+    """The first lines of a list, and one that counts the others and says ``how`` to see them; or all of them."""
+    hidden = 0 if _IN_FULL.get() else len(lines) - most
+    return [*lines] if hidden <= 0 else [*lines[:most], f"and {hidden} more; {how}"]
 
 
 def few(texts: Iterable[str], most: int, between: str = ", ") -> str:

@@ -300,6 +300,23 @@ def test_a_converter_that_cannot_be_is_refused(files, converter, said):
     assert said in str(refused.value)
 
 
+@pytest.mark.parametrize("option", ["--details", "--json"])
+def test_a_refusal_lists_all_that_is_wrong_at_ones_word(gfor, files, option):
+    """Without it the first twenty are shown, and how to see the others."""
+    raw, dyr = files
+    wrong = "".join(f"{1 + n % 5} 'COMP' 1 x{n} /\n" for n in range(30))
+    own = [line for line in dyr.read_text().splitlines() if "SEXS" not in line]
+    dyr.write_text("\n".join(own) + "\n" + wrong)
+    code, _, err = gfor(raw, dyr)
+    assert code == 2
+    assert "and 10 more; gfor new lists all with --details" in " ".join(err.split())
+    code, _, err = gfor(raw, dyr, option)
+    assert code == 2
+    assert " more" not in err
+    assert "at bus 5" in err.splitlines()[-1]
+    assert len(err.splitlines()) == 2 + 30  # what they are, and each of them
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -21,7 +21,7 @@ from orchestrator.cases.psse.missing_models import (
 from orchestrator.cases.psse.raw import Machine, unit_labels
 from orchestrator.cases.record_use import RecordUse, UseOfRecord
 from orchestrator.cases.remedies import APPROXIMATING, replacement_of, without_models
-from orchestrator.core.errors import InputError, few
+from orchestrator.core.errors import InputError, few, first_of
 
 _KNOWN = DYR_RECORDS | REGFM_A1_RECORDS | STATIC_VAR_RECORDS
 _COUPLED = {record.part for record in REGFM_A1_RECORDS.values()}
@@ -141,12 +141,11 @@ def machine_models(
     problems = [*(_may_be_meant(strange) if bare else ()), *problems, *unfit]
     if problems or missing:
         counted_once = [*_count_repeats(problems, first)]
-        hidden = len(counted_once) - _MOST_SHOWN
-        more = f"\n  and {hidden} more" if hidden > 0 else ""
-        shown = [*in_words(missing, labels), *counted_once[:_MOST_SHOWN]]
+        listed = first_of(counted_once, _MOST_SHOWN, "gfor new lists all with --details")
+        shown = [*in_words(missing, labels), *listed]
         raise InputError(
             "the dynamics data cannot be taken over; correct them, or name models that may go in [units] "
-            "dyr_leave_out:\n  " + "\n  ".join(shown) + more
+            "dyr_leave_out:\n  " + "\n  ".join(shown)
         )
     open_ = {(record.bus, record.machine) for record in records if record.name in left}
     return following | {

@@ -11,7 +11,7 @@ from rich.markup import escape
 from orchestrator.cases.new_case import WantedCase, read_converter, sources_of, write_case
 from orchestrator.cases.psse.known_records import known_records
 from orchestrator.cases.record_use import as_json, in_full
-from orchestrator.core.errors import InputError, ResultsError
+from orchestrator.core.errors import InputError, ResultsError, listing_all
 from orchestrator.core.safe_files import write_text
 from orchestrator.devices.fmi.vendor_files import is_vendor_file
 from orchestrator.face.cli.arguments import add_options
@@ -47,7 +47,8 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(
             f"{wanted.out}: the file is there already; choose another with --out, or --force"
         )
-    made = write_case(wanted)
+    with listing_all(in_full=options.details or options.json):
+        made = write_case(wanted)
     try:
         write_text(wanted.out, made.text)
     except ResultsError as error:
