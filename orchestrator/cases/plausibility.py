@@ -246,7 +246,7 @@ def _ratings(draft: Draft) -> Iterator[UnusualValue]:
 def question_loading(draft: Draft, flow: PowerFlow | None) -> None:
     """Ask about units whose operating point exceeds their rating, of machines in active power, and about powers that
     another rating moves. The operating point is the power flow's if there is one."""
-    question(draft, _rescaled(draft, flow))
+    question(draft, [*_rescaled(draft, flow), *_beyond_load_limits(draft)])
     # one question about a rating is enough
     asked = {question.place for question in draft.found.questions}
     question(draft, (d for d in _overloaded(draft) if d.place not in asked))
@@ -280,6 +280,31 @@ def _rescaled(draft: Draft, flow: PowerFlow | None) -> Iterator[UnusualValue]:
                 else ""
             )
             yield UnusualValue(f"{name}.S_n", place_of(draft, name, "S_n"), text)
+
+
+def _beyond_load_limits(draft: Draft) -> Iterator[UnusualValue]:
+    """Ask about turbines whose operating point lies at the load that their limiter holds (GGOV1), or above."""
+    for name, plan in draft.system.components.items():
+        held, P_m = value_of(plan, "governor.ld_ref"), _mechanical_power(plan)
+        if held is None or P_m is None or P_m < held:
+            continue
+        text = (
+            f"governor.ld_ref = {held:g} pu, the load that the turbine's limiter holds, is not above the operating "
+            f"point's {P_m:.4g} pu; the limiter holds a load just above that instead, and the turbine gives no more"
+        )
+        yield UnusualValue(
+            f"{name}.governor.ld_ref", place_of(draft, name, "governor.ld_ref"), text
+        )
+
+
+def _mechanical_power(plan: ComponentPlan) -> float | None:
+    """Return the power of a machine's turbine at the operating point, on the turbine's rating [pu]."""
+    P, Q, v, S_n = (value_of(plan, name) for name in ("P_0", "Q_0", "v_0", "S_n"))
+    if P is None or Q is None or not v or not S_n:
+        return None
+    R_s, R_t = (value_of(plan, name) or 0.0 for name in ("machine.R_s", "transformer.R_t"))
+    R = R_s * S_n / (value_of(plan, "machine.S_data") or S_n) + R_t
+    return (P + R * (P**2 + Q**2) / v**2) * S_n / (value_of(plan, "governor.T_rate") or S_n)
 
 
 def overloads(

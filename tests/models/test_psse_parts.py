@@ -412,6 +412,19 @@ def test_the_load_limiter_of_ggov1_holds_the_load_and_lets_go():
     assert found[-1]["P_m"] < 0.5
 
 
+def test_ggov1_starts_above_the_load_of_its_limiter_and_gives_no_more():
+    """The turbine is at rest there, without a mode of the limiter near 0; at too little speed it stays."""
+    values = {"R_select": 0, "K_pgov": 4.0, "ld_ref": P_M - 0.05}
+    alone = governor("ggov1", values)
+    assert not refused(alone)
+    assert max(map(abs, alone.rates([1.0, P_M]).values())) < 1e-12
+    usual = governor("ggov1", values | {"ld_ref": P_M + 0.05})
+    poles = [np.sort_complex(np.linalg.eigvals(g.blocks([1.0, P_M])[0])) for g in (alone, usual)]
+    assert poles[0] == pytest.approx(poles[1], abs=1e-9)
+    found, _ = integrated(alone, lambda t: [0.95, P_M], 40.0, step=2e-3)
+    assert found[-1]["P_m"] == pytest.approx(P_M + 1.5e-3, abs=1e-3)
+
+
 def test_the_valve_of_ggov1_moves_no_faster_than_its_rates():
     alone = governor("ggov1", {"T_act": 0.01, "R_open": 0.1, "R_close": -0.2, "T_b": 0.0})
     for w, fastest in ((0.95, 0.1), (1.05, -0.2)):

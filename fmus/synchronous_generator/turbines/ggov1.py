@@ -13,9 +13,11 @@ A PID controller of the speed and a limiter of the load, by the exhaust's temper
     load controller = K_imw/s of (P_e0 − P_e), within ± 1.1·R
 
 Feedback (R_select) is the electrical power through 1/(1+sT_pelec) (1), the valve (−1) or none (0). An integrator stops
-while its controller asks for more than it gets. Powers are on T_rate, or on S_n where that is 0; the delay is Padé's of
-second order. A moved reference arrives at R_up and R_down per second at most. The limiter of the acceleration (a_set,
-K_a, T_a) is left out: it acts while the speed gains more than a_set per second.
+while its controller asks for more than it gets. Where the operating point lies at ld_ref or above, the limiter holds a
+load just above it instead, so that the turbine starts in steady state and gives no more. Powers are on T_rate, or on
+S_n where that is 0; the delay is Padé's of second order. A moved reference arrives at R_up and R_down per second at
+most. The limiter of the acceleration (a_set, K_a, T_a) is left out: it acts while the speed gains more than a_set per
+second.
 
 Sources: IEEE PES-TR1, OpenIPSL at 2be0558a."""
 
@@ -86,6 +88,9 @@ GGOV1 = (
 _LEAST_SPEED = 0.1  # pu, below which a power of the speed is not followed
 _MOST_FUEL = 1.0  # of the load's limiter [pu]
 _LOAD_CONTROLLER = 1.1  # its limit, times the droop
+_HEADROOM = (
+    1e-3  # fuel [pu] of the load's limiter above an operating point beyond ld_ref: enough for rest
+)
 
 
 def ggov1(m: ModelBuilder, shaft: Shaft) -> Expr:
@@ -98,7 +103,7 @@ def ggov1(m: ModelBuilder, shaft: Shaft) -> Expr:
         P_0 = shaft.P_m_0 / share
         valve_0 = P_0 / p.K_turb + p.w_fnl
         require_within(m, valve_0, p.V_MIN, p.V_MAX, ("governor.V_MIN", "governor.V_MAX"))
-        _require(m, p, valve_0)
+        _require(m, p)
         valve = m.state("valve", valve_0, "pu", "Fuel valve", base="S_n")
         opened = clamp(valve, p.V_MIN, p.V_MAX) * if_else(by_speed, shaft.w, 1)
         delay = p.T_eng / 2, p.T_eng**2 / 12
@@ -110,12 +115,7 @@ def ggov1(m: ModelBuilder, shaft: Shaft) -> Expr:
         return share * (turbine - fmax(p.D_m, 0) * (shaft.w - 1))
 
 
-def _require(m: ModelBuilder, p: Given, valve_0: Expr) -> None:
-    m.require(
-        p.ld_ref / p.K_turb + p.w_fnl - valve_0,
-        "governor.ld_ref: the operating point of the power flow lies at or above the load that the limiter holds; "
-        "raise it, or lower the generator's active power",
-    )
+def _require(m: ModelBuilder, p: Given) -> None:
     for lead, lag in (("T_c", "T_b"), ("T_sa", "T_sb")):
         needs = logic_and(getattr(p, lag) <= 0, getattr(p, lead) > 0)
         m.require(if_else(needs, -1, 1), f"governor.{lag} = 0 needs governor.{lead} = 0 as well")
@@ -152,7 +152,8 @@ def _request(m: ModelBuilder, p: Given, error: Expr, fuel: Expr, w: Expr, valve_
     of_speed = if_else(p.D_m < 0, exp(p.D_m * log(fmax(w, _LEAST_SPEED))), 1)
     heat = lead_lag(m, "radiation", fuel * of_speed, p.T_sa, p.T_sb, valve_0)
     exhaust = low_pass_or_nothing(m, "exhaust", heat, p.T_fload, valve_0)
-    rest = p.ld_ref / p.K_turb + p.w_fnl - exhaust
+    held_fuel = p.ld_ref / p.K_turb + p.w_fnl
+    rest = if_else(held_fuel > valve_0, held_fuel, valve_0 + _HEADROOM) - exhaust
     y = m.state("load_limiter", _MOST_FUEL, "pu", "Integral of the load's limiter", base="S_n")
     asked = p.K_pload * rest + y
     held = logic_and(asked >= _MOST_FUEL, rest > 0)

@@ -174,6 +174,19 @@ def test_a_limiter_of_the_acceleration_that_is_left_out_is_asked_about(questions
     assert all("areas.dyr, line 11" in q for q in asked)
 
 
+@pytest.mark.parametrize(("held", "asked"), [("0.75", True), ("1", False)])
+def test_a_load_limit_below_the_operating_point_is_asked_about(questions, held, asked):
+    """GGOV1's Ldref: it is no reason to refuse a network, as the turbine starts."""
+    record = (
+        "3 'GGOV1' 1 1 0 0.04 1 0.05 -0.05 10 2 0 1 1 0.15 0.5 1.5 0.2 0.1 0 0 3 2 0.67"
+        f" {held} 0 0.1 -0.1 0 0.01 0 0.1 0 0 4 5 99 -99 /"
+    )
+    found = [q for q in questions(dyr=changed(DYR, (TGOV1, record))) if "ld_ref" in q]
+    assert len(found) == asked
+    assert all(f"ld_ref = {held} pu, the load that the turbine's limiter holds" in q for q in found)
+    assert all('meant = ["sg3.governor.ld_ref"]' in q for q in found)
+
+
 @pytest.mark.parametrize("kind", ["TGOV1", "EXST1", "STAB1"])
 def test_parts_that_no_machine_has_are_a_choice(questions, kind):
     dyr = without(kind, 1, 2, 3, 4)
