@@ -108,7 +108,10 @@ def of_modes(result: ModesResult) -> ScenarioAnswer:
         by = f": {verdict.mode.participation[0][0]}" if where and verdict.mode.participation else ""
         because = "" if verdict.cause is not Cause.COUPLING else "; cause: the coupling"
         remark = f"grows at {verdict.mode.eigenvalue.real:+.3g} 1/s{where}{by}{because}"
-        remark += f"; {swing}" if swing and not where else ""
+        if swing and not where:
+            remark += f"; {swing}"
+        elif mode is not None and mode.eigenvalue.real > 0:
+            remark += f"; the mode at {mode.frequency_hz:.3f} Hz grows as well: {swing}"
     told = [remark] if remark else []
     told += [
         f"{name}: {m.frequency_hz:.3f} Hz, {m.damping_percent:.2f} %"

@@ -150,3 +150,15 @@ def test_the_power_flow_is_given_and_written(capsys, tmp_path):
         assert machine["loading_percent"] == pytest.approx(100 * apparent / machine["rating_mva"])
     with (tmp_path / "power_flow_branches.csv").open(encoding="utf-8", newline="") as file:
         assert len(list(csv.DictReader(file))) == len(flow["branches"])
+
+
+def test_a_swing_that_grows_beside_a_faster_root_is_named():
+    run = result()
+    shape = np.array([1.0 + 0j, -0.8 + 0j])
+    run.modes.modes[:] = [make_mode(0.05 + 4j, shape / 1.64, shape, SPEEDS)]
+    root = make_mode(0.06 + 0j, shape / 1.64, shape, SPEEDS)
+    run.modes.stability = Stability(False, root)
+    run.modes.hidden = SimpleNamespace(frequency_range=(0.1, 2.0))
+    remark = of_modes(run.modes).remark
+    assert remark.startswith("grows at +0.06 1/s without oscillation: sg1.machine.omega; ")
+    assert "the mode at 0.637 Hz grows as well: sg1 against sg2" in remark
