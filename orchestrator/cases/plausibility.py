@@ -428,8 +428,15 @@ def _value_text(plan: ComponentPlan, variable: str) -> str:
 
 def _broken_orders(draft: Draft, broken: Iterable[tuple[str, Rule, str]]) -> Iterator[UnusualValue]:
     """Ask about rules that are broken at machines whose equations hold without them."""
+    broken = [*broken]
+    refused = {
+        (name, rule.smaller)
+        for name, rule, _ in broken
+        if _is_needed(rule, draft.system.components[name])
+    }
     for name, rule, text in broken:
-        if not _is_needed(rule, draft.system.components[name]):
+        asked = not _is_needed(rule, draft.system.components[name])
+        if asked and (name, rule.smaller) not in refused:
             place = place_of(draft, name, rule.smaller, rule.larger)
             warned = f"{text}; PSS/E only warns, and the equations hold with it"
             yield UnusualValue(f"{name}.{rule.smaller}", place, warned)
