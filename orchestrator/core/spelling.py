@@ -10,6 +10,8 @@ _KEYWORDS = {
     "min-damping": "least_damping",
     "rank": "ranked",
     "place": "places",
+    "event": "events",
+    "channel": "channels",
     "out": "folder",
     "dest": "folder",
     "checkpoint": "checkpoints",

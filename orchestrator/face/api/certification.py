@@ -120,8 +120,8 @@ def verify(
     revoked
         A file of keys that count no longer: public keys, one a line, or a list of ``ssh-keygen -k``.
     at
-        The time at which the signers' validity is judged, as YYYYMMDD[HHMM[SS]][Z] or a datetime, of this machine's
-        zone where it names none; now where None.
+        The time at which the signers' validity is judged, as YYYYMMDD, YYYYMMDDHHMM or YYYYMMDDHHMMSS, with Z for UTC,
+        or a datetime; of this machine's zone where it names none; now where None.
 
     Returns
     -------

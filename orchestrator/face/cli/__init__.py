@@ -82,6 +82,11 @@ def _run(words: Sequence[str]) -> int:
 
 
 def _done(words: Sequence[str]) -> int:
+    files: dict[str, Path] = {}
+
+    def tell_origin() -> dict[str, Any]:
+        return _origin(words, files)
+
     try:
         words = _spelt_today(words)
         with calls:  # libraries take an interrupt in their import for an error of their own
@@ -90,8 +95,8 @@ def _done(words: Sequence[str]) -> int:
             parser = _parser({_command_in(words, listed)}, listed)
         options = parser.parse_args(words)
         origin.check_named(vars(options))
-        files = origin.files_read(vars(options))
-        origin.said[:] = [lambda: _origin(words, files)]
+        files |= origin.files_read(vars(options))
+        origin.said.append(tell_origin)
         inputs.update(path.resolve() for path in files.values())
         for path in origin.written(vars(options)):
             spare_input(path)
@@ -106,6 +111,7 @@ def _done(words: Sequence[str]) -> int:
         return _failed(error)
     finally:
         inputs.clear()
+        origin.said[:] = [tell for tell in origin.said if tell is not tell_origin]
 
 
 def _spelt_today(words: Sequence[str]) -> list[str]:

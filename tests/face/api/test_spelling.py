@@ -17,7 +17,7 @@ from orchestrator.studies.points.failure import Failure
 
 ROOT = Path(__file__).parents[3]
 OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*[a-z])")
-OTHERS = ("certification", "interop", "cli", "report/pdf.py", "cases/new_case.py")
+OTHERS = ("certification", "interop", "cli", "agents", "report/pdf.py", "cases/new_case.py")
 """Where texts are for the command line alone: Python has no such functions."""
 
 COMMANDS_ALONE = {
@@ -31,6 +31,7 @@ COMMANDS_ALONE = {
         "beside",
         "contest",
         "details",
+        "models",
         "generator",
         "junit",
     ),

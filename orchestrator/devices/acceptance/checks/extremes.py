@@ -22,6 +22,10 @@ _HIDDEN = ("no error, and finite outputs", False)
 _SILENT = "outputs that are no numbers, and no error"
 
 
+_LOOKED_AT = 3  # steps before and after the change of an input
+_SMALL_MOVE = 1e-2  # [units of the inputs] far above rounding, and within what any device takes
+
+
 @check("nan_input", "Does it tell of inputs that are no numbers, and get over them?", needs=SAME)
 def nan_input(subject: Subject) -> CheckResult:
     if not subject.inputs:
@@ -37,6 +41,12 @@ def nan_input(subject: Subject) -> CheckResult:
         says = f"{subject.watched[place]} of a new instance differs by {apart:.3g} after another one was given NaN"
         return failed("nan_input", "not a number stays", says, difference=apart)
     seen = "; ".join(f"{bad}: {answer}" for bad, (answer, _) in answers.items())
+    if answers[str(np.nan)] == _HIDDEN and not _follows(subject):
+        return remarked(
+            "nan_input",
+            f"{seen}; no output follows its inputs within {_LOOKED_AT} steps, so it need not have read them",
+            "ask for fmi2Error where an input is not finite",
+        )
     if answers[str(np.nan)] == _HIDDEN:
         says = f"{seen}: what it puts in the place of an input that is no number is invented"
         return failed("nan_input", "not a number hidden", says)
@@ -49,14 +59,29 @@ def nan_input(subject: Subject) -> CheckResult:
     return passed("nan_input", seen)
 
 
+def _follows(subject: Subject) -> bool:
+    """Return whether an output moves as soon with its inputs as it was looked at with what is no number.
+
+    An input that a clock reads later, or whose function is off, is passed over by an honest FMU as well."""
+    still, moved = (
+        _after(subject, np.full(len(subject.inputs), size)) for size in (0.0, _SMALL_MOVE)
+    )
+    return bool(np.any(np.abs(moved - still) > EQUAL))
+
+
+def _after(subject: Subject, deviation: Numbers) -> Numbers:
+    """Outputs a few steps after its inputs have moved."""
+    with subject.running() as running:
+        running.record(_LOOKED_AT, subject.step_size, subject.one_step())
+        running.feed(deviation)
+        for _ in range(_LOOKED_AT):
+            running.step(subject.step_size)
+        return running.read()
+
+
 def _answer(subject: Subject, deviation: Numbers) -> tuple[str, bool]:
     try:
-        with subject.running() as running:
-            running.record(3, subject.step_size, subject.one_step())
-            running.feed(deviation)
-            for _ in range(3):
-                running.step(subject.step_size)
-            values = running.read()
+        values = _after(subject, deviation)
     except ComponentError as error:
         return f"{error.call} says {error.status}", True
     except EndedError:
