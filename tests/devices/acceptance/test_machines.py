@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orchestrator.devices.acceptance.checks import evenness, ride_through
+from orchestrator.devices.acceptance.checks import evenness, ride_through, windup
 
 TIME = np.linspace(0, 2, 400)
 
@@ -48,3 +48,14 @@ def test_a_machines_swing_may_be_damped_less_elsewhere(machine, fault):
     found = evenness._other(usual, here, machine)
     assert (found and found[0]) == fault
     assert evenness._other(usual, -usual, machine)[0] == "uneven droop"
+
+
+def test_a_machine_without_a_limit_of_its_current_cannot_wind_up_at_it(monkeypatch):
+    monkeypatch.setattr(windup, "current_limit", lambda subject: None)
+    machine = SimpleNamespace(starts=True, is_machine=True, memory={})
+    assert windup.anti_windup(machine).verdict == "not applicable"
+
+
+@pytest.mark.parametrize("ends", [True, False])
+def test_what_an_fmu_with_an_end_leaves_unjudged_is_no_reason_to_refuse_it(ends):
+    assert windup._summary(0, [], ends=ends).figures["reason"] is not ends

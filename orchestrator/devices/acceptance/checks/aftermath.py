@@ -120,7 +120,7 @@ def after_dips(subject: Subject) -> CheckResult:
             return result
         if found[-1].end is not _End.BACK:
             unknown.append(found[-1])
-    return _judge(found, unknown)
+    return _judge(found, unknown, ends="ended_at" in subject.memory)
 
 
 def _drawn(subject: Subject) -> Iterator[list[Segment]]:
@@ -144,14 +144,16 @@ def _wrong(after: _After) -> CheckResult | None:
     return None
 
 
-def _judge(found: list[_After], unknown: list[_After]) -> CheckResult:
-    """Tell what was compared; what was not, with little power and a third of it either, is a reason not to accept."""
+def _judge(found: list[_After], unknown: list[_After], *, ends: bool) -> CheckResult:
+    """Tell what was compared; what was not, with little power and a third of it either, is a reason not to accept.
+
+    ``ends``: it ends its simulation by itself, in order, so that nothing can be seen afterwards."""
     back = [after for after in found if after.end is _End.BACK]
     lost = [after for after in found if after.end is not _End.BACK]
     figures: dict[str, Any] = {"compared": len(back), "not_compared": len(lost)}
     if unknown:
         figures |= {"not_judged": f"what dips leave behind ({_unlike(unknown[0])})"}
-        figures |= {"reason": True}
+        figures |= {"reason": not ends}
     if not back:
         return remarked(
             "after_dips",

@@ -10,11 +10,17 @@ from orchestrator.devices.acceptance.checks.base import (
     CheckResult,
     check,
     failed,
+    not_applicable,
     passed,
     remarked,
 )
 from orchestrator.devices.acceptance.checks.events import in_words, scale
-from orchestrator.devices.acceptance.checks.port import cannot_import, currents, without_start
+from orchestrator.devices.acceptance.checks.port import (
+    cannot_import,
+    current_limit,
+    currents,
+    without_start,
+)
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Subject
 
 _SHORT = 0.6  # duration of an event [s] in which an angle and a filter have come to rest
@@ -65,6 +71,8 @@ def anti_windup(subject: Subject) -> CheckResult:
     """Hold it at its limit by dips and overvoltages in which it can keep its power, and watch until it rests."""
     if not subject.starts:
         return without_start("anti_windup", subject)
+    if subject.is_machine and current_limit(subject) is None:
+        return not_applicable("anti_windup", "because nothing limits a machine's current")
     draw = subject.random("anti-windup")
     compared = 0
     unknown = list[str]()
@@ -99,10 +107,11 @@ def anti_windup(subject: Subject) -> CheckResult:
             unknown.append(f"it leaves its angle in the {words}")
             continue
         compared += 1
-    return _summary(compared, unknown)
+    return _summary(compared, unknown, ends="ended_at" in subject.memory)
 
 
-def _summary(compared: int, unknown: list[str]) -> CheckResult:
+def _summary(compared: int, unknown: list[str], *, ends: bool) -> CheckResult:
+    """Tell what was compared; nothing is a reason not to accept it, unless it ends its simulation by itself."""
     if not compared:
         reason = "whether it winds up at its limit"
         return remarked(
@@ -110,7 +119,7 @@ def _summary(compared: int, unknown: list[str]) -> CheckResult:
             f"not judged: {'; '.join(unknown[:2]) or 'no event could be tried'}",
             "ask what holds its integral parts while its current is limited",
             not_judged=reason,
-            reason=True,
+            reason=not ends,
         )
     says = f"after {compared} dips and overvoltages, short and long, it is back alike"
     says += f"; not judged: {unknown[0]}" if unknown else ""
