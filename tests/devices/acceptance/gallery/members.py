@@ -1128,4 +1128,4 @@ def _invalid():
         bare,
         variables=tuple(replace(v, start=None) if v.name == "v_re" else v for v in bare.variables),
     )
-    return [Member(twice, "invalid FMI"), Member(bare, "invalid FMI")]
+    return [Member(twice, "unreadable"), Member(bare, "invalid FMI")]
