@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from orchestrator.cases.prepare import PreparedScenario
@@ -139,44 +140,25 @@ def run_scenario(
     ``recording``: where the rows go while the run goes on; at the end they are ``trajectory.nc`` beside it.
     ``checkpoints``: keep the run while it goes on, and go on from the newest where one was left; not with federates.
     ``boxes``: finds the modes where components hide their states."""
+    made = partial(
+        _run,
+        frequency_range=frequency_range,
+        linear=linear,
+        recording=recording,
+        threads=threads,
+        boxes=boxes,
+    )
     if federates is not None:
         with ENGINES[federates.engine](prepared, federates) as engine:
-            return _run(
-                engine.prepared,
-                frequency_range,
-                [*observers, *engine.observers()],
-                linear=linear,
-                recording=recording,
-                checkpoints=None,
-                threads=threads,
-                boxes=boxes,
-                engine=engine,
-            )
+            watching = [*observers, *engine.observers()]
+            return made(engine.prepared, observers=watching, checkpoints=None, engine=engine)
     try:
-        return _run(
-            prepared,
-            frequency_range,
-            observers,
-            linear=linear,
-            recording=recording,
-            checkpoints=checkpoints,
-            threads=threads,
-            boxes=boxes,
-        )
+        return made(prepared, observers=observers, checkpoints=checkpoints)
     except NotTakenUpError as error:
         if checkpoints is None:
             raise
         checkpoints.forget(str(error))
-        return _run(
-            prepared,
-            frequency_range,
-            observers,
-            linear=linear,
-            recording=recording,
-            checkpoints=checkpoints,
-            threads=threads,
-            boxes=boxes,
-        )
+        return made(prepared, observers=observers, checkpoints=checkpoints)
 
 
 def _run(
