@@ -44,7 +44,6 @@ _STRANGE = (
     2  # machines that one file has alone, in each, from which on the files may be of two networks
 )
 _NAMED = 8  # buses that one problem names
-_NO_RECORD = "has no record of a machine"
 
 
 @dataclass(frozen=True)
@@ -132,12 +131,14 @@ def machine_models(
     missing = missing_models(records, at, {*passed, *(FIELDS if approximate else ())})
     lacking |= {key for model in missing for key in _machines_of(model) if not model.may_go}
     missing = [model for model in missing if model.may_go or not _machines_of(model) <= {*replaced}]
-    unfit = list(_unfit(parts, {*replaced, *lacking}, labels))
-    bare = [key for key in _without_machine(parts) if key not in {*replaced, *lacking}]
+    accounted = {*replaced, *lacking}
+    bare = [key for key in _without_machine(parts) if key not in accounted]
     places = {(record.bus, record.machine) for record in strange}
     if min(len(places), len(bare)) >= _STRANGE:
         problems = [_other_network(strange, records, bare, len(at)), *problems]
-        strange, unfit = [], [text for text in unfit if _NO_RECORD not in text]
+        strange = []
+        accounted |= {*bare}
+    unfit = _unfit(parts, accounted, labels)
     problems = [*(_may_be_meant(strange) if bare else ()), *problems, *unfit]
     if problems or missing:
         counted_once = [*_count_repeats(problems, first)]
