@@ -18,7 +18,7 @@ import xarray as xr
 from orchestrator.core.errors import InputError, counted
 from orchestrator.output.report.html import studies
 from orchestrator.output.report.html.charts import Mark, bar_chart, complex_plane, legend
-from orchestrator.output.report.html.elements import colour, damping, table
+from orchestrator.output.report.html.elements import VERDICTS, colour, damping, table
 from orchestrator.output.report.html.least_damped import LeastDamped
 from orchestrator.output.report.html.origins import origin_of
 from orchestrator.output.report.html.verdict_lines import VerdictLine
@@ -27,11 +27,6 @@ from orchestrator.output.results.manifest import read_manifest
 
 _FEW, _LONGEST, _FASTEST = 4, 300, -5.0  # of a list; of a text; real part [1/s] of modes on a map
 _DESIGNED = {"without": "target", "predicted": "predicted", "with": "achieved"}
-_STABLE: Mapping[bool | None, str] = {
-    True: "stable",
-    False: "UNSTABLE",
-    None: "not known whether stable",
-}
 
 
 @dataclass(frozen=True)
@@ -222,7 +217,7 @@ def has_fault(scenario: Content) -> bool:
 def _screening(file: Path, c: Content) -> Chapter:
     where = "somewhere" if c["stable"] is False else "everywhere"
     points, outages = counted(c["points"], "operating point"), counted(c["outages"], "outage")
-    answer = f"{_STABLE[c['stable']]} {where}: {points}, {outages}"
+    answer = f"{VERDICTS[c['stable']]} {where}: {points}, {outages}"
     least = min(c["modes"], key=lambda mode: mode["worst"]["damping_percent"], default=None)
     told = []
     if least is not None:
@@ -457,7 +452,7 @@ def _interactions(file: Path, c: Content) -> Chapter:
     whole = c["as_in_the_case"]["stable"]
     verdicts = [whole, *(one["stable"] for one in (*c["pairs"], *c.get("assignments", [])))]
     good = False if False in verdicts else None if None in verdicts else True
-    answer = f"{_STABLE[whole]} as in the case; {counted(len(c['interaction_modes']), 'mode')} that vendors share"
+    answer = f"{VERDICTS[whole]} as in the case; {counted(len(c['interaction_modes']), 'mode')} that vendors share"
     answer += f"; {worst['sentence']}" if worst else ""
     sure = f"each of {len(c['vendors'])} vendors alone and each pair, the others as {c['stand_in']}"
     lost = [f"pair {' and '.join(pair)}" for pair in c["unknown_pairs"]]

@@ -1,7 +1,7 @@
 """Pieces of HTML: tables, figures with numbers, texts that are safe to put in a page, and the page around them."""
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from html import escape
 from importlib.metadata import version
@@ -72,11 +72,20 @@ def damping(percent: float, least: float = 5.0) -> str:
     return f'<span class="bad">{text}</span>' if percent < least else text
 
 
+SHADES: Mapping[bool | None, str] = {True: "good", False: "bad", None: "soft"}
+"""The class in the page's style sheet for what is good, bad or not known."""
+
+VERDICTS: Mapping[bool | None, str] = {
+    True: "stable",
+    False: "UNSTABLE",
+    None: "not known whether stable",
+}
+
+
 def paragraphs(good: bool | None, texts: Sequence[str]) -> str:
     """Sentences; the first one is the verdict, in the colour of what is good, bad or not known."""
-    shade = {True: "good", False: "bad", None: "soft"}[good]
     first, *rest = texts
-    return f'<p class="{shade}">{escape(first)}</p>' + "".join(
+    return f'<p class="{SHADES[good]}">{escape(first)}</p>' + "".join(
         f"<p>{escape(text)}</p>" for text in rest
     )
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from html import escape
 
 from orchestrator.output.report.html.chapters import Chapter
-from orchestrator.output.report.html.elements import table
+from orchestrator.output.report.html.elements import SHADES, table
 from orchestrator.output.report.html.origins import given_in
 from orchestrator.output.report.html.verdict_lines import verdicts
 from orchestrator.output.report.tables import short
@@ -17,8 +17,6 @@ _OPEN = 4
 
 _LONGEST = 240
 """Characters of each of them: three lines of the page."""
-
-_SHADES = {True: "good", False: "bad", None: "soft"}
 
 
 def first_page(chapters: Sequence[Chapter]) -> str:
@@ -54,7 +52,7 @@ def _row(chapter: Chapter, notes: dict[str, str]) -> list[str]:
     given = "".join(f"<br>{escape(text)}" for text in _places_and_options(chapter))
     return [
         f'{escape(chapter.question)}<span class="soft">{given}</span>',
-        f'<span class="{_SHADES[chapter.good]}">{escape(chapter.answer)}</span>',
+        f'<span class="{SHADES[chapter.good]}">{escape(chapter.answer)}</span>',
         escape(short(chapter.sure, 2 * _LONGEST)),
         "<br>".join(_not_judged(chapter, notes)),
     ]

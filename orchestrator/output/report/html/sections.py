@@ -15,6 +15,7 @@ from orchestrator.output.report.html.charts import (
     line_chart,
 )
 from orchestrator.output.report.html.elements import (
+    SHADES,
     Figures,
     colour,
     damping,
@@ -87,17 +88,13 @@ def findings(results: Results) -> str:
     )
     found = f"<ul>{''.join(f'<li>{item}</li>' for item in items)}</ul>" if items else ""
     by_modes = "".join(
-        f'<li>{escape(s["title"])}: <b class="{_verdict_shade(v["stable"])}">{escape(v["sentence"])}</b></li>'
+        f'<li>{escape(s["title"])}: <b class="{SHADES[v["stable"]]}">{escape(v["sentence"])}</b></li>'
         for s in results.scenarios
         if (v := s.get("stability"))
     )
     details = f"<details><summary>By the modes at the operating point</summary><ul>{by_modes}</ul></details>"
     told = found + (details if by_modes else "")
     return (f'<div class="findings">{told}</div>' if told else "") + warnings
-
-
-def _verdict_shade(stable: bool | None) -> str:
-    return {True: "good", False: "bad"}.get(stable, "soft")  # type: ignore[arg-type]
 
 
 def studied(results: Results) -> str:

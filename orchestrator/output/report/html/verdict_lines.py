@@ -8,17 +8,8 @@ from html import escape
 from typing import Any
 
 from orchestrator.core.errors import few
-from orchestrator.output.report.html.elements import damping, number, table
+from orchestrator.output.report.html.elements import SHADES, VERDICTS, damping, number, table
 from orchestrator.output.report.html.least_damped import LeastDamped
-
-_STABLE: Mapping[bool | None, str] = {
-    True: "stable",
-    False: "UNSTABLE",
-    None: "not known whether stable",
-}
-
-_SHADES: Mapping[bool | None, str] = {True: "good", False: "bad", None: "soft"}
-"""The class in the page's style sheet for what is good, bad or not known."""
 
 _WORST_FIRST: Mapping[bool | None, int] = {False: 0, None: 1, True: 2}
 
@@ -55,7 +46,7 @@ class VerdictLine:
         return cls(
             scenario=scenario.get("subject") or scenario.get("title", scenario["name"]),
             stable=stable,
-            verdict=answer.get("verdict") or _STABLE[stable],
+            verdict=answer.get("verdict") or VERDICTS[stable],
             remark=answer.get("remark") or "",
             least=_mode(least),
             after=_mode(answer.get("after_events")),
@@ -144,4 +135,4 @@ def _worst(lines: Sequence[VerdictLine]) -> str:
 
 
 def _in_colour(text: str, stable: bool | None) -> str:
-    return f'<b class="{_SHADES[stable]}">{escape(text)}</b>'
+    return f'<b class="{SHADES[stable]}">{escape(text)}</b>'
