@@ -10,6 +10,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from fmus.toolchain.cache import cache_directory
+
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 
 _PACKAGES = ("fmus", "gfor_fmu", "orchestrator")
@@ -20,10 +22,12 @@ _CHANGES = frozenset(
 )
 """Events of Python's audit hook, other than ``open``, by which files are changed."""
 
+_DEVICES = ("/dev/null", "/dev/shm")
+"""Where Python drops what nobody reads, and shares memory among processes."""
+
 _SYSTEM = (
-    "/proc",
     "/sys/fs/cgroup",
-    "/dev",
+    "/dev/urandom",
     "/usr",
     "/lib",
     "/lib64",
@@ -33,12 +37,19 @@ _SYSTEM = (
 )
 """Files and folders that libraries read on Linux to find their like, the number of cores and the time."""
 
+_PROC = Path("/proc")
+
+_OF_PROCESSES = frozenset(
+    {"cgroup", "children", "cpuinfo", "filesystems", "maps", "meminfo", "stat", "statm", "status"}
+)
+"""Files of /proc that libraries read: no words of a command, no environment, which may hold secrets."""
+
 
 def keep_within(roots: Sequence[Path], results: Path) -> None:
     """Refuse, from now on and in this process, to open files outside of folders that an agent may use.
 
-    Python's own folders, gfor's, its cache and the folder of temporary files (``TMPDIR``) stay open. A library that
-    opens files without Python is not seen; foreign FMUs run in a sandbox of their own.
+    Python's own folders, gfor's, its cache, Matplotlib's and the folder of temporary files (``TMPDIR``) stay open. A
+    library that opens files without Python is not seen; foreign FMUs run in a sandbox of their own.
 
     Parameters
     ----------
@@ -53,10 +64,12 @@ def keep_within(roots: Sequence[Path], results: Path) -> None:
     written = [
         results,
         Path(tempfile.gettempdir()),
-        Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")),
-        Path("/dev"),
-        Path("/proc"),
+        cache_directory("").absolute(),
+        *map(Path, _DEVICES),
     ]
+    pictures = os.environ.get("MPLCONFIGDIR")
+    if pictures:
+        written.append(Path(pictures))
     readable = _resolved([*roots, *own, *written])
     writable = _resolved(written)
 
@@ -77,6 +90,11 @@ def is_within(path: Path, folders: Sequence[Path]) -> bool:
     return any(place.is_relative_to(folder) for folder in folders)
 
 
+def _is_of_processes(path: Path) -> bool:
+    place = path.resolve()
+    return place.is_relative_to(_PROC) and place.name in _OF_PROCESSES
+
+
 def _folder(package: str) -> Path:
     spec = find_spec(package)
     if spec is None or not spec.submodule_search_locations:
@@ -92,7 +110,7 @@ def _check(path: object, folders: Sequence[Path], *, writes: bool) -> None:
     if not isinstance(path, str | bytes | os.PathLike):
         return  # the number of a file that is open
     place = Path(os.fsdecode(path))
-    if not is_within(place, folders):
+    if not is_within(place, folders) and not (not writes and _is_of_processes(place)):
         does = "written" if writes else "read"
         raise PermissionError(
             f"{place}: it lies outside of the folders that may be {does} here; "

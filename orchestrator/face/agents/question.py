@@ -2,20 +2,36 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fmus.toolchain.cache import cache_directory
 from orchestrator.core.errors import InputError
+
+MOST_WORDS = 20_000
+"""Characters of a question; one with a hundred values has 5,000."""
+
+MOST_SAID = 4_000
+"""Characters of a refusal that an agent gets: a screen full of it."""
 
 LARGEST_ANSWER = 64 * 1024**2
 """Bytes of JSON that a command may print: beyond, a question was too wide for any agent."""
+
+
+_REFUSAL = re.compile(r"^(?:gfor [^\n:]*: )?error: ", re.MULTILINE)
+"""The begin of a refusal, after the usage, remarks and questions that a command may have printed."""
+
+_turn = threading.Lock()
+"""Questions take turns: each may use all cores, and they write into one folder."""
 
 
 class NoAnswerError(InputError):
@@ -59,8 +75,23 @@ def ask(words: Sequence[str], allowance: Allowance) -> Any:
     Raises
     ------
     NoAnswerError
-        If the command refuses its input, fails, takes too long or prints too much.
+        If the command refuses its input, fails, takes too long or prints too much; or if the question is too long, or
+        another one is still being answered.
     """
+    length = sum(map(len, words))
+    if length > MOST_WORDS:
+        raise NoAnswerError(f"the question has {length} characters; at most {MOST_WORDS} are taken")
+    if not _turn.acquire(timeout=allowance.seconds):
+        raise NoAnswerError(
+            f"another question is being answered, for more than {allowance.seconds:g} s now; ask one after the other"
+        )
+    try:
+        return _ask(words, allowance)
+    finally:
+        _turn.release()
+
+
+def _ask(words: Sequence[str], allowance: Allowance) -> Any:
     allowance.results.mkdir(parents=True, exist_ok=True)
     task = {
         "roots": [str(root) for root in allowance.roots],
@@ -76,16 +107,29 @@ def ask(words: Sequence[str], allowance: Allowance) -> Any:
     try:
         return json.loads(out)
     except ValueError:
-        said = err.decode(errors="replace").strip().removeprefix("error: ")
+        said = _refusal(err.decode(errors="replace").strip())
         raise NoAnswerError(said or f"gfor {' '.join(words)} printed no JSON") from None
+
+
+def _refusal(said: str) -> str:
+    """Return why a command refused, without what it had printed before; the middle of a long text is left out."""
+    begin = _REFUSAL.search(said)
+    text = said[begin.end() :] if begin else said
+    if len(text) <= MOST_SAID:
+        return text
+    half = MOST_SAID // 2
+    return f"{text[:half]}\n… {len(text) - MOST_SAID} characters …\n{text[-half:]}"
 
 
 def _run(task: dict[str, Any], allowance: Allowance, temporary: Path) -> tuple[bytes, bytes]:
     """Run a task in a process of its own; returns what it printed and what it said."""
+    own = {"TMPDIR": str(temporary), "TEMP": str(temporary)}
+    own["MPLCONFIGDIR"] = str(cache_directory("pictures").absolute())  # its list of fonts, once
     process = subprocess.Popen(
-        [sys.executable, "-m", "orchestrator.face.cli.within", json.dumps(task)],
+        # -P: what lies in the folder of results is no module
+        [sys.executable, "-P", "-m", "orchestrator.face.cli.within", json.dumps(task)],
         cwd=allowance.results,
-        env=os.environ | {"TMPDIR": str(temporary), "TEMP": str(temporary)},
+        env=os.environ | own,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -96,7 +140,7 @@ def _run(task: dict[str, Any], allowance: Allowance, temporary: Path) -> tuple[b
     except subprocess.TimeoutExpired:
         raise NoAnswerError(
             f"gfor {' '.join(task['words'])}: no answer within {allowance.seconds:g} s; ask for less (one "
-            "scenario, fewer points), or start gfor mcp with a larger --seconds"
+            "scenario, fewer points, a check by its name), or start gfor mcp with a larger --seconds"
         ) from None
     finally:
         _end(process)

@@ -1,6 +1,9 @@
 """The eight verbs: each asks one command, and gives of its JSON what an agent needs."""
 
+import os
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +34,12 @@ MOST_ROWS = 20
 MOST_FILES = 200
 """Case files that `cases` lists."""
 
+MOST_FOLDERS = 5_000
+"""Folders in which `cases` looks for case files: a second of looking."""
+
+LONGEST_NAME = 1_000
+"""Characters of a name or a path."""
+
 Values = Mapping[str, float | bool | str]
 
 
@@ -49,8 +58,8 @@ class Verbs:
     def cases(self) -> CasesAnswer:
         """List the cases that can be asked about: the built-in ones, and case files in the given folders."""
         titles = {name: _title(BUILT_IN / name / "case.toml") for name in built_in_cases()}
-        files = [str(path) for root in self._allowance.roots for path in _case_files(root)]
-        return CasesAnswer(built_in=titles, files=files[:MOST_FILES])
+        files = (str(path) for root in self._allowance.roots for path in _case_files(root))
+        return CasesAnswer(built_in=titles, files=[*islice(files, MOST_FILES)])
 
     def modes(
         self, case: str, scenario: str | None = None, values: Values | None = None
@@ -63,7 +72,7 @@ class Verbs:
         return ModesAnswer(
             case=found["case"],
             scenarios=[_scenario_modes(one) for one in found["scenarios"]],
-            questions=[str(one) for one in found["questions"]],
+            questions=_first(found["questions"]),
         )
 
     def run_summary(
@@ -103,17 +112,21 @@ class Verbs:
             scenario=found["scenario"],
             stable=found["stable"],
             computed=found["counts"].get("computed", 0),
-            unstable=[_place(one) for one in found["unstable"]],
-            failures=failures,
+            unstable=_first(_place(one) for one in found["unstable"]),
+            failures=_first(failures),
             worst=[_screened(mode) for mode in modes[:MOST_ROWS]],
         )
 
-    def check(self, fmu: str, binding: str | None = None) -> CheckAnswer:
-        """Check whether an FMU can be trusted in a co-simulation; it runs in a sandbox.
+    def check(
+        self, fmu: str, binding: str | None = None, only: list[str] | None = None
+    ) -> CheckAnswer:
+        """Check whether an FMU can be trusted in a co-simulation; it runs in a sandbox, for minutes.
 
-        ``fmu`` and ``binding`` are files in a given folder.
+        ``fmu`` and ``binding`` are files in a given folder; ``only`` names checks, such as "repeatability".
         """
         words = ["fmu", "check", self._file(fmu), "--json"]
+        for name in only or []:
+            words += ["--only", _plain(name, "only")]
         if binding is not None:
             words += ["--binding", self._file(binding)]
         found = ask(words, self._allowance)
@@ -191,35 +204,52 @@ class Verbs:
         given = Path(_plain(name, "file"))
         for root in self._allowance.roots:
             path = (root / given).resolve()
-            if path.is_file() and is_within(path, self._allowance.roots):
-                return str(path)
+            with suppress(OSError):  # such as of a name that no file can have
+                if is_within(path, self._allowance.roots) and path.is_file():
+                    return str(path)
         folders = ", ".join(str(root) for root in self._allowance.roots)
         raise NoAnswerError(
             f"{name}: there is no such file in the folders that may be read: {folders}"
         )
 
 
+def _first(texts: Iterable[object]) -> list[str]:
+    """Return texts as an agent gets them: the first, and how many others there are."""
+    every = list(map(str, texts))
+    more = [f"and {len(every) - MOST_ROWS} more"] if len(every) > MOST_ROWS else []
+    return every[:MOST_ROWS] + more
+
+
 def _plain(text: str, what: str) -> str:
     """Return a text that a command takes for a value, not for an option."""
-    if not text or text.startswith("-") or not text.isprintable():
+    if not text or text.startswith("-") or not text.isprintable() or len(text) > LONGEST_NAME:
+        begin = text[:60]
         raise NoAnswerError(
-            f"{what} = {text!r}: give a name or a path, which does not begin with '-'"
+            f"{what} = {begin!r}: give a name or a path, which does not begin with '-' and has at most "
+            f"{LONGEST_NAME} characters"
         )
     return text
 
 
 def _case_files(root: Path) -> Iterable[Path]:
-    return sorted(
-        path
-        for path in root.glob("**/*.toml")
-        if path.is_file() and is_within(path, [root]) and "[components" in _beginning(path)
-    )
+    """Yield the case files of a folder and of those in it, the hidden ones and links to folders left out."""
+    for folder, inner, names in islice(os.walk(root), MOST_FOLDERS):
+        inner[:] = sorted(name for name in inner if not name.startswith("."))
+        for name in sorted(names):
+            path = Path(folder, name)
+            if path.suffix == ".toml" and is_within(path, [root]) and _is_case(path):
+                yield path
 
 
-def _beginning(path: Path) -> str:
-    """Return the first 100,000 characters of a file, in which a case names its components."""
-    with path.open(encoding="utf-8", errors="replace") as file:
-        return file.read(100_000)
+def _is_case(path: Path) -> bool:
+    """Return whether the first 100,000 characters of a file name components, as those of a case do."""
+    if not path.is_file():
+        return False
+    try:
+        with path.open(encoding="utf-8", errors="replace") as file:
+            return "[components" in file.read(100_000)
+    except OSError:
+        return False
 
 
 def _title(path: Path) -> str:

@@ -14,6 +14,7 @@ import json, os, sys
 from pathlib import Path
 from orchestrator.face.agents.guard import keep_within
 root, results, outside = map(Path, sys.argv[1:])
+cache = Path(os.environ["XDG_CACHE_HOME"])
 keep_within([root], results)
 def tried(do):
     try:
@@ -25,6 +26,9 @@ print(json.dumps({
     "read inside": tried(lambda: (root / "a").read_text()),
     "read outside": tried(lambda: (outside / "a").read_text()),
     "read by a link": tried(lambda: (root / "link").read_text()),
+    "read secrets": tried(lambda: Path("/proc/self/environ").read_bytes()),
+    "read caches": tried(lambda: (cache / "of_another").read_text()),
+    "read own cache": tried(lambda: (cache / "gfor-cosim" / "a").read_text()),
     "write inside": tried(lambda: (root / "b").write_text("b")),
     "write results": tried(lambda: (results / "b").write_text("b")),
     "remove": tried(lambda: os.remove(root / "a")),
@@ -43,7 +47,13 @@ def test_files_are_read_in_roots_and_written_in_results_alone(tmp_path, monkeypa
     for folder in (root, outside):
         (folder / "a").write_text("a", encoding="utf-8")
     (root / "link").symlink_to(outside / "a")
+    caches = tmp_path / "caches"
+    (caches / "gfor-cosim").mkdir(parents=True)
+    for file in (caches / "of_another", caches / "gfor-cosim" / "a"):
+        file.touch()
     monkeypatch.setenv("TMPDIR", str(elsewhere))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(caches))
+    monkeypatch.delenv("GFOR_COSIM_CACHE", raising=False)
     done = subprocess.run(
         [sys.executable, "-c", WITHIN, *map(str, folders)],
         capture_output=True,
@@ -54,6 +64,9 @@ def test_files_are_read_in_roots_and_written_in_results_alone(tmp_path, monkeypa
         "read inside": "done",
         "read outside": "refused",
         "read by a link": "refused",
+        "read secrets": "refused",
+        "read caches": "refused",
+        "read own cache": "done",
         "write inside": "refused",
         "write results": "done",
         "remove": "refused",
@@ -91,6 +104,43 @@ converter = "gfor_phasor"
     )
     with pytest.raises(NoAnswerError, match=r"secret\.csv: it lies outside"):
         Verbs(allowance(root)).modes("case.toml")
+
+
+def test_a_cache_elsewhere_serves_as_well(tmp_path, monkeypatch):
+    monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path / "cache"))
+    (weakest, *_) = Verbs(allowance(tmp_path)).scr("two_area").buses
+    assert weakest.s_sc_mva > 0
+
+
+@pytest.mark.parametrize("name", ["a" * 5_000, "a\0b", "-h", "", "../" * 300 + "etc/passwd"])
+def test_what_is_no_name_is_refused_before_anything_starts(tmp_path, name):
+    verbs = Verbs(Allowance((tmp_path,), tmp_path / "results", 0.0))
+    with pytest.raises(NoAnswerError) as refused:
+        verbs.modes(name)
+    with pytest.raises(NoAnswerError):
+        verbs.check(name)
+    assert len(str(refused.value)) < 1_500
+    assert not (tmp_path / "results").exists()
+
+
+def test_a_long_question_is_refused(tmp_path):
+    values = {f"grid.{number}": "1" * 900 for number in range(30)}
+    with pytest.raises(NoAnswerError, match="at most 20000 are taken"):
+        Verbs(allowance(tmp_path)).modes("two_area", "base", values)
+
+
+def test_a_refusal_comes_without_the_usage(tmp_path):
+    with pytest.raises(NoAnswerError, match=r"^argument --stop: '-1\.0' must exceed 0"):
+        Verbs(allowance(tmp_path)).run_summary("two_area", "base", -1.0)
+
+
+def test_cases_are_looked_for_where_they_can_be(tmp_path):
+    (tmp_path / "own").mkdir()
+    (tmp_path / ".hidden").mkdir()
+    for place in ("own/case.toml", ".hidden/case.toml"):
+        (tmp_path / place).write_text("[components.grid]\n", encoding="utf-8")
+    (tmp_path / "other.toml").write_text("[tool]\n", encoding="utf-8")
+    assert Verbs(allowance(tmp_path)).cases().files == [str(tmp_path / "own" / "case.toml")]
 
 
 def test_a_question_ends_in_time(tmp_path):
