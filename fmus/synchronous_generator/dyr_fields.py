@@ -20,7 +20,9 @@ class DyrField:
     ``name``: PSS/E's name of the field; ``parameters``: parameters of the component that take the value; none where the
     field only chooses something; ``negated``: parameters that take the negative value; ``times``: name of another field
     of the record; the parameters take the product of both. PSS/E gives some leads as T_A/T_B; ``only``: the only values
-    that our part can stand for; empty where it takes every one; ``same_as``: name of another field that must have the
+    that our part can stand for; empty where it takes every one; ``all_there``: whether these are all that PSS/E knows;
+    ``bus_of``: name of the field that chooses a signal, of another bus than the machine's own where this field, a bus,
+    names one; ``same_as``: name of another field that must have the
     same value, because our part has one parameter for both; ``not_zero``: whether 0, by which PSS/E means that it
     chooses a value itself, must be refused; ``zero_sets``: parameter that is true at 0, by which the part chooses the
     value as PSS/E does; ``switch``: whether the parameters are truth values; 0 is false;
@@ -31,6 +33,8 @@ class DyrField:
     negated: tuple[str, ...] = ()
     times: str = ""
     only: tuple[float, ...] = ()
+    all_there: bool = False
+    bus_of: str = ""
     same_as: str = ""
     not_zero: bool = False
     zero_sets: str = ""
@@ -55,8 +59,11 @@ class DyrRecord:
     omissions: Mapping[str, str] = field(default_factory=dict)
 
 
+SIGNALS_OF_BUSES = (2, 5, 6)
+"""Numbers of stabilisers' signals that PSS/E can take at another bus: frequency, voltage, its rate."""
+
 _WORD = re.compile(
-    r"(?P<name>[^:=!&-]+)(:(?P<sets>[\w+]+))?(-(?P<negated>[A-Za-z]\w*))?(\*(?P<times>[^=!&]+))?(==(?P<same>\w+))?(=(?P<only>[-\d|]+))?"
+    r"(?P<name>[^:=!&@-]+)(@(?P<bus_of>\w+))?(:(?P<sets>[\w+]+))?(-(?P<negated>[A-Za-z]\w*))?(\*(?P<times>[^=!&]+))?(==(?P<same>\w+))?(=(?P<only>[-\d|.]+))?"
     r"(!(?P<chooser>\w*))?(?P<switch>\??)(&(?P<without>\S+))?"
 )
 """A field as the table has it."""
@@ -71,6 +78,14 @@ _SCOPES = {
 }
 
 
+def _allowed(text: str) -> tuple[tuple[float, ...], bool]:
+    """The values of ``1|3`` or ``1..6``, and whether these are all that there are."""
+    first, dots, last = text.partition("..")
+    if dots:
+        return tuple(map(float, range(int(first), int(last) + 1))), True
+    return tuple(map(float, text.split("|"))) if text else (), False
+
+
 def _record(table: Mapping[str, Any]) -> DyrRecord:
     scope, fields = _SCOPES[table["kind"]], []
     for word in table["fields"].split():
@@ -80,7 +95,7 @@ def _record(table: Mapping[str, Any]) -> DyrRecord:
             tuple(f"{scope}{p}" for p in (found[group] or "").split("+") if p)
             for group in ("sets", "negated")
         )
-        only = tuple(map(float, found["only"].split("|"))) if found["only"] else ()
+        only, all_there = _allowed(found["only"] or "")
         times, same = found["times"] or "", found["same"] or ""
         chooser = f"{scope}{found['chooser']}" if found["chooser"] else ""
         one = DyrField(
@@ -89,6 +104,8 @@ def _record(table: Mapping[str, Any]) -> DyrRecord:
             negated,
             times,
             only,
+            all_there,
+            found["bus_of"] or "",
             same,
             not_zero=found["chooser"] == "",
             zero_sets=chooser,

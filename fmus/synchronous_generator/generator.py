@@ -8,7 +8,6 @@ from fmus.synchronous_generator.machine import (
     Machine,
     declare_machine,
     machine_equations,
-    terminal_power,
     terminal_voltage,
 )
 from fmus.synchronous_generator.stabilization.norm631 import pss2a
@@ -18,12 +17,12 @@ from fmus.synchronous_generator.variants import (
     ST1,
     ST4B,
     Governor,
-    Shaft,
     Stabilizer,
     Variant,
     declare_machine_outputs,
     of_power,
     of_speed,
+    seen_by_controls,
 )
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
@@ -69,8 +68,7 @@ def with_controls(
     stabilizer: Stabilizer | None,
 ) -> Model:
     """A machine with stator transients and its controls."""
-    v_nearly = terminal_voltage(g, port, g.field_current).magnitude()
-    shaft = Shaft(g.w, g.start.T_e, *terminal_power(g, port), v_nearly, g.start.v_t, g.S_n)
+    shaft = seen_by_controls(m, g, port, terminal_voltage(g, port, g.field_current))
     v_s = 0.0 if stabilizer is None else stabilizer(m, shaft)
     seen = Regulated(
         g.start,
@@ -82,6 +80,7 @@ def with_controls(
     )
     E_fd, v_t = exciter(m, seen)
     P_m = governor(m, shaft)
+    m.close(shaft.P_m, P_m)
     machine_equations(m, g, port, E_fd, P_m)
     declare_port_outputs(m, port, g.current.rotated(g.delta))
     declare_machine_outputs(m, g, v_t, E_fd, P_m)

@@ -50,7 +50,7 @@ from fmus.synchronous_generator.turbines.governors import (
 from fmus.synchronous_generator.turbines.steam import ieesgo, tgov3
 from fmus.synchronous_generator.turbines.water import hygov2, ieeeg2, ieeeg3
 from fmus.synchronous_generator.turbines.water_pid import pidgov, wpidhy, wshygp
-from fmus.synchronous_generator.variants import Governor, Stabilizer, of_power, of_speed
+from fmus.synchronous_generator.variants import Governor, Stabilizer, of_speed
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort
 from fmus.toolchain.symbols import Expr
@@ -123,9 +123,9 @@ GOVERNORS: dict[str, Governor] = {
 STABILIZERS: dict[str, Stabilizer | None] = {
     NONE: None,
     "pss1a": pss1a,
-    "pss2a": of_power(pss2a),
-    "pss2b": of_power(pss2b),
-    "pss2c": of_power(pss2c),
+    "pss2a": pss2a,
+    "pss2b": pss2b,
+    "pss2c": pss2c,
     "pss3b": pss3b,
     "pss4b": pss4b,
     "ieeest": ieeest,

@@ -19,7 +19,6 @@ from fmus.synchronous_generator.machine import (
     Machine,
     declare_machine,
     rotor_equations,
-    terminal_power,
 )
 from fmus.synchronous_generator.turbines.without_limits import ieeeg1
 from fmus.synchronous_generator.variants import (
@@ -27,11 +26,11 @@ from fmus.synchronous_generator.variants import (
     ST1,
     ST4B,
     Governor,
-    Shaft,
     Stabilizer,
     Variant,
     declare_machine_outputs,
     of_speed,
+    seen_by_controls,
 )
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
@@ -80,8 +79,7 @@ def with_controls(
     close_stator(m, g, port, emf)
     at_port = port.through_breaker(port.v.rotated(-g.delta), emf)  # the emf behind an open breaker
     terminal = at_port + Phasor(g.R_t, g.X_t) * g.current
-    v_t = terminal.magnitude()
-    shaft = Shaft(g.w, g.start.T_e, *terminal_power(g, port), v_t, g.start.v_t, g.S_n)
+    shaft = seen_by_controls(m, g, port, terminal)
     v_s = 0.0 if stabilizer is None else stabilizer(m, shaft)
     seen = Regulated(
         g.start,
@@ -93,9 +91,10 @@ def with_controls(
     )
     E_fd, _ = exciter(m, seen)
     P_m = governor(m, shaft)
+    m.close(shaft.P_m, P_m)
     rotor_equations(m, g, port, E_fd, P_m)
     declare_phasor_port(m, g, port, emf)
-    declare_machine_outputs(m, g, v_t, E_fd, P_m)
+    declare_machine_outputs(m, g, shaft.v_t, E_fd, P_m)
     return m.build()
 
 

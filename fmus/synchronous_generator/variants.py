@@ -14,8 +14,10 @@ from fmus.synchronous_generator.data import (
 )
 from fmus.synchronous_generator.excitation.common import Exciter
 from fmus.synchronous_generator.excitation.without_ceilings import ac4a, st1, st4b
-from fmus.synchronous_generator.machine import Machine
+from fmus.synchronous_generator.machine import Machine, terminal_power
+from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.port import DevicePort
 from fmus.toolchain.symbols import Expr
 
 
@@ -24,7 +26,9 @@ class Shaft:
     """What a governor and a stabiliser see of their machine: speed, power, voltage, and the same at the start.
 
     ``w``: speed [pu]; ``P_m_0``: mechanical power [pu, S_n]; ``P_e``, ``P_e_0``: electrical power at the terminal [pu,
-    S_n]; ``v_t``, ``v_t_0``: voltage magnitude there [pu, S_n]; ``S_n``: the rating [MVA], of parts chosen by name."""
+    S_n]; ``v_t``, ``v_t_0``: voltage magnitude there [pu, S_n]; ``phase``: change of the voltage's angle there over ω_b
+    [s], whose derivative is the deviation of the frequency [pu]; ``P_m``: mechanical power now [pu, S_n], for
+    stabilisers alone; ``S_n``: the rating [MVA], of parts chosen by name."""
 
     w: Expr
     P_m_0: Expr
@@ -32,6 +36,8 @@ class Shaft:
     P_e_0: Expr
     v_t: Expr
     v_t_0: Expr
+    phase: Expr
+    P_m: Expr
     S_n: Expr | None
 
 
@@ -50,6 +56,29 @@ def of_speed(governor: Callable[[ModelBuilder, Expr, Expr], Expr]) -> Governor:
 def of_power(stabilizer: Callable[[ModelBuilder, Expr, Expr, Expr], Expr]) -> Stabilizer:
     """A stabiliser of w − 1 and of electrical power, now and at the start."""
     return lambda m, shaft: stabilizer(m, shaft.w - 1, shaft.P_e, shaft.P_e_0)
+
+
+def seen_by_controls(
+    m: ModelBuilder, machine: Machine, port: DevicePort, terminal: Phasor
+) -> Shaft:
+    """Return what governor and stabiliser see; the mechanical power stays open until it is known.
+
+    ``terminal``: voltage there in the rotor's frame [pu]. Angles are counted in the rotor's frame, in which they stay
+    far from ±π, and the rotor's angle is a state, so nothing jumps."""
+    start = machine.start
+    delta_0 = (port.v_0 * start.v.conjugate()).angle()
+    at_start = delta_0 + start.terminal(machine.R_t, machine.X_t).angle()
+    phase = (machine.delta + terminal.angle() - at_start) / port.omega_b
+    return Shaft(
+        machine.w,
+        start.T_e,
+        *terminal_power(machine, port),
+        terminal.magnitude(),
+        start.v_t,
+        phase,
+        m.algebraic("P_m_of_controls"),
+        machine.S_n,
+    )
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,8 @@
 
 Needs the extra ``peers``; writes ``andes_records.json``. One machine (GENROU) at an infinite bus; eigenvalues in rad/s,
 of a pair the upper one. Where the source depends on the terminal (IEEET3, ESST3A) ANDES' eigenvalues hold it constant,
-so the voltage after a step of the reference is compared. In ANDES 2.0.0 EXAC2, ESDC2A and EXDC2 regulate the voltage
+so the voltage after a step of the reference is compared. Its measurement of a bus' frequency is given the filter of
+PSS/E's, and its other lag is left out. In ANDES 2.0.0 EXAC2, ESDC2A and EXDC2 regulate the voltage
 itself, without T_R, which is 0 here; EXAC2's reference at the start has K_L for K_H, so they are equal here;
 IEEEVC leaves the voltage control open, so that it is not compared. `tests.models.test_andes_records` has
 ours from the same records. Knows nothing of our models.
@@ -71,6 +72,16 @@ RECORDS: dict[str, tuple[str, ...]] = {
         "IEEEST MODE=3 busr=0 A1=0.06 A2=0.0017 A3=0.02 A4=0.001 A5=0.03 A6=0.001 T1=0.2 T2=0.05 T3=0.1 T4=0.03 T5=1.4 "
         "T6=1.1 KS=-0.5 LSMAX=0.3 LSMIN=-0.3 VCU=0 VCL=0",
     ),
+    "SEXS, IEEEST of the frequency": (
+        f"SEXS {SEXS}",
+        "IEEEST MODE=2 busr=0 A1=0.06 A2=0.0017 A3=0.02 A4=0.001 A5=0.03 A6=0.001 T1=0.2 T2=0.05 T3=0.1 T4=0.03 T5=1.4 "
+        "T6=1.1 KS=6 LSMAX=0.3 LSMIN=-0.3 VCU=0 VCL=0",
+    ),
+    "SEXS, ST2CUT of voltage and frequency": (
+        f"SEXS {SEXS}",
+        "ST2CUT MODE=5 busr=0 MODE2=2 busr2=0 K1=-0.3 K2=7 T1=0.02 T2=0.03 T3=2 T4=1.5 T5=0.2 T6=0.03 T7=0.1 T8=0.02 "
+        "T9=0.3 T10=0.5 LSMAX=0.3 LSMIN=-0.3 VCU=0.5 VCL=-0.5",
+    ),
     "SEXS, IEESGO": (
         f"SEXS {SEXS}",
         "IEESGO T1=0.12 T2=0.3 T3=0.5 T4=0.25 T5=7 T6=0.4 K1=20 K2=0.7 K3=0.4 PMAX=1.5 PMIN=0",
@@ -96,6 +107,8 @@ _FREQUENCY_POLES = (
     -50.0,
     -10.0,
 )  # of the measurement of a frequency that ANDES adds to a stabiliser [rad/s]
+
+_FREQUENCY, _FILTER = 2, 0.04  # a stabiliser's signal, and the filter that PSS/E has for it [s]
 
 _REMOTE = (
     "busr",
@@ -124,7 +137,14 @@ def _system(records: tuple[str, ...]) -> Any:
         numbers = {name: float(text) for name, text in values.items() if name not in _REMOTE}
         is_exciter = record is records[0]
         at = {"syn": "G"} if is_exciter or kind in GOVERNORS else {"avr": "X"}
-        made.add(kind, idx="X" if is_exciter else "Y", **at, **numbers)
+        of_frequency = {
+            field: "F"
+            for number, field in (("MODE", "busf"), ("MODE2", "busf2"))
+            if numbers.get(number) == _FREQUENCY
+        }
+        if of_frequency:
+            made.add("BusFreq", idx="F", bus=2, Tf=0.0, Tw=_FILTER)
+        made.add(kind, idx="X" if is_exciter else "Y", **at, **of_frequency, **numbers)
     made.setup()
     made.PFlow.run()
     made.TDS.config.criteria = 0

@@ -44,23 +44,29 @@ def governor(name, values=None):
     m = ModelBuilder("alone", "The governor alone")
     w = m.input("w", "pu", "Speed", base="f_n", start=1.0)
     P_e = m.input("P_e", "pu", "P_e", base="S_n", start=P_M) if name in OF_POWER else Expr(P_M)
-    shaft = Shaft(w, Expr(P_M), P_e, Expr(P_M), Expr(V_T), Expr(V_T), Expr(100))
+    shaft = Shaft(w, Expr(P_M), P_e, Expr(P_M), Expr(V_T), Expr(V_T), Expr(0), Expr(P_M), Expr(100))
     m.output("P_m", GOVERNORS[name](m, shaft), "pu", "Power", base="S_n")
     return Evaluated(m.build(), {f"governor.{key}": value for key, value in (values or {}).items()})
 
 
-def stabilizer(name, values=None, *, sees_voltage=False):
-    """A stabiliser behind speed deviation and power; ``sees_voltage``: behind the voltage too."""
+def stabilizer(name, values=None, *, sees_voltage=False, sees_all=False):
+    """A stabiliser behind speed deviation and power; ``sees_voltage``: behind the voltage too.
+
+    ``sees_all``: behind the voltage, its phase [s] and the mechanical power too."""
     m = ModelBuilder("alone", "The stabiliser alone")
     speed, power = (
         m.input("speed", "pu", "w − 1", base="f_n"),
         m.input("power", "pu", "P_e", base="S_n", start=0.8),
     )
-    sees_voltage = sees_voltage or name in OF_VOLTAGE
+    sees_voltage = sees_voltage or sees_all or name in OF_VOLTAGE
     v_t = m.input("v_t", "pu", "|v|", base="S_n", start=V_T) if sees_voltage else Expr(V_T)
+    phase, P_m = Expr(0), Expr(0.8)
+    if sees_all:
+        phase = m.input("phase", "s", "angle over ω_b")
+        P_m = m.input("P_m", "pu", "P_m", base="S_n", start=0.8)
     part = STABILIZERS[name]
     assert part is not None
-    shaft = Shaft(1 + speed, Expr(0.8), power, Expr(0.8), v_t, Expr(V_T), Expr(100))
+    shaft = Shaft(1 + speed, Expr(0.8), power, Expr(0.8), v_t, Expr(V_T), phase, P_m, Expr(100))
     m.output("v_s", part(m, shaft), "pu", "Signal", base="S_n")
     return Evaluated(m.build(), {f"pss.{key}": value for key, value in (values or {}).items()})
 

@@ -26,17 +26,100 @@ def washout(p, s, name):
     return s * p[name] / (1 + s * p[name])
 
 
+ALL = ("speed", "power", "v_t", "phase", "P_m")
+"""What a stabiliser sees: w − 1, P_e, |v|, the angle over ω_b, whose derivative is the frequency, and P_m."""
+
+
+def of_signal(signal, s, T_f):
+    """Transfer functions from what is seen to one of PSS/E's signals."""
+    derivative = s / (1 + s * T_f)
+    by_number = {
+        0: {},
+        1: {"speed": 1},
+        2: {"phase": derivative},
+        3: {"power": 1},
+        4: {"P_m": 1, "power": -1},
+        5: {"v_t": 1},
+        6: {"v_t": derivative},
+    }
+    return {seen: by_number[signal].get(seen, 0) for seen in ALL}
+
+
+def responses(name, values, s):
+    alone = stabilizer(name, values, sees_all=True)
+    assert not refused(alone)
+    rest = [*AT, V_T, 0.0, 0.8]
+    assert max(map(abs, alone.rates(rest).values())) < 1e-12
+    return alone.response(s, rest)
+
+
 @HERTZ
-@pytest.mark.parametrize(("signal", "taken"), [(1, "speed"), (3, "power"), (5, "v_t")])
-def test_pss1a_takes_one_of_three_signals(signal, taken, hertz):
-    s, p = 2j * np.pi * hertz, ONE
-    wanted = p["K_S"] * washout(p, s, "T_5") / (1 + s * p["T_6"])
-    wanted *= lead(p, s, "T_1", "T_2") * lead(p, s, "T_3", "T_4")
-    alone = stabilizer("pss1a", p | {"signal": signal}, sees_voltage=True)
-    response = alone.response(s, [*AT, V_T])
-    assert response["v_s", taken] == pytest.approx(wanted, rel=1e-9)
-    others = {"speed", "power", "v_t"} - {taken}
-    assert [response["v_s", other] for other in others] == [0, 0]
+@pytest.mark.parametrize("signal", range(1, 7))
+@pytest.mark.parametrize("name", ["pss1a", "ieeest"])
+def test_a_stabiliser_of_one_signal_takes_each_of_six(name, signal, hertz):
+    s, p = 2j * np.pi * hertz, ONE | {"signal": signal, "T_f": 0.025}
+    p |= {"T_6": 1.3} if name == "ieeest" else {}
+    wanted = lead(p, s, "T_1", "T_2") * lead(p, s, "T_3", "T_4") * p["K_S"] * s * p["T_5"]
+    wanted /= 1 + s * p["T_6"]
+    wanted /= 1 if name == "ieeest" else 1 + s * p["T_5"]
+    response = responses(name, p, s)
+    for seen, share in of_signal(signal, s, p["T_f"]).items():
+        assert response["v_s", seen] == pytest.approx(wanted * share, rel=1e-9, abs=1e-12)
+
+
+@HERTZ
+@pytest.mark.parametrize(("first", "second"), [(2, 4), (6, 2), (4, 5), (0, 6), (3, 0)])
+@pytest.mark.parametrize("name", ["st2cut", "iee2st", "pss3b", "pss2a", "pss2c"])
+def test_a_stabiliser_of_two_signals_takes_each_of_six_or_none(name, first, second, hertz):
+    """What it makes of its usual two signals, it makes of any others in their place."""
+    s = 2j * np.pi * hertz
+    p = {"T_1": 0.02, "T_2": 0.05}
+    p |= {"K_1": 8.0, "K_2": 0.4, "T_3": 2.0} if name in ("st2cut", "iee2st") else {}
+    p |= {"K_S1": 0.4, "K_S2": 4.0} if name == "pss3b" else {}
+    usual = responses(name, p | {"signal_1": 1, "signal_2": 3}, s)
+    found = responses(name, p | {"signal_1": first, "signal_2": second, "T_f": 0.03}, s)
+    one, other = (of_signal(number, s, 0.03) for number in (first, second))
+    for seen in ALL:
+        wanted = usual["v_s", "speed"] * one[seen] + usual["v_s", "power"] * other[seen]
+        assert found["v_s", seen] == pytest.approx(wanted, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("signal", [0, 1.4, 5.5])
+def test_a_number_that_is_no_signal_is_refused(signal):
+    alone = stabilizer("st2cut", {"signal_1": signal}, sees_all=True)
+    assert [text for text in refused(alone) if "signal" in text] == (
+        [] if signal == 0 else ["pss.signal_1 must be a whole number"]
+    )
+
+
+FACTORIES = pytest.mark.parametrize(
+    "factory", [synchronous_generator, synchronous_generator_phasor]
+)
+
+
+@FACTORIES
+@pytest.mark.parametrize("signal", [2, 4, 6])
+def test_a_generator_with_a_derived_signal_starts_in_steady_state(factory, signal):
+    """Behind a transformer and with the angle of its voltage near 180°, where an angle of a phasor jumps."""
+    for angle in (-0.4, 3.1):
+        at = AT_BUS | {"theta_0": angle, "transformer.X_t": 0.1, "pss.signal": signal}
+        made = factory(exciter="st1a", governor="tgov1", stabilizer="ieeest")
+        device, bus = Evaluated(made, at), 1.02 * np.exp(1j * angle)
+        assert not refused(device)
+        at_rest = max(map(abs, device.rates([bus.real, bus.imag]).values()))
+        assert (
+            at_rest < 1e-6
+        )  # [1/s]: a derivative and the regulator's gain raise the rounding of a voltage
+
+
+def test_the_signal_of_a_turning_voltage_is_its_frequency():
+    """A voltage that turns 0.3 Hz faster than 50 Hz: 0.006 pu behind the filter and the washout."""
+    p = {"signal": 2, "K_S": 1.0, "V_STMAX": 1.0} | dict.fromkeys(("T_1", "T_2", "T_3", "T_4"), 0.0)
+    alone, end = stabilizer("ieeest", p, sees_all=True), 0.4
+    outputs, _ = integrated(alone, lambda t: [0.0, 0.8, V_T, 0.006 * t, 0.8], end, step=2e-4)
+    T_f, T_6 = 0.04, 10.0
+    wanted = 0.006 * T_6 / (T_6 - T_f) * (np.exp(-end / T_6) - np.exp(-end / T_f))
+    assert outputs[-1]["v_s"] == pytest.approx(wanted, rel=5e-3)
 
 
 @HERTZ

@@ -7,6 +7,7 @@ from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
 from orchestrator.cases.psse.dyr import machine_models
 from orchestrator.cases.psse.dyr_records import read_dyr
 from orchestrator.cases.psse.raw import Machine
+from orchestrator.core.errors import InputError
 from tests.models.parts import (
     AT_REST,
     E_FD,
@@ -575,3 +576,26 @@ def test_every_second_point_of_saturation_is_nothing_without_the_first():
         for field in record.fields:
             second = field.name in ("S(1.2)", "SE(E2)")
             assert bool(field.nothing_without) == second, name
+
+
+def with_ieeest(signal, bus):
+    filters = "0 0 0 0 0 0 0.1 0.02 0.1 0.02 10 10 20 0.1 -0.1 0 0 /"
+    return GENROU + f"1 SEXS 1 0.1 10 100 0.1 -9 9 /\n1 IEEEST 1 {signal} {bus} {filters}"
+
+
+@pytest.mark.parametrize(("signal", "bus"), [(2, 0), (6, 1), (4, 0), (1, 7)])
+def test_a_stabiliser_takes_its_signal_at_its_machines_bus(signal, bus, tmp_path):
+    """0 is the machine's own bus; of the speed another bus means nothing."""
+    assert parameters(with_ieeest(signal, bus), tmp_path)["pss.signal"] == signal
+
+
+@pytest.mark.parametrize("signal", [2, 5, 6])
+def test_a_signal_of_another_bus_is_refused(signal, tmp_path):
+    said = rf"line 3: IEEEST has IB = 7: its signal, IM = {signal}, .*write IB = 0 for the own bus"
+    with pytest.raises(InputError, match=said):
+        parameters(with_ieeest(signal, 7), tmp_path)
+
+
+def test_a_number_that_is_no_signal_of_pss_e_is_refused(tmp_path):
+    with pytest.raises(InputError, match="IEEEST has IM = 7; only 1 or 2 or"):
+        parameters(with_ieeest(7, 0), tmp_path)

@@ -20,7 +20,7 @@ Sources: IEEE 421.5; dynawo at 34416d4 (PSS3B), InterPSS at 2b791e9 (the order o
 from collections.abc import Sequence
 
 from fmus.synchronous_generator.data_lines import Line, declared, number, power, seconds
-from fmus.synchronous_generator.stabilization.signals import POWER, SPEED, input_signal
+from fmus.synchronous_generator.stabilization.signals import POWER, SPEED, two_changes
 from fmus.synchronous_generator.stabilization.standard import SOURCE, limited_output
 from fmus.synchronous_generator.variants import Shaft
 from fmus.toolchain.blocks import (
@@ -112,8 +112,7 @@ def _band_lines(letter: str) -> Sequence[Line]:
 def pss3b(m: ModelBuilder, shaft: Shaft) -> Expr:
     """Declare the stabiliser and return its signal to the voltage regulator [pu]."""
     with m.scope("pss"):
-        one = input_signal(m, "signal_1", POWER, shaft, optional=True)
-        other = input_signal(m, "signal_2", SPEED, shaft, optional=True)
+        one, other = two_changes(m, shaft, POWER, SPEED)
         p = declared(m, PSS3B, SOURCE)
         one = low_pass_or_nothing(m, "transducer_1", p.K_S1 * one, p.T_1)
         other = low_pass_or_nothing(m, "transducer_2", p.K_S2 * other, p.T_2)

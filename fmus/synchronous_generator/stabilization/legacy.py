@@ -1,7 +1,7 @@
 """IEEEST, ST2CUT, IEE2ST and STAB2A: stabilisers of stability programs that are older than IEEE 421.5.
 
-IEEEST takes one signal, ST2CUT two; a signal is the speed, w − 1 (1), the electrical power (3) or the voltage (5), the
-last two as changes from the operating point, which the washout removes anyway; 0 (ST2CUT) is none:
+IEEEST takes one signal, ST2CUT two (`signals`; 0: none), as changes from the operating point, which the washout removes
+anyway:
 
     IEEEST  signal → (1 + A_5·s + A_6·s²)/((1 + A_1·s + A_2·s²)·(1 + A_3·s + A_4·s²))
             → (1+sT_1)/(1+sT_2) → (1+sT_3)/(1+sT_4) → K_S·s·T_5/(1+sT_6) → within limits
@@ -21,7 +21,13 @@ IEE2ST)."""
 from functools import partial
 
 from fmus.synchronous_generator.data_lines import Given, declared, number, power, seconds
-from fmus.synchronous_generator.stabilization.signals import SPEED, cut_off, input_signal
+from fmus.synchronous_generator.stabilization.signals import (
+    NO_SIGNAL,
+    SPEED,
+    cut_off,
+    one_signal,
+    two_changes,
+)
 from fmus.synchronous_generator.stabilization.standard import SOURCE, limited_output, stage
 from fmus.synchronous_generator.variants import Shaft
 from fmus.toolchain.blocks import clamp, low_pass_or_nothing, second_order, washout
@@ -62,7 +68,7 @@ STAB2A = (
 def ieeest(m: ModelBuilder, shaft: Shaft) -> Expr:
     """Declare the stabiliser and return its signal to the voltage regulator [pu]."""
     with m.scope("pss"):
-        signal = input_signal(m, "signal", SPEED, shaft)
+        signal = one_signal(m, shaft, SPEED)
         p = declared(m, IEEEST, SOURCE)
         signal = _filter(m, p, signal)
         signal = stage(m, signal, 1, ("T_1", "T_2"), (0.1, 0.02))
@@ -76,8 +82,7 @@ def st2cut(m: ModelBuilder, shaft: Shaft, *, of_changes: bool = True) -> Expr:
 
     ``of_changes``: whether V_CU and V_CL are changes from the voltage at the start."""
     with m.scope("pss"):
-        one = input_signal(m, "signal_1", SPEED, shaft)
-        other = input_signal(m, "signal_2", 0, shaft)
+        one, other = two_changes(m, shaft, SPEED, NO_SIGNAL)
         p = declared(m, ST2CUT, SOURCE)
         signal = p.K_1 * low_pass_or_nothing(m, "transducer_1", one, p.T_1)
         signal += p.K_2 * low_pass_or_nothing(m, "transducer_2", other, p.T_2)

@@ -5,7 +5,8 @@ PSS1A takes one signal (`signals`), and is cut off as IEEEST is; of the speed it
     signal → 1/(1+sT_6) → K_S·s·T_5/(1+sT_5) → 1/(1 + A_1·s + A_2·s²)
     → (1+sT_1)/(1+sT_2) → (1+sT_3)/(1+sT_4) → V_STMIN ≤ V_S ≤ V_STMAX
 
-PSS2A and PSS2B take the integral of accelerating power, from speed and electrical power:
+PSS2A and PSS2B take the integral of accelerating power, from speed and electrical power, or from two other signals of
+PSS/E's (`signals`) in their place:
 
     speed  w − 1 → limits → s·T_w1/(1+sT_w1) → s·T_w2/(1+sT_w2) → 1/(1+sT_6)
     power  P_e → limits → s·T_w3/(1+sT_w3) → s·T_w4/(1+sT_w4) → K_s2/(1+sT_7)
@@ -20,7 +21,14 @@ from functools import partial
 
 from fmus.synchronous_generator.declarations import per_unit, time_constant
 from fmus.synchronous_generator.stabilization.norm631 import RAMP_LAGS
-from fmus.synchronous_generator.stabilization.signals import SPEED, cut_off, input_signal
+from fmus.synchronous_generator.stabilization.signals import (
+    POWER,
+    SPEED,
+    Signal,
+    cut_off,
+    one_signal,
+    two_signals,
+)
 from fmus.synchronous_generator.variants import Shaft
 from fmus.toolchain.blocks import (
     RETURN_TIME,
@@ -76,7 +84,7 @@ def limited_output(m: ModelBuilder, signal: Expr) -> Expr:
 def pss1a(m: ModelBuilder, shaft: Shaft) -> Expr:
     """Declare the stabiliser and return its signal to the voltage regulator [pu]."""
     with m.scope("pss"):
-        taken = input_signal(m, "signal", SPEED, shaft)
+        taken = one_signal(m, shaft, SPEED)
         K_S = gain(m, "K_S", 20.0, "Gain")
         signal = low_pass_or_nothing(
             m, "transducer", taken, time(m, "T_6", 0.0, "Transducer; 0 leaves it out")
@@ -108,24 +116,15 @@ def _filter(m: ModelBuilder, u: Expr) -> Expr:
     return second_order(m, "filter", u, (A_1, A_2), (Expr(0), Expr(0)))
 
 
-def pss2a(
-    m: ModelBuilder,
-    delta_omega: Expr,
-    P_e: Expr,
-    P_e_0: Expr,
-    *,
-    newer: bool = False,
-    newest: bool = False,
-) -> Expr:
+def pss2a(m: ModelBuilder, shaft: Shaft, *, newer: bool = False, newest: bool = False) -> Expr:
     """Declare the stabiliser and return its signal to the voltage regulator [pu].
 
     ``newer``: whether it has what PSS2B has beyond PSS2A; ``newest``: what PSS2C has beyond PSS2B."""
     with m.scope("pss"):
-        speed, power = delta_omega, P_e - P_e_0
+        one, other = two_signals(m, shaft, SPEED, POWER)
         if newer:
-            speed = clamp(speed, *_input_limits(m, "1", "speed"))
-            limits = _input_limits(m, "2", "power")
-            power = clamp(P_e, *limits) - clamp(P_e_0, *limits)
+            one, other = _within_limits(m, one, "1"), _within_limits(m, other, "2")
+        speed, power = one[0] - one[1], other[0] - other[1]
         speed = washout_or_nothing(
             m, "washout_1", speed, time(m, "T_w1", 2.0, "First washout of the speed")
         )
@@ -152,18 +151,20 @@ def pss2a(
         if not newest:
             return limited_output(m, signal)
         signal = limited_output(m, stage(m, signal, 4, ("T_12", "T_13"), (0.0, 0.0)))
-        return if_else(_is_active(m, P_e, P_e_0), signal, 0)
+        return if_else(_is_active(m, shaft.P_e, shaft.P_e_0), signal, 0)
 
 
 pss2b = partial(pss2a, newer=True)  # PSS2A with limited inputs and a third stage
 pss2c = partial(pss2a, newer=True, newest=True)  # PSS2B with a fourth, and off at little power
 
 
-def _input_limits(m: ModelBuilder, number: str, text: str) -> tuple[Expr, Expr]:
-    low = m.parameter(f"V_SI{number}MIN", -2.0, "pu", f"Lower limit of the {text}", base="S_n")
-    high = m.parameter(f"V_SI{number}MAX", 2.0, "pu", f"Upper limit of the {text}", base="S_n")
+def _within_limits(m: ModelBuilder, signal: Signal, number: str) -> Signal:
+    """The signal itself within its limits, and so its steady value."""
+    text = f"limit of signal {number} itself, not of its change"
+    low = m.parameter(f"V_SI{number}MIN", -2.0, "pu", f"Lower {text}", base="S_n")
+    high = m.parameter(f"V_SI{number}MAX", 2.0, "pu", f"Upper {text}", base="S_n")
     m.require(high - low, f"pss.V_SI{number}MAX must exceed pss.V_SI{number}MIN")
-    return low, high
+    return clamp(signal[0], low, high), clamp(signal[1], low, high)
 
 
 def _is_active(m: ModelBuilder, P_e: Expr, P_e_0: Expr) -> Expr:

@@ -8,7 +8,12 @@ from dataclasses import dataclass, replace
 from fmus.grid_following.dyr_fields import CONVERTER, FIELDS, MODEL, PLANT, approximation
 from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
 from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
-from fmus.synchronous_generator.dyr_fields import DYR_RECORDS, DyrField, DyrRecord
+from fmus.synchronous_generator.dyr_fields import (
+    DYR_RECORDS,
+    SIGNALS_OF_BUSES,
+    DyrField,
+    DyrRecord,
+)
 from orchestrator.cases.psse.dyr_records import EVENT, DynamicRecord, given_values
 from orchestrator.cases.psse.missing_models import (
     MACHINE,
@@ -394,6 +399,16 @@ def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
             allowed = " or ".join(f"{x:g}" for x in field.only)
             raise InputError(
                 f"{record.place}: {record.name} has {field.name} = {value:g}; only {allowed} can be modelled"
+            )
+        if (
+            field.bus_of
+            and value not in (0, record.bus)
+            and given[field.bus_of] in SIGNALS_OF_BUSES
+        ):
+            raise InputError(
+                f"{record.place}: {record.name} has {field.name} = {value:g}: its signal, {field.bus_of} = "
+                f"{given[field.bus_of]:g}, is taken at another bus than the machine's own, which no part of ours does; "
+                f"write {field.name} = 0 for the own bus, or {without_models([record.name])}, and no {record.name} acts"
             )
         if field.same_as and value != given[field.same_as]:
             raise InputError(

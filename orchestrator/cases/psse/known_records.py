@@ -59,7 +59,9 @@ def known_records() -> list[KnownRecord]:
 def _limits(record: DyrRecord) -> Iterator[str]:
     """Return what a part of ours cannot take of a record, and what it does not use."""
     for field in record.fields:
-        if field.only:
+        if field.bus_of:
+            yield f"{field.name} only the machine's own"
+        if field.only and not field.all_there:
             yield f"{field.name} only {' or '.join(f'{value:g}' for value in field.only)}"
         if field.same_as:
             yield f"{field.name} only as {field.same_as}"
@@ -67,7 +69,15 @@ def _limits(record: DyrRecord) -> Iterator[str]:
     unused = [
         f.name
         for f in record.fields
-        if not (f.parameters or f.negated or f.only or f.same_as or f.zero_sets or f.name in used)
+        if not (
+            f.parameters
+            or f.negated
+            or f.only
+            or f.bus_of
+            or f.same_as
+            or f.zero_sets
+            or f.name in used
+        )
     ]
     if unused:
         yield f"{', '.join(unused)} not used"

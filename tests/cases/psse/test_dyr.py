@@ -149,11 +149,10 @@ def test_the_machines_swing(tables, tmp_path, gfor):
 
 
 def test_only_the_switches_that_are_modelled_are_taken():
-    """Of a stabilizer: IC1 = 1 is speed, IC2 = 3 power, M = 5 and N = 1 the ramp-tracking filter."""
+    """M = 5 and N = 1 are the ramp-tracking filter of a stabilizer, whose signals are all six of PSS/E."""
     switches = {f.name: f.only for record in DYR_RECORDS.values() for f in record.fields if f.only}
-    assert {name: switches[name] for name in ("IC1", "IC2", "M", "N", "Switch")} == {
-        "IC1": (1.0,),
-        "IC2": (3.0,),
+    assert {name: switches[name] for name in ("IM", "M", "N", "Switch")} == {
+        "IM": tuple(range(1, 7)),
         "M": (5.0,),
         "N": (1.0,),
         "Switch": (0.0,),
