@@ -1,4 +1,4 @@
-from orchestrator.cases.short_circuit import BusStrength as BusStrength
+from orchestrator.cases.scenario.short_circuit import BusStrength as BusStrength
 from orchestrator.core.errors import CosimError as CosimError
 from orchestrator.face.api.acceptance import Acceptance as Acceptance
 from orchestrator.face.api.acceptance import check as check

@@ -48,6 +48,24 @@ _PARTED = {
 }
 """Former room → present rooms → the modules that went there."""
 
+_CASES = {
+    "flow": "connected power_flow sharing flow_balance=balance flow_equations=equations "
+    "flow_limits=limits flow_newton=newton",
+    "form": "build_choices component_forms csv_rows definition devices given locate model_kinds "
+    "names parameter_files remedies schema values",
+    "networks": "areas branch_limits bus_loads cgmes element_names imported_flow kept_tables "
+    "load_models matpower pandapower_json psse record_use source_changes source_ratings unit_row "
+    "network_data=data network_import=conversion network_sources=sources flow_controls=controls",
+    "questions": "contradictions idle_values mentions plausibility plausible_networks "
+    "plausible_ranges plausible_sources plausible_values",
+    "settings": "assignment imperfection_tables layers references",
+    "events": "event_tables fault_tables islands",
+    "scenario": "case_network catalogue_fmus facts flow_figures flow_units operating_point prepare "
+    "run_plan scheduling service short_circuit start_values unit_tables wiring",
+    "new": "new_case",
+}
+"""Room of the cases → the modules that stood beside it; ``former=present`` where the name changed as well."""
+
 _HERE = __package__
 
 
@@ -62,8 +80,21 @@ def present_name(name: str) -> str | None:
     if room in _PARTED:
         homes = [home for home, names in _PARTED[room].items() if inside in names.split()]
         return f"{_HERE}.{homes[0]}.{inside}" if homes else None
+    if room == "cases":
+        return _present_case_module(inside)
     floors = [floor for floor, rooms in _ROOMS.items() if room in rooms.split()]
     return f"{_HERE}.{floors[0]}.{rest}" if floors else None
+
+
+def _present_case_module(inside: str) -> str | None:
+    """Return the present name of a module that stood directly in the folder of the cases, or in a room there."""
+    module, _, rest = inside.partition(".")
+    for room, names in _CASES.items():
+        for name in names.split():
+            former, _, present = name.partition("=")
+            if former == module:
+                return ".".join(filter(None, (_HERE, "cases", room, present or former, rest)))
+    return None
 
 
 def _notice(former: str, present: str) -> None:

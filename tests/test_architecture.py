@@ -24,7 +24,18 @@ FLOORS = {
     "devices": (("fmi",), ("binding",), ("acceptance",)),
     "systems": (("coupling",), ("ssp",)),
     "linear": (("models",), ("spectra",), ("doubts", "signals")),
-    "cases": (),
+    "cases": (
+        ("flow",),
+        ("form",),
+        ("networks",),
+        ("draft",),
+        ("questions",),
+        ("settings",),
+        ("events",),
+        ("scenario",),
+        ("case",),
+        ("built_in", "forcing", "new", "use"),
+    ),
     "simulation": (("engine",), ("federation", "interop", "watch")),
     "output": (("results", "signatures"), ("report",)),
     "studies": (
@@ -133,7 +144,7 @@ def test_the_imports_are_read():
     assert (
         "orchestrator.systems.coupling.observers" in graph["orchestrator.systems.coupling.master"]
     )
-    assert "pandapower" in imported_names(modules()["orchestrator.cases.network_sources"])
+    assert "pandapower" in imported_names(modules()["orchestrator.cases.networks.sources"])
 
 
 def test_the_folders_of_the_orchestrator_are_the_floors():
@@ -234,10 +245,10 @@ FOR_TYPES = {
     "face.api.case",
     "face.api.results",
     "cases.case",
-    "cases.definition",
-    "cases.given",
-    "cases.names",
-    "cases.values",
+    "cases.form.definition",
+    "cases.form.given",
+    "cases.form.names",
+    "cases.form.values",
     "systems.coupling.system",
     "face.cli.terminal",
     "systems.coupling.observers",
@@ -342,7 +353,7 @@ def test_there_is_no_cycle():
                 for name in ("binary", "description", "loaded", "messages", "validation")
             },
         ),
-        ("pandapower", {"orchestrator.cases.network_sources"}),
+        ("pandapower", {"orchestrator.cases.networks.sources"}),
         ("skrf", {"orchestrator.studies.black_box.fitting"}),
         ("pint", {"orchestrator.core.units"}),
         ("helics", {"orchestrator.simulation.federation.helics_calls"}),

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.csv_rows import rows_of
-from orchestrator.cases.psse.dyr_records import read_dyr
-from orchestrator.cases.psse.records import read_records
-from orchestrator.cases.source_changes import Changes
+from orchestrator.cases.form.csv_rows import rows_of
+from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.records import read_records
+from orchestrator.cases.networks.source_changes import Changes
 from orchestrator.core import foreign_files
 from orchestrator.core.errors import CaseError, InputError
 from orchestrator.core.foreign_files import check_regular, one_line, read_bytes, read_text, visible
@@ -127,9 +127,9 @@ OWN = {
     "devices.acceptance.runner": "is_file before it",
     "devices.acceptance.worker": "/proc",
     "face.api.saved": "results",
-    "cases.definition": "is_file before it",
-    "cases.psse.missing_models": "our own table",
-    "cases.kept_tables": "the cache and our own tables",
+    "cases.form.definition": "is_file before it",
+    "cases.networks.psse.missing_models": "our own table",
+    "cases.networks.kept_tables": "the cache and our own tables",
     "studies.certification.acceptance": "is_file before it",
     "studies.certification.files": "what was read before",
     "studies.certification.inside": "a copy in a folder of ours",

@@ -16,14 +16,14 @@ import tomli_w
 from pydantic import ValidationError
 
 from fmus.toolchain.cache import cache_directory
-from orchestrator.cases.contradictions import contradictions
-from orchestrator.cases.definition import CaseDefinition
-from orchestrator.cases.locate import place_in
-from orchestrator.cases.model_kinds import kind_wanted, of_kind
-from orchestrator.cases.names import close_names
-from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
-from orchestrator.cases.schema import CaseTable, ComponentTable, Value
-from orchestrator.cases.values import TWICE, flatten, given_twice
+from orchestrator.cases.form.definition import CaseDefinition
+from orchestrator.cases.form.locate import place_in
+from orchestrator.cases.form.model_kinds import kind_wanted, of_kind
+from orchestrator.cases.form.names import close_names
+from orchestrator.cases.form.parameter_files import ParameterFile, read_parameter_file
+from orchestrator.cases.form.schema import CaseTable, ComponentTable, Value
+from orchestrator.cases.form.values import TWICE, flatten, given_twice
+from orchestrator.cases.questions.contradictions import contradictions
 from orchestrator.core.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputError, Problem, few
 from orchestrator.core.foreign_files import check_name, cleaned, steering_in, why_refused
 from orchestrator.core.late import Late
@@ -31,19 +31,23 @@ from orchestrator.core.toml_files import Table, fault_of, read_toml
 from orchestrator.core.uncollected import uncollected
 
 if TYPE_CHECKING:
-    from orchestrator.cases import event_tables, idle_values, mentions, prepare, sharing
-    from orchestrator.cases.prepare import PreparedScenario, Preparer
-    from orchestrator.cases.sharing import Dispatch
+    from orchestrator.cases.events import event_tables
+    from orchestrator.cases.flow import sharing
+    from orchestrator.cases.flow.sharing import Dispatch
+    from orchestrator.cases.questions import idle_values, mentions
+    from orchestrator.cases.scenario import prepare
+    from orchestrator.cases.scenario.prepare import PreparedScenario, Preparer
     from orchestrator.systems.coupling.system import ComponentPlan
     from orchestrator.systems.ssp import reading
 else:  # what prepares a scenario: FMUs and the power flow, which reading a file does without
-    event_tables, idle_values, mentions, prepare, sharing = (
-        Late(f"orchestrator.cases.{name}")
-        for name in ("event_tables", "idle_values", "mentions", "prepare", "sharing")
-    )
+    event_tables = Late("orchestrator.cases.events.event_tables")
+    sharing = Late("orchestrator.cases.flow.sharing")
+    idle_values = Late("orchestrator.cases.questions.idle_values")
+    mentions = Late("orchestrator.cases.questions.mentions")
+    prepare = Late("orchestrator.cases.scenario.prepare")
     reading = Late("orchestrator.systems.ssp.reading")
 
-BUILT_IN = Path(__file__).parent
+BUILT_IN = Path(__file__).parent / "built_in"
 _SCHEMA_PASSES = 50
 _SOURCES = {
     ".raw": ("a network of PSS/E", "network", "raw"),

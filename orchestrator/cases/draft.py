@@ -5,12 +5,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fmus.grid.network import Network
-from orchestrator.cases.build_choices import Layer
-from orchestrator.cases.network_data import NetworkData
-from orchestrator.cases.parameter_files import ParameterFile
-from orchestrator.cases.record_use import RecordUse
-from orchestrator.cases.schema import CaseTable, ComponentTable, EventTable, ScenarioTable
-from orchestrator.cases.sharing import Dispatch
+from orchestrator.cases.flow.sharing import Dispatch
+from orchestrator.cases.form.build_choices import Layer
+from orchestrator.cases.form.parameter_files import ParameterFile
+from orchestrator.cases.form.schema import CaseTable, ComponentTable, EventTable, ScenarioTable
+from orchestrator.cases.networks.data import NetworkData
+from orchestrator.cases.networks.record_use import RecordUse
 from orchestrator.core.errors import MOST_PROBLEMS, TOO_MANY, CaseError, ErrorKind, Problem
 from orchestrator.systems.coupling.system import System
 

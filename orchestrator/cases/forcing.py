@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import Any
 
 from orchestrator.cases.case import Case
-from orchestrator.cases.network_data import bus_name
-from orchestrator.cases.schema import BusFaultTable, CaseTable, ForcingTable
+from orchestrator.cases.form.schema import BusFaultTable, CaseTable, ForcingTable
+from orchestrator.cases.networks.data import bus_name
 from orchestrator.core.errors import InputError
 from orchestrator.core.units import to_unit
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from orchestrator.cases.case import Case, load_case
-from orchestrator.cases.names import close_names
+from orchestrator.cases.form.names import close_names
 from orchestrator.core.errors import InputError
 from orchestrator.devices.acceptance.checks.subject import OperatingAt, Use
 from orchestrator.systems.coupling.system import ComponentPlan

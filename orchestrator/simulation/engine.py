@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Protocol, Self
 
 from fmus.toolchain.plugins import PlugIns
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
 from orchestrator.devices.fmi.component import Component
 from orchestrator.systems.coupling.master import Master

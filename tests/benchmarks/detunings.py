@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.cases.case import Case, load_case
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import CosimError
 from orchestrator.core.threads import alone
 from orchestrator.linear.spectra.stability import Cause, Stability

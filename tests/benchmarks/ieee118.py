@@ -19,7 +19,7 @@ import numpy as np
 from pythonfmu import FmuBuilder
 
 from orchestrator.cases.case import Case, load_case
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.devices.fmi.description import FmuDescription, read_description
 from orchestrator.linear.models.coupled_state import CoupledState
 from orchestrator.linear.models.linearization import Blocks, LinearModel, compose

@@ -23,11 +23,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from orchestrator.cases.network_data import bus_name
-from orchestrator.cases.new_case import WantedCase, write_case
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.psse.raw import read_raw
-from orchestrator.cases.service import in_service
+from orchestrator.cases.networks.data import bus_name
+from orchestrator.cases.networks.psse.raw import read_raw
+from orchestrator.cases.new.new_case import WantedCase, write_case
+from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.cases.scenario.service import in_service
 from orchestrator.core.errors import CosimError
 from orchestrator.studies.modes.modes import running
 

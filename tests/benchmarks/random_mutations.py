@@ -239,7 +239,7 @@ def _mirror(file: str) -> str:
 def _room(file: str) -> str:
     """Floor and room of a file of the orchestrator; the floor alone for one that stands on it."""
     *folders, _ = file.split("/")
-    return "/".join(folders[: 1 if folders[:1] == ["cases"] else 2])
+    return "/".join(folders[:2])
 
 
 def _folders_that_import(module: str, root: Path) -> set[str]:

@@ -27,8 +27,8 @@ from fmus.toolchain.python_fmu import PythonFmu
 from fmus.vendor_dll.device import DeviceFileError, device_of, read_device_file
 from fmus.vendor_dll.interface import DllInterface, DllParameter, Signal
 from orchestrator.cases.case import BUILT_IN, load_case
-from orchestrator.cases.parameter_files import read_parameter_file
-from orchestrator.cases.psse.raw import read_raw
+from orchestrator.cases.form.parameter_files import read_parameter_file
+from orchestrator.cases.networks.psse.raw import read_raw
 from orchestrator.core.errors import CosimError
 from orchestrator.devices.binding.binding import bind
 from orchestrator.devices.binding.draft import draft_binding
@@ -38,9 +38,9 @@ from orchestrator.output.results.comtrade.reading import read_comtrade
 from orchestrator.studies.operating_points.columns import Elements
 from orchestrator.studies.operating_points.points_file import read_points
 from orchestrator.systems.ssp.names import STUDY_TYPE, SYSTEM_FILE
-from tests.cases.psse import raw
-from tests.cases.psse.test_dyr import CASE as DYR_CASE
-from tests.cases.psse.test_dyr import DYR
+from tests.cases.networks.psse import raw
+from tests.cases.networks.psse.test_dyr import CASE as DYR_CASE
+from tests.cases.networks.psse.test_dyr import DYR
 from tests.devices.fmi.fuzz import text_changed as xml_changed
 from tests.output.results.test_comtrade import CFG, DAT
 from tests.support.vendor_dlls import DEVICE

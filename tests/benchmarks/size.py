@@ -26,8 +26,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.network_data import NetworkData, network_data
-from orchestrator.cases.power_flow import (
+from orchestrator.cases.flow.power_flow import (
     FlowLine,
     FlowLoad,
     FlowShunt,
@@ -35,7 +34,8 @@ from orchestrator.cases.power_flow import (
     PowerFlow,
     solve_power_flow,
 )
-from orchestrator.cases.schema import NetworkTable
+from orchestrator.cases.form.schema import NetworkTable
+from orchestrator.cases.networks.data import NetworkData, network_data
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.linearization import Blocks, compose
 from orchestrator.linear.models.steady_state import find_operating_point

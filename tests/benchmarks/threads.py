@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.systems.coupling.master import Master
 
 CASES = (("two_area", "pod_pq"), ("ieee118", "pod_pq"))

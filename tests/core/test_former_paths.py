@@ -22,6 +22,9 @@ FORMER = {
     "orchestrator.analysis.threads": "orchestrator.core.threads",
     "orchestrator.report.html.page": "orchestrator.output.report.html.page",
     "orchestrator.federation.choice": "orchestrator.simulation.federation.choice",
+    "orchestrator.cases.short_circuit": "orchestrator.cases.scenario.short_circuit",
+    "orchestrator.cases.network_data": "orchestrator.cases.networks.data",
+    "orchestrator.cases.psse.raw": "orchestrator.cases.networks.psse.raw",
 }
 
 

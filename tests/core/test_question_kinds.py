@@ -6,7 +6,7 @@ import re
 import pytest
 
 from orchestrator.core.question_kinds import by_kind
-from tests.cases.psse.test_questions import CASE, DYR, RAW, changed
+from tests.cases.networks.psse.test_questions import CASE, DYR, RAW, changed
 
 _TIMES = [
     f"own files/own.dyr, line {n}, sg{n}.machine.T_d10: sg{n}: machine.T_d10 = 0.{n} s is outside of 1 to 20 s; if it "

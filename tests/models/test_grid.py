@@ -8,8 +8,8 @@ import pytest
 
 from fmus.grid.grid import grid
 from fmus.grid.network import Line, Load, Network, Port, Shunt
-from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt
-from orchestrator.cases.power_flow import FlowUnit, solve_power_flow
+from orchestrator.cases.flow.balance import FlowLine, FlowLoad, FlowShunt
+from orchestrator.cases.flow.power_flow import FlowUnit, solve_power_flow
 from tests.support.jacobians import jacobians
 
 LINES = (

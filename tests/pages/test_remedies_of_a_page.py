@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from orchestrator.cases import remedies
+from orchestrator.cases.form import remedies
 
 PAGE = Path(__file__).parents[2] / ".docs" / "how-to" / "own-network.md"
 PRINTED = (

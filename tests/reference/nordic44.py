@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import root
 
-FOLDER = Path(__file__).parents[2] / "orchestrator" / "cases" / "nordic44"
+FOLDER = Path(__file__).parents[2] / "orchestrator" / "cases" / "built_in" / "nordic44"
 BASE = 100.0
 SLACK = "3300"
 NAMES = ("H", "X_d", "X_q", "X_d1", "X_q1", "X_d2", "T_d10", "T_q10", "T_d20", "T_q20")

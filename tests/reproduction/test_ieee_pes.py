@@ -1,7 +1,6 @@
 """Benchmarks of the IEEE PES for small-signal stability beside a second computation that shares nothing with gfor."""
 
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +8,7 @@ import pytest
 import orchestrator as gfor
 from orchestrator.cases import case as cases
 
-FOLDER = Path(cases.__file__).parent
+FOLDER = cases.BUILT_IN
 SECOND = {
     ("impedance", "exact"): ((0.3235, -7.64), (1.2224, 1.49), (1.4271, 7.99)),
     ("impedance", "psse"): ((0.3257, -5.33), (1.2341, 1.80), (1.4337, 7.80)),

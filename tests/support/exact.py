@@ -7,7 +7,7 @@ from fmus.grid.network import Network
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.model import Model
 from orchestrator.cases.case import Case
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from tests.support.jacobians import jacobians
 from tests.support.written_out import written_out
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from orchestrator.cases import infinite_bus
+from orchestrator.cases.built_in import infinite_bus
 from tests.devices.acceptance.gallery.build import build
 from tests.devices.acceptance.gallery.members import converter
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from orchestrator.cases.given import Time, binding_path, in_megabytes, in_seconds
+from orchestrator.cases.form.given import Time, binding_path, in_megabytes, in_seconds
 from orchestrator.cases.use import use_in_case
 from orchestrator.core.asked import Names, names, text_or_none
 from orchestrator.core.asked import path as path_of

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from orchestrator.cases.given import Time, binding_path, in_seconds, plain
+from orchestrator.cases.form.given import Time, binding_path, in_seconds, plain
 from orchestrator.core.asked import frequency_range
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.case import built_in_cases as names_of_cases
 from orchestrator.cases.case import load_case
-from orchestrator.cases.given import keep, kept
-from orchestrator.cases.locate import FROM_TEXT
-from orchestrator.cases.names import close_names
-from orchestrator.cases.schema import CaseTable
+from orchestrator.cases.form.given import keep, kept
+from orchestrator.cases.form.locate import FROM_TEXT
+from orchestrator.cases.form.names import close_names
+from orchestrator.cases.form.schema import CaseTable
 from orchestrator.core.asked import flag
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.attributes import NoSuchAttributeError, Unchanged

@@ -5,7 +5,7 @@ import warnings
 
 import xarray as xr
 
-from orchestrator.cases.given import Time, moment
+from orchestrator.cases.form.given import Time, moment
 from orchestrator.core.asked import Names, names
 from orchestrator.core.errors import InputError, few
 from orchestrator.core.threads import side_by_side

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from fmus.toolchain.archive import write_archive
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.asked import require_known
 from orchestrator.core.errors import InputError

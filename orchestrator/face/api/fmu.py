@@ -6,8 +6,8 @@ from typing import Any, NoReturn, Self
 
 import pandas as pd
 
-from orchestrator.cases.given import Time, binding_path, in_seconds, plain
-from orchestrator.cases.values import convert
+from orchestrator.cases.form.given import Time, binding_path, in_seconds, plain
+from orchestrator.cases.form.values import convert
 from orchestrator.core.asked import Names
 from orchestrator.core.asked import names as names_given
 from orchestrator.core.asked import path as path_of

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from orchestrator.cases.given import Time, moment, part_of_record
+from orchestrator.cases.form.given import Time, moment, part_of_record
 from orchestrator.core.asked import names as names_given
 from orchestrator.core.asked import number_between, positive, text_or_none
 from orchestrator.core.errors import AnalysisError, InputError

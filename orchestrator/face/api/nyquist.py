@@ -7,8 +7,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from orchestrator.cases.given import case_values, plain
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.form.given import case_values, plain
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.asked import names, number_in
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from orchestrator.cases.given import Time
+from orchestrator.cases.form.given import Time
 from orchestrator.core.arrays import Complex
 from orchestrator.core.errors import CosimError, InputError
 from orchestrator.core.late import Late, pd, xr
@@ -163,7 +163,7 @@ class Modes(NoTruth, ask=".stability.stable, or len() for the number of modes in
 
     def power_flow(self) -> dict[str, pd.DataFrame]:
         """``buses`` [pu, °], ``branches`` and ``machines`` [MW, Mvar, %]; nothing for a case without a power flow."""
-        from orchestrator.cases.flow_figures import power_flow_json  # noqa: PLC0415 - imports the reading of cases
+        from orchestrator.cases.scenario.flow_figures import power_flow_json  # noqa: PLC0415 - imports the reading of cases
 
         flow = power_flow_json(self.result.prepared) or {}
         kinds = [kind for kind, rows in flow.items() if isinstance(rows, list)]

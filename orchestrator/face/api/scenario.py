@@ -13,12 +13,12 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Self, cast
 
 from orchestrator.cases.case import Case as CaseFile
-from orchestrator.cases.given import Time, case_values, in_seconds
-from orchestrator.cases.load_models import as_powers, is_open
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.service import in_service
-from orchestrator.cases.sharing import SharingRule
-from orchestrator.cases.short_circuit import BusStrength, ShortCircuit
+from orchestrator.cases.flow.sharing import SharingRule
+from orchestrator.cases.form.given import Time, case_values, in_seconds
+from orchestrator.cases.networks.load_models import as_powers, is_open
+from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.cases.scenario.service import in_service
+from orchestrator.cases.scenario.short_circuit import BusStrength, ShortCircuit
 from orchestrator.core.asked import Names, flag, frequency_range, number_between
 from orchestrator.core.asked import names as names_given
 from orchestrator.core.asked import path as path_of

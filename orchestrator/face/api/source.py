@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from orchestrator.cases.given import Time
+from orchestrator.cases.form.given import Time
 from orchestrator.core.errors import InputError
 from orchestrator.face.api.identification import opened
 from orchestrator.face.api.results import Run

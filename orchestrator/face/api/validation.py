@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from orchestrator.cases.given import Time, binding_path, case_values, in_seconds, moment, plain
+from orchestrator.cases.form.given import Time, binding_path, case_values, in_seconds, moment, plain
 from orchestrator.core.asked import check_callable, names, number_in
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError
@@ -233,7 +233,7 @@ def _declared(description: FmuDescription, name: str, otherwise: float) -> float
 
 def _of_ours(name: str) -> FmuDescription:
     """A model of ours, without Python in it where this machine can compile."""
-    from orchestrator.cases.catalogue_fmus import catalogue_fmu  # noqa: PLC0415 - likewise
+    from orchestrator.cases.scenario.catalogue_fmus import catalogue_fmu  # noqa: PLC0415 - likewise
     from orchestrator.face.api.models import catalogue_model  # noqa: PLC0415 - builds models
 
     catalogue_model(name)  # refuses what is none, or needs a network

@@ -9,9 +9,9 @@ from typing import Literal
 from fmus.toolchain.catalogue import model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS
 from fmus.toolchain.model import FmiVersion
-from orchestrator.cases.build_choices import PARTS
 from orchestrator.cases.case import load_case
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.form.build_choices import PARTS
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
 from orchestrator.devices.fmi.linear_model import linear_model_members
 from orchestrator.face.api.dll import build_from_dll

@@ -5,11 +5,11 @@ from dataclasses import replace
 from typing import Any
 
 from orchestrator.cases.case import Case, load_case
+from orchestrator.cases.flow.sharing import SharingRule
 from orchestrator.cases.forcing import with_events
-from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import Value
-from orchestrator.cases.sharing import SharingRule
+from orchestrator.cases.form.parameter_files import ParameterFile, read_parameter_file
+from orchestrator.cases.form.schema import Value
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
 from orchestrator.face.api.scenario import Scenario, choose
 from orchestrator.face.cli.arguments import add_options, asked_by, option, repeatable, seconds

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.text import Text
 
-from orchestrator.cases.devices import Device
+from orchestrator.cases.form.devices import Device
 from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import made_folder
 from orchestrator.devices.fmi.port import BoundDescription

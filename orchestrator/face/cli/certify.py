@@ -2,7 +2,7 @@
 
 import argparse
 
-from orchestrator.cases.devices import devices_of
+from orchestrator.cases.form.devices import devices_of
 from orchestrator.core.errors import INTERRUPTED, InputError
 from orchestrator.face.cli.arguments import (
     add_executor_arguments,

@@ -7,7 +7,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.markup import escape
 
-from orchestrator.cases.devices import Device
+from orchestrator.cases.form.devices import Device
 from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import made_folder
 from orchestrator.face.cli.certificate import (

@@ -7,7 +7,7 @@ from shutil import rmtree
 
 from rich.markup import escape
 
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import PARTIAL, write_text
 from orchestrator.face.cli.run_request import asked_by, how_it_goes_on, keep_request

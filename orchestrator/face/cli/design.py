@@ -7,7 +7,7 @@ from shutil import rmtree
 
 from rich.markup import escape
 
-from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
+from orchestrator.cases.questions.idle_values import DAMPING_CONTROLLERS
 from orchestrator.core.errors import NOT_MET, CosimError, InputError
 from orchestrator.face.cli.arguments import (
     add_executor_arguments,

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from orchestrator.cases.new_case import WantedCase, read_converter, sources_of, write_case
-from orchestrator.cases.psse.known_records import known_records
-from orchestrator.cases.record_use import as_json, in_full
+from orchestrator.cases.networks.psse.known_records import known_records
+from orchestrator.cases.networks.record_use import as_json, in_full
+from orchestrator.cases.new.new_case import WantedCase, read_converter, sources_of, write_case
 from orchestrator.core.errors import InputError, ResultsError, listing_all
 from orchestrator.core.safe_files import write_text
 from orchestrator.devices.fmi.vendor_files import is_vendor_file
@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    from orchestrator.cases.service import in_service  # noqa: PLC0415 - these import what a run needs
+    from orchestrator.cases.scenario.service import in_service  # noqa: PLC0415 - these import what a run needs
     from orchestrator.studies.modes.modes import running  # noqa: PLC0415
 
     if options.models is True:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.markup import escape
 
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.devices.fmi.loaded import PYTHON_BACKED
 from orchestrator.face.cli.terminal import print_named_modes, print_sources
 from orchestrator.face.cli.verdict import print_answers, print_details

@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.markup import escape
 
-from orchestrator.cases.short_circuit import CONVENTION, BusStrength, weakest_first
+from orchestrator.cases.scenario.short_circuit import CONVENTION, BusStrength, weakest_first
 from orchestrator.face.cli.arguments import add_json_argument, add_kept_argument, add_options
 from orchestrator.face.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.face.cli.terminal import keep_json, make_console, print_json

@@ -6,7 +6,7 @@ from warnings import catch_warnings, simplefilter
 from rich.console import RenderableType
 from rich.markup import escape
 
-from orchestrator.cases.element_names import ElementNames
+from orchestrator.cases.networks.element_names import ElementNames
 from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import write_page
 from orchestrator.face.api.case import load

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from rich.console import Console, RenderableType
 from rich.markup import escape
 
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.safe_files import made_folder
 from orchestrator.face.api.progress import shown_progress
 from orchestrator.face.cli import arguments

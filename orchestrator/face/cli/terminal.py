@@ -26,8 +26,8 @@ from orchestrator.output.results.staging import new_run_id, staged
 from orchestrator.output.results.storage import save_json
 
 if TYPE_CHECKING:
-    from orchestrator.cases.element_names import ElementNames
-    from orchestrator.cases.prepare import PreparedScenario
+    from orchestrator.cases.networks.element_names import ElementNames
+    from orchestrator.cases.scenario.prepare import PreparedScenario
     from orchestrator.studies.modes.modes import ModesResult
     from orchestrator.studies.runs.run import RunResult
 
@@ -130,7 +130,7 @@ def print_questions(
 
     ``whole``: whether these are shown again; with ``as_json`` they are."""
     from orchestrator.cases.case import BUILT_IN  # noqa: PLC0415 - imports the reading of cases
-    from orchestrator.cases.facts import facts_of  # noqa: PLC0415 - as well
+    from orchestrator.cases.scenario.facts import facts_of  # noqa: PLC0415 - as well
 
     facts = facts_of(scenarios[0]) if scenarios and not as_json else None
     if facts is not None:

@@ -9,8 +9,8 @@ from typing import Any
 import tomli_w
 
 from orchestrator.cases.case import Case as CaseFile
-from orchestrator.cases.schema import Value
-from orchestrator.cases.values import flatten
+from orchestrator.cases.form.schema import Value
+from orchestrator.cases.form.values import flatten
 from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import made_folder, write_text
 from orchestrator.output.results.staging import new_run_id

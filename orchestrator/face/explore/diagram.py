@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cases.names import close_names
+from orchestrator.cases.form.names import close_names
 from orchestrator.core.errors import InputError, few
 from orchestrator.face.api.scenario import Scenario
 from orchestrator.output.report.html.network_map import HEIGHT, WIDTH, places

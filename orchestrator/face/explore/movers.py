@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cases.idle_values import why_idle
+from orchestrator.cases.questions.idle_values import why_idle
 from orchestrator.core.errors import InputError
 from orchestrator.face.api.scenario import Scenario
 from orchestrator.studies.sensitivities.sensitivities import CRITICAL, Sensitivity

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from orchestrator.cases.names import variables_of
+from orchestrator.cases.form.names import variables_of
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import InputError
 from orchestrator.face.api.results import Run

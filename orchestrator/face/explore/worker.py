@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from orchestrator.cases.idle_values import switches_of, why_idle
-from orchestrator.cases.layers import OptionValues
-from orchestrator.cases.schema import Value
-from orchestrator.cases.service import in_service
-from orchestrator.cases.sharing import SharingRule
+from orchestrator.cases.flow.sharing import SharingRule
+from orchestrator.cases.form.schema import Value
+from orchestrator.cases.questions.idle_values import switches_of, why_idle
+from orchestrator.cases.scenario.service import in_service
+from orchestrator.cases.settings.layers import OptionValues
 from orchestrator.core.arrays import Complex
 from orchestrator.core.errors import CosimError, InputError
 from orchestrator.core.spelling import as_options

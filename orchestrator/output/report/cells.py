@@ -11,10 +11,10 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
 from orchestrator.cases.case import BUILT_IN, Case, built_in_cases
-from orchestrator.cases.definition import CaseDefinition
-from orchestrator.cases.parameter_files import ParameterFile
-from orchestrator.cases.schema import Value
-from orchestrator.cases.sharing import SharingRule
+from orchestrator.cases.flow.sharing import SharingRule
+from orchestrator.cases.form.definition import CaseDefinition
+from orchestrator.cases.form.parameter_files import ParameterFile
+from orchestrator.cases.form.schema import Value
 from orchestrator.core.errors import InputError
 from orchestrator.output.results.storage import save_json
 

@@ -27,7 +27,7 @@ from orchestrator.output.results.storage import column_attributes, origin_of_row
 from orchestrator.systems.coupling.recorder import Block
 
 if TYPE_CHECKING:
-    from orchestrator.cases.prepare import PreparedScenario
+    from orchestrator.cases.scenario.prepare import PreparedScenario
 
 _NUMBER = 8  # bytes of a value in the compressed parts together with the joined file
 _CSV_NUMBER = 13  # bytes of a value in the table: its digits

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cases.names import variables_of
+from orchestrator.cases.form.names import variables_of
 from orchestrator.core.late import xr
 
 MOST_DRAWN = 200_000  # rows up to which a signal is drawn as it is

@@ -21,7 +21,7 @@ from orchestrator.systems.coupling.filtered_recorder import FILTER
 from orchestrator.systems.coupling.recorder import BLOCK_ROWS
 
 if TYPE_CHECKING:
-    from orchestrator.cases.prepare import PreparedScenario
+    from orchestrator.cases.scenario.prepare import PreparedScenario
 
 _CSV_ROWS = 10_000  # rows of a table that are written at a time
 

@@ -18,7 +18,7 @@ from typing import Any, Self
 
 from fmus.toolchain import temporary
 from fmus.toolchain.extras import require
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.closing import Closing
 from orchestrator.core.errors import ComponentError, InputError
 from orchestrator.devices.fmi.component import Component

@@ -13,7 +13,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.cases.catalogue_fmus import catalogue_fmu
+from orchestrator.cases.scenario.catalogue_fmus import catalogue_fmu
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import read_text
 from orchestrator.systems.coupling.clock import Clock

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import ComponentError, CosimError, NotFiniteError
 from orchestrator.devices.binding.misfits import Misfit

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import AnalysisError, InputError
 from orchestrator.devices.fmi.component import Component
 from orchestrator.linear.doubts.examination import Examination

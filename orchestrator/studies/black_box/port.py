@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cases.values import check_system_base, convert
+from orchestrator.cases.form.values import check_system_base, convert
 from orchestrator.core.errors import InputError
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.devices import NO_BUS, is_controller_alone

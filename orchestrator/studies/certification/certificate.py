@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from orchestrator.cases.schema import Value
+from orchestrator.cases.form.schema import Value
 from orchestrator.core.errors import CaseError, Problem
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.values import as_text

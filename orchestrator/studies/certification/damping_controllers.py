@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from orchestrator.cases.schema import Value
+from orchestrator.cases.form.schema import Value
 from orchestrator.core.errors import InputError
 from orchestrator.devices.fmi.description import FmuDescription, VariableInfo
 from orchestrator.devices.fmi.port import BoundDescription

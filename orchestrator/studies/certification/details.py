@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pydantic import ConfigDict, ValidationError
 
-from orchestrator.cases.locate import line_of
+from orchestrator.cases.form.locate import line_of
 from orchestrator.core.errors import CaseError, Problem
 from orchestrator.core.toml_files import Table, read_toml
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import CosimError, FmuFileError, InputError, few
 from orchestrator.core.safe_files import write_bytes

@@ -8,8 +8,8 @@ from typing import Any
 
 import xarray as xr
 
-from orchestrator.cases.given import binding_path, plain
-from orchestrator.cases.schema import Value
+from orchestrator.cases.form.given import binding_path, plain
+from orchestrator.cases.form.schema import Value
 from orchestrator.core.asked import FILE, FLAG, FieldKind, asked, number_in, one_of, path
 from orchestrator.core.errors import InputError
 from orchestrator.core.spelling import for_python

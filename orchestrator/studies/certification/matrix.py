@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from orchestrator.cases.devices import Device
+from orchestrator.cases.form.devices import Device
 from orchestrator.core.errors import InputError, counted
 from orchestrator.core.safe_files import write_text
 from orchestrator.devices.fmi.values import as_text

@@ -7,8 +7,8 @@ import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.case import Case
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import Value
+from orchestrator.cases.form.schema import Value
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.linear.models.device_start import misfits_of
 from orchestrator.linear.spectra.mode_tracking import ModeSet

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from orchestrator.cases.schema import Value
+from orchestrator.cases.form.schema import Value
 from orchestrator.core.asked import as_number
 from orchestrator.core.errors import InputError
 from orchestrator.devices.binding.binding import bound_fmu

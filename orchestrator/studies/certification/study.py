@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import Value
+from orchestrator.cases.form.schema import Value
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.studies.certification.case_file import BASE, WITH, WITHOUT, write_case

@@ -3,7 +3,7 @@
 from functools import partial
 
 from orchestrator.cases.case import Case
-from orchestrator.cases.definition import CaseDefinition
+from orchestrator.cases.form.definition import CaseDefinition
 from orchestrator.studies.coordinated_design.objective import Aim, RatedPoint
 from orchestrator.studies.coordinated_design.point import measure
 from orchestrator.studies.coordinated_design.search import SettingSearch

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from orchestrator.cases.case import Case
-from orchestrator.cases.definition import CaseDefinition
-from orchestrator.cases.layers import OptionValues
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import Value
+from orchestrator.cases.form.definition import CaseDefinition
+from orchestrator.cases.form.schema import Value
+from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.cases.settings.layers import OptionValues
 from orchestrator.core.asked import (
     DAMPING,
     GAIN_BOUNDS,

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from orchestrator.cases.parameter_files import parameter_file_text
+from orchestrator.cases.form.parameter_files import parameter_file_text
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import write_text
 from orchestrator.core.truth import NoTruth

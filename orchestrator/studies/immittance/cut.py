@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import scipy.sparse.csgraph
 
-from orchestrator.cases.facts import rated_frequency
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.facts import rated_frequency
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Complex, Matrix
 from orchestrator.core.errors import InputError
 from orchestrator.linear.models.device_start import misfits_of, sentences

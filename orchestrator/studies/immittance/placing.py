@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import ComponentTable
+from orchestrator.cases.form.schema import ComponentTable
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
 from orchestrator.studies.immittance.belonging import check_place
 from orchestrator.studies.immittance.cut import Cut

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.short_circuit import ShortCircuit
+from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.cases.scenario.short_circuit import ShortCircuit
 from orchestrator.core.arrays import Complex, Vector
 from orchestrator.studies.immittance.cut import Cut
 from orchestrator.studies.immittance.judgement import CutJudgement

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.studies.black_box.frequency_response import Excitation

@@ -5,15 +5,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from orchestrator.cases.case import Case
-from orchestrator.cases.power_flow import PowerFlow
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import (
+from orchestrator.cases.flow.power_flow import PowerFlow
+from orchestrator.cases.form.schema import (
     AnalysisTable,
     ComponentTable,
     EventTable,
     GridEventBase,
     Value,
 )
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.devices.fmi.description import FmuDescription

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestrator.cases.schema import ComponentTable
+from orchestrator.cases.form.schema import ComponentTable
 from orchestrator.core.errors import InputError
 from orchestrator.systems.coupling.system import ComponentPlan
 

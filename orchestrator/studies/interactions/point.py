@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from orchestrator.cases.case import Case
-from orchestrator.cases.schema import ComponentTable
+from orchestrator.cases.form.schema import ComponentTable
 from orchestrator.linear.models.linear_model import IDENTIFIED, LinearModel
 from orchestrator.linear.spectra.modes import Mode, damping_percent
 from orchestrator.studies.black_box.coupled_modes import modes_with_boxes

@@ -5,8 +5,8 @@ from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
-from orchestrator.cases.devices import Device, devices_of
-from orchestrator.cases.given import binding_path
+from orchestrator.cases.form.devices import Device, devices_of
+from orchestrator.cases.form.given import binding_path
 from orchestrator.core.asked import FLAG, FREQUENCIES, NAME, NAMES, SHARE, FieldKind, Names, asked
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError

@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from orchestrator.cases.build_choices import STAND_IN
 from orchestrator.cases.case import Case
-from orchestrator.cases.parameter_files import ParameterFile
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import ComponentTable
+from orchestrator.cases.form.build_choices import STAND_IN
+from orchestrator.cases.form.parameter_files import ParameterFile
+from orchestrator.cases.form.schema import ComponentTable
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.asked import names
 from orchestrator.core.errors import CaseError, InputError, Problem
 from orchestrator.studies.interactions.exchange import (

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from itertools import combinations, product
 
-from orchestrator.cases.devices import Device
-from orchestrator.cases.schema import ComponentTable
+from orchestrator.cases.form.devices import Device
+from orchestrator.cases.form.schema import ComponentTable
 from orchestrator.core.errors import InputError
 from orchestrator.studies.interactions.exchange import file_at, stand_in_at, vendors_device_at
 from orchestrator.studies.interactions.places import Place, first_of, vendors_of

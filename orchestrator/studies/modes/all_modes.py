@@ -6,8 +6,8 @@ scenario are initialised and linearised, which is Python's work. All calls of FM
 from collections.abc import Sequence
 from contextlib import ExitStack
 
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.service import in_service
+from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.cases.scenario.service import in_service
 from orchestrator.core.threads import side_by_side
 from orchestrator.devices.fmi.instance import is_ours
 from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ

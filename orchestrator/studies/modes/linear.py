@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from orchestrator.cases.names import variables_of
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.form.names import variables_of
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import InputError
 from orchestrator.core.late import xr

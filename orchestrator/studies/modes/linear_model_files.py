@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import AnalysisError
 from orchestrator.devices.fmi.linear_model import EmbeddedModel
 from orchestrator.linear.models.linearization import linearize_within

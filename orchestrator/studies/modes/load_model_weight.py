@@ -4,8 +4,8 @@ import math
 from collections.abc import Sequence
 from typing import Protocol, Self
 
-from orchestrator.cases.load_models import is_open
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.networks.load_models import is_open
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import CosimError
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.studies.modes.modes import ModesResult, compute_modes

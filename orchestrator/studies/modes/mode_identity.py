@@ -12,8 +12,8 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.questions.idle_values import DAMPING_CONTROLLERS
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import AnalysisError, CosimError
 from orchestrator.devices.fmi.instance import is_isolated, is_ours
 from orchestrator.linear.models.linear_model import IDENTIFIED, LinearModel

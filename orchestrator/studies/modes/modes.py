@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cases.areas import areas_of
-from orchestrator.cases.facts import facts_of
-from orchestrator.cases.fault_tables import component_faults
-from orchestrator.cases.flow_figures import power_flow_json
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import ReferenceModeTable
-from orchestrator.cases.service import in_service
+from orchestrator.cases.events.fault_tables import component_faults
+from orchestrator.cases.form.schema import ReferenceModeTable
+from orchestrator.cases.networks.areas import areas_of
+from orchestrator.cases.scenario.facts import facts_of
+from orchestrator.cases.scenario.flow_figures import power_flow_json
+from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.cases.scenario.service import in_service
 from orchestrator.core.errors import ComponentError
 from orchestrator.core.threads import side_by_side
 from orchestrator.devices.binding.misfits import Misfit

@@ -4,7 +4,7 @@ import fnmatch
 from collections.abc import Sequence
 from functools import partial
 
-from orchestrator.cases.definition import CaseDefinition
+from orchestrator.cases.form.definition import CaseDefinition
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.mode_names import Measure, Naming, name_modes, opposition
 from orchestrator.linear.spectra.modes import Mode

@@ -5,9 +5,9 @@ from dataclasses import KW_ONLY, dataclass
 from math import inf
 from typing import Any
 
-from orchestrator.cases.given import Time, in_seconds
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.sharing import SharingRule
+from orchestrator.cases.flow.sharing import SharingRule
+from orchestrator.cases.form.given import Time, in_seconds
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.asked import (
     CALLED,
     DAMPING,

@@ -1,7 +1,7 @@
 """What a component says that cannot start, in the words of the case: its place, its operating point, the remedy."""
 
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.sharing import power_limits
+from orchestrator.cases.flow.sharing import power_limits
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import ComponentError, ErrorKind, Problem, StartError
 from orchestrator.devices.fmi.instance import is_ours
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import AnalysisError, CosimError, InputError
 from orchestrator.linear.doubts.linearity import doubts, tell
 from orchestrator.linear.models.blocks import Blocks

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.closing import Closing
 from orchestrator.core.errors import ComponentError, few
 from orchestrator.devices.fmi.component import RealBatch

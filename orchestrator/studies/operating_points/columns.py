@@ -5,13 +5,13 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from orchestrator.cases.build_choices import STAND_IN
-from orchestrator.cases.element_names import ElementNames
-from orchestrator.cases.names import SERVICE, STATES, close_names
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import Value
-from orchestrator.cases.sharing import load_of
-from orchestrator.cases.values import convert
+from orchestrator.cases.flow.sharing import load_of
+from orchestrator.cases.form.build_choices import STAND_IN
+from orchestrator.cases.form.names import SERVICE, STATES, close_names
+from orchestrator.cases.form.schema import Value
+from orchestrator.cases.form.values import convert
+from orchestrator.cases.networks.element_names import ElementNames
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError, few
 from orchestrator.core.units import read_value
 from orchestrator.systems.coupling.system import ComponentPlan

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-from orchestrator.cases.schema import Value
+from orchestrator.cases.form.schema import Value
 from orchestrator.core.errors import ErrorKind
 from orchestrator.studies.points.failure import Failure
 

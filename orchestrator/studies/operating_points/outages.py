@@ -4,9 +4,9 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from orchestrator.cases.connected import connected_parts
-from orchestrator.cases.names import close_names
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.flow.connected import connected_parts
+from orchestrator.cases.form.names import close_names
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError, few
 from orchestrator.studies.operating_points.columns import Elements
 

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import cast
 
 from orchestrator.cases.case import Case
-from orchestrator.cases.layers import OptionValues
-from orchestrator.cases.parameter_files import ParameterFile
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import Value
+from orchestrator.cases.form.parameter_files import ParameterFile
+from orchestrator.cases.form.schema import Value
+from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.cases.settings.layers import OptionValues
 from orchestrator.core.asked import Names
 from orchestrator.core.errors import InputError
 from orchestrator.studies.operating_points.columns import Elements

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from orchestrator.cases.csv_rows import PLACE, Row, place_of, rows_of
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import Value
-from orchestrator.cases.sharing import load_of
+from orchestrator.cases.flow.sharing import load_of
+from orchestrator.cases.form.csv_rows import PLACE, Row, place_of, rows_of
+from orchestrator.cases.form.schema import Value
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError, Problem, few
 from orchestrator.core.units import read_value
 from orchestrator.studies.operating_points.columns import (

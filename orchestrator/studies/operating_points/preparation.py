@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.cases.case import Case
-from orchestrator.cases.flow_controls import moves_in_words
-from orchestrator.cases.parameter_files import ParameterFile
-from orchestrator.cases.plausibility import overloads
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import Value
-from orchestrator.cases.service import without_units
-from orchestrator.cases.sharing import Dispatch, SharingRule, in_words, load_of, lost_load
+from orchestrator.cases.flow.sharing import Dispatch, SharingRule, in_words, load_of, lost_load
+from orchestrator.cases.form.parameter_files import ParameterFile
+from orchestrator.cases.form.schema import Value
+from orchestrator.cases.networks.controls import moves_in_words
+from orchestrator.cases.questions.plausibility import overloads
+from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.cases.scenario.service import without_units
 from orchestrator.core.errors import CosimError, ErrorKind, InputError, StartError, few
 from orchestrator.studies.operating_points.columns import Elements, least_scale
 from orchestrator.studies.operating_points.item import Item, Status

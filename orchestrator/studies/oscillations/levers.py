@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.linear.models.periodic import model_of
 from orchestrator.linear.models.steady_state import find_operating_point

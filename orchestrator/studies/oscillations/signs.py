@@ -9,7 +9,7 @@ from orchestrator.studies.oscillations.measurements import Measurements, Site
 from orchestrator.studies.oscillations.models import UnitModels, fits, power_there
 
 if TYPE_CHECKING:
-    from orchestrator.cases.prepare import PreparedScenario
+    from orchestrator.cases.scenario.prepare import PreparedScenario
 
 _ALIKE = 0.25
 """A mean power that is the case's with its sign turned differs from it by less than this part; a record is of another

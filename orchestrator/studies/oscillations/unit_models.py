@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.cases.case import built_in_cases, load_case
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Complex, Matrix
 from orchestrator.core.errors import InputError, few
 from orchestrator.core.safe_files import file_hash

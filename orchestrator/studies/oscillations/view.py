@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.cases.given import Time, part_of_record
+from orchestrator.cases.form.given import Time, part_of_record
 from orchestrator.core.errors import CosimError
 from orchestrator.core.late import pd, xr
 from orchestrator.output.report.notebook import page
@@ -19,7 +19,7 @@ from orchestrator.studies.oscillations.signs import other_powers, turned_signs
 from orchestrator.studies.oscillations.verdict import Located, locate
 
 if TYPE_CHECKING:
-    from orchestrator.cases.prepare import PreparedScenario
+    from orchestrator.cases.scenario.prepare import PreparedScenario
 
 _SHOWN = 5
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.linear.doubts.examination import Examination, examine

@@ -9,9 +9,9 @@ from dataclasses import KW_ONLY, MISSING, dataclass, replace
 from typing import Any
 
 from orchestrator.cases.case import Case
-from orchestrator.cases.definition import CaseDefinition
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import Value
+from orchestrator.cases.form.definition import CaseDefinition
+from orchestrator.cases.form.schema import Value
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.asked import DAMPING, FLAG, GAIN, GAIN_BOUNDS, NAME, STAGES, asked
 from orchestrator.core.errors import AnalysisError, InputError
 from orchestrator.linear.doubts.examination import Examination

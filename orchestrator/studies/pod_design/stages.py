@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Complex
 from orchestrator.core.errors import AnalysisError
 from orchestrator.linear.models.component_linearization import ComponentLinearization

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from itertools import repeat
 
 from orchestrator.cases.case import Case
-from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
-from orchestrator.cases.parameter_files import ParameterFile
-from orchestrator.cases.schema import CaseTable, NamedModeTable, Value
+from orchestrator.cases.form.parameter_files import ParameterFile
+from orchestrator.cases.form.schema import CaseTable, NamedModeTable, Value
+from orchestrator.cases.questions.idle_values import DAMPING_CONTROLLERS
 from orchestrator.core.errors import InputError
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.studies.pod_design.stages import NEEDED, count_stages, neutral_time

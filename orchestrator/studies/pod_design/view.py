@@ -7,7 +7,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
-from orchestrator.cases.parameter_files import parameter_file_text
+from orchestrator.cases.form.parameter_files import parameter_file_text
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError
 from orchestrator.core.late import pd

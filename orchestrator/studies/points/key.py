@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.case import BUILT_IN, Case, load_case
-from orchestrator.cases.definition import CaseDefinition
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.form.definition import CaseDefinition
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import check_regular
 from orchestrator.devices.fmi.converted import ConvertedDescription, native

@@ -5,10 +5,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from orchestrator.cases.given import Paths, Time, case_values, in_seconds, kept, parameter_files
-from orchestrator.cases.layers import OptionValues
-from orchestrator.cases.parameter_files import ParameterFile
-from orchestrator.cases.schema import Value
+from orchestrator.cases.form.given import (
+    Paths,
+    Time,
+    case_values,
+    in_seconds,
+    kept,
+    parameter_files,
+)
+from orchestrator.cases.form.parameter_files import ParameterFile
+from orchestrator.cases.form.schema import Value
+from orchestrator.cases.settings.layers import OptionValues
 from orchestrator.core.asked import FLAG, FREQUENCIES, NAMES, FieldKind, asked, text_or_none
 from orchestrator.linear.spectra.modes import ELECTROMECHANICAL_HZ
 

@@ -10,7 +10,7 @@ from typing import Any, Concatenate, Generic, ParamSpec, TypeVar, cast
 from rich.console import RenderableType
 
 from orchestrator.cases.case import Case
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.cores import number_of_cores
 from orchestrator.core.errors import InputError
 from orchestrator.studies.points.dask_cluster import DaskCluster

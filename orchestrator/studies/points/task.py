@@ -9,9 +9,9 @@ from functools import cached_property
 from typing import Any, ClassVar, Self, TypeVar
 
 from orchestrator.cases.case import Case
-from orchestrator.cases.parameter_files import ParameterFile
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import Value
+from orchestrator.cases.form.parameter_files import ParameterFile
+from orchestrator.cases.form.schema import Value
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.threads import alone
 from orchestrator.studies.points.codec import packed, plain, unpacked
 from orchestrator.studies.points.failure import Failure

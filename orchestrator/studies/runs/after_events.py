@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import CosimError
 from orchestrator.linear.spectra.mode_tracking import ModeSet, match
 from orchestrator.linear.spectra.modes import Mode

@@ -13,8 +13,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from orchestrator.cases.locate import place_in
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.form.locate import place_in
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import few
 from orchestrator.output.results.origin import files_named
 from orchestrator.studies.points.code import code_hash, library_versions

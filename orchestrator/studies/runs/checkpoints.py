@@ -9,7 +9,7 @@ from urllib.parse import quote
 
 import numpy as np
 
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import ComponentError, InputError, ResultsError
 from orchestrator.core.safe_files import write_text
 from orchestrator.output.results import checkpoint_file

@@ -7,9 +7,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from orchestrator.cases.definition import CaseDefinition
-from orchestrator.cases.flow_figures import power_flow_json
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.form.definition import CaseDefinition
+from orchestrator.cases.scenario.flow_figures import power_flow_json
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import RunInterruptedError
 from orchestrator.core.safe_files import write_bytes
 from orchestrator.output.report.cells import word_of

@@ -8,7 +8,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestrator.cases.schema import PlotTable, ReferenceModeTable
+from orchestrator.cases.form.schema import PlotTable, ReferenceModeTable
 from orchestrator.linear.spectra.modes import Mode
 from orchestrator.output.report.plot_style import STYLE, add_legend, colour, save_figure
 from orchestrator.output.results.signals import outline, signal

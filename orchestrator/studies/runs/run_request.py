@@ -5,7 +5,7 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Any
 
-from orchestrator.cases.given import Time, in_seconds
+from orchestrator.cases.form.given import Time, in_seconds
 from orchestrator.core.asked import FLAG, FieldKind, asked, read_whole, whole_number
 from orchestrator.core.cores import MOST_THREADS
 from orchestrator.core.errors import InputError

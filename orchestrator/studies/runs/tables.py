@@ -6,7 +6,7 @@ from typing import Any
 
 from rich.table import Table
 
-from orchestrator.cases.flow_figures import power_flow_json
+from orchestrator.cases.scenario.flow_figures import power_flow_json
 from orchestrator.output.report import power_flow
 from orchestrator.output.report.tables import eigenvalue_text, first_few, make_table, share_text
 from orchestrator.output.results.signals import relative_difference, signal

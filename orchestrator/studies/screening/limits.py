@@ -3,7 +3,7 @@
 from collections.abc import Collection
 from typing import Any
 
-from orchestrator.cases.branch_limits import Loading
+from orchestrator.cases.networks.branch_limits import Loading
 from orchestrator.core.errors import counted
 from orchestrator.output.report.table import Column, ColumnTable
 from orchestrator.studies.screening.study import ScreenedItem

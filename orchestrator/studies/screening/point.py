@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cases.branch_limits import Loading, Outlier, loadings, outliers
 from orchestrator.cases.case import Case
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.sharing import SharingRule
+from orchestrator.cases.flow.sharing import SharingRule
+from orchestrator.cases.networks.branch_limits import Loading, Outlier, loadings, outliers
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.linear.models.apart import standing_apart
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.linear.models.slope_linearization import gives_slopes

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.cases.branch_limits import Loading, Outlier
+from orchestrator.cases.networks.branch_limits import Loading, Outlier
 from orchestrator.linear.spectra.mode_tracking import ModeSet
 from orchestrator.studies.operating_points.item import Status
 from orchestrator.studies.points.task import Kept

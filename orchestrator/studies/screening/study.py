@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import cast
 
 from orchestrator.cases.case import Case
-from orchestrator.cases.sharing import SharingRule
+from orchestrator.cases.flow.sharing import SharingRule
 from orchestrator.linear.spectra.mode_tracking import match
 from orchestrator.studies.operating_points.item import Item
 from orchestrator.studies.operating_points.outages import Outage

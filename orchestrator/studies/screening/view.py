@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rich.markup import escape as escape_markup
 
-from orchestrator.cases.layers import joined_values
+from orchestrator.cases.settings.layers import joined_values
 from orchestrator.core.errors import Problem, few
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder, write_text

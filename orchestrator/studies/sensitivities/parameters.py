@@ -4,7 +4,7 @@ import fnmatch
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from orchestrator.cases.names import close_names
+from orchestrator.cases.form.names import close_names
 from orchestrator.core.errors import InputError
 from orchestrator.devices.fmi.description import FmuDescription, VariableInfo
 from orchestrator.systems.coupling.master import Master

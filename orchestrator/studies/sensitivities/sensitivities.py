@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orchestrator.cases.idle_values import why_idle
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.questions.idle_values import why_idle
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.asked import names as names_of
 from orchestrator.core.errors import AnalysisError, CaseError, CosimError, InputError

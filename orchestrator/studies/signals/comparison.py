@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from orchestrator.cases.names import close_names
+from orchestrator.cases.form.names import close_names
 from orchestrator.core.errors import AnalysisError, InputError, few
 from orchestrator.core.safe_files import PARTIAL
 from orchestrator.linear.signals.identification import (

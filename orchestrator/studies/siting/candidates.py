@@ -4,9 +4,9 @@ import fnmatch
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 
-from orchestrator.cases.names import close_names
-from orchestrator.cases.plausible_ranges import SMALLEST_SHARE
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.form.names import close_names
+from orchestrator.cases.questions.plausible_ranges import SMALLEST_SHARE
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError, Problem, few
 
 # load of a plant's own at its terminal, in parts of the rating there

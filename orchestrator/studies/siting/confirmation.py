@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import AnalysisError, CosimError
 from orchestrator.linear.models.component_linearization import ComponentLinearization
 from orchestrator.linear.models.linear_model import LinearModel

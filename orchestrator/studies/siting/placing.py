@@ -10,8 +10,8 @@ import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.case import Case
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import ComponentTable
+from orchestrator.cases.form.schema import ComponentTable
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Vector
 from orchestrator.core.errors import InputError
 from orchestrator.linear.models.component_linearization import ComponentLinearization

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fmus.grid.names import injection_names
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Matrix, Vector
 from orchestrator.core.errors import InputError
 from orchestrator.linear.models.linear_model import LinearModel

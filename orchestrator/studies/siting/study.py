@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from orchestrator.cases.case import Case
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import ComponentTable
+from orchestrator.cases.form.schema import ComponentTable
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.asked import (
     DAMPING,
     FILE,

@@ -10,13 +10,13 @@ from functools import partial
 
 import numpy as np
 
-from orchestrator.cases.build_choices import ALPHA
-from orchestrator.cases.imperfection_tables import number_info, sets_imperfection
-from orchestrator.cases.names import close_names, whose
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import Value
-from orchestrator.cases.short_circuit import ShortCircuit
-from orchestrator.cases.values import convert
+from orchestrator.cases.form.build_choices import ALPHA
+from orchestrator.cases.form.names import close_names, whose
+from orchestrator.cases.form.schema import Value
+from orchestrator.cases.form.values import convert
+from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.cases.scenario.short_circuit import ShortCircuit
+from orchestrator.cases.settings.imperfection_tables import number_info, sets_imperfection
 from orchestrator.core.errors import InputError, few
 from orchestrator.core.units import read_value, to_unit
 from orchestrator.devices.fmi.description import VariableInfo

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from orchestrator.cases.case import Case
-from orchestrator.cases.plausibility import overloads
-from orchestrator.cases.schema import Value
+from orchestrator.cases.form.schema import Value
+from orchestrator.cases.questions.plausibility import overloads
 from orchestrator.linear.spectra.mode_tracking import ModeSet
 from orchestrator.studies.black_box.coupled_modes import coupled_with_boxes
 from orchestrator.studies.modes.modes import ModesResult, compute_modes

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
-from orchestrator.cases.given import check_case_name
+from orchestrator.cases.form.given import check_case_name
 from orchestrator.core.asked import FieldKind, Names, asked, plain_value, read_part
 from orchestrator.core.errors import InputError
 from orchestrator.studies.points.request import (

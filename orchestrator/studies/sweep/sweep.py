@@ -8,13 +8,13 @@ from typing import cast
 
 import numpy as np
 
-from orchestrator.cases.build_choices import ALPHA
 from orchestrator.cases.case import Case
-from orchestrator.cases.idle_values import Idle, idle_everywhere
-from orchestrator.cases.layers import joined_values
-from orchestrator.cases.parameter_files import ParameterFile
-from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import Value
+from orchestrator.cases.form.build_choices import ALPHA
+from orchestrator.cases.form.parameter_files import ParameterFile
+from orchestrator.cases.form.schema import Value
+from orchestrator.cases.questions.idle_values import Idle, idle_everywhere
+from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.cases.settings.layers import joined_values
 from orchestrator.core.errors import CaseError, InputError, Problem
 from orchestrator.linear.spectra.mode_tracking import ModeSet, is_ambiguous
 from orchestrator.studies.points.points import Work

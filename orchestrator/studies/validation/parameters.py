@@ -6,7 +6,7 @@ import fnmatch
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from orchestrator.cases.names import close_names
+from orchestrator.cases.form.names import close_names
 from orchestrator.core.errors import InputError
 from orchestrator.devices.fmi.description import VariableInfo
 from orchestrator.studies.validation.device import PlayedDevice

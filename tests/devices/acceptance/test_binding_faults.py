@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from orchestrator.cases.names import hint_at
+from orchestrator.cases.form.names import hint_at
 from orchestrator.devices.acceptance.checks import base
 from orchestrator.devices.acceptance.runner import AcceptanceReport, without_consequences
 from orchestrator.devices.binding.binding import bound_fmu

@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 from orchestrator import load
-from orchestrator.cases import infinite_bus, two_area
+from orchestrator.cases.built_in import infinite_bus, two_area
 from orchestrator.cases.case import load_case
 from orchestrator.cases.use import use_in_case
 from orchestrator.core.errors import CaseError

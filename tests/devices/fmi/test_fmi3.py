@@ -11,7 +11,7 @@ from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.compiler import compile_library, host_platform
 from fmus.toolchain.exporter import export
 from fmus.toolchain.native_fmu import NativeFmu
-from orchestrator.cases import two_area
+from orchestrator.cases.built_in import two_area
 from orchestrator.cases.case import load_case
 from orchestrator.core.errors import ComponentError, EndedError, FmuFileError
 from orchestrator.devices.fmi.description import read_description

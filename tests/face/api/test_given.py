@@ -12,7 +12,7 @@ import pytest
 
 import orchestrator as gfor
 from orchestrator.cases.case import BUILT_IN
-from orchestrator.cases.given import kept
+from orchestrator.cases.form.given import kept
 from orchestrator.core.errors import CaseError, InputError
 
 

@@ -17,7 +17,7 @@ from orchestrator.studies.points.failure import Failure
 
 ROOT = Path(__file__).parents[3]
 OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*[a-z])")
-OTHERS = ("certification", "interop", "cli", "agents", "report/pdf.py", "cases/new_case.py")
+OTHERS = ("certification", "interop", "cli", "agents", "report/pdf.py", "cases/new/new_case.py")
 """Where texts are for the command line alone: Python has no such functions."""
 
 COMMANDS_ALONE = {
@@ -80,7 +80,7 @@ def test_an_option_is_spelt_for_who_reads_it(text, python):
 
 
 def test_what_was_given_as_tables_is_named_as_it_was_given():
-    kept = "cases/given/0123456789abcdef"
+    kept = "cases/form/given/0123456789abcdef"
     assert spelled(f"{kept}/case.toml: no table") == "case: no table"
     assert spelled(f"{kept}/points.csv, line 1: no head") == "points: no head"
     assert spelled(f"{kept}/points.csv, line 4: hour = 'x'") == "points, row 3: hour = 'x'"

@@ -6,7 +6,7 @@ import shlex
 
 import pytest
 
-from tests.cases.psse.test_questions import CASE, DYR, RAW
+from tests.cases.networks.psse.test_questions import CASE, DYR, RAW
 
 
 @pytest.fixture

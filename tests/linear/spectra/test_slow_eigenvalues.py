@@ -9,7 +9,7 @@ from orchestrator.linear.doubts.slow_modes import tell_slow_modes
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.modes import find_modes
 from orchestrator.studies.modes.modes import compute_modes
-from tests.cases.psse.test_questions import CASE, DYR, RAW
+from tests.cases.networks.psse.test_questions import CASE, DYR, RAW
 
 SEXS = "'SEXS' 1  0.1 10.0 50.0 0.05 -5.0 5.0 /"
 PLAIN = "\n".join(

@@ -54,7 +54,7 @@ def exact_eigenvalues(model, path, values, X_L):
 
 def _grid_of(path):
     from fmus.grid.network import Network, Port  # noqa: PLC0415
-    from orchestrator.cases.network_data import network_data  # noqa: PLC0415
+    from orchestrator.cases.networks.data import network_data  # noqa: PLC0415
 
     case = load_case(path)
     data = network_data(case.table.network, case.path.parent)

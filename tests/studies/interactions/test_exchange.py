@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.devices import Device
+from orchestrator.cases.form.devices import Device
 from orchestrator.studies.interactions.exchange import (
     exchanged_case,
     stand_in_at,

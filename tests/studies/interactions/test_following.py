@@ -15,7 +15,7 @@ from orchestrator.studies.modes.modes import compute_modes
 from tests.pages.markdown import ROOT
 from tests.studies.interactions.park import folder, park, studied
 
-WSCC9 = ROOT / "orchestrator" / "cases" / "wscc9"
+WSCC9 = ROOT / "orchestrator" / "cases" / "built_in" / "wscc9"
 
 CONVERTERS = """
 [components.A]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.devices import Device
+from orchestrator.cases.form.devices import Device
 from orchestrator.core.errors import CaseError, ErrorKind, InputError
 from orchestrator.studies.interactions.exchange import stand_in_at
 from orchestrator.studies.interactions.point import SystemRecord, compute_system

@@ -9,7 +9,7 @@ import pytest
 import scipy.linalg
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.schema import ScenarioTable
+from orchestrator.cases.form.schema import ScenarioTable
 from orchestrator.core.errors import CosimError
 from orchestrator.face.api.results import Modes
 from orchestrator.linear.models.linear_model import IDENTIFIED, LinearModel

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.parameter_files import read_parameter_file
+from orchestrator.cases.form.parameter_files import read_parameter_file
 from orchestrator.studies.pod_design.target import find_target
 
 

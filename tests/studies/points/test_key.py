@@ -80,7 +80,7 @@ def changed(fresh, monkeypatch, tmp_path):
             "ELECTROMECHANICAL_HZ = (0.1, 2.0)",
             "ELECTROMECHANICAL_HZ = (0.1, 2.1)",
         ),
-        (SWEEP, "cases/power_flow.py", "complex(p, q)", "complex(q, p)"),
+        (SWEEP, "cases/flow/power_flow.py", "complex(p, q)", "complex(q, p)"),
         (SWEEP, "devices/binding/tables.py", '"50 Hz"', '"60 Hz"'),
         (
             ROW,
@@ -111,7 +111,7 @@ def test_another_figure_is_computed_anew(changed, module, file, old, new):
             "no steady state found: {changes};",
             "no steady state found, {changes};",
         ),
-        ("cases/power_flow.py", "complex(p, q)", "complex(p, q)  # in pu\n"),
+        ("cases/flow/power_flow.py", "complex(p, q)", "complex(p, q)  # in pu\n"),
         ("face/cli/check.py", "import argparse\n", "import argparse\nimport sys\n"),
     ],
 )
@@ -139,7 +139,7 @@ def test_no_point_is_computed_by_what_only_shows_it():
         ], task
 
 
-_READ = {"orchestrator.devices.binding.tables", "orchestrator.cases.cgmes.files"}
+_READ = {"orchestrator.devices.binding.tables", "orchestrator.cases.networks.cgmes.files"}
 """What is read from a binding's file, and files that are read."""
 
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orchestrator.cases.schema import KindTable
+from orchestrator.cases.form.schema import KindTable
 from orchestrator.face.cli import main
 from orchestrator.linear.spectra.modes import make_mode
 from orchestrator.linear.spectra.stability import Stability

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cases.case import BUILT_IN, load_case
-from orchestrator.cases.schema import PlotTable
+from orchestrator.cases.form.schema import PlotTable
 from orchestrator.core.errors import InputError
 from orchestrator.output.results.signals import signal
 from orchestrator.studies.runs import mode_plots

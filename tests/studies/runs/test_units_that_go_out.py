@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orchestrator.cases.short_circuit import BusStrength
+from orchestrator.cases.scenario.short_circuit import BusStrength
 from orchestrator.studies.immittance.margins import Margin, NyquistMargins, margins_json
 from orchestrator.studies.sensitivities.sensitivities import Sensitivity
 from orchestrator.studies.sensitivities.view import rows_of

@@ -1,7 +1,7 @@
 """Five machines on a ring with a radial load, as RAW and DYR: a network of these tests' own, 60 Hz, phasor models."""
 
 from orchestrator.cases.case import load_case
-from tests.cases.psse import ORDER, raw
+from tests.cases.networks.psse import ORDER, raw
 
 RATINGS = {1: 250.0, 2: 200.0, 3: 220.0, 4: 150.0, 5: 260.0}
 POWERS = {1: 190.0, 2: 130.0, 3: 160.0, 4: 110.0, 5: 150.0}

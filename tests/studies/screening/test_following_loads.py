@@ -9,7 +9,7 @@ from scipy.optimize import fsolve
 from orchestrator.cases.case import load_case
 from orchestrator.studies.operating_points.item import Item
 from orchestrator.studies.operating_points.preparation import ItemPreparation
-from tests.cases.psse import LINES, LOADS, MACHINES, TRANSFORMERS, raw, records
+from tests.cases.networks.psse import LINES, LOADS, MACHINES, TRANSFORMERS, raw, records
 
 CASE = """\
 name = "wscc"

@@ -5,13 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orchestrator.cases.branch_limits import loadings, outliers
 from orchestrator.cases.case import load_case
+from orchestrator.cases.networks.branch_limits import loadings, outliers
 from orchestrator.studies.operating_points.item import Item, Status
 from orchestrator.studies.operating_points.preparation import ItemPreparation
 from orchestrator.studies.screening.limits import limits_json, limits_sentence, limits_table
 from orchestrator.studies.screening.record import ItemRecord
-from tests.cases.psse import LINES, MACHINES, TRANSFORMERS, raw, records
+from tests.cases.networks.psse import LINES, MACHINES, TRANSFORMERS, raw, records
 from tests.studies.screening.test_following_loads import CASE
 
 LINE_MVA, TRANSFORMER_MVA = 80.0, 150.0

@@ -13,7 +13,7 @@ from orchestrator.core.errors import CaseError, InputError
 from orchestrator.studies.operating_points.item import Item
 from orchestrator.studies.operating_points.preparation import ItemPreparation
 from orchestrator.studies.screening.view import as_json
-from tests.cases.psse import ORDER, raw
+from tests.cases.networks.psse import ORDER, raw
 
 CASE = """\
 name = "radial"

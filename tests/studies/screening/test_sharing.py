@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 import orchestrator.face.api.case as gfor_face
-from orchestrator.cases.sharing import Reserve, SharingRule, droop_gain, power_limits, shares
+from orchestrator.cases.flow.sharing import Reserve, SharingRule, droop_gain, power_limits, shares
 from orchestrator.core.errors import ErrorKind, InputError
 from orchestrator.linear.spectra.modes import find_modes
 from orchestrator.studies.modes.modes import compute_modes

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orchestrator.cases.flow_limits import Excess
+from orchestrator.cases.flow.limits import Excess
 from orchestrator.studies.operating_points.item import Status
 from orchestrator.studies.operating_points.preparation import ItemPreparation
 from orchestrator.studies.screening.modes import CriticalRegion

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.sharing import SharingRule
+from orchestrator.cases.flow.sharing import SharingRule
 from orchestrator.core.errors import AnalysisError
 from orchestrator.linear.spectra.modes import find_modes
 from orchestrator.studies.modes.modes import compute_modes

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import orchestrator as gfor
-from orchestrator.cases.parameter_files import read_parameter_file
+from orchestrator.cases.form.parameter_files import read_parameter_file
 from orchestrator.studies.points.task import StudyCase
 from orchestrator.studies.sweep import point
 from orchestrator.studies.sweep.axes import Vary

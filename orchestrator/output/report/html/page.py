@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from orchestrator.cases.element_names import ElementNames
+from orchestrator.cases.networks.element_names import ElementNames
 from orchestrator.core.errors import InputError, few
 from orchestrator.core.safe_files import file_hash, write_page
 from orchestrator.output.report.html import sections, studies

@@ -10,7 +10,7 @@ import numpy as np
 import tomli_w
 
 from orchestrator.cases.case import Case
-from orchestrator.cases.schema import Value
+from orchestrator.cases.form.schema import Value
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import ComponentError, CosimError, ErrorKind
 from orchestrator.core.safe_files import write_text

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.studies.certification.case_file import lay_files
 from orchestrator.studies.certification.certificate import Certificate, refusing

@@ -5,7 +5,7 @@ from math import hypot, radians, sqrt
 
 import numpy as np
 
-from orchestrator.cases.schema import Value
+from orchestrator.cases.form.schema import Value
 from orchestrator.core.arrays import Numbers
 
 # rating that the plant under test is given [MVA], so that its per unit are the bench's

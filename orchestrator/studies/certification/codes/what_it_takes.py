@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
 from orchestrator.devices.fmi.description import VariableInfo
 from orchestrator.studies.certification.certificate import Certificate

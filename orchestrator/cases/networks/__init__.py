@@ -1,0 +1,1 @@
+"""Networks of other programs: what their files hold, as elements of our network."""

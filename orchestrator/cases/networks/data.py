@@ -1,0 +1,440 @@
+"""The network of a case: written out in tables and files, taken from another program's data, or both."""
+
+import cmath
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from scipy.sparse.linalg import spsolve
+
+from fmus.grid.network import Line, Load, Shunt, ThreeWinding
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
+from orchestrator.cases.flow.balance import inner_buses
+from orchestrator.cases.form.csv_rows import (
+    Row,
+    number,
+    optional_number,
+    place_of,
+    rows_of,
+    seen_from_here,
+)
+from orchestrator.cases.form.remedies import with_frequency
+from orchestrator.cases.form.schema import NetworkTable
+from orchestrator.cases.networks.branch_limits import FileLimits
+from orchestrator.cases.networks.cgmes.network import read_cgmes
+from orchestrator.cases.networks.controls import Control, with_controls
+from orchestrator.cases.networks.conversion import (
+    Generation,
+    ImportedNetwork,
+    bus_of,
+    import_network,
+)
+from orchestrator.cases.networks.element_names import BranchName
+from orchestrator.cases.networks.imported_flow import imported_equations
+from orchestrator.cases.networks.load_models import FlowLaws, device_laws, flow_laws, with_laws
+from orchestrator.cases.networks.psse.device_flow import solved_devices
+from orchestrator.cases.networks.psse.device_notes import device_notes
+from orchestrator.cases.networks.psse.raw import FileLoad, Machine, read_raw
+from orchestrator.cases.networks.psse.solution import stated_voltages
+from orchestrator.cases.networks.psse.synchronous_parts import synchronous_part
+from orchestrator.cases.networks.record_use import RecordUse
+from orchestrator.cases.networks.sources import read_matpower, read_pandapower
+from orchestrator.core.arrays import Matrix
+from orchestrator.core.errors import InputError, Problem, few
+
+_REFERENCE = 3  # code of a reference in the table of buses
+_FREQUENCY = 60.0  # of a RAW file that does not say it, as PSS/E's own default [Hz]
+_IN_OHMS = ("kv", "R_ohm", "X_ohm", "B_us")  # of a file of lines, in the place of R, X, B
+
+
+@dataclass(frozen=True)
+class _Source:
+    """The network of another program, what was taken over in another form, and its machines."""
+
+    network: ImportedNetwork
+    changes: tuple[Problem, ...] = ()
+    machines: tuple[Machine, ...] = ()
+    idle: frozenset[tuple[int, str]] = frozenset()
+    misfit: str = ""
+    records: tuple[RecordUse, ...] = ()
+    device_loads: tuple[Load, ...] = ()  # in the place of DC lines and the like
+    file_loads: tuple[FileLoad, ...] = ()
+    controls: tuple[Control, ...] = ()  # taps and shunts that move after an outage
+    counted_controls: str = ""  # how many could move, in words
+
+
+@dataclass(frozen=True)
+class NetworkData:
+    buses: tuple[str, ...]
+    lines: tuple[Line, ...]
+    loads: tuple[Load, ...]
+    shunts: tuple[Shunt, ...]
+    # power and voltage of the units at each bus
+    generation: dict[str, Generation] = field(default_factory=dict)
+    slack: str | None = None  # reference bus of the source
+    frequency: float | None = None  # rated frequency [Hz]; None leaves every model's own
+    stray_B: float = 0.0
+    # file and line of the lines that a file holds, by name
+    places: dict[str, str] = field(default_factory=dict)
+    transformers: tuple[ThreeWinding, ...] = ()
+    changes: tuple[Problem, ...] = ()
+    # machines, idle_machines: machines in service, one by one, where the source is of PSS/E; bus and identifier of
+    # those out of service
+    machines: tuple[Machine, ...] = ()
+    idle_machines: frozenset[tuple[int, str]] = frozenset()
+    # feeding, capacitors: by bus, as the source has them: loads below zero [MW] and capacitors [Mvar]
+    feeding: dict[str, float] = field(default_factory=dict)
+    capacitors: dict[str, float] = field(default_factory=dict)
+    misfit: str = ""  # what is wrong with the voltages that the source has as its solution
+    # loads of which the source tells constant impedances and currents, by name: they follow the
+    # voltage in a power flow that starts from another, as that of an outage does
+    flow_laws: Mapping[str, FlowLaws] = field(default_factory=dict)
+    records: tuple[RecordUse, ...] = ()  # what became of the records of the source
+    device_loads: tuple[str, ...] = ()  # names of the loads in the place of DC lines and the like
+    # ratings and bands of a RAW or MATPOWER file; those of other sources are not meant
+    limits: FileLimits = field(default_factory=FileLimits)
+    titles: Mapping[str, str] = field(default_factory=dict)  # names in the source's file, by bus
+    branch_names: Mapping[str, BranchName] = field(default_factory=dict)  # as the source has them
+    unit_names: Mapping[str, str] = field(default_factory=dict)  # of the generators, by bus
+    # file_loads: loads one by one, where the source is of PSS/E; recorded_loads: names of those whose laws are of
+    # records of dynamics data
+    file_loads: tuple[FileLoad, ...] = ()
+    recorded_loads: frozenset[str] = frozenset()
+    controls: tuple[Control, ...] = ()  # taps and shunts that move in the power flow of an outage
+    counted_controls: str = ""  # how many could move, in words
+
+
+def network_data(table: NetworkTable, directory: Path, slack: str | None = None) -> NetworkData:
+    """Buses, lines, loads and shunts of a network table, its files and its source included.
+
+    ``slack``: the unit or bus that the case names as the reference.
+
+    Raises an `InputError` if a file is missing, lacks a column, holds something that is not a number, or a source holds
+    something that the grid model does not have."""
+    found = _source(table, directory, slack)
+    source = found.network
+    lines = [
+        Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B, t.tap, t.shift, t.X_C)
+        for n, t in table.lines.items()
+    ]
+    loads = [with_laws(Load(n, t.bus, t.p, t.q), table, t) for n, t in table.loads.items()]
+    shunts = [Shunt(n, t.bus, t.g, t.b) for n, t in table.shunts.items()]
+    transformers = [
+        ThreeWinding(
+            n, t.buses, _star(t.X_12, t.X_13, t.X_23), _star(t.R_12, t.R_13, t.R_23), t.tap, t.shift
+        )
+        for n, t in table.three_winding_transformers.items()
+    ]
+    in_file = _lines_of_file(directory / table.lines_file) if table.lines_file is not None else []
+    lines += [line for line, _ in in_file]
+    if table.loads_file is not None:
+        for row in rows_of(directory / table.loads_file, ("bus", "p_mw", "q_mvar")):
+            bus = bus_name(row["bus"])
+            load = Load(f"load_{row['bus']}", bus, number(row, "p_mw"), number(row, "q_mvar"))
+            loads.append(with_laws(load, table))
+    buses = dict.fromkeys((*source.buses, *table.buses))
+    if not buses:  # no list of buses to check the lines' ends against: the ends define the buses
+        ends = [bus for line in lines for bus in (line.from_bus, line.to_bus)]
+        buses = dict.fromkeys([*ends, *(bus for x in transformers for bus in x.buses)])
+    return NetworkData(
+        tuple(buses),
+        (*source.lines, *lines),
+        (
+            *(
+                with_laws(x, table, parts=source.load_parts.get(x.name, (0j, 0j)))
+                for x in source.loads
+            ),
+            *(with_laws(x, table, device_laws(table)) for x in found.device_loads),
+            *loads,
+        ),
+        (*source.shunts, *shunts),
+        source.generation,
+        source.slack,
+        table.frequency if table.frequency is not None else source.frequency,
+        table.stray_B,
+        {line.name: place for line, place in in_file},
+        (*source.transformers, *transformers),
+        found.changes,
+        found.machines,
+        found.idle,
+        source.feeding,
+        source.capacitors,
+        found.misfit,
+        {
+            load.name: flow_laws(load, source.load_parts[load.name])
+            for load in source.loads
+            if load.name in source.load_parts
+        },
+        limits=source.limits if table.raw or table.matpower else FileLimits(),
+        records=found.records,
+        titles=source.titles,
+        branch_names=source.branch_names,
+        unit_names=source.unit_names,
+        device_loads=tuple(x.name for x in found.device_loads),
+        file_loads=found.file_loads,
+        controls=found.controls,
+        counted_controls=found.counted_controls,
+    )
+
+
+def _star(one_two: float, one_three: float, two_three: float) -> tuple[float, float, float]:
+    """Impedances of the windings in the star, from those between two windings each."""
+    half = (one_two + one_three + two_three) / 2
+    return half - two_three, half - one_three, half - one_two
+
+
+def bus_name(label: str) -> str:
+    """Name of a bus in FMU variables, which cannot begin with a digit: ``12`` → ``bus_12``."""
+    return f"bus_{label}" if label[:1].isdigit() else label
+
+
+def _source(table: NetworkTable, directory: Path, slack: str | None) -> _Source:
+    imported = ImportedNetwork()
+    if table.raw is not None:
+        return _from_raw(directory / table.raw, table, slack)
+    if table.keep_load_parts:
+        raise InputError(
+            "keep_load_parts is for networks of PSS/E; remove the key, or give the file as 'raw'"
+        )
+    if table.move_controls:
+        raise InputError(
+            "move_controls is for networks of PSS/E; remove the key, or give the file as 'raw'"
+        )
+    if table.cgmes is not None:
+        return _from_cgmes(directory / table.cgmes, table)
+    if table.leave_out:
+        raise InputError(
+            "leave_out is for networks of PSS/E and CGMES; remove the key, or give 'raw' or 'cgmes'"
+        )
+    if table.matpower is not None:
+        path = seen_from_here(directory / table.matpower)
+        tables = read_matpower(path)
+        imported = import_network(tables)
+        misfit = misfit_of(imported, tables.bus, tables.labels)
+        if table.frequency is None:
+            text = "MATPOWER's cases hold no frequency: every model keeps its own, usually 50 Hz"
+            text += f"; write it, such as {with_frequency(_FREQUENCY)}"
+            return _Source(imported, (Problem(str(path), text),), misfit=misfit)
+        return _Source(imported, misfit=misfit)
+    if table.pandapower is not None:
+        imported = import_network(read_pandapower(table.pandapower, directory))
+    return _Source(imported)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """A question to a RAW file: the file as it is now, and all that a case says of the network."""
+
+    path: Path
+    version: tuple[int, int]  # time of its last change [ns], and size [bytes]
+    slack: str | None
+    text: str  # the case's table as JSON, by which it is told from others
+    table: NetworkTable = field(compare=False)
+
+
+def _from_raw(path: Path, table: NetworkTable, slack: str | None) -> _Source:
+    """A network of PSS/E, which every scenario of a case asks for."""
+    path = seen_from_here(path)
+    state = path.stat() if path.is_file() else None
+    version = (state.st_mtime_ns, state.st_size) if state else (0, 0)
+    return _read_from_raw(_Asked(path, version, slack, table.model_dump_json(), table))
+
+
+@lru_cache(maxsize=2)
+def _read_from_raw(asked: _Asked) -> _Source:
+    """A network of PSS/E; the ratings of the machines are those of the file."""
+    table = asked.table
+    raw = read_raw(
+        asked.path,
+        table.leave_out,
+        keep_load_parts=table.keep_load_parts,
+        slack=asked.slack,
+    )
+    if not raw.machines:
+        raise InputError(
+            f"{raw.tables.name}: no generator is in service, so nothing feeds the network and nothing can swing; "
+            "give a case with generators"
+        )
+    own, changes = raw.tables.frequency, list(raw.changes)
+    if own is None and table.frequency is None:
+        text = f"BASFRQ, the sixth value, is missing or 0: {_FREQUENCY:g} Hz are taken"
+        changes.append(
+            Problem(
+                f"{raw.tables.name}, line 1",
+                f"{text}; if it is another, write it, such as {with_frequency(50.0)}",
+            )
+        )
+    if table.frequency is not None and own is not None and own != table.frequency:
+        text = f"BASFRQ is {own:g} Hz, and the case's frequency = {table.frequency:g} Hz counts; one of them is wrong"
+        changes.append(Problem(f"{raw.tables.name}, line 1", text))
+    # the machines are those of the file
+    needed = {bus for device in raw.devices for bus in device.places}
+    imported = import_network(raw.tables, joined=False, needed=needed)
+    imported = replace(imported, frequency=imported.frequency or _FREQUENCY)
+    references = [
+        bus_of(raw.tables.labels[int(row[0])]) for row in raw.tables.bus if row[1] == _REFERENCE
+    ]
+    part = synchronous_part(imported, raw.devices, references)
+    imported = part.network
+    left = {x for x in raw.machines if bus_name(str(x.bus)) in part.left}
+    machines = tuple(x for x in raw.machines if x not in left)
+    if part.left:
+        text = (
+            f"only DC lines lead to {few(sorted(part.left), _SHOWN)}: a part with a frequency of its own, which is "
+            "left out; the DC lines feed here what they do at the file's voltages there"
+        )
+        changes.append(Problem(raw.tables.name, text))
+    moving = with_controls(raw, imported)
+    if table.move_controls:
+        imported = moving.network
+        text = moving.in_words if moving.counted else "no tap and no switched shunt can move"
+        changes.append(Problem(raw.tables.name, text))
+    solved = solved_devices(raw.devices, imported, stated_voltages(raw.tables.bus))
+    changes += device_notes(solved, table, raw.tables.name)
+    with_devices = replace(imported, loads=(*imported.loads, *solved.loads))
+    misfit = misfit_of(with_devices, raw.tables.bus, raw.tables.labels, NOT_SOLVED)
+    ratings: dict[str, float] = {}
+    for machine in machines:
+        bus = bus_name(raw.tables.labels[machine.bus])
+        ratings[bus] = ratings.get(bus, 0.0) + machine.likely_mva
+    generation = {
+        bus: replace(g, rating_mva=ratings[bus]) for bus, g in imported.generation.items()
+    }
+    return _Source(
+        replace(imported, generation=generation),
+        tuple(changes),
+        machines,
+        raw.idle | {(x.bus, x.name.strip()) for x in left},
+        misfit,
+        records=tuple(
+            replace(x, why=solved.words_of(x.kind, x.line) or x.why) for x in raw.records
+        ),
+        device_loads=solved.loads,
+        file_loads=raw.loads,
+        controls=moving.controls if table.move_controls else (),
+        counted_controls=moving.counted,
+    )
+
+
+def _from_cgmes(path: Path, table: NetworkTable) -> _Source:
+    """A network of CGMES; the ratings of the units are those of the model where it knows them."""
+    model = read_cgmes(seen_from_here(path), table.leave_out)
+    imported = import_network(model.tables)
+    ratings = {bus_of(label): rating for label, rating in model.ratings.items()}
+    generation = {
+        bus: replace(g, rating_mva=ratings.get(bus, g.rating_mva))
+        for bus, g in imported.generation.items()
+    }
+    # balances SV's losses
+    slack = imported.slack or max(generation, key=lambda bus: generation[bus].p_mw)
+    misfit = misfit_of(replace(imported, slack=slack), model.tables.bus, model.tables.labels)
+    return _Source(replace(imported, generation=generation), model.changes, misfit=misfit)
+
+
+def _lines_of_file(path: Path) -> list[tuple[Line, str]]:
+    lines = []
+    ohms = "X_ohm" in next(iter(rows_of(path, ("from", "to"))), ())
+    for row in rows_of(path, ("from", "to", *(_IN_OHMS if ohms else ("R", "X", "B")))):
+        if not (row["from"] and row["to"]):
+            raise InputError(
+                f"{place_of(row)}: from = {row['from']!r}, to = {row['to']!r}; name the bus at each end"
+            )
+        circuit = (row.get("circuit") or "").strip()
+        if circuit and not (circuit.isascii() and circuit.isalnum()):
+            raise InputError(
+                f"{place_of(row)}: circuit = {circuit!r}; it becomes part of a name: use letters and digits"
+            )
+        name = "_".join(
+            ["line", row["from"], row["to"], *([circuit] if circuit not in ("", "1") else [])]
+        )
+        ends = bus_name(row["from"]), bus_name(row["to"])
+        tap, shift = optional_number(row, "tap") or 1.0, optional_number(row, "shift") or 0.0
+        X, R, B = _impedance(row)
+        lines.append((Line(name, *ends, X, R, B, tap, shift), place_of(row)))
+    return lines
+
+
+def _impedance(row: Row) -> list[float]:
+    """X, R and B [pu on 100 MVA], which a row gives so or in ohms and µS at its voltage."""
+    given = [key for key in ("X", "X_ohm") if (row.get(key) or "").strip()]
+    if len(given) == 2:
+        raise InputError(f"{place_of(row)}: X and X_ohm are both given; leave one of them empty")
+    if "X_ohm" not in row or given == ["X"]:
+        return [number(row, key) for key in ("X", "R", "B")]
+    kv, R, X, B = (number(row, key) for key in _IN_OHMS)
+    if kv <= 0:
+        raise InputError(
+            f"{place_of(row)}: kv = {kv:g}; ohms need the line's rated voltage, above 0"
+        )
+    z = kv**2 / SYSTEM_BASE_MVA
+    return [X / z, R / z, B * 1e-6 * z]
+
+
+_VM, _VA = 7, 8  # columns of MATPOWER's table
+_SMALL = 1e-3  # part of the file's load that may be out of balance at a bus
+_ROUNDS = 20  # to voltages that the file lacks
+_SHOWN = 3  # buses that are named; the others are counted
+
+NOT_SOLVED = (
+    "the file is not solved: every bus has VA = 0. The power flow is computed here, and what PSS/E takes from VM "
+    "(parts of loads, some generators' voltages) is that of the file; export the solved case"
+)
+
+
+def misfit_of(
+    network: ImportedNetwork, bus: Matrix, labels: Mapping[int, str], unsolved: str = ""
+) -> str:
+    """Return what does not fit; "" where all does, and ``unsolved`` where the file has no solution.
+
+    ``bus``: MATPOWER's table with the voltages [pu, degrees]; ``labels``: names of its buses by number."""
+    stated = {
+        bus_of(labels[int(r[0])]): cmath.rect(r[_VM], np.radians(r[_VA])) for r in bus if r[_VM] > 0
+    }
+    if network.slack not in stated or not bus[:, _VA].any():
+        return "" if bus[:, _VA].any() else unsolved
+    places = [place for place in network.buses if place in stated]
+    # of transformers with an open winding
+    stars = [place for place in network.buses if place not in stated]
+    buses = [*places, *stars, *(inner for x in network.transformers for inner in inner_buses(x))]
+    equations = imported_equations(network, buses, {}, network.slack)
+    known, matrix = len(places), equations.matrix
+    voltages = np.array([*(stated[place] for place in places), *[1 + 0j] * (len(buses) - known)])
+    if known < len(buses):
+        inside = matrix[known:]
+        for _ in range(_ROUNDS if equations.fed[known:].any() else 1):  # boundaries have loads
+            drawn = (equations.fed / voltages).conj()[known:] - inside[:, :known] @ voltages[:known]
+            voltages[known:] = np.atleast_1d(spsolve(inside[:, known:].tocsc(), drawn))
+    left = SYSTEM_BASE_MVA * (equations.fed - equations.powers(voltages))
+    units = [k for k, place in enumerate(places) if place in network.generation]
+    left[units], left[[equations.slack, *range(known, len(buses))]] = left[units].real, 0
+    rounding = _rounding(bus[:, _VM]) + np.radians(_rounding(bus[:, _VA]))
+    noise = SYSTEM_BASE_MVA * rounding * abs(voltages) * (abs(matrix) @ np.ones(len(buses)))
+    load = sum(x.p_mw for x in network.loads if x.p_mw > 0)
+    found = [int(k) for k in np.argsort(-abs(left)) if abs(left[k]) > noise[k] + _SMALL * load]
+    return _sentence({buses[k]: left[k] for k in found}, known) if found else ""
+
+
+def _sentence(left: Mapping[str, complex], buses: int) -> str:
+    shown = [
+        f"{p.real:+.4g} MW {p.imag:+.4g} Mvar at {place}" for place, p in [*left.items()][:_SHOWN]
+    ]
+    more = f" and less at {len(left) - _SHOWN} more" if len(left) > _SHOWN else ""
+    if len(left) == 1:
+        likely = "its load, its shunt, its unit's power or a branch to a bus with a unit"
+    elif 2 * len(left) > buses:
+        likely = "voltages of another case, or angles that are not in degrees"
+    else:
+        likely = "a branch between these buses (its status, ratio, shift, impedance and base), or a load at the other"
+    return (
+        "the file's own solution (VM, VA) does not fit its data, so the power flow computed here is another: with "
+        f"these voltages its data feed, beyond what the network takes away, {', '.join(shown)}{more}; look at {likely}"
+    )
+
+
+def _rounding(values: np.ndarray) -> float:
+    """Half of the last digit to which numbers are given."""
+    return next(
+        0.5 * 10.0**-d for d in range(16) if d == 15 or not (np.round(values, d) - values).any()
+    )

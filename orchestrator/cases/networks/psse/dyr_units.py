@@ -1,0 +1,228 @@
+"""Units of a case from the machines of a RAW file and their records in a DYR file.
+
+Parts of machines without a record are what [units] chooses for them, else what PSS/E assumes."""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from fmus.synchronous_generator.dyr_fields import MACHINE_VARIANTS
+from orchestrator.cases.form.unusual_value import UnusualValue
+from orchestrator.cases.networks.data import bus_name
+from orchestrator.cases.networks.psse.dyr import (
+    CLASSICAL,
+    COMPENSATION,
+    MANUAL,
+    WITHOUT_INERTIA,
+    machine_models,
+)
+from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
+from orchestrator.cases.networks.psse.raw import Machine, unit_labels
+from orchestrator.cases.networks.unit_row import UnitRow, checked
+from orchestrator.core.errors import InputError
+
+_WITHOUT = {"exciter": MANUAL, "governor": "constant_power", "stabilizer": "none"}
+"""What PSS/E assumes where there is no record."""
+
+# what is constant without the part
+_CONSTANT = {"exciter": "field voltage", "governor": "mechanical power"}
+_OTHERS = 2  # machines with a record from which on a machine without one is questioned
+_CONDENSER = 0.01  # active power [pu of the rating] below which a machine needs no governor
+
+
+def with_choices(
+    rows: Sequence[UnitRow], replaced: Collection[str], chosen: Mapping[str, str]
+) -> list[UnitRow]:
+    """The units with the parts that ``[units]`` chooses: the machine's variant, and what has no record."""
+    found, acted = [], set[str]()
+    for row in rows:
+        own = (
+            {}
+            if row.label in replaced or row.converter
+            else {k: n for k, n in chosen.items() if _fits(k, n, row)}
+        )
+        acted |= {*own}
+        found.append(replace(row, parts={**row.parts, **own}) if own else row)
+    machines = [row for row in rows if row.label not in replaced and not row.converter]
+    for kind in (kind for kind in chosen if kind not in acted and machines):
+        raise InputError(
+            f"{kind} = {chosen[kind]!r} in [units] acts on no machine: {_reason(kind, machines)}"
+        )
+    return found
+
+
+def _fits(kind: str, name: str, row: UnitRow) -> bool:
+    """Return whether a choice is for this machine: no record says otherwise, and the machine can have the part."""
+    if kind == "machine":
+        return row.parts.get("machine") == MACHINE_VARIANTS.get(name, name)
+    classical = row.parts.get("machine") == "classical" and kind in ("exciter", "stabilizer")
+    return kind not in row.parts and not classical
+
+
+def _reason(kind: str, machines: Sequence[UnitRow]) -> str:
+    if kind != "machine":
+        return "the DYR file has a record of it for every machine that can have one; remove the key"
+    names = sorted({row.parts["machine"] for row in machines})
+    variants = [variant for variant, of in MACHINE_VARIANTS.items() if of in names]
+    there = (
+        f"; beside its own name a record may become {', '.join(map(repr, variants))}"
+        if variants
+        else ""
+    )
+    known = ", ".join(names)
+    return f"the records of the DYR file say what each machine is ({known}){there}; correct or remove the key"
+
+
+def without_idle_controls(rows: Sequence[UnitRow], place: str) -> list[UnitRow]:
+    """The units without a stabiliser or a compensator where there is no exciter, with a question for each.
+
+    PSS/E leaves them idle. ``place``: of a record whose line is not known."""
+    return [row if row.partial else _without_idle_controls(row, place) for row in rows]
+
+
+def _without_idle_controls(row: UnitRow, place: str) -> UnitRow:
+    own = row.parameters.get("sg", {})
+    if row.parts.get("exciter", MANUAL) != MANUAL or row.converter is not None:
+        return row
+    kinds = {
+        "stabiliser": [name for name in own if name.startswith("pss.")],
+        "compensator": [name for name in own if name in COMPENSATION],
+    }
+    doubts = [
+        (
+            names[0],
+            f"{place}, line {row.lines[names[0]]}" if names[0] in row.lines else place,
+            f"a {kind} at a machine without an exciter acts on nothing, as in PSS/E, and is left out; add the "
+            "exciter's record, or choose one in [units], such as exciter = 'sexs'",
+        )
+        for kind, names in kinds.items()
+        if names
+    ]
+    idle = {name for names in kinds.values() for name in names}
+    return replace(
+        row,
+        parts={kind: part for kind, part in row.parts.items() if kind != "stabilizer"},
+        parameters={**row.parameters, "sg": {k: x for k, x in own.items() if k not in idle}},
+        doubts=(*row.doubts, *doubts),
+    )
+
+
+def missing_records(rows: Sequence[UnitRow], place: str) -> Iterator[UnusualValue]:
+    """Ask about machines without an exciter or a governor where others have one, or all have the other of both."""
+    for (kind, quantity), other in zip(_CONSTANT.items(), reversed(_CONSTANT), strict=True):
+        able = [row for row in rows if _can_have(kind, row)]
+        without = [row for row in able if kind not in row.parts and not row.partial]
+        having = len(able) - len(without)
+        all_other = (
+            kind == "governor" and len(able) >= _OTHERS and all(other in row.parts for row in able)
+        )
+        if not without or not (having >= _OTHERS or (not having and all_other)):
+            continue
+        where = (
+            f"{having} of {len(able)} machines have one"
+            if having
+            else f"every machine has its {other}'s"
+        )
+        chosen = next(
+            (row.parts[kind] for row in able if kind in row.parts),
+            {"governor": "tgov1"}.get(kind, "sexs"),
+        )
+        text = (
+            f"no record of {'an' if kind == 'exciter' else 'a'} {kind}, where {where}: the {quantity} is constant; add "
+            f"the record, or choose a part in [units], such as {kind} = {chosen!r}"
+        )
+        yield from (UnusualValue(f"sg{row.label}.{kind}", place, text) for row in without)
+
+
+def _can_have(kind: str, row: UnitRow) -> bool:
+    if row.converter is not None or row.parts.get("machine") == "classical":
+        return False
+    return kind != "governor" or abs(row.p_mw) > _CONDENSER * row.rating_mva
+
+
+def completed(rows: Sequence[UnitRow], replaced: Collection[str]) -> list[UnitRow]:
+    """The units with what PSS/E assumes for every part that nothing says, also where a record of it is left out."""
+    return [
+        row
+        if row.converter or row.label in replaced
+        else replace(row, parts={**_WITHOUT, **row.parts})
+        for row in rows
+    ]
+
+
+def rows_of_machines(machines: Sequence[Machine], place: str) -> list[UnitRow]:
+    """A unit for each machine, in their order, without what it is made of."""
+    at_bus: dict[int, list[Machine]] = {}
+    for machine in machines:
+        at_bus.setdefault(machine.bus, []).append(machine)
+    labels = unit_labels(machines)
+    rows = []
+    for machine in machines:
+        here = at_bus[machine.bus]
+        row = UnitRow(
+            labels[machine.bus, machine.name.strip()],
+            bus_name(str(machine.bus)),
+            machine.rating_mva,
+            machine.p_mw,
+            machine.v_pu,
+            place=place,
+            q_min_mvar=sum(m.q_min_mvar for m in here),
+            q_max_mvar=sum(m.q_max_mvar for m in here),
+            p_min_mw=machine.p_min_mw,
+            p_max_mw=machine.p_max_mw,
+            likely_mva=machine.likely_mva,
+        )
+        rows.append(checked(row, place, is_base=True))
+    return rows
+
+
+def with_infinite_buses(rows: Sequence[UnitRow], machines: Sequence[Machine]) -> list[UnitRow]:
+    """The units of a network without dynamics data, those in the place of missing machines as infinite buses."""
+    infinite = {bus_name(str(machine.bus)): machine for machine in machines if machine.is_infinite}
+    return [
+        replace(
+            row,
+            is_infinite=True,
+            parts={"machine": CLASSICAL, **_WITHOUT},
+            parameters={"sg": {**WITHOUT_INERTIA, "machine.X_d1": infinite[row.bus].source.imag}},
+        )
+        if row.bus in infinite
+        else row
+        for row in rows
+    ]
+
+
+def with_records(
+    rows: Sequence[UnitRow],
+    machines: Sequence[Machine],
+    records: Sequence[DynamicRecord],
+    leaving_out: Sequence[str],
+    without: Collection[str],
+    idle: Collection[tuple[int, str]] = (),
+    *,
+    approximate: bool = False,
+) -> list[UnitRow]:
+    """The units with what the records say of them."""
+    keys = [(machine.bus, machine.name.strip()) for machine in machines]
+    replaced = {key for key, row in zip(keys, rows, strict=True) if row.label in without}
+    models = machine_models(records, machines, leaving_out, replaced, idle, approximate=approximate)
+    found = []
+    for key, row in zip(keys, rows, strict=True):
+        model = models.get(key)
+        if model is None:
+            found.append(row)
+        elif model.converter is None:
+            own = {"sg": model.parameters}
+            of_records = replace(row, parameters=own, parts=model.parts, partial=model.partial)
+            found.append(replace(of_records, doubts=model.doubts, lines=model.lines))
+        else:
+            own = {"gfor": model.parameters}
+            found.append(
+                replace(
+                    row,
+                    parameters=own,
+                    converter=model.converter,
+                    replaced=model.replaced,
+                    lines=model.lines,
+                )
+            )
+    return found

@@ -1,0 +1,83 @@
+"""The records of dynamics data that gfor reads: what each becomes, where that is known from, what is left."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from fmus.grid_following.dyr_fields import CONVERTER, FIELDS, MODEL
+from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
+from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
+from fmus.synchronous_generator.dyr_fields import DYR_RECORDS, DyrRecord
+from orchestrator.cases.networks.psse.load_records import LOAD_RECORDS
+
+_LIBRARY = "PSS/E's model library as PowerWorld's and NEPLAN's guides and ANDES' reader describe it"
+_REGFM = "WECC's specification of REGFM_A1"
+_LOADS = "GridPACK's reader and model"
+_GENERIC = (
+    "WECC's generic converters: fields as ANDES and GridPACK read them, diagrams of WECC's guide"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class KnownRecord:
+    """A record: PSS/E's name, its kind, our part, where its fields are known from, and what is approximated."""
+
+    name: str
+    kind: str
+    part: str
+    source: str
+    approximated: str = ""
+
+
+def known_records() -> list[KnownRecord]:
+    """All records, by kind in the order of the tables that hold them."""
+    found = [
+        KnownRecord(name, record.kind, record.part, _LIBRARY, "; ".join(_limits(record)))
+        for name, record in DYR_RECORDS.items()
+    ]
+    found += [
+        KnownRecord(name, record.kind, record.part, _REGFM, "; ".join(_limits(record)))
+        for name, record in REGFM_A1_RECORDS.items()
+    ]
+    found += [
+        KnownRecord(name, "device", record.part, _LIBRARY, "; ".join(_limits(record)))
+        for name, record in STATIC_VAR_RECORDS.items()
+    ]
+    found += [
+        KnownRecord(name, "load", "load_model", _LOADS, "an exponent other than 0, 1, 2 near v_0")
+        for name in LOAD_RECORDS
+    ]
+    asked = "only with dyr_approximate = true; each case lists what that leaves out"
+    found += [
+        KnownRecord(
+            name, "converter" if name == CONVERTER else "converter control", MODEL, _GENERIC, asked
+        )
+        for name in FIELDS
+    ]
+    return found
+
+
+def _limits(record: DyrRecord) -> Iterator[str]:
+    """Return what a part of ours cannot take of a record, and what it does not use."""
+    for field in record.fields:
+        if field.bus_of:
+            yield f"{field.name} only the machine's own"
+        if field.only and not field.all_there:
+            yield f"{field.name} only {' or '.join(f'{value:g}' for value in field.only)}"
+        if field.same_as:
+            yield f"{field.name} only as {field.same_as}"
+    used = {name for f in record.fields for name in (f.times, f.same_as, f.nothing_without) if name}
+    unused = [
+        f.name
+        for f in record.fields
+        if not (
+            f.parameters
+            or f.negated
+            or f.only
+            or f.bus_of
+            or f.same_as
+            or f.zero_sets
+            or f.name in used
+        )
+    ]
+    if unused:
+        yield f"{', '.join(unused)} not used"

@@ -1,0 +1,12 @@
+"""A file of PSS/E's power flow data, whichever of its two forms it has: lines (RAW) or JSON (RAWX)."""
+
+from pathlib import Path
+
+from orchestrator.cases.networks.psse.rawx import read_rawx
+from orchestrator.cases.networks.psse.records import RawFile, read_records, text_of
+
+
+def read_file(path: Path) -> RawFile:
+    """The records of a RAW or a RAWX file, told apart by what stands in it."""
+    text = text_of(path)
+    return read_rawx(path, text) if text.lstrip().startswith("{") else read_records(path)

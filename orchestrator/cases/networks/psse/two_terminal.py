@@ -1,0 +1,114 @@
+"""Two-terminal DC lines of a PSS/E file, in the state that their controls give."""
+
+import math
+from dataclasses import dataclass
+
+from orchestrator.cases.form.remedies import without_kinds
+from orchestrator.cases.networks.psse.bridges import Bridges
+from orchestrator.cases.networks.psse.devices import DeviceEnd, HeldDevice, Voltages
+from orchestrator.core.errors import InputError
+
+_CURRENT = 2  # MDC of a line that holds its current
+_ROUNDS = 500
+_ACCURATE = 1e-12  # change of the current in a round [kA]
+_BEYOND = math.radians(0.5)  # by which an angle may exceed its band unasked
+
+
+@dataclass(frozen=True, slots=True)
+class Pole:
+    """Currents [kA] and voltages [kV] of a DC line."""
+
+    current: float
+    rectifier_kv: float
+    inverter_kv: float
+
+
+@dataclass(frozen=True)
+class TwoTerminal(HeldDevice):
+    """A DC line: the rectifier's firing angle holds the current or the power, the inverter's the voltage.
+
+    Taps stay where the file has them."""
+
+    place: str
+    mode: int  # MDC
+    r_ohm: float
+    setting: float  # SETVL: power [MW] of the rectifier, or below zero of the inverter; current [A]
+    scheduled_kv: float  # VSCHD
+    least_kv: float  # VCMOD: inverter voltage below which a power control holds the current instead
+    compounding_ohm: float  # RCOMP
+    margin: float  # DELTI
+    buses: tuple[int, int]  # of rectifier and inverter
+    bridges: tuple[Bridges, Bridges]
+
+    @property
+    def places(self) -> tuple[int, ...]:
+        return self.buses
+
+    def endings(self, voltages: Voltages) -> tuple[DeviceEnd, ...]:
+        pole = self.pole(voltages)
+        found = []
+        for bus, bridges, kilovolts, sign in self._ends(pole):
+            q = bridges.reactive(abs(voltages[bus]), pole.current, kilovolts)
+            fed = complex(sign * kilovolts * pole.current, -q)
+            found.append(DeviceEnd(self.ending_name("dc", bus), bus, fed))
+        return tuple(found)
+
+    def doubts(self, voltages: Voltages) -> tuple[str, ...]:
+        pole, found = self.pole(voltages), []
+        names = ("the rectifier's firing angle", "the inverter's extinction angle")
+        for name, (bus, bridges, kilovolts, _) in zip(names, self._ends(pole), strict=True):
+            if not bridges.is_known:
+                found.append(
+                    f"a converter without bridges (NB or EBAS is 0) at bus {bus}: it draws no reactive power"
+                )
+                continue
+            angle = bridges.angle(abs(voltages[bus]), pole.current, kilovolts)
+            if angle > bridges.most_angle + _BEYOND and pole.current:
+                found.append(
+                    f"{name} is {math.degrees(angle):.3g} degrees, beyond its band of "
+                    f"{math.degrees(bridges.least_angle):g} to {math.degrees(bridges.most_angle):g}: its tap is held, "
+                    "where PSS/E moves it"
+                )
+        return tuple(found)
+
+    def pole(self, voltages: Voltages) -> Pole:
+        """Return the line's state at voltages of its buses.
+
+        Raises an `InputError` where the line cannot carry what it is set to."""
+        rectifier, inverter = (abs(voltages[bus]) for bus in self.buses)
+        order = abs(self.setting)
+        current = order / 1000 if self.mode == _CURRENT else order / max(self.scheduled_kv, 1e-3)
+        for _ in range(_ROUNDS):
+            inverter_kv = min(
+                self.scheduled_kv - self.compounding_ohm * current,
+                self.bridges[1].most_voltage(inverter, current),
+            )
+            rectifier_kv = inverter_kv + self.r_ohm * current
+            most = self.bridges[0].most_voltage(rectifier, current)
+            is_at_limit = rectifier_kv > most
+            if is_at_limit:
+                rectifier_kv, inverter_kv = most, most - self.r_ohm * current
+            if min(rectifier_kv, inverter_kv) <= 0:
+                break
+            wanted = self._order(rectifier_kv, inverter_kv)
+            wanted *= 1 - self.margin if is_at_limit else 1.0
+            if abs(wanted - current) <= _ACCURATE * max(1.0, current):
+                return Pole(current, rectifier_kv, inverter_kv)
+            current = (current + wanted) / 2
+        raise InputError(
+            f"{self.place}, line {self.line}: the DC line {self.name!r} cannot carry SETVL = {self.setting:g} with "
+            f"VSCHD = {self.scheduled_kv:g} kV and RDC = {self.r_ohm:g} ohm at its buses' voltages; mend the record, "
+            f"or write {without_kinds([self.section])}"
+        )
+
+    def _order(self, rectifier_kv: float, inverter_kv: float) -> float:
+        """Return the current that is ordered [kA]."""
+        if self.mode == _CURRENT:
+            return abs(self.setting) / 1000
+        if inverter_kv < self.least_kv:
+            return abs(self.setting) / self.scheduled_kv
+        return abs(self.setting) / (rectifier_kv if self.setting > 0 else inverter_kv)
+
+    def _ends(self, pole: Pole) -> tuple[tuple[int, Bridges, float, int], ...]:
+        kilovolts = (pole.rectifier_kv, pole.inverter_kv)
+        return tuple(zip(self.buses, self.bridges, kilovolts, (-1, 1), strict=True))

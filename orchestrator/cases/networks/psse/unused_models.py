@@ -1,0 +1,111 @@
+"""Questions about records of a DYR file that are of no machine: models of loads, of SVCs, of DC lines, and strays."""
+
+import tomllib
+from collections.abc import Iterator, Sequence
+
+from orchestrator.cases.form.schema import LoadModelTable
+from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
+from orchestrator.cases.networks.psse.missing_models import OF_MACHINES, kind_of
+from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
+from orchestrator.cases.networks.source_changes import Changes
+from orchestrator.core.errors import Problem, counted, few
+
+_MATTER = {
+    "load": "loads follow [network] load_model",
+    "device": "what it feeds in the power flow is constant",
+    "unknown": "gfor does not know what it is",
+}
+"""What stands for a model of no machine, by its kind; relays act on events only, and are not asked about."""
+
+_EXPONENTIAL = ("IEELAL", "IEELBL", "IEELAR", "IEELOW", "IEELZN")
+_VALUES = 14
+_LAWS = {0.0: "p", 1.0: "i", 2.0: "z"}
+_SUM = 1e-3  # by which shares may miss 1
+_MOST_BUSES = 8
+
+
+def unused_models(
+    records: Sequence[DynamicRecord],
+    uses: Sequence[RecordUse],
+    said: LoadModelTable | None = None,
+) -> list[Problem]:
+    """One question for each model that matters, with the lines of all its records.
+
+    ``said``: how the case's loads follow the voltage; records that say the same are not asked about."""
+    if not records:
+        return []
+    changes = Changes(records[0].file)
+    unused = [
+        record
+        for record, use in zip(records, uses, strict=True)
+        if use.use is UseOfRecord.NOT_USED and use.of_no_machine
+    ]
+    for name in dict.fromkeys(record.name for record in unused):
+        own = [record for record in unused if record.name == name]
+        kind = kind_of(name)
+        law = _law(own)
+        is_said = bool(law) and said == LoadModelTable.model_validate(
+            tomllib.loads(law)["load_model"]
+        )
+        if kind in _MATTER and not is_said:
+            remedy = f"; to take it for all loads, write {law} in [network]" if law else ""
+            buses = few(dict.fromkeys(str(record.bus) for record in own), _MOST_BUSES)
+            text = f"{name} (bus {buses}) is of no machine and not used: {_MATTER[kind]}"
+            for record in own:
+                changes.note(record.line, text + remedy)
+    return [*_strays(records, unused), *changes.listed()]
+
+
+def _strays(records: Sequence[DynamicRecord], unused: Sequence[DynamicRecord]) -> Iterator[Problem]:
+    """Yield one question about all records of machines that the RAW file lacks, which PSS/E passes over too.
+
+    ``unused``: the records of no machine, among ``records``."""
+    strays = [record for record in unused if kind_of(record.name) in OF_MACHINES]
+    if not strays:
+        return
+    apart = {(record.bus, record.machine) for record in unused}
+    ids: dict[int, set[str]] = {}
+    for bus, machine in {(record.bus, record.machine) for record in records} - apart:
+        ids.setdefault(bus, set()).add(machine)
+    places = dict.fromkeys((record.bus, record.machine) for record in strays)
+    named = [
+        f"{bus} {machine!r}"
+        + (f", whose bus has {', '.join(map(repr, sorted(ids[bus])))}" if bus in ids else "")
+        for bus, machine in places
+    ]
+    yield Problem(
+        strays[0].place,
+        f"{counted(len(strays), 'record')} of {counted(len(places), 'machine')} that the RAW file does not have "
+        f"({few(named, _MOST_BUSES, '; ')}; first {strays[0].name}) are passed over, as PSS/E does; --details "
+        "lists them; if one is meant for a machine of the RAW file, correct its bus or identifier",
+    )
+
+
+def _law(records: Sequence[DynamicRecord]) -> str:
+    """Return what to write in the case, as TOML, so that loads follow the records; empty where that is not exact."""
+    if records[0].name not in _EXPONENTIAL or len({record.values for record in records}) > 1:
+        return ""
+    try:
+        values = [float(text) for text in records[0].values]
+    except ValueError:
+        return ""
+    if len(values) != _VALUES:
+        return ""
+    shares, (k_pf, k_qf), powers = values[:6], values[6:8], values[8:]
+    laws = [*_laws(shares[:3], powers[:3]), *_laws(shares[3:], powers[3:])]
+    if len(laws) < 2:
+        return ""
+    active, reactive = laws
+    return f"load_model = {{ active = {active}, reactive = {reactive}, k_pf = {k_pf:g}, k_qf = {k_qf:g} }}"
+
+
+def _laws(shares: Sequence[float], powers: Sequence[float]) -> Iterator[str]:
+    """A law of shares and powers of the voltage as the case writes it; none where it is no mixture of Z, I and P."""
+    found = dict.fromkeys("zip", 0.0)
+    for share, power in zip(shares, powers, strict=True):
+        if share and power not in _LAWS:
+            return
+        if share:
+            found[_LAWS[power]] += share
+    if abs(sum(found.values()) - 1) < _SUM:
+        yield f"{{ {', '.join(f'{letter} = {share:g}' for letter, share in found.items() if share)} }}"

@@ -1,0 +1,1 @@
+"""A new case file from the files of a network."""

@@ -1,0 +1,1 @@
+"""One scenario of a case, prepared: its network, units, wiring, clock and operating point."""

@@ -1,0 +1,98 @@
+"""What a network's files come to in one line, so that a reader sees at once what was computed."""
+
+from dataclasses import dataclass
+
+from orchestrator.cases.networks.load_models import in_words
+from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.core.errors import counted
+
+# keys of ``[network]`` that name another program's data
+SOURCES = ("raw", "matpower", "pandapower", "cgmes")
+
+
+@dataclass(frozen=True)
+class Facts:
+    sources: tuple[str, ...]  # files, as the case names them
+    # whether devices give the network an emf behind an admittance; else the models are EMT ones
+    phasors: bool
+    frequency_hz: float | None  # rated; None where no component has one
+    # how many; units out of service do not count
+    buses: int
+    machines: int
+    converters: int
+    others: int  # devices of another kind, such as static var compensators
+    governed: bool  # whether a machine has a governor
+    load_mw: float  # active power of all loads, without what feeds in [MW]
+    load_model: str
+    # units at the slack bus, with their power [MW] and their rating [MVA]
+    slack: tuple[tuple[str, float, float], ...]
+    voltages_pu: tuple[float, float]  # least and largest magnitude
+
+    def sentence(self) -> str:
+        units = [
+            counted(n, what)
+            for n, what in (
+                (self.machines, "machine"),
+                (self.converters, "converter"),
+                (self.others, "other device"),
+            )
+            if n
+        ]
+        slack = ", ".join(f"{n} at {p:.4g} MW ({100 * p / S_n:.0f} %)" for n, p, S_n in self.slack)
+        parts = [
+            "phasor models" if self.phasors else "EMT models",
+            *([f"{self.frequency_hz:g} Hz"] if self.frequency_hz else []),
+            counted(self.buses, "bus"),
+            *units,
+            *(["no governor"] if self.machines and not self.governed else []),
+            f"{self.load_mw:.5g} MW of load ({self.load_model})",
+            *([f"slack {slack}"] if slack else []),
+            "voltages {:.3g} to {:.3g} pu".format(*self.voltages_pu),
+        ]
+        return f"{', '.join(self.sources)}: {', '.join(parts)}"
+
+
+def facts_of(prepared: PreparedScenario) -> Facts | None:
+    """The facts of a scenario whose network comes from another program's files; else None."""
+    table, flow, network = prepared.case.table, prepared.power_flow, prepared.network
+    if table.network is None or table.power_flow is None or flow is None or network is None:
+        return None
+    sources = tuple(file for key in SOURCES if (file := getattr(table.network, key)) is not None)
+    if not sources:
+        return None
+    plans = prepared.system.components
+    units = {p.name: p.bus for p in network.ports if p.name in plans}
+    grid = plans[table.power_flow.grid]
+    wanted = table.power_flow.slack or prepared.source_slack or ""
+    feeding = [name for name in units if flow.powers.get(name)]
+    at_slack = [name for name in feeding if units[name] == units.get(wanted, wanted)]
+    machines = [n for n in feeding if plans[n].kind == "machine"]
+    others = sum(plans[n].kind == "load" for n in feeding)
+    magnitudes = [abs(flow.voltages[bus]) for bus in network.buses]
+    loads = [
+        (x, grid.number(f"{x.name}.scale") * grid.number(f"{x.name}.P")) for x in network.loads
+    ]
+    dyr = [table.units.dyr] if table.units is not None and table.units.dyr is not None else []
+    return Facts(
+        (*sources, *dyr),
+        any(name.endswith(".y_re") for name in grid.description.inputs),
+        rated_frequency(prepared),
+        len(network.buses),
+        len(machines),
+        len(feeding) - len(machines) - others,
+        others,
+        any(v.startswith("governor.T_") for n in machines for v in plans[n].description.variables),
+        sum(p for _, p in loads if p > 0),
+        in_words([load for load, p in loads if p > 0]),
+        tuple(
+            (n, flow.powers[n].real * plans[n].number("S_n"), plans[n].number("S_n"))
+            for n in at_slack
+        ),
+        (min(magnitudes), max(magnitudes)),
+    )
+
+
+def rated_frequency(prepared: PreparedScenario) -> float | None:
+    """Of all components, which have one in common [Hz]; None where none has one."""
+    plans = prepared.system.components.values()
+    return next((plan.number("f_n") for plan in plans if "f_n" in plan.description.variables), None)

@@ -1,0 +1,417 @@
+"""Generating units of a case, from rows of a file or generators of the network's source. A generator and a converter
+share each unit."""
+
+import re
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from orchestrator.cases.draft import Draft, UnitOrigin
+from orchestrator.cases.form.build_choices import PARTS
+from orchestrator.cases.form.csv_rows import (
+    PLACE,
+    Row,
+    optional_number,
+    place_of,
+    rows_of,
+    seen_from_here,
+)
+from orchestrator.cases.form.names import close_names
+from orchestrator.cases.form.schema import ComponentTable, UnitsTable
+from orchestrator.cases.form.unusual_value import UnusualValue
+from orchestrator.cases.networks.conversion import Generation
+from orchestrator.cases.networks.data import bus_name
+from orchestrator.cases.networks.load_models import is_open
+from orchestrator.cases.networks.psse.dyr import record_uses
+from orchestrator.cases.networks.psse.dyr_records import DynamicRecord, read_dyr
+from orchestrator.cases.networks.psse.dyr_units import (
+    completed,
+    missing_records,
+    rows_of_machines,
+    with_choices,
+    with_infinite_buses,
+    with_records,
+    without_idle_controls,
+)
+from orchestrator.cases.networks.psse.load_records import recorded_laws, with_recorded_laws
+from orchestrator.cases.networks.psse.unused_models import unused_models
+from orchestrator.cases.networks.record_use import UseOfRecord
+from orchestrator.cases.networks.source_changes import Changes
+from orchestrator.cases.networks.source_ratings import with_needed_ratings
+from orchestrator.cases.networks.unit_row import UnitRow, checked
+from orchestrator.cases.questions.plausibility import question
+from orchestrator.core.errors import InputError, Problem, few
+
+UNIT_KINDS = ("sg", "gfor")  # first parts of the names of a unit's generator and converter
+_LIMITS = ("q_min_mvar", "q_max_mvar")
+_REMARKS = ("q_mvar", "name", "comment", "source")
+"""Columns that say more to a reader; the power flow computes the reactive power."""
+
+_COLUMNS = ("bus", "unit", "rating_mva", "p_mw", "v_pu", "alpha", *_LIMITS)
+
+
+def unit_components(draft: Draft) -> dict[str, ComponentTable]:
+    """Generators ``sg<label>`` with the share 1 − α and converters ``gfor<label>`` with the share α of each unit. A
+    share of 0 gives no component.
+
+    All names that any share can give are added to the draft's known names."""
+    table = draft.given.case.units
+    if table is None or (draft.found.network_failed and table.file is None):
+        return {}
+    try:
+        generation = _generation(draft, table)
+        rows = (
+            unit_rows(table, draft.given.directory, generation)
+            if table.dyr is None
+            else _rows_of_dyr(draft, table)
+        )
+        if table.dyr is None and table.file is None and draft.data is not None:
+            rows = with_infinite_buses(rows, draft.data.machines)
+    except InputError as error:
+        if draft.found.network_failed:
+            return {}  # figures that the source would have given are missing
+        key = next((key for key in ("dyr", "file") if getattr(table, key) is not None), None)
+        draft.note_network(
+            draft.given.place("units", key) if key else draft.given.place("units"), str(error)
+        )
+        return {}
+    draft.known |= {f"{kind}{row.label}" for row in rows for kind in UNIT_KINDS}
+    draft.reactive_limits |= {row.bus: (row.q_min_mvar, row.q_max_mvar) for row in rows}
+    for row in rows:
+        if draft.data is not None and draft.data.buses and row.bus not in draft.data.buses:
+            hint = close_names(row.bus, draft.data.buses, f"there are: {few(draft.data.buses, 8)}")
+            text = f"the unit at bus {row.label}: the network has no bus {row.bus!r}; {hint}"
+            draft.note_network(row.place or draft.given.place("units"), text)
+    alphas = _alphas(draft, table, rows)
+    models = (
+        (table.generator, "generator_parameters", table.generator_parameters),
+        (table.converter, "converter_parameters", table.converter_parameters),
+    )
+    components = {}
+    for kind, (model, key, common) in zip(UNIT_KINDS, models, strict=True):
+        for row in rows:
+            share = alphas[row.label] if kind == "gfor" else 1 - alphas[row.label]
+            if share > 0:
+                own = {
+                    "S_n": share * row.rating_mva,
+                    "P_0": row.p_mw / row.rating_mva,
+                    "v_0": row.v_pu,
+                }
+                values = {**common, **row.parameters.get(kind, {}), **own}
+                name = f"{kind}{row.label}"
+                parts: dict[str, Any] = {**_parts_of(table), **row.parts} if kind == "sg" else {}
+                if row.converter is not None or row.is_infinite:  # the row says all
+                    values = {**row.parameters.get(kind, {}), **own}
+                components[name] = ComponentTable(
+                    model=_of_parts(model) if row.is_infinite else row.converter or model,
+                    bus=row.bus,
+                    parameters=values,
+                    **parts,
+                )
+                of_row = frozenset((*row.parameters.get(kind, {}), *own))
+                likely = None if row.likely_mva is None else share * row.likely_mva
+                draft.origins[name] = UnitOrigin(
+                    row.place or draft.given.place("units"), of_row, key, row.lines, likely
+                )
+                draft.active_limits[name] = share * row.p_min_mw, share * row.p_max_mw
+    return components
+
+
+def _of_parts(generator: str) -> str:
+    """Return the generator of parts in the form of a generator's model."""
+    return f"synchronous_generator{'_phasor' if generator.endswith('_phasor') else ''}"
+
+
+def _generation(draft: Draft, table: UnitsTable) -> Mapping[str, Generation]:
+    """Return what the network's source has at each bus, of a RAW file with ratings that fit the power flow."""
+    data, network = draft.data, draft.given.case.network
+    if data is None or network is None:
+        return {}
+    flow = draft.given.case.power_flow
+    if network.raw is None or table.dyr or table.file or not data.misfit or flow is None:
+        return data.generation
+    slack = flow.slack or data.slack or ""
+    slack = slack if slack in data.generation else bus_name(slack.removeprefix("sg"))
+    found, text = with_needed_ratings(data, slack)
+    if text:
+        draft.found.questions.append(Problem(draft.given.place("network", "raw"), text))
+    return found
+
+
+def unit_rows(
+    table: UnitsTable, directory: Path, generation: Mapping[str, Generation]
+) -> list[UnitRow]:
+    """The units of a units table. Figures that its file leaves out come from the network's source."""
+    if table.file is None:
+        if not generation:
+            raise InputError(
+                "the key 'file' is missing; without it the units are the generators of the [network] source, "
+                "which is not given or has none"
+            )
+        rows = [
+            UnitRow(
+                g.label,
+                bus,
+                g.rating_mva,
+                g.p_mw,
+                g.v_pu,
+                q_min_mvar=g.q_min_mvar,
+                q_max_mvar=g.q_max_mvar,
+            )
+            for bus, g in generation.items()
+        ]
+        return [checked(row, "the network's source") for row in rows]
+    rows = []
+    path = seen_from_here(directory / table.file)
+    for entry in _known_rows(path):
+        bus = bus_name(entry["bus"])
+        name = _name_in(entry)
+        # the source's figures are those of all units of the bus
+        given = None if name else generation.get(bus)
+        figures = {
+            column: _figure(entry, column, given) for column in ("rating_mva", "p_mw", "v_pu")
+        }
+        missing = [column for column, value in figures.items() if value is None]
+        if missing:
+            raise InputError(
+                f"{place_of(entry)}: the unit at bus {entry['bus']} has no {', '.join(missing)}; add the column, or "
+                "take the network from a source with a generator at this bus"
+            )
+        alpha = optional_number(entry, "alpha")
+        if alpha is not None and not 0 <= alpha <= 1:
+            raise InputError(
+                f"{place_of(entry)}: alpha = {alpha:g}; it must be a number from 0 to 1"
+            )
+        own = {kind: _parameters(entry, kind) for kind in UNIT_KINDS}
+        limits = {c: value for c in _LIMITS if (value := _figure(entry, c, given)) is not None}
+        numbers = {**figures, **limits}
+        parts = {part: text.strip() for part in PARTS if (text := entry.get(part) or "").strip()}
+        label = f"{entry['bus']}_{name}" if name else entry["bus"]
+        unit = UnitRow(
+            label,
+            bus,
+            **numbers,  # type: ignore[arg-type]
+            alpha=alpha,
+            parameters=own,
+            place=place_of(entry),
+            parts=parts,
+        )
+        rows.append(checked(unit, place_of(entry)))
+    _require_names(rows, path)
+    at_bus = {row.bus: [r for r in rows if r.bus == row.bus] for row in rows}
+    reach = {
+        bus: (sum(u.q_min_mvar for u in us), sum(u.q_max_mvar for u in us))
+        for bus, us in at_bus.items()
+    }
+    return [
+        replace(row, q_min_mvar=reach[row.bus][0], q_max_mvar=reach[row.bus][1]) for row in rows
+    ]
+
+
+def _name_in(entry: Row) -> str:
+    """The unit's name among those of its bus; empty without one."""
+    name = (entry.get("unit") or "").strip()
+    if name and not re.fullmatch(r"\w+", name, re.ASCII):
+        raise InputError(
+            f"{place_of(entry)}: unit = {name!r}; it becomes part of a name: use letters, digits and _"
+        )
+    return name
+
+
+def _require_names(rows: Sequence[UnitRow], path: Path) -> None:
+    at_bus = Counter(row.bus for row in rows)
+    labels = Counter(row.label for row in rows)
+    for row in rows:
+        if labels[row.label] > 1 or (at_bus[row.bus] > 1 and bus_name(row.label) == row.bus):
+            raise InputError(
+                f"{path}: the bus of unit {row.label} has more than one row; give each row of this bus a name of its "
+                "own in the column 'unit', or merge the rows"
+            )
+
+
+def _known_rows(path: Path) -> list[Row]:
+    """The rows of a units' file; a column that nothing reads may be a misspelt one."""
+    rows = rows_of(path, ("bus",))
+    known = [*_COLUMNS, *UnitsTable.model_fields]
+    for column in rows[0] if rows else ():
+        kind = column.partition(".")[0]
+        if column not in (*known, *_REMARKS, PLACE) and not ("." in column and kind in UNIT_KINDS):
+            similar = [] if "." in column else known
+            hint = close_names(
+                column,
+                similar,
+                f"there are {', '.join(_COLUMNS)}, and sg.… and gfor.… with a parameter",
+            )
+            raise InputError(f"{path}, line 1: nothing reads the column {column!r}; {hint}")
+    return rows
+
+
+def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
+    """A unit for each machine of a RAW file, of what the DYR file names; a converter alone needs no record."""
+    if table.file is not None:
+        raise InputError("'dyr' and 'file' both say what the units are; remove one of them")
+    machines = draft.data.machines if draft.data else ()
+    if (
+        not machines
+        and draft.given.case.network is not None
+        and draft.given.case.network.raw is not None
+    ):
+        raise InputError(
+            f"{draft.given.case.network.raw}: no generator is in service (STAT = 0), so 'dyr' is of no machine"
+        )
+    if not machines:
+        raise InputError(
+            "'dyr' is for the machines of a network of PSS/E; give it as 'raw' in [network]"
+        )
+    path = seen_from_here(draft.given.directory / (table.dyr or ""))
+    rows = rows_of_machines(machines, str(path))
+    alphas = _alphas(draft, table, rows)
+    replaced = [row.label for row in rows if alphas[row.label] == 1]
+    idle = draft.data.idle_machines if draft.data else ()
+    records = read_dyr(path)
+    keys = [(machine.bus, machine.name.strip()) for machine in machines]
+    ours = {key for key, row in zip(keys, rows, strict=True) if row.label in table.replace}
+    rows = with_records(
+        rows,
+        machines,
+        [record for record in records if (record.bus, record.machine) not in ours],
+        table.dyr_leave_out,
+        replaced,
+        idle,
+        approximate=table.dyr_approximate,
+    )
+    _account(draft, table, records, ours)
+    rows = with_choices(rows, replaced, _parts_of(table))
+    rows = without_idle_controls(rows, str(path))
+    machine_rows = [row for row in rows if row.label not in replaced]
+    question(
+        draft,
+        [
+            *(
+                UnusualValue(f"sg{row.label}.{v}", at, text)
+                for row in machine_rows
+                for v, at, text in row.doubts
+            ),
+            *missing_records(machine_rows, str(path)),
+        ],
+    )
+    rows = completed(rows, replaced)
+    changes = Changes(str(path))
+    for row in rows:
+        for line, text in row.replaced:
+            changes.note(line, f"grid-following converter as {row.converter}: {text}")
+    draft.found.questions += changes.listed()
+    phasors = [row for row in rows if row.converter is not None]
+    if phasors and not table.generator.endswith("_phasor"):
+        raise InputError(
+            f"{path}: the unit at bus {phasors[0].label} is the phasor model {phasors[0].converter}, and the generator "
+            f"{table.generator!r} is none; phasor models go together: write generator = "
+            "'synchronous_generator_phasor' in [units], converter = 'gfor_phasor' in [units], and model = "
+            "'phasor_grid' in [components.grid] (`gfor new --models phasor`)"
+        )
+    return rows
+
+
+def _figure(entry: Row, column: str, given: Generation | None) -> float | None:
+    """The figure of the file, or otherwise of the source."""
+    value = optional_number(entry, column)
+    return getattr(given, column, None) if value is None else value
+
+
+def _parameters(entry: Row, kind: str) -> dict[str, Any]:
+    """Values of this row in columns such as ``sg.machine.H``: numbers, truth values or texts with a unit."""
+    values: dict[str, Any] = {}
+    for column, text in entry.items():
+        if column.startswith(f"{kind}.") and (text or "").strip():
+            name, plain = column.removeprefix(f"{kind}."), text.strip()
+            values[name] = {"true": True, "false": False}.get(plain.lower(), plain)
+    return values
+
+
+def _account(
+    draft: Draft,
+    table: UnitsTable,
+    records: Sequence[DynamicRecord],
+    ours: Collection[tuple[int, str]],
+) -> None:
+    """Note what became of each record of a DYR file, and ask about those of no machine that could matter.
+
+    ``ours``: machines that a converter of the case replaces."""
+    machines = draft.data.machines if draft.data else ()
+    uses = record_uses(
+        records,
+        {(machine.bus, machine.name.strip()) for machine in machines},
+        draft.data.idle_machines if draft.data else (),
+        table.dyr_leave_out,
+        approximate=table.dyr_approximate,
+        exciter=table.exciter,
+        ours=ours,
+    )
+    taken = _with_recorded_loads(draft, records)
+    uses = [
+        replace(use, use=UseOfRecord.USED, why="", of_no_machine=False)
+        if (use.file, use.line) in taken
+        else use
+        for use in uses
+    ]
+    draft.found.records += uses
+    network = draft.given.case.network
+    said = network.load_model if network else None
+    draft.found.questions += unused_models(records, uses, said)
+
+
+def _with_recorded_loads(
+    draft: Draft, records: Sequence[DynamicRecord]
+) -> frozenset[tuple[str, int]]:
+    """Give the loads the laws of their records, where the case leaves them open; return the places of those records."""
+    data = draft.data
+    if data is None or not is_open(draft.given.case.network):
+        return frozenset()
+    recorded = recorded_laws(records, data.file_loads)
+    draft.data = replace(
+        data,
+        loads=tuple(
+            with_recorded_laws(load, recorded.laws[load.name])
+            if load.name in recorded.laws and load.p_mw >= 0
+            else load
+            for load in data.loads
+        ),
+        recorded_loads=frozenset(recorded.laws),
+    )
+    draft.found.questions += recorded.remarks
+    return recorded.places
+
+
+def _parts_of(table: UnitsTable) -> dict[str, str]:
+    return {part: name for part in PARTS if (name := getattr(table, part)) is not None}
+
+
+def _alphas(draft: Draft, table: UnitsTable, rows: Sequence[UnitRow]) -> dict[str, float]:
+    """Share of every unit: from the strongest layer that gives one, otherwise from the row, otherwise from the table.
+
+    Within a layer, a choice for this unit goes before the one for all."""
+    alphas = {row.label: table.alpha if row.alpha is None else row.alpha for row in rows}
+    for label in table.replace:
+        if label not in alphas:
+            hint = close_names(label, alphas, f"there are: {', '.join(alphas)}")
+            draft.note(draft.given.place("units", "replace"), f"there is no unit {label!r}; {hint}")
+            continue
+        alphas[label] = 1.0
+    converters = {row.label: row.converter for row in rows if row.converter is not None}
+    for choice in (choice for layer in draft.given.layers for choice in layer.shares):
+        label = choice.label
+        if label and label not in alphas:
+            hint = close_names(label, alphas, f"there are: {', '.join(alphas)}")
+            draft.note(choice.place, f"there is no unit {label!r}; {hint}")
+            continue
+        try:
+            alphas |= {label: choice.share} if label else dict.fromkeys(alphas, choice.share)
+        except ValueError as error:
+            draft.note(choice.place, str(error))
+            continue
+        if label in converters and choice.share != 1:
+            text = f"the unit {label!r} is a converter by its record ({converters[label]}); alpha is 1 there"
+            draft.note(choice.place, text)
+    return alphas | dict.fromkeys(converters, 1.0)

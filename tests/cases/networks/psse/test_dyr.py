@@ -1,0 +1,159 @@
+"""Dynamics data of PSS/E: from records to machines of a case, and what is refused."""
+
+import json
+
+import pytest
+
+from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
+from orchestrator.cases.case import load_case
+from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.core.errors import CaseError, InputError
+from tests.cases.networks.psse import raw, records
+
+DYR = """\
+// WSCC, figures of Sauer and Pai on the machines' own ratings
+1 'GENROU' 1  8.96 0.04 0.31 0.06  9.55 0.0
+   0.3614 0.2398 0.1505 0.15 0.12 0.08 0.0 0.0 / hydro in the book
+2,'GENROU','1', 6.0,0.04,0.535,0.06, 3.33,0.0, 1.72,1.66,0.23,0.378,0.2,0.1, 0.0,0.0 /
+3 'GENCLS' 1  2.35 0.0 /
+1 'SEXS' 1  0.1 10.0 100.0 0.05 -5.0 5.0 /
+1 'TGOV1' 1  0.05 0.5 1.0 0.0 2.1 7.0 0.0 /
+"""
+CASE = """\
+name = "wscc"
+[components.grid]
+model = "grid"
+[network]
+raw = "grid.raw"
+stray_B = 0.05
+[power_flow]
+grid = "grid"
+[units]
+dyr = "grid.dyr"
+generator = "synchronous_generator"
+converter = "gfor"
+[scenarios.plain]
+"""
+
+
+@pytest.fixture
+def tables(tmp_path):
+    """Text of a DYR file → the units' tables of the case, or its problems."""
+
+    def build(dyr=DYR, case=CASE, network=None):
+        (tmp_path / "grid.raw").write_text(network or raw(33))
+        (tmp_path / "grid.dyr").write_text(dyr)
+        (tmp_path / "case.toml").write_text(case)
+        preparer = load_case(tmp_path / "case.toml")._preparer("plain", None, ())
+        if preparer.problems:
+            raise CaseError("case", preparer.problems)
+        return preparer._everything
+
+    return build
+
+
+def test_records_become_parts_and_parameters(tables):
+    found = tables()
+    first, second, third = (found[f"sg{n}"] for n in (1, 2, 3))
+    assert (first.machine, first.exciter, first.governor, first.stabilizer) == (
+        "genrou",
+        "sexs",
+        "tgov1",
+        "none",
+    )
+    assert (second.exciter, second.governor) == ("manual", "constant_power")
+    assert third.machine == "classical"
+    assert first.parameters["machine.H"] == 9.55
+    assert first.parameters["machine.X_d"] == 0.3614
+    # PSS/E gives the lead as T_A/T_B
+    assert first.parameters["exciter.T_A"] == pytest.approx(0.1 * 10.0)
+    assert first.parameters["S_n"] == 247.5
+    assert third.parameters["machine.X_d1"] == 0.2  # ZX of the RAW file
+    assert first.parameters["transformer.X_t"] == 0
+    # ZR of the RAW file, and not what the part has by itself
+    assert first.parameters["machine.R_s"] == 0
+
+
+def test_a_machine_out_of_service_may_have_records(tables, tmp_path):
+    found = records(33)
+    found["GENERATOR"].append(
+        found["GENERATOR"][0].replace("1,'1 '", "1,'2 '").replace(",1,1,100,", ",1,0,100,")
+    )
+    dyr = DYR + "1 'GENCLS' 2  1.0 0.0 /\n"
+    assert set(tables(dyr, network=raw(33, found))) == set(tables())
+
+
+def test_records_over_lines_with_commas_or_blanks(tmp_path):
+    (tmp_path / "grid.dyr").write_text(DYR)
+    records = read_dyr(tmp_path / "grid.dyr")
+    assert [(r.bus, r.name, len(r.values)) for r in records] == [
+        (1, "GENROU", 14),
+        (2, "GENROU", 14),
+        (3, "GENCLS", 2),
+        (1, "SEXS", 6),
+        (1, "TGOV1", 7),
+    ]
+    assert records[0].place.endswith("grid.dyr, line 2")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            "'SEXS'",
+            "'OLDEXC'",
+            r"(?s)for these models.*\n +OLDEXC +1 +72 +line 6 .*gfor new --dyr-leave-out OLDEXC",
+        ),
+        ("3 'GENCLS'", "8 'GENCLS'", r"machine '1' at bus 3 has no record of a machine"),
+        ("9.55", "x", r"line 2: GENROU has H = 'x'; it must be a number"),
+        ("2.35 0.0 /", "2.35 /", r"line 5: GENCLS has 1 values, and needs 2: H, D"),
+        ("7.0 0.0 /", "7.0 0.0", r"grid.dyr, line 7: the record does not end with a slash"),
+        ("3 'GENCLS'", "three 'GENCLS'", r"line 5: .* is no record; one is bus 'MODEL' id values"),
+        ("2.35 0.0 /", "2.35 0.0 1.0 /", r"line 5: GENCLS has 3 values, and needs 2: H, D"),
+        (
+            "2.35 0.0 /",
+            "2.35 0.0",
+            r"line 5: the record GENCLS has no slash at its end, and runs into the next, SEXS",
+        ),
+        ("1 'TGOV1'", "1 'SEXS'", r"line 7: a second exciter of machine '1' at bus 1"),
+    ],
+)
+def test_what_cannot_be_taken_over(old, new, words, tables):
+    assert old in DYR
+    with pytest.raises((CaseError, InputError), match=words):
+        tables(DYR.replace(old, new, 1))
+
+
+def test_a_model_goes_at_the_users_word(tables):
+    case = CASE.replace("[units]", '[units]\ndyr_leave_out = ["OLDEXC"]\nexciter = "sexs"')
+    found = tables(DYR.replace("'SEXS'", "'OLDEXC'"), case)
+    assert found["sg1"].exciter == "sexs"
+    assert found["sg2"].exciter == "sexs"  # it has no record, and [units] says what stands there
+    assert found["sg3"].exciter == "manual"  # a classical machine has no field winding
+
+
+def test_a_governor_that_goes_leaves_the_power_constant(tables):
+    """As the table of missing models says, and as where the file has no record of one."""
+    case = CASE.replace("[units]", '[units]\ndyr_leave_out = ["OLDGOV"]')
+    found = tables(DYR.replace("'TGOV1'", "'OLDGOV'"), case)
+    assert found["sg1"].governor == found["sg2"].governor == "constant_power"
+
+
+@pytest.mark.slow
+def test_the_machines_swing(tables, tmp_path, gfor):
+    tables()
+    code, out, error = gfor("modes", tmp_path / "case.toml", "--json", "--range", "0.5:5")
+    assert code == 0, error
+    modes = json.loads(out)["scenarios"][0]["modes"]
+    assert len([m for m in modes if 0.8 < m["frequency_hz"] < 3]) == 2
+
+
+def test_only_the_switches_that_are_modelled_are_taken():
+    """M = 5 and N = 1 are the ramp-tracking filter of a stabilizer, whose signals are all six of PSS/E."""
+    switches = {f.name: f.only for record in DYR_RECORDS.values() for f in record.fields if f.only}
+    assert {name: switches[name] for name in ("IM", "M", "N", "Switch")} == {
+        "IM": tuple(range(1, 7)),
+        "M": (5.0,),
+        "N": (1.0,),
+        "Switch": (0.0,),
+    }

@@ -1,0 +1,134 @@
+"""Converters in dynamics data: REGFM_A1 as a component of its own, grid-following ones at the user's word."""
+
+import json
+
+import pytest
+
+from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
+from fmus.toolchain.catalogue import build_model
+from orchestrator.cases.case import load_case
+from orchestrator.core.errors import CaseError
+from tests.cases.networks.psse import raw, records
+from tests.cases.networks.psse.test_dyr import CASE, DYR
+
+REGFM = (
+    "3 'REGFMA1' 1  1 0  0.02 0.03 0.04  1.8 1.15 0.0  0.95 -0.9  0.44 -0.4  0.02 0.06  "
+    "0.05 0.2  3.0 20.0  0.0 5.86 /"
+)
+MACHINES = DYR.replace("3 'GENCLS' 1  2.35 0.0 /", REGFM)
+PHASORS = CASE.replace('"grid"\n[network]', '"phasor_grid"\n[network]').replace(
+    '"synchronous_generator"', '"synchronous_generator_phasor"'
+)
+
+
+@pytest.fixture
+def tables(tmp_path):
+    """Text of a DYR file and of a case → tables of the units, or the problems."""
+
+    def build(dyr=MACHINES, case=PHASORS, overrides=None):
+        found = records(33)
+        found["GENERATOR"][2] = (
+            "3,'1 ',85.0,0,300,-300,1.025,0,128.0,0.01,0.15,0,0,1,1,100,128.0,0,1,1"
+        )
+        (tmp_path / "grid.raw").write_text(raw(33, found))
+        (tmp_path / "grid.dyr").write_text(dyr)
+        (tmp_path / "case.toml").write_text(case)
+        preparer = load_case(tmp_path / "case.toml")._preparer("plain", overrides, ())
+        if preparer.problems:
+            raise CaseError("case", preparer.problems)
+        return preparer._everything
+
+    return build
+
+
+def test_regfm_a1_is_the_whole_unit_with_its_own_values(tables):
+    found = tables()
+    unit = found["gfor3"]
+    assert "sg3" not in found
+    assert (unit.model, unit.bus) == ("regfm_a1_phasor", "bus_3")
+    assert (unit.parameters["RL"], unit.parameters["XL"]) == (0.01, 0.15)  # ZSORCE
+    assert unit.parameters["VFlag"] is True
+    assert [
+        unit.parameters[name]
+        for name in ("TPf", "TQf", "TVf", "ImaxF", "Pmax", "Pmin", "Qmin", "mp", "mq")
+    ] == [0.02, 0.03, 0.04, 1.8, 0.95, -0.9, -0.4, 0.02, 0.06]
+    assert [
+        unit.parameters[name] for name in ("kppmax", "kipmax", "kpqmax", "kiqmax", "kpv", "kiv")
+    ] == [0.05, 0.2, 3.0, 20.0, 0.0, 5.86]
+    assert unit.parameters["S_n"] == 128.0
+    assert found["sg1"].machine == "genrou"
+
+
+def test_every_field_sets_a_parameter_of_the_model():
+    record = REGFM_A1_RECORDS["REGFMA1"]
+    known = {v.name for v in build_model(record.part).parameters}
+    assert {p for field in record.fields for p in field.parameters} <= known
+    assert len(record.fields) == 20
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            "'REGFMA1' 1  1 0",
+            "'REGFMA1' 1  1",
+            r"REGFMA1 has 19 values, and needs 20: VFlag, QVFlag, TPf",
+        ),
+        (
+            "'REGFMA1' 1  1 0",
+            "'REGFMA1' 1  2 0",
+            r"REGFMA1 has VFlag = 2; only 0 or 1 can be modelled",
+        ),
+        (
+            "1 'TGOV1'",
+            "3 'TGOV1'",
+            r"machine '1' at bus 3 is a converter, and has records of its governor; remove",
+        ),
+        (
+            "'REGFMA1'",
+            "'REGCA1'",
+            r"stands for REGCA1, a grid-following converter; write dyr_approximate",
+        ),
+        (
+            "'REGFMA1'",
+            "'WT4G1'",
+            r"stands for WT4G1, a grid-following converter; write replace = ",
+        ),
+    ],
+)
+def test_what_cannot_be_taken_over(old, new, words, tables):
+    assert old in MACHINES
+    with pytest.raises(CaseError, match=words):
+        tables(MACHINES.replace(old, new))
+
+
+def test_the_share_of_a_converter_by_its_record_cannot_be_chosen(tables):
+    assert tables(overrides={"units.alpha": 0.2})["gfor1"].model == "gfor"
+    with pytest.raises(
+        CaseError,
+        match=r"units.alpha.3: the unit '3' is a converter by its record \(regfm_a1_phasor\)",
+    ):
+        tables(overrides={"units.alpha.3": 0.5})
+
+
+def test_a_grid_following_unit_is_a_converter_of_the_case(tables):
+    case = PHASORS.replace("[units]", '[units]\ndyr_leave_out = ["REGCA1", "REECA1"]').replace(
+        '"gfor"', '"gfl_phasor"'
+    )
+    dyr = DYR.replace("3 'GENCLS' 1  2.35 0.0 /", "3 'REGCA1' 1 0.02 /\n3 'REECA1' 1 0 /")
+    found = tables(dyr, case, {"units.alpha.3": 1.0})
+    assert found["gfor3"].model == "gfl_phasor"
+    assert "sg3" not in found
+    with pytest.raises(CaseError, match="machine '1' at bus 3 has no record of a machine"):
+        tables(dyr, case)
+
+
+@pytest.mark.slow
+def test_the_system_with_regfm_a1_has_a_steady_state_and_modes(tables, tmp_path, gfor):
+    tables(
+        case=PHASORS.replace("[components.grid]", '[solver]\nstep_size = "2 ms"\n[components.grid]')
+    )
+    code, out, error = gfor("modes", tmp_path / "case.toml", "--json")
+    assert code == 0, error
+    scenario = json.loads(out)["scenarios"][0]
+    assert any("gfor3" in str(mode) for mode in scenario["modes"])

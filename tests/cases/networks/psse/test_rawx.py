@@ -1,0 +1,124 @@
+"""RAWX, PSS/E's data in JSON: the same network as the RAW file's, whatever the order of the fields."""
+
+import json
+
+import numpy as np
+import pytest
+
+from fmus.grid.element_data import SMALLEST_REACTANCE
+from orchestrator.cases.networks.psse.raw import read_raw
+from orchestrator.core.errors import InputError
+from tests.cases.networks.psse import (
+    BUSES,
+    LINES,
+    LOADS,
+    MACHINES,
+    REACTANCES,
+    TRANSFORMERS,
+    raw,
+    records,
+)
+
+
+def table(fields, rows):
+    return {"fields": fields.split(), "data": rows}
+
+
+def network():
+    """The nine buses, fields in another order than RAW's and no more than differ from their defaults."""
+    return {
+        "caseid": {
+            "fields": ["title1", "rev", "sbase", "basfrq", "ic"],
+            "data": ["nine buses", 35, 100.0, 60.0, 0],
+        },
+        "general": table("thrshz pqbrak", [[0.0001, 0.7]]),
+        "bus": table(
+            "name ibus ide baskv nvlo nvhi vm va",
+            [[f"BUS {n}", n, kind, kv, 0.9, 1.1, vm, 0.0] for n, (kv, kind, vm) in BUSES.items()],
+        ),
+        "load": table("ql pl ibus loadid", [[q, p, n, "1"] for n, (p, q) in LOADS.items()]),
+        "generator": table(
+            "ibus machid pg qt qb vs mbase zx stat pt",
+            [
+                [n, "1", p, 300, -300, v, base, REACTANCES[n], None, base]
+                for n, (p, v, base) in MACHINES.items()
+            ],
+        ),
+        "acline": table("ibus jbus bpu rpu xpu", [[i, j, b, r, x] for i, j, r, x, b in LINES]),
+        "transformer": table(
+            "ibus jbus x1_2 name", [[i, j, x, f"T {j}"] for i, j, x in TRANSFORMERS]
+        ),
+        "subnode": table("isub inode", [[1, 2, 3, 4]]),
+    }
+
+
+@pytest.fixture
+def read(tmp_path):
+    def write(text, name="nine.rawx"):
+        path = tmp_path / name
+        path.write_text(text if isinstance(text, str) else json.dumps({"network": text}, indent=1))
+        return read_raw(path)
+
+    return write
+
+
+@pytest.mark.parametrize("name", ["nine.rawx", "nine.raw"])  # what it is, its content says
+def test_the_network_is_that_of_the_raw_file(read, name):
+    ours, theirs = read(network(), name), read(raw(35, records(35)), "lines.raw")
+    for part in ("bus", "branch", "gen", "branch_to_earth"):
+        assert np.array_equal(getattr(ours.tables, part), getattr(theirs.tables, part)), part
+    assert ours.tables.labels == theirs.tables.labels
+    assert (ours.tables.base_mva, ours.tables.frequency) == (100.0, 60.0)
+    assert [m.source for m in ours.machines] == [m.source for m in theirs.machines]
+
+
+def test_three_windings_are_five_lines(read):
+    three = network()
+    three["bus"]["data"].append(["BUS 10", 10, 1, 13.8, 1.0, 0.0])
+    three["transformer"] = table(
+        "ibus jbus kbus x1_2 x2_3 x3_1 windv3",
+        [[i, j, 0, x, None, None, None] for i, j, x in TRANSFORMERS]
+        + [[4, 5, 10, 0.1, 0.2, 0.3, 0.98]],
+    )
+    branch = read(three).tables.branch[-3:]
+    least = 1.1 * SMALLEST_REACTANCE  # which the network takes for the leg without reactance
+    assert branch[:, 3] == pytest.approx([0.1, least, 0.2], abs=1e-15)  # of the star
+    assert branch[2, 8] == 0.98
+
+
+def test_a_mistake_is_told_with_its_line(read):
+    wrong = network()
+    wrong["load"]["data"][1][2] = 77
+    with pytest.raises(InputError, match=r"nine.rawx, line (\d+): there is no bus 77") as caught:
+        read(wrong)
+    lines = json.dumps({"network": wrong}, indent=1).splitlines()
+    told = int(str(caught.value).partition("line ")[2].partition(":")[0])
+    assert lines[told - 1].strip() == "["
+    assert "77" in lines[told + 2]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("{", "it is no JSON: Expecting property name"),
+        ("{" * 100_000, "it is no JSON"),
+        ('{"network": 3}', "it has no 'network'"),
+        ('{"net": {}}', "it has no 'network'"),
+        ('{"network": {"bus": {"data": []}}}', "line 1: network.bus lacks 'fields' or 'data'"),
+        ('{"network": {"bus": {"fields": ["ibus"], "data": []}}}', "network.bus has no rows"),
+        ('{"network": {"bus": {"fields": ["ibus"], "data": [[1, 2]]}}}', "2 values for 1 fields"),
+        (
+            '{"network": {"bus": {"fields": ["ibus"], "data": [[1], 3]}}}',
+            "a row of network.bus is 3",
+        ),
+        ('{"network": {"caseid": {"fields": ["sbase"], "data": [-1]}}}', "sbase is -1 MVA"),
+    ],
+)
+def test_what_is_no_rawx_is_refused_by_name(read, text, words):
+    with pytest.raises(InputError, match=r"nine\.rawx") as caught:
+        read(text)
+    assert words in str(caught.value)
+
+
+def test_fields_that_nothing_reads_do_not_count(read):
+    assert len(read(network()).tables.bus) == len(BUSES)
