@@ -11,7 +11,9 @@ from pathlib import PurePath
 
 import numpy as np
 
-_NUMBER = re.compile(r"([-−+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?)(\s*(?:%|Hz))?")
+_NUMBER = re.compile(r"(?<![\w.])([-−+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?)(?!\w|\.\d)(\s*(?:%|Hz))?")
+"""One within a name or a version, such as T_S1 or 0.3.0, is none."""
+
 _PERCENT = re.compile(r"percent|%", re.IGNORECASE)
 _POINTS = re.compile(
     r"_points\b|\[points\]"
@@ -37,7 +39,9 @@ class Figures:
 
 
 def figures_of(source):
-    """Every number in an object; those whose own name says percent are no ratios."""
+    """Every number in an object, unless they are known; those whose own name says percent are no ratios."""
+    if isinstance(source, Figures):
+        return source
     plain, hertz, percent = set(), set(), set()
     for name, value in _values(source):
         if isinstance(value, complex):
@@ -81,8 +85,12 @@ def foreign_in_json(said, source, place=""):
     return [
         (where, value)
         for where, value in _numbers(said, place)
-        if not np.isclose(known.of(_key(where)), value, rtol=1e-9, atol=1e-12).any()
+        if not _is_one(value, known.of(_key(where)))
     ]
+
+
+def _is_one(value, figures):
+    return np.isclose(figures, value, rtol=1e-9, atol=1e-12).any()
 
 
 def _key(place):
@@ -105,10 +113,10 @@ def foreign_in_text(text, source, heading=""):
     """Numbers of a page that are no figure of the object, rounded as they are shown.
 
     ``heading``: of the column, which may say percent."""
-    known, shown = figures_of(source), unescape(re.sub(r"<[^>]*>", " ", text)).replace("j", " ")
-    found = []
-    for word, unit in _NUMBER.findall(shown):
-        decimals = len(word.partition("e")[0].partition(".")[2])
+    known, found = figures_of(source), []
+    for word, unit in _NUMBER.findall(_plain(text)):
+        mantissa, _, exponent = word.partition("e")
+        decimals = len(mantissa.partition(".")[2]) - int(exponent or 0)
         value = float(word.replace("−", "-"))
         words = unit or heading
         figures = known.of(words) if words else np.append(known.plain, known.hertz)
@@ -117,32 +125,91 @@ def foreign_in_text(text, source, heading=""):
     return found
 
 
+def _plain(text):
+    """A piece of HTML as a reader sees it; j of a complex number stands before a number."""
+    return re.sub(r"\bj(?=\d)", " ", unescape(re.sub(r"<[^>]*>", " ", text)))
+
+
+SLIPS = {
+    "1000 times": 1000,
+    "100 times": 100,
+    "2π times": 2 * np.pi,
+    "a 2π-th": 1 / (2 * np.pi),
+    "a hundredth": 1 / 100,
+    "a thousandth": 1 / 1000,
+    "lost sign": -1,
+}
+"""Factors by which a figure in a wrong unit, or without its sign, differs."""
+
+
+_TELLING = 3
+"""Significant digits from which on a figure resembles no other by chance."""
+
+
 def unseen_slips(said, source):
-    """Figures in JSON that a factor of 100 or a lost sign would pass unseen, with the slip; empty where none would.
+    """Figures in JSON in which one of `SLIPS` would pass unseen, with the slip; empty where none would.
 
-    Counts, and numbers that are 0, have no unit and no sign to lose."""
-    found = []
-    for place, value in _numbers(said, ""):
-        slips = {"100 times": 100 * value, "a hundredth": value / 100, "lost sign": -value}
-        if value == 0 or (value == int(value) and not _PERCENT.search(place)):
-            continue
-        found += [
-            (place, slip)
-            for slip, wrong in slips.items()
-            if not foreign_in_json(_with(said, place.split(".")[1:], wrong), source)
-        ]
-    return found
+    Counts, and numbers that are 0, have no unit and no sign to lose; what has few digits is not tried."""
+    known = figures_of(source)
+    return [
+        (place, slip)
+        for place, value in _numbers(said, "")
+        if value != int(value) and _digits(f"{value:.15g}") >= _TELLING
+        for slip, factor in SLIPS.items()
+        if _is_one(factor * value, known.of(_key(place)))
+    ]
 
 
-def _with(said, keys, value):
-    """JSON's types with another number at a place."""
-    if not keys:
-        return value
-    if isinstance(said, Mapping):
-        # a key may hold dots itself
-        names = [key for key in said if ".".join(keys).startswith(str(key))]
-        key = max(names, key=len)
-        rest = ".".join(keys)[len(str(key)) :].removeprefix(".")
-        return {**said, key: _with(said[key], rest.split(".") if rest else [], value)}
-    place = int(keys[0])
-    return [*said[:place], _with(said[place], keys[1:], value), *said[place + 1 :]]
+def _digits(word):
+    """Significant digits of a number as it is written, without zeros at its end."""
+    return len(word.partition("e")[0].replace(".", "").strip("-−+0"))
+
+
+def cells_of(page):
+    """Each cell of a page's tables: the table's caption, the column's heading, and the cell's HTML."""
+    for table in re.findall(r"<table.*?</table>", page, re.DOTALL):
+        caption = "".join(re.findall(r"<caption>(.*?)</caption>", table))
+        headings = re.findall(r"<th(?: [^>]*)?>(.*?)</th>", table)
+        for row in re.findall(r"<tr>(.*?)</tr>", table, re.DOTALL)[1:]:
+            cells = re.findall(r"<td[^>]*>(.*?)</td>", row, re.DOTALL)
+            # a table of points tells a mode in its heading by its percent
+            of_points = " [points]" if "points of damping" in caption else ""
+            for heading, cell in zip(headings, cells, strict=True):
+                yield unescape(caption), unescape(heading) + of_points, cell
+
+
+def prose_of(page):
+    """The sentences of a page: what stands in no table, picture, script or code, and in no title of a section."""
+    beside = r"<(table|svg|script|style|head|pre|code|nav|header|h2|h3)\b.*?</\1>"
+    return re.sub(beside, " ", page, flags=re.DOTALL)
+
+
+def foreign_in_page(page, source):
+    """Numbers of a page that are no figure of the object, each with the column or the sentence that it stands in."""
+    source = figures_of(source)
+    found = [
+        (f"{caption}: {heading}", word)
+        for caption, heading, cell in cells_of(page)
+        for word in foreign_in_text(cell, source, heading)
+    ]
+    return found + [("prose", word) for word in foreign_in_text(prose_of(page), source)]
+
+
+def unseen_in_page(page, source):
+    """Figures of a page's tables in which one of `SLIPS` would pass unseen, with the slip, as `unseen_slips`."""
+    source = figures_of(source)
+    return [
+        (f"{caption}: {heading}", word, slip)
+        for caption, heading, cell in cells_of(page)
+        for word, _ in _NUMBER.findall(_plain(cell))
+        if "." in word and _digits(word) >= _TELLING
+        for slip, factor in SLIPS.items()
+        if not foreign_in_text(_slipped(cell, word, factor), source, heading)
+    ]
+
+
+def _slipped(cell, word, factor):
+    """A cell with a factor at one of its numbers, with digits enough not to become 0."""
+    mantissa, e, exponent = word.replace("−", "-").partition("e")
+    value = factor * float(mantissa)
+    return _plain(cell).replace(word, f"{value:.9f}{e}{exponent}", 1)
