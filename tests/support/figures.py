@@ -19,6 +19,7 @@ _POINTS = re.compile(
     r"_points\b|\[points\]"
 )  # a difference of percent, which an object may hold as such
 _HERTZ = re.compile(r"hz\b", re.IGNORECASE)
+_NO_HERTZ = re.compile(r"imag|real|rad|_deg|_mw|_mva|_pu|_s\b", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -54,8 +55,10 @@ def figures_of(source):
             percent.add(value)
         else:
             plain.add(value)
-            hertz.add(value)
-            percent.add(100 * value)
+            if not _NO_HERTZ.search(name):
+                hertz.add(value)
+            if not _HERTZ.search(name):
+                percent.add(100 * value)
     return Figures(*(np.array(sorted(values)) for values in (plain, hertz, percent)))
 
 
@@ -167,6 +170,11 @@ def _digits(word):
 
 def cells_of(page):
     """Each cell of a page's tables: the table's caption, the column's heading, and the cell's HTML."""
+    return (cell for row in rows_of(page) for cell in row)
+
+
+def rows_of(page):
+    """The cells of each row of a page's tables, as `cells_of` has them."""
     for table in re.findall(r"<table.*?</table>", page, re.DOTALL):
         caption = "".join(re.findall(r"<caption>(.*?)</caption>", table))
         headings = re.findall(r"<th(?: [^>]*)?>(.*?)</th>", table)
@@ -174,8 +182,37 @@ def cells_of(page):
             cells = re.findall(r"<td[^>]*>(.*?)</td>", row, re.DOTALL)
             # a table of points tells a mode in its heading by its percent
             of_points = " [points]" if "points of damping" in caption else ""
-            for heading, cell in zip(headings, cells, strict=True):
-                yield unescape(caption), unescape(heading) + of_points, cell
+            yield [
+                (unescape(caption), unescape(heading) + of_points, cell)
+                for heading, cell in zip(headings, cells, strict=True)
+            ]
+
+
+_ROUNDED = 0.02
+"""Error of a frequency [Hz] or a damping [%] from an eigenvalue with three decimals."""
+
+
+def unlike_eigenvalues(page):
+    """Rows of a page whose frequency [Hz] or damping [%] is not that of the eigenvalue [rad/s] beside it."""
+    found = []
+    for row in rows_of(page):
+        # a reference's damping may stand in a later column of that name
+        shown = {heading: _NUMBER.findall(_plain(cell)) for _, heading, cell in reversed(row)}
+        parts = [float(word.replace("−", "-")) for word, _ in shown.get("λ [rad/s]", ())]
+        if len(parts) != 2:
+            continue
+        value = complex(*parts)
+        of_value = {
+            "f [Hz]": value.imag / (2 * np.pi),
+            "Damping [%]": -100 * value.real / abs(value),
+        }
+        found += [
+            (heading, word, exact)
+            for heading, exact in of_value.items()
+            for word, _ in shown.get(heading, ())
+            if abs(float(word.replace("−", "-")) - exact) > _ROUNDED
+        ]
+    return found
 
 
 def prose_of(page):

@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 import orchestrator as gfor
+from orchestrator.cases.flow_figures import power_flow_json
 from orchestrator.face.cli import main
 from orchestrator.output.report.html.page import write_report
 from orchestrator.studies.modes.modes import running
@@ -17,6 +18,7 @@ from tests.support.figures import (
     SLIPS,
     foreign_in_json,
     foreign_in_page,
+    unlike_eigenvalues,
     unseen_in_page,
     unseen_slips,
 )
@@ -89,6 +91,8 @@ def test_of_the_page(folder):
     source = [held, deviations(folder / "run"), by_100, OF_THE_SOURCE, advised, LOAD_CHANGE]
     assert foreign_in_page(page, source) == []
     assert unseen_in_page(page, source) == []
+    assert "λ [rad/s]" in page
+    assert unlike_eigenvalues(page) == []
 
 
 def test_of_a_runs_power_flow():
@@ -115,8 +119,9 @@ def test_of_a_runs_power_flow():
         "all": [parts, total, fed, sum(flows).real, list(RATINGS.values())],
         "voltages": [[abs(v), np.degrees(np.angle(v))] for v in ends],
     }
-    assert foreign_in_json(said, source) == []
-    assert unseen_slips(said, source) == []
+    for shown in (said, power_flow_json(prepared)):
+        assert foreign_in_json(shown, source) == []
+        assert unseen_slips(shown, source) == []
     for slip, factor in SLIPS.items():
         wrong = {"p_mw": factor * said["units"]["gfor"]["p_mw"]}
         assert foreign_in_json(wrong, source), slip

@@ -15,7 +15,13 @@ from orchestrator.studies.certification.judgement import LOWERED
 from orchestrator.studies.certification.point import FREQUENCY, POWER, PointResult
 from orchestrator.studies.certification.request import REACTANCES
 from orchestrator.studies.certification.texts import TEXTS
-from tests.support.figures import foreign_in_json, foreign_in_page, unseen_in_page, unseen_slips
+from tests.support.figures import (
+    foreign_in_json,
+    foreign_in_page,
+    unlike_eigenvalues,
+    unseen_in_page,
+    unseen_slips,
+)
 
 
 def uneven(task):
@@ -128,3 +134,5 @@ def test_of_the_page(issued):
     source = [figures_behind(issued.certificate), {"norm": said, "norm_percent": said}]
     assert foreign_in_page(page, source) == []
     assert unseen_in_page(page, source) == []
+    assert "λ [rad/s]" in page
+    assert unlike_eigenvalues(page) == []
