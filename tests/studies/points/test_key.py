@@ -42,27 +42,46 @@ def test_another_version_of_a_library_gives_other_names(fresh, monkeypatch, libr
     assert fingerprint(case) != before[1]
 
 
-@pytest.fixture
-def changed(fresh, monkeypatch, tmp_path):
-    """Whether points of a module have other names once a file has another text, as a new process sees it."""
-    files = shutil.ignore_patterns("__pycache__", "*.toml", "*.raw", "*.dyr")
-    root = shutil.copytree(code._ROOT, tmp_path / "orchestrator", ignore=files)
-    monkeypatch.setattr(code, "_ROOT", root)
+@pytest.fixture(scope="module")
+def tree(tmp_path_factory):
+    """A copy of the code, with what Python compiled of it."""
+    files = shutil.ignore_patterns("*.toml", "*.raw", "*.dyr")
+    return shutil.copytree(
+        code._ROOT, tmp_path_factory.mktemp("code") / "orchestrator", ignore=files
+    )
 
-    def named(module):
+
+@pytest.fixture
+def named(fresh, monkeypatch, tree):
+    """Module → the name of a point of its, as a new process finds it."""
+    monkeypatch.setattr(code, "_ROOT", tree)
+
+    def find(module):
         for one in (code_hash, numbers_hash, code._code):
             one.cache_clear()
         return key_of({"a": 1}, module)
 
+    return find
+
+
+@pytest.fixture
+def changed(named, tree):
+    """Whether points of a module have other names once a file has another text."""
+
     def find(module, file, old, new):
-        before = named(module)
-        assert named(module) == before
-        text = (root / file).read_text(encoding="utf-8")
+        before, text = named(module), (tree / file).read_text(encoding="utf-8")
         assert text.count(old) == 1
-        (root / file).write_text(text.replace(old, new), encoding="utf-8")
-        return named(module) != before
+        (tree / file).write_text(text.replace(old, new), encoding="utf-8")
+        try:
+            return named(module) != before
+        finally:
+            (tree / file).write_text(text, encoding="utf-8")
 
     return find
+
+
+def test_the_same_files_give_the_same_name(named):
+    assert named(SWEEP) == named(SWEEP)
 
 
 @pytest.mark.parametrize(
