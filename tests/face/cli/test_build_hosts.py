@@ -61,21 +61,21 @@ def test_what_the_table_chooses_cannot_be_given_too(words, built):
     assert f"--for plecs chooses that by itself: leave out {words[0]}, or --for" in error
 
 
-def test_the_default_ends_with_what_its_host_needs(gfor, tmp_path):
-    code, out, error = gfor("fmu", "build", "infinite_bus", "--dest", tmp_path)
-    assert code == 0
-    assert out == f"{tmp_path / 'infinite_bus.fmu'}\n"
-    last = error.strip().splitlines()[-1]
-    assert last.startswith("A Python-backed FMU needs a host that is a program in Python")
+def test_the_default_ends_with_what_its_host_needs(built):
+    code, ((model, how),), error = built("infinite_bus")
+    assert (code, model, how["native"]) == (0, "infinite_bus", False)
+    _, needs, last = error.partition("A Python-backed FMU needs a host that is a program in Python")
+    assert needs
     assert "--native" in last
-    code, _, error = gfor("fmu", "build", "infinite_bus", "--for", "fmpy", "--dest", tmp_path)
+    code, _, error = built("infinite_bus", "--for", "fmpy")
     assert (code, "--native" in error) == (0, False)
 
 
 @pytest.mark.slow
 def test_an_fmu_for_a_host_is_what_was_said(gfor, tmp_path):
-    code, _, error = gfor("fmu", "build", "gfor", "--for", "libcosim", "--dest", tmp_path)
+    code, out, error = gfor("fmu", "build", "gfor", "--for", "libcosim", "--dest", tmp_path)
     assert code == 0, error
+    assert out == f"{tmp_path / 'gfor.fmu'}\n"
     with zipfile.ZipFile(tmp_path / "gfor.fmu") as archive:
         names = archive.namelist()
     assert {name.split("/")[1] for name in names if name.startswith("binaries/")} == {
