@@ -25,11 +25,12 @@ from tests.support.skips import Skips, in_ci
 
 
 def pytest_configure(config):
-    """No garbage is looked for among what is collected, which stays.
+    """No garbage is looked for among what is collected, which stays; nothing that is written waits for the disk.
 
     In CI a skip that is not on the list fails the session; with xdist the process that started the others counts.
     """
     gc.disable()
+    os.fsync = lambda handle: None  # no test cuts the power, and thousands of files would wait
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         # a shell starts what runs in its background deaf to Ctrl-C, and all that this starts would
         # be: tests of interrupts would wait for ever

@@ -5,7 +5,7 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -205,8 +205,10 @@ def runs_under_wine(described: FmuDescription) -> bool:
 def read_declared(path: Path | str) -> FmuDescription:
     """The same as `read_description`, also where the FMU has no binary for this platform and cannot run here."""
     path = as_fmu(Path(path))
-    names = names_in(path, with_backslashes=True)
-    return parse_description(path, read_model_description_text(path), names)
+    names = tuple(names_in(path, with_backslashes=True))
+    text = read_model_description_text(path)
+    parse = _parsed_before if len(text) <= _SMALL else parse_description
+    return parse(path, text, names)
 
 
 def platforms_of(archive: Path | BytesIO) -> tuple[str, ...]:
@@ -251,6 +253,12 @@ def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> Fmu
             "ask for that export",
         )
     return replace(described, has_backslashes=any("\\" in name for name in names))
+
+
+_SMALL = 1_000_000  # bytes of a description that is kept: that of a large network takes much memory
+
+# the newest descriptions by all that they are made of: a study reads its device's file for every point
+_parsed_before = lru_cache(maxsize=32)(parse_description)
 
 
 def _only(text: bytes, names: Sequence[str] = ()) -> BytesIO:

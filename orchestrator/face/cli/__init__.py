@@ -317,7 +317,8 @@ def _parser(
             whole = lists[""].add_parser(group, help=GROUPS[group], description=GROUPS[group])
             whole.set_defaults(command=lambda _, whole=whole: _print(whole.format_help()))
             lists[group] = whole.add_subparsers(metavar="COMMAND", parser_class=_Command)
-        command = lists[group].add_parser(last, help=words)
+        # each option costs argparse a look for translations, and nobody asks the others for help
+        command = lists[group].add_parser(last, help=words, add_help=name in chosen)
         if name in chosen:
             for kind in (None, "store"):
                 command.register("action", kind, _Once)

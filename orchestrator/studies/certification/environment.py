@@ -2,6 +2,7 @@
 
 import platform
 import subprocess
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
@@ -26,8 +27,10 @@ def environment() -> dict[str, str]:
     return known | versions_of(_LIBRARIES)
 
 
+@cache
 def commit() -> str:
-    """The commit of the checkout that this program runs from, and whether anything in it is not committed."""
+    """The commit of the checkout that this program runs from, and whether anything in it is not committed; asked once,
+    as `code_hash` is of what was loaded."""
     if not (_ROOT / ".git").exists():
         return "none: installed from a package"
     try:
