@@ -94,7 +94,7 @@ def validate(
         Another model of the same plant, such as its EMT model beside the phasor model: driven, compared and judged in
         the same way. It takes those ``values`` that it knows.
     explain
-        Whether to look for one parameter that would explain the errors.
+        Whether to look for one cause that would explain the errors: a switch, a number, a delay or a limit.
     start, stop
         The part of each recording that is used [s].
     step

@@ -101,6 +101,14 @@ def prepare_event(
     return RecordedEvent(recording, windows, start, tuple(reversed(unique.values())))
 
 
+def cut_event(event: RecordedEvent, after: float) -> RecordedEvent:
+    """The event without what comes so long after its begin [s], or later."""
+    whole = event.recording
+    count = int((event.windows.begin + after) / whole.interval) + 2
+    cut = {name: getattr(whole, name)[:count] for name in ("voltage", "power", "good", "driven")}
+    return replace(event, recording=replace(whole, **cut))
+
+
 def _frequency_before(recording: Recording, before: Mask) -> float:
     """By how much the frequency before the event is off the frame's [Hz]."""
     times, angle = recording.times[before], np.angle(recording.voltage[before])

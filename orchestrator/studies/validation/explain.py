@@ -1,117 +1,315 @@
-"""Which single parameter would explain what a model does otherwise than the plant."""
+"""The one cause that would explain what a model does otherwise than the plant: a value, a switch, a delay or a limit.
+
+Causes are tried where they can be: switches and kinds by a run each, numbers by one difference each, of which those
+that promise the most are followed. Delays and limits are read from the responses."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+import itertools
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
+import numpy as np
+
+from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.errors import CosimError
 from orchestrator.devices.fmi.description import VariableInfo
+from orchestrator.studies.validation.causes import (
+    Cause,
+    Explanation,
+    cap_of_current,
+    capped,
+    delay_of,
+    later,
+)
 from orchestrator.studies.validation.device import PlayedDevice
-from orchestrator.studies.validation.event import RecordedEvent, rms_error
-from orchestrator.studies.validation.fit import FittedParameter, fit_parameters
-from orchestrator.studies.validation.parameters import NEVER, Wanted, adjustable
-from orchestrator.studies.validation.residuals import Report, Residuals, stretches_of
+from orchestrator.studies.validation.event import RecordedEvent, cut_event, noise_before, rms_error
+from orchestrator.studies.validation.parameters import NEVER, Adjustable, adjustable
+from orchestrator.studies.validation.residuals import Report
 
-_TRIED = 3  # numbers that are fitted, those first of which a small change promises the most
-_EXPLAINS = 0.5  # part of the error that an explanation may leave
+_MOST_RECORDED = 12.0  # length of the recordings with which causes are tried, all together [s]
+_MOST_EVENTS = 3  # those with the largest errors
+_STEP = 0.02  # difference for a sensitivity, as part of a parameter's reach
+_FOLLOWED = 5  # numbers that are followed to their best value, those that promise the most
+_MOST_STEPS = 5  # runs in which one is followed
+_SETTLED = 1e-3  # part of the squared error: a smaller gain ends the following
 _MOST_WORDS = 8  # positions of a whole number that are tried
+_GAIN = re.compile(r"[Kk][^a-z]?.*|.*gain.*")  # last part of the name of a controller's gain
+_MOST_LIMITS = 8  # parameters that act on nothing yet and are tried as a limit
 
-
-@dataclass(frozen=True)
-class Explanation:
-    """One parameter with another value, and the error that it leaves: rms of P and Q together [pu of the rating]."""
-
-    parameter: str
-    now: float | bool
-    value: float | bool
-    error: float
-    left: float
-
-    @property
-    def explains(self) -> bool:
-        """Return whether most of the error goes away with it."""
-        return self.left <= _EXPLAINS * self.error
-
-    def as_json(self) -> dict[str, Any]:
-        return {
-            "parameter": self.parameter,
-            "now": self.now,
-            "value": self.value,
-            "rms_now_pu": self.error,
-            "rms_left_pu": self.left,
-            "explains": self.explains,
-        }
+Values = Mapping[str, float | bool]
+Responses = Sequence[Complex]
 
 
 def explain_errors(
     device: PlayedDevice, events: Sequence[RecordedEvent], report: Report = lambda text: None
 ) -> list[Explanation]:
-    """Explanations by one parameter each, the best first: switches and kinds tried, likeliest numbers fitted."""
-    error = _error(device, events)
-    found = []
-    for info, value in _positions(device):
-        report(f"trying {info.name} = {value}")
-        left = _error(device.with_values({info.name: value}), events)
-        if left is not None and error is not None:
-            found.append(Explanation(info.name, device.value(info.name), value, error, left))
-    for one in _likeliest(device, events, report):
-        left = _error(device.with_values({one.name: one.value}), events)
-        if left is not None and error is not None:
-            found.append(Explanation(one.name, one.start, one.value, error, left))
-    return sorted(found, key=lambda one: one.left)
+    """Causes that would explain the errors, each by itself, the one that leaves the least first.
+
+    Of long recordings the first seconds of the events with the largest errors are looked at."""
+    bench = _Bench(device, _looked_at(device, events), report)
+    promises = list(_promises(bench, bench.parameters("Real")))
+    found = [*_positions(bench), *_numbers(bench, promises), *_delays(bench, promises)]
+    found += _limits(bench)
+    better = [one for one in found if one.left < one.error]
+    return sorted(better, key=lambda one: one.left)
 
 
-def _error(device: PlayedDevice, events: Sequence[RecordedEvent]) -> float | None:
-    """Rms error of all events together [pu]; None where the device does not run so."""
-    squares = []
-    for event in events:
+def _looked_at(device: PlayedDevice, events: Sequence[RecordedEvent]) -> list[RecordedEvent]:
+    if sum(one.recording.length for one in events) <= _MOST_RECORDED:
+        return list(events)
+    most = _MOST_RECORDED / min(len(events), _MOST_EVENTS)
+    short = [cut_event(one, max(most - one.windows.begin, 0.5 * most)) for one in events]
+    if len(short) <= _MOST_EVENTS:
+        return short
+    errors = [np.hypot(*rms_error(device.play(e.recording, e.start).power, e)) for e in short]
+    return [short[k] for k in np.argsort(errors)[::-1][:_MOST_EVENTS]]
+
+
+@dataclass
+class _Bench:
+    """A device at events, with what was found of it so far.
+
+    ``squares`` of an error: the mean over the events of the squares of the rms errors of P and Q [pu²]."""
+
+    device: PlayedDevice
+    events: Sequence[RecordedEvent]
+    report: Report
+    base: Responses = field(init=False)
+    error: Numbers = field(init=False)
+    noise: float = field(init=False)
+    idle: list[VariableInfo] = field(default_factory=list)  # numbers that act on nothing
+
+    def __post_init__(self) -> None:
+        played = [self.device.play(one.recording, one.start) for one in self.events]
+        self.base = [one.power for one in played]
+        self.error = self.errors(self.base)
+        pairs = zip(self.events, played, strict=True)
+        scatters = [noise_before(event, one) for event, one in pairs]
+        self.noise = float(np.mean([n[s].scatter ** 2 for n in scatters for s in "pq"]) * 2) ** 0.5
+
+    def parameters(self, kind: str) -> Iterator[VariableInfo]:
+        for info in self.device.description.variables.values():
+            if info.causality == "parameter" and info.type == kind and info.name not in NEVER:
+                yield info
+
+    def responses(self, values: Values) -> Responses | None:
+        """What the device does with other values; None where it does not run with them."""
+        device = self.device.with_values(values)
         try:
-            power = device.play(event.recording, event.start).power
+            return [device.play(one.recording, one.start).power for one in self.events]
         except CosimError:
             return None
-        squares += [one**2 for one in rms_error(power, event)]
-    return math.sqrt(sum(squares) / len(events))
+
+    def errors(self, responses: Responses) -> Numbers:
+        """All errors of P and Q, of which the squares add up; those before the event count a start that is off."""
+        parts = []
+        for event, power in zip(self.events, responses, strict=True):
+            recording = event.recording
+            error = (power - recording.power)[recording.good]
+            size = np.sqrt(len(error) * len(self.events))
+            parts += [error.real / size, error.imag / size]
+        return np.concatenate(parts)
+
+    def explanation(
+        self,
+        cause: Cause,
+        name: str,
+        now: float | bool | None,
+        value: float | bool,
+        left: Numbers,
+        *,
+        unit: str = "",
+    ) -> Explanation:
+        rms = [float(np.sqrt(one @ one)) for one in (self.error, left)]
+        return Explanation(
+            cause, name, unit, now, value, error=rms[0], left=rms[1], noise=self.noise
+        )
 
 
-def _parameters(device: PlayedDevice, kind: str) -> Iterator[VariableInfo]:
-    for info in device.description.variables.values():
-        if info.causality == "parameter" and info.type == kind and info.name not in NEVER:
-            yield info
-
-
-def _positions(device: PlayedDevice) -> Iterator[tuple[VariableInfo, float | bool]]:
+def _positions(bench: _Bench) -> Iterator[Explanation]:
     """Other positions of switches and of kinds, which are whole numbers within bounds."""
-    for info in _parameters(device, "Boolean"):
-        yield info, not device.value(info.name)
-    for info in _parameters(device, "Integer"):
+    best: Explanation | None = None
+    for info, value in _other_positions(bench):
+        bench.report(f"trying {info.name} = {str(value).lower()}")
+        found = bench.responses({info.name: value})
+        if found is None:
+            continue
+        now = bench.device.value(info.name)
+        one = bench.explanation(Cause.POSITION, info.name, now, value, bench.errors(found))
+        yield one
+        if isinstance(value, bool) and (best is None or one.left < best.left):
+            best = one
+    if best is not None and best.left < best.error:
+        yield from _tuned(bench, best)
+
+
+def _other_positions(bench: _Bench) -> Iterator[tuple[VariableInfo, float | bool]]:
+    for info in bench.parameters("Boolean"):
+        yield info, not bench.device.value(info.name)
+    for info in bench.parameters("Integer"):
         low, high = info.minimum, info.maximum
         if low is None or high is None or high - low >= _MOST_WORDS:
             continue
         for value in range(int(low), int(high) + 1):
-            if value != device.value(info.name):
+            if value != bench.device.value(info.name):
                 yield info, value
 
 
-def _likeliest(
-    device: PlayedDevice, events: Sequence[RecordedEvent], report: Report
-) -> Iterator[FittedParameter]:
-    """The numbers of which a change promises the most, each fitted alone."""
-    residuals = Residuals(device, stretches_of(device, events), report)
-    numbers = [adjustable(device, info, None) for info in _parameters(device, "Real")]
-    numbers = [one for one in numbers if one.high > one.low]
-    errors = residuals.at({})
-    promises = []
-    for one in numbers:
-        at = replace(one, start=one.inside())
-        slope = residuals.slopes({one.name: at.start}, {one.name: at.step})[:, 0]
+def _tuned(bench: _Bench, switch: Explanation) -> Iterator[Explanation]:
+    """A switch in its other position, with the one number beside it that explains the most."""
+    part, dot, _ = switch.name.rpartition(".")
+    other = _Bench(
+        bench.device.with_values({switch.name: switch.value}), bench.events, bench.report
+    )
+    beside = [info for info in other.parameters("Real") if info.name.startswith(part + dot)]
+    promises = list(_promises(other, beside)) if dot else []
+    if promises:
+        best = max(promises, key=lambda one: one.gain(other.error))
+        value, left = _followed(other, best)
+        tuned = bench.explanation(Cause.POSITION, switch.name, switch.now, switch.value, left)
+        yield replace(tuned, beside={best.number.name: value})
+
+
+@dataclass(frozen=True)
+class _Promise:
+    """A number, and what a small change of it does to the responses and to the errors, both by its unit."""
+
+    number: Adjustable
+    moves: Responses
+    slope: Numbers
+
+    def gain(self, error: Numbers) -> float:
+        """What a straight line promises of the squared error [pu²]."""
+        return float(self.slope @ error) ** 2 / float(self.slope @ self.slope)
+
+
+def _numbers(bench: _Bench, promises: Sequence[_Promise]) -> Iterator[Explanation]:
+    """The numbers that promise the most, each followed by itself to where it leaves the least."""
+    ordered = sorted(promises, key=lambda one: -one.gain(bench.error))
+    for one in ordered[:_FOLLOWED]:
+        bench.report(f"following {one.number.name}")
+        value, left = _followed(bench, one)
+        number = one.number
+        yield bench.explanation(
+            Cause.VALUE, number.name, number.start, value, left, unit=number.unit
+        )
+
+
+def _promises(bench: _Bench, parameters: Iterable[VariableInfo]) -> Iterator[_Promise]:
+    """The numbers among some parameters that move the response at all."""
+    for info in parameters:
+        one = adjustable(bench.device, info, None)
+        if one.high <= one.low:
+            continue
+        step = _STEP * one.reach
+        step = step if one.start + step <= one.high else -step
+        bench.report(f"sensitivity to {one.name}")
+        found = bench.responses({one.name: one.start + step})
+        if found is None:
+            continue
+        slope = (bench.errors(found) - bench.error) / step
+        if float(slope @ slope) * one.reach**2 > _SETTLED**2 * float(bench.error @ bench.error):
+            pairs = zip(found, bench.base, strict=True)
+            yield _Promise(one, [(moved - base) / step for moved, base in pairs], slope)
+        else:
+            bench.idle.append(info)
+
+
+def _followed(bench: _Bench, promise: _Promise) -> tuple[float, Numbers]:
+    """The best value of one number, by Gauss and Newton with secants for slopes."""
+    number, slope = promise.number, promise.slope
+    at, error = number.start, bench.error
+    way = -float(slope @ error) / float(slope @ slope)
+    for _ in range(_MOST_STEPS):
+        value = min(max(at + way, number.low), number.high)
+        found = bench.responses({number.name: value}) if value != at else None
+        here = None if found is None else bench.errors(found)
+        gained = -1.0 if here is None else float(error @ error - here @ here)
+        if here is None or gained < 0:
+            way *= 0.4
+            continue
+        slope = (here - error) / (value - at)
+        done = gained < _SETTLED * float(error @ error)
+        at, error = value, here
         size = float(slope @ slope)
-        if size > 0:
-            promises.append((float(slope @ errors) ** 2 / size, one))
-    promises.sort(key=lambda pair: -pair[0])
-    for _, one in promises[:_TRIED]:
-        report(f"fitting {one.name} alone")
-        fit = fit_parameters(device, events, Wanted([one], []), report)
-        yield from (found for found in fit.parameters if found.value != found.start)
+        if done or size == 0:
+            break
+        way = -float(slope @ error) / size
+    return at, error
+
+
+def _delays(bench: _Bench, promises: Sequence[_Promise]) -> Iterator[Explanation]:
+    """The whole response later or earlier, and what each gain of a controller acts on.
+
+    A delay before a gain moves the response as the gain does, by the part that comes later: both act at one place, and
+    loops are closed around both."""
+    steady = [
+        np.full(len(power), event.start.power)
+        for power, event in zip(bench.base, bench.events, strict=True)
+    ]
+    without: dict[str, Responses] = {"delay of the whole response": steady}
+    for one in promises:
+        if _GAIN.fullmatch(one.number.name.rpartition(".")[2]) and one.number.start:
+            pairs = zip(bench.base, one.moves, strict=True)
+            without[f"delay before {one.number.name}"] = [
+                base - one.number.start * moves for base, moves in pairs
+            ]
+    intervals = [one.recording.interval for one in bench.events]
+    for name, rest in without.items():
+        delay = delay_of(bench.base, rest, intervals, bench.errors)
+        if delay:
+            left = bench.errors(later(bench.base, rest, intervals, delay))
+            yield bench.explanation(Cause.DELAY, name, 0.0, delay, left, unit="s")
+
+
+def _limits(bench: _Bench) -> Iterator[Explanation]:
+    """A current that the plant does not exceed and the model does, and the parameters that would limit it so."""
+    voltages = [np.abs(one.recording.voltage) for one in bench.events]
+    measured = [one.recording.power for one in bench.events]
+    limit = cap_of_current(bench.base, measured, voltages)
+    if limit is None:
+        return
+    left = bench.errors(capped(bench.base, measured, voltages, limit))
+    yield bench.explanation(Cause.LIMIT, "limit of the current", None, limit, left, unit="pu")
+    best: tuple[float, VariableInfo, Values] | None = None
+    for info, values in itertools.islice(_limiters(bench, limit), _MOST_LIMITS):
+        said = " with ".join(f"{name} = {value:.4g}" for name, value in values.items())
+        bench.report(f"trying {said}")
+        found = bench.responses(values)
+        if found is None:
+            continue
+        error = bench.errors(found)
+        if best is None or float(error @ error) < best[0]:
+            best = float(error @ error), info, values
+    if best is not None:
+        yield from _limiter(bench, *best[1:])
+
+
+def _limiters(bench: _Bench, limit: float) -> Iterator[tuple[VariableInfo, Values]]:
+    """Numbers that act on nothing yet and may be limits, with a kind of the same part that would use them."""
+    above = [i for i in bench.idle if i.unit == "pu" and bench.device.value(i.name) > limit]
+    for info in above:
+        yield info, {info.name: limit}
+        part = info.name.rpartition(".")[0]
+        for kind, value in _other_positions(bench):
+            if kind.type == "Integer" and kind.name.rpartition(".")[0] == part:
+                yield info, {kind.name: value, info.name: limit}
+
+
+def _limiter(bench: _Bench, info: VariableInfo, values: Values) -> Iterator[Explanation]:
+    """A parameter that limits the current, followed to its best value, with the kind that uses it."""
+    other = _Bench(bench.device.with_values(values), bench.events, bench.report)
+    value, left = float(values[info.name]), other.error
+    for promise in _promises(other, [info]):
+        value, left = _followed(other, promise)
+    kinds = [name for name in values if name != info.name]
+    if kinds:
+        name = kinds[0]
+        now = bench.device.value(name)
+        found = bench.explanation(Cause.POSITION, name, now, values[name], left)
+        yield replace(found, beside={info.name: value})
+    else:
+        now = bench.device.value(info.name)
+        yield bench.explanation(Cause.VALUE, info.name, now, value, left, unit=info.unit or "")

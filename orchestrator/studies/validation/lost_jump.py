@@ -16,6 +16,7 @@ from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import (
     EventComparison,
     RecordedEvent,
+    cut_event,
     rms_error,
     rms_movement,
 )
@@ -72,7 +73,7 @@ SMOOTHINGS = (
 
 def lost_jump(comparison: EventComparison) -> Iterator[tuple[float, Question]]:
     """A sharper angle that explains most of the error around the event's begin, with the part that it leaves."""
-    near = _near_event(comparison.event)
+    near = cut_event(comparison.event, _AFTER)
     if near.recording.instantaneous:
         return
     power = comparison.played.power[: len(near.recording.voltage)]
@@ -93,14 +94,6 @@ def lost_jump(comparison: EventComparison) -> Iterator[tuple[float, Question]]:
         "left": left,
     }
     yield left / error, Question(QuestionKind.LOST_JUMP, figures)
-
-
-def _near_event(event: RecordedEvent) -> RecordedEvent:
-    """The event without what comes long after its begin."""
-    whole = event.recording
-    count = int((event.windows.begin + _AFTER) / whole.interval) + 2
-    cut = {name: getattr(whole, name)[:count] for name in ("voltage", "power", "good", "driven")}
-    return replace(event, recording=replace(whole, **cut))
 
 
 def _tried(

@@ -11,7 +11,10 @@ from orchestrator.output.report.html.elements import Figures, colour, document, 
 from orchestrator.studies.validation.event import EventComparison
 from orchestrator.studies.validation.study import ValidationResult
 from orchestrator.studies.validation.words import (
+    EXPLANATION_COLUMNS,
     difference_sentence,
+    explanation_cells,
+    explanation_sentence,
     fit_sentence,
     sentence,
     untold_words,
@@ -38,7 +41,7 @@ def validation_page(result: ValidationResult) -> str:
     if result.criteria:
         chapters.append(("Limits", _limits(result)))
     if result.explanations:
-        chapters.append(("One parameter that would explain the error", _explained(result)))
+        chapters.append(("One cause that would explain the error", _explained(result)))
     if result.fit is not None:
         chapters.append(("Fit", _fit(result)))
     chapters.append(("Procedure, and what was not judged", _not_judged(result)))
@@ -178,18 +181,9 @@ def _fit(result: ValidationResult) -> str:
 
 
 def _explained(result: ValidationResult) -> str:
-    rows = [
-        [
-            escape(one.parameter),
-            f"{one.now:.5g}",
-            f"{one.value:.5g}",
-            f"{one.left:.4g} of {one.error:.4g}",
-            "yes" if one.explains else "no",
-        ]
-        for one in result.explanations
-    ]
-    columns = ["Parameter", "In the model", "Instead", "Rms error left [pu]", "Explains most of it"]
-    return table("Each parameter changed by itself", columns, rows)
+    rows = [list(map(escape, explanation_cells(one))) for one in result.explanations]
+    said = f"<p>{escape(explanation_sentence(result.explanations))}</p>"
+    return said + table("Each cause by itself", list(EXPLANATION_COLUMNS), rows)
 
 
 def _not_judged(result: ValidationResult) -> str:

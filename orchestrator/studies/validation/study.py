@@ -11,6 +11,7 @@ from orchestrator.core.errors import CosimError, InputError
 from orchestrator.core.late import xr
 from orchestrator.studies.validation.beside import WindowApart, models_apart
 from orchestrator.studies.validation.between import with_doubt_between
+from orchestrator.studies.validation.causes import Explanation
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import (
     EventComparison,
@@ -19,7 +20,7 @@ from orchestrator.studies.validation.event import (
     prepare_event,
     rms_error,
 )
-from orchestrator.studies.validation.explain import Explanation, explain_errors
+from orchestrator.studies.validation.explain import explain_errors
 from orchestrator.studies.validation.fit import Fit, fit_parameters
 from orchestrator.studies.validation.hypotheses import question_readings
 from orchestrator.studies.validation.limits import (

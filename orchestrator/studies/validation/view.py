@@ -19,18 +19,22 @@ from orchestrator.output.report.pdf import print_pdf
 from orchestrator.output.report.tables import PlainTable, VerdictSentence, make_table
 from orchestrator.output.results.staging import new_run_id, staged
 from orchestrator.output.results.storage import save_json, save_table
+from orchestrator.studies.validation.causes import Explanation
 from orchestrator.studies.validation.event import EventComparison
-from orchestrator.studies.validation.explain import Explanation
 from orchestrator.studies.validation.figures import ErrorFigures
 from orchestrator.studies.validation.fit import Fit
 from orchestrator.studies.validation.limits import Criterion, LimitVerdict
 from orchestrator.studies.validation.questions import Question
 from orchestrator.studies.validation.study import FitCheck, ValidationResult
 from orchestrator.studies.validation.words import (
+    EXPLANATION_COLUMNS,
     difference_sentence,
+    explanation_cells,
+    explanation_sentence,
     fit_sentence,
     sentence,
     untold_words,
+    value_text,
 )
 
 _GOOD = {LimitVerdict.MET: True, LimitVerdict.NOT_MET: False, LimitVerdict.OPEN: None}
@@ -229,6 +233,7 @@ def parts(found: Validation) -> Iterator[RenderableType]:
     if result.criteria:
         yield _criteria_table(result.criteria)
     if result.explanations:
+        yield escape(explanation_sentence(result.explanations))
         yield _explanation_table(result.explanations)
     if result.fit is not None:
         yield _fit_table(result.fit)
@@ -338,18 +343,8 @@ def _windows_table(one: EventComparison) -> PlainTable:
 
 
 def _explanation_table(explanations: Sequence[Explanation]) -> PlainTable:
-    rows = [
-        (
-            one.parameter,
-            _as_text(one.now),
-            _as_text(one.value),
-            f"{one.left:.4g} of {one.error:.4g}",
-            "yes" if one.explains else "no",
-        )
-        for one in explanations[:_SHOWN]
-    ]
-    columns = ("Parameter", "Now", "Instead", "rms error left [pu]", "Explains most of it")
-    return make_table("One parameter that would explain the error", *columns, rows=rows)
+    rows = [explanation_cells(one) for one in explanations[:_SHOWN]]
+    return make_table("One cause that would explain the error", *EXPLANATION_COLUMNS, rows=rows)
 
 
 def _fit_table(fit: Fit) -> PlainTable:
@@ -361,8 +356,8 @@ def _fit_table(fit: Fit) -> PlainTable:
         rows.append(
             (
                 f"{one.name} [{one.unit}]" if one.unit else one.name,
-                _as_text(one.start),
-                _as_text(one.value),
+                value_text(one.start),
+                value_text(one.value),
                 both,
                 untold_words(one),
             )
@@ -371,10 +366,6 @@ def _fit_table(fit: Fit) -> PlainTable:
     table = make_table("Fit", *columns, rows=rows)
     table.columns[4].justify = "left"
     return table
-
-
-def _as_text(value: float | bool) -> str:
-    return str(value).lower() if isinstance(value, bool) else f"{value:.4g}"
 
 
 def _confirmation_table(confirmations: Sequence[FitCheck]) -> PlainTable:

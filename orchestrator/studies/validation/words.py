@@ -6,10 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from orchestrator.studies.validation.beside import WindowApart
+from orchestrator.studies.validation.causes import Cause, Explanation
 from orchestrator.studies.validation.fit import Fit, FittedParameter, Untold
 from orchestrator.studies.validation.questions import Question, QuestionKind
 
 Figures = Mapping[str, Any]
+
+_ALIKE = (
+    1.3  # times the error that the best cause leaves, up to which another one is hardly told apart
+)
 
 
 def sentence(question: Question) -> str:
@@ -232,6 +237,65 @@ def difference_sentence(places: Sequence[WindowApart]) -> str:
         f"event of {worst.recording} by {worst.apart:.3g} pu (rms), from the record by {worst.first:.3g} and "
         f"{worst.second:.3g} pu{many}."
     )
+
+
+EXPLANATION_COLUMNS = ("Cause", "Now", "Instead", "rms error left [pu]", "Explains", "Most of it")
+"""Heads of `explanation_cells`."""
+
+
+def value_text(value: float | bool | None) -> str:
+    """Write a value with four digits; a dash where there is none."""
+    if value is None:
+        return "–"
+    return str(value).lower() if isinstance(value, bool) else f"{value:.4g}"
+
+
+def explanation_cells(one: Explanation) -> tuple[str, ...]:
+    """Cells of a table's row: the cause, its values, the error left and the part that it explains."""
+    unit = f" [{one.unit}]" if one.unit not in ("", "1") else ""
+    beside = "".join(f", {name} = {value_text(x)}" for name, x in one.beside.items())
+    return (
+        f"{one.name}{unit}",
+        value_text(one.now),
+        f"{value_text(one.value)}{beside}",
+        f"{one.left:.4g} of {one.error:.4g}",
+        f"{one.share:.0%}",
+        "yes" if one.explains else "no",
+    )
+
+
+def explanation_sentence(explanations: Sequence[Explanation]) -> str:
+    """Name the cause that explains the most, and those that explain nearly as much."""
+    best = explanations[0]
+    if not best.explains:
+        return (
+            f"No cause by itself explains most of the error; the nearest is {_cause(best)}, with {best.share:.0%} of "
+            "the squared error beyond the scatter."
+        )
+    said = f"The likeliest cause is {_cause(best)}: "
+    said += f"it explains {best.share:.0%} of the squared error beyond the scatter."
+    alike = [
+        one
+        for one in explanations[1:]
+        if one.name != best.name and one.explains and one.left < _ALIKE * best.left
+    ]
+    if alike:
+        said += f" The recordings tell it hardly apart from {'; '.join(map(_cause, alike))}."
+    return said
+
+
+def _cause(one: Explanation) -> str:
+    unit = f" {one.unit}" if one.unit not in ("", "1") else ""
+    beside = "".join(f" with {name} = {value_text(x)}" for name, x in one.beside.items())
+    match one.cause:
+        case Cause.DELAY:
+            way = "later" if one.value > 0 else "earlier"
+            what = one.name.removeprefix("delay of ").removeprefix("delay before ")
+            return f"{what} coming {abs(one.value):.3g} s {way} in the plant"
+        case Cause.LIMIT:
+            return f"a current that the plant limits to {one.value:.4g}{unit}"
+        case _:
+            return f"{one.name} = {value_text(one.value)}{unit}{beside} (now {value_text(one.now)})"
 
 
 def fit_sentence(fit: Fit, kept_back: Sequence[str]) -> str:

@@ -176,7 +176,7 @@ def test_the_page_holds_the_fit_and_what_explains_the_error(recording, tmp_path)
     )
     page = found.html()
     assert "Fitted parameters" in page
-    assert "Each parameter changed by itself" in page
+    assert "The likeliest cause is pod_p.K" in page
     assert "Rms error of P and Q" in page
 
 

@@ -1,0 +1,146 @@
+"""Causes of an error that stand in no parameter: a response that comes later, and a current that the plant limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+
+from orchestrator.core.arrays import Complex, Numbers
+
+_EXPLAINS = 0.75  # part of the squared error beyond the scatter that an explanation takes away
+_MOST_DELAY = 0.25  # longest delay that is looked for [s]
+_DELAYS = 500  # that are tried
+_LEAST_DELAY = 0.002  # [s]
+_LEVELS = 200  # limits of the current that are tried
+_ABOVE = 1.03  # times a limit which the measured current reaches at its most
+_FEWEST = 5  # samples that a limit changes
+_STAYS = 0.3  # part of the model's way above a limit that the measured current is off it there
+_LEAST_VOLTAGE = 1e-3  # [pu]
+
+Responses = Sequence[Complex]
+Errors = Callable[[Responses], Numbers]
+
+
+class Cause(StrEnum):
+    """Programs decide by it."""
+
+    VALUE = "value"
+    POSITION = "position"
+    DELAY = "delay"
+    LIMIT = "limit"
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """One cause by itself, and the error that it leaves: rms of P and Q together [pu of the rating].
+
+    ``now`` is None where the model has no such limit; ``noise``: the recordings' own scatter [pu of the rating]."""
+
+    cause: Cause
+    name: str
+    unit: str
+    now: float | bool | None
+    value: float | bool
+    error: float
+    left: float
+    noise: float = 0.0
+    beside: Mapping[str, float] = field(default_factory=dict)  # another number with its value
+
+    @property
+    def share(self) -> float:
+        """Part of the squared error beyond the scatter that goes away with it, 0 to 1."""
+        beyond = self.error**2 - self.noise**2
+        rest = max(self.left**2 - self.noise**2, 0.0)
+        return min(max(1 - rest / beyond, 0.0), 1.0) if beyond > 0 else 0.0
+
+    @property
+    def explains(self) -> bool:
+        """Return whether most of the error goes away with it."""
+        return self.share >= _EXPLAINS
+
+    def as_json(self) -> dict[str, Any]:
+        return {
+            "cause": str(self.cause),
+            "parameter": self.name,
+            "unit": self.unit,
+            "now": self.now,
+            "value": self.value,
+            "with": dict(self.beside),
+            "rms_now_pu": self.error,
+            "rms_left_pu": self.left,
+            "share": self.share,
+            "explains": self.explains,
+        }
+
+
+def later(
+    responses: Responses, without: Responses, intervals: Sequence[float], delay: float
+) -> list[Complex]:
+    """Responses of which the part that stands above others comes later by a time [s]."""
+    return [
+        rest + _shifted(whole - rest, delay / interval)
+        for whole, rest, interval in zip(responses, without, intervals, strict=True)
+    ]
+
+
+def _shifted(values: Complex, samples: float) -> Complex:
+    at = np.arange(len(values))
+    found: Complex = np.interp(at - samples, at, values)
+    return found
+
+
+def delay_of(
+    responses: Responses, without: Responses, intervals: Sequence[float], errors: Errors
+) -> float | None:
+    """The time by which a part of the responses comes later in the recordings [s]; None where none explains them."""
+    trial = np.linspace(-_MOST_DELAY, _MOST_DELAY, _DELAYS + 1)
+    costs = [_squares(errors(later(responses, without, intervals, one))) for one in trial]
+    best = int(np.argmin(costs))
+    delay = float(trial[best])
+    inside = 0 < best < _DELAYS
+    return delay if inside and abs(delay) >= _LEAST_DELAY else None
+
+
+def capped(
+    responses: Responses, measured: Responses, voltages: Sequence[Numbers], limit: float
+) -> list[Complex]:
+    """Responses that are cut where their current is above a limit [pu of the rating].
+
+    There the angle is the measured one: a device at its limit decides otherwise what it gives up."""
+    found = []
+    for own, seen, voltage in zip(responses, measured, voltages, strict=True):
+        at_limit = limit * np.maximum(voltage, _LEAST_VOLTAGE) * np.exp(1j * np.angle(seen))
+        found.append(np.where(_current(own, voltage) > limit, at_limit, own))
+    return found
+
+
+def cap_of_current(
+    responses: Responses, measured: Responses, voltages: Sequence[Numbers]
+) -> float | None:
+    """The limit at which the measured current stays while the model's is above it [pu of the rating].
+
+    None where the plant shows none: its current is not still while the model's moves."""
+    own, seen = (
+        np.concatenate([_current(x, v) for x, v in zip(powers, voltages, strict=True)])
+        for powers in (responses, measured)
+    )
+    levels = np.linspace(float(seen.max()) / _ABOVE, float(own.max()), _LEVELS)
+    costs = [_squares(np.minimum(own, level) - seen) for level in levels]
+    limit = float(levels[int(np.argmin(costs))])
+    above = own > limit
+    if above.sum() < _FEWEST:
+        return None
+    stays = _squares(seen[above] - limit) <= _STAYS**2 * _squares(own[above] - limit)
+    return limit if stays else None
+
+
+def _current(power: Complex, voltage: Numbers) -> Numbers:
+    return np.asarray(np.abs(power) / np.maximum(voltage, _LEAST_VOLTAGE))
+
+
+def _squares(error: Numbers) -> float:
+    return float(error @ error)

@@ -1,0 +1,63 @@
+"""A fault that is planted in the plant and not in its model is named, with its size, from the recording alone."""
+
+import numpy as np
+import pytest
+
+import orchestrator as gfor_in_python
+from orchestrator.studies.validation.causes import Cause
+from orchestrator.studies.validation.words import explanation_sentence
+from tests.studies.validation.recordings import run, table, with_noise
+
+ON = {"pod_p.enabled": True}
+STEP = "200 us"
+
+
+def explained(frame, device="gfor", **more):
+    frame = frame.set_index("time")
+    found = gfor_in_python.validate(device, frame, explain=True, **{"step": STEP} | more)
+    return found.result.explanations
+
+
+def test_a_wrong_inertia_is_named_with_the_plants():
+    step = {"time": 0.5, "component": "grid", "type": "load_change", "load": "load_7", "scale": 1.1}
+    case = gfor_in_python.load("k2a").with_(
+        events=[step], solver={"record": ["*"], "record_interval": "5 ms"}
+    )
+    ran = case.scenario("no_pss", {"sg1.machine.H": 5.2}).run(stop=3.0).dataset
+    frame = with_noise(table(ran, unit="sg1", bus="grid.bus_1"))
+    best, second, *_ = explained(frame, "k2a", component="sg1", scenario="no_pss", step="1 ms")
+    assert best.name == "machine.H"
+    assert best.now == 6.5
+    assert best.value == pytest.approx(5.2, rel=0.01)
+    assert best.explains
+    assert not second.explains
+
+
+def test_a_controller_that_is_off_in_the_model_is_named_with_the_plants_gain():
+    best, *_ = found = explained(with_noise(table(run("pod_p", stop=4.0, gfor__pod_p__K=120.0))))
+    assert (best.cause, best.name, best.value) == (Cause.POSITION, "pod_p.enabled", True)
+    assert best.beside["pod_p.K"] == pytest.approx(120, rel=0.01)
+    assert best.share > 0.99
+    said = explanation_sentence(found)
+    assert said.startswith("The likeliest cause is pod_p.enabled = true with pod_p.K = 120")
+
+
+def test_a_response_that_comes_30_ms_late_is_named_with_its_time():
+    frame = with_noise(table(run("pod_p", stop=4.0)))
+    late = {c: np.interp(frame.time - 0.03, frame.time, frame[c]) for c in ("p_mw", "q_mvar")}
+    best, second, *_ = explained(frame.assign(**late), values=ON)
+    assert (best.cause, best.name) == (Cause.DELAY, "delay of the whole response")
+    assert best.value == pytest.approx(0.03, abs=0.002)
+    assert best.explains
+    assert not second.explains
+
+
+def test_a_limit_of_the_current_that_the_model_lacks_is_named_with_its_level():
+    limits = {"gfor__current_limit__kind": 1, "gfor__current_limit__I_max": 1.05}
+    frame = with_noise(table(run("pod_p", stop=3.0, scale=1.12, **limits)))
+    best, *_ = found = explained(frame, values=ON)
+    assert (best.name, best.value) == ("current_limit.kind", 1)
+    assert best.beside["current_limit.I_max"] == pytest.approx(1.05, rel=0.002)
+    assert best.share > 0.99
+    (limit,) = (one for one in found if one.cause is Cause.LIMIT)
+    assert limit.value == pytest.approx(1.05, rel=0.01)
