@@ -36,13 +36,24 @@ from orchestrator.cases.networks.imported_flow import imported_equations
 from orchestrator.cases.networks.load_models import FlowLaws, device_laws, flow_laws, with_laws
 from orchestrator.cases.networks.psse.device_flow import solved_devices
 from orchestrator.cases.networks.psse.device_notes import device_notes
-from orchestrator.cases.networks.psse.raw import FileLoad, Machine, read_raw
-from orchestrator.cases.networks.psse.solution import stated_voltages
-from orchestrator.cases.networks.psse.synchronous_parts import synchronous_part
+from orchestrator.cases.networks.psse.raw import (
+    FileLoad,
+    Machine,
+    RawNetwork,
+    bus_of_unit,
+    read_raw,
+)
+from orchestrator.cases.networks.psse.solution import half_digit, stated_voltages
+from orchestrator.cases.networks.psse.studied_parts import (
+    StudiedPart,
+    choose_part,
+    part_notes,
+    reference_note,
+)
 from orchestrator.cases.networks.record_use import RecordUse
 from orchestrator.cases.networks.sources import read_matpower, read_pandapower
 from orchestrator.core.arrays import Matrix
-from orchestrator.core.errors import InputError, Problem, few
+from orchestrator.core.errors import InputError, Problem
 
 _REFERENCE = 3  # code of a reference in the table of buses
 _FREQUENCY = 60.0  # of a RAW file that does not say it, as PSS/E's own default [Hz]
@@ -273,19 +284,20 @@ def _read_from_raw(asked: _Asked) -> _Source:
     needed = {bus for device in raw.devices for bus in device.places}
     imported = import_network(raw.tables, joined=False, needed=needed)
     imported = replace(imported, frequency=imported.frequency or _FREQUENCY)
-    references = [
-        bus_of(raw.tables.labels[int(row[0])]) for row in raw.tables.bus if row[1] == _REFERENCE
-    ]
-    part = synchronous_part(imported, raw.devices, references)
+    slack = bus_of_unit(asked.slack, raw.machines) if asked.slack else None
+    part = _choose_part(raw, imported, slack)
     imported = part.network
-    left = {x for x in raw.machines if bus_name(str(x.bus)) in part.left}
+    left = {x for x in raw.machines if bus_name(str(x.bus)) in part.left_buses}
     machines = tuple(x for x in raw.machines if x not in left)
-    if part.left:
-        text = (
-            f"only DC lines lead to {few(sorted(part.left), _SHOWN)}: a part with a frequency of its own, which is "
-            "left out; the DC lines feed here what they do at the file's voltages there"
-        )
-        changes.append(Problem(raw.tables.name, text))
+    ratings: dict[str, float] = {}
+    for machine in machines:
+        bus = bus_name(raw.tables.labels[machine.bus])
+        ratings[bus] = ratings.get(bus, 0.0) + machine.likely_mva
+    changes += [Problem(raw.tables.name, text) for text in part_notes(part)]
+    if imported.slack is None and slack is None and ratings:
+        largest = max((bus for bus in ratings if bus in part.buses), key=ratings.__getitem__)
+        imported = replace(imported, slack=largest)
+        changes.append(Problem(raw.tables.name, reference_note(largest)))
     moving = with_controls(raw, imported)
     if table.move_controls:
         imported = moving.network
@@ -295,10 +307,6 @@ def _read_from_raw(asked: _Asked) -> _Source:
     changes += device_notes(solved, table, raw.tables.name)
     with_devices = replace(imported, loads=(*imported.loads, *solved.loads))
     misfit = misfit_of(with_devices, raw.tables.bus, raw.tables.labels, NOT_SOLVED)
-    ratings: dict[str, float] = {}
-    for machine in machines:
-        bus = bus_name(raw.tables.labels[machine.bus])
-        ratings[bus] = ratings.get(bus, 0.0) + machine.likely_mva
     generation = {
         bus: replace(g, rating_mva=ratings[bus]) for bus, g in imported.generation.items()
     }
@@ -316,6 +324,14 @@ def _read_from_raw(asked: _Asked) -> _Source:
         controls=moving.controls if table.move_controls else (),
         counted_controls=moving.counted,
     )
+
+
+def _choose_part(raw: RawNetwork, network: ImportedNetwork, slack: str | None) -> StudiedPart:
+    """Return the part of a network that is studied; ``slack``: the bus that the case names."""
+    references = [
+        bus_of(raw.tables.labels[int(row[0])]) for row in raw.tables.bus if row[1] == _REFERENCE
+    ]
+    return choose_part(network, raw.devices, references, slack)
 
 
 def _from_cgmes(path: Path, table: NetworkTable) -> _Source:
@@ -409,7 +425,7 @@ def misfit_of(
     left = SYSTEM_BASE_MVA * (equations.fed - equations.powers(voltages))
     units = [k for k, place in enumerate(places) if place in network.generation]
     left[units], left[[equations.slack, *range(known, len(buses))]] = left[units].real, 0
-    rounding = _rounding(bus[:, _VM]) + np.radians(_rounding(bus[:, _VA]))
+    rounding = half_digit(bus[:, _VM]) + np.radians(half_digit(bus[:, _VA]))
     noise = SYSTEM_BASE_MVA * rounding * abs(voltages) * (abs(matrix) @ np.ones(len(buses)))
     load = sum(x.p_mw for x in network.loads if x.p_mw > 0)
     found = [int(k) for k in np.argsort(-abs(left)) if abs(left[k]) > noise[k] + _SMALL * load]
@@ -430,11 +446,4 @@ def _sentence(left: Mapping[str, complex], buses: int) -> str:
     return (
         "the file's own solution (VM, VA) does not fit its data, so the power flow computed here is another: with "
         f"these voltages its data feed, beyond what the network takes away, {', '.join(shown)}{more}; look at {likely}"
-    )
-
-
-def _rounding(values: np.ndarray) -> float:
-    """Half of the last digit to which numbers are given."""
-    return next(
-        0.5 * 10.0**-d for d in range(16) if d == 15 or not (np.round(values, d) - values).any()
     )

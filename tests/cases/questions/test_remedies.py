@@ -126,8 +126,12 @@ GALLERY = {
     ),
     "how devices follow": Broken("How they follow the voltage is open", lines("INDUCTION MACHINE")),
     "no reference": Broken(
-        "that feeds what is left, such as",
+        "without which PSS/E solves nothing",
         changed(NINE, ("1,'BUS 1     ',16.5,3", "1,'BUS 1     ',16.5,2")),
+    ),
+    "no reference in MATPOWER": Broken(
+        "that feeds what is left, such as",
+        files={"three.m": changed(MPC, ("[1 3 0 0", "[1 2 0 0"))},
     ),
     "infinite bus": Broken(
         "an infinite bus holds",
@@ -448,6 +452,7 @@ _ELSEWHERE = (
     "`gfor fmu bind` drafts one",  # tests/devices/binding/test_draft.py
     "give that to --dll",  # tests/vendor_dll
     "reactive_limits = false in [power_flow]",  # for a power flow that swings from limit to limit
+    "a system of its own, with a reference of its own",  # tests/cases/networks/psse/test_studied_parts.py
     "study each on its own",  # tests/cases/networks/cgmes/test_cgmes.py, by the same function
 )
 """Remedies that other tests type, or that no small network asks for."""

@@ -3,7 +3,7 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
 from pathlib import Path
@@ -25,6 +25,7 @@ from orchestrator.cases.networks.psse.device_records import (
 )
 from orchestrator.cases.networks.psse.devices import HeldDevice
 from orchestrator.cases.networks.psse.impedance_corrections import correction_tables
+from orchestrator.cases.networks.psse.missing_buses import with_known_buses
 from orchestrator.cases.networks.psse.raw_accounts import record_uses
 from orchestrator.cases.networks.psse.raw_file import read_file
 from orchestrator.cases.networks.psse.records import (
@@ -38,13 +39,19 @@ from orchestrator.cases.networks.psse.references import (
     INFINITE_REACTANCE,
     references_without_machine,
 )
-from orchestrator.cases.networks.psse.solution import fits, reactive_needs, stated_voltages
+from orchestrator.cases.networks.psse.solution import (
+    HeldPower,
+    SolvedBuses,
+    reactive_needs,
+    sort_buses,
+    stated_voltages,
+)
 from orchestrator.cases.networks.psse.transformers import Transformer, star, transformers
 from orchestrator.cases.networks.psse.zero_impedances import is_joining, merged_buses, threshold
 from orchestrator.cases.networks.record_use import RecordUse
 from orchestrator.cases.networks.source_changes import Changes
 from orchestrator.cases.networks.sources import SourceTables
-from orchestrator.core.errors import Problem
+from orchestrator.core.errors import InputError, Problem
 
 _BUS_COLUMNS, _BRANCH_COLUMNS, _GEN_COLUMNS = 13, 11, 10
 _VM, _VA = 7, 8  # columns of the table of buses
@@ -114,6 +121,14 @@ def unit_labels(machines: Iterable[Machine]) -> dict[tuple[int, str], str]:
     }
 
 
+def bus_of_unit(name: str, machines: Iterable[Machine]) -> str:
+    """Return the bus of a unit or a bus that a case names, ``sg9_1`` or ``bus_9``; the name itself if it is no unit."""
+    machines = tuple(machines)
+    units = {f"sg{label}": bus for (bus, _), label in unit_labels(machines).items()}
+    units |= {f"sg{machine.bus}": machine.bus for machine in machines}
+    return f"bus_{units[name]}" if name in units else name
+
+
 @dataclass(frozen=True)
 class FileLoad:
     """One load in service [MW, Mvar], by what a record of dynamics data may name it.
@@ -166,7 +181,9 @@ def read_raw(
 
 class _Reading:
     def __init__(self, raw: RawFile, changes: Changes, keep_load_parts: bool) -> None:
-        self._raw, self._changes, self._keep_load_parts = raw, changes, keep_load_parts
+        self._file, self._changes, self._keep_load_parts = raw, changes, keep_load_parts
+        known = with_known_buses(raw)
+        self._raw, self._dropped = known.raw, known.dropped
         self._rows: dict[int, list[float]] = {}
         self._kilovolts: dict[int, float] = {}
         self._magnitudes: dict[int, float] = {}
@@ -203,6 +220,8 @@ class _Reading:
         for line, text in self._raw.remarks:
             self._changes.note(line, text)
         leave_out(self._raw, leaving_out, self._changes)
+        for line, text in self._dropped.items():
+            self._changes.note(line, text)
         self._buses()
         self._merge()
         self._loads()
@@ -239,7 +258,9 @@ class _Reading:
             {bus: x.feeding for bus, x in at_buses.items() if x.feeding.power},
             tuple(self._names),
         )
-        records = record_uses(self._raw, self._merged, leaving_out, self._devices.unused)
+        records = record_uses(
+            self._file, self._merged, leaving_out, self._devices.unused, self._dropped
+        )
         return RawNetwork(
             tables,
             machines,
@@ -258,6 +279,15 @@ class _Reading:
         if bus not in self._rows:
             raise record.error(f"there is no bus {bus}")
         return bus
+
+    def _group(self, record: Record, index: int, name: str) -> int:
+        """Return the area, zone or owner that a record names; a word in its place is asked about."""
+        try:
+            return record.whole(index, name, 1)
+        except InputError:
+            text = f"{name} is {record.text(index)!r}, which is no number: 1 is taken, and it has no effect on the flow"
+            self._changes.note(record.line, text)
+            return 1
 
     def _own(self, record: Record, index: int = 0) -> int:
         """The bus that a record names, also if it is one with another."""
@@ -434,9 +464,9 @@ class _Reading:
                 f"load_{self._labels[bus]}",
                 self._own(record),
                 record.text(1, "1").strip(),
-                record.whole(3, "AREA", 1),
-                record.whole(4, "ZONE", 1),
-                record.whole(11, "OWNER", 1),
+                self._group(record, 3, "AREA"),
+                self._group(record, 4, "ZONE"),
+                self._group(record, 11, "OWNER"),
                 pl + current.real + admittance.real * v**2,
                 ql + current.imag - admittance.imag * v**2,
             )
@@ -660,35 +690,41 @@ class _Reading:
                 fed[ending.bus] = fed.get(ending.bus, 0.0) + ending.fed.imag
         return fed
 
-    def _solved_buses(self, status: int) -> set[int]:
-        """Return the buses at which the file's voltages fit the machines' QG; none if the file is not solved.
+    def _solved_buses(self, status: int) -> SolvedBuses:
+        """Return the buses at which the file's voltages fit the machines' reactive power; none if it is not solved.
 
         ``status``: column of STAT in the records of machines."""
         needed = reactive_needs(self._rows, self._branches, self._to_earth, self._raw.base_mva)
         fed = self._fed_by_devices() if needed else {}
         fed = {bus: q for bus, q in fed.items() if bus in needed}
+        found: dict[int, list[HeldPower]] = {}
         for record in self._raw.of("generator"):
             bus = self._same.get(self._own(record), self._own(record))
             if record.whole(status, "STAT", 1) and bus in needed:
-                fed[bus] = fed.get(bus, 0.0) + record.number(3, "QG", 0.0)
-        return {bus for bus, q in fed.items() if fits(q, needed[bus])}
+                least, most = _limits(record, "QB", 5, "QT", 4, "Mvar")
+                above = self._magnitudes[bus] - record.number(6, "VS", 1.0)
+                power = HeldPower(record.number(3, "QG", 0.0), least, most, above)
+                found.setdefault(bus, []).append(power)
+        return sort_buses(needed, fed, found)
 
     def _setpoint(
-        self, record: Record, bus: int, limits: tuple[float, float], solved: Collection[int]
+        self, record: Record, bus: int, limits: tuple[float, float], solved: SolvedBuses
     ) -> float:
         """Return the voltage that a machine is to hold [pu]: VS, or VM if the file's solution fits there."""
         least, most = limits
         fed, VM = record.number(3, "QG", 0.0), self._magnitudes[bus]
         held = record.number(6, "VS", 1.0)
-        is_within = least + _AT_LIMIT < fed < most - _AT_LIMIT
-        if bus in solved and abs(held - VM) > _CLOSE:
+        is_within = least + _AT_LIMIT < fed < most - _AT_LIMIT and bus not in solved.at_limit
+        if bus in solved.all and abs(held - VM) > _CLOSE:
             text = "VS is not VM of the file's solution, as QG is at a limit"
+            if bus in solved.at_limit:
+                text = "VS is not VM of the file's solution, whose voltages need QB or QT there, and not QG"
             if is_within:
                 text = f"VS is {held:g} pu, where the solved file has VM = {VM:g} pu, with Q within its limits"
             text += ": it holds VM, from which PSS/E starts as well; the unit's v_0 in the case changes it"
             self._changes.note(record.line, text)
             return VM
-        if bus not in solved and VM != 1 and abs(held - VM) > _APART and least < fed < most:
+        if bus not in solved.all and VM != 1 and abs(held - VM) > _APART and least < fed < most:
             text = f"VS is {held:g} pu, where the solved file has VM = {VM:g} pu, with Q within its limits: VS is held"
             self._changes.note(record.line, text)
         return held

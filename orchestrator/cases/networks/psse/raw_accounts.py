@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 
+from orchestrator.cases.networks.psse.missing_buses import status_columns
 from orchestrator.cases.networks.psse.records import (
     LEFT_OUT,
     NODES,
@@ -13,7 +14,6 @@ from orchestrator.cases.networks.psse.records import (
 from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
 
 _OUT = 4  # IDE of a bus that is out of service
-_SHUNT_STATUS = 32  # first revision with STAT of a switched shunt
 _IREG = 7  # column of the bus whose voltage a machine controls
 _USED = (UseOfRecord.USED, "")
 _NO_EFFECT = (UseOfRecord.NOT_USED, "no effect on the network")
@@ -32,11 +32,13 @@ def record_uses(
     merged: Collection[int],
     leaving_out: Collection[str],
     unused: Mapping[tuple[str, int], str],
+    dropped: Mapping[int, str],
 ) -> tuple[RecordUse, ...]:
     """Return what became of every element of a file, by the first line of its record.
 
     ``merged``: lines of zero impedance lines that make their buses one; ``leaving_out``: elements that the user leaves
-    out; ``unused``: why a device is not used, by section and place among its elements."""
+    out; ``unused``: why a device is not used, by section and place among its elements; ``dropped``: why another element
+    is not used, by the line of its record."""
     found = []
     for section, records in raw.sections.items():
         for k, lines in enumerate(elements(section, records)):
@@ -45,6 +47,8 @@ def record_uses(
                 use, why = UseOfRecord.NOT_USED, "zero impedance: its buses are one"
             if (section, k) in unused:
                 use, why = UseOfRecord.NOT_USED, unused[section, k]
+            if lines[0].line in dropped:
+                use, why = UseOfRecord.NOT_USED, dropped[lines[0].line]
             found.append(RecordUse(raw.place, lines[0].line, section, use, why))
     return tuple(found)
 
@@ -59,7 +63,7 @@ def _use(
         return UseOfRecord.HELD, "what it feeds or draws in the file's solution"
     if section == "bus":
         return _out_of_service("IDE = 4") if record.whole(3, "IDE", 1) == _OUT else _USED
-    status = _status(raw.revision).get(section)
+    status = status_columns(raw.revision).get(section)
     if status is not None and not record.whole(status, "the status", 1):
         return _out_of_service("its status is 0")
     if section == "branch" and len({abs(record.whole(k, "the bus' number")) for k in (0, 1)}) == 1:
@@ -71,25 +75,12 @@ def _use(
     bus = abs(record.whole(0, "the bus' number")) if section == "generator" else 0
     if bus and record.whole(_IREG, "IREG", 0) not in (0, bus):
         return UseOfRecord.HELD, "the voltage of its own bus, instead of that of IREG"
-    is_element = section in _status(raw.revision) or section == "switched shunt"
+    is_element = section in status_columns(raw.revision) or section == "switched shunt"
     return _USED if is_element else _OF_SECTION.get(section, _NO_EFFECT)
 
 
 def _out_of_service(how: str) -> tuple[UseOfRecord, str]:
     return UseOfRecord.NOT_USED, f"out of service: {how}"
-
-
-def _status(revision: int) -> dict[str, int]:
-    """Return the column of an element's status by section."""
-    shunt = {} if revision < _SHUNT_STATUS else {"switched shunt": 3 + (revision >= NODES)}
-    return shunt | {
-        "load": 2,
-        "fixed shunt": 2,
-        "generator": 14 + (revision >= NODES),
-        "branch": 13 if revision < SWITCHING_DEVICES else 23,
-        "system switching device": 16,
-        "transformer": 11,
-    }
 
 
 def _mode(revision: int) -> int:

@@ -189,6 +189,12 @@ _WITHOUT_EFFECT = {
     "subnode": "substation",
     "subswd": "substation",
     "subterm": "substation",
+    "voltagedroop": "voltage droop control",
+    "swdratnam": "switching device rating set",
+    "swdratset": "switching device rating set",
+    "loadtype": "load type",
+    "interface": "interface",
+    "itfelmt": "interface element",
 }
 """Table of RAWX → section of RAW, where nothing reads the fields."""
 
@@ -417,10 +423,11 @@ def _rows(
 
 
 def _as_text(value: Any) -> str:
-    """A value as a field of a RAW file; null is an omitted one."""
+    """A value as a field of a RAW file; null is an omitted one, and 3.0 a whole number."""
     if value is None:
         return ""
-    return str(int(value)) if isinstance(value, bool) else str(value).strip()
+    is_whole = isinstance(value, bool) or (isinstance(value, float) and value.is_integer())
+    return str(int(value)) if is_whole else str(value).strip()
 
 
 def _skip(text: str, at: int) -> int:

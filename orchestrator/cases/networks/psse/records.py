@@ -18,6 +18,7 @@ from orchestrator.core.units import LARGEST
 
 REVISIONS = tuple(range(29, 37))  # revisions whose records are known
 NODES = 35  # first revision with nodes in the records of machines, switched shunts and converters
+NAMES = 36  # first revision with names of switched shunts, and sets of ratings of switching devices
 SWITCHING_DEVICES = 34  # first revision with system-wide data, switching devices and substations
 _FIXED_SHUNTS = 31  # first revision with fixed shunts beside the buses, and REV in the first record
 MOST_BYTES = 200_000_000  # of a file: ten times the largest interconnections
@@ -248,10 +249,34 @@ def _sections(
                 f"{path}, line {number}: the line before these data does not say which begin {_REMEDY}"
             )
         else:
-            sections.setdefault(name, []).append(Record(str(path), number, _fields(line)))
+            fields = _fields(line)
+            fields = _without_names(name, fields) if revision >= NAMES else fields
+            sections.setdefault(name, []).append(Record(str(path), number, fields))
     if not {"bus", "branch"} <= {*sections} or name in _HEAD:
         raise InputError(f"{path}: it ends within its {name} data; export the case once more")
     return sections, guessed if named else {}
+
+
+_NAME = {"switched shunt": 12, "induction machine": 8}
+"""Column of NAME, before others that revision 35 has as well."""
+
+_RATING_SET, _RATINGS = (
+    4,
+    12,
+)  # column of a set of ratings, by its name, and ratings that revision 35 has there
+
+
+def _without_names(section: str, fields: list[str]) -> list[str]:
+    """Return a record of revision 36 with the columns of revision 35; a number is no name.
+
+    Source: the headings of the columns in the sample that PSS/E 36 writes."""
+    column = _NAME.get(section)
+    if column is not None and len(fields) > column and not _is_number(fields[column]):
+        return [*fields[:column], *fields[column + 1 :]]
+    is_set = section == "system switching device" and len(fields) > _RATING_SET
+    if is_set and not _is_number(fields[_RATING_SET]):
+        return [*fields[:_RATING_SET], *[""] * _RATINGS, *fields[_RATING_SET + 1 :]]
+    return fields
 
 
 def _following(path: Path, number: int, line: str, name: str, order: list[str]) -> str:
@@ -267,7 +292,13 @@ def _following(path: Path, number: int, line: str, name: str, order: list[str]) 
         )
     found = _BEGIN.search(line)
     if found:
-        return section_of(found[1])
+        begun = section_of(found[1])
+        if begun == "transformer adjustment":
+            raise InputError(
+                f"{path}, line {number}: its transformers are among its branches, as up to revision 26; "
+                f"{REVISIONS[0]} to {REVISIONS[-1]} are read: export the case from PSS/E as one of them"
+            )
+        return begun
     if name not in order:
         if ended:
             return "end"
@@ -350,6 +381,9 @@ _WITHOUT_EFFECT = {
     "substation",
     "voltage droop control",
     "switching device rating set",
+    "load type",
+    "interface",
+    "interface element",
 }
 _KNOWN = {
     "bus",

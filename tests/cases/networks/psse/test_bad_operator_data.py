@@ -24,17 +24,13 @@ def generators(change):
 
 
 RAWS = {
-    "a load at a bus that is not there": (
-        raw(33, records(33) | {"LOAD": ["77,'1 ',1,1,1,10,5"]}),
-        r"grid.raw, line 14: there is no bus 77",
-    ),
     "no generator in service": (
         generators(lambda line: line.replace(",1,1,100,", ",1,0,100,")),
         r"grid.raw: no generator is in service",
     ),
-    "parts that nothing joins": (
-        raw(33, records(33) | {"BRANCH": records(33)["BRANCH"][2:]}),
-        r"no way leads to the slack bus 'bus_1' from",
+    "parts with machines that nothing joins, of which one has no reference": (
+        raw(33, records(33) | {"TRANSFORMER": records(33)["TRANSFORMER"][:-4]}),
+        r"no way leads to the slack bus 'bus_1' from: 'bus_3'",
     ),
     "a voltage of zero": (
         changed("BUS", 3, ",1.0,0.0", ",0.0,0.0"),

@@ -1,9 +1,12 @@
 """The dialects in which PSS/E's files come: each gives the same network, and each trap is told."""
 
+from dataclasses import replace
+
 import pytest
 
 from orchestrator.cases.form.schema import NetworkTable
 from orchestrator.cases.networks.data import network_data
+from orchestrator.cases.networks.psse.raw import read_raw
 from orchestrator.cases.networks.psse.titles import section_of
 from tests.cases.networks.psse import ORDER, raw, records
 
@@ -216,3 +219,35 @@ def test_a_ratio_of_0_is_the_nominal_one(read):
     data, usual = read(raw(33, found)), read(raw())
     assert data.lines == usual.lines
     assert "WINDV is 0" in texts(data)
+
+
+NAMED = {
+    "SWITCHED SHUNT": ("5,'1 ',1,0,1,1.03,0.97,0,0,100,'',10.0,{}1,2,10.0", "'CAPACITOR',"),
+    "SYSTEM SWITCHING DEVICE": ("4,5,'1 ',0.02,{},0,1,1,2,''", "'SUMMER'"),
+    "INDUCTION MACHINE": (
+        "5,'1',1,1,1,1,1,1,{}1,1,20,18,1,10,0,0,0,0,0,0.03,3,0.01,0.2",
+        "'PUMP',",
+    ),
+}
+
+
+@pytest.mark.parametrize("section", NAMED)
+def test_names_of_revision_36_move_no_column(section, tmp_path):
+    """PSS/E 36 writes a name amid these records, and a set of ratings in the place of twelve ratings."""
+    record, name = NAMED[section]
+    found = []
+    for revision, text in (
+        (35, ",".join(["0"] * 12) if section.startswith("SYSTEM") else ""),
+        (36, name),
+    ):
+        lines = records(revision)
+        lines[section] = [record.format(text)]
+        (tmp_path / "grid.raw").write_text(raw(revision, lines))
+        found.append(read_raw(tmp_path / "grid.raw"))
+    older, newer = found
+    assert (older.tables.bus == newer.tables.bus).all()
+    assert (older.tables.branch == newer.tables.branch).all()
+    assert [replace(x, line=0, place="") for x in older.devices] == [
+        replace(x, line=0, place="") for x in newer.devices
+    ]
+    assert [x.use for x in older.records] == [x.use for x in newer.records]

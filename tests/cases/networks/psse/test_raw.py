@@ -339,7 +339,6 @@ def test_a_case_says_what_was_changed_and_has_modes(tmp_path, gfor):
         ),
         ("0,100.0,33", "0,0,33", r"line 1: the system base SBASE is 0 MVA; it must exceed 0"),
         ("0.01,0.085", "0.01,x", r"line \d+: X is 'x'; it must be a number"),
-        ("4,5,'1 '", "4,55,'1 '", r"line \d+: there is no bus 55"),
         (
             "2,'BUS 2     ',18.0,2",
             "1,'BUS 2     ',18.0,2",

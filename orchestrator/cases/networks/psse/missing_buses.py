@@ -1,0 +1,77 @@
+"""Elements in service at buses that a RAW file does not have: PSS/E tells of each and goes on without it."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from orchestrator.cases.networks.psse.records import (
+    NODES,
+    SWITCHING_DEVICES,
+    RawFile,
+    Record,
+    elements,
+)
+
+_SWITCHED_SHUNT_STATUS = 32  # first revision with STAT of a switched shunt
+_ENDS: Mapping[str, int] = {
+    "load": 1,
+    "fixed shunt": 1,
+    "switched shunt": 1,
+    "generator": 1,
+    "branch": 2,
+    "system switching device": 2,
+    "transformer": 3,
+}
+"""Section → columns with the numbers of buses, from the first one on."""
+
+
+@dataclass(frozen=True)
+class KnownElements:
+    """A file without the elements at buses that it does not have, and why, by the line of their record."""
+
+    raw: RawFile
+    dropped: Mapping[int, str]
+
+
+def with_known_buses(raw: RawFile) -> KnownElements:
+    """Leave out elements in service at buses that the file does not have; others may point anywhere, as in PSS/E."""
+    buses = {abs(record.whole(0, "the bus' number")) for record in raw.of("bus")}
+    status = status_columns(raw.revision)
+    dropped: dict[int, str] = {}
+    sections = dict(raw.sections)
+    for section in (section for section in _ENDS if raw.of(section)):
+        kept: list[Record] = []
+        for lines in elements(section, raw.of(section)):
+            record, column = lines[0], status.get(section)
+            missing = [bus for bus in _buses(section, record) if bus not in buses]
+            if missing and (column is None or record.whole(column, "the status", 1)):
+                named = " and ".join(str(bus) for bus in missing)
+                dropped[record.line] = f"not used: the file has no bus {named}"
+            else:
+                kept += lines
+        sections[section] = kept
+    return (
+        KnownElements(replace(raw, sections=sections), dropped)
+        if dropped
+        else KnownElements(raw, {})
+    )
+
+
+def status_columns(revision: int) -> dict[str, int]:
+    """Return the column of an element's status by section, of which 0 is out of service."""
+    shunt = {} if revision < _SWITCHED_SHUNT_STATUS else {"switched shunt": 3 + (revision >= NODES)}
+    return shunt | {
+        "load": 2,
+        "fixed shunt": 2,
+        "generator": 14 + (revision >= NODES),
+        "branch": 13 if revision < SWITCHING_DEVICES else 23,
+        "system switching device": 16,
+        "transformer": 11,
+    }
+
+
+def _buses(section: str, record: Record) -> Iterator[int]:
+    """Yield the buses of an element; a transformer of two windings has no third one."""
+    for column in range(_ENDS[section]):
+        bus = abs(record.whole(column, "the bus' number", 0 if column > 1 else None))
+        if bus or column < 2:
+            yield bus

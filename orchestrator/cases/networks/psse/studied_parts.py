@@ -1,0 +1,134 @@
+"""Parts of a network that only DC lines join, or nothing: a study takes one of them."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from orchestrator.cases.flow.connected import connected_parts
+from orchestrator.cases.form.remedies import with_slack
+from orchestrator.cases.networks.conversion import ImportedNetwork, bus_of
+from orchestrator.cases.networks.psse.devices import HeldDevice
+from orchestrator.core.errors import few
+
+_SHOWN = 3  # buses that are named; the others are counted
+
+
+@dataclass(frozen=True)
+class StudiedPart:
+    """One part of a network, and the buses of others, which are left out.
+
+    ``by_dc``: buses to which DC lines lead; ``apart``: buses with a reference of their own, to which nothing leads;
+    ``dead``: buses without a machine, to which nothing leads."""
+
+    network: ImportedNetwork
+    buses: frozenset[
+        str
+    ]  # of the part; others that the network has as well are refused by its power flow
+    by_dc: frozenset[str] = frozenset()
+    apart: frozenset[str] = frozenset()
+    dead: frozenset[str] = frozenset()
+
+    @property
+    def left_buses(self) -> frozenset[str]:
+        """Return the buses that are left out."""
+        return self.by_dc | self.apart | self.dead
+
+
+def choose_part(
+    network: ImportedNetwork,
+    devices: Sequence[HeldDevice],
+    references: Collection[str],
+    slack: str | None = None,
+) -> StudiedPart:
+    """Return the part with the slack, or else that with machines which has the most buses.
+
+    A part with machines stays if neither a reference nor a DC line tells that it is a system of its own: the power flow
+    then refuses the network, as PSS/E does.
+
+    ``references``: the buses that the source names as references, in its order; ``slack``: the bus that a case names as
+    its own."""
+    part = _parts(network)
+    sizes = np.bincount(list(part.values()))
+    fed = {part[bus] for bus in network.generation}
+    if len(sizes) == 1 or not fed:
+        return StudiedPart(network, frozenset(network.buses))
+    studied = (
+        part[slack] if slack in part else max(sorted(fed), key=lambda number: int(sizes[number]))
+    )
+    joined = _joins(devices, part)
+    referred = {part[bus] for bus in references if bus in part}
+    others = {bus: number for bus, number in part.items() if number != studied}
+    by_dc = frozenset(bus for bus, number in others.items() if number in joined)
+    rest = {bus: number for bus, number in others.items() if bus not in by_dc}
+    apart = frozenset(bus for bus, number in rest.items() if number in fed & referred)
+    dead = frozenset(bus for bus, number in rest.items() if number not in fed)
+    own = next((bus for bus in references if part.get(bus) == studied), None)
+    kept = _without(replace(network, slack=own), by_dc | apart | dead)
+    own_buses = frozenset(bus for bus, number in part.items() if number == studied)
+    return StudiedPart(kept, own_buses, by_dc, apart, dead)
+
+
+def _joins(devices: Sequence[HeldDevice], part: dict[str, int]) -> set[int]:
+    """Return the parts that devices join to others."""
+    joined = set[int]()
+    for device in devices:
+        own = {part[bus] for number in device.places if (bus := bus_of(str(number))) in part}
+        joined |= own if len(own) > 1 else set()
+    return joined
+
+
+def _without(network: ImportedNetwork, left: frozenset[str]) -> ImportedNetwork:
+    return replace(
+        network,
+        buses=tuple(bus for bus in network.buses if bus not in left),
+        lines=tuple(x for x in network.lines if x.from_bus not in left),
+        loads=tuple(x for x in network.loads if x.bus not in left),
+        shunts=tuple(x for x in network.shunts if x.bus not in left),
+        transformers=tuple(x for x in network.transformers if x.buses[0] not in left),
+        generation={bus: g for bus, g in network.generation.items() if bus not in left},
+        feeding={bus: p for bus, p in network.feeding.items() if bus not in left},
+        capacitors={bus: q for bus, q in network.capacitors.items() if bus not in left},
+    )
+
+
+def _parts(network: ImportedNetwork) -> dict[str, int]:
+    """Return the number of the connected part of each bus."""
+    ends = [(line.from_bus, line.to_bus) for line in network.lines]
+    ends += [(x.buses[0], bus) for x in network.transformers for bus in x.buses[1:]]
+    return connected_parts(network.buses, ends)
+
+
+def part_notes(part: StudiedPart) -> list[str]:
+    """Return what is said of the buses that are left out."""
+    found = []
+    if part.by_dc:
+        found.append(
+            f"only DC lines lead to {_names(part.by_dc)}: a part with a frequency of its own, which is left out; the "
+            "DC lines feed here what they do at the file's voltages there"
+        )
+    if part.apart:
+        bus = min(part.apart)
+        found.append(
+            f"no branch leads to {_names(part.apart)}: a system of its own, with a reference of its own, which is left "
+            f"out. To study it instead, name one of its buses with a machine, such as {with_slack(bus)}"
+        )
+    if part.dead:
+        found.append(
+            f"no branch and no DC line lead to {_names(part.dead)}, and no machine feeds there: left out, as PSS/E "
+            "does with what has no reference. If a branch is open by mistake, close it in the file"
+        )
+    return found
+
+
+def _names(buses: Collection[str]) -> str:
+    return few(sorted(buses), _SHOWN)
+
+
+def reference_note(bus: str) -> str:
+    """Return what is said of a network without a reference, of which a bus becomes one."""
+    return (
+        f"no bus of the network that is studied is the reference (IDE = 3), without which PSS/E solves nothing: {bus}, "
+        "which has the largest machines, is taken, and feeds what is left. If that is right, or another bus is to, "
+        f"name it, such as {with_slack(bus)}"
+    )
