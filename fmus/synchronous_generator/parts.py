@@ -50,6 +50,7 @@ from fmus.synchronous_generator.turbines.governors import (
 from fmus.synchronous_generator.turbines.steam import ieesgo, tgov3
 from fmus.synchronous_generator.turbines.water import hygov2, ieeeg2, ieeeg3
 from fmus.synchronous_generator.turbines.water_pid import pidgov, wpidhy, wshygp
+from fmus.synchronous_generator.turbines.woodward import wehgov
 from fmus.synchronous_generator.variants import Governor, Stabilizer, of_speed
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort
@@ -119,6 +120,7 @@ GOVERNORS: dict[str, Governor] = {
     "pidgov": read_either_way(pidgov),
     "wpidhy": read_either_way(wpidhy),
     "wshygp": read_either_way(wshygp),
+    "wehgov": read_either_way(wehgov),
 }
 STABILIZERS: dict[str, Stabilizer | None] = {
     NONE: None,

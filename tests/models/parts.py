@@ -17,7 +17,7 @@ V_T, E_FD, P_M = 1.01, 2.2, 0.7
 CURRENT = Phasor(0.7, -0.1)
 START = Start(Expr(V_T), Expr(E_FD), Expr(P_M), Phasor(1.0, 0.0), CURRENT)
 AT_REST = {"exciter": [V_T, E_FD, 0.0], "governor": [1.0], "pss": [0.0, 0.8]}
-OF_POWER = ("ggov1", "degov1", "pidgov", "wpidhy", "wshygp")
+OF_POWER = ("ggov1", "degov1", "pidgov", "wpidhy", "wshygp", "wehgov")
 OF_VOLTAGE = ("ieeest", "st2cut", "iee2st")
 """Governors that see the electrical power too, an input more; and stabilisers that see the voltage."""
 

@@ -140,6 +140,7 @@ def test_every_field_of_a_dyr_record_sets_a_parameter_of_its_part(name):
         ("PIDGOV", 21),
         ("WPIDHY", 21),
         ("WSHYGP", 30),
+        ("WEHGOV", 50),
         ("COMP", 1),
         ("IEEEVC", 2),
         ("STAB1", 7),

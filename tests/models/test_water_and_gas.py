@@ -186,6 +186,66 @@ def test_wshygp_is_its_block_diagram(curve, T_t, T_d, hertz):
     assert response["P_m", "P_e"] == pytest.approx(of_power, rel=1e-6, abs=1e-12)
 
 
+WEHGOV = {"R_gate": 0.05, "R_Pe": 0.03, "T_Pe": 0.4, "K_P": 3.0, "K_I": 0.6, "K_D": 1.2}
+WEHGOV |= {"T_D": 0.1, "T_P": 0.06, "T_DV": 0.09, "T_g": 0.25, "T_W": 1.1, "D_turb": 0.3}
+
+
+@HERTZ
+@pytest.mark.parametrize("of_control", [True, False])
+def test_wehgov_is_its_block_diagram(of_control, hertz):
+    """At 0.7 pu between points 7 and 8 of the power by the flow, and 3 and 4 of the flow by the gate."""
+    s, p = 2j * np.pi * hertz, WEHGOV
+    curve = {"FlowG_4": 0.8}  # between 0.5 and 0.75 the flow rises by 0.3, from there by 0.2
+    alone = governor("wehgov", p | curve | {"feedback_of_control": of_control})
+    at_rest = [1.0, P_M]
+    assert not refused(alone)
+    assert alone.outputs(at_rest)["P_m"] == pytest.approx(P_M, rel=1e-12)
+    assert max(map(abs, alone.rates(at_rest).values())) < 1e-12
+    q = 0.7 + 0.1 * (P_M - 0.64) / (0.77 - 0.64)
+    gate = 0.5 + 0.25 * (q - 0.5) / 0.3
+    assert alone.states["governor.gate"] == pytest.approx(gate, rel=1e-12)
+    control = p["K_P"] + p["K_I"] / s + s * p["K_D"] / (1 + s * p["T_D"])
+    servo = 1 / (1 + s * p["T_DV"]) / (s * p["T_g"])
+    servo = servo / (1 + servo) / (1 + s * p["T_P"])
+    loop = p["R_gate"] * control * (1 if of_control else servo)
+    moved = control * servo / (1 + loop)  # of the gate, by the error without the gate's own droop
+    water = p["T_W"] * q / 2 * s  # dq = dg'·flow/(1 + s·T_W·q/2), H = (q/flow)²
+    flow = 0.3 / 0.25 / (1 + water)
+    head = -2 / q * 0.3 / 0.25 * water / (1 + water)
+    of_gate = (0.77 - 0.64) / 0.1 * flow + P_M * head
+    response = alone.response(s, at_rest)
+    wanted = -moved * of_gate - p["D_turb"] * gate
+    assert response["P_m", "w"] == pytest.approx(wanted, rel=1e-6)
+    of_power = 0 if of_control else -p["R_Pe"] / (1 + s * p["T_Pe"]) * moved * of_gate
+    assert response["P_m", "P_e"] == pytest.approx(of_power, rel=1e-6, abs=1e-12)
+
+
+def test_wehgov_rests_in_its_dead_band_and_acts_by_what_is_beyond():
+    values = {"db": 0.002, "R_gate": 0.05, "feedback_of_control": 1}
+    alone, free = governor("wehgov", values), governor("wehgov", values | {"db": 0.0})
+    within = alone.rates([1.0019, P_M])
+    assert max(map(abs, within.values())) < 1e-12
+    beyond, wanted = alone.rates([1.0, P_M]), free.rates([1.0, P_M])
+    assert beyond == pytest.approx(wanted, abs=1e-12)
+    assert alone.rates([1.005, P_M]) == pytest.approx(free.rates([1.003, P_M]), rel=1e-9)
+
+
+def test_wehgov_starts_where_its_curves_end_in_zeros():
+    """Tables of fewer points; and a flow at no load, below which the power is 0."""
+    short = {f"{name}_{k}": 0.0 for name in ("FlowP", "PMECH") for k in range(4, 11)}
+    values = {"FlowP_3": 1.0, "PMECH_3": 0.9, "Gate_3": 1.0, "FlowG_3": 0.95, "FlowG_2": 0.4}
+    values |= {f"{name}_{k}": 0.0 for name in ("Gate", "FlowG") for k in (4, 5)}
+    alone = governor("wehgov", values | short)
+    assert not refused(alone)
+    q = 0.2 + 0.8 * P_M / 0.9
+    assert alone.states["governor.q"] == pytest.approx(q, rel=1e-12)
+    assert alone.states["governor.gate"] == pytest.approx(0.25 + 0.75 * (q - 0.4) / 0.55, rel=1e-12)
+    assert max(map(abs, alone.rates([1.0, P_M]).values())) < 1e-12
+    assert any(
+        "PMECH_10" in text for text in refused(governor("wehgov", {**short, "PMECH_3": 0.6}))
+    )
+
+
 @pytest.mark.parametrize("name", ["pidgov", "wshygp"])
 def test_a_controller_without_an_integral_holds_its_error(name):
     alone = governor(name, {"K_I": 0.0, "T_d": 0.0} if name == "wshygp" else {"K_I": 0.0})
@@ -205,6 +265,7 @@ SETTLED = {
     "pidgov": ({"G_MAX": 0.8, "G_MIN": 0.4}, 0.8, 0.35),
     "wpidhy": ({"G_MAX": 0.8, "G_MIN": 0.4}, 0.8, 0.35),
     "wshygp": ({"P_MAX": 0.75, "P_MIN": 0.5}, 0.78, 0.48),
+    "wehgov": ({"G_MAX": 0.8, "G_MIN": 0.5}, 0.77, 0.38),
 }
 
 
@@ -227,6 +288,7 @@ def test_the_gate_stops_at_its_limits(name, side):
         ("pidgov", {"V_MAX": 0.05, "V_MIN": -0.05}, 0.05),
         ("wpidhy", {"V_MAX": 0.05, "V_MIN": -0.05}, 0.05),
         ("wshygp", {"VEL_open": 0.05, "VEL_close": 0.05, "T_P": 0.0}, 0.05),
+        ("wehgov", {"GTMX_OP": 0.05, "GTMX_CL": 0.05, "T_DV": 0.0}, 0.05),
     ],
 )
 @pytest.mark.parametrize("side", [1, -1])
@@ -276,7 +338,12 @@ def test_a_curve_goes_through_its_points_and_ends_level():
 
 @pytest.mark.parametrize(
     ("name", "values"),
-    [("pidgov", {"G_1": 0.05}), ("wpidhy", {"P_2": 0.3}), ("wshygp", {"GV_3": 0.2})],
+    [
+        ("pidgov", {"G_1": 0.05}),
+        ("wpidhy", {"P_2": 0.3}),
+        ("wshygp", {"GV_3": 0.2}),
+        ("wehgov", {"FlowG_3": 0.2}),
+    ],
 )
 def test_a_curve_that_falls_is_refused(name, values):
     assert any("must rise from point to point" in text for text in refused(governor(name, values)))
