@@ -11,7 +11,9 @@ import pytest
 import xarray as xr
 
 from orchestrator.core.errors import InputError
-from orchestrator.output.report.html.chapters import chapters_of, of_run, of_sweep
+from orchestrator.output.report.html.chapters.files import chapters_of
+from orchestrator.output.report.html.chapters.runs import of_run
+from orchestrator.output.report.html.chapters.studies import of_sweep
 from orchestrator.output.report.html.first_page import first_page
 from orchestrator.output.report.html.least_damped import LeastDamped
 from orchestrator.output.report.html.page import write_report

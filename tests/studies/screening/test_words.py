@@ -8,7 +8,7 @@ import pytest
 
 import orchestrator as face
 from orchestrator.cases.case import load_case
-from orchestrator.output.report.html.chapters import _screening
+from orchestrator.output.report.html.chapters.studies import of_screening
 from orchestrator.studies.operating_points.item import Status
 from orchestrator.studies.points.executor import Serial
 from orchestrator.studies.points.points import Work
@@ -116,7 +116,7 @@ def test_units_beyond_their_rating_are_in_the_verdict_and_the_report():
     assert found.stable
     assert found.verdict.endswith(f"; {said}")
     assert found.as_json()["beyond_rating"] == said
-    assert _screening(Path("screening.json"), found.as_json()).not_judged == [said]
+    assert of_screening(Path("screening.json"), found.as_json()).not_judged == [said]
     calm = replace(found.result, items=found.result.items[:1])
     assert "rating" not in verdict_sentence(Summary(calm))
 

@@ -13,7 +13,7 @@ import xarray as xr
 from orchestrator.cases.case import Case, load_case
 from orchestrator.core.errors import ErrorKind, InputError
 from orchestrator.devices.fmi.description import VariableInfo
-from orchestrator.output.report.html.chapters import of_sweep
+from orchestrator.output.report.html.chapters.studies import of_sweep
 from orchestrator.studies.points.dask_cluster import DaskCluster
 from orchestrator.studies.points.executor import Serial
 from orchestrator.studies.points.failure import Failure

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from html import escape
 
-from orchestrator.output.report.html.chapters import Chapter
+from orchestrator.output.report.html.chapters.chapter import Chapter
 from orchestrator.output.report.html.elements import SHADES, table
 from orchestrator.output.report.html.origins import given_in
 from orchestrator.output.report.html.verdict_lines import verdicts

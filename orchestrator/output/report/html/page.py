@@ -12,14 +12,11 @@ from orchestrator.cases.networks.element_names import ElementNames
 from orchestrator.core.errors import InputError, few
 from orchestrator.core.safe_files import file_hash, write_page
 from orchestrator.output.report.html import sections, studies
-from orchestrator.output.report.html.chapters import (
-    Chapter,
-    chapters_of,
-    has_fault,
-    of_run,
-    of_sweep,
-)
-from orchestrator.output.report.html.chapters import sections as sections_of
+from orchestrator.output.report.html.chapters.chapter import Chapter
+from orchestrator.output.report.html.chapters.files import chapters_of
+from orchestrator.output.report.html.chapters.files import sections as sections_of
+from orchestrator.output.report.html.chapters.runs import has_fault, of_run
+from orchestrator.output.report.html.chapters.studies import of_sweep
 from orchestrator.output.report.html.elements import Figures, document, held_data, paragraphs, table
 from orchestrator.output.report.html.first_page import first_page
 from orchestrator.output.report.html.folder import SUMMARY, Results, read_results, sweeps_of

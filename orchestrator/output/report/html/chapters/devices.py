@@ -1,0 +1,159 @@
+"""Chapters of devices and of their networks: acceptance tests, certificates, network strength, Nyquist's criterion."""
+
+from base64 import b64encode
+from collections.abc import Sequence
+from html import escape
+from itertools import chain
+from pathlib import Path
+
+from orchestrator.core.errors import counted
+from orchestrator.output.report.html.chapters.chapter import Chapter, Content
+from orchestrator.output.report.html.elements import table
+from orchestrator.output.report.tables import short
+
+_LONGEST = 300
+"""Characters of an answer that names the buses of a scenario; the table below has all."""
+
+
+def of_check(file: Path, c: Content) -> Chapter:
+    bad = [check for check in c["checks"] if check["verdict"] == "fail"]
+    remarks = sum(check["verdict"] == "remark" for check in c["checks"])
+    name = Path(c["fmu"]).name
+    answer = f"{name}: " + (
+        "no check failed" if c["trusted"] else ", ".join(c["faults"]) or "not to be judged here"
+    )
+    shade = {"fail": "bad", "pass": "good"}
+    rows = [
+        [
+            escape(x["question"]),
+            f'<span class="{shade.get(x["verdict"], "soft")}">{escape(x["verdict"])}</span>',
+            escape(x["evidence"]),
+            escape(x["remedy"]),
+        ]
+        for x in c["checks"]
+    ]
+    good = True if c["trusted"] else False if bad else None
+    return Chapter(
+        file,
+        "Can this FMU be trusted in a co-simulation?",
+        answer,
+        good,
+        f"{counted(len(c['checks']), 'check')}, {remarks} with a remark",
+        [*c["not_supported"], *_unjudged(c["checks"])],
+        table("Checks", ["Question", "Verdict", "Evidence", "Remedy"], rows, left=4),
+    )
+
+
+def of_certificate(file: Path, c: Content) -> Chapter:
+    open_ = [
+        text if isinstance(text, str) else f"X_L = {text:g} pu"
+        for text in (*c["departures"], *c["missing"])
+    ]
+    warned = [
+        texts for point in c.get("points", []) for texts in point.get("warnings", {}).values()
+    ]
+    check: Content = c.get("acceptance") or {}
+    open_ += dict.fromkeys([*chain(*warned), *_unjudged(check.get("checks", []))])
+    trusted = check.get("trusted") is not False
+    good = {"passes": trusted, "fails": False}.get(c["verdict"])
+    sure = (
+        f"judged: {c['judged']}"
+        if c.get("judged")
+        else counted(len(c["rows"]), "test")
+        if "rows" in c
+        else ""
+    )
+    question = f"Does the converter pass the tests of {c['code'].upper() if 'code' in c else 'the grid code'}?"
+    return Chapter(file, question, c["sentence"], good, sure, open_, page="certificate.html")
+
+
+def of_matrix(file: Path, c: Content) -> Chapter:
+    open_ = (
+        (x, x["failure"] or (x["missing"] and f"{x['missing']} not tested")) for x in c["cells"]
+    )
+    lost = [f"{x['device']}, {x['code']}: {text}" for x, text in open_ if text]
+    return Chapter(
+        file,
+        "Which converter passes which grid code?",
+        c["sentence"],
+        c["exit_code"] == 0,
+        f"{counted(len(c['cells']), 'pair')} of a device and a code",
+        lost,
+        page="matrix.html",
+    )
+
+
+def _unjudged(checks: Sequence[Content]) -> list[str]:
+    return [str(x["figures"]["not_judged"]) for x in checks if "not_judged" in x["figures"]]
+
+
+def of_strengths(file: Path, c: Content) -> Chapter:
+    said, rows = dict[str, list[str]](), []
+    for scenario in c["scenarios"]:
+        weakest, *_ = buses = sorted(scenario["buses"], key=lambda b: b["s_sc_mva"])
+        ratios = {b["bus"]: "–" if b["scr"] is None else f"{b['scr']:.2f}" for b in buses}
+        text = "".join(f", SCR {scr} at {bus}" for bus, scr in ratios.items() if scr != "–")
+        text = f"weakest is {weakest['bus']} with {weakest['s_sc_mva']:.0f} MVA{text}"
+        said.setdefault(short(text, _LONGEST), []).append(scenario["name"])
+        rows += [
+            [escape(scenario["name"]), escape(b["bus"]), f"{b['s_sc_mva']:.0f}", ratios[b["bus"]]]
+            for b in buses
+        ]
+    answer = "; ".join(f"{', '.join(names)}: {text}" for text, names in said.items())
+    return Chapter(
+        file,
+        "How strong is the network?",
+        answer,
+        None,
+        c["convention"],
+        (),
+        table("Short-circuit power", ["Scenario", "Bus", "S_sc [MVA]", "SCR"], rows, left=2),
+    )
+
+
+def of_nyquist(file: Path, c: Content) -> Chapter:
+    rows = [
+        [name, f"{m['value']:.4g}", f"{m['frequency_hz']:.4g}"]
+        for name, m in c["margins"].items()
+        if m
+    ]
+    content = table("Margins", ["Margin", "Value", "at [Hz]"], rows)
+    found = c.get("retune")
+    if found:
+        made = [
+            [
+                escape(x["name"]),
+                f"{x['now']:.4g}",
+                "" if x["needed"] is None else f"{x['needed']:.4g}",
+                ""
+                if (said := x["confirmed"]) is None
+                else f"{said['verdict']}, {said['distance']:.4f}",
+                escape(x["remark"]),
+            ]
+            for x in found["parameters"]
+        ]
+        wanted = f"What to retune for a distance of {found['distance_wanted']:g} from −1"
+        content += table(wanted, ["Parameter", "Now", "Needed", "Confirmed", "Remark"], made)
+    for picture in (
+        file.with_name(name) for name in ("eigenloci.png", "matrices.png", "retune.png")
+    ):
+        if picture.is_file():
+            data = b64encode(picture.read_bytes()).decode()
+            content += f'<p><img alt="{picture.stem}" style="max-width: 100%" src="data:image/png;base64,{data}"></p>'
+    good = {"stable": True, "unstable": False}.get(c["verdict"])
+    modes = (
+        "no modes asked"
+        if c["modes_stable"] is None
+        else "modes agree"
+        if c["modes_stable"] == good
+        else ("the modes do NOT agree")
+    )
+    return Chapter(
+        file,
+        f"Is {c['device']} stable at {c['network']}?",
+        c["sentence"],
+        good,
+        f"encirclements; {modes}",
+        c["reasons"],
+        content,
+    )

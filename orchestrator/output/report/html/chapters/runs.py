@@ -1,0 +1,82 @@
+"""Chapters of runs and of modes: one line of an answer for each scenario."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from html import escape
+from pathlib import Path
+
+from orchestrator.output.report.html.chapters.chapter import (
+    Chapter,
+    Content,
+    bases_of,
+    kinds_of,
+    modes_map,
+)
+from orchestrator.output.report.html.elements import damping, table
+from orchestrator.output.report.html.verdict_lines import VerdictLine
+
+
+def of_run(
+    folder: Path, scenarios: Sequence[Content], content: str = "", beside: Sequence[str] = ()
+) -> Chapter:
+    """Of a run's summary, or the same of `gfor modes`; ``beside``: what devices bring."""
+    open_ = []
+    lines = [VerdictLine.of(scenario) for scenario in scenarios]
+    for line, s in zip(lines, scenarios, strict=True):
+        open_ += [
+            f"{line.scenario}: {f['message']}"
+            for f in s.get("findings", [])
+            if f["kind"] == "not_judged"
+        ]
+        open_ += [f"{line.scenario}: {s['failure']}"] if s.get("failure") else []
+        if line.stable is None and not line.remark:
+            reason = (s.get("stability") or {}).get("reason")
+            open_.append(f"{line.scenario}: {reason or 'stability'}")
+    open_ += dict.fromkeys(text for s in scenarios for text in s.get("warnings", []))
+    verdicts = [line.stable for line in lines]
+    good = False if False in verdicts else None if None in verdicts else True
+    basis = (
+        "modes of the FMUs that were simulated"
+        if any("step_size_s" in s for s in scenarios)
+        else ("linear model of the FMUs at the operating point; nothing was run")
+    )
+    asked = "Is the fault survived" if any(map(has_fault, scenarios)) else "Is the network stable"
+    return Chapter(
+        folder,
+        f"{asked}, and which swing is damped least?",
+        "; ".join([*(line.words for line in lines), *beside]),
+        good,
+        "; ".join([*kinds_of(scenarios), basis]),
+        open_,
+        content,
+        bases=bases_of(scenarios),
+        least=[mode for line in lines for mode in line.modes],
+        lines=lines,
+        beside=beside,
+    )
+
+
+def has_fault(scenario: Content) -> bool:
+    return any(".fault.on = 1" in text for text in scenario.get("events", ()))
+
+
+def of_modes(file: Path, content: Content) -> Chapter:
+    rows = [
+        [
+            escape(s["name"]),
+            f"{m['frequency_hz']:.4f}",
+            damping(m["damping_percent"]),
+            escape(m["name"] or ""),
+            escape(", ".join(f"{c} {share:.0%}" for c, share in list(m["components"].items())[:3])),
+        ]
+        for s in content["scenarios"]
+        for m in s["modes"]
+    ]
+    columns = ["Scenario", "f [Hz]", "Damping [%]", "Name", "Who"]
+    groups = {s["name"]: s["modes"] for s in content["scenarios"]}
+    shown = modes_map("Modes", groups) + table("Modes", columns, rows)
+    made = of_run(file, content["scenarios"], shown, beside=content.get("beside", []))
+    sure = "; ".join(
+        filter(None, (made.sure, content["facts"], f"steps of {1e3 * content['step_size_s']:g} ms"))
+    )
+    return replace(made, sure=sure)

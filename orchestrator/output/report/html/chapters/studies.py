@@ -1,0 +1,247 @@
+"""Chapters of studies of many points: screening, siting, designs, limits and sweeps, sensitivities, interactions."""
+
+import json
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from orchestrator.core.errors import counted
+from orchestrator.output.report.html import studies
+from orchestrator.output.report.html.chapters.chapter import (
+    Chapter,
+    Content,
+    bases_of,
+    kinds_of,
+    modes_map,
+)
+from orchestrator.output.report.html.charts import bar_chart
+from orchestrator.output.report.html.elements import VERDICTS, colour, table
+from orchestrator.output.report.html.least_damped import LeastDamped
+
+_SHOWN = 4
+"""Parameters that an answer names and a picture shows: the strongest ones."""
+
+_DESIGNED = {"without": "target", "predicted": "predicted", "with": "achieved"}
+
+
+def of_screening(file: Path, c: Content) -> Chapter:
+    where = "somewhere" if c["stable"] is False else "everywhere"
+    points, outages = counted(c["points"], "operating point"), counted(c["outages"], "outage")
+    answer = f"{VERDICTS[c['stable']]} {where}: {points}, {outages}"
+    least = min(c["modes"], key=lambda mode: mode["worst"]["damping_percent"], default=None)
+    told = []
+    if least is not None:
+        worst = least["worst"]
+        told.append(LeastDamped.of({**worst, "components": least.get("participation")}))
+        answer += (
+            f"; least damped {worst['frequency_hz']:.3f} Hz, {worst['damping_percent']:.2f} %, "
+            f"{'' if c['points'] == 1 else worst['point'] + ', '}outage {worst['outage']}"
+        )
+    lost = [c["beyond_rating"]] if c.get("beyond_rating") else []
+    lost += [f"{f['point']}, {f['outage']}: {f['status']}: {f['why']}" for f in c["failures"]]
+    growth = (
+        "growth was counted at all frequencies"
+        if c["counted_at_all_frequencies"]
+        else ("growth outside of the range was counted at some points only")
+    )
+    return Chapter(
+        file,
+        "Which operating point and which outage is worst?",
+        answer,
+        c["stable"],
+        f"{counted(c['items'], 'case')} computed, {growth}",
+        lost,
+        page="screening.html",
+        least=told,
+    )
+
+
+def of_site(file: Path, c: Content) -> Chapter:
+    open_ = [
+        text.removeprefix("not judged: ") for text in c["remarks"] if text.startswith("not judged")
+    ]
+    sure = "; ".join(c["sure"])
+    good = True if c["agrees"] and c["confirmed"] else None if c["agrees"] else False
+    least = [LeastDamped.of(mode) for mode in c.get("modes", ())[:1]]
+    return Chapter(
+        file,
+        "Where does a converter help most?",
+        c["answer"],
+        good,
+        sure,
+        open_,
+        page="site.html",
+        least=least,
+    )
+
+
+def of_design(file: Path, c: Content) -> Chapter:
+    before, after = (100 * c[f"{when}_damping_ratio"] for when in ("target", "achieved"))
+    wanted = 100 * c["requirement"]["damping_ratio"]
+    answer = (
+        f"{'yes' if c['met'] else 'not as required'}: with K = {c['K']:.4g} the mode has {after:.2f} % of damping, "
+        f"{before:.2f} % before, {wanted:.2f} % wanted"
+    )
+    thin = c.get("thin_margin_damping_ratio")
+    if thin:
+        answer += f"; no margin: {100 * thin:.2f} % with 20 % more gain"
+    if c["met"] and (spoilt := c.get("larger_gain_spoils")):
+        answer += f"; no margin: with 20 % more gain {spoilt}"
+    sure = f"closed loop of the coupled FMUs: {c['verdict']}"
+    modes = {word: [c[f"{which}_mode"]] for word, which in _DESIGNED.items()}
+    content = modes_map("The mode that was designed for", modes) + studies.design(dict(c))
+    return Chapter(
+        file,
+        f"Does {c['controller']} damp the {c['mode']} mode?",
+        answer,
+        bool(c["met"]),
+        sure,
+        content=content,
+        title=f"Design of {c['controller']}",
+    )
+
+
+def of_coordinated(file: Path, c: Content) -> Chapter:
+    lost = [f"{f['point']}, {f['outage']}: {f['why']}" for f in c["failed"]]
+    limiting = c.get("limiting")
+    return Chapter(
+        file,
+        "Do damping controllers help at all operating points?",
+        c["verdict"],
+        bool(c["met"]),
+        f"checked at {c['items']} points and outages",
+        lost,
+        least=[LeastDamped.of_design_mode(limiting["mode"])]
+        if limiting and limiting.get("mode")
+        else [],
+    )
+
+
+def of_limits(file: Path, found: Any) -> Chapter:
+    answer = _limits_text(found)
+    sure = f"{sum(len(x['tried']) for x in found)} values tried, then bisected"
+    return Chapter(file, f"How far may {found[0]['parameter']} go?", answer, None, sure)
+
+
+def _limits_text(found: Any) -> str:
+    """Every limit of every scenario; an older result has the first alone."""
+    return "; ".join(
+        f"{x['scenario']}: {'; '.join(x.get('lines') or [x['sentence']])}" for x in found
+    )
+
+
+def limits_of(place: Path) -> list[Any]:
+    file = place / "limits.json"
+    return list(json.loads(file.read_text(encoding="utf-8"))) if file.is_file() else []
+
+
+def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:
+    named = sweep["damping"].where(sweep["named"] == 1)
+    least = named if bool(named.notnull().any()) else sweep["damping"]
+    at = least.where(least == least.min(), drop=True)
+    where = ", ".join(f"{d} = {at[d].values[0]:.4g}" for d in at.dims if at[d].dtype.kind == "f")
+    stable = sweep.get("stable")
+    lost = 0 if stable is None else int((stable == 0).sum())
+    unknown = 0 if stable is None else int((~stable.isin([0, 1])).sum())
+    open_ = [f"stability at {counted(unknown, 'point')}"] if unknown else []
+    open_ += json.loads(sweep.attrs.get("warned", "[]"))
+    about = {
+        "models": sweep.attrs.get("models"),
+        "basis": json.loads(sweep.attrs.get("basis", "{}")),
+    }
+    models, bases = "".join(f"{kind}; " for kind in kinds_of([about])), bases_of([about])
+    limits = limits_of(place)
+    if limits:
+        said = _limits_text(limits)
+        holds = all(one["ends_with"] == "holds" for one in limits)
+        return Chapter(
+            place,
+            f"How far may {limits[0]['parameter']} go?",
+            said,
+            holds or None,
+            f"{models}coarse values, then bisection; each is of the coupled FMUs at an operating point of its own",
+            [*open_, "narrow pieces between the values that were tried"],
+            bases=bases,
+        )
+    answer = f"least damping {float(least.min()):.2f} % at {where}" + (
+        f"; UNSTABLE at {counted(lost, 'point')}" if lost else ""
+    )
+    return Chapter(
+        place,
+        f"How do the modes move along {studies.axis_of(sweep)}?",
+        answer,
+        False if lost else None,
+        f"{models}each point is a linear model of the coupled FMUs there",
+        open_,
+        bases=bases,
+    )
+
+
+def of_interactions(file: Path, c: Content) -> Chapter:
+    worst = next((p for p in c["pairs"] if p["vendors"] == c["worst_pair"]), None)
+    whole = c["as_in_the_case"]["stable"]
+    verdicts = [whole, *(one["stable"] for one in (*c["pairs"], *c.get("assignments", [])))]
+    good = False if False in verdicts else None if None in verdicts else True
+    answer = f"{VERDICTS[whole]} as in the case; {counted(len(c['interaction_modes']), 'mode')} that vendors share"
+    answer += f"; {worst['sentence']}" if worst else ""
+    sure = f"each of {len(c['vendors'])} vendors alone and each pair, the others as {c['stand_in']}"
+    lost = [f"pair {' and '.join(pair)}" for pair in c["unknown_pairs"]]
+    return Chapter(
+        file,
+        "Do several vendors' converters agree?",
+        answer,
+        good,
+        sure,
+        lost,
+        page="interactions.html",
+        least=_of_pair(worst or {}),
+    )
+
+
+def _of_pair(pair: Content) -> list[LeastDamped]:
+    """The mode that a pair's sentence tells of."""
+    if pair.get("mode_hz") is None:
+        return []
+    return [LeastDamped(pair["mode_hz"], pair["mode_together_percent"], {})]
+
+
+def of_sensitivities(file: Path, c: Content) -> Chapter:
+    key, mode = "damping_points_per_percent", c["mode"]
+    found = sorted((r for r in c["sensitivities"] if r[key]), key=lambda r: -abs(r[key]))
+    first = found[:_SHOWN]
+    rows = [
+        [
+            escape(r["parameter"]),
+            f"{r['value']:.5g} {escape(r['unit'])}",
+            f"{r[key]:+.3g}",
+            f"{r['frequency_hz_per_percent']:+.3g}",
+            escape(r["doubts"]),
+        ]
+        for r in found
+    ]
+    said = ", ".join(f"{r['parameter']} ({r[key]:+.2g})" for r in first) or "no parameter"
+    answer = f"{mode['frequency_hz']:.3f} Hz, {mode['damping_percent']:.2f} %: most by {said} points for 1 % more"
+    answer = f"UNSTABLE; {answer}" if c["stable"] is False else answer
+    size = "Points by 1 %, without sign"
+    bars = (
+        bar_chart(
+            "Points of damping",
+            [r["parameter"] for r in first],
+            [("1 % more", colour(1), [abs(r[key]) for r in first])],
+            size,
+        )
+        if first
+        else ""
+    )
+    columns = ["Parameter", "Value", "Points by 1 %", "Hz by 1 %", "Doubts"]
+    return Chapter(
+        file,
+        f"What moves the {mode['name'] or 'critical'} mode of {c['scenario']}?",
+        answer,
+        None,
+        f"{c['derivative']} derivatives by {counted(len(found), 'parameter')}",
+        [f"{r['parameter']}: {r['reason']}" for r in c["sensitivities"] if r["reason"]],
+        bars + table("By the size of their effect", columns, rows),
+    )
