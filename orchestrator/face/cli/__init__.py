@@ -18,6 +18,7 @@ from orchestrator.core.safe_files import inputs, spare_input
 from orchestrator.core.spelling import as_options
 from orchestrator.devices.fmi.interrupts import calls
 from orchestrator.face.cli.interrupted import ending, is_interrupt
+from orchestrator.face.cli.later import answer_first
 from orchestrator.output.results import origin
 
 _ESCAPE = "gfor_escape"
@@ -104,7 +105,8 @@ def _done(words: Sequence[str]) -> int:
                 from orchestrator.output.results.manifest import spare_result  # noqa: PLC0415 - only where it is needed
 
                 spare_result(path)
-        return int(options.command(options))
+        with answer_first():
+            return int(options.command(options))
     except (CosimError, SetupError, OSError) as error:
         if is_interrupt(error):
             raise

@@ -117,7 +117,7 @@ def _compute(
     terminal.say("question", weights)
     whole = len(results) == 1 or options.details
     for result in results if whole else ():
-        console.print(tables.all_modes(result), "")
+        console.print(tables.all_modes(result, whole=options.details), "")
     terminal.print_named_modes(console, results, shapes=whole or any(r.named for r in results))
     terminal.print_sources(console, results)
     if options.details:

@@ -18,6 +18,7 @@ from orchestrator.core.errors import Problem
 from orchestrator.core.question_kinds import by_kind
 from orchestrator.core.safe_files import made_folder
 from orchestrator.face.cli.known_questions import new_questions
+from orchestrator.face.cli.later import say_last
 from orchestrator.output.report.linearised import exceptions_in_words
 from orchestrator.output.report.table import ColumnTable
 from orchestrator.output.report.tables import PlainTable
@@ -123,8 +124,8 @@ def print_sources(console: Console, results: Sequence[ModesResult]) -> None:
 def print_questions(
     scenarios: Sequence[PreparedScenario], *, as_json: bool, whole: bool = False
 ) -> None:
-    """Before anything is computed: what the network's files come to, and on standard error, once, questions about data
-    that are most unusual.
+    """Say what the network's files come to, and below the answer, on standard error and once, questions about data that
+    are most unusual.
 
     Of a case file that has not changed, questions that an earlier command has shown are counted in one line.
 
@@ -138,29 +139,32 @@ def print_questions(
     asked = list(dict.fromkeys(str(q) for prepared in scenarios for q in prepared.questions))
     path = scenarios[0].case.path if asked else None
     if path is None or path.is_relative_to(BUILT_IN):
-        say("question", asked)
+        _ask(asked)
         return
     fresh = new_questions(path, asked)
     known = len(asked) - len(fresh)
     command = f"gfor modes {quote(str(path))} --details"
     if as_json or whole:
-        say("question", asked)
+        _ask(asked)
         return
     named = scenarios[0].names.in_text
     shown = asked if known < _FEW else fresh
-    say("question", map(named, by_kind(shown, command).values()))
+    _ask(map(named, by_kind(shown, command).values()))
     if known < _FEW:
         return
     others = "other " if fresh else ""
     text = f"{known} {others}questions about {path.name} are those of an earlier command"
-    say(
-        "question",
-        [f"{text}; {command} shows them, and --json has them"],
-    )
+    _ask([f"{text}; {command} shows them, and --json has them"])
 
 
 def ask(questions: Iterable[Problem]) -> None:
-    say("question", dict.fromkeys(map(str, questions)))
+    """Say questions below the answer, each once."""
+    _ask(dict.fromkeys(map(str, questions)))
+
+
+def _ask(texts: Iterable[str]) -> None:
+    said = list(texts)
+    say_last(lambda: say("question", said))
 
 
 def print_warnings(results: Sequence[ModesResult]) -> None:

@@ -109,6 +109,15 @@ class ModesResult:
         """Participation of every area, largest first; components without an area are left out."""
         return mode.by_group(lambda state: self.areas.get(state.partition(".")[0]))
 
+    def swings_apart(self) -> tuple[list[spectra.Mode], list[spectra.Mode]]:
+        """Return the modes in which machines swing or that have a name, and the others."""
+        swinging: list[spectra.Mode] = []
+        others: list[spectra.Mode] = []
+        for mode in self.modes:
+            swings = any(state in self.swing for state, _ in mode.participation[:_LEADING])
+            (swinging if swings or self.name_of(mode) else others).append(mode)
+        return swinging, others
+
     def swing_of(self, mode: spectra.Mode) -> tuple[list[str], list[str]]:
         """Components that swing together in a mode, and those that swing against them; each largest first.
 

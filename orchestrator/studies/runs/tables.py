@@ -7,6 +7,7 @@ from typing import Any
 from rich.table import Table
 
 from orchestrator.cases.scenario.flow_figures import power_flow_json
+from orchestrator.linear.spectra.modes import Mode
 from orchestrator.output.report import power_flow
 from orchestrator.output.report.tables import eigenvalue_text, first_few, make_table, share_text
 from orchestrator.output.results.signals import relative_difference, signal
@@ -62,21 +63,41 @@ def named_modes(results: Sequence[ModesResult], reference_title: str | None) -> 
     return table
 
 
-def all_modes(result: ModesResult) -> Table:
+WELL_DAMPED = 0.3
+"""Damping ratio from which a control's mode is only counted: it is over within a period."""
+
+
+def all_modes(result: ModesResult, *, whole: bool = False) -> Table:
+    """Modes in the range: those in which machines swing, or that have a name, above those of controls and fluxes.
+
+    ``whole``: also lists the latter where they are well damped; else a line below counts them."""
     states, residual = result.model.number_of_states, result.operating_point.residual
     title = f"{result.prepared.title}: {states} states, residual {residual:.1e}"
     table = make_table(title, "Mode [rad/s]", "f [Hz]", "Damping [%]")
     table.add_column("Name")
     table.add_column("Most associated states (participation)", overflow="fold")
-    for mode in result.modes:
-        associated = ", ".join(f"{name} ({factor:.2f})" for name, factor in mode.participation[:3])
-        name, figures = (
-            result.name_of(mode) or "",
-            (f"{mode.frequency_hz:.4f}", f"{mode.damping_percent:.2f}"),
-        )
-        style = "bold" if name else None
-        table.add_row(eigenvalue_text(mode.eigenvalue), *figures, name, associated, style=style)
+    swings, others = result.swings_apart()
+    kept = [mode for mode in others if whole or not swings or mode.damping_ratio < WELL_DAMPED]
+    counted = [mode.damping_percent for mode in others if mode.damping_ratio >= WELL_DAMPED]
+    for mode in swings:
+        _add_mode(table, result, mode)
+    table.add_section()
+    for mode in kept:
+        _add_mode(table, result, mode)
+    if len(kept) < len(others):
+        modes = "modes" if len(counted) > 1 else "mode"
+        how_many = f"{len(counted)} {modes} of controls and fluxes"
+        table.caption = f"and {how_many}, damped by {min(counted):.0f} % or more: --details"
+        table.caption_justify = "left"
     return table
+
+
+def _add_mode(table: Table, result: ModesResult, mode: Mode) -> None:
+    associated = ", ".join(f"{name} ({factor:.2f})" for name, factor in mode.participation[:3])
+    name = result.name_of(mode) or ""
+    figures = (f"{mode.frequency_hz:.4f}", f"{mode.damping_percent:.2f}")
+    style = "bold" if name else None
+    table.add_row(eigenvalue_text(mode.eigenvalue), *figures, name, associated, style=style)
 
 
 def mode_shapes(results: Sequence[ModesResult]) -> Table:

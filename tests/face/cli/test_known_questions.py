@@ -1,11 +1,14 @@
 """Questions about a case file that has not changed are shown whole by the first command, and then counted."""
 
+import io
 import json
 import re
 import shlex
+from contextlib import redirect_stderr, redirect_stdout
 
 import pytest
 
+from orchestrator.face.cli import main
 from tests.cases.networks.psse.test_questions import CASE, DYR, RAW
 
 
@@ -47,3 +50,21 @@ def test_a_changed_file_is_asked_about_anew(gfor, case):
     _, first = asked(gfor, "modes", case)
     case.write_text(CASE + "# looked at\n")
     assert asked(gfor, "modes", case)[1] == first
+
+
+def test_questions_stand_below_the_answer(case):
+    screen = io.StringIO()
+    with redirect_stdout(screen), redirect_stderr(screen):
+        assert main(["modes", str(case)]) == 0
+    before, _, after = screen.getvalue().partition("question: ")
+    assert "Verdict" in before
+    assert "Verdict" not in after
+
+
+def test_questions_are_said_where_no_answer_comes(case):
+    screen = io.StringIO()
+    with redirect_stdout(screen), redirect_stderr(screen):
+        assert main(["sensitivities", str(case), "--mode", "nowhere"]) != 0
+    questions, _, error = screen.getvalue().rpartition("error: ")
+    assert "question: " in questions
+    assert "nowhere" in error

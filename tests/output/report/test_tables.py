@@ -129,16 +129,40 @@ def test_the_shift_by_the_communication_step(where, request, studied, summary):
     assert cells == len(known) >= 16
 
 
+def swings_apart(modes):
+    """The modes in which machines swing, and the others."""
+    swings, others = [], []
+    for mode in modes:
+        leading = [entry["state"] for entry in mode["participation"][:3]]
+        (swings if any(s.endswith("machine.omega") for s in leading) else others).append(mode)
+    return swings, others
+
+
+def test_the_terminal_shows_swings_and_counts_what_is_well_damped(gfor):
+    arguments = ["modes", "two_area", "--scenario", "pod_p", "--range", "0.1:60"]
+    _, out, _ = gfor(*arguments)
+    (scenario,) = json.loads(gfor(*arguments, "--json")[1])["scenarios"]
+    swings, others = swings_apart(scenario["modes"])
+    rows = [row for row in table(on_terminal(out), "62 states") if row["f [Hz]"]]
+    shown = [value(row["Damping [%]"]) for row in rows]
+    weak = [mode["damping_percent"] for mode in others if mode["damping_percent"] < 30]
+    assert shown == pytest.approx([*(m["damping_percent"] for m in swings), *weak], abs=0.005)
+    assert min(shown[len(swings) :]) < 1, "a weakly damped mode of the network is not left out"
+    hidden = len(others) - len(weak)
+    assert re.search(rf"and {hidden} modes of controls and fluxes, damped by \d\d % or more", out)
+
+
 def test_the_terminals_table_of_all_modes(gfor):
     arguments = ["modes", "two_area", "--scenario", "pod_p", "--range", "0.1:60"]
-    code, out, _ = gfor(*arguments)
+    code, out, _ = gfor(*arguments, "--details")
     assert code == 0
     (scenario,) = json.loads(gfor(*arguments, "--json")[1])["scenarios"]
     rows = table(on_terminal(out), "62 states")
     # A row goes on in the next line where the cell of participations is folded: that line has no mode.
     rows = [row for row in rows if row["f [Hz]"]]
     assert len(rows) == len(scenario["modes"]) >= 8
-    for row, mode in zip(rows, scenario["modes"], strict=True):
+    swings, others = swings_apart(scenario["modes"])
+    for row, mode in zip(rows, [*swings, *others], strict=True):
         assert eigenvalue(row["Mode [rad/s]"]) == pytest.approx(
             complex(mode["real"], mode["imag"]), abs=1e-4
         )
