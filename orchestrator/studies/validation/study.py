@@ -30,7 +30,7 @@ from orchestrator.studies.validation.limits import (
     judge_limits,
     verdict_of,
 )
-from orchestrator.studies.validation.parameters import wanted_parameters
+from orchestrator.studies.validation.parameters import Wanted, wanted_parameters
 from orchestrator.studies.validation.record import PortBases, read_recording
 from orchestrator.studies.validation.windows import given_windows
 from orchestrator.studies.validation.words import sentence
@@ -136,6 +136,8 @@ def validate_device(
 ) -> ValidationResult:
     """Drive the device by each recording, and judge it by the limits."""
     request.device.check_port()
+    if request.fit:  # before the device is driven, which takes seconds
+        _wanted(request)
     comparisons = []
     for event in events_of(request):
         report(f"{event.recording.label}: driving {request.device.name}")
@@ -171,16 +173,21 @@ def _others(
     return found
 
 
+def _wanted(request: ValidationRequest) -> Wanted:
+    """Find the parameters that are fitted; refuse a fit that no recording is left to."""
+    if all(given.held_back for given in request.recordings):
+        raise InputError("--hold-back: all recordings are kept back from the fit; leave one to it")
+    return wanted_parameters(request.device, request.fit, request.bounds)
+
+
 def add_fit(result: ValidationResult, report: Report) -> ValidationResult:
     """The result with a fit to the events that were not kept back, and what all events say of it."""
     request = result.request
     device = request.device
     kept = [given.held_back for given in request.recordings]
     events = [one.event for one in result.comparisons]
+    wanted = _wanted(request)
     taken = [event for event, held in zip(events, kept, strict=True) if not held]
-    if not taken:
-        raise InputError("--hold-back: all recordings are kept back from the fit; leave one to it")
-    wanted = wanted_parameters(device, request.fit, request.bounds)
     fit = fit_parameters(device, taken, wanted, report)
     other = device.with_values(fit.values)
     confirmations = []

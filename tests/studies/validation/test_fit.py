@@ -2,6 +2,7 @@
 
 import json
 
+import pandas as pd
 import pytest
 
 import orchestrator as gfor_in_python
@@ -46,7 +47,9 @@ def test_what_moves_nothing_is_named_before_the_fit_and_left(recording):
     assert by_name.loc["pod_p.K", "identifiable"]
 
 
-def test_names_and_bounds_that_do_not_fit_are_refused(gfor, recording):
+def test_names_and_bounds_that_do_not_fit_are_refused_before_anything_is_driven(gfor, tmp_path):
+    still = {"time [s]": [0.0, 0.1], "v_pu": 1.0, "angle_deg": 0.0, "p_mw": 1.0, "q_mvar": 0.0}
+    recording = written(pd.DataFrame(still), tmp_path)  # in which no event is found
     code, _, err = gfor("validate", "gfor", str(recording), "--fit", "pod_p.KK")
     assert code == 2
     assert "pod_p.K" in err
