@@ -137,7 +137,7 @@ def validate_device(
     """Drive the device by each recording, and judge it by the limits."""
     request.device.check_port()
     if request.fit:  # before the device is driven, which takes seconds
-        _wanted(request)
+        _find_wanted(request)
     comparisons = []
     for event in events_of(request):
         report(f"{event.recording.label}: driving {request.device.name}")
@@ -173,7 +173,7 @@ def _others(
     return found
 
 
-def _wanted(request: ValidationRequest) -> Wanted:
+def _find_wanted(request: ValidationRequest) -> Wanted:
     """Find the parameters that are fitted; refuse a fit that no recording is left to."""
     if all(given.held_back for given in request.recordings):
         raise InputError("--hold-back: all recordings are kept back from the fit; leave one to it")
@@ -186,7 +186,7 @@ def add_fit(result: ValidationResult, report: Report) -> ValidationResult:
     device = request.device
     kept = [given.held_back for given in request.recordings]
     events = [one.event for one in result.comparisons]
-    wanted = _wanted(request)
+    wanted = _find_wanted(request)
     taken = [event for event, held in zip(events, kept, strict=True) if not held]
     fit = fit_parameters(device, taken, wanted, report)
     other = device.with_values(fit.values)
