@@ -26,7 +26,8 @@ class DyrField:
     same value, because our part has one parameter for both; ``not_zero``: whether 0, by which PSS/E means that it
     chooses a value itself, must be refused; ``zero_sets``: parameter that is true at 0, by which the part chooses the
     value as PSS/E does; ``switch``: whether the parameters are truth values; 0 is false;
-    ``nothing_without``: name of another field; where that one is 0, PSS/E reads 0 here too, whatever stands here."""
+    ``nothing_without``: name of another field; where that one is 0, PSS/E reads 0 here too, whatever stands here;
+    ``is_text``: whether a text stands there, such as a circuit's identifier, which nothing here reads."""
 
     name: str
     parameters: tuple[str, ...] = ()
@@ -40,6 +41,7 @@ class DyrField:
     zero_sets: str = ""
     switch: bool = False
     nothing_without: str = ""
+    is_text: bool = False
 
 
 @dataclass(frozen=True)
@@ -47,24 +49,27 @@ class DyrRecord:
     """One kind of record.
 
     ``kind``: key of the component's table: ``machine``, ``exciter``, ``governor`` or ``stabilizer``; ``compensator``
-    for what an exciter measures, which is no part of its own; ``converter`` for a record that is a whole component;
+    for what an exciter measures, which is no part of its own; ``converter`` for a record that is a whole component, to
+    which ``electrical`` and ``plant`` may belong as its control and its plant's;
     ``part``: its value, the name of our part; for a whole component, its model;
     ``fields``: in the file's order; ``lacks``: parameters of our part that 0 leaves out, as the record has none;
-    ``omissions``: what our part leaves out where a field, by its name, is not 0."""
+    ``omissions``: what our part leaves out where a field, by its name, is not 0;
+    ``without``: switches of our part that are off, as the record does not have what they switch."""
 
     kind: str
     part: str
     fields: tuple[DyrField, ...]
     lacks: tuple[str, ...] = ()
     omissions: Mapping[str, str] = field(default_factory=dict)
+    without: tuple[str, ...] = ()
 
 
 SIGNALS_OF_BUSES = (2, 5, 6)
 """Numbers of stabilisers' signals that PSS/E can take at another bus: frequency, voltage, its rate."""
 
 _WORD = re.compile(
-    r"(?P<name>[^:=!&@-]+)(@(?P<bus_of>\w+))?(:(?P<sets>[\w+]+))?(-(?P<negated>[A-Za-z]\w*))?(\*(?P<times>[^=!&]+))?(==(?P<same>\w+))?(=(?P<only>[-\d|.]+))?"
-    r"(!(?P<chooser>\w*))?(?P<switch>\??)(&(?P<without>\S+))?"
+    r"(?P<name>[^:=!&@%-]+)(@(?P<bus_of>\w+))?(:(?P<sets>[\w+]+))?(-(?P<negated>[A-Za-z]\w*))?(\*(?P<times>[^=!&]+))?(==(?P<same>\w+))?(=(?P<only>[-\d|.]+))?"
+    r"(!(?P<chooser>\w*))?(?P<switch>\??)(&(?P<without>[^%\s]+))?(?P<text>%?)"
 )
 """A field as the table has it."""
 
@@ -75,6 +80,8 @@ _SCOPES = {
     "stabilizer": "pss.",
     "compensator": "exciter.",
     "converter": "",
+    "electrical": "electrical.",
+    "plant": "plant.",
 }
 
 
@@ -111,6 +118,7 @@ def _record(table: Mapping[str, Any]) -> DyrRecord:
             zero_sets=chooser,
             switch=found["switch"] != "",
             nothing_without=found["without"] or "",
+            is_text=found["text"] != "",
         )
         fields.append(one)
     return DyrRecord(
@@ -119,6 +127,7 @@ def _record(table: Mapping[str, Any]) -> DyrRecord:
         tuple(fields),
         tuple(f"{scope}{p}" for p in table.get("lacks", ())),
         table.get("omissions", {}),
+        without=tuple(f"{scope}{p}" for p in table.get("without", ())),
     )
 
 

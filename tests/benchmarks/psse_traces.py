@@ -98,7 +98,7 @@ UNREACHED = {
     "LOAD": "loads of constant power and current, by `gfor run`: page of conventions",
     "MultiGen": "several machines and converters: `gfor new` and `gfor run`",
     "PSS2A, PSS2B, PSS2C": "no DYR record of the stabiliser",
-    "RENA": "converters: REGCA1 and REECB1",
+    "RENA": "converters, no machine: tests.models.test_wecc_renewable",
     "STAB1": "a step of the reference: tests.models.test_psse_traces",
     "Test01": "GENCLS: only its decay is comparable, by PSS/E's step (tests.models.test_psse_traces)",
 }

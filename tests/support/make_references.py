@@ -107,6 +107,13 @@ REFERENCES = (
         ("i_re", "i_im", "e_re", "e_im", "omega", "E_droop"),
     ),
     Reference(
+        "regca1_repca1_phasor",
+        "fmus/wecc_renewable/reference.csv",
+        {"P_0": 0.8, "Q_0": 0.05, "plant.Fflag": 1.0, "plant.RefFlag": 1.0},
+        *_BUS,
+        ("i_re", "i_im", "e_re", "e_im", "I_p_fed", "I_q_fed"),
+    ),
+    Reference(
         "csvgn1_phasor",
         "fmus/static_var/reference.csv",
         {"Q_0": 0.15},

@@ -29,6 +29,8 @@ LEAFLETS = {
     "static_generation_phasor": ROOT / "fmus" / "static_generation" / "README.md",
     "regfm_a1_phasor": ROOT / "fmus" / "regfm_a1" / "README.md",
     "csvgn1_phasor": ROOT / "fmus" / "static_var" / "README.md",
+    "regca1_phasor": ROOT / "fmus" / "wecc_renewable" / "README.md",
+    "regca1_repca1_phasor": ROOT / "fmus" / "wecc_renewable" / "README.md",
     "infinite_bus": ROOT / "fmus" / "infinite_bus" / "README.md",
     "test_bench": ROOT / "fmus" / "test_bench" / "README.md",
     "probe_a": ROOT / "fmus" / "probe" / "README.md",

@@ -41,6 +41,18 @@ _L2EP_OPEN = {
 # without it the voltage at the filter is the droop's alone
 _VIRTUAL_OPEN = {"virtual_impedance.R_v": 0.02, "virtual_impedance.X_v": 0.1}
 
+# LVPL, the low-voltage gain and the high-voltage limit all act near the operating point.
+_PLANT_OPEN = {
+    "communication_step": 5e-3,
+    "R_port": 0.01,
+    "Brkpt": 1.3,
+    "Zerox": 0.2,
+    "Lvpl1": 1.33,
+    "Lvpnt1": 1.1,
+    "Volim": 1.0,
+    "Khv": 0.5,
+}
+
 ALL_PATHS_OPEN = {
     "gfor": _CONVERTER_OPEN,
     "gfor_abc": _CONVERTER_OPEN,
@@ -54,6 +66,8 @@ ALL_PATHS_OPEN = {
     "gfl_l2ep_phasor": _L2EP_OPEN | {"communication_step": 5e-3},
     "static_generation_phasor": {"communication_step": 5e-3, "R": 0.01},
     "csvgn1_phasor": {"communication_step": 5e-3, "R": 0.01},
+    "regca1_phasor": _PLANT_OPEN,
+    "regca1_repca1_phasor": _PLANT_OPEN,
     "regfm_a1_phasor": {
         "communication_step": 5e-3,
         "RL": 0.01,
@@ -71,8 +85,8 @@ FED = {
         f"sg1.{k}": v for k, v in (("e_re", 1.0), ("e_im", 0.2), ("y_re", 1.0), ("y_im", -50.0))
     }
 }
-# Outputs that reach some listed states only where a block is left out (time constant 0).
-BEHIND_LEFT_OUT_BLOCKS = {"P_m", "B"}
+# Outputs that reach some listed states only where a block is left out (time constant 0), or by the flags of a plant.
+BEHIND_LEFT_OUT_BLOCKS = {"P_m", "B", "I_p_command", "I_q_command"}
 # States that act at a threshold alone, which small changes do not reach.
 BEHIND_THRESHOLDS = {name: {"pll.freezing.awake"} for name in ("gfl_l2ep", "gfl_l2ep_phasor")} | {
     "csvgn1_phasor": {"first", "second"}  # T5 = 0 leaves out the lag between them and the outputs

@@ -14,6 +14,7 @@ from fmus.synchronous_generator.dyr_fields import (
     DyrField,
     DyrRecord,
 )
+from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
 from orchestrator.cases.form.remedies import APPROXIMATING, replacement_of, without_models
 from orchestrator.cases.networks.psse.dyr_records import EVENT, DynamicRecord, given_values
 from orchestrator.cases.networks.psse.missing_models import (
@@ -28,9 +29,12 @@ from orchestrator.cases.networks.psse.raw import Machine, unit_labels
 from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
 from orchestrator.core.errors import InputError, few, first_of
 
-_KNOWN = DYR_RECORDS | REGFM_A1_RECORDS | STATIC_VAR_RECORDS
+_KNOWN = DYR_RECORDS | REGFM_A1_RECORDS | STATIC_VAR_RECORDS | PLANT_RECORDS
 _COUPLED = {record.part for record in REGFM_A1_RECORDS.values()}
 """Models whose coupling impedance is ZSORCE of the network data."""
+
+_OF_CONVERTERS = ("converter", "electrical", "plant")
+"""Kinds of records that a converter is made of."""
 
 MANUAL = "manual"
 """The exciter without a regulator, on which neither a stabiliser nor a compensator acts."""
@@ -82,7 +86,7 @@ def machine_models(
     ``leaving_out``: models whose records may be left out; their generators keep what the case says of that part.
     ``replaced``: machines in whose place a converter of the case stands: they need no record.
     ``approximate``: whether WECC's grid-following converters become `gfl_phasor`, which leaves a part of them out; else
-    they are refused."""
+    those of REGCA1 are models of their own."""
     at = {(machine.bus, machine.name.strip()): machine for machine in machines}
     problems: list[str] = []
     parts: dict[tuple[int, str], dict[str, str]] = {key: {} for key in at}
@@ -107,7 +111,7 @@ def machine_models(
             of[key].append(record)
         if key not in at or record.name in left or (approximate and record.name in FIELDS):
             continue
-        known = _KNOWN.get(record.name)
+        known = None if approximate and record.name == PLANT else _KNOWN.get(record.name)
         if known is None:
             remedy = remedy_for(record.name, labels[key], approximate=approximate)
             if remedy:
@@ -158,6 +162,7 @@ def machine_models(
         key: replace(
             _model(at[key], parts[key], values[key], key in open_),
             lines=lines[key],
+            replaced=tuple(_left_out_of_plant(parts[key], of[key], left)),
             doubts=tuple(_doubts(at[key], of[key], values[key])),
         )
         for key in at
@@ -260,14 +265,41 @@ def _unfit(
 ) -> Iterator[str]:
     """Machines whose records are too many or too few; ``labels`` are of their units."""
     for (bus, name), own in parts.items():
-        if "converter" in own and len(own) > 1:
-            others = ", ".join(kind for kind in own if kind != "converter")
+        if (bus, name) not in replaced:
+            yield from _incomplete(f"machine {name!r} at bus {bus}", own, labels[bus, name])
+        others = ", ".join(kind for kind in own if kind not in _OF_CONVERTERS)
+        if "converter" in own and others:
             yield f"machine {name!r} at bus {bus} is a converter, and has records of its {others}; remove them"
     for bus, name in _without_machine(parts):
         if (bus, name) not in replaced:
             yield (
                 f"machine {name!r} at bus {bus} has no record of a machine; add one, or write "
                 f"{replacement_of(labels[bus, name])}, and a converter of ours stands there"
+            )
+
+
+def _incomplete(machine: str, own: Mapping[str, str], unit: str) -> Iterator[str]:
+    """Yield what the records of one of WECC's plants lack; ``unit``: the label of its unit."""
+    needs = own.get("converter") == PLANT_RECORDS[CONVERTER].part
+    if needs == ("electrical" in own) and (needs or "plant" not in own):
+        return
+    there = " and ".join(kind for kind in _OF_CONVERTERS if kind in own)
+    missing = "REECA1 or REECB1" if needs else CONVERTER
+    yield (
+        f"{machine} has records of its {there} and no {missing}: together they are a plant of WECC's generic models; "
+        f"add it, or write {replacement_of(unit)}, and a converter of ours stands there"
+    )
+
+
+def _left_out_of_plant(
+    parts: Mapping[str, str], records: Sequence[DynamicRecord], left: Collection[str]
+) -> Iterator[tuple[int, str]]:
+    """Yield the line and the consequence of a plant's controller that the case leaves out."""
+    for record in records:
+        if record.name == PLANT and PLANT in left and "electrical" in parts:
+            yield (
+                record.line,
+                f"{PLANT} left out, as dyr_leave_out says: the references are constant",
             )
 
 
@@ -379,7 +411,7 @@ def _model(
         own = dict(values)
         if parts["converter"] in _COUPLED:
             own = {"RL": machine.source.real, "XL": machine.source.imag, **values}
-        return MachineModel({}, own, parts["converter"])
+        return MachineModel({}, own, parts.get("plant", parts["converter"]))
     source = {"machine.R_s": machine.source.real}
     if parts["machine"] == CLASSICAL:
         source["machine.X_d1"] = machine.source.imag
@@ -390,8 +422,8 @@ def _model(
 
 def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
     given = given_values(record, known.fields, {*_KNOWN, *FIELDS})
-    found = dict.fromkeys(known.lacks, 0.0)
-    for field in known.fields:
+    found = dict.fromkeys(known.lacks, 0.0) | dict.fromkeys(known.without, False)
+    for field in (field for field in known.fields if not field.is_text):
         value = given[field.name]
         if field.nothing_without and given[field.nothing_without] == 0:
             value = 0.0
@@ -451,7 +483,7 @@ def remedy_for(name: str, unit: str, *, approximate: bool) -> str:
     )
 
 
-# -- WECC's grid-following converters: as the phasor converter at the user's word, else refused ------
+# -- WECC's grid-following converters as the phasor converter, at the user's word --------------------
 
 
 def followed(

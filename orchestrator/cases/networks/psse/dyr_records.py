@@ -90,6 +90,7 @@ def given_values(
     return {
         field.name: _number(record, field, text)
         for field, text in zip(fields, record.values, strict=True)
+        if not field.is_text
     }
 
 

@@ -3,10 +3,11 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from fmus.grid_following.dyr_fields import CONVERTER, FIELDS, MODEL
+from fmus.grid_following.dyr_fields import FIELDS, MODEL
 from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
 from fmus.static_var.dyr_fields import STATIC_VAR_RECORDS
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS, DyrRecord
+from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
 from orchestrator.cases.networks.psse.load_records import LOAD_RECORDS
 
 _LIBRARY = "PSS/E's model library as PowerWorld's and NEPLAN's guides and ANDES' reader describe it"
@@ -46,14 +47,26 @@ def known_records() -> list[KnownRecord]:
         KnownRecord(name, "load", "load_model", _LOADS, "an exponent other than 0, 1, 2 near v_0")
         for name in LOAD_RECORDS
     ]
-    asked = "only with dyr_approximate = true; each case lists what that leaves out"
     found += [
-        KnownRecord(
-            name, "converter" if name == CONVERTER else "converter control", MODEL, _GENERIC, asked
-        )
-        for name in FIELDS
+        KnownRecord(name, _KINDS[record.kind], record.part, _GENERIC, "; ".join(_of_plant(name)))
+        for name, record in PLANT_RECORDS.items()
     ]
     return found
+
+
+_KINDS = {
+    "converter": "converter",
+    "electrical": "converter control",
+    "plant": "plant control",
+}
+"""Words for the kinds of a plant's records."""
+
+
+def _of_plant(name: str) -> Iterator[str]:
+    """Yield what is approximated of a plant's record, and what stands for it at the user's word."""
+    yield from _limits(PLANT_RECORDS[name])
+    if name in FIELDS:
+        yield f"with dyr_approximate = true: {MODEL}"
 
 
 def _limits(record: DyrRecord) -> Iterator[str]:
@@ -70,7 +83,8 @@ def _limits(record: DyrRecord) -> Iterator[str]:
         f.name
         for f in record.fields
         if not (
-            f.parameters
+            f.is_text
+            or f.parameters
             or f.negated
             or f.only
             or f.bus_of

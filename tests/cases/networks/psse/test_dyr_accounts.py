@@ -120,7 +120,8 @@ def test_what_is_known_is_listed():
     records = {record.name: record for record in known_records()}
     assert records["GENROU"].part == "genrou"
     assert records["GENROU"].source
-    assert "only with dyr_approximate" in records["REGCA1"].approximated
+    assert "with dyr_approximate = true: gfl_phasor" in records["REGCA1"].approximated
+    assert records["REPCA1"].part == "regca1_repca1_phasor"
     assert all(record.kind and record.part and record.source for record in records.values())
     for name, record in records.items():  # the lists of models say of each what we take it for
         assert kind_of(name) == record.kind.split()[0], name

@@ -87,12 +87,17 @@ def test_every_field_sets_a_parameter_of_the_model():
         (
             "'REGFMA1'",
             "'REGCA1'",
-            r"stands for REGCA1, a grid-following converter; write dyr_approximate",
+            r"REGCA1 has 20 values, and needs 15: Lvplsw, Tg, Rrpwr",
         ),
         (
             "'REGFMA1'",
             "'WT4G1'",
             r"stands for WT4G1, a grid-following converter; write replace = ",
+        ),
+        (
+            "'REGFMA1'",
+            "'REGCB1'",
+            r"stands for REGCB1, a grid-following converter; write replace = ",
         ),
     ],
 )

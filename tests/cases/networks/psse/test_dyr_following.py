@@ -107,9 +107,9 @@ def test_voltage_control_is_an_integrator(prepared):
     ("text", "units", "words"),
     [
         (
-            dyr(),
+            dyr("REECA1").replace("'REECA1'", "'REECC1'"),
             "",
-            r"line 5: no part of ours stands for REGCA1.*write dyr_approximate = true .* for gfl_phasor",
+            r"line 6: no part of ours stands for REECC1, a grid-following converter; write replace = ",
         ),
         (
             dyr(QFLAG=1, VFLAG=1),

@@ -1,0 +1,130 @@
+"""REPCA1: the controller of a plant, which sets its converter's references by what it measures at one point.
+
+    RefFlag: V_ref − |v − (Rc + j·Xc)·i| (VCFlag), or V_ref − (v + Kc·Q); else Q_ref − Q: measured behind Tfltr
+             → beyond dbd1…dbd2, within emin…emax → Kp + Ki/s within Qmin…Qmax → (1+s·Tft)/(1+s·Tfv) → Q or V reference
+    Fflag:   P_ref − P behind Tp, + Ddn·(1 − f) or Dup·(1 − f) beyond fdbd1…fdbd2 → within femin…femax
+             → Kpg + Kig/s within Pmin…Pmax → 1/(1+s·Tg) → P reference; else it is constant
+
+Ddn acts above rated frequency, Dup below. Below Vfrz the integrator of the upper part waits. The point is the
+converter's own terminal, as in PSS/E where the record names neither a bus nor a branch.
+
+Source: WECC's specification of REPC_A (EPRI, 2013), and its "Solar Plant Dynamic Modeling Guidelines" (2014)."""
+
+from collections.abc import Mapping
+
+from fmus.converter_parts.bus_voltage import ExtrapolatedVoltage
+from fmus.synchronous_generator.data_lines import Given, declared, number, power, pu, seconds
+from fmus.toolchain.blocks import clamp, lead_lag, low_pass, low_pass_or_nothing
+from fmus.toolchain.frames import Phasor
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else
+from fmus.wecc_renewable.signals import (
+    ROUNDING,
+    SOURCE,
+    Controller,
+    References,
+    Terminal,
+    controlled,
+    dead_band,
+)
+
+LINES = (
+    seconds("Tfltr", 0.02, "Filter of voltage and reactive power; 0 leaves it out"),
+    number("Kp", 18.0, "Proportional gain of reactive power or voltage", 0),
+    number("Ki", 5.0, "Integral gain of reactive power or voltage", 0, "1/s"),
+    seconds("Tft", 0.0, "Lead of the reference"),
+    seconds("Tfv", 0.05, "Lag of the reference; 0 leaves the stage out"),
+    pu("Vfrz", 0.0, "Voltage below which the integrator of Ki waits", base="bus"),
+    power("Rc", 0.0, "Resistance of the compensation"),
+    power("Xc", 0.0, "Reactance of the compensation"),
+    power("Kc", 0.02, "Voltage by reactive power, where VCFlag is false"),
+    number("emax", 0.1, "Most error of reactive power or voltage"),
+    number("emin", -0.1, "Least error of reactive power or voltage"),
+    number("dbd1", -1.0, "Lower end of its dead band; at most 0"),
+    number("dbd2", 1.0, "Upper end of its dead band; at least 0", 0),
+    number("Qmax", 0.43, "Most reference of reactive power or voltage"),
+    number("Qmin", -0.43, "Least reference of reactive power or voltage"),
+    number("Kpg", 1.0, "Proportional gain of active power", 0),
+    number("Kig", 0.05, "Integral gain of active power", 0, "1/s"),
+    seconds("Tp", 0.25, "Filter of active power; 0 leaves it out"),
+    pu("fdbd1", -1.0, "Lower end of the dead band of 1 − f; at most 0", base="f_n"),
+    pu("fdbd2", 1.0, "Upper end of the dead band of 1 − f; at least 0", 0.0, base="f_n"),
+    power("femax", 99.0, "Most error of active power"),
+    power("femin", -99.0, "Least error of active power"),
+    power("Pmax", 1.0, "Most reference of active power"),
+    power("Pmin", 0.0, "Least reference of active power"),
+    seconds("Tg", 0.1, "Lag of the reference of active power; 0 leaves it out"),
+    power("Ddn", 0.0, "Active power by frequency above rated", 0),
+    power("Dup", 0.0, "Active power by frequency below rated", 0),
+    seconds("T_f", 0.04, "Filter of the bus frequency; PSS/E's own, no field of REPCA1", 1e-3),
+)
+
+SWITCHES: Mapping[str, str] = {
+    "VCFlag": "Rc and Xc compensate; else Kc",
+    "RefFlag": "The voltage is controlled; else the reactive power",
+    "Fflag": "Active power is controlled, with frequency; else its reference is constant",
+}
+
+_LEAST_SQUARE = 1e-4  # of a voltage [pu²], below which no frequency is told from it
+
+
+def plant_references(
+    m: ModelBuilder, t: Terminal, seen: ExtrapolatedVoltage, omega_b: Expr, start: References
+) -> References:
+    """Declare the controller; return the references that it sets.
+
+    ``seen``: the voltage at the point, for its frequency; ``start``: references of the operating point."""
+    flags = {name: m.switch(name, False, text) for name, text in SWITCHES.items()}
+    p = declared(m, LINES, SOURCE)
+    change_Q, change_V, change_P = (
+        m.parameter(f"delta_{name}", 0, "pu", f"Change of {name}", base=base, tunable=True)
+        for name, base in (("Qref", "S_n"), ("Vref", "bus"), ("Pref", "S_n"))
+    )
+    regulated, regulated_0 = (
+        _regulated(p, flags["VCFlag"], v, i, Q)
+        for v, i, Q in ((t.v, t.i, t.Q), (t.v_0, t.i_0, t.Q_0))
+    )
+    v = low_pass_or_nothing(m, "V_filtered", regulated, p.Tfltr, regulated_0)
+    Q = low_pass_or_nothing(m, "Q_filtered", t.Q, p.Tfltr, t.Q_0)
+    error = if_else(flags["RefFlag"], regulated_0 + change_V - v, t.Q_0 + change_Q - Q)
+    limited = clamp(dead_band(error, p.dbd1, p.dbd2), p.emin, p.emax)
+    least, most = _around(m, start.Q, (p.Qmin, p.Qmax), Expr(1.0))
+    how = Controller(p.Kp, p.Ki, least, most, 1.0, t.size < p.Vfrz)
+    of_voltage = controlled(m, "Q_control", limited, how, initial=start.Q)
+    reactive = lead_lag(m, "lead_lag", of_voltage, p.Tft, p.Tfv, start.Q)
+
+    measured = low_pass_or_nothing(m, "P_filtered", t.P, p.Tp, t.P_0)
+    away = 1 - _frequency(m, seen, omega_b, p.T_f)
+    beyond = dead_band(away, p.fdbd1, p.fdbd2)
+    droop = p.Dup * fmax(beyond, 0) + p.Ddn * fmin(beyond, 0)
+    power_error = clamp(t.P_0 + change_P - measured + droop, p.femin, p.femax)
+    floor, ceiling = _around(m, start.P, (p.Pmin, p.Pmax), flags["Fflag"])
+    of_power = Controller(p.Kpg, p.Kig, floor, ceiling, flags["Fflag"], Expr(0.0))
+    wanted = controlled(m, "P_control", power_error, of_power, initial=start.P)
+    slow = low_pass_or_nothing(m, "P_reference", wanted, p.Tg, start.P)
+    return References(if_else(flags["Fflag"], slow, start.P + change_P), reactive)
+
+
+def _around(
+    m: ModelBuilder, start: Expr, limits: tuple[Expr, Expr], counts: Expr
+) -> tuple[Expr, Expr]:
+    """Limits of a reference; an operating point outside of them is refused where the reference counts."""
+    low, high = limits
+    for margin, limit, side in ((start - low, low, "below"), (high - start, high, "above")):
+        text = f"the operating point asks for a reference {side} {limit.name()}"
+        m.require(if_else(counts, margin, 1) + ROUNDING, f"{text}; change it, P_0, Q_0 or v_0")
+    return fmin(low, start), fmax(high, start)
+
+
+def _regulated(p: Given, compensates: Expr, v: Phasor, i: Phasor, Q: Scalar) -> Expr:
+    """Voltage that is controlled [pu]."""
+    inside = (v - Phasor(p.Rc, p.Xc) * i).magnitude()
+    return if_else(compensates, inside, v.magnitude() + p.Kc * Q)
+
+
+def _frequency(m: ModelBuilder, seen: ExtrapolatedVoltage, omega_b: Expr, T: Expr) -> Expr:
+    """Frequency of the bus voltage behind a filter [pu], from states alone."""
+    v = seen.twice
+    turning = (v.conjugate() * ((seen.once - v) / seen.tau)).im
+    square = fmax(v.re**2 + v.im**2, _LEAST_SQUARE)
+    return low_pass(m, "frequency", 1 + turning / square / omega_b, T, 1.0)
