@@ -227,6 +227,11 @@ def test_the_orchestrator_knows_fmus_and_never_equations():
                 within(b, "fmus.vendor_dll", "fmus.toolchain.cache", "fmus.toolchain.archive")
                 or b == "fmus"
             )
+        if (
+            within(a, "orchestrator.devices.acceptance.controller_dll")
+            or a == "orchestrator.devices.fmi.dll_worker"
+        ):
+            return within(b, "fmus.vendor_dll")
         if a == "orchestrator.devices.fmi.wine_program":
             return b in ("fmus.toolchain.compiler", "fmus.vendor_dll.memory")
         if a in ("orchestrator.devices.fmi.instance", "orchestrator.systems.ssp.archive"):

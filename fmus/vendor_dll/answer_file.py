@@ -163,3 +163,9 @@ _ANSWER = {
     },
 }
 _ERROR = {"error": _text}
+
+
+def checked_interface(value: Any) -> dict[str, Any]:
+    """A DLL's declarations as JSON, where they have the form in which the process that reads a DLL gives them."""
+    found: dict[str, Any] = _taken(value, _ANSWER["interface"], "the answer")
+    return found

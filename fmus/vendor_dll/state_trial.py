@@ -13,9 +13,9 @@ from typing import Any
 from fmus.vendor_dll.interface import DllInterface, DllParameter, Layout, Signal, layout
 from fmus.vendor_dll.memory import Library, Region
 
-_SAMPLES = 200  # in each of the runs
+SAMPLES = 200  # in each of the runs
 # of the inputs' waves; the second where the DLL refuses the first with an error
-_LARGEST = (1.5, 0.6)
+LARGEST = (1.5, 0.6)
 # A word is taken for a number where its magnitude is zero or between these at all times
 _MODEST = (1e-12, 1e12)
 
@@ -47,7 +47,9 @@ class Trial:
         )
 
 
-class _Instance(c.Structure):
+class InstanceStructure(c.Structure):
+    """What a host hands to every call for one instance."""
+
     _fields_ = (
         *((name, c.c_void_p) for name in ("inputs", "outputs", "parameters")),
         ("time", c.c_double),
@@ -71,10 +73,10 @@ class _Host:
         self._sizes = [size + 64 for size in self._sizes]
         self._at = [library.allocate(size) for size in self._sizes]
         at = self._at
-        self._instance = _Instance(
+        self._instance = InstanceStructure(
             *at[:3], 0.0, 2 if interface.mode == 2 else 1, None, None, *at[3:]
         )
-        self._instance_at = library.allocate(c.sizeof(_Instance))
+        self._instance_at = library.allocate(c.sizeof(InstanceStructure))
         self._inputs = bytearray(self._sizes[0])
         self._set_defaults(interface.parameters, self._layouts[2])
 
@@ -87,7 +89,7 @@ class _Host:
                 self._library.write(address, text)
                 struct.pack_into("P", content, place.offset, address)
             else:
-                _pack(content, place.row, place.offset, parameter.default)
+                pack_value(content, place.row, place.offset, parameter.default)
         self._library.write(self._at[2], bytes(content))
 
     def start(self) -> None:
@@ -99,8 +101,8 @@ class _Host:
         library = self._library
         library.write(self._instance_at, bytes(self._instance))
         if c.c_int32(library.call(f"Model_{name}", self._instance_at)).value == 2:
-            said = _Instance.from_buffer_copy(
-                library.read(self._instance_at, c.sizeof(_Instance))
+            said = InstanceStructure.from_buffer_copy(
+                library.read(self._instance_at, c.sizeof(InstanceStructure))
             ).error
             words = (library.text(said) or b"(no message)").decode("utf-8", "replace").strip()
             raise ValueError(f"Model_{name} ends with an error: {words}")
@@ -109,27 +111,16 @@ class _Host:
         """Everything that came out in one run, which begins at a sample."""
         seen = b""
         step = self._interface.sample_time if self._interface.sample_time > 0 else 1e-4
-        for sample in range(first, first + _SAMPLES):
+        for sample in range(first, first + SAMPLES):
             for k, place in enumerate(self._layouts[0].places):
                 if place.type.kind != "String":
-                    _pack(
-                        self._inputs,
-                        place.row,
-                        place.offset,
-                        self._input(sample, k, place.type.kind),
-                    )
+                    value = moving_input(sample, k, place.type.kind, self._largest)
+                    pack_value(self._inputs, place.row, place.offset, value)
             self._library.write(self._at[0], bytes(self._inputs))
             self._instance.time = sample * step
             self._call("Outputs")
             seen += self._library.read(self._at[1], self._sizes[1])
         return seen + b"".join(self.arrays()[3:])
-
-    def _input(self, sample: int, k: int, kind: str) -> float:
-        """Waves beyond what is usual in per unit, then around 1, where a voltage is; whole numbers change in turn."""
-        if kind == "Integer":
-            return (sample // 25 + k) % 3
-        wave = math.sin(0.031 * sample * (1 + 0.01 * k) + 2.0944 * k)
-        return self._largest * wave if sample % _SAMPLES < _SAMPLES // 2 else 1.0 + 0.2 * wave
 
     def arrays(self) -> list[bytes]:
         return [
@@ -144,7 +135,7 @@ class _Host:
 
 def tried(library: Library, interface: DllInterface) -> Trial:
     """Run a DLL from the same arrays twice, and then from the same arrays and the same memory of its library."""
-    for largest in _LARGEST:
+    for largest in LARGEST:
         try:
             return _tried(_Host(library, interface, largest), library)
         except ValueError as error:
@@ -157,10 +148,10 @@ def _tried(host: _Host, library: Library) -> Trial:
     host.run(0)
     regions = library.regions() or []
     arrays, memory = host.arrays(), _copy(library, regions)
-    first = host.run(_SAMPLES)
+    first = host.run(SAMPLES)
     moving = [memory, _copy(library, regions)]
     host.restore(arrays)
-    from_arrays = host.run(_SAMPLES) == first
+    from_arrays = host.run(SAMPLES) == first
     places = tuple((start - base, size) for base, start, size in regions)
     if from_arrays and moving[0] == moving[1]:
         return Trial("arrays", regions=places)
@@ -168,14 +159,22 @@ def _tried(host: _Host, library: Library) -> Trial:
         return Trial("hidden", why="the library's own memory is looked at on Linux only")
     host.restore(arrays)
     _put_back(library, regions, memory)
-    if host.run(_SAMPLES) != first:
+    if host.run(SAMPLES) != first:
         return Trial(
             "hidden", why="a run from the same arrays and the same memory of the library differs"
         )
     return Trial("library", *_numbers(regions, moving), regions=places)
 
 
-def _pack(buffer: bytearray, row: Signal | DllParameter, offset: int, value: float) -> None:
+def moving_input(sample: int, k: int, kind: str, largest: float) -> float:
+    """Waves beyond what is usual in per unit, then around 1, where a voltage is; whole numbers change in turn."""
+    if kind == "Integer":
+        return (sample // 25 + k) % 3
+    wave = math.sin(0.031 * sample * (1 + 0.01 * k) + 2.0944 * k)
+    return largest * wave if sample % SAMPLES < SAMPLES // 2 else 1.0 + 0.2 * wave
+
+
+def pack_value(buffer: bytearray, row: Signal | DllParameter, offset: int, value: float) -> None:
     code = {1: "b", 2: "b", 3: "B", 4: "h", 5: "H", 6: "i", 7: "I", 8: "f", 9: "d"}[row.data_type]
     whole = max(0, round(value)) if code in "BHI" else round(value)
     struct.pack_into(code, buffer, offset, value if code in "fd" else whole)

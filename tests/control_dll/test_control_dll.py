@@ -15,6 +15,9 @@ from fmus.control_dll.export import (
     write_dll,
 )
 from fmus.vendor_dll.fmu import dll_fmu, read_dll
+from orchestrator.devices.acceptance.checks.base import Verdict
+from orchestrator.devices.acceptance.controller_dll.conformity import check_dll
+from orchestrator.devices.acceptance.controller_dll.questions import DLL_QUESTIONS
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.fmi.loaded import LoadedComponent
 from orchestrator.face.cli import main
@@ -251,3 +254,9 @@ def test_an_export_that_ends_half_way_leaves_nothing(part, tmp_path, monkeypatch
     with pytest.raises(OSError, match="no space left"):
         write_dll(part, tmp_path / "dest", ("linux64",))
     assert not [path for path in (tmp_path / "dest").rglob("*") if path.is_file()]
+
+
+def test_it_keeps_the_interface(written):
+    results = check_dll(written().libraries["linux64"])
+    assert [r.check for r in results] == list(DLL_QUESTIONS)
+    assert not [(r.check, r.evidence) for r in results if r.verdict is Verdict.FAIL]

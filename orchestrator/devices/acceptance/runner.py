@@ -30,6 +30,7 @@ from orchestrator.devices.acceptance.checks import base
 from orchestrator.devices.acceptance.checks.all import CHECKS, ORDER
 from orchestrator.devices.acceptance.checks.running import RUN_FOR
 from orchestrator.devices.acceptance.checks.subject import Subject, Use
+from orchestrator.devices.acceptance.controller_dll.questions import DLL_QUESTIONS
 from orchestrator.devices.acceptance.process import FmuProcess, ProcessEndedError
 from orchestrator.devices.binding.binding import bind, read_table
 from orchestrator.devices.binding.misfits import is_consequence, likely_cause
@@ -91,6 +92,11 @@ class AcceptanceReport:
         return not self.failures and not self.not_supported and not self.reasons
 
     @property
+    def drawn(self) -> bool:
+        """Return whether something was asked of it that is drawn at random."""
+        return any(r.check in CHECKS for r in self.results)
+
+    @property
     def sentence(self) -> str:
         """The verdict; the frequency that it is made for is told where this shows."""
         if self.trusted:
@@ -100,7 +106,8 @@ class AcceptanceReport:
         if self.reasons and not self.failures and not self.not_supported:
             return f"no check failed, and not to be accepted as it is: not judged: {', and '.join(self.not_judged)}"
         if not self.failures:
-            return f"not supported here: {', '.join(self.not_supported)}; that says nothing about the FMU"
+            what = "the FMU" if self.fmu.suffix == ".fmu" else "the DLL"
+            return f"not supported here: {', '.join(self.not_supported)}; that says nothing about {what}"
         if self.binding_fails and self.binding is not None:
             return f"nothing is known yet of it behind {self.binding.name}: mend it and check again"
         made = next((r for r in self.failures if "made_for_hz" in r.figures), None)
@@ -132,7 +139,11 @@ FILE_CHECKS = {
 
 
 def question_of(name: str) -> str:
-    return FILE_CHECKS[name] if name in FILE_CHECKS else CHECKS[name].question
+    """What a check asks."""
+    for questions in (FILE_CHECKS, DLL_QUESTIONS):
+        if name in questions:
+            return questions[name]
+    return CHECKS[name].question
 
 
 def check_fmu(

@@ -48,6 +48,25 @@ def is_vendor_file(path: Path) -> bool:
     return path.suffix.lower() in (*DLL_ENDINGS, DEVICE_ENDING)
 
 
+def controller_dll(path: Path) -> tuple[Path, dict[str, str]] | None:
+    """The controller DLL that a file is or names, and values of its text parameters; None where it is another file."""
+    if not is_vendor_file(path) or not path.exists():
+        return None
+    if path.suffix.lower() != DEVICE_ENDING:
+        check_regular(path)
+        return path, {}
+    from fmus.vendor_dll.device import DeviceFileError, read_device_file  # noqa: PLC0415 - as in `as_fmu`
+
+    try:
+        library, table = read_device_file(path)
+    except DeviceFileError as error:
+        raise InputError(str(error)) from error
+    check_regular(library)
+    texts = table.get("texts")
+    given = texts if isinstance(texts, dict) else {}
+    return library, {str(name): str(text) for name, text in given.items()}
+
+
 def as_fmu(path: Path) -> Path:
     """The FMU of a DLL or of a device's file; every other path stays as it is."""
     if not is_vendor_file(path):

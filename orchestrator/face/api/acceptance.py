@@ -10,12 +10,14 @@ from orchestrator.core.asked import Names, names, text_or_none
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError
 from orchestrator.core.truth import NoTruth
+from orchestrator.devices.acceptance.checks.base import CheckResult, Verdict
 from orchestrator.devices.acceptance.checks.subject import Use
+from orchestrator.devices.acceptance.controller_dll.questions import DLL_QUESTIONS
 from orchestrator.devices.acceptance.junit import write_junit
 from orchestrator.devices.acceptance.runner import AcceptanceReport, check_fmu, question_of
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.fmi.limits import LEAST_MEMORY, Limits
-from orchestrator.devices.fmi.vendor_files import as_fmu
+from orchestrator.devices.fmi.vendor_files import as_fmu, controller_dll
 from orchestrator.face.api.case import Case
 
 DataFrame = Any
@@ -101,10 +103,13 @@ def check(
 ) -> Acceptance:
     """Run the acceptance tests of an FMU: can it be trusted in a co-simulation?
 
+    A controller DLL, or the DLL that a device's file names, is first asked if it keeps the IEEE/CIGRE interface; where
+    it does, the FMU around it is tried as every other.
+
     Parameters
     ----------
     path
-        Path of the FMU.
+        Path of the FMU, of a controller DLL, or of a device's file.
     binding
         File that says what the FMU's variables mean at our port (``gfor fmu bind`` drafts one); by default the case's.
     step
@@ -163,6 +168,12 @@ def check(
     elif component or scenario:
         kind, name = ("component", component) if component else ("scenario", scenario)
         raise InputError(f"{kind} = {name!r} names a {kind} of a case; give case as well")
+    wanted = names(only, "only")
+    of_the_dll = _conformity(file, wanted, limits)
+    others = tuple(name for name in wanted if name not in DLL_QUESTIONS)
+    bad = any(r.verdict in (Verdict.FAIL, Verdict.NOT_SUPPORTED) for r in of_the_dll)
+    if bad or (wanted and not others):
+        return Acceptance(AcceptanceReport(file, bound_by, of_the_dll))
     fmu = as_fmu(file)
     if frequency is not None:
         if "f_n" not in read_description(fmu).variables:
@@ -170,7 +181,26 @@ def check(
                 f"frequency = {frequency}: {file.name} has no parameter f_n; a binding's [rating] has one"
             )
         use = replace(use, values={**use.values, "f_n": float(frequency)})
-    return Acceptance(check_fmu(fmu, bound_by, limits, names(only, "only"), use=use, seed=seed))
+    report = check_fmu(fmu, bound_by, limits, others, use=use, seed=seed)
+    report.results[:0] = of_the_dll
+    return Acceptance(report)
+
+
+def _conformity(file: Path, only: tuple[str, ...], limits: Limits) -> list[CheckResult]:
+    """Results of the checks of a controller DLL that were asked for; none for other files."""
+    asked = [name for name in only if name in DLL_QUESTIONS]
+    found = controller_dll(file)
+    if found is None and asked:
+        raise InputError(
+            f"the check {asked[0]!r} is of controller DLLs, and {file.name} is none; "
+            "give a .dll, a .so or a device's file"
+        )
+    if found is None or (only and not asked):
+        return []
+    from orchestrator.devices.acceptance.controller_dll.conformity import check_dll  # noqa: PLC0415 - most files are FMUs
+
+    library, texts = found
+    return check_dll(library, asked, texts, limits.seconds)
 
 
 def _limits(time_limit: Time | None, memory_limit: float | str | None) -> Limits:

@@ -89,9 +89,11 @@ def _print(report: AcceptanceReport) -> None:
         if result.remedy and result.remedy not in advised:
             console.print(f"{'':<38}[dim]{escape(result.remedy)}[/]")
             advised.add(result.remedy)
-    console.print(
-        f"\nDips, jumps and points were drawn at random; --seed {report.seed} draws the same ones again."
-    )
+    console.print()
+    if report.drawn:
+        console.print(
+            f"Dips, jumps and points were drawn at random; --seed {report.seed} draws the same ones again."
+        )
     if report.protections:
         in_force = [protection.name for protection in report.protections if protection.in_force]
         console.print(f"In force around the FMU's process: {', '.join(in_force)}.")

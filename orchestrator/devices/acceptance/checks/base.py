@@ -30,6 +30,7 @@ class Verdict(StrEnum):
 class Whose(StrEnum):
     NOBODY = ""
     FMU = "the FMU"
+    DLL = "the controller DLL"
     BINDING = "the binding"
     HERE = "not supported here"
     CALL = "provoked by a forbidden call"

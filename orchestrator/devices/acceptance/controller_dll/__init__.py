@@ -1,0 +1,1 @@
+"""Conformity of a controller DLL with the IEEE/CIGRE interface."""
