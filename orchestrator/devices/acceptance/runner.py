@@ -139,7 +139,7 @@ FILE_CHECKS = {
 
 
 def question_of(name: str) -> str:
-    """What a check asks."""
+    """The question of a check."""
     for questions in (FILE_CHECKS, DLL_QUESTIONS):
         if name in questions:
             return questions[name]

@@ -113,7 +113,7 @@ class DllProcess:
         return found
 
     def _answer(self, seconds: float) -> dict[str, Any]:
-        """What the process says next; what it is doing is kept."""
+        """The process's next answer; its doing is noted."""
         end = monotonic() + seconds
         while True:
             said = self._line(end)

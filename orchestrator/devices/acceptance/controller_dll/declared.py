@@ -66,7 +66,7 @@ def check_file(subject: DllSubject) -> CheckResult:
 
 
 def _exports_in_words(head: FileHead) -> str:
-    """What the file of another host exports of the interface."""
+    """Exports of the interface in the file of another host, in words."""
     if head.exports is None:
         return ""
     needed = [f"Model_{call}" for call in ("GetInfo", *NEEDED)]

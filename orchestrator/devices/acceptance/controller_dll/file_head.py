@@ -1,4 +1,4 @@
-"""What the head of a library file tells without any of its code being run: kind, bits, processor, exports.
+"""The head of a library file: kind, bits, processor and exports, read without running any of its code.
 
 Source: the published forms of ELF files and of Windows' portable executables."""
 

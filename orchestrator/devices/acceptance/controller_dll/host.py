@@ -25,7 +25,7 @@ _TEXT = 10  # number of the data type of texts
 
 @dataclass(frozen=True)
 class Heard:
-    """What came of one call."""
+    """The answer to one call."""
 
     call: str
     instance: int

@@ -192,7 +192,7 @@ def _kept_elsewhere(subject: DllSubject) -> str:
 
 
 def _in_new_process(subject: DllSubject, kept: list[str], onward: list[Heard]) -> str:
-    """What becomes of a snapshot that another process takes up, in words; empty where it goes on alike."""
+    """The fate of a snapshot that another process takes up, in words; empty where it goes on alike."""
     with subject.other_process() as process:
         session, one = subject.session(process), subject.instance(process)
         session.start(one)

@@ -61,7 +61,7 @@ class DllSubject:
 
     @cached_property
     def interface(self) -> DllInterface:
-        """What it declares.
+        """Its declarations.
 
         Raises
         ------

@@ -212,7 +212,7 @@ _ODD = (
 
 
 def _ends_at(subject: DllSubject, calls: tuple[str, ...]) -> str:
-    """What an odd order of calls does to its process, in words; empty where it goes on."""
+    """The end of its process by an odd order of calls, in words; empty where it goes on."""
     with subject.other_process() as process:
         session, one = subject.session(process), subject.instance(process)
         for call in calls:
