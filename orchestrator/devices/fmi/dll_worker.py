@@ -21,8 +21,13 @@ from orchestrator.devices.fmi.confinement import LAYERS, Means, confine
 from orchestrator.devices.fmi.limits import Limits, apply_limits
 
 PAGE = 4096  # the smallest page of the machines that are known [bytes]
-_READ_WRITE, _NONE, _PRIVATE_ANONYMOUS = 3, 0, 0x22  # sys/mman.h of Linux
-_ERROR_AT, _MESSAGE_AT = 40, 48  # places of the two texts in the instance's structure [bytes]
+_READ_WRITE = (
+    3  # PROT_READ and PROT_WRITE of Linux's sys/mman.h; those below are from there as well
+)
+_NONE = 0  # PROT_NONE
+_PRIVATE_ANONYMOUS = 0x22  # MAP_PRIVATE and MAP_ANONYMOUS
+_ERROR_AT = 40  # place of the error's text in the instance's structure [bytes]
+_MESSAGE_AT = 48  # place of the message's text there [bytes]
 _CONTROL = {"x86_64": (28, 4)}
 """Machine → place and size of the control word of floating-point arithmetic in what ``fegetenv`` gives [bytes]."""
 _FLAGS = 0x3F  # of that word, set by every inexact operation

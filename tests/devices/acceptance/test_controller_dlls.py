@@ -17,7 +17,8 @@ from tests.support.vendor_dlls import CALLS, compiled, lag
 
 LATE = "if (s->time > 0.005) "
 FIRST = "int32_t Model_FirstCall(struct instance *s) { %s return 0; } "
-OUT, IN = "((double *)s->out)", "((double *)s->in)"
+OUT = "((double *)s->out)"
+IN = "((double *)s->in)"
 
 FAULTY = {
     # what is planted: (source, check, fault, words of the evidence)

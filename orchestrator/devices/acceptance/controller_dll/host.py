@@ -10,13 +10,16 @@ from fmus.vendor_dll.state_trial import InstanceStructure, moving_input, pack_va
 from orchestrator.devices.fmi.dll_process import DllProcess, Order
 
 ARRAYS = ("inputs", "outputs", "parameters", "integer states", "float states", "double states")
-INPUTS, OUTPUTS, PARAMETERS = range(3)
+INPUTS = 0  # place among `ARRAYS`
+OUTPUTS = 1  # the same
+PARAMETERS = 2  # the same
 _STATES = range(3, 6)  # places among `ARRAYS`
 _SIZES_OF_STATES = (4, 4, 8)  # of one integer, float and double state [bytes]
 _MARK = 0xA5  # what lies around the arrays
 _ROOM = 256  # around arrays that no closed page guards [bytes]
 _TIME_AT = 24  # place of the time in an instance's structure [bytes]
-_EMT, _RMS = 1, 2  # modes of the host; 3 as declared mode is both
+_EMT = 1  # mode of a host
+_RMS = 2  # mode of a host, and of a DLL that is for such hosts alone
 START = ("FirstCall", "CheckParameters", "Initialize")
 REAL_CODES = {8: "f", 9: "d"}
 """Number of a data type of real numbers → its code in `struct`."""

@@ -25,7 +25,8 @@ _BLOCK = 2000  # samples in which memory is counted
 _LEAST_LEAK = 0.5  # less a sample than this is a table that grew once [bytes]
 _SIMULATIONS = 40  # first calls and ends in which memory is counted
 _LEAST_OF_SIMULATION = 8.0  # less for each than this is none [bytes]
-_TASKS, _FILES = ["entries", "/proc/self/task"], ["entries", "/proc/self/fd"]
+_TASKS = ["entries", "/proc/self/task"]  # order that counts threads
+_FILES = ["entries", "/proc/self/fd"]  # order that counts open files
 _DRIVEN = "the program under Wine is not looked into"
 
 
