@@ -27,6 +27,7 @@ from orchestrator.cases.questions.contradictions import contradictions
 from orchestrator.core.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputError, Problem, few
 from orchestrator.core.foreign_files import check_name, cleaned, steering_in, why_refused
 from orchestrator.core.late import Late
+from orchestrator.core.question_kinds import by_kind
 from orchestrator.core.toml_files import Table, fault_of, read_toml
 from orchestrator.core.uncollected import uncollected
 
@@ -143,7 +144,12 @@ class Case(CaseDefinition):
         )
         if problems:  # unusual data may be the reason of the failure
             kind = problems[0].kind  # a question besides is of no kind of its own
-            asked = [Problem(q.place, f"questioned besides: {q.text}", kind) for q in questions]
+            shown = by_kind(q.text for q in questions)
+            places = {q.text: q.place for q in reversed(questions)}
+            asked = [
+                Problem(places[first], f"questioned besides: {line}", kind)
+                for first, line in shown.items()
+            ]
             raise CaseError(str(self.path), [*problems, *asked])
         if scenarios and self.numbered:
             others = event_tables.other_scenarios(preparer.draft, scenarios)

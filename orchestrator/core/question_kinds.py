@@ -14,12 +14,12 @@ _NAME = re.compile(r"(?<![\w.])(?:[a-z]\w*?_?\d\w*)(?=[.:, ])")
 _MEANT = re.compile(r'meant = \["[^"]+?\.([\w.]+)"\]')
 
 
-def by_kind(texts: Iterable[str], command: str) -> dict[str, str]:
+def by_kind(texts: Iterable[str], command: str = "") -> dict[str, str]:
     """Return lines by the first question that they are for: each kind of which there are several has one line.
 
     Questions are of one kind if they differ in names, places and numbers alone.
 
-    ``command``: lists all of them."""
+    ``command``: lists all of them; it is not named where it is empty."""
     kinds: dict[str, list[str]] = {}
     for text in texts:
         kinds.setdefault(_OWN.sub("#", text), []).append(text)
@@ -36,7 +36,8 @@ def _lines(own: Sequence[str], command: str) -> Iterator[tuple[str, str]]:
     answers = {found[1] for text in own if (found := _MEANT.search(text))}
     if len(answers) == 1:
         first = _MEANT.sub(f'meant = ["*.{answers.pop()}"]', first)
-    yield own[0], f"{first} [and {len(others)} more of this kind{about}; {command} lists all]"
+    listed = f"; {command} lists all" if command else ""
+    yield own[0], f"{first} [and {len(others)} more of this kind{about}{listed}]"
 
 
 def _names(text: str) -> list[str]:

@@ -179,13 +179,24 @@ def test_a_hot_gas_turbine_falls_to_its_load_limit():
     assert found[-1]["P_m"] == pytest.approx(0.8, abs=1e-3)
 
 
+@pytest.mark.parametrize("limit", [P_M - 0.05, P_M])
+def test_gast_starts_at_or_above_its_load_limit_and_gives_no_more(limit):
+    """The turbine is at rest there, and moves as below the limit; at too little speed it stays."""
+    alone, usual = (governor("gast", {"A_T": held}) for held in (limit, P_M + 0.05))
+    assert not refused(alone)
+    assert max(map(abs, alone.rates([1.0]).values())) < 1e-12
+    poles = [np.sort_complex(np.linalg.eigvals(g.blocks([1.0])[0])) for g in (alone, usual)]
+    assert poles[0] == pytest.approx(poles[1], abs=1e-9)
+    found, _ = integrated(alone, lambda t: [0.95], 40.0, step=4e-3)
+    assert found[-1]["P_m"] == pytest.approx(P_M + 1e-3, abs=1e-4)
+
+
 @pytest.mark.parametrize(
     ("name", "values", "limit"),
     [
         ("tgov1", {"V_MAX": 0.7}, "governor.V_MAX"),
         ("tgov1", {"V_MIN": 0.75}, "governor.V_MIN"),
         ("gast", {"V_MAX": 0.5}, "governor.V_MAX"),
-        ("gast", {"A_T": 0.7}, "governor.A_T"),
         ("hygov", {"G_MAX": 0.6}, "governor.G_MAX"),
         ("ieeeg1", {"P_MAX": 0.65}, "governor.P_MAX"),
         ("ieeeg1", {"K_1": 0.0, "K_3": 0.0, "K_5": 0.0}, "governor: at least one turbine fraction"),

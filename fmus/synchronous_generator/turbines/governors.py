@@ -13,6 +13,9 @@ GAST has a gas turbine with a limit of its exhaust's temperature:
     → 1/(1+sT_1), held within V_MIN and V_MAX → 1/(1+sT_2) → fuel
     P_m = fuel − D_turb·(w − 1),   T_exh = fuel/(1+sT_3)
 
+Where the operating point lies at A_T or above, the limit holds a load just above it instead: the turbine starts in
+steady state and gives no more.
+
 TGOV1 has a steam turbine with a reheater:
 
     P_ref − (w − 1)/R → 1/(1+sT_1), held within V_MIN and V_MAX → (1+sT_2)/(1+sT_3) → − D_t·(w − 1) = P_m
@@ -38,6 +41,8 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and
 
 SOURCE = "typical data, IEEE PES-TR1"
+
+_HEADROOM = 1e-3  # fuel [pu] of GAST's limit above an operating point beyond A_T: enough for rest
 
 LONGEST_DELAY = 0.25
 """Longest delay of an engine [s]: Padé's fraction of second order keeps its phase within 3 degrees up to 8 rad/s."""
@@ -172,13 +177,9 @@ def gast(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
         )
         D_turb = power(m, "D_turb", 0.0, "Damping of the turbine", 0)
         require_within(m, P_m_0, low, high, ("governor.V_MIN", "governor.V_MAX"))
-        m.require(
-            A_T - P_m_0,
-            "governor.A_T: the operating point of the power flow lies at or above the turbine's load limit; raise A_T "
-            "or the rating S_n, or lower the generator's active power",
-        )
+        held = if_else(P_m_0 < A_T, A_T, P_m_0 + _HEADROOM)
         exhaust = m.state("exhaust", P_m_0, "pu", "Measured temperature of the exhaust", base="S_n")
-        wanted = fmin(power_reference(m, P_m_0) - (w - 1) / R, A_T + K_T * (A_T - exhaust))
+        wanted = fmin(power_reference(m, P_m_0) - (w - 1) / R, held + K_T * (held - exhaust))
         valve = blocks.limited_low_pass(m, "valve", wanted, T_1, low, high, initial=P_m_0)
         fuel = blocks.low_pass(m, "combustion", valve, T_2, P_m_0)
         m.derivative(exhaust, (fuel - exhaust) / T_3)

@@ -7,6 +7,7 @@ import fnmatch
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import product
 
 from fmus.synchronous_generator.conversion import LEAST_LEAKAGE
 from orchestrator.cases.draft import Draft
@@ -283,19 +284,21 @@ def _rescaled(draft: Draft, flow: PowerFlow | None) -> Iterator[UnusualValue]:
             yield UnusualValue(f"{name}.S_n", place_of(draft, name, "S_n"), text)
 
 
+_LOAD_LIMITS = ("governor.ld_ref", "governor.A_T")
+"""Loads that limiters of turbines hold: of GGOV1 and GAST."""
+
+
 def _beyond_load_limits(draft: Draft) -> Iterator[UnusualValue]:
-    """Ask about turbines whose operating point lies at the load that their limiter holds (GGOV1), or above."""
-    for name, plan in draft.system.components.items():
-        held, P_m = value_of(plan, "governor.ld_ref"), _mechanical_power(plan)
+    """Ask about turbines whose operating point lies at the load that their limiter holds, or above."""
+    for (name, plan), limit in product(draft.system.components.items(), _LOAD_LIMITS):
+        held, P_m = value_of(plan, limit), _mechanical_power(plan)
         if held is None or P_m is None or P_m < held:
             continue
         text = (
-            f"governor.ld_ref = {held:g} pu, the load that the turbine's limiter holds, is not above the operating "
+            f"{limit} = {held:g} pu, the load that the turbine's limiter holds, is not above the operating "
             f"point's {P_m:.4g} pu; the limiter holds a load just above that instead, and the turbine gives no more"
         )
-        yield UnusualValue(
-            f"{name}.governor.ld_ref", place_of(draft, name, "governor.ld_ref"), text
-        )
+        yield UnusualValue(f"{name}.{limit}", place_of(draft, name, limit), text)
 
 
 def _mechanical_power(plan: ComponentPlan) -> float | None:

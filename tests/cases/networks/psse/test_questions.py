@@ -187,6 +187,14 @@ def test_a_load_limit_below_the_operating_point_is_asked_about(questions, held, 
     assert all('meant = ["sg3.governor.ld_ref"]' in q for q in found)
 
 
+@pytest.mark.parametrize(("held", "asked"), [("0.75", True), ("1", False)])
+def test_a_load_limit_of_a_gas_turbine_is_asked_about_likewise(questions, held, asked):
+    record = f"3 'GAST' 1 0.05 0.4 0.1 3 {held} 2 1.2 -0.05 0 /"
+    found = [q for q in questions(dyr=changed(DYR, (TGOV1, record))) if "A_T" in q]
+    assert len(found) == asked
+    assert all('meant = ["sg3.governor.A_T"]' in q for q in found)
+
+
 @pytest.mark.parametrize("kind", ["TGOV1", "EXST1", "STAB1"])
 def test_parts_that_no_machine_has_are_a_choice(questions, kind):
     dyr = without(kind, 1, 2, 3, 4)

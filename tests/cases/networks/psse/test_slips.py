@@ -1,5 +1,7 @@
 """Slips of a planner in RAW, DYR and case: each is refused or questioned, in words that say what is likely wrong."""
 
+import re
+
 import pytest
 
 from orchestrator.cases.case import load_case
@@ -191,3 +193,12 @@ def test_an_unusual_system_base_is_asked_about(tmp_path):
         asked in text for text in texts(tmp_path, raw(33).replace("0,100.0,33", "0,1000.0,33"))
     )
     assert not any("SBASE" in text for text in texts(tmp_path))
+
+
+def test_questions_besides_a_problem_are_told_by_kind(tmp_path):
+    dyr = re.sub(r"(9\.55|3\.33|2\.35)([ ,]+)0\.0", r"\1\g<2>40.0", DYR)
+    case = CASE.replace('grid = "grid"', 'grid = "grid"\nslack = 7')
+    found = texts(tmp_path, dynamics=dyr, case=case)
+    (told,) = [text for text in found if "machine.D = 40 pu" in text]
+    assert "questioned besides" in told
+    assert told.endswith("[and 2 more of this kind (sg2, sg3)]")
