@@ -18,10 +18,12 @@ from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
 from orchestrator.cases.form.remedies import APPROXIMATING, replacement_of, without_models
 from orchestrator.cases.networks.psse.dyr_records import EVENT, DynamicRecord, given_values
 from orchestrator.cases.networks.psse.missing_models import (
-    MACHINE,
     OF_MACHINES,
+    RESTS,
     MissingModel,
     in_words,
+    is_own,
+    is_resting,
     kind_of,
     missing_models,
 )
@@ -136,12 +138,14 @@ def machine_models(
     following = _followed(of, left, problems, labels) if approximate else {}
     for key in following:
         parts[key]["converter"] = MODEL
-    passed = {*_KNOWN, *without, *(left - _own_machines(records, left))}
-    missing = missing_models(records, at, {*passed, *(FIELDS if approximate else ())})
+    unmodelled = _without_machine(parts)
+    passed = {*_KNOWN, *without, *(left - _own_models(records, left, unmodelled))}
+    passed |= {*(FIELDS if approximate else ())}
+    missing = missing_models(records, at, passed, unmodelled)
     lacking |= {key for model in missing for key in _machines_of(model) if not model.may_go}
     missing = [model for model in missing if model.may_go or not _machines_of(model) <= {*replaced}]
     accounted = {*replaced, *lacking}
-    bare = [key for key in _without_machine(parts) if key not in accounted]
+    bare = [key for key in unmodelled if key not in accounted]
     places = {(record.bus, record.machine) for record in strange}
     if min(len(places), len(bare)) >= _STRANGE:
         problems = [_other_network(strange, records, bare, len(at)), *problems]
@@ -170,12 +174,20 @@ def machine_models(
     }
 
 
-def _own_machines(records: Sequence[DynamicRecord], names: Collection[str]) -> set[str]:
-    """Names of models that are a machine's own record, which cannot be left out, among those that records have."""
-    given = {record.name for record in records}
-    return {
-        name for name in names if name in given and name not in _KNOWN and kind_of(name) == MACHINE
-    }
+def _own_models(
+    records: Sequence[DynamicRecord],
+    names: Collection[str],
+    bare: Collection[tuple[int, str]],
+) -> set[str]:
+    """Names of models that a generator is itself, which cannot be left out, among those that records have.
+
+    ``bare``: machines without a record of one."""
+    found = set()
+    for name in (name for name in names if name not in _KNOWN):
+        own = [record for record in records if record.name == name]
+        if own and is_own(name, own, bare):
+            found.add(name)
+    return found
 
 
 def _machines_of(model: MissingModel) -> set[tuple[int, str]]:
@@ -237,6 +249,8 @@ def _use_of(
     if key in machines:
         if record.name in left:
             return UseOfRecord.NOT_USED, "dyr_leave_out names it", False
+        if is_resting(record.name):
+            return UseOfRecord.NOT_USED, RESTS, False
         if key not in excited and kind_of(record.name) in ("stabilizer", "compensator"):
             return UseOfRecord.NOT_USED, "its machine has no exciter", False
         stand_in = f"approximated as {MODEL}" if approximate and record.name in FIELDS else ""

@@ -11,6 +11,8 @@ from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
 from orchestrator.cases.networks.psse.raw import Machine
 
 MACHINE = "machine"
+DEVICE = "device"
+
 UNKNOWN = "unknown"
 OF_MACHINES = (
     MACHINE,
@@ -61,11 +63,12 @@ class MissingModel:
     kind: str
     records: tuple[DynamicRecord, ...]
     p_mw: float
+    is_own: bool  # whether it is what a generator of the RAW file is: a machine, or a static var compensator
 
     @property
     def may_go(self) -> bool:
-        """Return whether its records may be left out; a machine's own may not."""
-        return self.kind != MACHINE
+        """Return whether its records may be left out; what a generator is itself may not."""
+        return not self.is_own
 
     @property
     def stands(self) -> str:
@@ -95,23 +98,46 @@ def kind_of(name: str) -> str:
     return _kinds().get(name, UNKNOWN)
 
 
+RESTS = "a limiter of excitation, taken to rest at the operating point"
+_RESTING = ("MAXEX", "MNLEX", "UEL", "OEL", "SCL")
+"""How the names of limiters of excitation begin, which rest at an operating point within their limits."""
+
+
+def is_resting(name: str) -> bool:
+    """Return whether a model is a limiter of excitation, which is passed over."""
+    return kind_of(name) == "limiter" and name.startswith(_RESTING)
+
+
 def missing_models(
     records: Sequence[DynamicRecord],
     machines: Mapping[tuple[int, str], Machine],
     known: Collection[str],
+    bare: Collection[tuple[int, str]],
 ) -> list[MissingModel]:
     """Models of machines in service that are not known, those behind most power first.
 
-    ``known``: names of models that need no place here."""
+    ``known``: names of models that need no place here; ``bare``: machines without a record of one."""
     found: dict[str, list[DynamicRecord]] = {}
     for record in records:
-        if (record.bus, record.machine) in machines and record.name not in known:
+        is_known = record.name in known or is_resting(record.name)
+        if (record.bus, record.machine) in machines and not is_known:
             found.setdefault(record.name, []).append(record)
     missing = [
-        MissingModel(name, kind_of(name), tuple(own), sum(_power(own, machines)))
+        MissingModel(
+            name, kind_of(name), tuple(own), sum(_power(own, machines)), is_own(name, own, bare)
+        )
         for name, own in found.items()
     ]
     return sorted(missing, key=lambda model: (model.may_go, -model.p_mw))
+
+
+def is_own(name: str, records: Sequence[DynamicRecord], bare: Collection[tuple[int, str]]) -> bool:
+    """Return whether records are what generators are themselves.
+
+    ``bare``: machines without a record of one; at others a static var compensator is a shunt beside them."""
+    stands_alone = any((record.bus, record.machine) in bare for record in records)
+    kind = kind_of(name)
+    return kind == MACHINE or (kind == DEVICE and stands_alone)
 
 
 def _power(

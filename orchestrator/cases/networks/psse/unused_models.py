@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 from orchestrator.cases.form.schema import LoadModelTable
 from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
-from orchestrator.cases.networks.psse.missing_models import OF_MACHINES, kind_of
+from orchestrator.cases.networks.psse.missing_models import OF_MACHINES, RESTS, kind_of
 from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
 from orchestrator.cases.networks.source_changes import Changes
 from orchestrator.core.errors import Problem, counted, few
@@ -53,7 +53,20 @@ def unused_models(
             text = f"{name} (bus {buses}) is of no machine and not used: {_MATTER[kind]}"
             for record in own:
                 changes.note(record.line, text + remedy)
+    for record in _named_in(records, uses, RESTS):
+        text = (
+            f"{record.name} is {RESTS}: it acts at limits only. Does the machine start within them?"
+        )
+        changes.note(record.line, text)
     return [*_strays(records, unused), *changes.listed()]
+
+
+def _named_in(
+    records: Sequence[DynamicRecord], uses: Sequence[RecordUse], why: str
+) -> Iterator[DynamicRecord]:
+    """Yield the records that are not used for a reason."""
+    pairs = zip(records, uses, strict=True)
+    yield from (record for record, use in pairs if use.why == why)
 
 
 def _strays(records: Sequence[DynamicRecord], unused: Sequence[DynamicRecord]) -> Iterator[Problem]:

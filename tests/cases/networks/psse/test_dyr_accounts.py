@@ -50,18 +50,18 @@ def test_comments_slashes_alone_and_double_quotes(tmp_path):
 
 def test_models_that_are_missing_are_one_table(tmp_path):
     many = "".join(f"{bus} 'URST5T' 1 0.1 /\n" for bus in (1, 2, 3))
-    text = refusal(tmp_path, CLASSICAL + many + "2 'OEL1B' 1 3 /\n3 'OWNGOV' 1 3 /\n")
+    text = refusal(tmp_path, CLASSICAL + many + "2 'LCFB1' 1 3 /\n3 'OWNGOV' 1 3 /\n")
     rows = [
-        line.split() for line in text.splitlines() if line.split()[:1] in (["URST5T"], ["OEL1B"])
+        line.split() for line in text.splitlines() if line.split()[:1] in (["URST5T"], ["LCFB1"])
     ]
     assert [row[:5] for row in rows] == [
         ["URST5T", "3", "600", "line", "4"],
-        ["OEL1B", "1", "200", "line", "7"],
+        ["LCFB1", "1", "200", "line", "7"],
     ]
     assert "much: the voltage control" in text
     assert "not: it acts at limits only" in text
     assert "not known: gfor does not know what this model is" in text
-    typed = "--dyr-leave-out URST5T --dyr-leave-out OWNGOV --dyr-leave-out OEL1B"
+    typed = "--dyr-leave-out URST5T --dyr-leave-out OWNGOV --dyr-leave-out LCFB1"
     assert (
         text.splitlines()[-1].strip().startswith("to go on without them, write dyr_leave_out = [")
     )
@@ -88,10 +88,10 @@ def test_records_of_no_machine_are_listed_and_asked_about(tmp_path):
     text = (
         CLASSICAL
         + IEELAL
-        + "9 'CMLDBLU2' 1 5 /\n9 'DISTR1' 1 5 /\n2 'OEL1B' 1 3 /\n8 'GENCLS' 1 4 0 /\n"
+        + "9 'CMLDBLU2' 1 5 /\n9 'DISTR1' 1 5 /\n2 'LCFB1' 1 3 /\n8 'GENCLS' 1 4 0 /\n"
     )
     records = read(tmp_path, text)
-    uses = record_uses(records, {(bus, "1") for bus in (1, 2, 3)}, {(8, "1")}, ["oel1b"])
+    uses = record_uses(records, {(bus, "1") for bus in (1, 2, 3)}, {(8, "1")}, ["lcfb1"])
     assert [use.use for use in uses] == [UseOfRecord.USED] * 3 + [UseOfRecord.NOT_USED] * 5
     assert [use.why for use in uses[5:]] == [
         "a relay at bus 9, which is of no machine",
@@ -201,3 +201,24 @@ def test_an_event_of_andes_is_no_record_and_told(tmp_path):
     )
     machine = Machine(1, "1", 1, 80.0, 1.0, 100.0, 0.25j, -9e3, 9e3)
     assert machine_models(records, [machine])[1, "1"].parts == {"machine": "classical"}
+
+
+def test_a_limiter_of_excitation_rests_and_is_asked_about(tmp_path):
+    """MAXEX1 acts beyond the rated field current only; a network with one is read."""
+    records = read(tmp_path, CLASSICAL + "2 'MAXEX1' 1 3.1 30 1.1 20 1.2 10 0.1 0 -0.2 /\n")
+    assert machine_models(records, MACHINES)[2, "1"].parts == {"machine": "classical"}
+    keys = {(machine.bus, machine.name.strip()) for machine in MACHINES}
+    uses = record_uses(records, keys, ())
+    assert [use.use for use in uses if use.kind == "MAXEX1"] == [UseOfRecord.NOT_USED]
+    (asked,) = unused_models(records, uses)
+    assert asked.place.endswith("grid.dyr, line 4")
+    assert "MAXEX1 is a limiter of excitation, taken to rest at the operating point" in asked.text
+
+
+def test_a_static_var_compensator_that_is_missing_is_no_record_that_may_go(tmp_path):
+    """Without it nothing stands for its generator of the RAW file; beside a machine it may go."""
+    without = CLASSICAL.replace("3 'GENCLS' 1 4.0 0.0 /\n", "")
+    record = "3 'CSVGN3' 1 10 0 0 0 0 1 0 1 0 0.1 /\n"
+    text = refusal(tmp_path, without + record, ["CSVGN3"])
+    assert "CSVGN3, the machine itself (1 of 300 MW); it cannot be left out" in text
+    assert "write dyr_leave_out = ['CSVGN3']" in refusal(tmp_path, CLASSICAL + record)
