@@ -47,7 +47,8 @@ class Machine:
     ``salient`` where its last reactances may differ; ``at_rated_speed`` where the emf is e'' instead of w·e'' unless
     a parameter says otherwise, which only a phasor model can have; ``emf_speed``: what e'' is multiplied by there, w
     where it is None; ``S_n``: the rating [MVA], which only parts that are chosen by name ask for;
-    ``is_infinite``: whether its speed stays at 1; None of a machine whose speed cannot."""
+    ``is_infinite``: whether its speed stays at 1; None of a machine whose speed cannot; ``X_port``: constant reactance
+    that the network sees behind the port, where the axes' change; None where that is the d axis'."""
 
     R: Expr
     R_t: Expr
@@ -64,6 +65,7 @@ class Machine:
     emf_speed: Expr | None = None
     S_n: Expr | None = None
     is_infinite: Expr | None = None
+    X_port: Expr | None = None
 
     @property
     def current(self) -> Phasor:

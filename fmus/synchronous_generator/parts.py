@@ -32,6 +32,7 @@ from fmus.synchronous_generator.machines.standard import (
     gensal,
     two_axis,
 )
+from fmus.synchronous_generator.machines.type_j import gentpj
 from fmus.synchronous_generator.stabilization.bands import pss3b, pss4b
 from fmus.synchronous_generator.stabilization.legacy import iee2st, ieeest, st2cut, stab2a
 from fmus.synchronous_generator.stabilization.standard import pss1a, pss2a, pss2b, pss2c
@@ -70,6 +71,7 @@ MACHINES: dict[str, MachinePart] = {
     "genrou": genrou,
     "genroe": genroe,
     "genrou_rated_speed": genrou_rated_speed,
+    "gentpj": gentpj,
 }
 EXCITERS: dict[str, Exciter] = {
     "manual": manual,

@@ -102,7 +102,7 @@ def declare_phasor_port(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phas
     """Declare emf and admittance, and the lag for what saliency the admittance cannot show.
 
     ``emf``: behind the subtransient reactance, rotor frame [pu]."""
-    impedance = Phasor(g.R, g.d.X_between)
+    impedance = Phasor(g.R, g.d.X_between if g.X_port is None else g.X_port)
     start = g.start.v + impedance * g.start.i
     source = source_emf(
         m, emf - _saliency(m, g) if g.salient else emf, start, g.delta, port.omega_b * (g.w - 1)
@@ -125,7 +125,7 @@ def close_stator(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phasor) -> 
 
 
 def _saliency(m: ModelBuilder, g: Machine) -> Phasor:
-    """j·(X''_q − X''_d)·i_q with i_q through a lag, rotor frame."""
+    """j·(X''_q − X)·i_q + (X''_d − X)·i_d with lagged currents, rotor frame; X is what the network sees."""
     with m.scope("machine"):
         T = m.parameter(
             "T_saliency",
@@ -137,5 +137,11 @@ def _saliency(m: ModelBuilder, g: Machine) -> Phasor:
         lagged = m.state(
             "i_q_lagged", g.start.i.re, "pu", "Stator current through a lag, q axis", base="S_n"
         )
-    m.derivative(lagged, (g.q.i - lagged) / T)
-    return Phasor(0.0, (g.q.X_between - g.d.X_between) * lagged)
+        m.derivative(lagged, (g.q.i - lagged) / T)
+        if g.X_port is None:
+            return Phasor(0.0, (g.q.X_between - g.d.X_between) * lagged)
+        of_d = m.state(
+            "i_d_lagged", -g.start.i.im, "pu", "Stator current through a lag, d axis", base="S_n"
+        )
+        m.derivative(of_d, (g.d.i - of_d) / T)
+    return Phasor((g.d.X_between - g.X_port) * of_d, (g.q.X_between - g.X_port) * lagged)

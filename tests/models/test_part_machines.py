@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from fmus.synchronous_generator.composed import synchronous_generator, synchronous_generator_phasor
 from fmus.synchronous_generator.parts import MACHINES
@@ -22,6 +23,7 @@ DATA = {
     "T_d20": 0.031,
     "X_q": 1.75,
     "X_q1": 0.52,
+    "X_q2": 0.25,
     "T_q10": 0.8,
     "T_q20": 0.052,
     "s_10": 0.11,
@@ -116,6 +118,94 @@ def test_genrou_is_the_model_of_stability_programs_with_saturation(seed, order):
     assert {name: found[name] for name in wanted} == pytest.approx(wanted, rel=1e-9)
 
 
+TYPE_J = DATA | {"X_q2": 0.22, "K_is": 0.08}
+
+
+def type_j(fluxes, factors, currents, E_fd):
+    """Rates of GENTPJ's four states, in the form of its block diagram; E'_d is the q axis' E' with the other sign."""
+    (E_q, E_d, psi_d2, psi_q2), (S_d, S_q), (i_d, i_q), p = fluxes, factors, currents, TYPE_J
+    d, d1, d2 = (p[name] for name in ("X_d", "X_d1", "X_d2"))
+    q, q1, q2 = (p[name] for name in ("X_q", "X_q1", "X_q2"))
+    E_q1 = (E_q * (d - d2) - psi_d2 * (d - d1)) / (d1 - d2)
+    E_q2 = (psi_d2 - E_q + i_d * (d1 - d2) / S_d) * (d - d2) / (d1 - d2)
+    E_d1 = (psi_q2 * (q - q1) + E_d * (q - q2)) / (q1 - q2)
+    E_d2 = -(E_d + psi_q2) * (q - q2) / (q1 - q2) - i_q * (q - q2) / S_q
+    return (
+        (E_fd - S_d * E_q1) / p["T_d10"],
+        -S_q * E_d1 / p["T_q10"],
+        -S_d * (d1 - d2) / (d - d2) * E_q2 / p["T_d20"],
+        S_q * (q1 - q2) / (q - q2) * E_d2 / p["T_q20"],
+    )
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_gentpj_is_its_block_diagram_with_saturation_of_flux_and_current(seed):
+    values = {f"machine.{name}": TYPE_J[name] for name in ("X_q2", "K_is")}
+    device, p = machine("gentpj", **values), TYPE_J
+    assert not refused(device)
+    x = shifted(device, seed)
+    i_d, i_q = current(device, x)
+    s = x["machine.saturation"]
+    S_d, S_q = 1 + s, 1 + s * p["X_q"] / p["X_d"]
+    psi_d = x["machine.psi_1d"] - (p["X_l"] + (p["X_d2"] - p["X_l"]) / S_d) * i_d
+    psi_q = x["machine.psi_2q"] - (p["X_l"] + (p["X_q2"] - p["X_l"]) / S_q) * i_q
+    assert (psi_d, psi_q) == pytest.approx((x["machine.psi_d"], x["machine.psi_q"]), rel=1e-9)
+    to_E = (p["X_d"] - p["X_d1"]) / (p["X_d"] - p["X_d2"])
+    to_E_d = (p["X_q"] - p["X_q1"]) / (p["X_q"] - p["X_q2"])
+    E_fd = device.outputs([BUS.real, BUS.imag], device.vector(x))["E_fd"]
+    E_q, E_d = to_E * x["machine.psi_f"], -to_E_d * x["machine.psi_1q"]
+    fluxes = E_q, E_d, x["machine.psi_1d"], x["machine.psi_2q"]
+    wanted = type_j(fluxes, (S_d, S_q), (i_d, i_q), E_fd)
+    found = device.rates([BUS.real, BUS.imag], device.vector(x))
+    scaled = (to_E, "psi_f"), (-to_E_d, "psi_1q"), (1.0, "psi_1d"), (1.0, "psi_2q")
+    assert [k * found[f"machine.{name}"] for k, name in scaled] == pytest.approx(wanted, rel=1e-9)
+    leak = np.hypot(psi_d + p["X_l"] * i_d, psi_q + p["X_l"] * i_q)
+    S_now = S(leak + p["K_is"] * np.hypot(i_d, i_q))
+    assert found["machine.saturation"] == pytest.approx((S_now - s) / 0.005, rel=1e-9)
+
+
+def test_gentpj_swings_as_its_equations_without_a_lag():
+    """Beside the machine at a stiff bus, its diagram's equations with S, current and torque solved at every instant."""
+    p = TYPE_J | {"D": 0.0, "R_s": 0.0}
+    lags = {"machine.T_saturation": 1e-3, "machine.T_saliency": 1e-3, "machine.speed_in_emf": 0}
+    values = {f"machine.{name}": p[name] for name in ("X_q2", "K_is", "D", "R_s")}
+    device = machine("gentpj", synchronous_generator_phasor, **values, **lags)
+    start = device.states
+    to_E = (p["X_d"] - p["X_d1"]) / (p["X_d"] - p["X_d2"])
+    to_E_d = (p["X_q"] - p["X_q1"]) / (p["X_q"] - p["X_q2"])
+    y = device.outputs([BUS.real, BUS.imag])
+
+    def rates(x):
+        E_q, E_d, psi_d2, psi_q2, w, delta = x
+        v = BUS * np.exp(-1j * delta)
+
+        def currents(s):
+            S_d, S_q = 1 + s, 1 + s * p["X_q"] / p["X_d"]
+            X_d = p["X_l"] + (p["X_d2"] - p["X_l"]) / S_d
+            X_q = p["X_l"] + (p["X_q2"] - p["X_l"]) / S_q
+            return S_d, S_q, (psi_d2 - v.real) / X_d, (psi_q2 - v.imag) / X_q
+
+        def misfit(s):
+            _, _, i_d, i_q = currents(s)
+            leak = np.hypot(v.real + p["X_l"] * i_d, v.imag + p["X_l"] * i_q)
+            return S(leak + p["K_is"] * np.hypot(i_d, i_q)) - s
+
+        S_d, S_q, i_d, i_q = currents(brentq(misfit, 0.0, 1.0, xtol=1e-15))
+        fluxes = type_j((E_q, E_d, psi_d2, psi_q2), (S_d, S_q), (i_d, i_q), y["E_fd"])
+        torque = v.real * i_q - v.imag * i_d
+        motion = (y["T_e"] - torque) / (2 * p["H"]), 100 * np.pi * (w - 1)
+        return np.array([*fluxes, *motion])
+
+    names = ("psi_f", "psi_1q", "psi_1d", "psi_2q", "omega", "delta")
+    x0 = np.array([start[f"machine.{name}"] for name in names]) * [to_E, -to_E_d, 1, 1, 1, 1]
+    assert rates(x0) == pytest.approx(np.zeros(6), abs=1e-9)
+    columns = [(rates(x0 + h) - rates(x0 - h)) / 2e-6 for h in 1e-6 * np.eye(6)]
+    wanted = np.linalg.eigvals(np.array(columns).T)
+    found = np.linalg.eigvals(device.blocks([BUS.real, BUS.imag])[0])
+    for pole in wanted:
+        assert min(abs(found - pole)) < 0.01 * max(abs(pole), 1), pole
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_gensal_saturates_the_d_axis_by_its_transient_emf(seed):
     device, p = machine("gensal"), DATA
@@ -190,7 +280,7 @@ def test_a_machine_starts_in_its_steady_state_with_the_power_flows_power(name, f
 
 
 @pytest.mark.parametrize("v", [0.7, 1.0, 1.2])
-@pytest.mark.parametrize("name", ["gensal", "genrou", "gensae", "genroe"])
+@pytest.mark.parametrize("name", ["gensal", "genrou", "gensae", "genroe", "gentpj"])
 def test_saturation_is_that_of_the_open_circuit_curve(name, v):
     """A data sheet's S(1.0) and S(1.2): the field's share beyond the air-gap line."""
     device = machine(name, P_0=0.0, Q_0=0.0, v_0=v)
@@ -274,6 +364,9 @@ def test_a_leakage_reactance_of_the_subtransient_ones_size_is_the_limit_of_small
         ("two_axis", {"machine.X_d1": 1.9}, "machine.X_d must exceed machine.X_d1"),
         ("gensal", {"machine.s_12": 0.05}, "saturation must rise"),
         ("genroe", {"machine.s_10": 0.0}, "no power of the flux goes through 0"),
+        ("gentpj", {"machine.X_d2": 0.37}, "machine.X_d1 must exceed machine.X_d2"),
+        ("gentpj", {"machine.X_q1": 1.8}, "machine.X_q1 must not exceed machine.X_q"),
+        ("gentpj", {"machine.X_l": 0.26}, "machine.X_l must not exceed machine.X_d2"),
     ],
 )
 def test_data_that_are_no_machine_are_refused(name, values, rule):

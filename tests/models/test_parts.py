@@ -100,6 +100,8 @@ def test_every_field_of_a_dyr_record_sets_a_parameter_of_its_part(name):
         ("GENSAL", 12),
         ("GENROE", 14),
         ("GENSAE", 12),
+        ("GENTPJ1", 16),
+        ("GENTPJU1", 22),
         ("GENCLS", 2),
         ("SEXS", 6),
         ("IEEET1", 14),
