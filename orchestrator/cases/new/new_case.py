@@ -47,6 +47,7 @@ _FILES = {
 _TEMPLATE = Path(__file__).with_suffix(".txt").read_text(encoding="utf-8")
 _EMT_STEP = 1e-4
 _MOST_CURVES = 12
+_MOST_MOVES = 5  # of taps and shunts that are named; the others are counted
 _EMF = """emf w·e''; [conventions] like = "psse" takes PSS/E's e'', which moves dampings by tenths of a point"""
 _CONVERTER, _INJECTION = "gfor", "injection"
 
@@ -83,6 +84,7 @@ class WantedCase:
     dyr_approximate: bool = False
     replace: tuple[str, ...] = ()
     load_parts: bool = True
+    move_controls: bool = False
     command: str = "gfor new"
 
     @property
@@ -149,6 +151,7 @@ def write_case(wanted: WantedCase) -> NewCase:
 
     Raises `InputError` if a file, a bus or a machine cannot be used; as a case of these files would be refused."""
     sources = sources_of(wanted.files)
+    _check_controls(wanted, sources)
     device = (
         None
         if wanted.device is None
@@ -163,10 +166,14 @@ def write_case(wanted: WantedCase) -> NewCase:
         )
     first = _Text(wanted, sources, fault_bus=_largest_load(_Text(wanted, sources).text, wanted))
     base = _prepared(first.text, wanted, ["base"])[0]
+    if wanted.move_controls:
+        moved = _moved_controls(first.text, wanted, base)
+        first = _Text(wanted, sources, fault_bus=first.fault_bus, moved=moved)
+        base = _prepared(first.text, wanted, ["base"])[0]
     places: list[_Place] = []
     for converter in wanted.converters:
         places.append(_placed(converter, base, _called(wanted.files), places))
-    draft = _Text(wanted, sources, base, _with_names(places), _switched(device))
+    draft = _Text(wanted, sources, base, _with_names(places), _switched(device), moved=first.moved)
     if not places and wanted.kind == "phasor" and draft.fault_bus == first.fault_bus:
         # nothing of the scenario ``base`` has changed, and a large network takes seconds to prepare
         scenarios = [base, *_prepared(draft.text, wanted, ["fault"])]
@@ -176,6 +183,32 @@ def write_case(wanted: WantedCase) -> NewCase:
     text = _commented(draft.text, list(questions), sources)
     black_box = device is not None and not device.can_save_state
     return NewCase(text, tuple(draft.assumed(len(questions))), tuple(scenarios), black_box)
+
+
+def _check_controls(wanted: WantedCase, sources: Mapping[str, Path]) -> None:
+    if wanted.move_controls and "raw" not in sources:
+        named = ", ".join(path.name for path in sources.values())
+        raise InputError(
+            f"--move-controls is for taps and switched shunts of a RAW file, and the network is {named}; leave it out"
+        )
+    if wanted.move_controls and wanted.kind != "phasor":
+        raise InputError(
+            "--move-controls: taps and switched shunts move in phasor models; write --models phasor, or leave it out"
+        )
+
+
+def _moved_controls(
+    text: str, wanted: WantedCase, base: PreparedScenario
+) -> dict[str, tuple[float, float]]:
+    """Return the positions of the taps and shunts that move in the base case, before and after, by variable."""
+    flow = base.power_flow
+    if flow is None:
+        return {}
+    case: Case = case_of_text(text, tomllib.loads(text), wanted.out)
+    (settled,) = case.prepare(["base"], voltages_before=flow.voltages)
+    before, after = (x.system.components[x.grid] for x in (base, settled))
+    positions = {name: (before.number(name), after.number(name)) for name in base.moving}
+    return {name: pair for name, pair in positions.items() if pair[0] != pair[1]}
 
 
 def _largest_load(text: str, wanted: WantedCase) -> str:
@@ -431,8 +464,9 @@ class _Text:
         places: Sequence[_Place] = (),
         pods: Mapping[str, bool] = MappingProxyType({}),
         fault_bus: str = "",
+        moved: Mapping[str, tuple[float, float]] = MappingProxyType({}),
     ) -> None:
-        self._pods = pods
+        self._pods, self.moved = pods, moved
         self._wanted, self._sources, self._base, self._places = wanted, sources, base, places
         self._stray, self._stray_why = _stray_capacitance(base) if base else (0.05, "")
         self._network = base.network if base else None
@@ -472,6 +506,7 @@ class _Text:
                 f"; slack {self._wanted.slack}, {self._wanted.frequency} (--slack, --frequency)"
             )
         lines.append(f"loads: {self._loads()}")
+        lines += [f"controls: {self._moves()}"] if self._wanted.move_controls else []
         lines.append(
             f"models: {self._wanted.kind}; stray_B of EMT models: {self._stray:g} pu{self._stray_why}"
         )
@@ -480,6 +515,22 @@ class _Text:
             lines.append(line + " (--details lists them)" * any(details(self._base.records)))
         more = f"{questions} question{'s' * (questions != 1)} about the data: comments at their lines in the file"
         return [*lines, more] if questions else lines
+
+    def _moves(self) -> str:
+        """Tell which taps and shunts moved, and that they do after an outage."""
+        moves = [f"{name} {old:.4g} to {new:.4g}" for name, (old, new) in self.moved.items()]
+        told = few(moves, _MOST_MOVES) if moves else "nothing had to move"
+        return f"{told}; after an outage they move again (move_controls in [network])"
+
+    def _positions(self) -> str:
+        """Return the table of the case with the positions of what moved."""
+        if not self.moved:
+            return ""
+        rows = [
+            f"{name} = {new:.12g}    # {old:.6g} in the file"
+            for name, (old, new) in self.moved.items()
+        ]
+        return "\n".join(["\n[components.grid.parameters]", *rows, ""])
 
     def _loads(self) -> str:
         """How the loads follow the voltage."""
@@ -545,8 +596,12 @@ class _Text:
             slack=(f"\nslack = {_quoted(w.slack)}" if w.slack else "")
             + "\nreactive_limits = true" * w.reactive_limits,
             grid="grid" if kind == "emt" else "phasor_grid",
+            moved=self._positions(),
             network=self._tables()
-            or f"{key} = {self._path(self._sources[key])}" + kept * (key == "raw" and w.load_parts),
+            or f"{key} = {self._path(self._sources[key])}"
+            + kept * (key == "raw" and w.load_parts)
+            + "\nmove_controls = true        # taps and switched shunts move after an outage"
+            * w.move_controls,
             loads="" if self._tables() else "# ",
             more=(f"frequency = {_quoted(w.frequency)}\n" if w.frequency else "")
             + stray["emt"] * (kind == "emt")

@@ -130,6 +130,7 @@ def _wanted(options: argparse.Namespace) -> WantedCase:
         dyr_approximate=options.dyr_approximate,
         replace=tuple(options.replace),
         load_parts=not options.no_load_parts,
+        move_controls=options.move_controls,
         command=f"gfor {shlex.join(sys.argv[1:])}" if sys.argv[1:2] == ["new"] else "gfor new",
     )
 
