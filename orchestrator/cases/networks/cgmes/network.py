@@ -39,6 +39,14 @@ LEFT_OUT = (*_TABLES, "island")
 """Elements that our network does not have, and parts of it that nothing joins to the largest; `leave_out` of the case
 names those that may go."""
 
+_NAMED = (
+    "get_lines",
+    "get_2_windings_transformers",
+    "get_3_windings_transformers",
+    "get_boundary_lines",
+)
+"""Tables of branches with names; the legs of a transformer of three windings have its own."""
+
 _NO_LIMIT = 9998.0  # mvar and MW by which exports say that there is no limit
 _ONE_LEVEL = 1.05  # nominal voltages with a larger ratio are two levels of voltage
 # MVA; an unknown rating is 9999 in exports, and pypowsybl's is the largest number there is
@@ -249,7 +257,7 @@ class _Reading:
 
     def _title_of(self, branch: str) -> str:
         """Return the name (IdentifiedObject.name) of a line or transformer; "" if the model has none."""
-        for getter in ("get_lines", "get_2_windings_transformers", "get_boundary_lines"):
+        for getter in _NAMED:
             table = self._tables_of_names.setdefault(
                 getter, dict(getattr(self._source, getter)()["name"])
             )

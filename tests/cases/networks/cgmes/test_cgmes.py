@@ -16,6 +16,7 @@ from orchestrator.cases.networks.cgmes.files import load_cgmes
 from orchestrator.cases.networks.cgmes.network import convert, read_cgmes
 from orchestrator.cases.networks.conversion import import_network
 from orchestrator.cases.networks.data import network_data
+from orchestrator.cases.networks.element_names import BranchName
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import one_line
 from tests.cases.networks.psse.test_raw import pandapowers
@@ -237,7 +238,11 @@ def test_three_windings_phase_shifter_and_boundaries(powsybl):
     nominal = network.get_voltage_levels().nominal_v[network.get_buses().voltage_level_id[bus]]
     network.update_generators(id=remote, regulated_element_id=remote, target_v=1.02 * nominal)
     ids = bus_ids(network)
-    said = {change.text: change.place for change in convert("model", network).changes}
+    model = convert("model", network)
+    said = {change.text: change.place for change in model.changes}
+    own = list(network.get_3_windings_transformers().name)
+    assert [x.name for x in model.tables.branch_names].count(own[0]) == 3
+    assert {*import_network(model.tables).branch_names.values()} >= {BranchName(own[0])}
     compare(powsybl, network, ids, strongest(network, ids))
     assert said["line to a boundary: what it exchanges there is a load"].count(",") == 5
     assert "control of a phase tap changer: held at its position" in said
