@@ -1,4 +1,4 @@
-"""Other ways to read a recording, tried where the device does not do as it says: turned signs, other units, clocks.
+"""Other ways to read a recording, tried where the device does not do as it says: signs, units, clocks, the meter.
 
 Each is judged by the device itself: it starts and runs again as the recording would then have it, and a reading is
 named only where most of the error goes away with it."""
@@ -23,7 +23,7 @@ from orchestrator.studies.validation.event import (
 )
 from orchestrator.studies.validation.lost_jump import lost_jump
 from orchestrator.studies.validation.questions import Question, QuestionKind
-from orchestrator.studies.validation.record import PortBases, Recording
+from orchestrator.studies.validation.record import PortBases, Recording, at_port
 
 _OFF = (
     0.25  # part of the movement by which a response is off, from which on other readings are tried
@@ -36,6 +36,9 @@ _LEAVES = 0.25  # part of the error that another scale may leave: parameters cha
 _MOST_FACTOR = 2000
 _NEAR_PREFIX = 0.1  # part by which a factor may miss one of ten and be it
 _RADIAN = 180 / math.pi  # [deg]
+_OFF_ELSEWHERE = 0.06  # part of the movement, as above, of a voltage that is measured elsewhere
+_TRIED_REACTANCE = 0.12  # of a usual transformer [pu of the rating]
+_REACTANCES = 0.04, 0.25  # of which transformers are [pu of the rating]
 _LEAST_CLOCK = 0.004  # delay [s] that is named, and at least
 _SAMPLES_CLOCK = 0.6  # so many samples
 _ALIKE = 0.25  # part by which the delays of P and Q may differ and be one clock's
@@ -101,7 +104,10 @@ def question_readings(comparison: EventComparison, bases: PortBases) -> list[Que
     named = _likeliest(comparison, bases, math.hypot(*error)) if any(off) else []
     if named:
         return named
-    explained = [*lost_jump(comparison), *_clock(comparison, math.hypot(*error))]
+    whole = math.hypot(*error)
+    explained = [*lost_jump(comparison), *_clock(comparison, whole)]
+    if whole > max(_LEAST_OFF, _OFF_ELSEWHERE * math.hypot(*moved)):
+        explained += _meter_elsewhere(comparison, bases, whole)
     return [min(explained, key=lambda one: one[0])[1]] if explained else []
 
 
@@ -182,6 +188,37 @@ def _error_left(
         return
     scale = abs(reading.factor) if "p" in reading.roles or "q" in reading.roles else 1.0
     yield math.hypot(*rms_error(played.power, changed)) / scale
+
+
+def _meter_elsewhere(
+    comparison: EventComparison, bases: PortBases, error: float
+) -> Iterator[tuple[float, Question]]:
+    """A transformer between meter and port that explains most of the error, and the part that is left."""
+    if bases.impedance:
+        return
+    event, device = comparison.event, comparison.device
+    part = event.recording.good & (event.recording.times > event.windows.begin)
+
+    def misses(reactance: float) -> Complex:
+        moved = at_port(event.recording, 1j * reactance)
+        changed = prepare_event(moved, bases, event.windows)
+        played = device.play(changed.recording, changed.start)
+        return np.asarray((played.power - changed.recording.power)[part])
+
+    here: Complex = (comparison.played.power - event.recording.power)[part]
+    try:
+        way = misses(_TRIED_REACTANCE) - here
+        size = float(np.sum(np.abs(way) ** 2))
+        times = -float(np.real(np.vdot(way, here))) / size if size > 0 else 0.0
+        reactance = times * _TRIED_REACTANCE
+        if not _REACTANCES[0] <= abs(reactance) <= _REACTANCES[1]:
+            return
+        left = float(np.sqrt(np.mean(np.abs(misses(reactance)) ** 2)))
+    except CosimError:
+        return
+    if left <= _LEAVES * error:
+        figures = {"reactance": reactance, "error": error, "left": left}
+        yield left / error, Question(QuestionKind.METER_ELSEWHERE, figures)
 
 
 def _clock(comparison: EventComparison, error: float) -> Iterator[tuple[float, Question]]:

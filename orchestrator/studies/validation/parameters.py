@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from orchestrator.cases.form.names import close_names
@@ -66,7 +66,7 @@ def wanted_parameters(
     }
     chosen: dict[str, VariableInfo] = {}
     for given in names:
-        pattern = given.strip().removeprefix(f"{device.name}.")
+        pattern = _own_name(device, given.strip(), known)
         fitting = {name: known[name] for name in fnmatch.filter(known, pattern)}
         if not fitting:
             hint = close_names(pattern, list(known))
@@ -75,16 +75,21 @@ def wanted_parameters(
                 f"{hint or '`gfor fmu info` lists them'}"
             )
         chosen |= fitting
-    strange = [name for name in bounds if name.removeprefix(f"{device.name}.") not in chosen]
+    own = {_own_name(device, name, known): of for name, of in bounds.items()}
+    strange = [name for name in bounds if _own_name(device, name, known) not in chosen]
     if strange:
         raise InputError(f"--bounds {strange[0]}: it is not fitted; name it with --fit as well")
-    own = {name.removeprefix(f"{device.name}."): of for name, of in bounds.items()}
     numbers = [
         adjustable(device, info, own.get(name))
         for name, info in chosen.items()
         if info.type == "Real"
     ]
     return Wanted(numbers, [name for name, info in chosen.items() if info.type == "Boolean"])
+
+
+def _own_name(device: PlayedDevice, given: str, known: Collection[str]) -> str:
+    """A name without the component's, unless the device has it as it stands: a component may be named as its part."""
+    return given if fnmatch.filter(known, given) else given.removeprefix(f"{device.name}.")
 
 
 def adjustable(

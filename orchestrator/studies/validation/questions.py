@@ -26,6 +26,7 @@ class QuestionKind(StrEnum):
     START = "starts elsewhere"
     READ_OTHERWISE = "read otherwise"
     CLOCKS = "clocks"
+    METER_ELSEWHERE = "meter elsewhere"
     SETPOINT = "setpoint"
     TOO_GOOD = "too good"
     NO_NOISE = "no noise"

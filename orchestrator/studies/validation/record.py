@@ -82,6 +82,7 @@ class Recording:
     angle_unit: str = ""  # that it is said to have
     # sample before a jump → part of the interval after which the voltage jumps; a straight line where none is given
     jumps: Mapping[int, float] = field(default_factory=dict)
+    sampled: Complex | None = None  # the power before it was averaged
 
     @property
     def times(self) -> Numbers:
@@ -414,7 +415,7 @@ def _evened(reading: _Reading, voltage: Complex, power: Complex) -> Recording:
         questions=tuple(reading.questions),
         angle_unit=reading.angle_unit,
     )
-    return _averaged(_at_port(recording, reading.bases.impedance))
+    return at_port(recording, reading.bases.impedance)
 
 
 def _longest_gap(label: str, times: Numbers, interval: float) -> float:
@@ -457,13 +458,17 @@ def _averaged(recording: Recording) -> Recording:
     return replace(recording, power=power)
 
 
-def _at_port(recording: Recording, impedance: complex) -> Recording:
-    """The measured voltage and power moved from the meter to the port, which lies behind an impedance [pu]."""
-    if not impedance:
-        return recording
-    current = (recording.power / recording.voltage).conj()
-    voltage = recording.voltage + impedance * current
-    return replace(recording, voltage=voltage, power=np.asarray(voltage * current.conj()))
+def at_port(recording: Recording, impedance: complex) -> Recording:
+    """The measured voltage and power moved from the meter to the port, which lies behind an impedance [pu].
+
+    The samples of the power are moved, and averaged then."""
+    power = recording.power if recording.sampled is None else recording.sampled
+    voltage = recording.voltage
+    if impedance:
+        current = (power / voltage).conj()
+        voltage = voltage + impedance * current
+        power = np.asarray(voltage * current.conj())
+    return _averaged(replace(recording, voltage=voltage, power=power, sampled=power))
 
 
 def questions_of_level(before: Recording, v: float, s: complex, bases: PortBases) -> list[Question]:

@@ -146,6 +146,16 @@ def _clocks(x: Figures) -> str:
     )
 
 
+def _meter_elsewhere(x: Figures) -> str:
+    side = "the grid's side" if x["reactance"] > 0 else "the device's side"
+    return (
+        f"is the meter at {side} of a transformer that the model does not hold? With a reactance of "
+        f"{abs(x['reactance']):.3g} pu between meter and port the error falls from {x['error']:.3g} to {x['left']:.3g} "
+        f"pu (rms). If it is so, give its own, such as --transformer 'X {x['reactance']:.3g}'; if not, a reactance "
+        "of the model is wrong"
+    )
+
+
 def _setpoint(x: Figures) -> str:
     return (
         f"at {x['at']:.4g} s {x['signal'].upper()} leaves the model's by {x['offset']:+.3g} pu and stays, and the "
@@ -199,6 +209,7 @@ _SENTENCES: Mapping[QuestionKind, Callable[[Figures], str]] = {
     QuestionKind.START: _start,
     QuestionKind.READ_OTHERWISE: _read_otherwise,
     QuestionKind.CLOCKS: _clocks,
+    QuestionKind.METER_ELSEWHERE: _meter_elsewhere,
     QuestionKind.SETPOINT: _setpoint,
     QuestionKind.TOO_GOOD: _too_good,
     QuestionKind.NOISE: _noise,

@@ -49,6 +49,30 @@ def without(frame, low, high):
     return frame[(frame.time <= low) | (frame.time > high)]
 
 
+def of_frequency(frame, sign=1.0):
+    """The frequency of the voltage beside the angle."""
+    turns = np.gradient(np.deg2rad(frame.angle_deg), frame.time) / (2 * np.pi)
+    return frame.assign(f_hz=50 + sign * turns)
+
+
+def moving_before(frame):
+    """P that swings by 4 % of the rating before the event and ends with it."""
+    swing = 60 * np.sin(2 * np.pi * 1.3 * frame.time) * (frame.time < 1)
+    return frame.assign(p_mw=frame.p_mw + swing)
+
+
+def beyond_transformer(frame, reactance=0.12):
+    """The same plant by a meter at the grid's side of a transformer, whose reactance is in pu of 1500 MVA."""
+    v = frame.v_pu * np.exp(1j * np.deg2rad(frame.angle_deg))
+    i = np.conj((frame.p_mw + 1j * frame.q_mvar) / 1500 / v)
+    seen = v - 1j * reactance * i
+    power = 1500 * seen * np.conj(i)
+    angle = np.rad2deg(np.unwrap(np.angle(seen)))
+    return frame.assign(
+        v_pu=np.abs(seen), angle_deg=angle, p_mw=np.real(power), q_mvar=np.imag(power)
+    )
+
+
 def of_pmu(frame, every=20, mean=40):
     """Means over two periods around each sample, as a PMU gives them."""
     angle = np.unwrap(np.deg2rad(frame.angle_deg))
@@ -85,6 +109,16 @@ PLANTED = {
     "60 Hz": (lambda f: f.assign(angle_deg=f.angle_deg + 3600 * f.time), "rated frequency"),
     "clocks": (late, "clocks"),
     "held": (held, "angle held"),
+    "the frequency turns the other way": (
+        lambda f: of_frequency(f, -1),
+        "angle and frequency differ",
+    ),
+    "there is a frequency alone": (
+        lambda f: of_frequency(f).drop(columns="angle_deg"),
+        "frequency alone",
+    ),
+    "the event begins outside of steady state": (moving_before, "no steady state before"),
+    "nothing happens": (lambda f: f[f.time < 0.95], "no event"),
     "setpoint": (lambda f: f.assign(p_mw=f.p_mw + 100 * (f.time > 2)), "setpoint"),
 }
 
@@ -123,6 +157,11 @@ def test_the_remedy_that_is_printed_works_when_it_is_given(good):
 def test_a_voltage_to_ground_is_named_though_the_device_does_not_start(good):
     with pytest.raises(gfor_in_python.CosimError, match=r"measured to ground.*1.732"):
         asked(good.assign(v_pu=good.v_pu / np.sqrt(3)))
+
+
+def test_the_rating_of_one_unit_of_two_is_asked_about_though_the_device_does_not_start(good):
+    with pytest.raises(gfor_in_python.CosimError, match=r"1\.8 pu of its rating.*--set S_n="):
+        asked(good.assign(p_mw=2 * good.p_mw, q_mvar=2 * good.q_mvar))
 
 
 def test_an_angle_that_is_wrapped_is_the_same(good):
@@ -177,3 +216,19 @@ def test_slow_samples_end_no_right_model_with_not_met(good):
         frame = good.iloc[::every].set_index("time")
         found = gfor_in_python.validate("gfor", frame, values=ON, limits=EXAMPLE)
         assert found.verdict != "not met", every
+
+
+def test_a_transformer_between_meter_and_port_is_counted_where_it_is_given(good):
+    seen = beyond_transformer(good)
+    assert asked(seen, transformer="X 0.12") == []
+    (question,) = [one for one in asked(seen) if one["keeps_open"]]
+    assert question["kind"] == "meter elsewhere"
+    assert question["figures"]["reactance"] == pytest.approx(0.12, rel=0.05)
+    assert "--transformer 'X 0.1" in question["text"]
+
+
+def test_a_control_that_is_faster_than_the_samples_is_not_fitted(good):
+    frame = good.iloc[::100].set_index("time")
+    found = gfor_in_python.validate("gfor", frame, values=ON, fit="voltage_control.tau").fitted()
+    assert found.why_not.item() == "too fast"
+    assert found.value.item() == found.start.item()

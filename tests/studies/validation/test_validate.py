@@ -2,10 +2,13 @@
 
 import json
 
+import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 
 import orchestrator as gfor_in_python
+from orchestrator.output.results.comtrade.writing import write_comtrade
 from orchestrator.studies.validation.limits import EXAMPLE
 from tests.studies.validation.recordings import run, table, with_noise, written
 
@@ -85,7 +88,21 @@ def test_a_machine_is_driven_by_its_own_voltage(gfor, tmp_path):
     assert max(after[signal]["max_error_pu"] for signal in "pq") < 0.005
 
 
-def test_an_excel_file_and_comtrade_give_the_same_figures(recording, tmp_path):
+def in_comtrade(frame, path):
+    """Three instantaneous voltages [kV] and currents [kA] at 230 kV and 50 Hz, as a fault recorder has them."""
+    v = frame.v_pu * np.exp(1j * np.deg2rad(frame.angle_deg))
+    i = np.conj((frame.p_mw + 1j * frame.q_mvar) / (np.sqrt(3) * 230 * v))
+    turn = np.exp(2j * np.pi * 50 * frame.time)
+    waves = {}
+    for k, phase in enumerate("abc"):
+        later = turn * np.exp(-2j * np.pi / 3 * k)
+        waves[f"v{phase}"] = ("time", np.real(230 * np.sqrt(2 / 3) * v * later), {"units": "kV"})
+        waves[f"i{phase}"] = ("time", np.real(np.sqrt(2) * i * later), {"units": "kA"})
+    dataset = xr.Dataset(waves, coords={"time": frame.time.to_numpy()})
+    return write_comtrade(dataset, list(waves), path)[0]
+
+
+def test_an_excel_file_gives_the_same_figures(recording, tmp_path):
     frame = pd.read_csv(recording)
     frame.to_excel(tmp_path / "rec.xlsx", index=False)
     tables = [
@@ -93,6 +110,25 @@ def test_an_excel_file_and_comtrade_give_the_same_figures(recording, tmp_path):
         for path in (recording, tmp_path / "rec.xlsx")
     ]
     pd.testing.assert_frame_equal(*tables)
+
+
+def test_a_fault_recorders_waves_in_comtrade_agree_with_the_device(gfor, recording, tmp_path):
+    waves = in_comtrade(pd.read_csv(recording), tmp_path / "rec.cfg")
+    options = ("--set", "pod_p.enabled=true", "--voltage", "230 kV", "--json")
+    code, out, _ = gfor("validate", "gfor", str(waves), *options)
+    assert code == 0
+    (event,) = json.loads(out)["events"]
+    assert event["questions"] == []
+    assert event["start"]["p_pu"] == pytest.approx(0.9, abs=1e-3)
+    assert max(event["windows"][2][signal]["max_error_pu"] for signal in "pq") < 0.006
+
+
+def test_several_events_stand_in_one_table(recording, tmp_path):
+    other = written(with_noise(table(run(stop=3.0, scale=0.95)), 2), tmp_path, "other.csv")
+    found = gfor_in_python.validate("gfor", [recording, other], values=ON).table()
+    after = found.query("window == 'after' and signal == 'p'").set_index("recording")
+    assert list(after.index) == [str(recording), str(other)]
+    assert after["mean_abs_error_pu"].max() < 0.002
 
 
 def test_the_folder_holds_figures_curves_and_the_page(gfor, recording, tmp_path):
