@@ -1,15 +1,25 @@
 """Functions of symbols as a list of instructions on a work array, which is evaluated, rewritten or written as code."""
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from fmus.toolchain.symbols.expression import Expr, Scalar, operation
-from fmus.toolchain.symbols.operations import UNARY, VALUE, Op
+from fmus.toolchain.symbols.operations import PYTHON, UNARY, VALUE, Op
+from fmus.toolchain.tape_kernel import NAMES
 
 Vector = Sequence[Expr]
+Values = list[list[float]]
 
+OFTEN = 20
+"""Calls of a function after which it is compiled to Python: that takes as long as a dozen evaluations of it."""
+
+_LONGEST = 20_000  # instructions of a function that is compiled; Python takes long for more
+
+_KNOWN: dict[str, Any] = {**NAMES, "atan": math.atan, "inf": math.inf, "nan": math.nan}
 
 Instruction = tuple[int, int, int, int, float]
 """An operation on a work array: its number, the place of its result, the places of its arguments, and its value, where
@@ -35,6 +45,7 @@ class Function:
         )
         for node in {node for node in self.nodes if node.op == Op.SYMBOL}.difference(*self.inputs):
             raise ValueError(f"{self.name}: {node.label!r} is none of its arguments")
+        self._calls = 0
 
     @property
     def instructions(self) -> list[Instruction]:
@@ -102,7 +113,13 @@ class Function:
             raise ValueError(
                 f"{self.name}: arguments of {[*map(len, values)]} elements, not {[*map(len, self.inputs)]}"
             )
-        found = tuple(np.zeros(len(vector)) for vector in self.outputs)
+        self._calls += 1
+        often = self._calls > OFTEN and len(self.instructions) <= _LONGEST
+        found = self._compiled(values) if often else self._interpreted(values)
+        return tuple(np.array(vector, dtype=float) for vector in found)
+
+    def _interpreted(self, values: Values) -> Values:
+        found = [[0.0] * len(vector) for vector in self.outputs]
         work = [0.0] * self.room
         for op, place, a, b, value in self.instructions:
             if op < Op.CONST:
@@ -114,6 +131,27 @@ class Function:
             else:
                 found[place][a] = work[b]
         return found
+
+    @cached_property
+    def _compiled(self) -> Callable[[Values], Values]:
+        """The same instructions in the same order as a function of Python, which gives the same values sooner."""
+        lines = ["def compiled(values):"]
+        lines += [f" v{i} = values[{i}]" for i in range(len(self.inputs))]
+        lines += [f" f{i} = [0.0] * {len(vector)}" for i, vector in enumerate(self.outputs)]
+        for op, place, a, b, value in self.instructions:
+            if op < Op.CONST:
+                lines.append(f" w{place} = {PYTHON[op].format(f'w{a}', f'w{b}')}")
+            elif op == Op.CONST:
+                lines.append(f" w{place} = {float(value)!r}")
+            elif op == Op.INPUT:
+                lines.append(f" w{place} = v{a}[{b}]")
+            else:
+                lines.append(f" f{place}[{a}] = w{b}")
+        lines.append(f" return [{', '.join(f'f{i}' for i in range(len(self.outputs)))}]")
+        scope = dict(_KNOWN)
+        exec("\n".join(lines), scope)
+        compiled: Callable[[Values], Values] = scope["compiled"]
+        return compiled
 
     def of(self, *arguments: Sequence[Scalar]) -> list[list[Expr]]:
         """The outputs as expressions of other arguments."""
