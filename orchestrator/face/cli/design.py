@@ -23,6 +23,7 @@ from orchestrator.face.cli.terminal import (
     print_json,
     print_parts,
     print_questions,
+    said_stages,
     warn,
 )
 from orchestrator.face.cli.verdict import add_verdict_argument, exit_code, print_stability
@@ -92,15 +93,15 @@ def run(options: argparse.Namespace) -> int:
             ),
         )
     _check_for_one_point(options)
-    case, console = case_of(options), make_console(stderr=options.json)
+    case = case_of(options)
     request = _request(options)
     path = _writable(options.out or Path(f"{case.name}_{request.controller}.toml"))
     folder = path.with_suffix(".points")
     with saying_how_it_goes_on(lambda: _how_it_goes_on(folder)):
         try:
-            with console.status("starting") as status:
+            with said_stages() as report:
                 store = PointStore(folder)
-                controller = design_controller(case, request, report=status.update, store=store)
+                controller = design_controller(case, request, report=report, store=store)
         except CosimError:
             rmtree(folder, ignore_errors=True)  # the same would come out again
             raise

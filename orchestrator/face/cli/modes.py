@@ -6,6 +6,7 @@ from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 from rich.markup import escape
 
 from orchestrator.core.errors import InputError
@@ -26,11 +27,12 @@ from orchestrator.face.cli.verdict import (
     print_answers,
     print_details,
 )
+from orchestrator.linear.spectra.modes import damping_ratio, in_range
 from orchestrator.output.results.lock import held
 from orchestrator.studies.modes import beside
 from orchestrator.studies.modes.all_modes import compute_all_modes
 from orchestrator.studies.modes.load_model_weight import load_model_weights
-from orchestrator.studies.modes.modes import modes_json
+from orchestrator.studies.modes.modes import ModesResult, modes_json
 from orchestrator.studies.modes.request import ModesRequest
 from orchestrator.studies.runs import tables
 from orchestrator.studies.runs.answers import of_modes
@@ -116,8 +118,12 @@ def _compute(
     terminal.print_warnings(results)
     terminal.say("question", weights)
     whole = len(results) == 1 or options.details
-    for result in results if whole else ():
-        console.print(tables.all_modes(result, whole=options.details), "")
+    for result in results:
+        if request.critical is not None and not result.modes:
+            none = _none_below(result, request.critical, request.frequencies)
+            console.print(escape(none), highlight=False, soft_wrap=True)
+        elif whole:
+            console.print(tables.all_modes(result, whole=options.details), "")
     terminal.print_named_modes(console, results, shapes=whole or any(r.named for r in results))
     terminal.print_sources(console, results)
     if options.details:
@@ -129,3 +135,17 @@ def _compute(
     if folder:
         console.print(escape(f"Modes in {folder}: {', '.join(written)}"), soft_wrap=True)
     return exit_code(options, [r.stability for r in results])
+
+
+def _none_below(result: ModesResult, damping: float, hertz: tuple[float, float]) -> str:
+    """The sentence in the place of an empty table, with the least damped mode where all eigenvalues are known.
+
+    ``damping``: the ratio below which modes were looked for; ``hertz``: the range of their frequencies."""
+    said = f"{result.prepared.title}: no mode from {hertz[0]:g} to {hertz[1]:g} Hz is below {100 * damping:g} %"
+    values = np.array(result.eigenvalues, complex)
+    values = values[in_range(values, *hertz)]
+    if not len(values):
+        return f"{said}."
+    least = min(values, key=damping_ratio)
+    at = f"{least.imag / (2 * np.pi):.4f} Hz"
+    return f"{said}; the least damped has {100 * damping_ratio(least):.2f} %, at {at}."

@@ -11,7 +11,7 @@ from rich.markup import escape
 from orchestrator.cases.networks.psse.known_records import known_records
 from orchestrator.cases.networks.record_use import as_json, in_full
 from orchestrator.cases.new.new_case import WantedCase, read_converter, sources_of, write_case
-from orchestrator.core.errors import InputError, ResultsError, listing_all
+from orchestrator.core.errors import CaseError, InputError, Problem, ResultsError, listing_all
 from orchestrator.core.safe_files import write_text
 from orchestrator.devices.fmi.vendor_files import is_vendor_file
 from orchestrator.face.cli.arguments import add_options
@@ -29,6 +29,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Write the case; with ``--json``, what stops it is on standard output as well as in the error."""
+    try:
+        return _written(options)
+    except CaseError as error:
+        if options.json:
+            print_json({"case": None, "problems": [*map(asdict, error.problems)]})
+        raise
+    except InputError as error:
+        if options.json:
+            print_json({"case": None, "problems": [asdict(Problem("", str(error), error.kind))]})
+        raise
+
+
+def _written(options: argparse.Namespace) -> int:
     from orchestrator.cases.scenario.service import in_service  # noqa: PLC0415 - these import what a run needs
     from orchestrator.studies.modes.modes import running  # noqa: PLC0415
 

@@ -159,8 +159,8 @@ class PodDesign:
     refinement: Refinement | None
     # smallest gain with the design's lead/lag that has the required damping, else that with most; None where refined
     other_gain: Placed | None
-    # the closed loop with the final setting: the refined setting, or ``designed`` without
-    # refinement
+    # the closed loop with the final setting: the refined setting, or without refinement ``other_gain`` where it is
+    # better, else ``designed``
     final: Placed
     before: Surroundings
     after: Surroundings
@@ -221,6 +221,11 @@ class PodDesign:
     @property
     def achieved_damping(self) -> float:
         return damping_ratio(self.achieved)
+
+    @property
+    def gain_is_swept(self) -> bool:
+        """Return whether the final gain is a better one than the equations', with their lead/lag."""
+        return self.refinement is None and self.final is not self.designed
 
     @property
     def active_bound(self) -> str | None:
@@ -401,7 +406,6 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
         final = refinement.chosen or designed
         after = around(final)
         broken = breach(before, after, request.least_damping)
-    examined = loop.examine(final.setting)
     other_gain = None
     if refinement is None and short:
         report("other gains")
@@ -409,10 +413,14 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
             other_gain = sweep(
                 loop, off, filters, required, request.bounds(search=False), "as designed"
             ).chosen
+    if other_gain is not None:
+        there, now = judge(other_gain), judge(designed)
+        if there.damping > now.damping + _MET and not (there.broken and not now.broken):
+            final, after, broken = other_gain, around(other_gain), there.broken
+    examined = loop.examine(final.setting)
     margins = spoilt = None
     if request.margins and final.setting.gain and examined.stability.stable is not False:
-        report("margins")
-        margins = compute_margins(loop, off, final, request.least_damping)
+        margins = compute_margins(loop, off, final, request.least_damping, report)
         with suppress(AnalysisError):  # the mode cannot be followed
             more = loop.place(off, (1 + VARIATION) * final.setting.gain, final.setting.filters)
             spoilt = breach(before, around(more), request.least_damping)

@@ -142,11 +142,14 @@ class Margins:
     reach: float = _REACH
 
 
-def compute_margins(loop: PodLoop, off: Placed, nominal: Placed, least: float) -> Margins:
+def compute_margins(
+    loop: PodLoop, off: Placed, nominal: Placed, least: float, report: Callable[[str], None]
+) -> Margins:
     weakest, fastest = _extremes(loop, nominal.setting)
     limit, growth = min(least, damping_ratio(weakest)), fastest.real if fastest else 0.0
 
     def lost(factor: float) -> complex | None:
+        report(f"margins: all modes with {factor:.3g} times the gain")
         setting = replace(nominal.setting, gain=nominal.setting.gain * factor)
         weakest, fastest = _extremes(loop, setting)
         if fastest and fastest.real > growth:
@@ -154,10 +157,11 @@ def compute_margins(loop: PodLoop, off: Placed, nominal: Placed, least: float) -
         return weakest if damping_ratio(weakest) < limit - 1e-9 else None
 
     (up, lost_up), (down, lost_down) = (_edge(lost, stride) for stride in (_STRIDE, 1 / _STRIDE))
+    report("margins: phase and delay")
     found, why = _of_loop(loop, nominal.setting)
-    return Margins(
-        limit, up, down, lost_up, lost_down, found, why, _variations(loop, off, nominal.setting)
-    )
+    report("margins: other values of the setting")
+    varied = _variations(loop, off, nominal.setting)
+    return Margins(limit, up, down, lost_up, lost_down, found, why, varied)
 
 
 def _extremes(loop: PodLoop, setting: PodSetting) -> tuple[complex, complex | None]:

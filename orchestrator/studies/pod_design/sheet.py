@@ -219,6 +219,11 @@ def verdict(d: PodDesign) -> str:
         text += f"; but {d.broken}"
     elif d.met and (other := d.worst_other) and other.damping_ratio < d.required_damping:
         text += f"; least damped of all then {percent(other.damping_ratio)} at {other.frequency_hz:.3f} Hz"
+    if d.gain_is_swept:
+        text += (
+            f"; K = {d.final.setting.gain:.4g} pu stands in the place of the equations' {d.gain:.4g} pu, with which "
+            f"the target has {percent(d.designed.damping_ratio)}"
+        )
     if d.damping_met:
         if d.thin_margin is not None:
             text += (
@@ -227,7 +232,7 @@ def verdict(d: PodDesign) -> str:
             )
         if d.met and d.spoilt:
             text += f"; no margin: at {LARGER_GAIN} {d.spoilt}"
-        if not d.refinement and d.active_bound == "lower":
+        if d.final is d.designed and d.active_bound == "lower":
             text += (
                 f"; the lower bound of the gain is active, {d.unbounded_gain:.4g} pu were computed before it: "
                 f"--gain-bounds 0:{d.request.bounds(search=True)[1]:g} --refine finds the least gain that meets it"
@@ -243,7 +248,7 @@ def _other_gain(d: PodDesign) -> str:
     low, high = d.request.bounds(search=False)
     gain, there = f"K = {d.other_gain.setting.gain:.4g} pu", percent(d.other_gain.damping_ratio)
     if d.other_gain.damping_ratio >= d.required_damping:
-        return f"; {gain} with the same lead/lag has {there}; or use --refine"
+        return f"; {gain} with the same lead/lag has {there}, at the cost of another mode: use --refine"
     return (
         f"; with this lead/lag no gain from {low:g} to {high:g} pu has more than {there}, at {gain}: see with --refine "
         "what another one does"

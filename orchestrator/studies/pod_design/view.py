@@ -168,6 +168,8 @@ def design_json(d: PodDesign) -> dict[str, Any]:
         "compensated_sensitivity": _polar(S.compensated),
         "K_non_compensated": d.gain_non_compensated,
         "K_compensated": d.gain_compensated,
+        "K_of_equations": d.gain,
+        "damping_ratio_of_equations": d.designed.damping_ratio,
         "active_bound": d.active_bound,
         "worst_other_mode": {
             "before": _other_json(d.before.worst),
@@ -199,7 +201,8 @@ def parameters_of(d: PodDesign) -> dict[str, bool | float | str]:
 def provenance(d: PodDesign, command: str) -> list[str]:
     return [
         f"{LABELS[d.request.controller]} for {d.case}, designed by eigenvalue sensitivity"
-        + (" and refined on the closed loop" if d.refinement else ""),
+        + (" and refined on the closed loop" if d.refinement else "")
+        + (", with a better gain than the equations'" if d.gain_is_swept else ""),
         f"command: {command}",
         f"scenario {d.target.scenario}, mode {d.mode_name} without the controller: {mode_text(d.initial)}",
         f"with it: {mode_text(d.achieved)}; required: {percent(d.required_damping)} ({'met' if d.met else 'not met'})",

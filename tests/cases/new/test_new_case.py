@@ -1,6 +1,7 @@
 """`gfor new`: from RAW and DYR to a case that runs, and what cannot become one."""
 
 import io
+import json
 import sys
 import tomllib
 from dataclasses import replace
@@ -310,8 +311,11 @@ def test_a_refusal_lists_all_that_is_wrong_at_ones_word(gfor, files, option):
     code, _, err = gfor(raw, dyr)
     assert code == 2
     assert "and 10 more; gfor new lists all with --details" in " ".join(err.split())
-    code, _, err = gfor(raw, dyr, option)
+    code, out, err = gfor(raw, dyr, option)
     assert code == 2
+    if option == "--json":
+        (problem,) = json.loads(out)["problems"]
+        assert problem["text"].count("at bus 5") == 5
     assert " more" not in err
     assert "at bus 5" in err.splitlines()[-1]
     assert len(err.splitlines()) == 2 + 30  # what they are, and each of them

@@ -79,3 +79,13 @@ def test_an_identification_says_what_it_is_doing():
         f"run {k} of 4" for k in (1, 2, 3, 4)
     ]
     assert sum("v_re" in line for line in said) == 2
+
+
+def test_critical_modes_that_are_none_are_a_sentence(capsys):
+    """An empty table leaves open if the search failed; the paper's mode has 10.63 %."""
+    assert main(["modes", "two_area_rms", "--scenario", "gfor", "--critical", "8"]) == 0
+    said = capsys.readouterr().out
+    assert (
+        "no mode from 0.1 to 2 Hz is below 8 %; the least damped has 10.63 %, at 0.5813 Hz" in said
+    )
+    assert "Most associated states" not in said

@@ -31,6 +31,9 @@ def test_a_mode_below_what_is_asked_is_told_with_met(other, met, broken, said):
         spoilt=None,
         thin_margin=None,
         refinement=None,
+        gain_is_swept=False,
+        final=None,
+        designed=None,
         active_bound=None,
     )
     assert verdict(design) == f"the target has 10.44 % of damping, 10.00 % are required{said}"
