@@ -199,10 +199,13 @@ def parameters_of(d: PodDesign) -> dict[str, bool | float | str]:
 
 
 def provenance(d: PodDesign, command: str) -> list[str]:
+    how = "designed by eigenvalue sensitivity"
+    if d.refinement:
+        how += " and refined on the closed loop"
+    elif d.gain_is_swept:
+        how += ", with a better gain than the equations'"
     return [
-        f"{LABELS[d.request.controller]} for {d.case}, designed by eigenvalue sensitivity"
-        + (" and refined on the closed loop" if d.refinement else "")
-        + (", with a better gain than the equations'" if d.gain_is_swept else ""),
+        f"{LABELS[d.request.controller]} for {d.case}, {how}",
         f"command: {command}",
         f"scenario {d.target.scenario}, mode {d.mode_name} without the controller: {mode_text(d.initial)}",
         f"with it: {mode_text(d.achieved)}; required: {percent(d.required_damping)} ({'met' if d.met else 'not met'})",
