@@ -41,7 +41,7 @@ _PARTED = {
     "study": {
         "studies.modes": "all_modes beside linear linear_model_files load_model_weight "
         "mode_identity modes naming request start_errors step_choice",
-        "studies.runs": "after_events answers checkpoint_mark checkpoints files like mode_plots "
+        "studies.runs": "after_events checkpoint_mark checkpoints files like mode_plots "
         "ring_down run run_request tables",
         "studies.signals": "ambient comparison measured signal_modes",
     },

@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from orchestrator.linear.spectra.stability import Stability
     from orchestrator.simulation.watch.finding import Finding
     from orchestrator.studies.modes.modes import ModesResult
-    from orchestrator.studies.runs import answers
+    from orchestrator.studies.runs import answer_of_run
     from orchestrator.studies.runs.run import RunResult
 else:  # what computes, which a recording is read without
-    answers = Late("orchestrator.studies.runs.answers")
+    answer_of_run = Late("orchestrator.studies.runs.answer_of_run")
 
 _STATES = 3
 """States with the largest participation that stand in a table."""
@@ -335,12 +335,12 @@ class Run(NoTruth):
     @property
     def stable(self) -> bool | None:
         """Whether the run and the modes before and after its events show no growth; None where that is not known."""
-        return answers.of_run(self.result).good
+        return answer_of_run.of_run(self.result).good
 
     @property
     def verdict(self) -> str:
         """The verdict in one sentence, as ``gfor run`` has it."""
-        answer = answers.of_run(self.result)
+        answer = answer_of_run.of_run(self.result)
         return spelled(f"{answer.verdict}: {answer.remark}" if answer.remark else answer.verdict)
 
     @property

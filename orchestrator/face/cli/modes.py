@@ -35,7 +35,7 @@ from orchestrator.studies.modes.load_model_weight import load_model_weights
 from orchestrator.studies.modes.modes import ModesResult, modes_json
 from orchestrator.studies.modes.request import ModesRequest
 from orchestrator.studies.runs import tables
-from orchestrator.studies.runs.answers import of_modes
+from orchestrator.studies.runs.answer_of_modes import of_modes
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

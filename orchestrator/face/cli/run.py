@@ -51,7 +51,8 @@ from orchestrator.simulation.engine import Federates
 from orchestrator.simulation.interop.rules import MASTERS, MasterRules, master_rules
 from orchestrator.studies.modes import beside
 from orchestrator.studies.modes.all_modes import all_ours
-from orchestrator.studies.runs.answers import EarlyEnd, of_run
+from orchestrator.studies.runs.answer import EarlyEnd
+from orchestrator.studies.runs.answer_of_run import of_run
 from orchestrator.studies.runs.files import files_of_study, save_run, save_study, summary_of
 from orchestrator.studies.runs.like import run_like
 from orchestrator.studies.runs.run import RunResult

@@ -10,7 +10,8 @@ from orchestrator.devices.fmi.loaded import PYTHON_BACKED
 from orchestrator.face.cli.terminal import print_named_modes, print_sources
 from orchestrator.face.cli.verdict import print_answers, print_details
 from orchestrator.studies.runs import tables
-from orchestrator.studies.runs.answers import EarlyEnd, of_run
+from orchestrator.studies.runs.answer import EarlyEnd
+from orchestrator.studies.runs.answer_of_run import of_run
 from orchestrator.studies.runs.run import RunResult
 from orchestrator.systems.coupling.statistics import StepCounts, StepStatistics
 

@@ -13,7 +13,8 @@ from orchestrator.linear.spectra.stability import Stability
 from orchestrator.output.report.tables import COLOURS, VerdictSentence
 from orchestrator.studies.modes.modes import ModesResult
 from orchestrator.studies.runs import tables
-from orchestrator.studies.runs.answers import ScenarioAnswer, answers_table, outside
+from orchestrator.studies.runs.answer import ScenarioAnswer
+from orchestrator.studies.runs.answers_table import answers_table, outside
 
 
 def add_verdict_argument(parser: argparse.ArgumentParser) -> None:

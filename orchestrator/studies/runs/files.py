@@ -21,7 +21,8 @@ from orchestrator.output.results.signals import relative_difference
 from orchestrator.output.results.staging import ScenarioFolder, new_run_id, staged
 from orchestrator.output.results.storage import save_csv, save_json, save_netcdf, save_table
 from orchestrator.studies.modes.modes import ModesResult, modes_json
-from orchestrator.studies.runs.answers import EarlyEnd, of_run
+from orchestrator.studies.runs.answer import EarlyEnd
+from orchestrator.studies.runs.answer_of_run import of_run
 from orchestrator.studies.runs.mode_plots import (
     plot_eigenvalues,
     plot_mode_shapes,

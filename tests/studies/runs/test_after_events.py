@@ -11,8 +11,10 @@ from rich.console import Console
 
 import orchestrator as gfor_api
 from orchestrator.studies.modes.modes import ModesResult
-from orchestrator.studies.runs import answers
+from orchestrator.studies.runs import answer_of_run
 from orchestrator.studies.runs.after_events import lasting_changes, modes_after
+from orchestrator.studies.runs.answer import ScenarioAnswer
+from orchestrator.studies.runs.answers_table import answers_table
 from tests.studies.screening.five_machines import five_machines
 
 pytestmark = pytest.mark.filterwarnings("ignore::orchestrator.face.api.scenario.UnusualDataWarning")
@@ -106,13 +108,13 @@ def test_a_whole_run_decides_about_modes_near_zero_and_not_of_others_that_grow(
         before, modes=[least], stability=replace(before.stability, stable=stable, mode=grows)
     )
     monkeypatch.setattr(
-        answers,
+        answer_of_run,
         "_by_response",
-        lambda _: answers.ScenarioAnswer("", True, "stable", None, "settles"),
+        lambda _: ScenarioAnswer("", True, "stable", None, "settles"),
     )
     prepared = SimpleNamespace(events=[SimpleNamespace(time=0.5)], stop_time=stop)
     modes = SimpleNamespace(prepared=prepared, modes=before.modes, model=before.model)
-    found = answers.of_run(SimpleNamespace(after=after, modes=modes))
+    found = answer_of_run.of_run(SimpleNamespace(after=after, modes=modes))
     assert found.good is good
     assert ("by a power flow, decides nothing" in found.remark) is (good and damping < 0.5)
 
@@ -123,11 +125,11 @@ def of_two_modes(case, monkeypatch, moved, other):
     least, next_one = sorted(before.modes, key=lambda mode: mode.damping_percent)[:2]
     left = [replace(least, eigenvalue=moved), replace(next_one, eigenvalue=other)]
     after = replace(before, modes=left, stability=replace(before.stability, stable=True, mode=None))
-    first = answers.ScenarioAnswer("", True, "stable", least, "settles")
-    monkeypatch.setattr(answers, "_by_response", lambda _: first)
-    found = answers.of_run(SimpleNamespace(after=after, modes=before))
+    first = ScenarioAnswer("", True, "stable", least, "settles")
+    monkeypatch.setattr(answer_of_run, "_by_response", lambda _: first)
+    found = answer_of_run.of_run(SimpleNamespace(after=after, modes=before))
     console = Console(width=200, record=True, file=io.StringIO())
-    console.print(answers.answers_table([found], (0.1, 2.5)))
+    console.print(answers_table([found], (0.1, 2.5)))
     return found, console.export_text(), least, after
 
 
@@ -151,7 +153,7 @@ def test_the_same_mode_after_the_events_is_one_row(case, monkeypatch):
 
 
 def test_no_arrow_leads_to_a_mode_that_is_not_clearly_the_same(case, monkeypatch):
-    monkeypatch.setattr(answers, "same_mode", lambda *_: None)
+    monkeypatch.setattr(answer_of_run, "same_mode", lambda *_: None)
     found, table, least, _ = of_two_modes(case, monkeypatch, -0.3 + 6.0j, -2.0 + 8.0j)
     assert "→" not in table
     assert f"{least.frequency_hz:.3f}" in table

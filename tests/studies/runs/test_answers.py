@@ -12,7 +12,8 @@ from orchestrator.face.cli import main
 from orchestrator.linear.spectra.modes import make_mode
 from orchestrator.linear.spectra.stability import Stability
 from orchestrator.simulation.watch.finding import Finding
-from orchestrator.studies.runs.answers import of_modes, of_run
+from orchestrator.studies.runs.answer_of_modes import of_modes
+from orchestrator.studies.runs.answer_of_run import of_run
 from orchestrator.studies.runs.run import RunResult
 
 

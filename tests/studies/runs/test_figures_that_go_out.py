@@ -10,7 +10,8 @@ from orchestrator.linear.spectra.stability import Cause, Hidden, Stability
 from orchestrator.studies.certification import report_criteria
 from orchestrator.studies.certification.criteria import PodEffect
 from orchestrator.studies.modes.step_choice import Allowed, StepChoice, TriedStep, step_choice_json
-from orchestrator.studies.runs.answers import ScenarioAnswer, answers_table
+from orchestrator.studies.runs.answer import ScenarioAnswer
+from orchestrator.studies.runs.answers_table import answers_table
 from orchestrator.studies.runs.files import _mode_rows
 from tests.support.figures import foreign_in_json, foreign_in_text, unseen_slips
 

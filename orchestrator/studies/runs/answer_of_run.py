@@ -1,0 +1,266 @@
+"""The answer of a run: what it showed, beside the eigenvalues before its events and after them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import ceil
+
+from orchestrator.core.errors import RunInterruptedError
+from orchestrator.linear.spectra.modes import Mode
+from orchestrator.output.report.tables import short
+from orchestrator.simulation.watch.confirmation import PERIODS
+from orchestrator.studies.modes.modes import ModesResult
+from orchestrator.studies.runs.after_events import lasting_changes, same_mode
+from orchestrator.studies.runs.answer import LONGEST_REMARK, ScenarioAnswer
+from orchestrator.studies.runs.answer_of_modes import (
+    least_damped,
+    of_modes,
+    swing_of,
+    with_misfits,
+)
+from orchestrator.studies.runs.run import RunResult
+from orchestrator.systems.coupling.events import Forcing
+
+_UNDECIDED = 0.5
+"""Damping after the events [%], of either sign, that decides nothing beside a run that is long enough: what the events
+leave is computed from a power flow, which the run does not reach exactly."""
+
+_NO_RUN_NEEDED = 4.0
+"""Damping after the events [%] from which on no run need be long enough to show a growth."""
+
+_PERIODS_OF_A_SLOW_GROWTH = 30
+"""Periods in which a run shows whether a mode grows that hardly decays."""
+
+KINDS = {
+    "growth": "grows",
+    "growing_oscillation": "an oscillation grows",
+    "sustained_oscillation": "oscillates on",
+    "run_away": "runs away",
+    "loss_of_synchronism": "loses synchronism",
+    "not_finite": "values are no numbers",
+    "failure": "fails",
+}
+"""In words, the findings that no stable system gives."""
+
+
+def of_run(result: RunResult) -> ScenarioAnswer:
+    """Return the answer of a run by what it showed, and by the eigenvalues before its events and after them."""
+    answer = _by_response(result)
+    after = result.after
+    if not isinstance(after, ModesResult):
+        return answer
+    left, swing = of_modes(after), _deciding(after)
+    if swing is not None and _is_undecided(result, answer, swing):
+        if answer.good:
+            told = (
+                f"{swing.damping_percent:+.2f} % after the events, by a power flow, decides nothing"
+            )
+            answer = replace(answer, remark=f"{answer.remark}; {told}")
+        return _with_after(answer, result.modes, after, swing)
+    if left.good is False and answer.good is not False:
+        remark = short(f"the system that the events leave: {left.remark}", LONGEST_REMARK)
+        answer = replace(answer, good=False, verdict="UNSTABLE", remark=remark)
+    return _with_after(answer, result.modes, after, left.mode)
+
+
+def _is_undecided(result: RunResult, answer: ScenarioAnswer, swing: Mode) -> bool:
+    """Tell whether the mode after the events decides nothing: near zero, or growing where a long run shows none."""
+    damping = swing.damping_percent
+    if damping >= _UNDECIDED:
+        return False
+    return damping > -_UNDECIDED or _settles(result, answer, swing)
+
+
+def _with_after(
+    answer: ScenarioAnswer, before: ModesResult, after: ModesResult, least: Mode | None
+) -> ScenarioAnswer:
+    """The answer with the least damped mode after the events, beside what became of the one before them."""
+    if least is None:
+        return answer
+    became = None if answer.mode is None else same_mode(before, answer.mode, after)
+    return replace(answer, after=least, after_swing=swing_of(after, least), became=became)
+
+
+# -- what the run itself showed -------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Response:
+    """A run, and the answer of the eigenvalues before its events."""
+
+    result: RunResult
+    by_modes: ScenarioAnswer
+
+    @cached_property
+    def end(self) -> float:
+        """Time at which the run stops [s]."""
+        return self.result.modes.prepared.stop_time
+
+    @cached_property
+    def later(self) -> str:
+        """Times of the events that the run does not reach, in words."""
+        return ", ".join(f"{time:g} s" for time in self.result.modes.prepared.not_reached)
+
+    def answer(self, good: bool | None, verdict: str, remark: str) -> ScenarioAnswer:
+        text = short(remark, LONGEST_REMARK)
+        return ScenarioAnswer(self.by_modes.subject, good, verdict, self.by_modes.mode, text)
+
+    def not_known(self, remark: str) -> ScenarioAnswer:
+        return self.answer(None, "not known", remark)
+
+
+def _by_response(result: RunResult) -> ScenarioAnswer:
+    shown = _Response(result, of_modes(result.modes))
+    answers = (rule(shown) for rule in _RULES)
+    return next(answer for answer in answers if answer is not None)
+
+
+def _of_an_interruption(shown: _Response) -> ScenarioAnswer | None:
+    failure = shown.result.failure
+    if not isinstance(failure, RunInterruptedError):
+        return None
+    return shown.answer(None, "interrupted", str(failure))
+
+
+def _of_what_grew(shown: _Response) -> ScenarioAnswer | None:
+    if not shown.result.went_unstable:
+        return None
+    worst = shown.result.went_unstable[0]
+    what = f"{worst.component}: {KINDS[worst.kind]} from {worst.time:.4g} s"
+    return shown.answer(False, "UNSTABLE", with_misfits(shown.result.modes, what))
+
+
+def _of_a_failure(shown: _Response) -> ScenarioAnswer | None:
+    if shown.result.failure is None:
+        return None
+    return shown.answer(False, "failed", str(shown.result.failure))
+
+
+def _of_modes_that_grow(shown: _Response) -> ScenarioAnswer | None:
+    return shown.by_modes if shown.by_modes.good is False else None
+
+
+def _of_a_missing_limit(shown: _Response) -> ScenarioAnswer | None:
+    missing = shown.result.missing_limits
+    if not missing:
+        return None
+    names = ", ".join(dict.fromkeys(finding.component for finding in missing))
+    table = shown.result.modes.prepared.case.table
+    both = table.models and table.emt.step_size
+    how = "--set models=emt" if both else "EMT models, whose names lack `_phasor`"
+    return shown.not_known(
+        f"the current limit of {names} would act, which the model lacks: repeat with {how}"
+    )
+
+
+def _of_an_early_stop(shown: _Response) -> ScenarioAnswer | None:
+    if not shown.result.before_its_events:
+        return None
+    return shown.not_known(
+        f"the run ends at {shown.end:g} s, before its events (t = {shown.later}): without --stop it reaches them"
+    )
+
+
+def _of_a_response_not_judged(shown: _Response) -> ScenarioAnswer | None:
+    if shown.result.stable_in_simulation is not None:
+        return None
+    return shown.not_known("not judged throughout; the findings say where and why")
+
+
+def _of_modes_not_known(shown: _Response) -> ScenarioAnswer | None:
+    return shown.by_modes if shown.by_modes.good is None else None
+
+
+def _of_no_event(shown: _Response) -> ScenarioAnswer | None:
+    if shown.result.modes.prepared.events:
+        return None
+    remark = "; ".join(filter(None, ("no event disturbs it", shown.by_modes.remark)))
+    return replace(shown.by_modes, remark=remark)
+
+
+def _of_a_forcing(shown: _Response) -> ScenarioAnswer | None:
+    events = (e for e in shown.result.modes.prepared.events if isinstance(e, Forcing))
+    names = dict.fromkeys(
+        f"{e.component}.{e.variable}" for e in events if (e.end or shown.end) >= shown.end
+    )
+    if not names:
+        return None
+    return shown.not_known(
+        f"keeps synchronism until {shown.end:g} s; {', '.join(names)}: forced until then, so settling is not judged"
+    )
+
+
+def _of_a_short_run(shown: _Response) -> ScenarioAnswer | None:
+    wanted = _seen_from(shown.result, shown.by_modes.mode)
+    if wanted <= shown.end:
+        return None
+    return shown.not_known(
+        f"the run is too short to show whether what the events leave settles: --stop {wanted:g}"
+    )
+
+
+def _of_settling(shown: _Response) -> ScenarioAnswer:
+    rest = f", before the events at {shown.later}" if shown.later else ""
+    rest += f"; {shown.by_modes.remark}" if shown.by_modes.remark else ""
+    return shown.answer(
+        True, "stable", f"keeps synchronism and settles until {shown.end:g} s{rest}"
+    )
+
+
+_RULES: tuple[Callable[[_Response], ScenarioAnswer | None], ...] = (
+    _of_an_interruption,
+    _of_what_grew,
+    _of_a_failure,
+    _of_modes_that_grow,
+    _of_a_missing_limit,
+    _of_an_early_stop,
+    _of_a_response_not_judged,
+    _of_modes_not_known,
+    _of_no_event,
+    _of_a_forcing,
+    _of_a_short_run,
+    _of_settling,
+)
+"""What decides the answer of a run, the first that applies: what it showed comes before what the eigenvalues say, and
+what leaves an answer open before a good one."""
+
+
+# -- how long a run has to be ---------------------------------------------------------------------
+
+
+def _seen_from(result: RunResult, mode: Mode | None) -> float:
+    """Time from which on a growth shows [s], where the modes of what the events leave do not exclude it; else 0."""
+    if mode is None or not lasting_changes(result.modes.prepared):
+        return 0.0
+    after = result.after if isinstance(result.after, ModesResult) else None
+    swing = None if after is None else _deciding(after)
+    damping = None if swing is None else swing.damping_percent
+    judged = after is not None and after.stability.stable is not None
+    if judged and (damping is None or damping >= _NO_RUN_NEEDED):
+        return 0.0
+    slow = damping is not None and abs(damping) < _UNDECIDED
+    return _after(result, swing or mode, _PERIODS_OF_A_SLOW_GROWTH if slow else PERIODS)
+
+
+def _after(result: RunResult, mode: Mode, periods: float) -> float:
+    """Return the time that is so many periods of a mode after the last event [s], in whole tenths."""
+    last = max(event.time for event in result.modes.prepared.events)
+    return ceil(10 * (last + periods / mode.frequency_hz)) / 10
+
+
+def _settles(result: RunResult, answer: ScenarioAnswer, swing: Mode) -> bool:
+    """Tell whether a run that is long enough to show a growth of the mode shows none."""
+    seen = _after(result, swing, _PERIODS_OF_A_SLOW_GROWTH)
+    return bool(answer.good) and result.modes.prepared.stop_time >= seen
+
+
+def _deciding(after: ModesResult) -> Mode | None:
+    """Return the least damped mode after the events, where it swings and nothing else grows.
+
+    What is left has voltages and powers of a power flow, where an event leaves references and admittances as they were:
+    a mode's damping was up to 3 points off in systems that were tuned for it."""
+    least = least_damped(after)
+    grows = after.stability.mode if after.stability.stable is False else least
+    if least is None or grows is None or not least.is_oscillation:
+        return None
+    return least if grows.eigenvalue == least.eigenvalue else None
