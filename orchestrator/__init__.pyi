@@ -13,6 +13,7 @@ from orchestrator.face.api.certification import certify as certify
 from orchestrator.face.api.certification import verify as verify
 from orchestrator.face.api.comparison import compare as compare
 from orchestrator.face.api.comtrade import export_comtrade as export_comtrade
+from orchestrator.face.api.exploration import Exploration as Exploration
 from orchestrator.face.api.export import export as export
 from orchestrator.face.api.fmu import Fmu as Fmu
 from orchestrator.face.api.fmu import FmuInfo as FmuInfo

@@ -11,6 +11,7 @@ from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import made_folder
 from orchestrator.devices.binding.binding import bound_fmu
+from orchestrator.output.report.notebook import page
 from orchestrator.output.results.staging import new_run_id, staged
 from orchestrator.studies.black_box.files import identification_json, save_identification
 from orchestrator.studies.black_box.fitting import fit, passivity, require_fitting
@@ -49,6 +50,14 @@ class Admittance:
         with staged(place, new_run_id()) as staging:
             files = save_identification(self.response, self.model, self.passivity, staging)
         return [place / file.name for file in files]
+
+    def _repr_html_(self) -> str:
+        bands = ", ".join(f"{low:.4g}–{high:.4g} Hz" for low, high in self.passivity.ranges())
+        accuracy = (
+            f"Largest bound of a line: {self.response.largest_bound:.2g} of it; "
+            f"error of the model: {self.model.error:.2g}"
+        )
+        return page(repr(self)[1:-1], [f"Can feed an oscillation: {bands or 'nowhere'}", accuracy])
 
     def __repr__(self) -> str:
         content = self.as_json()

@@ -13,6 +13,7 @@ from orchestrator.core.safe_files import made_folder
 from orchestrator.core.truth import NoTruth
 from orchestrator.face.api.methods import function
 from orchestrator.face.api.progress import shown_progress
+from orchestrator.output.report.notebook import page
 from orchestrator.output.results.lock import held
 from orchestrator.output.signatures.checking import State
 from orchestrator.output.signatures.signing import check_key
@@ -54,6 +55,9 @@ class IssuedCertificate(NoTruth, ask=".verdict"):
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor certify --json`` prints, as JSON's types."""
         return self.content
+
+    def _repr_html_(self) -> str:
+        return page(f"{self.verdict}: {self.sentence}", [f"Folder: {self.folder}"])
 
     def __repr__(self) -> str:
         return f"<IssuedCertificate in {self.folder}: {self.verdict}>"

@@ -10,6 +10,7 @@ from typing import Any
 from orchestrator.core.asked import path as path_of
 from orchestrator.core.errors import InputError
 from orchestrator.core.late import pd
+from orchestrator.output.report.notebook import page
 from orchestrator.output.results.manifest import MANIFEST, checked
 from orchestrator.output.results.recorded import open_whole
 
@@ -61,6 +62,9 @@ class Saved(Mapping[str, Any]):
         its ``attrs``."""
         file = self.folder / MANIFEST
         return dict(json.loads(file.read_text(encoding="utf-8"))) if file.is_file() else {}
+
+    def _repr_html_(self) -> str:
+        return page(str(self.folder), self)
 
     def __repr__(self) -> str:
         return f"<Saved {self.folder}: {', '.join(self)}>"

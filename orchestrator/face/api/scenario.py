@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import warnings
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import ExitStack
@@ -25,6 +26,7 @@ from orchestrator.core.asked import path as path_of
 from orchestrator.core.attributes import Unchanged
 from orchestrator.core.errors import InputError, Problem
 from orchestrator.core.late import pd, xr
+from orchestrator.face.api.exploration import Exploration, explored
 from orchestrator.face.api.linear import LinearSystem
 from orchestrator.face.api.methods import in_turn, method
 from orchestrator.face.api.progress import shown_progress
@@ -441,6 +443,29 @@ class Scenario(Unchanged):
             if continuous or black_box
             else partial(self.linearize, inputs, outputs, continuous=True),
         )
+
+    def explore(self) -> Exploration:
+        """The scenario in the explorer, beginning with these values: a notebook shows the page, with its sliders.
+
+        Returns
+        -------
+        Exploration
+            The page on a server of this machine, which ends with the program; ``address`` is for any browser.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> with gfor.load("infinite_bus").scenario("dip").explore() as page:
+        ...     page.address.startswith("http://127.0.0.1:")
+        True
+        """
+        given = {pattern for layer in self._asked.layers for pattern in layer.values}
+        values = {
+            name: value
+            for name, value in self.values.items()
+            if any(fnmatch.fnmatchcase(name, pattern) for pattern in given)
+        }
+        return explored(self.prepared, values, self._asked.step_size)
 
     def __repr__(self) -> str:
         return f"<Scenario {self.name} of {self.prepared.case.name}: {self.title}>"

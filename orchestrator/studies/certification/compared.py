@@ -12,6 +12,7 @@ import numpy as np
 
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.truth import NoTruth
+from orchestrator.output.report.notebook import page
 from orchestrator.output.signatures.checking import SignatureSeen, State
 from orchestrator.studies.certification.case_file import BINDING, FMU
 from orchestrator.studies.certification.request import CertificationRequest
@@ -61,6 +62,10 @@ class Verification(NoTruth, ask=".holds"):
     def signature(self) -> SignatureSeen:
         """The signature; of several certificates in an FMU that of the least worth."""
         return min(self.signatures.values(), key=lambda one: _LEAST_WORTH.index(one.state))
+
+    def _repr_html_(self) -> str:
+        signed = [str(one.sentence) for one in self.signatures.values()]
+        return page(repr(self)[1:-1], [*self.faults, *self.views, *signed, *self.agreed])
 
     def __repr__(self) -> str:
         what = "; ".join(self.faults) if self.faults else f"{len(self.agreed)} things agree"

@@ -9,7 +9,9 @@ import numpy as np
 from rich.console import RenderableType
 from rich.markup import escape
 
+from orchestrator.core.late import pd
 from orchestrator.core.truth import NoTruth
+from orchestrator.output.report.notebook import page
 from orchestrator.output.report.tables import VerdictSentence, make_table
 from orchestrator.output.results.storage import save_json
 from orchestrator.studies.immittance.margins import Margin
@@ -98,6 +100,12 @@ class Nyquist(NoTruth, ask=".verdict"):
         for side, scan in self.result.scans.items():
             if scan.unit == "S":
                 write_ztool(scan, folder / f"gfor#Y_AC#{side}-1#.txt")
+
+    def _repr_html_(self) -> str:
+        m = self.result.margins
+        rows = [] if m is None else [(n, *_cells(getattr(m, k), text)) for n, k, text in _MARGINS]
+        table = pd.DataFrame(rows, columns=["margin", "value", "at [Hz]"]) if rows else None
+        return page(f"{self.verdict}: {self.result.because}", self.reasons, table)
 
     def __repr__(self) -> str:
         return f"<Nyquist {self.verdict}: {self.result.because}>"

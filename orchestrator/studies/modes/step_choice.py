@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import AnalysisError, CosimError, InputError
+from orchestrator.core.late import pd
 from orchestrator.linear.doubts.linearity import doubts, tell
 from orchestrator.linear.models.blocks import Blocks
 from orchestrator.linear.models.linear_model import LinearModel
@@ -22,6 +23,7 @@ from orchestrator.linear.spectra.modes import (
     oscillations,
 )
 from orchestrator.linear.spectra.stability import WHOLE, fastest_growth
+from orchestrator.output.report.notebook import page
 from orchestrator.studies.modes.modes import running
 from orchestrator.systems.coupling.clock import Clock
 from orchestrator.systems.coupling.master import Master
@@ -105,6 +107,18 @@ class StepChoice:
                 break
             found = trial
         return found
+
+    def _repr_html_(self) -> str:
+        rows = [
+            {
+                "schedule": trial.schedule,
+                "step [s]": trial.step_size,
+                "within the error": trial.is_within(self.allowed),
+            }
+            for trial in self.trials
+        ]
+        left = [f"not tried: {step:g} s, as an event does not fall on it" for step in self.left_out]
+        return page(repr(self)[1:-1], left, pd.DataFrame(rows))
 
     def __repr__(self) -> str:
         found = []
