@@ -1,6 +1,7 @@
 """What names a point's file."""
 
 import shutil
+import sys
 
 import pytest
 
@@ -55,6 +56,8 @@ def tree(tmp_path_factory):
 def named(fresh, monkeypatch, tree):
     """Module → the name of a point of its, as a new process finds it."""
     monkeypatch.setattr(code, "_ROOT", tree)
+    # Python would take what it compiled of another text of that size in the same second
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
 
     def find(module):
         for one in (code_hash, numbers_hash, code._code):
