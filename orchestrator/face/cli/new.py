@@ -101,9 +101,9 @@ def _list_models(*, as_json: bool) -> None:
         return
     table = make_table(
         "Records of dynamics data that gfor reads",
-        *("record", "what", "part of ours", "approximated"),
-        left=4,
-        rows=[(r.name, r.kind, r.part, r.approximated) for r in records],
+        *("record", "what", "part of ours", "held against", "approximated"),
+        left=5,
+        rows=[(r.name, r.kind, r.part, r.held_against, r.approximated) for r in records],
     )
     sources = dict.fromkeys(record.source for record in records)
     print_parts(make_console(), [table, *(escape(f"Source: {source}") for source in sources)])

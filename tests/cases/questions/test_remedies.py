@@ -162,7 +162,7 @@ GALLERY = {
     ),
     "models": Broken("to go on without them", NINE, DYR + "1 'NOSTAB' 1 3 /\n1 'OEL1B' 1 3 /\n"),
     "machine itself": Broken(
-        "it cannot be left out", NINE, DYR.replace("3 'GENCLS'", "3 'GENTPJ1'")
+        "it cannot be left out", NINE, DYR.replace("3 'GENCLS'", "3 'GENQEC1'")
     ),
     "machine without a record": Broken(
         "and a converter of ours stands there", NINE, changed(DYR, (GENCLS + "\n", ""))

@@ -1,7 +1,9 @@
 """The records of dynamics data that gfor reads: what each becomes, where that is known from, what is left."""
 
+import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 from fmus.grid_following.dyr_fields import FIELDS, MODEL
 from fmus.regfm_a1.dyr_fields import REGFM_A1_RECORDS
@@ -20,13 +22,16 @@ _GENERIC = (
 
 @dataclass(frozen=True, slots=True)
 class KnownRecord:
-    """A record: PSS/E's name, its kind, our part, where its fields are known from, and what is approximated."""
+    """A record: PSS/E's name, its kind, our part, where its fields are known from, and what is approximated.
+
+    ``held_against``: what the part was compared with."""
 
     name: str
     kind: str
     part: str
     source: str
     approximated: str = ""
+    held_against: str = ""
 
 
 def known_records() -> list[KnownRecord]:
@@ -51,7 +56,18 @@ def known_records() -> list[KnownRecord]:
         KnownRecord(name, _KINDS[record.kind], record.part, _GENERIC, "; ".join(_of_plant(name)))
         for name, record in PLANT_RECORDS.items()
     ]
-    return found
+    by_name = _peers()
+    return [replace(r, held_against=by_name.get(r.name, _BY_HAND)) for r in found]
+
+
+_BY_HAND = "its diagram's equations, by hand"
+
+
+def _peers() -> dict[str, str]:
+    """What parts were compared with beside their diagrams, by the record's name."""
+    path = Path(__file__).with_name("held_against.toml")
+    table: dict[str, str] = tomllib.loads(path.read_text(encoding="utf-8"))
+    return {name: peer for peer, names in table.items() for name in names.split()}
 
 
 _KINDS = {

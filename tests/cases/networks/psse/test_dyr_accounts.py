@@ -15,6 +15,8 @@ from orchestrator.cases.networks.psse.unused_models import unused_models
 from orchestrator.cases.networks.record_use import UseOfRecord, in_one_line
 from orchestrator.cases.networks.unit_row import UnitRow
 from orchestrator.core.errors import InputError
+from tests.benchmarks.andes_records import RECORDS
+from tests.models.test_psse_traces import RECORDED
 
 MACHINES = [
     Machine(bus, "1 ", 10 + bus, 100.0 * bus, 1.0, 500.0, 0.2j, -99.0, 99.0) for bus in (1, 2, 3)
@@ -71,16 +73,16 @@ def test_models_that_are_missing_are_one_table(tmp_path):
     )
 
 
-@pytest.mark.parametrize("leaving_out", [(), ("GENTPJ1",)])
+@pytest.mark.parametrize("leaving_out", [(), ("GENQEC1",)])
 def test_a_machines_own_record_is_never_offered_to_go(tmp_path, leaving_out):
-    text = refusal(tmp_path, CLASSICAL.replace("3 'GENCLS'", "3 'GENTPJ1'"), leaving_out)
-    assert "line 3: no part of ours stands for GENTPJ1, the machine itself (1 of 300 MW)" in text
+    text = refusal(tmp_path, CLASSICAL.replace("3 'GENCLS'", "3 'GENQEC1'"), leaving_out)
+    assert "line 3: no part of ours stands for GENQEC1, the machine itself (1 of 300 MW)" in text
     assert "--dyr-leave-out" not in text
     assert "has no record of a machine" not in text  # one cause, one problem
 
 
 def test_a_machine_that_a_converter_replaces_needs_no_record(tmp_path):
-    records = read(tmp_path, CLASSICAL.replace("3 'GENCLS'", "3 'GENTPJ1'"))
+    records = read(tmp_path, CLASSICAL.replace("3 'GENCLS'", "3 'GENQEC1'"))
     assert set(machine_models(records, MACHINES, (), {(3, "1")})) == {(1, "1"), (2, "1")}
 
 
@@ -131,8 +133,25 @@ def test_the_page_has_the_table():
     page = (Path(__file__).parents[4] / ".docs/reference/dynamics-records.md").read_text("utf-8")
     rows = [line for line in page.splitlines() if line.startswith("|")][2:]
     assert rows == [
-        f"| {r.name} | {r.kind} | `{r.part}` | {r.approximated} |" for r in known_records()
+        f"| {r.name} | {r.kind} | `{r.part}` | {r.held_against} | {r.approximated} |"
+        for r in known_records()
     ]
+
+
+def test_each_record_says_what_it_was_held_against():
+    """Recordings and another program's eigenvalues are those of the tests that have them."""
+    against = {record.name: record.held_against for record in known_records()}
+    assert against["WEHGOV"] == "its diagram's equations, by hand"
+    recorded = {
+        line.split()[1]
+        for known in RECORDED.values()
+        for line in known.records.splitlines()
+        if line
+    }
+    assert recorded <= {name for name, peer in against.items() if peer == "PSS/E's recordings"}
+    listed = {record.split()[0] for records in RECORDS.values() for record in records}
+    computed = {name for name, peer in against.items() if peer == "eigenvalues of ANDES 2.0.0"}
+    assert computed == {name for name in listed if name not in recorded}
 
 
 def test_a_stabilizer_without_an_exciter_is_idle_and_said_so():
