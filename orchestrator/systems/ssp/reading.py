@@ -128,17 +128,38 @@ def _conversion(
     """Factor and offset of a value on its way from an FMU's output to another's input.
 
     Each connector that states a unit has the value in that unit. Without a statement at either side of a stretch, and
-    over a connection that suppresses the conversion, the value stays as it is."""
-    factor, offset, unit = 1.0, 0.0, _unit_inside(structure, ends[0], fmus)
+    over a connection that suppresses the conversion, the value stays as it is. A connection's own transformation comes
+    behind the conversion, at an FMU's connector behind that into the FMU's unit."""
+    way, unit = (1.0, 0.0), _unit_inside(structure, ends[0], fmus)
     for step in structure.ways[ends]:
         name = structure.units.get(step.connector, "")
         stated = name, structure.definitions.get(name)
+        if not name and step.connector == ends[1]:
+            stated = _unit_inside(structure, ends[1], fmus)
         if step.as_it_is:
             # whatever arrives counts in the next unit that somebody states
             unit = stated
-        elif name:
-            (factor, offset), unit = _then((factor, offset), unit, stated), stated
-    return _then((factor, offset), unit, _unit_inside(structure, ends[1], fmus))
+        elif stated[0]:
+            way, unit = _then(way, unit, stated), stated
+        if step.transformed is not None:
+            _check_transformed(ends, fmus)
+            factor, offset = step.transformed
+            way = factor * way[0], factor * way[1] + offset
+    return _then(way, unit, _unit_inside(structure, ends[1], fmus))
+
+
+def _check_transformed(
+    ends: tuple[Node, Node], fmus: Mapping[Owner, FmuDescription | None]
+) -> None:
+    """Refuse a factor and an offset between variables of which one is no Real."""
+    for owner, variable in ends:
+        fmu = fmus[owner]
+        info = None if fmu is None else fmu.variables.get(variable)
+        if info is not None and info.type != "Real":
+            raise InputError(
+                f"it has a LinearTransformation, which is of Real values, and {_text((owner, variable))} is "
+                f"{info.type}; remove it, or let a component convert"
+            )
 
 
 _Unit = tuple[str, Mapping[str, str] | None]  # name and definition; no name where none is stated

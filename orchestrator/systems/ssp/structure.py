@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from math import isfinite
 from xml.etree.ElementTree import Element
 
 from orchestrator.core.errors import InputError
@@ -33,10 +34,14 @@ _REFUSED = {
 
 @dataclass(frozen=True)
 class Step:
-    """A connector on the way of a value; ``as_it_is``: whether the value gets there without a conversion."""
+    """A connector on the way of a value.
+
+    ``as_it_is``: whether the value gets there without a conversion of its unit.
+    ``transformed``: factor and offset by which the connection to it changes the value, after the conversion."""
 
     connector: Node
     as_it_is: bool = False
+    transformed: tuple[float, float] | None = None
 
 
 @dataclass
@@ -79,6 +84,8 @@ class _Reader:
         self._kinds: dict[Node, str] = {}
         self._feeding: dict[Node, Node] = {}
         self._unconverted: set[Node] = set()  # ends of connections that suppress the conversion
+        # factor and offset of connections with a transformation, by their end
+        self._transformed: dict[Node, tuple[float, float]] = {}
         self._given: dict[Node, SspValue] = {}
 
     def read(self, system: Element) -> Structure:
@@ -145,17 +152,14 @@ class _Reader:
     def _connection(self, connection: Element, owner: Owner) -> None:
         ends = [self._end(connection, end, owner) for end in ("start", "end")]
         text = " - ".join(map(_text, ends))
-        change = next(
-            (e.tag.rpartition("}")[2] for e in connection if e.tag.endswith("Transformation")), None
-        )
+        try:
+            transformed = _transformation(connection)
+        except InputError as error:
+            self._note(f"connection {text}", str(error))
+            return
         missing = [node for node in ends if node not in self._kinds]
         sources = [node for node in ends if self._sends(node, owner)]
-        if change:
-            self._note(
-                f"connection {text}",
-                f"it has a {change}, which is not supported; do it inside a component",
-            )
-        elif missing:
+        if missing:
             self._note(
                 f"connection {text}",
                 f"there is no connector {' and no '.join(map(_text, missing))}",
@@ -170,6 +174,8 @@ class _Reader:
             (source,), (sink,) = sources, [node for node in ends if node not in sources]
             if connection.get("suppressUnitConversion") in ("true", "1"):
                 self._unconverted.add(sink)
+            if transformed is not None:
+                self._transformed[sink] = transformed
             if self._feeding.setdefault(sink, source) != source:
                 self._note(
                     f"connection {text}",
@@ -196,9 +202,18 @@ class _Reader:
             ends.append(source)
             last, source = source, self._feeding.get(source)
         if source is not None:
-            way = [Step(node, node in self._unconverted) for node in reversed(ends)]
+            way = [
+                Step(node, node in self._unconverted, self._transformed.get(node))
+                for node in reversed(ends)
+            ]
             self._structure.ways[source, sink] = (Step(source), *way)
             self._structure.connections.append((source, sink))
+        elif last in self._given and any(node in self._transformed for node in ends):
+            self._note(
+                f"connection to {_text(sink)}",
+                f"it transforms the value that is given to {_text(last)}, which is not supported; give it to "
+                f"{_text(sink)} as that takes it",
+            )
         elif last in self._given:
             self._structure.values[sink[0]].setdefault(sink[1], self._given[last])
 
@@ -268,6 +283,41 @@ def _inside(system: Element, owner: Owner) -> Iterator[tuple[Element, Owner]]:
         for element in group:
             if element.tag in (tag("ssd:Component"), tag("ssd:System")):
                 yield element, (*owner, element.get("name", ""))
+
+
+_LINEAR = "LinearTransformation"
+_MAPPINGS = (
+    "BooleanMappingTransformation, IntegerMappingTransformation, EnumerationMappingTransformation"
+)
+
+
+def _transformation(connection: Element) -> tuple[float, float] | None:
+    """Factor and offset of a connection; None without a transformation.
+
+    Raises
+    ------
+    InputError
+        If it is none of numbers by a factor and an offset, or one of these is no finite number."""
+    kinds = {e.tag.rpartition("}")[2]: e for e in connection if e.tag.endswith("Transformation")}
+    if not kinds:
+        return None
+    other = next((kind for kind in kinds if kind != _LINEAR), None)
+    if other is not None:
+        raise InputError(
+            f"it has a {other}, which is not supported, as no {_MAPPINGS} is; do it inside a component"
+        )
+    given = kinds[_LINEAR]
+    try:
+        factor, offset = float(given.get("factor", "1")), float(given.get("offset", "0"))
+    except ValueError as error:
+        raise InputError(
+            f"its {_LINEAR} holds what is no number: {error}; export it again"
+        ) from error
+    if not (isfinite(factor) and isfinite(offset)):
+        raise InputError(
+            f"its {_LINEAR} has factor {factor} and offset {offset}, which must be finite; export it again"
+        )
+    return factor, offset
 
 
 def _text(node: Node) -> str:

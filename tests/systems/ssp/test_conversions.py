@@ -45,7 +45,7 @@ DEFINED = (
 )
 
 
-def gains(tmp_path, given, needed, attributes="", ports=("", ""), around=""):
+def gains(tmp_path, given, needed, attributes="", ports=("", ""), around="", inside=""):
     """5 · 2 in the unit ``given`` into a gain of 3 whose input is in ``needed``; ``ports``: units of the connectors."""
     parts = [
         f'<ssd:Component name="{name}" source="resources/gain.fmu"><ssd:Connectors>'
@@ -55,7 +55,7 @@ def gains(tmp_path, given, needed, attributes="", ports=("", ""), around=""):
             ("b", ports[1], bindings(values(K=3.0))),
         )
     ]
-    top = system("top", parts, [wire("a.y", "b.u", attributes=attributes)])
+    top = system("top", parts, [wire("a.y", "b.u", inside, attributes)])
     after = f"<ssd:Units>{around}</ssd:Units>" * bool(around) + experiment("0.01", OSP_STEP)
     path = write(tmp_path / "gains.ssp", top, after, models=["gain"])
     changes = (
@@ -131,6 +131,52 @@ def test_a_converted_system_comes_back_from_its_own_export(tmp_path):
     path, out = gains(tmp_path, "kW", "W"), tmp_path / "again.ssp"
     assert main(["export", "ssp", str(path), "--out", str(out)]) == 0
     assert response(prepared(out))[1]["b.y"] == pytest.approx(30e3, rel=1e-12)
+
+
+LINEAR = '<ssc:LinearTransformation factor="-2" offset="7"/>'
+
+
+@pytest.mark.parametrize(
+    ("units", "attributes", "inside", "arrives"),
+    [
+        (("kW", "kW"), "", LINEAR, -2 * 10 + 7),
+        # the unit comes first, so that the offset is in the one that is needed
+        (("kW", "W"), "", LINEAR, -2 * 10e3 + 7),
+        (("kW", "W"), 'suppressUnitConversion="true"', LINEAR, -2 * 10 + 7),
+        (("Grad", "K"), "", '<ssc:LinearTransformation offset="0.5"/>', 205.5),
+        (("kW", "kW"), "", "<ssc:LinearTransformation/>", 10.0),
+    ],
+)
+def test_a_connections_own_transformation_comes_behind_the_conversion(
+    tmp_path, units, attributes, inside, arrives
+):
+    path = gains(tmp_path, *units, attributes, inside=inside)
+    assert response(prepared(path))[1]["b.y"][-1] == pytest.approx(3 * arrives, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("inside", "said"),
+    [
+        ('<ssc:LinearTransformation factor="INF"/>', "must be finite"),
+        (
+            '<ssc:IntegerMappingTransformation><ssc:MapEntry source="1" target="2"/>'
+            "</ssc:IntegerMappingTransformation>",
+            "IntegerMappingTransformation, which is not supported",
+        ),
+    ],
+)
+def test_a_transformation_that_cannot_be_is_one_problem(tmp_path, inside, said):
+    with pytest.raises(CosimError) as caught:
+        prepared(gains(tmp_path, "kW", "kW", inside=inside))
+    assert "1 problem\n" in str(caught.value)
+    assert said in str(caught.value)
+
+
+def test_a_transformation_of_a_whole_number_is_refused(tmp_path, whole):
+    path = wholes(tmp_path / "t.ssp", whole, [("m", "n")], inside=LINEAR)
+    with pytest.raises(CosimError) as caught:
+        prepared(path)
+    assert "LinearTransformation, which is of Real values, and a.m is Integer" in str(caught.value)
 
 
 def test_modes_see_a_conversion(tmp_path, capsys):
@@ -212,8 +258,8 @@ def whole(tmp_path_factory):
     return path
 
 
-def wholes(path, fmu, wires, **given):
-    """Two of them, a and b; ``given``: values of a."""
+def wholes(path, fmu, wires, inside="", **given):
+    """Two of them, a and b; ``inside``: of each connection; ``given``: values of a."""
     ports = "".join(
         f'<ssd:Connector name="{name}" kind="{kind}"><ssc:{form.replace("Enumeration", "Integer")}/></ssd:Connector>'
         for name, (kind, form, *_) in VARIABLES.items()
@@ -223,7 +269,7 @@ def wholes(path, fmu, wires, **given):
         "</ssd:Component>"
         for name, bound in (("a", bindings(values(**given)) if given else ""), ("b", ""))
     ]
-    top = system("top", parts, [wire(f"a.{source}", f"b.{sink}") for source, sink in wires])
+    top = system("top", parts, [wire(f"a.{source}", f"b.{sink}", inside) for source, sink in wires])
     return write(path, top, models=[], **{"whole__fmu": fmu.read_bytes()})
 
 

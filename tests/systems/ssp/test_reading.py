@@ -380,7 +380,11 @@ def test_outputs_that_are_no_real_numbers_are_not_recorded(tmp_path):
 
 # -- what is refused -------------------------------------------------------------------------------
 
-TRANSFORMED = wire("a.y", "b.u", '<ssc:LinearTransformation factor="2"/>')
+MAPPED = (
+    '<ssc:BooleanMappingTransformation><ssc:MapEntry source="true" target="false"/>'
+    "</ssc:BooleanMappingTransformation>"
+)
+TRANSFORMED = wire("a.y", "b.u", MAPPED)
 DICTIONARY = '<ssd:SignalDictionaries><ssd:SignalDictionary name="bus"/></ssd:SignalDictionaries>'
 SCALED = (
     '<ssd:ParameterMapping><ssm:ParameterMapping version="1.0"><ssm:MappingEntry source="gain" target="gain">'
@@ -391,7 +395,10 @@ SCALED = (
 @pytest.mark.parametrize(
     ("top", "words"),
     [
-        (system("top", IN_RING, [TRANSFORMED]), ["connection a.y - b.u", "LinearTransformation"]),
+        (
+            system("top", IN_RING, [TRANSFORMED]),
+            ["connection a.y - b.u", "BooleanMappingTransformation"],
+        ),
         (system("top", IN_RING, after=DICTIONARY), ["element bus", "signal dictionary"]),
         (
             system("top", [*IN_RING, '<ssd:SignalDictionaryReference name="r" dictionary="bus"/>']),
