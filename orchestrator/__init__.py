@@ -1,6 +1,6 @@
 """Co-simulation of grid-forming converters: ``import orchestrator as gfor``.
 
-A name is imported where it is first used, so that ``import orchestrator`` takes no time; ``__init__.pyi`` lists them.
+A name is imported where it is first used, so that ``import orchestrator`` takes no time.
 
 Examples
 --------
@@ -9,21 +9,52 @@ Examples
 >>> axes = scenario.modes().plot()
 """
 
-import re
 from difflib import get_close_matches
 from importlib import import_module
-from pathlib import Path
 
 from orchestrator.former_paths import install
 
-_STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
-_HOMES = {
-    name: home
-    for home, name in re.findall(
-        r"^from orchestrator\.(\S+) import \S+ as (\S+)$", _STUB, re.MULTILINE
-    )
+_NAMES = {
+    "cases.scenario.short_circuit": "BusStrength",
+    "core.errors": "CosimError",
+    "face.api.acceptance": "Acceptance check",
+    "face.api.admittance": "Admittance admittance",
+    "face.api.binding": "bind",
+    "face.api.case": "Case built_in_cases load",
+    "face.api.certification": "IssuedCertificate certify verify",
+    "face.api.comparison": "compare",
+    "face.api.comtrade": "export_comtrade",
+    "face.api.export": "export",
+    "face.api.fmu": "Fmu FmuInfo info open_fmu",
+    "face.api.identification": "ambient identify",
+    "face.api.linear": "LinearSystem read_linear_model",
+    "face.api.models": "build",
+    "face.api.nyquist": "nyquist",
+    "face.api.results": "Modes Run",
+    "face.api.saved": "Saved open",
+    "face.api.scenario": "CheckpointWarning RunEndedWarning Scenario UnusualDataWarning",
+    "face.api.source": "source",
+    "face.api.validation": "validate",
+    "linear.spectra.modes": "Mode",
+    "linear.spectra.stability": "Stability",
+    "studies.certification.compared": "Verification",
+    "studies.coordinated_design.view": "CoordinatedDesign",
+    "studies.immittance.view": "Nyquist",
+    "studies.interactions.view": "Interactions",
+    "studies.modes.step_choice": "StepChoice",
+    "studies.oscillations.view": "Sources",
+    "studies.pod_design.view": "ControllerDesign",
+    "studies.screening.view": "Screening",
+    "studies.sensitivities.view": "Sensitivities",
+    "studies.signals.signal_modes": "RunComparison SignalModes",
+    "studies.siting.view": "Siting",
+    "studies.sweep.view": "ParameterSweep",
+    "studies.validation.view": "Validation",
 }
-"""Name → module of this package that defines it, as ``__init__.pyi`` has them."""
+"""Module of this package → the public names that it defines; ``__init__.pyi`` says the same to type checkers."""
+
+_HOMES = {name: home for home, names in _NAMES.items() for name in names.split()}
+"""Public name → module that defines it."""
 
 __all__ = [*_HOMES]  # noqa: PLE0604 - names all the same
 
