@@ -24,6 +24,7 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.scenario.short_circuit import source_impedance
 from orchestrator.core.errors import InputError, Problem, few
 from orchestrator.core.question_kinds import by_kind
+from orchestrator.core.uncollected import uncollected
 from orchestrator.core.units import to_unit
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.devices.fmi.description import FmuDescription
@@ -146,6 +147,7 @@ def read_converter(text: str) -> WantedConverter:
     return WantedConverter(found["bus"], rating, power, found.get("less"), replaces)
 
 
+@uncollected()
 def write_case(wanted: WantedCase) -> NewCase:
     """Compose a case, with the questions about its data as comments at their lines.
 

@@ -13,6 +13,7 @@ import pytest
 
 import orchestrator
 from orchestrator.cases.case import load_case
+from orchestrator.cases.flow import limits
 from orchestrator.core.errors import CosimError
 from tests.cases.networks.psse import raw, records
 from tests.cases.networks.psse.test_devices import GNE, MULTI, lines_of
@@ -128,6 +129,11 @@ GALLERY = {
     "no reference": Broken(
         "without which PSS/E solves nothing",
         changed(NINE, ("1,'BUS 1     ',16.5,3", "1,'BUS 1     ',16.5,2")),
+    ),
+    "signal of another bus": Broken(
+        "is taken at another bus than the machine's own",
+        NINE,
+        DYR + SEXS + "2 'IEEEST' 1 2 5 0 0 0 0 0 0 0.1 0.1 0 0 0 1 10 0.1 -0.1 0 0 /\n",
     ),
     "no reference in MATPOWER": Broken(
         "that feeds what is left, such as",
@@ -451,11 +457,28 @@ _REMEDY = re.compile(
 _ELSEWHERE = (
     "`gfor fmu bind` drafts one",  # tests/devices/binding/test_draft.py
     "give that to --dll",  # tests/vendor_dll
-    "reactive_limits = false in [power_flow]",  # for a power flow that swings from limit to limit
+    "reactive_limits = false in [power_flow]",  # in the next test
+    "write --models phasor, or leave it out",  # tests/cases/new/test_moved_controls.py
+    "of a RAW file, and the network is",  # as above
     "a system of its own, with a reference of its own",  # tests/cases/networks/psse/test_studied_parts.py
     "study each on its own",  # tests/cases/networks/cgmes/test_cgmes.py, by the same function
 )
 """Remedies that other tests type, or that no small network asks for."""
+
+
+def test_limits_that_do_not_settle_are_not_kept_as_the_message_says(gfor, tmp_path, monkeypatch):
+    """A power flow that goes from limit to limit needs many buses: here one round is too many."""
+    file, case = tmp_path / "grid.raw", tmp_path / "case.toml"
+    file.write_text(changed(NINE, ("163.0,0,300,-300", "163.0,0,5,-5")))
+    monkeypatch.setattr(limits, "_ROUNDS", 1)
+    code, _, err = gfor("new", str(file), "--reactive-limits", "--out", str(case))
+    assert code == 2
+    assert "'bus_2'; widen their limits, or write reactive_limits = false in [power_flow]" in err
+    assert not gfor("new", str(file), "--out", str(case))[0]
+    case.write_text(with_key(case.read_text(), "power_flow", "reactive_limits", "false"))
+    code, told = answers(case)
+    assert code == 0
+    assert "limits of reactive power" not in " ".join(told)
 
 
 def texts_of(path):
