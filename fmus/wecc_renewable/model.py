@@ -21,7 +21,7 @@ from fmus.toolchain.symbols import Expr, fmax
 from fmus.toolchain.variables import usual_beside
 from fmus.wecc_renewable.electrical import Electrical, commands, declare_electrical
 from fmus.wecc_renewable.injection import Injection, declare_injection
-from fmus.wecc_renewable.plant import plant_references
+from fmus.wecc_renewable.plant import Measured, measured_elsewhere, plant_references
 from fmus.wecc_renewable.signals import LEAST_VOLTAGE, References, Terminal
 
 S_N, P_0 = 100.0, 0.8  # defaults of rating [MVA] and power [pu]
@@ -53,7 +53,16 @@ def regca1_repca1_phasor() -> Model:
     return _closed(m, with_plant=True)
 
 
-def _closed(m: ModelBuilder, *, with_plant: bool) -> Model:
+def regca1_repca1_remote_phasor() -> Model:
+    """REGCA1 with REECA1 or REECB1, behind a REPCA1 that measures at another point of the network."""
+    title = (
+        "Plant of REGCA1 with REECA1 or REECB1 and a REPCA1 that measures elsewhere (phasor type)"
+    )
+    m = phasor_builder("regca1_repca1_remote_phasor", title, kind="converter", usual=USUAL)
+    return _closed(m, with_plant=True, measures_elsewhere=True)
+
+
+def _closed(m: ModelBuilder, *, with_plant: bool, measures_elsewhere: bool = False) -> Model:
     port = device_port(m, S_n=S_N, P_0=P_0)
     text = (
         "Reactance of the port, across which the current is fed; it changes nothing in steady state"
@@ -65,7 +74,11 @@ def _closed(m: ModelBuilder, *, with_plant: bool) -> Model:
     seen = extrapolated_voltage(m, port, master)
     seen.follow(m, port.v)
     plant = _declared(m, port, seen)
-    references = _references(m, plant, with_plant=with_plant)
+    references = (
+        _references_of_plant(m, plant, measures_elsewhere=measures_elsewhere)
+        if with_plant
+        else _constant_references(m, plant)
+    )
     with m.scope("electrical"):
         active, reactive = commands(m, plant.terminal, plant.electrical, references)
     plant.injection.follow(m, active, reactive)
@@ -116,11 +129,19 @@ def _declared(m: ModelBuilder, port: DevicePort, seen: ExtrapolatedVoltage) -> _
     return _Plant(port, seen, injection, terminal, electrical)
 
 
-def _references(m: ModelBuilder, plant: _Plant, *, with_plant: bool) -> References:
+def _references_of_plant(m: ModelBuilder, plant: _Plant, *, measures_elsewhere: bool) -> References:
+    t, start = plant.terminal, plant.electrical.references
+    with m.scope("plant"):
+        point = (
+            measured_elsewhere(m, plant.port.current_scale)
+            if measures_elsewhere
+            else Measured(t.size, t.P, t.Q, t.size_0, t.P_0, t.Q_0)
+        )
+        return plant_references(m, point, plant.seen, plant.port.omega_b, start)
+
+
+def _constant_references(m: ModelBuilder, plant: _Plant) -> References:
     start = plant.electrical.references
-    if with_plant:
-        with m.scope("plant"):
-            return plant_references(m, plant.terminal, plant.seen, plant.port.omega_b, start)
     change_P = m.parameter(
         "delta_Pref", 0, "pu", "Change of the active power's reference", base="S_n", tunable=True
     )

@@ -5,25 +5,28 @@
     Fflag:   P_ref − P behind Tp, + Ddn·(1 − f) or Dup·(1 − f) beyond fdbd1…fdbd2 → within femin…femax
              → Kpg + Kig/s within Pmin…Pmax → 1/(1+s·Tg) → P reference; else it is constant
 
-Ddn acts above rated frequency, Dup below. Below Vfrz the integrator of the upper part waits. The point is the
-converter's own terminal, as in PSS/E where the record names neither a bus nor a branch.
+Ddn acts above rated frequency, Dup below. Below Vfrz the integrator of the upper part waits. The point is a bus and a
+branch of the network; the converter's own terminal, as in PSS/E, where the record names neither. The frequency is that
+of the terminal.
 
 Source: WECC's specification of REPC_A (EPRI, 2013), and its "Solar Plant Dynamic Modeling Guidelines" (2014)."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from fmus.converter_parts.bus_voltage import ExtrapolatedVoltage
 from fmus.synchronous_generator.data_lines import Given, declared, number, power, pu, seconds
 from fmus.toolchain.blocks import clamp, lead_lag, low_pass, low_pass_or_nothing
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.port_variables import SYSTEM_BASE
 from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else
 from fmus.wecc_renewable.signals import (
+    LEAST_VOLTAGE,
     ROUNDING,
     SOURCE,
     Controller,
     References,
-    Terminal,
     controlled,
     dead_band,
 )
@@ -65,15 +68,56 @@ SWITCHES: Mapping[str, str] = {
     "Fflag": "Active power is controlled, with frequency; else its reference is constant",
 }
 
+
+LEAST_LAG = 1e-3
+"""Least lag [s] of what is measured elsewhere: no output follows an input at once."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Voltage [pu] and power [pu, S_n] at the measured point, and the operating point's."""
+
+    v: Expr
+    P: Expr
+    Q: Expr
+    v_0: Scalar
+    P_0: Scalar
+    Q_0: Scalar
+    has_inputs: bool = False
+
+    def filter(self, m: ModelBuilder, name: str, u: Expr, T: Expr, *, initial: Scalar) -> Expr:
+        """Return a signal behind its lag; what comes from the network keeps one of `LEAST_LAG`."""
+        if self.has_inputs:
+            return low_pass(m, name, u, fmax(T, LEAST_LAG), initial)
+        return low_pass_or_nothing(m, name, u, T, initial)
+
+
+def measured_elsewhere(m: ModelBuilder, current_scale: Expr) -> Measured:
+    """Declare the inputs of a point of the network; ``current_scale``: S_n by the base of the system."""
+    v = m.input("v", "pu", "Voltage magnitude at the measured bus", base="bus", start=1.0)
+    v_0 = m.parameter("v_0", 1.0, "pu", "Power flow: voltage at the measured bus", base="bus")
+    turned = m.switch("reversed", False, "The end that is measured is where p and q leave")
+    toward = if_else(turned, -1, 1) / current_scale
+    P, Q = (
+        m.input(name, "pu", f"{text} power into the measured branch", base=SYSTEM_BASE) * toward
+        for name, text in (("p", "Active"), ("q", "Reactive"))
+    )
+    P_0, Q_0 = (
+        m.parameter(name, 0.0, "pu", f"Power flow: {text} power into it", base=SYSTEM_BASE) * toward
+        for name, text in (("p_0", "active"), ("q_0", "reactive"))
+    )
+    return Measured(v, P, Q, v_0, P_0, Q_0, has_inputs=True)
+
+
 _LEAST_SQUARE = 1e-4  # of a voltage [pu²], below which no frequency is told from it
 
 
 def plant_references(
-    m: ModelBuilder, t: Terminal, seen: ExtrapolatedVoltage, omega_b: Expr, start: References
+    m: ModelBuilder, t: Measured, seen: ExtrapolatedVoltage, omega_b: Expr, start: References
 ) -> References:
     """Declare the controller; return the references that it sets.
 
-    ``seen``: the voltage at the point, for its frequency; ``start``: references of the operating point."""
+    ``seen``: the terminal's voltage, for its frequency; ``start``: references of the operating point."""
     flags = {name: m.switch(name, False, text) for name, text in SWITCHES.items()}
     p = declared(m, LINES, SOURCE)
     change_Q, change_V, change_P = (
@@ -81,19 +125,19 @@ def plant_references(
         for name, base in (("Qref", "S_n"), ("Vref", "bus"), ("Pref", "S_n"))
     )
     regulated, regulated_0 = (
-        _regulated(p, flags["VCFlag"], v, i, Q)
-        for v, i, Q in ((t.v, t.i, t.Q), (t.v_0, t.i_0, t.Q_0))
+        _regulated(p, flags["VCFlag"], *point)
+        for point in ((t.v, t.P, t.Q), (Expr(t.v_0), t.P_0, t.Q_0))
     )
-    v = low_pass_or_nothing(m, "V_filtered", regulated, p.Tfltr, regulated_0)
-    Q = low_pass_or_nothing(m, "Q_filtered", t.Q, p.Tfltr, t.Q_0)
+    v = t.filter(m, "V_filtered", regulated, p.Tfltr, initial=regulated_0)
+    Q = t.filter(m, "Q_filtered", t.Q, p.Tfltr, initial=t.Q_0)
     error = if_else(flags["RefFlag"], regulated_0 + change_V - v, t.Q_0 + change_Q - Q)
     limited = clamp(dead_band(error, p.dbd1, p.dbd2), p.emin, p.emax)
     least, most = _around(m, start.Q, (p.Qmin, p.Qmax), Expr(1.0))
-    how = Controller(p.Kp, p.Ki, least, most, 1.0, t.size < p.Vfrz)
+    how = Controller(p.Kp, p.Ki, least, most, 1.0, t.v < p.Vfrz)
     of_voltage = controlled(m, "Q_control", limited, how, initial=start.Q)
     reactive = lead_lag(m, "lead_lag", of_voltage, p.Tft, p.Tfv, start.Q)
 
-    measured = low_pass_or_nothing(m, "P_filtered", t.P, p.Tp, t.P_0)
+    measured = t.filter(m, "P_filtered", t.P, p.Tp, initial=t.P_0)
     away = 1 - _frequency(m, seen, omega_b, p.T_f)
     beyond = dead_band(away, p.fdbd1, p.fdbd2)
     droop = p.Dup * fmax(beyond, 0) + p.Ddn * fmin(beyond, 0)
@@ -116,10 +160,11 @@ def _around(
     return fmin(low, start), fmax(high, start)
 
 
-def _regulated(p: Given, compensates: Expr, v: Phasor, i: Phasor, Q: Scalar) -> Expr:
+def _regulated(p: Given, compensates: Expr, v: Expr, P: Scalar, Q: Scalar) -> Expr:
     """Voltage that is controlled [pu]."""
-    inside = (v - Phasor(p.Rc, p.Xc) * i).magnitude()
-    return if_else(compensates, inside, v.magnitude() + p.Kc * Q)
+    current = Phasor(P, -Q) / fmax(v, LEAST_VOLTAGE)  # in the frame of v
+    inside = (Phasor(v, 0.0) - Phasor(p.Rc, p.Xc) * current).magnitude()
+    return if_else(compensates, inside, v + p.Kc * Q)
 
 
 def _frequency(m: ModelBuilder, seen: ExtrapolatedVoltage, omega_b: Expr, T: Expr) -> Expr:

@@ -10,6 +10,7 @@ from orchestrator.cases.form.build_choices import Layer
 from orchestrator.cases.form.parameter_files import ParameterFile
 from orchestrator.cases.form.schema import CaseTable, ComponentTable, EventTable, ScenarioTable
 from orchestrator.cases.networks.data import NetworkData
+from orchestrator.cases.networks.measured_point import MeasuredPoint
 from orchestrator.cases.networks.record_use import RecordUse
 from orchestrator.core.errors import MOST_PROBLEMS, TOO_MANY, CaseError, ErrorKind, Problem
 from orchestrator.systems.coupling.system import System
@@ -97,6 +98,8 @@ class Draft:
     reactive_limits: dict[str, tuple[float, float]] = field(default_factory=dict)
     # least and most active power of a unit in sharing [MW], by component.
     active_limits: dict[str, tuple[float, float]] = field(default_factory=dict)
+    # where units measure that do not at their own terminal
+    measured: dict[str, MeasuredPoint] = field(default_factory=dict)
     # what the units fed before an outage that they share; None without one
     dispatch: Dispatch | None = None
     # voltages before an outage [pu], at which loads that follow the voltage draw what is set

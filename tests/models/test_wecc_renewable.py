@@ -8,7 +8,11 @@ import pytest
 from scipy.optimize import fsolve
 
 from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
-from fmus.wecc_renewable.model import regca1_phasor, regca1_repca1_phasor
+from fmus.wecc_renewable.model import (
+    regca1_phasor,
+    regca1_repca1_phasor,
+    regca1_repca1_remote_phasor,
+)
 from orchestrator.cases.networks.psse.dyr import machine_models
 from orchestrator.cases.networks.psse.dyr_records import read_dyr
 from orchestrator.cases.networks.psse.raw import Machine
@@ -308,6 +312,8 @@ def test_a_record_has_the_fields_of_the_program():
     numbers = {"REGCA1": 1 + 14, "REECA1": 6 + 45, "REECB1": 5 + 25, "REPCA1": 7 + 27}
     assert {name: len(record.fields) for name, record in PLANT_RECORDS.items()} == numbers
     known = {v.name for v in regca1_repca1_phasor().parameters}
+    elsewhere = {v.name for v in regca1_repca1_remote_phasor().parameters}
+    assert elsewhere - known == {f"plant.{name}" for name in ("v_0", "p_0", "q_0", "reversed")}
     for record in PLANT_RECORDS.values():
         assert {p for field in record.fields for p in field.parameters} <= known
         assert {*record.without} <= known

@@ -31,6 +31,7 @@ LEAFLETS = {
     "csvgn1_phasor": ROOT / "fmus" / "static_var" / "README.md",
     "regca1_phasor": ROOT / "fmus" / "wecc_renewable" / "README.md",
     "regca1_repca1_phasor": ROOT / "fmus" / "wecc_renewable" / "README.md",
+    "regca1_repca1_remote_phasor": ROOT / "fmus" / "wecc_renewable" / "README.md",
     "infinite_bus": ROOT / "fmus" / "infinite_bus" / "README.md",
     "test_bench": ROOT / "fmus" / "test_bench" / "README.md",
     "probe_a": ROOT / "fmus" / "probe" / "README.md",

@@ -68,6 +68,7 @@ ALL_PATHS_OPEN = {
     "csvgn1_phasor": {"communication_step": 5e-3, "R": 0.01},
     "regca1_phasor": _PLANT_OPEN,
     "regca1_repca1_phasor": _PLANT_OPEN,
+    "regca1_repca1_remote_phasor": _PLANT_OPEN,
     "regfm_a1_phasor": {
         "communication_step": 5e-3,
         "RL": 0.01,

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from orchestrator.cases.networks.measured_point import MeasuredPoint
 from orchestrator.core.errors import InputError
 
 _MOST_VOLTAGE = 2.0  # largest voltage [pu] that a unit can hold
@@ -43,6 +44,7 @@ class UnitRow:
     p_max_mw: float = math.inf
     # likely rating [MVA] if rating_mva is only the base of the machine's data; otherwise None
     likely_mva: float | None = None
+    measured: MeasuredPoint | None = None  # where it measures; None for its own terminal
     is_infinite: bool = (
         False  # whether the source has no such unit, and an infinite bus stands there
     )

@@ -13,6 +13,7 @@ from orchestrator.cases.form.schema import UnitReconnectionTable
 from orchestrator.cases.networks.controls import Control
 from orchestrator.cases.questions.plausibility import question
 from orchestrator.cases.scenario.flow_units import note_contradictions, undecided_units
+from orchestrator.cases.scenario.measured_points import start_measured_points
 from orchestrator.cases.scenario.start_values import (
     FollowingLoad,
     is_connected,
@@ -83,6 +84,7 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
         kind = ErrorKind.VALUES if error.kind is ErrorKind.INPUT else error.kind
         draft.note(draft.given.place("power_flow"), f"scenario {draft.given.name!r}: {error}", kind)
         return None
+    start_measured_points(draft, flow)
     question(draft, undecided)
     draft.found.questions += [*_limit_questions(draft, flow), *_voltage_questions(draft, flow)]
     # else what it fed before is shared

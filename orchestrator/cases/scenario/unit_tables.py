@@ -115,6 +115,8 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
                 draft.origins[name] = UnitOrigin(
                     row.place or draft.given.place("units"), of_row, key, row.lines, likely
                 )
+                if row.measured is not None:
+                    draft.measured[name] = row.measured
                 draft.active_limits[name] = share * row.p_min_mw, share * row.p_max_mw
     return components
 

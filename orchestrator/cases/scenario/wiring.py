@@ -5,6 +5,7 @@ from difflib import get_close_matches
 
 from fmus.toolchain.catalogue import model_names
 from orchestrator.cases.draft import Draft
+from orchestrator.cases.scenario.measured_points import measured_sources
 from orchestrator.core.errors import InputError, Problem, few
 
 _PHASOR_PORT = ("e_re", "e_im", "y_re", "y_im")  # what a device gives to a network of phasors
@@ -151,6 +152,8 @@ def _connect_to_bus(draft: Draft, name: str, bus: str, taken: list[str]) -> None
             _try_connect(draft, f"{draft.grid}.{bus}.v_{part}", f"{name}.v_{part}", where)
         for variable in taken if name not in draft.found.misfits else ():
             _try_connect(draft, f"{name}.{variable}", f"{draft.grid}.{name}.{variable}", where)
+        for output, variable in measured_sources(draft, name, bus):
+            _try_connect(draft, output, variable, where)
 
 
 def _try_connect(draft: Draft, source: str, target: str, where: str, way: _Way = _PLAIN) -> None:

@@ -1,6 +1,7 @@
 """PSS/E dynamics data (DYR): machines with their controls, and converters, of the generators of a RAW file."""
 
 import dataclasses
+import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,6 +17,7 @@ from fmus.synchronous_generator.dyr_fields import (
 )
 from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
 from orchestrator.cases.form.remedies import APPROXIMATING, replacement_of, without_models
+from orchestrator.cases.networks.measured_point import MeasuredPoint
 from orchestrator.cases.networks.psse.dyr_records import EVENT, DynamicRecord, given_values
 from orchestrator.cases.networks.psse.missing_models import (
     OF_MACHINES,
@@ -38,6 +40,9 @@ _COUPLED = {record.part for record in REGFM_A1_RECORDS.values()}
 _OF_CONVERTERS = ("converter", "electrical", "plant")
 """Kinds of records that a converter is made of."""
 
+MEASURING_ELSEWHERE = "regca1_repca1_remote_phasor"
+"""The model of a plant whose controller measures at another point of the network."""
+
 MANUAL = "manual"
 """The exciter without a regulator, on which neither a stabiliser nor a compensator acts."""
 
@@ -48,6 +53,7 @@ WITHOUT_INERTIA = {"machine.H": 0.0, "machine.D": 0.0}
 COMPENSATION = ("exciter.R_C", "exciter.X_C")
 """Parameters of an exciter that a compensator's record sets."""
 
+_PLACES = 4  # first values of REPCA1: the bus and the branch that are measured
 _MOST_SHOWN = 20
 _SAME = 1e-3  # part by which two figures for one reactance may differ: files round them
 
@@ -72,6 +78,7 @@ class MachineModel:
     replaced: tuple[tuple[int, str], ...] = ()
     partial: bool = False
     lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
+    measured: MeasuredPoint | None = None
 
 
 def machine_models(
@@ -135,6 +142,7 @@ def machine_models(
     for key in (key for key, machine in at.items() if machine.is_infinite and not of[key]):
         parts[key]["machine"] = CLASSICAL
         values[key] |= WITHOUT_INERTIA
+    measured = _measured_points(of, parts, problems)
     following = _followed(of, left, problems, labels) if approximate else {}
     for key in following:
         parts[key]["converter"] = MODEL
@@ -164,9 +172,10 @@ def machine_models(
     open_ = {(record.bus, record.machine) for record in records if record.name in left}
     return following | {
         key: replace(
-            _model(at[key], parts[key], values[key], key in open_),
+            _model(at[key], parts[key], values[key], key in open_, measured.get(key)),
             lines=lines[key],
             replaced=tuple(_left_out_of_plant(parts[key], of[key], left)),
+            measured=measured.get(key),
             doubts=tuple(_doubts(at[key], of[key], values[key])),
         )
         for key in at
@@ -290,6 +299,44 @@ def _unfit(
                 f"machine {name!r} at bus {bus} has no record of a machine; add one, or write "
                 f"{replacement_of(labels[bus, name])}, and a converter of ours stands there"
             )
+
+
+def _measured_points(
+    of: Mapping[tuple[int, str], Sequence[DynamicRecord]],
+    parts: Mapping[tuple[int, str], Mapping[str, str]],
+    problems: list[str],
+) -> dict[tuple[int, str], MeasuredPoint]:
+    """Return where the controllers of plants measure that do not at their own terminal."""
+    found: dict[tuple[int, str], MeasuredPoint] = {}
+    for key, record in ((key, r) for key, own in of.items() for r in own if r.name == PLANT):
+        if "plant" in parts[key] and len(record.values) >= _PLACES:
+            try:
+                point = _measured_point(record, key[0])
+            except InputError as error:
+                problems.append(str(error))
+                continue
+            found |= {key: point} if point is not None else {}
+    return found
+
+
+def _measured_point(record: DynamicRecord, own_bus: int) -> MeasuredPoint | None:
+    """Return where a plant's controller measures; None at its own terminal."""
+    numbers = []
+    for name, text in zip(("BUSR", "BUS1", "BUS2"), record.values, strict=False):
+        if not re.fullmatch(r"\d{1,9}", text):
+            raise InputError(
+                f"{record.place}: {record.name} has {name} = {text!r}; it must be the number of a bus, or 0"
+            )
+        numbers.append(int(text))
+    bus, near, far = numbers
+    if bool(near) != bool(far):
+        raise InputError(
+            f"{record.place}: {record.name} has BUS1 = {near} and BUS2 = {far}; give both ends of it, or 0 twice"
+        )
+    found = MeasuredPoint(
+        0 if bus == own_bus else bus, near, far, record.values[3].strip(), record.place
+    )
+    return None if found.is_own else found
 
 
 def _incomplete(machine: str, own: Mapping[str, str], unit: str) -> Iterator[str]:
@@ -419,13 +466,18 @@ def _sets(name: str) -> set[str]:
 
 
 def _model(
-    machine: Machine, parts: Mapping[str, str], values: Mapping[str, float], partial: bool
+    machine: Machine,
+    parts: Mapping[str, str],
+    values: Mapping[str, float],
+    partial: bool,
+    measured: MeasuredPoint | None,
 ) -> MachineModel:
     if "converter" in parts:
         own = dict(values)
         if parts["converter"] in _COUPLED:
             own = {"RL": machine.source.real, "XL": machine.source.imag, **values}
-        return MachineModel({}, own, parts.get("plant", parts["converter"]))
+        model = parts.get("plant", parts["converter"])
+        return MachineModel({}, own, MEASURING_ELSEWHERE if measured is not None else model)
     source = {"machine.R_s": machine.source.real}
     if parts["machine"] == CLASSICAL:
         source["machine.X_d1"] = machine.source.imag

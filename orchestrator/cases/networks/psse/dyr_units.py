@@ -222,6 +222,7 @@ def with_records(
                     parameters=own,
                     converter=model.converter,
                     replaced=model.replaced,
+                    measured=model.measured,
                     lines=model.lines,
                 )
             )

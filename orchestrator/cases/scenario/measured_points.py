@@ -1,0 +1,102 @@
+"""Points of the network at which the controllers of plants measure: their connections and their start values."""
+
+from dataclasses import dataclass
+
+from orchestrator.cases.draft import Draft
+from orchestrator.cases.flow.balance import FlowLine
+from orchestrator.cases.flow.power_flow import PowerFlow
+from orchestrator.cases.form.remedies import without_models
+from orchestrator.cases.networks.data import bus_name
+from orchestrator.cases.networks.measured_point import MeasuredPoint
+from orchestrator.core.errors import InputError
+
+PLANT = "REPCA1"
+INPUTS = ("plant.v", "plant.p", "plant.q")
+"""Inputs of a plant that measures elsewhere: voltage [pu], active and reactive power [pu, 100 MVA]."""
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A measured point in the network: a bus, and a line, None for the unit's own power; ``is_far``: the end of the
+    line that is measured is the one that its power does not enter at."""
+
+    bus: str
+    line: str | None = None
+    is_far: bool = False
+
+
+def measured_sources(draft: Draft, name: str, own_bus: str) -> list[tuple[str, str]]:
+    """Return the grid's outputs and the unit's inputs that they feed; none for a unit that measures at its terminal.
+
+    What cannot be found in the network is noted."""
+    point = draft.measured.get(name)
+    if point is None or draft.grid is None:
+        return []
+    try:
+        found = _find(draft, point, own_bus)
+    except InputError as error:
+        draft.note(point.place, f"{name}: {error}")
+        draft.found.refused_inputs.update(f"{name}.{variable}" for variable in INPUTS)
+        return []
+    if found.is_far:
+        draft.system.components[name].parameters["plant.reversed"] = True
+    of_power = found.line or name
+    outputs = (f"{found.bus}.v", f"{of_power}.p", f"{of_power}.q")
+    return [
+        (f"{draft.grid}.{output}", f"{name}.{variable}")
+        for output, variable in zip(outputs, INPUTS, strict=True)
+    ]
+
+
+def start_measured_points(draft: Draft, flow: PowerFlow) -> None:
+    """Set the start values of all units that measure elsewhere."""
+    if draft.network is None:
+        return
+    buses = {port.name: port.bus for port in draft.network.ports}
+    lines = {line.name: line for line in flow.lines}
+    for name, point in draft.measured.items():
+        if name not in draft.system.components:
+            continue
+        plan = draft.system.components[name]
+        found = _find(draft, point, buses[name])
+        if found.line is None:
+            power = flow.powers[name] * plan.number("S_n") / plan.number("S_base")
+        else:
+            power = _entering(lines[found.line], flow)
+        plan.parameters |= {
+            "plant.v_0": abs(flow.voltages[found.bus]),
+            "plant.p_0": power.real,
+            "plant.q_0": power.imag,
+        }
+
+
+def _entering(line: FlowLine, flow: PowerFlow) -> complex:
+    """Power that enters a line without its charging [pu, 100 MVA], as the grid's models give it."""
+    v = flow.voltages[line.from_bus]
+    into, _ = line.powers(v, flow.voltages[line.to_bus])
+    return complex(into + 1j * line.charging[0] * abs(v) ** 2)
+
+
+def _find(draft: Draft, point: MeasuredPoint, own_bus: str) -> _Found:
+    assert draft.network is not None
+    bus = bus_name(str(point.bus)) if point.bus else own_bus
+    remedy = f"correct it, or write {without_models([PLANT])}, and the references are constant"
+    if bus not in draft.network.buses:
+        raise InputError(
+            f"{PLANT} measures at bus {point.bus}, which the network has not; {remedy}"
+        )
+    if not point.near:
+        return _Found(bus)
+    ends = tuple(bus_name(str(number)) for number in (point.near, point.far))
+    names = draft.data.branch_names if draft.data else {}
+    between = [line for line in draft.network.lines if {line.from_bus, line.to_bus} == {*ends}]
+    of_circuit = [
+        line for line in between if line.name in names and names[line.name].circuit == point.circuit
+    ]
+    chosen = of_circuit or (between if len(between) == 1 else [])
+    if not chosen:
+        raise InputError(
+            f"{PLANT} measures the branch {point.near}-{point.far}, circuit {point.circuit!r}, which is no line or "
+            f"transformer of two windings of the network; {remedy}"
+        )
+    return _Found(bus, chosen[0].name, is_far=chosen[0].from_bus != ends[0])
