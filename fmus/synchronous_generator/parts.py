@@ -34,6 +34,7 @@ from fmus.synchronous_generator.machines.standard import (
 )
 from fmus.synchronous_generator.machines.type_j import gentpj
 from fmus.synchronous_generator.stabilization.bands import pss3b, pss4b
+from fmus.synchronous_generator.stabilization.damping import pod, pod_input
 from fmus.synchronous_generator.stabilization.legacy import iee2st, ieeest, st2cut, stab2a
 from fmus.synchronous_generator.stabilization.standard import pss1a, pss2a, pss2b, pss2c
 from fmus.synchronous_generator.turbines.diesel import degov, degov1
@@ -136,6 +137,8 @@ STABILIZERS: dict[str, Stabilizer | None] = {
     "st2cut": st2cut,
     "iee2st": iee2st,
     "stab2a": stab2a,
+    "pod": pod,
+    "pod_input": pod_input,
 }
 
 

@@ -49,10 +49,10 @@ def governor(name, values=None):
     return Evaluated(m.build(), {f"governor.{key}": value for key, value in (values or {}).items()})
 
 
-def stabilizer(name, values=None, *, sees_voltage=False, sees_all=False):
+def stabilizer(name, values=None, *, sees_voltage=False, sees_all=False, scope="pss"):
     """A stabiliser behind speed deviation and power; ``sees_voltage``: behind the voltage too.
 
-    ``sees_all``: behind the voltage, its phase [s] and the mechanical power too."""
+    ``sees_all``: behind the voltage, its phase [s] and the mechanical power too; ``scope``: of its parameters."""
     m = ModelBuilder("alone", "The stabiliser alone")
     speed, power = (
         m.input("speed", "pu", "w − 1", base="f_n"),
@@ -68,7 +68,7 @@ def stabilizer(name, values=None, *, sees_voltage=False, sees_all=False):
     assert part is not None
     shaft = Shaft(1 + speed, Expr(0.8), power, Expr(0.8), v_t, Expr(V_T), phase, P_m, Expr(100))
     m.output("v_s", part(m, shaft), "pu", "Signal", base="S_n")
-    return Evaluated(m.build(), {f"pss.{key}": value for key, value in (values or {}).items()})
+    return Evaluated(m.build(), {f"{scope}.{key}": value for key, value in (values or {}).items()})
 
 
 def integrated(model, inputs, end, step=1e-3, x=None):

@@ -275,3 +275,31 @@ def test_a_generator_with_it_starts_in_steady_state(name, factory):
     device = Evaluated(factory(exciter="st1a", stabilizer=name), AT_BUS)
     assert not refused(device)
     assert max(map(abs, device.rates([BUS.real, BUS.imag]).values())) < 1e-8
+
+
+DAMPING = {"K": 12.0, "T_W": 4.0, "T_f": 0.03, "T_S1": 0.25, "T_S2": 0.06, "limit": 9.0}
+
+
+@HERTZ
+@pytest.mark.parametrize("stages", range(4))
+@pytest.mark.parametrize("name", ["pod", "pod_input"])
+def test_a_pod_at_a_machine_is_a_converters(name, stages, hertz):
+    """Washout, low pass, as many leads and lags, and the gain; of the speed, or of the frequency at its input."""
+    s, p = 2j * np.pi * hertz, DAMPING
+    alone = stabilizer(name, p | {"enabled": 1, "N_S": stages}, sees_all=True, scope="pod_q")
+    rest = [*AT, V_T, 0.0, 0.8, *([1.0] if name == "pod_input" else [])]
+    assert not refused(alone)
+    assert max(map(abs, alone.rates(rest).values())) < 1e-12
+    wanted = p["K"] * washout(p, s, "T_W") / (1 + s * p["T_f"])
+    wanted *= lead(p, s, "T_S1", "T_S2") ** stages
+    response = alone.response(s, rest)
+    taken = "omega_pod" if name == "pod_input" else "speed"
+    assert response["v_s", taken] == pytest.approx(wanted, rel=1e-9)
+    assert {key for key, value in response.items() if value} == {("v_s", taken)}
+
+
+def test_a_pod_at_a_machine_is_off_until_it_is_enabled_and_stays_within_its_limit():
+    values = {"limit": 0.04, "K": 100.0}
+    for enabled, wanted in ((0, 0.0), (1, 0.04)):
+        alone = stabilizer("pod", values | {"enabled": enabled}, scope="pod_q")
+        assert alone.outputs([0.0, 0.8], alone.x + 0.1)["v_s"] == wanted

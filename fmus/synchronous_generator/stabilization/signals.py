@@ -77,7 +77,7 @@ def _signal(m: ModelBuilder, shaft: Shaft, name: str, number: Expr, T_f: Expr) -
         now += if_else(chosen, value, 0)
         steady += if_else(chosen, start, 0)
         known = logic_or(known, chosen)
-    m.require(if_else(known, 1, -1), f"pss.{name} must be a whole number")
+    m.require(if_else(known, 1, -1), f"{number.name()} must be a whole number")
     return now, steady
 
 
