@@ -192,7 +192,8 @@ def _figures(v: PointVerdict) -> Iterator[str]:
 
 
 GB, ALL = "gb", "all"
-_CODES = (*WITH_VERDICT, GB)
+FREQUENCY = "frequency"  # the name of voltage source behaviour in frequency, among the codes
+_CODES = (*WITH_VERDICT, GB, FREQUENCY)
 LISTED = ", ".join(map(in_words, _CODES))  # as the help of ``--code`` names them
 
 

@@ -11,6 +11,7 @@ from orchestrator.face.cli.arguments import (
 )
 from orchestrator.face.cli.certificate import (
     ALL,
+    FREQUENCY,
     GB,
     LISTED,
     codes_of,
@@ -18,6 +19,7 @@ from orchestrator.face.cli.certificate import (
     run_one,
     run_stiffness,
 )
+from orchestrator.face.cli.certify_frequency import run_frequency
 from orchestrator.face.cli.certify_matrix import run_matrix
 from orchestrator.face.cli.certify_sensitivities import (
     add_sensitivity_arguments,
@@ -45,11 +47,13 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("the converter is missing: gfor certify FILE.fmu")
     check_sensitivity_options(options, codes_of(options.code), NTS631)
     devices = devices_of(options.fmu, options.binding, options.set)
-    if options.into and (len(devices) > 1 or options.code in (GB, ALL)):
+    if options.into and (len(devices) > 1 or options.code in (GB, FREQUENCY, ALL)):
         raise InputError(
             "--into: it takes one device's certificate by one code with a verdict; for another code "
             "repeat the command with the same --into"
         )
+    if options.code == FREQUENCY:
+        return run_frequency(options, devices)
     if options.code == GB and len(devices) == 1:
         return run_stiffness(options, devices[0])
     several = len(devices) > 1 or options.code == ALL

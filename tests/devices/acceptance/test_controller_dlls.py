@@ -326,6 +326,6 @@ def test_check_goes_on_with_the_fmu_around_a_dll_that_keeps_the_interface(writte
     )
 
 
-def test_a_check_of_dlls_is_refused_for_an_fmu():
+def test_a_check_of_dlls_is_refused_for_an_fmu(tmp_path):
     with pytest.raises(InputError, match="is of controller DLLs"):
-        gfor.check(gfor.build("infinite_bus"), only=["dll_states"])
+        gfor.check(gfor.build("infinite_bus", tmp_path), only=["dll_states"])

@@ -164,7 +164,7 @@ def test_the_page_has_the_codes_that_there_are():
     assert said == {
         key: (row._WORDS[key]["where"], f"{row._WORDS[key]['f_n']:g}") for key in row._WORDS
     }
-    assert set(row._WORDS) == {*KNOWN, NTS.key, "gb"}
+    assert set(row._WORDS) == {*KNOWN, NTS.key, "gb", "frequency"}
 
 
 @pytest.mark.parametrize(
