@@ -5,7 +5,9 @@ import pytest
 
 from orchestrator.simulation.watch.confirmation import KnownModes
 from orchestrator.simulation.watch.response import unsettled_response
+from orchestrator.simulation.watch.seen import MOST_LOOKS, Seen, look_every
 from orchestrator.simulation.watch.stretches import Stretch
+from orchestrator.simulation.watch.watch import _not_finite
 from tests.simulation.watch.seen import seen_of, system
 
 PI = np.pi
@@ -106,3 +108,16 @@ def test_what_is_beside_the_point_is_not_told():
     assert found(a=lambda t: 0.01 * np.maximum(t - EVENT, 0)) == []
     assert found(a=lambda t: 0.3 * (t > EVENT) * (1 - np.exp(-(t - EVENT) / 30))) == []
     assert found(stop=1.2, a=response(0.5, 9.0)) == []  # too short to say
+
+
+def test_one_look_that_is_no_number_is_told_with_its_time():
+    seen = Seen(0.5 * np.arange(4), {"a.b.x": np.array([0.0, 1.0, np.nan, 2.0])}, {}, {}, {}, {})
+    (found,) = _not_finite(seen)
+    assert (found.time, found.component, found.variable) == (1.0, "a", "b.x")
+    assert "(nan) at t = 1 s, and so in 1 of 4 looks" in found.message
+
+
+def test_a_long_run_is_not_looked_at_more_often_than_can_be_kept():
+    assert look_every(1e-3, 1, 10.0) == 5
+    assert look_every(1e-3, 4, 10.0) == 4
+    assert look_every(1e-3, 1, 1e4) == 1e7 / MOST_LOOKS

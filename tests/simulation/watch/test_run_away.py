@@ -1,9 +1,11 @@
 """Speeds and voltages that run away without swinging, and what settles however slowly."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from orchestrator.simulation.watch import run_away
+from orchestrator.simulation.watch import run_away, watch
 from orchestrator.simulation.watch.finding import Finding
 from orchestrator.simulation.watch.run_away import still_moving_away
 from orchestrator.simulation.watch.settings import Settings
@@ -224,3 +226,29 @@ def test_a_voltage_that_collapses_is_told():
 def test_a_short_end_of_a_long_run_is_not_judged(monkeypatch):
     monkeypatch.setattr(run_away, "_speeds", lambda *_: iter([None]))
     assert still_moving_away(None, None, None, Stretch(19.9, 20.0)) == []
+
+
+class PartsError(Exception):
+    """The stretches in which something that runs away is looked for."""
+
+
+@pytest.mark.parametrize(
+    ("events", "begins"), [([0.5], [0.0, 0.5]), ([0.0, 0.5], [0.0, 0.5]), ([], [0.0])]
+)
+def test_what_runs_away_is_looked_for_from_the_start_on(events, begins, monkeypatch):
+    def stop(seen, system, settings, parts, **_):
+        raise PartsError([part.begin for part in parts])
+
+    for name in ("undisturbed_motion", "lost_synchronism", "above_declared", "active_limits"):
+        monkeypatch.setattr(watch, name, lambda *_: ())
+    monkeypatch.setattr(watch, "resting_signals", lambda *_: ())
+    monkeypatch.setattr(
+        watch, "stretches", lambda seen, names, times: [watch.Stretch(t, 2.0) for t in times]
+    )
+    monkeypatch.setattr(
+        watch, "Settings", lambda *_: SimpleNamespace(effective_times=lambda: events)
+    )
+    monkeypatch.setattr(watch, "run_away", stop)
+    with pytest.raises(PartsError) as found:
+        watch.judge_run(SimpleNamespace(times=np.arange(3.0)), None, ())
+    assert found.value.args == (begins,)

@@ -10,7 +10,7 @@ from orchestrator.devices.binding.misfits import Misfit
 from orchestrator.simulation.watch import synchronism
 from orchestrator.simulation.watch.seen import rescaled
 from orchestrator.simulation.watch.settings import Settings
-from orchestrator.simulation.watch.synchronism import lost_synchronism
+from orchestrator.simulation.watch.synchronism import _forget_turns_off_the_grid, lost_synchronism
 from orchestrator.systems.coupling.events import ParameterChange
 from tests.simulation.watch.seen import foreign_fmu, seen_of, source_fmu, units
 from tests.support import vendor
@@ -161,3 +161,10 @@ def test_a_unit_counts_with_its_rating_at_the_start(known, value):
         synchronism._start(SimpleNamespace(components={"a": plan}), settings, "a", "S_n", 100.0)
         == value
     )
+
+
+def test_turns_off_the_grid_are_taken_away_from_the_moment_of_its_return():
+    angles = np.array([[0.0, 0.0, 0.1, 0.1, 0.1], [0.2, 7.0, 13.0, 13.0, 13.2]])
+    on = np.array([[True] * 5, [True, False, False, True, True]])
+    _forget_turns_off_the_grid(angles, on)
+    assert angles[1] == pytest.approx([0.2, 7.0, 13.0, 13.0 - 4 * np.pi, 13.2 - 4 * np.pi])

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from orchestrator.simulation.watch.finding import Finding
 from orchestrator.simulation.watch.seen import Watcher
-from orchestrator.simulation.watch.undisturbed import undisturbed_motion
+from orchestrator.simulation.watch.undisturbed import Unrest, undisturbed_motion
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.recorder import Recorder
 from orchestrator.systems.coupling.schedule import jacobi
@@ -84,3 +85,13 @@ def test_fmus_whose_coupling_makes_them_grow():
     assert finding.figures["frequency_hz"] == pytest.approx(
         np.arctan(omega * H) / (2 * PI * H), rel=0.02
     )
+
+
+@pytest.mark.parametrize(
+    ("hertz", "explained"), [(1.0, True), (2.004, True), (1.5, False), (0.02, False), (0.4, False)]
+)
+def test_a_forcing_explains_its_frequency_and_multiples_alone(hertz, explained):
+    swings = Finding(
+        "sustained_oscillation", 0.0, "a", "x", "swings", None, {"frequency_hz": hertz}
+    )
+    assert Unrest(0.0, 9.0, "a.x", "forcing", 1.0).explains(swings) is explained

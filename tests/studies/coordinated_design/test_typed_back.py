@@ -7,6 +7,10 @@ import re
 import numpy as np
 import pytest
 
+from orchestrator.studies.coordinated_design.settings import PodGroup
+from orchestrator.studies.coordinated_design.study import values_of
+from orchestrator.studies.pod_design.closed_loop import PodSetting
+from orchestrator.studies.pod_design.lead_lag import LeadLag
 from tests.studies.screening.five_machines import five_machines
 
 REQUIRED = 60  # percent, which none of them reaches: so all that can be had is searched for
@@ -104,3 +108,19 @@ def test_each_gives_its_figure_and_both_designs_are_one(gfor, tmp_path, monkeypa
         [figure for figure, _ in found], abs=0.1
     )
     assert best == pytest.approx(told, abs=0.3)
+
+
+@pytest.mark.parametrize(("gain", "enabled"), [(0.0, False), (123.456789012, True)])
+def test_a_controller_without_gain_is_switched_off(gain, enabled):
+    setting = PodSetting(gain, LeadLag(T_S1=0.2, T_S2=0.05, N_S=2))
+    values = values_of([PodGroup("pod_p", ("gfor1", "gfor2"), ("gfor*",), 2)], [setting])
+    assert values["gfor*.pod_p.enabled"] is enabled
+    if not enabled:
+        assert set(values) == {"gfor*.pod_p.enabled"}, "no setting is written for nothing"
+        return
+    assert values["gfor*.pod_p.K"] == pytest.approx(gain, rel=1e-7)
+    assert (values["gfor*.pod_p.T_S1"], values["gfor*.pod_p.T_S2"], values["gfor*.pod_p.N_S"]) == (
+        0.2,
+        0.05,
+        2,
+    )

@@ -1,11 +1,14 @@
 """What a design over points comes to, from modes that are given."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from orchestrator.studies.coordinated_design import view
 from orchestrator.studies.coordinated_design.objective import Aim
 from orchestrator.studies.coordinated_design.point import PointModes
-from orchestrator.studies.coordinated_design.verdict import PointsVerdict, judged
+from orchestrator.studies.coordinated_design.verdict import PointsVerdict, judged, least_of
 from orchestrator.studies.coordinated_design.words import verdict_sentence
 from orchestrator.studies.operating_points.item import Status
 from orchestrator.studies.operating_points.outages import Outage
@@ -69,3 +72,43 @@ def test_a_setting_that_more_gain_spoils_has_no_margin(thin):
     assert said.startswith("REACHED: 10 %")
     assert ("; no margin: 9.57 % with gains of × 1.2" in said) is (thin == 0.0957)
     assert ("; no margin: another mode below its least damping" in said) is (thin == 0.12)
+
+
+def test_the_table_of_points_says_what_is_allowed_and_why_not():
+    modes = SimpleNamespace(computed=True, status="computed", warnings=("w",))
+    where = {"point": SimpleNamespace(name="p1", hours=2), "outage": SimpleNamespace(name="tie")}
+    point = SimpleNamespace(
+        **where,
+        before=modes,
+        after=modes,
+        stable=True,
+        target_before=None,
+        target=None,
+        least_before=None,
+        least=None,
+        worth=SimpleNamespace(allowed=False),
+        why_not="n",
+    )
+    table = view.points_table(SimpleNamespace(points=[point], names=(), some_apart=False))
+    assert {
+        c.name: c.cell(point)
+        for c in table.columns
+        if c.name in ("outage", "allowed", "why", "stable")
+    } == {"outage": "tie", "allowed": "false", "why": "n; w", "stable": "true"}
+
+
+@pytest.mark.parametrize(
+    ("others", "wanted"),
+    [
+        ((), 0.1),
+        ((PointModes(Status.COMPUTED, values=np.array([-0.5 + 5j, -0.5 - 5j])),), 0.1),
+        ((PointModes(Status.COMPUTED, values=np.array([0.5 + 5j, 0.5 - 5j])),), None),
+        ((PointModes(Status.POWER_FLOW),), None),
+    ],
+)
+def test_the_least_damping_needs_modes_at_every_point_and_no_growth(others, wanted):
+    damped = 5 * complex(-0.1, np.sqrt(1 - 0.1**2))
+    points = [PointModes(Status.COMPUTED, values=np.array([damped, damped.conjugate()])), *others]
+    aim = SimpleNamespace(names=(), least=0.05)
+    found = least_of(points, aim)
+    assert found == (None if wanted is None else pytest.approx(wanted, rel=0.01))

@@ -2,14 +2,16 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from orchestrator.core.errors import CosimError, InputError
+from orchestrator.core.errors import AnalysisError, CosimError, InputError
 from orchestrator.face.api.case import load
 from orchestrator.face.cli import main
 from orchestrator.linear.models.linearization import Blocks, compose
+from orchestrator.studies.modes import step_choice
 from orchestrator.studies.modes.modes import running
 from orchestrator.studies.modes.step_choice import Allowed, _doubts, choose_step, keeps_stability
 from orchestrator.systems.coupling.master import Master
@@ -157,3 +159,24 @@ def test_the_ring_down_of_a_run_is_the_mode_that_is_predicted():
     wanted = found.trials[0].eigenvalues[0]
     assert seen.frequency_hz == pytest.approx(wanted.imag / 6.283185307, abs=0.002)
     assert seen.damping_percent == pytest.approx(-100 * wanted.real / abs(wanted), abs=0.2)
+
+
+class TriedError(Exception):
+    """It went on."""
+
+
+@pytest.mark.parametrize(
+    ("schedule", "saves", "goes_on"),
+    [("newton", False, False), ("newton", True, True), ("gauss-seidel", False, True)],
+)
+def test_newton_alone_needs_components_that_save_their_state(schedule, saves, goes_on, monkeypatch):
+    def go_on(*_, **__):
+        raise TriedError
+
+    monkeypatch.setattr(step_choice, "Blocks", go_on)
+    component = SimpleNamespace(description=SimpleNamespace(can_save_state=saves))
+    prepared = SimpleNamespace(rescheduled=lambda name: SimpleNamespace(schedule=name))
+    with pytest.raises(TriedError if goes_on else AnalysisError):
+        step_choice._trial(
+            prepared, SimpleNamespace(components={"a": component}), schedule, 1e-3, np.zeros(0), 0.0
+        )

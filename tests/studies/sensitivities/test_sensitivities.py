@@ -1,5 +1,7 @@
 """Derivatives of modes by parameters: against formulas, against modes computed anew, and what makes them doubtful."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,8 @@ from fmus.toolchain.exporter import cached
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.python_fmu import PythonFmu
 from fmus.toolchain.symbols import fabs, fmin, sin
+from orchestrator.studies.sensitivities import sensitivities
+from orchestrator.studies.sensitivities.parameters import Parameter
 
 # Perturbed over a step of 1 ms, λ is right to about 1e-7 rad/s; over 2 % of 0.6 or of 0.1 that is what is allowed here.
 K, C = 25.0, 0.6
@@ -247,3 +251,13 @@ def test_a_limit_that_acts_is_doubted_in_the_rows_of_its_component(two_area):
     assert "edge of a limit" in " ".join(near["gfor.pod_p.K"].doubts)
     free = rows_of(two_area.scenario("pod_p").sensitivities(parameters=names, held=True))
     assert free["gfor.pod_p.K"].doubts == ()
+
+
+@pytest.mark.parametrize(("moved", "stays"), [(0.0, True), (5e-14, True), (5e-13, False)])
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e4])
+def test_what_moves_by_no_more_than_rounding_stays(size, moved, stays, monkeypatch):
+    """By rounding of its size, or of 1 where it is smaller."""
+    answers = [np.array([size]), *[np.array([size + moved * max(1.0, size)])] * 2]
+    monkeypatch.setattr(sensitivities, "_answer", lambda master, name: answers.pop(0))
+    monkeypatch.setattr(sensitivities, "changed", lambda *_: nullcontext())
+    assert sensitivities._stays(None, Parameter("a", "K", "pu", 2.0, tunable=True), 1) is stays

@@ -1,4 +1,4 @@
-"""What tables and records of a screening take from which place."""
+"""From which item and which place the tables, the page and the records of a screening take each figure."""
 
 from types import SimpleNamespace
 

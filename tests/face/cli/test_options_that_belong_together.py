@@ -1,4 +1,4 @@
-"""Refusals that ask for one of two options."""
+"""Options that need another one: refused, or told, before anything is computed."""
 
 from argparse import Namespace
 from pathlib import Path
