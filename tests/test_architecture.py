@@ -76,6 +76,7 @@ def modules():
     return found
 
 
+@cache  # a walk through all modules takes half a second
 def imported_names(tree):
     """Dotted names that a module imports anywhere."""
     names = set()
