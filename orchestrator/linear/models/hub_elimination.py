@@ -55,10 +55,10 @@ class HubEquations:
 
     @cached_property
     def into_hub(self) -> tuple[Places, Matrix]:
-        """Columns of R that are not zero, and their dense matrix: nearly full, as they are."""
+        """Columns of R that are not zero, and their dense matrix, column by column: nearly full, as they are."""
         R = self.quadrants[2]
         entered = np.unique(R.indices)
-        return entered, R[:, entered].toarray()
+        return entered, R[:, entered].toarray(order="F")
 
     def taken_in(self, x: Vector) -> Vector:
         """R·x, for x of shape (k,) or (k, c), complex or not."""
@@ -100,7 +100,7 @@ class HubEquations:
 
     def at(self, sigma: complex) -> "HubFactors | None":
         """Factorise at σ; None where σ is so close to an eigenvalue of a block that the answer would be inaccurate."""
-        P, Q, R, T = self.quadrants
+        P, Q, _, T = self.quadrants
         at_rest = sp.diags_array((self.rest < self.states).astype(float))
         try:
             blocks = spla.splu((P - sigma * at_rest).tocsc())
@@ -110,11 +110,21 @@ class HubEquations:
         among = np.flatnonzero(self.hub < self.states)
         schur[among, among] -= sigma
         inside = self._through_blocks(blocks, Q, schur.dtype)
-        schur -= (R @ inside).toarray(order="F")
+        self._take_in_columns(inside, schur)
         port = scipy.linalg.lu_factor(schur, overwrite_a=True, check_finite=False)
         factors = HubFactors(self, sigma, blocks, inside, port)
         trial = np.random.default_rng(1).standard_normal(self.states).astype(schur.dtype)
         return factors if factors.left_over(trial) <= _ACCURATE else None
+
+    def _take_in_columns(self, inside: sp.csc_array, schur: Matrix) -> None:
+        """Subtract R·inside in place: a few whole columns of R for each, as no sparse product takes them."""
+        entered, dense = self.into_hub
+        turned = sp.csr_array(inside[entered].T)
+        if not np.iscomplexobj(schur):
+            schur -= (turned @ dense.T).T
+            return
+        schur.real -= (turned.real @ dense.T).T
+        schur.imag -= (turned.imag @ dense.T).T
 
     def _through_blocks(
         self, blocks: spla.SuperLU, Q: sp.csc_array, kind: np.dtype
