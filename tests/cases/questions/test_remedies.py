@@ -192,7 +192,7 @@ GALLERY = {
         NINE,
         DYR + "2 'STAB1' 1  1.0 10.0  2.5 0.02  0.5555556 5.4  0.1 /\n",
     ),
-    "signal of another bus": Broken(
+    "signal of another bus behind lags": Broken(
         "which no part of ours does",
         NINE,
         DYR + SEXS + "2 'IEEEST' 1 2 5 0 0 0 0 0 0 0.1 0.02 0.1 0.02 10 10 20 0.1 -0.1 0 0 /\n",
