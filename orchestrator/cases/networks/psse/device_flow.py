@@ -225,7 +225,7 @@ class _Solution:
         if not is_solved or others or ending.bus in self._machines or ending.bus not in self._place:
             raise InputError(
                 f"line {device.line}: the file does not hold what the {device.section.upper()} device {device.name!r} "
-                f"feeds at bus {ending.bus}: its model is the user's, and "
+                f"feeds at bus {ending.bus}: only its solution tells it, and "
                 + ("something else stands there" if is_solved else "the file is not solved")
                 + f"; write {without_kinds([device.section])}, and put what it feeds or draws into loads"
             )

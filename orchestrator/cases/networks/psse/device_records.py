@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from orchestrator.cases.form.remedies import without_kinds
 from orchestrator.cases.networks.psse.bridges import Bridges
 from orchestrator.cases.networks.psse.devices import HeldDevice
-from orchestrator.cases.networks.psse.facts_devices import BYPASSED, IMPEDANCE, NORMAL, FactsDevice
+from orchestrator.cases.networks.psse.facts_devices import BYPASSED, IMPEDANCE, FactsDevice
 from orchestrator.cases.networks.psse.induction_machines import ABSENT, Circuit, InductionMachine
 from orchestrator.cases.networks.psse.multi_terminal import MultiTerminal, Terminal
 from orchestrator.cases.networks.psse.records import NODES, RawFile, Record, elements, first_of_gne
@@ -293,21 +293,24 @@ def _link(line: Record) -> tuple[int, int, float]:
     return line.whole(0, "IDC"), line.whole(1, "JDC"), ohm
 
 
-_SERIES_MODES = {4: "a constant series voltage"} | dict.fromkeys(
-    range(5, 9), "one of several devices that are linked (IPFC)"
-)
-"""Modes of a FACTS device's series part that are not read."""
+_FROM_SOLUTION = range(4, 9)
+"""Modes of a FACTS device's series part that only a solution tells: a constant voltage, and linked devices (IPFC)."""
 
 _MODES = 9  # of PSS/E, from 0
 
 
-def _facts(raw: RawFile, lines: Sequence[Record], places: Places) -> FactsDevice:
+def _facts(raw: RawFile, lines: Sequence[Record], places: Places) -> FactsDevice | UnknownDevice:
     (record,) = lines
     mode, far = record.whole(3, "MODE", 1), record.whole(2, "J", 0)
-    if mode not in ((NORMAL, BYPASSED, IMPEDANCE) if far else range(_MODES)):
+    if mode not in range(_MODES):
         raise record.error(
-            f"MODE is {mode}: {_SERIES_MODES.get(mode, 'no mode of PSS/E')}; 0 to 3 are read. Write "
-            f"{without_kinds(['facts device'])}, and put what it feeds or draws into loads"
+            f"MODE is {mode}: no mode of PSS/E, which has 0 to 8. Write {without_kinds(['facts device'])}, and put "
+            "what it feeds or draws into loads"
+        )
+    if far and mode in _FROM_SOLUTION:
+        buses = (_bus(record, 1, places), _bus(record, 2, places))
+        return UnknownDevice(
+            "facts device", record.line, record.text(0), place=raw.place, buses=buses, kind="facts"
         )
     held = record.number(6, "VSET", 1.0)
     if not 0 < held < 2:

@@ -177,7 +177,7 @@ _MULTI_TERMINAL = {
 
 _END_OF_CORRECTIONS = ("0", "0", "0")  # behind the last point of a table in a RAW file
 
-_SYNONYMS = {"scode": "sc", "dcode": "dc", "tcode": "tc", "bcode": "bc"}
+_SYNONYMS = {"scode": "sc", "dcode": "dc", "tcode": "tc", "bcode": "bc", "nbrdg": "n"}
 
 _WITHOUT_EFFECT = {
     "zone": "zone",

@@ -1,4 +1,7 @@
-"""Devices of which a file has only the solution: generic network elements (GNE), whose models the user writes."""
+"""Devices of which a file has only the solution.
+
+These are generic network elements (GNE), whose models the user writes, and FACTS devices whose series part is a
+voltage, or linked with others'."""
 
 from dataclasses import dataclass
 
@@ -11,6 +14,7 @@ class UnknownDevice(HeldDevice):
 
     place: str
     buses: tuple[int, ...]
+    kind: str = "gne"  # with which the names of its loads begin
 
     @property
     def places(self) -> tuple[int, ...]:
@@ -18,5 +22,5 @@ class UnknownDevice(HeldDevice):
 
     def endings(self, voltages: Voltages) -> tuple[DeviceEnd, ...]:
         return tuple(
-            DeviceEnd(self.ending_name("gne", bus), bus, is_unknown=True) for bus in self.buses
+            DeviceEnd(self.ending_name(self.kind, bus), bus, is_unknown=True) for bus in self.buses
         )

@@ -192,28 +192,36 @@ def test_a_bypassed_series_part_is_a_branch_and_an_impedance_too(read):
     assert (line.R, line.X) == (0.01, 0.2)
 
 
-def test_what_a_series_part_cannot_be_is_refused_with_a_remedy_that_works(read):
+@pytest.mark.parametrize("mode", range(4, 9))
+def test_a_series_voltage_and_linked_devices_feed_what_the_solution_lacks(read, mode):
+    """MODE 4 to 8: what the device does is not in its record; the file's solution tells what it fed at both ends."""
+    fed_there = {8: 12 - 7j, 5: -12 + 3j}
+    voltages, _ = solved(lambda _v, _q: fed_there)
+    found = records(33)
+    found["BUS"] = in_solution(found["BUS"], voltages)
+    record = UPFC[0].replace("{node}", "").replace("4,10,1", f"8,5,{mode}")
+    found["FACTS DEVICE"] = [record]
+    data = read(raw(33, found))
+    wanted = {f"facts_F_2_{bus}": pytest.approx(s, abs=1e-4) for bus, s in fed_there.items()}
+    assert fed(data) == wanted
+    assert data.misfit == ""
+
+
+def test_a_series_voltage_without_a_solution_is_refused_with_a_remedy_that_works(read):
     far = {"BUS": ["10,'FAR',230,1,1,1,1,1,0"], "BRANCH": ["10,5,'1 ',0.01,0.085,0"]}
     voltage = {**far, "FACTS DEVICE": [UPFC[0].replace("{node}", "").replace("4,10,1", "4,10,4")]}
-    with pytest.raises(InputError, match=r"MODE is 4: .* leave_out = \['facts device'\]"):
+    with pytest.raises(
+        InputError, match=r"file is not solved; write leave_out = \['facts device'\]"
+    ):
         read(voltage)
     assert not fed(read(voltage, leave_out=["facts device"]))
 
 
-@pytest.mark.parametrize(
-    ("mode", "far", "words"),
-    [
-        (4, 10, "a constant series voltage"),
-        (5, 10, "one of several devices that are linked"),
-        (8, 10, "one of several devices that are linked"),
-        (9, 10, "no mode of PSS/E"),
-        (9, 0, "no mode of PSS/E"),
-    ],
-)
-def test_a_mode_that_is_not_read_is_named(mode, far, words, read):
+@pytest.mark.parametrize("far", [10, 0])
+def test_a_mode_that_is_none_is_named(far, read):
     buses = {"BUS": ["10,'FAR',230,1,1,1,1,1,0"], "BRANCH": ["10,5,'1 ',0.01,0.085,0"]}
-    record = UPFC[0].replace("{node}", "").replace("4,10,1", f"4,{far},{mode}")
-    with pytest.raises(InputError, match=f"MODE is {mode}: {words}"):
+    record = UPFC[0].replace("{node}", "").replace("4,10,1", f"4,{far},9")
+    with pytest.raises(InputError, match="MODE is 9: no mode of PSS/E"):
         read({**buses, "FACTS DEVICE": [record]})
 
 
@@ -436,12 +444,13 @@ def test_terminals_of_a_dc_network_share_its_losses(metered, read):
         read({"MULTI-TERMINAL DC": lost})
 
 
-def test_rawx_has_the_same_multi_terminal_network_and_gne(tmp_path, read):
+@pytest.mark.parametrize("bridges", ["n", "nbrdg"])  # PSS/E 35 writes the latter
+def test_rawx_has_the_same_multi_terminal_network_and_gne(bridges, tmp_path, read):
     usual = fed(read({"MULTI-TERMINAL DC": [line.replace("{met}", "1,") for line in MULTI]}))
     rows = [[x.strip("'") for x in line.replace("{met}", "1,").split(",")] for line in MULTI]
     whole = network()
     whole["ntermdc"] = table("name nconv ndcbs ndcln mdc vconv vcmod vconvn", rows[:1])
-    names = "name ib n angmx angmn rc xc ebas tr tap tpmx tpmn tstp setvl dcpf marg cnvcod"
+    names = f"name ib {bridges} angmx angmn rc xc ebas tr tap tpmx tpmn tstp setvl dcpf marg cnvcod"
     whole["ntermdcconv"] = table(names, [["M 1", *row] for row in rows[1:4]])
     names = "name idc ib area zone dcname idc2 rgrnd owner"
     whole["ntermdcbus"] = table(names, [["M 1", *row] for row in rows[4:7]])
