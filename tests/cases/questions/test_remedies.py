@@ -130,11 +130,6 @@ GALLERY = {
         "without which PSS/E solves nothing",
         changed(NINE, ("1,'BUS 1     ',16.5,3", "1,'BUS 1     ',16.5,2")),
     ),
-    "signal of another bus": Broken(
-        "is taken at another bus than the machine's own",
-        NINE,
-        DYR + SEXS + "2 'IEEEST' 1 2 5 0 0 0 0 0 0 0.1 0.1 0 0 0 1 10 0.1 -0.1 0 0 /\n",
-    ),
     "no reference in MATPOWER": Broken(
         "that feeds what is left, such as",
         files={"three.m": changed(MPC, ("[1 3 0 0", "[1 2 0 0"))},
