@@ -6,9 +6,15 @@ import numpy as np
 import pytest
 
 import orchestrator as gfor
-from orchestrator.studies.black_box.frequency_response import Excitation
+from orchestrator.devices.binding.binding import bound_fmu
+from orchestrator.studies.black_box.frequency_response import Excitation, measure
+from orchestrator.studies.black_box.port import bench_at
 from orchestrator.studies.certification.codes import voltage_source
-from orchestrator.studies.certification.codes.frequency_domain import Stiffness, asked_stiffness
+from orchestrator.studies.certification.codes.frequency_domain import (
+    Stiffness,
+    asked_stiffness,
+    stiffness,
+)
 from orchestrator.studies.certification.codes.voltage_source import (
     AtPoint,
     OperatingPoint,
@@ -21,6 +27,7 @@ from orchestrator.studies.certification.codes.voltage_source import (
     verdict_of,
 )
 from orchestrator.studies.immittance.forms import powers_over
+from tests.studies.certification.codes.impostor import write_impostor
 
 F = np.geomspace(0.05, 300.0, 400)
 S = 2j * np.pi * F
@@ -127,6 +134,22 @@ def test_one_bad_point_is_enough_and_one_that_is_not_measured_leaves_no_verdict(
 def _gfor_command(request):
     """The command of the same name as the module that is imported here."""
     return request.getfixturevalue("gfor")
+
+
+SOFT = Excitation(lowest_hz=2.0, highest_hz=40.0, lines=12, settled=1e-3)
+
+
+def test_a_grid_following_one_with_a_virtual_inertia_is_none_at_any_operating_point(tmp_path):
+    description = bound_fmu(write_impostor(4.0, tmp_path), None)
+    for point in voltage_source.POINTS:
+        given = {"S_n": 100.0, "P_0": point.active, "Q_0": point.reactive, "v_0": point.voltage}
+        bench = bench_at(description, given, 1e-4)
+        response = measure(bench, SOFT)
+        found = springs(stiffness(response, complex(*bench.rest), RATED), RATED)
+        # more than without the inertia, whose power then opposes the angle by next to nothing
+        assert 0.5 < found.angle.value < found.asked.value
+        assert found.magnitude.value < 0.1
+        assert not found.met
 
 
 QUICK = Excitation(lowest_hz=5.0, highest_hz=400.0, lines=24, settled=1e-3)
