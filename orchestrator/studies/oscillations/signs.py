@@ -1,9 +1,13 @@
-"""Powers of a record beside what the case's units feed: signs that are turned, and other operating points."""
+"""Powers and angles of a record beside the case's own: turned signs, other units, other operating points."""
 
 from __future__ import annotations
 
+import cmath
+import math
 from collections.abc import Container, Iterator
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from orchestrator.studies.oscillations.measurements import Measurements, Site
 from orchestrator.studies.oscillations.models import UnitModels, fits, power_there
@@ -33,6 +37,72 @@ _UNITS = {
 def turned_signs(measured: Measurements, prepared: PreparedScenario) -> dict[str, str]:
     """A remark on each unit whose P is the case's own with its sign turned, by name of the unit."""
     return dict(_turned(measured, prepared))
+
+
+_THOUSAND = 1000.0
+_SAME_HOUR = 1.5
+"""Factor by which a power of another hour may be larger or smaller than the case's."""
+
+
+def other_units(measured: Measurements, prepared: PreparedScenario) -> dict[str, str]:
+    """A question on each unit whose P is 1000 times the case's, or a 1000th of it, by name of the unit."""
+    return dict(_scaled(measured, prepared))
+
+
+def _scaled(measured: Measurements, prepared: PreparedScenario) -> Iterator[tuple[str, str]]:
+    for place, own in _beside_the_case(measured, prepared):
+        seen = _megawatts(place, measured.base)
+        ratio = seen / own
+        if 1 / _SAME_HOUR < ratio * _THOUSAND < _SAME_HOUR:
+            amount, meant = "a 1000th of it", "labelled kW and in MW"
+        elif 1 / _SAME_HOUR < ratio / _THOUSAND < _SAME_HOUR:
+            amount, meant = "1000 times as much", "labelled MW and in kW"
+        else:
+            continue
+        yield (
+            place.name,
+            f"{place.name}: its P is {seen:+.4g} MW in the record and {own:+.4g} MW in the case, {amount}: is the "
+            f"column {meant}? Then correct the unit behind its name; as it stands, {seen:+.4g} MW are taken, of "
+            "another hour",
+        )
+
+
+_DEGREES = 180 / math.pi
+_LEAST_SPREAD = 0.02  # of the case's angles [rad]: smaller ones tell no unit
+_ANGLES_ALIKE = 0.8  # correlation from which on angles are the case's in another unit
+_ANGLES_NEAR = 2.0  # factor by which they may be larger or smaller in another hour
+
+
+def other_angles(measured: Measurements, prepared: PreparedScenario) -> list[str]:
+    """A question on angles between places that are the case's times 57.3, or over it."""
+    flow, network = prepared.power_flow, prepared.network
+    if flow is None or network is None:
+        return []
+    buses = {port.name.casefold(): port.bus for port in network.ports}
+    buses |= {bus.casefold(): bus for bus in flow.voltages}
+    pairs = [
+        (float(np.unwrap(place.angle).mean()), cmath.phase(flow.voltages[bus]))
+        for place in measured.places
+        if (bus := buses.get(place.bus.casefold())) in flow.voltages
+    ]
+    if len(pairs) < 2:
+        return []
+    seen, own = (np.array(each) - np.mean(each) for each in zip(*pairs, strict=True))
+    spread = float(np.ptp(own))
+    if spread < _LEAST_SPREAD or not float(np.ptp(seen)):
+        return []
+    alike = float(seen @ own) / float(np.linalg.norm(seen) * np.linalg.norm(own))
+    ratio = float(seen @ own) / float(own @ own)
+    if alike < _ANGLES_ALIKE:
+        return []
+    if not 1 / _ANGLES_NEAR < ratio * _DEGREES < _ANGLES_NEAR:
+        return []
+    there, here = _DEGREES * float(np.ptp(seen)), _DEGREES * spread
+    return [
+        f"angles between places go up to {there:.3g} degrees in the record and to {here:.3g} in the case, about 57.3 "
+        f"times as far: are columns labelled [deg] in radians? Then write [rad] behind their names; as they stand, "
+        f"{there:.3g} degrees are taken, of another hour"
+    ]
 
 
 def other_powers(
@@ -84,6 +154,20 @@ def _meaning(seen: complex, wanted: complex) -> str:
 
 
 def _turned(measured: Measurements, prepared: PreparedScenario) -> Iterator[tuple[str, str]]:
+    for place, own in _beside_the_case(measured, prepared):
+        seen = _megawatts(place, measured.base)
+        if abs(seen + own) < _ALIKE * abs(own):
+            yield (
+                place.name,
+                f"{place.name}: its P is {seen:+.4g} MW in the record and {own:+.4g} MW in the case: is the sign of "
+                "its P and Q turned? P and Q count into the grid; the energy that flows from it counts with this sign",
+            )
+
+
+def _beside_the_case(
+    measured: Measurements, prepared: PreparedScenario
+) -> Iterator[tuple[Site, float]]:
+    """Places of the case's units, each with what the unit feeds there [MW], as far as that is not about nothing."""
     if prepared.power_flow is None:
         return
     plans = prepared.system.components
@@ -94,13 +178,8 @@ def _turned(measured: Measurements, prepared: PreparedScenario) -> Iterator[tupl
     }
     for place in measured.places:
         own = fed.get(place.name.casefold()) if place.kind == "unit" else None
-        seen = _megawatts(place, measured.base)
-        if own is not None and abs(own) >= _LEAST_MW and abs(seen + own) < _ALIKE * abs(own):
-            yield (
-                place.name,
-                f"{place.name}: its P is {seen:+.4g} MW in the record and {own:+.4g} MW in the case: is the sign of "
-                "its P and Q turned? P and Q count into the grid; the energy that flows from it counts with this sign",
-            )
+        if own is not None and abs(own) >= _LEAST_MW:
+            yield place, own
 
 
 def _megawatts(place: Site, base: float) -> float:

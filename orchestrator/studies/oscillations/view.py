@@ -15,7 +15,12 @@ from orchestrator.output.report.tables import PlainTable, make_table
 from orchestrator.studies.oscillations.detection import SpectralLine
 from orchestrator.studies.oscillations.measurements import Measurements
 from orchestrator.studies.oscillations.reading import measurements_of
-from orchestrator.studies.oscillations.signs import other_powers, turned_signs
+from orchestrator.studies.oscillations.signs import (
+    other_angles,
+    other_powers,
+    other_units,
+    turned_signs,
+)
 from orchestrator.studies.oscillations.verdict import Located, locate
 
 if TYPE_CHECKING:
@@ -116,7 +121,11 @@ def sources_of(
         remark = f"the case's models judge nothing: no signal is named after its units, {', '.join(models.units)}"
         measured = replace(measured, remarks=(remark, *measured.remarks))
     turned = turned_signs(measured, prepared) if prepared else {}
+    if prepared:
+        turned |= other_units(measured, prepared)
     elsewhere = other_powers(measured, models, turned) if models else []
+    if prepared and "places" not in dataset.attrs:
+        elsewhere += other_angles(measured, prepared)
     measured = replace(measured, remarks=(*turned.values(), *elsewhere, *measured.remarks))
     located = locate(measured, models)
     if models and prepared:

@@ -83,6 +83,35 @@ def test_a_power_with_the_sign_turned_beside_the_case_is_remarked(measured):
     assert f"{power:+.4g} MW in the case" in remark
 
 
+def asked_of(gfor, path):
+    """Remarks on a record beside the case that it is of."""
+    _, out, _ = gfor("signal", "source", path, "--case", "two_area", "--scenario", "gfor", "--json")
+    return json.loads(out)["remarks"]
+
+
+def test_units_that_the_case_contradicts_are_asked_about(gfor, tmp_path, measured):
+    """MW in columns of kW, kW in columns of MW, and small radians in columns of degrees, which jump nowhere."""
+    degrees = 57.29577951308232
+    honest = asked_of(gfor, csv(tmp_path / "honest.csv", measured))
+    assert not any("?" in remark for remark in honest)
+    for units, powers, words in (
+        (("kW", "kvar"), 100, "a 1000th of it: is the column labelled kW and in MW?"),
+        (("MW", "Mvar"), 1e5, "1000 times as much: is the column labelled MW and in kW?"),
+    ):
+        path = csv(
+            tmp_path / "p.csv",
+            measured,
+            units=("pu", "deg", *units),
+            scale=(1, degrees, powers, powers),
+        )
+        asked = [remark for remark in asked_of(gfor, path) if words in remark]
+        assert {remark.partition(":")[0] for remark in asked} == {"sg1", "sg2", "gfor"}
+    path = csv(tmp_path / "angles.csv", measured, scale=(1, 1.0, 100, 100))
+    (asked,) = [remark for remark in asked_of(gfor, path) if "57.3 times" in remark]
+    assert "are columns labelled [deg] in radians? Then write [rad] behind their names" in asked
+    assert "0.1 degrees in the record and to 5.74 in the case" in asked
+
+
 @pytest.mark.parametrize(
     ("old", "new", "remarks"),
     [
