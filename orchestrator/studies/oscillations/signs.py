@@ -54,9 +54,11 @@ def _scaled(measured: Measurements, prepared: PreparedScenario) -> Iterator[tupl
         seen = _megawatts(place, measured.base)
         ratio = seen / own
         if 1 / _SAME_HOUR < ratio * _THOUSAND < _SAME_HOUR:
-            amount, meant = "a 1000th of it", "labelled kW and in MW"
+            amount = "a 1000th of it"
+            meant = "labelled kW and in MW"
         elif 1 / _SAME_HOUR < ratio / _THOUSAND < _SAME_HOUR:
-            amount, meant = "1000 times as much", "labelled MW and in kW"
+            amount = "1000 times as much"
+            meant = "labelled MW and in kW"
         else:
             continue
         yield (
