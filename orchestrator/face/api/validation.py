@@ -24,6 +24,7 @@ from orchestrator.studies.validation.record import PortBases
 from orchestrator.studies.validation.study import GivenRecording, ValidationRequest, validate_device
 from orchestrator.studies.validation.transformer import read_impedance
 from orchestrator.studies.validation.view import Validation
+from orchestrator.systems.coupling.step_awareness import STEP_PARAMETER
 
 _FMUS = (".fmu", ".dll", ".so", ".dylib", ".toml")
 _RATED_HZ = 50.0  # of a device that says nothing
@@ -253,7 +254,9 @@ def _of_case(
         )
     plan = plans[component]
     known = plan.description.variables
-    own = {k: v for k, v in plan.parameters.items() if k not in ("P_0", "Q_0", "v_0", "theta_0")}
+    # what the recording and the step of its own run say
+    others = ("P_0", "Q_0", "v_0", "theta_0", STEP_PARAMETER)
+    own = {k: v for k, v in plan.parameters.items() if k not in others}
     rating = plan.number("S_n") if "S_n" in known else 100.0
     rated_hz = plan.number("f_n") if "f_n" in known else _RATED_HZ
     held = {k: float(v) for k, v in plan.inputs.items() if k not in ("v_re", "v_im")}

@@ -25,7 +25,7 @@ Responses = Sequence[Complex]
 Errors = Callable[[Responses], Numbers]
 
 
-class Cause(StrEnum):
+class CauseKind(StrEnum):
     """Programs decide by it."""
 
     VALUE = "value"
@@ -40,7 +40,7 @@ class Explanation:
 
     ``now`` is None where the model has no such limit; ``noise``: the recordings' own scatter [pu of the rating]."""
 
-    cause: Cause
+    cause: CauseKind
     name: str
     unit: str
     now: float | bool | None

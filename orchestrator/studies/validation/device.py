@@ -18,6 +18,7 @@ from orchestrator.devices.fmi.instance import open_component
 from orchestrator.studies.black_box.bench import drive
 from orchestrator.studies.validation.averaging import averaged
 from orchestrator.studies.validation.record import Recording
+from orchestrator.systems.coupling.step_awareness import STEP_PARAMETER
 
 _VOLTAGE, _CURRENT = ("v_re", "v_im"), ("i_re", "i_im")
 _NAMES = (_VOLTAGE, _CURRENT)
@@ -91,7 +92,7 @@ class PlayedDevice:
         """Bring it to rest at the operating point, and let the recorded voltage drive it.
 
         The voltage of a step is that at its begin, as in a coupled run."""
-        values = {**self._start_values(start), **self.values}
+        values = {**self._told_step(), **self._start_values(start), **self.values}
         component = open_component("device", self.description, isolated=self.isolated)
         try:
             component.setup(0.0, None)
@@ -108,6 +109,12 @@ class PlayedDevice:
         rest = start.voltage * complex(*before[-1]).conjugate() * SYSTEM_BASE_MVA / self.rating
         settled_after = (len(before) - 1) * self.step_size
         return Played(driven, settled_after, rest, still=settled_after < _LONGEST_REST)
+
+    def _told_step(self) -> dict[str, float]:
+        """The communication step, for a device whose outputs are for the middle of the next one."""
+        info = self.description.variables.get(STEP_PARAMETER)
+        known = info is not None and info.causality == "parameter"
+        return {STEP_PARAMETER: self.step_size} if known else {}
 
     def _start_values(self, start: OperatingStart) -> dict[str, float]:
         """The power flow's values of a device; those that it does not know are left out."""

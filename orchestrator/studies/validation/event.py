@@ -67,6 +67,17 @@ class EventComparison:
     questions: tuple[Question, ...] = field(default=())
 
     @property
+    def largest_error(self) -> tuple[str, str, ErrorFigures]:
+        """Window, signal and figures of the largest error of P or Q."""
+        found = [
+            (window, signal, of[signal])
+            for window, of in self.errors.items()
+            for signal in ("p", "q")
+            if signal in of
+        ]
+        return max(found, key=lambda one: one[2].max_error)
+
+    @property
     def measured(self) -> dict[str, Numbers]:
         """The measured signals, by name [pu of the rating]."""
         return signals_of(self.event.recording.power, self.event.recording.voltage)

@@ -16,7 +16,7 @@ from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.errors import CosimError
 from orchestrator.devices.fmi.description import VariableInfo
 from orchestrator.studies.validation.causes import (
-    Cause,
+    CauseKind,
     Explanation,
     cap_of_current,
     capped,
@@ -114,7 +114,7 @@ class _Bench:
 
     def explanation(
         self,
-        cause: Cause,
+        cause: CauseKind,
         name: str,
         now: float | bool | None,
         value: float | bool,
@@ -137,7 +137,7 @@ def _positions(bench: _Bench) -> Iterator[Explanation]:
         if found is None:
             continue
         now = bench.device.value(info.name)
-        one = bench.explanation(Cause.POSITION, info.name, now, value, bench.errors(found))
+        one = bench.explanation(CauseKind.POSITION, info.name, now, value, bench.errors(found))
         yield one
         if isinstance(value, bool) and (best is None or one.left < best.left):
             best = one
@@ -168,7 +168,7 @@ def _tuned(bench: _Bench, switch: Explanation) -> Iterator[Explanation]:
     if promises:
         best = max(promises, key=lambda one: one.gain(other.error))
         value, left = _followed(other, best)
-        tuned = bench.explanation(Cause.POSITION, switch.name, switch.now, switch.value, left)
+        tuned = bench.explanation(CauseKind.POSITION, switch.name, switch.now, switch.value, left)
         yield replace(tuned, beside={best.number.name: value})
 
 
@@ -193,7 +193,7 @@ def _numbers(bench: _Bench, promises: Sequence[_Promise]) -> Iterator[Explanatio
         value, left = _followed(bench, one)
         number = one.number
         yield bench.explanation(
-            Cause.VALUE, number.name, number.start, value, left, unit=number.unit
+            CauseKind.VALUE, number.name, number.start, value, left, unit=number.unit
         )
 
 
@@ -261,7 +261,7 @@ def _delays(bench: _Bench, promises: Sequence[_Promise]) -> Iterator[Explanation
         delay = delay_of(bench.base, rest, intervals, bench.errors)
         if delay:
             left = bench.errors(later(bench.base, rest, intervals, delay))
-            yield bench.explanation(Cause.DELAY, name, 0.0, delay, left, unit="s")
+            yield bench.explanation(CauseKind.DELAY, name, 0.0, delay, left, unit="s")
 
 
 def _limits(bench: _Bench) -> Iterator[Explanation]:
@@ -272,7 +272,7 @@ def _limits(bench: _Bench) -> Iterator[Explanation]:
     if limit is None:
         return
     left = bench.errors(capped(bench.base, measured, voltages, limit))
-    yield bench.explanation(Cause.LIMIT, "limit of the current", None, limit, left, unit="pu")
+    yield bench.explanation(CauseKind.LIMIT, "limit of the current", None, limit, left, unit="pu")
     best: tuple[float, VariableInfo, Values] | None = None
     for info, values in itertools.islice(_limiters(bench, limit), _MOST_LIMITS):
         said = " with ".join(f"{name} = {value:.4g}" for name, value in values.items())
@@ -308,8 +308,8 @@ def _limiter(bench: _Bench, info: VariableInfo, values: Values) -> Iterator[Expl
     if kinds:
         name = kinds[0]
         now = bench.device.value(name)
-        found = bench.explanation(Cause.POSITION, name, now, values[name], left)
+        found = bench.explanation(CauseKind.POSITION, name, now, values[name], left)
         yield replace(found, beside={info.name: value})
     else:
         now = bench.device.value(info.name)
-        yield bench.explanation(Cause.VALUE, info.name, now, value, left, unit=info.unit or "")
+        yield bench.explanation(CauseKind.VALUE, info.name, now, value, left, unit=info.unit or "")

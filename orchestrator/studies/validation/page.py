@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from html import escape
 
 from orchestrator.core.safe_files import file_hash
 from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart, thinned
 from orchestrator.output.report.html.elements import Figures, colour, document, listed, table
 from orchestrator.studies.validation.event import EventComparison
+from orchestrator.studies.validation.figures import SIGNALS
+from orchestrator.studies.validation.limits import LimitVerdict
 from orchestrator.studies.validation.study import ValidationResult
 from orchestrator.studies.validation.words import (
     EXPLANATION_COLUMNS,
     difference_sentence,
+    error_sentence,
     explanation_cells,
     explanation_sentence,
     fit_sentence,
@@ -35,7 +38,8 @@ def validation_page(result: ValidationResult) -> str:
     figures = Figures()
     device = result.request.device
     chapters = [("Model", _model(result))]
-    chapters += [(one.event.recording.label, _event(one, figures)) for one in result.comparisons]
+    for k, one in enumerate(result.comparisons):
+        chapters.append((one.event.recording.label, _event(one, figures, result.others[k : k + 1])))
     if result.others:
         chapters.append(("Two models of one plant", _beside(result)))
     if result.criteria:
@@ -46,7 +50,13 @@ def validation_page(result: ValidationResult) -> str:
         chapters.append(("Fit", _fit(result)))
     chapters.append(("Procedure, and what was not judged", _not_judged(result)))
     verdict = "no verdict: no limits were given" if result.verdict is None else str(result.verdict)
-    findings = f'<div class="findings"><ul><li>Limits: {escape(verdict)}.</li></ul></div>'
+    said = error_sentence(result.comparisons)
+    says = [f"Limits: {verdict}.", f"{device.name}: {said}."]
+    places = [one for one in result.apart if one.more_than_from_record]
+    says += [difference_sentence(places)] if places else []
+    says += [explanation_sentence(result.explanations)] if result.explanations else []
+    listed_says = "".join(f"<li>{escape(one)}</li>" for one in says)
+    findings = f'<div class="findings"><ul>{listed_says}</ul></div>'
     return document(f"Validation of {device.name}", "by recordings", findings, chapters)
 
 
@@ -63,11 +73,11 @@ def _model(result: ValidationResult) -> str:
     return table("The model and the values that it was given", ["", ""], rows, left=2)
 
 
-def _event(one: EventComparison, figures: Figures) -> str:
+def _event(one: EventComparison, figures: Figures, others: Sequence[EventComparison]) -> str:
     return "".join(
         [
             _recording(one),
-            *_charts(one, figures),
+            *_charts(one, figures, others),
             _errors(one),
             listed(map(sentence, one.questions)),
         ]
@@ -87,17 +97,24 @@ def _recording(one: EventComparison) -> str:
     return table("The recording", ["", ""], rows, left=2)
 
 
-def _charts(one: EventComparison, figures: Figures) -> Iterator[str]:
-    times = one.event.recording.times + one.event.recording.begin
+def _charts(
+    one: EventComparison, figures: Figures, others: Sequence[EventComparison]
+) -> Iterator[str]:
+    """P and Q over the time, of the recording and of each model; the window during the event is shaded."""
+    recording = one.event.recording
+    times = recording.times + recording.begin
+    low, high = one.event.windows.parts["during"]
+    during = (recording.begin + low, recording.begin + high, "during the event")
+    drawn = [("measured", one.measured), (one.device.name, one.simulated)]
+    drawn += [(other.device.name, other.simulated) for other in others]
     for signal in _POWERS:
         curves = [
             ChartCurve(name, colour(k), *thinned(times, values[signal]))
-            for k, (name, values) in enumerate(
-                [("measured", one.measured), ("simulated", one.simulated)]
-            )
+            for k, (name, values) in enumerate(drawn)
         ]
         chart = legend((c.label, c.colour) for c in curves)
-        chart += line_chart(f"{signal}", "Time [s]", f"{_NAMES[signal]} [pu]", curves)
+        label = f"{_NAMES[signal]} [pu]"
+        chart += line_chart(signal, "Time [s]", label, curves, bands=[during])
         yield figures.add(chart, f"{_NAMES[signal]}, measured and simulated.")[0]
 
 
@@ -190,6 +207,31 @@ def _not_judged(result: ValidationResult) -> str:
     texts = [_PROCEDURE]
     if result.request.limits is None:
         texts.append("No limit was given, and nothing was judged.")
+    else:
+        texts += _left_open(result)
     if result.fit is None:
         texts.append("No parameter was fitted.")
+    if not result.request.explain:
+        texts.append("No cause of the errors was looked for.")
     return listed(texts)
+
+
+def _left_open(result: ValidationResult) -> Iterator[str]:
+    """What has no limit, what its limit does not decide, and the questions for which a verdict waits."""
+    limits = result.request.limits
+    judged = {} if limits is None else limits.windows
+    without = [
+        f"{_NAMES[signal]} {window} the event"
+        for window in ("before", "during", "after")
+        for signal in SIGNALS
+        if signal not in judged.get(window, {})
+    ]
+    if without:
+        yield f"Without a limit, and not judged: {', '.join(without)}."
+    for one in result.criteria:
+        if one.verdict is LimitVerdict.OPEN:
+            yield f"Open: {one.name} of {one.place}; the recording does not decide it."
+    for comparison in result.comparisons:
+        for asked in comparison.questions:
+            if asked.keeps_open:
+                yield f"The verdict waits for an answer about {comparison.event.recording.label}: {asked.kind}."

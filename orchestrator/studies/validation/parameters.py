@@ -11,8 +11,11 @@ from orchestrator.core.errors import InputError
 from orchestrator.devices.fmi.description import VariableInfo
 from orchestrator.studies.validation.device import PlayedDevice
 
-NEVER = ("S_n", "S_base", "f_n", "V_n", "P_0", "Q_0", "v_0", "theta_0", "internal_step")
-"""Values that say where a device stands, and not what it is."""
+NEVER = (
+    *("S_n", "S_base", "f_n", "V_n", "P_0", "Q_0", "v_0", "theta_0"),
+    *("internal_step", "communication_step", "steps_late"),
+)
+"""Values that say where a device stands and how a master steps it, and not what it is."""
 
 _WIDE = 1000.0  # times the start value, where no bound is declared
 

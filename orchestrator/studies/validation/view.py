@@ -21,7 +21,6 @@ from orchestrator.output.results.staging import new_run_id, staged
 from orchestrator.output.results.storage import save_json, save_table
 from orchestrator.studies.validation.causes import Explanation
 from orchestrator.studies.validation.event import EventComparison
-from orchestrator.studies.validation.figures import ErrorFigures
 from orchestrator.studies.validation.fit import Fit
 from orchestrator.studies.validation.limits import Criterion, LimitVerdict
 from orchestrator.studies.validation.questions import Question
@@ -29,6 +28,7 @@ from orchestrator.studies.validation.study import FitCheck, ValidationResult
 from orchestrator.studies.validation.words import (
     EXPLANATION_COLUMNS,
     difference_sentence,
+    error_sentence,
     explanation_cells,
     explanation_sentence,
     fit_sentence,
@@ -268,27 +268,11 @@ def _beside_table(result: ValidationResult) -> PlainTable:
 
 def _answer(found: Validation) -> str:
     result = found.result
-    worst = max((_worst(one) for one in result.comparisons), key=lambda one: one[2].max_error)
-    label, place, figures = worst
-    says = (
-        f"the largest error is {figures.max_error:.3g} pu, of {place[1].upper()} {place[0]} the event of {label}, at "
-        f"{figures.max_at:.4g} s"
-    )
+    says = error_sentence(result.comparisons)
     if result.verdict is None:
         return escape(f"{result.request.device.name}: {says}; without --limits there is no verdict")
     word = {"met": "MET", "not met": "NOT MET", "open": "OPEN"}[str(result.verdict)]
     return VerdictSentence(_GOOD[result.verdict], word, says).markup(result.request.device.name)
-
-
-def _worst(one: EventComparison) -> tuple[str, tuple[str, str], ErrorFigures]:
-    found = [
-        ((window, signal), figures)
-        for window, of in one.errors.items()
-        for signal, figures in of.items()
-        if signal in _POWERS
-    ]
-    place, figures = max(found, key=lambda pair: pair[1].max_error)
-    return one.event.recording.label, place, figures
 
 
 def _events_table(result: ValidationResult) -> PlainTable:
@@ -303,7 +287,8 @@ def _events_table(result: ValidationResult) -> PlainTable:
     )
     rows = []
     for one in result.comparisons:
-        label, place, figures = _worst(one)
+        label = one.event.recording.label
+        _, signal, figures = one.largest_error
         windows, begin, power = one.event.windows, one.event.recording.begin, one.event.start.power
         modes = one.signals["p"].modes
         rows.append(
@@ -311,7 +296,7 @@ def _events_table(result: ValidationResult) -> PlainTable:
                 label,
                 f"{begin + windows.begin:.4g} to {begin + windows.end:.4g}",
                 f"{power.real:.3f}, {power.imag:.3f}",
-                f"{figures.max_error:.4f} of {place[1].upper()}",
+                f"{figures.max_error:.4f} of {signal.upper()}",
                 f"{figures.max_at:.4g}",
                 *(
                     f"{m.frequency_hz:.3g} Hz, {m.damping_percent:.3g} %" if m else "–"

@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from orchestrator.studies.validation.beside import WindowApart
-from orchestrator.studies.validation.causes import Cause, Explanation
+from orchestrator.studies.validation.causes import CauseKind, Explanation
+from orchestrator.studies.validation.event import EventComparison
 from orchestrator.studies.validation.fit import Fit, FittedParameter, Untold
 from orchestrator.studies.validation.questions import Question, QuestionKind
 
@@ -239,6 +240,16 @@ def untold_words(one: FittedParameter) -> str:
             return "no: its interval is as large as itself"
 
 
+def error_sentence(comparisons: Sequence[EventComparison]) -> str:
+    """Say how large the largest error of P or Q is, and where."""
+    one = max(comparisons, key=lambda each: each.largest_error[2].max_error)
+    window, signal, figures = one.largest_error
+    return (
+        f"the largest error is {figures.max_error:.3g} pu, of {signal.upper()} {window} the event of "
+        f"{one.event.recording.label}, at {figures.max_at:.4g} s"
+    )
+
+
 def difference_sentence(places: Sequence[WindowApart]) -> str:
     """Say that two models of a plant differ from each other more than from the recording, and where the most."""
     worst = max(places, key=lambda one: one.apart)
@@ -299,11 +310,11 @@ def _cause(one: Explanation) -> str:
     unit = f" {one.unit}" if one.unit not in ("", "1") else ""
     beside = "".join(f" with {name} = {value_text(x)}" for name, x in one.beside.items())
     match one.cause:
-        case Cause.DELAY:
+        case CauseKind.DELAY:
             way = "later" if one.value > 0 else "earlier"
             what = one.name.removeprefix("delay of ").removeprefix("delay before ")
             return f"{what} coming {abs(one.value):.3g} s {way} in the plant"
-        case Cause.LIMIT:
+        case CauseKind.LIMIT:
             return f"a current that the plant limits to {one.value:.4g}{unit}"
         case _:
             return f"{one.name} = {value_text(one.value)}{unit}{beside} (now {value_text(one.now)})"

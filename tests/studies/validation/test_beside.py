@@ -14,8 +14,12 @@ ON = {"pod_p.enabled": True}
 def test_the_phasor_and_the_emt_model_come_out_of_one_command(gfor, tmp_path):
     path = written(with_noise(table(run())), tmp_path)
     options = ("--set", "pod_p.enabled=true", "--beside", "gfor", "--limits", str(EXAMPLE))
-    code, out, _ = gfor("validate", "gfor_phasor", str(path), *options, "--json")
+    folder = tmp_path / "out"
+    more = ("--out", str(folder), "--json")
+    code, out, _ = gfor("validate", "gfor_phasor", str(path), *options, *more)
     assert code == 0
+    page = (folder / "validation.html").read_text(encoding="utf-8")
+    assert page.count('data-label="gfor"') == page.count('data-label="gfor_phasor"') == 2
     content = json.loads(out)
     assert content["verdict"] == "met"
     assert {one["device"] for one in content["criteria"]} == {"gfor_phasor", "gfor"}

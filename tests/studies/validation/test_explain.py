@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import orchestrator as gfor_in_python
-from orchestrator.studies.validation.causes import Cause
+from orchestrator.studies.validation.causes import CauseKind
 from orchestrator.studies.validation.words import explanation_sentence
 from tests.studies.validation.recordings import run, table, with_noise
 
@@ -35,7 +35,7 @@ def test_a_wrong_inertia_is_named_with_the_plants():
 
 def test_a_controller_that_is_off_in_the_model_is_named_with_the_plants_gain():
     best, *_ = found = explained(with_noise(table(run("pod_p", stop=4.0, gfor__pod_p__K=120.0))))
-    assert (best.cause, best.name, best.value) == (Cause.POSITION, "pod_p.enabled", True)
+    assert (best.cause, best.name, best.value) == (CauseKind.POSITION, "pod_p.enabled", True)
     assert best.beside["pod_p.K"] == pytest.approx(120, rel=0.01)
     assert best.share > 0.99
     said = explanation_sentence(found)
@@ -46,7 +46,7 @@ def test_a_response_that_comes_30_ms_late_is_named_with_its_time():
     frame = with_noise(table(run("pod_p", stop=4.0)))
     late = {c: np.interp(frame.time - 0.03, frame.time, frame[c]) for c in ("p_mw", "q_mvar")}
     best, second, *_ = explained(frame.assign(**late), values=ON)
-    assert (best.cause, best.name) == (Cause.DELAY, "delay of the whole response")
+    assert (best.cause, best.name) == (CauseKind.DELAY, "delay of the whole response")
     assert best.value == pytest.approx(0.03, abs=0.002)
     assert best.explains
     assert not second.explains
@@ -59,5 +59,5 @@ def test_a_limit_of_the_current_that_the_model_lacks_is_named_with_its_level():
     assert (best.name, best.value) == ("current_limit.kind", 1)
     assert best.beside["current_limit.I_max"] == pytest.approx(1.05, rel=0.002)
     assert best.share > 0.99
-    (limit,) = (one for one in found if one.cause is Cause.LIMIT)
+    (limit,) = (one for one in found if one.cause is CauseKind.LIMIT)
     assert limit.value == pytest.approx(1.05, rel=0.01)

@@ -142,6 +142,8 @@ def test_the_folder_holds_figures_curves_and_the_page(gfor, recording, tmp_path)
     page = (out / "validation.html").read_text(encoding="utf-8")
     assert "of no standard" in page
     assert "nothing here says that it is met" in page
+    assert "during the event</text>" in page
+    assert "Without a limit, and not judged: active current before the event" in page
 
 
 def test_the_device_itself_agrees_and_another_setting_does_not(recording):

@@ -91,11 +91,30 @@ class Frame:
 
 
 def line_chart(
-    name: str, x_label: str, y_label: str, curves: Sequence[ChartCurve], height: int = 210
+    name: str,
+    x_label: str,
+    y_label: str,
+    curves: Sequence[ChartCurve],
+    height: int = 210,
+    *,
+    bands: Sequence[tuple[float, float, str]] = (),
 ) -> str:
+    """Curves over one axis; ``bands``: stretches of it that are shaded, with what stands beside each."""
     x_all = np.concatenate([c.x for c in curves])
     y_all = np.concatenate([c.y for c in curves])
     frame = Frame(_span(x_all, 0.0), _span(y_all, 0.06), x_label, y_label, height)
+    for begin, end, text in bands:
+        (left, bottom), (right, top) = (
+            frame.at(begin, frame.y_range[0]),
+            frame.at(end, frame.y_range[1]),
+        )
+        frame.parts.append(
+            f'<rect x="{left:.1f}" y="{top:.1f}" width="{max(right - left, 1.0):.1f}" height="{bottom - top:.1f}" '
+            'fill="currentColor" opacity="0.1"/>'
+        )
+        frame.parts.append(
+            f'<text class="faint" x="{right + 4:.1f}" y="{top + 12:.1f}">{escape(text)}</text>'
+        )
     for curve in curves:
         x, y = thinned(curve.x, curve.y)
         points = " ".join(
