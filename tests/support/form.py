@@ -10,6 +10,7 @@ import tokenize
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -47,10 +48,15 @@ class SourceFile:
         parts = self.path.relative_to(ROOT).parts
         return "/".join(parts[: min(2, len(parts) - 1)])
 
+    @cached_property
+    def walked(self) -> list[ast.AST]:
+        """All nodes of the tree, in the order of `ast.walk`, which takes longer than the rules."""
+        return list(ast.walk(self.tree))
+
     @property
     def nodes(self) -> int:
         """Expressions and statements, which no layout changes."""
-        return sum(isinstance(node, ast.expr | ast.stmt) for node in ast.walk(self.tree))
+        return sum(isinstance(node, ast.expr | ast.stmt) for node in self.walked)
 
 
 Finder = Callable[[SourceFile], Iterator[int]]
@@ -58,6 +64,8 @@ Finder = Callable[[SourceFile], Iterator[int]]
 
 def marks_for_the_formatter(source: SourceFile) -> Iterator[int]:
     """Lines that keep code from the formatter."""
+    if "# fmt:" not in source.text:  # tokens take a second of all files
+        return
     for token in tokenize.generate_tokens(io.StringIO(source.text).readline):
         if token.type == tokenize.COMMENT and re.match(r"# fmt: (skip|off)", token.string):
             yield token.start[0]
@@ -65,7 +73,7 @@ def marks_for_the_formatter(source: SourceFile) -> Iterator[int]:
 
 def nested_conditionals(source: SourceFile) -> Iterator[int]:
     """Conditional expressions that hold another."""
-    for node in ast.walk(source.tree):
+    for node in source.walked:
         if isinstance(node, ast.IfExp):
             parts = [*ast.iter_child_nodes(node)]
             if any(isinstance(inner, ast.IfExp) for part in parts for inner in ast.walk(part)):
@@ -74,7 +82,7 @@ def nested_conditionals(source: SourceFile) -> Iterator[int]:
 
 def crowded_statements(source: SourceFile) -> Iterator[int]:
     """Statements with more comprehensions, conditionals and lambdas than one reads at once."""
-    for node in ast.walk(source.tree):
+    for node in source.walked:
         if isinstance(node, ast.stmt):
             expressions = [*_own_expressions(node)]
             cells = {id(value) for inner in expressions for value in _cells_of_a_column(inner)}
@@ -103,7 +111,7 @@ def _own_expressions(statement: ast.stmt) -> Iterator[ast.AST]:
 
 def long_calls(source: SourceFile) -> Iterator[int]:
     """Calls with more arguments by place than one can tell apart."""
-    for node in ast.walk(source.tree):
+    for node in source.walked:
         if not isinstance(node, ast.Call) or len(node.args) <= MOST_POSITIONAL:
             continue
         if not any(isinstance(argument, ast.Starred) for argument in node.args):
@@ -112,7 +120,7 @@ def long_calls(source: SourceFile) -> Iterator[int]:
 
 def packs_of_constants(source: SourceFile) -> Iterator[int]:
     """Assignments of several constants at once, which have no place for a reason each."""
-    for node in ast.walk(source.tree):
+    for node in source.walked:
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Tuple):
             values = node.value.elts if isinstance(node.value, ast.Tuple) else []
             if len(values) > 1 and all(isinstance(value, ast.Constant) for value in values):
@@ -122,7 +130,7 @@ def packs_of_constants(source: SourceFile) -> Iterator[int]:
 def walruses_outside_conditions(source: SourceFile) -> Iterator[int]:
     """Assignments inside expressions, but for the conditions of if, while and comprehensions."""
     conditions: list[ast.expr] = []
-    for node in ast.walk(source.tree):
+    for node in source.walked:
         if isinstance(node, ast.If | ast.While):
             conditions.append(node.test)
         elif isinstance(node, ast.comprehension):
@@ -133,21 +141,21 @@ def walruses_outside_conditions(source: SourceFile) -> Iterator[int]:
         for inner in ast.walk(condition)
         if isinstance(inner, ast.NamedExpr)
     }
-    for node in ast.walk(source.tree):
+    for node in source.walked:
         if isinstance(node, ast.NamedExpr) and id(node) not in allowed:
             yield node.lineno
 
 
 def walruses(source: SourceFile) -> Iterator[int]:
     """Assignments inside expressions, wherever they stand."""
-    for node in ast.walk(source.tree):
+    for node in source.walked:
         if isinstance(node, ast.NamedExpr):
             yield node.lineno
 
 
 def crowded_constructors(source: SourceFile) -> Iterator[int]:
     """Calls of a class with a comprehension in most of their arguments."""
-    for node in ast.walk(source.tree):
+    for node in source.walked:
         if isinstance(node, ast.Call) and _names_a_class(node.func):
             values = [*node.args, *(keyword.value for keyword in node.keywords)]
             crowded = sum(isinstance(value, _COMPREHENSIONS) for value in values)
@@ -162,7 +170,7 @@ def _names_a_class(function: ast.expr) -> bool:
 
 def fragments_as_docstrings(source: SourceFile) -> Iterator[int]:
     """Docstrings that begin as half a sentence."""
-    for node in ast.walk(source.tree):
+    for node in source.walked:
         if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module | ast.AsyncFunctionDef):
             text = ast.get_docstring(node) or ""
             if re.match(r"(What|Whether|Of|As)\b", text):
@@ -178,7 +186,7 @@ PARTICIPLES = re.compile(
 
 def participles_as_functions(source: SourceFile) -> Iterator[int]:
     """Functions whose name is a bare participle."""
-    for node in ast.walk(source.tree):
+    for node in source.walked:
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and PARTICIPLES.match(
             node.name
         ):
