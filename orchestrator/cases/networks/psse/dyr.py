@@ -486,6 +486,25 @@ def _model(
     return MachineModel(made_of, {**source, **values, **step_up}, partial=partial)
 
 
+_BUS = "BUSR"
+"""Field of a converter's control that names a bus; 0 and the machine's own are its terminal."""
+
+
+def _refuse_choice(record: DynamicRecord, field: DyrField, value: float) -> None:
+    """Refuse a value that our part cannot stand for."""
+    if field.name == _BUS:
+        if value == record.bus:
+            return
+        raise InputError(
+            f"{record.place}: {record.name} has {_BUS} = {value:g}: its control measures at another bus than its "
+            f"terminal, which no part of ours does; write {_BUS} = 0 for the terminal, or {APPROXIMATING} for {MODEL}"
+        )
+    allowed = " or ".join(f"{x:g}" for x in field.only)
+    raise InputError(
+        f"{record.place}: {record.name} has {field.name} = {value:g}; only {allowed} can be modelled"
+    )
+
+
 def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
     given = given_values(record, known.fields, {*_KNOWN, *FIELDS})
     found = dict.fromkeys(known.lacks, 0.0) | dict.fromkeys(known.without, False)
@@ -494,10 +513,7 @@ def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
         if field.nothing_without and given[field.nothing_without] == 0:
             value = 0.0
         if field.only and value not in field.only:
-            allowed = " or ".join(f"{x:g}" for x in field.only)
-            raise InputError(
-                f"{record.place}: {record.name} has {field.name} = {value:g}; only {allowed} can be modelled"
-            )
+            _refuse_choice(record, field, value)
         if (
             field.bus_of
             and value not in (0, record.bus)

@@ -94,7 +94,7 @@ def test_a_plant_controller_measures_at_a_bus_and_a_branch(point, bus, branch, e
 
 
 def test_the_terminal_itself_is_no_other_point(prepared):
-    ready = prepared(dyr(plant=elsewhere("3 0 0")), "")
+    ready = prepared(dyr(plant=elsewhere("3 0 0"), BUSR=3), "")
     assert unit(ready).description.model_name == "regca1_repca1_phasor"
 
 
@@ -140,7 +140,10 @@ def test_a_plant_controller_that_is_left_out_is_said(prepared):
             r"line 7: a second converter of machine '1' at bus 3",
         ),
         (dyr(plant=record("REECA1", {})), r"line 7: a second electrical of machine '1' at bus 3"),
-        (dyr(BUSR=2), r"line 6: REECB1 has BUSR = 2; only 0 can be modelled"),
+        (
+            dyr(BUSR=2),
+            r"line 6: REECB1 has BUSR = 2: its control measures at another .*write BUSR = 0 for the term",
+        ),
         (dyr(VFLAG=2), r"line 6: REECB1 has VFLAG = 2; only 0 or 1 can be modelled"),
         (
             dyr(plant=elsewhere("0 2 3")),
