@@ -39,6 +39,8 @@ def repository_pages() -> dict[str, str]:
                 site = name.removeprefix(".docs/").replace(".ipynb", ".md")
                 # A README would become the page of the section of `nav` that it stands in, not one of its entries.
                 found[name] = site.replace("/README.md", ".md")
+    for path in sorted((ROOT / ".docs" / "live").glob("*.html")):
+        found[f".docs/live/{path.name}"] = f"live/{path.name}"
     return found
 
 
@@ -60,6 +62,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
             files.append(
                 File.generated(config, f"{posixpath.dirname(site)}/{picture}", content=content)
             )
+    leads = (ROOT / ".docs" / "llms.txt").read_text(encoding="utf-8")
+    files.append(File.generated(config, "llms.txt", content=leads.replace(".md)", "/)")))
     return files
 
 

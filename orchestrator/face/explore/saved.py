@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -40,16 +41,20 @@ def save_page(
             raise InputError(
                 f"--vary {vary.key}: a saved page has sliders on single parameters; name one, with a COUNT"
             )
-    grid = {axis.key: list(axis.values) for axis in axes}
+    asked = {"scenario": name, "range": beginning["range"]}
+    parameters = desk.answer({**asked, "ask": "parameters"}, _nobody)
+    known = {one["parameter"]: one["value"] for one in parameters.get("parameters", ())} | values
+    own = {axis.key: float(known[axis.key]) for axis in axes if axis.key in known}
+    grid = {axis.key: _with_own(axis.values, own.get(axis.key)) for axis in axes}
     points = [dict(zip(grid, chosen, strict=True)) for chosen in itertools.product(*grid.values())]
     if len(points) > _MOST:
         raise InputError(
             f"--vary: the grid has {len(points)} points, and a saved page at most {_MOST}; give fewer values"
         )
-    asked = {"scenario": name, "range": beginning["range"]}
     first: dict[str, Any] = {}
-    own: dict[str, float] = {}
-    if not varied:
+    if varied:
+        first["first"] = _answered(desk, {**asked, "values": values, "ask": "first"})
+    else:
         first, steps = _first_screen(desk, {**asked, "values": values})
         own = {one["parameter"]: one["value"] for one in first["movers"]["movers"]}
         grid = {one["parameter"]: grid_of(one, steps) for one in first["movers"]["movers"]}
@@ -66,12 +71,12 @@ def save_page(
             continue  # the slider leaves out a value at which the case has no answer
         answers.append({"scenario": name, "values": point, "answer": found})
     opened = desk.answer({"ask": "open"}, _nobody)
-    parameters = desk.answer({**asked, "ask": "parameters"}, _nobody)
     content = {
         "beginning": beginning,
         "open": {**opened, "scenarios": {name: opened["scenarios"][name]}},
         "parameters": {name: parameters},
         "grid": grid if varied else _values_with_answers(grid, own, answers),
+        "own": own,
         "answers": answers,
         **first,
     }
@@ -89,14 +94,22 @@ def _first_screen(desk: Desk, asked: Mapping[str, Any]) -> tuple[dict[str, Any],
         "movers": {**asked, "ask": "movers", "components": least["components"]},
         "first": {**asked, "ask": "first"},
     }
-    first: dict[str, Any] = {}
-    for kind, question in questions.items():
-        try:
-            first[kind] = desk.answer(question, _nobody)
-        except CosimError as error:
-            first[kind] = {"movers": [], "curves": {}, "reason": str(error)}
+    first = {kind: _answered(desk, question) for kind, question in questions.items()}
     fitting = int(_BYTES / len(json.dumps(answer)) / max(1, len(first["movers"]["movers"])))
     return first, max(2, min(_STEPS, fitting))
+
+
+def _answered(desk: Desk, question: Mapping[str, Any]) -> dict[str, Any]:
+    try:
+        return desk.answer(question, _nobody)
+    except CosimError as error:
+        return {"movers": [], "curves": {}, "reason": str(error)}
+
+
+def _with_own(axis: Sequence[float], own: float | None) -> list[float]:
+    """A slider's values with the case's own among them, at which the page begins."""
+    others = [x for x in axis if own is None or not math.isclose(x, own, rel_tol=1e-9)]
+    return sorted(others if own is None else [*others, own])
 
 
 def _values_with_answers(

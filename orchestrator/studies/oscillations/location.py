@@ -101,11 +101,11 @@ def _opinions(
     ratio = float(np.abs(reactive.values).max() / (np.abs(energy.values).max() or 1e-300))
     flow, phase = energy.opinion(DEF, "feeds"), reactive.opinion(QV_PHASE, "drives")
     if ratio <= _POWER:
-        why = f"it acts through active power (reactive work {100 * ratio:.0f} % of the dissipating): says nothing here"
+        why = f"it acts through active power ({100 * ratio:.0f} % as much through voltage): says nothing here"
         phase = replace(phase, applies=False, place=None, reason=why)
     elif ratio >= _VOLTAGE:
         why = (
-            f"it acts through voltage (reactive work {100 * ratio:.0f} % of the dissipating), where energy flow is "
+            f"it acts through voltage ({100 * ratio:.0f} % of what it does through active power), where energy flow is "
             f"known to point elsewhere{f', here to {flow.place}' if flow.place else ''}"
         )
         flow = replace(flow, applies=False, place=None, reason=why)

@@ -141,8 +141,8 @@ def _judged(
     sharp = seen.envelope_spread <= _CLEAN or seen.skirt <= _SKIRT or bool(harmonics)
     steady = seen.envelope_spread < _STEADY and seen.kurtosis < _SINE and seen.coherence > _COHERENT
     figures = (
-        f"envelope ± {100 * seen.envelope_spread:.0f} %, kurtosis {seen.kurtosis:.2f}, phase coherence "
-        f"{seen.coherence:.2f}"
+        f"amplitude ± {100 * seen.envelope_spread:.0f} %, kurtosis {seen.kurtosis:.2f} (a sine has 1.5, noise 3), "
+        f"phase steady to {seen.coherence:.2f} of 1"
     )
     if abs(change) > _CHANGE and seen.coherence > 0.8 and not harmonics:
         way = "decays" if change < 0 else "grows"

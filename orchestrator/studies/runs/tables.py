@@ -207,8 +207,8 @@ def run_statistics(results: Sequence[RunResult]) -> Table:
         "Steps/s",
         "× real time",
         "Threads",
-        "Inside FMUs",
-        "Of each FMU",
+        "Time in FMUs",
+        "By component",
     )
     for r in results:
         s = r.statistics

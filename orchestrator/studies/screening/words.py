@@ -194,17 +194,21 @@ def what_was_counted(summary: Summary) -> str:
     wanted, computed = summary.result.plan.wanted, summary.counts[Status.COMPUTED]
     searched = sum(item.record.searched for item in summary.result.items)
     others = (
-        ", the others from a neighbour with a check that no mode is missed there"
+        ", at the others from those of a neighbour, with a check that none is missed"
         if searched < computed
+        else ""
+    )
+    large = (
+        f": in a system of more than {DENSE} states, such as this, what grows faster than {GROWING:g} 1/s, or near 0"
+        if summary.slowest
         else ""
     )
     return (
         f"Scenario {summary.result.plan.prepared.name}: modes from {wanted.lowest_hz:g} to {wanted.highest_hz:g} Hz "
         f"below {100 * wanted.damping:g} % damping, of the "
-        f"{_what_was_linearised(summary)}: {searched} of {computed} items were searched from scratch"
-        f"{others}. Growth at other frequencies was counted at "
-        f"{summary.counted} of {computed} items, in systems of more than {DENSE} states where it is faster than "
-        f"{GROWING:g} 1/s, or near 0."
+        f"{_what_was_linearised(summary)}: found anew at {searched} of {computed} points and outages"
+        f"{others}. Whether something grows at other frequencies was counted at "
+        f"{summary.counted} of {computed}{large}."
     )
 
 

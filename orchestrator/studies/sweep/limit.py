@@ -192,7 +192,7 @@ class ParameterLimit:
     @property
     def remarks(self) -> list[str]:
         return [
-            f"{self.title}: {len(self.tried)} values were tried before the bisection; a narrower piece between two of "
+            f"{self.title}: {len(self.tried)} values were tried before the bisection; a narrower range between two of "
             "them that does not hold would not be seen: COUNT in --vary tries more"
         ]
 

@@ -32,6 +32,7 @@ NAMES = {
         "Admittance",
         "ControllerDesign",
         "CoordinatedDesign",
+        "Exploration",
         "Fmu",
         "FmuInfo",
         "Interactions",

@@ -337,12 +337,18 @@ def test_a_saved_page_moves_without_a_server(browser, tmp_path, capsys):
         "--scenario",
         "pod_p",
         "--vary",
-        "gfor.pod_p.K=100:200:3",
+        "gfor.pod_p.K=100:250:3",  # between two of which the case's own value lies
         "--save",
         str(page),
     ]
     assert main(words) == 0
     with opened(browser, page.as_uri()) as view:
+        capsys.readouterr()
+        assert main(["modes", "two_area", "--scenario", "pod_p", "--json"]) == 0
+        content = json.loads(capsys.readouterr().out)["scenarios"][0]
+        assert [row[:2] for row in rows(view)] == shown(content["modes"]), "it begins with the case"
+        assert view.locator("#first-plot .curve").count() == 1
+        assert "being" not in view.locator("#movers").inner_text()
         slider = view.locator('.control[data-name="gfor.pod_p.K"] input[type="range"]')
         slider.focus()
         slider.press("Home")

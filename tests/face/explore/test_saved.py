@@ -27,6 +27,28 @@ def test_each_point_of_the_grid_is_asked_and_counted_once(monkeypatch, tmp_path)
     assert (tmp_path / "page.html").read_text(encoding="utf-8") == "6"
 
 
+def test_a_slider_holds_the_cases_own_value_at_which_the_page_begins(monkeypatch, tmp_path):
+    axis = SimpleNamespace(key="a.x", members=(), values=[0.0, 0.1 + 0.2, 1.0])
+    monkeypatch.setattr(saved, "resolve", lambda vary, _: axis)
+    kept = {}
+    monkeypatch.setattr(saved, "whole_page", lambda content: kept.update(content) or "")
+
+    def page_of(own):
+        parameters = [{"parameter": "a.x", "value": own}]
+        desk = SimpleNamespace(
+            answer=lambda what, tell: {"parameters": parameters, "scenarios": {"base": {}}}
+        )
+        case = SimpleNamespace(scenario=lambda name, values: SimpleNamespace(prepared=None))
+        beginning = {"scenario": "base", "values": {}, "range": [0.1, 2.0]}
+        saved.save_page(tmp_path / "p.html", case, desk, beginning, ["a.x"], lambda *count: None)
+        assert {"a.x": own} in [one["values"] for one in kept["answers"]]
+        return kept["grid"]["a.x"]
+
+    assert page_of(0.5) == [0.0, 0.1 + 0.2, 0.5, 1.0]
+    assert page_of(0.3) == [0.0, 0.3, 1.0]
+    assert kept["own"] == {"a.x": 0.3}
+
+
 def test_without_an_axis_the_values_that_move_the_mode_most_are_its_sliders(monkeypatch, tmp_path):
     """A value at which the case has no answer is left out; the case's own is computed once."""
     kept, asked = {}, []

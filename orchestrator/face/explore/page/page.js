@@ -120,11 +120,12 @@ function listen() {
 function savedAnswer(question) {
   if (question.ask === "open") return SAVED.open;
   if (question.ask === "parameters") return SAVED.parameters[question.scenario];
-  if (question.ask === "movers" || question.ask === "first") return SAVED[question.ask] ?? null;
+  if (question.ask === "movers") return SAVED.movers ?? { reason: "This page has the sliders above." };
+  if (question.ask === "first") return SAVED.first;
   if (question.ask !== "modes") return null;
   const snapped = {};
   for (const [name, values] of Object.entries(SAVED.grid)) {
-    const wanted = question.values[name] ?? SAVED.beginning.values[name] ?? original(name) ?? values[0];
+    const wanted = question.values[name] ?? SAVED.own[name] ?? original(name) ?? values[0];
     snapped[name] = values.reduce((best, v) => (Math.abs(v - wanted) < Math.abs(best - wanted) ? v : best));
     if (name in state.values) state.values[name] = snapped[name];
   }
