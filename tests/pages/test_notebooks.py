@@ -35,6 +35,12 @@ CLAIMS = {
         "f'gives {damping[\"outage_gfor\"]:.1f} % with the outage'",
         "f'same setting gives {damping[\"gfor\"]:.1f} %' if dv < 1e-5 and da < 1e-4 else 'another power flow'",
     ],
+    "recorder": [
+        'f\'with a gain of about {causes["with"].iloc[0]["pod_p.K"]:.0f} pu\'',
+        "f'explains {100 * causes[\"share\"].iloc[0]:.1f} % of the squared error'",
+        "f'K = {fitted[\"pod_p.K\"]:.1f} pu'",
+        "'the limits are met' if final.verdict == 'met' else final.verdict",
+    ],
     "vendor-fmu": [
         "f'asks {len(report.table())} questions'",
         f"f'{{plain.{MODE}.damping_percent:.1f}} % of damping as delivered'",
