@@ -24,6 +24,7 @@ _NAMES = {
     "face.api.certification": "IssuedCertificate certify verify",
     "face.api.comparison": "compare",
     "face.api.comtrade": "export_comtrade",
+    "face.api.exploration": "Exploration",
     "face.api.export": "export",
     "face.api.fmu": "Fmu FmuInfo info open_fmu",
     "face.api.identification": "ambient identify",

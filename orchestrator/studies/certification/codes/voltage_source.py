@@ -71,7 +71,7 @@ Model = tuple[Matrix | Complex, Matrix | Complex, Matrix | Complex, Matrix | Com
 
 
 @dataclass(frozen=True)
-class OperatingPoint:
+class ScannedPoint:
     active: float  # power fed in [pu of the rating]
     reactive: float  # the same
     voltage: float  # at the terminals [pu]
@@ -81,11 +81,11 @@ class OperatingPoint:
 
 
 POINTS = (
-    OperatingPoint(0.5, 0.0, 1.0),
-    OperatingPoint(0.05, 0.0, 1.0),
-    OperatingPoint(0.9, 0.3, 1.0),
-    OperatingPoint(0.9, -0.3, 1.0),
-    OperatingPoint(0.5, 0.0, 0.95),
+    ScannedPoint(0.5, 0.0, 1.0),
+    ScannedPoint(0.05, 0.0, 1.0),
+    ScannedPoint(0.9, 0.3, 1.0),
+    ScannedPoint(0.9, -0.3, 1.0),
+    ScannedPoint(0.5, 0.0, 0.95),
 )
 """At which a device is measured: half, hardly any and almost full power, reactive power either way, a low voltage."""
 
@@ -188,7 +188,7 @@ def springs(found: Stiffness, f_n: float) -> Springs:
 
 
 @dataclass(frozen=True)
-class Swing:
+class TerminalSwing:
     """Inertia and damping seen from the terminals: −P/ω = D + 2·H·s, fitted up to `SLOW`."""
 
     inertia: float  # H [s, of the rating]
@@ -196,7 +196,7 @@ class Swing:
     misses: float  # root mean square of what the two do not explain, of that of P/ω
 
 
-def swing(found: Stiffness) -> Swing:
+def swing(found: Stiffness) -> TerminalSwing:
     slow = found.frequencies <= SLOW
     values = -found.powers["P/omega"][slow]
     omega = 2 * np.pi * found.frequencies[slow]
@@ -204,7 +204,7 @@ def swing(found: Stiffness) -> Swing:
     inertia = float((values.imag @ omega) / (omega @ omega) / 2)
     rest = values - damping - 2j * omega * inertia
     size = float(np.sqrt((np.abs(values) ** 2).mean()))
-    return Swing(
+    return TerminalSwing(
         inertia, damping, float(np.sqrt((np.abs(rest) ** 2).mean())) / size if size else 0.0
     )
 
@@ -310,13 +310,13 @@ def least_damped(values: Complex) -> tuple[float | None, float | None]:
 class AtPoint:
     """A device at one operating point. ``swing`` is measured at the first one; ``failure``: why nothing is known."""
 
-    point: OperatingPoint
+    point: ScannedPoint
     failure: str = ""
     springs: Springs | None = None
     impedances: Impedances | None = None
     active_hz: tuple[tuple[float, float], ...] = ()  # where it can feed an oscillation
     strengths: Strengths | None = None
-    swing: Swing | None = None
+    swing: TerminalSwing | None = None
 
     def figures(self) -> dict[str, Any]:
         """Figures as JSON's types."""
@@ -387,7 +387,7 @@ def measure_points(
     request: CertificationRequest,
     f_n: float,
     report: Callable[[str], None],
-    points: Sequence[OperatingPoint] = (),
+    points: Sequence[ScannedPoint] = (),
 ) -> list[AtPoint]:
     """Measure a device at an ideal bus, at each operating point; at `POINTS` where none is given.
 
@@ -407,7 +407,7 @@ def _measured(
     request: CertificationRequest,
     f_n: float,
     report: Callable[[str], None],
-    point: OperatingPoint,
+    point: ScannedPoint,
     slowly: bool,
 ) -> AtPoint:
     description = bound_fmu(request.fmu, request.binding)
@@ -426,7 +426,7 @@ def _measured(
 
 
 def at_point(
-    point: OperatingPoint, name: str, response: FrequencyResponse, voltage: complex, *, f_n: float
+    point: ScannedPoint, name: str, response: FrequencyResponse, voltage: complex, *, f_n: float
 ) -> AtPoint:
     """Figures of a measured response."""
     stiff = stiffness(response, voltage, f_n)

@@ -17,7 +17,7 @@ from orchestrator.studies.certification.codes.frequency_domain import (
 )
 from orchestrator.studies.certification.codes.voltage_source import (
     AtPoint,
-    OperatingPoint,
+    ScannedPoint,
     closed_loop,
     impedances,
     least_damped,
@@ -117,12 +117,12 @@ def measured(*least):
     found = []
     for X in least:
         one = springs(stiffness_of(behind(0.1 * X, X)), RATED)
-        found.append(AtPoint(OperatingPoint(0.5, 0.0, 1.0), springs=one))
+        found.append(AtPoint(ScannedPoint(0.5, 0.0, 1.0), springs=one))
     return found
 
 
 def test_one_bad_point_is_enough_and_one_that_is_not_measured_leaves_no_verdict():
-    lost = AtPoint(OperatingPoint(0.9, 0.3, 1.0), failure="it does not come to rest")
+    lost = AtPoint(ScannedPoint(0.9, 0.3, 1.0), failure="it does not come to rest")
     assert verdict_of(measured(0.1, 0.2)) is True
     assert verdict_of(measured(0.1, 1.0)) is False
     assert verdict_of([*measured(1.0), lost]) is False
