@@ -23,7 +23,7 @@ from fmus.toolchain.symbols import Expr
 
 @dataclass(frozen=True)
 class Shaft:
-    """What a governor and a stabiliser see of their machine: speed, power, voltage, and the same at the start.
+    """Signals that a governor and a stabiliser see of their machine: speed, power, voltage, and the same at the start.
 
     ``w``: speed [pu]; ``P_m_0``: mechanical power [pu, S_n]; ``P_e``, ``P_e_0``: electrical power at the terminal [pu,
     S_n]; ``v_t``, ``v_t_0``: voltage magnitude there [pu, S_n]; ``phase``: change of the voltage's angle there over ω_b

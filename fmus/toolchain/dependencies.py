@@ -81,7 +81,7 @@ def structure(model: Model) -> Structure:
 
 
 def _voltages(model: Model, *marks: Callable[[int], int]) -> list[Callable[[int], int]]:
-    """What each voltage of a network that is solved as data depends on: all elements and currents of its island."""
+    """Give what each voltage of a network solved as data depends on: all elements and currents of its island."""
     nodal = model.nodal
     if nodal is None:
         return []

@@ -70,7 +70,7 @@ class Model:
 
     @property
     def compiled(self) -> bool:
-        """Whether a Python-backed FMU has its functions compiled, where a compiler is there. It takes seconds, which a
+        """True if a Python-backed FMU has its functions compiled, where a compiler is there. It takes seconds, which a
         model that is new most times it is asked for does not have: it is a tape, with the same results."""
         return self.kind != "network" and not self.of_parts
 

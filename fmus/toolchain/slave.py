@@ -55,7 +55,7 @@ PYTHON = (
 
 
 class Now(ctypes.Structure):
-    """What a step goes by; the functions in C read and write it, too."""
+    """Marks, sizes and pointers that a step goes by; the functions in C read and write them, too."""
 
     _fields_ = [
         ("size", ctypes.c_double),  # that the next step may have without a further look, or none

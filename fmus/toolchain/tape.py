@@ -72,7 +72,7 @@ def with_pairs(operations: dict[int, Operation], results: Iterable[int]) -> dict
     paired = operations.copy()
 
     def factors(value: int) -> Operation:
-        """Of a product that nothing else needs, else nothing."""
+        """Return the factors of a product that nothing else needs, else nothing."""
         operation = operations.get(value, (-1,))
         return operation[1:] if operation[0] == MUL and uses[value] == 1 else ()
 

@@ -97,7 +97,7 @@ TAKES = [sum(f"{{{k}}}" in form for k in range(4)) for form in FORMS]
 
 
 class Tape:
-    """What a tape says: sizes, lists, and a function of the slots before its own for each section."""
+    """Content of a tape: sizes, lists, and a function of the slots before its own for each section."""
 
     def __init__(self, content):
         head = struct.calcsize("<8s4I")
@@ -296,7 +296,7 @@ class Kernel:
         return v
 
     def _voltages(self, slots):
-        """Of a network that is solved as data: real parts, then imaginary parts."""
+        """Return the voltages of a network that is solved as data: real parts, then imaginary parts."""
         t, u = self._tape, self._u
         key = struct.pack(f"{u + t.given}d", *slots[:u], *(slots[u + k] for k in t.given_at))
         if key != self._key:

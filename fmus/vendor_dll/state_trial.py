@@ -48,7 +48,7 @@ class Trial:
 
 
 class InstanceStructure(c.Structure):
-    """What a host hands to every call for one instance."""
+    """The structure that a host hands to every call for one instance."""
 
     _fields_ = (
         *((name, c.c_void_p) for name in ("inputs", "outputs", "parameters")),

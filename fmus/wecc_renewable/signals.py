@@ -46,7 +46,7 @@ class References:
 
 
 def dead_band(u: Expr, low: Scalar, high: Scalar) -> Expr:
-    """What lies beyond a band around 0; continuous at its ends.
+    """Return the part of a signal that lies beyond a band around 0; continuous at its ends.
 
     ``low``: at most 0; ``high``: at least 0."""
     return fmax(u - high, 0) + fmin(u - low, 0)

@@ -32,7 +32,7 @@ E_FD = "E_fd"
 
 @dataclass(frozen=True)
 class Regulated:
-    """What an exciter sees: operating point, terminal and field current of its machine, and a stabiliser.
+    """Signals that an exciter sees: operating point, terminal and field current of its machine, and a stabiliser.
 
     ``i``: stator current in the rotor's frame [pu, S_n]; ``v_0``: terminal voltage of the operating point, same frame.
     """

@@ -168,7 +168,7 @@ def _within_limits(m: ModelBuilder, signal: Signal, number: str) -> Signal:
 
 
 def _is_active(m: ModelBuilder, P_e: Expr, P_e_0: Expr) -> Expr:
-    """Whether the stabiliser acts: from P_on on, until the power falls below P_off.
+    """Tell if the stabiliser acts: from P_on on, until the power falls below P_off.
 
     The state is a memory: it goes to 1 or 0, whichever the power asks for or it is nearer to."""
     on = gain(m, "P_on", 0.0, "Electrical power from which on there is a signal; 0: always", 0)

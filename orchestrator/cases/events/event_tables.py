@@ -62,8 +62,8 @@ def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Eve
 
 
 def other_scenarios(draft: Draft, wanted: Collection[str]) -> Iterator[Problem]:
-    """What is wrong with events of scenarios that are not asked for: a time after the run, an element that the network
-    of this one lacks. Their units may be others."""
+    """Yield what is wrong with events of scenarios that are not asked for: a time after the run, an element that the
+    network of this one lacks. Their units may be others."""
     for name in (name for name in draft.given.case.scenarios if name not in wanted):
         other = replace(draft, given=replace(draft.given, name=name), found=Findings())
         for index, table in enumerate(draft.given.case.scenarios[name].events or ()):
@@ -145,7 +145,7 @@ def _all_events_of(
 
 
 def _events_of(draft: Draft, table: schema.SettingEventTable, where: str) -> list[Event]:
-    """What a table stands for; its values are still as the file has them. Nothing for a component that is removed."""
+    """Return the events of a table, with values as the file has them; none for a component that is removed."""
     if isinstance(table, schema.ReferenceChangeTable | schema.ParameterChangeTable):
         component = table.component
     elif table.component is None and draft.found.network_failed:

@@ -42,7 +42,7 @@ _solved: dict[bytes, NewtonResult] = {}
 
 
 def solve_once(equations: FlowEquations) -> NewtonResult:
-    """As `solve`; equations that are equal to the last digit are solved once, as a controller's gain moves no flow."""
+    """Solve equations that are equal to the last digit once, as `solve` does: a controller's gain moves no flow."""
     if len(equations.buses) > _LARGEST_KEPT:
         return solve(equations)
     key = pickle.dumps(equations)

@@ -31,7 +31,7 @@ class SharingRule(StrEnum):
 
 @dataclass(frozen=True)
 class Dispatch:
-    """What the units feed before an outage [pu, S_n], how they share it, and about how much they have to share [MW]."""
+    """Powers that the units feed before an outage [pu, S_n], how they share it, and about how much [MW]."""
 
     rule: SharingRule
     powers: Mapping[str, complex]
@@ -40,7 +40,7 @@ class Dispatch:
 
 @dataclass(frozen=True)
 class Room:
-    """What a file says of the units' powers beside their models.
+    """Limits of the units' powers that a file gives beside their models.
 
     ``active``: least and most active power [MW]; ``ratings``: likely ratings [MVA] of units whose S_n is only the base
     of their data."""
@@ -71,7 +71,7 @@ def in_words(
     lost: Collection[str],
     also: Sequence[str] = (),
 ) -> str:
-    """What the lost units fed, what else was lost, and who feeds it now, by the units' powers afterwards [pu, S_n]."""
+    """Tell what the lost units fed, what else was lost, and who feeds it now, by the powers afterwards [pu, S_n]."""
     rating = {name: plans[name].number("S_n") for name in dispatch.powers if name in plans}
     fed = [
         f"{name} is lost, which fed {dispatch.powers[name].real * rating[name]:.4g} MW"
@@ -263,7 +263,7 @@ def _reserves(
     dispatch: Dispatch,
     room: Room,
 ) -> list[Reserve]:
-    """Of the units that are left. Where none answers to the frequency, ratings decide."""
+    """Return the reserves of the units that are left. Where none answers to the frequency, ratings decide."""
     left = [one for one in units if one.connected]
     gains = {one.name: droop_gain(plans[one.name]) for one in left}
     if dispatch.rule is SharingRule.RATING or not any(gains.values()):

@@ -75,7 +75,7 @@ class ShareChoice:
 
 @dataclass(frozen=True)
 class Layer:
-    """What one source gives: a parameter file, the scenario, or the command line."""
+    """The values that one source gives: a parameter file, the scenario, or the command line."""
 
     values: Mapping[str, Value]  # of the components' variables, by ``component.variable``
     natives: tuple[NativeChoice, ...]  # kinds of FMU, in the source's order

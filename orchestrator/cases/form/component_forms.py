@@ -1,4 +1,4 @@
-"""What a component of a case may be: a model of the catalogue, an FMU, a vendor's DLL, or a scan."""
+"""The forms that a component of a case may have: a model of the catalogue, an FMU, a vendor's DLL, or a scan."""
 
 from orchestrator.cases.form.schema import ComponentTable
 

@@ -290,7 +290,7 @@ class EventBase(Table):
 
 
 class PassingBase(EventBase):
-    """What may end again; it lasts to the end of the run where there is no ``end``."""
+    """An event that may end again; it lasts to the end of the run where there is no ``end``."""
 
     end: Seconds | None = None
 
@@ -566,7 +566,7 @@ class PlotTable(Table):
 
 
 class KindTable(Table):
-    """What one kind of models takes in place of the case's own values."""
+    """Values that one kind of models takes in place of the case's own values."""
 
     step_size: Seconds | None = Field(default=None, gt=0, le=LONGEST_STEP)
     stray_B: PerUnit | None = None

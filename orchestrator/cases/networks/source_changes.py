@@ -1,4 +1,4 @@
-"""What a network's source holds and our network has in another form, or not at all: listed, by kind."""
+"""Contents of a network's source that our network has in another form, or not at all: listed, by kind."""
 
 from collections import defaultdict
 
@@ -7,7 +7,7 @@ from orchestrator.core.foreign_files import one_line
 
 
 class Changes:
-    """What was taken over in another form, by kind, with the lines or names of all that it concerns."""
+    """Data that were taken over in another form, by kind, with the lines or names of all that it concerns."""
 
     def __init__(self, place: str, what: str = "line") -> None:
         self._place, self._what = place, what

@@ -67,8 +67,8 @@ class WantedConverter:
 
 @dataclass(frozen=True)
 class WantedCase:
-    """What `gfor new` is asked for: a vendor's ``device`` stands in place of our converter, ``models`` (emt, phasor) is
-    chosen where None, ``command`` is as it was typed."""
+    """The case that `gfor new` is asked for: a vendor's ``device`` stands in place of our converter, ``models`` (emt,
+    phasor) is chosen where None, ``command`` is as it was typed."""
 
     files: tuple[Path, ...]
     out: Path
@@ -551,7 +551,7 @@ class _Text:
         return f"{len(recorded)} as their records in the DYR file say; [network] load_model goes before{rest}"
 
     def _path(self, path: Path) -> str:
-        """As the file names it: relative where that is possible, with slashes everywhere."""
+        """Return a path as the file names it: relative where that is possible, with slashes everywhere."""
         try:
             return _quoted(
                 Path(

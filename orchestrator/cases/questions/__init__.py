@@ -1,1 +1,1 @@
-"""What is most unusual, contradicts itself or has no effect in a case: asked or refused."""
+"""Questions and refusals about values of a case that are most unusual, contradict each other or have no effect."""

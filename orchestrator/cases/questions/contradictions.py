@@ -1,4 +1,4 @@
-"""What a case file says twice, of nothing, or against itself. Nothing of a scenario is needed to see it."""
+"""Statements of a case file that stand twice, concern nothing, or contradict each other, in any scenario."""
 
 from collections.abc import Callable, Iterable, Iterator
 from itertools import permutations

@@ -49,7 +49,7 @@ def idle_values(
     events: Sequence[Event],
     absent: Mapping[str, str] = MappingProxyType({}),
 ) -> Idle:
-    """What keys with patterns set, and where that cannot act; a switch that is given too, or moves later, is meant.
+    """Find what keys with patterns set and where that cannot act; a switch that is given too, or moves later, is meant.
 
     ``absent``: places of values that components of other scenarios were given."""
     given = [

@@ -1,4 +1,4 @@
-"""What a network's source holds that is most unusual beside its own other data."""
+"""Values of a network's source that are most unusual beside its own other data."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations

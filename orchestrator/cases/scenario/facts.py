@@ -1,4 +1,4 @@
-"""What a network's files come to in one line, so that a reader sees at once what was computed."""
+"""One line on the content of a network's files, so that a reader sees at once what was computed."""
 
 from dataclasses import dataclass
 
@@ -93,6 +93,6 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
 
 
 def rated_frequency(prepared: PreparedScenario) -> float | None:
-    """Of all components, which have one in common [Hz]; None where none has one."""
+    """Return the rated frequency that all components have in common [Hz]; None where none has one."""
     plans = prepared.system.components.values()
     return next((plan.number("f_n") for plan in plans if "f_n" in plan.description.variables), None)

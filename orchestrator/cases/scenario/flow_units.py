@@ -1,4 +1,4 @@
-"""What every unit says to the power flow: that it holds a voltage, or that it feeds a reactive power."""
+"""The statement of every unit to the power flow: that it holds a voltage, or that it feeds a reactive power."""
 
 from collections.abc import Iterator, Mapping
 

@@ -179,7 +179,7 @@ class ShortCircuit:
 
 
 def source_impedance(plan: ComponentPlan) -> complex | None:
-    """Of a machine or an external grid [pu, 100 MVA]; None for anything else."""
+    """Return the impedance behind a machine or an external grid [pu, 100 MVA]; None for anything else."""
     known = plan.description.variables
     scale = SYSTEM_BASE_MVA / plan.number("S_n") if "S_n" in known else 0.0
     reactance = next((v for v in ("machine.X_d2", "machine.X_d1") if v in known), None)

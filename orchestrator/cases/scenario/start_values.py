@@ -152,7 +152,7 @@ def _as_set(x: ThreeWinding, grid: ComponentPlan) -> ThreeWinding:
     def values(
         quantity: str, given: tuple[float, float, float] | None = None
     ) -> tuple[float, float, float]:
-        """Of the three windings; those of a ratio are parameters only where there is one."""
+        """Return the values of the three windings; those of a ratio are parameters only where there is one."""
         one, two, three = (
             grid.number(f"{x.name}.{quantity}_{k + 1}")
             if given is None or x.has_ratio(k)
@@ -213,7 +213,7 @@ def _shunts(network: Network, grid: ComponentPlan) -> list[FlowShunt]:
 
 
 def _susceptance(shunt: Shunt, grid: ComponentPlan, closed: bool) -> float:
-    """Of a shunt [pu, 100 MVA]; of an open capacitor the part that the grid model keeps."""
+    """Return the susceptance of a shunt [pu, 100 MVA]; of an open capacitor the part that the grid model keeps."""
     rest = OPEN_CHARGING if shunt.b_mvar > 0 else 0.0
     return grid.number(f"{shunt.name}.B") / SYSTEM_BASE_MVA * (1.0 if closed else rest)
 

@@ -25,7 +25,7 @@ DataFrame = Any
 
 
 class Acceptance(NoTruth, ask=".trusted"):
-    """What the acceptance tests of an FMU found. `check` makes it.
+    """Findings of the acceptance tests of an FMU. `check` makes it.
 
     Attributes
     ----------

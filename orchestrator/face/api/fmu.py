@@ -212,7 +212,7 @@ def open_fmu(
 
 
 class FmuInfo:
-    """What an FMU declares. `info` makes it.
+    """Declarations of an FMU. `info` makes it.
 
     Attributes
     ----------

@@ -31,7 +31,19 @@ def method(
 def function(
     name: str, module: str, request: Callable[Asks, Any], call: Callable[[Any], Shown]
 ) -> Callable[Asks, Shown]:
-    """As `method`, a function of a ``module`` of the public face."""
+    """Make a function of the public face from a request, as `method` makes a method.
+
+    Parameters
+    ----------
+    name
+        Name of the function, such as ``nyquist``.
+    module
+        Module of the public face where users find it.
+    request
+        Class whose fields are the keywords.
+    call
+        Computes what a request asks.
+    """
     return cast("Callable[Asks, Shown]", _named(_made(request, [], call, name), name, module))
 
 

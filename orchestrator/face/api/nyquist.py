@@ -1,4 +1,4 @@
-"""Whether a device is stable at a network, by the generalised Nyquist criterion."""
+"""Stability of a device at a network, by the generalised Nyquist criterion."""
 
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
@@ -118,7 +118,7 @@ def _place(given: str | Path | Case, argument: str) -> str:
 
 
 class Asked:
-    """What is judged, as it was given, and the same with other values.
+    """A device and a network to be judged, as they were given, and the same with other values.
 
     Parameters
     ----------

@@ -334,7 +334,7 @@ class Run(NoTruth):
 
     @property
     def stable(self) -> bool | None:
-        """Whether the run and the modes before and after its events show no growth; None where that is not known."""
+        """True if the run and the modes before and after its events show no growth; None where that is not known."""
         return answer_of_run.of_run(self.result).good
 
     @property

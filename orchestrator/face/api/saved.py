@@ -20,7 +20,7 @@ class NoSuchFileError(InputError, KeyError):
 
 
 class Saved(Mapping[str, Any]):
-    """What a folder of results holds, by file; each is read, and compared with its manifest, where it is asked for.
+    """Content of a folder of results, by file; each is read, and compared with its manifest, where it is asked for.
 
     A ``.nc`` is an `xarray.Dataset`, a ``.csv`` a DataFrame, a ``.json`` what JSON makes of it.
     """

@@ -525,7 +525,19 @@ def _checkpoints(prepared: PreparedScenario, folder: Path, every: float) -> Chec
 def choose(
     file: CaseFile, names: Names, asked: Preparing, stop: float | None = None
 ) -> list[Scenario]:
-    """As `Case.choose`, of a case file, with scenarios prepared as ``asked`` says; runs end at ``stop`` [s]."""
+    """Choose scenarios of a case file, as `Case.choose` does.
+
+    Parameters
+    ----------
+    file
+        The case file.
+    names
+        Names of the scenarios.
+    asked
+        Values, parameter files, step and schedule with which they are prepared.
+    stop
+        End of their runs [s]; None for the case's own.
+    """
     file = replace(file, sharing=cast("SharingRule | None", asked.sharing))
     prepared = file.prepare(
         names_given(names, "names"), asked.overrides, asked.step_size, stop, asked.files

@@ -28,7 +28,7 @@ ENDINGS: dict[Port, str] = {"dq": "", "abc": "_abc", "phasor": "_phasor"}
 
 @dataclass(frozen=True)
 class Tool:
-    """What to build for a host.
+    """The kind of file to build for a host.
 
     ``why``: the reason for the kind, the version and the port.
     ``source``: where that is to be read; "here" where our own tests run such FMUs in it."""

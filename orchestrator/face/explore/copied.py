@@ -1,4 +1,4 @@
-"""What stands in the page, as text that makes it again: a command, a scenario of a case file, and Python."""
+"""Text that makes again what stands in the page: a command, a scenario of a case file, and Python."""
 
 import shlex
 import tomllib
@@ -108,7 +108,7 @@ def explored(
 
 
 def _tables(file: CaseFile) -> dict[str, Any]:
-    """Of a case file; of an SSP none but the events that it comes to."""
+    """Return the tables of a case file; of an SSP none but the events that it comes to."""
     try:
         return tomllib.loads(file.text)
     except tomllib.TOMLDecodeError:

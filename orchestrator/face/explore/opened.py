@@ -1,4 +1,4 @@
-"""What `gfor explore` is given: a case, a folder of results with the case behind it, or certificates."""
+"""The things that `gfor explore` opens: a case, a folder of results with the case behind it, or certificates."""
 
 import json
 from collections.abc import Iterator
@@ -30,7 +30,7 @@ CERTIFICATES = (MATRIX_JSON, JSON)  # names of files that `certified` opens
 
 
 def certified(file: Path) -> tuple[str, dict[str, Any]]:
-    """Of a certificate or a matrix of them: a word for its first bench, and its cells with their pictures.
+    """Return of a certificate or a matrix of them: a word for its first bench, and its cells with their pictures.
 
     What does not hold any more is refused."""
     places, whole, said, word = [("", file)], dict[str, dict[str, Any]](), [], ""
@@ -73,7 +73,7 @@ def certified(file: Path) -> tuple[str, dict[str, Any]]:
 
 
 def _rows(certificate: Certificate) -> Iterator[tuple[str, str, dict[str, Any]]]:
-    """Of each row its name, its case file, and its cell."""
+    """Yield of each row its name, its case file, and its cell."""
     for verdict in certificate.verdicts:
         pictures: list[tuple[str, list[ChartCurve], str]] = []
         if certificate.damping is None:

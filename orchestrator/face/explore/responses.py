@@ -121,8 +121,8 @@ def simulated(scenario: Scenario, wanted: Sequence[str], say: Say) -> dict[str, 
 
 
 def recorded(place: str, scenario: Scenario, wanted: Sequence[str]) -> dict[str, Any]:
-    """What an earlier run or an instrument recorded: ``curves``, the ``names`` of all signals, and what ``differs``
-    between a run and the scenario as it is now."""
+    """Return what an earlier run or an instrument recorded: ``curves``, the ``names`` of all signals, and what
+    ``differs`` between a run and the scenario as it is now."""
     if not place:
         raise InputError(
             f"nothing was recorded of scenario {scenario.name!r}; choose another one, or run it"

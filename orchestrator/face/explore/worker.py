@@ -90,7 +90,7 @@ def eigenvalues(modes: Modes) -> Complex:
 
 
 def matched(base: Complex, other: Complex) -> Complex:
-    """Of each eigenvalue, the one that it moved to; nan where none is near."""
+    """Return for each eigenvalue the one that it moved to; nan where none is near."""
     found = np.full(base.shape, np.nan + 0j)
     if base.size and other.size:
         apart = np.abs(base[:, None] - other[None]) / np.maximum(np.abs(base[:, None]), 1e-9)
@@ -129,7 +129,7 @@ class Desk:
         self._bench, self._files = PointBench(), dict[Path, list[float]]()
 
     def answer(self, question: Mapping[str, Any], say: Say) -> dict[str, Any]:
-        """What is asked for under ``ask``: open, cell, parameters, modes, movers, slopes, first, response,
+        """Answer what is asked for under ``ask``: open, cell, parameters, modes, movers, slopes, first, response,
         recorded, run, save."""
         ask = str(question["ask"])
         case = self._read()

@@ -171,7 +171,7 @@ def bands_of(f: Numbers, inside: Vector) -> list[tuple[float, float]]:
 
 @dataclass(frozen=True)
 class Passivity:
-    """Whether a device with the admittance Y = −i/v, currents counted into it, can drive an oscillation.
+    """Passivity of a device with the admittance Y = −i/v, currents counted into it: if it can drive an oscillation.
 
     It is passive at a frequency where Y + Yᴴ has no negative eigenvalue: it then takes power from every oscillation
     there. A negative index names the frequencies at which it could drive one, together with a grid that lets it."""

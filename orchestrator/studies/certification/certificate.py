@@ -127,7 +127,7 @@ def rows_in_words(c: Certificate) -> str:
 
 @dataclass(frozen=True)
 class DampingTest:
-    """What NTS 631 has beside the rows of other codes: rows are line reactances, of a case of its own."""
+    """Test that NTS 631 has beside the rows of other codes: rows are line reactances, of a case of its own."""
 
     controllers: DampingControllers
     event_time: float

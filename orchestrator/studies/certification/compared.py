@@ -1,4 +1,4 @@
-"""What a certificate says, compared with what comes out again."""
+"""Comparison of what a certificate says with what comes out again."""
 
 import json
 import math

@@ -95,7 +95,7 @@ def is_judged(frequency_hz: float) -> bool:
 
 
 def is_near(frequency_hz: float) -> bool:
-    """Whether a judged mode may have this frequency without the converter, or a mode of this frequency may become a
+    """Tell if a judged mode may have this frequency without the converter, or a mode of this frequency may become a
     judged one."""
     return PAIRED[0] <= frequency_hz <= PAIRED[1]
 

@@ -51,7 +51,7 @@ def parameter_rows(c: Certificate) -> list[ParameterRow]:
 
 
 def _start(info: VariableInfo) -> Scalar | None:
-    """As reports have it: all numbers as floats, items of an enumeration as text."""
+    """Return the start value as reports have it: all numbers as floats, items of an enumeration as text."""
     if info.start is None or isinstance(info.start, bool | str):
         return info.start
     return str(info.start) if info.type == "Enumeration" else float(info.start)

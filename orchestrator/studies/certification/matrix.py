@@ -69,7 +69,7 @@ class MatrixCell:
 
     @property
     def exit_code(self) -> int:
-        """As `gfor certify` of this device and code alone ends; 0 of figures without a verdict."""
+        """Exit code of `gfor certify` of this device and code alone; 0 of figures without a verdict."""
         if self.figures is not None:
             return 0
         return (
@@ -88,8 +88,8 @@ class CertificateMatrix:
 
     @property
     def exit_code(self) -> int:
-        """Of the worst cell: one that fails, one that could not be tested, one that is incomplete, one whose FMU an
-        acceptance test refuses; 0 where all pass. A code that is left out makes the whole incomplete."""
+        """Exit code of the worst cell: one that fails, one that could not be tested, one that is incomplete, one
+        whose FMU an acceptance test refuses; 0 where all pass. A code that is left out makes the whole incomplete."""
         found = {cell.exit_code for cell in self.cells.values()}
         found |= {exit_code(INCOMPLETE, refused=False)} if self.left_out else set()
         return next((code for code in WORST_FIRST if code in found), 0)

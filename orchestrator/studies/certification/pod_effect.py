@@ -1,4 +1,4 @@
-"""What the active damping controllers change at a point: its modes with them off, and whether the response shows it."""
+"""Effect of the active damping controllers at a point: its modes with them off, and whether the response shows it."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress

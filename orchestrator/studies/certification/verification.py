@@ -1,4 +1,4 @@
-"""Whether a certificate still holds: its hashes, all that it says, rebuilt from what its folder keeps, and parts
+"""Checks that a certificate still holds: its hashes, all that it says, rebuilt from what its folder keeps, and parts
 computed anew."""
 
 import json

@@ -1,4 +1,4 @@
-"""What a setting is worth over all operating points: its worst damping ratio, and what it does to the other modes."""
+"""Worth of a setting over all operating points: its worst damping ratio, and what it does to the other modes."""
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -276,6 +276,6 @@ def together(worths: Iterable[Worth]) -> Worth:
 def worth_of_all(
     loops: OpenLoops, setting: Setting, aim: Aim, apart: Sequence[complex] = ()
 ) -> Worth:
-    """What a setting is worth at a point, where all modes to be damped count, also those that no loop moves; those that
-    stand apart do not."""
+    """Return the worth of a setting at a point, where all modes to be damped count, also those that no loop moves;
+    those that stand apart do not."""
     return RatedPoint(0, loops, aim, None, apart).worth(setting)

@@ -105,7 +105,7 @@ class JudgedPoint:
 
     @property
     def unmoved(self) -> bool:
-        """Whether the controllers move the mode by less than 0.2 points of damping: a tenth of what a search passes.
+        """True if the controllers move the mode by less than 0.2 points of damping: a tenth of what a search passes.
 
         The least damped mode before may be another one; so the mode is sought among all that there were."""
         if self.target is None:
@@ -271,7 +271,7 @@ def _placed(mode: Watched, point: PointModes) -> PlacedMode:
 
 
 class PointsVerdict:
-    """What a design comes to over all points.
+    """Verdict on a design over all points.
 
     ``wanted``: damping ratio that is wanted everywhere; None for the best that there is.
     ``largest``: the largest gain that the search was allowed [pu].
@@ -363,14 +363,14 @@ class PointsVerdict:
 
     @property
     def stable(self) -> bool | None:
-        """Whether every point is stable with the controllers; None where that is not known of all and none grows."""
+        """True if every point is stable with the controllers; None where that is not known of all and none grows."""
         if self.unstable:
             return False
         return None if self.failed or self.doubtful else True
 
     @property
     def met(self) -> bool | None:
-        """Whether the wanted damping is reached everywhere, or, where none is wanted, the least one is better than
+        """True if the wanted damping is reached everywhere, or, where none is wanted, the least one is better than
         before; None where points have no modes or a limit is near, and no other point says no."""
         wanted, worst, before = self.wanted, self.worst, self.worst_before
         enough = worst is None or (

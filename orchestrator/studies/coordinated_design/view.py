@@ -45,7 +45,7 @@ class CoordinatedDesign(NoTruth, ask=".met, which is True, False, or None where 
 
     @property
     def met(self) -> bool | None:
-        """Whether the wanted damping is reached at every point; where none is wanted, whether the least one is better.
+        """True if the wanted damping is reached at every point; where none is wanted, if the least one is better.
 
         None where points have no modes, and no other point says no."""
         return self.result.verdict.met

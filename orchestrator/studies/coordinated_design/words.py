@@ -126,7 +126,7 @@ def _no_margin(thin: float | None, wanted: float) -> str:
 
 
 def _cannot_be_had(verdict: PointsVerdict, worst: float) -> str:
-    """What is known of how much can be had; that it cannot be had is said where settings were tried one by one."""
+    """Tell what is known of how much can be had; that it cannot be had is said where settings were tried one by one."""
     best = f"best {100 * worst:.2f} %"
     if not verdict.compared:
         return f"{best} (found by a search; no grid of settings was compared)"

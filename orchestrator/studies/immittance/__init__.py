@@ -1,1 +1,1 @@
-"""Whether a device is stable at a network: generalised Nyquist over scans, measured FMUs and linear models."""
+"""Stability of a device at a network: generalised Nyquist over scans, measured FMUs and linear models."""

@@ -1,4 +1,4 @@
-"""Whether two sides belong together, or a scan to its place in a case."""
+"""Checks that two sides belong together, or a scan to its place in a case."""
 
 from dataclasses import replace
 

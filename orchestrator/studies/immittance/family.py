@@ -44,8 +44,8 @@ class LoopFigures:
 
 
 def figures_of(path: LoopPath, growing: int | None, rated: float) -> LoopFigures:
-    """Of a loop with so many growing modes; None where that is not known. The decaying direct current of network and
-    stators, which in dq swings at the rated frequency, is no mode that is meant."""
+    """Return the figures of a loop with so many growing modes; None where that is not known. The decaying direct
+    current of network and stators, which in dq swings at the rated frequency, is no mode that is meant."""
     crossings = crossings_of(path)
     m = margins_of(path, crossings)
     sign = _sign(growing)

@@ -186,7 +186,7 @@ def _principal(path: LoopPath, k: int) -> float:
 
 
 def encirclements(path: LoopPath, *, exact: bool) -> tuple[int, int]:
-    """Of −1, clockwise, by the determinant and by the eigenloci; ``exact`` where the path goes on to infinity."""
+    """Count the clockwise turns around −1 of determinant and eigenloci; ``exact`` if the path goes to infinity."""
     return _count(path, path.turns, exact), _count(path, path.loci_turns, exact)
 
 

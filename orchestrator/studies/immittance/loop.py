@@ -44,7 +44,7 @@ class SeriesCapacitors:
 
 
 def _det(L: Complex) -> Complex:
-    """Of 1 + L; where a free angle's pole makes it 0 to the last digit, next to nothing."""
+    """Return det(1 + L); where a free angle's pole makes it 0 to the last digit, next to nothing."""
     found = np.linalg.det(np.eye(L.shape[-1]) + L)
     return np.asarray(np.where(found == 0, 1e-100, found))
 
@@ -206,7 +206,7 @@ class CutLoop:
         return np.asarray(w[np.diff(w, prepend=0.0) > 0.3 * _ROUND * w])
 
     def _marks(self, L: Complex) -> Complex:
-        """What must turn little from point to point: det(1 + L), and the same of the loop at each of several buses."""
+        """Return what must turn little from point to point: det(1 + L), also of the loop at each of several buses."""
         det = _det(L)[:, None]
         return (
             np.hstack([det, np.linalg.det(_at_buses(L))])

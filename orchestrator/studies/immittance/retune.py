@@ -1,4 +1,4 @@
-"""What to retune: margin, least damped mode and admissible weakening of the network over each parameter of a device.
+"""Parameters to retune: margin, least damped mode and admissible weakening of the network over each of a device.
 
 From a few scans the loop is a rational function of the parameter at every frequency. Each further scan stands where two
 such functions differ most, and checks what was predicted there before it is used."""
@@ -58,7 +58,7 @@ class Foretold:
 
 @dataclass
 class Retuned:
-    """What one parameter does."""
+    """Effect of one parameter on the loop: scans, and figures over its values."""
 
     setting: Tunable
     scans: dict[float, CutResult] = field(default_factory=dict)

@@ -65,7 +65,7 @@ class CutRequest:
 
 @dataclass(frozen=True)
 class CutResult:
-    """What was found. ``scans`` are those that were read or measured, by side."""
+    """Findings at a cut. ``scans`` are those that were read or measured, by side."""
 
     request: CutRequest
     loop: CutLoop
@@ -339,7 +339,7 @@ def _side(
 
 
 def _rating(request: CutRequest, cut: Cut | None) -> float | None:
-    """Of the device [MVA], as it is given or as the device has it."""
+    """Return the rating of the device [MVA], as it is given or as the device has it."""
     if (
         request.rating_mva is None
         and cut is not None

@@ -1,4 +1,4 @@
-"""What was found at a cut: as Python has it, as files, and in words."""
+"""Findings at a cut: as Python has it, as files, and in words."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -37,7 +37,7 @@ Report = Callable[[str], None]
 
 
 class Nyquist(NoTruth, ask=".verdict"):
-    """What `nyquist` found at a cut: ``result`` has loop, judgement and scans, ``retuned`` what `retune` found."""
+    """Findings of `nyquist` at a cut: ``result`` has loop, judgement and scans, ``retuned`` what `retune` found."""
 
     def __init__(
         self, result: CutResult, study: Study, settings: Callable[[Sequence[str]], list[Tunable]]
@@ -112,7 +112,7 @@ class Nyquist(NoTruth, ask=".verdict"):
 
 
 def parts(found: Nyquist) -> Iterator[RenderableType]:
-    """What a terminal shows: verdict, margins, where a side is not passive, how far a scan is from the case's own."""
+    """Yield the rows of a terminal: verdict, margins, where a side is not passive, how far a scan is off."""
     result = found.result
     good = {"stable": True, "unstable": False}.get(str(result.verdict))
     yield VerdictSentence(good, str(result.verdict), result.because).markup()
@@ -241,7 +241,7 @@ def _number(x: float) -> float | None:
 
 
 def _confirmed(x: Retuned) -> dict[str, Any] | None:
-    """What was predicted at the value that is needed, and what a scan and the coupled system's modes say there."""
+    """Return the prediction at the value that is needed, and what a scan and the coupled system's modes say there."""
     if x.needed is None or x.predicted is None:
         return None
     result, own, cut = (

@@ -86,7 +86,7 @@ def _of_place(place: Place, device: FmuDescription | None = None) -> dict[str, V
 
 
 def _rated_frequency(place: Place) -> float | None:
-    """Of the device at a place [Hz]; None where it does not say."""
+    """Return the rated frequency of the device at a place [Hz]; None where it does not say."""
     description = place.plan.description
     if isinstance(description, BoundDescription):
         return description.port.f_n

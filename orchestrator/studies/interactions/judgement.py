@@ -1,4 +1,4 @@
-"""What a study of interactions says: the modes that vendors share, the worst pair, the worst assignment.
+"""Judgement of a study of interactions: the modes that vendors share, the worst pair, the worst assignment.
 
 A mode is one of interaction between two subsystems where both take part in it by more than a threshold: J. Beerten,
 S. D'Arco and J. A. Suul, "Identification and small-signal analysis of interaction modes in VSC MTDC systems", IEEE

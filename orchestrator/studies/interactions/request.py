@@ -1,4 +1,4 @@
-"""What is asked of a study of interactions."""
+"""Request of a study of interactions."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, replace

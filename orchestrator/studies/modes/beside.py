@@ -1,4 +1,4 @@
-"""What a device brings: a scenario's damping beside that of another one with the same power flow."""
+"""Damping that a device brings: a scenario's damping beside that of another one with the same power flow."""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -16,7 +16,7 @@ _MOST_STATES = 200  # of a system whose modes are computed a second time
 class Choosable(Protocol):
     @property
     def prepared(self) -> PreparedScenario:
-        """As it was asked for."""
+        """The scenario as it was asked for."""
 
     def with_loads_as_powers(self) -> Self | None:
         """The other one; None where the load model is not open."""

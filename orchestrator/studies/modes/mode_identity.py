@@ -300,7 +300,7 @@ class _Others:
         )
 
     def _differs_in_foreign(self) -> bool:
-        """Whether a value of somebody else's FMU is another than in the scenario before, or in the case's file."""
+        """Tell if a value of somebody else's FMU is another than in the scenario before, or in the case's file."""
         b = self._system.prepared
         paths = {name: plan.description.path for name, plan in b.system.components.items()}
         foreign = {path for path in set(paths.values()) if not is_ours(path)}
@@ -443,7 +443,7 @@ def _gain(plan: ComponentPlan, controller: str) -> float:
 
 
 def _runs_beside(prepared: PreparedScenario) -> bool:
-    """Whether its FMUs can be instantiated beside those of another scenario: our own, and those with a process each."""
+    """Tell if the FMUs can be instantiated beside those of another scenario: our own, and those with a process each."""
     plans = prepared.system.components.values()
     return all(
         plan.isolated is not False or is_isolated(plan.description, None) is False for plan in plans

@@ -1,4 +1,4 @@
-"""What is asked of scenarios: how they are prepared, their modes, their communication step."""
+"""Requests of scenarios: how they are prepared, their modes, their communication step."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
@@ -245,7 +245,7 @@ _SCHEDULES = FieldKind(f"{{{','.join(SCHEDULES)}}}", _read_schedule, _schedules,
 
 @dataclass(frozen=True)
 class StepsRequest:
-    """What communication steps and schedules do to the critical modes, as ``gfor steps`` says it.
+    """Effect of communication steps and schedules on the critical modes, as ``gfor steps`` says it.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""What a component says that cannot start, in the words of the case: its place, its operating point, the remedy."""
+"""Messages of a component that cannot start, in the words of the case: its place, its operating point, the remedy."""
 
 from orchestrator.cases.flow.sharing import power_limits
 from orchestrator.cases.scenario.prepare import PreparedScenario

@@ -80,7 +80,7 @@ class TriedStep:
 
 @dataclass(frozen=True, repr=False)
 class StepChoice:
-    """What communication steps do to a scenario's critical modes."""
+    """Effect of communication steps on a scenario's critical modes."""
 
     prepared: PreparedScenario
     allowed: Allowed
@@ -279,7 +279,7 @@ def _trial(
 def keeps_stability(
     rate: float, growth: float, seen: NDArray[np.complex128], critical: NDArray[np.complex128]
 ) -> bool:
-    """Whether a step makes nothing grow by itself, and leaves each critical mode on its side of the imaginary axis.
+    """Tell if a step makes nothing grow by itself, and leaves each critical mode on its side of the imaginary axis.
 
     ``rate`` and ``growth``: largest growth rates [1/s] of the step map and of the continuous system; 0 where nothing
     grows.

@@ -150,7 +150,7 @@ def without_references(c: Any) -> Any:
 
 
 def _same_fmus(master: Master, prepared: PreparedScenario) -> bool:
-    """Whether the running FMUs can serve the next point. Others' are opened anew: many cannot go on after a reset."""
+    """Tell if the running FMUs can serve the next point. Others' are opened anew: many cannot go on after a reset."""
     system, other = master.system, prepared.system
     return (
         not (system.wires or other.wires)

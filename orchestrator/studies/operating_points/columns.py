@@ -1,4 +1,4 @@
-"""What the columns of a file of operating points mean, for one scenario."""
+"""Meaning of the columns of a file of operating points, for one scenario."""
 
 import fnmatch
 from collections import Counter

@@ -171,8 +171,9 @@ def _left(
     others: Mapping[str, float],
     load: float,
 ) -> float:
-    """What a point leaves to the slack [MW] of what the loads draw more and units out of service fed; 0 where that is
-    nearer to the slack's own share than to all of it. ``others``: units beside the slack's, and what each feeds."""
+    """Return what a point leaves to the slack [MW] of what the loads draw more and units out of service fed; 0 where
+    that is nearer to the slack's own share than to all of it. ``others``: units beside the slack's, and what each
+    feeds."""
     wanted, given = _drawn(point, prepared, elements) - load, 0.0
     for unit, power in others.items():
         switches = f"{unit}.connected", f"{elements.grid}.{unit}.connected"

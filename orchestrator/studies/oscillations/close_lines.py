@@ -1,4 +1,4 @@
-"""What stands close beside a line of a spectrum, where a record hardly tells their frequencies apart."""
+"""Lines that stand close beside a line of a spectrum, where a record hardly tells their frequencies apart."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -83,7 +83,7 @@ def most_explained(t: Numbers, z: Numbers, offsets: Numbers, count: int) -> tupl
 
 
 def _explained(times: Numbers, z: Numbers, frequency: float, count: int, *, free: bool) -> _Lines:
-    """Of exponentials, or of sines, those that leave least."""
+    """Fit the exponentials, or the sines, that leave least."""
     from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import
 
     t, span = np.linspace(0, 1, len(z)), times[-1] - times[0]

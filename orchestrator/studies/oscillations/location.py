@@ -155,7 +155,7 @@ def block_phasors(
 def felt_beyond(
     measured: Measurements, found: SpectralLine, others: Sequence[float], name: str
 ) -> bool:
-    """Whether a voltage at another bus than a place's own moves with it for sure: what drives a grid moves it."""
+    """Tell if a voltage at another bus than a place's own moves with it for sure: what drives a grid moves it."""
     (home,) = {place.bus for place in measured.places if place.name == name}
     away = [place.bus != home for place in measured.places]
     whole, errors = jackknife(

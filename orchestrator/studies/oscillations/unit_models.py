@@ -107,7 +107,7 @@ def recorded_case(attributes: Mapping[str, Any]) -> PreparedScenario | None:
 
 
 def unlike(attributes: Mapping[str, Any], prepared: PreparedScenario) -> str:
-    """What of a record's own case is another one in the scenario whose models judge it; "" where nothing is known."""
+    """Tell what of a record's own case differs in the scenario whose models judge it; "" where nothing is known."""
     case, there = prepared.case, prepared.given
     found = ["the case file"] if attributes.get("case_file", case.text) != case.text else []
     for name, content in json.loads(attributes.get("inputs", "{}")).items():

@@ -123,7 +123,7 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
 
 
 def forced_frequencies(times: Numbers, names: Sequence[str], values: Numbers) -> list[float]:
-    """Of the oscillations in signals, shape (n, m), that are forced."""
+    """Return the frequencies [Hz] of the forced oscillations in signals of shape (n, m)."""
     signals = Signals(times, tuple(names), values - values.mean(axis=0))
     return [
         one.frequency

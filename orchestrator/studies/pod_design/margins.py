@@ -92,7 +92,7 @@ class _Loop:
         self._closed, self._U, self._V = closed, U, V
 
     def eigenvalues(self, w: float) -> Vector:
-        """Of L at ω [rad/s], smallest first; their sizes depend continuously on ω."""
+        """Return the eigenvalues of L at ω [rad/s], smallest first; their sizes depend continuously on ω."""
         solver = self._closed.shifted(1j * w)
         T = -self._V @ np.column_stack([solver.solve(u) for u in self._U.T])
         found = np.linalg.eigvals(-np.linalg.solve(np.eye(len(T)) + T, T))

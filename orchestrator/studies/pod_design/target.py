@@ -122,7 +122,7 @@ def find_scenario(
 
 
 def _lacking(plan: Mapping[str, ComponentPlan], controller: str) -> str:
-    """Of the first component with some variables of a controller, which ones it lacks; "" if there is none."""
+    """Name the variables that the first component with some of a controller's lacks; "" if there is none."""
     for name, component in plan.items():
         having = [v for v in NEEDED if f"{controller}.{v}" in component.description.variables]
         lacks = [f"{controller}.{v}" for v in NEEDED if v not in having]

@@ -1,4 +1,4 @@
-"""What all executors have in common, and the one that computes one task after another, in this process."""
+"""Base of all executors, and the one that computes one task after another, in this process."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol, TypeVar

@@ -1,4 +1,4 @@
-"""What every study of a case can be asked, beside what it asks itself: its case's values, and where it is computed."""
+"""Request that every study of a case shares, beside its own fields: its case's values, and where it is computed."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -57,7 +57,7 @@ def _nothing(shown: Any) -> Iterable[str]:
 
 @dataclass(frozen=True, kw_only=True)
 class Study(Generic[Asks, Shown]):
-    """What may be asked of a study of a case, and how a command shows what users get of it.
+    """Request of a study of a case, and how a command shows what users get of it.
 
     The class of its request says what it is; options, keywords and documentation come from there. What users get has
     ``as_json`` and, where files are written, ``save``."""

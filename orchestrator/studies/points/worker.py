@@ -1,4 +1,4 @@
-"""What a worker of any study needs beside the module of its points: imported once, it saves each worker time."""
+"""Modules that a worker of any study needs beside that of its points: imported once, they save each worker time."""
 
 from orchestrator.core.units import to_unit
 from orchestrator.studies.points import task

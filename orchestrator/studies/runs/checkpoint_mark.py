@@ -1,4 +1,4 @@
-"""What a run is made of, item by item: a checkpoint is worth nothing to a run that is made of something else."""
+"""Ingredients of a run, item by item: a checkpoint is worth nothing to a run that is made of something else."""
 
 import hashlib
 import json

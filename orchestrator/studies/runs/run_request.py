@@ -1,4 +1,4 @@
-"""What is asked of a run."""
+"""Request of a run."""
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass

@@ -311,7 +311,7 @@ def _shares(modes: ModeSet) -> dict[str, Any]:
 
 
 def _residues(modes: ModeSet, whole: Mapping[str, Any]) -> dict[str, Any]:
-    """Of every converter: from its power references to its frequency, shape (2, m) [rad/s per pu and pu]."""
+    """Residues of every converter, from power references to frequency, shape (2, m) [rad/s per pu and pu]."""
     found, first, n = {}, 0, len(modes.names)
     for name, c in whole.items():
         last = first + len(c.states)

@@ -1,4 +1,4 @@
-"""What is asked of a screening."""
+"""Request of a screening."""
 
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass

@@ -1,4 +1,4 @@
-"""What a screening comes to: its modes with their worst points, durations of damping, counts, and a verdict."""
+"""Summary of a screening: its modes with their worst points, durations of damping, counts, and a verdict."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence

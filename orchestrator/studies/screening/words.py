@@ -77,7 +77,7 @@ def load_of(plan: ScreeningPlan, point: OperatingCase) -> float:
 
 @dataclass(frozen=True)
 class _Property:
-    """What items have in common, in words, and which items have it."""
+    """A property that items have in common, in words, and a test for it."""
 
     text: str
     holds: Callable[[ScreenedItem], bool]
@@ -257,7 +257,7 @@ def _least(item: ScreenedItem) -> str:
 
 
 def growth_outside(record: ItemRecord) -> str:
-    """What grows beside the critical modes, how fast if that is known, and at which frequency; "" if nothing does."""
+    """Tell what grows beside the critical modes, how fast if known, and at which frequency; "" if nothing does."""
     followed = np.delete(record.eigenvalues, record.critical)
     known = followed[followed.real > UNSTABLE].tolist()
     number = record.growing_elsewhere + 2 * len(known)

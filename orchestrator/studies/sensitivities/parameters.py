@@ -63,7 +63,7 @@ def parameters_in(
     *,
     fixed: bool = False,
 ) -> list[Parameter]:
-    """As `parameters_of`, of components that need not run.
+    """List parameters as `parameters_of` does, of components that need not run.
 
     ``value_of``: value of a component's variable, in its unit; asked for the chosen ones only."""
     everything = {

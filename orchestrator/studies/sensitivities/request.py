@@ -1,4 +1,4 @@
-"""What is asked of a mode's sensitivities."""
+"""Request of a mode's sensitivities."""
 
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass

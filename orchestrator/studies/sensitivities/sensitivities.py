@@ -269,7 +269,7 @@ def _shift(model: LinearModel, varied: LinearModel, pair: Eigenpair) -> complex:
 
 
 def _stays(master: Master, parameter: Parameter, period: int) -> bool:
-    """Whether the system is where it was, with another value of a parameter: its component now and a step later, or all
+    """Tell if the system is where it was, with another value of a parameter: its component now and a step later, or all
     of it a period [communication steps] later where sampled controllers make the steps differ."""
     change = _TRIED * parameter.scale
 

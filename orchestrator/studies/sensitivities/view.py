@@ -74,7 +74,7 @@ _LONGEST = 40
 
 
 def _long_texts(table: pd.DataFrame) -> dict[str, str]:
-    """Of each parameter, its texts that are too long for a table."""
+    """Return, by parameter, the texts that are too long for a table."""
     found = {}
     for name, row in table.iterrows():
         texts = [one for one in row if isinstance(one, str) and len(one) > _LONGEST]

@@ -56,7 +56,7 @@ class AmbientModes:
         return iter(self.windows)
 
     def alarm(self, mode: AmbientMode) -> Alarm:
-        """Whether the damping is below the level, for sure where all of its interval is; of a forced oscillation, that.
+        """Tell if the damping is below the level, for sure where all of its interval is; of a forced oscillation, that.
 
         Parameters
         ----------

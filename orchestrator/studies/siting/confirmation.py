@@ -56,9 +56,9 @@ class SearchEnd:
 
 @dataclass(frozen=True)
 class Confirmation:
-    """What the coupled FMUs say of one bus: Δλ [rad/s] by a small gain of the tuned POD, or by a device without one, as
-    predicted and as coupled; λ with the device, its POD off; the POD's setting and λ with it; the least damped mode
-    then [rad/s], which may be another one.
+    """Results of the coupled FMUs at one bus: Δλ [rad/s] by a small gain of the tuned POD, or by a device without
+    one, as predicted and as coupled; λ with the device, its POD off; the POD's setting and λ with it; the least
+    damped mode then [rad/s], which may be another one.
     """
 
     bus: str
@@ -82,7 +82,7 @@ class Confirmation:
 
     @property
     def damping_alone(self) -> float:
-        """Of the mode with the device, without its POD [%]."""
+        """Damping of the mode with the device, without its POD [%]."""
         return damping_percent(self.with_device)
 
     @property
@@ -92,12 +92,12 @@ class Confirmation:
 
     @property
     def damping(self) -> float:
-        """Of the mode with the device, tuned where it has a POD [%]."""
+        """Damping of the mode with the device, tuned where it has a POD [%]."""
         return damping_percent(self.reached)
 
     @property
     def least_damping(self) -> float | None:
-        """Of the least damped mode then [%]; None if nothing was computed."""
+        """Damping of the least damped mode then [%]; None if nothing was computed."""
         return None if self.least is None else damping_percent(self.least)
 
     @property

@@ -82,7 +82,7 @@ def ideal_support(kind: str, voltage: complex, eigenvalue: complex) -> Vector:
 
 
 def response_of(master: Master, model: ComponentLinearization, eigenvalue: complex) -> Vector:
-    """Of a running component's current [pu, 100 MVA] to the voltage of its bus at λ [rad/s], shape (2, 2).
+    """Response of a running component's current [pu, 100 MVA] to its bus voltage at λ [rad/s], shape (2, 2).
 
     The component answers the voltage at a step's beginning. A phasor network takes its admittance at the step's end."""
     z = cmath.exp(eigenvalue * master.clock.step_size)

@@ -169,7 +169,7 @@ class SiteResult:
 
     @property
     def by_coupled(self) -> bool:
-        """Whether the places that are confirmed come first, by the damping that coupled FMUs give: without outages,
+        """True if the places that are confirmed come first, by the damping that coupled FMUs give: without outages,
         for which nothing is confirmed, and of at least two places."""
         return (
             len(self.situations) == 1 and len([x for x in self.confirmations if not x.failure]) > 1
@@ -181,7 +181,7 @@ class SiteResult:
         return sorted(self.situations, key=lambda one: one.modes[0].mode.damping_ratio)
 
     def least(self, bus: str) -> tuple[float, str]:
-        """What the device does there for the least damped mode where it does least [points], and in which situation."""
+        """Return the device's least effect there on the least damped mode [points], and in which situation."""
         return min(
             (self.shifts[DEVICE][s.name][s.modes[0].label][bus].damping, s.name)
             for s in self.situations

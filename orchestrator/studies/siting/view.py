@@ -1,4 +1,4 @@
-"""What a study of places found: in Python, in words, as JSON, as rows, and as a page."""
+"""Findings of a study of places: in Python, in words, as JSON, as rows, and as a page."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class Siting:
 
 
 def unit(result: SiteResult, times: str = "1") -> str:
-    """Of all shifts of the device, ``times`` as much."""
+    """Return the unit of all shifts of the device, ``times`` as much."""
     if result.request.is_foreign:
         return "points of damping by the device as it is"
     quantity = "Mvar/Hz" if result.request.device == "pod_q" else "MW/Hz"
@@ -379,7 +379,7 @@ def ranking_table(result: SiteResult) -> Table:
 
 
 def _confirmed_headings(result: SiteResult) -> list[str]:
-    """Of the damping by coupled FMUs; none where nothing is confirmed."""
+    """Return the headings of the damping by coupled FMUs; none where nothing is confirmed."""
     if not result.confirmations:
         return []
     label = result.intact.modes[0].label

@@ -118,7 +118,7 @@ class FilteredRecorder(Recorder):
         super().end(run)
 
     def position(self) -> dict[str, Any]:
-        """As `Recorder.position`, with the rows that are not complete."""
+        """Position as `Recorder.position` gives it, with the rows that are not complete."""
         numbers = sorted(self._pending)
         sums = np.array([self._pending[n] for n in numbers]).reshape(len(numbers), len(self.names))
         times = np.array([[n, t] for n, t in sorted(self._pending_times.items())]).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""What a connection does to the value that it carries, and which connections of a system do so.
+"""Changes that a connection makes to the value that it carries, and which connections of a system do so.
 
 The order along a connection is fixed: the sensor's bias and noise, its quantisation, the way's delay, and last whether
 the value arrives at all."""
@@ -72,7 +72,7 @@ Imperfection = Bias | Noise | Quantisation | Delay | DropOut
 
 @dataclass
 class WirePlan:
-    """What one connection does, and may do later."""
+    """Settings of one connection, now and after later events."""
 
     name: str  # ``a.out -> b.in``
     # from t = 0 on, by kind
@@ -90,7 +90,7 @@ class WirePlan:
 
     @property
     def delay(self) -> float:
-        """Of the permanent settings [s]."""
+        """Delay of the permanent settings [s]."""
         found = self.permanent.get(Delay)
         return found.seconds if isinstance(found, Delay) else 0.0
 

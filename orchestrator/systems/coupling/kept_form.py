@@ -1,4 +1,4 @@
-"""Whether what was kept of a run has the form of the run that is to go on from it."""
+"""Check that what was kept of a run has the form of the run that is to go on from it."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

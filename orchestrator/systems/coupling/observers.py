@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class ObservedRun(Protocol):
-    """What an observer sees of a run; the master is one."""
+    """The view that an observer has of a run; the master is one."""
 
     @property
     def index(self) -> int:

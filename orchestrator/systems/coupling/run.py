@@ -169,7 +169,7 @@ class Run:
         self._stepper.jumped(y)
 
     def _require_finite(self, names: Iterable[str]) -> None:
-        """What components gave without a step, at the start and at events; the inner loop looks after the steps."""
+        """Check what components gave without a step, at the start and at events; the inner loop checks the steps."""
         for name in names:
             outputs = self._stepper.exchanges[name].outputs
             for variable, value in zip(outputs.names, outputs.values.tolist(), strict=True):

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True, slots=True)
 class ComponentStatistics:
-    """Of one component: number of steps, time inside its FMI calls [s], and its share of the run's threads."""
+    """Statistics of one component: number of steps, time inside FMI calls [s], and its share of the run's threads."""
 
     name: str
     steps: int

@@ -1,4 +1,4 @@
-"""What the inner loop steps, and what it offers: the forms that the loop in C and the one in Python share."""
+"""Parts that the inner loop steps, and what it offers: the forms that the loop in C and the one in Python share."""
 
 from typing import Protocol
 

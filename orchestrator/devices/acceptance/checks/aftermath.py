@@ -259,7 +259,7 @@ class _Look:
     def _seen(
         self, running: Running, segments: Sequence[Segment], soon: bool
     ) -> tuple[_End, float, float, Iterable[tuple[int, Complex, Complex]]]:
-        """What becomes of it, how far away it is, the bytes that each step keeps, and its answers after how many steps.
+        """Return how it ends, how far away, the bytes that each step keeps, and its answers after how many steps.
 
         Where its states come back, one run shows all of them."""
         sizes = []

@@ -240,7 +240,7 @@ def _changed_since(chapters: Sequence[Chapter]) -> str:
 def _unlike(
     told: Mapping[str, Sequence[tuple[str, str]]],
 ) -> Iterator[tuple[str, dict[str, list[str]]]]:
-    """Of what sources tell of one thing each, what differs: the thing, and the sources of every value."""
+    """Yield what differs among what sources tell of one thing each: the thing, and the sources of every value."""
     seen: dict[str, dict[str, list[str]]] = {}
     for source, pairs in told.items():
         for what in dict(pairs):

@@ -208,7 +208,7 @@ def row_result(task: BenchTask, case: Case) -> BenchResult:
 
 
 def _processor_time() -> float:
-    """Of this process and of those that it has started and that have ended [s]."""
+    """Return the processor time [s] of this process and of those that it has started and that have ended."""
     return sum(os.times()[:4])
 
 

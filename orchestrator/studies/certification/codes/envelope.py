@@ -36,7 +36,7 @@ _NEAR = 1e-6  # roots that are nearer to each other than this part count as one,
 
 @dataclass(frozen=True)
 class Bounds:
-    """What is asked and what is allowed, as distances from the value before the event."""
+    """Values that are asked and allowed, as distances from the value before the event."""
 
     ideal: Numbers  # response of the declared plant, shape (n,)
     # asked, allowed: bounds towards the value before the event and away from it, shape (n,). One below 0 lies on the
@@ -89,7 +89,7 @@ class Swinging:
         return 1 - _step(self.roots, t)
 
     def dying_of_source(self, t: Numbers) -> Numbers:
-        """As `dying`; where ζ ≤ 1 as DyCoV has it, e^(−σt)·(cos ω_d·t − (σ − 1)/ω_d·sin ω_d·t).
+        """Return what `dying` returns; where ζ ≤ 1 as DyCoV has it, e^(−σt)·(cos ω_d·t − (σ − 1)/ω_d·sin ω_d·t).
 
         That is no solution of the swing equation, for which +σ stands in place of −(σ − 1). It falls earlier."""
         if self.ratio > 1:

@@ -61,7 +61,7 @@ the first change within a time [s] (MISO BPM-015 r32 appendix H)."""
 
 @dataclass(frozen=True)
 class AskedStiffness:
-    """What the criterion of phase jumps comes to as a least |P/θ|, and what was found."""
+    """The least |P/θ| that the criterion of phase jumps comes to, and the |P/θ| that was found."""
 
     value: float  # least |P/θ| that it asks for at the terminals [pu/rad]
     band: tuple[float, float]  # frequencies at which it asks for it [Hz]

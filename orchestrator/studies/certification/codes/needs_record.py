@@ -1,4 +1,4 @@
-"""What failed criteria would take: tables for a terminal, JSON, and a page."""
+"""Records of what failed criteria would take: tables for a terminal, JSON, and a page."""
 
 from collections.abc import Sequence
 from dataclasses import asdict

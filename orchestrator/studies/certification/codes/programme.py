@@ -1,4 +1,4 @@
-"""What the test bench does in one row of a code: its operating point, and what changes when."""
+"""Programme of the test bench in one row of a code: its operating point, and what changes when."""
 
 from dataclasses import dataclass, field
 from math import hypot, radians, sqrt

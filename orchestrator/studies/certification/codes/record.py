@@ -1,4 +1,4 @@
-"""What the files of a certificate hold of the rows on the test bench: figures, responses, chapters of the page."""
+"""Records of the rows on the test bench in the files of a certificate: figures, responses, chapters of the page."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict

@@ -1,4 +1,4 @@
-"""What a code is: rows with a stimulus and criteria, sources, and what is left out by name."""
+"""Parts of a code: rows with a stimulus and criteria, sources, and what is left out by name."""
 
 import re
 import tomllib

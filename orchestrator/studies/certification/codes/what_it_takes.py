@@ -1,4 +1,4 @@
-"""What a failed criterion would take: each parameter of the converter is changed to either side, and the row run again.
+"""Changes that a failed criterion would take: the row runs again with each parameter of the converter to either side.
 
 Only rows that fail are run. What comes out is a slope at the present values; the change that a straight line asks for
 is only told where it was run."""

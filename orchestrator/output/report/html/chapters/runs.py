@@ -19,7 +19,7 @@ from orchestrator.output.report.html.verdict_lines import VerdictLine
 def of_run(
     folder: Path, scenarios: Sequence[Content], content: str = "", beside: Sequence[str] = ()
 ) -> Chapter:
-    """Of a run's summary, or the same of `gfor modes`; ``beside``: what devices bring."""
+    """Make the chapter of a run's summary, or the same of `gfor modes`; ``beside``: what devices bring."""
     open_ = []
     lines = [VerdictLine.of(scenario) for scenario in scenarios]
     for line, s in zip(lines, scenarios, strict=True):
