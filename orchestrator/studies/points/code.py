@@ -1,8 +1,8 @@
 """Hashes of this package's code: of all that computes, and of what the points of one module depend on."""
 
 import hashlib
+import inspect
 import json
-import re
 from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib.machinery import SourceFileLoader
@@ -18,12 +18,11 @@ _SHOWING = ("devices/acceptance", "face", "output/report", "simulation/interop")
 """Folders whose code does not change the result of any point; a test checks that the code of a point never imports
 them."""
 
+_HAS_DOCSTRING = int(getattr(inspect, "CO_HAS_DOCSTRING", 0))
+"""Flag of a function with a docstring, from Python 3.14 on; before, the first constant is None without one."""
+
 # what computes the figures beside our code; another version may give others
 LIBRARIES = ("numpy", "scipy")
-
-_SENTENCE = re.compile(r"^(?!\d)(?=.*[a-z]{2})(?=.* )(?!.*->)(?!.*;\n)", re.DOTALL)
-"""Texts that tell something: docstrings, and pieces of messages. Names and values are without a space, or begin with a
-digit, as ``50 Hz``."""
 
 
 @cache
@@ -59,7 +58,8 @@ def code_files() -> list[Path]:
 def numbers_hash(*modules: str) -> str:
     """Hash of the versions and of what computes points: some modules, and all that these import.
 
-    Comments, docstrings and sentences do not count, and no module that is not imported. Where the files are others than
+    Comments and docstrings do not count, and no module that is not imported; every other text counts, as it may be a
+    value: words that say where a vendor's current is positive turn it. Where the files are others than
     those that this process has loaded, it is the hash of what was loaded, to the last comma.
 
     ``modules``: of this package, or of a plug-in, whose own package then counts as well."""
@@ -137,11 +137,23 @@ def _computing(code: CodeType) -> Iterator[object]:
         code.co_freevars,
         code.co_cellvars,
     )
+    docstring = _docstring(code)
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
             yield from _computing(constant)
-        elif not (isinstance(constant, str) and _SENTENCE.match(constant)):
+        elif constant is not docstring:
             yield sorted(map(repr, constant)) if isinstance(constant, frozenset) else constant
+
+
+def _docstring(code: CodeType) -> str | None:
+    """Return the docstring of a function, class or module among its constants."""
+    if "__doc__" in code.co_names:  # a class or a module: the first text that is not its name
+        texts = (text for text in code.co_consts if isinstance(text, str))
+        return next((text for text in texts if text != code.co_qualname), None)
+    first = code.co_consts[0] if code.co_consts else None
+    named = not code.co_name.startswith("<")  # a comprehension has no docstring, nor a lambda
+    marked = _HAS_DOCSTRING == 0 or bool(code.co_flags & _HAS_DOCSTRING)
+    return first if isinstance(first, str) and named and marked else None
 
 
 code_hash()  # now, so that it is the hash of what is loaded

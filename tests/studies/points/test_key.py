@@ -104,6 +104,13 @@ def test_the_same_files_give_the_same_name(named):
         ),
         (SWEEP, "cases/flow/power_flow.py", "complex(p, q)", "complex(q, p)"),
         (SWEEP, "devices/binding/tables.py", '"50 Hz"', '"60 Hz"'),
+        (  # words with a meaning: they turn a vendor's current
+            SWEEP,
+            "devices/binding/tables.py",
+            '] = "into the grid"',
+            '] = "into the converter"',
+        ),
+        (SWEEP, "linear/models/steady_state.py", "{changes};", "{changes},"),  # may be one as well
         (
             ROW,
             "simulation/watch/synchronism.py",
@@ -128,16 +135,17 @@ def test_another_figure_is_computed_anew(changed, module, file, old, new):
         ("studies/sweep/point.py", "its task and its result.", "task and result."),
         ("studies/sweep/tables.py", "import", "import sys\nimport"),
         ("studies/sweep/trajectories.py", "\n\n\n", "\n\n\nMOST = 3\n\n\n"),
+        ("cases/flow/power_flow.py", '"""Power flow of a case:', '"""The power flow of a case:'),
         (
-            "linear/models/steady_state.py",
-            "no steady state found: {changes};",
-            "no steady state found, {changes};",
+            "linear/spectra/modes.py",
+            'class Mode(OfEigenvalue):\n    """',
+            'class Mode(OfEigenvalue):\n    """Again: ',
         ),
         ("cases/flow/power_flow.py", "complex(p, q)", "complex(p, q)  # in pu\n"),
         ("face/cli/check.py", "import argparse\n", "import argparse\nimport sys\n"),
     ],
 )
-def test_a_comma_in_a_sentence_keeps_what_is_kept(changed, file, old, new):
+def test_comments_docstrings_and_what_is_not_imported_keep_what_is_kept(changed, file, old, new):
     text = (code._ROOT / file).read_text(encoding="utf-8")
     if text.count(old) > 1:  # the first of them
         old, new = text[: text.index(old) + len(old)], text[: text.index(old)] + new
