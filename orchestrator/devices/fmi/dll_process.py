@@ -101,9 +101,9 @@ class DllProcess:
             self._process.stdin.write(json.dumps(orders).encode("ascii") + b"\n")
             self._process.stdin.flush()
         answer = self._answer(self._seconds * crowded())
-        if "error" in answer:
+        if answer.get("error") is not None:
             raise ValueError(str(answer["error"]))
-        if "broken" in answer:
+        if answer.get("broken") is not None:
             raise RuntimeError(
                 f"the process of a DLL does not follow its orders: {answer['broken']}"
             )
@@ -123,9 +123,9 @@ class DllProcess:
                 answer = None
             if not isinstance(answer, dict):
                 raise self._ended("tampering", "it gives an answer of another form")
-            if "not_loaded" in answer:
+            if answer.get("not_loaded") is not None:
                 raise DllNotLoadedError(str(answer["not_loaded"])[:1000])
-            if "doing" not in answer:
+            if answer.get("doing") is None:
                 return answer
             self._doing = str(answer["doing"])[:80]
 
