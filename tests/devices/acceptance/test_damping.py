@@ -84,6 +84,13 @@ def test_a_controller_whose_output_is_not_shown_is_judged_by_the_power(tmp_path)
     assert found.faults == ["POD of some points only"]
 
 
+def test_a_limit_is_judged_by_the_power_where_no_output_shows_it(tmp_path):
+    file, bound = behind_a_binding(tmp_path, FAULT_POD_LIMIT=0.5)
+    found = check_fmu(file, bound, LIMITS, ("pod",), run_for=0.3)
+    assert found.faults == ["POD limit not as declared"]
+    assert "no more than 0.05" in found.failures[0].evidence
+
+
 def test_a_parameter_under_another_name_is_tried_like_any_other(tmp_path):
     file, bound = behind_a_binding(tmp_path, FAULT_POD_KEEPS_GAIN=1)
     found = check_fmu(file, bound, LIMITS, ("tunables",), run_for=0.3)

@@ -46,6 +46,14 @@ _LEAST = 0.5  # how much smaller an answer may be at another point
 _MOST = 2.0  # how much larger
 _SAME_TIME = 0.05  # part of the answer by which it may differ at another time or step
 _DAMAGED = 0.4  # part of the answer by which it may differ soon after events
+_PROPORTION = 0.15  # part of the answer by which that to a larger swing below the limit may differ
+_LESS = 0.9  # how much smaller the answer to a larger swing may be
+_OF_POWER = 0.85  # least power in parts of the declared limit, where its output is not shown
+_FLAT = 0.05  # part by which the power may differ in two deviations that both reach the limit
+_TO_LIMIT = 2.0  # the smaller of these deviations, in parts of the one whose swing gives the limit
+_BEYOND_LIMIT = 3.0
+_WIDEST = 0.01  # largest lasting deviation of the frequency [pu]
+_PUSHED = 3.0  # its duration [s]
 _LIMIT = 0.03  # part of the declared limit by which the output's peak may differ from it
 _HELD = 0.93  # part of its answer to a lasting deviation that a controller without a washout keeps
 _RESTS = 60.0  # time at rest after which it is asked again [s]
@@ -56,6 +64,7 @@ _PLACES = (
     ((1.0, 1.0), (0.84, 0.95)),
     ((1.0, 1.0), (0.6, 0.75)),
     ((1.0, 1.0), (0.05, 0.2)),
+    ((1.0, 1.0), (0.0, 0.03)),
     ((1.0, 1.0), (-0.2, -0.05)),
     ((1.0, 1.0), (-0.6, -0.4)),
     ((1.0, 1.0), (-0.9, -0.75)),
@@ -65,6 +74,8 @@ _PLACES = (
     ((1.08, 1.1), (0.3, 0.6)),
 )
 """Bounds of voltage and power [pu] between which the points are drawn."""
+_REACTIVE = ((-0.4, -0.25), (0.25, 0.4))
+"""Bounds of reactive power [pu, S_n] of further points, at little power."""
 
 
 @dataclass(frozen=True)
@@ -123,13 +134,15 @@ class _Trial:
             return
         yield self._other_direction()
         yield self._smaller()
-        yield self._larger()
         yield from self._limits()
+        yield self._larger()
         yield from self._elsewhere()
         yield from self._other_steps()
         yield self._later_start()
         yield self._after_rest()
         yield self._after_events()
+        yield self._after_switching()
+        yield self._after_work()
         yield from self._lasting()
 
     def _find_size(self) -> _Fault | None:
@@ -175,10 +188,11 @@ class _Trial:
     def _larger(self) -> _Fault | None:
         for times in (_LARGE, _BEYOND):
             size = min(times * self._size, _LARGEST)
-            for usual, other in zip(
-                self._usual, self._bench.effects(FrequencySwing(size)), strict=True
-            ):
-                alike = likeness(usual, other)
+            for number, other in enumerate(self._bench.effects(FrequencySwing(size))):
+                usual = self._usual[number]
+                alike, name = likeness(usual, other), self._bench.names[number]
+                if fault := self._out_of_proportion(name, usual, other):
+                    return fault
                 if alike < _ALIKE and (usual.shown or times == _LARGE):
                     says = (
                         f"{usual.title} answers a swing of {1e6 * size:.3g}e-6 pu of the frequency "
@@ -187,21 +201,49 @@ class _Trial:
                     return _Fault("POD reversed" if alike < 0.5 else "POD uneven", says)
         return None
 
+    def _out_of_proportion(self, name: str, usual: Effect, other: Effect) -> _Fault | None:
+        """Compare the answer to a larger swing: in proportion below a limit that is known, never smaller."""
+        says = f"{usual.title} answers a swing of {1e6 * other.size:.3g}e-6 pu of the frequency by "
+        limit = self._bench.declared_limit(name)
+        below = limit and usual.peak * other.size / self._size < 0.9 * limit
+        apart = usual.apart(other)
+        if below and likeness(usual, other) > _ALIKE and apart > _PROPORTION:
+            says += f"{100 * apart:.3g} % otherwise than in proportion to one of {1e6 * self._size:.3g}e-6 pu"
+            return _Fault("POD uneven", says)
+        if usual.shown and other.peak < _LESS * usual.peak:
+            says += f"{other.peak:.3g} pu, less than the {usual.peak:.3g} pu of a smaller one"
+            return _Fault("POD uneven", says)
+        return None
+
     def _limits(self) -> Iterator[_Fault | None]:
         """Compare the output that is shown with the limit that is declared, in a swing far beyond it."""
         for number, name in enumerate(self._bench.names):
             limit, usual = self._bench.declared_limit(name), self._usual[number]
-            if not limit or not usual.shown:
+            if not limit:
+                continue
+            if not usual.shown:
+                if name == "pod_p":
+                    yield self._limit_of_power(number, limit)
                 continue
             size = self._size * 4.0 * limit / max(usual.peak, 1e-9)
-            seen = self._bench.effects(FrequencySwing(size))[number]
-            peak = seen.peak
-            if abs(peak / limit - 1) > _LIMIT:
-                word = "more" if peak > limit else "no more"
-                says = f"{usual.title} gives {word} than {peak:.4g} pu where {limit:g} pu is declared as its limit"
-                yield _Fault("POD limit not as declared", says)
-            else:
-                yield None
+            course = self._bench.effects(FrequencySwing(size))[number].course
+            peaks = (float(course.max()), float(-course.min()))
+            yield _far_from_limit(
+                usual.title, max(peaks, key=lambda peak: abs(peak / limit - 1)), limit
+            )
+
+    def _limit_of_power(self, number: int, limit: float) -> _Fault | None:
+        """Judge a limit by the power, where two lasting deviations both reach what limits it."""
+        usual, bench = self._usual[number], self._bench
+        unit = self._size * limit / max(usual.peak, 1e-9)
+        if _BEYOND_LIMIT * unit > _WIDEST:
+            return None
+        for way in (1, -1):
+            sizes = (way * _TO_LIMIT * unit, way * _BEYOND_LIMIT * unit)
+            less, most = (bench.plateaus(size, _PUSHED)[number] for size in sizes)
+            if most < _OF_POWER * limit and abs(most - less) < _FLAT * most:
+                return _far_from_limit(usual.title, most, limit)
+        return None
 
     def _places(self) -> Iterator[OperatingAt]:
         draw = self._bench.subject.random("pod, points")
@@ -209,6 +251,8 @@ class _Trial:
             yield OperatingAt(
                 round(float(draw.uniform(*v)), 3), 0.0, round(float(draw.uniform(*P)), 3), 0.0
             )
+        for Q in _REACTIVE:
+            yield OperatingAt(1.0, 0.0, 0.3, round(float(draw.uniform(*Q)), 3))
 
     def _elsewhere(self) -> Iterator[_Fault | None]:
         for point in self._places():
@@ -224,6 +268,7 @@ class _Trial:
 
     def _at(self, point: OperatingAt, found: tuple[Effect, ...]) -> _Fault | None:
         where = f"at P_0 = {point.P:g}, v_0 = {point.v:g}"
+        where += f", Q_0 = {point.Q:g}" if point.Q else ""
         for usual, other in zip(self._usual, found, strict=True):
             part, alike = ratio(usual, other), likeness(usual, other)
             if _LEAST < part < _MOST and alike > _ALIKE:
@@ -280,6 +325,26 @@ class _Trial:
             )
         return fault
 
+    def _after_switching(self) -> _Fault | None:
+        variables = self._bench.subject.description.variables
+        if any(variables[f"{name}.enabled"].variability != "tunable" for name in self._bench.names):
+            return None
+        parts = self._bench.apart_after_switching(self._size)
+        where = "after it was switched off and on again twice"
+        return self._changed(parts, "POD changed by its switch", where)
+
+    def _after_work(self) -> _Fault | None:
+        strong = min(_BEYOND * self._size, _LARGEST)
+        parts = self._bench.apart_after_work(self._size, strong)
+        return self._changed(parts, "POD changes with time", "3 s after strong swings")
+
+    def _changed(self, parts: list[float], fault: str, where: str) -> _Fault | None:
+        worst = int(np.argmax(parts))
+        if parts[worst] < _DAMAGED:
+            return None
+        says = f"{self._usual[worst].title} answers by {100 * parts[worst]:.3g} % otherwise {where}"
+        return _Fault(fault, says)
+
     def _lasting(self) -> Iterator[_Fault | None]:
         """Hold another frequency: a washout lets go of it."""
         for title, name, early, late, between in self._bench.lasting(self._size):
@@ -294,6 +359,14 @@ class _Trial:
                 yield _Fault("POD without washout", f"{says}over {between:.3g} s")
             else:
                 yield None
+
+
+def _far_from_limit(title: str, peak: float, limit: float) -> _Fault | None:
+    if abs(peak / limit - 1) <= _LIMIT:
+        return None
+    word = "more" if peak > limit else "no more"
+    says = f"{title} gives {word} than {peak:.4g} pu where {limit:g} pu is declared as its limit"
+    return _Fault("POD limit not as declared", says)
 
 
 def _compare(

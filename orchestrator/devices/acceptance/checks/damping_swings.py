@@ -1,6 +1,7 @@
 """Swings of the network's frequency, and what a damping controller (POD) adds to the answers."""
 
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from math import pi, sqrt
 
@@ -13,7 +14,10 @@ from orchestrator.devices.acceptance.checks.subject import OperatingAt, Running,
 _BASE = 100 * pi  # angular frequency [rad/s] by which an angle turns with 1 pu of deviation
 _HERTZ = (0.7, 1.3)  # bounds of the swing's frequency [Hz], that of oscillations between areas
 _SWINGS = 1.6  # duration of a swing [s]
-_LASTING = 8.0  # duration of a lasting deviation [s]
+LASTING = 8.0  # duration of a lasting deviation [s]
+_PLATEAU = 0.5  # time [s] over which the power is averaged where an output stays at its limit
+_WORKS = 3.0  # duration of the swings beyond the limit after which it is asked again [s]
+_RESTED = 3.0  # time after these [s]
 _LOOKS = (2.0, 8.0)  # times [s] at which the answer to it is compared
 _MEAN = 0.1  # time [s] over which that is averaged
 _BEFORE = 0.1  # time at rest before events [s]
@@ -51,14 +55,14 @@ class FrequencySwing:
     ``step_size``: communication step [s]; the subject's own where None.
     ``begin``: when the run begins [s].
     ``rest``: how long the device is at rest before it [s].
-    ``lasting``: whether the frequency stays where it went."""
+    ``lasting``: how long the frequency stays where it went [s]; 0 where it swings."""
 
     size: float
     point: OperatingAt | None = None
     step_size: float | None = None
     begin: float = 0.0
     rest: float = 0.0
-    lasting: bool = False
+    lasting: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -185,7 +189,7 @@ class DampingBench:
         """Active and reactive power [pu, S_n] and all outputs after each step of a swing."""
         h = swing.step_size or self.subject.step_size
         _still(running, swing.rest, h)
-        time = h * np.arange(max(2, round((_LASTING if swing.lasting else _SWINGS) / h)))
+        time = h * np.arange(max(2, round((swing.lasting or _SWINGS) / h)))
         turn = 2 * pi * self.hertz
         angle = _BASE * swing.size * (time if swing.lasting else (1 - np.cos(turn * time)) / turn)
         return _hold(running, np.exp(1j * angle), h)
@@ -201,16 +205,7 @@ class DampingBench:
                 break
         else:
             return None
-        swing = FrequencySwing(size)
-        usual, effects = self._rows(swing, on=True), self.effects(swing)
-        with_swing = self._after_events(swing, wait, strength)
-        moved = with_swing - still - (usual - rest)
-        found = []
-        for name, effect in zip(self.names, effects, strict=True):
-            shown = self._place(name)
-            change = _part(moved, name) if shown is None else moved[:, 2 + shown]
-            found.append(float(np.abs(change).max()) / effect.peak)
-        return found
+        return self._apart(size, self._after_events(FrequencySwing(size), wait, strength) - still)
 
     def _after_events(self, swing: FrequencySwing, wait: float, strength: float) -> Numbers:
         """The answer to a swing after a dip, a jump, an overvoltage and another dip, on with all controllers."""
@@ -231,9 +226,58 @@ class DampingBench:
             _still(running, wait, h)
             return self._swing(running, swing)
 
+    def apart_after_switching(self, size: float) -> list[float]:
+        """By which part each controller's answer differs where all were switched off and on again twice in the run."""
+
+        def rows(size: float) -> Numbers:
+            with self._on() as running:
+                for on in (False, True, False, True):
+                    running.component.set(self._settings(on))
+                    _still(running, _PAUSE, self.subject.step_size)
+                return self._swing(running, FrequencySwing(size))
+
+        return self._apart(size, rows(size) - rows(0.0))
+
+    def apart_after_work(self, size: float, strong: float) -> list[float]:
+        """By which part each controller's answer differs some seconds after strong swings."""
+
+        def rows(size: float) -> Numbers:
+            with self._on() as running:
+                for _ in range(round(_WORKS / _SWINGS)):
+                    self._swing(running, FrequencySwing(strong))
+                _still(running, _RESTED, self.subject.step_size)
+                return self._swing(running, FrequencySwing(size))
+
+        return self._apart(size, rows(size) - rows(0.0))
+
+    def _on(self) -> AbstractContextManager[Running]:
+        """A run with all controllers on."""
+        return self.subject.running(point=self._point, parameters=self._settings(True))
+
+    def _apart(self, size: float, moved: Numbers) -> list[float]:
+        """By which part each controller's usual effect differs from what a swing moves with all of them on."""
+        swing = FrequencySwing(size)
+        usual = self._rows(swing, on=True) - self._rows(FrequencySwing(0.0), on=True)
+        found = []
+        for name, effect in zip(self.names, self.effects(swing), strict=True):
+            change, shown = _part(moved - usual, name), self._place(name)
+            if shown is not None:
+                change = moved[:, 2 + shown] - usual[:, 2 + shown]
+            found.append(float(np.abs(change).max()) / effect.peak)
+        return found
+
+    def plateaus(self, size: float, seconds: float) -> list[float]:
+        """The most power [pu, S_n] that each controller adds for a while against a lasting deviation."""
+        mean = max(1, round(_PLATEAU / self.subject.step_size))
+        found = []
+        for effect in self.effects(FrequencySwing(size, lasting=seconds)):
+            sums = np.cumsum(effect.power)
+            found.append(float(np.abs(sums[mean:] - sums[:-mean]).max()) / mean)
+        return found
+
     def lasting(self, size: float) -> Iterator[tuple[str, str, float, float, float]]:
         """Title, name, answers early and late [pu, S_n] to a lasting deviation, and the time between them [s]."""
-        swing = FrequencySwing(0.5 * size, lasting=True)
+        swing = FrequencySwing(0.5 * size, lasting=LASTING)
         h = self.subject.step_size
         mean = max(1, round(_MEAN / h))
         for name, effect in zip(self.names, self.effects(swing), strict=True):

@@ -3,7 +3,7 @@
    z: parameters, inputs, outputs; memory: the states. */
 enum { S_N, P_0, Q_0, V_0, THETA_0, GAIN, TAU, IN_1, IN_2, IN_3, OUT_1, OUT_2, OUT_3, OMEGA, SHOWN, POD_K, POD_T_W, POD_T_F, POD_LIMIT, DELTA_P, SIZE };
 enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, ON, QUICK, SLOW, TIRED, DIPS, LOW, WOUND, BLOCKED, ANGLE, RING, RINGING,
-       LAGGED, TRIPLED, VOLT, P_NOW, SINCE, OVER, WASHED, PASSED, K_AT_START, AGE, MEMORY };
+       LAGGED, TRIPLED, VOLT, P_NOW, SINCE, OVER, WASHED, PASSED, K_AT_START, AGE, WORKED, WAS_ON, SWITCHED, MEMORY };
 #define SWITCH ON /* a Boolean: damping by the frequency behind a washout; with POD, a damping controller */
 #define IS_OUTPUT(r) (((r) >= OUT_1 && (r) <= SHOWN) || (r) == DELTA_P)
 #define DIVERGED 1e12
@@ -99,7 +99,8 @@ static double damping_power(const double *z, const double *m) {
     most *= FAULT_POD_LIMIT;
 #endif
     power = fmax(-most, fmin(most, power));
-#ifdef FAULT_POD_TIMES /* a factor of power; AGE: how long the instance has run [s] */
+#ifdef FAULT_POD_TIMES /* a factor of power; AGE: how long the instance has run [s]; WORKED: how long
+                         its output was large [s]; SWITCHED: how often it was switched while it ran */
     power *= FAULT_POD_TIMES;
 #endif
 #ifdef FAULT_POD_DEAD_BAND
@@ -164,7 +165,7 @@ static void initialise(double *z, double *m) {
     m[DIPS] = m[LOW] = m[WOUND] = m[BLOCKED] = m[RING] = m[RINGING] = 0;
 #endif
     m[ANGLE] = t;
-    m[WASHED] = m[PASSED] = m[AGE] = 0, m[K_AT_START] = z[POD_K];
+    m[WASHED] = m[PASSED] = m[AGE] = m[WORKED] = m[SWITCHED] = 0, m[WAS_ON] = m[ON], m[K_AT_START] = z[POD_K];
     m[TRIPLED] = m[OVER] = 0, m[SINCE] = 1e9, m[VOLT] = v, m[P_NOW] = m[P_F];
 #ifdef METER_BEGINS
     m[LAGGED] = METER_BEGINS - 1.0;
@@ -383,6 +384,8 @@ static void substep(const double *z, double *m, double *hidden, phasor v, double
 #endif
     m[PASSED] += h / z[POD_T_F] * (w - m[WASHED] - m[PASSED]);
     m[AGE] += h;
+    m[WORKED] += h * (fabs(damping_power(z, m)) > 0.6 * z[POD_LIMIT]);
+    m[SWITCHED] += m[WAS_ON] != m[ON], m[WAS_ON] = m[ON];
 #endif
     m[QUICK] += h / 0.02 * (slip(z, m, m[P_F]) - m[QUICK]);
     m[SLOW] += h / 5.0 * (m[QUICK] - m[SLOW]);

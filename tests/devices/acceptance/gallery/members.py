@@ -568,6 +568,32 @@ def damping():
         one("pod_above_its_limit", "POD limit not as declared", FAULT_POD_LIMIT=2.0),
         one("pod_below_its_limit", "POD limit not as declared", FAULT_POD_LIMIT=0.6),
         one("pod_latched_by_dips", "POD changed by a disturbance", FAULT_POD_TIMES="(m[DIPS] < 1)"),
+        one(
+            "pod_off_at_no_power",
+            "POD of some points only",
+            FAULT_POD_TIMES="(fabs(m[P_REF]) > 0.04)",
+        ),
+        one(
+            "pod_off_while_it_takes_reactive_power",
+            "POD of some points only",
+            FAULT_POD_TIMES="(m[Q_REF] > -0.2)",
+        ),
+        one(
+            "pod_of_less_limit_one_way",
+            "POD limit not as declared",
+            FAULT_POD_TIMES="(power < -0.04 ? -0.04 / power : 1)",
+        ),
+        one(
+            "pod_weak_in_larger_swings",
+            "POD uneven",
+            FAULT_POD_TIMES="(fabs(power) > 0.04 && fabs(power) < 0.09 ? 0.4 : 1)",
+        ),
+        one("pod_that_tires", "POD changes with time", FAULT_POD_TIMES="(m[WORKED] < 1 ? 1 : 0.4)"),
+        one(
+            "pod_that_stays_off",
+            "POD changed by its switch",
+            FAULT_POD_TIMES="(m[SWITCHED] < 3)",
+        ),
         one("pod_that_does_nothing", "POD without effect", FAULT_POD_TIMES="0"),
         one(
             "pod_gain_of_the_start",
