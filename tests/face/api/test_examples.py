@@ -57,6 +57,7 @@ def test_an_example_runs(example, tmp_path, monkeypatch):
 
 RESULTS = (
     "BusStrength",
+    "Exploration",
     "Mode",
     "Stability",
     "CheckpointWarning",

@@ -175,7 +175,8 @@ def test_a_range_of_frequencies(gfor):
 
 def test_modes_as_a_table_with_overrides_and_a_step(gfor):
     code, out, err = gfor(
-        "modes", "two_area", "--scenario", "base", "--set", "grid.X_L=0.3", "--step", "200 us"
+        *("modes", "two_area", "--scenario", "base", "--set", "grid.X_L=0.3", "--step", "200 us"),
+        "--details",
     )
     assert (code, err) == (0, "")
     assert "Base (only SG): 35 states" in out
