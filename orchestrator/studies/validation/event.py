@@ -306,7 +306,9 @@ def _alone(steps: Numbers, width: int) -> bool:
 
 
 def _setpoint(comparison: EventComparison) -> list[Question]:
-    """P or Q that leaves the model's at once and for good while the voltage does nothing."""
+    """P or Q that leaves the model's at once and for good while the voltage does nothing.
+
+    An error that shrinks is the end of a transient, in which the model was off."""
     event = comparison.event
     recording = event.recording
     width = max(1, round(_SETPOINT_WITHIN / recording.interval))
@@ -324,8 +326,9 @@ def _setpoint(comparison: EventComparison) -> list[Question]:
         if not len(after):
             continue
         offset = float(after.mean() - before.mean())
+        leaves = abs(after.mean()) > abs(before.mean())
         abrupt = float(steps.max()) > _ABRUPT * float(np.median(steps)) + _OFFSET
-        abrupt = abrupt and _alone(steps, width)
+        abrupt = abrupt and leaves and _alone(steps, width)
         around = recording.voltage[at : at + 2 * width]
         if abrupt and abs(offset) > _OFFSET and np.ptp(np.abs(around)) < _BACK:
             moment = recording.begin + float(times[at + width])

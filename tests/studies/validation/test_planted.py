@@ -136,6 +136,15 @@ def test_a_good_recording_is_not_asked_about(good):
     assert asked(good) == []
 
 
+def test_a_transient_that_the_model_lacks_is_no_setpoint(good):
+    """A ring-down of 5 Hz dies out, and the plant is where the model is again."""
+    slow = good.iloc[::20]
+    since = slow.time.to_numpy() - 1.1
+    ring = np.exp(-since / 0.15) * np.cos(2 * np.pi * 5 * since + 2)
+    spoilt = slow.assign(p_mw=slow.p_mw + 300 * np.where(since > 0, ring, 0))
+    assert "setpoint" not in [one["kind"] for one in asked(spoilt)]
+
+
 def test_an_angle_at_rest_before_the_event_is_not_held(good):
     """A recording of a plant at rest has an angle that stays, but for rounding, until the event comes."""
     short = good[good.time < 3.0]
