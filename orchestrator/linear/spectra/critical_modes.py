@@ -189,6 +189,10 @@ def _searched(model: LinearModel, cell: _Cell) -> "tuple[Search, NDArray[np.comp
     return search, values
 
 
+_OFF = 1e-6
+"""Part by which the point of a search is moved off an eigenvalue that it meets exactly."""
+
+
 class Search:
     """Arnoldi's method on (A − σI)⁻¹ around one point λ = ``centre``.
 
@@ -199,7 +203,11 @@ class Search:
         self._model, self.centre = model, centre
         self.sigma = np.exp(centre * model.step_size) if model.step_size else centre
         with one_thread():
-            self._solver = model.shifted(self.sigma)
+            try:
+                self._solver = model.shifted(self.sigma)
+            except RuntimeError:  # exactly singular, as SuperLU says: the point is an eigenvalue
+                self.sigma += _OFF * max(1.0, abs(self.sigma))
+                self._solver = model.shifted(self.sigma)
         self._values: NDArray[np.complex128] = np.zeros(0, dtype=complex)
         self.reach = 0.0
         self._right = np.zeros((len(model.names), 0), dtype=complex)

@@ -12,6 +12,7 @@ from orchestrator.linear.spectra.critical_modes import (
     _Cell,
     find_critical_modes,
     nearest_eigenvalue,
+    nearest_pairs,
 )
 from orchestrator.linear.spectra.modes import eigenvalues, find_modes
 
@@ -49,6 +50,14 @@ def test_every_critical_mode_is_found_once_with_its_participation(step_size):
     for one, other in zip(found, full, strict=True):
         assert one.eigenvalue == pytest.approx(other.eigenvalue, abs=1e-7)
         assert dict(one.participation) == pytest.approx(dict(other.participation), abs=1e-6)
+
+
+def test_a_search_from_an_eigenvalue_itself_finds_it():
+    """A washout that nothing feeds is a root of the equations to the last digit."""
+    A = np.diag([-0.0625, *-np.linspace(1.0, 9.0, 40)])
+    system = LinearModel.from_matrix(A, tuple(f"x{k}" for k in range(len(A))), None)
+    found = min(abs(value + 0.0625) for value, _, _ in nearest_pairs(system, -0.0625 + 0j, 2))
+    assert found < 1e-9
 
 
 def test_a_crowd_that_is_too_large_for_one_disc_is_cut(monkeypatch):
