@@ -38,13 +38,19 @@ def time_constant(
     return T
 
 
+_ROUNDING = 1e-9
+"""How far beyond a limit an operating point may lie that a power flow puts there to its accuracy [pu]."""
+
+
 def require_between(
     m: ModelBuilder, value: Scalar, low: Scalar, high: Scalar, names: tuple[str, str], rule: str
 ) -> None:
-    """Refuse an operating point at or beyond a limit of a signal, whose steady state is ``value``."""
+    """Refuse an operating point beyond a limit of a signal, whose steady state is ``value``.
+
+    At the limit itself it starts, as in PSS/E."""
     for margin, name, side in ((value - low, names[0], "below"), (high - value, names[1], "above")):
         m.require(
-            margin,
+            margin + _ROUNDING,
             f"{name}: the operating point of the power flow lies at or {side} this limit, {rule}",
         )
 

@@ -247,7 +247,7 @@ def test_a_held_lag_leaves_its_limit_at_once():
     ("name", "values", "limit"),
     [
         ("sexs", {"E_MAX": 2.1}, "exciter.E_MAX"),
-        ("sexs", {"E_MIN": 2.2}, "exciter.E_MIN"),
+        ("sexs", {"E_MIN": 2.3}, "exciter.E_MIN"),
         ("dc1a", {"V_RMAX": 2.0}, "exciter.V_RMAX"),
         ("ac1a", {"V_RMAX": 2.0}, "exciter.V_RMAX"),
         ("ac1a", {"V_AMIN": 5.0, "V_AMAX": 9.0}, "exciter.V_AMIN"),
@@ -261,6 +261,10 @@ def test_a_start_at_a_limit_is_refused_by_the_limits_name(name, values, limit):
     texts = refused(exciter(name, values))
     assert texts
     assert texts[0].startswith(f"{limit}: the operating point of the power flow lies at or ")
+
+
+def test_a_start_at_the_limit_itself_is_none_beyond_it():
+    assert refused(exciter("sexs", {"E_MIN": 2.2})) == []
 
 
 def test_the_field_currents_limiter_of_st1a_lowers_the_field_voltage():
