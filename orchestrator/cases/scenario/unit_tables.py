@@ -5,6 +5,7 @@ import re
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,7 @@ from orchestrator.cases.questions.plausibility import question
 from orchestrator.core.errors import InputError, Problem, few
 
 UNIT_KINDS = ("sg", "gfor")  # first parts of the names of a unit's generator and converter
+_EXCITER = ".exciter"  # end of a scenario's key that names one
 _LIMITS = ("q_min_mvar", "q_max_mvar")
 _REMARKS = ("q_mvar", "name", "comment", "source")
 """Columns that say more to a reader; the power flow computes the reactive power."""
@@ -286,7 +288,7 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
     )
     _account(draft, table, records, ours)
     rows = with_choices(rows, replaced, _parts_of(table))
-    rows = without_idle_controls(rows, str(path))
+    rows = without_idle_controls(rows, str(path), _choosing_exciters(draft, rows))
     machine_rows = [row for row in rows if row.label not in replaced]
     question(
         draft,
@@ -314,6 +316,16 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
             "'phasor_grid' in [components.grid] (`gfor new --models phasor`)"
         )
     return rows
+
+
+def _choosing_exciters(draft: Draft, rows: Sequence[UnitRow]) -> set[str]:
+    """Return labels of the units whose component, or a scenario, names an exciter."""
+    case = draft.given.case
+    patterns = [name for name, component in case.components.items() if component.exciter]
+    for scenario in case.scenarios.values():
+        patterns += [key.removesuffix(_EXCITER) for key in scenario.set if key.endswith(_EXCITER)]
+    named = [row.label for row in rows]
+    return {label for label in named for p in patterns if fnmatchcase(f"sg{label}", p)}
 
 
 def _figure(entry: Row, column: str, given: Generation | None) -> float | None:

@@ -228,7 +228,8 @@ def record_uses(
     excited = {
         (record.bus, record.machine)
         for record in records
-        if exciter not in (None, MANUAL) or kind_of(record.name) == "exciter"
+        if exciter not in (None, MANUAL)
+        or (kind_of(record.name) == "exciter" and record.name not in left)
     }
     return [
         RecordUse(
@@ -431,6 +432,7 @@ def _doubts(
     machine: Machine, records: Sequence[DynamicRecord], values: Mapping[str, float]
 ) -> Iterator[tuple[str, str, str]]:
     yield from _omissions(records)
+    yield from _chosen_limits(records)
     x_d2, x_source = values.get("machine.X_d2"), machine.source.imag
     if x_d2 is None or abs(x_source - x_d2) <= _SAME * abs(x_d2):
         return
@@ -505,8 +507,50 @@ def _refuse_choice(record: DynamicRecord, field: DyrField, value: float) -> None
     )
 
 
-def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
+_CEILING, _FLOOR = "VRMAX", "VRMIN"
+"""Fields of an exciter's record with the limits of its regulator."""
+
+
+def _chosen_ceiling(known: DyrRecord, given: Mapping[str, float]) -> float:
+    """Return VRMAX that PSS/E chooses for a shaft's exciter that gives none [pu]; 0 where it is no such exciter.
+
+    It holds the field voltage E2: SE(E2)·E2, with KE·E2 where KE exceeds 0. Sources: OpenIPSL
+    (`calculate_dc_exciter_params.mo`), which leaves the factor E2 out where KE exceeds 0; IEEE 421.5."""
+    choosing = any(field.name == "KE" and field.zero_sets for field in known.fields)
+    if not choosing or given.get(_CEILING) != 0:
+        return 0.0
+    return (max(given["KE"], 0.0) + given["SE(E2)"]) * given["E2"]
+
+
+def _given(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
+    """Return the numbers of a record, with the limits that PSS/E chooses."""
     given = given_values(record, known.fields, {*_KNOWN, *FIELDS})
+    if (ceiling := _chosen_ceiling(known, given)) > 0:
+        given |= {_CEILING: ceiling, _FLOOR: -ceiling}
+    return given
+
+
+def _chosen_limits(records: Sequence[DynamicRecord]) -> Iterator[tuple[str, str, str]]:
+    """Ask about the limits that PSS/E chooses."""
+    for record in (record for record in records if record.name in DYR_RECORDS):
+        known = DYR_RECORDS[record.name]
+        given = given_values(record, known.fields, {*_KNOWN, *FIELDS})
+        if (ceiling := _chosen_ceiling(known, given)) <= 0:
+            continue
+        text = (
+            f"{record.name} has {_CEILING} = 0, for which PSS/E chooses limits that hold the field voltage E2: "
+            f"{_CEILING} = -{_FLOOR} = {ceiling:.4g} pu is taken"
+        )
+        if given["KE"] == 0:
+            text += (
+                ", and KE = 0 is such that V_R starts at a tenth of it, which moves modes (ANDES has no ceiling and "
+                "KE = 0 there)"
+            )
+        yield "exciter.V_RMAX", record.place, text
+
+
+def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
+    given = _given(record, known)
     found = dict.fromkeys(known.lacks, 0.0) | dict.fromkeys(known.without, False)
     for field in (field for field in known.fields if not field.is_text):
         value = given[field.name]

@@ -72,11 +72,14 @@ def _reason(kind: str, machines: Sequence[UnitRow]) -> str:
     return f"the records of the DYR file say what each machine is ({known}){there}; correct or remove the key"
 
 
-def without_idle_controls(rows: Sequence[UnitRow], place: str) -> list[UnitRow]:
+def without_idle_controls(
+    rows: Sequence[UnitRow], place: str, choosing: Collection[str] = ()
+) -> list[UnitRow]:
     """The units without a stabiliser or a compensator where there is no exciter, with a question for each.
 
-    PSS/E leaves them idle. ``place``: of a record whose line is not known."""
-    return [row if row.partial else _without_idle_controls(row, place) for row in rows]
+    PSS/E leaves them idle. ``place``: of a record whose line is not known; ``choosing``: labels of units for which the
+    case names an exciter elsewhere than in [units]."""
+    return [row if row.label in choosing else _without_idle_controls(row, place) for row in rows]
 
 
 def _without_idle_controls(row: UnitRow, place: str) -> UnitRow:

@@ -721,7 +721,10 @@ class _Reading:
                 text = "VS is not VM of the file's solution, whose voltages need QB or QT there, and not QG"
             if is_within:
                 text = f"VS is {held:g} pu, where the solved file has VM = {VM:g} pu, with Q within its limits"
-            text += ": it holds VM, from which PSS/E starts as well; the unit's v_0 in the case changes it"
+            text += (
+                ": it holds VM, from which PSS/E starts as well, where ANDES holds VS; the unit's v_0 (in "
+                "[components.sg….parameters], also as --set sg….v_0=VS) changes it"
+            )
             self._changes.note(record.line, text)
             return VM
         if bus not in solved.all and VM != 1 and abs(held - VM) > _APART and least < fed < most:

@@ -1,6 +1,7 @@
 """Dynamics data of PSS/E: from records to machines of a case, and what is refused."""
 
 import json
+import re
 
 import pytest
 
@@ -137,6 +138,39 @@ def test_a_governor_that_goes_leaves_the_power_constant(tables):
     case = CASE.replace("[units]", '[units]\ndyr_leave_out = ["OLDGOV"]')
     found = tables(DYR.replace("'TGOV1'", "'OLDGOV'"), case)
     assert found["sg1"].governor == found["sg2"].governor == "constant_power"
+
+
+ESDC2A = "1 'ESDC2A' 1 0.02 50.0 0.05 0.02 0.0 {VRMAX} -3.0 {KE} 0.512 0.07 1.3 0 3.9825 0.5 5.31 1.049 /"
+ST2CUT = "1 'ST2CUT' 1 1 0 0 0 10 0 0 0 3 3 0.15 0.05 0.15 0.05 0.15 0.05 0.05 -0.05 0 0 /"
+
+
+@pytest.mark.parametrize(("KE", "ceiling"), [(0, 1.049 * 5.31), (1, (1.049 + 1) * 5.31)])
+def test_a_ceiling_of_zero_is_the_one_that_holds_the_second_point_of_saturation(
+    tables, KE, ceiling
+):
+    values = tables(_with_exciter(ESDC2A.format(VRMAX=0, KE=KE)))["sg1"].parameters
+    assert values["exciter.V_RMAX"] == pytest.approx(ceiling)
+    assert values["exciter.V_RMIN"] == pytest.approx(-ceiling)
+    assert values["exciter.K_E_of_start"] == (KE == 0)
+
+
+def test_a_given_ceiling_stays(tables):
+    values = tables(_with_exciter(ESDC2A.format(VRMAX=6, KE=1)))["sg1"].parameters
+    assert (values["exciter.V_RMAX"], values["exciter.V_RMIN"]) == (6, -3)
+
+
+def test_an_exciter_that_goes_takes_its_stabilizer_along(tables):
+    dyr = _with_exciter(f"{ESDC2A.format(VRMAX=6, KE=1)}\n{ST2CUT}")
+    case = CASE.replace("[units]", '[units]\ndyr_leave_out = ["ESDC2A"]')
+    alone = tables(dyr, case)["sg1"]
+    assert (alone.exciter, alone.stabilizer) == ("manual", "none")
+    own = case.replace("[scenarios.plain]", '[components.sg1]\nexciter = "sexs"\n[scenarios.plain]')
+    assert tables(dyr, own)["sg1"].stabilizer == "st2cut"
+
+
+def _with_exciter(records):
+    found = re.search(r"1 'SEXS'.*/", DYR)
+    return DYR.replace(found[0], records)
 
 
 @pytest.mark.slow

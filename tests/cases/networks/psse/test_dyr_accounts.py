@@ -174,9 +174,9 @@ def test_a_stabilizer_without_an_exciter_is_idle_and_said_so():
         ("pss.K_S", "one.dyr, line 7"),
         ("exciter.X_C", "one.dyr"),
     ]
-    for parts, partial in (({"exciter": "sexs"}, False), ({}, True)):
-        active = replace(row, parts={**row.parts, **parts}, partial=partial)
-        assert without_idle_controls([active], "one.dyr") == [active]
+    for parts, choosing in (({"exciter": "sexs"}, ""), ({}, "30")):
+        active = replace(row, parts={**row.parts, **parts})
+        assert without_idle_controls([active], "one.dyr", [choosing]) == [active]
 
 
 @pytest.mark.parametrize(
