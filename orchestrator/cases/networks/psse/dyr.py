@@ -522,10 +522,11 @@ def _chosen_ceiling(known: DyrRecord, given: Mapping[str, float]) -> float:
     return (max(given["KE"], 0.0) + given["SE(E2)"]) * given["E2"]
 
 
-def _given(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
+def _read_numbers(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
     """Return the numbers of a record, with the limits that PSS/E chooses."""
     given = given_values(record, known.fields, {*_KNOWN, *FIELDS})
-    if (ceiling := _chosen_ceiling(known, given)) > 0:
+    ceiling = _chosen_ceiling(known, given)
+    if ceiling > 0:
         given |= {_CEILING: ceiling, _FLOOR: -ceiling}
     return given
 
@@ -535,7 +536,8 @@ def _chosen_limits(records: Sequence[DynamicRecord]) -> Iterator[tuple[str, str,
     for record in (record for record in records if record.name in DYR_RECORDS):
         known = DYR_RECORDS[record.name]
         given = given_values(record, known.fields, {*_KNOWN, *FIELDS})
-        if (ceiling := _chosen_ceiling(known, given)) <= 0:
+        ceiling = _chosen_ceiling(known, given)
+        if ceiling <= 0:
             continue
         text = (
             f"{record.name} has {_CEILING} = 0, for which PSS/E chooses limits that hold the field voltage E2: "
@@ -550,7 +552,7 @@ def _chosen_limits(records: Sequence[DynamicRecord]) -> Iterator[tuple[str, str,
 
 
 def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
-    given = _given(record, known)
+    given = _read_numbers(record, known)
     found = dict.fromkeys(known.lacks, 0.0) | dict.fromkeys(known.without, False)
     for field in (field for field in known.fields if not field.is_text):
         value = given[field.name]
