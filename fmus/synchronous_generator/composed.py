@@ -30,7 +30,8 @@ def synchronous_generator(
     Parameters
     ----------
     machine, exciter, governor, stabilizer
-        Names of `parts.MACHINES`, `parts.EXCITERS`, `parts.GOVERNORS` and `parts.STABILIZERS`.
+        Names of `parts.MACHINES`, `parts.EXCITERS`, `parts.GOVERNORS` and `parts.STABILIZERS`; a governor with an end
+        of `parts.WITH_POD` has a POD-P.
 
     Raises
     ------

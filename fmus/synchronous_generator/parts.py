@@ -34,7 +34,7 @@ from fmus.synchronous_generator.machines.standard import (
 )
 from fmus.synchronous_generator.machines.type_j import gentpj
 from fmus.synchronous_generator.stabilization.bands import pss3b, pss4b
-from fmus.synchronous_generator.stabilization.damping import pod, pod_input
+from fmus.synchronous_generator.stabilization.damping import pod, pod_input, with_pod
 from fmus.synchronous_generator.stabilization.legacy import iee2st, ieeest, st2cut, stab2a
 from fmus.synchronous_generator.stabilization.standard import pss1a, pss2a, pss2b, pss2c
 from fmus.synchronous_generator.turbines.diesel import degov, degov1
@@ -140,6 +140,10 @@ STABILIZERS: dict[str, Stabilizer | None] = {
     "pod": pod,
     "pod_input": pod_input,
 }
+WITH_POD = {"_pod": False, "_pod_input": True}
+"""Ends of a governor's name that give it a POD-P, and whether that acts on a frequency at an input."""
+
+WITHOUT_REFERENCE = ("degov",)  # governors without a power reference, so without a POD-P
 
 
 @dataclass(frozen=True)
@@ -168,7 +172,7 @@ def chosen_parts(machine: str, exciter: str, governor: str, stabilizer: str) -> 
     found = Parts(
         _part("machine", MACHINES, machine),
         _part("exciter", EXCITERS, exciter),
-        _part("governor", GOVERNORS, governor),
+        _governor(governor),
         _part("stabilizer", STABILIZERS, stabilizer),
         (machine, exciter, governor, *([stabilizer] if stabilizer != NONE else [])),
     )
@@ -183,6 +187,21 @@ def chosen_parts(machine: str, exciter: str, governor: str, stabilizer: str) -> 
             "stabilizer out, or take another exciter"
         )
     return found
+
+
+def _governor(name: str) -> Governor:
+    """The governor of a name, with a POD-P where the name ends so."""
+    end = next((end for end in WITH_POD if name.endswith(end)), "")
+    plain = name.removesuffix(end)
+    if not end or plain not in GOVERNORS:
+        found: Governor = _part("governor", GOVERNORS, name)
+        return found
+    if plain in WITHOUT_REFERENCE:
+        raise ValueError(
+            f"governor = {name!r}: {plain} has no power reference that a POD could move; take another governor, such "
+            f"as {plain}1{end}"
+        )
+    return with_pod(GOVERNORS[plain], far=WITH_POD[end])
 
 
 def _part(kind: str, parts: Mapping[str, Any], name: str) -> Any:

@@ -58,6 +58,7 @@ class ModelBuilder:
         self._opened: list[Expr] = []
         self._algebraic: list[tuple[Expr, Expr]] = []
         self._nodes: Nodes | None = None
+        self._handed_over: dict[str, Expr] = {}
         self.internal_step = self.parameter(
             "internal_step",
             internal_step,
@@ -175,6 +176,16 @@ class ModelBuilder:
             )
         self._expressions[full] = Expr(initial)
         return self._declare(State(full, unit, description, base, stepwise))
+
+    def hand_over(self, name: str, signal: Expr) -> None:
+        """Keep a signal of one part of the model for the part that takes it by this name."""
+        if name in self._handed_over:
+            raise ValueError(f"model {self.name}: {name!r} is handed over twice")
+        self._handed_over[name] = signal
+
+    def handed_over(self, name: str) -> Expr | None:
+        """Return the signal that another part has handed over by this name; None if there is none."""
+        return self._handed_over.get(name)
 
     def derivative(self, state: Expr, rate: Scalar, implicit: Scalar | None = None) -> None:
         """Give the time derivative of a declared state.

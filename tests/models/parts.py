@@ -39,14 +39,17 @@ def exciter(name, values=None):
     return Evaluated(m.build(), {f"exciter.{key}": value for key, value in (values or {}).items()})
 
 
-def governor(name, values=None):
-    """A governor and turbine behind the speed."""
+def governor(name, values=None, *, made=None, full=None):
+    """A governor and turbine behind the speed.
+
+    ``made``: what stands in the table's place; ``full``: values by their names with the scope."""
     m = ModelBuilder("alone", "The governor alone")
     w = m.input("w", "pu", "Speed", base="f_n", start=1.0)
     P_e = m.input("P_e", "pu", "P_e", base="S_n", start=P_M) if name in OF_POWER else Expr(P_M)
     shaft = Shaft(w, Expr(P_M), P_e, Expr(P_M), Expr(V_T), Expr(V_T), Expr(0), Expr(P_M), Expr(100))
-    m.output("P_m", GOVERNORS[name](m, shaft), "pu", "Power", base="S_n")
-    return Evaluated(m.build(), {f"governor.{key}": value for key, value in (values or {}).items()})
+    m.output("P_m", (made or GOVERNORS[name])(m, shaft), "pu", "Power", base="S_n")
+    own = {f"governor.{key}": value for key, value in (values or {}).items()}
+    return Evaluated(m.build(), own | (full or {}))
 
 
 def stabilizer(name, values=None, *, sees_voltage=False, sees_all=False, scope="pss"):

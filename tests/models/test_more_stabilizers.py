@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 from fmus.synchronous_generator.composed import synchronous_generator, synchronous_generator_phasor
+from fmus.synchronous_generator.parts import GOVERNORS, chosen_parts
 from tests.models.parts import (
     AT_BUS,
     AT_REST,
     BUS,
     OF_VOLTAGE,
     V_T,
+    governor,
     integrated,
     refused,
     stabilizer,
@@ -303,3 +305,65 @@ def test_a_pod_at_a_machine_is_off_until_it_is_enabled_and_stays_within_its_limi
     for enabled, wanted in ((0, 0.0), (1, 0.04)):
         alone = stabilizer("pod", values | {"enabled": enabled}, scope="pod_q")
         assert alone.outputs([0.0, 0.8], alone.x + 0.1)["v_s"] == wanted
+
+
+def test_a_pod_with_the_other_sign_does_the_opposite():
+    values = {"limit": 0.04, "K": 100.0, "enabled": 1, "sign": -1}
+    alone = stabilizer("pod", values, scope="pod_q")
+    assert alone.outputs([0.0, 0.8], alone.x + 0.1)["v_s"] == -0.04
+    (text,) = refused(stabilizer("pod", {"sign": 0}, scope="pod_q"))
+    assert text == "pod_q.sign must be 1 or -1"
+
+
+def with_a_pod(far, **values):
+    """TGOV1 with a POD-P."""
+    own = {f"pod_p.{key}": value for key, value in values.items()}
+    made = chosen_parts(
+        "genrou", "sexs", "tgov1_pod_input" if far else "tgov1_pod", "none"
+    ).governor
+    return governor("tgov1", made=made, full=own)
+
+
+@HERTZ
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("far", [False, True])
+def test_a_pod_p_moves_the_governors_power_reference(far, sign, hertz):
+    """Less power while the frequency is high, through the turbine; of the speed, or of the frequency at its input."""
+    s, p = 2j * np.pi * hertz, DAMPING
+    rest = [1.0, 1.0] if far else [1.0]
+    taken = "omega_pod_p" if far else "w"
+    on, off = (
+        with_a_pod(far, **p, N_S=2, sign=sign, enabled=enabled).response(s, rest)
+        for enabled in (1, 0)
+    )
+    turbine = (1 + 3.0 * s) / (1 + 10.0 * s) / (1 + 0.5 * s)  # of TGOV1's defaults
+    wanted = -sign * p["K"] * washout(p, s, "T_W") / (1 + s * p["T_f"])
+    wanted *= lead(p, s, "T_S1", "T_S2") ** 2 * turbine
+    assert on["P_m", taken] - off["P_m", taken] == pytest.approx(wanted, rel=1e-9)
+
+
+REFERRED = [name for name in GOVERNORS if name != "degov"]
+
+
+@pytest.mark.parametrize("name", REFERRED)
+def test_every_governor_with_a_reference_takes_a_pod(name):
+    """From rest, with the speed up, a POD that is on takes power away that the same one off leaves."""
+    power = {}
+    for enabled in (0, 1):
+        device = Evaluated(
+            synchronous_generator_phasor("genrou", "sexs", f"{name}_pod", "pss1a"),
+            AT_BUS | {"pod_p.enabled": enabled, "pod_p.K": 50.0},
+        )
+        assert not refused(device)
+        assert max(map(abs, device.rates([BUS.real, BUS.imag]).values())) < 1e-8
+        states = list(device.model.states)
+        x = device.x + 0.0
+        x[[k for k, state in enumerate(states) if state.name.startswith("pod_p.")]] += 0.001
+        power[enabled] = device.rates([BUS.real, BUS.imag], x)
+    changed = {key for key in power[0] if abs(power[0][key] - power[1][key]) > 1e-9}
+    assert {key for key in changed if not key.startswith("pod_p.")}
+
+
+def test_a_governor_without_a_reference_has_no_pod():
+    with pytest.raises(ValueError, match="degov has no power reference that a POD could move"):
+        synchronous_generator_phasor(governor="degov_pod")

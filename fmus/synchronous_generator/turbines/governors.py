@@ -48,18 +48,24 @@ LONGEST_DELAY = 0.25
 """Longest delay of an engine [s]: Padé's fraction of second order keeps its phase within 3 degrees up to 8 rad/s."""
 
 
+POWER_REFERENCE = "power reference"  # name of a signal that adds to it, in a model's hand-over
+
 power = partial(per_unit, base="S_n", source=SOURCE)
 time = partial(time_constant, source=SOURCE)
 
 
 def power_reference(m: ModelBuilder, P_ref_0: Scalar) -> Expr:
-    """Declare the power reference of the operating point and its change; return their sum [pu, S_n]."""
+    """Declare the power reference of the operating point and its change; return their sum [pu, S_n].
+
+    What another part, a POD, has handed over adds to it."""
     P_ref = m.calculated(
         "P_ref", P_ref_0, "pu", "Power reference of the operating point", base="S_n"
     )
-    return P_ref + m.parameter(
+    reference = P_ref + m.parameter(
         "delta_P_ref", 0.0, "pu", "Change of the power reference", base="S_n", tunable=True
     )
+    signal = m.handed_over(POWER_REFERENCE)
+    return reference if signal is None else reference + signal
 
 
 def read_either_way(governor: Governor) -> Governor:
