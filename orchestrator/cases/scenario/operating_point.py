@@ -12,6 +12,7 @@ from orchestrator.cases.form.remedies import KEEPING_LIMITS, with_slack
 from orchestrator.cases.form.schema import UnitReconnectionTable
 from orchestrator.cases.networks.controls import Control
 from orchestrator.cases.questions.plausibility import question
+from orchestrator.cases.scenario.feeding_loads import feeding_loads
 from orchestrator.cases.scenario.flow_units import note_contradictions, undecided_units
 from orchestrator.cases.scenario.measured_points import start_measured_points
 from orchestrator.cases.scenario.start_values import (
@@ -82,7 +83,10 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
         )
     except InputError as error:
         kind = ErrorKind.VALUES if error.kind is ErrorKind.INPUT else error.kind
-        draft.note(draft.given.place("power_flow"), f"scenario {draft.given.name!r}: {error}", kind)
+        text = f"scenario {draft.given.name!r}: {error}"
+        if kind is ErrorKind.START:  # units at their limits
+            text += _cause(draft, 0.0)
+        draft.note(draft.given.place("power_flow"), text, kind)
         return None
     start_measured_points(draft, flow)
     question(draft, undecided)
@@ -128,8 +132,20 @@ def _leftover(draft: Draft, flow: PowerFlow) -> Iterator[Problem]:
         if not least - close <= fed_mw <= most + close:
             text = f"{name} is the slack and feeds {fed_mw:.4g} MW, beyond its limits, {least:g} to {most:g} MW"
             yield Problem(
-                draft.places.get(f"{name}.P_0", ""), f"{text}; let other units feed more or less"
+                draft.places.get(f"{name}.P_0", ""),
+                f"{text}; let other units feed more or less{_cause(draft, rating) if fed_mw < least else ''}",
             )
+        elif fed_mw < -close and draft.system.components[name].kind == "machine":
+            cause = _cause(draft, rating)
+            text = f"{name} is the slack and takes {-fed_mw:.4g} MW, as a motor does{cause}"
+            yield from [Problem(draft.place_of_component(name), text)] if cause else ()
+
+
+def _cause(draft: Draft, rating: float) -> str:
+    """What may leave too much power for a unit of a rating [MVA], to be added to a sentence; "" if nothing is seen."""
+    grid = draft.system.components.get(draft.grid or "")
+    fed = feeding_loads(draft.network, grid, rating)
+    return f"; {fed}" if fed else ""
 
 
 def _reference(draft: Draft, units: Mapping[str, str], slack: str, grid: str) -> str:

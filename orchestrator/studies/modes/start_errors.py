@@ -1,6 +1,7 @@
 """Messages of a component that cannot start, in the words of the case: its place, its operating point, the remedy."""
 
 from orchestrator.cases.flow.sharing import power_limits
+from orchestrator.cases.scenario.feeding_loads import feeding_loads
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import ComponentError, ErrorKind, Problem, StartError
 from orchestrator.devices.fmi.instance import is_ours
@@ -43,6 +44,9 @@ def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError
                 ". Give others more of the power (P_0 of units; a screening of outages shares it by itself), lower the "
                 "loads or the reactive power around it, or correct a limit that is wrong in its data"
             )
+        grid = prepared.system.components.get(prepared.grid) if computed else None
+        fed = feeding_loads(prepared.network, grid, given["S_n"])
+        text += f"; {fed}" if fed else ""
     # The same values are refused again by a model of ours; an FMU of others may lack a licence today.
     kind = ErrorKind.START if is_ours(plan.description.path) else ErrorKind.FMU
     return StartError(str(prepared.case.path), Problem(prepared.places[name], text, kind), name)
