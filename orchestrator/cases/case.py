@@ -147,7 +147,7 @@ class Case(CaseDefinition):
             shown = by_kind(q.text for q in questions)
             places = {q.text: q.place for q in reversed(questions)}
             asked = [
-                Problem(places[first], f"questioned besides: {line}", kind)
+                Problem(places[first], f"questioned besides: {line}", kind, besides=True)
                 for first, line in shown.items()
             ]
             raise CaseError(str(self.path), [*problems, *asked])

@@ -47,6 +47,7 @@ class DraftInput:
     exchanged: frozenset[str] = frozenset()
     # variables, by ``component.variable``, that the command line or its parameter files set.
     from_outside: frozenset[str] = frozenset()
+    varied: frozenset[str] = frozenset()  # as in `CaseDefinition`
     # values and choices from parameter files, the scenario and the command line; a later layer overrides an earlier
     # one.
     layers: list[Layer] = field(default_factory=list)

@@ -157,6 +157,7 @@ class Problem:
     place: str
     text: str
     kind: ErrorKind = ErrorKind.VALUES
+    besides: bool = False  # a question that stands beside a failure, as its likely reason
 
     def __str__(self) -> str:
         return spelled(f"{self.place}: {self.text}" if self.place else self.text)

@@ -49,6 +49,8 @@ class CaseDefinition:
     events_given: tuple[str, ...] = ()  # in words, by the caller, in the place of the file's
     # whether the grid takes a current besides at every bus; see `Network.injections`
     injections: bool = False
+    # variables, by ``component.variable``, that a study varies: their values are meant, whatever is usual
+    varied: frozenset[str] = frozenset()
 
     @property
     def content(self) -> bytes:

@@ -5,6 +5,7 @@ A question is a warning: the case runs. It is answered by the key ``meant`` of t
 
 import fnmatch
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
@@ -147,10 +148,8 @@ def check_plausibility(draft: Draft) -> None:
     thousands = [
         (name, text) for name, text in draft.found.thousandfold.items() if name not in ranges
     ]
-    question(
-        draft,
-        [*doubts, *(UnusualValue(name, draft.places[name], text) for name, text in thousands)],
-    )
+    doubts += (UnusualValue(name, draft.places[name], text) for name, text in thousands)
+    question(draft, [doubt for doubt in doubts if not _is_varied(draft.given.varied, doubt)])
 
 
 def question(draft: Draft, doubts: Iterable[UnusualValue]) -> None:
@@ -159,6 +158,16 @@ def question(draft: Draft, doubts: Iterable[UnusualValue]) -> None:
     draft.found.questions += _merged(
         [d for d in doubts if not any(fnmatch.fnmatchcase(d.name, m) for m in meant)]
     )
+
+
+def _is_varied(varied: Iterable[str], doubt: UnusualValue) -> bool:
+    """Tell if a question is about a value that a study varies, alone or beside another."""
+    component, _, variable = doubt.name.partition(".")
+    for pattern, _, changed in (key.partition(".") for key in varied):
+        named = variable == changed or re.search(rf"(?<![\w.]){re.escape(changed)} = ", doubt.text)
+        if changed and named and fnmatch.fnmatchcase(component, pattern):
+            return True
+    return False
 
 
 def _check_meant(draft: Draft) -> None:

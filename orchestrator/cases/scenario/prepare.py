@@ -210,6 +210,7 @@ class Preparer:
             case.injections,
             frozenset(case.exchanged),
             outside,
+            case.varied,
         )
         self.draft = draft = Draft(given)
         given.layers = value_layers(draft, parameters, overrides)

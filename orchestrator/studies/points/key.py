@@ -4,6 +4,7 @@ worker refuses a changed case or changed code."""
 import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -67,7 +68,12 @@ def reference_to(case: CaseDefinition) -> str:
 
 
 @lru_cache(maxsize=8)
-def same_case(reference: str, wanted: str, trust_fmus: bool = False) -> Case:
+def same_case(
+    reference: str,
+    wanted: str,
+    trust_fmus: bool = False,
+    varied: frozenset[str] = frozenset(),
+) -> Case:
     """The case of a task, as a worker sees it."""
     case = load_case(reference, trust_fmus=trust_fmus)
     here = fingerprint(case)
@@ -85,7 +91,7 @@ def same_case(reference: str, wanted: str, trust_fmus: bool = False) -> Case:
             f"{case.path}: this file{which} has another text now than when the study loaded it; load the case again, "
             "and on a cluster give all machines the same files"
         )
-    return case
+    return replace(case, varied=varied) if varied else case
 
 
 def sha256_of(path: Path) -> str:

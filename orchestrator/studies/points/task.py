@@ -3,7 +3,7 @@
 A study has, in a module of its own, a subclass of `Task` with the fields in which its points differ, and a dataclass
 with `Kept` for what comes out. The key of a task is made of all its fields, and of the code of that module."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, ClassVar, Self, TypeVar
@@ -39,6 +39,7 @@ class StudyCase:
     step_size: float | None  # communication step [s]; None for the case's
     trust_fmus: bool  # as `load_case`: the user's word holds in every worker
     mark: str  # hash of all of it, and of the FMUs
+    varied: frozenset[str] = frozenset()  # as in `CaseDefinition`
 
     @classmethod
     def of(
@@ -47,12 +48,13 @@ class StudyCase:
         layers: Sequence[ParameterFile] = (),
         step_size: float | None = None,
         text: str | None = None,
+        varied: Iterable[str] = (),
         **besides: Any,
     ) -> Self:
         """The case of a scenario as it is without what differs between the points.
 
-        ``text``: what stands for the case's own in keys. ``besides``: what the results depend on as well [JSON's
-        types]."""
+        ``text``: what stands for the case's own in keys. ``varied``: as in `CaseDefinition`.
+        ``besides``: what the results depend on as well [JSON's types]."""
         case = prepared.case
         content = {
             "case": case.text if text is None else text,
@@ -69,6 +71,7 @@ class StudyCase:
             step_size,
             case.trust_fmus,
             digest(content),
+            frozenset(varied),
         )
 
     def prepare(self, case: Case, values: Mapping[str, Value]) -> PreparedScenario:
@@ -138,7 +141,8 @@ Out = TypeVar("Out")
 
 def computed(task: AnyTask, compute: Callable[[AnyTask, Case], Out]) -> Out:
     """Compute a point where it is: with the study's case, on one thread of BLAS; a failure becomes a record as well."""
-    case = same_case(task.study.reference, task.study.fingerprint, task.study.trust_fmus)
+    study = task.study
+    case = same_case(study.reference, study.fingerprint, study.trust_fmus, study.varied)
     with alone():
         try:
             return compute(task, case)

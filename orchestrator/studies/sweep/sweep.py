@@ -70,7 +70,11 @@ class SweepPlan:
 
     @cached_property
     def studies(self) -> dict[str, StudyCase]:
-        return {one.name: StudyCase.of(one, self.layers, self.step_size) for one in self.scenarios}
+        first = self.values(tuple(0 for _ in self.axes))
+        return {
+            one.name: StudyCase.of(one, self.layers, self.step_size, varied=first)
+            for one in self.scenarios
+        }
 
     def task(self, prepared: PreparedScenario, place: GridPlace) -> SweepPointTask:
         return SweepPointTask(
@@ -185,13 +189,15 @@ def _check_end(plan: SweepPlan, varied: Mapping[str, Value]) -> list[Problem]:
     marks = {f"--set {key}": f"--vary {key}" for key in varied}
     found: dict[Problem, list[str]] = {}
     idle: list[Idle] = []
+    case = replace(plan.case, varied=frozenset(varied))
     for name in [prepared.name for prepared in plan.scenarios]:
         try:
-            (one,) = plan.case.prepare([name], varied, plan.step_size, None, plan.layers)
+            (one,) = case.prepare([name], varied, plan.step_size, None, plan.layers)
             idle.append(one.idle)
         except CaseError as error:
             for problem in error.problems:
-                if problem.place in marks:
+                # a question beside a failure of this end alone, such as no power flow, refuses no sweep
+                if problem.place in marks and not problem.besides:
                     found.setdefault(Problem(marks[problem.place], problem.text), []).append(name)
     if found:
         everywhere = len(plan.scenarios)

@@ -65,3 +65,27 @@ def test_what_an_fmu_of_ours_refuses_fails_alone_and_is_kept(tmp_path):
     assert refused.lasting  # a model of ours refuses the same values again
     assert fine.error is None
     assert fine.modes is not None
+
+
+def test_a_value_that_is_varied_is_not_questioned():
+    """An inertia of 0.05 s is asked about where a case has it, and is meant where a sweep goes through it."""
+    case, vary = load_case("two_area_rms"), ["sg1.machine.H=0.05:60:2", "sg2.machine.H=6,7"]
+    plan = plan_sweep(case, SweepRequest([parse_vary(text) for text in vary], scenarios=["base"]))
+    one = plan.task(plan.scenarios[0], (0, 0))
+    assert not any("sg1: machine.H" in text for text in compute_point(one).warnings)
+    (own,) = case.prepare(["base"], one.overrides)
+    assert any("sg1: machine.H = 0.05 s is outside" in q.text for q in own.questions)
+    held = SweepRequest(
+        [parse_vary("sg2.machine.H=6,7")], scenarios=["base"], values={"sg1.machine.H": 0.05}
+    )
+    plan = plan_sweep(case, held)
+    warnings = compute_point(plan.task(plan.scenarios[0], (0,))).warnings
+    assert any("sg1: machine.H = 0.05 s is outside" in text for text in warnings)
+
+
+def test_a_range_whose_end_has_no_power_flow_is_no_range_that_is_refused():
+    case = load_case("two_area_rms")
+    plan = plan_sweep(case, SweepRequest([parse_vary("gfor.S_n=0.25:1500:2")], scenarios=["gfor"]))
+    error = compute_point(plan.task(plan.scenarios[0], (0,))).error
+    assert "no solution found" in error
+    assert "is it in MVA" not in error
