@@ -16,7 +16,17 @@ PACKAGES = ("fmus", "gfor_fmu", "orchestrator")
 
 FLOORS = {
     "core": (
-        ("arrays", "closing", "cores", "late", "spelling", "threads", "uncollected", "units"),
+        (
+            "arrays",
+            "closing",
+            "cores",
+            "late",
+            "read_only",
+            "spelling",
+            "threads",
+            "uncollected",
+            "units",
+        ),
         ("errors",),
         ("asked", "attributes", "foreign_files", "question_kinds"),
         ("safe_files", "toml_files", "truth"),

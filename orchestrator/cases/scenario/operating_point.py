@@ -142,7 +142,7 @@ def _leftover(draft: Draft, flow: PowerFlow) -> Iterator[Problem]:
 
 
 def _cause(draft: Draft, rating: float) -> str:
-    """What may leave too much power for a unit of a rating [MVA], to be added to a sentence; "" if nothing is seen."""
+    """Likely cause of too much power for a unit of a rating [MVA], to be added to a sentence; "" if none is seen."""
     grid = draft.system.components.get(draft.grid or "")
     fed = feeding_loads(draft.network, grid, rating)
     return f"; {fed}" if fed else ""

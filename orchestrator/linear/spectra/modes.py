@@ -11,6 +11,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Vector
+from orchestrator.core.read_only import ReadOnlyTable
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.real_schur import RealSchur
 
@@ -79,7 +80,7 @@ class Mode(OfEigenvalue):
     participation
         Factor of every state, largest first; the factors of a mode sum to 1.
     shape
-        Right eigenvector by state, scaled so that its largest element is 1.
+        Right eigenvector by state, scaled so that its largest element is 1; it is read-only, ``dict(shape)`` is a copy.
     left
         Left eigenvector l by state, scaled so that lᴴ·shape is 1: it recognises the mode elsewhere.
     """
@@ -110,7 +111,7 @@ class Mode(OfEigenvalue):
             group = group_of(state)
             if group is not None:
                 sums[group] = sums.get(group, 0.0) + factor
-        return dict(sorted(sums.items(), key=lambda entry: -entry[1]))
+        return ReadOnlyTable(sorted(sums.items(), key=lambda entry: -entry[1]))
 
     def swing(self, states: Iterable[str], least: float = 0.1) -> tuple[list[str], list[str]]:
         """Two groups of some states, such as all speeds, that swing against each other.
@@ -292,6 +293,6 @@ def make_mode(
     return Mode(
         complex(value),
         tuple((names[k], float(factors[k])) for k in order),
-        dict(zip(names, shape.tolist(), strict=True)),
-        dict(zip(names, scaled.tolist(), strict=True)),
+        ReadOnlyTable(zip(names, shape.tolist(), strict=True)),
+        ReadOnlyTable(zip(names, scaled.tolist(), strict=True)),
     )

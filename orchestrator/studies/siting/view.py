@@ -32,6 +32,10 @@ TITLES = {"pod_p": "POD-P", "pod_q": "POD-Q", DROOP: "a droop"}
 # damping [points] by 1 MW/Hz below which no bus reaches a mode: 1000 give a hundredth of a point
 _NONE = 1e-5
 
+_PEOPLE = 100
+"""Support [MW/Hz or Mvar/Hz] by which shifts are shown to people."""
+
+_MW, _MVAR = "per_100_MW_per_Hz", "per_100_Mvar_per_Hz"
 _SHOWN, _NAMED = 12, 4
 
 
@@ -104,7 +108,7 @@ def unit(result: SiteResult, times: str = "1") -> str:
 
 def shown(result: SiteResult, damping: float) -> str:
     """A shift for people, in the unit ``unit(result, "100")``."""
-    return f"{damping * (1 if result.request.is_foreign else 100):+.3g}"
+    return f"{damping * (1 if result.request.is_foreign else _PEOPLE):+.3g}"
 
 
 def device_title(result: SiteResult) -> str:
@@ -249,6 +253,7 @@ def remarks(result: SiteResult) -> list[str]:
 
 def as_json(result: SiteResult) -> dict[str, Any]:
     here, stable = result.intact.name, [at.found.stability.stable for at in result.situations]
+    own = "" if result.request.is_foreign else _MVAR if result.request.device == "pod_q" else _MW
     return {
         **result.prepared.about,
         "device": result.request.device,
@@ -274,9 +279,9 @@ def as_json(result: SiteResult) -> dict[str, Any]:
             {
                 "bus": bus,
                 "rank": k + 1,
-                "shift": {m: _shift(by[bus]) for m, by in result.shifts[DEVICE][here].items()},
-                "p": {m: _shift(by[bus]) for m, by in result.shifts[ACTIVE][here].items()},
-                "q": {m: _shift(by[bus]) for m, by in result.shifts[REACTIVE][here].items()},
+                "shift": {m: _shift(by[bus], own) for m, by in result.shifts[DEVICE][here].items()},
+                "p": {m: _shift(by[bus], _MW) for m, by in result.shifts[ACTIVE][here].items()},
+                "q": {m: _shift(by[bus], _MVAR) for m, by in result.shifts[REACTIVE][here].items()},
                 "least": dict(zip(("damping_points", "situation"), result.least(bus), strict=True)),
             }
             for k, bus in enumerate(result.ranking)
@@ -306,9 +311,11 @@ def _modes(modes: tuple[SeenMode, ...]) -> list[dict[str, Any]]:
     ]
 
 
-def _shift(shift: SupportShift) -> dict[str, Any]:
+def _shift(shift: SupportShift, unit: str = "") -> dict[str, Any]:
+    """One shift by one MW/Hz or Mvar/Hz, and, with its unit in the key, by the 100 of them that people are shown."""
     return {
         "damping_points": shift.damping,
+        **({f"damping_points_{unit}": _PEOPLE * shift.damping} if unit else {}),
         "real": shift.change.real,
         "imag": shift.change.imag,
         "part_of_best": shift.part,

@@ -1,7 +1,10 @@
 """Eigenvalues, damping and participation factors of systems whose answer is known."""
 
 import cmath
+import copy
+import json
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -120,3 +123,21 @@ def test_who_stands_across_is_neither_together_nor_against():
     alone = mode.swing_groups(["sg1.omega", "sg3.omega"])
     assert alone.words(", ".join) == "sg1; sg3 at +87°"
     assert mode.swing_groups([]).words(", ".join) == ""
+
+
+def test_a_mode_that_is_handed_out_cannot_be_changed():
+    """A shape or a participation that somebody writes into would change a result that others read."""
+    (mode,) = find_modes(model(OSCILLATOR, None))
+    for table in (mode.shape, mode.left, mode.by_component):
+        name = next(iter(table))
+        for change in (
+            lambda table=table, name=name: table.__setitem__(name, 0),
+            lambda table=table: table.update(a=1),
+            lambda table=table: table.clear(),
+        ):
+            with pytest.raises(TypeError, match="change a copy"):
+                change()
+        assert dict(table) | {name: 0} != table
+        assert json.loads(json.dumps({name: abs(x) for name, x in table.items()}))
+    for copied in (pickle.loads(pickle.dumps(mode)), copy.deepcopy(mode)):
+        assert copied == mode

@@ -154,6 +154,10 @@ def test_the_json_has_a_shift_for_each_bus_and_mode(gfor, tmp_path):
     assert shift["damping_points"] > 0
     assert "Mvar/Hz" in found["units"]["damping_points"]
     assert found["buses"][0]["q"]["electromechanical"] == shift
+    by_100 = shift["damping_points_per_100_Mvar_per_Hz"]
+    assert by_100 == 100 * shift["damping_points"]
+    assert f"{by_100:+.3g}" in found["answer"]
+    assert "damping_points_per_100_MW_per_Hz" in found["buses"][0]["p"]["electromechanical"]
     assert found["confirmed"][0]["agrees"] is True
     assert {"site.html", "buses.csv"} < {path.name for path in tmp_path.iterdir()}
 
