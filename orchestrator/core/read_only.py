@@ -14,8 +14,8 @@ class ReadOnlyTable(dict[Key, Entry]):
     def _refuse(self, *_: Any, **__: Any) -> NoReturn:
         raise TypeError("this belongs to a result and cannot be changed; change a copy: dict(...)")
 
-    __setitem__ = __delitem__ = __ior__ = _refuse  # type: ignore[assignment]
-    clear = pop = popitem = setdefault = update = _refuse  # type: ignore[assignment]
+    __setitem__ = __delitem__ = __ior__ = _refuse
+    clear = pop = popitem = setdefault = update = _refuse
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (dict(self),)

@@ -70,7 +70,7 @@ def plain(
     return found
 
 
-def _users_level() -> int:
+def users_level() -> int:
     """How far above its caller the nearest code outside of this package stands, as `warnings.warn` counts."""
     frame, level = sys._getframe(1), 1
     package = __name__.partition(".")[0]
@@ -135,7 +135,7 @@ def kept(given: Any, name: str, argument: str) -> Path:
     if table is given and (gaps := [str(name) for name in table if table[name].isna().any()]):
         warnings.warn(
             f"question: {argument}: {', '.join(gaps)}: the case's value is taken at NaN; is it meant?",
-            stacklevel=_users_level(),
+            stacklevel=users_level(),
         )
     named = {"time", "name"} & set(table.columns)
     return keep(table.to_csv(index=not named, index_label=None if named else "name"), name)

@@ -1,6 +1,7 @@
 """The modes in a recorded signal."""
 
 import re
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,12 +11,13 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from orchestrator.cases.form.given import Time, moment, part_of_record
+from orchestrator.cases.form.given import Time, moment, part_of_record, users_level
 from orchestrator.core.asked import names as names_given
 from orchestrator.core.asked import number_between, positive, text_or_none
 from orchestrator.core.errors import AnalysisError, InputError
 from orchestrator.core.units import to_unit
 from orchestrator.face.api.results import Run
+from orchestrator.face.api.scenario import UnusualDataWarning
 from orchestrator.linear.signals.ambient import ambient_modes
 from orchestrator.linear.signals.identification import sampling
 from orchestrator.linear.signals.mode_doubts import straight_line
@@ -29,7 +31,7 @@ from orchestrator.studies.signals.comparison import (
     require_numbers,
     strongest_modes,
 )
-from orchestrator.studies.signals.signal_modes import SignalModes
+from orchestrator.studies.signals.signal_modes import RARE, SignalModes
 
 Recorded = Any
 """`Run`, `xarray.Dataset`, `xarray.DataArray`, `pandas.DataFrame`, or a path; pandas is imported late."""
@@ -208,7 +210,14 @@ def _seconds(index: Any, otherwise: str) -> Any:
         )
     if not index.is_monotonic_increasing or not index.is_unique:
         raise InputError(f"{otherwise}: the times of its index do not ascend; {rule}")
-    return index.to_numpy(dtype=float) * _second(str(index.name), otherwise)
+    times = index.to_numpy(dtype=float)
+    name = "time" if index.name is None else str(index.name)
+    apart = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    if apart > RARE and not _IN_BRACKETS.search(name):
+        text = f"question: {otherwise}: its times are {apart:g} apart, perhaps in ms, and their name {name!r} says no "
+        text += f"unit; they are taken as seconds: name the index '{name} [s]' or '{name} [ms]'"
+        warnings.warn(text, UnusualDataWarning, stacklevel=users_level())
+    return times * _second(name, otherwise)
 
 
 def _second(name: str, otherwise: str) -> float:

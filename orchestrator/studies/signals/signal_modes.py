@@ -19,7 +19,7 @@ from orchestrator.output.report.notebook import page
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.studies.signals.comparison import Comparison
 
-_RARE = 1.0  # samples [s] that are further apart show no swing of machines
+RARE = 1.0  # samples [s] that are further apart show no swing of machines
 
 
 @dataclass(eq=False, repr=False)
@@ -79,7 +79,7 @@ class SignalModes:
         highest = 0.5 / self.interval
         texts = [
             f"The samples used, every {self.interval:g} s, show nothing above {highest:.4g} Hz: "
-            f"a faster oscillation appears as a slower one.{' Is the time in ms?' * (self.interval > _RARE)}"
+            f"a faster oscillation appears as a slower one.{' Is the time in ms?' * (self.interval > RARE)}"
         ]
         near = [f"{m.frequency_hz:.4g} Hz" for m in self.modes if m.frequency_hz > highest / 2]
         if near:

@@ -3,6 +3,8 @@
 import copy
 import pickle
 import re
+import warnings
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -332,3 +334,18 @@ def test_the_tab_key_offers_no_more_than_before(case, scenario, modes):
     """What errors are made of is not the user's."""
     for shown in (case, scenario, modes):
         assert not {"elsewhere", "own", "instead"} & {*dir(shown)}
+
+
+def test_times_far_apart_without_a_unit_are_asked_about():
+    """Samples that are seconds apart show no swing; written in ms, they are the recorder's 20 ms."""
+    times = pd.Index(20.0 * np.arange(len(RING)))
+    ring = pd.DataFrame({"x": RING}, index=times)
+    with pytest.warns(
+        gfor.UnusualDataWarning, match=r"20 apart, perhaps in ms.*'time \[ms\]'"
+    ) as asked:
+        gfor.identify(ring, start=0)
+    assert Path(asked[0].filename) == Path(__file__)
+    for name in ("time [ms]", "time [s]"):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            gfor.identify(ring.rename_axis(name), start=0)
