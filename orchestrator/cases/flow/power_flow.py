@@ -54,6 +54,11 @@ class PowerFlow:
     beyond_limits: tuple[Excess, ...] = ()
     # what it was solved with; a transformer of three windings is three of them
     lines: tuple[FlowLine, ...] = ()
+    loads: tuple[
+        FlowLoad, ...
+    ] = ()  # with units of given reactive power, which draw less than zero
+    shunts: tuple[FlowShunt, ...] = ()
+    holding: tuple[str, ...] = ()  # buses whose units hold a voltage
     slack: str = ""  # bus that feeds what is left
     balancing: tuple[str, ...] = ()  # units there that do, whatever their P_0
 
@@ -145,9 +150,12 @@ def solve_power_flow(
         flow.residual,
         tuple(at_limits),
         beyond,
-        tuple(lines),
-        slack_bus,
-        left,
+        lines=tuple(lines),
+        loads=tuple(drawn),
+        shunts=tuple(shunts),
+        holding=tuple(at_bus),
+        slack=slack_bus,
+        balancing=left,
     )
 
 

@@ -1,17 +1,16 @@
 """The network of a case: written out in tables and files, taken from another program's data, or both."""
 
-import cmath
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from scipy.sparse.linalg import spsolve
 
 from fmus.grid.network import Line, Load, Shunt, ThreeWinding
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow.balance import inner_buses
+from orchestrator.cases.flow.beside_file import FileVoltages, complete_voltages
 from orchestrator.cases.form.csv_rows import (
     Row,
     number,
@@ -69,6 +68,7 @@ class _Source:
     machines: tuple[Machine, ...] = ()
     idle: frozenset[tuple[int, str]] = frozenset()
     misfit: str = ""
+    file_voltages: FileVoltages = field(default_factory=FileVoltages)
     records: tuple[RecordUse, ...] = ()
     device_loads: tuple[Load, ...] = ()  # in the place of DC lines and the like
     file_loads: tuple[FileLoad, ...] = ()
@@ -99,6 +99,7 @@ class NetworkData:
     feeding: dict[str, float] = field(default_factory=dict)
     capacitors: dict[str, float] = field(default_factory=dict)
     misfit: str = ""  # what is wrong with the voltages that the source has as its solution
+    file_voltages: FileVoltages = field(default_factory=FileVoltages)  # of a solved source
     # loads of which the source tells constant impedances and currents, by name: they follow the
     # voltage in a power flow that starts from another, as that of an outage does
     flow_laws: Mapping[str, FlowLaws] = field(default_factory=dict)
@@ -173,6 +174,7 @@ def network_data(table: NetworkTable, directory: Path, slack: str | None = None)
         source.feeding,
         source.capacitors,
         found.misfit,
+        found.file_voltages,
         {
             load.name: flow_laws(load, source.load_parts[load.name])
             for load in source.loads
@@ -224,11 +226,13 @@ def _source(table: NetworkTable, directory: Path, slack: str | None) -> _Source:
         tables = read_matpower(path)
         imported = import_network(tables)
         misfit = misfit_of(imported, tables.bus, tables.labels)
+        stated = file_voltages(tables.bus, tables.labels)
         if table.frequency is None:
             text = "MATPOWER's cases hold no frequency: every model keeps its own, usually 50 Hz"
             text += f"; write it, such as {with_frequency(_FREQUENCY)}"
-            return _Source(imported, (Problem(str(path), text),), misfit=misfit)
-        return _Source(imported, misfit=misfit)
+            changes = (Problem(str(path), text),)
+            return _Source(imported, changes, misfit=misfit, file_voltages=stated)
+        return _Source(imported, misfit=misfit, file_voltages=stated)
     if table.pandapower is not None:
         imported = import_network(read_pandapower(table.pandapower, directory))
     return _Source(imported)
@@ -316,6 +320,7 @@ def _read_from_raw(asked: _Asked) -> _Source:
         machines,
         raw.idle | {(x.bus, x.name.strip()) for x in left},
         misfit,
+        file_voltages(raw.tables.bus, raw.tables.labels),
         records=tuple(
             replace(x, why=solved.words_of(x.kind, x.line) or x.why) for x in raw.records
         ),
@@ -346,7 +351,12 @@ def _from_cgmes(path: Path, table: NetworkTable) -> _Source:
     # balances SV's losses
     slack = imported.slack or max(generation, key=lambda bus: generation[bus].p_mw)
     misfit = misfit_of(replace(imported, slack=slack), model.tables.bus, model.tables.labels)
-    return _Source(replace(imported, generation=generation), model.changes, misfit=misfit)
+    return _Source(
+        replace(imported, generation=generation),
+        model.changes,
+        misfit=misfit,
+        file_voltages=file_voltages(model.tables.bus, model.tables.labels),
+    )
 
 
 def _lines_of_file(path: Path) -> list[tuple[Line, str]]:
@@ -390,13 +400,31 @@ def _impedance(row: Row) -> list[float]:
 
 _VM, _VA = 7, 8  # columns of MATPOWER's table
 _SMALL = 1e-3  # part of the file's load that may be out of balance at a bus
-_ROUNDS = 20  # to voltages that the file lacks
 _SHOWN = 3  # buses that are named; the others are counted
+_COARSE = 5e-4
+"""Half of the third digit of a magnitude [pu], which files give at least: 1.0 at every bus may be a round number."""
+_COARSE_ANGLE = 0.05  # half of the first digit of an angle [degrees]
 
 NOT_SOLVED = (
     "the file is not solved: every bus has VA = 0. The power flow is computed here, and what PSS/E takes from VM "
     "(parts of loads, some generators' voltages) is that of the file; export the solved case"
 )
+
+
+def file_voltages(bus: Matrix, labels: Mapping[int, str]) -> FileVoltages:
+    """Return the voltages of a source; none if it is not solved, that is if all angles are 0.
+
+    ``bus``, ``labels``: see `misfit_of`."""
+    if not bus[:, _VA].any():
+        return FileVoltages()
+    stated = stated_voltages(bus)
+    return FileVoltages({bus_of(labels[k]): v for k, v in stated.items()}, _rounding(bus))
+
+
+def _rounding(bus: Matrix) -> float:
+    """Return what the digits of a source's voltages leave open [pu]."""
+    magnitudes, angles = half_digit(bus[:, _VM]), half_digit(bus[:, _VA])
+    return float(min(magnitudes, _COARSE) + np.radians(min(angles, _COARSE_ANGLE)))
 
 
 def misfit_of(
@@ -405,10 +433,8 @@ def misfit_of(
     """Return what does not fit; "" where all does, and ``unsolved`` where the file has no solution.
 
     ``bus``: MATPOWER's table with the voltages [pu, degrees]; ``labels``: names of its buses by number."""
-    stated = {
-        bus_of(labels[int(r[0])]): cmath.rect(r[_VM], np.radians(r[_VA])) for r in bus if r[_VM] > 0
-    }
-    if network.slack not in stated or not bus[:, _VA].any():
+    stated = file_voltages(bus, labels).at
+    if network.slack is None or network.slack not in stated:
         return "" if bus[:, _VA].any() else unsolved
     places = [place for place in network.buses if place in stated]
     # of transformers with an open winding
@@ -416,17 +442,11 @@ def misfit_of(
     buses = [*places, *stars, *(inner for x in network.transformers for inner in inner_buses(x))]
     equations = imported_equations(network, buses, {}, network.slack)
     known, matrix = len(places), equations.matrix
-    voltages = np.array([*(stated[place] for place in places), *[1 + 0j] * (len(buses) - known)])
-    if known < len(buses):
-        inside = matrix[known:]
-        for _ in range(_ROUNDS if equations.fed[known:].any() else 1):  # boundaries have loads
-            drawn = (equations.fed / voltages).conj()[known:] - inside[:, :known] @ voltages[:known]
-            voltages[known:] = np.atleast_1d(spsolve(inside[:, known:].tocsc(), drawn))
+    voltages = complete_voltages(equations, {place: stated[place] for place in places})
     left = SYSTEM_BASE_MVA * (equations.fed - equations.powers(voltages))
     units = [k for k, place in enumerate(places) if place in network.generation]
     left[units], left[[equations.slack, *range(known, len(buses))]] = left[units].real, 0
-    rounding = half_digit(bus[:, _VM]) + np.radians(half_digit(bus[:, _VA]))
-    noise = SYSTEM_BASE_MVA * rounding * abs(voltages) * (abs(matrix) @ np.ones(len(buses)))
+    noise = SYSTEM_BASE_MVA * _rounding(bus) * abs(voltages) * (abs(matrix) @ np.ones(len(buses)))
     load = sum(x.p_mw for x in network.loads if x.p_mw > 0)
     found = [int(k) for k in np.argsort(-abs(left)) if abs(left[k]) > noise[k] + _SMALL * load]
     return _sentence({buses[k]: left[k] for k in found}, known) if found else ""

@@ -15,6 +15,7 @@ from types import MappingProxyType
 from fmus.grid.network import Load
 from fmus.toolchain.port_variables import I_IM, I_RE, SYSTEM_BASE_MVA, V_IM, V_RE
 from orchestrator.cases.case import Case, case_of_text
+from orchestrator.cases.flow.beside_file import BesideFile
 from orchestrator.cases.form.csv_rows import number, rows_of
 from orchestrator.cases.form.names import close_names
 from orchestrator.cases.networks.data import bus_name, network_data
@@ -105,6 +106,11 @@ class NewCase:
     def records(self) -> tuple[RecordUse, ...]:
         """Return what became of the records of the network's files."""
         return self.scenarios[0].records if self.scenarios else ()
+
+    @property
+    def beside_file(self) -> BesideFile | None:
+        """How far the power flow of the base case is from the file's voltages; None where the file has none."""
+        return self.scenarios[0].beside_file if self.scenarios else None
 
 
 def read_converter(text: str) -> WantedConverter:
@@ -513,6 +519,8 @@ class _Text:
             f"models: {self._wanted.kind}; stray_B of EMT models: {self._stray:g} pu{self._stray_why}"
         )
         lines.append(f"fault: three-phase at {self._fault_bus}, 100 ms, nothing trips")
+        beside = self._base.beside_file if self._base else None
+        lines += [f"power flow: {beside.in_words}"] if beside else []
         if self._base is not None and (line := in_one_line(self._base.records)):
             lines.append(line + " (--details lists them)" * any(details(self._base.records)))
         more = f"{questions} question{'s' * (questions != 1)} about the data: comments at their lines in the file"

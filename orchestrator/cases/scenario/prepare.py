@@ -9,6 +9,7 @@ from fmus.grid.network import Network
 from fmus.toolchain.catalogue import model_names, network_of, parts_of
 from orchestrator.cases.draft import Draft, DraftInput
 from orchestrator.cases.events.event_tables import scenario_events
+from orchestrator.cases.flow.beside_file import BesideFile, FileVoltages, compare_with_file
 from orchestrator.cases.flow.power_flow import PowerFlow
 from orchestrator.cases.form import component_forms
 from orchestrator.cases.form.build_choices import MODELS, PARTS, STAND_IN
@@ -93,6 +94,7 @@ class PreparedScenario:
     network: Network | None = None
     source_slack: str | None = None  # reference bus of the network's source
     file_limits: FileLimits = field(default_factory=FileLimits)  # of the network's source
+    file_voltages: FileVoltages = field(default_factory=FileVoltages)  # of the network's source
     titles: Mapping[str, str] = field(default_factory=dict)  # names in the network's file, by bus
     names: ElementNames = field(default_factory=ElementNames)  # of the network's file, for people
     recorded_loads: frozenset[str] = frozenset()  # loads whose laws are of records of dynamics data
@@ -157,6 +159,14 @@ class PreparedScenario:
         }
         network = Path(file).name if file else self.case.name
         return {"network": network, "loads": in_words(loads) if loads else "", "machines": machines}
+
+    @property
+    def beside_file(self) -> BesideFile | None:
+        """How far the power flow is from the voltages of the network's file; None where it has none."""
+        if self.power_flow is None or self.network is None:
+            return None
+        at_devices = [x.bus for x in self.network.loads if x.name in self.device_loads]
+        return compare_with_file(self.power_flow, self.file_voltages, at_devices)
 
     @property
     def grid(self) -> str:
@@ -303,6 +313,7 @@ class Preparer:
             not_reached=tuple(sorted(draft.found.not_reached)),
             source_slack=draft.data.slack if draft.data else None,
             file_limits=draft.data.limits if draft.data else FileLimits(),
+            file_voltages=draft.data.file_voltages if draft.data else FileVoltages(),
             titles=draft.data.titles if draft.data else {},
             names=names_of(draft.network, draft.data)
             if draft.data and draft.network

@@ -82,11 +82,14 @@ def _written(options: argparse.Namespace) -> int:
         escape(f"Next: gfor modes {wanted.out}{' --black-box' * made.black_box}"), highlight=False
     )
     if options.json:
+        found = made.beside_file
+        beside = found.as_json() if found else None
         print_json(
             {
                 "case": str(wanted.out),
                 "scenarios": [prepared.name for prepared in made.scenarios],
                 "assumed": [*made.assumed],
+                "power_flow": beside,
                 "records": as_json(made.records),
                 "questions": [*dict.fromkeys(str(q) for p in made.scenarios for q in p.questions)],
             }

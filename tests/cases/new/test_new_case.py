@@ -11,6 +11,7 @@ import pytest
 
 from orchestrator.cases.case import case_of_text, load_case
 from orchestrator.cases.form.parameter_files import read_parameter_file
+from orchestrator.cases.form.schema import NetworkTable
 from orchestrator.cases.networks import data as network_data
 from orchestrator.cases.networks.psse.raw import read_raw
 from orchestrator.cases.new.new_case import WantedCase, _switched, read_converter, write_case
@@ -19,6 +20,9 @@ from orchestrator.devices.fmi.description import read_description
 from orchestrator.linear.spectra.continuation import ModesMeetError
 from orchestrator.studies.modes import beside
 from orchestrator.studies.modes.modes import compute_modes
+from tests.cases.networks.psse import raw, records
+from tests.cases.networks.psse.test_solution import solved_records
+from tests.cases.networks.test_network_sources import solved
 from tests.studies.screening.five_machines import POWERS, RATINGS, five_machines
 from tests.support import vendor
 
@@ -34,6 +38,14 @@ def gfor(gfor):
 def files(tmp_path):
     five_machines(tmp_path)
     return tmp_path / "five.raw", tmp_path / "five.dyr"
+
+
+@pytest.fixture
+def solved_raw(tmp_path):
+    """Text of the WSCC system's RAW file with its solution."""
+    (tmp_path / "grid.raw").write_text(raw(33, records(33)), encoding="utf-8")
+    data = network_data.network_data(NetworkTable(raw="grid.raw"), tmp_path)
+    return raw(33, solved_records(solved(data), setpoint=1.025))
 
 
 def made(files, converter=CONVERTER, **more):
@@ -55,6 +67,22 @@ def test_a_case_is_written_and_said_in_few_lines(gfor, files):
     assert again[0] == 2
     assert "--force" in again[2]
     assert gfor(*files, "--converter", CONVERTER, "--out", out, "--force")[0] == 0
+
+
+def test_the_distance_from_the_files_voltages_is_told(gfor, tmp_path, solved_raw):
+    """A solved file is met within its digits; with another load the line names the bus and what is left there."""
+    path = tmp_path / "solved.raw"
+    path.write_text(solved_raw, encoding="utf-8")
+    code, text, err = gfor(path, "--out", tmp_path / "case.toml", "--json")
+    told = json.loads(text)["power_flow"]
+    assert (code, told["cause"]) == (0, "")
+    assert told["beside_file_pu"] < 1e-6
+    assert "power flow: within" in err
+    path.write_text(solved_raw.replace("8,'1 ',1,1,1,100,35", "8,'1 ',1,1,1,102,35"))
+    text = gfor(path, "--out", tmp_path / "case.toml", "--force")[1]
+    text = " ".join(text.split())
+    assert "beside the file's voltages: " in text
+    assert "which leave -2 MW" in text
 
 
 def test_the_converter_takes_over_what_the_machine_feeds_less(files):

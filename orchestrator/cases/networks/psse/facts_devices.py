@@ -1,5 +1,6 @@
 """FACTS devices of a PSS/E file: a shunt part that holds its bus' voltage, and a series part that sets a power."""
 
+import math
 from dataclasses import dataclass
 
 from orchestrator.cases.networks.psse.devices import DeviceEnd, HeldDevice, Hold, Voltages
@@ -32,18 +33,20 @@ class FactsDevice(HeldDevice):
     def endings(self, voltages: Voltages) -> tuple[DeviceEnd, ...]:
         v = abs(voltages[self.sending])
         held = v if self.is_remote else self.v_pu
-        fed = 0j
-        series = 0.0  # reactive power that flows into the series part
+        fed = series = 0j  # series: power that flows into the series part
         found = []
         if self.sets_power:
             # the shunt part brings what active power the series part takes; both are at the sending bus
             current = (self.power / voltages[self.terminal]).conjugate()
-            series = (voltages[self.sending] * current.conjugate()).imag
+            series = voltages[self.sending] * current.conjugate()
             fed = complex(-self.power.real)
             name = self.ending_name("facts", self.terminal)
             found.append(DeviceEnd(name, self.terminal, self.power))
-        most = self.most_mva * v
-        hold = Hold(held, -most - series, most - series)
+        # SHMX is of the apparent power, as in the solutions of PSS/E's example: what the series part
+        # inserts, the shunt part draws
+        inserted = (series + fed).real
+        most = math.sqrt(max((self.most_mva * v) ** 2 - inserted**2, 0.0))
+        hold = Hold(held, -most - series.imag, most - series.imag)
         name = self.ending_name("facts", self.sending)
         return (DeviceEnd(name, self.sending, fed, hold), *found)
 

@@ -21,6 +21,7 @@ NODES = 35  # first revision with nodes in the records of machines, switched shu
 NAMES = 36  # first revision with names of switched shunts, and sets of ratings of switching devices
 SWITCHING_DEVICES = 34  # first revision with system-wide data, switching devices and substations
 _FIXED_SHUNTS = 31  # first revision with fixed shunts beside the buses, and REV in the first record
+_OLD_FIELDS = 11  # of a bus until revision 30
 MOST_BYTES = 200_000_000  # of a file: ten times the largest interconnections
 
 _TAIL = (
@@ -139,6 +140,10 @@ def read_records(path: Path) -> RawFile:
         remarks.append("one line of titles, where PSS/E writes two: the second is a bus")
         lines = chain([titles[1]], lines)
     sections, guessed = _sections(path, revision, lines)
+    if revision >= _FIXED_SHUNTS and _are_old_buses(sections.get("bus", [])):
+        text = f"REV is {revision}, and the buses hold GL and BL before their areas, as in revision 30: read so"
+        remarks.append(text)
+        sections = _later_buses(sections)
     if revision < _FIXED_SHUNTS:
         sections = _later_buses(sections)
     noted = tuple((head.line, text) for text in remarks)
@@ -182,18 +187,26 @@ def _is_bus(line: str) -> bool:
     return len(fields) > 7 and all(_is_number(text) for text in fields[2:4])
 
 
+def _are_old_buses(buses: Sequence[Record]) -> bool:
+    """Return whether buses are as in revision 30: GL and BL, with a decimal point, where later ones have areas."""
+    return bool(buses) and all(
+        len(x.fields) == _OLD_FIELDS and all("." in text for text in (*x.fields[4:6], x.fields[8]))
+        for x in buses
+    )
+
+
 def _later_buses(sections: dict[str, list[Record]]) -> dict[str, list[Record]]:
     """Buses of revisions 29 and 30, which hold GL and BL, as those of later ones, with fixed shunts."""
     buses, shunts = [], []
     for record in sections.get("bus", []):
-        padded = [*record.fields, *[""] * (11 - len(record.fields))]
-        number, name, kilovolts, kind, g, b, area, zone, vm, va, owner = padded[:11]
+        padded = [*record.fields, *[""] * (_OLD_FIELDS - len(record.fields))]
+        number, name, kilovolts, kind, g, b, area, zone, vm, va, owner = padded[:_OLD_FIELDS]
         buses.append(
             replace(record, fields=[number, name, kilovolts, kind, area, zone, owner, vm, va])
         )
         if any(_is_number(text) and float(text) for text in (g, b)):
             shunts.append(replace(record, fields=[number, "1", "1", g, b]))
-    return {**sections, "bus": buses, "fixed shunt": shunts}
+    return {**sections, "bus": buses, "fixed shunt": [*sections.get("fixed shunt", ()), *shunts]}
 
 
 def text_of(path: Path) -> str:

@@ -182,6 +182,23 @@ def test_a_series_part_delivers_its_power_and_the_shunt_part_brings_it(read):
     assert found["facts_F_2_4"].real == -40
 
 
+def test_the_shunt_part_at_its_limit_draws_the_series_parts_power_within_its_rating(read):
+    """As in the solutions of PSS/E's example (SAVNW with a UPFC at bus 153): SHMX limits the apparent power."""
+    rating, series = 1.0, 40 + 10j
+    record = UPFC[0].replace("{node}", "").replace("4,10,1", "8,5,1").replace("200.0", "1.0")
+    found = fed(read({"FACTS DEVICE": [record.replace("1.02", "1.08")]}))
+
+    def powers(v, _):
+        into = v[8] * series / v[5]
+        shunt = math.sqrt((rating * abs(v[8])) ** 2 - (into.real - series.real) ** 2)
+        return {5: series, 8: complex(-series.real, shunt - into.imag)}
+
+    voltages, _ = solved(powers)
+    assert found["facts_F_2_8"] == pytest.approx(powers(voltages, None)[8], abs=1e-4)
+    inserted = (voltages[8] * series / voltages[5]).real - series.real
+    assert abs(inserted) > 0.1 * rating
+
+
 def test_a_bypassed_series_part_is_a_branch_and_an_impedance_too(read):
     far = {"BUS": ["10,'FAR',230,1,1,1,1,1,0"]}
     bypassed = UPFC[0].replace("{node}", "").replace("4,10,1", "4,10,2")

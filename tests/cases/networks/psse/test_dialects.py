@@ -94,6 +94,25 @@ def test_revisions_before_31_have_their_shunts_in_the_buses(revision, read):
     assert [(x.bus, x.b_mvar) for x in other.shunts] == [("bus_5", pytest.approx(50))]
 
 
+def test_buses_of_revision_30_under_a_later_revision_are_read_as_they_are(read):
+    """As a public file of three buses has them; read by REV, VM would be the owner, and VA the voltage in degrees."""
+    found = records(33)
+    found["BUS"] = [
+        ",".join([*line.split(",")[:4], "0.000,0.000,1,1", *line.split(",")[7:9], "1"])
+        for line in found["BUS"]
+    ]
+    found["BUS"][4] = found["BUS"][4].replace("0.000,0.000", "0.000,50.000")
+    found["FIXED SHUNT"] = ["6,'1 ',1,0,20"]
+    usual, other = read(raw()), read(raw(33, found))
+    assert (other.lines, other.loads, other.generation) == (
+        usual.lines,
+        usual.loads,
+        usual.generation,
+    )
+    assert {x.bus: x.b_mvar for x in other.shunts} == pytest.approx({"bus_5": 50, "bus_6": 20})
+    assert "as in revision 30" in texts(other)
+
+
 def test_one_line_of_titles_costs_no_bus(read):
     data = read(raw().replace("figure 7.4\n", ""))
     assert data.buses == read(raw()).buses
