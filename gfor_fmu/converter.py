@@ -14,7 +14,8 @@ from gfor_fmu.pod import pod
 from gfor_fmu.usual import FORMING
 from gfor_fmu.virtual_impedance import declare_virtual_impedance
 
-S_N, P_0 = 1500.0, 0.9  # default rating [MVA] and dispatch [pu]: the two-area system's converter
+S_N = 1500.0  # default rating [MVA]: the two-area system's converter
+P_0 = 0.9  # default dispatch [pu, S_n]: that of the same converter
 
 
 @dataclass(frozen=True)

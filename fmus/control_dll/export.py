@@ -99,7 +99,9 @@ DLL_TARGETS = {
 """Platforms that a DLL is written for. EMT programs run on Windows; some load DLLs of 32 bits alone."""
 
 SAMPLE_TIME = 2e-5  # default of ``FixedStepBaseSampleTime`` [s]
-_SHORTEST, _LONGEST = 1e-6, 2e-4
+# bounds of that sample time [s], around the steps that EMT programs take
+_SHORTEST = 1e-6
+_LONGEST = 2e-4
 
 
 class ControlDllError(ValueError):

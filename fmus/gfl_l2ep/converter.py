@@ -16,8 +16,8 @@ from fmus.toolchain.phasor_port import (
 from fmus.toolchain.port import declare_port_outputs, device_port
 from fmus.toolchain.symbols import Expr
 
-# default rating [MVA] and dispatch [pu]: those of a wind park of the benchmark
-S_N, P_0 = 2400.0, 0.83
+S_N = 2400.0  # default rating [MVA]: that of a wind park of the benchmark
+P_0 = 0.83  # default dispatch [pu, S_n]: that of the same park
 
 BEHIND = Phasor(0.1, 10.0)
 """Impedance [pu, S_n] behind which the phasor variant gives its current: the larger, the less does the error of the

@@ -37,8 +37,9 @@ ieee39 with such loads alone, 0.5 ms leaves one at 151 Hz growing, 1 ms none."""
 # least τ [s]: the law is taken at the stages of an implicit step of up to 0.2 ms
 SHORTEST_RECOVERY = 5e-4
 
-PHASOR_RECOVERY_TIME, SHORTEST_PHASOR_RECOVERY = 1e-2, 4e-3
-"""The same for phasor networks, whose explicit steps are up to 2 ms long."""
+# the same [s] for phasor networks, whose explicit steps are up to 2 ms long
+PHASOR_RECOVERY_TIME = 1e-2
+SHORTEST_PHASOR_RECOVERY = 4e-3
 
 LONGEST_RECOVERY = 1.0  # largest τ [s]
 # default time constant [s] of the frequency that a load feels: one period at 50 Hz
@@ -131,7 +132,7 @@ def declare_following_load(
 def following_load_equations(m: ModelBuilder, load: FollowingLoad) -> None:
     """Give the equation τ·dc/dt = (Y' − Y)·v − c, and declare the load's power."""
     v, declared = load.bus.v, load.load
-    rate = (_wanted(m, load) - load.correction) * (1 / load.tau)
+    rate = (_current_beyond_admittance(m, load) - load.correction) * (1 / load.tau)
     implicit = load.correction * (-1 / load.tau)
     phasor_derivative(m, load.correction, rate, implicit)
     if load.held is not None:
@@ -161,7 +162,7 @@ def following_load_equations(m: ModelBuilder, load: FollowingLoad) -> None:
             m.output("q", drawn.im, "pu", "Reactive power drawn", base=SYSTEM_BASE)
 
 
-def _wanted(m: ModelBuilder, load: FollowingLoad) -> Phasor:
+def _current_beyond_admittance(m: ModelBuilder, load: FollowingLoad) -> Phasor:
     """(Y' − Y)·v: what the law draws more than the admittance."""
     v, data = load.bus.v, load.data
     w = v.magnitude() if load.v_min is None else fmax(v.magnitude(), load.v_min)

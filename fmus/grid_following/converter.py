@@ -14,8 +14,9 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort, declare_port_outputs, device_port
 from fmus.toolchain.symbols import Expr
 
-# default rating [MVA] and dispatch [pu]: the two-area system's converter, whose place it takes
-S_N, P_0 = 1500.0, 0.9
+# the two-area system's converter, whose place it takes
+S_N = 1500.0  # default rating [MVA]
+P_0 = 0.9  # default dispatch [pu, S_n]
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,11 @@ PLANT = "REPCA1"  # the plant's controller, of which nothing can be taken over
 X_S = 0.5
 
 _FLAGS = {"PFFLAG", "VFLAG", "QFLAG", "PFLAG", "PQFLAG"}
-_SHORTEST, _SHORTEST_CURRENT, _LEAST_LIMIT, _LEAST_REACTANCE = 5e-3, 1e-3, 0.1, 0.01
+# the least values that `gfl_phasor` takes in place of smaller ones of records
+_SHORTEST = 5e-3  # time constant [s]
+_SHORTEST_CURRENT = 1e-3  # time constant of the current [s]
+_LEAST_LIMIT = 0.1  # limit of the current [pu, S_n]
+_LEAST_REACTANCE = 0.01  # [pu, S_n]
 
 
 def approximation(records: Mapping[str, Mapping[str, float]]) -> tuple[dict[str, float], list[str]]:

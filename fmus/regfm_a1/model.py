@@ -140,7 +140,7 @@ def internal_voltage(
     command = Vref + change_V + mq * (Qref + change_Q - Qf) + beyond
     error = command - Vf
     x = m.state("x_V", E_0, "pu", "Integrator of the voltage control", base="S_n")
-    m.derivative(x, controlled * _held(x, kiv * error, least, most))
+    m.derivative(x, controlled * _rate_within(x, kiv * error, least, most))
     return fmin(fmax(if_else(controlled, kpv * error + x, command), least), most)
 
 
@@ -180,14 +180,15 @@ def _limits(
     return fmin(kp * above + down, 0) + fmax(kp * below + up, 0)
 
 
-def _held(x: Expr, rate: Expr, least: Expr, most: Expr) -> Expr:
+def _rate_within(x: Expr, rate: Expr, least: Expr, most: Expr) -> Expr:
     """The rate of an integrator that stays within two values."""
     outward = logic_or(logic_and(x >= most, rate > 0), logic_and(x <= least, rate < 0))
     return if_else(outward, 0, rate)
 
 
-# default rating [MVA] and dispatch [pu]: the two-area system's converter, whose place it takes
-S_N, P_0 = 1500.0, 0.9
+# the two-area system's converter, whose place it takes
+S_N = 1500.0  # default rating [MVA]
+P_0 = 0.9  # default dispatch [pu, S_n]
 USUAL = usual_beside(__file__)
 
 

@@ -21,8 +21,9 @@ from fmus.toolchain.phasor_port import (
 from fmus.toolchain.port import BREAKER_TIME, DevicePort, declare_port_outputs, device_port
 from fmus.toolchain.symbols import Expr, fmax
 
-# default rating [MVA] and dispatch [pu]: those of `gfor` and `gfl`, whose place it takes
-S_N, P_0 = 1500.0, 0.9
+# those of `gfor` and `gfl`, whose place it takes
+S_N = 1500.0  # default rating [MVA]
+P_0 = 0.9  # default dispatch [pu, S_n]
 # default of ω_0/2π [Hz]: above electromechanical modes, which the current follows, below networks'
 # own
 F_0 = 10.0
@@ -40,12 +41,14 @@ class Following:
 
     def rate(self, port: DevicePort, v: Phasor) -> Phasor:
         """di/dt [pu/s] at a bus voltage [pu]."""
-        return (_wanted(port, v) - self.current) * (2 * self.omega_0) + self.turning * self.omega_0
+        return (_turned_current(port, v) - self.current) * (
+            2 * self.omega_0
+        ) + self.turning * self.omega_0
 
     def follow(self, m: ModelBuilder, port: DevicePort, v: Phasor) -> None:
         """Give the equations at a bus voltage [pu]; behind an open breaker the current fades."""
         rate = port.through_breaker(self.rate(port, v), self.current * (-1 / BREAKER_TIME))
-        error = (_wanted(port, v) - self.current) * self.omega_0
+        error = (_turned_current(port, v) - self.current) * self.omega_0
         turning = port.through_breaker(error, self.turning * (-1 / BREAKER_TIME))
         for state, its in ((self.current, rate), (self.turning, turning)):
             phasor_derivative(m, state, its)
@@ -118,7 +121,7 @@ def _declare_current(m: ModelBuilder, port: DevicePort) -> Following:
     return Following(current, turning, 2 * pi * f_0)
 
 
-def _wanted(port: DevicePort, v: Phasor) -> Phasor:
+def _turned_current(port: DevicePort, v: Phasor) -> Phasor:
     """The current of the operating point [pu, S_n], turned as far as the voltage is."""
     size = fmax(v.magnitude(), LEAST_VOLTAGE) * port.v_0.magnitude()
     return port.i_0 * v * port.v_0.conjugate() / size

@@ -16,7 +16,8 @@ from fmus.toolchain.port import declare_rating, device_port_of
 from fmus.toolchain.port_variables import LARGEST_POWER_ON_BASE
 from fmus.toolchain.symbols import if_else
 
-S_N, P_0 = 100.0, 0.8  # defaults of rating [MVA] and power [pu]
+S_N = 100.0  # default rating [MVA]: the base of networks
+P_0 = 0.8  # default power [pu, S_n]
 
 
 def synchronous_generator(

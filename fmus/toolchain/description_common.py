@@ -79,14 +79,17 @@ def described_variables(model: Model) -> Iterator[DescribedVariable]:
     for reference, variable in enumerate(model.variables):
         attributes, kind, own = _attributes_of(variable)
         yield DescribedVariable(
-            reference, _named(variable.name, reference, variable.text) | attributes, kind, own
+            reference,
+            _naming_attributes(variable.name, reference, variable.text) | attributes,
+            kind,
+            own,
         )
     for state in model.states:
         name = f"der({state.name})"
         reference = model.value_references[name]
         yield DescribedVariable(
             reference,
-            _named(name, reference, f"Time derivative of {state.name}") | _CALCULATED,
+            _naming_attributes(name, reference, f"Time derivative of {state.name}") | _CALCULATED,
             "Real",
             {"unit": _derivative_unit(state)},
             model.value_references[state.name],
@@ -148,7 +151,7 @@ def _derivative_unit(state: State) -> str:
     return f"{state.unit}/s"
 
 
-def _named(name: str, reference: int, text: str) -> dict[str, str]:
+def _naming_attributes(name: str, reference: int, text: str) -> dict[str, str]:
     return {"name": name, "valueReference": str(reference), "description": text}
 
 

@@ -13,9 +13,12 @@ from fmus.toolchain.port import DevicePort, declare_port_outputs
 from fmus.toolchain.port_variables import SYSTEM_BASE
 from fmus.toolchain.symbols import Expr
 
-INTERNAL_STEP, LONGEST_STEP = 1e-3, 2e-3
-"""Internal step [s], default and maximum: parameters allow time constants of 1 ms, and Runge-Kutta of order 4 needs
-steps below 2.78 of them."""
+INTERNAL_STEP = 1e-3
+"""Internal step [s], by default."""
+
+LONGEST_STEP = 2e-3
+"""Longest internal step [s]: parameters allow time constants of 1 ms, and Runge-Kutta of order 4 needs steps below 2.78
+of them."""
 
 # lag [s] of the derivative that carries an emf half a communication step ahead
 DERIVATIVE_LAG = 5e-3

@@ -123,7 +123,8 @@ def runs_of(operations: dict[int, Operation]) -> list[tuple[int, list[int]]]:
     return runs
 
 
-MAGIC, VERSION = b"gfortape", 1
+MAGIC = b"gfortape"  # the first bytes of a tape
+VERSION = 1  # of its format, which the functions in C compare
 
 # executes tapes for a slave
 LIBRARY = tuple(Path(__file__).with_name("c") / name for name in ("tape.c", "slave.c"))

@@ -18,8 +18,12 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-_LOCKED, _NEW = "gfor_locked_", "gfor_new_"
-"""Beginnings of the names of folders that have their lock, and of those that get it within microseconds."""
+_LOCKED = "gfor_locked_"
+"""Beginning of the names of folders that have their lock."""
+
+_NEW = "gfor_new_"
+"""Beginning of the names of folders that get their lock within microseconds."""
+
 _YOUNG = 60.0  # age below which a new folder may not have its lock yet [s]
 # age at which a folder counts as left behind where there are no locks [s]
 _ABANDONED = 7 * 86_400.0

@@ -17,9 +17,14 @@ import pythonfmu
 
 from fmus.toolchain.extras import SetupError
 
-_ENTRY, _RETURN = b"\xf3\x0f\x1e\xfa", b"\xc3"  # x86-64: endbr64, ret
-_X86_64, _DYNAMIC_SYMBOLS, _TO_LOAD, _EXECUTABLE = 62, 11, 1, 1
-_ESCAPED_BLANK, _NEVER = b"\0%20\0", b"\0\1\1\1\0"
+_ENTRY = b"\xf3\x0f\x1e\xfa"  # x86-64: endbr64
+_RETURN = b"\xc3"  # x86-64: ret
+_X86_64 = 62  # e_machine of an ELF file: EM_X86_64
+_DYNAMIC_SYMBOLS = 11  # sh_type of a section: SHT_DYNSYM
+_TO_LOAD = 1  # p_type of a segment: PT_LOAD
+_EXECUTABLE = 1  # flag of a segment: PF_X
+_ESCAPED_BLANK = b"\0%20\0"
+_NEVER = b"\0\1\1\1\0"
 _ENDS, _FAILS = bytes.fromhex("c6430801 b802000000"), bytes.fromhex("c6430800 b803000000")
 """Both compilers' machine code for: it wants to terminate; return fmi2Discard. And: it does not; return fmi2Error."""
 
@@ -63,7 +68,7 @@ def _release_once(binary: bytes) -> bytes:
     found = _exported(binary, b"finalizePythonInterpreter")
     if found is None or not binary.startswith(_ENTRY, found[1]):
         return binary
-    return _put(binary, found[1] + len(_ENTRY), _RETURN)
+    return _overwrite(binary, found[1] + len(_ENTRY), _RETURN)
 
 
 def _read_any_folder(binary: bytes) -> bytes:
@@ -89,13 +94,13 @@ def _read_any_folder(binary: bytes) -> bytes:
         return binary
     here = address + free + len(_RESOURCES_PATH) - 4
     added = _RESOURCES_PATH[:-4] + struct.pack("<i", at - start + address - here)
-    binary = _put(binary, start + free, added)
-    binary = _put(binary, symbol + 8, struct.pack("<QQ", address + free, len(added)))
-    binary = _put(binary, place + 32, struct.pack("<QQ", end - start, end - start))
+    binary = _overwrite(binary, start + free, added)
+    binary = _overwrite(binary, symbol + 8, struct.pack("<QQ", address + free, len(added)))
+    binary = _overwrite(binary, place + 32, struct.pack("<QQ", end - start, end - start))
     return binary.replace(_ESCAPED_BLANK, _NEVER)  # all is undone by then
 
 
-def _put(binary: bytes, at: int, what: bytes) -> bytes:
+def _overwrite(binary: bytes, at: int, what: bytes) -> bytes:
     return binary[:at] + what + binary[at + len(what) :]
 
 

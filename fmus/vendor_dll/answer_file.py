@@ -50,7 +50,7 @@ def read_answer(path: Path) -> dict[str, Any]:
             raise
         raise ForeignAnswerError("it is not JSON") from error
     form = _ERROR if isinstance(content, dict) and "error" in content else _ANSWER
-    found: dict[str, Any] = _taken(content, form, "the answer")
+    found: dict[str, Any] = _require_form(content, form, "the answer")
     return found
 
 
@@ -102,18 +102,20 @@ def _bound(value: Any, where: str) -> float | None:
     return None if value is None else _number(value, where)
 
 
-def _taken(value: Any, form: Any, where: str) -> Any:
+def _require_form(value: Any, form: Any, where: str) -> Any:
     """The value, where it has the form: a dict of forms by key, a list of one form, a tuple of forms, or a function."""
     if isinstance(form, dict):
         if not isinstance(value, dict) or value.keys() != form.keys():
             raise ForeignAnswerError(f"{where} has other entries than {', '.join(form)}")
-        return {key: _taken(value[key], inner, f"{where}: {key}") for key, inner in form.items()}
+        return {
+            key: _require_form(value[key], inner, f"{where}: {key}") for key, inner in form.items()
+        }
     if isinstance(form, list | tuple):
         if not isinstance(value, list) or (isinstance(form, tuple) and len(value) != len(form)):
             raise ForeignAnswerError(f"{where} is no list of its length")
         forms = form if isinstance(form, tuple) else form * len(value)
         return [
-            _taken(inner, kind, f"{where}[{n}]")
+            _require_form(inner, kind, f"{where}[{n}]")
             for n, (inner, kind) in enumerate(zip(value, forms, strict=True))
         ]
     checked: Callable[[Any, str], Any] = form
@@ -167,5 +169,5 @@ _ERROR = {"error": _text}
 
 def checked_interface(value: Any) -> dict[str, Any]:
     """A DLL's declarations as JSON, where they have the form in which the process that reads a DLL gives them."""
-    found: dict[str, Any] = _taken(value, _ANSWER["interface"], "the answer")
+    found: dict[str, Any] = _require_form(value, _ANSWER["interface"], "the answer")
     return found

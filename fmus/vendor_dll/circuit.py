@@ -34,7 +34,9 @@ MEASURED = tuple(f"{name}_{phase}" for name in ("u", "v", "i_s", "i_g") for phas
 BASES = {"voltage": "base.voltage", "current": "base.current", "power": "S_n"}
 """Parameters that hold what 1 pu is [kV, kA, MVA]."""
 
-S_N, P_0, V_N = 100.0, 0.8, 0.69  # default rating [MVA], dispatch [pu] and rated voltage [kV]
+S_N = 100.0  # default rating [MVA]: the base of networks
+P_0 = 0.8  # default dispatch [pu, S_n]
+V_N = 0.69  # default rated voltage [kV]: that of most converters' terminals
 
 
 @dataclass(frozen=True)

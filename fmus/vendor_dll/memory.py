@@ -6,7 +6,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Protocol
 
-_WRITABLE, _LOADED, _RELOCATED_ONLY = 2, 1, 0x6474E552  # PF_W, PT_LOAD, PT_GNU_RELRO
+_WRITABLE = 2  # flag of a segment: PF_W
+_LOADED = 1  # type of a segment: PT_LOAD
+_RELOCATED_ONLY = 0x6474E552  # type of a segment: PT_GNU_RELRO
 
 Region = tuple[int, int, int]  # base of the library, start and size of a stretch of its memory
 

@@ -24,7 +24,8 @@ from fmus.wecc_renewable.injection import Injection, declare_injection
 from fmus.wecc_renewable.plant import Measured, measured_elsewhere, plant_references
 from fmus.wecc_renewable.signals import LEAST_VOLTAGE, References, Terminal
 
-S_N, P_0 = 100.0, 0.8  # defaults of rating [MVA] and power [pu]
+S_N = 100.0  # default rating [MVA]: the base of networks
+P_0 = 0.8  # default power [pu, S_n]
 USUAL = usual_beside(__file__)
 
 

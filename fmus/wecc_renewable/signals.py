@@ -102,8 +102,11 @@ def controlled(
     return clamp(u, how.low, how.high)
 
 
-AFTER, UP = 0.5, 1.5
-"""A timer's threshold, and where it stands while its event lasts: one unit above, so that it falls by its time."""
+AFTER = 0.5
+"""A timer's threshold."""
+
+UP = 1.5
+"""Value of a timer while its event lasts: one unit above the threshold, so that it falls by its time."""
 
 
 def still_after(m: ModelBuilder, name: str, event: Expr, time: Expr) -> Expr:

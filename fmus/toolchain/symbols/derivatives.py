@@ -15,14 +15,14 @@ _Partials = tuple[Expr, Expr]
 
 def jacobian(values: Vector, by: Vector) -> dict[tuple[int, int], Expr]:
     """Derivative of each value by each symbol that it depends on, by their numbers."""
-    rows = _moved(values, {symbol: {j: ONE} for j, symbol in enumerate(by)})
+    rows = _moves_of(values, {symbol: {j: ONE} for j, symbol in enumerate(by)})
     return {(i, j): moved for i, row in enumerate(rows) for j, moved in sorted(row.items())}
 
 
 def jtimes(values: Vector, by: Vector, direction: Sequence[Scalar]) -> list[Expr]:
     """The Jacobian of values by symbols, times a direction."""
     along = {symbol: {0: Expr(size)} for symbol, size in zip(by, direction, strict=True)}
-    return [moved.get(0, ZERO) for moved in _moved(values, along)]
+    return [moved.get(0, ZERO) for moved in _moves_of(values, along)]
 
 
 def jtimes_transposed(values: Vector, by: Vector, seeds: Sequence[Scalar]) -> list[Expr]:
@@ -46,7 +46,7 @@ def jtimes_transposed(values: Vector, by: Vector, seeds: Sequence[Scalar]) -> li
     return [total[symbol] for symbol in by]
 
 
-def _moved(values: Vector, symbols: Mapping[Expr, dict[int, Expr]]) -> list[dict[int, Expr]]:
+def _moves_of(values: Vector, symbols: Mapping[Expr, dict[int, Expr]]) -> list[dict[int, Expr]]:
     """How values move in each direction that they depend on, where symbols move so."""
     moves = dict(symbols)
     for node in sorted_nodes(values)[0]:

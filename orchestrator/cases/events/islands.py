@@ -26,7 +26,8 @@ def question_islands(draft: Draft, events: Sequence[tuple[Event, str]]) -> None:
     for time, group in groupby(
         sorted(events, key=lambda pair: pair[0].time), key=lambda pair: pair[0].time
     ):
-        where, switched = "", False
+        where = ""
+        switched = False
         for event, place in group:
             where = where or place
             for name, value in event.changes().get(draft.grid, {}).items():

@@ -35,8 +35,11 @@ class NewtonResult:
     history: tuple[tuple[float, str], ...]
 
 
-_KEPT, _LARGEST_KEPT = 32, 500
-"""Solutions that are kept, and buses of the largest network that is: a larger one takes longer to compare."""
+_KEPT = 32
+"""Solutions that are kept, the latest ones."""
+
+_LARGEST_KEPT = 500
+"""Buses of the largest network whose solution is kept: a larger one takes longer to compare."""
 
 _solved: dict[bytes, NewtonResult] = {}
 
@@ -84,7 +87,8 @@ def grow(equations: FlowEquations) -> tuple[float, NewtonResult | None]:
         found = _newton(empty, _unloaded(equations))
     if not found.converged:
         return 0.0, None
-    share, step = 0.0, 0.25
+    share = 0.0
+    step = 0.25
     while step > 0.002 and share < 1:
         wanted = min(1.0, share + step)
         further = _newton(scaled(equations, wanted), found.voltages)
@@ -149,7 +153,7 @@ def _newton(equations: FlowEquations, start: NDArray[np.complex128]) -> NewtonRe
             break
         norm, length = np.linalg.norm(mismatch), 1.0
         for _ in range(_HALVINGS):
-            trial = _moved(equations, angle, magnitude, length * step)
+            trial = _take_step(equations, angle, magnitude, length * step)
             left = equations.mismatch(_voltages(*trial))
             if (
                 np.isfinite(left).all()
@@ -181,7 +185,7 @@ def _polished(
         step = _newton_step(equations, angle, magnitude, mismatch)
         if step is None:
             break
-        trial = _moved(equations, angle, magnitude, step)
+        trial = _take_step(equations, angle, magnitude, step)
         left = equations.mismatch(_voltages(*trial))
         if not np.abs(left).max(initial=0) < np.abs(mismatch).max(initial=0):
             break
@@ -203,7 +207,7 @@ def _newton_step(
     return step if np.isfinite(step).all() else None
 
 
-def _moved(
+def _take_step(
     equations: FlowEquations, angle: np.ndarray, magnitude: np.ndarray, step: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     angle, magnitude, count = angle.copy(), magnitude.copy(), len(equations.angle_buses)

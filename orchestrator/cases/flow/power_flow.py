@@ -114,7 +114,7 @@ def solve_power_flow(
         ),
     ]
     equations = FlowEquations.of(buses, lines, drawn, shunts, active, held, slack_bus)
-    known = _left(limits or {}, fixed)
+    known = _limits_beside(limits or {}, fixed)
     if keep_limits:
         final, result, at_limits = solve_with_limits(equations, known)
     else:
@@ -159,7 +159,7 @@ def solve_power_flow(
     )
 
 
-def _left(limits: Limits, fixed: Mapping[str, complex]) -> Limits:
+def _limits_beside(limits: Limits, fixed: Mapping[str, complex]) -> Limits:
     """Return what the limits of a bus leave to the units that hold its voltage."""
     fed = {bus: fixed.get(bus, 0j).imag for bus in limits}
     return {bus: (least - fed[bus], most - fed[bus]) for bus, (least, most) in limits.items()}

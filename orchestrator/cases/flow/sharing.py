@@ -16,7 +16,8 @@ _ROUNDS = 30
 # so much of its rating stays between a unit and its limit: at the limit itself no model starts
 _ROOM = 1e-3
 
-_LEAST_SHARE, _SHOWN = 0.01, 4  # shares below this [MW] are not told; so many are
+_LEAST_SHARE = 0.01  # shares below this [MW] are not told
+_SHOWN = 4  # units whose shares are told, the largest first
 
 _ISOCHRONOUS = 1e6  # gain of a droop of 0 [pu]: such a unit feeds all that it can
 

@@ -39,7 +39,9 @@ def read_parameter_file(path: Path) -> ParameterFile:
         )
     unknown = "this key is unknown; a parameter file has the table [set] and no other"
     problems = [
-        Problem(_named(path, line_of(text, (key,)), key), unknown) for key in raw if key != _TABLE
+        Problem(_place_of(path, line_of(text, (key,)), key), unknown)
+        for key in raw
+        if key != _TABLE
     ]
     problems += [Problem(_place(path, text, key), TWICE) for key in given_twice(flatten(table))]
     values: dict[str, Value] = {}
@@ -82,8 +84,8 @@ def _toml(value: Value) -> str:
 def _place(path: Path, text: str, key: str) -> str:
     """The place of a key. A quoted key is one part of a path, and an unquoted key with dots has several parts."""
     lines = [line_of(text, (_TABLE, *parts)) for parts in ((key,), key.split("."))]
-    return _named(path, max(filter(None, lines), default=None), key)
+    return _place_of(path, max(filter(None, lines), default=None), key)
 
 
-def _named(path: Path, line: int | None, key: str) -> str:
+def _place_of(path: Path, line: int | None, key: str) -> str:
     return f"{path}, line {line}, {key}" if line else f"{path}, {key}"

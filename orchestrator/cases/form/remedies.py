@@ -6,18 +6,18 @@ from collections.abc import Sequence
 def without_kinds(kinds: Sequence[str]) -> str:
     """Return ``leave_out = ['gne'] in [network] (`gfor new --leave-out "gne"`)``, without the devices of some kinds."""
     options = " ".join(f'--leave-out "{kind}"' for kind in kinds)
-    return f"leave_out = {_listed(kinds)} in [network] (`gfor new {options}`)"
+    return f"leave_out = {_toml_list(kinds)} in [network] (`gfor new {options}`)"
 
 
 def without_models(names: Sequence[str]) -> str:
     """Return the same for records of dynamics data, by the names of their models."""
     options = " ".join(f"--dyr-leave-out {name}" for name in names)
-    return f"dyr_leave_out = {_listed(names)} in [units] (`gfor new {options}`)"
+    return f"dyr_leave_out = {_toml_list(names)} in [units] (`gfor new {options}`)"
 
 
 def replacement_of(unit: str) -> str:
     """Return what puts a converter of the case in the place of a machine, by the label of its unit."""
-    return f"replace = {_listed([unit])} in [units] (`gfor new --replace {unit}`)"
+    return f"replace = {_toml_list([unit])} in [units] (`gfor new --replace {unit}`)"
 
 
 def with_frequency(hertz: float) -> str:
@@ -35,5 +35,5 @@ WITHOUT_PARTS = "keep_load_parts = false in [network] (`gfor new --no-load-parts
 KEEPING_LIMITS = "reactive_limits = true in [power_flow] (`gfor new --reactive-limits`)"
 
 
-def _listed(names: Sequence[str]) -> str:
+def _toml_list(names: Sequence[str]) -> str:
     return f"[{', '.join(map(repr, names))}]"

@@ -12,7 +12,8 @@ from orchestrator.cases.networks.psse.raw import RawNetwork
 from orchestrator.core.errors import counted
 from orchestrator.systems.coupling.system import ComponentPlan
 
-TAP, SUSCEPTANCE = "tap", "B"
+TAP = "tap"  # parameter that a transformer's control moves
+SUSCEPTANCE = "B"  # parameter that a shunt's control moves
 _OFF_MVAR = 1e-6  # of a shunt without a step that is on: without any it would be no element
 _SHOWN = 5  # decimals of a position
 _SAME = 1e-9  # part of a position by which two are one

@@ -18,11 +18,14 @@ from orchestrator.cases.networks.sources import SourceTables
 from orchestrator.core.arrays import Matrix
 from orchestrator.core.foreign_files import one_line
 
-_REFERENCE, _OUT = 3, 4
+_REFERENCE = 3  # MATPOWER's type of the reference bus
+_OUT = 4  # MATPOWER's type of an isolated bus
 _POWER_FACTOR = 0.9
 _NEGLIGIBLE = 1e-9
 _NO_LIMIT = 1e4
-_RATE_A, _VMAX, _VMIN = 5, 11, 12  # columns of MATPOWER's tables of branches and of buses
+_RATE_A = 5  # column of MATPOWER's table of branches
+_VMAX = 11  # columns of MATPOWER's table of buses
+_VMIN = 12
 
 
 @dataclass(frozen=True, slots=True)

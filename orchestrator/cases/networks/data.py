@@ -398,7 +398,8 @@ def _impedance(row: Row) -> list[float]:
     return [X / z, R / z, B * 1e-6 * z]
 
 
-_VM, _VA = 7, 8  # columns of MATPOWER's table
+_VM = 7  # columns of MATPOWER's table
+_VA = 8
 _SMALL = 1e-3  # part of the file's load that may be out of balance at a bus
 _SHOWN = 3  # buses that are named; the others are counted
 _COARSE = 5e-4

@@ -40,13 +40,13 @@ def in_words(loads: list[Load]) -> str:
         return "several models"
     (p,), q = active or {LAWS["impedance"]}, next(iter(reactive), None)
     return (
-        f"constant {_named(p)}"
+        f"constant {_name_of(p)}"
         if q in (None, p)
-        else f"P constant {_named(p)}, Q constant {_named(q)}"
+        else f"P constant {_name_of(p)}, Q constant {_name_of(q)}"
     )
 
 
-def _named(law: Zip | None) -> str:
+def _name_of(law: Zip | None) -> str:
     return (
         "power"
         if law is None

@@ -180,7 +180,7 @@ def write_case(wanted: WantedCase) -> NewCase:
         base = _prepared(first.text, wanted, ["base"])[0]
     places: list[_Place] = []
     for converter in wanted.converters:
-        places.append(_placed(converter, base, _called(wanted.files), places))
+        places.append(_place_for(converter, base, _called(wanted.files), places))
     draft = _Text(wanted, sources, base, _with_names(places), _switched(device), moved=first.moved)
     if not places and wanted.kind == "phasor" and draft.fault_bus == first.fault_bus:
         # nothing of the scenario ``base`` has changed, and a large network takes seconds to prepare
@@ -391,7 +391,7 @@ def _called(files: Sequence[Path]) -> dict[str, list[str]]:
     return found
 
 
-def _placed(
+def _place_for(
     wanted: WantedConverter,
     base: PreparedScenario,
     called: Mapping[str, Sequence[str]],
@@ -615,11 +615,11 @@ class _Text:
             loads="" if self._tables() else "# ",
             more=(f"frequency = {_quoted(w.frequency)}\n" if w.frequency else "")
             + stray["emt"] * (kind == "emt")
-            + (f"leave_out = {_listed(w.leave_out)}\n" if w.leave_out else ""),
+            + (f"leave_out = {_toml_list(w.leave_out)}\n" if w.leave_out else ""),
             units=dyr
-            + (f"\ndyr_leave_out = {_listed(w.dyr_leave_out)}" if w.dyr_leave_out else "")
+            + (f"\ndyr_leave_out = {_toml_list(w.dyr_leave_out)}" if w.dyr_leave_out else "")
             + "\ndyr_approximate = true" * w.dyr_approximate
-            + (f"\nreplace = {_listed(w.replace)}" if w.replace else ""),
+            + (f"\nreplace = {_toml_list(w.replace)}" if w.replace else ""),
             generator="" if "dyr" in self._sources else "_st1",
             suffix="" if kind == "emt" else "_phasor",
             converter=self._converter(),
@@ -636,7 +636,7 @@ class _Text:
         ]
         if "buses" in self._sources:
             buses = [bus_name(row["bus"]) for row in rows_of(self._sources["buses"], ("bus",))]
-            tables.append(f"buses = {_listed(buses)}")
+            tables.append(f"buses = {_toml_list(buses)}")
         return "\n".join(tables)
 
     @property
@@ -681,7 +681,7 @@ class _Text:
 
     def _scenarios(self) -> list[list[str]]:
         devices = [x for place in self._places for x in (place.name, place.injection)]
-        removed = [f"remove = {_listed(devices)}"] if devices else []
+        removed = [f"remove = {_toml_list(devices)}"] if devices else []
         found = [["[scenarios.base]", 'title = "As in the files"', *removed]]
         if self._base is None or self._network is None:
             return [*found, self._fault()] if self._fault_bus else found
@@ -725,7 +725,7 @@ class _Text:
         less = "; ".join(f"{unit}: {mw:.5g} for {before[unit]:.5g} MW" for unit, mw in left.items())
         gone = [p.name if name == "dispatch" else p.injection for p in places]
         gone += [p.less for p in places if p.less and p.wanted.replaces]
-        settings = [f"remove = {_listed(gone)}"] if gone else []
+        settings = [f"remove = {_toml_list(gone)}"] if gone else []
         told = f"beside = {_quoted(beside)}    # `gfor modes` tells what the device brings"
         settings += [told] if places and beside else []
         settings += (
@@ -764,12 +764,12 @@ class _Text:
 def _plot(name: str, panels: Sequence[tuple[Sequence[str], str]]) -> list[str]:
     lines = ["[[plots]]", f'name = "{name}"', f'title = "{name.capitalize()}"', "panels = ["]
     for signals, label in panels:
-        also = f", also = {_listed(signals[1:_MOST_CURVES])}" if signals[1:] else ""
+        also = f", also = {_toml_list(signals[1:_MOST_CURVES])}" if signals[1:] else ""
         lines.append(f"    {{ signal = {_quoted(signals[0])}{also}, label = {_quoted(label)} }},")
     return [*lines, "]"]
 
 
-def _listed(names: Sequence[str]) -> str:
+def _toml_list(names: Sequence[str]) -> str:
     return f"[{', '.join(map(_quoted, names))}]"
 
 

@@ -19,11 +19,12 @@ SOLVED = "solved"  # of the grid, in ``meant``: the source's voltages are a flat
 _STEP_UP = (0.03, 0.35)
 _PARTS = {"machine": "machine", "exciter": "exciter", "governor": "governor", "pss": "stabilizer"}
 _SHOWN = 3  # machines beyond which one is compared with the others
-# loading that is questioned [pu], and part by which two powers may differ
-_LITTLE, _SAME = 0.05, 0.05
+_LITTLE = 0.05  # loading below which it is questioned [pu]
+_SAME = 0.05  # part by which two powers may differ
 _ROUNDING = 1e-3  # part of the converters' power by which six digits of P_0 differ at most
 _COMPARED = 8  # converters from which on chance would make some of them fit
-_ALIKE, _UNLIKE = 2.0, 5.0  # factors within which machines are alike, and from which one is not
+_ALIKE = 2.0  # factor within which machines are alike
+_UNLIKE = 5.0  # factor from which a machine is unlike the others
 _FAR = 20.0
 """A capacitor or a load that is smaller than the next one by this factor is questioned where 100 times as much is
 usual; a step-up transformer from this factor of the least usual on."""

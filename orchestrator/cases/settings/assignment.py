@@ -16,7 +16,8 @@ from orchestrator.cases.form.values import TWICE, check_system_base, convert, fl
 from orchestrator.cases.settings.imperfection_tables import sets_imperfection
 from orchestrator.devices.fmi.description import VariableInfo
 
-EMF, TORQUE = "machine.speed_in_emf", "governor.output_is_torque"
+EMF = "machine.speed_in_emf"  # parameter: the emf grows with the speed
+TORQUE = "governor.output_is_torque"  # parameter: the governor gives a torque, not a power
 
 
 @dataclass(frozen=True)
@@ -146,7 +147,7 @@ def _assign_key(draft: Draft, key: str, value: Value, where: str) -> None:
             name: draft.system.components[name].number(variable) for name in having
         }
     for name in fitting:
-        for each in _meant(draft, name, variable) or [variable]:
+        for each in _matches(draft, name, variable) or [variable]:
             _assign(draft, name, each, value, where)
     _check_component(draft, pattern, where)
 
@@ -180,11 +181,11 @@ def _switch(draft: Draft, key: str, value: Value) -> str:
 def _has(draft: Draft, name: str, variable: str) -> bool:
     plan = draft.system.components.get(name)
     return plan is not None and (
-        variable in plan.description.variables or bool(_meant(draft, name, variable))
+        variable in plan.description.variables or bool(_matches(draft, name, variable))
     )
 
 
-def _meant(draft: Draft, name: str, variable: str) -> list[str]:
+def _matches(draft: Draft, name: str, variable: str) -> list[str]:
     known = name in draft.system.components and "*" in variable
     return fnmatch.filter(_settable(draft, name), variable) if known else []
 

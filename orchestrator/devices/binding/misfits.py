@@ -108,7 +108,8 @@ def of_power(asked: complex, found: complex) -> Misfit | None:
     """By the power at its start [pu, S_n]."""
     if abs(found - asked) <= BALANCE or abs(asked) <= BALANCE:
         return None
-    fault, says = "power not as asked", ""
+    fault = "power not as asked"
+    says = ""
     for a, b in ((-1, 0), (0, 1), (0, -1)):
         if abs(a * asked + b * asked.conjugate() - found) <= BALANCE * abs(asked):
             fault, says = diagnosis("S", a, b, 0j, 0.0)

@@ -7,14 +7,12 @@ import sys
 from functools import cache
 from typing import Any
 
-NEW_USER, NEW_PROCESSES, NEW_NETWORK, NEW_MOUNTS, NEW_IPC = (
-    0x10000000,
-    0x20000000,
-    0x40000000,
-    0x00020000,
-    0x08000000,
-)
-"""Flags of ``unshare`` and ``clone``, one for each namespace."""
+# flags of ``unshare`` and ``clone``, one for each namespace, from linux/sched.h
+NEW_USER = 0x10000000
+NEW_PROCESSES = 0x20000000
+NEW_NETWORK = 0x40000000
+NEW_MOUNTS = 0x00020000
+NEW_IPC = 0x08000000
 
 # options of prctl, from linux/prctl.h
 _DIES_WITH_PARENT = 1

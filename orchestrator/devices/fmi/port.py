@@ -22,10 +22,14 @@ PORT = tuple(variable.name for variable in (*INPUTS, *OUTPUTS))
 
 START = tuple(variable.name for variable in START_VALUES)
 
-_SAME, _NEAR, _OTHER = 0.01, 1.06, 2.0
-"""How far the rating of a binding may be from the FMU's own, and the factors from which on its start is another's: in
-volts, and in general.
-"""
+_SAME = 0.01
+"""Part by which the rating of a binding may differ from the FMU's own."""
+
+_NEAR = 1.06
+"""Factor from which on a start in volts is another's."""
+
+_OTHER = 2.0
+"""Factor from which on any other start is another's."""
 
 _RATED = (("S_n", "s"), ("V_n", "[vu]"), ("f_n", "f"))
 _NAMED = {name: re.compile(rf"(?:^|\.){of}_?(?:n|nom|rated)$", re.I) for name, of in _RATED}

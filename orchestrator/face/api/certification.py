@@ -155,7 +155,7 @@ def verify(
             f"anew = {anew!r}; give a list of line reactances [pu], or of names of rows, such as [0.1]"
         )
     found, wanted = Verification(), None if anew is None else tuple(anew)
-    file, asked = path_of(certificate, "certificate"), _asked(signers, revoked, at)
+    file, asked = path_of(certificate, "certificate"), _signature_request(signers, revoked, at)
     if is_signed_alone(file):
         return _verify_signature(file, asked)
     with laid_out(file) as places:
@@ -174,7 +174,7 @@ def verify(
     return found
 
 
-def _asked(
+def _signature_request(
     signers: str | Path | None, revoked: str | Path | None, at: str | datetime | None
 ) -> Asked:
     if not isinstance(at, str | datetime | None):

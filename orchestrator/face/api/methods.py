@@ -24,8 +24,8 @@ def method(
 
     Its keywords are the fields of the request, and ``call`` computes what is asked of an object."""
     owner, _, last = name.partition(".")
-    made = _made(request, [Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)], call, last)
-    return cast("Callable[Concatenate[Any, Asks], Shown]", _named(made, name, owner.lower()))
+    made = _function_of(request, [Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)], call, last)
+    return cast("Callable[Concatenate[Any, Asks], Shown]", _give_name(made, name, owner.lower()))
 
 
 def function(
@@ -44,10 +44,12 @@ def function(
     call
         Computes what a request asks.
     """
-    return cast("Callable[Asks, Shown]", _named(_made(request, [], call, name), name, module))
+    return cast(
+        "Callable[Asks, Shown]", _give_name(_function_of(request, [], call, name), name, module)
+    )
 
 
-def _made(request: Any, before: list[Parameter], call: Callable[..., Any], who: str) -> Any:
+def _function_of(request: Any, before: list[Parameter], call: Callable[..., Any], who: str) -> Any:
     signature = Signature([*before, *_parameters(request)])
 
     def studied(*given: Any, **wanted: Any) -> Any:
@@ -104,7 +106,7 @@ def by_known_keywords(function: Callable[Asks, Shown]) -> Callable[Asks, Shown]:
     return call
 
 
-def _named(made: Any, name: str, module: str) -> Any:
+def _give_name(made: Any, name: str, module: str) -> Any:
     made.__name__, made.__qualname__, made.__module__ = (
         name.rpartition(".")[2],
         name,
@@ -114,13 +116,13 @@ def _named(made: Any, name: str, module: str) -> Any:
 
 
 def _parameters(request: type) -> Iterable[Parameter]:
-    for one, asks in _listed(request):
+    for one, asks in _fields_in_order(request):
         kind = Parameter.KEYWORD_ONLY if one.kw_only else Parameter.POSITIONAL_OR_KEYWORD
         default = Parameter.empty if asks.default is MISSING else asks.shown_default
         yield Parameter(one.name, kind, default=default, annotation=one.type)
 
 
-def _listed(request: type) -> Iterable[tuple[Any, Asked]]:
+def _fields_in_order(request: type) -> Iterable[tuple[Any, Asked]]:
     """Fields in the order of their keywords: those that are given by place first, then the study's own."""
     every = asked_of(request)
     known = [one for one in fields(request) if one.name in every]
@@ -133,6 +135,8 @@ def _documentation(request: type) -> str:
     """Return what the class of the request says, with its fields as parameters."""
     text = cleandoc(request.__doc__ or "")
     summary, *rest = re.split(r"\n(?=\w+\n---)", text, maxsplit=1)
-    lines = [f"{one.name}\n{indent(asks.meaning, '    ')}" for one, asks in _listed(request)]
+    lines = [
+        f"{one.name}\n{indent(asks.meaning, '    ')}" for one, asks in _fields_in_order(request)
+    ]
     parts = [summary.rstrip(), "\n".join(["Parameters", "----------", *lines]), *rest]
     return "\n\n".join(parts) + "\n"

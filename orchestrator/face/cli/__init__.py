@@ -66,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(words: Sequence[str]) -> int:
     """Run; where it returns, no signal changes the exit code any more."""
     try:
-        code = _done(words)
+        code = _execute(words)
         if calls.taken and code != INTERRUPTED:
             raise KeyboardInterrupt  # somebody swallowed it on its way
         calls.over = True
@@ -82,7 +82,7 @@ def _run(words: Sequence[str]) -> int:
     return code
 
 
-def _done(words: Sequence[str]) -> int:
+def _execute(words: Sequence[str]) -> int:
     files: dict[str, Path] = {}
 
     def tell_origin() -> dict[str, Any]:

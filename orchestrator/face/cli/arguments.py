@@ -55,7 +55,7 @@ def add_options(parser: argparse._ActionsContainer, part: str, **given: Any) -> 
     """Add the options that ``options.toml`` has for a part of a command.
 
     ``given``: readers and choices that the file names and that are not here, and what its help is filled in with."""
-    for name, table in _listed()[part].items():
+    for name, table in _read_options()[part].items():
         if name == "epilog":
             cast("argparse.ArgumentParser", parser).epilog = str(table).format(**given)
             continue
@@ -83,7 +83,7 @@ def add_options(parser: argparse._ActionsContainer, part: str, **given: Any) -> 
 
 
 @cache
-def _listed() -> dict[str, dict[str, dict[str, Any]]]:
+def _read_options() -> dict[str, dict[str, dict[str, Any]]]:
     return tomllib.loads(Path(__file__).with_name("options.toml").read_text(encoding="utf-8"))
 
 

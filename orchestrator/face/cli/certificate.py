@@ -191,7 +191,8 @@ def _figures(v: PointVerdict) -> Iterator[str]:
     yield "–" if seen is None else f"{seen:.2f}"
 
 
-GB, ALL = "gb", "all"
+GB = "gb"  # the code of Great Britain, which has figures and no verdict
+ALL = "all"  # every code
 FREQUENCY = "frequency"  # the name of voltage source behaviour in frequency, among the codes
 _CODES = (*WITH_VERDICT, GB, FREQUENCY)
 LISTED = ", ".join(map(in_words, _CODES))  # as the help of ``--code`` names them

@@ -55,7 +55,7 @@ def _written(options: argparse.Namespace) -> int:
         return 0
     if not options.files:
         _ask(options)
-    wanted = _wanted(options)
+    wanted = _wanted_case(options)
     sources_of(wanted.files)
     if wanted.out.exists() and not options.force:
         raise InputError(
@@ -112,7 +112,7 @@ def _list_models(*, as_json: bool) -> None:
     print_parts(make_console(), [table, *(escape(f"Source: {source}") for source in sources)])
 
 
-def _wanted(options: argparse.Namespace) -> WantedCase:
+def _wanted_case(options: argparse.Namespace) -> WantedCase:
     device = options.fmu or options.dll
     if (device or options.binding) and not options.converter:
         raise InputError(

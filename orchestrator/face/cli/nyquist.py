@@ -56,14 +56,14 @@ def run(options: argparse.Namespace) -> int:
         options.out or Path("results") / f"nyquist_{Path(options.device).stem}", "--out"
     )
     if options.points:
-        judged = lambda values, place: _row(_judged(options, asked.at(values), place))  # noqa: E731
+        judged = lambda values, place: _row(_judge(options, asked.at(values), place))  # noqa: E731
         rows = by_point(options, folder, judged, {"verdict": "not known"})
         return (
             NOT_MET
             if options.fail_unstable and any(row["verdict"] != "stable" for row in rows)
             else 0
         )
-    found = _judged(options, asked, folder)
+    found = _judge(options, asked, folder)
     if options.json:
         print_json(found.as_json())
     else:
@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
     return NOT_MET if options.fail_unstable and found.verdict != "stable" else 0
 
 
-def _judged(options: argparse.Namespace, asked: Asked, folder: Path) -> Nyquist:
+def _judge(options: argparse.Namespace, asked: Asked, folder: Path) -> Nyquist:
     with said_stages() as report:
         found = asked.judged(report)
         say("question", found.result.questions)

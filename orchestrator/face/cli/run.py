@@ -284,7 +284,8 @@ def _save_together(
 
 
 def _end(stopped: Mapping[str, BaseException], folder: Path) -> int:
-    where, text = "", ""
+    where = ""
+    text = ""
     for scenario, error in stopped.items():
         if isinstance(error, ResultsError):
             begun = [

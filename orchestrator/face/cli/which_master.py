@@ -79,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("give either the tool's RESULT.csv, or --build DIR for the probe pair")
     if options.build is not None:
         return _build(options)
-    named = dict(_named(text) for text in options.column)
+    named = dict(_read_column(text) for text in options.column)
     verdict = identify(read_probe_result(options.result, named), options.step, options.stop)
     if options.json:
         print_json(
@@ -118,7 +118,7 @@ def _build(options: argparse.Namespace) -> int:
     return 0
 
 
-def _named(text: str) -> tuple[str, str]:
+def _read_column(text: str) -> tuple[str, str]:
     signal, equals, heading = text.partition("=")
     if not equals or not heading:
         raise InputError(f"--column {text}: write SIGNAL=HEADING, such as a.y=Probe1.Output")

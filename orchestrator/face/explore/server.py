@@ -110,7 +110,7 @@ def _handler(explorer: Explorer) -> type[BaseHTTPRequestHandler]:
         protocol_version = "HTTP/1.1"
 
         def do_GET(self) -> None:
-            name = self._asked()
+            name = self._authorised_path()
             if name is None:
                 return
             name, _, page = name.partition("?page=")
@@ -126,7 +126,7 @@ def _handler(explorer: Explorer) -> type[BaseHTTPRequestHandler]:
                 self._refuse(HTTPStatus.NOT_FOUND)
 
         def do_POST(self) -> None:
-            name = self._asked()
+            name = self._authorised_path()
             if name is None:
                 return
             length = self.headers.get("Content-Length", "")
@@ -142,7 +142,7 @@ def _handler(explorer: Explorer) -> type[BaseHTTPRequestHandler]:
             found = explorer.answer(page, question)
             self._send(HTTPStatus.OK, json.dumps(found).encode(), "application/json")
 
-        def _asked(self) -> str | None:
+        def _authorised_path(self) -> str | None:
             """Return what is asked for behind the token; None where it is refused."""
             _, token, *rest = (*self.path.split("/", 2), "")[:3]
             known = secrets.compare_digest(token.encode(), explorer.token.encode())

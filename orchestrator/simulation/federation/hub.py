@@ -75,7 +75,8 @@ class Hub:
                 answer = self._step(content)
             case _:
                 self.leave("" if self._broker is not None else OVER)
-                self.ended, answer = True, b""
+                self.ended = True
+                answer = b""
         with self._sending:
             self._gfor.send(kind, answer)
 

@@ -198,7 +198,7 @@ def _refused(request: CertificationRequest, error: CaseError, trial: str, where:
         place = re.sub(r"^line \d+, ", "", problem.place)
         value = _OWN.match(place)
         if value and value["name"] in request.values:
-            place = f"--set {value['name']}={_shown(request.values[value['name']])}"
+            place = f"--set {value['name']}={_value_text(request.values[value['name']])}"
         text = said(problem.text).replace(f"component {CONVERTER!r} has", "the FMU has")
         problems.append(Problem(place, text))
     if request.binding is None and any(
@@ -213,5 +213,5 @@ def _refused(request: CertificationRequest, error: CaseError, trial: str, where:
     return CaseError(f"{request.fmu}, {where}", tuple(dict.fromkeys(problems)))
 
 
-def _shown(value: Value) -> str:
+def _value_text(value: Value) -> str:
     return f"{value:.15g}" if isinstance(value, float) else as_text(value)

@@ -209,7 +209,7 @@ def matrix_page(matrix: CertificateMatrix, devices: Sequence[Device], made: date
         [escape(code.upper()), *(_cell_html(matrix.cells[name, code]) for name in matrix.devices)]
         for code in matrix.codes
     ]
-    tried = [[escape(text) for text in _given(device)] for device in devices]
+    tried = [[escape(text) for text in _device_cells(device)] for device in devices]
     bad = [
         [
             escape(cell.device),
@@ -257,7 +257,7 @@ def matrix_page(matrix: CertificateMatrix, devices: Sequence[Device], made: date
     )
 
 
-def _given(device: Device) -> list[str]:
+def _device_cells(device: Device) -> list[str]:
     values = ", ".join(f"{name} = {as_text(value)}" for name, value in device.values.items())
     return [
         device.name,

@@ -301,9 +301,9 @@ def _differ_modes(stated: list[complex], again: list[complex], tolerance: float)
         differences, key=lambda d: np.inf if np.isnan(d[0]) else d[0], default=(0.0, 0j, 0j)
     )
     if not worst[0] <= tolerance:
-        return f"{_shown(worst[2])} comes out and {_shown(worst[1])} was certified", ""
+        return f"{_mode_text(worst[2])} comes out and {_mode_text(worst[1])} was certified", ""
     return "", said_of(worst[0], tolerance)
 
 
-def _shown(value: complex) -> str:
+def _mode_text(value: complex) -> str:
     return f"{value.imag / (2 * np.pi):.4f} Hz with {100 * damping_ratio(value):.4f} %"

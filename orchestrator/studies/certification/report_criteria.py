@@ -294,7 +294,7 @@ def _overview(c: Certificate) -> str:
         row += (
             [f"{worst.frequency_hz:.3f}", damping(worst.damping_percent)] if worst else ["–", "–"]
         )
-        row += [before(worst.before) if worst else "–", *_time_cells(v.time), _said(c, v)]
+        row += [before(worst.before) if worst else "–", *_time_cells(v.time), _verdict_cell(c, v)]
         rows.append(row)
     columns = [
         "X_L [pu]",
@@ -316,7 +316,7 @@ def _overview(c: Certificate) -> str:
     )
 
 
-def _said(c: Certificate, v: PointVerdict) -> str:
+def _verdict_cell(c: Certificate, v: PointVerdict) -> str:
     beyond = "" if any(v.name == row.name for row in c.code.rows) else ", beyond the norm's"
     return (verdict(v.accepted) if v.judged else '<span class="bad">not judged</span>') + beyond
 

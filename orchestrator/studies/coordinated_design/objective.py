@@ -214,12 +214,12 @@ class RatedPoint:
         found = self.loops.solve(setting)
         return (
             found.values,
-            self._named(found.values, found.left, found.right),
+            self._named_places(found.values, found.left, found.right),
             found.left,
             found.right,
         )
 
-    def _named(self, values: Complex, left: Complex, right: Complex) -> list[int] | None:
+    def _named_places(self, values: Complex, left: Complex, right: Complex) -> list[int] | None:
         """Places of the named modes; None where one of the names is not borne here, so that all modes count."""
         if self._aim.naming is None:
             return None

@@ -21,9 +21,14 @@ _FASTEST = 2 * np.pi * 30
 LEAD = lead_lag_turning(2 * LARGEST_STAGE_ANGLE, 1.0, 2).filtering_ratio ** -2
 """Two stages of a lead/lag that leads most pass fast signals with this gain."""
 
-_GAIN, _MOVED, _SLOWEST = 400.0, 0.02, 0.3
-"""A mode that loops with this gain [pu] move by less than this part of its size, which counts as at least so much
-[rad/s], stays where it is. Fast modes meet the gain with the lead's on top."""
+_GAIN = 400.0
+"""Gain [pu] of the loops by which a mode that stays is told. Fast modes meet it with the lead's on top."""
+
+_MOVED = 0.02
+"""Part of a mode's size; a mode that the loops move by less stays where it is."""
+
+_SLOWEST = 0.3
+"""Size [rad/s] that a slower mode counts as."""
 
 _TRUE = 1e-6  # A reduction whose modes are not those of the system to this part is not taken
 _SEEN = (0.05, 4.0)  # modes between these frequencies [Hz] are kept however little they move

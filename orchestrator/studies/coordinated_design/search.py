@@ -20,26 +20,32 @@ from orchestrator.studies.pod_design.lead_lag import angle_deg, compensation_deg
 from orchestrator.studies.sensitivities.sensitivities import damping_change
 
 # of where the sensitivities are trusted, as parts of the ranges
-_RADIUS, _SMALLEST, _LARGEST = 0.15, 2e-4, 0.4
+_RADIUS = 0.15  # at the start
+_SMALLEST = 2e-4
+_LARGEST = 0.4
 _STEPS = 60
 _PRICE = 10.0  # what a breach costs, in damping ratio
 # weight of the least damping of those modes that are moved more than hardly, beside that of all
 _BESIDE = 1e-3
-# modes whose damping ratio is farther away than this are left out of a linear program
-_NEAR, _NEAR_FLOOR = 0.3, 0.1
+# modes whose damping ratio is farther than this above the least one, or above their floor, are
+# left out of a linear program
+_NEAR = 0.3
+_NEAR_FLOOR = 0.1
 _APART = 0.2
-_EDGE, _POLISHING = 0.1, 40
+_EDGE = 0.1  # edge of the first simplex of the polishing, as a part of the ranges
+_POLISHING = 40  # evaluations of the polishing for each value that is searched
 _DIFFERENCE = 1e-6
 _WORTH = 1e-6
 _IDLE = 1e-4  # merit (damping ratio) that a controller must bring to be kept
 _TURNS, _CENTRES, _GAINS = (-90.0, -45.0, 0.0, 45.0, 90.0), (0.7, 1.0, 1.8), (0.05, 0.15, 0.4, 1.0)
-_STARTS, _STARTS_OF_SEVERAL = 4, 6
+_STARTS = 4  # searches besides the chosen starts, for one controller
+_STARTS_OF_SEVERAL = 6  # the same for several controllers
 _GRID, _LEAST_SHARE = (13, 6, 9), 0.025
 """Turns, centres and gains of an exhaustive grid, and its smallest gain as a part of the largest."""
 # sum of the cubes of all points' numbers of states up to which a grid is computed
 _MOST_CUBED = 4e6
-# vectors that are spread over all ranges for each of several groups, and at most
-_SPREAD, _MOST_SPREAD = 64, 256
+_SPREAD = 64  # vectors that are spread over all ranges for each of several groups
+_MOST_SPREAD = 256  # such vectors at most
 
 
 @dataclass(frozen=True)

@@ -159,11 +159,11 @@ def judged(
     ``setting``: of the controllers, to tell which modes these move out of the range; None if that is not asked."""
     for k, here in enumerate(where):
         origins = None if setting is None else partial(_origin, before[k], setting)
-        point = _judged(here, before[k], after[k], aim, apart.get(k, ()), origins)
+        point = _judge_point(here, before[k], after[k], aim, apart.get(k, ()), origins)
         yield replace(point, predicted=predicted.get(k))
 
 
-def _judged(
+def _judge_point(
     where: tuple[OperatingCase, Outage],
     before: PointModes,
     after: PointModes,
@@ -176,7 +176,7 @@ def _judged(
     first = _watched(before, aim, floors_of((), 0.0), apart)
     floors = floors_of((mode.value for mode in first if mode.floor is not None), aim.least)
     second = _watched(after, aim, floors, apart)
-    left = [] if origins is None or _targets(after, aim) is not None else _left(second, origins)
+    left = [] if origins is None or _targets(after, aim) is not None else _departed(second, origins)
     second = [replace(mode, floor=None) if mode.place in left else mode for mode in second]
     others = [mode for mode in second if mode.floor is not None]
     closest = min(others, key=lambda mode: mode.damping - (mode.floor or 0.0), default=None)
@@ -187,17 +187,19 @@ def _judged(
         after,
         target_before=_least(first, before),
         target=_least(second, after),
-        other=None if closest is None else _placed(closest, after),
+        other=None if closest is None else _placed_mode(closest, after),
         worth=worth_of(second, growth(after.values), growth(before.values)),
         unnamed=any(name not in point.named for point in (before, after) for name in aim.names),
         least_before=_least_of_all(before),
         least=_least_of_all(after),
-        apart=tuple(_placed(second[k], after) for k in dict.fromkeys(beside)),
-        left=tuple(_placed(mode, after) for mode in second if mode.place in left),
+        apart=tuple(_placed_mode(second[k], after) for k in dict.fromkeys(beside)),
+        left=tuple(_placed_mode(mode, after) for mode in second if mode.place in left),
     )
 
 
-def _left(watched: Sequence[Watched], origins: Callable[[complex], complex | None]) -> list[int]:
+def _departed(
+    watched: Sequence[Watched], origins: Callable[[complex], complex | None]
+) -> list[int]:
     """Places of the modes beside 0.1 to 2 Hz that come from there and have less damping than all that are there.
 
     Only those would change what a point comes to."""
@@ -262,10 +264,10 @@ def _least(watched: Sequence[Watched], point: PointModes) -> PlacedMode | None:
         key=lambda mode: mode.damping,
         default=None,
     )
-    return None if found is None else _placed(found, point)
+    return None if found is None else _placed_mode(found, point)
 
 
-def _placed(mode: Watched, point: PointModes) -> PlacedMode:
+def _placed_mode(mode: Watched, point: PointModes) -> PlacedMode:
     who = dict(zip(point.swinging, point.who, strict=True)).get(mode.place, "")
     return PlacedMode(mode.value, who)
 

@@ -207,7 +207,7 @@ class _Opened:
         states = np.concatenate([kept for _, kept in self._units])
         net = np.setdiff1d(np.arange(len(self.A)), states)
         v, i = (np.concatenate([x[at[0]] for at in self._ports]) for x in (self._v, self._i))
-        alone = self._settled("the network", net, i, self.C[v], self.D[v])
+        alone = self._submodel("the network", net, i, self.C[v], self.D[v])
         units = tuple(self._unit(*unit, mine) for unit in own)
         together = Together(", ".join(devices), units, 2 * len(mine))
         at = [tuple(d for d in self._ports[k] if d in devices) for k in mine]
@@ -236,7 +236,7 @@ class _Opened:
         side = Exact(", ".join(inside), self.A[np.ix_(states, states)], B, C[:, states], D)
         return Unit(inside, _rows(mine), side.negated())
 
-    def _settled(self, name: str, kept: Rows, given: Rows, C: Matrix, D: Matrix) -> Exact:
+    def _submodel(self, name: str, kept: Rows, given: Rows, C: Matrix, D: Matrix) -> Exact:
         """Some of the states; clocks among them say nothing."""
         A, B = self.A[np.ix_(kept, kept)], self.B[np.ix_(kept, given)]
         told = (np.abs(A).sum(axis=1) + np.abs(B).sum(axis=1) > 0) | (np.abs(A).sum(axis=0) > 0)

@@ -104,13 +104,13 @@ class Family:
 
     def distance(self, value: float) -> float:
         """From −1, as `LoopFigures` has it."""
-        path, growing = self._judged(value)
+        path, growing = self._path_and_growth(value)
         return _sign(growing) * margins_of(path, []).distance.value
 
     def figures(self, value: float) -> LoopFigures:
-        return figures_of(*self._judged(value), self.rated)
+        return figures_of(*self._path_and_growth(value), self.rated)
 
-    def _judged(self, value: float) -> tuple[LoopPath, int | None]:
+    def _path_and_growth(self, value: float) -> tuple[LoopPath, int | None]:
         path = self.at(value)
         k = int(np.clip(np.searchsorted(self.nodes, value), 0, len(self.nodes) - 1))
         beside = {k} if self.nodes[k] == value else {max(k - 1, 0), k}

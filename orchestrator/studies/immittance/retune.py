@@ -127,7 +127,7 @@ def retune(
         for value in setting.grid[[GRID // 2, GRID // 4]].tolist():
             if len(out.scans) < _FIRST:
                 _scan(study, out, value, report)
-        while len(out.scans) < _MOST and not _settled(out):
+        while len(out.scans) < _MOST and not _has_converged(out):
             _check(study, out, report)
         _tell(out)
         _meet(study, out, goal, report)
@@ -169,7 +169,7 @@ def _scan(study: Study, out: Retuned, value: float, report: Callable[[str], None
     return out.scans[value]
 
 
-def _settled(out: Retuned) -> bool:
+def _has_converged(out: Retuned) -> bool:
     last = out.checks[-2:]
     return len(last) == 2 and all(
         max(abs(c.found - c.predicted), c.expected_error) < _CLOSE for c in last

@@ -104,7 +104,7 @@ def exchanged_case(case: Case, exchanged: Mapping[str, ComponentTable]) -> Case:
     scenarios = {
         name: scenario
         if scenario.events is None
-        else scenario.model_copy(update={"events": _kept(scenario.events)})
+        else scenario.model_copy(update={"events": _grid_events(scenario.events)})
         for name, scenario in table.scenarios.items()
     }
     changed = table.model_copy(
@@ -112,7 +112,7 @@ def exchanged_case(case: Case, exchanged: Mapping[str, ComponentTable]) -> Case:
             "analysis": AnalysisTable(),
             "plots": [],
             "reference": None,
-            "events": _kept(table.events),
+            "events": _grid_events(table.events),
             "scenarios": scenarios,
             "solver": table.solver.model_copy(update={"record": ["*"]}),
         }
@@ -120,7 +120,7 @@ def exchanged_case(case: Case, exchanged: Mapping[str, ComponentTable]) -> Case:
     return replace(case, table=changed, exchanged=dict(exchanged))
 
 
-def _kept(events: list[EventTable]) -> list[EventTable]:
+def _grid_events(events: list[EventTable]) -> list[EventTable]:
     return [event for event in events if isinstance(event, GridEventBase)]
 
 

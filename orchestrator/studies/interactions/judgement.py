@@ -254,7 +254,7 @@ class JudgedInteractions:
             self.systems[NONE] = self._none_of_one_vendor()
         self.unfollowed: dict[SystemName, str] = {}
         self.systems |= self._assignments_alike()
-        self.modes = [self._judged(mode) for mode in self.whole.record.modes]
+        self.modes = [self._judge_mode(mode) for mode in self.whole.record.modes]
         alone = self.alone
         found = [
             JudgedPair((a, b), self.systems[name], (alone[a], alone[b]), modes)
@@ -386,7 +386,7 @@ class JudgedInteractions:
     def participation(self, mode: SharedMode) -> dict[str, float]:
         return by_group(mode.components, self.result.plan.groups)
 
-    def _judged(self, mode: SharedMode) -> JudgedMode:
+    def _judge_mode(self, mode: SharedMode) -> JudgedMode:
         groups = self.participation(mode)
         threshold = self.result.plan.request.threshold
         vendors = tuple(

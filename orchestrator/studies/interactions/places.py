@@ -8,8 +8,10 @@ from orchestrator.cases.form.schema import ComponentTable
 from orchestrator.core.errors import InputError
 from orchestrator.systems.coupling.system import ComponentPlan
 
-GENERATORS, GRID, OTHERS = "generators", "grid", "others"
-"""Groups of components that are nobody's converter. ``others`` are components without a port, such as a controller."""
+# groups of components that are nobody's converter
+GENERATORS = "generators"
+GRID = "grid"
+OTHERS = "others"  # components without a port, such as a controller
 
 NOT_VENDORS = (GENERATORS, GRID, OTHERS)
 

@@ -40,14 +40,19 @@ from orchestrator.studies.interactions.words import (
     verdict_word,
 )
 
-MODES, PAIRS, ASSIGNMENTS = "modes.csv", "pairs.csv", "assignments.csv"
-SUMMARY, PAGE = "interactions.json", "interactions.html"
+# names of the files in a folder of results
+MODES = "modes.csv"
+PAIRS = "pairs.csv"
+ASSIGNMENTS = "assignments.csv"
+SUMMARY = "interactions.json"
+PAGE = "interactions.html"
 
 _UNFOLLOWED = "not followed"
 _LEAST = "; least: of the vendors' modes, if it cannot be followed"
 
 _LEAST_SHARE = 0.005
-_CELL, _MARGIN = 96, 120
+_CELL = 96  # side of a square of the matrix [px]
+_MARGIN = 120  # space for the names above and left of it [px]
 _LONGEST = 13  # characters that fit above a square, and left of it
 
 _GOOD, _MIDDLE, _BAD, _UNKNOWN = (86, 180, 233), (255, 255, 255), (213, 94, 0), "#d9d9d9"

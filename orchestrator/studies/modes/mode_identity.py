@@ -220,11 +220,13 @@ class _Others:
         self._later = [name for name in alike if name not in self._earlier]
         self._small = len(system.model.names) <= MOST_STATES
         self._without_damping: list[NamedSystem | None] = []
-        self.checked, self.lost = False, ""
+        self.checked = False
+        self.lost = ""
 
     def origin(self, name: str, *, contested: bool, far: bool) -> _Origin | None:
         """The mode of a name in the first system from which a way leads here."""
-        self.checked, self.lost = False, ""
+        self.checked = False
+        self.lost = ""
         if contested or self._small:
             system = self._undamped()
             if system is not None and name in system.naming.named:

@@ -35,9 +35,10 @@ MULTIPLES = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 10.0, 20.0, 50.0)
 TRIED: tuple[ScheduleName, ...] = ("gauss-seidel", "midpoint", "newton")
 LEAST_DAMPED = 6  # so many modes are compared, least damped first
 SWINGING = 0.5  # largest damping ratio of a compared mode
-_COUPLING_FACTOR, _COUPLING_RATE = 2.0, 1.0
-"""As in `orchestrator.linear.spectra.stability`: growth beyond the first figure times the continuous system's plus the
-second [1/s] is the coupling's."""
+# growth beyond the factor times the continuous system's plus the rate is the coupling's, as in
+# `orchestrator.linear.spectra.stability`
+_COUPLING_FACTOR = 2.0
+_COUPLING_RATE = 1.0  # [1/s]
 
 # so many steps in turn that are not within the error end the search with a schedule
 _AFTER_THE_FIRST = 2

@@ -137,7 +137,7 @@ def questions_about(
     load = load_of(elements.loads, prepared.system.components[elements.grid])
     # a factor of 1 for generation leaves it to the slack by intention
     leaves = {
-        point.name: _left(point, prepared, elements, fed, load)
+        point.name: _share_of_slack(point, prepared, elements, fed, load)
         for row, point in zip(rows, points, strict=True)
         if float((row.get("generation") or "").strip() or 0) != 1
     }
@@ -164,7 +164,7 @@ def _static_question(
     )
 
 
-def _left(
+def _share_of_slack(
     point: OperatingCase,
     prepared: PreparedScenario,
     elements: Elements,

@@ -122,10 +122,10 @@ class ItemPreparation:
             )
             text = in_words(dispatch, found.power_flow.powers, plans, units, lost_load(load))
         if item.lost and self.base.moving:
-            text = "; ".join(filter(None, (text, self._moved(found))))
+            text = "; ".join(filter(None, (text, self._moves_text(found))))
         return PreparedItem(without_units(found, remains.units), text, remains.dead)
 
-    def _moved(self, found: PreparedScenario) -> str:
+    def _moves_text(self, found: PreparedScenario) -> str:
         """Return which taps and shunts have moved from where the case has them, and how far."""
         grid = self.elements.grid
         before, now = (x.system.components[grid] for x in (self.base, found))

@@ -9,7 +9,9 @@ from orchestrator.core.arrays import Numbers, Vector
 from orchestrator.studies.oscillations.measurements import Measurements
 from orchestrator.studies.oscillations.onset import Onset, onset_of
 
-LOWEST_HZ, HIGHEST_HZ = 0.08, 8.0
+# the range in which oscillations are sought, from interarea modes to controllers' [Hz]
+LOWEST_HZ = 0.08
+HIGHEST_HZ = 8.0
 # power of a line beside the median of its neighbours: a mode that noise shakes seldom reaches it
 _ABOVE = 35.0
 _MOST = 6

@@ -16,8 +16,8 @@ from orchestrator.studies.modes.modes import changed, running
 from orchestrator.studies.oscillations.verdict import Located
 
 _SWITCH = re.compile(r"(pod_p|pod_q|pss)\.enabled")
-# relative distance of a case's mode from what was seen; controllers in a sentence
-_NEAR, _NAMED = 0.15, 3
+_NEAR = 0.15  # largest relative distance of a case's mode from what was seen
+_NAMED = 3  # controllers in a sentence
 
 
 def levers_of(prepared: PreparedScenario, hertz: float) -> tuple[complex, list[dict[str, Any]]]:

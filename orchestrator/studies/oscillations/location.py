@@ -16,7 +16,10 @@ from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.studies.oscillations.detection import SpectralLine, phasors
 from orchestrator.studies.oscillations.measurements import Measurements, Site
 
-DEF, DYNAMIC_MODE, QV_PHASE = "dissipating energy flow", "dynamic-mode participation", "Q-V phase"
+# names of the methods, as results have them
+DEF = "dissipating energy flow"
+DYNAMIC_MODE = "dynamic-mode participation"
+QV_PHASE = "Q-V phase"
 
 _SHARE = 0.8
 """Part of all that is fed that one place must feed to be named. Over 540 forcings with known places in `two_area` and
@@ -25,12 +28,17 @@ _SHARE = 0.8
 # what is fed beside what is taken, 0.75 and more with all units in view; with less, others feed too
 _BALANCE = 0.7
 _CONCENTRATED = 0.9  # participation of one place from which it is no mode's shape
-_POWER, _VOLTAGE = 0.16, 0.4
-"""Reactive work beside dissipating work: up to the first the oscillation acts through active power, and the Q-V phase
-says nothing; from the second on it acts through voltage, and energy flow points elsewhere."""
+_POWER = 0.16
+"""Reactive work beside dissipating work up to which an oscillation acts through active power, and the Q-V phase says
+nothing."""
+
+_VOLTAGE = 0.4
+"""Reactive work beside dissipating work from which on an oscillation acts through voltage, and energy flow points
+elsewhere."""
 
 _CERTAIN = 3.0  # standard errors by which a figure must exceed zero
-_BLOCK_PERIODS, _MOST_BLOCKS = 4, 8
+_BLOCK_PERIODS = 4  # periods of the oscillation that a block has at least
+_MOST_BLOCKS = 8
 _SMALL = 0.02  # part of the largest mean power below which its sign says nothing
 
 

@@ -31,17 +31,21 @@ OscillationKind = Literal["forced", "mode", "not known"]
 
 _STRONGEST = 5
 _FEWEST_PERIODS = 8
-_STEADY, _RESTLESS = 0.25, 0.35
-"""Spread of the envelope as a part of its mean: a sine's below the first; of filtered noise it is 0.52."""
+# spread of the envelope as a part of its mean: of filtered noise it is 0.52
+_STEADY = 0.25  # below it is a sine's
+_RESTLESS = 0.35  # above it is not
 
 _TREND = 0.7  # part of the envelope's variance that an exponential must explain to be one
 _SINE = 1.85  # fourth moment beside the square of the second: 1.5 of a sine, 3 of noise
 # of the largest amplitude of its kind, from which a signal is looked at for disturbances
 _LEAST_PART = 0.2
 
-_CLEAN, _SKIRT = 0.04, 5.0
-"""Spread of the envelope up to which nothing else is asked; beyond it what is left beside the line, near it and further
-off, must not fall by more than the factor, as it does beside a mode with next to no damping that noise shakes."""
+_CLEAN = 0.04
+"""Spread of the envelope up to which nothing else is asked."""
+
+_SKIRT = 5.0
+"""Factor by which what is left beside a line may fall from near it to further off where the envelope spreads more: it
+falls by more beside a mode with next to no damping that noise shakes."""
 
 _SHOCK = 6.0  # deviation at the begin, in amplitudes, that a forcing's own transient does not reach
 _COHERENT = 0.975
@@ -114,7 +118,7 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
     figures = Evidence(
         "not known", damping, spread, kurtosis, coherence, beside, periods, shocked, ()
     )
-    kind, reasons = _judged(figures, change, pair, found)
+    kind, reasons = _judge(figures, change, pair, found)
     if kind != "not known":
         shown = signals.values[used][half : len(t) - half, columns]
         other = doubt(kind, late, np.column_stack(envelopes), shown, f)
@@ -132,7 +136,7 @@ def forced_frequencies(times: Numbers, names: Sequence[str], values: Numbers) ->
     ]
 
 
-def _judged(
+def _judge(
     seen: Evidence, change: float, pair: float, found: SpectralLine
 ) -> tuple[OscillationKind, list[str]]:
     harmonics = ", ".join(

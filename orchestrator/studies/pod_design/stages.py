@@ -21,7 +21,8 @@ NEEDED = ("enabled", "K", "T_S1", "T_S2")  # variables without which no POD can 
 _NEUTRAL = 0.1
 # gain [pu] and lead T_S1/T_S2 with which stages are counted: so small that the converter's answer to its own POD does
 # not turn the ratio (of 10 pu by 8° in a device with matching control, of 0.1 pu by 0.1°)
-_GAIN, _LEAD = 0.1, 2.0
+_GAIN = 0.1
+_LEAD = 2.0
 # by how much the response that is measured may differ from that of a whole number of stages
 _WHOLE = 0.02
 _MOST = 10

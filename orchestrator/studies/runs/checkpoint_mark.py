@@ -22,7 +22,8 @@ from orchestrator.studies.points.key import component_content, sha256_of
 
 Keys = tuple[str, ...]
 
-_CASE, _EVENTS = "the case", "the events"
+_CASE = "the case"
+_EVENTS = "the events"
 _KERNEL = "GFOR_COSIM_KERNEL"
 _SHOWN = 4  # so many differences are named
 

@@ -110,7 +110,7 @@ class Checkpoints:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             if resume:
-                self._kept = self._found()
+                self._kept = self._read_latest()
             else:
                 self.clear()
         except OSError as error:
@@ -198,7 +198,7 @@ class Checkpoints:
         self._unable = True
         self._say(f"scenario {self._name!r}: no checkpoints are written any more: {reason}")
 
-    def _found(self) -> RunState | None:
+    def _read_latest(self) -> RunState | None:
         damaged = []
         for path in (self._path, checkpoint_file.previous(self._path)):
             try:

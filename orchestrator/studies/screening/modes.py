@@ -23,8 +23,11 @@ _MOST_STATES = 4000
 """Up to this number of states, all eigenvalues are computed where a search for some of them does not converge: they
 take some minutes and a gigabyte."""
 
-_BESIDE_ZERO, _NEAREST = 1e-2, 6
-"""Beside 0 [rad/s], where so many nearest eigenvalues are sought: those that are zero or grow slowly are among them."""
+_BESIDE_ZERO = 1e-2
+"""Place [rad/s] beside 0 whose nearest eigenvalues are sought: those that are zero or grow slowly are among them."""
+
+_NEAREST = 6
+"""Eigenvalues that are sought there."""
 
 _MOST = 0.9
 MOST_DAMPING = 0.6  # damping ratio up to which modes are looked for
@@ -135,7 +138,9 @@ def _from_neighbour(
             return None
     except (AnalysisError, np.linalg.LinAlgError):
         return None
-    return _kept(ModeSet(refined.values, refined.left.T, refined.right.T, model.names), wanted)
+    return _modes_within(
+        ModeSet(refined.values, refined.left.T, refined.right.T, model.names), wanted
+    )
 
 
 def _with_names(modes: ModeSet, names: tuple[str, ...]) -> ModeSet:
@@ -150,7 +155,7 @@ def _with_names(modes: ModeSet, names: tuple[str, ...]) -> ModeSet:
     return ModeSet(modes.eigenvalues, left, right, names)
 
 
-def _kept(modes: ModeSet, wanted: CriticalRegion) -> ModeSet:
+def _modes_within(modes: ModeSet, wanted: CriticalRegion) -> ModeSet:
     wider = wanted.wider
     held = [k for k, value in enumerate(modes.eigenvalues.tolist()) if wider.holds(value)]
     held.sort(key=lambda k: damping_ratio(complex(modes.eigenvalues[k])))
@@ -161,7 +166,7 @@ def _kept(modes: ModeSet, wanted: CriticalRegion) -> ModeSet:
 
 def _whole(model: LinearModel, wanted: CriticalRegion) -> FoundModes:
     spectrum = find_spectrum(model, wanted.wider.lowest_hz, wanted.wider.highest_hz)
-    modes = _kept(
+    modes = _modes_within(
         ModeSet.of([mode for mode in spectrum.modes if mode.is_oscillation], model.names), wanted
     )
     growing = spectrum.eigenvalues[grows(spectrum.eigenvalues)]

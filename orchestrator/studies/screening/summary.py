@@ -12,8 +12,8 @@ from orchestrator.studies.operating_points.item import Status
 from orchestrator.studies.screening.study import ScreenedItem, ScreeningResult
 
 _LEADING = 2
-# one mode above this likeness of shares, within this part of the frequency
-_ALIKE, _FREQUENCY = 0.8, 0.15
+_ALIKE = 0.8  # likeness of shares above which two modes are one
+_FREQUENCY = 0.15  # part of the frequency within which they are
 
 _SHOWN = 5
 

@@ -47,7 +47,11 @@ from orchestrator.studies.screening.words import (
     where,
 )
 
-ITEMS, MODES, SUMMARY, PAGE = "items.csv", "modes.csv", "screening.json", "screening.html"
+# names of the files in a folder of results
+ITEMS = "items.csv"
+MODES = "modes.csv"
+SUMMARY = "screening.json"
+PAGE = "screening.html"
 
 _SHOWN, _FEW = 4, 6
 _NAMED = 40  # outages of one cause that are named: a planner looks for each; items.csv has them all

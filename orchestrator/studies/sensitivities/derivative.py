@@ -58,7 +58,7 @@ def differentiate(
         floor = (
             _FLOOR * max(abs(eigenvalue), _SLOWEST) / (SHARE * parameter.scale) * (SIZES[0] / size)
         )
-        derivative = _judged(slopes, floor)
+        derivative = _derivative_of(slopes, floor)
         found = found or derivative
         if not derivative.doubts:
             return derivative
@@ -74,11 +74,11 @@ def _slope(shift_at: Callable[[float], Shift], parameter: Parameter, change: flo
     )
 
 
-def _judged(slopes: dict[int, list[Shift]], floor: float) -> Derivative:
+def _derivative_of(slopes: dict[int, list[Shift]], floor: float) -> Derivative:
     """The derivative of slopes by their side, each over one change and over twice of it; ``floor`` is not judged."""
     step, twice = (_together([pair[k].step for pair in slopes.values()]) for k in (0, 1))
     rates = [[shift.continuous for shift in pair] for pair in slopes.values()]
-    continuous, later = (_given([pair[k] for pair in rates]) for k in (0, 1))
+    continuous, later = (_mean_if_all([pair[k] for pair in rates]) for k in (0, 1))
     doubts = []
     if abs(step - twice) > _AGREE * abs(step) + floor:
         doubts.append(
@@ -108,6 +108,6 @@ def _together(values: list[complex]) -> complex:
     return sum(values) / len(values)
 
 
-def _given(values: list[complex | None]) -> complex | None:
+def _mean_if_all(values: list[complex | None]) -> complex | None:
     known = [value for value in values if value is not None]
     return _together(known) if len(known) == len(values) else None

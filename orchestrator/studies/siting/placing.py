@@ -68,7 +68,8 @@ def placed(case: Case, device: ComponentTable, buses: Sequence[str]) -> Case:
     return replace(case, table=changed)
 
 
-ACTIVE, REACTIVE = "P", "Q"
+ACTIVE = "P"  # kind of support: active power
+REACTIVE = "Q"  # kind of support: reactive power
 
 
 def ideal_support(kind: str, voltage: complex, eigenvalue: complex) -> Vector:

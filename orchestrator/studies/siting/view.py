@@ -35,8 +35,14 @@ _NONE = 1e-5
 _PEOPLE = 100
 """Support [MW/Hz or Mvar/Hz] by which shifts are shown to people."""
 
-_MW, _MVAR = "per_100_MW_per_Hz", "per_100_Mvar_per_Hz"
-_SHOWN, _NAMED = 12, 4
+_MW = "per_100_MW_per_Hz"
+"""Unit in a key of a shift by active power."""
+
+_MVAR = "per_100_Mvar_per_Hz"
+"""Unit in a key of a shift by reactive power."""
+
+_SHOWN = 12  # buses in a table, best first
+_NAMED = 4  # things in a sentence; the others are counted
 
 
 class Siting:

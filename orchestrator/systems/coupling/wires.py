@@ -72,15 +72,15 @@ class Wires:
             index, count = index + part, count - part
 
     def begin(self, target: Endpoint, imperfection: Imperfection) -> None:
-        bank, k = self._placed(target)
+        bank, k = self._place_of(target)
         bank.begin(k, imperfection)
 
     def end(self, target: Endpoint, kind: type[Imperfection]) -> None:
         """From now on the connection into ``target`` is as its permanent settings have it."""
-        bank, k = self._placed(target)
+        bank, k = self._place_of(target)
         bank.end(k, kind)
 
-    def _placed(self, target: Endpoint) -> tuple[WireBank, int]:
+    def _place_of(self, target: Endpoint) -> tuple[WireBank, int]:
         if target not in self._place:
             raise InputError(
                 f"the connection into {target} was to be disturbed, but the system does not foresee it; announce it "

@@ -43,7 +43,8 @@ def read_ssp(path: Path, cache: Path) -> SspCase:
         "name": plain_name(name),
         "title": description.get("description", name),
     }
-    study, step = None, None
+    study = None
+    step = None
     try:
         tables["solver"] = _times(description)
         study, step = read_study(description), foreign_step(description)

@@ -23,7 +23,10 @@ VERSION = "1.0.0-beta.1"  # of LS-REF
 # relative to the largest value of an output: what another compiler's mathematics may change
 TOLERANCE = 1e-9
 _LS = "http://fmi-standard.org/fmi-ls-manifest"
-_STEP, _STEPS, _JUMP_AT, _JUMP = 1e-4, 200, 50, 0.01
+_STEP = 1e-4  # communication step [s]
+_STEPS = 200
+_JUMP_AT = 50  # step at which the input jumps
+_JUMP = 0.01  # size of the jump, in the input's unit
 
 register_namespace("fmi-ls", _LS)
 

@@ -123,7 +123,7 @@ def test_a_pattern_names_variables_as_it_names_components():
 
 def test_a_component_that_is_not_there_has_no_variable(monkeypatch):
     monkeypatch.setattr(
-        assignment, "_meant", lambda draft, name, variable: ["pod.K"] if variable == "K" else []
+        assignment, "_matches", lambda draft, name, variable: ["pod.K"] if variable == "K" else []
     )
     plan = SimpleNamespace(description=SimpleNamespace(variables={"H": None}))
     draft = SimpleNamespace(system=SimpleNamespace(components={"sg1": plan}))

@@ -23,7 +23,7 @@ def test_a_device_needs_a_place(given):
     )
     setattr(options, given, Path("vendor.file"))
     with pytest.raises(InputError, match="are for a converter; say where by --converter"):
-        new._wanted(options)
+        new._wanted_case(options)
 
 
 @pytest.mark.parametrize(

@@ -362,7 +362,7 @@ class _Reading:
         for row in self._source.get_generators(all_attributes=True).itertuples():
             if not row.connected or row.bus_id not in self._numbers:
                 continue
-            held = self._held(row)
+            held = self._held_voltage(row)
             least, most = (
                 finite(float(q), _NO_LIMIT) for q in (row.min_q_at_target_p, row.max_q_at_target_p)
             )
@@ -385,7 +385,7 @@ class _Reading:
             )
         return np.array(rows, dtype=float).reshape(-1, 10)
 
-    def _held(self, row: Any) -> float:
+    def _held_voltage(self, row: Any) -> float:
         """Voltage that a generator holds at its bus [pu]."""
         bus = row.bus_id
         if row.voltage_regulator_on and row.regulated_bus_id == bus and row.target_v > 0:

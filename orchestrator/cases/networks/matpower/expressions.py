@@ -314,7 +314,8 @@ class _Reader:
         return found
 
     def _count_of_indices(self) -> int:
-        depth, count = 0, 1
+        depth = 0
+        count = 1
         for kind, text in self._tokens[self._at :]:
             if kind == "mark":
                 depth += (text in "([{") - (text in ")]}")

@@ -35,7 +35,8 @@ def statements(source: str) -> Iterator[Statement]:
     source = source.replace("\r\n", "\n") + "\n"
     source = _BLOCK.sub(lambda found: "\n" * found[0].count("\n"), source)
     kept: list[str] = []
-    depth, at = 0, 0
+    depth = 0
+    at = 0
     begin: int | None = None  # of the statement
     for piece in _PIECE.finditer(source):
         kind, before = piece.lastgroup, source[at : piece.start()]

@@ -55,10 +55,10 @@ class ChangeTask(BenchTask):
 
 
 def compute_change(task: ChangeTask) -> ChangeResult:
-    return computed(task, _judged)
+    return computed(task, _judge_change)
 
 
-def _judged(task: ChangeTask, case: Case) -> ChangeResult:
+def _judge_change(task: ChangeTask, case: Case) -> ChangeResult:
     result = row_result(task, case)
     if result.failure is not None:
         return ChangeResult(failure=result.failure)

@@ -117,7 +117,7 @@ class MeasuredRow:
         odd = [] if self.finite else ["the response is not finite"]
         gone = self.tripped
         slips = [] if self.turned is None or watched else [_turned(self.turned)]
-        return odd + watched + slips + ([] if gone is None else [_gone(gone)])
+        return odd + watched + slips + ([] if gone is None else [_trip_text(gone)])
 
     @property
     def undecided(self) -> list[str]:
@@ -208,14 +208,14 @@ class MeasuredRow:
             return "the response is not finite"
         if self.turned is not None:
             return _turned(self.turned)
-        return "" if self.tripped is None else _gone(self.tripped)
+        return "" if self.tripped is None else _trip_text(self.tripped)
 
 
 def _turned(time: float) -> str:
     return f"it slips after t = {time:g} s: the voltage behind its current is half a turn or more from where it was"
 
 
-def _gone(time: float) -> str:
+def _trip_text(time: float) -> str:
     return f"it feeds in nothing from t = {time:g} s on, as after a trip"
 
 

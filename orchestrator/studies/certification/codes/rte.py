@@ -180,7 +180,7 @@ def rte_code(declared: Mapping[str, float]) -> GridCode[CodeRow]:
     return replace(code, title=code.title.format(declared=stated))
 
 
-def _named(test: str, scr: float, power: float, more: str = "") -> str:
+def _row_name(test: str, scr: float, power: float, more: str = "") -> str:
     percent = f"{'m' if power < 0 else ''}{abs(round(100 * power))}"
     return f"{test}_scr{scr:g}_p{percent}{more}"
 
@@ -209,7 +209,7 @@ def _jumps(declared: Mapping[str, float], scr: float, power: float) -> CodeRow:
         return Envelope(jump_bounds(_grid(declared, scr, f_n), angle), sign)
 
     return _row(
-        _named("igfm1", scr, power),
+        _row_name("igfm1", scr, power),
         f"∓{np.degrees(angle):.2g}° at SCR {scr:g}, {power:.0%}",
         programme,
         stays_inside(0, partial(envelope, -1), "power after the jump ahead"),
@@ -233,7 +233,7 @@ def _steps(declared: Mapping[str, float], scr: float, power: float) -> CodeRow:
         return Envelope(amplitude_bounds(CURRENT), sign, limited=False)
 
     return _row(
-        _named("igfm2", scr, power),
+        _row_name("igfm2", scr, power),
         f"Source ∓{100 * CURRENT * X:.2g} % at SCR {scr:g}, {power:.0%}",
         programme,
         stays_inside(0, partial(envelope, -1), "current after the rise", reactive_current),
@@ -256,7 +256,7 @@ def _strength(declared: Mapping[str, float], start: float, end: float, power: fl
         )
 
     return _row(
-        _named("igfm3", start, power, f"_scr{end:g}"),
+        _row_name("igfm3", start, power, f"_scr{end:g}"),
         f"SCR {start:g} → {end:g}, {power:.0%}",
         programme,
         stays_inside(0, envelope, "power after the step"),
@@ -274,7 +274,7 @@ def _ramping(
         plant = _grid(declared, scr, f_n)
         return Envelope(ramp_bounds(plant, -sign * rate / f_n, lasts), sign)
 
-    name = _named("igfm4", scr, power, f"_{rate:g}".replace(".", "_"))
+    name = _row_name("igfm4", scr, power, f"_{rate:g}".replace(".", "_"))
     return _row(
         name,
         f"±{rate:g} Hz/s for {lasts:g} s at SCR {scr:g}, {power:.0%}",
