@@ -59,6 +59,8 @@ class WindowPart:
 
         Rife and Boorstyn, "Single-tone parameter estimation from discrete-time observations", IEEE Trans. Information
         Theory 20(5), 1974, for a real signal of amplitude 2·|A|; a damped one counts for one of its time constants."""
+        if mode.amplitude <= 0:
+            return np.inf
         lasting = min(self.length, 1 / max(abs(mode.eigenvalue.real), 1e-9))
         count = max(self.samples * lasting / self.length, 1.0)
         deviation = np.sqrt(24 / count) * self.remainder / (2 * mode.amplitude * lasting)

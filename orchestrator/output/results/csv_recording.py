@@ -35,6 +35,7 @@ _THOUSANDS = r"[-+]?\d{1,3}(?:[.,'\s]\d{3})+(?:[.,]\d+)?"
 _DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}([T\s].*)?|\d{1,2}:\d{2}(:.*)?")
 _TIME = re.compile(rf"\s*([-+]?\d*[.,]?\d+([eE][-+]?\d+)?|{_DATE.pattern})\s*")
 _SAMPLED = 0.045  # times farther apart [s] are slower than phasors are usually sent: perhaps ms
+_AGAIN = " "  # behind a name for each time that it came before: columns of a table differ
 _EPOCH = 1e8  # numbers of seconds above it count from 1970, and are taken from the first sample on
 
 
@@ -59,7 +60,7 @@ def read_table(path: Path) -> xr.Dataset:
     times = table[first].to_numpy(float) * _SECONDS[unit] if stamps is None else stamps
     if len(times) < 2 or not (np.diff(times) > 0).all():
         raise InputError(
-            f"{path}: the time of its {len(times)} rows does not rise from each row to the next; sort them"
+            f"{path}: the time of its {len(times)} rows does not rise from each row to the next; {_time_remedy(times)}"
         )
     apart = float(np.median(np.diff(times)))
     if stamps is None and not unit and (apart > _SAMPLED or kind == "i"):
@@ -71,14 +72,36 @@ def read_table(path: Path) -> xr.Dataset:
     found = {
         name: _parts(name)
         for name in map(str, table.columns[1:])
-        if name and table[name].dtype.kind in "if"
+        if name.strip() and table[name].dtype.kind in "if"
     }
+    shorts = ["time", *(short for short, _ in found.values())]
+    twice = next((short for k, short in enumerate(shorts) if short in shorts[:k]), None)
+    if twice:
+        raise InputError(
+            f"{path}: several columns have the name {twice!r}; give each a name of its own"
+        )
     columns = {
         short: ("time", table[full].to_numpy(float), {"units": u})
         for full, (short, u) in found.items()
     }
     times = np.round(times - times[0], 6) if times[0] > _EPOCH else times
     return xr.Dataset(columns, {"time": times, LINE_FREQUENCY: 0.0})
+
+
+def _time_remedy(times: Numbers) -> str:
+    """Say what mends times that do not rise."""
+    if len(times) < 2:
+        return "give at least two rows"
+    if np.isnan(times).any():
+        row = int(np.flatnonzero(np.isnan(times))[0]) + 1
+        return f"row {row} of the numbers has no time: give it, or leave the row out"
+    ordered = np.sort(times)
+    alike = ordered[1:][np.diff(ordered) <= 0]
+    if len(alike):
+        return (
+            f"several rows have {alike[0]:.10g}: give each row once, and its time with all digits"
+        )
+    return "sort them"
 
 
 def _table(path: Path) -> pd.DataFrame:
@@ -104,7 +127,7 @@ def _table(path: Path) -> pd.DataFrame:
         )
     texts = pd.DataFrame(
         rows,
-        columns=[f"{n} ({k})" if n in names[:k] else n for k, n in enumerate(names)],
+        columns=[f"{n}{_AGAIN * names[:k].count(n)}" for k, n in enumerate(names)],
         dtype=str,
     )
     return texts.apply(lambda column: _numbers(column, comma=mark != ","))

@@ -76,6 +76,9 @@ _UNITS = {
 }
 """Ends of names that say a unit, in small letters, and the unit."""
 
+_UNITS_OF_OTHER_POWER = {"MW": "Mvar", "kW": "kvar", "Mvar": "MW", "kvar": "kW"}
+"""Units of active power and of reactive power that are of one size."""
+
 _GIVEN = re.compile(r"(?P<factor>[-+]|[-+]?[\d.]+(?:[eE][-+]?\d+)?\*)?(?P<column>.+)")
 _IN_UNIT = re.compile(r"(?P<column>.+) in (?P<unit>\S+)")
 
@@ -100,6 +103,14 @@ class RecordedChannel:
         """The same with another factor or unit, as ``--channel`` takes it."""
         return RecordedChannel(
             self.role, self.column, self.factor * factor, unit or self.unit
+        ).as_text()
+
+    def taken_for(self, role: str) -> str:
+        """Return the column for another role, in that role's unit of the same size, as ``--channel`` takes it."""
+        _, _, end = self.column.casefold().rpartition("_")
+        unit = self.unit or _UNITS.get(end, "")
+        return RecordedChannel(
+            role, self.column, self.factor, _UNITS_OF_OTHER_POWER.get(unit, unit)
         ).as_text()
 
 

@@ -27,6 +27,9 @@ from orchestrator.studies.validation.windows import Windows, find_windows
 
 _SHORTEST_BEFORE = 0.1  # a window before the event [s] that shows a steady state
 _MOVES_BEFORE = 0.02  # movement of P or Q before the event [pu] that is no steady state
+_LEAST_BEFORE = 0.003  # the same, where the event moves P and Q little
+_PART_BEFORE = 0.05  # part of the largest movement from the event on
+_SCATTERS = 8.0  # standard deviations of a mean that its noise may move it
 _FARTHEST_HZ = 1.0  # from the rated frequency before the event
 _STARTS_ELSEWHERE = 0.02  # power at rest [pu] by which a device misses what was measured
 _NO_NOISE = 2e-6  # scatter of P and Q before the event [pu] that no instrument has
@@ -137,7 +140,7 @@ def _of_windows(recording: Recording, windows: Windows, before: Mask) -> list[Qu
         found.append(Question(QuestionKind.SHORT_BEFORE, {"length": windows.begin}))
     elif windows.seen:
         moves = _trend(recording, before)
-        if moves > _MOVES_BEFORE:
+        if moves > _MOVES_BEFORE or _swings_before(recording, windows, before, moves):
             found.append(Question(QuestionKind.NO_STEADY_STATE, {"moves": moves}))
     return found + _gaps(recording, windows)
 
@@ -204,6 +207,24 @@ def _trend(recording: Recording, before: Mask) -> float:
         whole = values[: len(values) // width * width].reshape(-1, width).mean(axis=1)
         most = max(most, float(np.ptp(whole)) if len(whole) > 1 else 0.0)
     return most
+
+
+def _swings_before(recording: Recording, windows: Windows, before: Mask, moves: float) -> bool:
+    """Return whether the movement before the event is much of that after it, as in a record that begins in a swing."""
+    after = windows.part("after", recording.times)
+    most = _trend(recording, after | windows.part("during", recording.times))
+    count = max(1, int(before.sum()) // 10)
+    return moves > max(_LEAST_BEFORE, _PART_BEFORE * most) and moves > _SCATTERS * _scatter(
+        recording, before
+    ) / np.sqrt(count)
+
+
+def _scatter(recording: Recording, before: Mask) -> float:
+    """How far P or Q scatters from sample to sample [pu]."""
+    changes = np.diff(recording.power[before])
+    if not len(changes):
+        return 0.0
+    return float(max(np.std(changes.real), np.std(changes.imag)) / np.sqrt(2))
 
 
 def compare_with(device: PlayedDevice, event: RecordedEvent) -> EventComparison:

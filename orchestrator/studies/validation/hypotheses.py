@@ -55,6 +55,7 @@ class Reading:
     change: Callable[[Recording], Recording]
     of_unit: str = ""  # of the angle, where only one in that unit may be meant so
     leaves: float = _EXPLAINS  # part of the error that it may leave, to be named
+    swaps: bool = False  # its two channels change their places
 
     def fits(self, recording: Recording) -> bool:
         """Return whether a recording may be meant so: it has the channels, in the unit."""
@@ -62,6 +63,19 @@ class Reading:
         if not set(self.roles) <= channels.keys():
             return False
         return self.of_unit in ("", recording.angle_unit)
+
+    def remedy(self, recording: Recording) -> list[str]:
+        """Return what ``--channel`` takes to read the recording so."""
+        channels = recording.channels
+        if self.swaps:
+            first, second = self.roles
+            return [channels[second].taken_for(first), channels[first].taken_for(second)]
+        return [channels[role].changed(factor=round(self.factor, 6)) for role in self.roles]
+
+    def scales(self) -> tuple[float, float]:
+        """Return by what it multiplies P and Q."""
+        p, q = (abs(self.factor) if role in self.roles else 1.0 for role in ("p", "q"))
+        return p, q
 
 
 def _power(p: float, q: float) -> Callable[[Recording], Recording]:
@@ -72,6 +86,11 @@ def _power(p: float, q: float) -> Callable[[Recording], Recording]:
         return replace(recording, power=np.asarray(power))
 
     return changed
+
+
+def _swapped(recording: Recording) -> Recording:
+    power = recording.power.imag + 1j * recording.power.real
+    return replace(recording, power=np.asarray(power))
 
 
 def _angle(factor: float) -> Callable[[Recording], Recording]:
@@ -88,6 +107,9 @@ READINGS = (
     Reading("Q counts into the plant", ("q",), -1, _power(1, -1)),
     Reading("P and Q count into the plant", ("p", "q"), -1, _power(-1, -1)),
     Reading("P and Q are of one phase", ("p", "q"), 3, _power(3, 3)),
+    Reading("P is of one phase", ("p",), 3, _power(3, 1), "", _LEAVES),
+    Reading("Q is of one phase", ("q",), 3, _power(1, 3), "", _LEAVES),
+    Reading("P and Q are in each other's place", ("p", "q"), 1, _swapped, "", _LEAVES, swaps=True),
     Reading("the angle is in radians", ("angle",), _RADIAN, _angle(_RADIAN), of_unit="deg"),
     Reading("the angle is in degrees", ("angle",), 1 / _RADIAN, _angle(1 / _RADIAN), of_unit="rad"),
     Reading("the angle has the other sign", ("angle",), -1, _angle(-1)),
@@ -126,8 +148,7 @@ def _likeliest(comparison: EventComparison, bases: PortBases, error: float) -> l
         return []
     least = min(left for left, _ in tried)
     left, best = next(one for one in tried if one[0] <= _AS_GOOD * least)
-    channels = event.recording.channels
-    remedy = [channels[role].changed(factor=round(best.factor, 6)) for role in best.roles]
+    remedy = best.remedy(event.recording)
     figures = {"reading": best.name, "error": error, "left": left, "remedy": remedy}
     return [Question(QuestionKind.READ_OTHERWISE, figures)]
 
@@ -186,8 +207,8 @@ def _error_left(
         played = device.play(changed.recording, changed.start)
     except CosimError:
         return
-    scale = abs(reading.factor) if "p" in reading.roles or "q" in reading.roles else 1.0
-    yield math.hypot(*rms_error(played.power, changed)) / scale
+    errors = zip(rms_error(played.power, changed), reading.scales(), strict=True)
+    yield math.hypot(*(error / scale for error, scale in errors))
 
 
 def _meter_elsewhere(
@@ -222,20 +243,27 @@ def _meter_elsewhere(
 
 
 def _clock(comparison: EventComparison, error: float) -> Iterator[tuple[float, Question]]:
-    """P and Q that come later than the model's by one time, and the part of the error that this leaves."""
+    """P and Q, or one of them, that come later than the model's by one time, and the part of the error that is left."""
     event = comparison.event
     interval = event.recording.interval
-    delays = [one.delay for one in comparison.signals.values() if one.delay is not None]
-    if not delays:
-        return
-    delay = float(np.mean(delays))
+    delays = {
+        name: one.delay
+        for name, one in comparison.signals.items()
+        if name in ("p", "q") and one.delay is not None
+    }
     least = max(_LEAST_CLOCK, _SAMPLES_CLOCK * interval)
-    if abs(delay) < least or np.ptp(delays) > max(_ALIKE * abs(delay), interval):
-        return
-    times = event.recording.times
-    shifted = np.interp(times - delay, times, comparison.played.power)
-    left = math.hypot(*rms_error(np.asarray(shifted), event))
-    if left > _CLOCK_LEAVES * error:
-        return
-    figures = {"delay": delay, "error": error, "left": left, "together": len(delays)}
-    yield left / error, Question(QuestionKind.CLOCKS, figures)
+    times, own = event.recording.times, comparison.played.power
+    for signals in (("p", "q"), ("p",), ("q",)):
+        late = [delays[name] for name in signals if name in delays]
+        delay = float(np.mean(late)) if late else 0.0
+        if abs(delay) < least or np.ptp(late) > max(_ALIKE * abs(delay), interval):
+            continue
+        shifted: Complex = np.interp(times - delay, times, own)
+        p = shifted.real if "p" in signals else own.real
+        q = shifted.imag if "q" in signals else own.imag
+        left = math.hypot(*rms_error(np.asarray(p + 1j * q), event))
+        if left <= _CLOCK_LEAVES * error:
+            which = " and ".join(signals).upper().replace("AND", "and")
+            figures = {"delay": delay, "error": error, "left": left, "together": len(late)}
+            yield left / error, Question(QuestionKind.CLOCKS, figures | {"which": which})
+            return

@@ -24,6 +24,8 @@ class QuestionKind(StrEnum):
     GAP_AT_EVENT = "gap at the event"
     LOST_JUMP = "angle lacks a jump"
     START = "starts elsewhere"
+    STUCK = "channel does not move"
+    SPIKE = "spike"
     READ_OTHERWISE = "read otherwise"
     CLOCKS = "clocks"
     METER_ELSEWHERE = "meter elsewhere"

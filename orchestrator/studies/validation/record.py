@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -27,6 +27,7 @@ _TURN = 2 * np.pi
 _NEAR_A_TURN = 0.2  # part of a turn by which a jump of the angle may miss a whole one
 _MOVES = 1e-6
 """Part of its range from which on an angle moves: more than rounding makes of an angle at rest."""
+_SPIKE = 3.0  # jump to one sample and back [pu] that no plant makes
 _HELD = (
     0.2  # part of the samples whose angle is that of the sample before, from which on it is held
 )
@@ -142,6 +143,7 @@ def read_recording(
         dataset, place = _of_run(dataset, place, label), None
     channels = channels_in(dataset, place, given, label)
     reading = _Reading(dataset, label, bases, channels)
+    reading.ask_of_samples()
     voltage, power = reading.voltage(), reading.power()
     return _evened(reading, voltage, power)
 
@@ -218,6 +220,27 @@ class _Reading:
             if role in roles
         ]
         return filled_samples(columns) if columns else np.zeros(len(self.times), dtype=bool)
+
+    def ask_of_samples(self) -> None:
+        """Ask about a channel that never moves, and about one sample that stands alone."""
+        for role, read in _IN_PER_UNIT.items():
+            if role not in self.channels:
+                continue
+            column = self.channels[role].column
+            values = read(self, role)
+            known = np.isfinite(values)
+            value, times = values[known], self.times[known]
+            if len(value) < _FEWEST:
+                continue
+            if np.ptp(value) == 0:
+                figures = {"role": role, "column": column, "count": len(value)}
+                self.ask(QuestionKind.STUCK, value=float(self.dataset[column][known][0]), **figures)
+            before, after = value[1:-1] - value[:-2], value[1:-1] - value[2:]
+            alone = np.where(before * after > 0, np.minimum(np.abs(before), np.abs(after)), 0.0)
+            most = int(alone.argmax())
+            if alone[most] > _SPIKE:
+                at = float(times[most + 1])
+                self.ask(QuestionKind.SPIKE, column=column, jump=float(alone[most]), at=at)
 
     def voltage(self) -> Complex:
         """[pu], in a frame that rotates with the rated frequency."""
@@ -323,6 +346,8 @@ class _Reading:
         degrees = unit_of(channel, self.dataset) == "deg"
         other = "rad" if degrees else "deg"
         within = abs(largest / _TURN - 1) if degrees else abs(largest / 360 - 1)
+        if degrees and float(np.nanmax(np.abs(raw), initial=0.0)) > 1.01 * _TURN:
+            within = 1.0  # radians that wrap stay within a turn
         beyond = not degrees and float(np.nanmax(np.abs(raw[:5]), initial=0.0)) > 1.01 * _TURN
         if within < _NEAR_A_TURN or beyond:
             self.ask(
@@ -369,6 +394,13 @@ class _Reading:
                 factor=factor,
                 remedy=self.channels["angle"].changed(factor=round(1 / factor, 6)),
             )
+
+
+_IN_PER_UNIT: Mapping[str, Callable[[_Reading, str], Numbers]] = {
+    "v": lambda reading, role: reading._volts(role, 1.0),
+    "p": _Reading._watts,
+    "q": _Reading._watts,
+}
 
 
 def _evened(reading: _Reading, voltage: Complex, power: Complex) -> Recording:
@@ -465,7 +497,7 @@ def at_port(recording: Recording, impedance: complex) -> Recording:
     power = recording.power if recording.sampled is None else recording.sampled
     voltage = recording.voltage
     if impedance:
-        current = (power / voltage).conj()
+        current = np.divide(power, voltage, out=np.zeros_like(power), where=voltage != 0).conj()
         voltage = voltage + impedance * current
         power = np.asarray(voltage * current.conj())
     return _averaged(replace(recording, voltage=voltage, power=power, sampled=power))

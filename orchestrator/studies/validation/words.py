@@ -137,13 +137,28 @@ def _read_otherwise(x: Figures) -> str:
     )
 
 
+def _stuck(x: Figures) -> str:
+    return (
+        f"{x['column']!r} is {x['value']:.4g} in all {x['count']} samples, which no instrument measures: was it "
+        f"recorded at all? Give the column that holds it, as in --channel '{x['role']}=COLUMN'"
+    )
+
+
+def _spike(x: Figures) -> str:
+    return (
+        f"{x['column']!r} leaves both samples beside it by {x['jump']:.3g} pu at {x['at']:g} s: is that a fault of the "
+        "recorder? Leave the cell empty if it is"
+    )
+
+
 def _clocks(x: Figures) -> str:
     late = "after" if x["delay"] > 0 else "before"
     both = " by the same time" if x["together"] > 1 else ""
+    comes = "come" if "and" in x["which"] else "comes"
     return (
-        f"P and Q come {1000 * abs(x['delay']):.3g} ms {late} the model's{both}, and without that the error falls from "
-        f"{x['error']:.3g} to {x['left']:.3g} pu (rms): do the clocks of voltage and power differ, or has the plant a "
-        "delay that the model lacks? gfor shifts nothing"
+        f"{x['which']} {comes} {1000 * abs(x['delay']):.3g} ms {late} the model's{both}, and without that the error "
+        f"falls from {x['error']:.3g} to {x['left']:.3g} pu (rms): do the clocks of voltage and power "
+        "differ, or has the plant a delay that the model lacks? gfor shifts nothing"
     )
 
 
@@ -209,6 +224,8 @@ _SENTENCES: Mapping[QuestionKind, Callable[[Figures], str]] = {
     QuestionKind.LOST_JUMP: _lost_jump,
     QuestionKind.START: _start,
     QuestionKind.READ_OTHERWISE: _read_otherwise,
+    QuestionKind.STUCK: _stuck,
+    QuestionKind.SPIKE: _spike,
     QuestionKind.CLOCKS: _clocks,
     QuestionKind.METER_ELSEWHERE: _meter_elsewhere,
     QuestionKind.SETPOINT: _setpoint,

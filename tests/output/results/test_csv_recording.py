@@ -104,6 +104,11 @@ def test_what_is_no_table_over_the_time_is_refused_in_own_words(tmp_path):
         ("f,time\n1,2\n", "its first column is 'f'; it must be the time"),
         ("time [h],f\n1,2\n2,3\n", "must be the time, as numbers below"),
         ("time,f\n1,2\n1,3\n", "the time of its 2 rows does not rise"),
+        ("time,f\n1.5,2\n1.5,3\n", "several rows have 1.5: give each row once"),
+        ("time,f\n1.5,2\n1.4,3\n", "sort them"),
+        ("time,f\n1.5,2\n", "give at least two rows"),
+        ("time,f\n1.51,2\n,7\n1.53,3\n", "row 2 of the numbers has no time"),
+        ("time,f,f\n1.51,2,4\n1.52,3,4\n", "several columns have the name 'f'"),
         ("time,f\n1,2\n2,3,4,5\n", "and '2,3,4,5' has 4; name them all"),
         (
             "time,f\n0,00,50,1\n0,02,50,2\n",

@@ -98,6 +98,12 @@ PLANTED = {
         lambda f: f.assign(p_mw=f.p_mw / 3, q_mvar=f.q_mvar / 3),
         "read otherwise",
     ),
+    "P is of one phase": (lambda f: f.assign(p_mw=f.p_mw / 3), "read otherwise"),
+    "Q is of one phase": (lambda f: f.assign(q_mvar=f.q_mvar / 3), "read otherwise"),
+    "P and Q are in each other's place": (
+        lambda f: f.assign(p_mw=f.q_mvar, q_mvar=f.p_mw),
+        "read otherwise",
+    ),
     "the angle is in radians": (
         lambda f: f.assign(angle_deg=np.deg2rad(f.angle_deg)),
         "read otherwise",
@@ -108,6 +114,16 @@ PLANTED = {
     ),
     "60 Hz": (lambda f: f.assign(angle_deg=f.angle_deg + 3600 * f.time), "rated frequency"),
     "clocks": (late, "clocks"),
+    "the clock of P alone": (lambda f: f.assign(p_mw=late(f).p_mw), "clocks"),
+    "P drifts before the event": (
+        lambda f: f.assign(p_mw=f.p_mw + 12 * f.time),
+        "no steady state before",
+    ),
+    "Q was not recorded": (lambda f: f.assign(q_mvar=0.0), "channel does not move"),
+    "one sample of P is wild": (
+        lambda f: f.assign(p_mw=f.p_mw.where(f.index != 3000, -9999.0)),
+        "spike",
+    ),
     "held": (held, "angle held"),
     "the frequency turns the other way": (
         lambda f: of_frequency(f, -1),
@@ -161,6 +177,12 @@ def test_the_remedy_that_is_printed_works_when_it_is_given(good):
     (remedy,) = question["figures"]["remedy"]
     assert remedy == "p=-p_mw"
     assert asked(turned, channels=[remedy]) == []
+
+
+def test_channels_in_each_others_place_are_read_as_the_remedy_says(good):
+    swapped = good.assign(p_mw=good.q_mvar, q_mvar=good.p_mw)
+    (question,) = asked(swapped)
+    assert asked(swapped, channels=question["figures"]["remedy"]) == []
 
 
 def test_a_voltage_to_ground_is_named_though_the_device_does_not_start(good):
