@@ -51,7 +51,8 @@ _EMT_STEP = 1e-4
 _MOST_CURVES = 12
 _MOST_MOVES = 5  # of taps and shunts that are named; the others are counted
 _EMF = """emf w·e''; [conventions] like = "psse" takes PSS/E's e'', which moves dampings by tenths of a point"""
-_CONVERTER, _INJECTION = "gfor", "injection"
+_CONVERTER = "gfor"
+_INJECTION = "injection"
 
 
 @dataclass(frozen=True)
