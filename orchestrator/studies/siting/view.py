@@ -257,9 +257,16 @@ def remarks(result: SiteResult) -> list[str]:
     return said
 
 
+def _unit_in_keys(result: SiteResult) -> str:
+    """Return the unit of the device's shifts for a key; "" for a foreign device, which is counted as it is."""
+    if result.request.is_foreign:
+        return ""
+    return _MVAR if result.request.device == "pod_q" else _MW
+
+
 def as_json(result: SiteResult) -> dict[str, Any]:
     here, stable = result.intact.name, [at.found.stability.stable for at in result.situations]
-    own = "" if result.request.is_foreign else _MVAR if result.request.device == "pod_q" else _MW
+    own = _unit_in_keys(result)
     return {
         **result.prepared.about,
         "device": result.request.device,
