@@ -194,7 +194,7 @@ def test_gast_starts_at_or_above_its_load_limit_and_gives_no_more(limit):
 @pytest.mark.parametrize(
     ("name", "values", "limit"),
     [
-        ("tgov1", {"V_MAX": 0.7}, "governor.V_MAX"),
+        ("tgov1", {"V_MAX": 0.69}, "governor.V_MAX"),
         ("tgov1", {"V_MIN": 0.75}, "governor.V_MIN"),
         ("gast", {"V_MAX": 0.5}, "governor.V_MAX"),
         ("hygov", {"G_MAX": 0.6}, "governor.G_MAX"),
@@ -206,3 +206,7 @@ def test_a_start_at_a_limit_is_refused_by_the_limits_name(name, values, limit):
     texts = refused(governor(name, values))
     assert texts
     assert texts[0].startswith(limit)
+
+
+def test_a_start_at_the_limit_itself_is_none_beyond_it():
+    assert refused(governor("tgov1", {"V_MAX": 0.7})) == []
