@@ -9,7 +9,8 @@
 
 Their stator is that of `machine`: with stator transients EMT-type, algebraic in the phasor model. As in stability
 programs' models of these names X''_q = X''_d, and saturation adds a current of the iron, S·ψ/X_md, beside the slowest
-winding of an axis. X'_q = X_q (genrou, two_axis) says that the slow winding of the q axis is missing.
+winding of an axis. X'_q = X_q (genrou, two_axis) says that the slow winding of the q axis is missing; saturation acts
+on that axis all the same, with T'_q0.
 The equations of these names hold for T''_0 ≥ T'_0 too, as each winding has its own time constant, and for X'' > X' and
 X_l ≥ X'', where a winding has a negative reactance; only X_l = X' of an axis with two windings is singular.
 
@@ -46,10 +47,11 @@ class Saturation:
     """S(x)·x as a function of x [pu].
 
     ``both_axes``: of the subtransient flux, on both axes by its parts (GENROU, GENROE, GENSAE); otherwise of E'_q on
-    the d axis (GENSAL)."""
+    the d axis (GENSAL). ``is_given``: whether the data have a saturation at all."""
 
     part: Callable[[Expr], Expr]
     both_axes: bool
+    is_given: Expr
 
 
 @dataclass(frozen=True)
@@ -84,14 +86,13 @@ def declare_wound_machine(
         }
         dc, qc = circuits["d"], circuits["q"]
         R, X_l = common.R_s + common.R_t, d.data.X_l
-        has_slow_q = if_else(q.data.X - q.data.X1 > 1e-9, 1, 0)
         S_q = Expr(0)  # saturation of the q axis, S
         if saturation and saturation.both_axes:
             flux = (port.v_0 + Phasor(R, dc.X_between) * port.i_0).magnitude()
             S = m.calculated(
                 "saturation_0", saturation.part(flux) / flux, "1", "S(ψ'') at the operating point"
             )
-            S_q = S * has_slow_q
+            S_q = S
         X_q = qc.X_between + (q.data.X - X_l - qc.X_sub) / (1 + S_q * qc.X_m / dc.X_m)
         delta_0 = (port.v_0 + Phasor(R, X_q) * port.i_0).angle()
         i, v = port.i_0.rotated(-delta_0), port.v_0.rotated(-delta_0)
@@ -105,7 +106,7 @@ def declare_wound_machine(
             iron = S * (psi_d + dc.X_between * i_d)
             now = (axis_d.emf**2 + axis_q.emf**2) ** 0.5
             factor = saturation.part(now) / fmax(now, 1e-6)
-            axis_q = _with_iron(axis_q, has_slow_q * factor * axis_q.emf / dc.X_m)
+            axis_q = _with_iron(axis_q, factor * axis_q.emf / dc.X_m)
             axis_d = _with_iron(axis_d, factor * axis_d.emf / dc.X_m)
         elif saturation:
             iron = saturation.part(psi_d + (common.X_t + d.data.X1) * i_d)
@@ -174,6 +175,9 @@ _FIRST_Q = ("psi_1q", "First damper flux, q axis")
 _SECOND_Q = ("psi_2q", "Second damper flux, q axis")
 
 _NO_TIME = 1e-3  # stands for the time constant [s] of a fast winding that a machine does not have
+_PATH_OF_SATURATION = 1e-4
+"""Part of X_q − X_l by which X'_q stays below X_q at least, where the q axis saturates: it moves no mode by 0.01 %."""
+
 _OF_NO_WINDING = 0.1  # part of T'_0 that stands for a longer T''_0 of such a winding
 
 
@@ -247,6 +251,7 @@ def genrou(
         _require_order(m, d, q, "X_q1")
         _require_apart(m, X_l, X_q1, "X_q1")
         saturation = _saturation(m, both_axes=True, exponential=exponential)
+        q = _with_path_of_saturation(q, saturation)
     return declare_wound_machine(
         m,
         port,
@@ -308,6 +313,15 @@ def _of_winding(fast: Expr, slow: Expr, screened: Expr) -> Expr:
     return if_else(fabs(screened) <= 0, fmin(fast, _OF_NO_WINDING * slow), fast)
 
 
+def _with_path_of_saturation(q: AxisData, saturation: Saturation) -> AxisData:
+    """Return the data of the q axis with X'_q below X_q, if there is saturation.
+
+    With X'_q = X_q the diagram's E'_d still follows the saturation of the q axis, with T'_q0; a winding that is missing
+    would leave it out."""
+    highest = q.X - _PATH_OF_SATURATION * (q.X - q.X_l)
+    return replace(q, X1=if_else(saturation.is_given, fmin(q.X1, highest), q.X1))
+
+
 def _require_apart(m: ModelBuilder, X_l: Expr, X1: Expr, name: str) -> None:
     """Refuse X_l = X', with which the field's or the slow winding's flux is the air gap's."""
     m.require(fabs(X1 - X_l) - LEAST_LEAKAGE * X1, f"machine.X_l must differ from machine.{name}")
@@ -333,5 +347,5 @@ def _saturation(m: ModelBuilder, *, both_axes: bool, exponential: bool) -> Satur
             if_else(logic_and(s_12 > 0, s_10 <= 0), -1, 1),
             "machine.s_10 = 0: no power of the flux goes through 0 and machine.s_12; give 0 at both for none",
         )
-        return Saturation(lambda x: exponential_part(x, s_10, s_12), both_axes)
-    return Saturation(lambda x: saturated_part(x, *points), both_axes)
+        return Saturation(lambda x: exponential_part(x, s_10, s_12), both_axes, s_10 > 0)
+    return Saturation(lambda x: saturated_part(x, *points), both_axes, s_10 > 0)
