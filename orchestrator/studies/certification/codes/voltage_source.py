@@ -358,18 +358,35 @@ SOURCES = (
 
 
 def verdict_of(points: Sequence[AtPoint]) -> bool | None:
-    """Tell if it is a voltage source at each point; None where one could not be measured and none says no."""
-    known = [one.springs for one in points if one.springs is not None]
-    if any(not one.met for one in known):
+    """Tell if it is a voltage source at each point; None where one was not measured, or stands in no network.
+
+    A stiff answer alone is no proof: a derivative of a phase-locked loop opposes the angle too, above the loop's own
+    bandwidth. Such a device was found stable at no short-circuit ratio."""
+    if any(one.springs is not None and not one.springs.met for one in points):
         return False
-    return True if len(known) == len(points) else None
+    return None if any(map(_open_reason, points)) else True
+
+
+def _open_reason(one: AtPoint) -> str:
+    """Say why a point leaves the verdict open; "" if it does not."""
+    if one.springs is None:
+        return f"it was not measured: {one.failure}"
+    if one.strengths is None or one.strengths.limit is not None:
+        return ""
+    ratios = one.strengths.ratios
+    why = next((ratio.why for ratio in ratios if ratio.why), "")
+    reason = f" ({why})" if why else ""
+    return (
+        f"its loop with a network was found stable at no short-circuit ratio from {ratios[0].scr:g} to "
+        f"{ratios[-1].scr:g}{reason}, so what it opposes the angle with is no proof"
+    )
 
 
 def sentence_of(points: Sequence[AtPoint]) -> str:
     found = verdict_of(points)
     if found is None:
-        lost = next(one for one in points if one.springs is None)
-        return f"not judged: at {lost.point} it was not measured: {lost.failure}"
+        point, reason = next((x.point, _open_reason(x)) for x in points if _open_reason(x))
+        return f"not judged: at {point} {reason}"
     worst, at = min(
         ((one.springs, one.point) for one in points if one.springs is not None),
         key=lambda pair: pair[0].least,

@@ -1,6 +1,7 @@
 """Voltage source behaviour from an admittance: against sources, masses and loops whose answer is known."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,7 +18,9 @@ from orchestrator.studies.certification.codes.frequency_domain import (
 )
 from orchestrator.studies.certification.codes.voltage_source import (
     AtPoint,
+    AtRatio,
     ScannedPoint,
+    Strengths,
     closed_loop,
     impedances,
     least_damped,
@@ -119,6 +122,18 @@ def measured(*least):
         one = springs(stiffness_of(behind(0.1 * X, X)), RATED)
         found.append(AtPoint(ScannedPoint(0.5, 0.0, 1.0), springs=one))
     return found
+
+
+def test_a_stiff_device_that_is_stable_in_no_network_is_no_proven_source():
+    """As one whose virtual inertia is a derivative of its phase-locked loop."""
+    (stiff,) = measured(0.1)
+    ratios = tuple(
+        AtRatio(scr, "not known", "scan higher", None, None, None, None) for scr in (20, 1.25)
+    )
+    lost = replace(stiff, strengths=Strengths(ratios, None))
+    assert verdict_of([stiff, lost]) is None
+    assert "stable at no short-circuit ratio from 20 to 1.25 (scan higher)" in sentence_of([lost])
+    assert verdict_of([replace(stiff, strengths=Strengths(ratios, 0.0))]) is True
 
 
 def test_one_bad_point_is_enough_and_one_that_is_not_measured_leaves_no_verdict():
