@@ -106,7 +106,7 @@ READINGS = (
     Reading("P counts into the plant", ("p",), -1, _power(-1, 1)),
     Reading("Q counts into the plant", ("q",), -1, _power(1, -1)),
     Reading("P and Q count into the plant", ("p", "q"), -1, _power(-1, -1)),
-    Reading("P and Q are of one phase", ("p", "q"), 3, _power(3, 3)),
+    Reading("P and Q are of one phase", ("p", "q"), 3, _power(3, 3), "", _LEAVES),
     Reading("P is of one phase", ("p",), 3, _power(3, 1), "", _LEAVES),
     Reading("Q is of one phase", ("q",), 3, _power(1, 3), "", _LEAVES),
     Reading("P and Q are in each other's place", ("p", "q"), 1, _swapped, "", _LEAVES, swaps=True),
@@ -253,7 +253,8 @@ def _clock(comparison: EventComparison, error: float) -> Iterator[tuple[float, Q
     }
     least = max(_LEAST_CLOCK, _SAMPLES_CLOCK * interval)
     times, own = event.recording.times, comparison.played.power
-    for signals in (("p", "q"), ("p",), ("q",)):
+    alone = (("p",), ("q",)) if error > _LEAST_OFF else ()
+    for signals in (("p", "q"), *alone):
         late = [delays[name] for name in signals if name in delays]
         delay = float(np.mean(late)) if late else 0.0
         if abs(delay) < least or np.ptp(late) > max(_ALIKE * abs(delay), interval):
