@@ -14,6 +14,9 @@ import numpy as np
 _NUMBER = re.compile(r"(?<![\w.])([-−+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?)(?!\w|\.\d)(\s*(?:%|Hz))?")
 """One within a name or a version, such as T_S1 or 0.3.0, is none."""
 
+_GUID = re.compile(r"[0-9a-fA-F]{8}(?:-[0-9a-fA-F]{4}){3}-[0-9a-fA-F]{12}")
+"""Of an FMU; a part such as 8e58 is no figure."""
+
 _PERCENT = re.compile(r"percent|%", re.IGNORECASE)
 _POINTS = re.compile(
     r"_points\b|\[points\]"
@@ -129,8 +132,9 @@ def foreign_in_text(text, source, heading=""):
 
 
 def _plain(text):
-    """A piece of HTML as a reader sees it; j of a complex number stands before a number."""
-    return re.sub(r"\bj(?=\d)", " ", unescape(re.sub(r"<[^>]*>", " ", text)))
+    """A piece of HTML as a reader sees it, without GUIDs; j of a complex number stands before a number."""
+    seen = _GUID.sub(" ", unescape(re.sub(r"<[^>]*>", " ", text)))
+    return re.sub(r"\bj(?=\d)", " ", seen)
 
 
 SLIPS = {
