@@ -22,7 +22,7 @@ def is_ours(path: Path) -> bool:
     What a file says of itself does not count, nor does its place: a built file that was changed since is a stranger."""
     built = cache_directory("fmus")
     if path.resolve().is_relative_to(built.resolve()):
-        return intact(path)
+        return intact(path) or not path.exists()  # described already, and built before it runs
     size = path.stat().st_size
     return any(
         file.stat().st_size == size and filecmp.cmp(path, file, shallow=False) and intact(file)

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from fmus.toolchain.cache import cache_directory
 from orchestrator.cases.case import BUILT_IN, load_case
 from orchestrator.core.errors import AnalysisError, CaseError
+from orchestrator.devices.fmi.instance import is_ours
 from orchestrator.face.cli import main
 from orchestrator.simulation.interop.rules import MASTERS
 from orchestrator.simulation.watch.settings import Settings
@@ -127,6 +129,16 @@ def test_faults_of_components(tmp_path):
     path = tmp_path / "isolated.toml"
     path.write_text(text.replace('[components.gfor]\nmodel = "gfor"', isolated), encoding="utf-8")
     assert prepare(load_case(path)).events == (Silence(1.0, "gfor"),)
+
+
+def test_a_model_of_ours_is_ours_before_it_is_built(monkeypatch, tmp_path):
+    """So that a time-out is refused at it with an empty cache as well."""
+    monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path))
+    assert is_ours(cache_directory("fmus") / "to come" / "gfor.fmu")
+    stranger = cache_directory("fmus") / "gfor.fmu"
+    stranger.parent.mkdir(parents=True, exist_ok=True)
+    stranger.write_bytes(b"of somebody else")
+    assert not is_ours(stranger)
 
 
 # -- what is refused, with its line and the remedy -------------------------------------------------
