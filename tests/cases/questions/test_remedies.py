@@ -168,7 +168,6 @@ GALLERY = {
     "machine without a record": Broken(
         "and a converter of ours stands there", NINE, changed(DYR, (GENCLS + "\n", ""))
     ),
-    "converter": Broken("a grid-following converter", NINE, following()),
     "converter that is not known": Broken(
         "a grid-following converter", NINE, changed(DYR, (GENCLS, "3 'WT4G1' 1 0 /"))
     ),

@@ -7,9 +7,9 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
-from orchestrator.cases.flow_figures import power_flow_json
 
 import orchestrator as gfor
+from orchestrator.cases.scenario.flow_figures import power_flow_json
 from orchestrator.face.cli import main
 from orchestrator.output.report.html.page import write_report
 from orchestrator.studies.modes.modes import running
