@@ -17,7 +17,6 @@ from orchestrator.core.asked import number_between, positive, text_or_none
 from orchestrator.core.errors import AnalysisError, InputError
 from orchestrator.core.units import to_unit
 from orchestrator.face.api.results import Run
-from orchestrator.face.api.scenario import UnusualDataWarning
 from orchestrator.linear.signals.ambient import ambient_modes
 from orchestrator.linear.signals.identification import sampling
 from orchestrator.linear.signals.mode_doubts import straight_line
@@ -216,6 +215,8 @@ def _seconds(index: Any, otherwise: str) -> Any:
     if apart > RARE and not _IN_BRACKETS.search(name):
         text = f"question: {otherwise}: its times are {apart:g} apart, perhaps in ms, and their name {name!r} says no "
         text += f"unit; they are taken as seconds: name the index '{name} [s]' or '{name} [ms]'"
+        from orchestrator.face.api.scenario import UnusualDataWarning  # noqa: PLC0415 - imports the reading of cases
+
         warnings.warn(text, UnusualDataWarning, stacklevel=users_level())
     return times * _second(name, otherwise)
 
