@@ -7,29 +7,17 @@ import pytest
 import orchestrator as gfor
 from orchestrator.cases.case import load_case
 from orchestrator.core.errors import InputError
+from tests.cases.form.test_case_files import LOOP
 from tests.systems.coupling.small_fmus import small_fmu
 
-CASE = """\
-name = "loop"
-[solver]
-step_size = "1 ms"
-stop_time = "20 ms"
-record_interval = "2 ms"
-[components.x]
-fmu = "fmus/x.fmu"
-[components.k]
-fmu = "fmus/k.fmu"
-parameters = { K = -3.0 }
-[[connections]]
-from = "x.y"
-to = "k.u"
-[[connections]]
-from = "k.y"
-to = "x.u"
+CASE = (
+    LOOP
+    + """\
 [scenarios.one]
 parameters = ["one.toml"]
 [scenarios.two]
 """
+)
 
 
 @pytest.fixture

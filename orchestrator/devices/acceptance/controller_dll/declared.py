@@ -103,7 +103,7 @@ def check_declarations(subject: DllSubject) -> CheckResult:
         return failed(name, "another layout", str(error))
     faults = interface.faults()
     if faults:
-        fault = "another layout" if any("layout" in text for text in faults) else "bad declaration"
+        fault = "bad declaration" if interface.outputs else "another layout"
         return failed(name, fault, "; ".join(faults[:3]))
     outside = _outside_of_bounds(interface)
     if interface.mode not in _MODES:

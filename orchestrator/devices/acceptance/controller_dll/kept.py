@@ -64,9 +64,7 @@ def check_memory(subject: DllSubject) -> CheckResult:
 def _arrays_left(subject: DllSubject) -> str:
     """Arrays beside which a plain run writes, in words."""
     with subject.other_process() as process:
-        session, one = subject.session(process), subject.instance(process)
-        session.start(one)
-        session.samples(one, 1, SAMPLES)
+        session, one = subject.begin(process, SAMPLES)
         try:
             subject.play(session)
         except DllEndedError:
@@ -148,9 +146,7 @@ def check_instances(subject: DllSubject) -> CheckResult:
 def check_states(subject: DllSubject) -> CheckResult:
     name = "dll_states"
     with subject.other_process() as process:
-        session, one = subject.session(process), subject.instance(process)
-        session.start(one)
-        session.samples(one, 1, SAMPLES)
+        session, one = subject.begin(process, SAMPLES)
         subject.play(session)
         kept = one.snapshot()
         session.samples(one, SAMPLES + 1, SAMPLES)
@@ -179,9 +175,7 @@ def _kept_elsewhere(subject: DllSubject) -> str:
     with subject.other_process() as process:
         (regions,) = process.do([["regions"]])
         reads = [["read", start, size] for _, start, size in regions or []]
-        session, one = subject.session(process), subject.instance(process)
-        session.start(one)
-        session.samples(one, 1, SAMPLES)
+        session, one = subject.begin(process, SAMPLES)
         subject.play(session)
         early = process.do(reads)
         session.samples(one, SAMPLES + 1, SAMPLES)
@@ -195,8 +189,7 @@ def _kept_elsewhere(subject: DllSubject) -> str:
 def _in_new_process(subject: DllSubject, kept: list[str], onward: list[Heard]) -> str:
     """The fate of a snapshot that another process takes up, in words; empty where it goes on alike."""
     with subject.other_process() as process:
-        session, one = subject.session(process), subject.instance(process)
-        session.start(one)
+        session, one = subject.begin(process)
         subject.play(session)
         one.restore(kept)
         session.samples(one, SAMPLES + 1, SAMPLES)
@@ -220,8 +213,7 @@ def check_restart(subject: DllSubject) -> CheckResult:
             f"a second simulation in the same process differs {_where(second)}",
         )
     with subject.other_process() as process:
-        session, one = subject.session(process), subject.instance(process)
-        session.start(one)
+        session, one = subject.begin(process)
         for _ in range(5):
             session.call(one, "Initialize")
         session.samples(one, 1, SAMPLES)
@@ -244,9 +236,7 @@ def check_threads(subject: DllSubject) -> CheckResult:
         return not_applicable(name, f"because {_DRIVEN}")
     with subject.other_process() as process:
         (begun,) = process.do([_TASKS])
-        session, one = subject.session(process), subject.instance(process)
-        session.start(one)
-        session.samples(one, 1, SAMPLES // 2)
+        session, one = subject.begin(process, SAMPLES // 2)
         heard = subject.play(session)
         session.in_thread = True
         session.samples(one, SAMPLES // 2 + 1, SAMPLES - SAMPLES // 2)
@@ -275,9 +265,7 @@ def check_leaks(subject: DllSubject) -> CheckResult:
     if subject.windows:
         return not_applicable(name, f"because {_DRIVEN}")
     with subject.other_process() as process:
-        session, one = subject.session(process), subject.instance(process)
-        session.start(one)
-        session.samples(one, 1, 1)
+        session, one = subject.begin(process, 1)
         subject.play(session)
         block = [["heap"], _FILES, one.order_of_many("Outputs", _BLOCK)]
         marks = [process.do(block)[:2] for _ in range(5)]
@@ -326,9 +314,7 @@ def check_arithmetic(subject: DllSubject) -> CheckResult:
         (loaded,) = process.do([["arithmetic"]])
         if loaded is None:
             return not_applicable(name, "because this processor's control word is not known here")
-        session, one = subject.session(process), subject.instance(process)
-        session.start(one)
-        session.samples(one, 1, SAMPLES // 4)
+        session, _ = subject.begin(process, SAMPLES // 4)
         subject.play(session)
         (after,) = process.do([["arithmetic"]])
     usual = 0x1F80  # of x86-64: rounds to nearest, keeps tiny numbers, traps nothing

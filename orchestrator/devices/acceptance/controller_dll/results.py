@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from orchestrator.devices.acceptance.checks import base
 from orchestrator.devices.acceptance.checks.base import CheckResult, Verdict, Whose
 from orchestrator.devices.acceptance.controller_dll.questions import (
     DLL_QUESTIONS,
@@ -34,12 +35,11 @@ def dll_check(
 
 
 def passed(name: str, evidence: str, **figures: Any) -> CheckResult:
-    return CheckResult(name, Verdict.PASS, evidence, figures=_with_source(name, figures))
+    return base.passed(name, evidence, **_with_source(name, figures))
 
 
 def remarked(name: str, evidence: str, remedy: str, **figures: Any) -> CheckResult:
-    found = _with_source(name, figures)
-    return CheckResult(name, Verdict.REMARK, evidence, remedy=remedy, figures=found)
+    return base.remarked(name, evidence, remedy, **_with_source(name, figures))
 
 
 def failed(name: str, fault: str, evidence: str, **figures: Any) -> CheckResult:

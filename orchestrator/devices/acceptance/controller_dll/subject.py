@@ -111,10 +111,7 @@ class DllSubject:
         """
         said = ""
         for largest in (*LARGEST, 0.0):
-            session = self.session()
-            one = self.instance(largest=largest)
-            session.start(one)
-            session.samples(one, 1, SAMPLES)
+            session, _ = self.begin(None, SAMPLES, self.instance(largest=largest))
             bad = next((heard for heard in self.play(session) if heard.code == 2), None)
             if bad is None:
                 return largest
@@ -136,6 +133,16 @@ class DllSubject:
     def session(self, process: DllProcess | None = None) -> Session:
         return Session(process or self.process(), self.interface, self.step)
 
+    def begin(
+        self, process: DllProcess | None, samples: int = 0, instance: Instance | None = None
+    ) -> tuple[Session, Instance]:
+        """Queue the first calls of an instance and its first samples; a plain instance where none is given."""
+        session = self.session(process)
+        one = self.instance(process) if instance is None else instance
+        session.start(one)
+        session.samples(one, 1, samples)
+        return session, one
+
     def play(self, session: Session) -> list[Heard]:
         """Make a session's calls, and note them."""
         found = session.play()
@@ -149,9 +156,7 @@ class DllSubject:
         phase: int = 0,
     ) -> list[Heard]:
         """A plain run of one instance from its first call on, and its end."""
-        session, one = self.session(process), self.instance(process, placement, phase=phase)
-        session.start(one)
-        session.samples(one, 1, SAMPLES)
+        session, one = self.begin(process, SAMPLES, self.instance(process, placement, phase=phase))
         session.call(one, "Terminate", SAMPLES * self.step)
         return self.play(session)
 

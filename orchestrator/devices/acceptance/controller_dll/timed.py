@@ -101,8 +101,7 @@ def _slightly_other_times(step: float) -> dict[str, list[float]]:
 
 def _run_at(subject: DllSubject, times: Sequence[float]) -> list[Heard]:
     with subject.other_process() as process:
-        session, one = subject.session(process), subject.instance(process)
-        session.start(one)
+        session, one = subject.begin(process)
         for sample in range(1, SAMPLES + 1):
             session.sample(one, sample, times[sample])
         return [h for h in subject.play(session) if h.call == "Outputs"]
@@ -133,9 +132,7 @@ def check_not_a_number(subject: DllSubject) -> CheckResult:
     with subject.other_process() as process:
         for place in range(len(inputs)):
             for words, value in _REPLACED.items():
-                session, one = subject.session(process), subject.instance(process)
-                session.start(one)
-                session.samples(one, 1, _NAN_AT)
+                session, one = subject.begin(process, _NAN_AT)
                 session.sample(
                     one, _NAN_AT + 1, inputs=bytes(one.with_not_a_number(_NAN_AT + 1, place, value))
                 )
@@ -173,9 +170,7 @@ def _what_it_did(subject: DllSubject, heard: Heard) -> str:
 def check_call_order(subject: DllSubject) -> CheckResult:
     name = "dll_call_order"
     with subject.other_process() as process:
-        session, one = subject.session(process), subject.instance(process)
-        session.start(one)
-        session.samples(one, 1, SAMPLES // 2)
+        session, one = subject.begin(process, SAMPLES // 2)
         heard = subject.play(session)
         process.do([["call", "GetInfo", 0]])
         for call in ("CheckParameters", "PrintInfo"):
