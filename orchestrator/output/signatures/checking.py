@@ -127,19 +127,39 @@ def _plain(
     signers: Signers | None,
     at: datetime,
 ) -> Signatory:
-    """Check a signature without SSH's form, which does not hold its key: the signers' file has to."""
-    keys = {} if signers is None else {line.key.fingerprint: line.key for line in signers.lines}
-    key = keys.get(one.key)
-    if key is None:
-        words = (
-            f"it is signed by the key {one.key}, which is not at hand, so that nobody here can say whether it made "
-            f"the signature; {_ASK}"
-        )
-        return Signatory(State.UNKNOWN, None, one.key, words)
-    require_cryptography("checking a PEM key's signature")
-    if not key.verifies_plain(one.content, envelope.signed):
-        return Signatory(State.CHANGED, None, one.key, _NOT_MADE.format(key=one.key))
-    return _by_signers(key, namespace, signers, at)
+    """Check a signature without SSH's form, which does not hold its key: the envelope or the signers' file has to."""
+    own = [] if signers is None else [line.key for line in signers.lines]
+    try:
+        named = _named_key(one, own)
+    except WireError as error:
+        return Signatory(State.CHANGED, None, one.key, f"the signature is damaged: {error}")
+    keys = own if named is None else [named]
+    if keys:
+        require_cryptography("checking a PEM key's signature")
+    made = [key for key in keys if key.verifies_plain(one.content, envelope.signed)]
+    if made:
+        return _by_signers(made[0], namespace, signers, at)
+    if named is not None:
+        key = named.fingerprint
+        return Signatory(State.CHANGED, None, key, _NOT_MADE.format(key=key))
+    words = (
+        f"it names the key {one.key}, which is not at hand, so that nobody here can say whether that made the "
+        f"signature: it counts for nothing; {_ASK}"
+    )
+    return Signatory(State.UNKNOWN, None, one.key, words)
+
+
+def _named_key(one: EnvelopeSignature, known: Sequence[PublicKey]) -> PublicKey | None:
+    """Return the key that the envelope holds, or else the known one whose fingerprint it names.
+
+    Raises
+    ------
+    WireError
+        If what the envelope holds is no public key."""
+    if one.public:
+        kind, _, text = one.public.partition(" ")
+        return PublicKey.of_text(kind, text)
+    return next((key for key in known if key.fingerprint == one.key), None)
 
 
 _ASK = "ask the signer for the public key by another way, and enter it into the file of --signers"

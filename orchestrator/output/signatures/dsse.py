@@ -11,6 +11,8 @@ from orchestrator.output.signatures.wire import WireError
 
 IN_TOTO = "application/vnd.in-toto+json"
 
+_PUBLIC = "publicKey"
+
 
 def pae(kind: str, payload: bytes) -> bytes:
     """DSSE's pre-authentication encoding: the bytes that are signed."""
@@ -19,10 +21,18 @@ def pae(kind: str, payload: bytes) -> bytes:
 
 @dataclass(frozen=True)
 class EnvelopeSignature:
-    """One signature in an envelope; ``key`` is the fingerprint of its key, a hint that nothing relies on."""
+    """One signature in an envelope; ``key`` is the fingerprint of its key, a hint that nothing relies on.
+
+    ``public`` is the line of the public key, where the signature does not hold it, as one of SSH does. DSSE lets an
+    entry have more than its own, and other libraries pass over it."""
 
     key: str
     content: bytes
+    public: str = ""
+
+    def as_json(self) -> dict[str, str]:
+        entry = {"keyid": self.key, "sig": _text(self.content)}
+        return entry | {_PUBLIC: self.public} if self.public else entry
 
 
 @dataclass(frozen=True)
@@ -41,9 +51,7 @@ class SignedEnvelope:
         content = {
             "payload": _text(self.payload),
             "payloadType": self.kind,
-            "signatures": [
-                {"keyid": one.key, "sig": _text(one.content)} for one in self.signatures
-            ],
+            "signatures": [one.as_json() for one in self.signatures],
         }
         return json.dumps(content, indent=1) + "\n"
 
@@ -70,10 +78,10 @@ def read_envelope(text: str) -> SignedEnvelope:
 
 def _signatures(listed: Iterable[Any]) -> Iterable[EnvelopeSignature]:
     for one in listed:
-        key = one.get("keyid", "")
-        if not isinstance(key, str):
-            raise ValueError("a keyid is no text")
-        yield EnvelopeSignature(key, _bytes(one["sig"]))
+        key, public = one.get("keyid", ""), one.get(_PUBLIC, "")
+        if not isinstance(key, str) or not isinstance(public, str):
+            raise ValueError("a keyid or a public key is no text")
+        yield EnvelopeSignature(key, _bytes(one["sig"]), public)
 
 
 def read_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from orchestrator.output.signatures.public_key import (
     public_key_of,
     require_cryptography,
 )
-from orchestrator.output.signatures.sshsig import read_content, sign_with
+from orchestrator.output.signatures.sshsig import MAGIC, read_content, sign_with
 from orchestrator.output.signatures.wire import WireError
 
 _OPENSSH = b"-----BEGIN OPENSSH PRIVATE KEY-----"
@@ -33,7 +33,8 @@ class Made:
 
     @property
     def in_envelope(self) -> EnvelopeSignature:
-        return EnvelopeSignature(self.key.fingerprint, self.content)
+        public = "" if self.content.startswith(MAGIC) else self.key.line
+        return EnvelopeSignature(self.key.fingerprint, self.content, public)
 
 
 def check_key(key: Path) -> None:

@@ -11,6 +11,7 @@ from orchestrator.core.errors import InputError
 from orchestrator.output.signatures.allowed_signers import Signers, read_signers, read_time
 from orchestrator.output.signatures.beside import NAMESPACE, Beside
 from orchestrator.output.signatures.checking import (
+    Signatory,
     SignatureSeen,
     State,
     check_signatures,
@@ -102,9 +103,16 @@ def look_beside(beside: Beside, differences: Differences, asked: Asked) -> Signa
     if changed:
         return SignatureSeen(State.CHANGED, "; ".join(changed), signatures=found)
     least = worst_of(found)
-    others = [one.sentence for one in found if one is not least]
-    sentence = "; and ".join([least.sentence, *others])
-    return SignatureSeen(least.state, sentence, least.signer, found)
+    return SignatureSeen(least.state, _words_of(found), least.signer, found)
+
+
+def _words_of(found: Sequence[Signatory]) -> str:
+    """Tell of each signature; the one that decides stands first."""
+    if len(found) == 1:
+        return found[0].sentence
+    told = [f"signature {k} of {len(found)}: {one.sentence}" for k, one in enumerate(found, 1)]
+    first = found.index(worst_of(found))
+    return "; ".join([told[first], *told[:first], *told[first + 1 :]])
 
 
 def _statement_in(envelope: SignedEnvelope) -> dict[str, Any]:

@@ -229,7 +229,18 @@ def verified(
 
 
 def _unproved(folder: Path, content: Content) -> list[str]:
-    """Files in the folder of which the certificate has no hash."""
+    """Files in the folder, and in folders in it, of which the certificate has no hash; those of a kind together."""
     known = {JSON, *content["files"], *signatures_of(folder).names()}
-    others = [path.name for path in folder.iterdir() if path.is_file() and path.name not in known]
-    return [f"{name}: the certificate does not cover it" for name in sorted(others)]
+    found = [path for path in folder.rglob("*") if path.is_symlink() or not path.is_dir()]
+    kinds: dict[str, list[str]] = {}
+    for name in sorted(path.relative_to(folder).as_posix() for path in found):
+        if name not in known:
+            parent, _, last = name.rpartition("/")
+            kind = f"{parent}/*{Path(last).suffix}" if parent else name
+            kinds.setdefault(kind, []).append(name)
+    return [
+        f"{names[0]}: the certificate does not cover it"
+        if len(names) == 1
+        else f"{kind}: {len(names)} files that the certificate does not cover"
+        for kind, names in kinds.items()
+    ]

@@ -103,7 +103,8 @@ def seen(gfor, folder, *arguments):
 
 def test_a_certificate_is_good_with_its_signer_and_unknown_without(certificate, signers, gfor):
     code, found = verified(gfor, certificate, "--signers", signers())
-    (view,) = found["unproved"]
+    view, points = found["unproved"]
+    assert points.startswith("points/")
     assert (code, found["holds"], "a view, not proved" in view) == (3, True, True)
     assert (found["signature"]["state"], found["signature"]["signer"]) == ("good", LAB)
     code, found = verified(gfor, certificate)
@@ -462,6 +463,108 @@ def test_two_sign_and_each_is_named(certificate, keys, signers, gfor):
     assert seen(gfor, certificate, "--signers", signers(lines[1]))[:2] == (5, "changed")
 
 
+def second(change):
+    """Change the second signature in the envelope."""
+
+    def changed(folder):
+        envelope = envelope_of(folder)
+        change(envelope["signatures"][1])
+        put(folder, envelope)
+
+    return changed
+
+
+def wrong(entry):
+    sig = base64.b64decode(entry["sig"])
+    entry["sig"] = base64.b64encode(sig[:-1] + bytes([sig[-1] ^ 1])).decode()
+
+
+def without_its_form(entry):
+    """Its first byte is another, so that it is no signature of SSH any more."""
+    entry["sig"] = base64.b64encode(b"T" + base64.b64decode(entry["sig"])[1:]).decode()
+    entry.pop("publicKey", None)
+
+
+def without_its_key(entry):
+    del entry["publicKey"]
+
+
+def wrong_without_its_key(entry):
+    wrong(entry)
+    del entry["publicKey"]
+
+
+def with_a_damaged_key(entry):
+    entry["publicKey"] = entry["publicKey"][:-9]
+
+
+def with_another_name(entry):
+    entry["keyid"] = "SHA256:0"
+    entry.pop("publicKey", None)
+
+
+EXPIRED = 'valid-before="20200101Z" '
+
+
+@pytest.mark.parametrize(
+    ("other", "change", "known", "state", "said"),
+    [
+        ("ecdsa", None, "", "good", "signature 2 of 2: signed by other@example.org"),
+        ("ecdsa", None, None, "good", "signature 2 of 2: it is signed by the key SHA256:"),
+        ("ecdsa", None, EXPIRED, "good", "of other@example.org expired on 2020-01-01 00:00"),
+        ("ecdsa", second(wrong), "", "changed", "is not one of these bytes"),
+        ("ecdsa", second(wrong), None, "changed", "is not one of these bytes"),
+        ("ecdsa", second(wrong), EXPIRED, "changed", "is not one of these bytes"),
+        ("ecdsa", second(without_its_form), "", "changed", "is not one of these bytes"),
+        ("ecdsa", second(without_its_form), None, "good", "it counts for nothing"),
+        ("ecdsa", a_detail, "", "changed", "changed since it was signed: certificate.json"),
+        ("rsa.pem", None, "", "good", "signature 2 of 2: signed by other@example.org"),
+        ("rsa.pem", None, None, "good", "signature 2 of 2: it is signed by the key SHA256:"),
+        ("rsa.pem", None, EXPIRED, "good", "of other@example.org expired on 2020-01-01 00:00"),
+        ("rsa.pem", second(wrong), "", "changed", "is not one of these bytes"),
+        ("rsa.pem", second(wrong), None, "changed", "is not one of these bytes"),
+        ("rsa.pem", second(wrong), EXPIRED, "changed", "is not one of these bytes"),
+        ("rsa.pem", second(without_its_key), None, "good", "it counts for nothing"),
+        ("rsa.pem", second(wrong_without_its_key), None, "good", "it counts for nothing"),
+        ("rsa.pem", second(wrong_without_its_key), "", "changed", "is not one of these bytes"),
+        ("rsa.pem", second(with_a_damaged_key), None, "changed", "the signature is damaged"),
+        ("rsa.pem", second(with_another_name), "", "good", "signed by other@example.org"),
+        ("rsa.pem", the_payload, "", "changed", "though every hash is the same"),
+    ],
+)
+def test_each_state_of_a_second_signature_is_told(
+    certificate, keys, signers, gfor, other, change, known, state, said
+):
+    """The first signature is good, and the lab's; ``known`` begins the second's line among the signers."""
+    assert gfor("sign", certificate, "--sign", keys / other)[0] == 0
+    if change is not None:
+        change(certificate)
+    lines = [f"{LAB} {line_of(keys, 'ed25519')}"]
+    if known is not None:
+        lines.append(f"other@example.org {known}{line_of(keys, other.removesuffix('.pem'))}")
+    found = seen(gfor, certificate, "--signers", signers(*lines))
+    assert found[:2] == (3 if state == "good" else 5, state)
+    assert said in found[2]
+
+
+def test_files_in_folders_of_a_certificate_are_named(certificate, signers, gfor):
+    """Of the signature nothing speaks of them; a link is named, and not followed."""
+    (certificate / "points").mkdir(exist_ok=True)
+    (certificate / "points" / "one.npz").write_bytes(b"1")
+    (certificate / "points" / "two.npz").write_bytes(b"2")
+    (certificate / "deep" / "er").mkdir(parents=True)
+    (certificate / "deep" / "er" / "approval.txt").write_text("approved")
+    (certificate / "elsewhere").symlink_to(certificate.parent)
+    _, found = verified(gfor, certificate, "--signers", signers())
+    count = len(list((certificate / "points").iterdir()))
+    (_, *told) = found["unproved"]
+    assert told == [
+        "deep/er/approval.txt: the certificate does not cover it",
+        "elsewhere: the certificate does not cover it",
+        f"points/*.npz: {count} files that the certificate does not cover",
+    ]
+
+
 def test_what_does_not_hold_or_was_changed_is_not_signed(certificate, keys, gfor):
     a_detail(certificate)
     code, _, said = gfor("sign", certificate, "--sign", keys / "other")
@@ -550,10 +653,11 @@ def of_rows(tmp_path, tmp_path_factory, fmu_path, gfor):
 @pytest.mark.slow
 def test_the_page_of_a_code_is_made_anew(of_rows, gfor):
     found = json.loads(gfor("verify", of_rows, "--json", "--files-only")[1])
-    assert (found["holds"], found["unproved"]) == (True, []), found["faults"]
+    points = "points/*.npz: 4 files that the certificate does not cover"
+    assert (found["holds"], found["unproved"]) == (True, [points]), found["faults"]
     (of_rows / "approval.txt").write_text("approved")
     found = json.loads(gfor("verify", of_rows, "--json", "--files-only")[1])
-    assert found["unproved"] == ["approval.txt: the certificate does not cover it"]
+    assert found["unproved"] == ["approval.txt: the certificate does not cover it", points]
 
 
 @pytest.mark.slow
