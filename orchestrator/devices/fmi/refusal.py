@@ -22,6 +22,19 @@ _SILENT = {
 }
 """What a status means where an FMU says nothing."""
 
+IN_THE_LOG = "an error in the log"
+"""The status of a call that was granted, while the FMU logs an error with it."""
+
+_INITIALISING = frozenset(
+    f"fmi{version}{step}InitializationMode" for version in (2, 3) for step in ("Enter", "Exit")
+)
+_REFUSING = frozenset(
+    [
+        IN_THE_LOG,
+        *(f"fmi{version}{status}" for version in (2, 3) for status in ("Discard", "Error")),
+    ]
+)
+
 Said = Callable[[int], list[str]]  # gives the distinct messages of at least a status, oldest first
 
 
@@ -57,7 +70,14 @@ def in_its_words(description: FmuDescription, text: str) -> str:
     return in_words_of_3(text) if description.fmi_version == "3.0" else text
 
 
+def refuses_to_start(error: ComponentError) -> bool:
+    """Return whether a component refused its initialisation, which is neither another call nor the end of its process.
+
+    The error's call and status are names of FMI, in its version 2.0 or 3.0."""
+    return error.call in _INITIALISING and error.status in _REFUSING
+
+
 def check_log(name: str, said_by: Said, call: str) -> None:
     errors = said_by(ERROR)
     if errors:
-        raise ComponentError(name, call, "an error in the log", "; ".join(errors))
+        raise ComponentError(name, call, IN_THE_LOG, "; ".join(errors))

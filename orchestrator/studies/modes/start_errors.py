@@ -5,27 +5,24 @@ from orchestrator.cases.scenario.feeding_loads import feeding_loads
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import ComponentError, ErrorKind, Problem, StartError
 from orchestrator.devices.fmi.instance import is_ours
+from orchestrator.devices.fmi.refusal import refuses_to_start
 
-_INITIALISATION = "InitializationMode"
-# begins what our models say of values that do not fit together
 _PREFACE = "parameters cannot be used: "
+"""Begins what our models log of values that do not fit together, and is said by "cannot start" already. By FMI a model
+can give its reason as a text only; a text of another's FMU stays as it is."""
+
 _FULL = 1.0  # apparent power [pu] beyond which a unit is asked for more than its rating
 
 
 def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError | None:
     """The error of a component that refused to initialise; None for any other call, and where its process died."""
-    refused = error.status.removeprefix("fmi2").removeprefix("fmi3") in (
-        "Error",
-        "Discard",
-        "an error in the log",
-    )
-    if not refused or _INITIALISATION not in error.call or error.component not in prepared.places:
+    if not refuses_to_start(error) or error.component not in prepared.places:
         return None
     name, plan = error.component, prepared.system.components[error.component]
-    said = (
-        error.log.removeprefix(f"{name}: ").removeprefix(_PREFACE)
-        or "the FMU says no more than that its initialisation failed"
-    )
+    ours = is_ours(plan.description.path)
+    said = error.log.removeprefix(f"{name}: ")
+    said = said.removeprefix(_PREFACE) if ours else said
+    said = said or "the FMU says no more than that its initialisation failed"
     given = {
         v: plan.number(v) for v in ("P_0", "Q_0", "S_n", "v_0") if v in plan.description.variables
     }
@@ -48,5 +45,5 @@ def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError
         fed = feeding_loads(prepared.network, grid, given["S_n"])
         text += f"; {fed}" if fed else ""
     # The same values are refused again by a model of ours; an FMU of others may lack a licence today.
-    kind = ErrorKind.START if is_ours(plan.description.path) else ErrorKind.FMU
+    kind = ErrorKind.START if ours else ErrorKind.FMU
     return StartError(str(prepared.case.path), Problem(prepared.places[name], text, kind), name)

@@ -30,6 +30,7 @@ from orchestrator.studies.runs.mode_plots import (
     plot_signals,
 )
 from orchestrator.studies.runs.run import RunResult
+from orchestrator.systems.coupling.events import BusFault
 
 _TABLES = ("modes.csv", "participation.csv", "mode_shapes.csv")  # of `save_modes`
 _LEAST_PARTICIPATION = 1e-3  # smaller factors are left out of the files
@@ -253,6 +254,7 @@ def summary_of(result: RunResult) -> dict[str, Any]:
         if stats is None or stats.adaptive is None
         else asdict(stats.adaptive),
         "events": [str(event) for event in modes.prepared.events],
+        "bus_faults": [e.bus for e in modes.prepared.events if isinstance(e, BusFault) and e.on],
         "answer": of_run(result).as_json(),
         "power_flow": _power_flow(modes.prepared),
         "linearised": modes.linearised,

@@ -245,16 +245,21 @@ def remarks(result: SiteResult) -> list[str]:
             said.append(
                 f"{_called(seen)}: not controllable at {best} ({100 * shifts[best].part:.1g} % of {top})"
             )
-    hidden = result.intact.found.hidden
-    for value in hidden.electromechanical if hidden else ():
-        said.append(
-            f"not judged: {value.imag / math.tau:.3f} Hz, {damping_percent(value):.2f} %, outside of --range"
-        )
-    said += [f"not judged: outage {name}: {why}" for name, why in result.not_judged.items()]
+    said += [f"not judged: {open_point}" for open_point in open_points(result)]
     if result.terminals:
         there = few(result.terminals, _NAMED)
         said.append(f"left out: the terminals of units, {there}; --buses 'bus_*' takes all buses")
     return said
+
+
+def open_points(result: SiteResult) -> list[str]:
+    """Modes and outages that the study did not judge, each with the reason."""
+    hidden = result.intact.found.hidden
+    beyond = [
+        f"{value.imag / math.tau:.3f} Hz, {damping_percent(value):.2f} %, outside of --range"
+        for value in (hidden.electromechanical if hidden else ())
+    ]
+    return [*beyond, *(f"outage {name}: {why}" for name, why in result.not_judged.items())]
 
 
 def _unit_in_keys(result: SiteResult) -> str:
@@ -279,6 +284,7 @@ def as_json(result: SiteResult) -> dict[str, Any]:
         "answer": answer(result),
         "sure": sureness(result),
         "remarks": remarks(result),
+        "open_points": open_points(result),
         "agrees": result.agrees,
         "ranked_by": "damping with the device, by coupled FMUs"
         if result.by_coupled

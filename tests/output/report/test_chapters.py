@@ -13,7 +13,7 @@ import xarray as xr
 from orchestrator.core.errors import InputError
 from orchestrator.output.report.html.chapters.files import chapters_of
 from orchestrator.output.report.html.chapters.runs import of_run
-from orchestrator.output.report.html.chapters.studies import of_sweep
+from orchestrator.output.report.html.chapters.studies import of_site, of_sweep
 from orchestrator.output.report.html.first_page import first_page
 from orchestrator.output.report.html.least_damped import LeastDamped
 from orchestrator.output.report.html.page import write_report
@@ -588,6 +588,7 @@ def test_a_fault_has_a_question_of_its_own(tmp_path):
         "title": "Hit",
         "stable": False,
         "events": ["t = 1 s: grid.b.fault.R = 0, grid.b.fault.on = 1"],
+        "bus_faults": ["b"],
     }
     asked = {
         s["name"]: of_run(tmp_path, [s]).question
@@ -597,6 +598,15 @@ def test_a_fault_has_a_question_of_its_own(tmp_path):
         "base": "Is the network stable, and which swing is damped least?",
         "hit": "Is the fault survived, and which swing is damped least?",
     }
+
+
+def test_open_points_of_a_site_are_those_that_the_study_names(tmp_path):
+    site = {"agrees": True, "confirmed": True, "answer": "bus_2", "sure": []}
+    file = tmp_path / "site.json"
+    remark = {"remarks": ["not judged is how a remark may begin"]}
+    assert not of_site(file, site | remark).not_judged
+    open_points = ["outage tie: it has no power flow"]
+    assert of_site(file, site | remark | {"open_points": open_points}).not_judged == open_points
 
 
 SHAKY = {"stable": False, "verdict": "UNSTABLE", "frequency_hz": 0.57, "damping_percent": -0.9}

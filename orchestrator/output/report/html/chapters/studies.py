@@ -59,9 +59,6 @@ def of_screening(file: Path, c: Content) -> Chapter:
 
 
 def of_site(file: Path, c: Content) -> Chapter:
-    open_ = [
-        text.removeprefix("not judged: ") for text in c["remarks"] if text.startswith("not judged")
-    ]
     sure = "; ".join(c["sure"])
     good = True if c["agrees"] and c["confirmed"] else None if c["agrees"] else False
     least = [LeastDamped.of(mode) for mode in c.get("modes", ())[:1]]
@@ -71,7 +68,7 @@ def of_site(file: Path, c: Content) -> Chapter:
         c["answer"],
         good,
         sure,
-        open_,
+        c.get("open_points", ()),
         page="site.html",
         least=least,
     )
