@@ -1,7 +1,9 @@
 """``gfor design``: a POD controller by eigenvalue sensitivity."""
 
 import argparse
+import shlex
 from contextlib import suppress
+from fnmatch import fnmatchcase
 from pathlib import Path
 from shutil import rmtree
 
@@ -15,7 +17,12 @@ from orchestrator.face.cli.arguments import (
     add_request_arguments,
     option,
 )
-from orchestrator.face.cli.case_arguments import add_case_arguments, asked_of_case, case_of
+from orchestrator.face.cli.case_arguments import (
+    add_case_arguments,
+    asked_of_case,
+    case_of,
+    values_set,
+)
 from orchestrator.face.cli.interrupted import saying_how_it_goes_on
 from orchestrator.face.cli.study import shown, working_in
 from orchestrator.face.cli.terminal import (
@@ -33,7 +40,7 @@ from orchestrator.studies.coordinated_design.one_point import design_controller
 from orchestrator.studies.coordinated_design.study import ALL, PointsDesignRequest
 from orchestrator.studies.pod_design.design import DesignRequest
 from orchestrator.studies.pod_design.sheet import first_screen, sheet
-from orchestrator.studies.pod_design.view import parameter_file_path
+from orchestrator.studies.pod_design.view import ControllerDesign, parameter_file_path
 from orchestrator.studies.points.store import PointStore, any_kept
 
 
@@ -132,13 +139,33 @@ def run(options: argparse.Namespace) -> int:
     )
     console.print(
         escape(
-            f"Parameter file {path}{warned}; use it with: gfor modes {options.case} --scenario "
-            f"{design.target.scenario} --parameters {path}{emt}"
+            f"Parameter file {path}{warned}; use it with: {_command_with(options, controller, path)}{emt}"
         ),
         soft_wrap=True,
         highlight=False,
     )
     return ends
+
+
+def _command_with(options: argparse.Namespace, controller: ControllerDesign, path: Path) -> str:
+    """The command that shows the modes of the system that was designed for, with the setting.
+
+    It has the values and files that the design was given. A value of ``--set`` that is one of the setting's is left
+    out, and where a pattern would replace one, the setting's value stands behind it."""
+    given = {k: v for k, v in values_set(options).items() if k not in controller.parameters}
+    replaced = {
+        name: value
+        for name, value in controller.parameters.items()
+        if any(fnmatchcase(name, pattern) or fnmatchcase(pattern, name) for pattern in given)
+    }
+    words = ["gfor", "modes", options.case, "--scenario", controller.result.target.scenario]
+    for name, value in (given | replaced).items():
+        words += ["--set", f"{name}={str(value).lower() if isinstance(value, bool) else value}"]
+    for file in (*options.parameters, path):
+        words += ["--parameters", str(file)]
+    words += [] if options.step is None else ["--step", repr(options.step)]
+    words += ["--trust-fmus"] if options.trust_fmus else []
+    return shlex.join(words)
 
 
 def _check_for_one_point(options: argparse.Namespace) -> None:

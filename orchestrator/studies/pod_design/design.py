@@ -24,6 +24,7 @@ from orchestrator.studies.modes.modes import identified, running
 from orchestrator.studies.modes.naming import named_modes
 from orchestrator.studies.pod_design import lead_lag as leads
 from orchestrator.studies.pod_design.closed_loop import Placed, PodLoop, PodSetting, figures_of
+from orchestrator.studies.pod_design.growth import Growth, growth_of
 from orchestrator.studies.pod_design.guard import Naming, Surroundings, breach, surroundings
 from orchestrator.studies.pod_design.margins import LARGER_GAIN, VARIATION, Margins, compute_margins
 from orchestrator.studies.pod_design.refinement import Judgement, Refinement, refine, sweep
@@ -42,6 +43,9 @@ from orchestrator.studies.points.store import PointStore
 StageReport = Callable[[str], None]
 
 _OFF = PodSetting(0.0, leads.NO_COMPENSATION)
+_WRONG_WAY = 60.0
+"""Angle of the sensitivity [°] below which a POD of the other sign needs less lead or lag: two usual stages turn the
+rest, 120°."""
 # a requirement counts as met if the damping ratio falls short of it by less: 0.05 points
 _MET = 5e-4
 
@@ -188,6 +192,12 @@ class PodDesign:
     @property
     def warnings(self) -> tuple[str, ...]:
         return tuple(dict.fromkeys([*self.examined_before.warnings, *self.examined.warnings]))
+
+    @property
+    def other_sign(self) -> str:
+        """Advice to take controllers of the other sign, where that leaves the lead/lag less to turn; "" elsewhere."""
+        angle = leads.angle_deg(self.sensitivities.value)
+        return _other_sign(angle, self.target, self.prepared, self.request.controller)
 
     @property
     def met(self) -> bool:
@@ -387,7 +397,12 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
     report("sensitivity of the mode")
     bare = loop.place(off, request.delta_gain)
     S = leads.sensitivity(bare.eigenvalue, initial, request.delta_gain)
-    filters = leads.lead_lag(leads.angle_deg(S), initial.imag, start.target.stages)
+    angle = leads.angle_deg(S)
+    try:
+        filters = leads.lead_lag(angle, initial.imag, start.target.stages)
+    except AnalysisError as error:
+        typed = _other_sign(angle, start.target, start.prepared, request.controller)
+        raise AnalysisError(f"{error}{typed and f'. Or {typed}'}") from error
     turned = loop.place(off, request.delta_gain, filters)
     S_turned = leads.sensitivity(turned.eigenvalue, initial, request.delta_gain)
     gains = [leads.required_gain(predicted, initial, abs(value)) for value in (S, S_turned)]
@@ -418,6 +433,9 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
         if there.damping > now.damping + _MET and not (there.broken and not now.broken):
             final, after, broken = other_gain, around(other_gain), there.broken
     examined = loop.examine(final.setting)
+    growth = growth_of(
+        loop, final.setting, examined.stability, request.bounds(search=refinement is not None)
+    )
     margins = spoilt = None
     if request.margins and final.setting.gain and examined.stability.stable is not False:
         margins = compute_margins(loop, off, final, request.least_damping, report)
@@ -444,7 +462,7 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
         final=final,
         before=before,
         after=after,
-        broken=broken or _unstable(examined.stability),
+        broken=broken or _unstable(examined.stability, growth),
         margins=margins,
         spoilt=spoilt,
         examined_before=start.examined,
@@ -452,12 +470,30 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
     )
 
 
-def _unstable(stability: Stability) -> str | None:
-    """The fault of a design with which the system is not known to be stable at all frequencies; None if it is."""
+def _unstable(stability: Stability, growth: Growth | None) -> str | None:
+    """The fault of a design with which the system is not known to be stable at all frequencies; None if it is.
+
+    ``growth``: what grows, beside what it was without the controller; None where that is not known."""
     if stability.stable:
         return None
+    if growth is not None:
+        return growth.sentence()
     subject = "the system is" if stability.stable is False else "whether the system is stable is"
     return f"{subject} {stability.sentence()}"
+
+
+def _other_sign(angle: float, target: Target, prepared: PreparedScenario, controller: str) -> str:
+    """The advice to turn the sign around: a sensitivity of a small angle [°] points to less damping."""
+    if abs(angle) >= _WRONG_WAY:
+        return ""
+    typed = target.turned_around(prepared.system.components, controller)
+    if not typed:
+        return ""
+    return (
+        f"turn the sign around: without compensation the controller undamps the mode (the sensitivity's angle is "
+        f"{angle:.0f}°), and with the other sign the lead/lag turns by {abs(angle):.0f}° instead of "
+        f"{180 - abs(angle):.0f}°: add {' '.join(typed)}"
+    )
 
 
 def _required(request: DesignRequest, initial: complex) -> float:

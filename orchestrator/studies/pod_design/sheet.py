@@ -65,6 +65,8 @@ def first_screen(d: PodDesign) -> Iterable[Table | str]:
         stable = {True: "yes", False: "NO", None: "not known"}[stability.stable]
         table.add_row(title, _short(around.counting(target)), least, following, stable)
     yield table
+    if d.other_sign:
+        yield escape(d.other_sign[0].upper() + d.other_sign[1:])
     yield ""
 
 

@@ -39,6 +39,15 @@ class Target:
     # both time constants [s] with which stages of a fixed number do nothing; None where N_S can be set
     neutral: float | None = None
 
+    def turned_around(self, plan: Mapping[str, ComponentPlan], controller: str) -> list[str]:
+        """Return the values that turn the controllers' signs around, as they are typed; empty where one has no sign."""
+        variable = f"{controller}.sign"
+        if not all(variable in plan[name].description.variables for name in self.components):
+            return []
+        return [
+            f"--set {name}.{variable}={-plan[name].number(variable):g}" for name in self.components
+        ]
+
 
 def find_target(
     case: Case,

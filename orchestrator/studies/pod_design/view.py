@@ -179,6 +179,7 @@ def design_json(d: PodDesign) -> dict[str, Any]:
         "largest_growth_rate": after.largest_growth_rate,
         "stability": {"before": before.as_json(), "after": after.as_json()},
         "warnings": list(d.warnings),
+        "other_sign": d.other_sign or None,
         "largest_real_part": {
             "before": before.largest_growth_rate,
             "after": after.largest_growth_rate,
