@@ -101,4 +101,4 @@ def _in_python(found: re.Match[str]) -> str:
             for name, _, value in given
         ]
         return f"`{words[1]}({', '.join(values)})`"
-    return f"`{command}` with {', '.join(f'{keyword(name)} {value}'.strip() for name, _, value in given)}"
+    return found[0]  # Python has no such function: to be typed at a terminal

@@ -12,6 +12,7 @@ from orchestrator.cases.case import Case
 from orchestrator.cases.form.parameter_files import ParameterFile
 from orchestrator.cases.form.schema import Value
 from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.core.spelling import as_options
 from orchestrator.core.threads import alone
 from orchestrator.studies.points.codec import packed, plain, unpacked
 from orchestrator.studies.points.failure import Failure
@@ -140,10 +141,12 @@ Out = TypeVar("Out")
 
 
 def computed(task: AnyTask, compute: Callable[[AnyTask, Case], Out]) -> Out:
-    """Compute a point where it is: with the study's case, on one thread of BLAS; a failure becomes a record as well."""
+    """Compute a point where it is: with the study's case, on one thread of BLAS; a failure becomes a record as well.
+
+    Its texts name options as they are typed, in every worker process: a kept point is the same for everybody."""
     study = task.study
     case = same_case(study.reference, study.fingerprint, study.trust_fmus, study.varied)
-    with alone():
+    with alone(), as_options():
         try:
             return compute(task, case)
         except (

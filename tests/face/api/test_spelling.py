@@ -65,8 +65,9 @@ def test_questions_name_keywords_too():
         ("give --trust-fmus; see --min-damping", "give trust_fmus; see least_damping"),
         ("`gfor modes CASE --black-box` shows it", "`modes(black_box=True)` shows it"),
         ("`gfor check --only initial_outputs`", "`check(only='initial_outputs')`"),
-        ("`gfor black-box CASE --component sg1`", "`gfor black-box CASE` with component sg1"),
-        ("`gfor build --with-linear-model` packs", "`gfor build` with with_linear_model packs"),
+        ("`gfor black-box CASE --component sg1`", "`gfor black-box CASE --component sg1`"),
+        ("`gfor build --with-linear-model` packs", "`gfor build --with-linear-model` packs"),
+        ("(`gfor new --slack bus_1`)", "(`gfor new --slack bus_1`)"),
         ("(`--step 0.01`)", "(`step 0.01`)"),
         ("leave out --engine helics", "leave out federates"),
         ("start `helics_broker -f 2 --ipv4`", "start `helics_broker -f 2 --ipv4`"),
@@ -178,4 +179,6 @@ WRONG = {
 def test_an_error_of_the_face_has_no_word_of_the_command_line(case, tmp_path, call):
     with pytest.raises(CosimError) as caught:
         call(case, tmp_path)
-    assert not re.search(r"(^|[ `(])--[a-z]", str(caught.value)), str(caught.value)
+    said = str(caught.value)
+    # a whole command that no function stands for is to be typed at a terminal
+    assert not re.search(r"(^|[ `(])--[a-z]", re.sub("`gfor [^`]*`", "", said)), said

@@ -4,7 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from orchestrator.core.errors import InputError
+from orchestrator.core import spelling
+from orchestrator.core.errors import InputError, Problem
+from orchestrator.studies.points import task as points
 from orchestrator.studies.points.failure import failure_kept
 
 
@@ -36,3 +38,16 @@ def test_an_interrupt_ends_all_points():
     with pytest.raises(KeyboardInterrupt), failure_kept(result):
         raise KeyboardInterrupt
     assert result.failure is None
+
+
+def test_texts_of_a_point_name_options_as_they_are_typed_whoever_computes_it(monkeypatch):
+    """A worker process has not begun as a command, and its texts are shown by one."""
+    monkeypatch.setattr(spelling, "_commanded", [])
+    monkeypatch.setattr(points, "same_case", lambda *wanted: None)
+    question = Problem("own.raw", "write `gfor new --reactive-limits`, or --set grid.X=1")
+    asked = SimpleNamespace(study=SimpleNamespace(reference="", fingerprint="", trust_fmus=False))
+    asked.study.varied = frozenset()
+    assert points.computed(asked, lambda task, case: str(question)) == (
+        "own.raw: write `gfor new --reactive-limits`, or --set grid.X=1"
+    )
+    assert str(question).endswith("or values grid.X=1")
