@@ -21,9 +21,10 @@ from orchestrator.cases.form.names import close_names
 from orchestrator.cases.networks.data import bus_name, network_data
 from orchestrator.cases.networks.psse.raw_file import read_file
 from orchestrator.cases.networks.record_use import RecordUse, details, in_one_line
+from orchestrator.cases.new.refusal import of_what_was_given
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.scenario.short_circuit import source_impedance
-from orchestrator.core.errors import InputError, Problem, few
+from orchestrator.core.errors import CaseError, InputError, Problem, few
 from orchestrator.core.question_kinds import by_kind
 from orchestrator.core.uncollected import uncollected
 from orchestrator.core.units import to_unit
@@ -51,6 +52,7 @@ _EMT_STEP = 1e-4
 _MOST_CURVES = 12
 _MOST_MOVES = 5  # of taps and shunts that are named; the others are counted
 _EMF = """emf w·e''; [conventions] like = "psse" takes PSS/E's e'', which moves dampings by tenths of a point"""
+_LINE = re.compile(r"line (\d+)")  # of the text, as places of questions begin
 _CONVERTER = "gfor"
 _INJECTION = "injection"
 
@@ -95,12 +97,24 @@ class WantedCase:
         """A vendor's file has no phasor form."""
         return self.models or ("phasor" if self.device is None else "emt")
 
+    @property
+    def options(self) -> dict[str, tuple[str, ...]]:
+        """Return the values that were given by option."""
+        return {
+            "--slack": (self.slack,) if self.slack else (),
+            "--frequency": (self.frequency,) if self.frequency else (),
+            "--leave-out": self.leave_out,
+            "--dyr-leave-out": self.dyr_leave_out,
+            "--replace": self.replace,
+        }
+
 
 @dataclass(frozen=True)
 class NewCase:
     text: str
     assumed: tuple[str, ...]
     scenarios: tuple[PreparedScenario, ...]
+    questions: tuple[str, ...] = ()  # at the lines of the text
     black_box: bool = False  # whether its modes need --black-box
 
     @property
@@ -161,6 +175,14 @@ def write_case(wanted: WantedCase) -> NewCase:
     Raises `InputError` if a file, a bus or a machine cannot be used; as a case of these files would be refused."""
     sources = sources_of(wanted.files)
     _check_controls(wanted, sources)
+    try:
+        return _compose(wanted, sources)
+    except CaseError as error:
+        raise of_what_was_given(error, sources, wanted.options) from error
+
+
+def _compose(wanted: WantedCase, sources: dict[str, Path]) -> NewCase:
+    """Compose a case of the files, by the keys of the case that name them."""
     device = (
         None
         if wanted.device is None
@@ -189,9 +211,10 @@ def write_case(wanted: WantedCase) -> NewCase:
     else:
         scenarios = _prepared(draft.text, wanted, [])
     questions = dict.fromkeys(q for prepared in scenarios for q in prepared.questions)
-    text = _commented(draft.text, list(questions), sources)
+    text, numbers = _commented(draft.text, list(questions), sources)
     black_box = device is not None and not device.can_save_state
-    return NewCase(text, tuple(draft.assumed(len(questions))), tuple(scenarios), black_box)
+    placed = tuple(str(_renumber(question, numbers)) for question in questions)
+    return NewCase(text, tuple(draft.assumed(len(placed))), tuple(scenarios), placed, black_box)
 
 
 def _check_controls(wanted: WantedCase, sources: Mapping[str, Path]) -> None:
@@ -803,8 +826,10 @@ def _quoted(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
-def _commented(text: str, questions: Sequence[Problem], sources: dict[str, Path]) -> str:
-    """The text with every question as a comment above the line that it is about."""
+def _commented(
+    text: str, questions: Sequence[Problem], sources: dict[str, Path]
+) -> tuple[str, list[int]]:
+    """The text with every question as a comment above the line that it is about, and each line's new number."""
     lines = text.splitlines()
     above: dict[int, list[str]] = {}
     told = {
@@ -822,9 +847,21 @@ def _commented(text: str, questions: Sequence[Problem], sources: dict[str, Path]
                 break_long_words=False,
             )
         )
-    return (
-        "\n".join(part for k, line in enumerate(lines) for part in [*above.get(k, []), line]) + "\n"
-    )
+    written: list[str] = []
+    numbers = []
+    for k, line in enumerate(lines):
+        written += [*above.get(k, []), line]
+        numbers.append(len(written))
+    return "\n".join([*written, ""]), numbers
+
+
+def _renumber(question: Problem, numbers: Sequence[int]) -> Problem:
+    """Return a question at the line that has its key, by the new numbers of the lines."""
+    found = _LINE.match(question.place)
+    if found is None:
+        return question
+    number = numbers[int(found[1]) - 1]
+    return replace(question, place=f"line {number}{question.place[found.end() :]}")
 
 
 def _line_of(question: Problem, lines: Sequence[str], sources: dict[str, Path]) -> int:
@@ -832,5 +869,5 @@ def _line_of(question: Problem, lines: Sequence[str], sources: dict[str, Path]) 
     for key, path in sources.items():
         if path.name in question.place:
             return next(k for k, line in enumerate(lines) if line.startswith(f"{key} = "))
-    found = re.match(r"line (\d+)", question.place)
+    found = _LINE.match(question.place)
     return int(found[1]) - 1 if found else 2

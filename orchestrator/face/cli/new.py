@@ -91,7 +91,7 @@ def _written(options: argparse.Namespace) -> int:
                 "assumed": [*made.assumed],
                 "power_flow": beside,
                 "records": as_json(made.records),
-                "questions": [*dict.fromkeys(str(q) for p in made.scenarios for q in p.questions)],
+                "questions": [*dict.fromkeys(made.questions)],
             }
         )
     return 0

@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 import sys
 import tomllib
 from dataclasses import replace
@@ -242,6 +243,47 @@ def test_questions_stand_at_the_lines_that_they_are_about(files):
     assert "# question: " in above
     assert "the file is not solved" in above
     assert max(map(len, lines)) < 260
+
+
+def test_questions_name_the_lines_of_the_written_file(gfor, files):
+    """Comments move the lines on which the case's keys stand."""
+    out = files[0].parent / "case.toml"
+    code, printed, _ = gfor(*files, "--out", out, "--json")
+    assert code == 0
+    lines = out.read_text(encoding="utf-8").splitlines()
+    found = [re.match(r"line (\d+), ([\w.]+): ", q) for q in json.loads(printed)["questions"]]
+    keys = {one[2]: lines[int(one[1]) - 1] for one in found if one}
+    assert keys["network.raw"] == 'raw = "five.raw"'
+    assert keys["network"] == "[network]"
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["--slack", "bus_999"], "--slack bus_999: 'bus_999' is neither a unit"),
+        (["--frequency", "50 kV"], "--frequency '50 kV': '50 kV' is in kV"),
+        (["--replace", "77"], "--replace 77: there is no unit '77'"),
+        (["--leave-out", "foo"], "five.raw: leave_out: 'foo' is unknown"),
+    ],
+)
+def test_a_refusal_names_what_was_given_and_no_file_that_is_not_there(gfor, files, given, said):
+    out = files[0].parent / "case.toml"
+    code, _, err = gfor(*files, "--out", out, *given)
+    assert code == 2
+    assert not out.exists()
+    text = " ".join(err.split())
+    assert said in text
+    assert text.startswith("error: five.raw, five.dyr: ")
+    assert "case.toml" not in text
+    assert not re.search(r" line \d+, (network|power_flow|units)", text)
+
+
+def test_a_refusal_of_the_file_names_its_line(gfor, files):
+    raw = files[0]
+    raw.write_text(raw.read_text().replace("0.004,0.05", "x,0.05", 1))
+    code, _, err = gfor(*files)
+    assert code == 2
+    assert re.search(r"- \S*five\.raw, line \d+: ", err)
 
 
 def test_without_a_converter(files):
