@@ -144,11 +144,12 @@ class Case(CaseDefinition):
         )
         if problems:  # unusual data may be the reason of the failure
             kind = problems[0].kind  # a question besides is of no kind of its own
-            shown = by_kind(q.text for q in questions)
-            places = {q.text: q.place for q in reversed(questions)}
+            by_text: dict[str, Problem] = {}
+            for question in questions:
+                by_text.setdefault(question.text, question)
             asked = [
-                Problem(places[first], f"questioned besides: {line}", kind, besides=True)
-                for first, line in shown.items()
+                Problem(by_text[first].place, f"questioned besides: {line}", kind, besides=True)
+                for first, line in by_kind(by_text).items()
             ]
             raise CaseError(str(self.path), [*problems, *asked])
         if scenarios and self.numbered:

@@ -151,6 +151,25 @@ class HostileFmuError(FmuFileError):
 
 
 @dataclass(frozen=True, slots=True)
+class QuestionTopic:
+    """Subject of a question; of questions of one kind a command shows the first, and counts the others.
+
+    Attributes
+    ----------
+    kind : str
+        The same for questions that one answer could settle; it has no figure and no name of an element.
+    about : str
+        The element in question, as a list of such elements names it.
+    variables : tuple of str
+        The variables, ``component.variable``, that ``meant`` in the case file names to answer the question.
+    """
+
+    kind: str
+    about: str = ""
+    variables: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Problem:
     """One mistake in a case: its place, and what is wrong with the remedy."""
 
@@ -158,6 +177,7 @@ class Problem:
     text: str
     kind: ErrorKind = ErrorKind.VALUES
     besides: bool = False  # a question that stands beside a failure, as its likely reason
+    topic: QuestionTopic | None = None  # of a question that several elements can raise
 
     def __str__(self) -> str:
         return spelled(f"{self.place}: {self.text}" if self.place else self.text)

@@ -1,45 +1,53 @@
 """Questions of one kind in one line: the first of them, how many more there are, and about what."""
 
-import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
-from orchestrator.core.errors import few
+from orchestrator.core.errors import Problem, QuestionTopic, few
 
 _LEAST = 3  # questions of a kind from which one line stands for them
 _SHOWN = 4  # names of the others
-_OWN = re.compile(r"""'[^']*'|"[^"]*"|[^\s:,]*[/\\][^\s:,]*|[^\s:,;()]*\d[^\s:,;()]*""")
-"""Names, files and numbers: what differs between questions of one kind."""
-
-_NAME = re.compile(r"(?<![\w.])(?:[a-z]\w*?_?\d\w*)(?=[.:, ])")
-_MEANT = re.compile(r'meant = \["[^"]+?\.([\w.]+)"\]')
 
 
-def by_kind(texts: Iterable[str], command: str = "") -> dict[str, str]:
+def answer(variables: Sequence[str]) -> str:
+    """Return the line of a case file that says of variables that their values are meant."""
+    quoted = ", ".join(f'"{name}"' for name in variables)
+    return f"meant = [{quoted}]"
+
+
+def by_kind(questions: Mapping[str, Problem], command: str = "") -> dict[str, str]:
     """Return lines by the first question that they are for: each kind of which there are several has one line.
 
-    Questions are of one kind if they differ in names, places and numbers alone.
-
-    ``command``: lists all of them; it is not named where it is empty."""
+    Parameters
+    ----------
+    questions
+        The questions by their texts, as they are shown. One without a topic is the only one of its kind.
+    command
+        Lists all of them; it is not named where it is empty."""
     kinds: dict[str, list[str]] = {}
-    for text in texts:
-        kinds.setdefault(_OWN.sub("#", text), []).append(text)
-    return dict(pair for own in kinds.values() for pair in _lines(own, command))
+    for text, question in questions.items():
+        kind = question.topic.kind if question.topic else text
+        kinds.setdefault(kind, []).append(text)
+    lines = dict[str, str]()
+    for texts in kinds.values():
+        lines.update(_lines({text: questions[text].topic for text in texts}, command))
+    return lines
 
 
-def _lines(own: Sequence[str], command: str) -> Iterator[tuple[str, str]]:
-    if len(own) < _LEAST:
-        yield from zip(own, own, strict=True)
+def _lines(topics: Mapping[str, QuestionTopic | None], command: str) -> Iterator[tuple[str, str]]:
+    texts, known = [*topics], [topic for topic in topics.values() if topic]
+    if len(known) < _LEAST:
+        yield from zip(texts, texts, strict=True)
         return
-    first, others = own[0], own[1:]
-    names = dict.fromkeys(name for text in others for name in _names(text)[:1])
-    about = f" ({few(names, _SHOWN)})" if names else ""
-    answers = {found[1] for text in own if (found := _MEANT.search(text))}
-    if len(answers) == 1:
-        first = _MEANT.sub(f'meant = ["*.{answers.pop()}"]', first)
+    others = [topic.about for topic in known[1:] if topic.about]
+    about = f" ({few(dict.fromkeys(others), _SHOWN)})" if others else ""
     listed = f"; {command} lists all" if command else ""
-    yield own[0], f"{first} [and {len(others)} more of this kind{about}{listed}]"
+    more = f"[and {len(texts) - 1} more of this kind{about}{listed}]"
+    yield texts[0], f"{_with_answer_for_all(texts[0], known)} {more}"
 
 
-def _names(text: str) -> list[str]:
-    """Names of elements in a question, behind its place."""
-    return _NAME.findall(re.sub(r"\S*[/\\]\S*|\bline \d+", "", text))
+def _with_answer_for_all(text: str, topics: Sequence[QuestionTopic]) -> str:
+    """Have a question name the answer to all of its kind, where all are about the same variable of a component."""
+    variables = {name.partition(".")[2] for topic in topics for name in topic.variables}
+    if len(variables) != 1:
+        return text
+    return text.replace(answer(topics[0].variables), answer([f"*.{variables.pop()}"]))

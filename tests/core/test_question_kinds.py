@@ -5,20 +5,31 @@ import re
 
 import pytest
 
+from orchestrator.core.errors import Problem, QuestionTopic
 from orchestrator.core.question_kinds import by_kind
 from tests.cases.networks.psse.test_questions import CASE, DYR, RAW, changed
 
-_TIMES = [
-    f"own files/own.dyr, line {n}, sg{n}.machine.T_d10: sg{n}: machine.T_d10 = 0.{n} s is outside of 1 to 20 s; if it "
-    f'is meant, say so at the top of the case: meant = ["sg{n}.machine.T_d10"]'
-    for n in range(1, 8)
-]
+
+def question_about(n):
+    name = f"sg{n}.machine.T_d10"
+    return Problem(
+        f"own files/own.dyr, line {n}, {name}",
+        f"sg{n}: machine.T_d10 = 0.{n} s is outside of 1 to 20 s; if it is meant, say so at the top of the case: "
+        f'meant = ["{name}"]',
+        topic=QuestionTopic("T_d10 outside of 1 to 20 s", f"sg{n}", (name,)),
+    )
+
+
+_TIMES = {str(question): question for question in map(question_about, range(1, 8))}
 
 
 def test_a_kind_has_one_line_with_the_first_names_and_a_remedy_for_all():
-    other = "line 3, power_flow: limits of reactive power are reached"
-    lines = by_kind([_TIMES[0], other, *_TIMES[1:]], "gfor modes x --details")
-    assert [*lines] == [_TIMES[0], other]
+    limits = Problem("line 3, power_flow", "limits of reactive power are reached")
+    (first_time, *_), other = _TIMES, str(limits)
+    lines = by_kind(
+        {first_time: _TIMES[first_time], other: limits} | _TIMES, "gfor modes x --details"
+    )
+    assert [*lines] == [first_time, other]
     first, second = lines.values()
     assert second == other
     assert 'meant = ["*.machine.T_d10"] [and 6 more of this kind (sg2' in first
@@ -27,7 +38,24 @@ def test_a_kind_has_one_line_with_the_first_names_and_a_remedy_for_all():
 
 @pytest.mark.parametrize("number", [1, 2])
 def test_one_or_two_stand_as_they_are(number):
-    assert [*by_kind(_TIMES[:number], "x").values()] == _TIMES[:number]
+    some = dict([*_TIMES.items()][:number])
+    assert [*by_kind(some, "x").values()] == [*some]
+
+
+def test_sentences_that_differ_in_figures_alone_are_of_no_common_kind():
+    """The words of a user's own file decide nothing."""
+    texts = {f"bus {n} is 'weak {n}'": Problem("", f"bus {n} is 'weak {n}'") for n in range(5)}
+    assert [*by_kind(texts).values()] == [*texts]
+
+
+def test_an_answer_for_all_is_named_only_where_one_variable_is_asked_about():
+    def asked(variable):
+        text = f'{variable} is odd: meant = ["{variable}"]'
+        return Problem("", text, topic=QuestionTopic("odd", variable, (variable,)))
+
+    several = [asked(f"sg1.{name}") for name in ("H", "D", "K")]
+    (line,) = by_kind({q.text: q for q in several}).values()
+    assert 'meant = ["sg1.H"] [and 2 more of this kind (sg1.D, sg1.K)]' in line
 
 
 def test_a_command_shows_a_kind_once_and_its_remedy_answers_all(gfor, tmp_path):

@@ -14,7 +14,7 @@ from orchestrator.cases.flow.sharing import power_limits
 from orchestrator.cases.form import schema
 from orchestrator.cases.form.names import close_names, hint_at
 from orchestrator.cases.settings.assignment import convert_value
-from orchestrator.core.errors import InputError, Problem
+from orchestrator.core.errors import InputError, Problem, QuestionTopic
 from orchestrator.systems.coupling import events as coupled
 from orchestrator.systems.coupling.clock import Clock
 from orchestrator.systems.coupling.events import Event
@@ -97,7 +97,8 @@ def _note_late(draft: Draft, time: float, stop: float, where: str) -> None:
     if stop == draft.given.case.solver.stop_time:
         draft.note(where, f"{text}; give it an earlier time, or the run a later solver.stop_time")
     else:
-        draft.found.questions.append(Problem(where, f"{text} (--stop)"))
+        topic = QuestionTopic("an event after the stop")
+        draft.found.questions.append(Problem(where, f"{text} (--stop)", topic=topic))
 
 
 def _endless(table: schema.EventTable, stop: float) -> Iterator[str]:
@@ -176,7 +177,8 @@ def forcing_events(
         if table.component in draft.given.scenario.remove:
             if table.place:
                 text = f"{table.place} cannot act: the scenario has no {table.component}"
-                draft.found.questions.append(Problem("", text))
+                topic = QuestionTopic("an event at a removed component", table.component)
+                draft.found.questions.append(Problem("", text, topic=topic))
         else:
             names = list(draft.system.components)
             known = close_names(table.component, names, f"the case has: {', '.join(draft.tables)}")

@@ -7,7 +7,7 @@ from itertools import groupby
 from fmus.grid.network import Network
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.flow.connected import connected_parts
-from orchestrator.core.errors import Problem, few
+from orchestrator.core.errors import Problem, QuestionTopic, few
 from orchestrator.systems.coupling.events import Event
 
 _SHOWN = 5  # buses that a question names; the others are counted
@@ -44,6 +44,7 @@ def question_islands(draft: Draft, events: Sequence[tuple[Event, str]]) -> None:
                         f"from t = {time:g} s on no unit is connected to {few(part, _SHOWN)}: nothing "
                         "holds the voltage and the frequency of the loads there, and no verdict speaks of them; trip "
                         "these loads at the same time",
+                        topic=QuestionTopic("a part without a unit"),
                     )
                 )
 

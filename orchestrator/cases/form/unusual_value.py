@@ -15,8 +15,11 @@ class UnusualValue:
         File and line of the value, as messages write them.
     text : str
         The question: the value seen, what is usual, and why it matters.
+    kind : str
+        The question without figures and elements: the same for questions that one answer could settle.
     """
 
     name: str
     place: str
     text: str
+    kind: str

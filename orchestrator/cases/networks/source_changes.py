@@ -1,9 +1,13 @@
 """Contents of a network's source that our network has in another form, or not at all: listed, by kind."""
 
+import re
 from collections import defaultdict
 
-from orchestrator.core.errors import Problem
+from orchestrator.core.errors import Problem, QuestionTopic
 from orchestrator.core.foreign_files import one_line
+
+_OWN = re.compile(r"""'[^']*'|[^\s:,;()]*\d[^\s:,;()]*""")
+"""Names and figures of our own sentence on a record: what differs between records that are changed in the same way."""
 
 
 class Changes:
@@ -18,9 +22,13 @@ class Changes:
         self._items[text].append(item)
 
     def listed(self) -> list[Problem]:
-        """One row for each kind, complete: how many, what was done, and every line or name."""
+        """One row for each text, complete: how many, what was done, and every line or name."""
         return [
-            Problem(f"{self._place}, {self._place_of(items)}", text)
+            Problem(
+                f"{self._place}, {self._place_of(items)}",
+                text,
+                topic=QuestionTopic(_OWN.sub("#", text)),
+            )
             for text, items in self._items.items()
         ]
 

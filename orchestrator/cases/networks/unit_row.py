@@ -3,12 +3,23 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from orchestrator.cases.networks.measured_point import MeasuredPoint
 from orchestrator.core.errors import InputError
 
 _MOST_VOLTAGE = 2.0  # largest voltage [pu] that a unit can hold
+
+
+class DoubtOfRecord(NamedTuple):
+    """A question that a record of a machine raises, about a variable or a part of the machine.
+
+    ``place``: file and line; ``kind``: the question without figures, the same for all machines that raise it."""
+
+    variable: str
+    place: str
+    text: str
+    kind: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +45,7 @@ class UnitRow:
     q_min_mvar: float = -math.inf
     q_max_mvar: float = math.inf
     converter: str | None = None  # model of the converter that the whole unit is by its record
-    # questions about the generator's data: parameter, place and text
-    doubts: tuple[tuple[str, str, str], ...] = ()
+    doubts: tuple[DoubtOfRecord, ...] = ()  # questions about the generator's data
     # lines of records for which the converter's model stands, each with what it leaves out.
     replaced: tuple[tuple[int, str], ...] = ()
     # lines of the records that give parameters, by parameter

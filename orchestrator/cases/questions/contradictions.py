@@ -7,7 +7,7 @@ from orchestrator.cases.form.build_choices import STAND_IN
 from orchestrator.cases.form.names import close_names
 from orchestrator.cases.form.schema import CaseTable, ComponentTable
 from orchestrator.cases.form.values import TWICE, flatten, given_twice
-from orchestrator.core.errors import Problem
+from orchestrator.core.errors import Problem, QuestionTopic
 from orchestrator.core.units import to_unit
 
 Locate = Callable[..., str]
@@ -118,7 +118,9 @@ def _stand_ins(case: CaseTable, place: Locate) -> Iterator[Problem]:
             and fed[name] != fed[other]
         ):
             text = f"{name} feeds {fed[name]:.4g} MW, and {other}, which stands for it, {fed[other]:.4g} MW"
-            yield Problem(place("components", other), f"{text}: give both the same S_n and P_0")
+            topic = QuestionTopic("a stand-in with another power", other)
+            remedy = "give both the same S_n and P_0"
+            yield Problem(place("components", other), f"{text}: {remedy}", topic=topic)
 
 
 def _is_named_alike(device: str, still: str) -> bool:

@@ -5,7 +5,7 @@ from collections.abc import Collection, Mapping, Sequence
 from itertools import groupby
 from types import MappingProxyType
 
-from orchestrator.core.errors import Problem, few
+from orchestrator.core.errors import Problem, QuestionTopic, few
 from orchestrator.systems.coupling.events import Event
 from orchestrator.systems.coupling.system import System
 
@@ -66,10 +66,13 @@ def idle_values(
     for name, of_one in groupby(sorted(absent.keys() & keys), lambda key: key.partition(".")[0]):
         missing = list(of_one)
         text = f"{few(missing, _SHOWN)} cannot act: the scenario has no {name}"
-        found |= dict.fromkeys(missing, Problem(absent[missing[0]], text))
+        topic = QuestionTopic("values of a component that the scenario lacks", name)
+        found |= dict.fromkeys(missing, Problem(absent[missing[0]], text, topic=topic))
     for name, variable in given:
         key, why = f"{name}.{variable}", why_idle(system, name, variable, moved)
-        found[key] = Problem(places.get(key, ""), f"{key} cannot act: {why}") if why else None
+        topic = QuestionTopic(f"{variable} cannot act", name)
+        asked = Problem(places.get(key, ""), f"{key} cannot act: {why}", topic=topic)
+        found[key] = asked if why else None
     return found
 
 

@@ -20,7 +20,8 @@ from orchestrator.cases.questions.plausible_networks import network_doubts
 from orchestrator.cases.questions.plausible_ranges import SMALLEST_SHARE
 from orchestrator.cases.questions.plausible_sources import SOLVED, source_doubts
 from orchestrator.cases.questions.plausible_values import outside, place_of, unit_of, value_of
-from orchestrator.core.errors import Problem, few
+from orchestrator.core.errors import Problem, QuestionTopic, few
+from orchestrator.core.question_kinds import answer
 from orchestrator.devices.fmi.port import BoundDescription
 from orchestrator.systems.coupling.schedule import SECOND_ORDER
 from orchestrator.systems.coupling.system import ComponentPlan
@@ -148,16 +149,18 @@ def check_plausibility(draft: Draft) -> None:
     thousands = [
         (name, text) for name, text in draft.found.thousandfold.items() if name not in ranges
     ]
-    doubts += (UnusualValue(name, draft.places[name], text) for name, text in thousands)
+    doubts += (
+        UnusualValue(name, draft.places[name], text, "a thousand times the value of the file")
+        for name, text in thousands
+    )
     question(draft, [doubt for doubt in doubts if not _is_varied(draft.given.varied, doubt)])
 
 
 def question(draft: Draft, doubts: Iterable[UnusualValue]) -> None:
     """Add questions to the draft's, without those that the case answers; equal ones become one."""
     meant = draft.given.case.meant
-    draft.found.questions += _merged(
-        [d for d in doubts if not any(fnmatch.fnmatchcase(d.name, m) for m in meant)]
-    )
+    open_ = [d for d in doubts if not any(fnmatch.fnmatchcase(d.name, m) for m in meant)]
+    draft.found.questions += _merged(open_, draft.grid)
 
 
 def _is_varied(varied: Iterable[str], doubt: UnusualValue) -> bool:
@@ -207,18 +210,17 @@ def _doubts(draft: Draft) -> Iterator[UnusualValue]:
                 and value_of(plan, own) is not None
             ):
                 text = f"{of_lead} = {lead:g} s, the lead, exceeds {of_lag} = {lag:g} s, the lag; are the two swapped?"
-                yield UnusualValue(
-                    f"{name}.{of_lead}", place_of(draft, name, of_lead, of_lag), text
-                )
+                place = place_of(draft, name, of_lead, of_lag)
+                yield UnusualValue(f"{name}.{of_lead}", place, text, f"{of_lead} above {of_lag}")
         for resistance, reactance in RESISTANCES:
             R, X = value_of(plan, resistance), value_of(plan, reactance)
             if R is not None and X is not None and R > 1.05 * X > 0:
                 text = (
                     f"{resistance} = {R:g} pu exceeds {reactance} = {X:g} pu; are the two swapped?"
                 )
-                yield UnusualValue(
-                    f"{name}.{resistance}", place_of(draft, name, resistance, reactance), text
-                )
+                place = place_of(draft, name, resistance, reactance)
+                kind = f"{resistance} above {reactance}"
+                yield UnusualValue(f"{name}.{resistance}", place, text, kind)
     yield from _small_units(draft)
     yield from network_doubts(draft)
     yield from source_doubts(draft)
@@ -249,9 +251,8 @@ def _ratings(draft: Draft) -> Iterator[UnusualValue]:
             continue
         for rated, said in found.unlike_delivered().items():
             text = f"the binding has {said}: is the binding's rating that of one unit as delivered?"
-            yield UnusualValue(
-                f"{name}.{rated}", draft.given.place("components", name, "binding"), text
-            )
+            place = draft.given.place("components", name, "binding")
+            yield UnusualValue(f"{name}.{rated}", place, text, f"{rated} of a binding")
 
 
 def question_loading(draft: Draft, flow: PowerFlow | None) -> None:
@@ -290,7 +291,8 @@ def _rescaled(draft: Draft, flow: PowerFlow | None) -> Iterator[UnusualValue]:
                 if abs(P * before) <= S_n
                 else ""
             )
-            yield UnusualValue(f"{name}.S_n", place_of(draft, name, "S_n"), text)
+            kind = "a rating that moves a power"
+            yield UnusualValue(f"{name}.S_n", place_of(draft, name, "S_n"), text, kind)
 
 
 _LOAD_LIMITS = ("governor.ld_ref", "governor.A_T")
@@ -307,7 +309,8 @@ def _beyond_load_limits(draft: Draft) -> Iterator[UnusualValue]:
             f"{limit} = {held:g} pu, the load that the turbine's limiter holds, is not above the operating "
             f"point's {P_m:.4g} pu; the limiter holds a load just above that instead, and the turbine gives no more"
         )
-        yield UnusualValue(f"{name}.{limit}", place_of(draft, name, limit), text)
+        kind = f"{limit} below the operating point"
+        yield UnusualValue(f"{name}.{limit}", place_of(draft, name, limit), text, kind)
 
 
 def _mechanical_power(plan: ComponentPlan) -> float | None:
@@ -357,7 +360,8 @@ def _overloaded(draft: Draft) -> Iterator[UnusualValue]:
             f"the operating point, P_0 = {P:.4g} pu and Q_0 = {Q:.4g} pu, asks for {apparent:.3g} pu of "
             f"S_n = {S_n:g} MVA, more than the rating of the {plan.kind}"
         )
-        yield UnusualValue(f"{name}.S_n", place_of(draft, name, "S_n"), text)
+        kind = f"a {plan.kind} above its rating"
+        yield UnusualValue(f"{name}.S_n", place_of(draft, name, "S_n"), text, kind)
 
 
 # -- one value ---------------------------------------------------------------------------------------
@@ -452,7 +456,8 @@ def _broken_orders(draft: Draft, broken: Iterable[tuple[str, Rule, str]]) -> Ite
         if asked and (name, rule.smaller) not in refused:
             place = place_of(draft, name, rule.smaller, rule.larger)
             warned = f"{text}; PSS/E only warns, and the equations hold with it"
-            yield UnusualValue(f"{name}.{rule.smaller}", place, warned)
+            kind = f"{rule.smaller} not below {rule.larger}"
+            yield UnusualValue(f"{name}.{rule.smaller}", place, warned, kind)
 
 
 # -- several components ------------------------------------------------------------------------------
@@ -527,23 +532,30 @@ def _small_units(draft: Draft) -> Iterator[UnusualValue]:
         whole = sum(ratings[n] for n in shared) if shared else S_n
         if whole < SMALLEST_SHARE * ratings[largest]:
             text = f"S_n = {S_n:g} MVA beside {largest}'s {ratings[largest]:g} MVA; is it in MVA?"
-            yield UnusualValue(f"{name}.S_n", place_of(draft, name, "S_n"), text)
+            kind = "a small rating"
+            yield UnusualValue(f"{name}.S_n", place_of(draft, name, "S_n"), text, kind)
 
 
 # -- questions ---------------------------------------------------------------------------------------
 
 
-def _merged(doubts: list[UnusualValue]) -> list[Problem]:
-    """Merge equal questions about several components into one, and add how to answer it."""
-    groups: dict[tuple[str, str], list[str]] = {}
+def _merged(doubts: list[UnusualValue], grid: str | None) -> list[Problem]:
+    """Merge equal questions about several components into one, and add how to answer it.
+
+    ``grid``: the component whose lines and loads are elements of their own."""
+    groups: dict[tuple[str, str, str], list[str]] = {}
     for doubt in doubts:
-        groups.setdefault((doubt.place, doubt.text), []).append(doubt.name)
-    return [Problem(place, _question(text, names)) for (place, text), names in groups.items()]
+        groups.setdefault((doubt.place, doubt.text, doubt.kind), []).append(doubt.name)
+    questions = []
+    for (place, text, kind), names in groups.items():
+        component, _, variable = names[0].partition(".")
+        about = variable.partition(".")[0] if component == grid else component
+        answers = names if len(names) <= _SHOWN else [f"*.{variable}"]
+        topic = QuestionTopic(kind, about, tuple(answers))
+        questions.append(Problem(place, _question(text, names, answers), topic=topic))
+    return questions
 
 
-def _question(text: str, names: list[str]) -> str:
-    components = [name.partition(".")[0] for name in names]
-    variable = names[0].partition(".")[2]
-    answers = names if len(names) <= _SHOWN else [f"*.{variable}"]
-    quoted = ", ".join(f'"{name}"' for name in answers)
-    return f"{few(components, _SHOWN)}: {text}; if it is meant, say so at the top of the case: meant = [{quoted}]"
+def _question(text: str, names: list[str], answers: list[str]) -> str:
+    asked = f"{few((name.partition('.')[0] for name in names), _SHOWN)}: {text}"
+    return f"{asked}; if it is meant, say so at the top of the case: {answer(answers)}"

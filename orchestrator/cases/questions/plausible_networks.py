@@ -56,9 +56,8 @@ def _equivalents(draft: Draft, name: str, network: Network) -> Iterator[UnusualV
                 f"{len(found)} of {len(network.lines)} branches have a negative {what}: {shown}; as equivalents "
                 "of a reduced network they are taken as admittances, which hold at rated frequency alone"
             )
-            yield UnusualValue(
-                f"{name}.{found[0].variable(quantity)}", draft.given.place("network"), text
-            )
+            variable, place = found[0].variable(quantity), draft.given.place("network")
+            yield UnusualValue(f"{name}.{variable}", place, text, f"a negative {what}")
 
 
 def _unlike_others(
@@ -80,9 +79,9 @@ def _unlike_others(
                 f"{variable} = {X:g} pu: its X/R is {times[0]:.3g} times and its X/B {times[1]:.3g} times that of the "
                 f"middle line; has X a digit too {'many' if times[0] > 1 else 'few'}?"
             )
-            yield UnusualValue(
-                f"{name}.{variable}", _place(draft, "lines", line.name, "X", variable), text
-            )
+            place = _place(draft, "lines", line.name, "X", variable)
+            kind = "a reactance unlike those of other lines"
+            yield UnusualValue(f"{name}.{variable}", place, text, kind)
 
 
 def _unlike_twins(
@@ -104,9 +103,9 @@ def _unlike_twins(
                     f"the parallel {one.name} has {own[odd[0]]:g} pu",
                 )
                 text = f"{variable} = {its[odd[0]]:g} pu, and {its_twins}, with like other data"
-                yield UnusualValue(
-                    f"{name}.{variable}", _place(draft, "lines", other.name, odd[0], variable), text
-                )
+                place = _place(draft, "lines", other.name, odd[0], variable)
+                kind = f"{odd[0]} unlike the parallel circuit's"
+                yield UnusualValue(f"{name}.{variable}", place, text, kind)
 
 
 def _line(draft: Draft, name: str, grid: ComponentPlan, line: Line) -> Iterator[UnusualValue]:
@@ -133,7 +132,8 @@ def _line(draft: Draft, name: str, grid: ComponentPlan, line: Line) -> Iterator[
             f"{variables['X_C']} = {X_C:g} pu is {X_C / X:.3g} of {variables['X']} = {X:g} pu, outside of "
             f"{COMPENSATION.low:g} to {COMPENSATION.high:g} ({COMPENSATION.why})"
         )
-        yield UnusualValue(f"{name}.{variables['X_C']}", place("X_C"), text)
+        name_of_capacitor = f"{name}.{variables['X_C']}"
+        yield UnusualValue(name_of_capacitor, place("X_C"), text, "series compensation")
 
 
 def _transformer(
@@ -168,7 +168,7 @@ def _shift(
 ) -> Iterator[UnusualValue]:
     if shift is not None and abs(shift) > math.pi:
         text = f"{variable} = {shift:g} rad is more than half a turn; if it is in degrees, write '{shift:g} deg'"
-        yield UnusualValue(f"{component}.{variable}", place, text)
+        yield UnusualValue(f"{component}.{variable}", place, text, "a shift in degrees")
 
 
 def _swapped(
@@ -176,7 +176,8 @@ def _swapped(
 ) -> Iterator[UnusualValue]:
     if R > MOST_R_OVER_X * X > 0:
         text = f"{resistance} = {R:g} pu is {R / X:.3g} times {reactance} = {X:g} pu; are the two swapped?"
-        yield UnusualValue(f"{component}.{resistance}", place, text)
+        kind = "a resistance above the reactance"
+        yield UnusualValue(f"{component}.{resistance}", place, text, kind)
 
 
 def _place(draft: Draft, kind: str, element: str, key: str, *variables: str) -> str:

@@ -43,7 +43,7 @@ def source_doubts(draft: Draft) -> Iterator[UnusualValue]:
         return
     where = place_of_source(draft)
     if draft.data.misfit:
-        yield UnusualValue(f"{draft.grid}.{SOLVED}", where, draft.data.misfit)
+        yield UnusualValue(f"{draft.grid}.{SOLVED}", where, draft.data.misfit, "a flat start")
     yield from _negative_loads(draft, draft.grid, where)
     yield from _hundredths(draft.grid, "shunt", "Mvar", draft.data.capacitors, where)
     loads = {
@@ -70,9 +70,8 @@ def _negative_loads(draft: Draft, grid: str, where: str) -> Iterator[UnusualValu
         apart = f"static_{number}" in names
         beside = " beside what loads draw there" if apart else ""
         text = f"the load at {bus} is {p_mw:g} MW, below zero{beside}: it feeds in, as static generation; is its "
-        yield UnusualValue(
-            f"{grid}.{'static' if apart else 'load'}_{number}.P", where, f"{text}sign right?"
-        )
+        name = f"{grid}.{'static' if apart else 'load'}_{number}.P"
+        yield UnusualValue(name, where, f"{text}sign right?", "a load below zero")
 
 
 def _hundredths(
@@ -89,7 +88,8 @@ def _hundredths(
             f"the {what} at bus_{number} has {b:g} {unit}, where the others have {min(others):g} to "
             f"{max(others):g} {unit}: is {100 * b:g} {unit} meant?"
         )
-        yield UnusualValue(f"{grid}.{what}_{number}.{'B' if what == 'shunt' else 'P'}", where, text)
+        name = f"{grid}.{what}_{number}.{'B' if what == 'shunt' else 'P'}"
+        yield UnusualValue(name, where, text, f"a {what} much smaller than the others")
 
 
 def _step_up(draft: Draft, name: str, grid: ComponentPlan, where: str) -> Iterator[UnusualValue]:
@@ -133,7 +133,7 @@ def _step_up(draft: Draft, name: str, grid: ComponentPlan, where: str) -> Iterat
                 f"step-up transformers have {low:g} to {high:g} pu there; {meant}"
             )
             place = draft.places.get(f"{name}.{variable}", f"{where}, {branches[0].name}")
-            yield UnusualValue(f"{name}.{variable}", place, text)
+            yield UnusualValue(f"{name}.{variable}", place, text, "an unusual step-up transformer")
 
 
 def _saturation(draft: Draft) -> Iterator[UnusualValue]:
@@ -151,7 +151,8 @@ def _saturation(draft: Draft) -> Iterator[UnusualValue]:
         "S(1.2)"
     )
     where = draft.given.place("units")
-    yield from (UnusualValue(f"{name}.machine.s_10", where, text) for name in without)
+    kind = "no saturation"
+    yield from (UnusualValue(f"{name}.machine.s_10", where, text, kind) for name in without)
 
 
 def _unlike_others(draft: Draft) -> Iterator[UnusualValue]:
@@ -175,7 +176,8 @@ def _unlike_others(draft: Draft) -> Iterator[UnusualValue]:
             if high <= _ALIKE * low and (value > _UNLIKE * high or value < low / _UNLIKE):
                 beside = f"the {len(others)} other machines have {low:g} to {high:g}"
                 text = f"{variable} = {value:g}, where {beside}: is it so?"
-                yield UnusualValue(f"{name}.{variable}", place_of(draft, name, variable), text)
+                place, kind = place_of(draft, name, variable), f"{variable} unlike the others"
+                yield UnusualValue(f"{name}.{variable}", place, text, kind)
 
 
 def _own_converters(draft: Draft) -> Iterator[UnusualValue]:
@@ -207,9 +209,9 @@ def _own_converters(draft: Draft) -> Iterator[UnusualValue]:
                     if P < 0
                     else f"feeds {P * S_n:g} MW with S_n = {S_n:g} MVA"
                 )
-                yield UnusualValue(
-                    f"{port.name}.P_0", place, f"P_0 = {P:g} pu: it {said}; is it so?"
-                )
+                kind = "a converter that draws power" if P < 0 else "a converter with little power"
+                text = f"P_0 = {P:g} pu: it {said}; is it so?"
+                yield UnusualValue(f"{port.name}.P_0", place, text, kind)
         elif plan.kind != "converter":
             beside += P * S_n
     less, fed = sum(left.values()), sum(own.values()) + beside
@@ -224,7 +226,9 @@ def _own_converters(draft: Draft) -> Iterator[UnusualValue]:
             f"with P_0 and S_n the case's converters feed {fed:.4g} MW, and the file's units {less:.4g} MW less than "
             "in the file; the slack takes the difference: is one of them wrong?"
         )
-        yield from (UnusualValue(f"{name}.P_0", place_of(draft, name, "P_0"), text) for name in own)
+        kind = "the power of the case's converters"
+        for name in own:
+            yield UnusualValue(f"{name}.P_0", place_of(draft, name, "P_0"), text, kind)
 
 
 def _is_of_some(less: float, powers: Sequence[float]) -> bool:

@@ -59,6 +59,7 @@ def outside(
     declared = "pu" if info is None else info.unit
     unit = f" {declared}" if declared != "1" else ""
     slip = f"; is it {wanted.slip}?" if wanted.slip else ""
+    slipped = wanted.slip
     ratio = declared in ("pu", "1")
     for meant, text, far, cause in (
         (
@@ -77,6 +78,7 @@ def outside(
         ),
     ):
         if far and not slip and wanted.low <= meant <= wanted.high:
+            slipped = cause or "a factor of 1000"
             slip = (
                 f"; is it {cause}? {meant:.4g}{unit} would be usual"
                 if cause
@@ -88,6 +90,7 @@ def outside(
         else f"{given:g}{unit} on {bases[0]}, {value:.4g}{unit} on {bases[1]},"
     )
     text = f"{variable} = {shown} is outside of {wanted.low:g} to {wanted.high:g}{unit} ({wanted.why}){slip}"
-    yield UnusualValue(
-        f"{component}.{variable}", where or place_of(draft, component, variable), text
-    )
+    place = where or place_of(draft, component, variable)
+    of_which = "the network" if component == draft.grid else variable  # its elements are alike
+    kind = f"{of_which}, {wanted.why}: {slipped}"
+    yield UnusualValue(f"{component}.{variable}", place, text, kind)

@@ -59,7 +59,8 @@ def undecided_units(draft: Draft, units: Mapping[str, str], slack: str) -> Itera
             continue
         default = f"v_0 = {plan.number('v_0'):g} {unit_of(plan, 'v_0')}"
         text = f"neither v_0 nor Q_0 is given: its default, {default}, {_HELD}"
-        yield UnusualValue(f"{name}.v_0", place_of(draft, name, "v_0"), text)
+        place = place_of(draft, name, "v_0")
+        yield UnusualValue(f"{name}.v_0", place, text, "neither v_0 nor Q_0")
 
 
 def _place(draft: Draft, name: str, variable: str) -> str:

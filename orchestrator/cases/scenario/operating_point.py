@@ -20,7 +20,7 @@ from orchestrator.cases.scenario.start_values import (
     is_connected,
     start_from_power_flow,
 )
-from orchestrator.core.errors import ErrorKind, InputError, Problem, few
+from orchestrator.core.errors import ErrorKind, InputError, Problem, QuestionTopic, few
 
 _USUAL_VOLTAGES = (0.8, 1.2)  # magnitudes [pu] of bus voltages that are not questioned
 _CLOSE = 1e-3  # power [pu of the rating] by which a limit is not passed
@@ -124,7 +124,11 @@ def _leftover(draft: Draft, flow: PowerFlow) -> Iterator[Problem]:
     """Powers that were asked of units at the slack bus, which feeds what is left, and limits that this exceeds."""
     for name in (unit for unit in flow.balancing if f"{unit}.P_0" in draft.given.from_outside):
         fed = f"{flow.slack} is the slack and feeds what is left, here P_0 = {flow.powers[name].real:.4g} pu"
-        yield Problem(draft.places.get(f"{name}.P_0", ""), f"{name}.P_0 cannot act: {fed}")
+        place, topic = (
+            draft.places.get(f"{name}.P_0", ""),
+            QuestionTopic("a power at the slack", name),
+        )
+        yield Problem(place, f"{name}.P_0 cannot act: {fed}", topic=topic)
     for name in flow.balancing:
         rating = draft.system.components[name].number("S_n")
         fed_mw, close = flow.powers[name].real * rating, _CLOSE * rating

@@ -47,7 +47,7 @@ from orchestrator.cases.settings.assignment import EMF, TORQUE, assign_values
 from orchestrator.cases.settings.imperfection_tables import disturb_connections
 from orchestrator.cases.settings.layers import value_layers
 from orchestrator.cases.settings.references import references_of
-from orchestrator.core.errors import InputError, Problem
+from orchestrator.core.errors import InputError, Problem, QuestionTopic
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.devices.fmi.instance import is_ours
@@ -459,6 +459,7 @@ class Preparer:
             Problem(
                 given.place("analysis", "areas", found[1]),
                 counts.format(name, " and ".join(found), found[0]),
+                topic=QuestionTopic("a machine in two areas", name),
             )
             for name, found in in_two_areas(given.case.analysis.areas, system).items()
         ]

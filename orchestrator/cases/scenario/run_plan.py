@@ -8,7 +8,7 @@ from orchestrator.cases.form.names import close_names, variables_of
 from orchestrator.cases.form.schema import LONGEST_STEP, ForcingTable
 from orchestrator.cases.questions.mentions import shown_signals
 from orchestrator.cases.scenario.scheduling import schedule_of
-from orchestrator.core.errors import InputError, Problem
+from orchestrator.core.errors import InputError, Problem, QuestionTopic
 from orchestrator.systems.coupling.clock import Clock
 from orchestrator.systems.coupling.schedule import Schedule
 
@@ -121,7 +121,7 @@ def recorded(draft: Draft) -> tuple[tuple[str, ...], list[Problem]]:
         ]
         if missing:
             text = f"{expression!r} is not shown, because solver.record leaves out {' and '.join(missing)}"
-            questions.append(Problem(place, text))
+            questions.append(Problem(place, text, topic=QuestionTopic("a signal that is not kept")))
     return tuple(name for name in outputs if name in wanted), questions
 
 

@@ -294,9 +294,9 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
         draft,
         [
             *(
-                UnusualValue(f"sg{row.label}.{v}", at, text)
+                UnusualValue(f"sg{row.label}.{doubt.variable}", doubt.place, doubt.text, doubt.kind)
                 for row in machine_rows
-                for v, at, text in row.doubts
+                for doubt in row.doubts
             ),
             *missing_records(machine_rows, str(path)),
         ],

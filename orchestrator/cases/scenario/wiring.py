@@ -6,7 +6,7 @@ from difflib import get_close_matches
 from fmus.toolchain.catalogue import model_names
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.scenario.measured_points import measured_sources
-from orchestrator.core.errors import InputError, Problem, few
+from orchestrator.core.errors import InputError, Problem, QuestionTopic, few
 
 _PHASOR_PORT = ("e_re", "e_im", "y_re", "y_im")  # what a device gives to a network of phasors
 
@@ -84,7 +84,8 @@ def _check_forms(draft: Draft, names: list[str]) -> None:
             f"({draft.tables[draft.grid].model}): its current would follow the voltage at once; take "
             f"{model.removesuffix('_phasor')!r}, or model = 'phasor_grid' for the network and phasor models for all"
         )
-        draft.found.questions.append(Problem(_place_of_model(draft, others[0]), text))
+        topic = QuestionTopic("a phasor model at an EMT network", others[0])
+        draft.found.questions.append(Problem(_place_of_model(draft, others[0]), text, topic=topic))
 
 
 def _remedy(model: str) -> str:

@@ -136,7 +136,8 @@ def print_questions(
     facts = facts_of(scenarios[0]) if scenarios and not as_json else None
     if facts is not None:
         make_console().print(facts.sentence(), soft_wrap=True, highlight=False, markup=False)
-    asked = list(dict.fromkeys(str(q) for prepared in scenarios for q in prepared.questions))
+    by_text = {str(q): q for prepared in scenarios for q in prepared.questions}
+    asked = list(by_text)
     path = scenarios[0].case.path if asked else None
     if path is None or path.is_relative_to(BUILT_IN):
         _ask(asked)
@@ -149,7 +150,7 @@ def print_questions(
         return
     named = scenarios[0].names.in_text
     shown = asked if known < _FEW else fresh
-    _ask(map(named, by_kind(shown, command).values()))
+    _ask(map(named, by_kind({text: by_text[text] for text in shown}, command).values()))
     if known < _FEW:
         return
     others = "other " if fresh else ""

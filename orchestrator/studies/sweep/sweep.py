@@ -208,7 +208,7 @@ def _check_end(plan: SweepPlan, varied: Mapping[str, Value]) -> list[Problem]:
             for p, names in found.items()
         ]
         raise CaseError(str(plan.case.path), wrong)
-    return [Problem(marks.get(p.place, p.place), p.text) for p in idle_everywhere(idle)]
+    return [replace(p, place=marks.get(p.place, p.place)) for p in idle_everywhere(idle)]
 
 
 def run_sweep(plan: SweepPlan, work: Work) -> SweepResult:

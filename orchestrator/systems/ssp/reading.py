@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
 
-from orchestrator.core.errors import CaseError, InputError, Problem
+from orchestrator.core.errors import CaseError, InputError, Problem, QuestionTopic
 from orchestrator.devices.fmi.description import FmuDescription, VariableInfo, read_description
 from orchestrator.devices.fmi.values import Scalar
 from orchestrator.systems.ssp.archive import SspArchive
@@ -216,7 +216,8 @@ def _values(
         try:
             values[variable] = _converted(value, fmu.variables[variable].unit, fmu)
             if value.unit and (says := contradiction(value.unit, value.base)):
-                questions.append(Problem(place, says))
+                topic = QuestionTopic("a unit and its base", ".".join((*owner, variable)))
+                questions.append(Problem(place, says, topic=topic))
         except InputError as error:
             problems.append(Problem(place, str(error)))
     return {v: value for v, value in values.items() if v not in fed}

@@ -400,9 +400,10 @@ def test_a_rating_that_moves_a_power_is_asked_about(values, moves):
 
 def test_questions_about_two_values_at_one_place_both_stay():
     found = SimpleNamespace(questions=[])
-    draft = SimpleNamespace(found=found, given=SimpleNamespace(case=SimpleNamespace(meant=())))
-    question(draft, [UnusualValue("a.H", "units.csv, line 5", "H is large")])
-    question(draft, [UnusualValue("a.S_n", "units.csv, line 5", "S_n is small")])
+    given = SimpleNamespace(case=SimpleNamespace(meant=()))
+    draft = SimpleNamespace(found=found, given=given, grid="grid")
+    question(draft, [UnusualValue("a.H", "units.csv, line 5", "H is large", "a large H")])
+    question(draft, [UnusualValue("a.S_n", "units.csv, line 5", "S_n is small", "a small S_n")])
     assert [one.text.partition(";")[0] for one in found.questions] == [
         "a: H is large",
         "a: S_n is small",

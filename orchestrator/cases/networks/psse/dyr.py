@@ -31,6 +31,7 @@ from orchestrator.cases.networks.psse.missing_models import (
 )
 from orchestrator.cases.networks.psse.raw import Machine, unit_labels
 from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
+from orchestrator.cases.networks.unit_row import DoubtOfRecord
 from orchestrator.core.errors import InputError, few, first_of
 
 _KNOWN = DYR_RECORDS | REGFM_A1_RECORDS | STATIC_VAR_RECORDS | PLANT_RECORDS
@@ -74,7 +75,7 @@ class MachineModel:
     parts: Mapping[str, str]
     parameters: Mapping[str, float]
     converter: str | None = None
-    doubts: tuple[tuple[str, str, str], ...] = ()
+    doubts: tuple[DoubtOfRecord, ...] = ()
     replaced: tuple[tuple[int, str], ...] = ()
     partial: bool = False
     lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
@@ -430,22 +431,21 @@ def _followed(
 
 def _doubts(
     machine: Machine, records: Sequence[DynamicRecord], values: Mapping[str, float]
-) -> Iterator[tuple[str, str, str]]:
+) -> Iterator[DoubtOfRecord]:
     yield from _omissions(records)
     yield from _chosen_limits(records)
     x_d2, x_source = values.get("machine.X_d2"), machine.source.imag
     if x_d2 is None or abs(x_source - x_d2) <= _SAME * abs(x_d2):
         return
     record = next(record for record in records if "machine.X_d2" in _sets(record.name))
-    yield (
-        "machine.X_d2",
-        record.place,
+    text = (
         f"{record.name} has X''d = {x_d2:g} pu, and the RAW file has ZX = {x_source:g} pu of the same machine in line "
-        f"{machine.line}; PSS/E wants one figure in both, and X''d counts here; correct the one that is wrong",
+        f"{machine.line}; PSS/E wants one figure in both, and X''d counts here; correct the one that is wrong"
     )
+    yield DoubtOfRecord("machine.X_d2", record.place, text, "X''d unlike ZX of the RAW file")
 
 
-def _omissions(records: Sequence[DynamicRecord]) -> Iterator[tuple[str, str, str]]:
+def _omissions(records: Sequence[DynamicRecord]) -> Iterator[DoubtOfRecord]:
     """Return what a part of ours leaves out of its record, by the fields that ask for it."""
     for record in records:
         known = _KNOWN.get(record.name)
@@ -454,11 +454,9 @@ def _omissions(records: Sequence[DynamicRecord]) -> Iterator[tuple[str, str, str
         given = given_values(record, known.fields, {*_KNOWN, *FIELDS})
         for name, text in known.omissions.items():
             if given[name]:
-                yield (
-                    known.kind,
-                    record.place,
-                    f"{record.name} has {name} = {given[name]:g}: {text}",
-                )
+                said = f"{record.name} has {name} = {given[name]:g}: {text}"
+                kind = f"{record.name} without {name}"
+                yield DoubtOfRecord(known.kind, record.place, said, kind)
 
 
 def _sets(name: str) -> set[str]:
@@ -531,7 +529,7 @@ def _read_numbers(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
     return given
 
 
-def _chosen_limits(records: Sequence[DynamicRecord]) -> Iterator[tuple[str, str, str]]:
+def _chosen_limits(records: Sequence[DynamicRecord]) -> Iterator[DoubtOfRecord]:
     """Ask about the limits that PSS/E chooses."""
     for record in (record for record in records if record.name in DYR_RECORDS):
         known = DYR_RECORDS[record.name]
@@ -548,7 +546,8 @@ def _chosen_limits(records: Sequence[DynamicRecord]) -> Iterator[tuple[str, str,
                 ", and KE = 0 is such that V_R starts at a tenth of it, which moves modes (ANDES has no ceiling and "
                 "KE = 0 there)"
             )
-        yield "exciter.V_RMAX", record.place, text
+        kind = f"limits of {record.name} that PSS/E chooses"
+        yield DoubtOfRecord("exciter.V_RMAX", record.place, text, kind)
 
 
 def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:

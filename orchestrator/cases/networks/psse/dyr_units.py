@@ -17,7 +17,7 @@ from orchestrator.cases.networks.psse.dyr import (
 )
 from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
 from orchestrator.cases.networks.psse.raw import Machine, unit_labels
-from orchestrator.cases.networks.unit_row import UnitRow, checked
+from orchestrator.cases.networks.unit_row import DoubtOfRecord, UnitRow, checked
 from orchestrator.core.errors import InputError
 
 _WITHOUT = {"exciter": MANUAL, "governor": "constant_power", "stabilizer": "none"}
@@ -91,11 +91,12 @@ def _without_idle_controls(row: UnitRow, place: str) -> UnitRow:
         "compensator": [name for name in own if name in COMPENSATION],
     }
     doubts = [
-        (
+        DoubtOfRecord(
             names[0],
             f"{place}, line {row.lines[names[0]]}" if names[0] in row.lines else place,
             f"a {kind} at a machine without an exciter acts on nothing, as in PSS/E, and is left out; add the "
             "exciter's record, or choose one in [units], such as exciter = 'sexs'",
+            f"a {kind} without an exciter",
         )
         for kind, names in kinds.items()
         if names
@@ -133,7 +134,8 @@ def missing_records(rows: Sequence[UnitRow], place: str) -> Iterator[UnusualValu
             f"no record of {'an' if kind == 'exciter' else 'a'} {kind}, where {where}: the {quantity} is constant; add "
             f"the record, or choose a part in [units], such as {kind} = {chosen!r}"
         )
-        yield from (UnusualValue(f"sg{row.label}.{kind}", place, text) for row in without)
+        asked = f"no record of the {kind}"
+        yield from (UnusualValue(f"sg{row.label}.{kind}", place, text, asked) for row in without)
 
 
 def _can_have(kind: str, row: UnitRow) -> bool:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from fmus.grid.element_data import Load, Zip
 from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
 from orchestrator.cases.networks.psse.raw import FileLoad
-from orchestrator.core.errors import Problem
+from orchestrator.core.errors import Problem, QuestionTopic
 
 LOAD_RECORDS = ("IEELBL", "IEELOW", "IEELZN", "IEELAR", "IEELAL")
 """The records, the narrower first."""
@@ -69,7 +69,8 @@ def _remarks(records: Iterable[DynamicRecord]) -> Iterator[Problem]:
             total = sum(values[at : at + 3])
             if abs(total - 1) > _SUM:
                 text = f"{record.name}: the shares of {quantity} sum to {total:g}; they are scaled to 1"
-                yield Problem(record.place, text)
+                topic = QuestionTopic(f"shares of {quantity} that do not sum to 1")
+                yield Problem(record.place, text, topic=topic)
 
 
 def with_recorded_laws(load: Load, law: RecordedLaw) -> Load:

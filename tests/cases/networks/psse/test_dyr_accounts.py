@@ -170,7 +170,7 @@ def test_a_stabilizer_without_an_exciter_is_idle_and_said_so():
     (idle,) = without_idle_controls([row], "one.dyr")
     assert idle.parameters["sg"] == {"machine.H": 4.0}
     assert idle.parts == {"machine": "genrou"}
-    assert [(name, place) for name, place, _ in idle.doubts] == [
+    assert [(name, place) for name, place, *_ in idle.doubts] == [
         ("pss.K_S", "one.dyr, line 7"),
         ("exciter.X_C", "one.dyr"),
     ]
