@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.errors import ComponentError, InputError
+from orchestrator.devices.acceptance.linear_network import LinearNetwork
 from orchestrator.devices.acceptance.shifted_clock import with_shift
 from orchestrator.devices.fmi import answers
 from orchestrator.devices.fmi.component import RealBatch
@@ -115,6 +116,7 @@ class FmuProcess:
         steps: int = 0,
         time: float = 0.0,
         step_size: float = 0.0,
+        network: LinearNetwork | None = None,
     ) -> tuple[int, int, int, Numbers]:
         """Set inputs, step and read, as often as asked.
 
@@ -123,6 +125,7 @@ class FmuProcess:
         ``steps``: How many; with 0 the first row is set and one row read, without a step.
         ``time``: At which the first step starts [s].
         ``step_size``: Communication step [s].
+        ``network``: What the instance stands at, with one row that stays; its state moves on.
 
         Returns of the call that was refused, or 0 or 1; what that call is; how many steps were finished; what was read,
         shape (steps, len(out)), or one row without a step."""
@@ -134,15 +137,20 @@ class FmuProcess:
             )
         head, asked = self.box.head, self.box.run
         length, values = max(1, steps), np.empty((max(1, steps), len(out)))
-        chunk = max(1, ROOM // max(1, len(into) + len(out)))
+        beside = np.empty(0) if network is None else network.numbers
+        chunk = max(1, (ROOM - beside.size) // max(1, len(into) + len(out)))
+        asked.n_network = 0 if network is None else len(network.x)
         for begin in range(0, length, chunk):
-            some = np.ascontiguousarray(rows[begin : begin + chunk])
+            some = np.ascontiguousarray(rows if network else rows[begin : begin + chunk])
             count = min(chunk, length - begin)
             asked.instance, asked.n_steps, asked.n_rows = instance, min(count, steps), len(some)
             asked.n_in, asked.n_out = len(into), len(out)
             head.time, head.step = time + begin * step_size, step_size
             self._into[: len(into)], self._out[: len(out)] = into, out
             self._room[: some.size] = some.ravel()
+            behind = some.size + max(1, min(count, steps)) * len(out)
+            if network is not None:
+                self._room[behind : behind + beside.size] = network.numbers
             self.time = head.time
             asked_at = monotonic()
             status = self._ask(RUN, "")
@@ -151,6 +159,8 @@ class FmuProcess:
             self.time = time + (begin + done) * step_size
             read = self._room[some.size : some.size + count * len(out)]
             values[begin : begin + count] = read.reshape(count, len(out))
+            if network is not None:
+                network.x = self._room[behind : behind + len(network.x)].copy()
             if status > 1:
                 return status, asked.stage, begin + done, values
         return status, 0, length, values
@@ -294,6 +304,7 @@ class HostedComponent(RemoteCalls):
         steps: int,
         time: float,
         step_size: float,
+        network: LinearNetwork | None = None,
     ) -> Numbers:
         """Step several times; rows of inputs before each, what was read after each.
 
@@ -301,9 +312,10 @@ class HostedComponent(RemoteCalls):
         ``rows``: values of the inputs, shape (n, inputs): one row a step; after the last row they stay.
         ``steps``: how many; with 0 the first row is set and one row read, without a step.
         ``time``: at which the first step starts [s].
-        ``step_size``: communication step [s]."""
+        ``step_size``: communication step [s].
+        ``network``: what it stands at, with one row that stays; its state moves on."""
         status, stage, done, values = self._process.run(
-            self.number, _references(into), rows, _references(out), steps, time, step_size
+            self.number, _references(into), rows, _references(out), steps, time, step_size, network
         )
         if status > 1:
             self.check(status, _STAGES.get(stage, "fmi2DoStep"), time + done * step_size)

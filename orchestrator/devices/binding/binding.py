@@ -237,12 +237,18 @@ class _Reader:
                 return bases.voltage_unit(unit, table.base, _phase(table), info.name)
 
             form, matrix, angle_factor = self._phasor("voltage", table, "input", scale)
-            found = PhasorMap(form, tuple(table.variables), matrix, angle_factor, per_rating=False)
+            if table.moment is not None and form is not Form.ABC:
+                raise ValueError("'moment' is for form 'abc', whose values turn; remove it")
+            moment = 0.0 if table.moment == "begin" else 0.5
+            names = tuple(table.variables)
+            found = PhasorMap(form, names, matrix, angle_factor, per_rating=False, moment=moment)
         return found
 
     def _current(self, bases: Bases, own_rating: bool) -> PhasorMap | None:
         table, found = self._table.current, None
         with self._at("current"):
+            if table.moment is not None:
+                raise ValueError("'moment' is for [voltage]; remove it")
 
             def scale(unit: str, info: VariableInfo) -> float:
                 if table.form == "power":

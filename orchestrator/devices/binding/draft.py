@@ -40,6 +40,10 @@ _START_NAMES = {
 _RATED_VOLTAGE = re.compile(r"^[vu]_?(n|nom|rated|base)$|rated_?volt|nominal_?volt", re.IGNORECASE)
 
 
+# angle of a frame of its own, which models of ours move at the end of a communication step
+_FRAME = "frame.angle"
+
+
 @dataclass(frozen=True)
 class Guess:
     """The form and the variables of a port, and how certain the guess is."""
@@ -74,6 +78,7 @@ def draft_binding(fmu: FmuDescription, beside: Path | None = None) -> str:
         *_rating(starts["S_n"], fmu, voltage, current),
         "",
         *_phasor("voltage", voltage, fmu.inputs),
+        *_moment(voltage, fmu),
         "",
         *_phasor("current", current, fmu.outputs),
         "",
@@ -242,6 +247,15 @@ def _phasor(table: str, guess: Guess | None, names: Sequence[str]) -> list[str]:
         )
     lines.append("# frame_angle = \"-90 deg\"  # by which the FMU's frame leads the network's")
     return lines
+
+
+def _moment(voltage: Guess | None, fmu: FmuDescription) -> list[str]:
+    """Write the moment of a communication step whose phase voltages it is given."""
+    if voltage is None or voltage.form != "abc":
+        return []
+    if _FRAME in fmu.variables:
+        return [f'moment = "begin"  # GUESS: {_FRAME} stands still within a communication step']
+    return ['# moment = "begin"  # where its own frame stands still within a communication step']
 
 
 def _units(table: str, guess: Guess | None) -> list[str]:

@@ -59,6 +59,7 @@ class PhasorTable(QuantityTable):
     ) = None
     angle_unit: Literal["rad", "deg"] | None = None
     frame_angle: str | float = 0.0
+    moment: Literal["middle", "begin"] | None = None
     signs: list[Literal[1, -1]] | None = None
     direction: Literal["into the grid", "into the converter"] = "into the grid"
 

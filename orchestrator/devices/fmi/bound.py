@@ -34,6 +34,7 @@ class _Port(ctypes.Structure):
         ("form", ctypes.c_int64),
         ("matrix", ctypes.c_double * 4),
         ("angle_factor", ctypes.c_double),
+        ("moment", ctypes.c_double),
         ("references", ctypes.c_uint * 4),
     )
 
@@ -111,6 +112,7 @@ class BoundComponent(Derived):
 
     def _fill_port(self, field: Any, phasor: PhasorMap) -> None:
         field.form, field.angle_factor = int(phasor.form), phasor.angle_factor
+        field.moment = phasor.moment
         field.matrix[:] = phasor.matrix
         for place, variable in enumerate(phasor.variables):
             field.references[place] = self.description.inner.variables[variable].reference

@@ -52,8 +52,9 @@ struct mailbox {
     double set_values[MOST], got[MOST];
     char text[TEXT];
     char log[LOG];
-    /* RUN: `n_rows` rows of inputs in `room`, then a row of outputs for each step, or one for none. */
-    int64_t instance, n_steps, n_rows, n_in, n_out;
+    /* RUN: `n_rows` rows of inputs in `room`, then a row of outputs for each step, or one for none; then the network of
+       `n_network` states around the instance, if it has one: x, A, B, C. */
+    int64_t instance, n_steps, n_rows, n_in, n_out, n_network;
     int64_t done, stage; /* steps that are finished; what it is at: SET, STEP or GET */
     double room[ROOM];
 };
@@ -228,9 +229,44 @@ struct served {
     do_step step;
 };
 
+/* A linear network around an instance: its inputs are row + C·x; what is read after a step makes x to A·x + B·out. */
+enum { NETWORK = 16 }; /* states, at most */
+struct network {
+    int64_t n, n_in, n_out;
+    double *x;
+    const double *A, *B, *C;
+};
+
+static struct network network_in(struct mailbox *box) {
+    const int64_t n = box->n_network, length = box->n_steps > 1 ? box->n_steps : 1;
+    double *x = box->room + box->n_rows * box->n_in + length * box->n_out;
+    return (struct network){n, box->n_in, box->n_out, x, x + n, x + n + n * n, x + n + n * n + n * box->n_out};
+}
+
+static const double *fed(const struct network *net, const double *row) {
+    static double values[MOST];
+    for (int64_t j = 0; j < net->n_in; ++j) {
+        values[j] = row[j];
+        for (int64_t l = 0; l < net->n; ++l) values[j] += net->C[j * net->n + l] * net->x[l];
+    }
+    return values;
+}
+
+static void move_on(const struct network *net, const double *out) {
+    double x[NETWORK];
+    for (int64_t j = 0; j < net->n; ++j) {
+        x[j] = 0;
+        for (int64_t l = 0; l < net->n; ++l) x[j] += net->A[j * net->n + l] * net->x[l];
+        for (int64_t l = 0; l < net->n_out; ++l) x[j] += net->B[j * net->n_out + l] * out[l];
+    }
+    memcpy(net->x, x, (size_t)net->n * sizeof *x);
+}
+
 static int run(struct mailbox *box, const struct served *served) {
     double *in = box->room, *out = in + box->n_rows * box->n_in;
     int worst = OK, status;
+    const struct network net = network_in(box);
+    if (net.n < 0 || net.n > NETWORK || (net.n && (box->n_rows != 1 || net.n_in > MOST))) return REFUSED;
     /* Time is a whole number of steps where it can be: a sum would pass an FMU's end by a rounding error. */
     const double first = nearbyint(box->time / box->step);
     const int whole = fabs(first * box->step - box->time) <= 1e-9 * box->step;
@@ -238,9 +274,11 @@ static int run(struct mailbox *box, const struct served *served) {
     for (int64_t k = 0;; ++k) {
         const double time = whole ? (first + (double)k) * box->step : box->time + (double)k * box->step;
         box->stage = SET;
-        if (box->n_in && k < box->n_rows &&
-            (status = served->set_real(served->component, box->set_references, (size_t)box->n_in, in + k * box->n_in)) > worst)
-            if ((worst = status) > 1) return worst;
+        if (box->n_in && (net.n || k < box->n_rows)) {
+            const double *row = net.n ? fed(&net, in) : in + k * box->n_in;
+            if ((status = served->set_real(served->component, box->set_references, (size_t)box->n_in, row)) > worst)
+                if ((worst = status) > 1) return worst;
+        }
         box->stage = STEP;
         if (box->n_steps) {
             ++box->steps;
@@ -251,6 +289,7 @@ static int run(struct mailbox *box, const struct served *served) {
         if (box->n_out &&
             (status = served->get_real(served->component, box->get_references, (size_t)box->n_out, out + k * box->n_out)) > worst)
             if ((worst = status) > 1) return worst;
+        if (net.n) move_on(&net, out + k * box->n_out);
         box->done = k + 1;
         if (k + 1 >= box->n_steps) return worst;
     }

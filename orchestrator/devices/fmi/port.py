@@ -56,6 +56,9 @@ class PhasorMap:
     angle_factor: float = 1.0  # the FMU's unit of angle per radian
     # current: whether the matrix grows with S_n (several units in parallel, or an output in pu of the rating)
     per_rating: bool = True
+    # voltage in phases: the part of a communication step after which they are taken; 0 where the FMU's own frame stands
+    # still within a step
+    moment: float = 0.5
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ struct port {
     int64_t form;
     double matrix[4];    /* voltage: network → FMU's axes; current: FMU's axes → network, 100 MVA */
     double angle_factor; /* FMU's unit of angle per radian */
+    double moment;       /* voltage in phases: of a step's middle (1/2), or of its begin (0) */
     unsigned references[4];
 };
 
@@ -137,8 +138,9 @@ EXPORT int adapter_get_real(struct adapter *a, const unsigned *references, size_
 
 EXPORT int adapter_do_step(struct adapter *a, double time, double step, int no_set_state) {
     int status;
-    /* Phase quantities turn while they are held: those of the middle of the step have the mean angle right. */
-    if (a->voltage.form == ABC && (status = send_voltage(a, time + step / 2)) > 1) return status;
+    /* Phase quantities turn while they are held: those of the middle of the step have the mean angle right, unless the
+       FMU's own frame stands still as well. */
+    if (a->voltage.form == ABC && (status = send_voltage(a, time + a->voltage.moment * step)) > 1) return status;
     status = a->step(a->component, time, step, no_set_state);
     a->time = time + step;
     if (a->voltage.form == ABC && status < 2) {

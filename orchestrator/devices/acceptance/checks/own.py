@@ -20,12 +20,14 @@ from orchestrator.devices.acceptance.checks import (
     state,
     timing,
     tuning,
+    unbalanced,
     windup,
 )
 
 MODULES = (
     *(file, loading, running, instances, clock, state, sampling, timing, tuning),
-    *(port, points, signs, evenness, damping, ride_through, windup, aftermath, extremes, resources),
+    *(port, points, signs, evenness, damping, ride_through, windup, aftermath, unbalanced),
+    *(extremes, resources),
 )
 """Importing them enters their checks."""
 
@@ -54,6 +56,7 @@ ORDER = (
     "delay",
     "step_invariance",
     "internal_step",
+    "phase_order",
     "steady_state",
     "later_times",
     "angles",
@@ -68,6 +71,8 @@ ORDER = (
     "limits",
     "anti_windup",
     "after_dips",
+    "negative_sequence",
+    "unbalanced_dips",
     "nan_input",
     "extreme_inputs",
     "memory",

@@ -12,6 +12,7 @@ import numpy as np
 
 from orchestrator.core.arrays import Numbers
 from orchestrator.core.closing import Closing
+from orchestrator.devices.acceptance.linear_network import LinearNetwork
 from orchestrator.devices.acceptance.process import FmuProcess, HostedComponent
 from orchestrator.devices.fmi.component import RealBatch
 from orchestrator.devices.fmi.description import FmuDescription
@@ -318,6 +319,19 @@ class Running(Closing):
             rows = np.ascontiguousarray((self.rest + deviations)[:, self.order])
         values = self.component.run(self._in, rows, self._out, steps, begin, step_size)
         self.time = begin + steps * step_size
+        self.subject.steps_made += steps
+        return values
+
+    def coupled(self, network: LinearNetwork, out: RealBatch, steps: int) -> Numbers:
+        """Step many times at a network that takes what is read and gives the bus voltage, shape (steps, n).
+
+        ``out``: what is read after each step."""
+        row = self.rest.copy()
+        row[[self.subject.inputs.index(name) for name in ("v_re", "v_im")]] = 0.0
+        begin, h = self.time, self.subject.step_size
+        rows = np.ascontiguousarray(row[self.order])[None]
+        values = self.component.run(self._in, rows, out, steps, begin, h, network=network)
+        self.time = begin + steps * h
         self.subject.steps_made += steps
         return values
 
