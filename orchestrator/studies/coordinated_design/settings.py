@@ -15,6 +15,7 @@ from orchestrator.studies.pod_design.lead_lag import (
     NO_COMPENSATION,
     lead_lag_turning,
 )
+from orchestrator.studies.pod_design.stages import GAIN_ALONE
 
 CENTRES = (0.5, 4.0)  # range of the lead/lag's centre, as parts of the modes' frequency
 # part of the largest gain that stands for a gain of 0 in a search, where a loop must keep its
@@ -29,11 +30,16 @@ class PodGroup:
     key: tuple[str, ...]  # their names in a parameter file
     stages: int  # of the lead/lag
     neutral: float | None = None  # as `Target` has it
+    remarks: tuple[str, ...] = ()  # the same
 
     @property
     def name(self) -> str:
         """For people: ``gfor*.pod_p``."""
         return f"{few(self.key, 3)}: {self.controller}"
+
+    @property
+    def has_gain_alone(self) -> bool:
+        return self.neutral == GAIN_ALONE
 
     @property
     def places(self) -> tuple[PodPlace, ...]:

@@ -47,7 +47,12 @@ from orchestrator.studies.coordinated_design.verdict import (
 from orchestrator.studies.modes.naming import modes_named
 from orchestrator.studies.operating_points.plan import OperatingPoints, read_operating_points
 from orchestrator.studies.pod_design.closed_loop import PodSetting, check_tunable
-from orchestrator.studies.pod_design.stages import count_stages, neutral_time
+from orchestrator.studies.pod_design.stages import (
+    GAIN_ALONE,
+    LEAD_LAG,
+    count_stages,
+    neutral_time,
+)
 from orchestrator.studies.pod_design.target import (
     check_range,
     find_scenario,
@@ -163,12 +168,10 @@ def plan_points_design(case: Case, request: PointsDesignRequest) -> PointsDesign
     off: dict[str, Value] = {}
     plan = case.components_of(scenario, request.overrides, request.files)
     for place in candidates:
-        time = neutral_time(plan[place.component], place.controller) or 0.0
-        off |= {
-            f"{place.name}.enabled": False,
-            f"{place.name}.T_S1": time,
-            f"{place.name}.T_S2": time,
-        }
+        time = neutral_time(plan[place.component], place.controller)
+        off[f"{place.name}.enabled"] = False
+        if time != GAIN_ALONE:
+            off |= {f"{place.name}.{name}": time or 0.0 for name in LEAD_LAG}
     settable = [group for group in groups if group.neutral is None]
     off |= {
         f"{place.name}.N_S": float(group.stages) for group in settable for place in group.places
@@ -218,7 +221,14 @@ def _groups(case: Case, request: PointsDesignRequest) -> tuple[PodGroup, ...]:
             overrides=request.overrides,
             parameters=request.files,
         )
-        group = PodGroup(controller, target.components, target.key, target.stages, target.neutral)
+        group = PodGroup(
+            controller,
+            target.components,
+            target.key,
+            target.stages,
+            target.neutral,
+            target.remarks,
+        )
         for other in found:
             shared = set(other.places) & set(group.places)
             if shared:
@@ -419,7 +429,10 @@ def _stages(plan: PointsDesignPlan) -> dict[PodPlace, int]:
 
 def _stages_at(plan: PointsDesignPlan, place: PodPlace) -> int:
     component = plan.prepared.system.components[place.component]
-    if neutral_time(component, place.controller) is None:
+    time = neutral_time(component, place.controller)
+    if time == GAIN_ALONE:
+        return 0
+    if time is None:
         return int(component.number(f"{place.controller}.N_S"))
     return count_stages(plan.prepared, place.component, place.controller)
 

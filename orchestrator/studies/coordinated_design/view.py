@@ -17,6 +17,7 @@ from orchestrator.output.report.tables import PlainTable, make_table
 from orchestrator.output.results.manifest import made_now
 from orchestrator.output.results.storage import save_json
 from orchestrator.studies.coordinated_design.search import RankedConverter
+from orchestrator.studies.coordinated_design.settings import PodGroup
 from orchestrator.studies.coordinated_design.study import PointsDesign, values_of
 from orchestrator.studies.coordinated_design.verdict import JudgedPoint, PlacedMode, PointsVerdict
 from orchestrator.studies.coordinated_design.words import (
@@ -138,9 +139,9 @@ def as_json(design: PointsDesign) -> dict[str, Any]:
                 "controller": group.controller,
                 "components": list(group.components),
                 "K": setting.gain,
-                "T_S1": setting.filters.T_S1,
-                "T_S2": setting.filters.T_S2,
-                "N_S": group.stages,
+                "T_S1": None if group.has_gain_alone else setting.filters.T_S1,
+                "T_S2": None if group.has_gain_alone else setting.filters.T_S2,
+                "N_S": None if group.has_gain_alone else group.stages,
             }
             for group, setting in design.used
         ],
@@ -202,14 +203,16 @@ def _ranked(one: RankedConverter) -> dict[str, Any]:
 def settings_table(design: PointsDesign) -> PlainTable:
     columns = ("Controller", "K [pu]", "T_S1 [s]", "T_S2 [s]", "N_S", "Lead [°]", "of")
     rows = [
-        (group.name, *_setting(setting), str(len(group.components)))
+        (group.name, *_setting(group, setting), str(len(group.components)))
         for group, setting in design.used
     ]
     return make_table("Settings", *columns, rows=rows)
 
 
-def _setting(setting: PodSetting) -> list[str]:
+def _setting(group: PodGroup, setting: PodSetting) -> list[str]:
     filters = setting.filters
+    if group.has_gain_alone:
+        return [f"{setting.gain:.5g}", "fixed", "fixed", "fixed", "–"]
     angle = filters.N_S * filters.stage_angle_deg if filters.T_S1 else 0.0
     return [
         f"{setting.gain:.5g}",

@@ -178,7 +178,8 @@ def what_it_rests_on(design: PointsDesign) -> str:
 
 def about_settings(design: PointsDesign) -> list[str]:
     """Controllers that were left out, and gains that stand at their bound."""
-    texts, largest = [], design.plan.request.gain_bounds[1]
+    largest = design.plan.request.gain_bounds[1]
+    texts = [text for group, _ in design.used for text in group.remarks]
     if design.left_out:
         names = ", ".join(group.name for group in design.left_out)
         texts.append(f"left out, as they bring less than 0.01 points of damping: {names}")

@@ -21,12 +21,11 @@ from orchestrator.linear.models.linearization import Blocks, compose, continuous
 from orchestrator.linear.spectra.continuation import Eigenpair, follow_along
 from orchestrator.linear.spectra.modes import damping_ratio
 from orchestrator.studies.pod_design.lead_lag import NO_COMPENSATION, LeadLag
+from orchestrator.studies.pod_design.stages import GAIN_ALONE, NEEDED
 from orchestrator.studies.points.key import key_of
 from orchestrator.studies.points.store import Arrays, PointStore
 from orchestrator.studies.points.task import StudyCase
 from orchestrator.systems.coupling.master import Master
-
-_TUNED = ("enabled", "K", "T_S1", "T_S2")
 
 
 class KeptFigures:
@@ -88,8 +87,10 @@ class PodSetting:
         """Gain and time constants.
 
         ``neutral``: both time constants [s] of a device with a fixed number of stages where there is no compensation;
-        None where the number can be set."""
+        None where the number can be set; `GAIN_ALONE` where nothing of the lead/lag can."""
         filters = self.filters
+        if neutral == GAIN_ALONE:
+            return {"K": self.gain}
         if neutral is not None and not filters.T_S2:
             return {"K": self.gain, "T_S1": neutral, "T_S2": neutral}
         return {"K": self.gain, "T_S1": filters.T_S1, "T_S2": filters.T_S2}
@@ -225,12 +226,12 @@ class PodLoop:
 
 
 def check_tunable(name: str, description: FmuDescription, controller: str) -> None:
-    """A controller's gain and lead/lag must be tunable.
+    """A controller's switch and gain must be tunable; a lead/lag that is not stays as it is.
 
     ``controller``: ``pod_p`` or ``pod_q``."""
     fixed = [
         v
-        for v in (f"{controller}.{key}" for key in _TUNED)
+        for v in (f"{controller}.{key}" for key in NEEDED)
         if description.variables[v].variability != "tunable"
     ]
     if fixed:

@@ -191,7 +191,8 @@ class PodDesign:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        return tuple(dict.fromkeys([*self.examined_before.warnings, *self.examined.warnings]))
+        of_both = [*self.examined_before.warnings, *self.examined.warnings]
+        return tuple(dict.fromkeys([*self.target.remarks, *of_both]))
 
     @property
     def other_sign(self) -> str:

@@ -9,7 +9,6 @@ from rich.table import Table
 from orchestrator.linear.spectra.modes import Mode, damping_ratio
 from orchestrator.linear.spectra.stability import Stability
 from orchestrator.output.report.tables import eigenvalue_text, make_table
-from orchestrator.studies.pod_design.closed_loop import Placed
 from orchestrator.studies.pod_design.design import PodDesign
 from orchestrator.studies.pod_design.lead_lag import (
     LARGEST_STAGE_ANGLE,
@@ -54,7 +53,7 @@ def first_screen(d: PodDesign) -> Iterable[Table | str]:
     for title, around, target, stability in (
         ("as it is, the controller off", d.before, d.initial, d.stability_before),
         (
-            f"{LABELS[d.request.controller]}, {_setting(d.final)}",
+            f"{LABELS[d.request.controller]}, {_setting(d)}",
             d.after,
             d.final.eigenvalue,
             d.stability,
@@ -86,13 +85,23 @@ def _steps(d: PodDesign) -> Iterable[tuple[str, str, str]]:
     )
     yield "Required damping", asked, f"ζ_d = {percent(d.required_damping)}"
     yield "Mode aimed at", "λ_d = −ζ_d·ω₀ ± jω₀", mode_text(d.predicted)
-    yield f"Mode with K = ΔK = {K} pu, no lead/lag", "λ_NC (T_S1 = T_S2 = 0)", mode_text(S.mode)
+    yield (
+        (f"Mode with K = ΔK = {K} pu", "λ_NC (the device's own lead/lag)", mode_text(S.mode))
+        if d.target.has_gain_alone
+        else (
+            f"Mode with K = ΔK = {K} pu, no lead/lag",
+            "λ_NC (T_S1 = T_S2 = 0)",
+            mode_text(S.mode),
+        )
+    )
     yield (
         "Non-compensated sensitivity",
         "Ŝ_NC = (λ_NC − λ₀)/ΔK",
         f"{abs(S.value):.6f} rad/s per pu ∠ {phase:.2f}°",
     )
-    if N == 0:
+    if d.target.has_gain_alone:
+        yield "Lead/lag", "fixed", "the device's own: only the gain is designed"
+    elif N == 0:
         yield "Lead/lag", "N_S = 0", "none"
     else:
         kind = "lead" if phase >= 0 else "lag"
@@ -153,8 +162,7 @@ def _swept(s: GainSweep) -> tuple[str, ...]:
     chosen = f"{s.chosen.setting.gain:.1f}{_MARK * (s.chosen.setting.gain in s.unstable)}"
     return (
         s.why,
-        f"{s.filters.T_S1:.4f}",
-        f"{s.filters.T_S2:.4f}",
+        *([f"{s.filters.T_S1:.4f}", f"{s.filters.T_S2:.4f}"] if s.filters.T_S2 else ["–", "–"]),
         dampings or f"{gains[0]:g}…{gains[-1]:g} ({len(gains)})",
         f"K = {chosen}: {percent(s.chosen.damping_ratio)}",
         "–" if s.chosen_least is None else percent(s.chosen_least),
@@ -163,10 +171,8 @@ def _swept(s: GainSweep) -> tuple[str, ...]:
 
 def _result(d: PodDesign) -> Table:
     f = d.final.setting.filters
-    setting = (
-        f"K = {d.final.setting.gain:.2f} pu, N_S = {d.target.stages}, "
-        f"T_S1 = {f.T_S1:.4f} s, T_S2 = {f.T_S2:.4f} s"
-    )
+    lead = f", N_S = {d.target.stages}, T_S1 = {f.T_S1:.4f} s, T_S2 = {f.T_S2:.4f} s"
+    setting = f"K = {d.final.setting.gain:.2f} pu{'' if d.target.has_gain_alone else lead}"
     rows = (
         ("Setting", "off", setting),
         (f"Target mode {d.mode_name}", mode_text(d.initial), mode_text(d.achieved)),
@@ -273,9 +279,11 @@ def _out_of_reach(d: PodDesign, r: Refinement) -> str:
     return text
 
 
-def _setting(p: Placed) -> str:
-    f = p.setting.filters
-    return f"K = {p.setting.gain:.4g} pu, T_S1 = {f.T_S1:.4f} s, T_S2 = {f.T_S2:.4f} s"
+def _setting(d: PodDesign) -> str:
+    gain, f = f"K = {d.final.setting.gain:.4g} pu", d.final.setting.filters
+    return (
+        gain if d.target.has_gain_alone else f"{gain}, T_S1 = {f.T_S1:.4f} s, T_S2 = {f.T_S2:.4f} s"
+    )
 
 
 def mode_text(value: complex) -> str:

@@ -1,6 +1,7 @@
 """The stages of a POD's lead/lag: as many as its variable says, or the fixed number of a vendor's device.
 
-A device with a fixed number has no variable N_S. Its stages do nothing where both time constants are equal."""
+A device with a fixed number has no variable N_S. Its stages do nothing where both time constants are equal. A device
+whose time constants cannot be set either, or not while it runs, has a gain alone that can be designed."""
 
 import cmath
 import math
@@ -10,13 +11,16 @@ import numpy as np
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.arrays import Complex
 from orchestrator.core.errors import AnalysisError
+from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.linear.models.component_linearization import ComponentLinearization
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.studies.modes.modes import running
 from orchestrator.systems.coupling.system import ComponentPlan
 
-NEEDED = ("enabled", "K", "T_S1", "T_S2")  # variables without which no POD can be designed
+NEEDED = ("enabled", "K")  # variables without which no POD can be designed
+LEAD_LAG = ("T_S1", "T_S2")  # variables without which its gain alone is designed
+GAIN_ALONE = 0.0  # in place of neutral time constants [s], of a device whose lead/lag cannot be set
 # [s], of both time constants, if the device starts with none
 _NEUTRAL = 0.1
 # gain [pu] and lead T_S1/T_S2 with which stages are counted: so small that the converter's answer to its own POD does
@@ -29,10 +33,23 @@ _MOST = 10
 
 
 def neutral_time(plan: ComponentPlan, controller: str) -> float | None:
-    """Both time constants [s] with which the stages of a device do nothing; None if their number can be set to 0."""
+    """Both time constants [s] with which the stages of a device do nothing; None if their number can be set to 0,
+    `GAIN_ALONE` if its lead/lag cannot be set at all."""
+    if fixed_lead_lag(plan.description, controller):
+        return GAIN_ALONE
     if f"{controller}.N_S" in plan.description.variables:
         return None
     return plan.number(f"{controller}.T_S2") or plan.number(f"{controller}.T_S1") or _NEUTRAL
+
+
+def fixed_lead_lag(description: FmuDescription, controller: str) -> list[str]:
+    """Return the variables of the lead/lag that the device has not, or not as tunable ones; none if it can be set."""
+    variables = description.variables
+    return [
+        name
+        for name in (f"{controller}.{v}" for v in LEAD_LAG)
+        if name not in variables or variables[name].variability != "tunable"
+    ]
 
 
 def count_stages(prepared: PreparedScenario, component: str, controller: str) -> int:

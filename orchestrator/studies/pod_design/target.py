@@ -3,16 +3,22 @@
 import fnmatch
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import repeat
 
 from orchestrator.cases.case import Case
 from orchestrator.cases.form.parameter_files import ParameterFile
 from orchestrator.cases.form.schema import CaseTable, NamedModeTable, Value
 from orchestrator.cases.questions.idle_values import DAMPING_CONTROLLERS
-from orchestrator.core.errors import InputError
+from orchestrator.core.errors import InputError, few
 from orchestrator.linear.spectra.modes import Mode
-from orchestrator.studies.pod_design.stages import NEEDED, count_stages, neutral_time
+from orchestrator.studies.pod_design.stages import (
+    GAIN_ALONE,
+    NEEDED,
+    count_stages,
+    fixed_lead_lag,
+    neutral_time,
+)
 from orchestrator.systems.coupling.system import ComponentPlan
 
 CRITICAL = "least damped swing"  # the mode that is designed for where the case names none
@@ -36,8 +42,27 @@ class Target:
     # names of the components in a parameter file: one pattern that fits exactly these components, or each name
     key: tuple[str, ...]
     stages: int  # of the components' lead/lag: N_S, or the fixed number of a device without that variable
-    # both time constants [s] with which stages of a fixed number do nothing; None where N_S can be set
+    # both time constants [s] with which stages of a fixed number do nothing; None where N_S can be set, `GAIN_ALONE`
+    # where nothing of the lead/lag can
     neutral: float | None = None
+    # variables of the lead/lag that a device with a gain alone has not, or not as tunable ones, as component.variable
+    fixed: tuple[str, ...] = ()
+
+    @property
+    def has_gain_alone(self) -> bool:
+        return self.neutral == GAIN_ALONE
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Sentences on components whose lead/lag is not designed."""
+        if not self.has_gain_alone:
+            return ()
+        variable = self.fixed[0].split(".", 1)[1]
+        return (
+            f"only the gain is designed, and the lead/lag stays as it is: {few(self.fixed, 4)} cannot be set while the "
+            f"FMU runs, or are not there; where the FMU has them as tunable ones, name them in its binding, as "
+            f'[signals."{variable}"]',
+        )
 
     def turned_around(self, plan: Mapping[str, ComponentPlan], controller: str) -> list[str]:
         """Return the values that turn the controllers' signs around, as they are typed; empty where one has no sign."""
@@ -69,6 +94,11 @@ def find_target(
     fixed = [name for name, time in times.items() if time is not None]
     if not fixed:
         return Target(scenario, chosen, key, _stages_set(plan, chosen, controller, stages))
+    alone = [name for name, time in times.items() if time == GAIN_ALONE]
+    if alone:
+        return _target_of_gains(
+            Target(scenario, chosen, key, 0, GAIN_ALONE), plan, controller, alone, stages
+        )
     others = [name for name in chosen if name not in fixed]
     if others:
         raise InputError(
@@ -90,6 +120,35 @@ def find_target(
             f"{controller}.N_S); leave --stages out"
         )
     return Target(scenario, chosen, key, number, times[fixed[0]])
+
+
+def _target_of_gains(
+    found: Target,
+    plan: Mapping[str, ComponentPlan],
+    controller: str,
+    alone: Sequence[str],
+    stages: int | None,
+) -> Target:
+    """Complete the target whose components' lead/lag cannot be set: only their gain is designed."""
+    first = alone[0]
+    fixed = fixed_lead_lag(plan[first].description, controller)
+    other = next((name for name in found.components if name not in alone), None)
+    if other:
+        raise InputError(
+            f"{first} has a lead/lag that cannot be set ({', '.join(fixed)}), {other} has one that can; they cannot "
+            "have one setting: design them one after the other with --component"
+        )
+    if stages is not None:
+        raise InputError(
+            f"--stages {stages}: the lead/lag of {first}.{controller} cannot be set ({', '.join(fixed)}), so that only "
+            "its gain is designed; leave --stages out"
+        )
+    named = [
+        f"{name}.{variable}"
+        for name in alone
+        for variable in fixed_lead_lag(plan[name].description, controller)
+    ]
+    return replace(found, fixed=tuple(named))
 
 
 def find_scenario(

@@ -141,9 +141,9 @@ def design_json(d: PodDesign) -> dict[str, Any]:
         "controller": d.request.controller,
         "target_mode": _complex(d.initial),
         "sensitivity": _polar(S.value),
-        "T_S1": setting.filters.T_S1,
-        "T_S2": setting.filters.T_S2,
-        "N_S": d.target.stages,
+        "T_S1": None if d.target.has_gain_alone else setting.filters.T_S1,
+        "T_S2": None if d.target.has_gain_alone else setting.filters.T_S2,
+        "N_S": None if d.target.has_gain_alone else d.target.stages,
         "K": setting.gain,
         "K_unbounded": d.unbounded_gain,
         "predicted_mode": _complex(d.predicted),
@@ -211,6 +211,7 @@ def provenance(d: PodDesign, command: str) -> list[str]:
         f"scenario {d.target.scenario}, mode {d.mode_name} without the controller: {mode_text(d.initial)}",
         f"with it: {mode_text(d.achieved)}; required: {percent(d.required_damping)} ({'met' if d.met else 'not met'})",
         "K in pu of the converter's rating, T_S1 and T_S2 in s",
+        *d.target.remarks,
     ]
 
 

@@ -10,6 +10,7 @@ import pytest
 from orchestrator.cases.case import load_case
 from orchestrator.core.errors import AnalysisError, InputError
 from orchestrator.studies.coordinated_design.one_point import design_controller
+from orchestrator.studies.modes.modes import compute_modes
 from orchestrator.studies.pod_design import stages
 from orchestrator.studies.pod_design.closed_loop import PodSetting
 from orchestrator.studies.pod_design.design import DesignRequest
@@ -106,10 +107,48 @@ def test_stages_that_do_nothing_have_equal_time_constants():
 
 
 def test_a_pod_that_lacks_a_variable_is_told_with_what_it_lacks(vendor):
-    hidden = RENAMED | {"pod_p.T_S2": "lag"}
+    hidden = RENAMED | {"pod_p.K": "gain"}
     case = vendor("hidden", hidden)
-    with pytest.raises(
-        InputError, match=r"gfor has pod_p.enabled, and lacks pod_p.T_S2: name them"
-    ):
+    with pytest.raises(InputError, match=r"gfor has pod_p.enabled, and lacks pod_p.K: name them"):
         target(case, scenario=None)
     assert target(case, "pod_q", scenario=None, stages=None).scenario == "gfor"
+
+
+# a device that has a gain and a lead/lag of its own, which nobody can set
+GAIN_ALONE = RENAMED | {"pod_p.T_S1": "lead", "pod_p.T_S2": "lag"}
+
+
+@pytest.fixture(scope="module")
+def by_gain(vendor):
+    """The design of its gain; its two stages are those of the paper, 0.20 s and 0.37 s."""
+    case = vendor("gain_alone", GAIN_ALONE, values=", lead = 0.20, lag = 0.37")
+    return design_controller(case, DesignRequest("pod_p", "gfor", margins=False, damping=0.2))
+
+
+def test_where_the_lead_lag_cannot_be_set_the_gain_alone_is_designed(by_gain):
+    """The closed loop is that of our converter with the same lead/lag and the gain that was found."""
+    assert by_gain.met
+    assert set(by_gain.parameters) == {"gfor.pod_p.enabled", "gfor.pod_p.K"}
+    gain = by_gain.parameters["gfor.pod_p.K"]
+    own = {"enabled": True, "K": gain, "N_S": 2, "T_S1": 0.20, "T_S2": 0.37}
+    values = {f"gfor.pod_p.{name}": value for name, value in own.items()}
+    (prepared,) = load_case("two_area").prepare(["gfor"], values)
+    modes = compute_modes(prepared).modes
+    swing = min(abs(mode.eigenvalue - by_gain.result.achieved) for mode in modes)
+    assert swing < 1e-3 * abs(by_gain.result.achieved)
+
+
+def test_that_it_is_the_gain_alone_is_told(by_gain, tmp_path):
+    (said,) = [text for text in by_gain.warnings if text.startswith("only the gain is designed")]
+    assert "gfor.pod_p.T_S1; gfor.pod_p.T_S2" in said or "gfor.pod_p.T_S1, gfor.pod_p.T_S2" in said
+    assert '[signals."pod_p.T_S1"]' in said
+    assert [by_gain.as_json()[name] for name in ("T_S1", "T_S2", "N_S")] == [None, None, None]
+    written = by_gain.save(tmp_path / "gain.toml").read_text("utf-8")
+    assert "gfor.pod_p.K" in written
+    assert "only the gain is designed" in written
+
+
+def test_stages_cannot_be_asked_for_where_the_lead_lag_cannot_be_set(vendor):
+    case = vendor("gain_alone", GAIN_ALONE, values=", lead = 0.20, lag = 0.37")
+    with pytest.raises(InputError, match=r"--stages 2: the lead/lag of gfor.pod_p cannot be set"):
+        target(case, stages=2)

@@ -212,10 +212,17 @@ def design(sheet: dict[str, Any]) -> str:
         "Predicted": sheet["predicted_mode"],
         "Achieved": sheet["achieved_mode"],
     }
+    lead_lag = (
+        [["Lead/lag", "fixed"]]
+        if sheet["N_S"] is None
+        else [
+            ["T_S1 [s]", f"{sheet['T_S1']:.4f}"],
+            ["T_S2 [s]", f"{sheet['T_S2']:.4f}"],
+            ["N_S", str(sheet["N_S"])],
+        ]
+    )
     settings = [
-        ["T_S1 [s]", f"{sheet['T_S1']:.4f}"],
-        ["T_S2 [s]", f"{sheet['T_S2']:.4f}"],
-        ["N_S", str(sheet["N_S"])],
+        *lead_lag,
         ["K", f"{sheet['K']:.1f}"],
         ["K before its bounds", f"{sheet['K_unbounded']:.1f}"],
     ]
@@ -231,6 +238,7 @@ def design(sheet: dict[str, Any]) -> str:
             ]
         )
     kind = "lead" if sensitivity["phase_deg"] >= 0 else "lag"
+    needed = "" if sheet["N_S"] is None else f": a {kind} is needed"
     extra = []
     if "stability" in sheet:
         after = sheet["stability"]["after"]
@@ -248,7 +256,7 @@ def design(sheet: dict[str, Any]) -> str:
         )
     return "".join(extra) + (
         f"<p>Non-compensated eigenvalue sensitivity {sensitivity['magnitude']:.4g} ∠ "
-        f"{number(sensitivity['phase_deg'], 1)}°: a {kind} is needed.</p>"
+        f"{number(sensitivity['phase_deg'], 1)}°{needed}.</p>"
         + table("Setting", ["Parameter", "Value"], settings)
         + table("Modes", ["Mode", "λ [rad/s]", "f [Hz]", "Damping [%]"], rows)
         + _margins(sheet.get("margins") or {})
