@@ -11,6 +11,7 @@ from fmus.toolchain.symbols import Expr
 
 APPENDIX = "Mateu-Barriendos et al. 2024, appendix, grid-forming converter parameters"
 STAMP = "STAMP toolbox of the paper's group"
+LEAST_REACTANCE = 0.01  # of filter and transformer, where the internal step is the usual one [pu]
 
 
 @dataclass(frozen=True)
@@ -60,17 +61,18 @@ class Filter(MeasuredFilter):
 
 
 def declare_filter_data(
-    m: ModelBuilder, port: OperatingPoint, virtual: Phasor = ZERO
+    m: ModelBuilder, port: OperatingPoint, virtual: Phasor = ZERO, *, least: float = LEAST_REACTANCE
 ) -> FilterData:
     """Declare parameters alone; the power flow gives the operating point.
 
-    ``virtual``: impedance in the control between the frame's own voltage and the capacitor [pu, S_n]."""
+    ``virtual``: impedance in the control between the frame's own voltage and the capacitor [pu, S_n]; ``least``:
+    reactance of the inductors that is taken [pu, S_n]."""
     with m.scope("filter"):
         R_c = m.parameter(
             "R_c", 0.005, "pu", "Inductor resistance", base="S_n", minimum=0.0, source=APPENDIX
         )
         X_c = m.parameter(
-            "X_c", 0.15, "pu", "Inductor reactance", base="S_n", minimum=0.01, source=APPENDIX
+            "X_c", 0.15, "pu", "Inductor reactance", base="S_n", minimum=least, source=APPENDIX
         )
         B_c = m.parameter(
             "B_c", 0.15, "pu", "Capacitor susceptance", base="S_n", minimum=0.01, source=APPENDIX
@@ -78,7 +80,7 @@ def declare_filter_data(
     with m.scope("transformer"):
         R_t = m.parameter("R_t", 0.002, "pu", "Resistance", base="S_n", minimum=0.0, source=STAMP)
         X_t = m.parameter(
-            "X_t", 0.15, "pu", "Reactance", base="S_n", minimum=0.01, source="paper, case study 1"
+            "X_t", 0.15, "pu", "Reactance", base="S_n", minimum=least, source="paper, case study 1"
         )
 
     # In series with the capacitor, 1/(3·10·ω_b·C_c) as the paper has it: the factor 3·10 is dimensionless.
@@ -87,9 +89,11 @@ def declare_filter_data(
     return FilterData(R_c, X_c, B_c, R_t, X_t, R_cap, _steady_state(*given, virtual))
 
 
-def declare_filter(m: ModelBuilder, port: DevicePort, virtual: Phasor = ZERO) -> Filter:
+def declare_filter(
+    m: ModelBuilder, port: DevicePort, virtual: Phasor = ZERO, *, least: float = LEAST_REACTANCE
+) -> Filter:
     """Declare parameters and states; the equations follow once the control has formed v_c."""
-    data = declare_filter_data(m, port, virtual)
+    data = declare_filter_data(m, port, virtual, least=least)
     start = data.initial
     u_c_start = start.u - (start.i_s - start.i_g) * data.R_cap
     with m.scope("filter"):

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from fmus.converter_parts.current_control import current_control
+from fmus.converter_parts.current_control import current_control, declare_free_gains
 from fmus.converter_parts.filter import APPENDIX, Filter, declare_filter, filter_equations
 from fmus.converter_parts.usual import FOLLOWING
 from fmus.grid_following.current_limit import Limited
@@ -17,6 +17,8 @@ from fmus.toolchain.symbols import Expr
 # the two-area system's converter, whose place it takes
 S_N = 1500.0  # default rating [MVA]
 P_0 = 0.9  # default dispatch [pu, S_n]
+# of filter and transformer [pu, S_n]; such a small one needs a short internal step
+LEAST_REACTANCE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ def grid_following_converter() -> Model:
     )
     m = ModelBuilder("gfl", title, kind="converter", usual=FOLLOWING)
     port = device_port(m, S_n=S_N, P_0=P_0)
-    f = declare_filter(m, port)
+    f = declare_filter(m, port, least=LEAST_REACTANCE)
     seen, tau = _declare_measurement(m, f)
     frame = phase_locked_loop(m, f.initial.theta, port.omega_b, seen.value)
     # Behind an open breaker the bus is seen, so that the converter closes in synchronism.
@@ -44,7 +46,8 @@ def grid_following_converter() -> Model:
     seen.set_derivative(m, (source - seen.value) / tau)
     measured = Measured(power(f.u, f.i_g.value), f.u.magnitude(), frame.w)
     limited, i_ref = outer_control(m, f, port, measured, _standby(f, port, frame, seen.value))
-    v_c = current_control(m, f, port.omega_b, frame.w, i_ref, seen.value)
+    gains = declare_free_gains(m)
+    v_c = current_control(m, f, port.omega_b, frame.w, i_ref, seen.value, gains=gains)
     filter_equations(m, f, port, v_c, frame.theta, frame.w)
     declare_port_outputs(m, port, f.i_g.value.rotated(frame.theta))
     declare_signals(m, Signals(frame, limited, f.u.magnitude(), f.i_s.value.magnitude()))

@@ -1,7 +1,8 @@
 """Outer control: active power, and reactive power or voltage, each by a PI controller that asks for current.
 
-The gains follow from one response time each. The controllers' zeros cancel the lag τ_m of the measurement: at 1 pu and
-with a fast current control the measured power follows its reference as 1/(1 + s·τ), the power as (1 + s·τ_m)/(1 + s·τ).
+The gains follow from one response time each, unless they are given. Without given ones the controllers' zeros cancel
+the lag τ_m of the measurement: at 1 pu and with a fast current control the measured power follows its reference as
+1/(1 + s·τ), the power as (1 + s·τ_m)/(1 + s·τ).
 """
 
 from dataclasses import dataclass
@@ -51,21 +52,58 @@ def outer_control(
         U_f = low_pass(m, "U_f", measured.u, tau, start.u.re)
     active, K_P = _active_error(m, start.s.re, P_f, measured.w)
     reactive, K_Q = _reactive_error(m, start.s.im, start.u.re, Q_f, U_f)
+    crossed = _declare_crossing(m)
+    of_P = _declare_gains(m, "active_power", tau * K_P, K_P)
+    of_Q = _declare_gains(m, "reactive_power", tau * K_Q, K_Q)
     with m.scope("active_power"):
-        x_P = m.state("x", start.i_s.re, "pu", "Integrator, active current", base="S_n")
+        own = if_else(crossed, start.i_s.im, start.i_s.re)
+        x_P = m.state("x", own, "pu", "Integrator, active current", base="S_n")
     with m.scope("reactive_power"):
-        x_Q = m.state("x", -start.i_s.im, "pu", "Integrator, reactive current", base="S_n")
-    demanded = Phasor(tau * K_P * active + x_P, -(tau * K_Q * reactive + x_Q))
+        own = if_else(crossed, start.i_s.re, -start.i_s.im)
+        x_Q = m.state("x", own, "pu", "Integrator, reactive current", base="S_n")
+    asked_P, asked_Q = of_P.proportional * active + x_P, of_Q.proportional * reactive + x_Q
+    demanded = Phasor(if_else(crossed, asked_Q, asked_P), if_else(crossed, asked_P, -asked_Q))
     limited = limited_current(m, start, demanded)
-    tracked = (standby - demanded) / TRACKING_TIME
-    moving = Phasor(
-        _unless_outward(K_P * active, limited.excess.re),
-        -_unless_outward(K_Q * reactive, -limited.excess.im),
-    )
-    rate = port.through_breaker(moving, tracked)
+    tracked, excess = (standby - demanded) / TRACKING_TIME, limited.excess
+    rate_P = _unless_outward(of_P.integral * active, if_else(crossed, excess.im, excess.re))
+    rate_Q = _unless_outward(of_Q.integral * reactive, if_else(crossed, excess.re, -excess.im))
+    tracked_P = if_else(crossed, tracked.im, tracked.re)
+    tracked_Q = if_else(crossed, tracked.re, -tracked.im)
+    rate = port.through_breaker(Phasor(rate_P, rate_Q), Phasor(tracked_P, tracked_Q))
     m.derivative(x_P, rate.re)
-    m.derivative(x_Q, -rate.im)
+    m.derivative(x_Q, rate.im)
     return limited, port.through_breaker(limited.allowed, standby)
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Proportional [pu] and integral gain [1/s] of an outer controller."""
+
+    proportional: Expr
+    integral: Expr
+
+
+def _declare_gains(m: ModelBuilder, scope: str, proportional: Expr, integral: Expr) -> Gains:
+    """Declare both gains, 0 by default, where those from the response time hold, which are given."""
+    with m.scope(scope):
+        K_P = m.parameter(
+            *("K_P", 0.0, "pu", "Proportional gain; 0: from tau and measurement.tau"),
+            base="S_n",
+            minimum=0.0,
+        )
+        K_I = m.parameter("K_I", 0.0, "1/s", "Integral gain; 0: 1/tau", minimum=0.0)
+    return Gains(if_else(K_P > 0, K_P, proportional), if_else(K_I > 0, K_I, integral))
+
+
+def _declare_crossing(m: ModelBuilder) -> Expr:
+    """Declare that each controller asks for the other's current."""
+    with m.scope("outer_control"):
+        crossed = m.switch(
+            "crossed",
+            False,
+            "P asks for reactive and Q for active current, as PowerSimulationsDynamics.jl's PI controllers do",
+        )
+    return crossed > 0
 
 
 def _active_error(m: ModelBuilder, P_0: Scalar, P_f: Expr, w: Expr) -> tuple[Expr, Expr]:
