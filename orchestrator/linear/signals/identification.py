@@ -75,7 +75,7 @@ def identify_modes(
     vandermonde = multipliers[None, :] ** np.arange(len(y))[:, None]
     residues = np.linalg.lstsq(vandermonde, y.astype(complex), rcond=None)[0]
     found = [
-        (complex(np.log(mu) / interval), abs(r))
+        (complex(np.log(complex(mu)) / interval), abs(r))  # also of a real one below zero
         for mu, r in zip(multipliers, residues, strict=True)
         if mu.imag >= 0 and abs(mu) > 1e-6
     ]

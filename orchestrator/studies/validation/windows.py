@@ -22,6 +22,7 @@ _LEAST_STARTS = 5e-4  # smallest such deviation [pu]
 _EXCURSION = 0.1  # deviation of the magnitude [pu] for which a dip or swell lasts
 _LONGEST_EVENT = 3.0  # dips last no longer [s]; what comes later is another one
 _SHORTEST = 0.1  # an event without a dip lasts so long [s], for its window
+_SAME = 1e-9  # times that are less apart [s] are one
 _LASTS = 0.3  # part of the largest change over the lag, from which on a change is still the event
 
 
@@ -44,11 +45,12 @@ class Windows:
         }
 
     def part(self, name: str, times: Numbers) -> Mask:
-        """Return which times are in a window; the sample at a border belongs to the window that ends there."""
-        low, high = self.parts[name]
-        small = 1e-9
-        above = times > low + small if low > 0 else times >= low
-        return np.asarray(above & (times <= high + small))
+        """Return which times are in a window: the event's first and last sample are in its own.
+
+        The first one may hold a part of the event already, as where a recorder takes its sample in the transition."""
+        early, late = times < self.begin - _SAME, times > self.end + _SAME
+        inside = {"before": early, "during": ~(early | late), "after": late}
+        return np.asarray(inside[name])
 
 
 def find_windows(recording: Recording) -> Windows:

@@ -47,6 +47,14 @@ def test_as_many_modes_as_a_system_of_several_areas_has_are_found():
         assert mode.amplitude == pytest.approx((1 - 0.12 * k) / 2, rel=1e-3)
 
 
+def test_what_alternates_from_sample_to_sample_has_an_eigenvalue():
+    """Two exponentials, 0.9^k and (-0.8)^k: both multipliers are real, and one is negative."""
+    k = np.arange(40)
+    modes = identify_modes(0.1 * k, 0.9**k + 0.5 * (-0.8) ** k)
+    wanted = np.array([np.log(0.9), np.log(0.8) + 1j * np.pi]) / 0.1
+    assert [one.eigenvalue for one in modes] == pytest.approx(list(wanted))
+
+
 def test_noise_is_not_a_mode():
     rng = np.random.default_rng(1)
     signal = exponential(-0.2 + 4j, 1.0) + 1e-3 * rng.standard_normal(len(TIMES))

@@ -197,6 +197,15 @@ def test_windows_are_as_the_user_says(recording):
     assert [(w["begin_s"], w["end_s"]) for w in event["windows"]][1] == pytest.approx((2.0, 2.5))
 
 
+def test_the_sample_in_which_the_event_begins_is_the_events():
+    """A right model, and a recorder of 50 samples a second whose sample at 1 s holds a part of the event."""
+    frame = with_noise(table(run())).iloc[::20].set_index("time")
+    found = gfor_in_python.validate("gfor", frame, values=ON, events=[(1.0, 1.1)]).table()
+    largest = found.groupby("window")["max_error_pu"].max()
+    assert largest["before"] < 0.01
+    assert largest["during"] > 0.05
+
+
 def test_columns_that_are_missing_are_asked_for(gfor, tmp_path):
     frame = table(run()).rename(columns={"p_mw": "p_left_mw", "v_pu": "v_pu"})
     path = written(frame, tmp_path)
