@@ -36,7 +36,7 @@ _MOST_STEPS = 5  # runs in which one is followed
 _SETTLED = 1e-3  # part of the squared error: a smaller gain ends the following
 _MOST_WORDS = 8  # positions of a whole number that are tried
 _GAIN = re.compile(r"[Kk][^a-z]?.*|.*gain.*")  # last part of the name of a controller's gain
-_MOST_LIMITS = 8  # parameters that act on nothing yet and are tried as a limit
+_MOST_LIMITS = 12  # values that are tried as a limit, with the kinds that would use them
 
 Values = Mapping[str, float | bool]
 Responses = Sequence[Complex]
@@ -273,24 +273,32 @@ def _limits(bench: _Bench) -> Iterator[Explanation]:
         return
     left = bench.errors(capped(bench.base, measured, voltages, limit))
     yield bench.explanation(CauseKind.LIMIT, "limit of the current", None, limit, left, unit="pu")
-    best: tuple[float, VariableInfo, Values] | None = None
+    tried: list[tuple[float, VariableInfo, Values]] = []
     for info, values in itertools.islice(_limiters(bench, limit), _MOST_LIMITS):
         said = " with ".join(f"{name} = {value:.4g}" for name, value in values.items())
         bench.report(f"trying {said}")
         found = bench.responses(values)
-        if found is None:
-            continue
-        error = bench.errors(found)
-        if best is None or float(error @ error) < best[0]:
-            best = float(error @ error), info, values
-    if best is not None:
-        yield from _limiter(bench, *best[1:])
+        if found is not None:
+            error = bench.errors(found)
+            tried.append((float(error @ error), info, values))
+    for count in (1, 2):  # a number by itself, which is the simpler cause, and one with a kind
+        likely = [one for one in tried if len(one[2]) == count]
+        if likely:
+            _, info, values = min(likely, key=lambda one: one[0])
+            yield from _limiter(bench, info, values)
 
 
 def _limiters(bench: _Bench, limit: float) -> Iterator[tuple[VariableInfo, Values]]:
-    """Numbers that act on nothing yet and may be limits, with a kind of the same part that would use them."""
-    above = [i for i in bench.idle if i.unit == "pu" and bench.device.value(i.name) > limit]
-    for info in above:
+    """Numbers that may be limits and are too high, with a kind of the same part that would use them.
+
+    Those that act on nothing come first: a limit that cuts a short peak moves the response a little, and more would."""
+    idle = {info.name for info in bench.idle}
+    above = [
+        info
+        for info in bench.parameters("Real")
+        if info.unit == "pu" and bench.device.value(info.name) > limit
+    ]
+    for info in sorted(above, key=lambda one: one.name not in idle):
         yield info, {info.name: limit}
         part = info.name.rpartition(".")[0]
         for kind, value in _other_positions(bench):

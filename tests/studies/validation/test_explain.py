@@ -61,3 +61,14 @@ def test_a_limit_of_the_current_that_the_model_lacks_is_named_with_its_level():
     assert best.share > 0.99
     (limit,) = (one for one in found if one.cause is CauseKind.LIMIT)
     assert limit.value == pytest.approx(1.05, rel=0.01)
+
+
+def test_a_limit_of_the_current_that_is_too_high_in_the_model_is_named_with_the_plants():
+    """A plant at its limit falls out of step by a thousandth: the level that is read off the record is not enough."""
+    limits = {"gfor__current_limit__kind": 1, "gfor__current_limit__I_max": 1.02}
+    frame = with_noise(table(run("pod_p", stop=3.0, scale=1.12, **limits)))
+    values = ON | {"current_limit.kind": 1, "current_limit.I_max": 1.2}
+    best, *_ = explained(frame, values=values)
+    assert (best.cause, best.name, best.now) == (CauseKind.VALUE, "current_limit.I_max", 1.2)
+    assert best.value == pytest.approx(1.02, rel=0.001)
+    assert best.share > 0.99
