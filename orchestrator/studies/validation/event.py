@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -43,6 +44,8 @@ _SHORT_GAP = 0.02  # [s]: over a period voltages are means, and a gap hides litt
 _IN_GAP = 0.3  # part of the largest change of the voltage, from which on a gap hides an event
 _SETPOINT_WITHIN = 0.1  # time [s] within which a setpoint moves P or Q by most of its step
 _ABRUPT = 6.0  # times the usual change over that time
+_FEWEST_BEFORE = 30  # samples before an event that a part of the recording keeps
+_OF_SAMPLES = ("voltage", "power", "good", "driven")
 _BESIDE = 0.4  # part of the step by which the signal moves just before or after, as a swing does
 
 
@@ -80,6 +83,12 @@ class EventComparison:
         ]
         return max(found, key=lambda one: one[2].max_error)
 
+    def near_power(self, near: RecordedEvent) -> Complex:
+        """The device's power in a part of the recording [pu of the rating]."""
+        whole = self.event.recording
+        first = round((near.recording.begin - whole.begin) / whole.interval)
+        return np.asarray(self.played.power[first : first + len(near.recording.power)])
+
     @property
     def measured(self) -> dict[str, Numbers]:
         """The measured signals, by name [pu of the rating]."""
@@ -115,12 +124,20 @@ def prepare_event(
     return RecordedEvent(recording, windows, start, tuple(reversed(unique.values())))
 
 
-def cut_event(event: RecordedEvent, after: float) -> RecordedEvent:
-    """The event without what comes so long after its begin [s], or later."""
-    whole = event.recording
-    count = int((event.windows.begin + after) / whole.interval) + 2
-    cut = {name: getattr(whole, name)[:count] for name in ("voltage", "power", "good", "driven")}
-    return replace(event, recording=replace(whole, **cut))
+def cut_event(event: RecordedEvent, after: float, before: float = math.inf) -> RecordedEvent:
+    """The event without what comes so long after its begin [s] or later, and so long before it or earlier."""
+    whole, windows = event.recording, event.windows
+    stop = int((windows.begin + after) / whole.interval) + 2
+    kept = max(round(before / whole.interval), _FEWEST_BEFORE) if before < math.inf else stop
+    first = max(0, round(windows.begin / whole.interval) - kept)
+    cut = {name: getattr(whole, name)[first:stop] for name in _OF_SAMPLES}
+    if whole.sampled is not None:
+        cut["sampled"] = whole.sampled[first:stop]
+    earlier = first * whole.interval
+    recording = replace(whole, begin=whole.begin + earlier, **cut)
+    begin, end = windows.begin - earlier, windows.end - earlier
+    moved = replace(windows, begin=begin, end=end, length=recording.length)
+    return replace(event, recording=recording, windows=moved)
 
 
 def _frequency_before(recording: Recording, before: Mask) -> float:

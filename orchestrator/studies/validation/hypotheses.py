@@ -17,6 +17,7 @@ from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import (
     EventComparison,
     RecordedEvent,
+    cut_event,
     prepare_event,
     rms_error,
     rms_movement,
@@ -32,6 +33,8 @@ _NOISY = 1.5  # times the scatter before the event, which is not the response's
 _LEAST_OFF = 0.003  # rms error [pu] below which nothing is tried
 _EXPLAINS = 0.35  # part of the error that a reading may leave, to be named
 _AS_GOOD = 1.15  # times the least error left, up to which the reading that comes first in the list is named
+_BEFORE = 1.0  # part of a recording before the event with which readings are tried [s]
+_AFTER = 3.0  # part after its begin, the same [s]
 _LEAVES = 0.25  # part of the error that another scale may leave: parameters change a size as well
 _MOST_FACTOR = 2000
 _NEAR_PREFIX = 0.1  # part by which a factor may miss one of ten and be it
@@ -136,18 +139,23 @@ def question_readings(comparison: EventComparison, bases: PortBases) -> list[Que
 def _likeliest(comparison: EventComparison, bases: PortBases, error: float) -> list[Question]:
     """The one reading that explains the most, where it explains enough."""
     event, device = comparison.event, comparison.device
+    near = cut_event(event, _AFTER, _BEFORE)
+    here = math.hypot(*rms_error(comparison.near_power(near), near))
     readings = [*READINGS, *_scalings(comparison)]
     tried = [
         (left, reading)
         for reading in readings
         if reading.fits(event.recording)
-        for left in _error_left(device, event, reading, bases)
-        if left <= reading.leaves * error
+        for left in _error_left(device, near, reading, bases)
+        if left <= reading.leaves * here
     ]
     if not tried:
         return []
     least = min(left for left, _ in tried)
-    left, best = next(one for one in tried if one[0] <= _AS_GOOD * least)
+    best = next(reading for left, reading in tried if left <= _AS_GOOD * least)
+    left = min(_error_left(device, event, best, bases), default=math.inf)
+    if left > best.leaves * error:
+        return []
     remedy = best.remedy(event.recording)
     figures = {"reading": best.name, "error": error, "left": left, "remedy": remedy}
     return [Question(QuestionKind.READ_OTHERWISE, figures)]
@@ -217,24 +225,26 @@ def _meter_elsewhere(
     """A transformer between meter and port that explains most of the error, and the part that is left."""
     if bases.impedance:
         return
-    event, device = comparison.event, comparison.device
-    part = event.recording.good & (event.recording.times > event.windows.begin)
+    near, device = cut_event(comparison.event, _AFTER, _BEFORE), comparison.device
+    part = near.recording.good & (near.recording.times > near.windows.begin)
 
-    def misses(reactance: float) -> Complex:
+    def misses(event: RecordedEvent, reactance: float) -> Complex:
         moved = at_port(event.recording, 1j * reactance)
         changed = prepare_event(moved, bases, event.windows)
         played = device.play(changed.recording, changed.start)
-        return np.asarray((played.power - changed.recording.power)[part])
+        return np.asarray(played.power - changed.recording.power)
 
-    here: Complex = (comparison.played.power - event.recording.power)[part]
+    here: Complex = (comparison.near_power(near) - near.recording.power)[part]
     try:
-        way = misses(_TRIED_REACTANCE) - here
+        way = misses(near, _TRIED_REACTANCE)[part] - here
         size = float(np.sum(np.abs(way) ** 2))
         times = -float(np.real(np.vdot(way, here))) / size if size > 0 else 0.0
         reactance = times * _TRIED_REACTANCE
         if not _REACTANCES[0] <= abs(reactance) <= _REACTANCES[1]:
             return
-        left = float(np.sqrt(np.mean(np.abs(misses(reactance)) ** 2)))
+        whole = comparison.event
+        part = whole.recording.good & (whole.recording.times > whole.windows.begin)
+        left = float(np.sqrt(np.mean(np.abs(misses(whole, reactance)[part]) ** 2)))
     except CosimError:
         return
     if left <= _LEAVES * error:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orchestrator.core.arrays import Numbers
+from orchestrator.core.arrays import Complex, Numbers
 from orchestrator.core.errors import CosimError
 from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.event import (
@@ -24,9 +24,11 @@ from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import Recording
 
 _AFTER = 2.0  # part of the recording after the event's begin that is looked at [s]
+_BEFORE = 0.5  # part before it, the same [s]
 _LEAST = 0.003  # rms error in that part [pu] below which nothing is tried
 _OFF = 0.06  # part of the movement there that the error is at least
 _EXPLAINS = 0.4  # part of the error that a sharper angle may leave, to be named
+_PROMISES = 0.7  # part of the error that a straight line may leave, for a run to say what is left
 _ABRUPT = 0.005  # time [s] within which an angle jumps, and over which its derivative is taken
 _TIMES = 2.0  # times the recorded angle's fastest change, from which on the sharper one has a jump of its own
 _SHORTEST = 0.01  # smoothing over less [s] is none that matters
@@ -73,18 +75,22 @@ SMOOTHINGS = (
 
 def lost_jump(comparison: EventComparison) -> Iterator[tuple[float, Question]]:
     """A sharper angle that explains most of the error around the event's begin, with the part that it leaves."""
-    near = cut_event(comparison.event, _AFTER)
+    near = cut_event(comparison.event, _AFTER, _BEFORE)
     if near.recording.instantaneous:
         return
-    power = comparison.played.power[: len(near.recording.voltage)]
+    power = comparison.near_power(near)
     error, moved = math.hypot(*rms_error(power, near)), math.hypot(*rms_movement(near))
     if error < max(_LEAST, _OFF * moved):
         return
-    found = [one for smoothing in SMOOTHINGS for one in _tried(comparison.device, near, smoothing)]
-    left, length, lost = min(found, key=lambda one: one[0], default=(error, 0.0, np.zeros(2)))
+    found = [
+        one for smoothing in SMOOTHINGS for one in _tried(comparison.device, near, power, smoothing)
+    ]
+    if not found:
+        return
+    left, length, lost = min(found, key=lambda one: one[0])
     angle = np.unwrap(np.angle(near.recording.voltage))
     jumps = _fastest(angle + lost, near.recording) > _TIMES * _fastest(angle, near.recording)
-    if left > _EXPLAINS * error or length < _SHORTEST or not jumps:
+    if left > _EXPLAINS * error or not jumps:
         return
     figures = {
         "at": near.recording.begin + near.windows.begin,
@@ -97,22 +103,31 @@ def lost_jump(comparison: EventComparison) -> Iterator[tuple[float, Question]]:
 
 
 def _tried(
-    device: PlayedDevice, near: RecordedEvent, smoothing: Smoothing
+    device: PlayedDevice, near: RecordedEvent, base: Complex, smoothing: Smoothing
 ) -> Iterator[tuple[float, float, Numbers]]:
-    """The rms error left [pu], the likeliest length of the smoothing [s] and the lost angle; none if it cannot run."""
+    """The rms error left [pu], the likeliest length of the smoothing [s] and the lost angle.
+
+    ``base``: what the device does by the recorded angle. None if it cannot run, or a straight line promises too
+    little."""
     recording = near.recording
     lost = smoothing.lost(recording)
     try:
-        base = device.play(recording, near.start).power
         moves = device.play(_turned(recording, lost), near.start).power - base
         off = recording.power - base
         part = recording.good
         size = float(np.sum(np.abs(moves[part]) ** 2))
         scale = float(np.real(np.vdot(moves[part], off[part]))) / size if size > 0 else 0.0
+        promised = _rms((off - scale * moves)[part])
+        if promised > _PROMISES * _rms(off[part]) or scale * smoothing.length < _SHORTEST:
+            return
         power = device.play(_turned(recording, scale * lost), near.start).power
     except CosimError:
         return
     yield math.hypot(*rms_error(power, near)), scale * smoothing.length, scale * lost
+
+
+def _rms(values: Complex) -> float:
+    return float(np.sqrt(np.mean(np.abs(values) ** 2)))
 
 
 def _turned(recording: Recording, angle: Numbers) -> Recording:
