@@ -93,13 +93,12 @@ def run(options: argparse.Namespace) -> int:
         )
     if options.sources and not options.native:
         raise InputError("--sources is for native FMUs, which are compiled from C; add --native")
-    names = options.names or [name for name in model_names() if not needs_arguments(name)]
     parts = {part: name for part in PARTS if (name := getattr(options, part)) is not None}
     if parts and not options.names:
         raise InputError(
             f"--{next(iter(parts))} is for one model: name it, such as synchronous_generator"
         )
-    models = [catalogue_model(name, parts) for name in names]
+    models = [catalogue_model(name, parts) for name in _find_names(options)]
     extra = extra_members(options, [model.name for model in models])
     kind = "native" if options.native else "Python-backed"
     with said_stages() as report:
@@ -121,6 +120,27 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
+def _find_names(options: argparse.Namespace) -> list[str]:
+    """Names of the models to build: those that were typed, or each with ``--all``."""
+    known = model_names()
+    if options.all and options.names:
+        raise InputError(f"--all builds each model: leave it out, or the name {options.names[0]}")
+    if options.all:
+        return [name for name in known if not needs_arguments(name)]
+    if not options.names:
+        raise InputError(
+            f"no model is named, and nothing is built; name one of {', '.join(known)}; or give --all for each"
+        )
+    strange = [name for name in options.names if name not in known]
+    if strange and len(options.names) > 1:
+        first = next((name for name in options.names if name in known), "gfor")
+        raise InputError(
+            f"there is no model {strange[0]!r}; there are: {', '.join(known)}. If it is a folder, write gfor fmu build "
+            f"{first} --dest {strange[0]}"
+        )
+    return list(options.names)
+
+
 def _take_from_table(options: argparse.Namespace) -> None:
     given = {"--native": options.native, "--fmi": options.fmi, "--platform": options.platform}
     said = [name for name, value in given.items() if value]
@@ -130,8 +150,8 @@ def _take_from_table(options: argparse.Namespace) -> None:
         )
     host = HOSTS[options.host]
     options.native, options.fmi, options.platform = host.native, host.fmi, list(host.platforms)
-    names = options.names or [name for name in model_names() if not needs_arguments(name)]
-    options.names = list(dict.fromkeys(with_port(name, host.port, model_names()) for name in names))
+    names = [with_port(name, host.port, model_names()) for name in _find_names(options)]
+    options.names, options.all = list(dict.fromkeys(names)), False
     make_errors().print(
         f"for {options.host}: {host.kind}, FMI {host.fmi}, {', '.join(host.platforms)}; port: {host.port}. Why: "
         f"{host.why} ({host.source})",
@@ -143,6 +163,7 @@ def _take_from_table(options: argparse.Namespace) -> None:
 def _from_dll(options: argparse.Namespace) -> int:
     if (
         options.names
+        or options.all
         or options.native
         or options.platform
         or options.reference
@@ -150,8 +171,8 @@ def _from_dll(options: argparse.Namespace) -> int:
         or options.host
     ):
         raise InputError(
-            "--from-dll takes the DLL's own name, its platform and FMI 2.0: leave out names, --native, --platform, "
-            "--reference, --fmi and --for"
+            "--from-dll takes the DLL's own name, its platform and FMI 2.0: leave out names, --all, --native, "
+            "--platform, --reference, --fmi and --for"
         )
     pairs = [entry.partition("=") for entry in options.text]
     wrong = [name for name, sign, _ in pairs if not (name and sign)]

@@ -267,7 +267,10 @@ def test_info_tells_of_it(fmu, fmu_path, capsys):
             ["gfor", "--with-linear-model", "two_area", "--scenario", "gfor", "--component", "sg1"],
             "no component of the model 'gfor' 'sg1'",
         ),
-        (["--with-linear-model", "two_area", "--scenario", "gfor"], "needs one model to build"),
+        (
+            ["--all", "--with-linear-model", "two_area", "--scenario", "gfor"],
+            "needs one model to build",
+        ),
         (["gfor", "--scenario", "gfor"], "say more of --with-linear-model"),
     ],
 )

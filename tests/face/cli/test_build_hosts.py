@@ -54,6 +54,14 @@ def test_a_model_without_the_port_and_one_that_names_its_own_stay(built):
     assert "port: phasor" in error
 
 
+def test_all_models_are_built_where_all_are_asked_for(built):
+    code, made, _ = built("--all", "--for", "fmpy")
+    assert code == 0
+    assert len(made) > 20
+    assert len({model for model, _ in made}) == len(made)
+    assert built()[:2] == (2, [])
+
+
 @pytest.mark.parametrize("words", [("--native",), ("--fmi", "2.0"), ("--platform", "win64")])
 def test_what_the_table_chooses_cannot_be_given_too(words, built):
     code, made, error = built("gfor", "--for", "plecs", *words)

@@ -306,6 +306,20 @@ def test_build_of_an_unknown_model_builds_nothing(refused, tmp_path):
     assert not (tmp_path / "new").exists()
 
 
+def test_build_without_a_name_lists_the_models_and_builds_nothing(refused, tmp_path):
+    err = refused("fmu", "build", "--native", "--dest", tmp_path / "new")
+    assert (
+        "no model is named, and nothing is built; name one of csvgn1_phasor, external_grid" in err
+    )
+    assert "--all" in err
+    assert not (tmp_path / "new").exists()
+    assert "leave it out, or the name gfor" in refused("fmu", "build", "gfor", "--all")
+
+
+def test_build_says_how_a_folder_is_given(refused):
+    assert "write gfor fmu build gfor --dest b" in refused("fmu", "build", "gfor", "b")
+
+
 def test_build_of_a_model_that_needs_a_network(refused, tmp_path):
     err = refused("fmu", "build", "grid", "--dest", tmp_path)
     assert "model 'grid' is built from the [network] table of a case file" in err
