@@ -6,7 +6,7 @@ import pytest
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
 from orchestrator.cases.networks.psse.dyr import machine_models
 from orchestrator.cases.networks.psse.dyr_records import read_dyr
-from orchestrator.cases.networks.psse.raw import Machine
+from orchestrator.cases.networks.psse.raw_network import Machine
 from orchestrator.core.errors import InputError
 from tests.models.parts import (
     AT_REST,

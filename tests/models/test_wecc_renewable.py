@@ -15,7 +15,7 @@ from fmus.wecc_renewable.model import (
 )
 from orchestrator.cases.networks.psse.dyr import machine_models
 from orchestrator.cases.networks.psse.dyr_records import read_dyr
-from orchestrator.cases.networks.psse.raw import Machine
+from orchestrator.cases.networks.psse.raw_network import Machine
 from tests.models.parts import integrated, refused
 from tests.models.renewable_by_hand import Plant, fields
 from tests.support.evaluated import Evaluated

@@ -8,7 +8,7 @@ from fmus.grid.names import line_variable
 from fmus.grid.network import Shunt
 from orchestrator.cases.flow.power_flow import PowerFlow
 from orchestrator.cases.networks.conversion import ImportedNetwork, branch_names, bus_of
-from orchestrator.cases.networks.psse.raw import RawNetwork
+from orchestrator.cases.networks.psse.raw_network import RawNetwork
 from orchestrator.core.errors import counted
 from orchestrator.systems.coupling.system import ComponentPlan
 

@@ -35,13 +35,8 @@ from orchestrator.cases.networks.imported_flow import imported_equations
 from orchestrator.cases.networks.load_models import FlowLaws, device_laws, flow_laws, with_laws
 from orchestrator.cases.networks.psse.device_flow import solved_devices
 from orchestrator.cases.networks.psse.device_notes import device_notes
-from orchestrator.cases.networks.psse.raw import (
-    FileLoad,
-    Machine,
-    RawNetwork,
-    bus_of_unit,
-    read_raw,
-)
+from orchestrator.cases.networks.psse.raw import read_raw
+from orchestrator.cases.networks.psse.raw_network import FileLoad, Machine, RawNetwork, bus_of_unit
 from orchestrator.cases.networks.psse.solution import half_digit, stated_voltages
 from orchestrator.cases.networks.psse.studied_parts import (
     StudiedPart,

@@ -25,7 +25,6 @@ from orchestrator.cases.form.unusual_value import UnusualValue
 from orchestrator.cases.networks.conversion import Generation
 from orchestrator.cases.networks.data import bus_name
 from orchestrator.cases.networks.load_models import is_open
-from orchestrator.cases.networks.psse.dyr import record_uses
 from orchestrator.cases.networks.psse.dyr_records import DynamicRecord, read_dyr
 from orchestrator.cases.networks.psse.dyr_units import (
     completed,
@@ -36,6 +35,7 @@ from orchestrator.cases.networks.psse.dyr_units import (
     with_records,
     without_idle_controls,
 )
+from orchestrator.cases.networks.psse.dyr_uses import record_uses
 from orchestrator.cases.networks.psse.load_records import recorded_laws, with_recorded_laws
 from orchestrator.cases.networks.psse.unused_models import unused_models
 from orchestrator.cases.networks.record_use import UseOfRecord

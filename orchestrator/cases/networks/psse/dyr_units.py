@@ -8,15 +8,15 @@ from dataclasses import replace
 from fmus.synchronous_generator.dyr_fields import MACHINE_VARIANTS
 from orchestrator.cases.form.unusual_value import UnusualValue
 from orchestrator.cases.networks.data import bus_name
-from orchestrator.cases.networks.psse.dyr import (
+from orchestrator.cases.networks.psse.dyr import machine_models
+from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
+from orchestrator.cases.networks.psse.machine_model import (
     CLASSICAL,
     COMPENSATION,
     MANUAL,
     WITHOUT_INERTIA,
-    machine_models,
 )
-from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
-from orchestrator.cases.networks.psse.raw import Machine, unit_labels
+from orchestrator.cases.networks.psse.raw_network import Machine, unit_labels
 from orchestrator.cases.networks.unit_row import DoubtOfRecord, UnitRow, checked
 from orchestrator.core.errors import InputError
 

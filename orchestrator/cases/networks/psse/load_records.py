@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from fmus.grid.element_data import Load, Zip
 from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
-from orchestrator.cases.networks.psse.raw import FileLoad
+from orchestrator.cases.networks.psse.raw_network import FileLoad
 from orchestrator.core.errors import Problem, QuestionTopic
 
 LOAD_RECORDS = ("IEELBL", "IEELOW", "IEELZN", "IEELAR", "IEELAL")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from orchestrator.cases.form.remedies import replacement_of, without_models
 from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
-from orchestrator.cases.networks.psse.raw import Machine
+from orchestrator.cases.networks.psse.raw_network import Machine
 
 MACHINE = "machine"
 DEVICE = "device"

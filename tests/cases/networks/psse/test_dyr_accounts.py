@@ -5,12 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cases.networks.psse.dyr import COMPENSATION, machine_models, record_uses
+from orchestrator.cases.networks.psse.dyr import machine_models
 from orchestrator.cases.networks.psse.dyr_records import read_dyr
 from orchestrator.cases.networks.psse.dyr_units import without_idle_controls
+from orchestrator.cases.networks.psse.dyr_uses import record_uses
 from orchestrator.cases.networks.psse.known_records import known_records
+from orchestrator.cases.networks.psse.machine_model import COMPENSATION
 from orchestrator.cases.networks.psse.missing_models import kind_of
-from orchestrator.cases.networks.psse.raw import Machine
+from orchestrator.cases.networks.psse.raw_network import Machine
 from orchestrator.cases.networks.psse.unused_models import unused_models
 from orchestrator.cases.networks.record_use import UseOfRecord, in_one_line
 from orchestrator.cases.networks.unit_row import UnitRow

@@ -11,9 +11,10 @@ from orchestrator.cases.networks.psse.load_records import (
     recorded_laws,
     with_recorded_laws,
 )
-from orchestrator.cases.networks.psse.raw import FileLoad
+from orchestrator.cases.networks.psse.raw_network import FileLoad
 from orchestrator.cases.networks.record_use import UseOfRecord
-from orchestrator.cases.new.new_case import WantedCase, write_case
+from orchestrator.cases.new.new_case import write_case
+from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.studies.modes.modes import compute_modes
 from tests.cases.networks.psse.test_machine_bases import dynamics, network
 

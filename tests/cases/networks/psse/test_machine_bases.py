@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.new.new_case import WantedCase, write_case
+from orchestrator.cases.new.new_case import write_case
+from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.cases.scenario.flow_figures import power_flow_json
 from orchestrator.core.errors import CaseError
 from orchestrator.output.report.power_flow import cells

@@ -3,7 +3,8 @@
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.new.new_case import WantedCase, write_case
+from orchestrator.cases.new.new_case import write_case
+from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.studies.modes.modes import compute_modes
 from tests.cases.networks.psse.test_machine_bases import dynamics, network
 

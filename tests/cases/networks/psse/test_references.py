@@ -5,7 +5,8 @@ import math
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.new.new_case import WantedCase, write_case
+from orchestrator.cases.new.new_case import write_case
+from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.studies.modes.modes import compute_modes
 
 RAW = """\

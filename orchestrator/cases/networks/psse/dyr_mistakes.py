@@ -1,0 +1,126 @@
+"""Mistakes of dynamics data, which stop the reading: records that lack, fit no machine or have no part of ours."""
+
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+
+from fmus.grid_following.dyr_fields import CONVERTER, FIELDS, MODEL, PLANT
+from fmus.wecc_renewable.dyr_fields import PLANT_RECORDS
+from orchestrator.cases.form.remedies import APPROXIMATING, replacement_of, without_models
+from orchestrator.cases.networks.psse.dyr_records import DynamicRecord
+from orchestrator.cases.networks.psse.machine_model import KINDS_OF_CONVERTERS, KNOWN_RECORDS
+from orchestrator.core.errors import few
+
+LEAST_STRANGE = (
+    2  # machines that one file has alone, in each, from which on the files may be of two networks
+)
+_NAMED = 8  # buses that one problem names
+
+
+def count_repeats(problems: Sequence[str], first: Mapping[str, str]) -> Iterator[str]:
+    """The problems, each once: of those with a place of a first record, how many more there are."""
+    for text, count in Counter(problems).items():
+        more = f" and {count - 1} more" if count > 1 else ""
+        yield f"{first[text]}{more}: {text}" if text in first else text
+
+
+def records_unfit(
+    parts: Mapping[tuple[int, str], Mapping[str, str]],
+    replaced: Collection[tuple[int, str]],
+    labels: Mapping[tuple[int, str], str],
+) -> Iterator[str]:
+    """Machines whose records are too many or too few; ``labels`` are of their units."""
+    for (bus, name), own in parts.items():
+        if (bus, name) not in replaced:
+            yield from _incomplete(f"machine {name!r} at bus {bus}", own, labels[bus, name])
+        others = ", ".join(kind for kind in own if kind not in KINDS_OF_CONVERTERS)
+        if "converter" in own and others:
+            yield f"machine {name!r} at bus {bus} is a converter, and has records of its {others}; remove them"
+    for bus, name in without_machine(parts):
+        if (bus, name) not in replaced:
+            yield (
+                f"machine {name!r} at bus {bus} has no record of a machine; add one, or write "
+                f"{replacement_of(labels[bus, name])}, and a converter of ours stands there"
+            )
+
+
+def _incomplete(machine: str, own: Mapping[str, str], unit: str) -> Iterator[str]:
+    """Yield what the records of one of WECC's plants lack; ``unit``: the label of its unit."""
+    needs = own.get("converter") == PLANT_RECORDS[CONVERTER].part
+    if needs == ("electrical" in own) and (needs or "plant" not in own):
+        return
+    there = " and ".join(kind for kind in KINDS_OF_CONVERTERS if kind in own)
+    missing = "REECA1 or REECB1" if needs else CONVERTER
+    yield (
+        f"{machine} has records of its {there} and no {missing}: together they are a plant of WECC's generic models; "
+        f"add it, or write {replacement_of(unit)}, and a converter of ours stands there"
+    )
+
+
+def without_machine(
+    parts: Mapping[tuple[int, str], Mapping[str, str]],
+) -> list[tuple[int, str]]:
+    """Machines in service with neither a machine's record nor a converter's."""
+    return [key for key, own in parts.items() if not {"machine", "converter"} & {*own}]
+
+
+def other_network(
+    strange: Sequence[DynamicRecord],
+    records: Sequence[DynamicRecord],
+    bare: Sequence[tuple[int, str]],
+    machines: int,
+) -> str:
+    """One problem for two files that do not belong together, with what each has alone."""
+    places = dict.fromkeys((record.bus, record.machine) for record in strange)
+
+    def names_of(keys: Iterable[tuple[int, str]]) -> str:
+        return few((f"{bus} {name!r}" for bus, name in keys), _NAMED)
+
+    known = sum(record.name in KNOWN_RECORDS for record in records)
+    return (
+        f"{strange[0].file} and the RAW file do not belong together, as it seems: {len(strange)} of {known} records of "
+        f"machines stand at buses or identifiers that the RAW file has no generator at ({names_of(places)}; first "
+        f"{strange[0].name} in line {strange[0].line}), and {len(bare)} of {machines} machines have no record "
+        f"({names_of(bare)}): give the DYR file of this network; if it is that one, correct these buses, "
+        "or remove the records"
+    )
+
+
+def slips(strange: Sequence[DynamicRecord]) -> Iterator[str]:
+    """Yield one problem with the machines that the RAW file lacks, where another machine has no record: a slip."""
+    own = [
+        record for record in strange if KNOWN_RECORDS[record.name].kind in ("machine", "converter")
+    ]
+    if own:
+        named = (
+            f"{record.name} of machine {record.machine!r} at bus {record.bus}" for record in own
+        )
+        yield (
+            f"{own[0].place}: the RAW file does not have {few(named, _NAMED)}; if one of them is meant for a machine "
+            "without a record, correct its bus or identifier"
+        )
+
+
+_FAMILIES = ("REGC", "REEC", "REPC", "WTG", "WT4", "WT3", "PVGU", "PVEU", "PLNTB")
+"""How the names of grid-following converters and their controls begin."""
+
+
+def remedy_for(name: str, unit: str, *, approximate: bool) -> str:
+    """Return what to do about a record that no part stands for; empty where it is of no grid-following converter.
+
+    ``unit``: label of its machine's unit."""
+    if not name.startswith(_FAMILIES):
+        return ""
+    if name == PLANT:
+        return (
+            f", the controller of a plant; write {without_models([PLANT])}, and the references of its "
+            "converter are constant"
+        )
+    if approximate or name not in FIELDS:
+        return f", a grid-following converter; write {replacement_of(unit)}, and a converter of ours stands there"
+    return (
+        f", a grid-following converter; write {APPROXIMATING} for {MODEL} in its place, with a list of what that "
+        f"leaves out, or {replacement_of(unit)}, and a converter of ours stands there"
+    )
+
+
+# -- WECC's grid-following converters as the phasor converter, at the user's word --------------------

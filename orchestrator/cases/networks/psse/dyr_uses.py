@@ -1,0 +1,86 @@
+"""Use of each record of dynamics data: which part stands for it, or why it is not used."""
+
+from collections.abc import Collection, Sequence
+
+from fmus.grid_following.dyr_fields import FIELDS, MODEL
+from orchestrator.cases.networks.psse.dyr_records import EVENT, DynamicRecord
+from orchestrator.cases.networks.psse.machine_model import MANUAL
+from orchestrator.cases.networks.psse.missing_models import (
+    OF_MACHINES,
+    RESTS,
+    is_resting,
+    kind_of,
+)
+from orchestrator.cases.networks.record_use import RecordUse, UseOfRecord
+
+
+def record_uses(
+    records: Sequence[DynamicRecord],
+    machines: Collection[tuple[int, str]],
+    idle: Collection[tuple[int, str]],
+    leaving_out: Sequence[str] = (),
+    *,
+    approximate: bool = False,
+    exciter: str | None = None,
+    ours: Collection[tuple[int, str]] = (),
+) -> list[RecordUse]:
+    """Return what becomes of each record, of which none that stops the reading is there.
+
+    ``exciter``: what machines without a record of one get, where the case says so; ``ours``: machines that a converter
+    of the case replaces."""
+    left = {name.upper() for name in leaving_out}
+    excited = {
+        (record.bus, record.machine)
+        for record in records
+        if exciter not in (None, MANUAL)
+        or (kind_of(record.name) == "exciter" and record.name not in left)
+    }
+    return [
+        RecordUse(
+            record.file,
+            record.line,
+            record.name,
+            *(
+                (UseOfRecord.NOT_USED, "a converter of ours replaces its machine", False)
+                if (record.bus, record.machine) in ours
+                else _use_of(record, machines, idle, left, approximate, excited)
+            ),
+        )
+        for record in records
+    ]
+
+
+def _use_of(
+    record: DynamicRecord,
+    machines: Collection[tuple[int, str]],
+    idle: Collection[tuple[int, str]],
+    left: Collection[str],
+    approximate: bool,
+    excited: Collection[tuple[int, str]],
+) -> tuple[UseOfRecord, str, bool]:
+    """Return what became of a record, why, and whether it is of no machine."""
+    key = record.bus, record.machine
+    if key in machines:
+        if record.name in left:
+            return UseOfRecord.NOT_USED, "dyr_leave_out names it", False
+        if is_resting(record.name):
+            return UseOfRecord.NOT_USED, RESTS, False
+        if key not in excited and kind_of(record.name) in ("stabilizer", "compensator"):
+            return UseOfRecord.NOT_USED, "its machine has no exciter", False
+        stand_in = f"approximated as {MODEL}" if approximate and record.name in FIELDS else ""
+        return UseOfRecord.USED, stand_in, False
+    if key in idle:
+        return UseOfRecord.NOT_USED, "its machine is out of service", False
+    if record.name == EVENT:
+        told = f"an event of ANDES, of {record.machine}; [scenarios] has events"
+        return UseOfRecord.NOT_USED, told, False
+    kind = kind_of(record.name)
+    if kind in OF_MACHINES:
+        told = f"the RAW file has no machine {record.machine!r} at bus {record.bus}"
+        return UseOfRecord.NOT_USED, told, True
+    what = {"load": "a load model", "device": "a model of an SVC or a DC line", "relay": "a relay"}
+    return (
+        UseOfRecord.NOT_USED,
+        f"{what.get(kind, 'a model')} at bus {record.bus}, which is of no machine",
+        True,
+    )

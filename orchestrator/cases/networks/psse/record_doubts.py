@@ -1,0 +1,72 @@
+"""Questions that records of dynamics data raise."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from fmus.grid_following.dyr_fields import FIELDS
+from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
+from orchestrator.cases.networks.psse.dyr_records import DynamicRecord, given_values
+from orchestrator.cases.networks.psse.machine_model import KNOWN_RECORDS
+from orchestrator.cases.networks.psse.raw_network import Machine
+from orchestrator.cases.networks.psse.record_values import CEILING, FLOOR, chosen_ceiling
+from orchestrator.cases.networks.unit_row import DoubtOfRecord
+
+_SAME = 1e-3  # part by which two figures for one reactance may differ: files round them
+
+
+def doubts_of_machine(
+    machine: Machine, records: Sequence[DynamicRecord], values: Mapping[str, float]
+) -> Iterator[DoubtOfRecord]:
+    yield from _omissions(records)
+    yield from _chosen_limits(records)
+    x_d2, x_source = values.get("machine.X_d2"), machine.source.imag
+    if x_d2 is None or abs(x_source - x_d2) <= _SAME * abs(x_d2):
+        return
+    record = next(record for record in records if "machine.X_d2" in _sets(record.name))
+    text = (
+        f"{record.name} has X''d = {x_d2:g} pu, and the RAW file has ZX = {x_source:g} pu of the same machine in line "
+        f"{machine.line}; PSS/E wants one figure in both, and X''d counts here; correct the one that is wrong"
+    )
+    yield DoubtOfRecord("machine.X_d2", record.place, text, "X''d unlike ZX of the RAW file")
+
+
+def _omissions(records: Sequence[DynamicRecord]) -> Iterator[DoubtOfRecord]:
+    """Return what a part of ours leaves out of its record, by the fields that ask for it."""
+    for record in records:
+        known = KNOWN_RECORDS.get(record.name)
+        if known is None or not known.omissions:
+            continue
+        given = given_values(record, known.fields, {*KNOWN_RECORDS, *FIELDS})
+        for name, text in known.omissions.items():
+            if given[name]:
+                said = f"{record.name} has {name} = {given[name]:g}: {text}"
+                kind = f"{record.name} without {name}"
+                yield DoubtOfRecord(known.kind, record.place, said, kind)
+
+
+def _sets(name: str) -> set[str]:
+    return {
+        p
+        for field in (KNOWN_RECORDS[name].fields if name in KNOWN_RECORDS else ())
+        for p in field.parameters
+    }
+
+
+def _chosen_limits(records: Sequence[DynamicRecord]) -> Iterator[DoubtOfRecord]:
+    """Ask about the limits that PSS/E chooses."""
+    for record in (record for record in records if record.name in DYR_RECORDS):
+        known = DYR_RECORDS[record.name]
+        given = given_values(record, known.fields, {*KNOWN_RECORDS, *FIELDS})
+        ceiling = chosen_ceiling(known, given)
+        if ceiling <= 0:
+            continue
+        text = (
+            f"{record.name} has {CEILING} = 0, for which PSS/E chooses limits that hold the field voltage E2: "
+            f"{CEILING} = -{FLOOR} = {ceiling:.4g} pu is taken"
+        )
+        if given["KE"] == 0:
+            text += (
+                ", and KE = 0 is such that V_R starts at a tenth of it, which moves modes (ANDES has no ceiling and "
+                "KE = 0 there)"
+            )
+        kind = f"limits of {record.name} that PSS/E chooses"
+        yield DoubtOfRecord("exciter.V_RMAX", record.place, text, kind)
