@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.new.new_case import WantedCase, write_case
+from orchestrator.cases.new.new_case import write_case
+from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.studies.modes.modes import ModesResult, compute_modes
 from tests.benchmarks.second_computation import read, spectrum
 

@@ -25,7 +25,8 @@ from typing import Any
 
 from orchestrator.cases.networks.data import bus_name
 from orchestrator.cases.networks.psse.raw import read_raw
-from orchestrator.cases.new.new_case import WantedCase, write_case
+from orchestrator.cases.new.new_case import write_case
+from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.scenario.service import in_service
 from orchestrator.core.errors import CosimError

@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.cases.networks.psse.dyr_records import read_dyr
-from orchestrator.cases.new.new_case import WantedCase, write_case
+from orchestrator.cases.new.new_case import write_case
+from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.core.errors import CaseError, InputError
 from tests.models.one_machine import OneMachine, four_buses, three_buses
 from tests.models.test_psse_traces import E_fd, delta, deviation, v_2

@@ -10,7 +10,9 @@ from rich.markup import escape
 
 from orchestrator.cases.networks.psse.known_records import known_records
 from orchestrator.cases.networks.record_use import as_json, in_full
-from orchestrator.cases.new.new_case import WantedCase, read_converter, sources_of, write_case
+from orchestrator.cases.new.network_files import sources_of
+from orchestrator.cases.new.new_case import write_case
+from orchestrator.cases.new.wanted_case import WantedCase, read_converter
 from orchestrator.core.errors import CaseError, InputError, Problem, ResultsError, listing_all
 from orchestrator.core.safe_files import write_text
 from orchestrator.devices.fmi.vendor_files import is_vendor_file

@@ -3,7 +3,8 @@
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.new.new_case import WantedCase, write_case
+from orchestrator.cases.new.new_case import write_case
+from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.core.errors import InputError
 from tests.cases.networks.psse import raw, records
 

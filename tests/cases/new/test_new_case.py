@@ -15,7 +15,8 @@ from orchestrator.cases.form.parameter_files import read_parameter_file
 from orchestrator.cases.form.schema import NetworkTable
 from orchestrator.cases.networks import data as network_data
 from orchestrator.cases.networks.psse.raw import read_raw
-from orchestrator.cases.new.new_case import WantedCase, _switched, read_converter, write_case
+from orchestrator.cases.new.new_case import _switched, write_case
+from orchestrator.cases.new.wanted_case import WantedCase, read_converter
 from orchestrator.core.errors import CaseError, InputError
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.linear.spectra.continuation import ModesMeetError

@@ -3,13 +3,9 @@
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.new.new_case import (
-    WantedCase,
-    _Place,
-    _with_names,
-    read_converter,
-    write_case,
-)
+from orchestrator.cases.new.converter_places import ConverterPlace, with_names
+from orchestrator.cases.new.new_case import write_case
+from orchestrator.cases.new.wanted_case import WantedCase, read_converter
 from orchestrator.core.errors import InputError
 from orchestrator.studies.coordinated_design.study import PointsDesignRequest, plan_points_design
 from orchestrator.studies.modes.modes import compute_modes
@@ -106,7 +102,7 @@ def test_one_converter_is_gfor_as_before(made):
 )
 def test_converters_are_called_alike(buses, names):
     """One has a plain name; several have those of their buses, and numbers where a bus has several."""
-    found = _with_names([_Place(None, bus, 1.0, "") for bus in buses])
+    found = with_names([ConverterPlace(None, bus, 1.0, "") for bus in buses])
     assert [place.name for place in found] == names
     assert len({place.injection for place in found}) == len(buses)
 

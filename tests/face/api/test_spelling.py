@@ -17,7 +17,7 @@ from orchestrator.studies.points.failure import Failure
 
 ROOT = Path(__file__).parents[3]
 OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*[a-z])")
-OTHERS = ("certification", "interop", "cli", "agents", "report/pdf.py", "cases/new/new_case.py")
+OTHERS = ("certification", "interop", "cli", "agents", "report/pdf.py", "cases/new")
 """Where texts are for the command line alone: Python has no such functions."""
 
 COMMANDS_ALONE = {

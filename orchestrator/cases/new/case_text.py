@@ -1,0 +1,371 @@
+"""Text of a new case: its tables, scenarios and plots, and comments that a person can read and change."""
+
+import math
+import os
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+
+from fmus.grid.network import Load
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
+from orchestrator.cases.form.csv_rows import rows_of
+from orchestrator.cases.networks.data import bus_name
+from orchestrator.cases.networks.record_use import details, in_one_line
+from orchestrator.cases.new.converter_places import ConverterPlace
+from orchestrator.cases.new.wanted_case import WantedCase
+from orchestrator.cases.scenario.prepare import PreparedScenario
+from orchestrator.cases.scenario.short_circuit import source_impedance
+from orchestrator.core.errors import few
+
+_TEMPLATE = Path(__file__).with_suffix(".txt").read_text(encoding="utf-8")
+_EMT_STEP = 1e-4
+_MOST_CURVES = 12
+_MOST_MOVES = 5  # of taps and shunts that are named; the others are counted
+_EMF = """emf w·e''; [conventions] like = "psse" takes PSS/E's e'', which moves dampings by tenths of a point"""
+
+
+def bus_of_largest_load(loads: Sequence[Load], buses: Sequence[str]) -> str:
+    largest = max(loads, key=lambda load: load.p_mw, default=None)
+    return largest.bus if largest else buses[0]
+
+
+class CaseText:
+    """The text of a case, without and with what the network's first power flow says."""
+
+    def __init__(
+        self,
+        wanted: WantedCase,
+        sources: dict[str, Path],
+        base: PreparedScenario | None = None,
+        places: Sequence[ConverterPlace] = (),
+        pods: Mapping[str, bool] = MappingProxyType({}),
+        fault_bus: str = "",
+        moved: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+    ) -> None:
+        self._pods, self.moved = pods, moved
+        self._wanted, self._sources, self._base, self._places = wanted, sources, base, places
+        self._stray, self._stray_why = _stray_capacitance(base) if base else (0.05, "")
+        self._network = base.network if base else None
+        self._fault_bus = fault_bus
+        if places:
+            self._fault_bus = places[0].bus
+        elif self._network:
+            self._fault_bus = bus_of_largest_load(self._network.loads, self._network.buses)
+
+    @property
+    def fault_bus(self) -> str:
+        """Return the bus of the scenario ``fault``; "" while it is not known."""
+        return self._fault_bus
+
+    def assumed(self, questions: int) -> list[str]:
+        lines, device = [], self._wanted.device
+        for p in self._places:
+            w = p.wanted
+            dispatch = f"the slack ({p.slack}) feeds {w.p_mw:g} MW less"
+            if w.replaces:
+                dispatch = f"{p.less} is gone ({p.before_mw:.5g} MW before); the slack ({p.slack}) feeds the difference"
+            elif p.less:
+                dispatch = f"{p.less} feeds {w.p_mw:g} MW less ({p.before_mw:.5g} before), with its rating and inertia"
+            ours = "ours, with the POD gains of the paper's system (`gfor design` finds others)"
+            what = ours if device is None else device.name
+            called = "converter" if len(self._places) == 1 else p.name
+            holding = f"at {p.bus} it holds the {p.v_pu:g} pu of the base"
+            lines.append(f"{called}: {what}; {holding}; {dispatch}")
+        if "dyr" not in self._sources:
+            lines.append(
+                "machines: no dynamics data, so all are a steam turbine's with exciter ST1: typical data"
+            )
+        elif self._wanted.kind == "phasor":
+            lines.append(f"machines: {_EMF}")
+        if "units" in self._sources:
+            lines[-1] += (
+                f"; slack {self._wanted.slack}, {self._wanted.frequency} (--slack, --frequency)"
+            )
+        lines.append(f"loads: {self._loads()}")
+        lines += [f"controls: {self._moves()}"] if self._wanted.move_controls else []
+        lines.append(
+            f"models: {self._wanted.kind}; stray_B of EMT models: {self._stray:g} pu{self._stray_why}"
+        )
+        lines.append(f"fault: three-phase at {self._fault_bus}, 100 ms, nothing trips")
+        beside = self._base.beside_file if self._base else None
+        lines += [f"power flow: {beside.in_words}"] if beside else []
+        if self._base is not None and (line := in_one_line(self._base.records)):
+            lines.append(line + " (--details lists them)" * any(details(self._base.records)))
+        more = f"{questions} question{'s' * (questions != 1)} about the data: comments at their lines in the file"
+        return [*lines, more] if questions else lines
+
+    def _moves(self) -> str:
+        """Tell which taps and shunts moved, and that they do after an outage."""
+        moves = [f"{name} {old:.4g} to {new:.4g}" for name, (old, new) in self.moved.items()]
+        told = few(moves, _MOST_MOVES) if moves else "nothing had to move"
+        return f"{told}; after an outage they move again (move_controls in [network])"
+
+    def _positions(self) -> str:
+        """Return the table of the case with the positions of what moved."""
+        if not self.moved:
+            return ""
+        rows = [
+            f"{name} = {new:.12g}    # {old:.6g} in the file"
+            for name, (old, new) in self.moved.items()
+        ]
+        return "\n".join(["\n[components.grid.parameters]", *rows, ""])
+
+    def _loads(self) -> str:
+        """How the loads follow the voltage."""
+        if self._tables():
+            return "constant power; [network] load_model changes it"
+        asked = (
+            "constant impedance until [network] load_model says otherwise; `gfor modes` tells what power would "
+            "change"
+        )
+        base = self._base
+        if base is None or not base.recorded_loads:
+            return asked
+        recorded, network = base.recorded_loads, base.network
+        names = {load.name for load in network.loads} if network else set()
+        rest = f"; the others: {asked}" if names - recorded else ""
+        return f"{len(recorded)} as their records in the DYR file say; [network] load_model goes before{rest}"
+
+    def _path(self, path: Path) -> str:
+        """Return a path as the file names it: relative where that is possible, with slashes everywhere."""
+        try:
+            return _quoted(
+                Path(
+                    os.path.relpath(path.absolute(), self._wanted.out.absolute().parent)
+                ).as_posix()
+            )
+        except ValueError:  # on another drive
+            return _quoted(path.absolute().as_posix())
+
+    @property
+    def text(self) -> str:
+        w, places = self._wanted, self._places
+        key = next(key for key in self._sources if key not in ("dyr", "units"))
+        kind, other = w.kind, "phasor" if w.kind == "emt" else "emt"
+        steps = {"emt": "100 us", "phasor": "2 ms"}
+        stray = {
+            "emt": f"stray_B = {self._stray:g}             # pu on 100 MVA{self._stray_why}\n",
+            "phasor": "stray_B = 0                 # no bus needs any\n",
+        }
+        both = f'models = "{kind}"           # the same with the others: --set models={other}\n'
+        rest = f"\n[{other}]                       # what --set models={other} takes instead\n"
+        rest += f'step_size = "{steps[other]}"\n'
+        kept = "\nkeep_load_parts = true      # IP, IQ stay constant currents, YP, YQ constant impedances"
+        own = f"    # {_EMF}" if kind == "phasor" else ""
+        dyr = "generator_parameters = { transformer.X_t = 0.0, transformer.R_t = 0.0 }    # the network has it"
+        dyr = f"dyr = {self._path(self._sources['dyr'])}{own}" if "dyr" in self._sources else dyr
+        dyr = (
+            f"file = {self._path(self._sources['units'])}\n{dyr}"
+            if "units" in self._sources
+            else dyr
+        )
+        lines = self._network is not None and any(
+            x.name.startswith("line_") for x in self._network.lines
+        )
+        return _TEMPLATE.format(
+            command=w.command,
+            name=_quoted(re.sub(r"[^0-9A-Za-z_]+", "_", w.out.stem).strip("_") or "case"),
+            title=_quoted(self._sources[key].name + self._with_converters),
+            source=_quoted(", ".join(path.name for path in self._sources.values())),
+            models=both if w.device is None else "",
+            step=steps[kind],
+            record=', "grid.line_*.p"' * lines + "".join(f', "{place.name}.*"' for place in places),
+            other=rest + stray[other] if w.device is None else "",
+            slack=(f"\nslack = {_quoted(w.slack)}" if w.slack else "")
+            + "\nreactive_limits = true" * w.reactive_limits,
+            grid="grid" if kind == "emt" else "phasor_grid",
+            moved=self._positions(),
+            network=self._tables()
+            or f"{key} = {self._path(self._sources[key])}"
+            + kept * (key == "raw" and w.load_parts)
+            + "\nmove_controls = true        # taps and switched shunts move after an outage"
+            * w.move_controls,
+            loads="" if self._tables() else "# ",
+            more=(f"frequency = {_quoted(w.frequency)}\n" if w.frequency else "")
+            + stray["emt"] * (kind == "emt")
+            + (f"leave_out = {_toml_list(w.leave_out)}\n" if w.leave_out else ""),
+            units=dyr
+            + (f"\ndyr_leave_out = {_toml_list(w.dyr_leave_out)}" if w.dyr_leave_out else "")
+            + "\ndyr_approximate = true" * w.dyr_approximate
+            + (f"\nreplace = {_toml_list(w.replace)}" if w.replace else ""),
+            generator="" if "dyr" in self._sources else "_st1",
+            suffix="" if kind == "emt" else "_phasor",
+            converter=self._converter(),
+            scenarios="\n".join(
+                "\n".join([*block, ""]) for block in [*self._scenarios(), *self._plots()]
+            ),
+        )
+
+    def _tables(self) -> str:
+        tables = [
+            f"{k} = {self._path(self._sources[k])}"
+            for k in ("lines_file", "loads_file")
+            if k in self._sources
+        ]
+        if "buses" in self._sources:
+            buses = [bus_name(row["bus"]) for row in rows_of(self._sources["buses"], ("bus",))]
+            tables.append(f"buses = {_toml_list(buses)}")
+        return "\n".join(tables)
+
+    @property
+    def _with_converters(self) -> str:
+        """Where the converters are, as the end of a title."""
+        if not self._places:
+            return ""
+        word = "a converter" if len(self._places) == 1 else "converters"
+        return f" with {word} at {', '.join(place.bus for place in self._places)}"
+
+    def _converter(self) -> str:
+        return "".join(map(self._component, self._places))
+
+    def _component(self, at: ConverterPlace) -> str:
+        """The tables of one converter, and of the same power without dynamics."""
+        w, device, place = self._wanted, self._wanted.device, at.wanted
+        what = 'model = "gfor"' if w.kind == "emt" else 'model = "gfor_phasor"'
+        if device is not None:
+            what = f"{'dll' if w.is_dll else 'fmu'} = {self._path(device)}"
+            what += f"\nbinding = {self._path(w.binding)}" if w.binding else ""
+        if len(self._places) > 1:
+            what += f"\nvendor = {_quoted(at.name)}    # for `gfor interactions`: whose make it is"
+        power = f"P_0 = {place.p_mw / place.rating_mva:.6g}"
+        values = f'S_n = "{place.rating_mva:g} MVA", {power}, v_0 = {at.v_pu:g}'
+        without = values + "".join(
+            f", pod_{x}.enabled = false" for x, starts in self._pods.items() if starts
+        )
+        still = f'model = "static_generation{"" if w.kind == "emt" else "_phasor"}"'
+        parts = (
+            (at.name, what, without, f"P_0 in parts of S_n: {place.p_mw:g} MW"),
+            (
+                at.injection,
+                still,
+                values,
+                "the same power without dynamics, in [scenarios.dispatch]",
+            ),
+        )
+        return "".join(
+            f'\n[components.{name}]\n{kind}\nbus = "{at.bus}"\nparameters = {{ {given} }}    # {why}\n'
+            for name, kind, given, why in parts
+        )
+
+    def _scenarios(self) -> list[list[str]]:
+        devices = [x for place in self._places for x in (place.name, place.injection)]
+        removed = [f"remove = {_toml_list(devices)}"] if devices else []
+        found = [["[scenarios.base]", 'title = "As in the files"', *removed]]
+        if self._base is None or self._network is None:
+            return [*found, self._fault()] if self._fault_bus else found
+        if self._places:
+            without = "the device" if len(self._places) == 1 else "the devices"
+            found.append(self._scenario("dispatch", f"Dispatch without {without}", beside=""))
+            found.append(self._scenario("converter", f"Converter{'s' * (len(self._places) > 1)}"))
+            found += [
+                self._scenario(f"pod_{x}", f"POD-{x.upper()}", f"pod_{x}.enabled")
+                for x in self._pods
+            ]
+        return [*found, self._fault()]
+
+    def _fault(self) -> list[str]:
+        fault = f'type = "bus_fault", time = "1 s", bus = "{self._fault_bus}", duration = "100 ms"'
+        lines = sorted(
+            self._network.lines if self._network else (),
+            key=lambda x: (x.has_ratio, self._fault_bus not in (x.from_bus, x.to_bus)),
+        )
+        opening = (
+            f'    # cleared_by = "{lines[0].name}" would open that line with it' if lines else ""
+        )
+        events = f"events = [{{ {fault} }}]{opening}"
+        return [
+            *self._scenario("fault", f"Fault of 100 ms at {self._fault_bus}", beside=""),
+            events,
+        ]
+
+    def _scenario(
+        self, name: str, title: str, enabled: str = "", beside: str = "dispatch"
+    ) -> list[str]:
+        places = self._places
+        changed = {key: value for p in places for key, value in p.changed.items()}
+        values = [f'"{key}" = {value}' for key, value in changed.items()]
+        values += [f'"{p.name}.{enabled}" = true' for p in places if enabled]
+        before: dict[str, float] = {}
+        left: dict[str, float] = {}
+        for p in (p for p in places if p.changed and p.less):
+            before.setdefault(str(p.less), p.before_mw)
+            left[str(p.less)] = p.left_mw
+        less = "; ".join(f"{unit}: {mw:.5g} for {before[unit]:.5g} MW" for unit, mw in left.items())
+        gone = [p.name if name == "dispatch" else p.injection for p in places]
+        gone += [p.less for p in places if p.less and p.wanted.replaces]
+        settings = [f"remove = {_toml_list(gone)}"] if gone else []
+        told = f"beside = {_quoted(beside)}    # `gfor modes` tells what the device brings"
+        settings += [told] if places and beside else []
+        settings += (
+            [f"set = {{ {', '.join(values)} }}{f'    # {less}' if less else ''}"] if values else []
+        )
+        return [f"[scenarios.{name}]", f'title = "{title}"', *settings]
+
+    def _plots(self) -> list[list[str]]:
+        if self._base is None or self._network is None:
+            return []
+        plans = self._base.system.components
+        speeds = [
+            f"{name}.omega" for name, plan in plans.items() if "omega" in plan.description.outputs
+        ]
+        with_units = {port.bus for port in self._network.ports}
+        buses = [
+            self._fault_bus,
+            *(x for x in self._network.buses if x not in {*with_units, self._fault_bus}),
+        ]
+        found = [_plot("speeds", [(speeds, "Speed [pu]")])] if speeds else []
+        found.append(_plot("voltages", [([f"grid.{bus}.v" for bus in buses], "v [pu]")]))
+        if self._places:
+            current = f"{'current_demand' if self._wanted.kind == 'emt' else 'current_limit'}"
+            panels = [
+                ([f"{place.name}.{signal}" for place in self._places], label)
+                for signal, label in (
+                    ("p", "p [pu]"),
+                    ("q", "q [pu]"),
+                    (current, "Current / limit"),
+                )
+            ]
+            found.append(_plot("converter", panels[: 3 if self._wanted.device is None else 2]))
+        return found
+
+
+def _plot(name: str, panels: Sequence[tuple[Sequence[str], str]]) -> list[str]:
+    lines = ["[[plots]]", f'name = "{name}"', f'title = "{name.capitalize()}"', "panels = ["]
+    for signals, label in panels:
+        also = f", also = {_toml_list(signals[1:_MOST_CURVES])}" if signals[1:] else ""
+        lines.append(f"    {{ signal = {_quoted(signals[0])}{also}, label = {_quoted(label)} }},")
+    return [*lines, "]"]
+
+
+def _toml_list(names: Sequence[str]) -> str:
+    return f"[{', '.join(map(_quoted, names))}]"
+
+
+def _stray_capacitance(base: PreparedScenario) -> tuple[float, str]:
+    """Capacitance [pu, 100 MVA] that EMT models need at buses without one, and why.
+
+    Unit and bus swing at ω_b/√(X''·B), and exchange values once in a step H: H·ω_b/√(X''·B) ≤ 1 for the largest unit at
+    a bus without capacitance."""
+    network, plans = base.network, base.system.components
+    if network is None:
+        return 0.05, ""
+    charged = {bus for line in network.lines if line.B > 0 for bus in (line.from_bus, line.to_bus)}
+    charged |= {shunt.bus for shunt in network.shunts if shunt.b_mvar > 0}
+    needed: dict[str, float] = {}
+    for port in (port for port in network.ports if port.name in plans and port.bus not in charged):
+        plan, z = plans[port.name], source_impedance(plans[port.name])
+        X = abs(z) if z is not None else 0.15 * SYSTEM_BASE_MVA / plan.number("S_n")
+        f_n = plan.number("f_n") if "f_n" in plan.description.variables else 50.0
+        needed[port.name] = (2 * math.pi * f_n * _EMT_STEP) ** 2 / X
+    if not needed:
+        return 0.0, ", as every bus of a unit has a capacitance of its own"
+    name = max(needed, key=needed.__getitem__)
+    digits = 10 ** (math.floor(math.log10(needed[name])) - 1)
+    return math.ceil(
+        needed[name] / digits
+    ) * digits, f", (ω_b·H)²/X'' of {name} at a bus without capacitance"
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'

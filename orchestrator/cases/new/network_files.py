@@ -1,0 +1,78 @@
+"""Files of a network that `gfor new` is given, by the key of the case that names each."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from orchestrator.cases.form.csv_rows import rows_of
+from orchestrator.cases.form.names import close_names
+from orchestrator.core.errors import InputError
+
+_TABLES = {
+    "lines_file": ("from", "to"),
+    "units": ("bus", "rating_mva"),
+    "loads_file": ("bus", "p_mw"),
+    "buses": ("bus",),
+}
+"""What a table of a plain network is → the columns that tell it."""
+
+_FILES = {
+    ".raw": "raw",
+    ".rawx": "raw",
+    ".m": "matpower",
+    ".mat": "matpower",
+    ".json": "pandapower",
+    ".zip": "cgmes",
+}
+
+
+def sources_of(files: Sequence[Path]) -> dict[str, Path]:
+    """Key of the case file that names it → file."""
+    found: dict[str, Path] = {}
+    for path in files:
+        suffix = path.suffix.lower()
+        known = ", ".join([*_FILES, ".dyr", ".csv"])
+        if not path.is_dir() and suffix not in (*_FILES, ".dyr", ".csv"):
+            raise InputError(
+                f"{path}: no network that is read; give a file {known}, or the folder of a CGMES model"
+            )
+        if not path.exists():
+            near = close_names(path.name, [p.name for p in path.absolute().parent.glob("*")])
+            raise InputError(f"{path}: there is no such file{f'; {near}' if near else ''}")
+        key = (
+            "cgmes"
+            if path.is_dir()
+            else "dyr"
+            if suffix == ".dyr"
+            else _FILES.get(suffix) or _table_of(path)
+        )
+        others = [k for k in found if "dyr" not in (k, key) and not {k, key} <= {*_TABLES}]
+        if key in found or others:
+            raise InputError(
+                f"{path} and {found.get(key) or found[others[0]]}: a case has one of them; give one"
+            )
+        found[key] = path
+    if not [key for key in found if key != "dyr"]:
+        raise InputError("no network is given; name its file, such as own.raw, and with it own.dyr")
+    if {*found} & {*_TABLES} and (
+        lacks := [key for key in ("lines_file", "units") if key not in found]
+    ):
+        wanted = " and ".join(f"one with the columns {', '.join(_TABLES[key])}" for key in lacks)
+        raise InputError(
+            f"{', '.join(map(str, found.values()))}: of the tables of a network, {wanted} is missing"
+        )
+    if "dyr" in found and "raw" not in found:
+        raise InputError(
+            f"{found['dyr']}: dynamics data of PSS/E need the network's RAW file; give both"
+        )
+    return found
+
+
+def _table_of(path: Path) -> str:
+    columns = {*next(iter(rows_of(path, ())), ())}
+    key = next((key for key, wanted in _TABLES.items() if columns >= {*wanted}), None)
+    if key is None:
+        kinds = "; ".join(", ".join(wanted) for wanted in _TABLES.values())
+        raise InputError(
+            f"{path}: no table of a network: none has its columns in line 1, or it has no row ({kinds})"
+        )
+    return key
