@@ -234,22 +234,27 @@ def run_one(options: argparse.Namespace, device: Device) -> int:
 
 
 def check_code_options(options: argparse.Namespace, devices: Sequence[Device]) -> None:
-    asked = {
-        "--pod": options.pod,
-        "--black-box": options.black_box,
-        "--reactances": options.reactances,
-    }
-    other = [name for name, value in asked.items() if value]
-    if other:
-        raise InputError(
-            f"{', '.join(other)}: only --code {NTS631} has it; leave it out, and set a damping "
-            "controller by --set"
-        )
+    remedy = "leave it out, and set a damping controller by --set"
+    why = f"only --code {NTS631} has it; {remedy}"
+    _refuse_options(options, ("pod", "black-box", "reactances"), why)
     study = [name for device in devices for name in device.values if name.split(".")[0] in STUDY]
     if study:
         raise InputError(
             f"--set {study[0]}: the test bench has no such component; give values of the converter only"
         )
+
+
+def refuse_certificate_options(options: argparse.Namespace, code: str) -> None:
+    """Refuse the options of a certificate for a code that gives figures alone."""
+    why = f"--code {code} gives figures and no certificate; leave it out"
+    _refuse_options(options, ("pdf", "details", "check", "sign"), why)
+
+
+def _refuse_options(options: argparse.Namespace, names: Iterable[str], why: str) -> None:
+    """Refuse options by their names without dashes, all that are given in one error."""
+    given = [f"--{name}" for name in names if getattr(options, name.replace("-", "_"))]
+    if given:
+        raise InputError(f"{', '.join(given)}: {why}")
 
 
 def certified(
@@ -296,12 +301,7 @@ def certified(
 
 
 def run_stiffness(options: argparse.Namespace, device: Device) -> int:
-    asked = {"--pdf": options.pdf, "--details": options.details, "--check": options.check}
-    other = [name for name, value in asked.items() if value]
-    if other:
-        raise InputError(
-            f"{', '.join(other)}: --code {GB} gives figures and no certificate; leave it out"
-        )
+    refuse_certificate_options(options, GB)
     checked((), dict(options.declare), GB)
     check_code_options(options, [device])
     folder = options.out or Path("results") / f"certify_{device.name}_{GB}"

@@ -10,7 +10,11 @@ from rich.markup import escape
 from orchestrator.cases.form.devices import Device
 from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import made_folder
-from orchestrator.face.cli.certificate import FREQUENCY, check_code_options
+from orchestrator.face.cli.certificate import (
+    FREQUENCY,
+    check_code_options,
+    refuse_certificate_options,
+)
 from orchestrator.face.cli.terminal import make_console, print_json, said_stages
 from orchestrator.output.results.lock import held
 from orchestrator.studies.certification.codes.row import checked
@@ -23,17 +27,7 @@ def run_frequency(options: argparse.Namespace, devices: Sequence[Device]) -> int
     if len(devices) > 1:
         raise InputError(f"--code {FREQUENCY} takes one device; repeat the command for each")
     (device,) = devices
-    asked = {
-        "--pdf": options.pdf,
-        "--details": options.details,
-        "--check": options.check,
-        "--sign": options.sign,
-    }
-    other = [name for name, value in asked.items() if value]
-    if other:
-        raise InputError(
-            f"{', '.join(other)}: --code {FREQUENCY} gives figures and no certificate; leave it out"
-        )
+    refuse_certificate_options(options, FREQUENCY)
     checked((), dict(options.declare), FREQUENCY)
     check_code_options(options, [device])
     folder = options.out or Path("results") / f"certify_{device.name}_{FREQUENCY}"
@@ -51,15 +45,19 @@ def run_frequency(options: argparse.Namespace, devices: Sequence[Device]) -> int
 
 
 def _measured(device: Device, folder: Path) -> tuple[dict[str, Any], list[Path]]:
-    from orchestrator.studies.certification.codes import voltage_source  # noqa: PLC0415 - scipy, for other codes in vain
+    # scipy, for other codes in vain
+    from orchestrator.studies.certification.codes.voltage_source import files  # noqa: PLC0415
+    from orchestrator.studies.certification.codes.voltage_source.measurement import (  # noqa: PLC0415
+        measure_points,
+    )
 
     request = bench_request(device.file, device.binding, device.values)
     made_folder(folder, "--out")
     with said_stages() as report:
         f_n = rated_frequency(request, 50.0)
-        points = voltage_source.measure_points(request, f_n, report)
-    figures = voltage_source.figures_of(points, request.fmu.stem, f_n)
-    return figures, voltage_source.save(points, figures, folder)
+        points = measure_points(request, f_n, report)
+    figures = files.figures_of(points, request.fmu.stem, f_n)
+    return figures, files.save(points, figures, folder)
 
 
 def lines_of(figures: Mapping[str, Any]) -> Iterator[str]:

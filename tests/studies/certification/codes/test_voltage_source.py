@@ -10,25 +10,30 @@ import orchestrator as gfor
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.studies.black_box.frequency_response import Excitation, measure
 from orchestrator.studies.black_box.port import bench_at
-from orchestrator.studies.certification.codes import voltage_source
 from orchestrator.studies.certification.codes.frequency_domain import (
     Stiffness,
     asked_stiffness,
     stiffness,
 )
-from orchestrator.studies.certification.codes.voltage_source import (
-    AtPoint,
-    AtRatio,
-    ScannedPoint,
-    Strengths,
-    closed_loop,
+from orchestrator.studies.certification.codes.voltage_source import measurement
+from orchestrator.studies.certification.codes.voltage_source.figures import (
     impedances,
-    least_damped,
-    sentence_of,
     springs,
     swing,
-    verdict_of,
 )
+from orchestrator.studies.certification.codes.voltage_source.point import (
+    POINTS,
+    AtPoint,
+    ScannedPoint,
+)
+from orchestrator.studies.certification.codes.voltage_source.strength import (
+    RATIOS,
+    AtRatio,
+    Strengths,
+    closed_loop,
+    least_damped,
+)
+from orchestrator.studies.certification.codes.voltage_source.verdict import sentence_of, verdict_of
 from orchestrator.studies.immittance.forms import powers_over
 from tests.studies.certification.codes.impostor import write_impostor
 
@@ -156,7 +161,7 @@ SOFT = Excitation(lowest_hz=2.0, highest_hz=40.0, lines=12, settled=1e-3)
 
 def test_a_grid_following_one_with_a_virtual_inertia_is_none_at_any_operating_point(tmp_path):
     description = bound_fmu(write_impostor(4.0, tmp_path), None)
-    for point in voltage_source.POINTS:
+    for point in POINTS:
         given = {"S_n": 100.0, "P_0": point.active, "Q_0": point.reactive, "v_0": point.voltage}
         bench = bench_at(description, given, 1e-4)
         response = measure(bench, SOFT)
@@ -173,8 +178,8 @@ QUICK = Excitation(lowest_hz=1.0, lines=40, settled=1e-3)
 
 @pytest.mark.parametrize(("model", "is_one"), [("gfor", True), ("gfl", False)])
 def test_the_command_tells_ours_apart(gfor_command, tmp_path, monkeypatch, model, is_one):
-    monkeypatch.setattr(voltage_source, "WHOLE", QUICK)
-    monkeypatch.setattr(voltage_source, "POINTS", voltage_source.POINTS[:1])
+    monkeypatch.setattr(measurement, "WHOLE", QUICK)
+    monkeypatch.setattr(measurement, "POINTS", POINTS[:1])
     fmu, out = gfor.build(model, tmp_path), tmp_path / "out"
     code, printed, _ = gfor_command("certify", fmu, "--code", "frequency", "--out", out, "--json")
     figures = json.loads(printed)
@@ -187,4 +192,4 @@ def test_the_command_tells_ours_apart(gfor_command, tmp_path, monkeypatch, model
         "impedance.png",
     }
     ratios = [row["scr"] for row in figures["points"][0]["strength"]["ratios"]]
-    assert ratios == list(voltage_source.RATIOS)
+    assert ratios == list(RATIOS)
