@@ -10,6 +10,7 @@ from fmus.toolchain.port import DevicePort, declare_port_outputs, device_port
 from fmus.toolchain.symbols import Expr
 from gfor_fmu.droop import Droop, declare_droop, frequency, voltage_reference
 from gfor_fmu.inner_loops import inner_loops
+from gfor_fmu.negative_sequence import declare_negative_sequence_drop
 from gfor_fmu.pod import pod
 from gfor_fmu.usual import FORMING
 from gfor_fmu.virtual_impedance import declare_virtual_impedance
@@ -54,14 +55,35 @@ def grid_forming_converter() -> Model:
     return m.build()
 
 
-def declare_converter(m: ModelBuilder, port: DevicePort, measured: Expr | None = None) -> Converter:
-    """Everything behind a port, whatever its inputs are; ``measured`` as `outer_control`."""
+def declare_converter(
+    m: ModelBuilder, port: DevicePort, measured: Expr | None = None, *, of_phases: bool = False
+) -> Converter:
+    """Declare everything behind a port, whatever its inputs are.
+
+    Parameters
+    ----------
+    m
+        The model it belongs to.
+    port
+        The port.
+    measured
+        Frequency that the POD controllers act on [pu], as of `outer_control`.
+    of_phases
+        Whether the port has phases, and so the control a resistance to the negative sequence.
+    """
     virtual = declare_virtual_impedance(m)
     electrical = declare_filter(m, port, virtual.rated)
     P, Q = m.algebraic("P"), m.algebraic("Q")
     droop = declare_droop(m, electrical.initial, Phasor(P, Q))
     control = outer_control(m, droop, port.omega_b, measured)
-    v_c, limited = inner_loops(m, electrical, port.omega_b, control.omega, control.u_ref, virtual)
+    beside = (
+        declare_negative_sequence_drop(m, electrical, port.omega_b, control.omega)
+        if of_phases
+        else None
+    )
+    v_c, limited = inner_loops(
+        m, electrical, port.omega_b, control.omega, control.u_ref, virtual, beside=beside
+    )
     # Exactly the power at the capacitor while nothing is limited.
     s = power(electrical.u + limited.informed, electrical.i_g.value)
     m.close(P, s.re)

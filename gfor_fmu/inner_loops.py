@@ -22,6 +22,8 @@ def inner_loops(
     w: Expr,
     u_ref: Phasor,
     virtual: VirtualImpedance,
+    *,
+    beside: Phasor | None = None,
 ) -> tuple[Phasor, LimitedCurrent]:
     """Declare both loops; return the voltage that the converter applies [pu, S_n], and the limit at work.
 
@@ -39,10 +41,13 @@ def inner_loops(
         Reference of the voltage across the capacitor branch and the virtual impedance, converter's frame [pu, S_n].
     virtual
         The virtual impedance.
+    beside
+        What else the voltage reference falls by, converter's frame [pu, S_n]; nothing by default.
     """
     start = f.initial
     u_lagged, i_g_lagged, slope = _feed_forwards(m, f)
     drop = virtual.drop(w, f.i_g.value) + declare_inductive_voltage(m, virtual, omega_b, slope)
+    drop = drop if beside is None else drop + beside
     with m.scope("voltage_control"):
         tau = m.parameter(
             "tau", 0.05, "s", "Response time of the AC-voltage loop", minimum=1e-3, source=APPENDIX

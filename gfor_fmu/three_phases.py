@@ -47,7 +47,7 @@ def grid_forming_converter_abc() -> Model:
 
     port = port_at(m, of_phases((v_a, v_b, v_c), angle) / volt, P_0, ampere)
     m.derivative(angle, port.omega_b)
-    converter = declare_converter(m, port)
+    converter = declare_converter(m, port, of_phases=True)
 
     for name, current in zip(
         "abc", phases(converter.current * port.current_scale, angle), strict=True

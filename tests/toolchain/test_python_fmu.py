@@ -55,7 +55,7 @@ _PLANT_OPEN = {
 
 ALL_PATHS_OPEN = {
     "gfor": _CONVERTER_OPEN,
-    "gfor_abc": _CONVERTER_OPEN,
+    "gfor_abc": _CONVERTER_OPEN | {"negative_sequence.R": 0.5},
     "gfor_pod_input": _CONVERTER_OPEN,
     "gfor_phasor": _PODS_OPEN | _BOX_OPEN | _VIRTUAL_OPEN | {"communication_step": 5e-3},
     "synchronous_generator": {"transformer.X_t": 0.1},  # without it v_t is the bus voltage
