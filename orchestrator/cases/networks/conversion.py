@@ -14,6 +14,7 @@ from fmus.grid.network import SMALLEST_REACTANCE, Line, Load, Shunt, ThreeWindin
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.networks.branch_limits import FileLimits, Rating
 from orchestrator.cases.networks.element_names import BranchName
+from orchestrator.cases.networks.regions import Region
 from orchestrator.cases.networks.sources import SourceTables
 from orchestrator.core.arrays import Matrix
 from orchestrator.core.foreign_files import one_line
@@ -72,6 +73,7 @@ class ImportedNetwork:
     titles: dict[str, str] = field(default_factory=dict)  # names in the file, by bus
     branch_names: dict[str, BranchName] = field(default_factory=dict)  # as the file has them
     unit_names: dict[str, str] = field(default_factory=dict)  # of the generators, by bus
+    regions: dict[str, Region] = field(default_factory=dict)  # area, zone, … by bus
 
 
 def import_network(
@@ -122,6 +124,7 @@ def import_network(
         {bus_of(labels[n]): one_line(x) for n, x in source.titles.items() if x and n in labels},
         names,
         {bus_of(labels[n]): one_line(x) for n, x in source.unit_names.items() if n in labels},
+        {bus_of(labels[n]): region for n, region in source.regions.items() if n in labels},
     )
 
 

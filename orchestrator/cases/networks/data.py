@@ -45,6 +45,7 @@ from orchestrator.cases.networks.psse.studied_parts import (
     reference_note,
 )
 from orchestrator.cases.networks.record_use import RecordUse
+from orchestrator.cases.networks.regions import Regions
 from orchestrator.cases.networks.sources import read_matpower, read_pandapower
 from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import InputError, Problem
@@ -105,6 +106,7 @@ class NetworkData:
     titles: Mapping[str, str] = field(default_factory=dict)  # names in the source's file, by bus
     branch_names: Mapping[str, BranchName] = field(default_factory=dict)  # as the source has them
     unit_names: Mapping[str, str] = field(default_factory=dict)  # of the generators, by bus
+    regions: Regions = field(default_factory=Regions)  # area, zone, … of the buses
     # file_loads: loads one by one, where the source is of PSS/E; recorded_loads: names of those whose laws are of
     # records of dynamics data
     file_loads: tuple[FileLoad, ...] = ()
@@ -180,6 +182,7 @@ def network_data(table: NetworkTable, directory: Path, slack: str | None = None)
         titles=source.titles,
         branch_names=source.branch_names,
         unit_names=source.unit_names,
+        regions=Regions.telling(source.regions, buses),
         device_loads=tuple(x.name for x in found.device_loads),
         file_loads=found.file_loads,
         controls=found.controls,

@@ -18,6 +18,7 @@ from fmus.toolchain.cache import CacheError, cache_directory, intact, keep
 from fmus.toolchain.extras import installed_version
 from orchestrator.cases.networks.bus_loads import LoadSum
 from orchestrator.cases.networks.element_names import BranchName
+from orchestrator.cases.networks.regions import Region
 from orchestrator.core.arrays import Matrix
 
 
@@ -45,6 +46,7 @@ class SourceTables:
     unit_names: dict[int, str] = field(
         default_factory=dict
     )  # of the generators at a bus, by its number
+    regions: dict[int, Region] = field(default_factory=dict)  # area, zone, … by a bus' number
 
 
 LIBRARIES = ("pandapower", "numpy", "scipy", "pandas", "lightsim2grid")

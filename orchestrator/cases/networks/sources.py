@@ -21,6 +21,8 @@ from orchestrator.cases.networks.element_names import BranchName
 from orchestrator.cases.networks.kept_tables import SourceTables, kept_tables, tables_beside
 from orchestrator.cases.networks.matpower.program import NAMES, CaseProgram, case_tables
 from orchestrator.cases.networks.pandapower_json import network_text
+from orchestrator.cases.networks.regions import Region
+from orchestrator.core.arrays import Matrix
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import read_bytes
 
@@ -31,6 +33,8 @@ _LIMITS = {"bus": [], "branch": [5, 6, 7], "gen": [3, 4, 8, 9]}
 """Columns of limits, which MATPOWER lets be ``Inf``."""
 
 _PMAX = 8
+_AREA = 6  # column of a bus
+_ZONE = 10  # the same
 
 
 def read_matpower(path: Path) -> SourceTables:
@@ -92,7 +96,15 @@ def read_matpower(path: Path) -> SourceTables:
         titles=dict(zip(numbers.tolist(), names.get("bus_name", ()), strict=False)),
         branch_names=tuple(map(BranchName, names.get("branch_name", ()))),
         unit_names=_names_by_bus(gen[:, 0].astype(int).tolist(), names.get("gen_name", ())),
+        regions=_regions(tables["bus"]),
     )
+
+
+def _regions(bus: Matrix) -> dict[int, Region]:
+    """Return the areas and loss zones of MATPOWER's table of buses, which have no names there."""
+    columns = [column for column in (_AREA, _ZONE) if column < bus.shape[1]]
+    whole = np.nan_to_num(bus[:, [0, *columns]]).astype(int).tolist()
+    return {number: Region(*map(str, own)) for number, *own in whole}
 
 
 def _names_by_bus(buses: Sequence[int], names: Sequence[str]) -> dict[int, str]:

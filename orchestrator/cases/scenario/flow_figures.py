@@ -28,6 +28,7 @@ def power_flow_json(prepared: PreparedScenario) -> dict[str, Any] | None:
                 "p_to_mw": out.real,
                 "q_to_mvar": out.imag,
                 "losses_mw": into.real + out.real,
+                **_area(prepared, line.from_bus, line.to_bus),
             }
         )
     places = {port.name: port.bus for port in prepared.network.ports} if prepared.network else {}
@@ -44,6 +45,7 @@ def power_flow_json(prepared: PreparedScenario) -> dict[str, Any] | None:
                 "p_mw": power.real * S_n,
                 "q_mvar": power.imag * S_n,
                 "loading_percent": 100 * abs(power) * S_n / rating,
+                **_area(prepared, places[name]),
             }
         )
     total = sum(machine["p_mw"] for machine in machines)
@@ -65,9 +67,16 @@ def power_flow_json(prepared: PreparedScenario) -> dict[str, Any] | None:
                 "title": prepared.titles.get(bus, ""),
                 "v_pu": abs(v),
                 "angle_deg": math.degrees(cmath.phase(v)),
+                **prepared.regions.of(bus).as_json(),
             }
             for bus, v in flow.voltages.items()
         ],
         "branches": branches,
         "machines": machines,
     }
+
+
+def _area(prepared: PreparedScenario, *buses: str) -> dict[str, str]:
+    """Return the area of buses as the file names it; nothing where it has not several."""
+    area = prepared.regions.area_of(*buses)
+    return {"area": area} if area else {}

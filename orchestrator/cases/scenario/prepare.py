@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from orchestrator.cases.networks.branch_limits import FileLimits
 from orchestrator.cases.networks.element_names import ElementNames, names_of
 from orchestrator.cases.networks.load_models import in_words, open_question
 from orchestrator.cases.networks.record_use import RecordUse
+from orchestrator.cases.networks.regions import Regions
 from orchestrator.cases.questions.contradictions import doubts
 from orchestrator.cases.questions.idle_values import Idle, idle_values
 from orchestrator.cases.questions.plausibility import check_plausibility, question_loading
@@ -97,6 +99,7 @@ class PreparedScenario:
     file_voltages: FileVoltages = field(default_factory=FileVoltages)  # of the network's source
     titles: Mapping[str, str] = field(default_factory=dict)  # names in the network's file, by bus
     names: ElementNames = field(default_factory=ElementNames)  # of the network's file, for people
+    regions: Regions = field(default_factory=Regions)  # area, zone, … of the buses in the file
     recorded_loads: frozenset[str] = frozenset()  # loads whose laws are of records of dynamics data
     # likely ratings [MVA] of units whose S_n is only the base of their data
     base_ratings: Mapping[str, float] = field(default_factory=dict)
@@ -118,6 +121,31 @@ class PreparedScenario:
     idle: Idle = field(default_factory=dict, repr=False)
     changed: str = ""  # what parameter files and the caller set, in few words
     not_reached: tuple[float, ...] = ()  # times of events for which the run stops too early [s]
+
+    @cached_property
+    def buses_of(self) -> Mapping[str, tuple[str, ...]]:
+        """Buses of every element of the network: of a branch its ends, of what else its own."""
+        network = self.network
+        if network is None:
+            return {}
+        found: dict[str, tuple[str, ...]] = {bus: (bus,) for bus in network.buses}
+        found |= {x.name: (x.from_bus, x.to_bus) for x in network.lines}
+        for x in network.transformers:
+            found[x.name] = x.buses
+            found |= {f"{x.name}.leg_{k + 1}": (bus,) for k, bus in enumerate(x.buses)}
+        found |= {x.name: (x.bus,) for x in network.loads}
+        found |= {x.name: (x.bus,) for x in network.shunts}
+        return found | {x.name: (x.bus,) for x in network.ports}
+
+    def area_of(self, *elements: str) -> str:
+        """Return the areas of elements as the file names them; "" where it has not several."""
+        return self.regions.area_of(*(x for one in elements for x in self.buses_of.get(one, ())))
+
+    @property
+    def areas_of_units(self) -> dict[str, str]:
+        """Areas of the units as the file names them; empty where it has not several."""
+        ports = self.network.ports if self.network and self.regions.has_areas else ()
+        return {port.name: self.regions.area_of(port.bus) for port in ports}
 
     @property
     def subject(self) -> str:
@@ -318,6 +346,7 @@ class Preparer:
             names=names_of(draft.network, draft.data)
             if draft.data and draft.network
             else ElementNames(),
+            regions=draft.data.regions if draft.data else Regions(),
             recorded_loads=draft.data.recorded_loads if draft.data else frozenset(),
             base_ratings=draft.base_ratings,
             following_loads=tuple(draft.data.flow_laws) if draft.data else (),

@@ -3,6 +3,7 @@
 import argparse
 import shlex
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -13,12 +14,13 @@ from orchestrator.cases.networks.record_use import as_json, in_full
 from orchestrator.cases.new.network_files import sources_of
 from orchestrator.cases.new.new_case import write_case
 from orchestrator.cases.new.wanted_case import WantedCase, read_converter
+from orchestrator.cases.scenario.region_totals import RegionTotal, region_totals
 from orchestrator.core.errors import CaseError, InputError, Problem, ResultsError, listing_all
 from orchestrator.core.safe_files import write_text
 from orchestrator.devices.fmi.vendor_files import is_vendor_file
 from orchestrator.face.cli.arguments import add_options
 from orchestrator.face.cli.terminal import make_console, print_json, print_parts
-from orchestrator.output.report.tables import make_table
+from orchestrator.output.report.tables import PlainTable, first_few, make_table
 
 _EXAMPLE = 'gfor new own.raw own.dyr --converter "bus 9, 300 MVA, 200 MW, less sg3" --out case.toml'
 
@@ -77,6 +79,9 @@ def _written(options: argparse.Namespace) -> int:
     if options.details:
         lines += in_full(made.records)
     print_parts(console, map(escape, lines))
+    regions = region_totals(made.scenarios[0]) if made.scenarios else []
+    if options.details and regions:
+        print_parts(console, [_table_of_regions(regions)])
     for prepared in made.scenarios:
         if prepared.name in ("base", "converter"):
             running(in_service(prepared)).close()  # what cannot start is told at once
@@ -93,10 +98,30 @@ def _written(options: argparse.Namespace) -> int:
                 "assumed": [*made.assumed],
                 "power_flow": beside,
                 "records": as_json(made.records),
+                "regions": [*map(asdict, regions)],
                 "questions": [*dict.fromkeys(made.questions)],
             }
         )
     return 0
+
+
+def _table_of_regions(regions: Sequence[RegionTotal]) -> PlainTable:
+    rows = [
+        (
+            f"{one.kind} {one.name}",
+            first_few(one.buses, str),
+            first_few(one.units, str),
+            f"{one.generation_mw:.1f}",
+            f"{one.load_mw:.1f}",
+        )
+        for one in regions
+    ]
+    return make_table(
+        "Areas, zones, owners and stations of the file",
+        *("What", "Buses", "Units", "Generation [MW]", "Load [MW]"),
+        left=3,
+        rows=rows,
+    )
 
 
 def _list_models(*, as_json: bool) -> None:

@@ -2,11 +2,11 @@
 
 import argparse
 import json
-from collections.abc import Mapping
 from typing import Any
 
 from rich.markup import escape
 
+from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.scenario.short_circuit import CONVENTION, BusStrength, weakest_first
 from orchestrator.face.cli.arguments import add_json_argument, add_kept_argument, add_options
 from orchestrator.face.cli.case_arguments import add_case_arguments, chosen
@@ -29,7 +29,7 @@ def run(options: argparse.Namespace) -> int:
         for s in chosen(options)
     }
     told = [
-        {"name": s.name, "buses": [_with_title(s.prepared.titles, bus) for bus in buses]}
+        {"name": s.name, "buses": [_with_title(s.prepared, bus) for bus in buses]}
         for s, buses in found.items()
     ]
     about = next(iter(found)).prepared.about
@@ -42,14 +42,15 @@ def run(options: argparse.Namespace) -> int:
         return 0
     alike: dict[str, list[str]] = {}
     for scenario, buses in found.items():
-        with_titles = [_with_title(scenario.prepared.titles, bus) for bus in buses]
+        with_titles = [_with_title(scenario.prepared, bus) for bus in buses]
         alike.setdefault(json.dumps(with_titles), []).append(scenario.title)
     console = make_console(names=names)
     for rows, titles in alike.items():
-        table = make_table(
-            ", ".join(titles), "Bus", "S_sc [MVA]", "SCR", "of [MVA]", "X/R", "Converters"
-        )
-        for x in json.loads(rows):
+        told = json.loads(rows)
+        columns = ["Bus", "S_sc [MVA]", "SCR", "of [MVA]", "X/R", "Converters"]
+        columns += ["Area"] * any("area" in x for x in told)
+        table = make_table(", ".join(titles), *columns)
+        for x in told:
             numbers = (
                 (x["s_sc_mva"], ".0f"),
                 (x["scr"], ".2f"),
@@ -57,12 +58,15 @@ def run(options: argparse.Namespace) -> int:
                 (x["x_r"], ".1f"),
             )
             figures = ["–" if value is None else f"{value:{form}}" for value, form in numbers]
-            table.add_row(x["bus"], *figures, ", ".join(x["converters"]))
+            row = [x["bus"], *figures, ", ".join(x["converters"]), x.get("area", "")]
+            table.add_row(*row[: len(columns)])
         console.print(table, "")
     console.print(escape(f"Convention: {convention}."), soft_wrap=True, highlight=False)
     return 0
 
 
-def _with_title(titles: Mapping[str, str], bus: BusStrength) -> dict[str, Any]:
-    """The bus as JSON, with its name in the network's file."""
-    return bus.as_json() | {"title": titles.get(bus.bus, "")}
+def _with_title(prepared: PreparedScenario, bus: BusStrength) -> dict[str, Any]:
+    """The bus as JSON, with its name in the network's file, and its area where that has several."""
+    area = prepared.regions.area_of(bus.bus)
+    title = {"title": prepared.titles.get(bus.bus, "")}
+    return bus.as_json() | title | ({"area": area} if area else {})

@@ -17,7 +17,18 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
     network, grid = prepared.network, prepared.grid
     if network is None:
         return None
-    units, shown = prepared.system.components, prepared.names.of
+    units = prepared.system.components
+
+    def title(name: str) -> str:
+        """Return the title of an element, with what it belongs to in the file."""
+        buses = prepared.buses_of.get(name, ())
+        if len(buses) == 1:
+            belongs = prepared.regions.of(buses[0]).in_words
+        else:
+            areas = prepared.regions.area_of(*buses)
+            belongs = f"area {areas}" if areas else ""
+        return ", ".join(filter(None, (prepared.names.of(name), belongs)))
+
     plan = units[grid]
     has = plan.description.variables
 
@@ -27,7 +38,7 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
     lines: list[dict[str, Any]] = [
         {
             "name": line.name,
-            "title": shown(line.name),
+            "title": title(line.name),
             "from": line.from_bus,
             "to": line.to_bus,
             "kind": "branch" if line.has_ratio else "line",
@@ -41,7 +52,7 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
     lines += [
         {
             "name": x.name,
-            "title": shown(x.name),
+            "title": title(x.name),
             "from": x.buses[0],
             "to": bus,
             "kind": "branch",
@@ -65,14 +76,14 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
         "width": WIDTH,
         "height": HEIGHT,
         "buses": [
-            {"name": bus, "title": shown(bus), "x": x, "y": y}
+            {"name": bus, "title": title(bus), "x": x, "y": y}
             for bus, (x, y) in zip(network.buses, at, strict=True)
         ],
         "lines": lines,
         "loads": [
             {
                 "name": load.name,
-                "title": shown(load.name),
+                "title": title(load.name),
                 "bus": load.bus,
                 "scale": of_grid(f"{load.name}.scale"),
                 "p_mw": plan.number(power) if (power := f"{load.name}.P") in has else load.p_mw,
@@ -82,7 +93,7 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
         "units": [
             {
                 "name": port.name,
-                "title": shown(port.name),
+                "title": title(port.name),
                 "bus": port.bus,
                 "machine": any(
                     state.endswith("machine.omega") for state in units[port.name].description.states

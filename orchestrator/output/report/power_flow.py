@@ -27,6 +27,9 @@ COLUMNS = {
 
 # how many columns at the left of each table hold text
 TEXTS = {"machines": 2, "buses": 1, "branches": 3}
+_REGIONS = {"area": "Area", "zone": "Zone", "owner": "Owner", "station": "Station"}
+"""Columns of a file that tells them."""
+
 _DIGITS = {"v_pu": 4, "angle_deg": 2, "rating_mva": None, "losses_mw": 3}
 
 
@@ -45,10 +48,17 @@ def totals(found: dict[str, Any]) -> list[tuple[str, str]]:
     ]
 
 
+def columns(rows: Sequence[Mapping[str, Any]], kind: str) -> dict[str, str]:
+    """Return the headings of a table by column, with the regions that its rows tell."""
+    told = {name: heading for name, heading in _REGIONS.items() if any(name in row for row in rows)}
+    return COLUMNS[kind] | told
+
+
 def cells(rows: Sequence[dict[str, Any]], kind: str) -> list[list[str]]:
     """The rows as text; a bus has its name in the file beside it."""
+    shown = columns(rows, kind)
     return [
-        [_cell(column, row[column]) + _titled(column, row) for column in COLUMNS[kind]]
+        [_cell(column, row.get(column, "")) + _titled(column, row) for column in shown]
         for row in rows
     ]
 

@@ -357,7 +357,7 @@ class Linearised:
                 for name in model.names
                 if any(fnmatch.fnmatchcase(name, p) for p in analysis.swing)
             ),
-            areas=areas_of(analysis.areas, prepared.system),
+            areas=areas_of(analysis.areas, prepared.system) or prepared.areas_of_units,
             stability=examined.stability.doubted(
                 [
                     f"{name} does not fit its binding: {m.fault}"

@@ -285,7 +285,9 @@ def _power_flow(prepared: PreparedScenario) -> dict[str, Any] | None:
         }
     buses = {bus: [abs(v), math.degrees(cmath.phase(v))] for bus, v in flow.voltages.items()}
     found = power_flow_json(prepared) or {}
-    return {**found, "residual": flow.residual, "buses": buses, "units": units}
+    regions = {bus: prepared.regions.of(bus).as_json() for bus in prepared.regions.at}
+    told = {"regions": regions} if regions else {}
+    return {**found, "residual": flow.residual, "buses": buses, "units": units, **told}
 
 
 def _linear_differences(result: RunResult) -> dict[str, float] | None:

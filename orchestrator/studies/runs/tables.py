@@ -131,7 +131,8 @@ def power_flows(results: Sequence[ModesResult]) -> Iterator[Table]:
             flows.pop(same, None)
             flows[f"{same}, {r.prepared.title}" if same else r.prepared.title] = flow
     for titles, flow in flows.items():
-        for kind, columns in power_flow.COLUMNS.items():
+        for kind in power_flow.COLUMNS:
+            columns = power_flow.columns(flow[kind], kind)
             cells = power_flow.cells(flow[kind], kind)
             title, left = f"{kind.capitalize()}: {titles}", power_flow.TEXTS[kind]
             yield make_table(title, *columns.values(), left=left, rows=cells)

@@ -1,6 +1,6 @@
 """Branches beyond the ratings and buses outside of the bands that a network's file has."""
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import Any
 
 from orchestrator.cases.networks.branch_limits import Loading
@@ -46,20 +46,30 @@ def limits_table(summary: Summary, most: int = 12) -> ColumnTable[ScreenedItem] 
     if not found:
         return None
     found.sort(key=lambda item: -(_percent(item) or 0.0))
+    prepared = summary.result.plan.prepared
+    has_areas = prepared.regions.has_areas
+
+    def area(heading: str, get: Callable[[ScreenedItem], str | None]) -> list[Column[ScreenedItem]]:
+        if not has_areas:
+            return []
+        return [Column(heading, lambda item: prepared.area_of(get(item) or ""), text=True)]
+
     return ColumnTable(
         "Branches beyond their rating, and buses outside of their band",
         (
             Column("Point", lambda item: item.point.name),
             Column("Outage", lambda item: item.outage.name),
             Column("Branch", lambda item: _branch(item) or ""),
+            *area("Area of branch", _branch),
             Column("Loading [%]", _percent, ".4g"),
             Column("Beyond", lambda item: _number(item, branches_beyond(item))),
             Column("Bus", lambda item: _bus(item) or ""),
+            *area("Area of bus", _bus),
             Column("Voltage [pu]", _voltage, ".4f"),
             Column("Outside", lambda item: len(item.record.outliers)),
         ),
         found,
-        3,
+        3 + has_areas,
         most,
         "items.csv",
     )
@@ -69,25 +79,36 @@ def limits_json(summary: Summary) -> dict[str, Any] | None:
     """Give every item with a branch beyond its rating or a bus outside of its band; None where the file has neither."""
     if not limits_sentence(summary):
         return None
-    intact = _beyond_intact(summary)
+    intact, area_of = _beyond_intact(summary), summary.result.plan.prepared.area_of
     concerned = [
         item for item in summary.result.items if branches_beyond(item) or item.record.outliers
     ]
-    return {"items": [_item_json(item, intact.get(item.point.name, ())) for item in concerned]}
+    return {
+        "items": [_item_json(item, intact.get(item.point.name, ()), area_of) for item in concerned]
+    }
 
 
-def _item_json(item: ScreenedItem, beyond_intact: Collection[str]) -> dict[str, Any]:
+def _item_json(
+    item: ScreenedItem, beyond_intact: Collection[str], area_of: Callable[[str], str]
+) -> dict[str, Any]:
+    """Return an item's branches and buses beyond their limits, with their areas where the file has several."""
+
+    def area(element: str) -> dict[str, str]:
+        name = area_of(element)
+        return {"area": name} if name else {}
+
     branches = [
         {
             "branch": one.branch,
             "loading_percent": 100 * one.part,
             "beyond_in_intact_network": one.branch in beyond_intact,
+            **area(one.branch),
         }
         for one in item.record.loadings
         if one.beyond
     ]
     buses = [
-        {"bus": one.bus, "voltage_pu": one.voltage, "limit_pu": one.limit}
+        {"bus": one.bus, "voltage_pu": one.voltage, "limit_pu": one.limit, **area(one.bus)}
         for one in item.record.outliers
     ]
     return {

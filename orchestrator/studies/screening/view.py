@@ -245,6 +245,10 @@ def overview(summary: Summary, most: int = 12) -> ColumnTable[OutageRow]:
     at = {(item.outage.name, item.point.name): item for item in summary.result.items}
     title = f"Least damping [%] below {100 * plan.wanted.damping:g} %, worst outage first"
     columns = [Column[OutageRow]("Outage", lambda row: row.name)]
+    prepared, out = plan.prepared, {one.name: one.elements for one in plan.outages}
+    if prepared.regions.has_areas:
+        columns.append(Column("Area", lambda row: prepared.area_of(*out.get(row.name, ()))))
+    texts = len(columns)
 
     def at_point(name: str) -> Column[OutageRow]:
         return Column(name, lambda row: at.get((row.name, name)), _cell)
@@ -254,7 +258,7 @@ def overview(summary: Summary, most: int = 12) -> ColumnTable[OutageRow]:
             title,
             [*columns, *(at_point(point.name) for point in plan.points)],
             rows,
-            1,
+            texts,
             most,
             ITEMS,
         )
@@ -266,7 +270,7 @@ def overview(summary: Summary, most: int = 12) -> ColumnTable[OutageRow]:
             "Not judged", lambda row: f"{len(row.unjudged)} of {row.points}" if row.unjudged else ""
         ),
     ]
-    return ColumnTable(title, columns, rows, 3, most, ITEMS)
+    return ColumnTable(title, columns, rows, texts + 2, most, ITEMS)
 
 
 def _who(mode: ModeAt | None) -> str:

@@ -25,9 +25,11 @@ from orchestrator.cases.networks.cgmes.branches import (
 from orchestrator.cases.networks.cgmes.files import load_cgmes, profiles_of
 from orchestrator.cases.networks.cgmes.reference import Reference, dynamics_of, reference_of
 from orchestrator.cases.networks.element_names import BranchName
+from orchestrator.cases.networks.regions import Region
 from orchestrator.cases.networks.source_changes import Changes
 from orchestrator.cases.networks.sources import SourceTables
 from orchestrator.core.errors import InputError, Problem, few
+from orchestrator.core.foreign_files import one_line
 
 _TABLES = {
     "static var compensator": "get_static_var_compensators",
@@ -109,6 +111,7 @@ class _Reading:
         self._numbers: dict[str, int] = {}
         self._labels: dict[str, str] = {}
         self._titles: dict[str, str] = {}
+        self._regions: dict[str, Region] = {}
         self._tables_of_names: dict[str, dict[str, str]] = {}
         self._volts: dict[str, float] = {}
         self._rows: list[list[float]] = []
@@ -142,6 +145,7 @@ class _Reading:
             {number: self._labels[bus] for bus, number in numbers.items()},
             titles={numbers[bus]: title for bus, title in self._titles.items() if bus in numbers},
             branch_names=tuple(BranchName(self._title_of(b.name)) for b in self._branches),
+            regions={numbers[bus]: x for bus, x in self._regions.items() if bus in numbers},
             feeding={n: fed for n, x in self._loads.items() if (fed := x.apart().feeding).power},
         )
         ratings: dict[str, float] = {}
@@ -172,6 +176,7 @@ class _Reading:
     def _buses(self, leaving_out: Sequence[str]) -> None:
         buses = self._source.get_buses(all_attributes=True)
         levels = self._source.get_voltage_levels()["nominal_v"]
+        self._regions = self._regions_of(buses)
         generators = self._source.get_generators(all_attributes=True)
         fed = set(generators[generators.connected].bus_id)
         islands: dict[int, list[str]] = {}
@@ -224,6 +229,19 @@ class _Reading:
             bus = nodes.bus_id[node]
             if bus in {*units.bus_id}:
                 return found or {bus}
+        return found
+
+    def _regions_of(self, buses: Any) -> dict[str, Region]:
+        """Return the substation of each bus, and its SubGeographicalRegion as the area."""
+        station_of = self._source.get_voltage_levels().substation_id
+        stations = self._source.get_substations(all_attributes=True)
+        areas = stations.geo_tags if "geo_tags" in stations else {}
+        found = {}
+        for bus, level in buses.voltage_level_id.items():
+            station = station_of.get(level, "")
+            if station in stations.index:
+                area, name = str(areas.get(station, "")), str(stations.name[station])
+                found[str(bus)] = Region(one_line(area), station=one_line(name))
         return found
 
     def _bus_names(self, buses: Any) -> dict[str, str]:

@@ -17,6 +17,7 @@ from orchestrator.cases.networks.psse.raw_file import read_file
 from orchestrator.cases.networks.psse.raw_loads import named_loads, read_loads, read_shunts
 from orchestrator.cases.networks.psse.raw_machines import infinite_buses, read_machines
 from orchestrator.cases.networks.psse.raw_network import RawNetwork
+from orchestrator.cases.networks.psse.raw_regions import regions_of
 from orchestrator.cases.networks.psse.raw_tables import (
     BRANCH_COLUMNS,
     BUS_COLUMNS,
@@ -99,6 +100,7 @@ def _network(net: RawTables, leaving_out: Sequence[str], slack: str | None = Non
         net.titles,
         {bus: x.feeding for bus, x in at_buses.items() if x.feeding.power},
         tuple(net.names),
+        regions=regions_of(net.raw),
     )
     records = record_uses(net.file, net.merged, leaving_out, net.devices.unused, net.dropped)
     return RawNetwork(

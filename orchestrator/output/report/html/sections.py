@@ -25,7 +25,7 @@ from orchestrator.output.report.html.elements import (
 )
 from orchestrator.output.report.html.folder import Results
 from orchestrator.output.report.linearised import exceptions_in_words
-from orchestrator.output.report.power_flow import COLUMNS, TEXTS, cells
+from orchestrator.output.report.power_flow import TEXTS, cells, columns
 from orchestrator.output.results.signals import relative_difference, signal
 from orchestrator.simulation.watch.finding import NOT_JUDGED
 
@@ -161,8 +161,9 @@ def operating_point(results: Results) -> str:
         low = high = "–"
         if flow:
             low, high = (f"{pick(v[0] for v in flow['buses'].values()):.4f}" for pick in (min, max))
+            regions = flow.get("regions", {})
             buses = [
-                {"name": bus, "v_pu": v, "angle_deg": angle}
+                {"name": bus, "v_pu": v, "angle_deg": angle, **regions.get(bus, {})}
                 for bus, (v, angle) in flow["buses"].items()
             ]
             found = {
@@ -173,7 +174,7 @@ def operating_point(results: Results) -> str:
             shown = [
                 table(
                     "Units" if kind == "machines" else kind.capitalize(),
-                    list(COLUMNS[kind].values()),
+                    list(columns(found[kind], kind).values()),
                     [[escape(cell) for cell in row] for row in cells(found[kind], kind)],
                     left=TEXTS[kind],
                 )
