@@ -36,6 +36,7 @@ _NAMES = {
     "face.api.scenario": "CheckpointWarning RunEndedWarning Scenario UnusualDataWarning",
     "face.api.source": "source",
     "face.api.validation": "validate",
+    "face.api.voltage_source": "VoltageSource voltage_source",
     "linear.spectra.modes": "Mode",
     "linear.spectra.stability": "Stability",
     "studies.certification.compared": "Verification",

@@ -35,6 +35,8 @@ from orchestrator.face.api.scenario import Scenario as Scenario
 from orchestrator.face.api.scenario import UnusualDataWarning as UnusualDataWarning
 from orchestrator.face.api.source import source as source
 from orchestrator.face.api.validation import validate as validate
+from orchestrator.face.api.voltage_source import VoltageSource as VoltageSource
+from orchestrator.face.api.voltage_source import voltage_source as voltage_source
 from orchestrator.linear.spectra.modes import Mode as Mode
 from orchestrator.linear.spectra.stability import Stability as Stability
 from orchestrator.studies.certification.compared import Verification as Verification

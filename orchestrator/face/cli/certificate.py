@@ -54,6 +54,7 @@ from orchestrator.studies.certification.kinds import (
     usual_folder,
 )
 from orchestrator.studies.certification.margins import margin_of, narrowest
+from orchestrator.studies.certification.matrix import BEHAVIOUR
 from orchestrator.studies.certification.request import STUDY, rated_frequency
 from orchestrator.studies.certification.signed import sign_folder
 from orchestrator.studies.certification.verdict import FAILS, INCOMPLETE, exit_code
@@ -193,7 +194,7 @@ def _figures(v: PointVerdict) -> Iterator[str]:
 
 GB = "gb"  # the code of Great Britain, which has figures and no verdict
 ALL = "all"  # every code
-FREQUENCY = "frequency"  # the name of voltage source behaviour in frequency, among the codes
+FREQUENCY = BEHAVIOUR  # the name of voltage source behaviour in frequency, among the codes
 _CODES = (*WITH_VERDICT, GB, FREQUENCY)
 LISTED = ", ".join(map(in_words, _CODES))  # as the help of ``--code`` names them
 

@@ -52,8 +52,8 @@ def run(options: argparse.Namespace) -> int:
             "--into: it takes one device's certificate by one code with a verdict; for another code "
             "repeat the command with the same --into"
         )
-    if options.code == FREQUENCY:
-        return run_frequency(options, devices)
+    if options.code == FREQUENCY and len(devices) == 1:
+        return run_frequency(options, devices[0])
     if options.code == GB and len(devices) == 1:
         return run_stiffness(options, devices[0])
     several = len(devices) > 1 or options.code == ALL

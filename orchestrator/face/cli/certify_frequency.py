@@ -1,14 +1,13 @@
 """``gfor certify --code frequency``: voltage source behaviour of a device, from its admittance."""
 
 import argparse
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from rich.markup import escape
 
 from orchestrator.cases.form.devices import Device
-from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import made_folder
 from orchestrator.face.cli.certificate import (
     FREQUENCY,
@@ -22,17 +21,14 @@ from orchestrator.studies.certification.kinds import bench_request
 from orchestrator.studies.certification.request import rated_frequency
 
 
-def run_frequency(options: argparse.Namespace, devices: Sequence[Device]) -> int:
+def run_frequency(options: argparse.Namespace, device: Device) -> int:
     """Measure, print and write; 0 where it behaves as a voltage source at every operating point, else 1."""
-    if len(devices) > 1:
-        raise InputError(f"--code {FREQUENCY} takes one device; repeat the command for each")
-    (device,) = devices
     refuse_certificate_options(options, FREQUENCY)
     checked((), dict(options.declare), FREQUENCY)
     check_code_options(options, [device])
     folder = options.out or Path("results") / f"certify_{device.name}_{FREQUENCY}"
     with held(folder):
-        figures, files = _measured(device, folder)
+        figures, files = measured_behaviour(device, folder)
     if options.json:
         print_json(figures)
     else:
@@ -44,7 +40,8 @@ def run_frequency(options: argparse.Namespace, devices: Sequence[Device]) -> int
     return 0 if figures["verdict"] else 1
 
 
-def _measured(device: Device, folder: Path) -> tuple[dict[str, Any], list[Path]]:
+def measured_behaviour(device: Device, folder: Path) -> tuple[dict[str, Any], list[Path]]:
+    """Measure a device at each operating point, and write figures, impedances and their picture."""
     # scipy, for other codes in vain
     from orchestrator.studies.certification.codes.voltage_source import files  # noqa: PLC0415
     from orchestrator.studies.certification.codes.voltage_source.measurement import (  # noqa: PLC0415

@@ -12,6 +12,7 @@ from orchestrator.core.errors import InputError
 from orchestrator.core.safe_files import made_folder
 from orchestrator.face.cli.certificate import (
     ALL,
+    FREQUENCY,
     GB,
     certified,
     check_code_options,
@@ -19,6 +20,7 @@ from orchestrator.face.cli.certificate import (
     measured_figures,
     show,
 )
+from orchestrator.face.cli.certify_frequency import measured_behaviour
 from orchestrator.face.cli.certify_sensitivities import find_needs
 from orchestrator.face.cli.terminal import make_console, make_errors, print_json
 from orchestrator.output.report.tables import PlainTable, make_table
@@ -47,10 +49,10 @@ def run_matrix(options: argparse.Namespace, devices: Sequence[Device]) -> int:
     if options.code == ALL and not options.declare:
         left_out = tuple(codes_by_declaration())
         codes = tuple(key for key in codes if key not in left_out)
-    codes += (GB,) if options.code == ALL else ()
+    codes += (GB, FREQUENCY) if options.code == ALL else ()
     several = len(devices) > 1
-    if GB in codes:
-        checked((), {} if options.code == ALL else dict(options.declare), GB)
+    for key in sorted({GB, FREQUENCY} & set(codes)):
+        checked((), {} if options.code == ALL else dict(options.declare), key)
     if set(codes) - {NTS631}:
         check_code_options(options, devices)
     if several and options.check:
@@ -114,6 +116,9 @@ def _tested(
             cell.verdict, cell.figures = FIGURES, ()
             figures, _ = measured_figures(device, own)
             cell.figures = [*stiffness_in_words(figures), figures["phase_jump"]["sentence"]]
+        elif key == FREQUENCY:
+            figures, files = measured_behaviour(device, own)
+            cell.take_behaviour(figures, files[0].name, files[-1].name)
         else:
             found, files = certified(options, device, key, own, console)
             cell.take(found)
@@ -121,7 +126,7 @@ def _tested(
                 show(found, files, own, console)
             if options.sensitivities and found.damping is None:
                 _take_needs(options, found, cell, own, console)
-        if not options.no_check and key != GB:
+        if not options.no_check and key not in (GB, FREQUENCY):
             options.check = own / KEPT
     if cell.failure is not None and cell.figures is not None:
         cell.verdict = NOT_TESTED

@@ -1,6 +1,6 @@
 """Several devices under several codes: a verdict and the narrowest margin for each pair, and the files with them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from html import escape
@@ -34,6 +34,8 @@ from orchestrator.studies.points.failure import Failure
 NOT_TESTED = "not tested"  # a device could not be tested at all
 FIGURES = "no verdict"  # a code gives figures alone
 
+BEHAVIOUR = "frequency"  # the code of voltage source behaviour: a verdict from figures, without a certificate
+
 
 @dataclass
 class MatrixCell:
@@ -51,6 +53,27 @@ class MatrixCell:
     has_needs: bool = False
     # what a code without a verdict gives, in words; None of a code with one. Whatever it is, it decides nothing.
     figures: Sequence[str] | None = None
+    # names of the files with its figures and with its page; a verdict without a certificate has others
+    record: str = JSON
+    page: str = HTML
+
+    @property
+    def has_certificate(self) -> bool:
+        """Return whether its folder holds a certificate."""
+        return self.failure is None and self.figures is None and self.record == JSON
+
+    @property
+    def file_of_figures(self) -> str | None:
+        """Where the figures lie that are no certificate's; None where there are none."""
+        if self.has_certificate or self.failure is not None:
+            return None
+        return f"{self.folder}/{FIGURES_JSON if self.record == JSON else self.record}"
+
+    def take_behaviour(self, found: Mapping[str, Any], record: str, page: str) -> None:
+        """Take the verdict on voltage source behaviour, which has figures and no certificate."""
+        self.verdict = {True: PASSES, False: FAILS, None: INCOMPLETE}[found["verdict"]]
+        self.sentence, self.judged = found["sentence"], len(found["points"])
+        self.record, self.page = record, page
 
     def take(self, found: Certificate) -> None:
         self.verdict, self.sentence, self.refused = found.verdict, found.sentence(), found.refused
@@ -95,7 +118,7 @@ class CertificateMatrix:
         return next((code for code in WORST_FIRST if code in found), 0)
 
     def sentence(self) -> str:
-        verdicts = [cell.verdict for cell in self.cells.values() if cell.figures is None]
+        verdicts = [cell.verdict for cell in self.cells.values() if _is_of_certificate(cell)]
         said = {PASSES: "passed", FAILS: "failed", INCOMPLETE: INCOMPLETE, NOT_TESTED: NOT_TESTED}
         judged = ", ".join(
             f"{n} {word}" for key, word in said.items() if (n := verdicts.count(key))
@@ -113,11 +136,21 @@ class CertificateMatrix:
             if verdicts
             else "No certificate was asked for."
         )
+        without = [cell for cell in self.cells.values() if cell.code == BEHAVIOUR]
+        if without:
+            found = ", ".join(
+                f"{cell.device} {said.get(cell.verdict, cell.verdict)}" for cell in without
+            )
+            text += f" Voltage source in frequency: {found}."
         if alone:
             text += f" Figures without a verdict: {', '.join(alone)}."
         if self.left_out:
             text += f" Left out, as it needs --declare: {', '.join(self.left_out)}."
         return f"{text} Acceptance tests failed: {', '.join(refused)}." if refused else text
+
+
+def _is_of_certificate(cell: MatrixCell) -> bool:
+    return cell.figures is None and cell.code != BEHAVIOUR
 
 
 WORST_FIRST = (
@@ -180,12 +213,8 @@ def _cell_json(cell: MatrixCell) -> dict[str, Any]:
         "acceptance_failed": cell.refused,
         "narrowest": None if least is None else asdict(least),
         "failed": [asdict(m) for m in cell.failed],
-        "certificate": None
-        if cell.failure is not None or cell.figures is not None
-        else f"{cell.folder}/{JSON}",
-        "figures": None
-        if cell.figures is None or cell.failure is not None
-        else f"{cell.folder}/{FIGURES_JSON}",
+        "certificate": f"{cell.folder}/{JSON}" if cell.has_certificate else None,
+        "figures": cell.file_of_figures,
         "sensitivities": f"{cell.folder}/{NEEDS_JSON}" if cell.has_needs else None,
     }
 
@@ -278,7 +307,7 @@ def _cell_html(cell: MatrixCell) -> str:
     style = "good" if passing else "bad" if verdict == FAILS or cell.failure is not None else "soft"
     word = f'<span class="{style}">{escape(verdict)}</span>'
     if cell.failure is None:
-        word = f'<a href="{quote(f"{cell.folder}/{HTML}")}">{word}</a>'
+        word = f'<a href="{quote(f"{cell.folder}/{cell.page}")}">{word}</a>'
     if verdict == PASSES and cell.refused:
         rest = ["acceptance tests failed", *rest]
     lines = [word, *(escape(line) for line in rest)]

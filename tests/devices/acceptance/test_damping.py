@@ -84,6 +84,30 @@ def test_a_controller_whose_output_is_not_shown_is_judged_by_the_power(tmp_path)
     assert found.faults == ["POD of some points only"]
 
 
+@pytest.mark.parametrize(
+    ("times", "fault", "said"),
+    [
+        ("(m[AGE] > 4)", "POD changes with time", "and answers one after 10 s at rest"),
+        (
+            "(m[P_REF] > 0.5)",
+            "POD of some points only",
+            "at P_0 = 0.4, v_0 = 1, and answers one at",
+        ),
+        (
+            "(1 - 0.9 * fmin(1, 2 * m[WORKED]))",
+            "POD changes with time",
+            "otherwise 3 s after strong swings",
+        ),
+    ],
+)
+def test_less_than_its_answer_is_told_by_its_cause(tmp_path, times, fault, said):
+    """It wakes late, acts at high power alone, or tires while its limit is tried."""
+    file = build(converter("asleep", pod=True, FAULT_POD_TIMES=times), tmp_path)
+    found = check_fmu(file, None, LIMITS, ("pod",), run_for=0.3)
+    assert found.faults == [fault], found.failures
+    assert said in found.failures[0].evidence
+
+
 def test_a_limit_is_judged_by_the_power_where_no_output_shows_it(tmp_path):
     file, bound = behind_a_binding(tmp_path, FAULT_POD_LIMIT=0.5)
     found = check_fmu(file, bound, LIMITS, ("pod",), run_for=0.3)

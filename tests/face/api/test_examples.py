@@ -14,6 +14,7 @@ MODULES = (
         for name in ("acceptance", "admittance", "binding", "case", "certification", "comparison")
     ),
     *(f"face.api.{name}" for name in ("comtrade", "export", "fmu", "identification", "linear")),
+    "face.api.voltage_source",
     *(
         f"face.api.{name}"
         for name in ("models", "nyquist", "results", "saved", "scenario", "source", "validation")
@@ -70,6 +71,7 @@ RESULTS = (
     "StepChoice",
     "Validation",
     "Verification",
+    "VoltageSource",
 )
 """Types of results, named for annotations; the functions that return them have the examples."""
 

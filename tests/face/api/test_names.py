@@ -49,6 +49,7 @@ NAMES = {
     ),
     *("StepChoice", "Validation", "Verification", "validate"),
     *("BusStrength", "Mode", "Stability"),
+    *("VoltageSource", "voltage_source"),
     *("CheckpointWarning", "RunEndedWarning", "UnusualDataWarning"),
     *(
         "ambient",

@@ -186,6 +186,23 @@ def test_figures_without_a_verdict_stand_in_the_matrix_and_decide_nothing():
     assert (third["certificate"], third["figures"]) == (None, "b/gb/frequency.json")
 
 
+@pytest.mark.parametrize(
+    ("verdict", "word", "code"),
+    [(True, "passed", 0), (False, "failed", 1), (None, "incomplete", 3)],
+)
+def test_the_behaviour_in_frequency_counts_beside_the_certificates(verdict, word, code):
+    found = cell("b", "frequency")
+    figures = {"verdict": verdict, "sentence": "as measured", "points": [{}, {}]}
+    found.take_behaviour(figures, "frequency.json", "impedance.png")
+    whole = matrix(cell("b"), found)
+    assert whole.exit_code == code
+    assert whole.sentence() == f"Of 1 certificate: 1 passed. Voltage source in frequency: b {word}."
+    _, of_it = matrix_json(whole, [])["cells"]
+    assert (of_it["certificate"], of_it["figures"]) == (None, "b/frequency/frequency.json")
+    assert (of_it["sentence"], of_it["judged"]) == ("as measured", 2)
+    assert 'href="b/frequency/impedance.png"' in matrix_page(whole, [], None)
+
+
 @pytest.mark.slow
 def test_devices_of_one_file_name_keep_their_results_beside_one_that_cannot_be_used(tmp_path, gfor):
     """Ours and a grid-following converter in files of one name, each with the figures that it has alone."""

@@ -57,6 +57,7 @@ _PUSHED = 3.0  # its duration [s]
 _LIMIT = 0.03  # part of the declared limit by which the output's peak may differ from it
 _HELD = 0.93  # part of its answer to a lasting deviation that a controller without a washout keeps
 _RESTS = 60.0  # time at rest after which it is asked again [s]
+_WAITS = (10.0, _RESTS)  # times at rest after which one that is silent at first is asked again [s]
 _SOON = 2.0  # time after events [s]
 _LATE = 15.0  # time after events of a second look [s]
 
@@ -158,9 +159,35 @@ class _Trial:
                 self._size = size * min(10.0, wanted / max(effect.peak for effect in seen))
                 self._usual = bench.effects(FrequencySwing(self._size))
                 return None
-        dead = min(seen, key=lambda effect: effect.least_peak)
+        return self._reason_of_silence(min(seen, key=lambda effect: effect.least_peak))
+
+    def _reason_of_silence(self, dead: Effect) -> _Fault:
+        """Look later and at other points for what a controller that brings nothing at first does there."""
         says = f"{dead.title} changes nothing in a swing of {100 * _SIZES[-1]:g} % of the frequency"
-        return _Fault("POD without effect", f"{says} at {bench.hertz:.3g} Hz")
+        for rest in _WAITS:
+            if self._answers(dead, FrequencySwing(_SIZES[-1], rest=rest)):
+                says += f" that begins with the run, and answers one after {rest:g} s at rest"
+                return _Fault("POD changes with time", says)
+        for point in self._places():
+            if self._answers(dead, FrequencySwing(_SIZES[-1], point=point)):
+                says += f" at P_0 = {_POINT.P:g}, v_0 = {_POINT.v:g}, and answers one at P_0 = {point.P:g}, "
+                says += f"v_0 = {point.v:g}"
+                says += f", Q_0 = {point.Q:g}" if point.Q else ""
+                return _Fault("POD of some points only", says)
+        return _Fault("POD without effect", f"{says} at {self._bench.hertz:.3g} Hz")
+
+    def _answers(self, dead: Effect, swing: FrequencySwing) -> bool:
+        """Return whether the controller that was silent answers another swing; not where the device does not run."""
+        if swing.point is not None and cannot_import(self._bench.subject, swing.point):
+            return False
+        try:
+            found = self._bench.effects(swing)
+        except ComponentError:
+            return False
+        return any(
+            effect.title == dead.title and effect.least_peak > answer_size(swing.size)
+            for effect in found
+        )
 
     def _other_direction(self) -> _Fault | None:
         for usual, other in zip(
@@ -192,7 +219,7 @@ class _Trial:
                 usual = self._usual[number]
                 alike, name = likeness(usual, other), self._bench.names[number]
                 if fault := self._out_of_proportion(name, usual, other):
-                    return fault
+                    return self._unless_tired(fault)
                 if alike < _ALIKE and (usual.shown or times == _LARGE):
                     says = (
                         f"{usual.title} answers a swing of {1e6 * size:.3g}e-6 pu of the frequency "
@@ -223,14 +250,13 @@ class _Trial:
                 continue
             if not usual.shown:
                 if name == "pod_p":
-                    yield self._limit_of_power(number, limit)
+                    yield self._unless_tired(self._limit_of_power(number, limit))
                 continue
             size = self._size * 4.0 * limit / max(usual.peak, 1e-9)
             course = self._bench.effects(FrequencySwing(size))[number].course
             peaks = (float(course.max()), float(-course.min()))
-            yield _far_from_limit(
-                usual.title, max(peaks, key=lambda peak: abs(peak / limit - 1)), limit
-            )
+            peak = max(peaks, key=lambda peak: abs(peak / limit - 1))
+            yield self._unless_tired(_far_from_limit(usual.title, peak, limit))
 
     def _limit_of_power(self, number: int, limit: float) -> _Fault | None:
         """Judge a limit by the power, where two lasting deviations both reach what limits it."""
@@ -337,6 +363,10 @@ class _Trial:
         strong = min(_BEYOND * self._size, _LARGEST)
         parts = self._bench.apart_after_work(self._size, strong)
         return self._changed(parts, "POD changes with time", "3 s after strong swings")
+
+    def _unless_tired(self, fault: _Fault | None) -> _Fault | None:
+        """Return what its work changes in it, if that is what gives it less in a strong swing; else the fault."""
+        return fault and (self._after_work() or fault)
 
     def _changed(self, parts: list[float], fault: str, where: str) -> _Fault | None:
         worst = int(np.argmax(parts))

@@ -398,7 +398,18 @@ def test_every_row_of_rte_is_named_for_a_file_and_told_in_words():
     [
         (
             [],
-            ["nts631", "miso", "aemo", "ercot", "nogrr245", "fingrid", "prc029", "tr331", "gb"],
+            [
+                "nts631",
+                "miso",
+                "aemo",
+                "ercot",
+                "nogrr245",
+                "fingrid",
+                "prc029",
+                "tr331",
+                "gb",
+                "frequency",
+            ],
             3,
         ),
         (
@@ -414,6 +425,7 @@ def test_every_row_of_rte_is_named_for_a_file_and_told_in_words():
                 "tr331",
                 "rte",
                 "gb",
+                "frequency",
             ],
             0,
         ),

@@ -15,7 +15,7 @@ from orchestrator.studies.certification.codes.frequency_domain import (
     asked_stiffness,
     stiffness,
 )
-from orchestrator.studies.certification.codes.voltage_source import measurement
+from orchestrator.studies.certification.codes.voltage_source import files, measurement
 from orchestrator.studies.certification.codes.voltage_source.figures import (
     impedances,
     springs,
@@ -193,3 +193,20 @@ def test_the_command_tells_ours_apart(gfor_command, tmp_path, monkeypatch, model
     }
     ratios = [row["scr"] for row in figures["points"][0]["strength"]["ratios"]]
     assert ratios == list(RATIOS)
+
+
+def test_python_gives_what_the_command_gives(tmp_path, monkeypatch):
+    (stiff,) = measured(0.1)
+    seen = impedances(F, behind(0.01, 0.1), 0.0, RATED)
+    points = [replace(stiff, impedances=seen, strengths=Strengths((), 0.0))]
+    monkeypatch.setattr(measurement, "measure_points", lambda request, f_n, report: points)
+    found = gfor.voltage_source(gfor.build("gfor", tmp_path))
+    assert found.verdict is True
+    assert "it behaves as a voltage source" in found.sentence
+    assert found.as_json() == files.figures_of(points, "gfor", RATED)
+    row = dict(found.table().iloc[0])
+    assert (row["met"], row["angle"], row["scr_limit"]) == (True, stiff.springs.angle.value, 0.0)
+    (file, *_) = found.save(tmp_path / "out")
+    assert json.loads(file.read_text("utf-8")) == found.as_json()
+    with pytest.raises(gfor.CosimError, match=r"ask .verdict"):
+        bool(found)
