@@ -1,31 +1,50 @@
 """Places of a device: what users may ask, what they get, and what ``gfor site`` prints."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from rich.console import RenderableType
 from rich.markup import escape
 
+from orchestrator.cases.case import Case
 from orchestrator.core.errors import NOT_MET
 from orchestrator.studies.points.study import StudyAtOnce
-from orchestrator.studies.siting.study import SiteRequest, find_sites
+from orchestrator.studies.siting.machine_view import MachineSiting, machine_table
+from orchestrator.studies.siting.machines import find_machines
+from orchestrator.studies.siting.study import REGULATOR, SiteRequest, find_sites
 from orchestrator.studies.siting.view import Siting, ranking_table
 
+Found = Siting | MachineSiting
 
-def _parts(found: Siting) -> Iterator[RenderableType]:
+
+def _computed(case: Case, request: SiteRequest, report: Callable[[int, int], None]) -> Found:
+    """Compute a device's places: buses, or machines."""
+    if request.device == REGULATOR:
+        return MachineSiting(find_machines(case, request, report))
+    return Siting(find_sites(case, request, report))
+
+
+def _parts(found: Found) -> Iterator[RenderableType]:
     yield from map(escape, (found.answer, *found.remarks))
-    yield from ("", ranking_table(found.result), "")
+    yield ""
+    if isinstance(found, MachineSiting):
+        yield machine_table(found.result)
+    else:
+        yield ranking_table(found.result)
+    yield ""
+
+
+def _warnings(found: Found) -> list[str]:
+    modes = found.result.found if isinstance(found, MachineSiting) else found.result.intact.found
+    return [f"scenario {found.result.prepared.name!r}: {text}" for text in modes.unasked]
 
 
 STUDY = StudyAtOnce(
     request=SiteRequest,
-    compute=lambda case, request, report: Siting(find_sites(case, request, report)),
+    compute=_computed,
     prepared=lambda found: [found.result.prepared],
     parts=_parts,
     code=lambda found, _: 0 if found.agrees and not found.result.breaking else NOT_MET,
     counted="places",
-    files="site.json, buses.csv and site.html with a map",
-    warnings=lambda found: [
-        f"scenario {found.result.prepared.name!r}: {text}"
-        for text in found.result.intact.found.unasked
-    ],
+    files="site.json, buses.csv and site.html with a map; for --device regulator machines.json, .csv and .html",
+    warnings=_warnings,
 )

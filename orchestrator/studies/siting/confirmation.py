@@ -141,7 +141,7 @@ def _as_it_is(
     found = modes_from(prepared, master, find_operating_point(master), blocks, frequency_range)
     pair, eigenvalue = same_mode(seen.mode, found.model), seen.mode.eigenvalue
     predicted = _predicted(master, blocks.components[name_at(bus)], bus, seen) - eigenvalue
-    coupled, least = pair.eigenvalue - eigenvalue, _least(found.modes, pair.eigenvalue)
+    coupled, least = pair.eigenvalue - eigenvalue, least_damped(found.modes, pair.eigenvalue)
     return Confirmation(
         bus, predicted, coupled, pair.eigenvalue, least=least, stable=found.stability.stable
     )
@@ -168,14 +168,13 @@ def _with_pod(
     by_gain = shift(PodSetting(1.0, NO_COMPENSATION))
     if not by_gain:
         raise AnalysisError("a POD there does not move the mode at all")
-    tuned, search = _tuned(loop, start, by_gain, eigenvalue, gain)
-    small = _SMALL * abs(eigenvalue / (by_gain * tuned.filters.response(eigenvalue)))
-    trial = replace(tuned, gain=min(tuned.gain, small))
+    tuned, search = tuned_setting(loop, start, by_gain, eigenvalue, gain)
+    trial = trial_of(tuned, by_gain, eigenvalue)
     predicted = shift(trial)
     coupled = loop.place(start, trial.gain, trial.filters).eigenvalue - start.eigenvalue
     reached = loop.place(start, tuned.gain, tuned.filters)
     modes = find_modes(loop.model(tuned), *frequency_range)
-    least = _least(modes, reached.eigenvalue)
+    least = least_damped(modes, reached.eigenvalue)
     stable = loop.examine(tuned).stability.stable
     return Confirmation(
         bus,
@@ -195,7 +194,7 @@ def _predicted(master: Master, model: ComponentLinearization, bus: str, seen: Se
     return seen.mode.eigenvalue + seen.settled(bus, lambda at: response_of(master, model, at))
 
 
-def _tuned(
+def tuned_setting(
     loop: PodLoop, start: Placed, by_gain: complex, eigenvalue: complex, most: float
 ) -> tuple[PodSetting, SearchEnd]:
     """The setting with the best least damping: around the angle that the residue asks for, with gains up to the most.
@@ -218,6 +217,12 @@ def _tuned(
     of_followed = {one: _of_followed(loop, start, one) for one in equal}
     best = min(equal, key=lambda one: (-round(of_followed[one] / _EQUAL), one.gain))
     return best, _search_end(best, settings, worth, most)
+
+
+def trial_of(tuned: PodSetting, by_gain: complex, eigenvalue: complex) -> PodSetting:
+    """The setting with so small a gain that the mode [rad/s] moves as the residue ``by_gain`` [rad/s per pu] says."""
+    small = _SMALL * abs(eigenvalue / (by_gain * tuned.filters.response(eigenvalue)))
+    return replace(tuned, gain=min(tuned.gain, small))
 
 
 def _of_followed(loop: PodLoop, start: Placed, setting: PodSetting) -> float:
@@ -257,7 +262,7 @@ def same_mode(mode: Mode, model: LinearModel) -> Eigenpair:
     return pairs[best]
 
 
-def _least(modes: Sequence[Mode], followed: complex) -> complex:
+def least_damped(modes: Sequence[Mode], followed: complex) -> complex:
     """The least damped oscillation of the range [rad/s]; the mode that is followed counts also beside the range."""
     found = [mode.eigenvalue for mode in modes if mode.is_oscillation]
     return min([*found, followed], key=damping_ratio)

@@ -38,6 +38,9 @@ from orchestrator.studies.siting.residues import SeenMode, Situation, situation_
 
 PODS = {"pod_p": placing.ACTIVE, "pod_q": placing.REACTIVE}
 DROOP = "droop"
+REGULATOR = "regulator"
+"""A POD at a machine's voltage regulator: `machines`."""
+
 _RATING = FieldKind(
     "MVA", POSITIVE.read, lambda given, name: None if given is None else above_zero(given, name)
 )
@@ -68,7 +71,9 @@ class SiteRequest(OfCase):
     """
 
     device: str | Path = asked(
-        _DEVICE, "pod_p", "pod_p (default), pod_q, droop, or a vendor's .fmu"
+        _DEVICE,
+        "pod_p",
+        "pod_p (default), pod_q, droop, regulator (a machine's), or a vendor's .fmu",
     )
     scenario: str | None = of_scenario()
     values: Mapping[str, Any] | None = of_values()
@@ -119,7 +124,7 @@ class SiteRequest(OfCase):
 
     @property
     def is_foreign(self) -> bool:
-        return self.device not in (*PODS, DROOP)
+        return self.device not in (*PODS, DROOP, REGULATOR)
 
 
 @dataclass(frozen=True)
@@ -204,7 +209,7 @@ def find_sites(
     """Linearise the case with and without outages, shift its modes by a device at every bus, and confirm the best."""
     if request.is_foreign and not request.name.lower().endswith(".fmu"):
         raise InputError(
-            f"--device {request.device}: give pod_p, pod_q, droop or the path of an .fmu"
+            f"--device {request.device}: give pod_p, pod_q, droop, regulator or the path of an .fmu"
         )
     scenario = request.scenario or next(iter(case.scenarios))
     open_case = replace(case, injections=True)

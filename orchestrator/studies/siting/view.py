@@ -163,7 +163,7 @@ def _lowered(result: SiteResult, first: Confirmation) -> str:
     """Return the least damped mode of all at the best place, which may have less than the least before."""
     before = result.intact.modes[0].mode.damping_percent
     lower = first.other is not None and damping_percent(first.other) < before
-    return f"{', but' if lower else ';'} {_least_then(first, before)}"
+    return f"{', but' if lower else ';'} {least_then(first, before)}"
 
 
 def _title(seen: SeenMode) -> str:
@@ -193,16 +193,16 @@ def _confirmed(result: SiteResult, one: Confirmation, before: float) -> str:
     word = "confirmed" if one.agrees else "NOT CONFIRMED"
     steps = f"{before:.2f} % → {one.damping_alone:.2f} % with {_rated(result)}"
     if one.setting is not None:
-        steps += f" → {one.damping:.2f} % with its POD (K {one.setting.gain:g}{_search_end(one)})"
+        steps += f" → {one.damping:.2f} % with its POD (K {one.setting.gain:g}{end_of_search(one)})"
     if one in result.breaking:
         word += ", but UNSTABLE with it (`gfor modes` of a case with it tells the cause, often the step)"
     return (
-        f"{one.bus}: {word} by coupled FMUs: {steps}; {_least_then(one, before)}; predicted and "
+        f"{one.bus}: {word} by coupled FMUs: {steps}; {least_then(one, before)}; predicted and "
         f"coupled shift differ by {100 * one.error:.2g} %"
     )
 
 
-def _search_end(one: Confirmation) -> str:
+def end_of_search(one: Confirmation) -> str:
     """Tell whether the search for the gain ended at its bound, or where more gain brings nothing."""
     if one.search is None:
         return ""
@@ -214,7 +214,7 @@ def _search_end(one: Confirmation) -> str:
     return f"; with {one.search.next_gain:g} the least damped mode has {100 * least:.2f} %"
 
 
-def _least_then(one: Confirmation, before: float) -> str:
+def least_then(one: Confirmation, before: float) -> str:
     """The least damped mode with the device: whether it is another one, and has less than the least before."""
     if one.other is None:
         return "it is the least damped then as well"
@@ -315,7 +315,7 @@ def as_json(result: SiteResult) -> dict[str, Any]:
             if at.name != here
         ],
         "not_judged": dict(result.not_judged),
-        "confirmed": [_confirmation(one) for one in result.confirmations],
+        "confirmed": [confirmation_json(one) for one in result.confirmations],
     }
 
 
@@ -350,9 +350,10 @@ def _best(result: SiteResult, situation: str, mode: str) -> dict[str, float]:
     }
 
 
-def _confirmation(one: Confirmation) -> dict[str, Any]:
+def confirmation_json(one: Confirmation, place: str = "bus") -> dict[str, Any]:
+    """A confirmation as JSON's types; ``place``: key of the bus, or of the machine."""
     if one.failure:
-        return {"bus": one.bus, "agrees": False, "failure": one.failure}
+        return {place: one.bus, "agrees": False, "failure": one.failure}
     pod = (
         {}
         if one.setting is None
@@ -366,7 +367,7 @@ def _confirmation(one: Confirmation) -> dict[str, Any]:
     )
     device = eigenvalue_json(one.with_device, damping_percent(one.with_device))
     return {
-        "bus": one.bus,
+        place: one.bus,
         "agrees": one.agrees,
         "error_percent": 100 * one.error,
         "predicted": {"real": one.predicted.real, "imag": one.predicted.imag},

@@ -165,7 +165,10 @@ def test_the_json_has_a_shift_for_each_bus_and_mode(gfor, tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["two_area_rms", "--device", "pod_x"], "give pod_p, pod_q, droop or the path of an .fmu"),
+        (
+            ["two_area_rms", "--device", "pod_x"],
+            "give pod_p, pod_q, droop, regulator or the path of an .fmu",
+        ),
         (["two_area_rms", "--device", "no.fmu", "--scenario", "gfor"], "there is no such file"),
         (["infinite_bus"], "[power_flow]"),
         (

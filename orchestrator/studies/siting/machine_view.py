@@ -1,0 +1,233 @@
+"""Findings of a study of machines as places of a POD: in Python, in words, as JSON, as rows, and as a page."""
+
+from __future__ import annotations
+
+import shlex
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from orchestrator.core.errors import few
+from orchestrator.core.late import pd
+from orchestrator.core.safe_files import made_folder, write_text
+from orchestrator.linear.spectra.modes import Mode
+from orchestrator.output.report.html.elements import document, table
+from orchestrator.output.report.notebook import page
+from orchestrator.output.report.tables import make_table
+from orchestrator.output.results.lock import held
+from orchestrator.output.results.mode_json import eigenvalue_json
+from orchestrator.output.results.staging import new_run_id, staged
+from orchestrator.output.results.storage import save_json, save_table
+from orchestrator.studies.points.code import code_hash
+from orchestrator.studies.siting.confirmation import Confirmation
+from orchestrator.studies.siting.machines import CONTROLLER, PART, MachineSites
+from orchestrator.studies.siting.view import confirmation_json, end_of_search, least_then
+
+UNIT = "points of damping by 1 pu of voltage for 1 pu of speed, with its phase tuned"
+_SHOWN = 12  # machines in a table, best first
+_NAMED = 4  # things in a sentence; the others are counted
+
+
+class MachineSiting:
+    """How far a POD at each machine's voltage regulator moves the poorly damped modes, best machine first.
+
+    Attributes
+    ----------
+    result
+        All that was computed.
+    """
+
+    def __init__(self, result: MachineSites) -> None:
+        self.result = result
+
+    @property
+    def ranking(self) -> tuple[str, ...]:
+        """All machines with a voltage regulator, best first."""
+        return self.result.ranking
+
+    @property
+    def answer(self) -> str:
+        """The best machines in one sentence."""
+        return answer(self.result)
+
+    @property
+    def remarks(self) -> list[str]:
+        """Return what coupled FMUs say of the best machines, and which were left out."""
+        return [*sureness(self.result), *remarks(self.result)]
+
+    @property
+    def agrees(self) -> bool:
+        """Return whether the coupled FMUs confirm every machine that was tried."""
+        return self.result.agrees
+
+    def table(self) -> pd.DataFrame:
+        """One row for each machine and mode; columns as in ``machines.csv``."""
+        return pd.DataFrame(rows(self.result))
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as ``gfor site --json`` prints, as JSON's types."""
+        return as_json(self.result)
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write ``machines.json``, ``machines.csv`` and the page ``machines.html`` into a folder."""
+        place = made_folder(folder, "folder")
+        with held(place), staged(place, new_run_id()) as staging:
+            save_json(self.as_json(), staging / "machines.json")
+            save_table(rows(self.result), staging / "machines.csv")
+            write_text(staging / "machines.html", _page(self.result))
+        return [place / f"machines.{end}" for end in ("json", "csv", "html")]
+
+    def __repr__(self) -> str:
+        return f"<MachineSiting in {self.result.case.name}: {self.answer}>"
+
+    def _repr_html_(self) -> str:
+        title = f"Machines of {self.result.case.name} as places of a POD"
+        return page(title, [self.answer, *self.remarks], self.table())
+
+
+def answer(result: MachineSites) -> str:
+    label, mode = next(iter(result.modes.items()))
+    best = result.ranking[:3]
+    figures = ", ".join(f"{name} {result.shifts[label][name].damping:+.3g}" for name in best)
+    return (
+        f"{best[0]} is the machine where a POD at the voltage regulator helps most, for the least damped mode "
+        f"({_called(label, mode)}): {figures} {UNIT}{_command(result)}"
+    )
+
+
+def _command(result: MachineSites) -> str:
+    """The command that designs the POD at the best machine that can have one; "" where none can."""
+    if not result.free:
+        return ""
+    request, name = result.request, result.free[0]
+    words = ["gfor", "design", result.case.name, "--scenario", result.prepared.name]
+    for key, value in {**request.overrides, f"{name}.stabilizer": PART}.items():
+        words += ["--set", f"{key}={str(value).lower() if isinstance(value, bool) else value}"]
+    words += ["--component", name, "--controller", CONTROLLER]
+    return f"; design one at {name} with: {shlex.join(words)}"
+
+
+def _called(label: str, mode: Mode) -> str:
+    hertz = f"{mode.frequency_hz:.3f} Hz"
+    title = label if hertz in label else f"{label}, {hertz}"
+    return f"{title}, {mode.damping_percent:.2f} %"
+
+
+def sureness(result: MachineSites) -> list[str]:
+    before = result.modes[result.first].damping_percent
+    unstable = result.found.stability.stable is False
+    said = [f"UNSTABLE without a POD: {result.found.stability.because()}"] if unstable else []
+    found = [_confirmed(result, one, before) for one in result.confirmations]
+    return [*said, *(found or ["not confirmed by coupled FMUs"])]
+
+
+def _confirmed(result: MachineSites, one: Confirmation, before: float) -> str:
+    if one.failure:
+        return f"{one.bus}: NOT CONFIRMED: {one.failure}"
+    word = "confirmed" if one.agrees else "NOT CONFIRMED"
+    if one in result.breaking:
+        word += ", but UNSTABLE with it"
+    gain = "" if one.setting is None else f" (K {one.setting.gain:g}{end_of_search(one)})"
+    return (
+        f"{one.bus}: {word} by coupled FMUs: {before:.2f} % → {one.damping:.2f} % with a POD{gain}; "
+        f"{least_then(one, before)}; predicted and coupled shift differ by {100 * one.error:.2g} %"
+    )
+
+
+def remarks(result: MachineSites) -> list[str]:
+    said = []
+    if result.stabilised:
+        there = few(result.stabilised, _NAMED)
+        said.append(f"with a stabiliser, which a POD would replace, so not confirmed: {there}")
+    if result.fixed:
+        there = few(result.fixed, _NAMED)
+        said.append(
+            f"of a model without a stabiliser to choose, so not confirmed: {there}; take the model "
+            "synchronous_generator or synchronous_generator_phasor"
+        )
+    if result.without:
+        there = few(result.without, _NAMED)
+        said.append(f"left out, without a voltage regulator to act on: {there}")
+    return said
+
+
+def as_json(result: MachineSites) -> dict[str, Any]:
+    return {
+        **result.prepared.about,
+        "device": result.request.device,
+        "units": {
+            "damping_points": UNIT,
+            "real, imag": "eigenvalue's shift [rad/s] by a gain of 1 pu without lead or lag, through washout and "
+            "lag of the POD",
+        },
+        "answer": answer(result),
+        "sure": sureness(result),
+        "remarks": remarks(result),
+        "agrees": result.agrees,
+        "stable": result.found.stability.stable,
+        "warnings": list(result.found.warnings),
+        "code": code_hash(),
+        "modes": [
+            {
+                "mode": label,
+                **eigenvalue_json(mode.eigenvalue, mode.damping_percent),
+                "components": dict(list(mode.by_component.items())[:3]),
+            }
+            for label, mode in result.modes.items()
+        ],
+        "machines": rows(result),
+        "stabilised": list(result.stabilised),
+        "left_out": list(result.without),
+        "confirmed": [confirmation_json(one, "machine") for one in result.confirmations],
+    }
+
+
+def rows(result: MachineSites) -> list[dict[str, Any]]:
+    """One row for each machine and mode, best machine first."""
+    return [
+        {
+            "machine": name,
+            "rank": k + 1,
+            "mode": label,
+            "damping_points": by_machine[name].damping,
+            "real": by_machine[name].change.real,
+            "imag": by_machine[name].change.imag,
+            "angle_deg": by_machine[name].angle,
+            "part_of_best": by_machine[name].part,
+        }
+        for k, name in enumerate(result.ranking)
+        for label, by_machine in result.shifts.items()
+    ]
+
+
+def machine_table(result: MachineSites) -> Table:
+    cells = [[name, *_cells(result, name)] for name in result.ranking[:_SHOWN]]
+    title = f"{UNIT}, and the angle to turn to 180°; best first"
+    return make_table(title, "Machine", *_headings(result), rows=cells)
+
+
+def _headings(result: MachineSites) -> list[str]:
+    modes = [f"{label}, {mode.damping_percent:.2f} %" for label, mode in result.modes.items()]
+    return [*modes, *(["with a POD [%]"] if result.confirmations else [])]
+
+
+def _cells(result: MachineSites, name: str) -> list[str]:
+    shifts = [result.shifts[label][name] for label in result.modes]
+    cells = [f"{one.damping:+.3g} ∠ {one.angle:.0f}°" for one in shifts]
+    if not result.confirmations:
+        return cells
+    one = next((x for x in result.confirmations if x.bus == name and not x.failure), None)
+    return [*cells, "–" if one is None else f"{one.damping:.2f}"]
+
+
+def _page(result: MachineSites) -> str:
+    title = f"{result.case.table.title or result.case.name}: machines as places of a POD"
+    lines = "".join(f"<li>{escape(text)}</li>" for text in (*sureness(result), *remarks(result)))
+    shade = "good" if result.agrees and result.confirmations else "soft"
+    findings = f'<div class="findings"><p class="{shade}">{escape(answer(result))}</p><ul>{lines}</ul></div>'
+    cells = [[escape(name), *_cells(result, name)] for name in result.ranking]
+    content = [("All machines", table(UNIT, ["Machine", *_headings(result)], cells))]
+    kind, names = f"{result.prepared.title}; code {code_hash()[:12]}", result.prepared.names
+    return document(title, kind, findings, content, names=names)
