@@ -102,7 +102,7 @@ def test_an_honest_device_passes_whatever_it_does_with_a_negative_sequence(membe
 @pytest.mark.parametrize("member", planted(), ids=lambda member: member.name)
 def test_a_planted_fault_of_the_phases_is_named(member, tmp_path):
     check_macros(member.source)
-    report, _ = checked(member, tmp_path)
+    report, _ = checked(member, tmp_path, member.only or ASKED)
     assert report.faults == [member.fault]
 
 

@@ -18,6 +18,7 @@ from orchestrator.devices.acceptance.checks.sequences import (
     SequencePair,
     in_phases,
     pair_of,
+    remainder_of,
     ripple_of,
 )
 from orchestrator.devices.acceptance.checks.subject import Running, Subject
@@ -81,6 +82,11 @@ class Course:
     def current(self) -> SequencePair:
         """Both sequences of the current [pu, S_n]."""
         return pair_of(self.i, self.i_times, self.omega)
+
+    @property
+    def remainder(self) -> float:
+        """The part of the current that swings otherwise than both sequences do, r.m.s. [pu, S_n]."""
+        return remainder_of(self.i, self.i_times, self.omega)
 
     @property
     def phase_currents(self) -> Numbers:

@@ -36,10 +36,23 @@ def lines_of(values: Complex, times: Numbers, rates: Sequence[float]) -> Complex
     return np.asarray(np.linalg.lstsq(np.hstack([basis, drift]), values, rcond=None)[0][:-1])
 
 
+# what both sequences and a nonlinear part of either make in the frame, in parts of the rated frequency
+_SWINGS = (0, -2, 2, -4, 4)
+
+
 def pair_of(values: Complex, times: Numbers, omega: float) -> SequencePair:
     """Both sequences of what swings at 0, ±2 and ±4 times the rated angular frequency [rad/s] in the frame."""
-    constant, negative, *_ = lines_of(values, times, [k * omega for k in (0, -2, 2, -4, 4)])
+    constant, negative, *_ = lines_of(values, times, [k * omega for k in _SWINGS])
     return SequencePair(complex(constant), complex(negative.conjugate()))
+
+
+def remainder_of(values: Complex, times: Numbers, omega: float) -> float:
+    """The r.m.s. value of what swings otherwise in the frame, beside a straight drift."""
+    rates = [k * omega for k in _SWINGS]
+    left = values - np.exp(1j * np.outer(times, rates)) @ lines_of(values, times, rates)
+    drift = times - times.mean()
+    left -= drift * (left @ drift) / (drift @ drift)
+    return float(np.sqrt(np.mean(np.abs(left) ** 2)))
 
 
 def in_phases(values: Complex, times: Numbers, omega: float) -> Numbers:

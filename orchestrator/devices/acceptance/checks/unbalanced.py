@@ -49,7 +49,12 @@ EN 50160, 4.2.4: up to 2 % of the positive sequence, as means over 10 minutes, f
 
 _SETTLES = 0.8  # time [s] after which an answer is looked at, and over which
 _LOOKED = 0.2
-_GROWS = 1.5  # times as much negative sequence as the source has, or as a while before, that is amplified
+_GROWS = 1.5  # times as much negative sequence as the source has, or its current had a while before, that is amplified
+_FAINT = 0.01  # change of that current [pu, S_n] below which it does not grow
+_SWINGS = (
+    0.05  # current at other frequencies [pu, S_n, r.m.s.] that swings, where it does not decay
+)
+_DECAYS = 0.5  # part of it that is left after 0.4 s where it does
 _STILL = 1e-4  # negative sequence of a current [pu, S_n] that is none
 
 # lines of an admittance, in fifths of the rated frequency: 10 to 300 Hz at 50 Hz. No line is another one's mirror in
@@ -172,11 +177,19 @@ def negative_sequence(subject: Subject) -> CheckResult:
     if not np.isfinite(course.i).all():
         says = f"its current is no number with {100 * _NEGATIVE:g} % of negative sequence"
         return failed("negative_sequence", "not a number", says)
-    before = course.between(_SETTLES / 2, _SETTLES / 2 + _LOOKED)
-    late = course.between(_SETTLES + _LOOKED, _SETTLES + 2 * _LOOKED)
+    early, before, late = (
+        course.between(begin, begin + _LOOKED)
+        for begin in (_LOOKED, _SETTLES / 2 + _LOOKED, _SETTLES + _LOOKED)
+    )
     at_bus, current, ripple = late.voltage, late.current, late.ripple
     times = abs(at_bus.negative) / (_NEGATIVE * abs(source.E))
-    grows = abs(current.negative) / max(abs(before.current.negative), _STILL)
+    moved = [
+        abs(one.current.negative - other.current.negative)
+        for one, other in ((before, early), (late, before))
+    ]
+    grows = moved[1] > max(moved[0], _FAINT) and abs(current.negative) > _GROWS * abs(
+        before.current.negative
+    )
     figures: dict[str, Any] = {
         "I_negative": abs(current.negative),
         "V_negative": abs(at_bus.negative),
@@ -186,16 +199,14 @@ def negative_sequence(subject: Subject) -> CheckResult:
     }
     seen = f"{100 * _NEGATIVE:g} % of negative sequence behind SCR {SCR:g} and X/R {X_R:g}: "
     seen += _words_of(at_bus, current, ripple)
-    if not (times <= _GROWS and grows <= _GROWS):
+    if times > _GROWS or grows:
         how = f"{times:.3g} times the source's stands at its bus"
-        how += (
-            f", and its current grows {grows:.3g}fold in {_SETTLES / 2 + _LOOKED:g} s"
-            if grows > _GROWS
-            else ""
-        )
-        return failed(
-            "negative_sequence", "amplifies the negative sequence", f"{how}; {seen}", **figures
-        )
+        how += ", and its current grows more and more" if grows else ""
+        fault = "amplifies the negative sequence"
+        return failed("negative_sequence", fault, f"{how}; {seen}", **figures)
+    if late.remainder > _SWINGS and late.remainder > _DECAYS * before.remainder:
+        how = f"its current swings by {late.remainder:.3g} pu r.m.s. at other frequencies, and that does not decay"
+        return failed("negative_sequence", "keeps moving", f"{how}; {seen}", **figures)
     negative, positive = (_admittance(subject, negative=which) for which in (True, False))
     hertz = list(negative.own)[_NEGATIVE_LINES.index(_OF_RATED)]
     y = negative.own[hertz]

@@ -94,7 +94,10 @@ static void rates(const double *m, phasor v, double time, double *d) {
     const phasor given_n = {part * wanted_n.re, part * wanted_n.im};
 #endif
     const phasor given = {part * wanted.re, part * wanted.im};
-    const phasor u = plus(plus(p, times(Z, given)), plus(n, times(Z_n, given_n)));
+    phasor u = plus(plus(p, times(Z, given)), plus(n, times(Z_n, given_n)));
+#ifdef FAULT_SWINGS /* voltage [pu] of an oscillation of 30 Hz that a negative sequence keeps up */
+    if (hypot(n.re, n.im) > 0.003) u.re += FAULT_SWINGS * cos(2 * 3.14159265358979323846 * 30 * time);
+#endif
     const phasor across = minus(minus(u, v), times(Z, i));
     d[I_RE] = OMEGA_B / X_PU * across.re, d[I_IM] = OMEGA_B / X_PU * across.im;
     d[P_RE] = SEPARATES * left.re, d[P_IM] = SEPARATES * left.im;

@@ -37,5 +37,11 @@ def planted():
         three_phase("swapped_both", "phases swapped", FAULT_SWAPS_VOLTAGE=1, FAULT_SWAPS_CURRENT=1),
         three_phase("swapped_current", "phases swapped", FAULT_SWAPS_CURRENT=1),
         three_phase("swapped_voltage", "phases swapped", FAULT_SWAPS_VOLTAGE=1),
+        three_phase(
+            "swings_with_it",
+            "keeps moving",
+            ("phase_order", "negative_sequence"),
+            FAULT_SWINGS=0.05,
+        ),
         three_phase("amplifies", "amplifies the negative sequence", FOLLOWS=3.5),
     ]
