@@ -15,6 +15,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from difflib import SequenceMatcher
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -86,13 +87,20 @@ CHANGES_BY_ITSELF = {
 
 _MASKS = (
     (re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d+)?)?(Z|\+00:00)?"), "DATE"),
-    (re.compile(r"\b[0-9a-f]{64}\b"), "HASH"),
+    (re.compile(r"\b[0-9a-f]{40,64}\b(\.\.\.)?"), "HASH"),
     (re.compile(r"\b[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}\b"), "ID"),
 )
 """Pieces of text that differ from run to run: times, hashes of files with a time in them, identifiers."""
 
+_IN_LINES = {".html", ".txt", ".toml"}
+"""Kinds of files whose lines are aligned before they are compared."""
+
 _ONLY_PRESENT = {".png", ".pdf", ".fmu", ".npz", ".lock"}
 """Kinds of files of which only the presence is compared."""
+
+
+Leaf = tuple[str, str]
+"""A place in a file and what stands there."""
 
 
 def write(folder: Path, only: Sequence[str]) -> None:
@@ -138,17 +146,15 @@ def _write_frames(folder: Path) -> None:
 def compare(before: Path, after: Path, meant: Sequence[str]) -> list[str]:
     """Return a line for each difference that nothing names, as ``file: place: before -> after``."""
     names = sorted({str(p.relative_to(top)) for top in (before, after) for p in _files(top)})
-    found = []
+    found: list[tuple[str, str, str, str]] = []
     for name in names:
         there = [(top / name).is_file() for top in (before, after)]
         if not all(there):
-            found.append((name, "the file", *map(str, there)))
+            found.append((name, "the file", str(there[0]), str(there[1])))
             continue
-        first, second = (dict(_leaves(top / name, top)) for top in (before, after))
-        for place in dict.fromkeys([*first, *second]):
-            values = first.get(place, "nothing"), second.get(place, "nothing")
-            if values[0] != values[1]:
-                found.append((name, place, *values))
+        first, second = (list(_leaves(top / name, top)) for top in (before, after))
+        differences = _of_lines if Path(name).suffix in _IN_LINES else _of_places
+        found += [(name, *one) for one in differences(first, second)]
     return [
         f"{name}: {place}: {old} -> {new}"
         for name, place, old, new in found
@@ -156,11 +162,28 @@ def compare(before: Path, after: Path, meant: Sequence[str]) -> list[str]:
     ]
 
 
+def _of_places(first: Sequence[Leaf], second: Sequence[Leaf]) -> Iterator[tuple[str, str, str]]:
+    """Yield each place whose values differ."""
+    old, new = dict(first), dict(second)
+    for place in dict.fromkeys([*old, *new]):
+        values = old.get(place, "nothing"), new.get(place, "nothing")
+        if values[0] != values[1]:
+            yield place, *values
+
+
+def _of_lines(first: Sequence[Leaf], second: Sequence[Leaf]) -> Iterator[tuple[str, str, str]]:
+    """Yield the lines that one text has and the other does not have there."""
+    old, new = ([line for _, line in leaves] for leaves in (first, second))
+    for kind, i, k, j, m in SequenceMatcher(None, old, new, autojunk=False).get_opcodes():
+        if kind != "equal":
+            yield f"line {i}", " ".join(old[i:k]) or "nothing", " ".join(new[j:m]) or "nothing"
+
+
 def _files(top: Path) -> Iterator[Path]:
     return (path for path in top.rglob("*") if path.is_file() and path.name != "manifest.json")
 
 
-def _leaves(path: Path, top: Path) -> Iterator[tuple[str, str]]:
+def _leaves(path: Path, top: Path) -> Iterator[Leaf]:
     """Yield the places in a file and what stands there."""
     if path.suffix in _ONLY_PRESENT:
         return
@@ -170,7 +193,7 @@ def _leaves(path: Path, top: Path) -> Iterator[tuple[str, str]]:
     text = path.read_text(encoding="utf-8", errors="replace").replace(str(top), "FOLDER")
     for mask, word in _MASKS:
         text = mask.sub(word, text)
-    readers: dict[str, Callable[[str], Iterator[tuple[str, str]]]] = {
+    readers: dict[str, Callable[[str], Iterator[Leaf]]] = {
         ".json": _of_json,
         ".csv": _of_csv,
         ".html": _of_html,
@@ -178,20 +201,20 @@ def _leaves(path: Path, top: Path) -> Iterator[tuple[str, str]]:
     yield from readers.get(path.suffix, _of_text)(text)
 
 
-def _of_dataset(path: Path) -> Iterator[tuple[str, str]]:
+def _of_dataset(path: Path) -> Iterator[Leaf]:
     with xr.open_dataset(path) as dataset:
         for name, variable in dataset.variables.items():
             digest = hashlib.sha256(str(variable.values.tolist()).encode()).hexdigest()
             yield str(name), f"{variable.dims} {variable.shape} {digest[:16]}"
 
 
-def _of_json(text: str) -> Iterator[tuple[str, str]]:
+def _of_json(text: str) -> Iterator[Leaf]:
     """Yield each figure with its digits as they are written, and the keys of each object in their order."""
     if text.strip():
         yield from _of_value(json.loads(text, parse_float=str, parse_int=str), "")
 
 
-def _of_value(value: Any, place: str) -> Iterator[tuple[str, str]]:
+def _of_value(value: Any, place: str) -> Iterator[Leaf]:
     if isinstance(value, dict):
         yield f"{place}.keys", ", ".join(value)
         for key, one in value.items():
@@ -205,18 +228,18 @@ def _of_value(value: Any, place: str) -> Iterator[tuple[str, str]]:
         yield place, repr(value)
 
 
-def _of_csv(text: str) -> Iterator[tuple[str, str]]:
+def _of_csv(text: str) -> Iterator[Leaf]:
     for k, row in enumerate(csv.reader(text.splitlines())):
         yield f"row {k}", " | ".join(row)
 
 
-def _of_html(text: str) -> Iterator[tuple[str, str]]:
+def _of_html(text: str) -> Iterator[Leaf]:
     """Yield a page's pieces, each up to the end of a tag."""
-    for k, piece in enumerate(re.split(r"(?<=>)", text)):
-        yield f"piece {k}", piece
+    for k, piece in enumerate(re.split(r"(?<=>)|\n", text)):
+        yield f"line {k}", piece
 
 
-def _of_text(text: str) -> Iterator[tuple[str, str]]:
+def _of_text(text: str) -> Iterator[Leaf]:
     for k, line in enumerate(text.splitlines()):
         yield f"line {k}", line
 

@@ -202,7 +202,10 @@ def unlike_eigenvalues(page):
     for row in rows_of(page):
         # a reference's damping may stand in a later column of that name
         shown = {heading: _NUMBER.findall(_plain(cell)) for _, heading, cell in reversed(row)}
-        parts = [float(word.replace("−", "-")) for word, _ in shown.get("λ [rad/s]", ())]
+        parts = [
+            float(word.replace("−", "-"))
+            for word, _ in shown.get("λ [rad/s]") or shown.get("Mode [rad/s]", ())
+        ]
         if len(parts) != 2:
             continue
         value = complex(*parts)

@@ -18,7 +18,6 @@ from orchestrator.core.truth import NoTruth
 from orchestrator.linear.signals.identification import IdentifiedMode
 from orchestrator.linear.spectra.modes import ZERO, Mode, eigenvalues
 from orchestrator.output.report.notebook import Axes, axes_or_new, curves_on, page
-from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.output.results.staging import ScenarioFolder, new_run_id, staged
 from orchestrator.studies.oscillations.view import Sources, sources_of
 from orchestrator.studies.signals.comparison import recorded
@@ -31,10 +30,6 @@ if TYPE_CHECKING:
     from orchestrator.studies.runs.run import RunResult
 else:  # what computes, which a recording is read without
     answer_of_run = Late("orchestrator.studies.runs.answer_of_run")
-
-_STATES = 3
-"""States with the largest participation that stand in a table."""
-
 
 _OF_EACH = (
     "eigenvalue",
@@ -115,20 +110,10 @@ class Modes(NoTruth, ask=".stability.stable, or len() for the number of modes in
     def table(self) -> pd.DataFrame:
         """All modes in the range, least damped first: eigenvalue [1/s, rad/s], frequency, damping, name, states. Row 1
         is ``modes[0]``, whose ``shape`` holds its right eigenvector by state."""
-        rows = [
-            {
-                **eigenvalue_json(mode.eigenvalue, mode.damping_percent),
-                "name": self.result.name_of(mode) or "",
-                "states": ", ".join(
-                    f"{state} {factor:.2f}" for state, factor in mode.participation[:_STATES]
-                ),
-            }
-            for mode in self.result.modes
-        ]
-        columns = ["real", "imag", "frequency_hz", "damping_percent", "name", "states"]
-        return pd.DataFrame(
-            rows, columns=columns, index=pd.RangeIndex(1, len(rows) + 1, name="mode")
-        )
+        from orchestrator.studies.modes.tables import modes_table  # noqa: PLC0415 - imports the reading of cases
+
+        index = pd.RangeIndex(1, len(self) + 1, name="mode")
+        return modes_table([self.result]).frame().set_index(index)
 
     def participation(self) -> pd.DataFrame:
         """Participation of every state (row) in every mode (column, as in `table`)."""

@@ -34,7 +34,7 @@ from orchestrator.studies.modes.all_modes import compute_all_modes
 from orchestrator.studies.modes.load_model_weight import load_model_weights
 from orchestrator.studies.modes.modes import ModesResult, modes_json
 from orchestrator.studies.modes.request import ModesRequest
-from orchestrator.studies.runs import tables
+from orchestrator.studies.modes.tables import all_modes
 from orchestrator.studies.runs.answer_of_modes import of_modes
 
 
@@ -123,7 +123,7 @@ def _compute(
             none = _none_below(result, request.critical, request.frequencies)
             console.print(escape(none), highlight=False, soft_wrap=True)
         elif whole:
-            console.print(tables.all_modes(result, whole=options.details), "")
+            console.print(all_modes(result, whole=options.details), "")
     terminal.print_named_modes(console, results, shapes=whole or any(r.named for r in results))
     terminal.print_sources(console, results)
     if options.details:

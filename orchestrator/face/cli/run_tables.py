@@ -60,8 +60,9 @@ def print_run(
     print_answers(console, [of_run(r) for r in results], modes, beside)
     print_named_modes(console, modes)
     print_sources(console, modes)
-    if any(r.ring_down for r in results):
-        console.print("", tables.ring_downs(results))
+    ring_downs = tables.ring_downs(results)
+    if ring_downs is not None:
+        console.print("", ring_downs)
     console.print("", tables.steady_states(modes))
     if any(r.shifts for r in results):
         console.print("", tables.mode_shifts(results))

@@ -20,7 +20,7 @@ from orchestrator.core.safe_files import made_folder
 from orchestrator.face.cli.known_questions import new_questions
 from orchestrator.face.cli.later import say_last
 from orchestrator.output.report.linearised import exceptions_in_words
-from orchestrator.output.report.table import ColumnTable
+from orchestrator.output.report.table import ColumnTable, ShownTable
 from orchestrator.output.report.tables import PlainTable
 from orchestrator.output.results.manifest import ResultsWarning
 from orchestrator.output.results.staging import new_run_id, staged
@@ -49,7 +49,7 @@ class NamingConsole(Console):
     def _with_names(self, one: Any) -> Any:
         if isinstance(one, str):
             return self._names.in_text(one, escape)
-        shown = one.__rich__() if isinstance(one, ColumnTable) else one
+        shown = one.__rich__() if isinstance(one, ColumnTable | ShownTable) else one
         return shown.with_texts(self._names.in_text) if isinstance(shown, PlainTable) else shown
 
 

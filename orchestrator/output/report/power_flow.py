@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from orchestrator.output.report.table import ShownTable
+
 COLUMNS = {
     "machines": {
         "name": "Unit",
@@ -54,13 +56,14 @@ def columns(rows: Sequence[Mapping[str, Any]], kind: str) -> dict[str, str]:
     return COLUMNS[kind] | told
 
 
-def cells(rows: Sequence[dict[str, Any]], kind: str) -> list[list[str]]:
-    """The rows as text; a bus has its name in the file beside it."""
+def flow_table(title: str, kind: str, rows: Sequence[Mapping[str, Any]]) -> ShownTable:
+    """A table of machines, buses or branches; a bus has its name in the file beside it."""
     shown = columns(rows, kind)
-    return [
+    cells = [
         [_cell(column, row.get(column, "")) + _titled(column, row) for column in shown]
         for row in rows
     ]
+    return ShownTable(title, list(shown.values()), cells, left=TEXTS[kind])
 
 
 def _titled(column: str, row: Mapping[str, Any]) -> str:

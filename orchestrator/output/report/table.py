@@ -32,6 +32,42 @@ class Marked:
     mark: str
 
 
+ShownCell = str | Marked
+
+
+@dataclass(frozen=True)
+class ShownTable:
+    """Headings and cells that a terminal and a page show; the columns behind the ``left`` first ones hold figures."""
+
+    title: str
+    headings: Sequence[str]
+    rows: Sequence[Sequence[ShownCell]]
+    left: int = 1
+    note: str = ""  # a sentence below it
+    # the part of the table that each row is in: a line divides parts on a terminal
+    parts: Sequence[Any] = ()
+    stand_out: Sequence[bool] = ()  # whether each row is bold on a terminal
+    texts: Sequence[bool] = ()  # whether each column holds text, though it stands behind figures
+
+    def __rich__(self) -> PlainTable:
+        table = make_table(self.title, *self.headings, left=self.left)
+        for k, row in enumerate(self.rows):
+            cells = [c if isinstance(c, str) else Text(c.text, _ON_TERMINALS[c.mark]) for c in row]
+            style = "bold" if any(self.stand_out[k : k + 1]) else None
+            ends = len(set(self.parts[k : k + 2])) > 1
+            table.add_row(*cells, style=style, end_section=ends)
+        table.caption = self.note or None
+        table.caption_justify = "left"
+        for is_text, shown in zip(self.texts, table.columns, strict=False):
+            shown.justify = "left" if is_text else shown.justify
+        return table
+
+    def html(self) -> str:
+        cells = [[_on_page(cell) for cell in row] for row in self.rows]
+        text = table_of_page(self.title, self.headings, cells, self.left)
+        return f"{text}<p>{escape(self.note)}</p>" if self.note else text
+
+
 @dataclass(frozen=True)
 class Column(Generic[Row]):
     heading: str  # on terminals and pages; "" for what only files and programs have
@@ -39,12 +75,27 @@ class Column(Generic[Row]):
     write: str | Callable[[Any], str | Marked] = ""  # how a cell shows it: a format, or a function
     name: str = ""  # in files and DataFrames; "" for what is only shown
     text: bool = False  # whether it holds text, though it stands behind figures
+    # its heading in CSV files where that is not the name; "" for what they do not have
+    file: str | None = None
+    stored: str = ""  # the format of a figure in CSV files; "" for all its digits
+
+    @property
+    def file_heading(self) -> str:
+        """The heading in CSV files, "" where they do not have the column."""
+        return self.name if self.file is None else self.file
 
     def cell(self, row: Row) -> str | Marked:
         value = self.get(row)
         if callable(self.write):
             return self.write(value)
         return "–" if value is None else f"{value:{self.write}}"
+
+    def stored_value(self, row: Row) -> Any:
+        """The value as CSV files have it; truth values are in lower case, as in JSON."""
+        value = self.get(row)
+        if isinstance(value, bool):
+            return str(value).lower()
+        return format(value, self.stored) if self.stored else value
 
 
 @dataclass(frozen=True)
@@ -55,39 +106,39 @@ class ColumnTable(Generic[Row]):
     left: int = 1  # how many columns at the left hold text
     most: int | None = None  # rows that are shown; the others are counted
     file: str = "the files"  # where all of them stand
+    note: str = ""  # a sentence below it, in the place of how many rows are left out
+    stands_out: Callable[[Row], bool] = lambda row: False
+    # names the part of the table that a row is in; a line divides parts on a terminal
+    part: Callable[[Row], Any] = lambda row: None
 
     @property
     def shown_columns(self) -> list[Column[Row]]:
         return [column for column in self.columns if column.heading]
 
     def __rich__(self) -> PlainTable:
-        rows = [
-            [column.cell(row) for column in self.shown_columns] for row in self.rows[: self.most]
-        ]
-        cells = [
-            [c if isinstance(c, str) else Text(c.text, _ON_TERMINALS[c.mark]) for c in row]
-            for row in rows
-        ]
-        table = make_table(
-            self.title,
-            *(column.heading for column in self.shown_columns),
-            left=self.left,
-            rows=cells,
-        )
-        table.caption = self._rest or None
-        for column, shown in zip(self.shown_columns, table.columns, strict=True):
-            shown.justify = "left" if column.text else shown.justify
+        table = self._table.__rich__()
+        table.caption_justify = "left" if self.note else "center"
         return table
 
     def html(self) -> str:
-        cells = [
-            [_on_page(column.cell(row)) for column in self.shown_columns]
-            for row in self.rows[: self.most]
-        ]
-        text = table_of_page(
-            self.title, [column.heading for column in self.shown_columns], cells, self.left
+        return self._table.html()
+
+    @property
+    def _table(self) -> ShownTable:
+        rows, columns = self.rows[: self.most], self.shown_columns
+        headings = [column.heading for column in columns]
+        cells = [[column.cell(row) for column in columns] for row in rows]
+        texts = [column.text for column in columns]
+        return ShownTable(
+            self.title,
+            headings,
+            cells,
+            left=self.left,
+            note=self.note or self._rest,
+            parts=[self.part(row) for row in rows],
+            stand_out=[self.stands_out(row) for row in rows],
+            texts=texts,
         )
-        return f"{text}<p>{escape(self._rest)}</p>" if self._rest else text
 
     @property
     def _rest(self) -> str:
@@ -114,12 +165,13 @@ class ColumnTable(Generic[Row]):
         return found.assign(point=times) if times.notna().all() else found
 
     def save(self, path: Path) -> None:
-        """Write a CSV file; truth values are in lower case, as in JSON."""
-        plain = [
-            {k: str(v).lower() if isinstance(v, bool) else v for k, v in row.items()}
-            for row in self.records()
+        """Write a CSV file with all rows."""
+        columns = {column.file_heading: column for column in self.columns if column.file_heading}
+        rows = [
+            {heading: column.stored_value(row) for heading, column in columns.items()}
+            for row in self.rows
         ]
-        save_table(plain, path, [column.name for column in self.columns if column.name])
+        save_table(rows, path, list(columns))
 
 
 def _on_page(cell: str | Marked) -> str:
@@ -128,7 +180,8 @@ def _on_page(cell: str | Marked) -> str:
     return _MINUS.sub("−", escape(cell)).replace("\n", "<br>")
 
 
-def damping(percent: float | None) -> str | Marked:
+def damping(percent: float | None) -> ShownCell:
+    """Return the damping ratio [%] with two digits, marked if it is poor."""
     text = "–" if percent is None else f"{percent:.2f}"
     return Marked(text, "bad") if percent is not None and percent < LEAST_DAMPING else text
 
@@ -143,6 +196,7 @@ def verdict(stable: bool | None) -> str | Marked:
 
 
 def mode_columns(mode_of: Callable[[Row], Any]) -> list[Column[Row]]:
+    """Columns of an eigenvalue [rad/s], its frequency [Hz] and its damping ratio [%]."""
     return [
         Column("Mode [rad/s]", lambda row: mode_of(row).eigenvalue, eigenvalue_text),
         Column("", lambda row: mode_of(row).eigenvalue.real, name="real"),

@@ -516,24 +516,48 @@ def modes_json(
         "facts": None if facts is None else facts.sentence(),
         "beside": list(beside),
         "questions": list(dict.fromkeys([*asked, *questions])),
-        "scenarios": [_scenario_json(r) for r in results],
+        "scenarios": [_whole_json(r) for r in results],
     }
 
 
-def _scenario_json(r: ModesResult) -> dict[str, Any]:
-    named = {table.name: r.named.get(table.name) for table in r.prepared.case.table.analysis.modes}
+def scenario_json(r: ModesResult) -> dict[str, Any]:
+    """Return what `gfor modes` and `gfor run` both say of a scenario in JSON."""
+    residual = r.operating_point.residual
     return {
         "name": r.prepared.name,
         "subject": r.prepared.subject,
         "models": r.prepared.models,
         "basis": r.prepared.basis,
         **r.prepared.names.as_json(),
-        "residual": r.operating_point.residual,
+        "residual": None if math.isnan(residual) else residual,
         "states": r.model.number_of_states,
         "stable": r.stability.stable,
         "largest_growth_rate": r.stability.largest_growth_rate,
         "stability": r.stability.as_json(),
         "outside_range": None if r.hidden is None else r.hidden.as_json(),
+    }
+
+
+def named_json(r: ModesResult) -> dict[str, Any]:
+    """Return the modes with a name, somebody else's figures for them, and why other names have none."""
+    return {
+        "title": r.prepared.title,
+        "modes": {
+            name: eigenvalue_json(mode.eigenvalue, mode.damping_percent)
+            for name, mode in r.named.items()
+        },
+        "references": {
+            name: table.model_dump(exclude_none=True) for name, table in r.references.items()
+        },
+        "unnamed": dict(r.unnamed),
+    }
+
+
+def _whole_json(r: ModesResult) -> dict[str, Any]:
+    """Return the same with all modes in the range."""
+    named = {table.name: r.named.get(table.name) for table in r.prepared.case.table.analysis.modes}
+    return {
+        **scenario_json(r),
         "power_flow": power_flow_json(r.prepared),
         "linearised": r.linearised,
         "fit_errors": r.fit_errors,

@@ -14,13 +14,13 @@ from orchestrator.core.errors import RunInterruptedError
 from orchestrator.core.safe_files import write_bytes
 from orchestrator.output.report.cells import word_of
 from orchestrator.output.report.power_flow import COLUMNS
-from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.output.results.recorded import in_memory, open_whole
 from orchestrator.output.results.recording import TRAJECTORY
 from orchestrator.output.results.signals import relative_difference
 from orchestrator.output.results.staging import ScenarioFolder, new_run_id, staged
 from orchestrator.output.results.storage import save_csv, save_json, save_netcdf, save_table
-from orchestrator.studies.modes.modes import ModesResult, modes_json
+from orchestrator.studies.modes.modes import ModesResult, modes_json, named_json, scenario_json
+from orchestrator.studies.modes.tables import head_of, modes_table
 from orchestrator.studies.runs.answer import EarlyEnd
 from orchestrator.studies.runs.answer_of_run import of_run
 from orchestrator.studies.runs.mode_plots import (
@@ -30,6 +30,7 @@ from orchestrator.studies.runs.mode_plots import (
     plot_signals,
 )
 from orchestrator.studies.runs.run import RunResult
+from orchestrator.studies.runs.tables import ring_down_json
 from orchestrator.systems.coupling.events import BusFault
 
 _TABLES = ("modes.csv", "participation.csv", "mode_shapes.csv")  # of `save_modes`
@@ -42,14 +43,14 @@ def save_run(result: RunResult, scenario: ScenarioFolder, *, csv: bool = True) -
         save_csv(result.dataset, scenario.path / "trajectory.csv")
     if result.linear is not None:
         save_netcdf(result.linear.assign_attrs(result.dataset.attrs), scenario.path / "linear.nc")
-    save_table(_mode_rows([result.modes]), scenario.path / "modes.csv")
+    modes_table([result.modes]).save(scenario.path / "modes.csv")
     place = scenario.publish(None if result.failure is None else str(result.failure))
     if not in_memory(result.dataset):
         result.dataset = open_whole(place / TRAJECTORY)
 
 
 def save_modes(results: Sequence[ModesResult], folder: Path) -> list[Path]:
-    save_table(_mode_rows(results), folder / "modes.csv")
+    modes_table(results).save(folder / "modes.csv")
     save_table(_participation_rows(results), folder / "participation.csv")
     save_table(_shape_rows(results), folder / "mode_shapes.csv")
     flows = {
@@ -129,41 +130,19 @@ def save_study(
     return [*plots, *save_modes([r.modes for r in results], folder)]
 
 
-def _mode_rows(results: Sequence[ModesResult]) -> list[dict[str, Any]]:
-    return [
-        {
-            "scenario": r.prepared.name,
-            "real [1/s]": f"{m.eigenvalue.real:.8g}",
-            "imag [rad/s]": f"{m.eigenvalue.imag:.8g}",
-            "frequency [Hz]": f"{m.frequency_hz:.6g}",
-            "damping [%]": f"{m.damping_percent:.6g}",
-            "name": r.name_of(m) or "",
-            "participation": "; ".join(
-                f"{name} {factor:.4f}" for name, factor in m.participation[:6]
-            ),
-        }
-        for r in results
-        for m in r.modes
-    ]
-
-
 def _participation_rows(results: Sequence[ModesResult]) -> list[dict[str, Any]]:
     return [
         {
-            "scenario": r.prepared.name,
-            "frequency [Hz]": f"{m.frequency_hz:.6g}",
-            "damping [%]": f"{m.damping_percent:.6g}",
-            "name": r.name_of(m) or "",
+            **head_of(row),
             "of": kind,
             "element": element,
             "participation": f"{factor:.6g}",
         }
-        for r in results
-        for m in r.modes
+        for row in modes_table(results).rows
         for kind, factors in (
-            ("state", dict(m.participation)),
-            ("component", m.by_component),
-            ("area", r.by_area(m)),
+            ("state", dict(row.mode.participation)),
+            ("component", row.mode.by_component),
+            ("area", row.result.by_area(row.mode)),
         )
         for element, factor in factors.items()
         if factor >= _LEAST_PARTICIPATION
@@ -173,22 +152,19 @@ def _participation_rows(results: Sequence[ModesResult]) -> list[dict[str, Any]]:
 def _shape_rows(results: Sequence[ModesResult]) -> list[dict[str, Any]]:
     """Magnitude and angle of the states that swing, relative to the mode's largest of them."""
     rows = []
-    for r in results:
-        for m in r.modes:
-            largest = max((m.shape[s] for s in r.swing), key=abs, default=0)
-            rows += [
-                {
-                    "scenario": r.prepared.name,
-                    "frequency [Hz]": f"{m.frequency_hz:.6g}",
-                    "damping [%]": f"{m.damping_percent:.6g}",
-                    "name": r.name_of(m) or "",
-                    "state": state,
-                    "magnitude": f"{abs(m.shape[state] / largest):.6g}",
-                    "angle [deg]": f"{math.degrees(cmath.phase(m.shape[state] / largest)):.4g}",
-                }
-                for state in r.swing
-                if largest
-            ]
+    for row in modes_table(results).rows:
+        swing = {state: row.mode.shape[state] for state in row.result.swing}
+        largest = max(swing.values(), key=abs, default=0)
+        rows += [
+            {
+                **head_of(row),
+                "state": state,
+                "magnitude": f"{abs(value / largest):.6g}",
+                "angle [deg]": f"{math.degrees(cmath.phase(value / largest)):.4g}",
+            }
+            for state, value in swing.items()
+            if largest
+        ]
     return rows
 
 
@@ -212,34 +188,16 @@ def _shift_rows(results: Sequence[RunResult]) -> list[dict[str, Any]]:
 def summary_of(result: RunResult) -> dict[str, Any]:
     """Figures of one scenario: steady state, named modes, references, ring-down, speed, findings, failure."""
     modes = result.modes
-    seen, stats = result.ring_down, result.statistics
+    stats = result.statistics
     # no event has happened that growth would have to wait for
     undecided = result.before_its_events and modes.stability.stable is not False
     return {
         "name": modes.prepared.name,
         "title": modes.prepared.title,
-        "subject": modes.prepared.subject,
-        "models": modes.prepared.models,
-        "basis": modes.prepared.basis,
-        **modes.prepared.names.as_json(),
-        "residual": None
-        if math.isnan(modes.operating_point.residual)
-        else modes.operating_point.residual,
-        "states": modes.model.number_of_states,
+        **scenario_json(modes),
         "stable": None if undecided else modes.stability.stable,
-        "largest_growth_rate": modes.stability.largest_growth_rate,
-        "stability": modes.stability.as_json(),
-        "outside_range": None if modes.hidden is None else modes.hidden.as_json(),
-        "modes": {
-            name: eigenvalue_json(mode.eigenvalue, mode.damping_percent)
-            for name, mode in modes.named.items()
-        },
-        "references": {
-            name: table.model_dump(exclude_none=True) for name, table in modes.references.items()
-        },
-        "ring_down": None
-        if seen is None
-        else eigenvalue_json(seen.eigenvalue, seen.damping_percent),
+        **named_json(modes),
+        **ring_down_json(result),
         "steps_per_second": stats.steps_per_second if stats else None,
         "share_in_fmus": stats.share_in_fmus if stats else None,
         "real_time_factor": stats.real_time_factor if stats else None,

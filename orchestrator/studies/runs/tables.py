@@ -7,11 +7,13 @@ from typing import Any
 from rich.table import Table
 
 from orchestrator.cases.scenario.flow_figures import power_flow_json
-from orchestrator.linear.spectra.modes import Mode
-from orchestrator.output.report import power_flow
-from orchestrator.output.report.tables import eigenvalue_text, first_few, make_table, share_text
+from orchestrator.output.report import mode_tables
+from orchestrator.output.report.power_flow import COLUMNS, flow_table, totals
+from orchestrator.output.report.table import ShownTable
+from orchestrator.output.report.tables import first_few, make_table, share_text
+from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.output.results.signals import relative_difference, signal
-from orchestrator.studies.modes.modes import ModesResult
+from orchestrator.studies.modes.modes import ModesResult, named_json
 from orchestrator.studies.runs.run import RunResult
 
 
@@ -32,72 +34,9 @@ def steady_states(results: Sequence[ModesResult]) -> Table:
     return make_table("Steady state", *columns, rows=rows)
 
 
-def named_modes(results: Sequence[ModesResult], reference_title: str | None) -> Table:
+def named_modes(results: Sequence[ModesResult], reference: str | None) -> ShownTable:
     """The modes that a case looks for, beside somebody else's figures where there are any."""
-    names = list(
-        dict.fromkeys(name for r in results for name in [*r.named, *r.unnamed, *r.references])
-    )
-    compared = any(r.references for r in results)
-    columns = ["Scenario", "Mode [rad/s]", "f [Hz]", "Damping [%]"]
-    if compared:
-        columns += [f"{reference_title}: f [Hz]", "Damping [%]"]
-    table = make_table(
-        "Electromechanical modes" if len(names) > 1 else "Electromechanical mode", *columns
-    )
-    for name in names:
-        for r in results:
-            mode, reference = r.named.get(name), r.references.get(name)
-            row = [f"{name}: {r.prepared.title}" if len(names) > 1 else r.prepared.title]
-            if mode is None:
-                row += ["not known" if name in r.unnamed else "none in range", "", ""]
-            else:
-                row += [
-                    eigenvalue_text(mode.eigenvalue),
-                    f"{mode.frequency_hz:.3f}",
-                    f"{mode.damping_percent:.2f}",
-                ]
-            if reference is not None:
-                row += [f"{reference.frequency_hz:.2f}", f"{reference.damping_percent:.2f}"]
-            table.add_row(*row)
-        table.add_section()
-    return table
-
-
-WELL_DAMPED = 0.3
-"""Damping ratio from which a control's mode is only counted: it is over within a period."""
-
-
-def all_modes(result: ModesResult, *, whole: bool = False) -> Table:
-    """Modes in the range: those in which machines swing, or that have a name, above those of controls and fluxes.
-
-    ``whole``: also lists the latter where they are well damped; else a line below counts them."""
-    states, residual = result.model.number_of_states, result.operating_point.residual
-    title = f"{result.prepared.title}: {states} states, residual {residual:.1e}"
-    table = make_table(title, "Mode [rad/s]", "f [Hz]", "Damping [%]")
-    table.add_column("Name")
-    table.add_column("Most associated states (participation)", overflow="fold")
-    swings, others = result.swings_apart()
-    kept = [mode for mode in others if whole or not swings or mode.damping_ratio < WELL_DAMPED]
-    counted = [mode.damping_percent for mode in others if mode.damping_ratio >= WELL_DAMPED]
-    for mode in swings:
-        _add_mode(table, result, mode)
-    table.add_section()
-    for mode in kept:
-        _add_mode(table, result, mode)
-    if len(kept) < len(others):
-        modes = "modes" if len(counted) > 1 else "mode"
-        how_many = f"{len(counted)} {modes} of controls and fluxes"
-        table.caption = f"and {how_many}, damped by {min(counted):.0f} % or more: --details"
-        table.caption_justify = "left"
-    return table
-
-
-def _add_mode(table: Table, result: ModesResult, mode: Mode) -> None:
-    associated = ", ".join(f"{name} ({factor:.2f})" for name, factor in mode.participation[:3])
-    name = result.name_of(mode) or ""
-    figures = (f"{mode.frequency_hz:.4f}", f"{mode.damping_percent:.2f}")
-    style = "bold" if name else None
-    table.add_row(eigenvalue_text(mode.eigenvalue), *figures, name, associated, style=style)
+    return mode_tables.named_modes([named_json(r) for r in results], reference)
 
 
 def mode_shapes(results: Sequence[ModesResult]) -> Table:
@@ -122,7 +61,7 @@ def mode_shapes(results: Sequence[ModesResult]) -> Table:
     return table
 
 
-def power_flows(results: Sequence[ModesResult]) -> Iterator[Table]:
+def power_flows(results: Sequence[ModesResult]) -> Iterator[Table | ShownTable]:
     flows: dict[str, dict[str, Any]] = {}
     for r in results:
         flow = power_flow_json(r.prepared)
@@ -131,36 +70,24 @@ def power_flows(results: Sequence[ModesResult]) -> Iterator[Table]:
             flows.pop(same, None)
             flows[f"{same}, {r.prepared.title}" if same else r.prepared.title] = flow
     for titles, flow in flows.items():
-        for kind in power_flow.COLUMNS:
-            columns = power_flow.columns(flow[kind], kind)
-            cells = power_flow.cells(flow[kind], kind)
-            title, left = f"{kind.capitalize()}: {titles}", power_flow.TEXTS[kind]
-            yield make_table(title, *columns.values(), left=left, rows=cells)
-        yield make_table(f"Power flow: {titles}", "What", "Value", rows=power_flow.totals(flow))
+        for kind in COLUMNS:
+            yield flow_table(f"{kind.capitalize()}: {titles}", kind, flow[kind])
+        yield make_table(f"Power flow: {titles}", "What", "Value", rows=totals(flow))
 
 
-def ring_downs(results: Sequence[RunResult]) -> Table:
-    columns = (
-        "Scenario",
-        "f simulated [Hz]",
-        "f mode [Hz]",
-        "Damping simulated [%]",
-        "Damping mode [%]",
-    )
-    rows = [
-        (
-            r.modes.prepared.title,
-            f"{seen.frequency_hz:.4f}",
-            f"{mode.frequency_hz:.4f}",
-            f"{seen.damping_percent:.2f}",
-            f"{mode.damping_percent:.2f}",
-        )
-        for r in results
-        if (mode := r.ringing.electromechanical) and (seen := r.ring_down)
-    ]
-    return make_table(
-        "Ring-down of the simulated response against the eigenvalue", *columns, rows=rows
-    )
+def ring_downs(results: Sequence[RunResult]) -> ShownTable | None:
+    """The swing that each response shows, beside the eigenvalue; None if no response shows one."""
+    titles = [{"title": r.modes.prepared.title, **ring_down_json(r)} for r in results]
+    return mode_tables.ring_downs(titles)
+
+
+def ring_down_json(result: RunResult) -> dict[str, Any]:
+    """Return the swing that the response shows, and the mode of the system that rings."""
+    pair = {"ring_down": result.ring_down, "ring_down_mode": result.ringing.electromechanical}
+    return {
+        key: seen and eigenvalue_json(seen.eigenvalue, seen.damping_percent)
+        for key, seen in pair.items()
+    }
 
 
 def linear_differences(results: Sequence[RunResult]) -> Table:
@@ -187,17 +114,12 @@ def linear_differences(results: Sequence[RunResult]) -> Table:
     return table
 
 
-def mode_shifts(results: Sequence[RunResult]) -> Table:
-    steps = sorted({s.step_size for r in results for s in r.shifts})
-    columns = ("Scenario", "Schedule", *(f"{h * 1e6:g} µs" for h in steps))
-    table = make_table(
-        "Shift of the electromechanical mode by the communication step [rad/s]", *columns, left=2
+def mode_shifts(results: Sequence[RunResult]) -> ShownTable:
+    return mode_tables.mode_shifts(
+        (r.modes.prepared.title, shift.schedule, shift.step_size, shift.shift)
+        for r in results
+        for shift in sorted(r.shifts, key=lambda shift: shift.schedule)
     )
-    for r in results:
-        for schedule in sorted({s.schedule for s in r.shifts}):
-            values = {s.step_size: s.shift for s in r.shifts if s.schedule == schedule}
-            table.add_row(r.modes.prepared.title, schedule, *(f"{values[h]:.1e}" for h in steps))
-    return table
 
 
 def run_statistics(results: Sequence[RunResult]) -> Table:

@@ -149,7 +149,7 @@ def test_the_power_flow_names_areas_of_buses_units_and_ties(prepared):
     assert of["branches"]["line_7_8"] == "1 WEST – 2 EAST"
     assert of["branches"]["line_5_6"] == "1 WEST"
     assert [*power_flow.columns(flow["buses"], "buses").values()][-1] == "Area"
-    assert power_flow.cells(flow["buses"], "buses")[0][-1] == "1 WEST"
+    assert power_flow.flow_table("Buses", "buses", flow["buses"]).rows[0][-1] == "1 WEST"
 
 
 @pytest.mark.filterwarnings("ignore::orchestrator.UnusualDataWarning")

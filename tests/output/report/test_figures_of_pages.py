@@ -91,7 +91,7 @@ def test_of_the_page(folder):
     source = [held, deviations(folder / "run"), by_100, OF_THE_SOURCE, advised, LOAD_CHANGE]
     assert foreign_in_page(page, source) == []
     assert unseen_in_page(page, source) == []
-    assert "λ [rad/s]" in page
+    assert "Mode [rad/s]" in page
     assert unlike_eigenvalues(page) == []
 
 

@@ -10,9 +10,9 @@ from orchestrator.linear.spectra.stability import Cause, Hidden, Stability
 from orchestrator.studies.certification import report_criteria
 from orchestrator.studies.certification.criteria import PodEffect
 from orchestrator.studies.modes.step_choice import Allowed, StepChoice, TriedStep, step_choice_json
+from orchestrator.studies.modes.tables import COLUMNS, modes_table
 from orchestrator.studies.runs.answer import ScenarioAnswer
 from orchestrator.studies.runs.answers_table import answers_table
-from orchestrator.studies.runs.files import _mode_rows
 from tests.support.figures import foreign_in_json, foreign_in_text, unseen_slips
 
 # no two of them are a simple multiple of each other
@@ -76,9 +76,10 @@ def test_of_a_table_of_modes():
     result = SimpleNamespace(
         prepared=SimpleNamespace(name="base"), name_of=lambda mode: "", modes=modes
     )
-    for row in _mode_rows([result]):
-        for heading, cell in row.items():
-            assert foreign_in_text(cell, modes, heading) == [], heading
+    for row in modes_table([result]).rows:
+        for column in COLUMNS:
+            cell = str(column.stored_value(row))
+            assert foreign_in_text(cell, modes, column.file_heading) == [], column.file_heading
 
 
 def test_of_a_certificates_page(monkeypatch):

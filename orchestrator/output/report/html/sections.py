@@ -18,14 +18,12 @@ from orchestrator.output.report.html.elements import (
     SHADES,
     Figures,
     colour,
-    damping,
-    eigenvalue,
-    number,
     table,
 )
 from orchestrator.output.report.html.folder import Results
 from orchestrator.output.report.linearised import exceptions_in_words
-from orchestrator.output.report.power_flow import TEXTS, cells, columns
+from orchestrator.output.report.mode_tables import mode_shifts, named_modes, ring_downs
+from orchestrator.output.report.power_flow import flow_table
 from orchestrator.output.results.signals import relative_difference, signal
 from orchestrator.simulation.watch.finding import NOT_JUDGED
 
@@ -172,18 +170,13 @@ def operating_point(results: Results) -> str:
                 "branches": flow.get("branches", []),
             }
             shown = [
-                table(
-                    "Units" if kind == "machines" else kind.capitalize(),
-                    list(columns(found[kind], kind).values()),
-                    [[escape(cell) for cell in row] for row in cells(found[kind], kind)],
-                    left=TEXTS[kind],
-                )
-                for kind in found
+                flow_table("Units" if kind == "machines" else kind.capitalize(), kind, listed)
+                for kind, listed in found.items()
             ]
             details.append(
                 f"<details><summary>{escape(s['title'])}: {counted(len(found['machines']), 'unit')}, "
                 f"{counted(len(buses), 'bus')}</summary>"
-                f"{''.join(shown)}</details>"
+                f"{''.join(table.html() for table in shown)}</details>"
             )
         residual = f"{flow['residual']:.1e}" if flow else "–"
         change = "–" if s["residual"] is None else f"{s['residual']:.1e}"
@@ -201,32 +194,8 @@ def operating_point(results: Results) -> str:
 def modes(results: Results, figures: Figures) -> str:
     reference = results.case.table.reference
     compared = reference is not None and any(s["references"] for s in results.scenarios)
-    columns = ["Mode", "Scenario", "λ [rad/s]", "f [Hz]", "Damping [%]"]
-    columns += [f"{reference.title}: f [Hz]", "Damping [%]"] if reference and compared else []
-    rows = []
-    for name in dict.fromkeys(
-        n for s in results.scenarios for n in [*s["modes"], *s["references"]]
-    ):
-        for s in results.scenarios:
-            mode, theirs = s["modes"].get(name), s["references"].get(name)
-            row = [escape(name), escape(s["title"])]
-            row += (
-                ["none in range", "", ""]
-                if not mode
-                else [
-                    eigenvalue(mode["real"], mode["imag"]),
-                    f"{mode['frequency_hz']:.3f}",
-                    damping(mode["damping_percent"]),
-                ]
-            )
-            if compared:
-                row += (
-                    [f"{theirs['frequency_hz']:.2f}", number(theirs["damping_percent"], 2)]
-                    if theirs
-                    else ["", ""]
-                )
-            rows.append(row)
-    parts = [table("Electromechanical modes", columns, rows, left=2)]
+    title = reference.title if reference else None
+    parts = [named_modes(results.scenarios, title, with_names=True).html()]
     if reference and compared:
         parts.append(f'<p class="soft">{escape(reference.title)}: {escape(reference.source)}</p>')
     picture, link = figures.add(
@@ -389,52 +358,24 @@ def _curves(
 
 
 def _ring_downs(results: Results) -> str:
-    rows = []
-    for s in results.scenarios:
-        mode, seen = next(iter(s["modes"].values()), None), s["ring_down"]
-        if mode and seen:
-            rows.append(
-                [
-                    escape(s["title"]),
-                    f"{seen['frequency_hz']:.4f}",
-                    f"{mode['frequency_hz']:.4f}",
-                    damping(seen["damping_percent"]),
-                    damping(mode["damping_percent"]),
-                ]
-            )
-    columns = [
-        "Scenario",
-        "f seen [Hz]",
-        "f of the mode [Hz]",
-        "Damping seen [%]",
-        "Damping of the mode [%]",
-    ]
-    return (
-        table("Ring-down of the simulated response against the eigenvalue", columns, rows)
-        if rows
-        else ""
+    # results of earlier versions do not have the mode of the system that rings
+    shown = ring_downs(
+        [{"ring_down_mode": next(iter(s["modes"].values()), None), **s} for s in results.scenarios]
     )
+    return "" if shown is None else shown.html()
 
 
 def step_sizes(results: Results) -> str:
-    steps = sorted({float(r["step size [s]"]) for r in results.step_sizes})
-    title, rows = titles(results), []
-    for name in title:
-        for schedule in sorted({r["schedule"] for r in results.step_sizes}):
-            found = {
-                float(r["step size [s]"]): float(r["shift [rad/s]"])
-                for r in results.step_sizes
-                if (r["scenario"], r["schedule"]) == (name, schedule)
-            }
-            if found:
-                rows.append([escape(title[name]), schedule, *(f"{found[h]:.1e}" for h in steps)])
-    columns = ["Scenario", "Schedule", *(f"{1e6 * h:g} µs" for h in steps)]
-    return table(
-        "Shift of the electromechanical mode from the continuous system's [rad/s]",
-        columns,
-        rows,
-        left=2,
-    )
+    title = titles(results)
+    return mode_shifts(
+        (
+            title[row["scenario"]],
+            row["schedule"],
+            float(row["step size [s]"]),
+            float(row["shift [rad/s]"]),
+        )
+        for row in results.step_sizes
+    ).html()
 
 
 def provenance(results: Results) -> str:

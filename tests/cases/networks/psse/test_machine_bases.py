@@ -8,7 +8,7 @@ from orchestrator.cases.new.new_case import write_case
 from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.cases.scenario.flow_figures import power_flow_json
 from orchestrator.core.errors import CaseError
-from orchestrator.output.report.power_flow import cells
+from orchestrator.output.report.power_flow import flow_table
 from orchestrator.studies.modes.modes import compute_modes
 
 RAW = """\
@@ -118,4 +118,4 @@ def test_a_bus_has_its_name_in_the_file_beside_its_number(prepared):
         "bus_3": "EAST GEN",
         "bus_7": "WEST",
     }
-    assert cells(buses, "buses")[0][0] == "bus_1 WEST GEN"
+    assert flow_table("Buses", "buses", buses).rows[0][0] == "bus_1 WEST GEN"

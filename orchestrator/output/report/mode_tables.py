@@ -1,0 +1,87 @@
+"""Tables over the JSON of scenarios: a terminal shows them of what was computed, a page of what was kept."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from orchestrator.output.report.table import ShownCell, ShownTable, damping
+from orchestrator.output.report.tables import eigenvalue_text
+
+Content = Mapping[str, Any]
+"""The JSON of a scenario, or a part of it."""
+
+
+def named_modes(
+    scenarios: Sequence[Content], reference: str | None, *, with_names: bool = False
+) -> ShownTable:
+    """The modes that a case looks for, beside somebody else's figures if there are any, whose title is given.
+
+    ``with_names``: shows a mode's name also if there is no other."""
+    keys = ("modes", "unnamed", "references")
+    found = [(name, s) for s in scenarios for key in keys for name in s.get(key, ())]
+    names = list(dict.fromkeys(name for name, _ in found))
+    several = len(names) > 1
+    compared = any(s["references"] for s in scenarios)
+    rows = []
+    for name in names:
+        for s in scenarios:
+            row: list[ShownCell] = [s["title"]]
+            if several or with_names:
+                row = [f"{name}: {s['title']}"]
+            absence = "not known" if name in s.get("unnamed", ()) else "none in range"
+            row += _figures(s["modes"].get(name), absence)
+            theirs = s["references"].get(name)
+            if theirs:
+                row += [f"{theirs['frequency_hz']:.2f}", damping(theirs["damping_percent"])]
+            rows.append([*row, "", ""] if compared and not theirs else row)
+    headings = ["Scenario", "Mode [rad/s]", "f [Hz]", "Damping [%]"]
+    headings += [f"{reference}: f [Hz]", "Damping [%]"] if compared else []
+    return ShownTable(
+        "Electromechanical modes" if several else "Electromechanical mode",
+        headings,
+        rows,
+        parts=[name for name in names for _ in scenarios],
+    )
+
+
+def _figures(mode: Content | None, absence: str) -> list[ShownCell]:
+    if mode is None:
+        return [absence, "", ""]
+    value = complex(mode["real"], mode["imag"])
+    return [eigenvalue_text(value), f"{mode['frequency_hz']:.3f}", damping(mode["damping_percent"])]
+
+
+def ring_downs(scenarios: Sequence[Content]) -> ShownTable | None:
+    """The swing that each response shows, beside the mode of the system that rings; None if no response shows one."""
+    rows = []
+    for s in scenarios:
+        seen, mode = s["ring_down"], s["ring_down_mode"]
+        if seen and mode:
+            hertz = [f"{one['frequency_hz']:.4f}" for one in (seen, mode)]
+            percent = [damping(one["damping_percent"]) for one in (seen, mode)]
+            rows.append([s["title"], *hertz, *percent])
+    title = "Ring-down of the simulated response against the eigenvalue"
+    headings = [
+        "Scenario",
+        "f simulated [Hz]",
+        "f mode [Hz]",
+        "Damping simulated [%]",
+        "Damping mode [%]",
+    ]
+    return ShownTable(title, headings, rows) if rows else None
+
+
+def mode_shifts(shifts: Iterable[tuple[str, str, float, float]]) -> ShownTable:
+    """The shift of the electromechanical mode by each step.
+
+    ``shifts``: scenario, schedule, communication step [s], shift [rad/s]."""
+    found: dict[tuple[str, str], dict[float, float]] = {}
+    for scenario, schedule, step, shift in shifts:
+        found.setdefault((scenario, schedule), {})[step] = shift
+    steps = sorted({step for by_step in found.values() for step in by_step})
+    rows = [[*key, *(f"{by_step[step]:.1e}" for step in steps)] for key, by_step in found.items()]
+    return ShownTable(
+        "Shift of the electromechanical mode by the communication step [rad/s]",
+        ["Scenario", "Schedule", *(f"{1e6 * step:g} µs" for step in steps)],
+        rows,
+        left=2,
+    )
