@@ -10,6 +10,7 @@ from fmus.synchronous_generator.excitation.bridge import st5b, st6b, st7b, st8c
 from fmus.synchronous_generator.excitation.common import Exciter
 from fmus.synchronous_generator.excitation.compound import esst2a, esst3a, ieeet3
 from fmus.synchronous_generator.excitation.integral import ac7b, dc4b, expic1
+from fmus.synchronous_generator.excitation.nve import exni
 from fmus.synchronous_generator.excitation.rotating import (
     ac1a,
     ac4a,
@@ -78,6 +79,7 @@ EXCITERS: dict[str, Exciter] = {
     "manual": manual,
     "sexs": sexs,
     "scrx": scrx,
+    "exni": exni,
     "ieeet1": ieeet1,
     "ieeet2": ieeet2,
     "dc1a": dc1a,
