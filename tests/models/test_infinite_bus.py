@@ -8,6 +8,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.studies.modes.modes import compute_modes
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.recorder import Recorder
+from tests.support.scenarios import prepare_one
 
 H, STOP = 1e-4, 0.06
 FASTEST = 2.0 / 0.5 * 2 * np.pi * 50
@@ -39,7 +40,7 @@ def test_it_stands_still_with_the_current_it_was_told(values):
 
 def run(scenario, values, *, events, internal_step=1e-4):
     steps = {f"{name}.internal_step": internal_step for name in ("gfor", "grid")}
-    (prepared,) = load_case("infinite_bus").prepare([scenario], steps | values)
+    prepared = prepare_one("infinite_bus", scenario, steps | values)
     moved = (
         [type(e)(e.time - 0.98, e.component, e.parameter, e.value) for e in prepared.events]
         if events

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import orchestrator as gfor
-from orchestrator.cases.case import BUILT_IN, load_case
+from orchestrator.cases.case import BUILT_IN
 from orchestrator.studies.modes.modes import compute_modes
 from orchestrator.studies.runs.run import run_scenario
 from tests.reference.four_vsc import BUSES, HVDC1, HVDC2, WP1, WP2, FourVsc, emtp, report, with_all
+from tests.support.scenarios import prepare_one
 from tests.support.tables import figures
 
 pytestmark = pytest.mark.reproduction
@@ -220,9 +221,7 @@ def test_with_the_files_gain_the_phasor_system_has_the_limit_of_the_slides():
 
 
 def stability(name, scenario, S_sc, step=None, **overrides):
-    (ready,) = load_case(name).prepare(
-        [scenario], {"equivalent.S_n": S_sc} | overrides, step_size=step
-    )
+    ready = prepare_one(name, scenario, {"equivalent.S_n": S_sc} | overrides, step_size=step)
     return compute_modes(ready, (1.0, 60.0)).stability
 
 
@@ -259,7 +258,7 @@ def test_every_independent_eigenvalue_is_one_of_the_fmus(name, S_sc):
         if emt
         else {f"{unit}.bus_voltage.tau": 1e-3 for unit in ("wp1", "wp2", "hvdc1", "hvdc2")}
     )
-    (ready,) = load_case(name).prepare(["following"], {"equivalent.S_n": S_sc} | lags)
+    ready = prepare_one(name, "following", {"equivalent.S_n": S_sc} | lags)
     fmus = np.linalg.eigvals(compute_modes(ready).system.A)
     exact = FourVsc(S_sc=S_sc, R_X=0.001, dynamic=emt).eigenvalues()
     exact = exact[np.abs(exact + 1000) > 1e-3]  # the lags of what is not in the benchmark
@@ -310,8 +309,8 @@ def test_the_simulated_oscillation_grows_as_the_independent_eigenvalue_says(tmp_
         .replace('time = "1 s"', 'time = "0.1 s"')
     )
     (tmp_path / "case.toml").write_text(text, encoding="utf-8")
-    (ready,) = load_case(tmp_path / "case.toml").prepare(
-        ["following"], {"equivalent.S_n": 9500.0}, stop_time=0.8
+    ready = prepare_one(
+        tmp_path / "case.toml", "following", {"equivalent.S_n": 9500.0}, stop_time=0.8
     )
     recorded = run_scenario(ready).dataset
     time, v = recorded["time"].values, recorded["grid.bus_F.v"].values

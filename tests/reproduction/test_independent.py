@@ -18,6 +18,7 @@ from tests.reference.grid_forming import GFOR
 from tests.reference.synchronous_machine import PSS2A, SG1, SG2
 from tests.reference.two_areas import SCENARIOS, TwoAreas, grid_code_system, paper_system
 from tests.support.exact import exact_continuous, network_of
+from tests.support.scenarios import prepare_one
 
 pytestmark = pytest.mark.reproduction
 
@@ -203,7 +204,7 @@ def continuous_eigenvalues(prepared):
 @pytest.mark.parametrize("X_L", [0.05, 0.1])
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_the_fmus_continuous_model_has_the_same_modes(scenario, X_L):
-    (prepared,) = load_case("two_area").prepare([scenario], {"grid.X_L": X_L})
+    prepared = prepare_one("two_area", scenario, {"grid.X_L": X_L})
     ours = continuous_eigenvalues(prepared)
     for value in paper_system(scenario, X_L).linearised().oscillations(0.1, 2.0):
         assert np.abs(ours - value).min() < 1e-4

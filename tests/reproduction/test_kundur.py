@@ -11,6 +11,7 @@ from orchestrator.cases.case import BUILT_IN, load_case
 from orchestrator.studies.modes.modes import compute_modes
 from tests.reference.multi_machine import hertz_and_percent
 from tests.reference.published import KUNDUR_EXCITERS, kundur
+from tests.support.scenarios import prepare_one
 from tests.support.tables import figures
 from tests.support.variants import as_phasors, with_load_model
 
@@ -248,7 +249,7 @@ def test_the_modes_are_those_of_an_independent_emt_model(scenario, constant):
 
 @pytest.mark.slow
 def test_governors_hold_the_common_speed():
-    (ready,) = load_case("kundur").prepare(["pss"], {"sg*.governor": "tgov1"})
+    ready = prepare_one("kundur", "pss", {"sg*.governor": "tgov1"})
     found = compute_modes(ready)
     assert found.stability.stable
     assert not found.warnings

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.optimize import root
 
-from orchestrator.cases.case import load_case
 from orchestrator.studies.modes.modes import compute_modes
+from tests.support.scenarios import prepare_one
 from tests.support.tables import figures
 
 pytestmark = pytest.mark.reproduction
@@ -142,7 +142,7 @@ def swing():
 def ready(tmp_path_factory):
     path = tmp_path_factory.mktemp("kinds") / "case.toml"
     path.write_text(CASE, encoding="utf-8")
-    (found,) = load_case(path).prepare()
+    found = prepare_one(path)
     return found
 
 

@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.cases.case import BUILT_IN, load_case
+from orchestrator.cases.case import BUILT_IN
 from orchestrator.studies.modes.modes import compute_modes
 from tests.reference.multi_machine import hertz_and_percent
 from tests.reference.nordic44 import Nordic44
+from tests.support.scenarios import prepare_one
 from tests.support.tables import figures
 
 pytestmark = pytest.mark.reproduction
@@ -110,7 +111,7 @@ def test_the_growth_is_the_lost_synchronising_torque_of_northern_norway():
 
 @pytest.mark.slow
 def test_the_fmus_without_controls():
-    (ready,) = load_case("nordic44").prepare(["manual"])
+    ready = prepare_one("nordic44", "manual")
     voltages = ready.power_flow.voltages
     for name, v in zip(Nordic44().buses, Nordic44().voltages, strict=True):
         assert voltages[f"bus_{name}"] == pytest.approx(v, abs=2e-5)
@@ -127,7 +128,7 @@ def test_the_fmus_without_controls():
 @pytest.mark.slow
 @pytest.mark.parametrize("scenario", ["base", "pss", "gfor", "pod_p", "pod_q", "pod_pq"])
 def test_the_rows_with_controls(scenario):
-    (ready,) = load_case("nordic44").prepare([scenario])
+    ready = prepare_one("nordic44", scenario)
     result = compute_modes(ready, (0.3, 1.3))
     found = [m.eigenvalue for m in result.modes]
     for hertz, percent in figures(PAGE, CONTROLS, scenario):

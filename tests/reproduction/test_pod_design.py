@@ -11,6 +11,7 @@ from orchestrator.studies.modes.modes import compute_modes, running
 from orchestrator.studies.pod_design.closed_loop import PodLoop, PodSetting
 from orchestrator.studies.pod_design.design import DesignRequest
 from orchestrator.studies.pod_design.lead_lag import angle_deg
+from tests.support.scenarios import prepare_one
 
 pytestmark = pytest.mark.reproduction
 
@@ -189,9 +190,7 @@ def test_margins_say_where_a_mode_is_lost():
 def test_the_delay_margin_is_the_delay_at_which_the_system_turns_unstable(controller):
     """The same linear system with what the gain sees delayed: its history is a polynomial in 30 Chebyshev points."""
     d = design(controller, margins=True)
-    (ready,) = load_case("two_area").prepare(
-        [d.target.scenario], {f"gfor.{controller}.N_S": d.target.stages}
-    )
+    ready = prepare_one("two_area", d.target.scenario, {f"gfor.{controller}.N_S": d.target.stages})
     with running(ready) as master:
         loop = PodLoop(master, ["gfor"], controller)
         half, full = (model.A for model in loop.continuous_models(PodSetting(d.gain, d.filters)))

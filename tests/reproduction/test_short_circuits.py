@@ -9,13 +9,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from orchestrator.cases.case import BUILT_IN, load_case
+from orchestrator.cases.case import BUILT_IN
 from orchestrator.studies.modes.modes import compute_modes
 from orchestrator.studies.runs.run import run_scenario
 from tests.reference.multi_machine import hertz_and_percent
 from tests.reference.rotor_circuits import Axis, classical_data, of_short_circuit_data
 from tests.reference.short_circuit import ShortCircuit, rms_micro
 from tests.reference.tops_systems import recorded_speeds, tops_system
+from tests.support.scenarios import prepare_one
 from tests.support.tables import figures
 
 pytestmark = pytest.mark.reproduction
@@ -35,7 +36,7 @@ def row(case, heading, label):
 
 @cache
 def errors_of_fmus(case, machine="genrou_rated_speed"):
-    (ready,) = load_case(case).prepare(["pss"], {"sg*.machine": machine})
+    ready = prepare_one(case, "pss", {"sg*.machine": machine})
     data = run_scenario(ready).dataset
     names = tops_system(CASES[case]).bus + 1
     speeds = np.column_stack(
@@ -64,7 +65,7 @@ def test_the_recordings_begin_at_rest_and_the_power_flow_is_the_cases(case):
     name = CASES[case]
     assert recorded_speeds(name).shape == (2000, len(tops_system(name).names))
     assert (recorded_speeds(name)[:201] == 1).all()
-    (ready,) = load_case(case).prepare(["pss"])
+    ready = prepare_one(case, "pss")
     ours = np.array(
         [ready.power_flow.voltages[f"bus_{k + 1}"] for k in range(len(tops_system(name).v))]
     )
@@ -73,7 +74,7 @@ def test_the_recordings_begin_at_rest_and_the_power_flow_is_the_cases(case):
 
 @pytest.mark.parametrize("case", CASES)
 def test_the_machines_data_are_converted_from_tops_tables(case):
-    (ready,) = load_case(case).prepare(["pss"])
+    ready = prepare_one(case, "pss")
     system = tops_system(CASES[case])
     g, omega_b = system.data, 2 * np.pi * system.frequency
     for k, bus in enumerate(system.bus + 1):
@@ -175,9 +176,7 @@ def test_the_modes_of_tops_system_k2a(scenario):
 @pytest.mark.slow
 @pytest.mark.parametrize("scenario", ["pss", "no_pss"])
 def test_the_fmus_modes_with_the_data_of_tops_system_k2a(scenario):
-    (ready,) = load_case("k2a").prepare(
-        [scenario], {f"sg*.{key}": value for key, value in OF_K2A.items()}
-    )
+    ready = prepare_one("k2a", scenario, {f"sg*.{key}": value for key, value in OF_K2A.items()})
     found = compute_modes(ready, (0.1, 3.0))
     assert_modes(
         [m.eigenvalue for m in found.modes], wanted_modes("k2a", f"{scenario}, k2a | FMUs")
@@ -192,7 +191,7 @@ def test_the_fmus_modes_with_the_data_of_tops_system_k2a(scenario):
 @pytest.mark.parametrize("scenario", ["pss", "no_pss"])
 @pytest.mark.parametrize("case", CASES)
 def test_the_fmus_modes_are_those_of_the_independent_equations(case, scenario):
-    (ready,) = load_case(case).prepare([scenario])
+    ready = prepare_one(case, scenario)
     found = [m.eigenvalue for m in compute_modes(ready, (0.1, 3.0)).modes]
     assert_modes(found, wanted_modes(case, f"{scenario} | FMUs"))
     equations = ShortCircuit(
@@ -207,7 +206,7 @@ def test_the_fmus_modes_are_those_of_the_independent_equations(case, scenario):
 @pytest.mark.parametrize("scenario", ["no_pss", "gfor", "pod_p", "pod_q"])
 @pytest.mark.parametrize("case", CASES)
 def test_the_rows_with_a_converter(case, scenario):
-    (ready,) = load_case(case).prepare([scenario])
+    ready = prepare_one(case, scenario)
     named = compute_modes(ready).named
     cells = figures(PAGES[case], CONVERTER, scenario)
     assert len(cells) == len(named)

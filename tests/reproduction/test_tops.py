@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.cases.case import load_case
 from tests.reference.short_circuit import ShortCircuit
 from tests.reference.tops_systems import tops_system
 from tests.reproduction.test_short_circuits import MICRO, SPEEDS, assert_modes, row, wanted_modes
+from tests.support.scenarios import prepare_one
 
 pytestmark = [pytest.mark.reproduction, pytest.mark.slow]
 
@@ -45,7 +45,7 @@ def test_tops_has_the_cases_power_flow_and_the_pages_errors_and_modes():
     tops = json.loads(done.stdout)
     assert tops["tops"] == "0.3.0"
 
-    (ready,) = load_case("k2a").prepare(["pss"])
+    ready = prepare_one("k2a", "pss")
     theirs = numbers(tops["voltages"])
     ours = np.array([ready.power_flow.voltages[f"bus_{k + 1}"] for k in range(len(theirs))])
     ours *= np.exp(1j * (np.angle(theirs[0]) - np.angle(ours[0])))

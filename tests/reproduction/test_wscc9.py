@@ -10,6 +10,7 @@ from orchestrator.cases.case import BUILT_IN, load_case
 from orchestrator.studies.modes.modes import compute_modes
 from tests.reference.multi_machine import hertz_and_percent
 from tests.reference.published import quadratic, with_subtransients, wscc9
+from tests.support.scenarios import prepare_one
 from tests.support.tables import figures
 from tests.support.variants import as_phasors, with_load_model
 
@@ -146,7 +147,7 @@ def test_the_fmus_rows_with_constant_power(tmp_path):
 
 @pytest.mark.slow
 def test_a_quarter_of_the_stray_capacitance_is_enough_for_the_coupling():
-    (ready,) = load_case("wscc9").prepare(["base"], DAMPERS | QUARTER)
+    ready = prepare_one("wscc9", "base", DAMPERS | QUARTER)
     assert not [text for text in compute_modes(ready).warnings if "coupling" in text]
 
 
@@ -171,7 +172,7 @@ def test_the_phasor_models_are_the_independent_computation(tmp_path):
 
 @pytest.mark.slow
 def test_governors_hold_the_common_speed():
-    (ready,) = load_case("wscc9").prepare(["base"], {"sg*.governor": "tgov1"})
+    ready = prepare_one("wscc9", "base", {"sg*.governor": "tgov1"})
     found = compute_modes(ready)
     assert found.stability.stable
     assert not found.warnings

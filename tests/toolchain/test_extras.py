@@ -10,7 +10,7 @@ import pytest
 
 from fmus.toolchain import compiler, native_fmu, python_fmu
 from fmus.toolchain.extras import EXTRAS, MissingLibraryError, require
-from orchestrator.cases.case import load_case
+from tests.support.scenarios import prepare_one
 
 ROOT = Path(__file__).parents[2]
 DISTRIBUTIONS = {"skrf": "scikit-rf"}
@@ -84,7 +84,7 @@ def test_a_table_that_wants_native_fmus_has_them_without_a_compiler(monkeypatch)
     """`gfor certify` writes such tables, which must be the same on every machine to verify."""
     for module in (native_fmu, python_fmu):
         monkeypatch.setattr(module, "installed_version", lambda library: "")
-    (prepared,) = load_case("norm631").prepare(["with"])
+    prepared = prepare_one("norm631", "with")
     tools = {plan.description.generation_tool for plan in prepared.system.components.values()}
     assert not all("PythonFMU" in tool for tool in tools), tools
 

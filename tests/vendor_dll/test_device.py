@@ -20,6 +20,7 @@ from orchestrator.linear.spectra.modes import eigenvalues
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.schedule import gauss_seidel
 from orchestrator.systems.coupling.system import System
+from tests.support.scenarios import prepare_one
 from tests.support.vendor_dlls import compiled, droop_device, lag
 
 W_B = 2 * np.pi * 50
@@ -175,7 +176,7 @@ inputs = { u = 0.5 }
 """
     case = tmp_path / "case.toml"
     case.write_text(text, encoding="utf-8")
-    (prepared,) = load_case(str(case)).prepare()
+    prepared = prepare_one(str(case))
     assert prepared.system.components["k"].description.states == ("held.y", "DoubleStates[1]")
     case.write_text(text.replace("dll =", 'fmu = "k.fmu"\ndll ='), encoding="utf-8")
     with pytest.raises(InputError, match=r"give either 'model' .*, 'fmu' .*, 'dll' .* or 'scan'"):

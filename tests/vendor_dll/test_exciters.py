@@ -2,8 +2,8 @@
 
 import pytest
 
-from orchestrator.cases.case import load_case
 from orchestrator.studies.modes.modes import compute_modes
+from tests.support.scenarios import prepare_one
 from tests.support.vendor_dlls import INTERFACE, compiled
 
 EXCITER = (
@@ -61,7 +61,7 @@ def warned(folder, start, reference):
     path.write_text(
         CASE.replace("START", repr(start)).replace("REFERENCE", repr(reference)), encoding="utf-8"
     )
-    (prepared,) = load_case(path).prepare()
+    prepared = prepare_one(path)
     return compute_modes(prepared).warnings
 
 

@@ -7,6 +7,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.core.errors import CaseError
 from orchestrator.systems.coupling.events import BusFault, LineSwitching
 from tests.cases.events.test_switching import RING, watch
+from tests.support.scenarios import prepare_one
 
 FAULT = '[[events]]\ntype = "bus_fault"\ntime = "0.1 s"\nbus = "b3"\n'
 
@@ -92,7 +93,7 @@ def test_the_built_in_two_area_systems_take_faults(name, tmp_path):
         1,
     )
     (tmp_path / "case.toml").write_text(text, encoding="utf-8")
-    ready = load_case(tmp_path / "case.toml").prepare(("base",))[0]
+    ready = prepare_one(tmp_path / "case.toml", "base")
     before, during, after = watch(ready, ("grid.bus_3.v", "sg1.omega"), (0.09, 0.19, 0.6))
     assert before["grid.bus_3.v"] == pytest.approx(1.0, abs=0.05)
     assert 0.2 < during["grid.bus_3.v"] < 0.8

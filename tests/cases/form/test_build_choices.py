@@ -6,6 +6,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.cases.form.build_choices import NativeChoice, layer_of
 from orchestrator.cases.form.parameter_files import read_parameter_file
 from orchestrator.core.errors import CaseError
+from tests.support.scenarios import prepare_one
 
 
 def native(components):
@@ -41,7 +42,7 @@ def test_a_stronger_layer_decides(tmp_path):
 
 
 def test_a_choice_is_no_value_of_the_scenario():
-    (prepared,) = load_case("two_area").prepare(["gfor"], {"*.native": True, "grid.X_L": 0.2})
+    prepared = prepare_one("two_area", "gfor", {"*.native": True, "grid.X_L": 0.2})
     assert prepared.values["grid.X_L"] == 0.2
     assert not [name for name in prepared.values if name.endswith(".native")]
 

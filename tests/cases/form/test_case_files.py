@@ -11,6 +11,7 @@ from orchestrator.core.errors import CaseError, InputError
 from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.systems.coupling.events import LoadChange, ParameterChange
 from orchestrator.systems.coupling.master import Master
+from tests.support.scenarios import prepare_one
 from tests.systems.coupling.small_fmus import small_fmu
 
 LOOP = """\
@@ -594,8 +595,8 @@ def test_units_at_one_bus_must_want_one_voltage(written):
 
 
 def angle(**overrides):
-    (ready,) = load_case("two_area").prepare(
-        ["gfor"], {k.replace("__", ".", 1): v for k, v in overrides.items()}
+    ready = prepare_one(
+        "two_area", "gfor", {k.replace("__", ".", 1): v for k, v in overrides.items()}
     )
     return ready.values["sg1.theta_0"] - ready.values["sg2.theta_0"], ready
 

@@ -5,6 +5,7 @@ import pytest
 from orchestrator.cases.case import load_case
 from orchestrator.cases.form.parameter_files import parameter_file_text, read_parameter_file
 from orchestrator.core.errors import CaseError, InputError
+from tests.support.scenarios import prepare_one
 
 
 @pytest.fixture
@@ -61,7 +62,7 @@ def test_a_case_file_names_parameter_files(write):
         ),
         "case.toml",
     )
-    (ready,) = load_case(path).prepare(["pod_p"])
+    ready = prepare_one(path, "pod_p")
     assert [ready.values[f"gfor.pod_p.{v}"] for v in ("enabled", "K", "T_S1")] == [
         True,
         150.0,

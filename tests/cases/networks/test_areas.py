@@ -4,10 +4,11 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.networks.areas import areas_of
+from tests.support.scenarios import prepare_one
 
 
 def test_areas_by_component_and_by_bus():
-    (ready,) = load_case("two_area").prepare(["gfor"])
+    ready = prepare_one("two_area", "gfor")
     assert areas_of({"one": ["sg1", "gfor"], "two": ["bus_3"]}, ready.system) == {
         "sg1": "one",
         "gfor": "one",

@@ -11,6 +11,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.cases.scenario.catalogue_fmus import plan_fmu
 from orchestrator.core.errors import CaseError
 from orchestrator.studies.modes.modes import compute_modes
+from tests.support.scenarios import prepare_one
 
 CASE = """\
 name = "three"
@@ -530,7 +531,7 @@ def test_what_can_be_meant_is_asked(tmp_path, where, old, new, said):
         (tmp_path / name).write_text(
             text.replace(old, new, 1) if text is where else text, encoding="utf-8"
         )
-    (ready,) = load_case(tmp_path / "case.toml").prepare()
+    ready = prepare_one(tmp_path / "case.toml")
     asked = [str(question).replace(f"{tmp_path}{os.sep}", "") for question in ready.questions]
     assert any(question.startswith(said) for question in asked), asked
 
@@ -540,7 +541,7 @@ def test_a_pattern_fits_what_has_the_variable(tmp_path):
     text = CASE.replace('"sg1.machine.H" = 5.0', '"g*.droop.R_f" = 0.04')
     (tmp_path / "case.toml").write_text(text, encoding="utf-8")
     (tmp_path / "units.csv").write_text(UNITS, encoding="utf-8")
-    (ready,) = load_case(tmp_path / "case.toml").prepare()
+    ready = prepare_one(tmp_path / "case.toml")
     assert {n: x for n, x in ready.values.items() if n.endswith("R_f")} == {
         "gfor1.droop.R_f": 0.04,
         "gfor2.droop.R_f": 0.04,
@@ -566,7 +567,7 @@ def test_a_component_that_cannot_start_is_named_with_its_row(tmp_path):
     text = CASE.replace('q = "50 Mvar"', 'q = "330 Mvar"').replace('"200 MW"', '"120 MW"')
     (tmp_path / "case.toml").write_text(text, encoding="utf-8")
     (tmp_path / "units.csv").write_text(UNITS.replace("1,250,100", "1,140,100"), encoding="utf-8")
-    (ready,) = load_case(tmp_path / "case.toml").prepare()
+    ready = prepare_one(tmp_path / "case.toml")
     with pytest.raises(CaseError) as caught:
         compute_modes(ready)
     (problem,) = caught.value.problems

@@ -13,6 +13,7 @@ from orchestrator.core.errors import CosimError, InputError
 from orchestrator.studies.operating_points.columns import Elements
 from orchestrator.studies.operating_points.outages import read_outages
 from orchestrator.studies.siting.candidates import candidates
+from tests.support.scenarios import prepare_one
 
 _CASE = (
     'name = "areas"\n[solver]\nstep_size = "5 ms"\n[power_flow]\ngrid = "grid"\n[components.grid]\n'
@@ -143,7 +144,7 @@ def test_a_matpower_case_has_its_names(tmp_path):
         'dyr = "areas.dyr"', ""
     )
     (tmp_path / "case.toml").write_text(case.replace('_phasor"\nconv', '_st1_phasor"\nconv'))
-    (ready,) = load_case(tmp_path / "case.toml").prepare()
+    ready = prepare_one(tmp_path / "case.toml")
     shown = {
         name: ready.names.of(name) for name in ("bus_9", "line_7_9", "line_9_8", "sg8", "load_9")
     }

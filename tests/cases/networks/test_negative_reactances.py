@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from fmus.grid.network import Line, Load, Network
-from orchestrator.cases.case import load_case
 from orchestrator.cases.flow.balance import FlowLine, FlowLoad, FlowShunt, inner_buses, legs_of
 from orchestrator.cases.flow.power_flow import FlowUnit, solve_power_flow
 from orchestrator.cases.form.schema import NetworkTable
 from orchestrator.cases.networks.conversion import without_negative_reactances, without_star_points
 from orchestrator.cases.networks.data import network_data
 from tests.cases.events.test_switching import RING, watch
+from tests.support.scenarios import prepare_one
 
 
 def two_port(lines, buses, ends):
@@ -130,7 +130,7 @@ def test_a_transformer_of_a_case_file_starts_in_steady_state(tmp_path):
     """X_12 + X_23 < X_13: winding 2 has a negative reactance, and a ratio."""
     i, j = RING.index("[network]"), RING.index("[components.sg]")
     (tmp_path / "case.toml").write_text(RING[:i] + CASE + RING[j:], encoding="utf-8")
-    (ready,) = load_case(tmp_path / "case.toml").prepare()
+    ready = prepare_one(tmp_path / "case.toml")
     (found,) = watch(ready, ("grid.b3.v", "grid.b2.v", "grid.t.winding_3.p"), (0.05,))
     assert set(ready.power_flow.voltages) >= {"b1", "b2", "b3"}
     for bus in ("b2", "b3"):

@@ -2,11 +2,11 @@
 
 import pytest
 
-from orchestrator.cases.case import load_case
 from orchestrator.cases.new.new_case import write_case
 from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.core.errors import InputError
 from tests.cases.networks.psse import raw, records
+from tests.support.scenarios import prepare_one
 
 SHUNT = "5,1,0,1,{most},{least},0,100,'',10.0,4,10.0"
 
@@ -22,7 +22,7 @@ def made(tmp_path):
         file.write_text(raw(33, found))
         case = write_case(WantedCase((file,), out, move_controls=move_controls))
         out.write_text(case.text, encoding="utf-8")
-        return case, load_case(out).prepare(["base"])[0]
+        return case, prepare_one(out, "base")
 
     return new
 
@@ -38,7 +38,7 @@ def test_a_shunt_moves_until_its_voltage_is_in_the_band(made):
     moved = base.system.components["grid"].number("shunt_5.B")
     assert moved in (20, 30, 40)
     assert voltage(base) > least
-    fewer = load_case(base.case.path).prepare(["base"], {"grid.shunt_5.B": moved - 10})[0]
+    fewer = prepare_one(base.case.path, "base", {"grid.shunt_5.B": moved - 10})
     assert voltage(fewer) < least
     assert f"shunt_5.B 10 to {moved:g}" in "\n".join(case.assumed)
     assert f"shunt_5.B = {moved:g}    # 10 in the file" in case.text

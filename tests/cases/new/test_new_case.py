@@ -27,6 +27,7 @@ from tests.cases.networks.psse.test_solution import solved_records
 from tests.cases.networks.test_network_sources import solved
 from tests.studies.screening.five_machines import POWERS, RATINGS, five_machines
 from tests.support import vendor
+from tests.support.scenarios import prepare_one
 
 CONVERTER = "bus 13, 100 MVA, 60 MW, less sg3"
 
@@ -211,7 +212,7 @@ def test_limits_of_reactive_power_are_kept_where_asked(gfor, files):
     flows = []
     for more in ([], ["--reactive-limits", "--force"]):
         assert gfor(*files, "--out", out, *more)[0] == 0
-        flows.append(load_case(out).prepare(["base"])[0].power_flow)
+        flows.append(prepare_one(out, "base").power_flow)
     assert [bool(flow.at_limits) for flow in flows] == [False, True]
     most = [max(flow.powers[f"sg{n}"].imag * RATINGS[n] for n in range(1, 5)) for flow in flows]
     assert most[0] > 21

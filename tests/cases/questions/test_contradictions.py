@@ -5,6 +5,7 @@ import pytest
 from orchestrator.cases.case import load_case
 from orchestrator.core.errors import CaseError
 from tests.cases.form.test_case_files import THREE_BUSES
+from tests.support.scenarios import prepare_one
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +20,7 @@ def prepared(tmp_path, text):
     def prepare(old, new, scenario="pod_p"):
         assert old in text
         (tmp_path / "case.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
-        (ready,) = load_case(tmp_path / "case.toml").prepare([scenario])
+        ready = prepare_one(tmp_path / "case.toml", scenario)
         return ready
 
     return prepare
@@ -178,7 +179,7 @@ def test_a_sound_case_raises_no_question(prepared):
 def test_a_shift_in_degrees_and_a_bus_listed_twice(tmp_path):
     grid = THREE_BUSES.replace("B = 0.02 }", "B = 0.02, shift = 30 }", 1)
     (tmp_path / "case.toml").write_text(grid, encoding="utf-8")
-    (ready,) = load_case(tmp_path / "case.toml").prepare()
+    ready = prepare_one(tmp_path / "case.toml")
     assert (
         "shift_l12 = 30 rad is more than half a turn; if it is in degrees, write '30 deg'"
         in ready.questions[0].text
@@ -186,7 +187,7 @@ def test_a_shift_in_degrees_and_a_bus_listed_twice(tmp_path):
     (tmp_path / "case.toml").write_text(
         grid.replace("shift = 30", "shift = '30 deg'"), encoding="utf-8"
     )
-    (ready,) = load_case(tmp_path / "case.toml").prepare()
+    ready = prepare_one(tmp_path / "case.toml")
     assert not [question for question in ready.questions if "shift" in question.text]
     (tmp_path / "case.toml").write_text(grid.replace('"b3"]', '"b3", "b2"]', 1), encoding="utf-8")
     with pytest.raises(CaseError, match="the bus 'b2' is listed twice"):

@@ -25,6 +25,7 @@ from orchestrator.core.errors import CaseError
 from orchestrator.devices.fmi.description import parse_description, read_description
 from orchestrator.systems.coupling.system import ComponentPlan
 from tests.devices.binding.test_binding import OURS
+from tests.support.scenarios import prepare_one
 
 CASE = """\
 name = "plausible"
@@ -69,7 +70,7 @@ def questions(tmp_path):
             assert text.count(old) == 1
             text = text.replace(old, new)
         (tmp_path / "case.toml").write_text(text, encoding="utf-8")
-        (prepared,) = load_case(tmp_path / "case.toml").prepare((), overrides or {})
+        prepared = prepare_one(tmp_path / "case.toml", None, overrides or {})
         return [str(question) for question in prepared.questions]
 
     return ask
@@ -371,7 +372,7 @@ generator_parameters = { transformer.X_t = 0.0, transformer.R_t = 0.0, machine.T
         f"bus,rating_mva,sg.machine.H\n{rows}\n".replace("39,1000", "39,9000")
     )
     (tmp_path / "case.toml").write_text(text, encoding="utf-8")
-    (prepared,) = load_case(tmp_path / "case.toml").prepare()
+    prepared = prepare_one(tmp_path / "case.toml")
     common, own = sorted(map(str, prepared.questions), key=lambda text: "machine.H" in text)
     assert re.match(
         r"line 15, units.generator_parameters.*: sg30, sg31, sg32 and 7 more: machine.T_d10 = 8000",
@@ -392,7 +393,7 @@ generator_parameters = { transformer.X_t = 0.0, transformer.R_t = 0.0, machine.T
 def test_a_rating_that_moves_a_power_is_asked_about(values, moves):
     found = [
         str(q)
-        for q in load_case("two_area").prepare(["base"], values)[0].questions
+        for q in prepare_one("two_area", "base", values).questions
         if "in parts of S_n" in str(q)
     ]
     assert [moves in text for text in found] == [True] * bool(moves), found

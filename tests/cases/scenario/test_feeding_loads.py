@@ -2,9 +2,9 @@
 
 import pytest
 
-from orchestrator.cases.case import load_case
 from orchestrator.core.errors import CosimError
 from orchestrator.studies.modes.modes import in_service, running
+from tests.support.scenarios import prepare_one
 
 CASE = """\
 name = "feeding"
@@ -43,7 +43,7 @@ def prepared(tmp_path):
         path = tmp_path / "feeding.toml"
         text = CASE.replace("-600 MW", f"{feeds} MW").replace("900 MW", f"{d2} MW")
         path.write_text(text, encoding="utf-8")
-        (found,) = load_case(path).prepare(overrides=values)
+        found = prepare_one(path, overrides=values)
         return found
 
     return prepare

@@ -5,10 +5,10 @@ import math
 
 import pytest
 
-from orchestrator.cases.case import load_case
 from orchestrator.cases.flow.power_flow import FlowLine, FlowLoad, FlowUnit, solve_power_flow
 from orchestrator.core.errors import CaseError, InputError
 from tests.cases.form.test_case_files import THREE_BUSES
+from tests.support.scenarios import prepare_one
 
 FOLLOWING = THREE_BUSES.replace('model = "gfor"', 'model = "gfl"')
 LINE = [FlowLine("line", "a", "b", R=0.0, X=0.2, B=0.0)]
@@ -18,7 +18,7 @@ SOURCE = FlowUnit("source", "a", 100.0, 0.0, 1.0)
 def prepared(tmp_path, text):
     path = tmp_path / "case.toml"
     path.write_text(text, encoding="utf-8")
-    (ready,) = load_case(path).prepare()
+    ready = prepare_one(path)
     return ready
 
 

@@ -10,6 +10,7 @@ from orchestrator.core.errors import InputError
 from orchestrator.studies.coordinated_design.study import PointsDesignRequest, plan_points_design
 from orchestrator.studies.modes.modes import compute_modes
 from tests.studies.screening.five_machines import POWERS, five_machines
+from tests.support.scenarios import prepare_one
 
 A, B = "bus 13, 100 MVA, 60 MW, less sg3", "bus 15, 80 MVA, 30 MW, less sg3"
 
@@ -57,7 +58,7 @@ def test_two_at_one_bus_are_compared_each_with_its_own_stand_in(made):
 
     def asked(text):
         case.path.write_text(text, encoding="utf-8")
-        (base,) = load_case(case.path).prepare(["base"])
+        base = prepare_one(case.path, "base")
         return [str(q) for q in base.questions if "which stands for it" in str(q)]
 
     assert asked(new.text) == []
@@ -76,7 +77,7 @@ def test_what_the_slack_feeds_less_for_one_of_two_is_not_asked_about(made, less)
 
     def asked(text):
         case.path.write_text(text, encoding="utf-8")
-        (both,) = load_case(case.path).prepare(["converter"])
+        both = prepare_one(case.path, "converter")
         return [str(q) for q in both.questions if "the slack takes the difference" in str(q)]
 
     assert asked(new.text) == []

@@ -4,6 +4,7 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.core.errors import CaseError
+from tests.support.scenarios import prepare_one
 
 WHEN = 'when = { "grid.X_L" = 0.1 }'
 
@@ -20,7 +21,7 @@ def references(tmp_path, text):
         (tmp_path / "case.toml").write_text(
             text.replace(WHEN, f"when = {{ {condition} }}"), encoding="utf-8"
         )
-        (prepared,) = load_case(tmp_path / "case.toml").prepare(["pod_p"], overrides)
+        prepared = prepare_one(tmp_path / "case.toml", "pod_p", overrides)
         return list(prepared.references)
 
     return find
@@ -45,7 +46,7 @@ def test_a_value_from_outside_that_is_no_condition_hides_the_figures(references)
 
 
 def test_a_condition_on_a_value_that_nobody_set_looks_at_the_default(references):
-    (prepared,) = load_case("two_area_rms").prepare(["pod_p"])
+    prepared = prepare_one("two_area_rms", "pod_p")
     default = prepared.system.components["sg1"].description.variables["machine.X_l"].start
     assert "sg1.machine.X_l" not in prepared.values
     assert references(f'"sg1.machine.X_l" = {default}') == ["electromechanical"]

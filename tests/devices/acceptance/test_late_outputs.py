@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from orchestrator.cases.case import load_case
 from orchestrator.face.cli import main
 from orchestrator.systems.coupling.coupled import _jump
 from orchestrator.systems.coupling.master import Master
+from tests.support.scenarios import prepare_one
 
 CASE = """
 name = "late"
@@ -77,7 +77,7 @@ def test_a_run_with_a_good_fmu_says_nothing_of_it(case, tmp_path, capsys):
 
 @pytest.mark.parametrize(("name", "late"), [("outputs_at_exit", True), ("converter", False)])
 def test_the_master_knows_which_outputs_came_late(name, late, case):
-    (prepared,) = load_case(case(name)).prepare()
+    prepared = prepare_one(case(name))
     with Master(prepared.system, prepared.schedule, prepared.step_size) as master:
         assert list(master.late_starts) == (["box"] if late else [])
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from orchestrator.cases.case import load_case
 from orchestrator.core.errors import BindingError, InputError
 from orchestrator.devices.binding.binding import bind, bound_fmu
 from orchestrator.devices.binding.draft import draft_binding
@@ -12,6 +11,7 @@ from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.fmi.instance import open_component
 from orchestrator.systems.coupling.master import Master
 from tests.support.bindings import GFOR_RATED
+from tests.support.scenarios import prepare_one
 
 H = 1e-4
 START = {"P_0": 0.6, "Q_0": 0.15, "v_0": 1.02, "theta_0": 0.3}
@@ -122,7 +122,7 @@ def test_our_converter_behind_a_binding_is_our_converter(fmu_path, binding):
     """In the two-area system, to the last bit, with the same compiled loop."""
     ends = []
     for bound in (False, True):
-        prepared = load_case("two_area").prepare(["pod_pq"])[0]
+        prepared = prepare_one("two_area", "pod_pq")
         if bound:
             prepared.system.components["gfor"].description = bound_fmu(
                 fmu_path("gfor"), binding(OURS)

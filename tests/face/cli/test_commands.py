@@ -17,6 +17,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.devices.fmi import wine
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.face.cli import COMMANDS, GROUPS, OLD, QUESTIONS, _command_in, _parser
+from tests.support.scenarios import prepare_one
 from tests.systems.coupling.small_fmus import small_fmu
 
 
@@ -435,7 +436,7 @@ def test_the_trajectory_has_units_and_says_where_it_comes_from(results):
     assert attributes["case_file"] == load_case("two_area").text
     assert json.loads(attributes["values"])["gfor.pod_p.enabled"] is True
     fmus = json.loads(attributes["fmus"])
-    (ready,) = load_case("two_area").prepare(["pod_p"])
+    ready = prepare_one("two_area", "pod_p")
     assert {name: fmu["guid"] for name, fmu in fmus.items()} == {
         name: plan.description.guid for name, plan in ready.system.components.items()
     }

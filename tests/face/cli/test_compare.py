@@ -9,6 +9,7 @@ import xarray as xr
 
 from orchestrator.face.cli import main
 from orchestrator.studies.runs.ring_down import ring_down_of
+from tests.support.scenarios import bare_scenario
 
 TIMES = np.arange(0, 15, 0.01)
 
@@ -194,7 +195,7 @@ def test_a_ring_down_that_is_recorded_too_coarsely_is_left_out(tmp_path, interva
     folder = save(tmp_path / "run", value, times=np.arange(0, 100, interval))
     ring_down = SimpleNamespace(signal="a.omega", start=2.0)
     case = SimpleNamespace(table=SimpleNamespace(analysis=SimpleNamespace(ring_down=ring_down)))
-    prepared = SimpleNamespace(case=case, events=())
+    prepared = bare_scenario(case=case)
     modes = SimpleNamespace(
         prepared=prepared, electromechanical=SimpleNamespace(eigenvalue=value, frequency_hz=0.5733)
     )

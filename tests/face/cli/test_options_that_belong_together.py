@@ -8,6 +8,7 @@ import pytest
 
 from orchestrator.core.errors import InputError
 from orchestrator.face.cli import checkpoints, new
+from tests.support.scenarios import bare_scenario
 
 
 @pytest.mark.parametrize("given", ["fmu", "dll", "binding"])
@@ -37,7 +38,7 @@ def test_what_cannot_be_resumed_is_told_before_the_run(monkeypatch, checkpoint, 
     )
     monkeypatch.setattr(checkpoints, "warn", lambda name, texts: told.extend(texts))
     plan = SimpleNamespace(description=SimpleNamespace(path=Path("vendor.fmu")))
-    scenario = SimpleNamespace(name="base", system=SimpleNamespace(components={"vendor": plan}))
+    scenario = bare_scenario(system=SimpleNamespace(components={"vendor": plan}))
     options = Namespace(checkpoint=checkpoint, require_checkpoint=required)
     if said == "refused":
         with pytest.raises(InputError, match="leave --require-checkpoint out"):

@@ -3,10 +3,11 @@
 from types import SimpleNamespace
 
 from orchestrator.face.explore.responses import Streamed
+from tests.support.scenarios import bare_scenario
 
 
 def test_a_streamed_signal_is_the_variable_the_difference_or_the_magnitude():
-    prepared = SimpleNamespace(stop_time=0.2, step_size=0.1, record_every=1)
+    prepared = bare_scenario(stop_time=0.2, step_size=0.1)
     said = []
     names = ["gfor.p", "gfor.p - sg1.p", "|gfor.i|"]
     streamed = Streamed(SimpleNamespace(prepared=prepared), names, said.append)

@@ -20,6 +20,7 @@ from orchestrator.studies.black_box.frequency_response import Excitation, measur
 from orchestrator.studies.modes.linear import linear_model
 from orchestrator.studies.modes.modes import compute_modes, running
 from tests.devices.acceptance.gallery.build import Source, Variable, build
+from tests.support.scenarios import prepare_one
 from tests.systems.coupling.small_fmus import small_fmu
 
 STATES = {"x": 2, "v": 3}
@@ -87,7 +88,7 @@ title = "Base"
 """,
         encoding="utf-8",
     )
-    (prepared,) = load_case(str(path)).prepare()
+    prepared = prepare_one(str(path))
     return prepared
 
 

@@ -7,7 +7,6 @@ from fmus.toolchain.exporter import cached
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.python_fmu import PythonFmu
 from fmus.toolchain.symbols import fabs, fmax, fmin, sin
-from orchestrator.cases.case import load_case
 from orchestrator.core.errors import AnalysisError
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.linear.doubts.linearity import doubts, tell
@@ -18,6 +17,7 @@ from orchestrator.studies.modes.modes import compute_modes
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.schedule import gauss_seidel
 from orchestrator.systems.coupling.system import System
+from tests.support.scenarios import prepare_one
 from tests.systems.coupling.small_fmus import small_fmu
 
 H = 1e-3
@@ -117,9 +117,7 @@ def test_a_mode_that_an_edge_may_turn_is_named_so():
 @pytest.mark.parametrize("limit", [0.01, 0.1])
 def test_the_limit_of_a_damping_controller_does_not_decide_its_stability(limit):
     """Growth at 45.7 Hz, with its own directional derivatives as with a perturbation, whatever the output's limit."""
-    (prepared,) = load_case("two_area").prepare(
-        ["pod_q"], {"gfor.pod_q.K": 5000.0, "gfor.pod_q.limit": limit}
-    )
+    prepared = prepare_one("two_area", "pod_q", {"gfor.pod_q.K": 5000.0, "gfor.pod_q.limit": limit})
     stability = compute_modes(prepared).stability
     assert stability.stable is False
     assert stability.largest_growth_rate == pytest.approx(2.773, abs=2e-3)

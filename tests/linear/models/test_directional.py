@@ -10,7 +10,6 @@ from fmus.toolchain.compiler import host_platform
 from fmus.toolchain.exporter import export
 from fmus.toolchain.native_fmu import NativeFmu
 from fmus.toolchain.symbols import Function
-from orchestrator.cases.case import load_case
 from orchestrator.core.errors import AnalysisError
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.linear.models.component_linearization import linearize_by_derivatives
@@ -20,12 +19,13 @@ from orchestrator.studies.modes.modes import compute_modes
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.schedule import gauss_seidel
 from orchestrator.systems.coupling.system import System
+from tests.support.scenarios import prepare_one
 from tests.systems.coupling import small_fmus
 
 
 @pytest.fixture(params=["base", "pod_pq"])
 def prepared(request):
-    return load_case("two_area").prepare([request.param], {"*.native": True})[0]
+    return prepare_one("two_area", request.param, {"*.native": True})
 
 
 def farthest(ours, theirs):
@@ -59,7 +59,7 @@ def test_the_named_mode_is_the_same(prepared):
 
 
 def test_a_kind_without_derivatives_is_refused_with_the_remedy():
-    prepared = load_case("two_area").prepare(["base"], {"*.native": True, "sg2.native": False})[0]
+    prepared = prepare_one("two_area", "base", {"*.native": True, "sg2.native": False})
     with (
         Master(prepared.system, prepared.schedule, prepared.step_size) as master,
         pytest.raises(

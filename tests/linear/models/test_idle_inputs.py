@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from orchestrator.cases.case import load_case
 from orchestrator.linear.models import blocks as blocks_module
 from orchestrator.linear.models.linearization import Blocks, compose
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.schedule import gauss_seidel
 from orchestrator.systems.coupling.system import System
+from tests.support.scenarios import prepare_one
 from tests.systems.coupling.small_fmus import small_fmu
 
 H = 1e-3
@@ -50,7 +50,7 @@ def test_an_input_that_comes_to_move_is_perturbed_then(again, monkeypatch):
 
 def test_a_phasor_networks_admittances_are_left_out_without_a_change(monkeypatch):
     """Devices' admittances do not answer anything: half of the network's inputs."""
-    (ready,) = load_case("two_area_rms").prepare(["gfor"])
+    ready = prepare_one("two_area_rms", "gfor")
     with Master(ready.system, ready.schedule, ready.step_size) as master:
         whole = Blocks(master)
         monkeypatch.setattr(blocks_module, "MANY_INPUTS", 8)

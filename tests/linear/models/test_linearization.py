@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from orchestrator.cases.case import load_case
 from orchestrator.linear.models.component_linearization import linearize_component
 from orchestrator.linear.models.coupled_state import CoupledState
 from orchestrator.linear.models.linear_model import HELD
@@ -13,6 +12,7 @@ from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.schedule import gauss_seidel, jacobi
 from orchestrator.systems.coupling.system import System
 from tests.support.exact import exact_continuous
+from tests.support.scenarios import prepare_one
 from tests.systems.coupling.small_fmus import lag_factor, small_fmu
 
 SCENARIOS = ("base", "gfor", "pod_pq")
@@ -20,8 +20,8 @@ DEVICES = ("gfor", "sg1", "sg2")
 
 
 def prepared(scenario: str, **overrides):
-    (ready,) = load_case("two_area").prepare(
-        [scenario], {k.replace("__", "."): v for k, v in overrides.items()}
+    ready = prepare_one(
+        "two_area", scenario, {k.replace("__", "."): v for k, v in overrides.items()}
     )
     return ready
 

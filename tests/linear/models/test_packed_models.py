@@ -20,6 +20,7 @@ from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.linear.spectra.modes import eigenvalues
 from orchestrator.studies.modes.linear_model_files import component_model
 from orchestrator.studies.modes.modes import compute_modes, running
+from tests.support.scenarios import prepare_one
 
 MODEL = f"{FOLDER}/linear_model.json"
 MOVES = 1e-5
@@ -92,7 +93,7 @@ def system_with(folder, closed):
 
 @pytest.fixture(scope="module")
 def master(system_with):
-    (prepared,) = load_case(system_with()).prepare(["pod_pq"])
+    prepared = prepare_one(system_with(), "pod_pq")
     with running(prepared) as running_system:
         find_operating_point(running_system)
         yield running_system
@@ -199,7 +200,7 @@ def test_an_element_that_should_be_zero(master, with_model):
 def test_matrices_of_another_point_under_the_right_names(master, with_model, change):
     """What the file says of its operating point is right, the matrices are of another one."""
     honest = read_embedded_model(master.components["gfor"].description.path)
-    (prepared,) = load_case("two_area").prepare(["pod_pq"], {"*.native": True, **change})
+    prepared = prepare_one("two_area", "pod_pq", {"*.native": True, **change})
     other = component_model(prepared, "gfor")
     matrices = {key: getattr(other, key) for key in "ABCD"}
     with pytest.raises(AnalysisError, match="is not what the FMU does"):

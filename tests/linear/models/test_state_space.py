@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from orchestrator.cases.case import load_case
 from orchestrator.core.errors import InputError
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.linear.models.state_space import state_space
@@ -11,13 +10,14 @@ from orchestrator.systems.coupling.events import LoadChange
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.recorder import Recorder
 from orchestrator.systems.coupling.schedule import jacobi
+from tests.support.scenarios import prepare_one
 
 INPUTS = ("grid.load_2.scale", "sg2.exciter.delta_V_ref")
 OUTPUTS = ("sg1.omega", "sg2.omega", "grid.bus_2.v", "gfor.p")
 
 
 def running(schedule=None):
-    (ready,) = load_case("two_area").prepare(["gfor"])
+    ready = prepare_one("two_area", "gfor")
     return Master(ready.system, schedule or ready.schedule, ready.step_size)
 
 

@@ -2,15 +2,15 @@
 
 import pytest
 
-from orchestrator.cases.case import load_case
 from orchestrator.core.errors import AnalysisError
 from orchestrator.linear.models import steady_state
 from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.systems.coupling.master import Master
+from tests.support.scenarios import prepare_one
 
 
 def master_of(scenario="gfor", change=None):
-    (ready,) = load_case("two_area").prepare([scenario])
+    ready = prepare_one("two_area", scenario)
     if change:
         for key, value in change.items():
             component, _, variable = key.partition(".")

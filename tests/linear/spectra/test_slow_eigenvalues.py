@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from orchestrator.cases.case import load_case
 from orchestrator.linear.doubts.slow_modes import tell_slow_modes
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.spectra.modes import find_modes
 from orchestrator.studies.modes.modes import compute_modes
 from tests.cases.networks.psse.test_questions import CASE, DYR, RAW
+from tests.support.scenarios import prepare_one
 
 SEXS = "'SEXS' 1  0.1 10.0 50.0 0.05 -5.0 5.0 /"
 PLAIN = "\n".join(
@@ -30,7 +30,7 @@ def stability(tmp_path):
         (tmp_path / "areas.raw").write_text(RAW)
         (tmp_path / "areas.dyr").write_text("\n".join([PLAIN, *more, ""]))
         (tmp_path / "case.toml").write_text(CASE.replace('"power"', '"impedance"'))
-        (prepared,) = load_case(tmp_path / "case.toml").prepare((), {"grid.load_9.P": 1500.0})
+        prepared = prepare_one(tmp_path / "case.toml", None, {"grid.load_9.P": 1500.0})
         return compute_modes(prepared).stability
 
     return judge

@@ -8,20 +8,19 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
 import xarray as xr
 
-from orchestrator.cases.case import load_case
 from orchestrator.core.errors import InputError, ResultsError
 from orchestrator.output.results import recorded, storage
 from orchestrator.output.results.recorded import open_recording, open_whole
 from orchestrator.output.results.recording import RecordingFolder, parts_of
 from orchestrator.output.results.signals import signal as signal_of
 from orchestrator.output.results.storage import save_csv, trajectory_dataset
+from tests.support.scenarios import bare_scenario, prepare_one
 
 NAMES = ("gfor.p", "gfor.omega", "grid.v")
 
@@ -37,7 +36,7 @@ class Rows:
 
 @pytest.fixture(scope="module")
 def prepared():
-    (ready,) = load_case("infinite_bus").prepare(["dip"])
+    ready = prepare_one("infinite_bus", "dip")
     return ready
 
 
@@ -284,5 +283,5 @@ def test_the_attributes_say_of_which_run_a_part_is(tmp_path, prepared):
 def test_a_recording_says_how_far_its_rows_are_apart(monkeypatch):
     monkeypatch.setattr(storage, "provenance", lambda prepared: {})
     monkeypatch.setattr(storage, "measuring_places", lambda prepared: {})
-    prepared = SimpleNamespace(record_filtered=True, record_every=40, step_size=1e-4)
+    prepared = bare_scenario(record_filtered=True, record_every=40, step_size=1e-4)
     assert storage.origin_of_rows(prepared)["record_interval_s"] == pytest.approx(4e-3)

@@ -18,7 +18,6 @@ import numpy as np
 import pytest
 
 from fmus.toolchain.temporary import sweep
-from orchestrator.cases.case import load_case
 from orchestrator.core.errors import ComponentError, InputError, NotFiniteError, RunInterruptedError
 from orchestrator.simulation.federation import federation as processes
 from orchestrator.simulation.federation import frames
@@ -30,6 +29,7 @@ from orchestrator.studies.runs.run import run_scenario
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.recorder import Recorder
 from orchestrator.systems.coupling.schedule import jacobi
+from tests.support.scenarios import prepare_one
 from tests.systems.coupling.small_fmus import small_fmu
 
 STAND_INS = Path(__file__).with_name("stand_ins.py")
@@ -64,7 +64,7 @@ def prepared(tmp_path):
         path = tmp_path / "case.toml"
         text = LOOP.format(x=small_fmu("integrator").path, load=small_fmu("gain").path, stop=stop)
         path.write_text(text + more, encoding="utf-8")
-        (one,) = load_case(path).prepare()
+        one = prepare_one(path)
         return one
 
     return prepare
@@ -128,7 +128,7 @@ def assert_same(one, other):
     [(("gfor",), "gauss-seidel"), (("gfor", "sg1"), "jacobi"), (("sg2", "grid"), "gauss-seidel")],
 )
 def test_a_case_gives_the_local_master_s_numbers(names, schedule, temporary, started):
-    (ready,) = load_case("two_area").prepare(["pod_p"], stop_time=0.02)
+    ready = prepare_one("two_area", "pod_p", stop_time=0.02)
     if schedule == "jacobi":
         ready = replace(ready, schedule=jacobi(tuple(ready.system.components)))
     local, federated = run_scenario(ready), run_scenario(ready, federates=Federates(names))
@@ -450,7 +450,7 @@ def test_the_program_of_the_guide(tmp_path, temporary, started):
     )
     program, port = tmp_path / "admittance.py", broker_port(None)
     program.write_text(re.search(r"```python\n(.*?)```", page, re.DOTALL)[1], encoding="utf-8")
-    (ready,) = load_case("two_area").prepare(["gfor"], stop_time=0.02)
+    ready = prepare_one("two_area", "gfor", stop_time=0.02)
     flow = ready.values
     current = (
         complex(flow["gfor.P_0"], -flow["gfor.Q_0"]) * flow["gfor.S_n"] / 100 / flow["gfor.v_0"]

@@ -8,9 +8,9 @@ from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.native_fmu import NativeFmu
 from fmus.toolchain.python_fmu import PythonFmu
-from orchestrator.cases.case import load_case
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.systems.coupling.system import System
+from tests.support.scenarios import prepare_one
 
 STEP_SIZE, STOP_TIME = 1e-4, 0.05
 KINDS = ("Python-backed", "native")
@@ -50,7 +50,7 @@ def load_step(kind: str) -> System:
 
 
 def _prepared(case: str, scenario: str, kind: str, values: dict) -> System:
-    (prepared,) = load_case(case).prepare([scenario], {"*.native": kind == "native", **values})
+    prepared = prepare_one(case, scenario, {"*.native": kind == "native", **values})
     return prepared.system
 
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from orchestrator.cases.case import load_case
 from orchestrator.core.errors import InputError
 from orchestrator.face.cli import main
 from orchestrator.simulation.interop.probe_result import probe_system
@@ -19,6 +18,7 @@ from orchestrator.systems.coupling.recorder import Recorder
 from orchestrator.systems.coupling.schedule import FirstInputs, jacobi
 from tests.simulation.interop import drivers, table
 from tests.simulation.interop.jobs import job_of, write_ssp
+from tests.support.scenarios import prepare_one
 
 COFMUPY_GAUSS_SEIDEL, ECOS_EXECUTABLE, FMPY_SSP, FMUCONTAINER, LIBCOSIM, MOSAIK, PATHSIM = (
     MASTERS[name]
@@ -130,7 +130,7 @@ def test_run_like_gives_what_fmpy_gives(tmp_path, capsys):
     ours = xr.open_dataset(tmp_path / "like" / "pod_pq" / "trajectory.nc")
     assert "simulate_ssp" in ours.attrs["like"]
     assert ours.attrs["schedule"] == "fmpy_ssp: gfor, sg1, sg2, grid"
-    (prepared,) = load_case("two_area").prepare(["pod_pq"])
+    prepared = prepare_one("two_area", "pod_pq")
     names = ["sg1.omega", "gfor.p", "grid.bus_2.v"]
     job = job_of(prepared.system, H, 0.02, names) | {"ssp": str(tmp_path / "system.ssp")}
     write_ssp(prepared.system, job, tmp_path / "system.ssp")

@@ -12,6 +12,7 @@ from orchestrator.systems.coupling.events import WireFault, WireRecovery
 from orchestrator.systems.coupling.imperfections import Noise, Quantisation
 from orchestrator.systems.coupling.system import Connection, Endpoint
 from tests.simulation.watch.seen import seen_of, system
+from tests.support.scenarios import prepare_one
 
 PI = np.pi
 STOP = 12.0
@@ -102,7 +103,7 @@ def two_area(tmp_path, scenario, stop, deviation, to):
         f'{case.path.read_text(encoding="utf-8")}\n[imperfections.n]\ntype = "noise"\n{table}',
         "utf-8",
     )
-    (ready,) = load_case(file).prepare([scenario], stop_time=stop)
+    ready = prepare_one(file, scenario, stop_time=stop)
     return run_scenario(ready)
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.studies.runs.run import run_scenario
+from tests.support.scenarios import prepare_one
 
 PARTS = {
     "exciter": ("st1a", "st4b", "ac4a", "dc1a"),
@@ -32,7 +33,7 @@ def run(tmp_path=None, scenario="pss", stop=4.0, **overrides):
             for k, name in enumerate(names, 1)
         }
     changed = {name.replace("__", "."): value for name, value in overrides.items()}
-    (ready,) = load_case(file).prepare([scenario], changed, stop_time=stop)
+    ready = prepare_one(file, scenario, changed, stop_time=stop)
     result = run_scenario(ready)
     return {
         (f.component, f.variable): f for f in result.findings if f.kind == "active_limit"

@@ -13,6 +13,7 @@ from orchestrator.studies.modes.modes import running
 from orchestrator.studies.runs.run import run_scenario
 from orchestrator.systems.coupling.events import LoadChange, UnitSwitching
 from orchestrator.systems.coupling.recorder import Recorder
+from tests.support.scenarios import prepare_one
 
 DEEP = """
 name = "deep"
@@ -190,9 +191,7 @@ def test_a_pod_at_its_limit_is_told_with_its_duration():
 
 def test_a_limit_that_acts_without_a_break_is_told_for_its_whole_interval():
     """0.105 s were told between 1.04 s and 1.14 s."""
-    (ready,) = load_case("two_area_rms").prepare(
-        ["pod_p"], {"gfor.pod_p.limit": 1e-4}, stop_time=3.0
-    )
+    ready = prepare_one("two_area_rms", "pod_p", {"gfor.pod_p.limit": 1e-4}, stop_time=3.0)
     trip = UnitSwitching(1.2, "grid", "gfor", False)
     result = run_scenario(replace(ready, events=[*ready.events, trip]))
     (limit,) = [f for f in result.findings if f.kind == "active_limit"]
@@ -203,9 +202,7 @@ def test_a_limit_that_acts_without_a_break_is_told_for_its_whole_interval():
 @pytest.mark.parametrize(("limit", "trip"), [(0.1, 1.0), (1e-4, 3.0)])
 def test_no_limit_of_a_tripped_converter_is_told(limit, trip):
     """Its frequency goes its own way, so its POD is at its limit; what acted before the trip is told until then."""
-    (ready,) = load_case("two_area_rms").prepare(
-        ["pod_p"], {"gfor.pod_p.limit": limit}, stop_time=6.0
-    )
+    ready = prepare_one("two_area_rms", "pod_p", {"gfor.pod_p.limit": limit}, stop_time=6.0)
     result = run_scenario(
         replace(ready, events=[*ready.events, UnitSwitching(trip, "grid", "gfor", False)])
     )

@@ -9,6 +9,7 @@ from orchestrator.studies.runs.files import summary_of
 from orchestrator.studies.runs.run import run_scenario
 from orchestrator.systems.coupling.events import ParameterChange
 from tests.simulation.watch.seen import seen_of, system
+from tests.support.scenarios import prepare_one
 
 STOP = 15.0
 
@@ -74,7 +75,7 @@ def test_a_trip_half_a_second_before_the_end(tmp_path):
         text.replace('time = "1 s"\ncomponent = "grid"', 'time = "0.1 s"\ncomponent = "grid"'),
         "utf-8",
     )
-    (ready,) = load_case(file).prepare(["gfor"], stop_time=1.5)
+    ready = prepare_one(file, "gfor", stop_time=1.5)
     result = run_scenario(ready)
     assert [f.kind for f in result.findings] == ["not_judged"]
     assert not result.went_unstable

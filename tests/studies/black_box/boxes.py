@@ -4,17 +4,17 @@ import numpy as np
 import scipy.linalg
 
 from fmus.toolchain.catalogue import build_model
-from orchestrator.cases.case import load_case
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.studies.black_box.bench import Bench
 from tests.support.jacobians import jacobians
+from tests.support.scenarios import prepare_one
 
 H = 1e-4
 
 
 def prepared(scenario, native=True):
     """The two-area case; native FMUs run ten times as fast."""
-    (found,) = load_case("two_area").prepare([scenario], {"*.native": native})
+    found = prepare_one("two_area", scenario, {"*.native": native})
     return found
 
 

@@ -35,11 +35,12 @@ from tests.studies.certification.fabricated import figures, rings
 from tests.studies.certification.sign_turned import turned
 from tests.support.exact import exact_continuous
 from tests.support.interruption import interrupted_after
+from tests.support.scenarios import prepare_one
 
 
 def exact_eigenvalues(model, path, values, X_L):
     """Of the continuous equations, interconnected without any FMU; ``model`` stands for the converter."""
-    (prepared,) = load_case(path).prepare(["with"], {**values, "grid.X_L": X_L})
+    prepared = prepare_one(path, "with", {**values, "grid.X_L": X_L})
     grid = prepared.system.components["grid"].description.model_name
 
     def build(name):

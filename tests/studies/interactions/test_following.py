@@ -5,7 +5,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from orchestrator.cases.case import load_case
 from orchestrator.linear.spectra.modes import damping_percent
 from orchestrator.studies.interactions.following import FollowedMode, Ways, followed
 from orchestrator.studies.interactions.judgement import SAME
@@ -14,6 +13,7 @@ from orchestrator.studies.interactions.systems import NONE, Kind, SystemName
 from orchestrator.studies.modes.modes import compute_modes
 from tests.pages.markdown import ROOT
 from tests.studies.interactions.park import folder, park, studied
+from tests.support.scenarios import prepare_one
 
 WSCC9 = ROOT / "orchestrator" / "cases" / "built_in" / "wscc9"
 
@@ -55,7 +55,7 @@ def helped(threshold=0.05):
 
 def slow_swing(path):
     """Damping [%] of the swing of 1.3 Hz: of the modes below 1.6 Hz the one that is not well damped."""
-    (prepared,) = load_case(path).prepare()
+    prepared = prepare_one(path)
     modes = compute_modes(prepared, (1.0, 1.6)).modes
     (found,) = [mode.damping_percent for mode in modes if mode.damping_percent < 20]
     return found

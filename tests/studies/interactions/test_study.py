@@ -18,6 +18,7 @@ from orchestrator.studies.interactions.view import Interactions
 from orchestrator.studies.modes.modes import compute_modes
 from orchestrator.studies.points.failure import Failure
 from tests.studies.interactions.park import folder, park, studied, swapped, written
+from tests.support.scenarios import prepare_one
 
 
 def pair(*vendors):
@@ -50,7 +51,7 @@ def test_the_pair_that_is_stable_alone_and_not_together_is_the_worst():
 
 
 def test_the_system_as_it_is_has_the_modes_and_the_verdict_of_gfor_modes():
-    (prepared,) = load_case(folder() / "park.toml").prepare()
+    prepared = prepare_one(folder() / "park.toml")
     modes = compute_modes(prepared, (0.1, 100.0))
     whole = park().judgement.whole.record
     assert [mode.eigenvalue for mode in whole.modes] == [mode.eigenvalue for mode in modes.modes]
@@ -184,7 +185,7 @@ def test_values_stay_with_the_device_that_they_were_given_to():
         ("reactive_power.mode = 1 }", "reactive_power.mode = 1, pll.f_0 = 12, pll.xi = 0.8 }"),
         ('pll.f_0 = "20 Hz"', "pll.xi = 0.8"),
     )
-    (prepared,) = load_case(changed).prepare()
+    prepared = prepare_one(changed)
     wanted = compute_modes(prepared, (0.1, 100.0))
     assert [m.eigenvalue for m in found.modes] == pytest.approx(
         [m.eigenvalue for m in wanted.modes], rel=1e-9

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from orchestrator.studies.modes import load_model_weight
+from tests.support.scenarios import bare_scenario
 
 
 @pytest.mark.parametrize(
@@ -28,5 +29,5 @@ def test_the_scenario_with_the_least_damping_is_told(monkeypatch, weights, said)
     monkeypatch.setattr(
         load_model_weight, "_weight", lambda scenario, result, frequencies: found[scenario]
     )
-    results = [SimpleNamespace(prepared=SimpleNamespace(name=name)) for name in "abc"]
+    results = [SimpleNamespace(prepared=bare_scenario(name)) for name in "abc"]
     assert load_model_weight.load_model_weights("abc", results, (0.1, 2.0)) == said

@@ -20,6 +20,7 @@ from orchestrator.studies.modes.all_modes import compute_all_modes
 from orchestrator.studies.modes.mode_identity import NamedSystem, settled
 from orchestrator.studies.modes.modes import compute_modes, modes_json
 from orchestrator.systems.coupling.system import ComponentPlan, System
+from tests.support.scenarios import prepare_one
 
 STATES = ("a.x", "a.v", "b.x", "b.v")
 OF_A = {"mine": partial(Mode.participation_of, states=("a.x", "a.v"))}
@@ -161,7 +162,7 @@ def test_two_names_never_go_to_one_mode():
 )
 def test_a_name_does_not_pass_to_another_mode_because_a_gain_grew(gain, hertz, percent):
     values = {"grid.X_L": 0.3, "gfor.pod_p.K": gain}
-    (prepared,) = load_case("two_area").prepare(["pod_p"], values)
+    prepared = prepare_one("two_area", "pod_p", values)
     found = compute_modes(prepared)
     mode = found.named["electromechanical"]
     assert (round(mode.frequency_hz, 3), round(mode.damping_percent, 2)) == (hertz, percent)
@@ -300,7 +301,7 @@ def test_fitted_models_of_other_states_are_compared_by_those_that_both_have(monk
 )
 def test_a_name_is_followed_along_the_reactance_from_the_value_of_the_file(X_L, hertz):
     """At 0.43 the swing meets another mode; beyond, what has its shape may be the one or the other."""
-    (prepared,) = load_case("two_area").prepare(["gfor"], {"grid.X_L": X_L})
+    prepared = prepare_one("two_area", "gfor", {"grid.X_L": X_L})
     found = compute_modes(prepared)
     mode = found.named.get("electromechanical")
     assert (None if mode is None else round(mode.frequency_hz, 3)) == hertz

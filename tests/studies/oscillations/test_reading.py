@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from orchestrator import source
-from orchestrator.cases.case import load_case
 from orchestrator.core.errors import InputError
 from orchestrator.studies.oscillations.measurements import Site
 from orchestrator.studies.oscillations.reading import _table, contest_cases, read_contest
@@ -16,6 +15,7 @@ from orchestrator.studies.oscillations.signs import other_powers, turned_signs
 from orchestrator.studies.oscillations.verdict import locate
 from orchestrator.studies.oscillations.view import Sources
 from tests.support.forced_records import model, record, sine, times_of, unit_models_of
+from tests.support.scenarios import prepare_one
 
 TIMES = times_of(40.0)
 
@@ -71,7 +71,7 @@ def test_degrees_that_are_labelled_rad_are_remarked(gfor, tmp_path, measured):
 
 
 def test_a_power_with_the_sign_turned_beside_the_case_is_remarked(measured):
-    (prepared,) = load_case("two_area").prepare(["gfor"])
+    prepared = prepare_one("two_area", "gfor")
     assert not turned_signs(measured, prepared)
     places = tuple(
         replace(place, p=-place.p, q=-place.q) if place.name == "sg1" else place

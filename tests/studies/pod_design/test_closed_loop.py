@@ -5,13 +5,13 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from orchestrator.cases.case import load_case
 from orchestrator.core.errors import AnalysisError
 from orchestrator.linear.models.linearization import Blocks
 from orchestrator.linear.models.steady_state import find_operating_point
 from orchestrator.studies.modes.modes import running
 from orchestrator.studies.pod_design.closed_loop import PodLoop, PodSetting
 from orchestrator.studies.pod_design.lead_lag import LeadLag
+from tests.support.scenarios import prepare_one
 
 ON = PodSetting(200.0, LeadLag(0.3, 0.2, 2))
 STRONGER = PodSetting(300.0, LeadLag(0.3, 0.2, 2))
@@ -19,7 +19,7 @@ STRONGER = PodSetting(300.0, LeadLag(0.3, 0.2, 2))
 
 @contextmanager
 def pod_loop():
-    (prepared,) = load_case("two_area").prepare(["pod_p"], {"*.native": True})
+    prepared = prepare_one("two_area", "pod_p", {"*.native": True})
     with running(prepared) as master:
         find_operating_point(master)
         yield PodLoop(master, ["gfor"], "pod_p")

@@ -16,6 +16,7 @@ from orchestrator.studies.runs.after_events import lasting_changes, modes_after
 from orchestrator.studies.runs.answer import ScenarioAnswer
 from orchestrator.studies.runs.answers_table import answers_table
 from tests.studies.screening.five_machines import five_machines
+from tests.support.scenarios import bare_scenario
 
 pytestmark = pytest.mark.filterwarnings("ignore::orchestrator.face.api.scenario.UnusualDataWarning")
 
@@ -112,7 +113,7 @@ def test_a_whole_run_decides_about_modes_near_zero_and_not_of_others_that_grow(
         "_by_response",
         lambda _: ScenarioAnswer("", True, "stable", None, "settles"),
     )
-    prepared = SimpleNamespace(events=[SimpleNamespace(time=0.5)], stop_time=stop)
+    prepared = bare_scenario(events=(SimpleNamespace(time=0.5),), stop_time=stop)
     modes = SimpleNamespace(prepared=prepared, modes=before.modes, model=before.model)
     found = answer_of_run.of_run(SimpleNamespace(after=after, modes=modes))
     assert found.good is good

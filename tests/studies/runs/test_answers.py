@@ -15,6 +15,7 @@ from orchestrator.simulation.watch.finding import Finding
 from orchestrator.studies.runs.answer_of_modes import of_modes
 from orchestrator.studies.runs.answer_of_run import of_run
 from orchestrator.studies.runs.run import RunResult
+from tests.support.scenarios import bare_scenario
 
 
 def lines(capsys, *words):
@@ -44,15 +45,13 @@ def result(findings=(), stable=True, events=(1.0,), failure=None, kind=None):
     )
     # leaves nothing changed
     passing = [SimpleNamespace(time=t, changes=dict) for t in events if t < 5]
-    prepared = SimpleNamespace(
+    prepared = bare_scenario(
         title="S",
-        subject="S",
         events=passing,
         stop_time=5.0,
         case=case,
-        not_reached=[t for t in events if t >= 5],
+        not_reached=tuple(t for t in events if t >= 5),
     )
-    prepared.system = SimpleNamespace(components={})
     modes = SimpleNamespace(
         prepared=prepared,
         modes=[mode],

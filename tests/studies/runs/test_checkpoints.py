@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.cases.case import BUILT_IN, load_case
+from orchestrator.cases.case import BUILT_IN
 from orchestrator.core.errors import InputError
 from orchestrator.face.api.case import load
 from orchestrator.face.api.scenario import CheckpointWarning
@@ -18,6 +18,7 @@ from orchestrator.studies.runs.files import summary_of
 from orchestrator.studies.runs.run import run_scenario
 from orchestrator.systems.coupling import run as coupled_run
 from orchestrator.systems.coupling.run import Run
+from tests.support.scenarios import prepare_one
 
 STOP = 1.3
 """After both events of the scenario [s]."""
@@ -47,7 +48,7 @@ class KeptOnce(Checkpoints):
 def prepared_scenario(kind="python-backed", stop=STOP, values=None):
     options = dict(KINDS[kind])
     isolated = options.pop("isolated", None)
-    (prepared,) = load_case("infinite_bus").prepare(["dip"], options | (values or {}), None, stop)
+    prepared = prepare_one("infinite_bus", "dip", options | (values or {}), None, stop)
     prepared.system.components["gfor"].isolated = isolated
     return prepared
 
@@ -121,7 +122,7 @@ def disturbed(folder, values=None):
         text.replace("[scenarios.load_step]", DISTURBED, 1), encoding="utf-8"
     )
     values = {"gfor.pod_q.enabled": True} | (values or {})
-    return load_case(folder / "case.toml").prepare(["dip"], values, None, STOP)[0]
+    return prepare_one(folder / "case.toml", "dip", values, None, STOP)
 
 
 @pytest.mark.parametrize("at", [0.5, 1.1, 1.26])

@@ -11,6 +11,7 @@ from orchestrator.studies.runs import tables
 from orchestrator.studies.runs.ring_down import ring_down_of
 from orchestrator.studies.runs.run import run_scenario
 from orchestrator.studies.signals import signal_modes
+from tests.support.scenarios import prepare_one
 
 
 def run_of(tmp_path, events, stop):
@@ -18,7 +19,7 @@ def run_of(tmp_path, events, stop):
     head, _, tail = text.partition("[[events]]")
     path = tmp_path / "case.toml"
     path.write_text(f"{head}{events}{tail[tail.index(chr(10) + '[') :]}", encoding="utf-8")
-    (ready,) = load_case(path).prepare(["gfor"], stop_time=stop)
+    ready = prepare_one(path, "gfor", stop_time=stop)
     return run_scenario(ready)
 
 

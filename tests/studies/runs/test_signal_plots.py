@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from orchestrator.cases.case import BUILT_IN, load_case
+from orchestrator.cases.case import BUILT_IN
 from orchestrator.cases.form.schema import PlotTable
 from orchestrator.core.errors import InputError
 from orchestrator.output.results.signals import signal
 from orchestrator.studies.runs import mode_plots
 from orchestrator.studies.runs.run import run_scenario
+from tests.support.scenarios import prepare_one
 
 TEXT = (BUILT_IN / "two_area_rms" / "case.toml").read_text(encoding="utf-8")
 
@@ -16,7 +17,7 @@ TEXT = (BUILT_IN / "two_area_rms" / "case.toml").read_text(encoding="utf-8")
 def run(tmp_path, solver, stop=0.2):
     path = tmp_path / "case.toml"
     path.write_text(TEXT.replace("[solver]", f"[solver]\n{solver}", 1), encoding="utf-8")
-    (ready,) = load_case(path).prepare(["gfor"], stop_time=stop)
+    ready = prepare_one(path, "gfor", stop_time=stop)
     return run_scenario(ready)
 
 
@@ -53,7 +54,7 @@ def test_a_recording_says_what_its_rows_are(tmp_path, chosen, word):
     )
     path = tmp_path / "case.toml"
     path.write_text(text, encoding="utf-8")
-    (ready,) = load_case(path).prepare(["gfor"], stop_time=0.2)
+    ready = prepare_one(path, "gfor", stop_time=0.2)
     dataset = run_scenario(ready).dataset
     assert dataset.attrs["record_filter"].startswith(word)
     assert dataset.attrs["record_interval_s"] == pytest.approx(0.02)

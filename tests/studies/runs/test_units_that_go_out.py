@@ -11,6 +11,7 @@ from orchestrator.studies.sensitivities.sensitivities import Sensitivity
 from orchestrator.studies.sensitivities.view import rows_of
 from orchestrator.studies.siting.confirmation import Confirmation
 from orchestrator.studies.siting.view import _confirmation, _modes, _shift
+from tests.support.scenarios import bare_scenario
 
 EIGENVALUE = -0.3137 + 3.7193j
 EIGENVALUE_JSON = {
@@ -59,7 +60,7 @@ def test_of_a_sensitivity():
         frequency_hz=EIGENVALUE_JSON["frequency_hz"],
         damping_percent=EIGENVALUE_JSON["damping_percent"],
     )
-    modes = SimpleNamespace(name_of=lambda _: "", prepared=SimpleNamespace(title="base"))
+    modes = SimpleNamespace(name_of=lambda _: "", prepared=bare_scenario())
     (said,) = rows_of(SimpleNamespace(rows=[row], mode=mode, modes=modes, held=()))
     # a difference quotient of the damping ratio [%], beside the derivative of the product
     step = 1e-6

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from orchestrator.cases.case import load_case
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.linear.models.slope_linearization import _Point, linearize_slopes
 from orchestrator.linear.spectra.critical_modes import DENSE
@@ -13,6 +12,7 @@ from orchestrator.linear.spectra.modes import find_spectrum
 from orchestrator.linear.spectra.shifted_equations import ShiftedEquations, count_growing
 from orchestrator.studies.modes.modes import running
 from orchestrator.studies.screening.modes import CriticalRegion, find_modes_here
+from tests.support.scenarios import prepare_one
 
 REGION = CriticalRegion(0.1, 2.0, 0.2)
 
@@ -111,7 +111,7 @@ def test_growing_eigenvalues_are_counted():
 
 def test_a_pattern_that_does_not_hold_is_noticed():
     """Planted: an effect that the pattern of another operating point did not have."""
-    (prepared,) = load_case("two_area").prepare(["gfor"])
+    prepared = prepare_one("two_area", "gfor")
     with running(prepared) as master:
         exchange = master.exchanges["sg1"]
         full = linearize_slopes(exchange, 0.0, 1e-4)

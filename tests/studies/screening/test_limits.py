@@ -13,6 +13,7 @@ from orchestrator.studies.screening.limits import limits_json, limits_sentence, 
 from orchestrator.studies.screening.record import ItemRecord
 from tests.cases.networks.psse import LINES, MACHINES, TRANSFORMERS, raw, records
 from tests.studies.screening.test_following_loads import CASE
+from tests.support.scenarios import bare_scenario
 
 LINE_MVA, TRANSFORMER_MVA = 80.0, 150.0
 LOST = (5, 7)
@@ -137,9 +138,7 @@ def test_items_without_a_power_flow_are_not_counted(tmp_path):
 
 def test_a_file_without_ratings_and_bands_has_nothing_said(tmp_path):
     summary = screened(tmp_path)
-    summary.result.plan = SimpleNamespace(
-        prepared=SimpleNamespace(file_limits=SimpleNamespace(bands={}))
-    )
+    summary.result.plan = SimpleNamespace(prepared=bare_scenario())
     for item in summary.result.items:
         item.record = ItemRecord(Status.COMPUTED)
     assert limits_sentence(summary) == ""

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
-from orchestrator.cases.case import load_case
 from orchestrator.linear.models.linear_model import LinearModel
 from orchestrator.studies.pod_design.closed_loop import PodSetting
 from orchestrator.studies.pod_design.lead_lag import NO_COMPENSATION
@@ -25,6 +24,7 @@ from orchestrator.studies.siting.view import (
     sureness,
 )
 from tests.studies.screening.five_machines import RATINGS, five_machines
+from tests.support.scenarios import prepare_one
 
 
 @pytest.fixture(scope="module")
@@ -143,9 +143,9 @@ def test_terminals_of_machines_are_left_out_unless_they_are_asked_for(five):
 
 def test_a_bus_with_lines_is_no_terminal_and_some_bus_is_left():
     """Bus 39 has a machine and two lines; at bus 31 stands the plant's own load. Of two buses neither is left out."""
-    (ieee39,) = load_case("ieee39").prepare(["base"])
+    ieee39 = prepare_one("ieee39", "base")
     assert unit_terminals(ieee39) == [f"bus_{n}" for n in range(30, 39)]
-    (two,) = load_case("two_area_rms").prepare(["gfor"])
+    two = prepare_one("two_area_rms", "gfor")
     assert unit_terminals(two) == []
 
 

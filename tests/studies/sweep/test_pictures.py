@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from orchestrator.studies.sweep import plots, tables
 from orchestrator.studies.sweep.view import ParameterSweep
+from tests.support.scenarios import bare_scenario
 
 
 @pytest.fixture
@@ -16,7 +17,7 @@ def drawn(monkeypatch):
     """Figures, in place of their files; one named curve from 40 to 60."""
     figures = []
     trajectory = SimpleNamespace(name="tie", carries="tie")
-    sweep = SimpleNamespace(prepared=SimpleNamespace(title="SG + GFOR"))
+    sweep = SimpleNamespace(prepared=bare_scenario(title="SG + GFOR"))
     monkeypatch.setattr(plots, "_named", lambda samples: [(0, sweep, trajectory, None)])
     monkeypatch.setattr(plots, "_draw", lambda axis, *_, **__: axis.plot([1, 2], [40, 60]))
     monkeypatch.setattr(plots, "axis_label", lambda axis: "X_L [pu]")
@@ -36,7 +37,7 @@ def test_numbers_beside_curves_stand_in_the_legend():
     trajectories = [SimpleNamespace(name=f"tie {k}", carries="tie") for k in (1, 2)]
     sweep = SimpleNamespace(
         trajectories=trajectories,
-        prepared=SimpleNamespace(title="SG + GFOR"),
+        prepared=bare_scenario(title="SG + GFOR"),
         unstable=lambda axes: [],
     )
     samples = SimpleNamespace(
@@ -75,7 +76,7 @@ def test_participation_begins_at_0(drawn, states):
 def test_failures_are_listed_up_to_a_number_and_the_rest_is_counted(monkeypatch, beyond):
     monkeypatch.setattr(tables, "place_text", lambda samples, place: str(place))
     monkeypatch.setattr(tables, "warned", lambda result: [])
-    sweep = SimpleNamespace(prepared=SimpleNamespace(name="base"))
+    sweep = SimpleNamespace(prepared=bare_scenario())
     failed = [(sweep, place, "no power flow") for place in range(tables._FAILURES_SHOWN + beyond)]
     result = SimpleNamespace(
         plan=SimpleNamespace(idle=(), number_of_points=99),

@@ -27,6 +27,7 @@ from orchestrator.studies.sweep.request import SweepRequest
 from orchestrator.studies.sweep.sweep import ScenarioSweep, plan_sweep, run_sweep
 from tests.studies.sweep.sweep_case import two_oscillators
 from tests.support.interruption import interrupted_after
+from tests.support.scenarios import prepare_one
 
 FULL_TURN = 2 * np.pi
 
@@ -345,7 +346,7 @@ def test_points_in_between_resolve_what_one_step_cannot(gfor, case, tmp_path):
 
 
 def test_a_parameter_of_whole_numbers_is_known_as_one():
-    (prepared,) = load_case("two_area").prepare(["pod_p"])
+    prepared = prepare_one("two_area", "pod_p")
     assert resolve(parse_vary("gfor.pod_p.N_S=0,1,2,3"), [prepared]).multiple_of == 1.0
     assert resolve(parse_vary("gfor.pod_p.K=0,1,2,3"), [prepared]).multiple_of is None
 
@@ -485,7 +486,7 @@ def test_a_point_that_failed_leaves_the_stability_open(case, verdicts, stable):
     """None stands for a point without modes, such as one whose FMU refuses the value."""
     refused = PointRecord(failure=Failure(ErrorKind.START, "refused", lasting=True))
     records = [refused if v is None else PointRecord(stability={"stable": v}) for v in verdicts]
-    (prepared,) = load_case(case).prepare(["one"])
+    prepared = prepare_one(case, "one")
     assert (
         ScenarioSweep(prepared, {(k,): record for k, record in enumerate(records)}).stable is stable
     )

@@ -16,7 +16,6 @@ import pytest
 
 from fmus.toolchain.exporter import cached
 from fmus.toolchain.native_fmu import NativeFmu
-from orchestrator.cases.case import load_case
 from orchestrator.core.errors import ComponentError, NotFiniteError
 from orchestrator.devices.fmi.description import read_description
 from orchestrator.devices.fmi.loaded import LoadedComponent
@@ -28,6 +27,7 @@ from orchestrator.systems.coupling.schedule import gauss_seidel, jacobi
 from orchestrator.systems.coupling.sharing import Trial, best_number, shares
 from orchestrator.systems.coupling.system import System
 from tests.devices.acceptance.gallery.build import Source, Variable, build
+from tests.support.scenarios import prepare_one
 from tests.systems.coupling.small_fmus import MODELS, small_fmu
 
 H = 1e-3
@@ -115,7 +115,7 @@ def test_neighbours_within_a_group_see_nothing_new(schedule, threads):
 
 @pytest.mark.parametrize("case", ["two_area", pytest.param("ieee118", marks=pytest.mark.slow)])
 def test_a_case_with_its_event(case):
-    (ready,) = load_case(case).prepare(["pod_pq"], {"*.native": True})
+    ready = prepare_one(case, "pod_pq", {"*.native": True})
     (grid, changes), *_ = ready.events[0].changes().items()
     events = [ParameterChange(0.1, grid, name, value) for name, value in changes.items()]
     names = [n for n in ready.record if n.endswith((".omega", ".v"))][:20]

@@ -14,6 +14,7 @@ from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.recorder import Recorder
 from orchestrator.systems.ssp.archive import SspArchive
 from orchestrator.systems.ssp.names import NAMESPACES
+from tests.support.scenarios import prepare_one
 from tests.systems.ssp.packages import (
     OSP_STEP,
     bindings,
@@ -39,7 +40,7 @@ def cache(tmp_path, monkeypatch):
 
 
 def prepared(path, **options):
-    (scenario,) = load_case(path).prepare(**options)
+    scenario = prepare_one(path, **options)
     return scenario
 
 

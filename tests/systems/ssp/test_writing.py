@@ -20,6 +20,7 @@ from orchestrator.studies.modes.modes import compute_modes
 from orchestrator.systems.coupling.master import Master
 from orchestrator.systems.coupling.recorder import Recorder
 from orchestrator.systems.coupling.schedule import jacobi
+from tests.support.scenarios import prepare_one
 from tests.systems.coupling.small_fmus import small_fmu
 
 SMALL_CASE = f"""
@@ -279,7 +280,7 @@ def test_fmpy_runs_the_two_area_system(two_area):
         step_size=1e-4,
         parameter_set=typed_values(two_area["pod_p"]),
     )
-    (scenario,) = load_case(two_area["pod_p"]).prepare(stop_time=0.5)
+    scenario = prepare_one(two_area["pod_p"], stop_time=0.5)
     names, values = response(scenario)
     for name in ("sg1.omega", "sg2.omega"):
         theirs, ours = result[name][:5000:50], values[:100, 1 + names.index(name)]
@@ -320,7 +321,7 @@ def ecos(path):
 @pytest.mark.parametrize("tool", [libcosim, ecos])
 def test_other_tools_run_it_as_our_jacobi_schedule(small, tool):
     """They step side by side and see no events."""
-    (scenario,) = load_case(small[1]).prepare()
+    scenario = prepare_one(small[1])
     components = scenario.system.components
     steps = tool(small[1])
     with Master(scenario.system, jacobi(tuple(components)), scenario.step_size) as master:

@@ -7,12 +7,12 @@ import pytest
 
 from fmus.grid_following.dyr_fields import FIELDS, MODEL, approximation
 from fmus.toolchain.catalogue import build_model
-from orchestrator.cases.case import load_case
 from orchestrator.core.errors import CaseError
 from tests.cases.networks.psse import raw
 from tests.cases.networks.psse.test_dyr import DYR
 from tests.cases.networks.psse.test_dyr_converters import PHASORS
 from tests.support.jacobians import jacobians
+from tests.support.scenarios import prepare_one
 
 REGCA1 = {
     "Lvplsw": 1,
@@ -68,7 +68,7 @@ def prepared(tmp_path):
             "[components.grid]", f'[solver]\nstep_size = "{step}"\n[components.grid]'
         )
         (tmp_path / "case.toml").write_text(case)
-        (ready,) = load_case(tmp_path / "case.toml").prepare()
+        ready = prepare_one(tmp_path / "case.toml")
         return ready
 
     return build

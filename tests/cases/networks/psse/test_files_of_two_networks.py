@@ -5,6 +5,7 @@ import pytest
 from orchestrator.cases.case import load_case
 from orchestrator.core.errors import CosimError
 from tests.studies.screening.five_machines import five_machines
+from tests.support.scenarios import prepare_one
 
 
 def renumbered(folder, machines):
@@ -53,7 +54,7 @@ def test_machines_that_the_network_lacks_are_passed_over_in_one_question(tmp_pat
     sexs = "'SEXS' {} 0.1 10.0 100.0 0.05 -5.0 5.0 /\n"
     strange = f"104 'GENCLS' 1 4 0 /\n104 {sexs.format(1)}3 {sexs.format(7)}105 'GENCLS' 1 4 0 /\n"
     path.write_text(own + strange, encoding="utf-8")
-    found = load_case(tmp_path / "five.toml").prepare(["base"])[0]
+    found = prepare_one(tmp_path / "five.toml", "base")
     (asked,) = [str(one) for one in found.questions if "does not have" in str(one)]
     line = len(own.splitlines()) + 1
     assert (

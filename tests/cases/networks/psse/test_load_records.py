@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from fmus.grid.element_data import Load, Zip
-from orchestrator.cases.case import load_case
 from orchestrator.cases.networks.psse.dyr_records import read_dyr
 from orchestrator.cases.networks.psse.load_records import (
     RecordedLaw,
@@ -17,6 +16,7 @@ from orchestrator.cases.new.new_case import write_case
 from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.studies.modes.modes import compute_modes
 from tests.cases.networks.psse.test_machine_bases import dynamics, network
+from tests.support.scenarios import prepare_one
 
 POWERS = "2 1 0 2 1 0"  # exponents n1 to n6 of impedance, current and power
 LOADS = [
@@ -113,7 +113,7 @@ def swings(tmp_path, record, said):
     files = (tmp_path / "grid.raw", tmp_path / "grid.dyr")
     text = write_case(WantedCase(files, out)).text
     out.write_text(text.replace("[network]\n", f"[network]\n{said}\n"), encoding="utf-8")
-    prepared = load_case(out).prepare(["base"])[0]
+    prepared = prepare_one(out, "base")
     found = (mode.eigenvalue for mode in compute_modes(prepared).modes)
     asked = any("load model is open" in question.text for question in prepared.questions)
     used = any(use.kind == "IEELAL" and use.use is UseOfRecord.USED for use in prepared.records)

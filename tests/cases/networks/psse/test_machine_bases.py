@@ -10,6 +10,7 @@ from orchestrator.cases.scenario.flow_figures import power_flow_json
 from orchestrator.core.errors import CaseError
 from orchestrator.output.report.power_flow import flow_table
 from orchestrator.studies.modes.modes import compute_modes
+from tests.support.scenarios import prepare_one
 
 RAW = """\
 0, 100.0, 33, 0, 1, 60.0 / two machines, a tie
@@ -66,7 +67,7 @@ def prepared(tmp_path):
             files[1].write_text(dynamics(1, 6.5, west, 900.0) + dynamics(3, 5.0, east, 600.0))
         out = folder / "case.toml"
         out.write_text(write_case(WantedCase(tuple(files), out)).text, encoding="utf-8")
-        return load_case(out).prepare(["base"])[0]
+        return prepare_one(out, "base")
 
     return scenario
 

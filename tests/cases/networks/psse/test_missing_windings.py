@@ -2,11 +2,11 @@
 
 import pytest
 
-from orchestrator.cases.case import load_case
 from orchestrator.cases.new.new_case import write_case
 from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.studies.modes.modes import compute_modes
 from tests.cases.networks.psse.test_machine_bases import dynamics, network
+from tests.support.scenarios import prepare_one
 
 WITHOUT = "3 'GENSAL' 1 8.0 {fast} 0.05 5.0 0.0 1.8 1.7 0.3 {X2} {X_l} 0.03 0.2 /\n"
 
@@ -22,7 +22,7 @@ def prepared(tmp_path):
         out = tmp_path / "case.toml"
         files = (tmp_path / "grid.raw", tmp_path / "grid.dyr")
         out.write_text(write_case(WantedCase(files, out)).text, encoding="utf-8")
-        return load_case(out).prepare(["base"])[0]
+        return prepare_one(out, "base")
 
     return scenario
 

@@ -12,6 +12,7 @@ from orchestrator.cases.networks.conversion import import_network
 from orchestrator.cases.networks.data import misfit_of
 from orchestrator.cases.networks.sources import read_pandapower
 from orchestrator.core.errors import CaseError
+from tests.support.scenarios import prepare_one
 
 FILES = Path(__file__).parents[4] / ".docs" / "tutorials" / "psse"
 RAW, DYR = ((FILES / name).read_text() for name in ("areas.raw", "areas.dyr"))
@@ -46,7 +47,7 @@ def questions(tmp_path):
         (tmp_path / "areas.raw").write_text(raw)
         (tmp_path / "areas.dyr").write_text(dyr)
         (tmp_path / "case.toml").write_text(case)
-        (prepared,) = load_case(tmp_path / "case.toml").prepare()
+        prepared = prepare_one(tmp_path / "case.toml")
         return [str(q) for q in prepared.questions if not any(text in str(q) for text in CHANGES)]
 
     return ask
@@ -534,7 +535,7 @@ def test_a_unit_that_is_out_is_not_asked_to_start(questions, tmp_path, gfor, swi
         (alone + back, 0.0),
     ):  # of a unit that comes back, the limit stays
         (tmp_path / "case.toml").write_text(text)
-        (prepared,) = load_case(tmp_path / "case.toml").prepare((), values)
+        prepared = prepare_one(tmp_path / "case.toml", None, values)
         assert prepared.system.components["sg4"].value("governor.V_MIN") == least
 
 
@@ -562,7 +563,7 @@ def test_a_load_that_feeds_beside_a_machine_counts(questions, tmp_path):
     slack = []
     for raw in (RAW, changed(RAW, (line, beside + line))):
         asked = questions(raw=raw)
-        (prepared,) = load_case(tmp_path / "case.toml").prepare()
+        prepared = prepare_one(tmp_path / "case.toml")
         slack.append(900 * prepared.power_flow.powers["sg1"].real)
     assert any("MW +0 Mvar at bus_2" in question for question in asked)
     assert slack[0] - slack[1] == pytest.approx(100, abs=5)  # but for losses

@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from orchestrator.cases.case import load_case
 from orchestrator.cases.new.new_case import write_case
 from orchestrator.cases.new.wanted_case import WantedCase
 from orchestrator.studies.modes.modes import compute_modes
+from tests.support.scenarios import prepare_one
 
 RAW = """\
 0, 100.0, 33, 0, 1, 60.0 / a machine at an infinite bus
@@ -41,7 +41,7 @@ def prepared(tmp_path):
             files[1].write_text(dyr)
         out = tmp_path / "case.toml"
         out.write_text(write_case(WantedCase(tuple(files), out, slack=slack)).text, "utf-8")
-        return load_case(out).prepare(["base"])[0]
+        return prepare_one(out, "base")
 
     return scenario
 

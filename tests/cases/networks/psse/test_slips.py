@@ -8,6 +8,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.core.errors import CaseError
 from tests.cases.networks.psse import raw, records
 from tests.cases.networks.psse.test_dyr import CASE, DYR
+from tests.support.scenarios import prepare_one
 
 LATE = '[scenarios.late]\n[[scenarios.late.events]]\ntype = "line_trip"\nline = "line_4_5"\ntime = "60 s"\n'
 UNKNOWN = '[scenarios.other]\n[[scenarios.other.events]]\ntype = "line_trip"\nline = "line_4_7"\ntime = "1 s"\n'
@@ -28,7 +29,7 @@ def texts(tmp_path, network=None, dynamics=DYR, case=CASE):
     (tmp_path / "grid.dyr").write_text(dynamics)
     (tmp_path / "case.toml").write_text(case)
     try:
-        (prepared,) = load_case(tmp_path / "case.toml").prepare(["plain"])
+        prepared = prepare_one(tmp_path / "case.toml", "plain")
     except CaseError as error:
         return [str(problem) for problem in error.problems]
     return [str(question) for question in prepared.questions]
