@@ -100,6 +100,7 @@ class CosimError(Exception):
 
     exit_code = 1
     kind = ErrorKind.OTHER
+    words_of_others = ""  # part of the message that an FMU or another program wrote, which no reader's words replace
 
     def __init__(self, message: str = "", *, kind: ErrorKind | None = None) -> None:
         super().__init__(message)
@@ -112,7 +113,7 @@ class CosimError(Exception):
 
     def __str__(self) -> str:
         # not that of another base, such as KeyError, which quotes
-        return spelled(Exception.__str__(self))
+        return spelled(Exception.__str__(self), self.words_of_others)
 
     def _render_traceback_(self) -> list[str]:
         """Return what a notebook shows of an uncaught error: the sentence, without the calls inside of this package."""
@@ -178,9 +179,19 @@ class Problem:
     kind: ErrorKind = ErrorKind.VALUES
     besides: bool = False  # a question that stands beside a failure, as its likely reason
     topic: QuestionTopic | None = None  # of a question that several elements can raise
+    words_of_others: str = ""  # part of the text that an FMU or another program wrote
 
     def __str__(self) -> str:
-        return spelled(f"{self.place}: {self.text}" if self.place else self.text)
+        text = f"{self.place}: {self.text}" if self.place else self.text
+        return spelled(text, self.words_of_others)
+
+    def as_json(self) -> dict[str, str | bool]:
+        return {
+            "place": self.place,
+            "text": self.text,
+            "kind": self.kind,
+            "besides": self.besides,
+        }
 
 
 # so many mistakes of one case are listed; looking for more would take long and help nobody
@@ -204,6 +215,7 @@ class CaseError(InputError):
     def __init__(self, source: str, problems: Sequence[Problem]) -> None:
         self.problems = tuple(problems)
         kinds = {problem.kind for problem in problems}
+        self.words_of_others = next(filter(None, (p.words_of_others for p in problems)), "")
         count = f"{len(problems)} problem" + ("s" if len(problems) != 1 else "")
         message = f"{source}: {count}\n" + "\n".join(f"  - {problem}" for problem in problems)
         super().__init__(message, kind=kinds.pop() if len(kinds) == 1 else ErrorKind.VALUES)
@@ -254,6 +266,7 @@ class ComponentError(CosimError):
             log,
             time,
         )
+        self.words_of_others = log
         when = "" if time is None else f" at t = {time:.6g} s"
         said = log or "the FMU logged no text"
         super().__init__(
@@ -293,6 +306,7 @@ class EndedError(CosimError):
             time,
             ended_at,
         )
+        self.words_of_others = log
         said = f" (it says: {log})" if log else ""
         super().__init__(
             f"component {component!r}: it ended its simulation at t = {ended_at:.6g} s by itself, which is no error"

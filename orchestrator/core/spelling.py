@@ -51,7 +51,13 @@ _KEPT = re.compile(
 _COMMAND_ONLY = {"json", "with-linear-model"}
 _TYPED = {"modes": {"component", "set", "out"}, "design": {"points"}}
 """Options that the call of the same name lacks: the command stays as it is typed at a terminal."""
-_QUOTED = re.compile(r"`[^`]*`|(?<![\w-])--(engine helics|[a-z][a-z-]*)")
+_QUOTED = re.compile(
+    r"`[^`]*`"
+    r"""|(?<!\w)'(?:[^'\\\n]|\\.)*'(?!\w)|(?<!\w)"(?:[^"\\\n]|\\.)*"(?!\w)"""
+    r"|(?<![\w/\\-])--(engine helics|[a-z][a-z-]*)"
+)
+"""A command, a value of the user's as Python writes it, or an option, which alone is spelt anew."""
+
 _commanded = list[None]()  # one for each that asks for options
 
 
@@ -74,9 +80,19 @@ def keyword(option: str) -> str:
     return _KEYWORDS.get(option, option.replace("-", "_"))
 
 
-def spelled(text: str) -> str:
-    """A text that names options as ``--out``, for who reads it; commands of other programs stay. What was given as
-    tables is named as it was given, and not by the file that keeps it."""
+def spelled(text: str, words_of_others: str = "") -> str:
+    """Spell the options that a text names, such as ``--out``, for who reads it.
+
+    What was given as tables is named as it was given, and not by the file that keeps it. Commands of other programs,
+    quoted values and ``words_of_others``, which the text contains, stay as they are: a log of an FMU may name options
+    of its own."""
+    before, found, after = (
+        text.rpartition(words_of_others) if "--" in words_of_others else ("", "", text)
+    )
+    return f"{_spelled(before)}{found}{_spelled(after)}"
+
+
+def _spelled(text: str) -> str:
     text = _KEPT.sub(
         lambda m: m[1] + (f", row {int(m[2]) - 1}" if (m[2] or "1") != "1" else ""), text
     )
@@ -86,6 +102,8 @@ def spelled(text: str) -> str:
 def _in_python(found: re.Match[str]) -> str:
     if found[1]:
         return keyword(found[1])
+    if not found[0].startswith("`"):
+        return found[0]
     if found[0].startswith("`--"):
         return f"`{spelled(found[0][1:-1])}`"
     command, *options = found[0][1:-1].split(" --")

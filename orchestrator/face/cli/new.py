@@ -38,11 +38,12 @@ def run(options: argparse.Namespace) -> int:
         return _written(options)
     except CaseError as error:
         if options.json:
-            print_json({"case": None, "problems": [*map(asdict, error.problems)]})
+            print_json({"case": None, "problems": [one.as_json() for one in error.problems]})
         raise
     except InputError as error:
         if options.json:
-            print_json({"case": None, "problems": [asdict(Problem("", str(error), error.kind))]})
+            problem = Problem("", str(error), error.kind)
+            print_json({"case": None, "problems": [problem.as_json()]})
         raise
 
 

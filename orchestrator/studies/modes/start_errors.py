@@ -46,4 +46,8 @@ def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError
         text += f"; {fed}" if fed else ""
     # The same values are refused again by a model of ours; an FMU of others may lack a licence today.
     kind = ErrorKind.START if ours else ErrorKind.FMU
-    return StartError(str(prepared.case.path), Problem(prepared.places[name], text, kind), name)
+    return StartError(
+        str(prepared.case.path),
+        Problem(prepared.places[name], text, kind, words_of_others=said),
+        name,
+    )

@@ -10,7 +10,14 @@ from pkgutil import iter_modules
 import pytest
 
 import orchestrator as gfor
-from orchestrator.core.errors import CaseError, CosimError, InputError, Problem
+from orchestrator.core.errors import (
+    CaseError,
+    ComponentError,
+    CosimError,
+    EndedError,
+    InputError,
+    Problem,
+)
 from orchestrator.core.spelling import as_options, keyword, spelled
 from orchestrator.face import api
 from orchestrator.studies.points.failure import Failure
@@ -78,6 +85,28 @@ def test_an_option_is_spelt_for_who_reads_it(text, python):
     assert spelled(text) == str(CosimError(text)) == python
     with as_options():
         assert spelled(text) == str(InputError(text)) == text
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "line 3: title = 'give --out': it is too long",
+        'line 3: title = "see --set, it\'s odd": it is too long',
+        "/data/--set/case.toml: there is no such file",
+    ],
+)
+def test_words_of_a_users_file_stay_as_they_are(text):
+    assert str(InputError(text)) == text
+
+
+def test_words_of_an_fmu_stay_as_they_are_beside_an_option_of_ours():
+    error = ComponentError("dev", "fmi2DoStep", "fmi2Error", "pass --step or --set to me")
+    assert str(error).endswith("pass --step or --set to me")
+    ended = EndedError("dev", "fmi2Discard", "stopped by --stop", 1.0, 0.9)
+    assert "(it says: stopped by --stop)" in str(ended)
+    problem = Problem("line 4", "it says: use --set; give --step", words_of_others="use --set")
+    assert str(problem) == "line 4: it says: use --set; give step"
+    assert "it says: use --set; give step" in str(CaseError("case.toml", [problem]))
 
 
 def test_what_was_given_as_tables_is_named_as_it_was_given():
