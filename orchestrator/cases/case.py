@@ -453,7 +453,15 @@ def _case(
             files[name] = str(error)
     home = path.absolute().parent
     return Case(
-        table, text, path, tuple(problems), directory.absolute(), numbered, trust_fmus, home, files
+        table,
+        text,
+        path=path,
+        problems=tuple(problems),
+        directory=directory.absolute(),
+        numbered=numbered,
+        trust_fmus=trust_fmus,
+        home=home,
+        parameter_files=files,
     )
 
 

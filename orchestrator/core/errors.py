@@ -44,11 +44,9 @@ def few(texts: Iterable[str], most: int, between: str = ", ") -> str:
 
 def counted(number: int, what: str) -> str:
     """``3 points``."""
-    return (
-        f"{number} {what}"
-        if number == 1
-        else f"{number} {what}{'es' if what.endswith('s') else 's'}"
-    )
+    if number == 1:
+        return f"{number} {what}"
+    return f"{number} {what}{'es' if what.endswith('s') else 's'}"
 
 
 class ErrorKind(StrEnum):

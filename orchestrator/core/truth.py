@@ -1,10 +1,19 @@
 """Results whose truth value would be taken for their verdict: ``if modes:`` is true of any object, also of an unstable
 system's."""
 
+from collections.abc import Iterable
 from typing import ClassVar, NoReturn
 
 from orchestrator.core.attributes import KnownNames
 from orchestrator.core.errors import InputError
+
+
+def all_true(verdicts: Iterable[bool | None]) -> bool | None:
+    """Combine verdicts: False where one is false, None where one is not known and none is false, else True."""
+    verdicts = list(verdicts)
+    if False in verdicts:
+        return False
+    return None if None in verdicts else True
 
 
 class NoTruthError(InputError, TypeError):

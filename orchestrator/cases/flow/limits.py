@@ -44,8 +44,8 @@ def exceeded(equations: FlowEquations, voltages: np.ndarray, limits: Limits) -> 
     for k, bus in enumerate(equations.buses):
         if equations.held[k] and bus in limits:
             least, most = limits[bus]
-            limit = most if q[k] > most + _TOUCHED else least if q[k] < least - _TOUCHED else None
-            if limit is not None:
+            if q[k] > most + _TOUCHED or q[k] < least - _TOUCHED:
+                limit = most if q[k] > most + _TOUCHED else least
                 magnitude = float(abs(voltages[k]))
                 found.append(
                     Excess(bus, float(q[k]), limit, float(equations.magnitudes[k]), magnitude)

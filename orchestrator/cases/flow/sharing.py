@@ -93,11 +93,9 @@ def load_of(loads: Collection[str], plan: ComponentPlan) -> float:
 
 def lost_load(drawn: float) -> list[str]:
     """Return what is told of load that values or an outage take away [MW]."""
-    return (
-        [f"{abs(drawn):.4g} MW of load {'lost' if drawn > 0 else 'more'}"]
-        if abs(drawn) >= _LEAST_SHARE
-        else []
-    )
+    if abs(drawn) < _LEAST_SHARE:
+        return []
+    return [f"{abs(drawn):.4g} MW of load {'lost' if drawn > 0 else 'more'}"]
 
 
 def _number(plan: ComponentPlan, name: str) -> float | None:

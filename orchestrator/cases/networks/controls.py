@@ -91,7 +91,15 @@ def with_controls(raw: RawNetwork, network: ImportedNetwork) -> MovingNetwork:
         seen = bus_of(raw.tables.labels[tap.bus])
         if line and (line.from_bus, line.to_bus, line.tap) == (*ends, ratio) and seen in buses:
             lines[line.name] = replace(line, adjustable=True)
-            control = Control(line.name, TAP, seen, tap.least, tap.most, tap.positions, tap.raises)
+            control = Control(
+                line.name,
+                TAP,
+                bus=seen,
+                least=tap.least,
+                most=tap.most,
+                positions=tap.positions,
+                raises=tap.raises,
+            )
             controls.append(control)
     taps, shunts = len(controls), {shunt.bus: shunt for shunt in network.shunts}
     at = Counter(record.place for record in raw.shunts)

@@ -111,20 +111,28 @@ def import_network(
     return ImportedNetwork(
         tuple(bus for label in labels.values() if (bus := bus_of(label)) not in merged),
         tuple(lines),
-        tuple(loads),
-        tuple(shunts),
-        {bus_of(labels[n]): _generation(labels[n], members) for n, members in at_bus.items()},
-        bus_of(labels[reference[0]]) if reference else None,
-        source.frequency,
-        tuple(transformers),
-        _load_parts(source, labels),
-        {bus_of(labels[n]): p for n, p in _fed(source, rows).items() if p < -_NEGLIGIBLE},
-        {bus_of(labels[n]): float(row[5]) for n, row in rows.items() if row[5] > _NEGLIGIBLE},
-        FileLimits(ratings, _bands(rows, labels)),
-        {bus_of(labels[n]): one_line(x) for n, x in source.titles.items() if x and n in labels},
-        names,
-        {bus_of(labels[n]): one_line(x) for n, x in source.unit_names.items() if n in labels},
-        {bus_of(labels[n]): region for n, region in source.regions.items() if n in labels},
+        loads=tuple(loads),
+        shunts=tuple(shunts),
+        generation={
+            bus_of(labels[n]): _generation(labels[n], members) for n, members in at_bus.items()
+        },
+        slack=bus_of(labels[reference[0]]) if reference else None,
+        frequency=source.frequency,
+        transformers=tuple(transformers),
+        load_parts=_load_parts(source, labels),
+        feeding={bus_of(labels[n]): p for n, p in _fed(source, rows).items() if p < -_NEGLIGIBLE},
+        capacitors={
+            bus_of(labels[n]): float(row[5]) for n, row in rows.items() if row[5] > _NEGLIGIBLE
+        },
+        limits=FileLimits(ratings, _bands(rows, labels)),
+        titles={
+            bus_of(labels[n]): one_line(x) for n, x in source.titles.items() if x and n in labels
+        },
+        branch_names=names,
+        unit_names={
+            bus_of(labels[n]): one_line(x) for n, x in source.unit_names.items() if n in labels
+        },
+        regions={bus_of(labels[n]): region for n, region in source.regions.items() if n in labels},
     )
 
 

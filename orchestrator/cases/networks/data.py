@@ -150,7 +150,7 @@ def network_data(table: NetworkTable, directory: Path, slack: str | None = None)
     return NetworkData(
         tuple(buses),
         (*source.lines, *lines),
-        (
+        loads=(
             *(
                 with_laws(x, table, parts=source.load_parts.get(x.name, (0j, 0j)))
                 for x in source.loads
@@ -158,21 +158,21 @@ def network_data(table: NetworkTable, directory: Path, slack: str | None = None)
             *(with_laws(x, table, device_laws(table)) for x in found.device_loads),
             *loads,
         ),
-        (*source.shunts, *shunts),
-        source.generation,
-        source.slack,
-        table.frequency if table.frequency is not None else source.frequency,
-        table.stray_B,
-        {line.name: place for line, place in in_file},
-        (*source.transformers, *transformers),
-        found.changes,
-        found.machines,
-        found.idle,
-        source.feeding,
-        source.capacitors,
-        found.misfit,
-        found.file_voltages,
-        {
+        shunts=(*source.shunts, *shunts),
+        generation=source.generation,
+        slack=source.slack,
+        frequency=table.frequency if table.frequency is not None else source.frequency,
+        stray_B=table.stray_B,
+        places={line.name: place for line, place in in_file},
+        transformers=(*source.transformers, *transformers),
+        changes=found.changes,
+        machines=found.machines,
+        idle_machines=found.idle,
+        feeding=source.feeding,
+        capacitors=source.capacitors,
+        misfit=found.misfit,
+        file_voltages=found.file_voltages,
+        flow_laws={
             load.name: flow_laws(load, source.load_parts[load.name])
             for load in source.loads
             if load.name in source.load_parts

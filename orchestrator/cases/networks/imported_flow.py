@@ -11,7 +11,8 @@ from orchestrator.cases.networks.conversion import ImportedNetwork
 def flow_lines(network: ImportedNetwork) -> list[FlowLine]:
     """Return the branches of a network, with the legs of its three-winding transformers."""
     own = [
-        FlowLine(x.name, x.from_bus, x.to_bus, x.R, x.X, x.B, x.tap, x.shift) for x in network.lines
+        FlowLine(x.name, x.from_bus, to_bus=x.to_bus, R=x.R, X=x.X, B=x.B, tap=x.tap, shift=x.shift)
+        for x in network.lines
     ]
     return [*own, *(leg for x in network.transformers for leg in legs_of(x))]
 

@@ -112,12 +112,12 @@ def _from_json(kept: Mapping[str, Any]) -> SourceTables:
     return SourceTables(
         kept["name"],
         kept["base_mva"],
-        arrays["bus"],
-        arrays["branch"],
-        arrays["gen"],
-        to_earth,
-        labels,
-        kept["frequency"],
+        bus=arrays["bus"],
+        branch=arrays["branch"],
+        gen=arrays["gen"],
+        branch_to_earth=to_earth,
+        labels=labels,
+        frequency=kept["frequency"],
         titles={int(number): str(title) for number, title in kept.get("titles", ())},
         branch_names=tuple(BranchName(*names) for names in kept.get("branch_names", ())),
     )

@@ -51,7 +51,8 @@ def _powers(data: NetworkData, slack: str) -> Mapping[str, complex]:
         return {}
     inner = (bus for x in data.transformers for bus in inner_buses(x))
     lines = [
-        FlowLine(x.name, x.from_bus, x.to_bus, x.R, x.X, x.B, x.tap, x.shift) for x in data.lines
+        FlowLine(x.name, x.from_bus, to_bus=x.to_bus, R=x.R, X=x.X, B=x.B, tap=x.tap, shift=x.shift)
+        for x in data.lines
     ]
     shunts = [
         FlowShunt(x.bus, x.g_mw / SYSTEM_BASE_MVA, x.b_mvar / SYSTEM_BASE_MVA) for x in data.shunts

@@ -297,9 +297,8 @@ class CaseText:
         settings = [f"remove = {_toml_list(gone)}"] if gone else []
         told = f"beside = {_quoted(beside)}    # `gfor modes` tells what the device brings"
         settings += [told] if places and beside else []
-        settings += (
-            [f"set = {{ {', '.join(values)} }}{f'    # {less}' if less else ''}"] if values else []
-        )
+        why = f"    # {less}" if less else ""
+        settings += [f"set = {{ {', '.join(values)} }}{why}"] if values else []
         return [f"[scenarios.{name}]", f'title = "{title}"', *settings]
 
     def _plots(self) -> list[list[str]]:

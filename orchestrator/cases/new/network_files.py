@@ -38,13 +38,7 @@ def sources_of(files: Sequence[Path]) -> dict[str, Path]:
         if not path.exists():
             near = close_names(path.name, [p.name for p in path.absolute().parent.glob("*")])
             raise InputError(f"{path}: there is no such file{f'; {near}' if near else ''}")
-        key = (
-            "cgmes"
-            if path.is_dir()
-            else "dyr"
-            if suffix == ".dyr"
-            else _FILES.get(suffix) or _table_of(path)
-        )
+        key = _key_of(path)
         others = [k for k in found if "dyr" not in (k, key) and not {k, key} <= {*_TABLES}]
         if key in found or others:
             raise InputError(
@@ -65,6 +59,14 @@ def sources_of(files: Sequence[Path]) -> dict[str, Path]:
             f"{found['dyr']}: dynamics data of PSS/E need the network's RAW file; give both"
         )
     return found
+
+
+def _key_of(path: Path) -> str:
+    """Return the key of the case file that names a file."""
+    suffix = path.suffix.lower()
+    if path.is_dir():
+        return "cgmes"
+    return "dyr" if suffix == ".dyr" else _FILES.get(suffix) or _table_of(path)
 
 
 def _table_of(path: Path) -> str:

@@ -172,13 +172,13 @@ def _from_table(draft: Draft, grid: ComponentTable, everything: Tables) -> Netwo
         network = Network(
             name,
             data.buses,
-            data.lines,
-            data.loads,
-            ports,
-            data.shunts,
-            data.stray_B,
-            (),
-            data.transformers,
+            lines=data.lines,
+            loads=data.loads,
+            ports=ports,
+            shunts=data.shunts,
+            stray_B=data.stray_B,
+            faults=(),
+            transformers=data.transformers,
             phasors=grid.model == "phasor_grid",
         )
         return _with_switches(network, draft)

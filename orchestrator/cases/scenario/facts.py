@@ -76,19 +76,21 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
     return Facts(
         (*sources, *dyr),
         any(name.endswith(".y_re") for name in grid.description.inputs),
-        rated_frequency(prepared),
-        len(network.buses),
-        len(machines),
-        len(feeding) - len(machines) - others,
-        others,
-        any(v.startswith("governor.T_") for n in machines for v in plans[n].description.variables),
-        sum(p for _, p in loads if p > 0),
-        in_words([load for load, p in loads if p > 0]),
-        tuple(
+        frequency_hz=rated_frequency(prepared),
+        buses=len(network.buses),
+        machines=len(machines),
+        converters=len(feeding) - len(machines) - others,
+        others=others,
+        governed=any(
+            v.startswith("governor.T_") for n in machines for v in plans[n].description.variables
+        ),
+        load_mw=sum(p for _, p in loads if p > 0),
+        load_model=in_words([load for load, p in loads if p > 0]),
+        slack=tuple(
             (n, flow.powers[n].real * plans[n].number("S_n"), plans[n].number("S_n"))
             for n in at_slack
         ),
-        (min(magnitudes), max(magnitudes)),
+        voltages_pu=(min(magnitudes), max(magnitudes)),
     )
 
 

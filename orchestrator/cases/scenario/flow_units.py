@@ -15,7 +15,13 @@ def flow_unit(name: str, bus: str, plan: ComponentPlan, *, connected: bool) -> F
     """A unit as the power flow sees it: one whose ``Q_0`` is set feeds that, any other holds its ``v_0``."""
     Q_0 = plan.number("Q_0") if "Q_0" in plan.parameters else None
     return FlowUnit(
-        name, bus, plan.number("S_n"), plan.number("P_0"), plan.number("v_0"), connected, Q_0
+        name,
+        bus,
+        S_n=plan.number("S_n"),
+        P_0=plan.number("P_0"),
+        v_0=plan.number("v_0"),
+        connected=connected,
+        Q_0=Q_0,
     )
 
 

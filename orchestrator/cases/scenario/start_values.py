@@ -75,11 +75,11 @@ def start_from_power_flow(
         return solve_power_flow(
             (*network.buses, *(bus for x in network.transformers for bus in inner_buses(x))),
             [*_lines(network, system.components[grid]), *_legs(network, system.components[grid])],
-            [*loads.values()],
-            fed,
-            slack,
-            _shunts(network, system.components[grid]),
-            _limits(limits or {}, fed),
+            loads=[*loads.values()],
+            units=fed,
+            slack_bus=slack,
+            shunts=_shunts(network, system.components[grid]),
+            limits=_limits(limits or {}, fed),
             keep_limits=keep_limits,
         )
 

@@ -252,4 +252,15 @@ def number_info(
         unit = next((signal_info(system, c).unit for c in matching(system.connections, ends)), "")
     least = None if field in ("value", "substitute") else 0.0
     text = f"{field} of the imperfection {name}"
-    return VariableInfo(key, 0, "Real", "parameter", "tunable", unit or "", None, least, None, text)
+    return VariableInfo(
+        key,
+        0,
+        type="Real",
+        causality="parameter",
+        variability="tunable",
+        unit=unit or "",
+        start=None,
+        minimum=least,
+        maximum=None,
+        description=text,
+    )

@@ -104,14 +104,14 @@ class _Reader:
                 port = PortMap(
                     bases.rating,
                     bases.frequency,
-                    voltage,
-                    current,
-                    start,
-                    signals,
-                    settings,
-                    self._current_limit(),
-                    bases.voltage,
-                    self._frequency_range(bases),
+                    voltage=voltage,
+                    current=current,
+                    start=start,
+                    signals=signals,
+                    settings=settings,
+                    current_limit=self._current_limit(),
+                    V_n=bases.voltage,
+                    frequency_range=self._frequency_range(bases),
                 )
                 self._check_once(port)
         if self._problems or port is None:

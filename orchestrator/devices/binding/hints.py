@@ -62,4 +62,6 @@ def kind_of_current(text: str) -> str:
 
 def _size(words: str) -> str:
     peak, rms = bool(re.search(r"\b(peak|amplitude)\b", words)), bool(re.search(r"\brms\b", words))
-    return "" if peak == rms else "peak" if peak else "rms"
+    if peak == rms:
+        return ""
+    return "peak" if peak else "rms"

@@ -154,17 +154,10 @@ def diagnosis(of: str, a: complex, b: complex, c: complex, rest: float) -> tuple
         )
     turn = phase(a) * 180 / pi
     if abs(abs(a) - 1) > BALANCE:
-        return (
-            "wrong base",
-            f"the power is {abs(a):.4g} times what is asked{known_ratio(abs(a))}"
-            + (
-                ", with the opposite sign"
-                if abs(turn) > 178
-                else f", turned by {turn:.0f}°"
-                if abs(turn) > 2
-                else ""
-            ),
-        )
+        turned = f", turned by {turn:.0f}°" if abs(turn) > 2 else ""
+        turned = ", with the opposite sign" if abs(turn) > 178 else turned
+        fit = f"the power is {abs(a):.4g} times what is asked{known_ratio(abs(a))}"
+        return "wrong base", f"{fit}{turned}"
     if abs(turn) > 178:
         return "wrong sign", "the power has the opposite sign"
     if abs(turn) > 1:

@@ -62,7 +62,8 @@ def restrict(readable: Iterable[Path], writable: Sequence[Path]) -> None:
     asked = struct.pack(
         "<QQQ", everything, _TCP if version >= 4 else 0, _SCOPES if version >= 6 else 0
     )
-    asked = asked[: 8 if version < 4 else 16 if version < 6 else 24]
+    known = 16 if version < 6 else 24  # bytes of the structure that this version of Landlock reads
+    asked = asked[: 8 if version < 4 else known]
     ruleset = call(_CREATE_RULESET, asked, len(asked), 0)
     try:
         for path in readable:

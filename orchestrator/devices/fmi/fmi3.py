@@ -222,13 +222,8 @@ class Fmi3Library:
 
 
 def _described(clock: FmiClock) -> _Clock:
-    kind = (
-        "periodic"
-        if clock.periodic
-        else "output"
-        if clock.variability == "triggered"
-        else clock.variability
-    )
+    kind = "output" if clock.variability == "triggered" else clock.variability
+    kind = "periodic" if clock.periodic else kind
     asked = kind != "output" and clock.interval is None
     interval = 0.0 if clock.interval is None else clock.interval
     return _Clock(
@@ -250,7 +245,8 @@ def _specials(description: FmuDescription) -> list[_Special]:
         if variable is None or (kind := _kind(variable.declared_type)) not in _KINDS:
             continue
         inside = variable.causality == "input"
-        role = (_CLOCKED_INPUT if inside else _CLOCKED) if clocks else _DISCRETE_INPUT
+        clocked = _CLOCKED_INPUT if inside else _CLOCKED
+        role = clocked if clocks else _DISCRETE_INPUT
         bits = sum(1 << place[clock] for clock in set(clocks) if clock in place)
         start = variable.start_number if isfinite(variable.start_number) else 0.0
         found.append(_Special(bits, start, reference, _KINDS.index(kind), role))

@@ -117,11 +117,13 @@ def asked_by(options: argparse.Namespace, request: type) -> dict[str, Any]:
         return getattr(options, f"{_ASKED}{name}", getattr(options, name, None))
 
     found = {name: (one.kind, given(name)) for name, one in asked_of(request).items()}
-    return {
-        name: ",".join(value) if kind.joined else tuple(value) if isinstance(value, list) else value
-        for name, (kind, value) in found.items()
-        if value is not None and value is not False and value != []
-    }
+    asked: dict[str, Any] = {}
+    for name, (kind, value) in found.items():
+        if value is None or value is False or value == []:
+            continue
+        plain = tuple(value) if isinstance(value, list) else value
+        asked[name] = ",".join(value) if kind.joined else plain
+    return asked
 
 
 def assignment(text: str) -> tuple[str, bool | float | str]:

@@ -101,15 +101,9 @@ def _verdicts(found: Certificate) -> PlainTable:
     for v in found.verdicts:
         known = [f for f in v.findings if f.accepted is not None]
         least = narrowest(known)
-        word = (
-            NOT_JUDGED
-            if v in unknown
-            else NO_VERDICT
-            if not v.judged
-            else "fails"
-            if v in bad
-            else "accepted"
-        )
+        word = "fails" if v in bad else "accepted"
+        word = word if v.judged else NO_VERDICT
+        word = NOT_JUDGED if v in unknown else word
         failed = "; ".join(f"{f.criterion}: {f.text}" for f in v.failed)
         remark = v.unknown or failed or (f"nearest: {least.criterion}" if least else "")
         margin = "–" if least is None else margin_of(least)
@@ -159,11 +153,8 @@ def _show_damping_test(found: Certificate, test: DampingTest, console: Console) 
         left=0,
     )
     for v in found.verdicts:
-        table.add_row(
-            f"{v.X_L:g}",
-            *_figures(v),
-            "accepted" if v.accepted else Text("not accepted" if v.judged else NOT_JUDGED, "red"),
-        )
+        refusal = Text("not accepted" if v.judged else NOT_JUDGED, "red")
+        table.add_row(f"{v.X_L:g}", *_figures(v), "accepted" if v.accepted else refusal)
     console.print(table, "")
     for v in found.verdicts:
         said = v.of_base_critical()

@@ -100,5 +100,6 @@ def _print(report: AcceptanceReport) -> None:
     lacking = missing(report.protections)
     if lacking:
         console.print(f"Not in force on this system: {', '.join(lacking)}.")
-    colour = "" if report.trusted else "bold red" if report.failures else "bold yellow"
-    console.print(escape(f"{report.fmu.name}: {report.sentence}"), style=colour)
+    colour = "bold red" if report.failures else "bold yellow"
+    style = "" if report.trusted else colour
+    console.print(escape(f"{report.fmu.name}: {report.sentence}"), style=style)

@@ -266,12 +266,12 @@ class Desk:
             "copied": copied(
                 case.file,
                 self._word,
-                scenario.name,
-                values,
-                frequencies,
-                question.get("events"),
-                question.get("places"),
-                question.get("step"),
+                scenario=scenario.name,
+                values=values,
+                frequencies=frequencies,
+                events=question.get("events"),
+                places=question.get("places"),
+                step=question.get("step"),
             ),
         }
 

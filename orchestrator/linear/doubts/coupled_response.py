@@ -174,7 +174,9 @@ def worst_disagreement(master: Master, model: LinearModel) -> Disagreement:
     every = model.period * max(1, round(_SAMPLE / (model.period * master.clock.step_size)))
 
     def departure(size: float, times: int | None = None) -> _Departure:
-        measured, start = _response(master, state, model, x_0, size * shape, every, times)
+        measured, start = _response(
+            master, state, model=model, x_0=x_0, disturbance=size * shape, every=every, times=times
+        )
         expected = _predicted(model, start, every, len(measured))[:, : len(x_0)]
         return _compare(measured, expected, size, np.maximum(1.0, np.abs(x_0)))
 

@@ -206,7 +206,15 @@ class Equations:
     ) -> LinearModel:
         F, G, H, K = (self._matrix(name) for name in self._shapes)
         return LinearModel(
-            F, G, H, K, tuple(names), step_size, disagreement, sources, wires=tuple(wires)
+            F,
+            G,
+            H=H,
+            K=K,
+            names=tuple(names),
+            step_size=step_size,
+            disagreement=disagreement,
+            sources=sources,
+            wires=tuple(wires),
         )
 
     def _matrix(self, name: str) -> sp.csr_array:

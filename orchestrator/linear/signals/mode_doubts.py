@@ -132,17 +132,15 @@ def with_doubts(
     total = sum(
         energy for mode, energy in zip(modes, energies, strict=True) if _swings(mode, length)
     )
-    return [
-        replace(
-            mode,
-            doubts=tuple(
-                _doubts(mode, length, energy / total if total else 1.0, others, halves, noise_like)
-            ),
-        )
-        if mode.frequency_hz > 0
-        else mode
-        for mode, energy in zip(modes, energies, strict=True)
-    ]
+    judged = []
+    for mode, energy in zip(modes, energies, strict=True):
+        if mode.frequency_hz > 0:
+            share = energy / total if total else 1.0
+            doubts = tuple(_doubts(mode, length, share, others, halves, noise_like))
+            judged.append(replace(mode, doubts=doubts))
+        else:
+            judged.append(mode)
+    return judged
 
 
 def is_trend(mode: IdentifiedMode, length: float) -> bool:

@@ -135,7 +135,16 @@ def between(one: LinearModel, other: LinearModel) -> Callable[[float], LinearMod
     def model_at(part: float) -> LinearModel:
         sides = zip((one.F, one.G, one.H, one.K), (other.F, other.G, other.H, other.K), strict=True)
         F, G, H, K = ((1 - part) * a + part * b for a, b in sides)
-        return LinearModel(F, G, H, K, other.names, other.step_size, 0.0, period=other.period)
+        return LinearModel(
+            F,
+            G,
+            H=H,
+            K=K,
+            names=other.names,
+            step_size=other.step_size,
+            disagreement=0.0,
+            period=other.period,
+        )
 
     return model_at
 

@@ -339,13 +339,13 @@ def _look_at(model: LinearModel, spectrum: Spectrum | None) -> Stability:
         return Stability(
             not search.modes,
             mode,
-            len(search.modes),
-            0,
-            n,
-            Cause.SYSTEM if mode else None,
-            None,
-            model.step_size,
-            f"too large for all {n} eigenvalues: the right half-plane was searched, {search.not_searched}",
+            growing=len(search.modes),
+            zeros=0,
+            eigenvalues=n,
+            cause=Cause.SYSTEM if mode else None,
+            continuous_growth_rate=None,
+            step_size=model.step_size,
+            reason=f"too large for all {n} eigenvalues: the right half-plane was searched, {search.not_searched}",
         )
     growing = int(grows(spectrum.eigenvalues).sum())
     zeros = int((np.abs(spectrum.eigenvalues) <= ZERO).sum()) - model.clocks
@@ -353,10 +353,10 @@ def _look_at(model: LinearModel, spectrum: Spectrum | None) -> Stability:
     return Stability(
         growing == 0,
         spectrum.rightmost,
-        growing,
-        zeros,
-        len(spectrum.eigenvalues),
-        cause,
-        None,
-        model.step_size,
+        growing=growing,
+        zeros=zeros,
+        eigenvalues=len(spectrum.eigenvalues),
+        cause=cause,
+        continuous_growth_rate=None,
+        step_size=model.step_size,
     )

@@ -89,12 +89,12 @@ def make_layout(
                 Part(
                     name,
                     tuple(inputs),
-                    tuple(outputs),
-                    tuple(needed),
-                    start,
-                    units,
-                    slot,
-                    name in set(external),
+                    outputs=tuple(outputs),
+                    needed=tuple(needed),
+                    start=start,
+                    units=units,
+                    slot=slot,
+                    external=name in set(external),
                 )
             )
     return Layout(period, slots, tuple(parts))

@@ -93,7 +93,13 @@ def identify(
     best, nearest = min(differences, key=lambda pair: pair[0])
     fits = tuple(c for d, c in differences if d <= max(10 * best, 1e-9)) if best <= _FITS else ()
     return Identified(
-        fits, nearest, best, int(known.sum()), int(index[on_point].max()), step_size, stop_time
+        fits,
+        nearest,
+        difference=best,
+        rows=int(known.sum()),
+        last_row=int(index[on_point].max()),
+        step_size=step_size,
+        stop_time=stop_time,
     )
 
 

@@ -176,7 +176,8 @@ def _finding(
     times_over = f", in {stretches} stretches" if stretches > 1 else ""
     which = [parameter for parameter, seconds in of_each.items() if seconds > 0]
     shares = [f"{parameter} for {of_each[parameter]:.3g} s" for parameter in which]
-    named = f" ({', '.join(shares if len(which) > 1 else which)})" if which else ""
+    listed = ", ".join(shares if len(which) > 1 else which)
+    named = f" ({listed})" if which else ""
     message = (
         f"the {limit.name} of {name}{named} {acts} from t = {begin:.4g} s "
         f"{'to the end of the run' if end is None else f'to t = {end:.4g} s'}, for {duration:.3g} s in all{times_over}"
@@ -185,7 +186,14 @@ def _finding(
         message += "; what follows is not known: repeat with EMT models"
     figures = {"duration_s": duration, "stretches": float(stretches)}
     return Finding(
-        "active_limit", begin, name, limit.signal, message, end, figures, limit.represented
+        "active_limit",
+        begin,
+        component=name,
+        variable=limit.signal,
+        message=message,
+        until=end,
+        figures=figures,
+        represented=limit.represented,
     )
 
 
@@ -223,7 +231,15 @@ def above_declared(seen: Seen, system: System) -> Iterator[Finding]:
         if long and long[0][0]:  # at rest it is told by itself
             begin = float(seen.times[long[0][0] + cycle - 1])
             misfit = of_dip(float(max(means[a:b].max() for a, b in long)), limit, begin)
-            yield Finding(MISFIT, begin, name, "i_re", misfit.sentence(name), None, misfit.figures)
+            yield Finding(
+                MISFIT,
+                begin,
+                component=name,
+                variable="i_re",
+                message=misfit.sentence(name),
+                until=None,
+                figures=misfit.figures,
+            )
 
 
 def told_of(findings: Sequence[Mapping[str, Any]], component: str) -> Mapping[str, Any] | None:

@@ -277,7 +277,15 @@ def _fast_swing(name: str, seen: Seen, first: int, begin: float) -> Swing | None
     if end < KEPT * middle or end / 2 < max(SMALLEST_FAST * scale, SMALLEST_PART * deviation):
         return None
     size, hz = end / (2 * np.sqrt(2)) / scale, often / 2 / seen.interval
-    return Swing(name, size, scale, (times, ripple), times[stretch], ripple[stretch], hz)
+    return Swing(
+        name,
+        size,
+        scale=scale,
+        response=(times, ripple),
+        times=times[stretch],
+        signal=ripple[stretch],
+        turns_hz=hz,
+    )
 
 
 def _regular(

@@ -175,9 +175,7 @@ def _outside(times: Numbers, course: _Course, allowed: float) -> float | None:
         return float(times[int(np.argmax(far))]) if far[-1] else None
     outside = course.on & _beyond(course.signal / _rated(course.signal), ALLOWED)
     interval = float(times[1] - times[0])
-    at_end = (
-        0 if not outside[-1] else len(outside) if outside.all() else int(np.argmin(outside[::-1]))
-    )
+    at_end = len(outside) if outside.all() else int(np.argmin(outside[::-1]))
     if not far[-1] and at_end * interval < OUTSIDE_AT_END and outside.sum() * interval <= allowed:
         return None
     return float(times[int(np.argmax(outside))])
@@ -237,7 +235,17 @@ def still_moving_away(
     )
     component, _, variable = largest.name.partition(".")
     figures = {"value": float(mean[-1]), "rate": rate}
-    return [Finding("not_judged", last.begin, component, variable, message, None, figures)]
+    return [
+        Finding(
+            "not_judged",
+            last.begin,
+            component=component,
+            variable=variable,
+            message=message,
+            until=None,
+            figures=figures,
+        )
+    ]
 
 
 def _at_their_limits(
@@ -315,7 +323,8 @@ def _finding(
         if outside is not None
         else ""
     )
-    well = f"; so {'does' if others == 1 else 'do'} {others} more" if others else ""
+    do = "does" if others == 1 else "do"
+    well = f"; so {do} {others} more" if others else ""
     message = (
         f"the {course.what} runs away from t = {begin:.4g} s on: {shown_name(course.name)} is {value:.4g} {unit} at "
         f"t = {times[row]:.4g} s and moves at {rate:+.3g} {unit}/s{left}{well}"
@@ -325,9 +334,9 @@ def _finding(
     return Finding(
         "run_away",
         begin,
-        component,
-        variable,
-        message,
-        None if last else float(times[row]),
-        figures,
+        component=component,
+        variable=variable,
+        message=message,
+        until=None if last else float(times[row]),
+        figures=figures,
     )

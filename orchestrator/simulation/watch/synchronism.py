@@ -209,7 +209,15 @@ def _finding(
             else {}
         ),
     }
-    return Finding("loss_of_synchronism", time, group[0], variable, message, None, figures)
+    return Finding(
+        "loss_of_synchronism",
+        time,
+        component=group[0],
+        variable=variable,
+        message=message,
+        until=None,
+        figures=figures,
+    )
 
 
 def slips_at_the_end(relative: Numbers) -> bool:

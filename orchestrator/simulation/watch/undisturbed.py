@@ -156,14 +156,28 @@ def undisturbed_motion(seen: Seen, system: System, until: float) -> Iterator[Fin
     if not steep:
         message = f"the undisturbed state does not stand still from t = {time:.4g} s: {sizes}"
         yield Finding(
-            "undisturbed_motion", time, component, variable, message, None, {"motion": size}
+            "undisturbed_motion",
+            time,
+            component=component,
+            variable=variable,
+            message=message,
+            until=None,
+            figures={"motion": size},
         )
         return
     growth = _growth(seen, motions)
     how = f"with {growth.frequency_hz:.4g} Hz" if growth.frequency_hz else "without oscillation"
     message = f"the undisturbed state grows at {growth.rate:+.4g} 1/s {how} from t = {time:.4g} s: {sizes}"
     figures = {"motion": size, "growth_rate": growth.rate, "frequency_hz": growth.frequency_hz}
-    yield Finding("growth", time, component, variable, message, None, figures)
+    yield Finding(
+        "growth",
+        time,
+        component=component,
+        variable=variable,
+        message=message,
+        until=None,
+        figures=figures,
+    )
 
 
 def _motions(seen: Seen, system: System, count: int) -> dict[str, Numbers]:

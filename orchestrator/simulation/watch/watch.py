@@ -321,7 +321,16 @@ def _late(starts: Mapping[str, LateStart]) -> Iterator[Finding]:
 def _misfits(found: Mapping[str, Sequence[Misfit]]) -> Iterator[Finding]:
     for name, misfits in found.items():
         yield from (
-            Finding(MISFIT, 0.0, name, "", m.sentence(name), None, m.figures) for m in misfits
+            Finding(
+                MISFIT,
+                0.0,
+                component=name,
+                variable="",
+                message=m.sentence(name),
+                until=None,
+                figures=m.figures,
+            )
+            for m in misfits
         )
 
 

@@ -100,11 +100,11 @@ def linearize_with_box(
     return BoxedSystem(
         component,
         response,
-        identified,
-        model,
-        max(moved, residual),
-        (*misfits, *tell(doubtful)),
-        misfits,
+        identified=identified,
+        model=model,
+        residual=max(moved, residual),
+        warnings=(*misfits, *tell(doubtful)),
+        misfits=misfits,
     )
 
 
@@ -140,7 +140,14 @@ def linear_with_boxes(
 ) -> tuple[StateSpace, OperatingPoint, Examination]:
     """The step map from inputs to outputs, with the verdict on it."""
     found, blocks = _with_boxes(
-        prepared, master, ELECTROMECHANICAL_HZ, None, Excitation(), None, inputs, outputs
+        prepared,
+        master,
+        frequency_range=ELECTROMECHANICAL_HZ,
+        critical=None,
+        excitation=Excitation(),
+        report=None,
+        inputs=inputs,
+        outputs=outputs,
     )
     space = state_space(blocks, master.schedule)
     return space, found.operating_point, Examination(found.stability, found.warnings)
@@ -177,7 +184,13 @@ def _with_boxes(
     blocks = Blocks(master, inputs=inputs, outputs=outputs, known=identified(master))
     point = OperatingPoint(most, most / master.clock.step_size, most, 0, {})
     return modes_from(
-        prepared, master, point, blocks, frequency_range, critical, identified
+        prepared,
+        master,
+        point=point,
+        blocks=blocks,
+        frequency_range=frequency_range,
+        critical=critical,
+        black_boxes=identified,
     ), blocks
 
 

@@ -121,12 +121,26 @@ def _fit_with(response: FrequencyResponse, real: int, pairs: int) -> IdentifiedM
     if not len(A) or not np.isfinite(A).all() or np.abs(np.linalg.eigvals(A)).max() >= 1:
         return None
     model = IdentifiedModel(
-        A, B, C, response.feedthrough, H, response.inputs, response.outputs, np.nan
+        A,
+        B,
+        C=C,
+        D=response.feedthrough,
+        step_size=H,
+        inputs=response.inputs,
+        outputs=response.outputs,
+        error=np.nan,
     )
     difference = np.linalg.norm(model.response(response.z) - data, ord=2, axis=(1, 2))
     error = float((difference / np.linalg.norm(response.values, ord=2, axis=(1, 2))).max())
     return IdentifiedModel(
-        A, B, C, response.feedthrough, H, response.inputs, response.outputs, error
+        A,
+        B,
+        C=C,
+        D=response.feedthrough,
+        step_size=H,
+        inputs=response.inputs,
+        outputs=response.outputs,
+        error=error,
     )
 
 

@@ -151,7 +151,13 @@ def matched_modes(
         likeness = float(alike[k, left].max(initial=0.0) if partner is None else alike[k, partner])
         accepted, reason = judge_mode(value, before)
         yield ModeVerdict(
-            value, before, likeness, accepted, reason, components[k] if components else "", doubt
+            value,
+            before,
+            similarity=likeness,
+            accepted=accepted,
+            reason=reason,
+            components=components[k] if components else "",
+            doubt=doubt,
         )
 
 

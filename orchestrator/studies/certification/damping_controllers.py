@@ -39,14 +39,9 @@ class DampingControllers:
             return f"without POD{_AS_DECLARED if self.declared else ''}"
         groups: dict[str, list[str]] = {}
         for letter in active:
-            said = (
-                _AS_DECLARED
-                if letter in self.declared
-                else f" ({UNSEEN})"
-                if letter in self.unseen
-                else ""
-            )
-            groups.setdefault(said, []).append(f"POD-{letter.upper()}")
+            note = f" ({UNSEEN})" if letter in self.unseen else ""
+            note = _AS_DECLARED if letter in self.declared else note
+            groups.setdefault(note, []).append(f"POD-{letter.upper()}")
         return "with " + " and ".join(
             f"{' and '.join(names)}{said}" for said, names in groups.items()
         )

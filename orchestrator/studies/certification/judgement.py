@@ -199,7 +199,14 @@ def judge(
     if time is None and not having.failure:
         faults.append(f"there is no response of {signal}")
     return PointVerdict(
-        having.X_L, modes, time, base, tuple(faults), beside, "" if faults else unknown, critical
+        having.X_L,
+        modes,
+        time=time,
+        base_time=base,
+        faults=tuple(faults),
+        neighbours=beside,
+        unknown="" if faults else unknown,
+        base_critical=critical,
     )
 
 

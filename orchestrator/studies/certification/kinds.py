@@ -240,7 +240,13 @@ class CertifyRequest:
         own = {name: value for name, value in values.items() if name not in study}
         reactances = self.reactances or REACTANCES
         norm = CertificationRequest(
-            as_device(fmu, binding), binding, own, self.pod, reactances, study, self.black_box
+            as_device(fmu, binding),
+            binding,
+            values=own,
+            pod=self.pod,
+            reactances=reactances,
+            study_values=study,
+            black_box=self.black_box,
         )
         norm.check()
         return Issue(

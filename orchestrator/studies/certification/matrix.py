@@ -304,7 +304,8 @@ def _cell_html(cell: MatrixCell) -> str:
         )
         return "<br>".join([word, *(escape(line) for line in rest)])
     passing = cell.exit_code == 0 and cell.failure is None
-    style = "good" if passing else "bad" if verdict == FAILS or cell.failure is not None else "soft"
+    style = "bad" if verdict == FAILS or cell.failure is not None else "soft"
+    style = "good" if passing else style
     word = f'<span class="{style}">{escape(verdict)}</span>'
     if cell.failure is None:
         word = f'<a href="{quote(f"{cell.folder}/{cell.page}")}">{word}</a>'

@@ -137,7 +137,7 @@ def pod_section(verdicts: Sequence[PointVerdict]) -> str:
         change, better = (
             "–" if x is None else number(x, 2) for x in (pod.apart("on", "off"), pod.better_off)
         )
-        said = "–" if pod.disagrees is None else "<b>yes</b>" if pod.disagrees else "no"
+        said = {None: "–", True: "<b>yes</b>", False: "no"}[pod.disagrees]
         rows.append([X_L, *(named.get(k, "–") for k in NAMES), said, change, better])
     columns = [
         "X_L [pu]",

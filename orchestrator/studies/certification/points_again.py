@@ -64,11 +64,11 @@ def rebuilt(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Cer
     return Certificate(
         request,
         description,
-        NTS,
-        NTS.f_n,
-        verdicts,
-        points,
-        folder / CASE,
+        code=NTS,
+        f_n=NTS.f_n,
+        verdicts=verdicts,
+        results=points,
+        case=folder / CASE,
         damping=DampingTest(controllers, event),
     )
 

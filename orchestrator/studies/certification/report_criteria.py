@@ -325,11 +325,10 @@ def _time_cells(time: TimeVerdict | None) -> list[str]:
     if time is None:
         return ["–"] * 4
     swings, test = time.swings.swings, time.swings
-    depths = (
-        [f"{s.depth:.4g}" for s in (swings[0], swings[4])]
-        if len(swings) >= 5
-        else [f"{swings[0].depth:.4g}" if swings else "–", "died out" if test.accepted else "–"]
-    )
+    first = f"{swings[0].depth:.4g}" if swings else "–"
+    died_out = "died out" if test.accepted else "–"
+    fifth = f"{swings[4].depth:.4g}" if len(swings) >= 5 else died_out
+    depths = [first, fifth]
     ratio = "–" if test.ratio is None else f"{test.ratio:.3f}"
     least = min((m.damping_percent for m in time.modal.modes), default=None)
     return [

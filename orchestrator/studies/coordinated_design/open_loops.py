@@ -184,13 +184,13 @@ def _reduced(whole: OpenLoops) -> OpenLoops | None:
     return OpenLoops(
         matrix,
         from_all @ U,
-        V @ to_all,
-        whole.D + at_rest.real,
-        whole.places,
-        whole.names,
-        to_all,
-        from_all,
-        rest,
+        V=V @ to_all,
+        D=whole.D + at_rest.real,
+        places=whole.places,
+        names=whole.names,
+        right=to_all,
+        left=from_all,
+        rest=rest,
     )
 
 

@@ -362,7 +362,13 @@ def design_over_points(
     # the least gain is not the best
     designed = (places[0], settings[0]) if len(places) == 1 and not reached else None
     alone = ranked(
-        plan.candidates, _stages(plan), alike, largest, frequency, plan.request.ranked, designed
+        plan.candidates,
+        _stages(plan),
+        points=alike,
+        largest=largest,
+        frequency=frequency,
+        most=plan.request.ranked,
+        known=designed,
     )
     known = {designed[0]: after} if designed else {}
     quietly = replace(work, report=nobody)
@@ -389,7 +395,15 @@ def design_over_points(
         )
     )
     return PointsDesign(
-        plan, frequency, settings, found, points, ranking, search.evaluations, compared, thin
+        plan,
+        frequency,
+        settings=settings,
+        found=found,
+        points=points,
+        ranking=ranking,
+        evaluations=search.evaluations,
+        compared=compared,
+        thin=thin,
     )
 
 

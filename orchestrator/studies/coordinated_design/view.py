@@ -227,13 +227,9 @@ def points_table(verdict: PointsVerdict) -> ColumnTable[JudgedPoint]:
     """Each operating point with each outage; "" where there is no figure."""
 
     def of(mode: PlacedMode | None, figure: str) -> float | str:
-        return (
-            ""
-            if mode is None
-            else 100 * mode.damping_ratio
-            if figure == "damping"
-            else mode.frequency_hz
-        )
+        if mode is None:
+            return ""
+        return 100 * mode.damping_ratio if figure == "damping" else mode.frequency_hz
 
     of_all = "all modes [%]" if verdict.names or verdict.some_apart else ""
     return ColumnTable(

@@ -70,16 +70,16 @@ def cut_of(prepared: PreparedScenario, bus: str | None, names: tuple[str, ...]) 
     return Cut(
         devices,
         device,
-        network,
-        judge(model, spectrum).stable,
-        voltages,
-        currents,
-        rated_frequency(prepared),
-        said,
-        spectrum.eigenvalues if spectrum else found,
-        places.pop() if len(places) == 1 else "",
-        tuple((homes[at[0]], at) for at in ports),
-        units,
+        network=network,
+        modes_stable=judge(model, spectrum).stable,
+        voltages=voltages,
+        currents=currents,
+        rated_hz=rated_frequency(prepared),
+        warnings=said,
+        eigenvalues=spectrum.eigenvalues if spectrum else found,
+        bus=places.pop() if len(places) == 1 else "",
+        ports=tuple((homes[at[0]], at) for at in ports),
+        units=units,
     )
 
 

@@ -53,14 +53,15 @@ def figures_of(path: LoopPath, growing: int | None, rated: float) -> LoopFigures
     modes = [p for p in modes if p.real < 0 or not sign > 0]  # the count knows better what grows
     mode = None if not modes or (sign < 0 and modes[0].real < 0) else modes[0]
     beyond = [gain.value for gain in gains_of(path, crossings) if gain.value < 1]
-    weaker = (
-        (m.gain_up.value if m.gain_up else math.inf) if sign > 0 else min(beyond, default=math.nan)
-    )
+    up = m.gain_up.value if m.gain_up else math.inf
+    weaker = up if sign > 0 else min(beyond, default=math.nan)
     return LoopFigures(sign * m.distance.value, m.distance.frequency_hz, mode, weaker)
 
 
 def _sign(growing: int | None) -> float:
-    return math.nan if growing is None or growing < 0 else 1.0 if growing == 0 else -1.0
+    if growing is None or growing < 0:
+        return math.nan
+    return 1.0 if growing == 0 else -1.0
 
 
 def light_modes(path: LoopPath, centres: Numbers = _EVERYWHERE) -> list[complex]:
@@ -134,11 +135,11 @@ class Family:
         return Family(
             self.nodes[kept],
             self.s,
-            self.loops[kept],
-            tuple(np.array(self.poles)[kept].tolist()),
-            self.exact,
-            self.rated,
-            self.lead,
+            loops=self.loops[kept],
+            poles=tuple(np.array(self.poles)[kept].tolist()),
+            exact=self.exact,
+            rated=self.rated,
+            lead=self.lead,
         )
 
     def _path(self, L: Complex) -> LoopPath:

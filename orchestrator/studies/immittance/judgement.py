@@ -112,13 +112,8 @@ def judge_loop(
     reasons += [reason for bus in buses if (reason := _doubt(loop, bus))]
     if not frames_known and not reasons:
         reasons += _frames(loop, nodes, count)
-    verdict = (
-        NyquistVerdict.NOT_KNOWN
-        if reasons
-        else NyquistVerdict.UNSTABLE
-        if growing
-        else NyquistVerdict.STABLE
-    )
+    verdict = NyquistVerdict.UNSTABLE if growing else NyquistVerdict.STABLE
+    verdict = NyquistVerdict.NOT_KNOWN if reasons else verdict
     margins = margins_of(path, crossings)
     active = {
         "device": bands_of(*_active(loop.device)),
@@ -128,17 +123,17 @@ def judge_loop(
     return CutJudgement(
         verdict,
         tuple(reasons),
-        None if reasons else growing,
-        count,
-        by_loci,
-        poles,
-        tuple(crossings),
-        margins,
-        path,
-        (low, high),
-        active,
-        small,
-        buses,
+        growing=None if reasons else growing,
+        encirclements=count,
+        by_loci=by_loci,
+        open_loop=poles,
+        crossings=tuple(crossings),
+        margins=margins,
+        path=path,
+        range_hz=(low, high),
+        active=active,
+        small_gain=small,
+        buses=buses,
     )
 
 

@@ -52,7 +52,15 @@ def as_scan(
     power = voltage * complex(*response.operating_point).conjugate() * SYSTEM_BASE_MVA
     point = PortPoint(abs(voltage) * kilovolt, power.real, power.imag, cmath.phase(voltage))
     share = np.interp(frequencies, measured, bounds) + model.error
-    in_network = Scan(name, frequencies, values, (name,), PER_UNIT, share * size, {name: point})
+    in_network = Scan(
+        name,
+        frequencies,
+        values=values,
+        ports=(name,),
+        unit=PER_UNIT,
+        bounds=share * size,
+        points={name: point},
+    )
     return in_network.rotated([-cmath.phase(voltage)])
 
 

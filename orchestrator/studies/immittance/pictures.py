@@ -95,7 +95,8 @@ def _eigenloci(judgement: CutJudgement, title: str) -> Figure:
     ):
         for k in range(count):
             z = path.loci[:, k]
-            label = f"locus {k + 1}" if count <= _NAMED else None if k else f"{count} loci"
+            of_all = None if k else f"{count} loci"
+            label = f"locus {k + 1}" if count <= _NAMED else of_all
             axes.plot(z.real, z.imag, color=colour(k + 1), label=label)
             axes.plot(z.real, -z.imag, color=colour(k + 1), linestyle=":", linewidth=0.8)
         turn = np.exp(2j * np.pi * np.linspace(0, 1, 200))

@@ -146,7 +146,15 @@ def _family(out: Retuned, values: list[float] | None = None) -> Family:
     loops = np.array([result.loop.values(s) for result in results])
     poles = tuple(len(result.judgement.open_loop) for result in results)
     rated, loop = 2 * np.pi * results[0].request.frequency, results[0].loop
-    return Family(np.array(nodes), s, loops, poles, loop.is_exact, rated, loop.lead)
+    return Family(
+        np.array(nodes),
+        s,
+        loops=loops,
+        poles=poles,
+        exact=loop.is_exact,
+        rated=rated,
+        lead=loop.lead,
+    )
 
 
 def _end(study: Study, out: Retuned, end: float, report: Callable[[str], None]) -> float:

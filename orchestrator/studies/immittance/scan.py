@@ -183,7 +183,9 @@ def _rated_seen(frequencies: Numbers, values: Vector, rated_hz: float) -> float:
         < _SURE
         for sign in (1, -1)
     )
-    return -1.0 if opposite else 1.0 if met and seen < _OTHER_AXIS else seen
+    if opposite:
+        return -1.0
+    return 1.0 if met and seen < _OTHER_AXIS else seen
 
 
 def _turning(

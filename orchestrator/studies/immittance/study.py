@@ -227,9 +227,8 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
     questions = tuple(q for scan in scans.values() for q in scan.questions) + (
         cut.warnings if cut else ()
     )
-    device: Side | None = (
-        sampled(scans["device"]) if "device" in scans else cut.device if cut else None
-    )
+    device: Side | None = cut.device if cut else None
+    device = sampled(scans["device"]) if "device" in scans else device
     rating, kilovolt = _rating(request, cut), request.kilovolt
     questions += tuple(
         f"{scan.source} was scanned at {point.megawatt:g} MW, and the device is rated at {rating:g} MVA; do both hold?"
@@ -241,14 +240,10 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
         kilovolt = kilovolt or next(
             (point.kilovolt for point in scan.points.values() if point.kilovolt), None
         )
-    base = SYSTEM_BASE_MVA if unit == PER_UNIT else kilovolt**2 if kilovolt else None
-    network: Side | None = (
-        sampled(scans["network"], inverse=True)
-        if "network" in scans
-        else cut.network
-        if cut
-        else None
-    )
+    of_ohms = kilovolt**2 if kilovolt else None
+    base = SYSTEM_BASE_MVA if unit == PER_UNIT else of_ohms
+    network: Side | None = cut.network if cut else None
+    network = sampled(scans["network"], inverse=True) if "network" in scans else network
     if request.scr is not None:
         network = _source(request, rating, base)
     assert device is not None

@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from orchestrator.core.errors import CosimError, ErrorKind
+from orchestrator.core.truth import all_true
 from orchestrator.studies.interactions.exchange import settings_of
 from orchestrator.studies.interactions.following import Follow, FollowedMode, Ways, followed
 from orchestrator.studies.interactions.places import NOT_VENDORS, by_group, first_of
@@ -380,8 +381,7 @@ class JudgedInteractions:
     @property
     def stable(self) -> bool | None:
         """Return whether no system of the study grows; None where one has no verdict and none grows."""
-        verdicts = [record.stable for record in self.result.records.values()]
-        return False if False in verdicts else None if None in verdicts else True
+        return all_true(record.stable for record in self.result.records.values())
 
     def participation(self, mode: SharedMode) -> dict[str, float]:
         return by_group(mode.components, self.result.plan.groups)

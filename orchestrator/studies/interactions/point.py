@@ -83,7 +83,15 @@ class KeptModel:
     def model(self) -> LinearModel:
         F, G, H, K = (kept.matrix() for kept in (self.F, self.G, self.H, self.K))
         return LinearModel(
-            F, G, H, K, self.names, self.step_size, 0.0, period=self.period, wires=self.wires
+            F,
+            G,
+            H=H,
+            K=K,
+            names=self.names,
+            step_size=self.step_size,
+            disagreement=0.0,
+            period=self.period,
+            wires=self.wires,
         )
 
 

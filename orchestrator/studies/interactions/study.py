@@ -109,15 +109,15 @@ def plan_interactions(case: Case, request: InteractionsRequest) -> InteractionsP
     return InteractionsPlan(
         case,
         prepared,
-        layers,
-        step_size,
-        request,
-        places,
-        groups,
-        stand_in,
-        swapped,
-        systems,
-        files,
+        layers=layers,
+        step_size=step_size,
+        request=request,
+        places=places,
+        groups=groups,
+        stand_in=stand_in,
+        swapped=swapped,
+        systems=systems,
+        files=files,
     )
 
 

@@ -160,13 +160,13 @@ class Interactions(NoTruth):
         return Cells(
             title,
             plan.case,
-            plan.prepared.name,
-            plan.request.frequencies,
-            sides,
-            sides,
-            pairs,
-            values,
-            plan.step_size,
+            scenario=plan.prepared.name,
+            frequencies=plan.request.frequencies,
+            rows=sides,
+            columns=sides,
+            cells=pairs,
+            values=values,
+            step=plan.step_size,
         )
 
     def __repr__(self) -> str:

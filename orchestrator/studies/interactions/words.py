@@ -103,9 +103,8 @@ def swap_sentence(judgement: JudgedInteractions) -> str:
     counted = (
         f"{grows} of {len(found)} are UNSTABLE" if grows else f"none of {len(found)} is UNSTABLE"
     )
-    rest = (
-        f", {len(unknown)} {'has' if len(unknown) == 1 else 'have'} no verdict" if unknown else ""
-    )
+    have = "has" if len(unknown) == 1 else "have"
+    rest = f", {len(unknown)} {have} no verdict" if unknown else ""
     figure = f"least damping {damping_text(worst)} %{', ' if worst.critical else ''}{frequency_text(worst)}"
     return f"worst assignment: {plan_text(swapped, worst.name)}: {verdict_word(worst)}, {figure}; {counted}{rest}"
 

@@ -195,7 +195,16 @@ def linearised(
     point = find_operating_point(master)
     said += settled_warnings(master)
     blocks = Blocks(master, derivatives=True, directional=directional)
-    return Linearised(prepared, master, point, blocks, frequency_range, critical, said, misfits)
+    return Linearised(
+        prepared,
+        master,
+        point=point,
+        blocks=blocks,
+        frequency_range=frequency_range,
+        critical=critical,
+        said=said,
+        misfits=misfits,
+    )
 
 
 def modes_from(
@@ -211,7 +220,15 @@ def modes_from(
     misfits = misfits_of(master)
     return _computed(
         Linearised(
-            prepared, master, point, blocks, frequency_range, critical, (), misfits, black_boxes
+            prepared,
+            master,
+            point=point,
+            blocks=blocks,
+            frequency_range=frequency_range,
+            critical=critical,
+            said=(),
+            misfits=misfits,
+            black_boxes=black_boxes,
         )
     )
 
@@ -303,11 +320,11 @@ class Linearised:
             self.named = identified(
                 prepared,
                 self._point,
-                model,
-                swinging,
-                self._range,
-                known,
-                self._at_gains,
+                model=model,
+                modes=swinging,
+                frequency_range=self._range,
+                known=known,
+                at_gains=self._at_gains,
                 directional=directional,
                 black_boxes=self._black_boxes,
                 master=self._master,

@@ -165,7 +165,13 @@ def choose_step(
         trials: list[TriedStep] = []
         for name in dict.fromkeys(schedules or TRIED):
             trials += _tried(
-                prepared, master, name, lengths, critical, growth, None if steps else allowed
+                prepared,
+                master,
+                name=name,
+                steps=lengths,
+                critical=critical,
+                growth=growth,
+                allowed=None if steps else allowed,
             )
     return StepChoice(
         prepared, allowed, critical, growth, tuple(trials), tuple(left_out) if steps else ()
@@ -266,13 +272,13 @@ def _trial(
     return TriedStep(
         name,
         step,
-        (seen.imag - critical.imag) / (2 * np.pi),
-        np.array(
+        hertz=(seen.imag - critical.imag) / (2 * np.pi),
+        points=np.array(
             [damping_percent(a) - damping_percent(b) for a, b in zip(seen, critical, strict=True)]
         ),
-        seen,
-        rate,
-        keeps_stability(rate, growth, seen, critical),
+        eigenvalues=seen,
+        growth=rate,
+        stable=keeps_stability(rate, growth, seen, critical),
         doubts=_doubts(blocks, schedule, model),
     )
 

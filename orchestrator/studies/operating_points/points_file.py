@@ -247,7 +247,15 @@ def _point(
         prepared.device_loads, ""
     )  # DC lines and the like have a power of their own
     scales = {
-        load: _scale_of(load, factors[column], column, elements, prepared, values.found, place)
+        load: _scale_of(
+            load,
+            factors[column],
+            column=column,
+            elements=elements,
+            prepared=prepared,
+            values=values.found,
+            place=place,
+        )
         for load, column in columns.items()
     }
     for load, column in columns.items():

@@ -186,7 +186,16 @@ def _described(signals: Signals, frequency: float, shown: dict[int, float]) -> S
     clear = sum(above > _AS_CLEAR * max(shown.values()) for above in shown.values())
     seen = slice(0, last - half if last < len(signals.times) else len(z))
     onset = None if begin is None else onset_of(signals.times, z[seen], half, frequency)
-    return SpectralLine(frequency, begin, first, last, {}, amplitudes, clear, onset)
+    return SpectralLine(
+        frequency,
+        begin,
+        first=first,
+        last=last,
+        harmonics={},
+        amplitudes=amplitudes,
+        clear=clear,
+        onset=onset,
+    )
 
 
 def _relative(signals: Signals, base: SpectralLine, order: int) -> float:

@@ -76,7 +76,14 @@ def _of_run(dataset: xr.Dataset) -> list[Site]:
         kind: Kind = "branch" if beyond else "unit"
         found.append(
             Site(
-                name, kind, bus, np.abs(voltage), np.angle(voltage), power.real, power.imag, beyond
+                name,
+                kind,
+                bus=bus,
+                v=np.abs(voltage),
+                angle=np.angle(voltage),
+                p=power.real,
+                q=power.imag,
+                beyond=beyond,
             )
         )
     return found
@@ -114,12 +121,12 @@ def _of_columns(dataset: xr.Dataset, label: str) -> tuple[list[Site], float, lis
                 Site(
                     place,
                     kind,
-                    bus,
-                    seen["vm"],
-                    seen["va"],
-                    sign * seen["p"],
-                    sign * seen["q"],
-                    beyond,
+                    bus=bus,
+                    v=seen["vm"],
+                    angle=seen["va"],
+                    p=sign * seen["p"],
+                    q=sign * seen["q"],
+                    beyond=beyond,
                 )
             )
     used = {site.name for site in found} | {site.bus for site in found}
@@ -183,12 +190,12 @@ def read_contest(folder: Path) -> Measurements:
             Site(
                 " ".join((bus if alone else name).split()),
                 "unit" if alone else "branch",
-                parts[0],
-                vm[bus],
-                angle,
-                power.real,
-                power.imag,
-                "" if alone else parts[2],
+                bus=parts[0],
+                v=vm[bus],
+                angle=angle,
+                p=power.real,
+                q=power.imag,
+                beyond="" if alone else parts[2],
             )
         )
     if not places:

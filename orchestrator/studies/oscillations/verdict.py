@@ -83,13 +83,13 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
         return Evidence(
             "not known",
             0.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            periods,
-            False,
-            (f"only {periods:.1f} periods are seen",),
+            envelope_spread=0.0,
+            kurtosis=0.0,
+            coherence=0.0,
+            skirt=0.0,
+            periods=periods,
+            disturbed=False,
+            reasons=(f"only {periods:.1f} periods are seen",),
         )
     seen, envelopes = [], []
     for k in columns:
@@ -116,7 +116,15 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
     damping = float(-100 * slope / np.hypot(slope, 2 * np.pi * f))
     shocked = _disturbed(signals, found)
     figures = Evidence(
-        "not known", damping, spread, kurtosis, coherence, beside, periods, shocked, ()
+        "not known",
+        damping,
+        envelope_spread=spread,
+        kurtosis=kurtosis,
+        coherence=coherence,
+        skirt=beside,
+        periods=periods,
+        disturbed=shocked,
+        reasons=(),
     )
     kind, reasons = _judge(figures, change, pair, found)
     if kind != "not known":
@@ -278,7 +286,15 @@ def locate(measured: Measurements, models: UnitModels | None = None) -> list[Loc
             reason += f"; whether {drives} does so alone is not known"
         advice = _advice(measured, evidence, drives, sole=sole)
         answers.append(
-            Located(one, evidence, tuple(said), drives, drives if sole else None, reason, advice)
+            Located(
+                one,
+                evidence,
+                opinions=tuple(said),
+                drives=drives,
+                source=drives if sole else None,
+                reason=reason,
+                advice=advice,
+            )
         )
     return answers
 

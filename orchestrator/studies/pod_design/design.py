@@ -327,14 +327,14 @@ def design_pod(
             start = _Start(
                 case.name,
                 request,
-                target,
-                prepared,
-                name,
-                off,
-                before.without(before.named),
-                naming,
-                examined,
-                search,
+                target=target,
+                prepared=prepared,
+                mode_name=name,
+                off=off,
+                before=before.without(before.named),
+                naming=naming,
+                examined=examined,
+                search=search,
             )
             return _design(start, loop, report)
 
@@ -417,7 +417,15 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
     if request.refine or ((short or broken) and request.gain_bounds is None):
         bounds, evenly = request.bounds(search=True), request.mode is None
         refinement = refine(
-            loop, off, filters, required, bounds, judge, settings, evenly=evenly, report=report
+            loop,
+            off,
+            filters=filters,
+            required=required,
+            bounds=bounds,
+            judge=judge,
+            search=settings,
+            evenly=evenly,
+            report=report,
         )
         final = refinement.chosen or designed
         after = around(final)

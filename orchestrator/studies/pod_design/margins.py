@@ -161,7 +161,16 @@ def compute_margins(
     found, why = _of_loop(loop, nominal.setting)
     report("margins: other values of the setting")
     varied = _variations(loop, off, nominal.setting)
-    return Margins(limit, up, down, lost_up, lost_down, found, why, varied)
+    return Margins(
+        limit,
+        up,
+        down=down,
+        lost_up=lost_up,
+        lost_down=lost_down,
+        loop=found,
+        no_loop=why,
+        variations=varied,
+    )
 
 
 def _extremes(loop: PodLoop, setting: PodSetting) -> tuple[complex, complex | None]:

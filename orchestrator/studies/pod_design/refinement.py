@@ -103,7 +103,15 @@ def refine(
     for why, candidate, gain in chain(near, _searched(result, search)):
         report(f"refinement, lead/lag {why}: {len(result.sweeps)} swept before")
         try:
-            found = sweep(loop, off, candidate, required, bounds, why, gain)
+            found = sweep(
+                loop,
+                off,
+                filters=candidate,
+                required=required,
+                bounds=bounds,
+                why=why,
+                special=gain,
+            )
         except AnalysisError as error:
             result.notes.append(f"{why}: {error}")
             continue

@@ -79,13 +79,13 @@ def run_like(
     emulation = emulate(
         prepared.system,
         rules,
-        prepared.step_size,
-        prepared.stop_time,
-        prepared.record,
-        prepared.record_every,
-        prepared.events,
-        order,
-        observers,
+        step_size=prepared.step_size,
+        stop_time=prepared.stop_time,
+        record=prepared.record,
+        every=prepared.record_every,
+        events=prepared.events,
+        order=order,
+        observers=observers,
     )
     schedule = rules.schedule(tuple(prepared.system.components), order)
     dataset = trajectory_dataset(emulation, replace(prepared, schedule=schedule))

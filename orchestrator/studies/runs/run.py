@@ -241,14 +241,14 @@ def _run(
     return RunResult(
         modes,
         dataset,
-        statistics,
-        ring_down,
-        shifts,
-        follows,
-        failure,
-        findings,
-        protections,
-        after,
+        statistics=statistics,
+        ring_down=ring_down,
+        shifts=shifts,
+        linear=follows,
+        failure=failure,
+        findings=findings,
+        protections=protections,
+        after=after,
     )
 
 

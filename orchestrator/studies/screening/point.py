@@ -255,11 +255,12 @@ class _Worker:
         certain: bool,
     ) -> ItemRecord:
         critical, counted = found.critical(self._task.wanted), found.growing_elsewhere is not None
+        stable = True if counted and certain else None  # where none grows of those that were found
         return ItemRecord(
             Status.COMPUTED,
             warnings=warnings,
             residual=residual,
-            stable=False if found.grows else True if counted and certain else None,
+            stable=False if found.grows else stable,
             counted=counted,
             growing_elsewhere=found.growing_elsewhere or 0,
             fastest=None if found.fastest is None else (found.fastest.real, found.fastest.imag),

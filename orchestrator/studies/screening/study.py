@@ -65,7 +65,15 @@ def plan_screening(case: Case, request: ScreeningRequest) -> ScreeningPlan:
         point = read.points[part[0].point]
         anchor = Item(part[0].point, 0, point.values, point.out)
         tasks.append(
-            StretchTask(study, region, anchor, part, request.whole, sharing, request.move_controls)
+            StretchTask(
+                study,
+                region,
+                anchor=anchor,
+                items=part,
+                whole=request.whole,
+                sharing=sharing,
+                move_controls=request.move_controls,
+            )
         )
     return ScreeningPlan(**vars(read), wanted=region, tasks=tuple(tasks))
 

@@ -186,15 +186,15 @@ def _cells(summary: Summary) -> Cells:
     return Cells(
         f"Least damping of {plan.case.table.title or plan.case.name}: outages, worst first, by operating points",
         plan.case,
-        plan.prepared.name,
-        (plan.wanted.lowest_hz, plan.wanted.highest_hz),
-        [CellLine(name, out=taken[name]) for name in outages],
-        [CellLine(one.name, one.values, out=one.out) for one in plan.points],
-        [[cell(of.get((name, point.name))) for point in plan.points] for name in outages],
-        joined_values(plan.layers),
-        plan.tasks[0].study.step_size,
-        plan.tasks[0].sharing,
-        plan.tasks[0].move_controls,
+        scenario=plan.prepared.name,
+        frequencies=(plan.wanted.lowest_hz, plan.wanted.highest_hz),
+        rows=[CellLine(name, out=taken[name]) for name in outages],
+        columns=[CellLine(one.name, one.values, out=one.out) for one in plan.points],
+        cells=[[cell(of.get((name, point.name))) for point in plan.points] for name in outages],
+        values=joined_values(plan.layers),
+        step=plan.tasks[0].study.step_size,
+        sharing=plan.tasks[0].sharing,
+        move_controls=plan.tasks[0].move_controls,
     )
 
 

@@ -112,5 +112,11 @@ def _check_fits(
 def _parameter(component: str, info: VariableInfo, value: float) -> Parameter:
     tunable = info.variability == "tunable"
     return Parameter(
-        component, info.name, info.unit or "1", value, tunable, info.minimum, info.maximum
+        component,
+        info.name,
+        unit=info.unit or "1",
+        value=value,
+        tunable=tunable,
+        minimum=info.minimum,
+        maximum=info.maximum,
     )

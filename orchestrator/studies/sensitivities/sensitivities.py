@@ -362,7 +362,15 @@ def _row(
 
 
 def _none(parameter: Parameter, mode: Mode, operating_point: str, reason: str) -> Sensitivity:
-    return Sensitivity(parameter, mode.eigenvalue, None, None, operating_point, (), reason)
+    return Sensitivity(
+        parameter,
+        mode.eigenvalue,
+        derivative=None,
+        continuous=None,
+        operating_point=operating_point,
+        doubts=(),
+        reason=reason,
+    )
 
 
 def _between_models(derivative: Derivative, parameter: Parameter, mode: Mode) -> tuple[str, ...]:

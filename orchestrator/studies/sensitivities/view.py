@@ -166,7 +166,9 @@ def as_json(result: SensitivityResult) -> dict[str, Any]:
 
 
 def _text(figure: float | None) -> str:
-    return "–" if figure is None else "0" if figure == 0 else f"{figure:+.3g}"
+    if figure is None:
+        return "–"
+    return "0" if figure == 0 else f"{figure:+.3g}"
 
 
 def left_out(result: SensitivityResult) -> list[Sensitivity]:

@@ -205,11 +205,11 @@ def compare(
             first.attrs.get("units")
             or a[expression.partition(" - ")[0].strip()].attrs.get("units", "")
         ),
-        (float(np.abs(y_1 - y_1[0]).max()), float(np.abs(y_2 - y_2[0]).max())),
-        float(abs(difference[worst])),
-        float(np.sqrt(np.mean(difference**2))),
-        float(common.times[worst]),
-        (_strongest(first, start), _strongest(second, start)),
+        deviations=(float(np.abs(y_1 - y_1[0]).max()), float(np.abs(y_2 - y_2[0]).max())),
+        largest=float(abs(difference[worst])),
+        rms=float(np.sqrt(np.mean(difference**2))),
+        at=float(common.times[worst]),
+        modes=(_strongest(first, start), _strongest(second, start)),
     )
 
 

@@ -179,12 +179,12 @@ def _with_pod(
     return Confirmation(
         bus,
         predicted,
-        coupled,
-        start.eigenvalue,
-        tuned,
-        reached.eigenvalue,
-        least,
-        stable,
+        coupled=coupled,
+        with_device=start.eigenvalue,
+        setting=tuned,
+        tuned=reached.eigenvalue,
+        least=least,
+        stable=stable,
         search=search,
     )
 

@@ -13,6 +13,7 @@ from rich.table import Table
 from orchestrator.core.errors import few
 from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder, write_text
+from orchestrator.core.truth import all_true
 from orchestrator.linear.spectra.modes import damping_percent
 from orchestrator.output.report.html.elements import Figures, damping, document, table
 from orchestrator.output.report.html.network_map import network_map
@@ -290,7 +291,7 @@ def as_json(result: SiteResult) -> dict[str, Any]:
         if result.by_coupled
         else unit(result),
         "terminals_left_out": list(result.terminals),
-        "stable": False if False in stable else None if None in stable else True,
+        "stable": all_true(stable),
         "warnings": list(result.intact.found.warnings),
         "code": code_hash(),
         "modes": _modes(result.intact.modes),

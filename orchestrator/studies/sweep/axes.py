@@ -27,7 +27,16 @@ _KEYS = r"[^.\s]+\.[^\s,]+(\s*,\s*[^.\s]+\.[^\s,]+)*"
 _LENGTH, _SCR = "length", "scr"
 _MOST = 100_000
 _ALPHA_INFO = VariableInfo(
-    ALPHA, 0, "Real", "parameter", "fixed", "", None, 0.0, 1.0, "Share of the converters"
+    ALPHA,
+    0,
+    type="Real",
+    causality="parameter",
+    variability="fixed",
+    unit="",
+    start=None,
+    minimum=0.0,
+    maximum=1.0,
+    description="Share of the converters",
 )
 
 
@@ -201,7 +210,16 @@ def _length_axis(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
             for quantity in ("X", "R", "B") if line.B else ("X", "R"):
                 members |= _of_line(vary, scenarios, line.variable(quantity))
     info = VariableInfo(
-        _LENGTH, 0, "Real", "parameter", "fixed", "", None, 1e-6, None, f"Length of {names}"
+        _LENGTH,
+        0,
+        type="Real",
+        causality="parameter",
+        variability="fixed",
+        unit="",
+        start=None,
+        minimum=1e-6,
+        maximum=None,
+        description=f"Length of {names}",
     )
     return replace(_axis(vary, info), members=tuple(members.items()))
 
@@ -229,23 +247,21 @@ def _scr_axis(vary: Vary, bus: str, scenarios: Sequence[PreparedScenario]) -> Ax
             )
         members: dict[str, float] = {}
         for line in one.network.lines if one.network else ():
-            for quantity in (
-                ("X", "R", "X_C")[: 3 if line.X_C else 2]
-                if bus in (line.from_bus, line.to_bus)
-                else ()
-            ):
+            if bus not in (line.from_bus, line.to_bus):
+                continue
+            for quantity in ("X", "R", "X_C") if line.X_C else ("X", "R"):
                 members |= _of_line(vary, scenarios, line.variable(quantity))
         info = VariableInfo(
             _SCR,
             0,
-            "Real",
-            "parameter",
-            "fixed",
-            "MVA" if in_mva else "",
-            None,
-            1e-3,
-            None,
-            vary.key,
+            type="Real",
+            causality="parameter",
+            variability="fixed",
+            unit="MVA" if in_mva else "",
+            start=None,
+            minimum=1e-3,
+            maximum=None,
+            description=vary.key,
         )
         axis = _axis(vary, info)
         unit = 1.0 if in_mva else max(ratings)

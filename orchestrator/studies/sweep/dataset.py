@@ -281,7 +281,8 @@ def sweep_json(samples: Samples) -> dict[str, Any]:
     for sweep, place, error in result.failures():
         failed[sweep.prepared.name].append({"values": samples.setting(place), "error": error})
     limits = [limit.as_json() for limit in result.limits]
-    found = {} if not limits else (limits[0] if len(limits) == 1 else {}) | {"limits": limits}
+    only = limits[0] if len(limits) == 1 else {}
+    found = only | {"limits": limits} if limits else {}
     return found | {
         "case": result.plan.case.name,
         "parameters": [

@@ -63,9 +63,8 @@ def _varied(vary: Any, argument: str) -> tuple[Vary, ...]:
             f"{argument}: a {type(vary).__name__} is no grid; give lists by name, {_HOW}; a row for each operating "
             "point is what case.screen takes as points"
         )
-    given: list[Any] = (
-        [vary] if isinstance(vary, str) else list(vary) if isinstance(vary, Iterable) else [None]
-    )
+    given: list[Any] = list(vary) if isinstance(vary, Iterable) else [None]
+    given = [vary] if isinstance(vary, str) else given
     if not given or not all(isinstance(one, str | Vary) for one in given):
         raise InputError(f"{argument} = {vary!r}; give what is varied, {_HOW}")
     try:

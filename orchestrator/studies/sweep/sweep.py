@@ -16,6 +16,7 @@ from orchestrator.cases.questions.idle_values import Idle, idle_everywhere
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.cases.settings.layers import joined_values
 from orchestrator.core.errors import CaseError, InputError, Problem
+from orchestrator.core.truth import all_true
 from orchestrator.linear.spectra.mode_tracking import ModeSet, is_ambiguous
 from orchestrator.studies.points.points import Work
 from orchestrator.studies.points.task import StudyCase
@@ -114,8 +115,7 @@ class ScenarioSweep:
 
     @property
     def stable(self) -> bool | None:
-        verdicts = [record.stability.get("stable") for record in self.points.values()]
-        return False if False in verdicts else None if None in verdicts else True
+        return all_true(record.stability.get("stable") for record in self.points.values())
 
 
 @dataclass
@@ -153,13 +153,13 @@ def plan_sweep(case: Case, request: SweepRequest) -> SweepPlan:
     plan = SweepPlan(
         case,
         axes,
-        tuple(prepared),
-        request.layers,
-        request.step_size,
-        request.frequencies,
-        (),
-        until,
-        request.black_box,
+        scenarios=tuple(prepared),
+        layers=request.layers,
+        step_size=request.step_size,
+        frequency_range=request.frequencies,
+        idle=(),
+        until=until,
+        black_box=request.black_box,
     )
     refuse_doubles(axes, prepared)
     ends = [plan.values(tuple(end % len(axis.values) for axis in axes)) for end in (0, -1)]
@@ -297,26 +297,28 @@ def _limit(result: SweepResult, sweep: ScenarioSweep, work: Work) -> ParameterLi
     return ParameterLimit(
         axis.key,
         axis.unit,
-        sweep.prepared.name,
-        sweep.prepared.title,
-        until,
-        end,
-        value(holds),
-        value(beyond),
-        mode,
-        who,
-        tuple(tried),
-        tuple(float(axis.values[k]) for k in again),
-        why,
-        float(axis.values[worst]),
-        strained,
+        scenario=sweep.prepared.name,
+        title=sweep.prepared.title,
+        until=until,
+        kind=end,
+        holds_at=value(holds),
+        beyond=value(beyond),
+        mode=mode,
+        who=who,
+        tried=tuple(tried),
+        again=tuple(float(axis.values[k]) for k in again),
+        why=why,
+        worst_at=float(axis.values[worst]),
+        strained=strained,
     )
 
 
 def _margin(record: PointRecord) -> float:
     rate = record.stability.get("largest_growth_rate")
     least = least_damping(record)
-    return least if least is not None else np.inf if rate is None else -rate
+    if least is not None:
+        return least
+    return np.inf if rate is None else -rate
 
 
 def _gaps(plan: SweepPlan, sweep: ScenarioSweep, width: float) -> Iterator[GridPlace]:

@@ -113,13 +113,8 @@ def _history(
         if origin is None:
             frequency = float(modes[place].frequencies[index])
             entered = near_an_end(frequency, frequency_range)
-            return np.nan, (
-                Beginning.START
-                if place in first
-                else Beginning.ENTERED
-                if entered
-                else Beginning.BROKEN
-            )
+            later = Beginning.ENTERED if entered else Beginning.BROKEN
+            return np.nan, Beginning.START if place in first else later
         alike = min(alike, followed.similarity[place][index])
         if _on_grid(origin):
             return alike, Beginning.REFINED if refined else Beginning.FOLLOWED

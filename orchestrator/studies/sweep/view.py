@@ -154,13 +154,13 @@ class ParameterSweep(NoTruth):
         return Cells(
             f"Damping of followed modes over {axis.key} [{axis.unit or 1}]",
             plan.case,
-            plan.scenarios[0].name,
-            plan.frequency_range,
-            [side(*key) for key in rows],
-            [CellLine(f"{value:g}", axis.sets(value)) for value in axis.values],
-            [[row.get(k) for k in range(len(axis.values))] for row in rows.values()],
-            plan.overrides,
-            plan.step_size,
+            scenario=plan.scenarios[0].name,
+            frequencies=plan.frequency_range,
+            rows=[side(*key) for key in rows],
+            columns=[CellLine(f"{value:g}", axis.sets(value)) for value in axis.values],
+            cells=[[row.get(k) for k in range(len(axis.values))] for row in rows.values()],
+            values=plan.overrides,
+            step=plan.step_size,
             followed=True,
         )
 

@@ -235,12 +235,14 @@ class Stepper(CoupledComponents):
         return StepStatistics(
             steps if adaptive is None else adaptive.accepted,
             seconds,
-            tuple(
+            components=tuple(
                 ComponentStatistics(n, steps, s, s / (threads * seconds))
                 for n, s in zip(names, spent, strict=True)
             ),
-            self.clock.time(steps),
-            threads,
-            {name: reason for name, c in self.components.items() if (reason := c.one_thread)},
-            adaptive,
+            simulated=self.clock.time(steps),
+            threads=threads,
+            one_thread={
+                name: reason for name, c in self.components.items() if (reason := c.one_thread)
+            },
+            adaptive=adaptive,
         )

@@ -54,7 +54,15 @@ def study_of(
         for component, new in event.changes().items()
         for variable, value in new.items()
     )
-    return SspStudy(scenario, title, step_size, schedule.name, schedule.groups, settings, tables)
+    return SspStudy(
+        scenario,
+        title,
+        step_size=step_size,
+        schedule=schedule.name,
+        groups=schedule.groups,
+        settings=settings,
+        tables=tables,
+    )
 
 
 def write_study(annotations: Element, study: SspStudy) -> None:
@@ -121,11 +129,11 @@ def _read(annotation: Element) -> SspStudy:
     return SspStudy(
         root.attrib["scenario"],
         root.get("title", ""),
-        float(step.attrib["seconds"]),
-        schedule.attrib["name"],
-        groups,
-        settings,
-        parsed("".join(e.text or "" for e in children(root, "gfor:CaseTables"))),
+        step_size=float(step.attrib["seconds"]),
+        schedule=schedule.attrib["name"],
+        groups=groups,
+        settings=settings,
+        tables=parsed("".join(e.text or "" for e in children(root, "gfor:CaseTables"))),
     )
 
 

@@ -43,7 +43,16 @@ def ssp_members(
             sets[files[component]] = write_parameter_set(component, plan, tool)
     contents = {
         SYSTEM_FILE: xml_text(
-            _description(name, title, system, fmus, files, stop_time, study, tool)
+            _description(
+                name,
+                title,
+                system=system,
+                fmus=fmus,
+                files=files,
+                stop_time=stop_time,
+                study=study,
+                tool=tool,
+            )
         )
     }
     contents |= {member: xml_text(root) for member, root in sets.items()}

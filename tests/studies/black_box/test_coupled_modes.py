@@ -66,14 +66,14 @@ def test_a_box_is_measured_once_though_names_ask_for_its_model_again(monkeypatch
         measured.append(bench)
         return measure(bench, *given)
 
-    def named(prepared, master, point, blocks, frequencies, critical, identified):
+    def named(prepared, master, point, blocks, frequency_range, critical, black_boxes):
         """As names are followed from other scenarios: the same point, and one with another gain."""
-        again = identified(master)
+        again = black_boxes(master)
         assert again["gfor"] is blocks.components["gfor"]
         master.system.components["gfor"].parameters["pod_p.K"] = 1.0
-        assert identified(master)["gfor"] is not again["gfor"]
+        assert black_boxes(master)["gfor"] is not again["gfor"]
         asked.append(len(measured))
-        return modes_from(prepared, master, point, blocks, frequencies, critical, None)
+        return modes_from(prepared, master, point, blocks, frequency_range, critical, None)
 
     monkeypatch.setattr(coupled_modes, "is_black_box", lambda component: component.name == "gfor")
     monkeypatch.setattr(coupled_modes, "measure", counted)

@@ -65,7 +65,9 @@ def _shorter(line: Branch) -> Branch:
         return line
     y, t = 1 / line.z, line.tap
     to_earth = (y + line.to_earth[0]) / t**2 - y / t, y + line.to_earth[1] - y / t
-    plain = Branch(line.name, line.start, line.end, t * line.z, to_earth, 1.0, 0.0)
+    plain = Branch(
+        line.name, line.start, end=line.end, z=t * line.z, to_earth=to_earth, tap=1.0, shift=0.0
+    )
     return plain if sum(map(abs, to_earth)) < sum(map(abs, line.to_earth)) else line
 
 
@@ -77,7 +79,13 @@ def transformers(network: Any, nominal: dict[str, float]) -> Iterator[Branch]:
             z = complex(row.r_at_current_tap, row.x_at_current_tap)
             y = complex(row.g_at_current_tap, row.b_at_current_tap), 0j
             yield branch(
-                row.Index, ends, (nominal[ends[0]], nominal[ends[1]]), z, y, row.rho, row.alpha
+                row.Index,
+                ends,
+                nominal=(nominal[ends[0]], nominal[ends[1]]),
+                z=z,
+                to_earth=y,
+                rho=row.rho,
+                alpha=row.alpha,
             )
 
 
@@ -97,11 +105,11 @@ def stars(network: Any, nominal: dict[str, float]) -> Iterator[tuple[str, list[B
                     branch(
                         str(row.name),
                         (end, bus),
-                        volts,
-                        z,
-                        (y, 0j),
-                        row[f"rho{k}"],
-                        row[f"alpha{k}"],
+                        nominal=volts,
+                        z=z,
+                        to_earth=(y, 0j),
+                        rho=row[f"rho{k}"],
+                        alpha=row[f"alpha{k}"],
                     )
                 )
         if len(legs) > 1:

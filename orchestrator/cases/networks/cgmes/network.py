@@ -70,7 +70,8 @@ def read_cgmes(path: Path, leaving_out: Sequence[str] = ()) -> CgmesNetwork:
         raise InputError(
             f"leave_out: {unknown[0]!r} is unknown for CGMES; choose from {', '.join(LEFT_OUT)}"
         )
-    files = sorted(path.iterdir()) if path.is_dir() else [path] if path.exists() else []
+    files = [path] if path.exists() else []
+    files = sorted(path.iterdir()) if path.is_dir() else files
     return _read(
         path, tuple((str(f.resolve()), f.stat().st_mtime_ns) for f in files), tuple(leaving_out)
     )

@@ -81,7 +81,8 @@ def shunt_record(record: Record, revision: int, place: int) -> ShuntRecord | Non
         return None
     if has_status and record.whole(mode + 1, "ADJM", 0):
         return None
-    high = 5 if has_identifier else 4 if has_status else 2
+    high = 4 if has_status else 2
+    high = 5 if has_identifier else high
     most, least = record.number(high, "VSWHI", 1.0), record.number(high + 1, "VSWLO", 1.0)
     bus = record.whole(high + 2, "SWREM", 0) or place
     initial = high + (6 if has_identifier else 5)

@@ -44,12 +44,12 @@ def read_loads(net: RawTables) -> None:
         one = FileLoad(
             f"load_{net.labels[bus]}",
             net.own_bus(record),
-            record.text(1, "1").strip(),
-            net.group(record, 3, "AREA"),
-            net.group(record, 4, "ZONE"),
-            net.group(record, 11, "OWNER"),
-            pl + current.real + admittance.real * v**2,
-            ql + current.imag - admittance.imag * v**2,
+            name=record.text(1, "1").strip(),
+            area=net.group(record, 3, "AREA"),
+            zone=net.group(record, 4, "ZONE"),
+            owner=net.group(record, 11, "OWNER"),
+            p_mw=pl + current.real + admittance.real * v**2,
+            q_mvar=ql + current.imag - admittance.imag * v**2,
         )
         net.file_loads.append((one, bus, power.real < 0))
 

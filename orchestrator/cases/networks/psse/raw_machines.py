@@ -140,16 +140,16 @@ def read_machines(net: RawTables) -> tuple[Machine, ...]:
             Machine(
                 bus,
                 record.text(1, "1"),
-                record.line,
-                feeds,
-                held,
-                rating,
-                source,
-                least,
-                most,
-                p_least,
-                p_most,
-                record.number(3, "QG", 0.0),
+                line=record.line,
+                p_mw=feeds,
+                v_pu=held,
+                rating_mva=rating,
+                source=source,
+                q_min_mvar=least,
+                q_max_mvar=most,
+                p_min_mw=p_least,
+                p_max_mw=p_most,
+                q_mvar=record.number(3, "QG", 0.0),
             )
         )
         if machines[-1].likely_mva > rating:

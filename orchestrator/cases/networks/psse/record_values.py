@@ -86,8 +86,7 @@ def values_of_record(record: DynamicRecord, known: DyrRecord) -> dict[str, float
             )
         if field.zero_sets:
             found[field.zero_sets] = value == 0
-        product = (
-            bool(value) if field.switch else value * given[field.times] if field.times else value
-        )
+        product = value * given[field.times] if field.times else value
+        product = bool(value) if field.switch else product
         found |= dict.fromkeys(field.parameters, product) | dict.fromkeys(field.negated, -product)
     return found

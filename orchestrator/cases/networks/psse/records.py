@@ -147,7 +147,15 @@ def read_records(path: Path) -> RawFile:
     if revision < _FIXED_SHUNTS:
         sections = _later_buses(sections)
     noted = tuple((head.line, text) for text in remarks)
-    return RawFile(str(path), revision, base, frequency or None, sections, guessed, noted)
+    return RawFile(
+        str(path),
+        revision,
+        base_mva=base,
+        frequency=frequency or None,
+        sections=sections,
+        guessed=guessed,
+        remarks=noted,
+    )
 
 
 def _revision(head: Record, line: str) -> tuple[int, list[str]]:

@@ -129,7 +129,15 @@ def failed(name: str, fault: str, evidence: str, **figures: Any) -> CheckResult:
 
     ``fault``: A key of `REMEDIES`, which has the remedy for it.
     ``figures``: what was measured, for the report: plain values by name."""
-    return CheckResult(name, Verdict.FAIL, evidence, fault, REMEDIES[fault], figures, Whose.FMU)
+    return CheckResult(
+        name,
+        Verdict.FAIL,
+        evidence=evidence,
+        fault=fault,
+        remedy=REMEDIES[fault],
+        figures=figures,
+        whose=Whose.FMU,
+    )
 
 
 def not_applicable(name: str, because: str) -> CheckResult:

@@ -252,7 +252,13 @@ def _disturbed(
             early = float(np.abs(during[2 * cycle : 3 * cycle]).mean())
             answers.append(
                 Answer(
-                    event, float(size.max()), early, float(means.max()), float(away), blocked, gone
+                    event,
+                    float(size.max()),
+                    early=early,
+                    mean=float(means.max()),
+                    away=float(away),
+                    blocked=blocked,
+                    gone=gone,
                 )
             )
             if away > _BACK:

@@ -45,12 +45,12 @@ def read_results(folder: Path) -> Results:
         return Results(
             folder,
             case,
-            scenarios,
-            _rows(folder / "modes.csv"),
-            _rows(folder / "participation.csv"),
-            _rows(folder / "step_size.csv"),
-            dict(_datasets(folder, names, "trajectory.nc")),
-            dict(_datasets(folder, names, "linear.nc")),
+            scenarios=scenarios,
+            modes=_rows(folder / "modes.csv"),
+            participation=_rows(folder / "participation.csv"),
+            step_sizes=_rows(folder / "step_size.csv"),
+            trajectories=dict(_datasets(folder, names, "trajectory.nc")),
+            linear=dict(_datasets(folder, names, "linear.nc")),
             ended_early=content.get("ended_early"),
             beside=content.get("beside", []),
         )

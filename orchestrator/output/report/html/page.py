@@ -77,11 +77,9 @@ def page(
     charts = (re.search(_PICTURE, text, re.DOTALL) for _, text in content)
     picture = next((found[0] for found in charts if found), "")
     first = "<p>Its picture stands on the first page.</p>"
-    content = (
-        []
-        if short
-        else [(h, text.replace(picture, first) if picture else text) for h, text in content]
-    )
+    if picture:
+        content = [(heading, text.replace(picture, first)) for heading, text in content]
+    content = [] if short else content
     if against is not None:
         before = (
             [chapter for chapter, _ in _tell_origins([against], Figures())[0]]

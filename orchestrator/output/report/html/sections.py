@@ -343,9 +343,8 @@ def _curves(
             continue
         x, y = seen["time"].values, scale * seen.values
         alone = place is not None and len(results.scenarios) == 1
-        name = (
-            s["title"] if place is None else expression if alone else f"{s['title']}: {expression}"
-        )
+        name = expression if alone else f"{s['title']}: {expression}"
+        name = s["title"] if place is None else name
         curves.append(ChartCurve(name, colour(place if alone and place is not None else k), x, y))
         text = f"{np.abs(y - y[0]).max():.3g}"
         if linear is not None and (answer := signal(linear, expression)) is not None:

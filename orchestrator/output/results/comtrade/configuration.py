@@ -139,16 +139,16 @@ def read_configuration(text: str, place: str) -> Configuration:
     return Configuration(
         place,
         station,
-        device,
-        revision,
-        tuple(channels[:analog_count]),
-        tuple(channels[analog_count:]),
-        frequency,
-        rates,
-        start,
-        trigger,
-        form,
-        multiplier * (1e-9 if nanoseconds else 1e-6),
+        device=device,
+        revision=revision,
+        analog=tuple(channels[:analog_count]),
+        status=tuple(channels[analog_count:]),
+        frequency=frequency,
+        rates=rates,
+        start=start,
+        trigger=trigger,
+        form=form,
+        time_unit=multiplier * (1e-9 if nanoseconds else 1e-6),
     )
 
 
@@ -210,7 +210,6 @@ def _distinct(channels: list[Channel], analog_count: int) -> list[str]:
     for k, channel in enumerate(channels):
         number = f"A{k + 1}" if k < analog_count else f"D{k - analog_count + 1}"
         alone = channel.name and seen[channel.name] == 1 and channel.name != "time"
-        names.append(
-            channel.name if alone else f"{channel.name} ({number})" if channel.name else number
-        )
+        numbered = f"{channel.name} ({number})" if channel.name else number
+        names.append(channel.name if alone else numbered)
     return names

@@ -43,11 +43,11 @@ def certify_code(
     return Certificate(
         request,
         bound_fmu(request.fmu, request.binding),
-        code,
-        f_n,
-        verdicts,
-        results,
-        prepared[0].case.path,
+        code=code,
+        f_n=f_n,
+        verdicts=verdicts,
+        results=results,
+        case=prepared[0].case.path,
         values=prepared[0].values,
         stored=work.stored,
     )

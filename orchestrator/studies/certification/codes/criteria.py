@@ -56,7 +56,16 @@ def _finding(
     good = bool(value <= limit) if at_most else bool(value >= limit)
     scale = abs(limit) or 1.0
     margin = (limit - value) / scale if at_most else (value - limit) / scale
-    return RowFinding(name, rule, origin, _number(value), limit, _number(margin), good, text)
+    return RowFinding(
+        name,
+        rule,
+        origin=origin,
+        value=_number(value),
+        limit=limit,
+        margin=_number(margin),
+        accepted=good,
+        text=text,
+    )
 
 
 def _number(value: float) -> float | None:
@@ -74,12 +83,12 @@ def holds_together() -> Judge:
         return RowFinding(
             "stable",
             "no loss of synchronism, growth, lasting oscillation or trip",
-            READING,
-            float(len(faults)),
-            0.0,
-            None,
-            not faults,
-            text,
+            origin=READING,
+            value=float(len(faults)),
+            limit=0.0,
+            margin=None,
+            accepted=not faults,
+            text=text,
         )
 
     return judge

@@ -152,7 +152,8 @@ def _cells(s: MarginSensitivity) -> list[str]:
     p = s.parameter
     value = f"{p.value:.5g}" + ("" if p.unit == "1" else f" {p.unit}")
     points = _points(s.per_percent)
-    slope = "–" if points is None else "0" if points == 0 else f"{points:+.3g}".replace("-", "−")
+    slope = "–" if points is None else f"{points:+.3g}".replace("-", "−")
+    slope = "0" if points == 0 else slope
     remark = [" ".join(text.split()) for text in ([s.reason] if s.reason else s.doubts)]
     remark += [f"met {word}" for word, met in zip(("below", "above"), s.met, strict=True) if met]
     remark += ["per hundredth of its unit"] if not p.value else []

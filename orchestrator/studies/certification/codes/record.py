@@ -127,7 +127,8 @@ def _pictures(c: Certificate, figures: Figures) -> str:
     for v in c.verdicts:
         content = row_pictures(v, c.results[v.row.name], c.f_n, figures)
         if content:
-            word = "accepted" if v.accepted else NO_VERDICT if v.row.shown_only else "not accepted"
+            refusal = NO_VERDICT if v.row.shown_only else "not accepted"
+            word = "accepted" if v.accepted else refusal
             title = escape(f"{v.row.name}: {v.row.title}: {word}")
             parts.append(
                 f"<details{'' if v.accepted else ' open'}><summary>{title}</summary>{content}</details>"

@@ -96,7 +96,16 @@ def judge_row(
         text = "; ".join(measured.faults) or f"the run ended at {ended:g} s"
         rule = "the converter runs to the end"
         found: Sequence[RowFinding] = [
-            RowFinding("runs", rule, "reading", ended, programme.stop, None, False, text)
+            RowFinding(
+                "runs",
+                rule,
+                origin="reading",
+                value=ended,
+                limit=programme.stop,
+                margin=None,
+                accepted=False,
+                text=text,
+            )
         ]
     else:
         found = [judge(measured) for judge in row.criteria]

@@ -68,7 +68,15 @@ def rebuilt(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Cer
         for row in rows
     ]
     case = folder / case_name(rows[0].name)
-    return Certificate(request, description, code, content["f_n"], verdicts, results, case)
+    return Certificate(
+        request,
+        description,
+        code=code,
+        f_n=content["f_n"],
+        verdicts=verdicts,
+        results=results,
+        case=case,
+    )
 
 
 def _response(row: str, stated: dict[str, Any] | None, responses: xr.Dataset) -> BenchResult:

@@ -140,12 +140,12 @@ def stays_inside(
         return RowFinding(
             name,
             f"within the envelope for {HORIZON:g} s",
-            c.CODE,
-            number,
-            0.0,
-            least if np.isfinite(least) else None,
-            bool(worst <= 0),
-            text,
+            origin=c.CODE,
+            value=number,
+            limit=0.0,
+            margin=least if np.isfinite(least) else None,
+            accepted=bool(worst <= 0),
+            text=text,
         )
 
     def bands(row: MeasuredRow) -> list[Band]:

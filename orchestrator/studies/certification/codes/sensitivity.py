@@ -114,7 +114,16 @@ def sensitivity_of(
     slope = sum(slopes.values()) / len(slopes)
     below, above = margins.get(-1), margins.get(1)
     return MarginSensitivity(
-        parameter, criterion.margin, below, above, slope, sides_met, tuple(doubts), "", idle, values
+        parameter,
+        criterion.margin,
+        below=below,
+        above=above,
+        slope=slope,
+        met=sides_met,
+        doubts=tuple(doubts),
+        reason="",
+        idle=idle,
+        values=values,
     )
 
 

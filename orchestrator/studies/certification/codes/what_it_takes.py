@@ -82,7 +82,9 @@ def plan_changes(
     patterns all tunable ones are taken."""
     rows = [v for v in certificate.verdicts if v.judged and not v.accepted]
     if not rows:
-        return ChangePlan(certificate, folder, (), (), {}, change, {})
+        return ChangePlan(
+            certificate, folder, rows=(), parameters=(), left_out={}, change=change, tasks={}
+        )
     plan = _prepared(folder, rows[0].row.name).system.components[PLANT]
     given = (*GIVEN, STEP_PARAMETER, INTERNAL_STEP)
     described = {PLANT: plan.description}
@@ -116,7 +118,15 @@ def plan_changes(
         for sign in (-1, 1)
         if p.allows(sign * change * p.scale)
     }
-    return ChangePlan(certificate, folder, rows, chosen, left_out, change, tasks)
+    return ChangePlan(
+        certificate,
+        folder,
+        rows=rows,
+        parameters=chosen,
+        left_out=left_out,
+        change=change,
+        tasks=tasks,
+    )
 
 
 def _why_not(info: VariableInfo, unknown: Sequence[str], named: bool) -> str:
@@ -192,19 +202,16 @@ def _confirmed(
     result: change_point.ChangeResult,
 ) -> ConfirmedChange:
     again = next((c for c in result.criteria if c.criterion == need.criterion.criterion), None)
-    reason = (
-        str(result.failure)
-        if result.failure
-        else ("" if again else "; ".join(c.text for c in result.criteria))
-    )
+    reason = "" if again else "; ".join(c.text for c in result.criteria)
+    reason = str(result.failure) if result.failure else reason
     return ConfirmedChange(
         sensitivity.parameter,
         change,
-        _expected(sensitivity, change),
-        again.margin if again else None,
-        again.accepted if again else None,
-        tuple(c.criterion for c in result.criteria if not c.accepted),
-        reason,
+        straight_line=_expected(sensitivity, change),
+        margin=again.margin if again else None,
+        met=again.accepted if again else None,
+        failing=tuple(c.criterion for c in result.criteria if not c.accepted),
+        reason=reason,
     )
 
 

@@ -32,15 +32,15 @@ def of_check(file: Path, c: Content) -> Chapter:
         ]
         for x in c["checks"]
     ]
-    good = True if c["trusted"] else False if bad else None
+    untrusted = False if bad else None
     return Chapter(
         file,
         "Can this FMU be trusted in a co-simulation?",
-        answer,
-        good,
-        f"{counted(len(c['checks']), 'check')}, {remarks} with a remark",
-        [*c["not_supported"], *_unjudged(c["checks"])],
-        table("Checks", ["Question", "Verdict", "Evidence", "Remedy"], rows, left=4),
+        answer=answer,
+        good=True if c["trusted"] else untrusted,
+        sure=f"{counted(len(c['checks']), 'check')}, {remarks} with a remark",
+        not_judged=[*c["not_supported"], *_unjudged(c["checks"])],
+        content=table("Checks", ["Question", "Verdict", "Evidence", "Remedy"], rows, left=4),
     )
 
 
@@ -56,13 +56,8 @@ def of_certificate(file: Path, c: Content) -> Chapter:
     open_ += dict.fromkeys([*chain(*warned), *_unjudged(check.get("checks", []))])
     trusted = check.get("trusted") is not False
     good = {"passes": trusted, "fails": False}.get(c["verdict"])
-    sure = (
-        f"judged: {c['judged']}"
-        if c.get("judged")
-        else counted(len(c["rows"]), "test")
-        if "rows" in c
-        else ""
-    )
+    tests = counted(len(c["rows"]), "test") if "rows" in c else ""
+    sure = f"judged: {c['judged']}" if c.get("judged") else tests
     question = f"Does the converter pass the tests of {c['code'].upper() if 'code' in c else 'the grid code'}?"
     return Chapter(file, question, c["sentence"], good, sure, open_, page="certificate.html")
 
@@ -103,11 +98,13 @@ def of_strengths(file: Path, c: Content) -> Chapter:
     return Chapter(
         file,
         "How strong is the network?",
-        answer,
-        None,
-        c["convention"],
-        (),
-        table("Short-circuit power", ["Scenario", "Bus", "S_sc [MVA]", "SCR"], rows, left=2),
+        answer=answer,
+        good=None,
+        sure=c["convention"],
+        not_judged=(),
+        content=table(
+            "Short-circuit power", ["Scenario", "Bus", "S_sc [MVA]", "SCR"], rows, left=2
+        ),
     )
 
 
@@ -141,19 +138,14 @@ def of_nyquist(file: Path, c: Content) -> Chapter:
             data = b64encode(picture.read_bytes()).decode()
             content += f'<p><img alt="{picture.stem}" style="max-width: 100%" src="data:image/png;base64,{data}"></p>'
     good = {"stable": True, "unstable": False}.get(c["verdict"])
-    modes = (
-        "no modes asked"
-        if c["modes_stable"] is None
-        else "modes agree"
-        if c["modes_stable"] == good
-        else ("the modes do NOT agree")
-    )
+    agree = "modes agree" if c["modes_stable"] == good else "the modes do NOT agree"
+    modes = "no modes asked" if c["modes_stable"] is None else agree
     return Chapter(
         file,
         f"Is {c['device']} stable at {c['network']}?",
-        c["sentence"],
-        good,
-        f"encirclements; {modes}",
-        c["reasons"],
-        content,
+        answer=c["sentence"],
+        good=good,
+        sure=f"encirclements; {modes}",
+        not_judged=c["reasons"],
+        content=content,
     )

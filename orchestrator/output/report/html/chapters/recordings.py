@@ -26,11 +26,11 @@ def of_comparison(file: Path, signals: Any) -> Chapter:
     return Chapter(
         file,
         "How do two runs differ?",
-        answer,
-        None,
-        counted(len(signals), "signal"),
-        (),
-        table("Differences", columns, rows, left=2),
+        answer=answer,
+        good=None,
+        sure=counted(len(signals), "signal"),
+        not_judged=(),
+        content=table("Differences", columns, rows, left=2),
     )
 
 
@@ -55,11 +55,11 @@ def of_identified(file: Path, modes: Any) -> Chapter:
     return Chapter(
         file,
         "With which modes does a record ring?",
-        f"strongest: {figures}",
-        None,
-        sure,
-        doubts,
-        modes_map("Modes", {"record": modes})
+        answer=f"strongest: {figures}",
+        good=None,
+        sure=sure,
+        not_judged=doubts,
+        content=modes_map("Modes", {"record": modes})
         + table("Modes", ["f [Hz]", "Damping [%]", "Amplitude", "Doubts"], rows, left=0),
     )
 
@@ -83,11 +83,11 @@ def of_sources(file: Path, records: Any) -> Chapter:
     return Chapter(
         file,
         "Where does the oscillation come from?",
-        "; ".join(said) or "nothing oscillates",
-        None,
-        f"power and voltage of {sum(len(c['places']) for c in records)} places",
-        [*unnamed, *(text for c in records for text in c["remarks"])],
-        table(
+        answer="; ".join(said) or "nothing oscillates",
+        good=None,
+        sure=f"power and voltage of {sum(len(c['places']) for c in records)} places",
+        not_judged=[*unnamed, *(text for c in records for text in c["remarks"])],
+        content=table(
             "Oscillations",
             ["Record", "Oscillation", "Kind", "Source", "Why", "Next"],
             [[escape(cell) for cell in row] for row in rows],

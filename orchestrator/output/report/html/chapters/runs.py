@@ -5,6 +5,7 @@ from dataclasses import replace
 from html import escape
 from pathlib import Path
 
+from orchestrator.core.truth import all_true
 from orchestrator.output.report.html.chapters.chapter import (
     Chapter,
     Content,
@@ -33,8 +34,7 @@ def of_run(
             reason = (s.get("stability") or {}).get("reason")
             open_.append(f"{line.scenario}: {reason or 'stability'}")
     open_ += dict.fromkeys(text for s in scenarios for text in s.get("warnings", []))
-    verdicts = [line.stable for line in lines]
-    good = False if False in verdicts else None if None in verdicts else True
+    good = all_true(line.stable for line in lines)
     basis = (
         "modes of the FMUs that were simulated"
         if any("step_size_s" in s for s in scenarios)
@@ -44,11 +44,11 @@ def of_run(
     return Chapter(
         folder,
         f"{asked}, and which swing is damped least?",
-        "; ".join([*(line.words for line in lines), *beside]),
-        good,
-        "; ".join([*kinds_of(scenarios), basis]),
-        open_,
-        content,
+        answer="; ".join([*(line.words for line in lines), *beside]),
+        good=good,
+        sure="; ".join([*kinds_of(scenarios), basis]),
+        not_judged=open_,
+        content=content,
         bases=bases_of(scenarios),
         least=[mode for line in lines for mode in line.modes],
         lines=lines,

@@ -8,6 +8,7 @@ from typing import Any
 import xarray as xr
 
 from orchestrator.core.errors import counted
+from orchestrator.core.truth import all_true
 from orchestrator.output.report.html import studies
 from orchestrator.output.report.html.chapters.chapter import (
     Chapter,
@@ -60,7 +61,7 @@ def of_screening(file: Path, c: Content) -> Chapter:
 
 def of_site(file: Path, c: Content) -> Chapter:
     sure = "; ".join(c["sure"])
-    good = True if c["agrees"] and c["confirmed"] else None if c["agrees"] else False
+    good = bool(c["confirmed"]) or None if c["agrees"] else False
     least = [LeastDamped.of(mode) for mode in c.get("modes", ())[:1]]
     return Chapter(
         file,
@@ -180,7 +181,7 @@ def of_interactions(file: Path, c: Content) -> Chapter:
     worst = next((p for p in c["pairs"] if p["vendors"] == c["worst_pair"]), None)
     whole = c["as_in_the_case"]["stable"]
     verdicts = [whole, *(one["stable"] for one in (*c["pairs"], *c.get("assignments", [])))]
-    good = False if False in verdicts else None if None in verdicts else True
+    good = all_true(verdicts)
     answer = f"{VERDICTS[whole]} as in the case; {counted(len(c['interaction_modes']), 'mode')} that vendors share"
     answer += f"; {worst['sentence']}" if worst else ""
     sure = f"each of {len(c['vendors'])} vendors alone and each pair, the others as {c['stand_in']}"
@@ -236,9 +237,9 @@ def of_sensitivities(file: Path, c: Content) -> Chapter:
     return Chapter(
         file,
         f"What moves the {mode['name'] or 'critical'} mode of {c['scenario']}?",
-        answer,
-        None,
-        f"{c['derivative']} derivatives by {counted(len(found), 'parameter')}",
-        [f"{r['parameter']}: {r['reason']}" for r in c["sensitivities"] if r["reason"]],
-        bars + table("By the size of their effect", columns, rows),
+        answer=answer,
+        good=None,
+        sure=f"{c['derivative']} derivatives by {counted(len(found), 'parameter')}",
+        not_judged=[f"{r['parameter']}: {r['reason']}" for r in c["sensitivities"] if r["reason"]],
+        content=bars + table("By the size of their effect", columns, rows),
     )
