@@ -1,13 +1,14 @@
 """Devices with three phases at voltages that are not balanced: what is measured, and what is found."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from orchestrator.core.errors import BindingError
 from orchestrator.devices.acceptance import process
-from orchestrator.devices.acceptance.checks import phase_source, sequences
+from orchestrator.devices.acceptance.checks import phase_source, sequences, unbalanced
 from orchestrator.devices.acceptance.checks.subject import Use
 from orchestrator.devices.acceptance.runner import check_fmu
 from orchestrator.devices.binding.binding import bind
@@ -85,6 +86,36 @@ def test_an_inductance_has_its_own_admittance_in_both_sequences(tmp_path):
     assert figures["I_negative"] == pytest.approx(figures["V_negative"] / abs(IMPEDANCE), rel=2e-3)
     assert "at 50 Hz Y₋ = 0.473 − j3.94 pu of its rating, as 0.03 + j0.25 pu in series" in (
         found["negative_sequence"].evidence
+    )
+
+
+@pytest.mark.parametrize("frame", ["", 'frame_angle = "-90 deg"'])
+def test_a_dip_of_one_phase_is_the_one_of_two_sequence_networks(frame, tmp_path, monkeypatch):
+    """A voltage E behind Z at a source behind Z_s: each sequence by itself, in the device's own phases."""
+    factors = (1.0, 0.4, 1.0)
+    event = unbalanced._Event("dip of phase b to 0.4 pu", factors, 0.5)
+    monkeypatch.setattr(unbalanced, "_events", lambda draw: iter([event]))
+    member = three_phase("passive", PASSIVE=1)
+    bound = member.binding.replace("[voltage]", f"[voltage]\n{frame}")
+    bound = bound.replace("[current]", f"[current]\n{frame}")
+    _, found = checked(replace(member, binding=bound), tmp_path, ("phase_order", "unbalanced_dips"))
+    X = np.hypot(1, 6) / 6 / 10
+    source, start = 1 / (1 / (6 * X) + 1 / (1j * X)), 0.5 - 0.1j  # at the check's operating point
+    own, E = 1 + IMPEDANCE * start, 1 - source * start
+    parts = phase_source.of_phase_factors(factors)
+    current = sequences.SequencePair(
+        (own - E * parts.positive) / (IMPEDANCE + source),
+        -E * parts.negative / (IMPEDANCE + source),
+    )
+    voltage = sequences.SequencePair(
+        E * parts.positive + source * current.positive,
+        E * parts.negative + source * current.negative,
+    )
+    figures = found["unbalanced_dips"].figures
+    assert list(figures["phases"].values()) == pytest.approx(current.of_phases, rel=0.015)
+    ripple = sequences.ripple_of(voltage, current)
+    assert (figures["ripple_P"], figures["ripple_Q"]) == pytest.approx(
+        (ripple.p, ripple.q), rel=0.01
     )
 
 

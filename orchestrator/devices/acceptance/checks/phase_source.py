@@ -5,7 +5,7 @@ quantities turn while they are held, so each voltage is that of the middle of it
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import hypot
+from math import atan2, hypot
 
 import numpy as np
 
@@ -45,6 +45,14 @@ def omega_of(subject: Subject) -> float | None:
     return described.port.omega if forms == {Form.ABC} else None
 
 
+def lead_of(subject: Subject) -> float:
+    """Angle [rad] by which the device's phases lead those of the network, by its binding."""
+    described = subject.description
+    assert isinstance(described, BoundDescription)
+    matrix = described.port.voltage.matrix
+    return atan2(matrix[2], matrix[0])
+
+
 def why_not(subject: Subject) -> str:
     """The reason why a device is not tried at phases of its own; "" where it is."""
     omega = omega_of(subject)
@@ -64,13 +72,19 @@ class Course:
     i: Complex
     i_times: Numbers
     omega: float
+    lead: float = 0.0  # of the device's phases [rad]
 
     def between(self, begin: float, end: float) -> "Course":
         """The part of it between two times [s] after its first step's begin."""
         step = 2 * (self.i_times[0] - self.v_times[0])
         part = slice(round(begin / step), round(end / step))
         return Course(
-            self.v[part], self.v_times[part], self.i[part], self.i_times[part], self.omega
+            self.v[part],
+            self.v_times[part],
+            self.i[part],
+            self.i_times[part],
+            omega=self.omega,
+            lead=self.lead,
         )
 
     @property
@@ -90,8 +104,8 @@ class Course:
 
     @property
     def phase_currents(self) -> Numbers:
-        """Instantaneous currents of the phases [pu of the rated peak], shape (n, 3)."""
-        return in_phases(self.i, self.i_times, self.omega)
+        """Instantaneous currents of the device's phases [pu of the rated peak], shape (n, 3)."""
+        return in_phases(self.i * np.exp(1j * self.lead), self.i_times, self.omega)
 
     @property
     def ripple(self) -> Ripple:
@@ -179,8 +193,11 @@ class PhaseSource:
         self.network = LinearNetwork(_real(A), read, inputs, state)
 
     def set_sequences(self, source: SequencePair) -> None:
-        """Give the source another voltage from now on: both sequences in parts of its voltage at rest."""
-        now = np.exp(-2j * self.omega * self.running.time)
+        """Give the source another voltage from now on: both sequences in parts of its voltage at rest.
+
+        They are those of the device's own phases: what turns these ahead turns the negative sequence back."""
+        lead = lead_of(self.running.subject)
+        now = np.exp(-2j * (self.omega * self.running.time + lead))
         negative = (source.negative * self.E).conjugate() * now
         for place, value in ((2, source.positive * self.E), (4, negative)):
             self.network.x[place : place + 2] = value.real, value.imag
@@ -194,7 +211,8 @@ class PhaseSource:
         times: Numbers = begin + (np.arange(steps, dtype=float) + 0.5) * h
         scale = SYSTEM_BASE_MVA / rating_of(running)
         current, voltage = values[:, :2] @ np.array([1, 1j]), values[:, 2:] @ np.array([1, 1j])
-        return Course(voltage, times, scale * current, times + h / 2, self.omega)
+        lead = lead_of(running.subject)
+        return Course(voltage, times, scale * current, times + h / 2, omega=self.omega, lead=lead)
 
 
 def of_phase_factors(factors: tuple[complex, complex, complex]) -> SequencePair:

@@ -27,7 +27,11 @@ from orchestrator.devices.acceptance.checks.phase_source import (
     omega_of,
     why_not,
 )
-from orchestrator.devices.acceptance.checks.port import current_limit, present_current
+from orchestrator.devices.acceptance.checks.port import (
+    current_limit,
+    present_current,
+    without_start,
+)
 from orchestrator.devices.acceptance.checks.sequences import (
     PHASES,
     Ripple,
@@ -85,6 +89,8 @@ def phase_order(subject: Subject) -> CheckResult:
     because = why_not(subject)
     if because:
         return not_applicable("phase_order", because)
+    if not subject.starts:
+        return without_start("phase_order", subject)
     point, found = OperatingAt(), dict[tuple[bool, bool], float]()
     expected = (point.P - 1j * point.Q) / point.v
     for of_voltage in (False, True):
