@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import orchestrator as gfor_api
+from orchestrator.face.cli import certify_matrix
 from orchestrator.linear.signals.identification import IdentifiedMode
 from orchestrator.studies.certification.certificate import Certificate
 from orchestrator.studies.certification.codes.all_codes import CODES
@@ -201,6 +202,20 @@ def test_the_behaviour_in_frequency_counts_beside_the_certificates(verdict, word
     assert (of_it["certificate"], of_it["figures"]) == (None, "b/frequency/frequency.json")
     assert (of_it["sentence"], of_it["judged"]) == ("as measured", 2)
     assert 'href="b/frequency/impedance.png"' in matrix_page(whole, [], None)
+
+
+def test_several_devices_are_judged_in_frequency_beside_each_other(tmp_path, gfor, monkeypatch):
+    def measured(device, folder):
+        figures = {"verdict": device.name == "a", "sentence": f"of {device.name}", "points": []}
+        return figures, [folder / "frequency.json"]
+
+    monkeypatch.setattr(certify_matrix, "measured_behaviour", measured)
+    words = ["certify", tmp_path / "a.fmu", tmp_path / "b.fmu", "--code", "frequency", "--json"]
+    code, text, _ = gfor(*words, "--out", tmp_path / "out")
+    cells = json.loads(text)["cells"]
+    assert (code, [cell["verdict"] for cell in cells]) == (1, ["passes", "fails"])
+    assert [cell["sentence"] for cell in cells] == ["of a", "of b"]
+    assert gfor(*words, "--declare", "D=2", "--out", tmp_path / "out")[0] == 2
 
 
 @pytest.mark.slow
