@@ -37,11 +37,13 @@ ieee39 with such loads alone, 0.5 ms leaves one at 151 Hz growing, 1 ms none."""
 # least τ [s]: the law is taken at the stages of an implicit step of up to 0.2 ms
 SHORTEST_RECOVERY = 5e-4
 
-# the same [s] for phasor networks, whose explicit steps are up to 2 ms long
+# the same [s] for phasor networks; a step takes the law explicitly, so two internal steps at least go into τ
 PHASOR_RECOVERY_TIME = 1e-2
-SHORTEST_PHASOR_RECOVERY = 4e-3
+SHORTEST_PHASOR_RECOVERY = 1e-3
+STEPS_IN_RECOVERY = 2
 
 LONGEST_RECOVERY = 1.0  # largest τ [s]
+_ROUNDING = 1e-9  # of a lag that is exactly two steps, in parts of it
 # default time constant [s] of the frequency that a load feels: one period at 50 Hz
 FREQUENCY_TIME = 0.02
 
@@ -101,6 +103,9 @@ def declare_following_load(
             minimum=shortest,
             maximum=LONGEST_RECOVERY,
         )
+        if phasors:
+            rule = f"{load.name}.tau must be at least {STEPS_IN_RECOVERY} times internal_step; raise it, or lower that"
+            m.require(tau - (1 - _ROUNDING) * STEPS_IN_RECOVERY * m.internal_step, rule)
         v_min = None
         if load.low_voltage:
             text = "Voltage below which the load is an impedance"

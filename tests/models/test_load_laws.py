@@ -266,12 +266,26 @@ def test_what_a_network_cannot_be(load, words):
 
 
 def test_a_lag_shorter_than_a_step_can_follow_is_refused():
-    load = Load("quick", "a", 10.0, active=POWER, tau=1e-3)
+    load = Load("quick", "a", 10.0, active=POWER, tau=5e-4)
     assert grid(network(load)).states
     with pytest.raises(
-        ValueError, match=r"'quick' has the lag tau = 0.001 s; in this network .* from 0.004 to 1 s"
+        ValueError,
+        match=r"'quick' has the lag tau = 0.0005 s; in this network .* from 0.001 to 1 s",
     ):
         phasor_grid(network(load))
+
+
+@pytest.mark.parametrize(("step", "taken"), [(5e-4, True), (6e-4, False), (1e-3, False)])
+def test_a_phasor_networks_lag_has_two_internal_steps(step, taken):
+    model = phasor_grid(network(Load("quick", "a", 10.0, active=POWER, tau=1e-3)))
+    values = [{"internal_step": step}.get(v.name, v.start) for v in model.parameters]
+    margins = np.array(model.requirements(values, Evaluated(model).c)).ravel()
+    (margin,) = [
+        margin
+        for text, margin in zip(model.requirement_texts, margins, strict=True)
+        if text.startswith("quick.tau must be at least 2 times internal_step")
+    ]
+    assert (margin > 0) == taken
 
 
 def test_a_voltage_below_that_of_the_impedance_is_refused():
