@@ -130,7 +130,8 @@ def verify(
     Returns
     -------
     Verification
-        ``holds``, with what agreed and what did not, and ``signature``, with its ``state`` and ``signer``.
+        ``holds``, with what agreed, what did not and what is ``unproved``, and ``signature``, with its ``state`` and
+        ``signer``.
 
     Raises
     ------
@@ -170,6 +171,8 @@ def verify(
             prefix = f"{place.name}: " if len(places) > 1 else ""
             found.faults += [prefix + text for text in one.faults]
             found.agreed += [prefix + text for text in one.agreed]
+            found.views += [prefix + text for text in one.views]
+            found.unproved += [prefix + text for text in one.unproved]
             found.signatures |= one.signatures
     return found
 

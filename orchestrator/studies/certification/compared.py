@@ -43,6 +43,8 @@ class Verification(NoTruth, ask=".holds"):
         Sentences on what agrees.
     views
         Sentences on pages that show the certificate and could not be made anew here, so that they prove nothing.
+    unproved
+        Sentences on all that lies there and that nothing vouches for: those pages, and files that it does not cover.
     signatures
         The signature of each certificate by its folder's name, with ``state`` (``good``, ``unsigned``, ``changed`` or
         ``unknown signer``), ``signer`` (None where nobody known signed), ``sentence``, and ``signatures``, the same of
@@ -52,6 +54,7 @@ class Verification(NoTruth, ask=".holds"):
     faults: list[str] = field(default_factory=list)
     agreed: list[str] = field(default_factory=list)
     views: list[str] = field(default_factory=list)
+    unproved: list[str] = field(default_factory=list)
     signatures: dict[str, SignatureSeen] = field(default_factory=dict)
 
     @property
@@ -65,7 +68,7 @@ class Verification(NoTruth, ask=".holds"):
 
     def _repr_html_(self) -> str:
         signed = [str(one.sentence) for one in self.signatures.values()]
-        return page(repr(self)[1:-1], [*self.faults, *self.views, *signed, *self.agreed])
+        return page(repr(self)[1:-1], [*self.faults, *self.unproved, *signed, *self.agreed])
 
     def __repr__(self) -> str:
         what = "; ".join(self.faults) if self.faults else f"{len(self.agreed)} things agree"

@@ -166,7 +166,6 @@ class Verified(Verification):
     chosen: list[Any]
     computed: list[Any]
     later: tuple[str, ...]  # rows that the table had not in the version that issued the certificate
-    unproved: list[str]  # files in the folder that nothing vouches for
 
     @property
     def verdict(self) -> str:

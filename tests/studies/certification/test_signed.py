@@ -11,6 +11,7 @@ import pytest
 from cryptography.hazmat.primitives.asymmetric import ec, ed25519, rsa
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 
+import orchestrator as gfor_api
 from orchestrator.core.safe_files import file_hash
 from orchestrator.face.cli import main
 from orchestrator.output.signatures import ssh_keygen
@@ -556,6 +557,9 @@ def test_files_in_folders_of_a_certificate_are_named(certificate, signers, gfor)
     (certificate / "deep" / "er" / "approval.txt").write_text("approved")
     (certificate / "elsewhere").symlink_to(certificate.parent)
     _, found = verified(gfor, certificate, "--signers", signers())
+    in_python = gfor_api.verify(certificate, anew=(), signers=signers())
+    assert (in_python.unproved, in_python.holds) == (found["unproved"], True)
+    assert in_python.views == found["unproved"][:1]
     count = len(list((certificate / "points").iterdir()))
     (_, *told) = found["unproved"]
     assert told == [
