@@ -19,6 +19,7 @@ from fmus.synchronous_generator.excitation.rotating import (
     dc2a,
     ieeet1,
     ieeet2,
+    ieeex2,
 )
 from fmus.synchronous_generator.excitation.static import scrx, sexs, st1a, st4b
 from fmus.synchronous_generator.excitation.two_limits import bbsex1
@@ -82,6 +83,7 @@ EXCITERS: dict[str, Exciter] = {
     "exni": exni,
     "ieeet1": ieeet1,
     "ieeet2": ieeet2,
+    "ieeex2": ieeex2,
     "dc1a": dc1a,
     "dc2a": dc2a,
     "ac1a": ac1a,

@@ -106,6 +106,7 @@ def test_every_field_of_a_dyr_record_sets_a_parameter_of_its_part(name):
         ("SEXS", 6),
         ("IEEET1", 14),
         ("IEEEX1", 16),
+        ("IEEEX2", 16),
         ("SCRX", 8),
         ("BBSEX1", 11),
         ("EXNI", 10),

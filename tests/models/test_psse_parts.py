@@ -58,6 +58,18 @@ EXCITERS = {
         "T_F2": 0.9,
         "T_R": 0.02,
     },
+    "ieeex2": {
+        "K_A": 60.0,
+        "T_A": 0.05,
+        "K_E": 0.9,
+        "T_E": 0.4,
+        "K_F": 0.05,
+        "T_F": 0.5,
+        "T_F2": 0.9,
+        "T_R": 0.02,
+        "T_C": 0.3,
+        "T_B": 1.1,
+    },
     "exac2": {
         "K_A": 300.0,
         "T_A": 0.02,
@@ -165,8 +177,8 @@ def exciter_by_hand(name, p, s):
         return V_T * p["K"] * lead(p, s, "T_A", "T_B") / (1 + p["T_E"] * s)
     if name == "bbsex1":
         return p["K"] * lead(p, s, "T_2", "T_1") * lead(p, s, "T_3", "T_4")
-    if name in ("dc2a", "ieeet2"):
-        points = {"dc2a": ((3.0, 0.41), (4.0, 1.96)), "ieeet2": ((2.85, 0.3), (3.8, 0.6))}[name]
+    if name in ("dc2a", "ieeet2", "ieeex2"):
+        points = ((3.0, 0.41), (4.0, 1.96)) if name == "dc2a" else ((2.85, 0.3), (3.8, 0.6))
         field = p["K_E"] + slope(lambda E: saturated(E, points), E_FD) + s * p["T_E"]
         forward = lead(p, s, "T_C", "T_B") * p["K_A"] / (1 + p["T_A"] * s)
         if name == "dc2a":

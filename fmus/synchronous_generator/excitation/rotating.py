@@ -11,6 +11,8 @@ IEEET2 has no such stage either, and its rate feedback is of the regulator's vol
 
     V_F = s·K_F/((1+sT_F)·(1+sT_F2))·V_R
 
+IEEEX2 is IEEET2 with the stage (1+sT_C)/(1+sT_B) before the amplifier.
+
 AC5A is a simplified alternator: IEEET2 with a lead in the rate feedback, and without negative field voltages:
 
     V_F = s·K_F·(1+sT_F3)/((1+sT_F)·(1+sT_F2))·V_R,  E_fd ≥ 0
@@ -93,10 +95,13 @@ ieeet1 = partial(dc1a, compensated=False)  # DC1A without its lead and lag
 dc2a = partial(dc1a, bus_fed=True)  # DC1A fed from the machine's terminal
 
 
-def ieeet2(m: ModelBuilder, seen: Regulated, *, alternator: bool = False) -> tuple[Expr, Expr]:
+def ieeet2(
+    m: ModelBuilder, seen: Regulated, *, alternator: bool = False, compensated: bool = False
+) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu].
 
-    ``alternator``: whether it is AC5A, with a lead in its rate feedback and no negative field voltage."""
+    ``alternator``: whether it is AC5A, with a lead in its rate feedback and no negative field voltage; ``compensated``:
+    whether it is IEEEX2, with a lead and a lag before the amplifier."""
     with m.scope("exciter"):
         K_A, T_A = gain(m, "K_A", 200.0, "Gain", 1e-3), time(m, "T_A", 0.02, "Amplifier", 1e-3)
         high = gain(m, "V_RMAX", 6.08, "Upper limit of V_R")
@@ -122,12 +127,15 @@ def ieeet2(m: ModelBuilder, seen: Regulated, *, alternator: bool = False) -> tup
         V_F = lead_lag(m, "feedback_2", fast, T_F3, T_F2)
         measured = Measurement(m, seen)
         error = measured.error(V_R0 / K_A) - V_F
+        if compensated:
+            error = lead_lag_stage(m, error, V_R0 / K_A)
         close_limited_low_pass(m, amplifier, K_A * error, T_A, low, high)
         rate = (V_R - K_E * E_fd - curve.part(E_fd)) / T_E
         m.derivative(E, held_at_limits(E, rate, 0, _MOST) if alternator else rate)
         return measured.close(E_fd)
 
 
+ieeex2 = partial(ieeet2, compensated=True)  # IEEET2 with DC1A's lead and lag
 ac5a = partial(ieeet2, alternator=True)  # IEEET2 with a lead in its feedback, and E_fd >= 0
 
 
