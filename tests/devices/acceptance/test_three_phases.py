@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -135,6 +136,13 @@ def test_a_planted_fault_of_the_phases_is_named(member, tmp_path):
     check_macros(member.source)
     report, _ = checked(member, tmp_path, member.only or ASKED)
     assert report.faults == [member.fault]
+
+
+def test_the_page_counts_the_devices():
+    page = Path(__file__).parents[3] / ".docs/validation/foreign-fmus.md"
+    text = page.read_text(encoding="utf-8")
+    assert f"{len(honest())} honest devices with phases pass" in text
+    assert f"{len(planted())} with a planted fault are named" in text
 
 
 @pytest.mark.parametrize(
