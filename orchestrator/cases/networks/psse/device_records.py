@@ -1,4 +1,4 @@
-"""Records of the devices of a PSS/E file, in revisions 29 to 36: DC lines, FACTS devices, induction machines, GNE."""
+"""Records of the devices of a PSS/E file, in revisions 23 to 36: DC lines, FACTS devices, induction machines, GNE."""
 
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence

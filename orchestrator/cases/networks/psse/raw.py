@@ -1,4 +1,4 @@
-"""A PSS/E RAW file of revision 29 to 36 as tables of a network source."""
+"""A PSS/E RAW file of revision 23 to 36 as tables of a network source."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -4,6 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 from orchestrator.cases.networks.psse.missing_buses import status_columns
 from orchestrator.cases.networks.psse.records import (
+    ADJUSTMENTS,
     LEFT_OUT,
     NODES,
     SWITCHING_DEVICES,
@@ -23,6 +24,7 @@ _OF_SECTION = {
     "impedance correction": _USED,
     "multi-section line": (UseOfRecord.NOT_USED, "its sections are branches of their own"),
     "system-wide": (UseOfRecord.NOT_USED, "settings of PSS/E's solution, beside THRSHZ"),
+    ADJUSTMENTS: (UseOfRecord.HELD, "its tap or phase shift"),
     "substation": (UseOfRecord.NOT_USED, "its nodes and switches are passed over"),
 }
 

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from orchestrator.cases.networks.psse.older_revisions import with_later_records
 from orchestrator.cases.networks.psse.rawx import read_rawx
 from orchestrator.cases.networks.psse.records import RawFile, read_records, text_of
 
@@ -9,4 +10,5 @@ from orchestrator.cases.networks.psse.records import RawFile, read_records, text
 def read_file(path: Path) -> RawFile:
     """The records of a RAW or a RAWX file, told apart by what stands in it."""
     text = text_of(path)
-    return read_rawx(path, text) if text.lstrip().startswith("{") else read_records(path)
+    is_json = text.lstrip().startswith("{")
+    return read_rawx(path, text) if is_json else with_later_records(read_records(path))

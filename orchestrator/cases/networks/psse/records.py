@@ -5,7 +5,7 @@ Elements that our network does not have are refused without the user's word, and
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 
@@ -16,12 +16,15 @@ from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import read_bytes, visible
 from orchestrator.core.units import LARGEST
 
-REVISIONS = tuple(range(29, 37))  # revisions whose records are known
+REVISIONS = tuple(range(23, 37))  # revisions whose records are known
 NODES = 35  # first revision with nodes in the records of machines, switched shunts and converters
 NAMES = 36  # first revision with names of switched shunts, and sets of ratings of switching devices
 SWITCHING_DEVICES = 34  # first revision with system-wide data, switching devices and substations
-_FIXED_SHUNTS = 31  # first revision with fixed shunts beside the buses, and REV in the first record
-_OLD_FIELDS = 11  # of a bus until revision 30
+_OLDEST = 23  # last revision with loads in the records of buses
+_OLDEST_FIELDS = 12  # of a bus until then
+ADJUSTMENTS = "transformer adjustment"
+"""Section of the controls of transformers, which are branches up to revision 26."""
+
 MOST_BYTES = 200_000_000  # of a file: ten times the largest interconnections
 
 _TAIL = (
@@ -46,6 +49,10 @@ _ORDER[30] = _ORDER[29] = (
     *("vsc dc line", "switched shunt", "impedance correction", "multi-terminal dc"),
     *("multi-section line", "zone", "inter-area transfer", "owner", "facts device"),
 )
+_ORDER[28] = tuple(name for name in _ORDER[29] if name != "vsc dc line")
+_ORDER[24] = tuple(ADJUSTMENTS if name == "transformer" else name for name in _ORDER[28])
+_ORDER[26] = _ORDER[25] = _ORDER[24]
+_ORDER[_OLDEST] = tuple(name for name in _ORDER[24] if name != "load")
 _ORDER[34] = ("system-wide", *_HEAD, "system switching device", "transformer", *_TAIL, "substation")
 _ORDER[35] = _ORDER[34]
 
@@ -57,6 +64,7 @@ _STRICT_TOKEN = re.compile(
 )
 _BETWEEN_COMMAS = re.compile(r"""[^'"/]*,\s*['"]""")  # begin of a record whose texts stand so
 _BEGIN = re.compile(r"\bBEGIN(?:NING OF)?\s+(.*?)(?:\s+DATA\b.*)?$", re.IGNORECASE)
+_RECORD = re.compile(r"""\s*[-'"\d]""")  # begin of a record: a number or a text
 _END = re.compile(r"\bEND OF\s+(.*?)(?:\s+DATA\b.*|,.*)?$", re.IGNORECASE)
 _COMMENT = re.compile(r"\s*(@!|//?(\s|$))")  # begins of a line without data
 _WRITER = re.compile(r"PSS\W*(?:\w{1,2}\W*)?E\W*(\d{2})", re.IGNORECASE)  # "PSS/E-30.3"
@@ -126,7 +134,11 @@ def read_records(path: Path) -> RawFile:
     if first is None:
         raise InputError(f"{path}: it is empty; export the case from PSS/E as RAW")
     head = Record(str(path), first[0], _fields(first[1]))
-    revision, remarks = _revision(head, first[1])
+    titles = [next(lines, None) for _ in range(2)]
+    begin = [line for line in (next(lines, None),) if line is not None]
+    lines = chain(begin, lines)
+    oldest = all(_is_oldest_bus(line) for _, line in begin) and bool(begin)
+    revision, remarks = _revision(head, first[1], oldest=oldest)
     if head.whole(0, "IC", 0) not in (0, 1):
         raise head.error(f"IC is {head.text(0)}; it is 0 for a whole case, or 1 for changes")
     if head.whole(0, "IC", 0):
@@ -135,17 +147,10 @@ def read_records(path: Path) -> RawFile:
     if not base > 0:
         raise head.error(f"the system base SBASE is {base:g} MVA; it must exceed 0")
     frequency = head.number(5, "the frequency BASFRQ [Hz]", 0.0)
-    titles = [next(lines, None) for _ in range(2)]
     if titles[1] is not None and _is_bus(titles[1][1]):
         remarks.append("one line of titles, where PSS/E writes two: the second is a bus")
         lines = chain([titles[1]], lines)
     sections, guessed = _sections(path, revision, lines)
-    if revision >= _FIXED_SHUNTS and _are_old_buses(sections.get("bus", [])):
-        text = f"REV is {revision}, and the buses hold GL and BL before their areas, as in revision 30: read so"
-        remarks.append(text)
-        sections = _later_buses(sections)
-    if revision < _FIXED_SHUNTS:
-        sections = _later_buses(sections)
     noted = tuple((head.line, text) for text in remarks)
     return RawFile(
         str(path),
@@ -158,18 +163,22 @@ def read_records(path: Path) -> RawFile:
     )
 
 
-def _revision(head: Record, line: str) -> tuple[int, list[str]]:
-    """REV, which revisions before 31 only tell in the comment, and remarks."""
+def _revision(head: Record, line: str, *, oldest: bool) -> tuple[int, list[str]]:
+    """REV, which revisions before 31 only tell in the comment, and remarks.
+
+    ``oldest``: whether the buses hold their loads."""
     written = _WRITER.search(line)
     known = f"{REVISIONS[0]} to {REVISIONS[-1]}"
     if head.text(2):
         revision = head.whole(2, "the revision REV")
     elif written:
         revision = int(written[1])
-    elif len(head.fields) < 2 or not _is_number(head.text(1)):
+    elif len(head.fields) < 2 or not is_number(head.text(1)):
         raise head.error(
             "the first record has no revision; a RAW file begins with IC, SBASE, REV, XFRRAT, NXFRAT, BASFRQ"
         )
+    elif oldest:
+        return _OLDEST, ["no revision REV, and the buses hold their loads: read as revision 23"]
     else:
         return 30, ["no revision REV: read as revision 30, the last one without it"]
     if revision not in REVISIONS:
@@ -179,7 +188,7 @@ def _revision(head: Record, line: str) -> tuple[int, list[str]]:
     return revision, []
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
     try:
         float(text)
     except ValueError:
@@ -192,29 +201,13 @@ def _is_bus(line: str) -> bool:
     if not re.match(r"\s*\d+\s*,?\s*['\"]", line):
         return False
     fields = _fields(line)
-    return len(fields) > 7 and all(_is_number(text) for text in fields[2:4])
+    return len(fields) > 7 and all(is_number(text) for text in fields[2:4])
 
 
-def _are_old_buses(buses: Sequence[Record]) -> bool:
-    """Return whether buses are as in revision 30: GL and BL, with a decimal point, where later ones have areas."""
-    return bool(buses) and all(
-        len(x.fields) == _OLD_FIELDS and all("." in text for text in (*x.fields[4:6], x.fields[8]))
-        for x in buses
-    )
-
-
-def _later_buses(sections: dict[str, list[Record]]) -> dict[str, list[Record]]:
-    """Buses of revisions 29 and 30, which hold GL and BL, as those of later ones, with fixed shunts."""
-    buses, shunts = [], []
-    for record in sections.get("bus", []):
-        padded = [*record.fields, *[""] * (_OLD_FIELDS - len(record.fields))]
-        number, name, kilovolts, kind, g, b, area, zone, vm, va, owner = padded[:_OLD_FIELDS]
-        buses.append(
-            replace(record, fields=[number, name, kilovolts, kind, area, zone, owner, vm, va])
-        )
-        if any(_is_number(text) and float(text) for text in (g, b)):
-            shunts.append(replace(record, fields=[number, "1", "1", g, b]))
-    return {**sections, "bus": buses, "fixed shunt": [*sections.get("fixed shunt", ()), *shunts]}
+def _is_oldest_bus(line: str) -> bool:
+    """Return whether a bus has its kind in the place of its name, and 12 values, as up to revision 23."""
+    fields = _fields(line)
+    return len(fields) == _OLDEST_FIELDS and fields[1] in ("1", "2", "3", "4")
 
 
 def text_of(path: Path) -> str:
@@ -265,6 +258,8 @@ def _sections(
             name = _following(path, number, stripped, name, order)
             if not (_BEGIN.search(stripped) or _END.search(stripped)) and name != "end":
                 guessed[number] = name
+        elif name == "end" and not _RECORD.match(line):
+            continue  # what a program says behind the last section
         elif name == "end":
             raise InputError(
                 f"{path}, line {number}: the line before these data does not say which begin {_REMEDY}"
@@ -292,10 +287,10 @@ def _without_names(section: str, fields: list[str]) -> list[str]:
 
     Source: the headings of the columns in the sample that PSS/E 36 writes."""
     column = _NAME.get(section)
-    if column is not None and len(fields) > column and not _is_number(fields[column]):
+    if column is not None and len(fields) > column and not is_number(fields[column]):
         return [*fields[:column], *fields[column + 1 :]]
     is_set = section == "system switching device" and len(fields) > _RATING_SET
-    if is_set and not _is_number(fields[_RATING_SET]):
+    if is_set and not is_number(fields[_RATING_SET]):
         return [*fields[:_RATING_SET], *[""] * _RATINGS, *fields[_RATING_SET + 1 :]]
     return fields
 
@@ -313,13 +308,7 @@ def _following(path: Path, number: int, line: str, name: str, order: list[str]) 
         )
     found = _BEGIN.search(line)
     if found:
-        begun = section_of(found[1])
-        if begun == "transformer adjustment":
-            raise InputError(
-                f"{path}, line {number}: its transformers are among its branches, as up to revision 26; "
-                f"{REVISIONS[0]} to {REVISIONS[-1]} are read: export the case from PSS/E as one of them"
-            )
-        return begun
+        return section_of(found[1])
     if name not in order:
         if ended:
             return "end"
@@ -415,6 +404,7 @@ _KNOWN = {
     "system switching device",
     "transformer",
     "switched shunt",
+    ADJUSTMENTS,
 }
 
 

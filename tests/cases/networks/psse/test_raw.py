@@ -329,8 +329,8 @@ def test_a_case_says_what_was_changed_and_has_modes(tmp_path, gfor):
     [
         (
             "0,100.0,33",
-            "0,100.0,28",
-            r"grid.raw, line 1: the revision REV is 28; 29 to 36 are read: export",
+            "0,100.0,22",
+            r"grid.raw, line 1: the revision REV is 22; 23 to 36 are read: export",
         ),
         (
             "0,100.0,33",
