@@ -18,6 +18,13 @@ _NATIVE = "native"
 PARTS = ("machine", "exciter", "governor", "stabilizer")
 """Keys of a component's table, of ``[units]`` and columns of its file that choose the parts of a generator."""
 
+
+def chosen_parts(source: object) -> dict[str, str]:
+    """Return the parts that a table or a command's options choose, by their keys."""
+    choices = {part: getattr(source, part) for part in PARTS}
+    return {part: name for part, name in choices.items() if name is not None}
+
+
 STAND_IN = "static_generation"
 """The neutral device: the current of the operating point, which turns with the voltage, and no other dynamics."""
 

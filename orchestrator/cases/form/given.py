@@ -132,7 +132,8 @@ def kept(given: Any, name: str, argument: str) -> Path:
         raise InputError(
             f"{argument}: a {type(given).__name__} has no columns; give a DataFrame, a row each"
         )
-    if table is given and (gaps := [str(name) for name in table if table[name].isna().any()]):
+    gaps = [str(name) for name in table if table[name].isna().any()] if table is given else []
+    if gaps:
         warnings.warn(
             f"question: {argument}: {', '.join(gaps)}: the case's value is taken at NaN; is it meant?",
             stacklevel=users_level(),

@@ -1,7 +1,7 @@
 """The areas of the grid, and the components of each."""
 
 import fnmatch
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from orchestrator.systems.coupling.system import System
 
@@ -23,12 +23,13 @@ def _fitting(areas: Mapping[str, Sequence[str]], system: System) -> dict[str, li
     homes: dict[str, set[str]] = {name: {name} for name in system.components}
     for wire in system.connections:
         homes[wire.target.component].add(wire.source.variable.rpartition(".")[0])
-    found = {
-        name: [
-            area
-            for area, patterns in areas.items()
-            if any(fnmatch.filter(known_as, x) for x in patterns)
-        ]
-        for name, known_as in homes.items()
-    }
+
+    def areas_of(known_as: Iterable[str]) -> list[str]:
+        names = list(known_as)
+        fits = (
+            area for area, patterns in areas.items() for x in patterns if fnmatch.filter(names, x)
+        )
+        return list(dict.fromkeys(fits))
+
+    found = {name: areas_of(known_as) for name, known_as in homes.items()}
     return {name: fitting for name, fitting in found.items() if fitting}

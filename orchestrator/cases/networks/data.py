@@ -312,6 +312,7 @@ def _read_from_raw(asked: _Asked) -> _Source:
     generation = {
         bus: replace(g, rating_mva=ratings[bus]) for bus, g in imported.generation.items()
     }
+    records = tuple(replace(x, why=solved.words_of(x.kind, x.line) or x.why) for x in raw.records)
     return _Source(
         replace(imported, generation=generation),
         tuple(changes),
@@ -319,9 +320,7 @@ def _read_from_raw(asked: _Asked) -> _Source:
         raw.idle | {(x.bus, x.name.strip()) for x in left},
         misfit,
         file_voltages(raw.tables.bus, raw.tables.labels),
-        records=tuple(
-            replace(x, why=solved.words_of(x.kind, x.line) or x.why) for x in raw.records
-        ),
+        records=records,
         device_loads=solved.loads,
         file_loads=raw.loads,
         controls=moving.controls if table.move_controls else (),

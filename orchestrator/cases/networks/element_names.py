@@ -176,8 +176,9 @@ def element_names(
     for name, bus in {**at_bus, **units}.items():
         words = [own_names.get(name, "")]
         words += [titles[bus]] if bus in titles and not _is_in(bus, titles[bus]) else []
-        if told := ", ".join(filter(None, words)):
-            shown[name] = f"{name} ({told})"
+        others = ", ".join(filter(None, words))
+        if others:
+            shown[name] = f"{name} ({others})"
     meant = [(title, bus) for bus, title in titles.items()]
     meant += [(titles.get(bus, ""), name) for name, bus in units.items()]
     meant += [(own, name) for name, own in own_names.items()]

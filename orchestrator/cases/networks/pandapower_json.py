@@ -91,7 +91,8 @@ def _plain_object(value: Mapping[str, Any]) -> dict[str, Any]:
     inner = value.get("_object")
     if named == _NETWORK and isinstance(inner, dict):
         inner = _without_unused(inner)
-    if named in _TABLES and (more := sorted(set(value) - _OF_A_TABLE)):
+    more = sorted(set(value) - _OF_A_TABLE)
+    if named in _TABLES and more:
         raise ValueError(f"a table has the key {more[0]!r}")
     plain = {key: _plain(one) for key, one in value.items() if key != "_object"}
     if "_object" in value:

@@ -90,8 +90,10 @@ class CaseText:
         lines.append(f"fault: three-phase at {self._fault_bus}, 100 ms, nothing trips")
         beside = self._base.beside_file if self._base else None
         lines += [f"power flow: {beside.in_words}"] if beside else []
-        if self._base is not None and (line := in_one_line(self._base.records)):
-            lines.append(line + " (--details lists them)" * any(details(self._base.records)))
+        records = self._base.records if self._base else ()
+        line = in_one_line(records)
+        if line:
+            lines.append(line + " (--details lists them)" * any(details(records)))
         more = f"{questions} question{'s' * (questions != 1)} about the data: comments at their lines in the file"
         return [*lines, more] if questions else lines
 

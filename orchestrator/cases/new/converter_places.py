@@ -107,12 +107,8 @@ def place_for(
     found = ConverterPlace(wanted, bus, round(abs(flow.voltages[bus]), 5), ", ".join(at_slack))
     if wanted.less is None:
         return found
-    if (
-        len(
-            there := [unit for unit, place in units.items() if place in called.get(wanted.less, ())]
-        )
-        == 1
-    ):
+    there = [unit for unit, place in units.items() if place in called.get(wanted.less, ())]
+    if len(there) == 1:
         wanted = replace(wanted, less=there[0])
     if wanted.less not in units:
         known = f"the network's units: {', '.join(units)}"

@@ -47,9 +47,8 @@ def sources_of(files: Sequence[Path]) -> dict[str, Path]:
         found[key] = path
     if not [key for key in found if key != "dyr"]:
         raise InputError("no network is given; name its file, such as own.raw, and with it own.dyr")
-    if {*found} & {*_TABLES} and (
-        lacks := [key for key in ("lines_file", "units") if key not in found]
-    ):
+    lacks = [key for key in ("lines_file", "units") if key not in found]
+    if {*found} & {*_TABLES} and lacks:
         wanted = " and ".join(f"one with the columns {', '.join(_TABLES[key])}" for key in lacks)
         raise InputError(
             f"{', '.join(map(str, found.values()))}: of the tables of a network, {wanted} is missing"

@@ -95,13 +95,12 @@ def _unlike_twins(
     for parallel in circuits.values():
         for (one, own), (other, its) in combinations(parallel, 2):
             odd = [q for q in "RXB" if abs(own[q] - its[q]) > 0.25 * max(abs(own[q]), abs(its[q]))]
-            if len(odd) == 1 and max(sizes := [abs(own[odd[0]]), abs(its[odd[0]])]) > _TWINS * min(
-                sizes
-            ):
-                variable, its_twins = (
-                    other.variable(odd[0]),
-                    f"the parallel {one.name} has {own[odd[0]]:g} pu",
-                )
+            if len(odd) != 1:
+                continue
+            sizes = [abs(own[odd[0]]), abs(its[odd[0]])]
+            if max(sizes) > _TWINS * min(sizes):
+                variable = other.variable(odd[0])
+                its_twins = f"the parallel {one.name} has {own[odd[0]]:g} pu"
                 text = f"{variable} = {its[odd[0]]:g} pu, and {its_twins}, with like other data"
                 place = _place(draft, "lines", other.name, odd[0], variable)
                 kind = f"{odd[0]} unlike the parallel circuit's"

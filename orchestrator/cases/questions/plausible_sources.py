@@ -100,7 +100,8 @@ def _step_up(draft: Draft, name: str, grid: ComponentPlan, where: str) -> Iterat
     ratings: dict[str, float] = {}
     for port in draft.network.ports:
         plan = draft.system.components.get(port.name)
-        if plan is not None and (S_n := value_of(plan, "S_n")) is not None:
+        S_n = None if plan is None else value_of(plan, "S_n")
+        if S_n is not None:
             ratings[port.bus] = ratings.get(port.bus, 0.0) + S_n
     low, high = _STEP_UP
     at_bus: dict[str, list[Line]] = {bus: [] for bus in ratings}
@@ -115,10 +116,8 @@ def _step_up(draft: Draft, name: str, grid: ComponentPlan, where: str) -> Iterat
         variable = branches[0].variable("X")
         X = value_of(grid, variable)
         own = 0.0 if X is None else X * rating / 100  # on the machines' rating [pu]
-        if X is not None and (
-            (low_side := own < low <= own * rating / 100 <= high)
-            or (own > high and (low <= X <= high or own > _FAR * low))
-        ):
+        low_side = own < low <= own * rating / 100 <= high
+        if X is not None and (low_side or (own > high and (low <= X <= high or own > _FAR * low))):
             meant = (
                 f"if {X:g} pu is on the machine's base, it is {100 * X / rating:.4g} pu on 100 MVA"
             )
@@ -141,7 +140,8 @@ def _saturation(draft: Draft) -> Iterator[UnusualValue]:
     known = {}
     for name in draft.origins:
         plan = draft.system.components.get(name)
-        if plan is not None and (s_10 := value_of(plan, "machine.s_10")) is not None:
+        s_10 = None if plan is None else value_of(plan, "machine.s_10")
+        if plan is not None and s_10 is not None:
             known[name] = max(s_10, value_of(plan, "machine.s_12") or 0.0)
     without = [name for name, saturation in known.items() if saturation == 0]
     if len(known) - len(without) < 2 or 2 * len(without) > len(known):

@@ -13,7 +13,7 @@ from orchestrator.cases.events.event_tables import scenario_events
 from orchestrator.cases.flow.beside_file import BesideFile, FileVoltages, compare_with_file
 from orchestrator.cases.flow.power_flow import PowerFlow
 from orchestrator.cases.form import component_forms
-from orchestrator.cases.form.build_choices import MODELS, PARTS, STAND_IN
+from orchestrator.cases.form.build_choices import MODELS, STAND_IN, chosen_parts
 from orchestrator.cases.form.definition import CaseDefinition
 from orchestrator.cases.form.names import close_names
 from orchestrator.cases.form.parameter_files import ParameterFile
@@ -431,7 +431,7 @@ class Preparer:
             if table.model in model_names() and not takes_network(table)
             else {}
         )
-        chosen = {part: found for part in PARTS if (found := getattr(table, part)) is not None}
+        chosen = chosen_parts(table)
         choices = [choice for layer in self.draft.given.layers for choice in layer.parts]
         for choice in (c for c in choices if c.fits(name, has_part=c.part in known)):
             try:

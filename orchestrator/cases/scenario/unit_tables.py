@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.draft import Draft, UnitOrigin
-from orchestrator.cases.form.build_choices import PARTS
+from orchestrator.cases.form.build_choices import PARTS, chosen_parts
 from orchestrator.cases.form.csv_rows import (
     PLACE,
     Row,
@@ -103,7 +103,7 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
                 }
                 values = {**common, **row.parameters.get(kind, {}), **own}
                 name = f"{kind}{row.label}"
-                parts: dict[str, Any] = {**_parts_of(table), **row.parts} if kind == "sg" else {}
+                parts: dict[str, Any] = {**chosen_parts(table), **row.parts} if kind == "sg" else {}
                 if row.converter is not None or row.is_infinite:  # the row says all
                     values = {**row.parameters.get(kind, {}), **own}
                 components[name] = ComponentTable(
@@ -205,10 +205,9 @@ def unit_rows(
         rows.append(checked(unit, place_of(entry)))
     _require_names(rows, path)
     at_bus = {row.bus: [r for r in rows if r.bus == row.bus] for row in rows}
-    reach = {
-        bus: (sum(u.q_min_mvar for u in us), sum(u.q_max_mvar for u in us))
-        for bus, us in at_bus.items()
-    }
+    least = {bus: sum(u.q_min_mvar for u in units) for bus, units in at_bus.items()}
+    most = {bus: sum(u.q_max_mvar for u in units) for bus, units in at_bus.items()}
+    reach = {bus: (least[bus], most[bus]) for bus in at_bus}
     return [
         replace(row, q_min_mvar=reach[row.bus][0], q_max_mvar=reach[row.bus][1]) for row in rows
     ]
@@ -287,7 +286,7 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
         approximate=table.dyr_approximate,
     )
     _account(draft, table, records, ours)
-    rows = with_choices(rows, replaced, _parts_of(table))
+    rows = with_choices(rows, replaced, chosen_parts(table))
     rows = without_idle_controls(rows, str(path), _choosing_exciters(draft, rows))
     machine_rows = [row for row in rows if row.label not in replaced]
     question(
@@ -396,10 +395,6 @@ def _with_recorded_loads(
     )
     draft.found.questions += recorded.remarks
     return recorded.places
-
-
-def _parts_of(table: UnitsTable) -> dict[str, str]:
-    return {part: name for part in PARTS if (name := getattr(table, part)) is not None}
 
 
 def _alphas(draft: Draft, table: UnitsTable, rows: Sequence[UnitRow]) -> dict[str, float]:

@@ -115,6 +115,7 @@ class AcceptanceReport:
         return f"do not use it as it is: {', '.join(self.faults)}{hertz}"
 
     def as_dict(self) -> dict[str, Any]:
+        checks = [{"question": question_of(r.check), **r.as_dict()} for r in self.results]
         return {
             "tool": f"gfor-cosim {version('gfor-cosim')}",
             "fmu": str(self.fmu),
@@ -128,7 +129,7 @@ class AcceptanceReport:
             "protections": [asdict(protection) for protection in self.protections],
             "used_as": self.used_as,
             "seed": self.seed,
-            "checks": [{"question": question_of(r.check), **r.as_dict()} for r in self.results],
+            "checks": checks,
         }
 
 

@@ -322,12 +322,11 @@ def _describe(
         v.name = one_line(v.name or "")
     _check_names(path, md)
     variables = {v.name: _variable(path, v, usual) for v in md.modelVariables}
-    dependencies = {
-        unknown.variable.name: None
-        if unknown.dependencies is None
-        else tuple(d.name for d in unknown.dependencies)
-        for unknown in md.outputs
-    }
+    dependencies: dict[str, tuple[str, ...] | None] = {}
+    for unknown in md.outputs:
+        known = unknown.dependencies
+        names = None if known is None else tuple(d.name for d in known)
+        dependencies[unknown.variable.name] = names
     discrete = _discrete_states(path, root, md)
     return FmuDescription(
         path=path,
@@ -496,9 +495,14 @@ def _component(root: ElementTree.Element, version: str) -> tuple[str, dict[str, 
     return found.get("kind", ""), usual
 
 
+def _number_or_none(value: Any) -> float | None:
+    return None if value is None else float(value)
+
+
 def _variable(path: Path, v: Any, usual: Mapping[str, Usual]) -> VariableInfo:
     unit = v.unit or (v.declaredType.unit if v.declaredType is not None else None) or ""
     fmi_type = "Array" if v.dimensions else _TYPES_OF_3.get(v.type, v.type)
+    rated = _RATED.get(v.name)
     return VariableInfo(
         name=v.name,
         reference=v.valueReference,
@@ -507,12 +511,11 @@ def _variable(path: Path, v: Any, usual: Mapping[str, Usual]) -> VariableInfo:
         variability=v.variability or "continuous",
         unit=one_line(unit),
         start=None if v.start is None else _start(path, v, fmi_type),
-        minimum=None if v.min is None else float(v.min),
-        maximum=None if v.max is None else float(v.max),
+        minimum=_number_or_none(v.min),
+        maximum=_number_or_none(v.max),
         description=one_line(v.description or ""),
         declared_type=v.type,
-        usual=usual.get(v.name)
-        or (rated.usual if (rated := _RATED.get(v.name)) and rated.unit == unit else None),
+        usual=usual.get(v.name) or (rated.usual if rated and rated.unit == unit else None),
     )
 
 

@@ -39,7 +39,8 @@ def on_message(
     """Watch what FMUs log in this process, and end it if one logs without end; for processes of foreign FMUs."""
 
     def guard(messages: Messages) -> None:
-        if messages.step != (now := steps()):
+        now = steps()
+        if messages.step != now:
             messages.step, messages.streak = now, 0
         messages.streak += 1
         if keep is not None and messages.streak < _KEPT:

@@ -111,15 +111,15 @@ class PortMap:
                 **{**part, "form": Form(part["form"]), "variables": tuple(part["variables"])}
             )
 
+        starts = {n: tuple(StartMap(**m) for m in maps) for n, maps in values["start"].items()}
+        signals = {n: SignalMap(**m) for n, m in values["signals"].items()}
         return cls(
             **{
                 **values,
                 "voltage": phasor(values["voltage"]),
                 "current": phasor(values["current"]),
-                "start": {
-                    n: tuple(StartMap(**m) for m in maps) for n, maps in values["start"].items()
-                },
-                "signals": {n: SignalMap(**m) for n, m in values["signals"].items()},
+                "start": starts,
+                "signals": signals,
             }
         )
 
@@ -303,10 +303,10 @@ def _info(
     minimum: float | None = None,
     maximum: float | None = None,
 ) -> VariableInfo:
+    reference = PORT.index(variable.name) if variable.name in PORT else 2**32 - 1
     return VariableInfo(
         name=variable.name,
-        # start values are not read
-        reference=PORT.index(variable.name) if variable.name in PORT else 2**32 - 1,
+        reference=reference,
         type="Real",
         causality=causality,
         variability="fixed" if causality == "parameter" else "continuous",

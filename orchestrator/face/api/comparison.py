@@ -92,9 +92,8 @@ def compare(
 
 
 def _warn_of_other_files(first: xr.Dataset, second: xr.Dataset, labels: tuple[str, str]) -> None:
-    if (cases := [run.attrs.get("case_file") for run in (first, second)])[0] != cases[
-        1
-    ] and None not in cases:
+    cases = [run.attrs.get("case_file") for run in (first, second)]
+    if cases[0] != cases[1] and None not in cases:
         told = [
             f"{label} of {run.attrs['case']}"
             for label, run in zip(labels, (first, second), strict=True)

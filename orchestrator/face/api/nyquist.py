@@ -93,6 +93,11 @@ def nyquist(
         else number_in(rating, "MVA", "rating", "a rating in MVA, such as 100")
     )
     share = number_in(compensation, "", "compensation", "a share in percent, such as 30") / 100
+    kilovolt = (
+        None
+        if voltage is None
+        else number_in(voltage, "kV", "voltage", "a voltage in kV, such as 230")
+    )
     return Asked(
         _place(device, "device"),
         None if network is None else _place(network, "network"),
@@ -107,9 +112,7 @@ def nyquist(
         scr=scr,
         x_r=x_r,
         rating_mva=rated,
-        kilovolt=None
-        if voltage is None
-        else number_in(voltage, "kV", "voltage", "a voltage in kV, such as 230"),
+        kilovolt=kilovolt,
     ).judged()
 
 
@@ -189,7 +192,8 @@ class Asked:
     def at(self, point: Mapping[str, Any]) -> "Asked":
         """The same with other values; ``device`` among them is the file of another scan of the device."""
         found, values = copy(self), dict(point)
-        if self._device is not None and (other := values.pop("device", None)) is not None:
+        other = None if self._device is None else values.pop("device", None)
+        if other is not None:
             found._device = Path(other)
         found._given = self._given | values
         return found

@@ -10,7 +10,7 @@ from fmus.toolchain.catalogue import model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS
 from fmus.toolchain.model import FmiVersion
 from orchestrator.cases.case import load_case
-from orchestrator.cases.form.build_choices import PARTS
+from orchestrator.cases.form.build_choices import PARTS, chosen_parts
 from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
 from orchestrator.devices.fmi.linear_model import linear_model_members
@@ -93,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
         )
     if options.sources and not options.native:
         raise InputError("--sources is for native FMUs, which are compiled from C; add --native")
-    parts = {part: name for part in PARTS if (name := getattr(options, part)) is not None}
+    parts = chosen_parts(options)
     if parts and not options.names:
         raise InputError(
             f"--{next(iter(parts))} is for one model: name it, such as synchronous_generator"

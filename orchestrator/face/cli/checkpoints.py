@@ -84,7 +84,8 @@ class StudyCheckpoints:
             remove_at_once(self._folder, self.run)
             return
         worth_it = interrupted or any(one.exist for one in self._of.values())
-        if worth_it and (text := how_it_goes_on(self._options)):
+        text = how_it_goes_on(self._options) if worth_it else ""
+        if text:
             _say(text)
 
 

@@ -12,7 +12,8 @@ def saying_how_it_goes_on(words: Callable[[], str]) -> Iterator[None]:
     try:
         yield
     except BaseException as error:
-        if is_interrupt(error) and (text := words()):
+        text = words() if is_interrupt(error) else ""
+        if text:
             error.add_note(text)
         raise
 

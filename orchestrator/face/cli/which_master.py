@@ -82,14 +82,15 @@ def run(options: argparse.Namespace) -> int:
     named = dict(_read_column(text) for text in options.column)
     verdict = identify(read_probe_result(options.result, named), options.step, options.stop)
     if options.json:
+        told = {
+            name: a[0] if len(a) == 1 else None
+            for name in PROPERTIES
+            for a in [verdict.answers(name)]
+        }
         print_json(
             {
                 "fits": [asdict(fit) for fit in verdict.fits],
-                "told": {
-                    name: a[0] if len(a) == 1 else None
-                    for name in PROPERTIES
-                    for a in [verdict.answers(name)]
-                },
+                "told": told,
                 "nearest": asdict(verdict.nearest),
                 "difference": verdict.difference,
                 "rows": verdict.rows,

@@ -77,11 +77,12 @@ def slopes(
     moved = [matched(base, eigenvalues(computed(one, wider))) for one in beside]
     width = ends[1] - ends[0]
     found = (moved[1] - moved[0]) / width if width > 0 else np.full(base.shape, np.nan + 0j)
+    slopes = [[x.real, x.imag] if np.isfinite(x) else None for x in found.tolist()]
     return {
         "parameter": parameter,
         "value": value,
         "eigenvalues": [[x.real, x.imag] for x in base.tolist()],
-        "slopes": [[x.real, x.imag] if np.isfinite(x) else None for x in found.tolist()],
+        "slopes": slopes,
     }
 
 

@@ -89,7 +89,8 @@ def _of(master: Master, name: str) -> Iterator[Misfit]:
     if "omega" in described.outputs:  # it may begin at 1 whatever it shows at rest
         with suppress(CosimError):  # there may be no second instance
             omega, settled = _omega_alone(master, name)
-            if settled and (misfit := of_frequency(omega, described.port.f_n)):
+            misfit = of_frequency(omega, described.port.f_n) if settled else None
+            if misfit:
                 yield misfit
     inputs = master.exchanges[name].inputs
     given = dict(zip(inputs.names, inputs.values.tolist(), strict=True))

@@ -136,11 +136,10 @@ class Mode(OfEigenvalue):
             state: math.degrees(cmath.phase(self.shape[state] / self.shape[moving[0]]))
             for state in moving
         }
-        return SwingGroups(
-            tuple(s for s in moving if abs(angles[s]) <= _ALIKE_DEG),
-            tuple(s for s in moving if abs(angles[s]) >= 180 - _ALIKE_DEG),
-            {s: angles[s] for s in moving if _ALIKE_DEG < abs(angles[s]) < 180 - _ALIKE_DEG},
-        )
+        alike = tuple(s for s in moving if abs(angles[s]) <= _ALIKE_DEG)
+        against = tuple(s for s in moving if abs(angles[s]) >= 180 - _ALIKE_DEG)
+        between = {s: angles[s] for s in moving if s not in {*alike, *against}}
+        return SwingGroups(alike, against, between)
 
     def participation_of(self, states: Iterable[str]) -> float:
         """Participation of some states together."""

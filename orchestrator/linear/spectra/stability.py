@@ -206,13 +206,14 @@ class Stability(NoTruth):
     def as_json(self) -> dict[str, Any]:
         """Figures and sentence as JSON's types; rates in 1/s, frequencies in Hz."""
         mode = self.mode
+        participation = (
+            [] if mode is None else [{"state": s, "factor": f} for s, f in mode.participation[:6]]
+        )
         return {
             "stable": self.stable,
             "largest_growth_rate": self.largest_growth_rate,
             "frequency_hz": None if mode is None else mode.frequency_hz,
-            "participation": []
-            if mode is None
-            else [{"state": s, "factor": f} for s, f in mode.participation[:6]],
+            "participation": participation,
             "growing_modes": self.growing,
             "zero_eigenvalues": self.zeros,
             "eigenvalues": self.eigenvalues,

@@ -64,6 +64,7 @@ def files_named(text: str, home: Path) -> dict[str, Path]:
     found = {}
     for name in re.findall(r"""["']([^"'\n]{1,200})["']""", text):
         with suppress(OSError, ValueError):
-            if (path := home / name).is_file():
+            path = home / name
+            if path.is_file():
                 found[name] = path
     return found

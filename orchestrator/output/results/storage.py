@@ -31,6 +31,12 @@ def provenance(prepared: PreparedScenario) -> dict[str, str | float]:
     packages = ("gfor-cosim", "fmpy", "numpy", "pythonfmu", "scipy")
     fmus = {name: plan.description for name, plan in prepared.system.components.items()}
     tolerance = prepared.schedule.tolerance
+    models = json.dumps(
+        {
+            n: {"model": d.model_name, "guid": d.guid, "tool": d.generation_tool}
+            for n, d in fmus.items()
+        }
+    )
     return {
         "case": prepared.case.name,
         "scenario": prepared.name,
@@ -42,12 +48,7 @@ def provenance(prepared: PreparedScenario) -> dict[str, str | float]:
         "step_size_s": prepared.step_size,
         "schedule": f"{prepared.schedule.name}: {' | '.join(', '.join(g) for g in prepared.schedule.groups)}",
         **({} if tolerance is None else {"tolerance": tolerance}),
-        "fmus": json.dumps(
-            {
-                n: {"model": d.model_name, "guid": d.guid, "tool": d.generation_tool}
-                for n, d in fmus.items()
-            }
-        ),
+        "fmus": models,
         "versions": json.dumps(versions_of(packages)),
         "Conventions": "CF-1.10",
     }

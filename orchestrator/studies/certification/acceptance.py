@@ -78,7 +78,8 @@ def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
     from orchestrator.devices.acceptance.checks.all import CHECKS  # noqa: PLC0415 - as above
 
     there = {name for *_, name in found}
-    if not faults and (left := [name for name in CHECKS if name not in there]):
+    left = [name for name in CHECKS if name not in there]
+    if not faults and left:
         raise InputError(f"--check {path}: it does not hold {', '.join(left)}; {remedy}")
     if not faults and not any(verdict == "pass" for verdict, *_ in found):
         raise InputError(

@@ -131,19 +131,13 @@ def faults_of(stated: Mapping[str, Any], again: Mapping[str, Any]) -> Iterator[s
         yield f"{place!r} {text}"
     named = [{_name(row): row for row in content[rows]} for content in (stated, again)]
     listed = [_name(row) for row in stated[rows]]
+    lost = [name for name in listed if name not in named[1]]
+    fresh = [name for name in named[1] if name not in named[0]]
+    double = [name for k, name in enumerate(listed) if name in listed[:k]]
     compared = (
-        (
-            "rows of the record that do not come out anew",
-            [name for name in listed if name not in named[1]],
-        ),
-        (
-            "rows that come out anew that the record has not",
-            [name for name in named[1] if name not in named[0]],
-        ),
-        (
-            "rows that the record has twice",
-            [name for k, name in enumerate(listed) if name in listed[:k]],
-        ),
+        ("rows of the record that do not come out anew", lost),
+        ("rows that come out anew that the record has not", fresh),
+        ("rows that the record has twice", double),
     )
     yield from (f"{what}: {', '.join(dict.fromkeys(names))}" for what, names in compared if names)
     for name in (name for name in named[0] if name in named[1]):

@@ -164,9 +164,8 @@ def matched_modes(
 def _comparable(having: ModeSet, lacking: ModeSet) -> NDArray[np.bool_]:
     """Mask of the pairs that may be one mode: a judged mode and a mode that is not judged must have near
     frequencies."""
-    judged, near = (
-        [[f(hz) for hz in s.frequencies] for s in (having, lacking)] for f in (is_judged, is_near)
-    )
+    judged = [[is_judged(hz) for hz in s.frequencies] for s in (having, lacking)]
+    near = [[is_near(hz) for hz in s.frequencies] for s in (having, lacking)]
     forbidden = np.logical_and.outer(judged[0], np.logical_not(near[1]))
     forbidden |= np.logical_and.outer(np.logical_not(near[0]), judged[1])
     return np.logical_not(forbidden)

@@ -179,19 +179,20 @@ def save_matrix(matrix: CertificateMatrix, devices: Sequence[Device], folder: Pa
 
 
 def matrix_json(matrix: CertificateMatrix, devices: Sequence[Device]) -> dict[str, Any]:
+    tested = [
+        {
+            "name": d.name,
+            "file": d.file.name,
+            "binding": d.binding.name if d.binding else None,
+            "values": dict(d.values),
+        }
+        for d in devices
+    ]
     return {
         "format": FORMAT,
         "sentence": matrix.sentence(),
         "exit_code": matrix.exit_code,
-        "devices": [
-            {
-                "name": d.name,
-                "file": d.file.name,
-                "binding": d.binding.name if d.binding else None,
-                "values": dict(d.values),
-            }
-            for d in devices
-        ],
+        "devices": tested,
         "codes": list(matrix.codes),
         "left_out": list(matrix.left_out),
         "cells": [_cell_json(cell) for cell in matrix.cells.values()],

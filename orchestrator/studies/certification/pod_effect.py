@@ -39,10 +39,8 @@ def kept_off(stated: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a certificate states, as a `PointResult` has it."""
     if stated["unknown"]:
         return {"off_failure": stated["unknown"]}
-    named = [
-        complex(x["real"], x["imag"]) if (x := stated["modal"][k]) else np.nan
-        for k in ("off", "on")
-    ]
+    modal = [stated["modal"][k] for k in ("off", "on")]
+    named = [complex(x["real"], x["imag"]) if x else np.nan for x in modal]
     return {
         "off": np.array([complex(*x) for x in stated["modes_off"]]),
         "swings": np.array(named, dtype=complex),
@@ -76,7 +74,8 @@ def with_pod(
                 f"{name} acts otherwise in the response than at the eigenvalues: the modes without it fit {POWER} "
                 f"{pod.better_off:.3g} times better"
             ]
-        if least == min(known) < np.inf and (by := pod.apart("on", "off") or 0.0) < RAISED:
+        by = pod.apart("on", "off") or 0.0
+        if least == min(known) < np.inf and by < RAISED:
             told = f"{least:.2f} % without, {by:+.2f} points with it"
             said.append(f"{name} does not damp the electromechanical mode: {told}")
         faults = tuple(dict.fromkeys((*v.faults, *said)))

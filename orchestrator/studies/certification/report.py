@@ -192,7 +192,8 @@ _TITLES = {PASSES: "passed", FAILS: "failed", INCOMPLETE: "incomplete"}
 
 def title(c: Certificate) -> str:
     word = _TITLES[c.verdict]
-    if c.damping is not None and (left := missing_of(c)):
+    left = missing_of(c) if c.damping is not None else []
+    if left:
         word += f" ({len(c.code.rows) - len(left)} of {len(c.code.rows)})"
     if c.refused:
         word += ", acceptance tests failed"

@@ -61,7 +61,8 @@ class CertificationRequest:
 
 def rated_frequency(request: CertificationRequest, wanted: float) -> float:
     """Frequency at which a test runs [Hz]: the code's where the FMU can be set to it, else the FMU's own."""
-    if isinstance(set_by_user := request.values.get("f_n"), int | float):
+    set_by_user = request.values.get("f_n")
+    if isinstance(set_by_user, int | float):
         return float(set_by_user)
     description = bound_fmu(request.fmu, request.binding)
     if isinstance(description, BoundDescription):

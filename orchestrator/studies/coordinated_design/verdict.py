@@ -181,19 +181,21 @@ def _judge_point(
     others = [mode for mode in second if mode.floor is not None]
     closest = min(others, key=lambda mode: mode.damping - (mode.floor or 0.0), default=None)
     beside = [k for value in apart if (k := nearest(second, value)) is not None]
+    other = None if closest is None else _placed_mode(closest, after)
+    left_modes = tuple(_placed_mode(mode, after) for mode in second if mode.place in left)
     return JudgedPoint(
         *where,
         before,
         after,
         target_before=_least(first, before),
         target=_least(second, after),
-        other=None if closest is None else _placed_mode(closest, after),
+        other=other,
         worth=worth_of(second, growth(after.values), growth(before.values)),
         unnamed=any(name not in point.named for point in (before, after) for name in aim.names),
         least_before=_least_of_all(before),
         least=_least_of_all(after),
         apart=tuple(_placed_mode(second[k], after) for k in dict.fromkeys(beside)),
-        left=tuple(_placed_mode(mode, after) for mode in second if mode.place in left),
+        left=left_modes,
     )
 
 

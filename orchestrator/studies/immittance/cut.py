@@ -67,6 +67,7 @@ def cut_of(prepared: PreparedScenario, bus: str | None, names: tuple[str, ...]) 
         currents = {d: complex(*(values[f"{d}.{i}"] for i in _PORT[1])) for d in devices}
     device, network, units, ports = opened.sides(devices)
     places, found = {homes[name] for name in devices}, np.zeros(0, dtype=complex)
+    named_ports = tuple((homes[at[0]], at) for at in ports)
     return Cut(
         devices,
         device,
@@ -78,7 +79,7 @@ def cut_of(prepared: PreparedScenario, bus: str | None, names: tuple[str, ...]) 
         warnings=said,
         eigenvalues=spectrum.eigenvalues if spectrum else found,
         bus=places.pop() if len(places) == 1 else "",
-        ports=tuple((homes[at[0]], at) for at in ports),
+        ports=named_ports,
         units=units,
     )
 
@@ -228,9 +229,9 @@ class _Opened:
         """Its currents count into it."""
         mine = [k for k, port in enumerate(ports) if set(self._ports[port]) & set(inside)]
         at = [[d for d in self._ports[ports[k]] if d in inside] for k in mine]
-        C, D = (
-            np.concatenate([sum(M[self._i[d]] for d in ds) for ds in at]) for M in (self.C, self.D)
-        )
+        rows = [[self._i[d] for d in devices] for devices in at]
+        C = np.concatenate([sum(self.C[i] for i in own) for own in rows])
+        D = np.concatenate([sum(self.D[i] for i in own) for own in rows])
         v = np.concatenate([self._v[ds[0]] for ds in at])
         B, D = self.B[np.ix_(states, v)], D[:, v]
         side = Exact(", ".join(inside), self.A[np.ix_(states, states)], B, C[:, states], D)

@@ -175,14 +175,12 @@ def _rated_seen(frequencies: Numbers, values: Vector, rated_hz: float) -> float:
         [_turning(frequencies, Z, rated_hz, frequencies[-1] / top)[1:] for Z in forms]
         for top in _TOPS
     ]
-    met, opposite = (
-        min(
-            math.sqrt(math.prod(math.hypot(part - sign, unlike) for part, unlike in band))
-            for band in bands
-        )
-        < _SURE
-        for sign in (1, -1)
-    )
+
+    def is_met(sign: int) -> bool:
+        apart = ([math.hypot(part - sign, unlike) for part, unlike in band] for band in bands)
+        return min(math.sqrt(math.prod(of_band)) for of_band in apart) < _SURE
+
+    met, opposite = is_met(1), is_met(-1)
     if opposite:
         return -1.0
     return 1.0 if met and seen < _OTHER_AXIS else seen

@@ -235,9 +235,8 @@ def read_scan(path: Path, rated_hz: float, *, network: bool = False) -> Scan:
             f"{path}: it is not a text file; a scan is one of Z-tool's or IMTB's"
         ) from error
     first = text.partition("\n")[0].strip()
-    if (names := first.split())[:1] == ["f"] and any(
-        name.endswith(("_d", "_dc")) for name in names
-    ):
+    names = first.split()
+    if names[:1] == ["f"] and any(name.endswith(("_d", "_dc")) for name in names):
         return read_ztool(path, text, rated_hz)
     if first.startswith("f,") and ("_dq_11_re" in first or "_ab_11_re" in first):
         return read_imtb(path, text, rated_hz, network=network)

@@ -93,7 +93,8 @@ def strengths_of(
     """Short-circuit power at a cut [MVA], SCR of the converters by bus, and gSCR of all of them; of a case without a
     power flow the first alone, of the network's impedance up to the rated frequency, where it is one."""
     if prepared is not None and prepared.network is not None and prepared.power_flow is not None:
-        found = (whole := ShortCircuit.of(prepared)).strengths()
+        whole = ShortCircuit.of(prepared)
+        found = whole.strengths()
         here = next((b.s_sc_mva for b in found if b.bus == bus.rpartition(".")[2]), None)
         return here, {b.bus: b.scr for b in found if b.scr is not None}, whole.gscr()
     low = network.frequencies[:1] if not network.is_exact else np.array([1e-3])

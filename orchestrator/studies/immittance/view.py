@@ -213,6 +213,8 @@ def _one(x: Retuned, goal: float) -> dict[str, Any]:
         for v, f in zip(x.values.tolist(), x.figures, strict=True)
         if math.isfinite(f.distance)
     ]
+    scans = [{"value": v, "verdict": str(r.verdict)} for v, r in sorted(x.scans.items())]
+    checks = [vars(c) for c in x.checks if math.isfinite(c.found + c.predicted)]
     return {
         "name": x.setting.name,
         "unit": x.setting.unit,
@@ -222,8 +224,8 @@ def _one(x: Retuned, goal: float) -> dict[str, Any]:
         "needed": x.needed,
         "confirmed": _confirmed(x),
         "remark": x.remark,
-        "scans": [{"value": v, "verdict": str(r.verdict)} for v, r in sorted(x.scans.items())],
-        "checks": [vars(c) for c in x.checks if math.isfinite(c.found + c.predicted)],
+        "scans": scans,
+        "checks": checks,
         "curve": [
             {
                 "value": v,

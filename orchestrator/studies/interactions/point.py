@@ -148,15 +148,14 @@ def _modes(case: Case, task: SystemTask) -> ModesResult:
 def _record(result: ModesResult) -> SystemRecord:
     stability = result.stability
     grows = stability.stable is False and stability.mode is not None
+    identified = [name for name, source in result.linearised.items() if source == IDENTIFIED]
     return SystemRecord(
         modes=tuple(SharedMode.of(mode) for mode in result.modes if mode.is_oscillation),
         growing=SharedMode.of(stability.mode) if grows and stability.mode is not None else None,
         stability=stability.as_json(),
         because=stability.because(),
         warnings=result.warnings,
-        identified=tuple(
-            name for name, source in result.linearised.items() if source == IDENTIFIED
-        ),
+        identified=tuple(identified),
         states=result.model.number_of_states,
         residual=result.operating_point.residual,
         model=KeptModel.of(result.model),

@@ -32,9 +32,8 @@ def told(results: Sequence[ModesResult]) -> Iterator[str]:
 
 def _compared(result: ModesResult, other: ModesResult, before: Mode) -> str:
     title = result.prepared.title
-    voltages = [
-        {} if (flow := r.prepared.power_flow) is None else flow.voltages for r in (result, other)
-    ]
+    flows = [r.prepared.power_flow for r in (result, other)]
+    voltages = [{} if flow is None else flow.voltages for flow in flows]
     if not all(
         abs(v - voltages[1].get(bus, 0.0)) < _SAME_VOLTAGE for bus, v in voltages[0].items()
     ):

@@ -152,15 +152,13 @@ def without_references(c: Any) -> Any:
 def _same_fmus(master: Master, prepared: PreparedScenario) -> bool:
     """Tell if the running FMUs can serve the next point. Others' are opened anew: many cannot go on after a reset."""
     system, other = master.system, prepared.system
+    paths = {n: plan.description.path for n, plan in system.components.items()}
     return (
         not (system.wires or other.wires)
         and system.connections == other.connections
         and list(system.components) == list(other.components)
-        and all(
-            plan.description.path == other.components[n].description.path
-            for n, plan in system.components.items()
-        )
-        and all(map(is_ours, {plan.description.path for plan in system.components.values()}))
+        and paths == {n: plan.description.path for n, plan in other.components.items()}
+        and all(map(is_ours, set(paths.values())))
         and all(
             plan.isolated == other.components[n].isolated for n, plan in system.components.items()
         )

@@ -131,23 +131,23 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
             f"{few(dead, _SHOWN)} cut off by branches that the case or the point has open"
         )
     opened = set(out) - set(ties)
+    loads = tuple(
+        x.name for x in network.loads if x.name in out or (part[x.bus] != main and power[x.name])
+    )
+    charging = tuple(
+        x.variable("B")
+        for x in network.lines
+        if x.B and x.name not in opened and {x.from_bus, x.to_bus} & set(dead)
+    )
     return Remains(
         units=tuple(
             dict.fromkeys((*out_units, *(n for n in units if part[elements.units[n]] != main)))
         ),
-        loads=tuple(
-            x.name
-            for x in network.loads
-            if x.name in out or (part[x.bus] != main and power[x.name])
-        ),
+        loads=loads,
         shunts=tuple(
             x.name for x in network.shunts if x.name in elements.shunts and part[x.bus] != main
         ),
-        charging=tuple(
-            x.variable("B")
-            for x in network.lines
-            if x.B and x.name not in opened and {x.from_bus, x.to_bus} & set(dead)
-        ),
+        charging=charging,
         ties=tuple(dict.fromkeys(ties)),
         dead=tuple(dead),
     )

@@ -124,7 +124,8 @@ def questions_about(
         place, own = f"{path}, line 1: column {column!r}", own_power(column, elements, prepared)
         cells = [text for row in rows if (text := (row[column] or "").strip())]
         most = max((abs(float(text)) for text in cells if own), default=0.0)
-        if cells and (units := elements.balancing_in(column)):
+        units = elements.balancing_in(column)
+        if cells and units:
             left = f"cannot act on {', '.join(units)}: {elements.slack} is the slack and feeds what is left"
             yield Problem(place, f"{left}; leave it out, or name another slack in [power_flow]")
         elif own and 0 < _ANOTHER_UNIT * most < abs(own):

@@ -136,7 +136,8 @@ class ItemPreparation:
         """Values by which the case alone is at an item: what is off, and what each unit feeds where others share it.
 
         Raises as `prepared`."""
-        remains = what_remains(valued := self._valued(item), self.elements, item.out)
+        valued = self._valued(item)
+        remains = what_remains(valued, self.elements, item.out)
         prepared = self.prepared(item)
         scenario = prepared.scenario
         found = {**item.values, **switched_off(item.out, remains, valued, self.elements.grid)}
@@ -192,9 +193,8 @@ class ItemPreparation:
         before, now = (
             (x.power_flow.beyond_limits if x.power_flow else ()) for x in (self.base, prepared)
         )
-        found = (
-            [] if limits is False else [x for x in now if x.bus not in {one.bus for one in before}]
-        )
+        already = {one.bus for one in before}
+        found = [] if limits is False else [x for x in now if x.bus not in already]
         return max(found, key=lambda x: abs(x.q - x.limit)).text(kept=False) if found else ""
 
     def _prepare(

@@ -111,7 +111,8 @@ def _map(measured: Measurements, one: Located, others: list[float], figures: Fig
 def _spectrum(measured: Measurements, found: list[Located], figures: Figures) -> str:
     grid, power = spectra(signals_of(measured).values, measured.interval)
     shown = (grid > 0.05) & (grid < min(4.0, 0.4 / measured.interval))
-    level = 10 * np.log10(np.maximum((mean := power[shown].mean(axis=1)) / mean.max(), 1e-12))
+    mean = power[shown].mean(axis=1)
+    level = 10 * np.log10(np.maximum(mean / mean.max(), 1e-12))
     curves = [ChartCurve("all signals", colour(1), grid[shown], level)]
     chart = line_chart("spectrum", "Frequency [Hz]", "Power [dB]", curves)
     lines = ", ".join(f"{x.found.frequency:.4f} Hz" for x in found) or "none"

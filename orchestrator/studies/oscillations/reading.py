@@ -186,9 +186,10 @@ def read_contest(folder: Path) -> Measurements:
         power = vm[bus] * im[name] * np.exp(1j * (angle - np.deg2rad(ia[name])))
         alone = ends.count(parts[0]) == 1
         power = power if alone else -power
+        place = " ".join((bus if alone else name).split())
         places.append(
             Site(
-                " ".join((bus if alone else name).split()),
+                place,
                 "unit" if alone else "branch",
                 bus=parts[0],
                 v=vm[bus],

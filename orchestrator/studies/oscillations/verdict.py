@@ -282,7 +282,8 @@ def locate(measured: Measurements, models: UnitModels | None = None) -> list[Loc
         ):
             reason = f"no other bus moves with {drives}: its measuring may err, or nothing else is in view"
             drives = None
-        if not (sole := said[0].alone and drives is not None) and drives is not None:
+        sole = said[0].alone and drives is not None
+        if not sole and drives is not None:
             reason += f"; whether {drives} does so alone is not known"
         advice = _advice(measured, evidence, drives, sole=sole)
         answers.append(

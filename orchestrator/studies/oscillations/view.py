@@ -113,7 +113,8 @@ def sources_of(
         given = f"--case {case} --scenario {dataset.attrs['scenario']}"
         remark = f"without its own case the run is judged by its signals alone; the units' models decide: give {given}"
         measured = replace(measured, remarks=(remark, *measured.remarks))
-    if models and prepared and (differ := own.unlike(dataset.attrs, prepared)):
+    differ = own.unlike(dataset.attrs, prepared) if models and prepared else ""
+    if differ:
         remark = f"the models that judge it are not of the recorded system; what differs: {differ}"
         measured = replace(measured, remarks=(*measured.remarks, remark))
     units = {name.casefold() for name in models.units} if models else set()
@@ -167,13 +168,8 @@ def _rows(one: Sources) -> Iterator[Sequence[str]]:
 
 def opinions_table(head: str, one: Located) -> PlainTable:
     columns = ("Method", "Applies", "Names", "Places, the largest part first")
-    rows = [
-        (
-            o.method,
-            "yes" if o.applies else "no",
-            o.place or "–",
-            ", ".join(f"{name} {100 * share:.0f} %" for name, share in o.ranking[:_SHOWN]),
-        )
-        for o in one.opinions
-    ]
+    rows = []
+    for o in one.opinions:
+        ranked = ", ".join(f"{name} {100 * share:.0f} %" for name, share in o.ranking[:_SHOWN])
+        rows.append((o.method, "yes" if o.applies else "no", o.place or "–", ranked))
     return make_table(head, *columns, left=4, rows=rows)

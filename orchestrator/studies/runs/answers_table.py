@@ -23,7 +23,8 @@ def answers_table(answers: Sequence[ScenarioAnswer], frequency_range: tuple[floa
         word = Text(answer.verdict, style=f"bold {COLOURS[answer.good]}")
         figures = _figures([mode for mode in (answer.mode, answer.became) if mode])
         table.add_row(answer.subject, word, *figures, answer.remark)
-        if another := answer.another_after:
+        another = answer.another_after
+        if another:
             which = "another mode" if answer.became else "not clearly the same mode"
             who = f": {answer.after_swing}" if answer.after_swing else ""
             remark = f"least damped after the events, {which}{who}"

@@ -18,7 +18,8 @@ def _parts(found: Screening) -> Iterator[RenderableType]:
     yield verdict(found.summary)
     if len(plan.outages) + len(plan.points) > 2:
         yield from ("", overview(found.summary))
-    if (beyond := limits_table(found.summary)) is not None:
+    beyond = limits_table(found.summary)
+    if beyond is not None:
         yield from ("", beyond)
     yield from ("", modes_table(found.summary), "")
 

@@ -135,12 +135,12 @@ def items_table(summary: Summary) -> ColumnTable[ScreenedItem]:
             Column("", lambda item: item.record.counted, name="counted"),
             Column(
                 "",
-                lambda item: None if (one := least_of(item)) is None else one.damping,
+                lambda item: _of_least(item, "damping"),
                 name="least_damping_percent",
             ),
             Column(
                 "",
-                lambda item: None if (one := least_of(item)) is None else one.frequency,
+                lambda item: _of_least(item, "frequency"),
                 name="frequency_hz",
             ),
             Column(
@@ -154,6 +154,11 @@ def items_table(summary: Summary) -> ColumnTable[ScreenedItem]:
         summary.result.items,
         left=4,
     )
+
+
+def _of_least(item: ScreenedItem, figure: str) -> float | None:
+    """Return a figure of an item's least damped mode; None where it has none."""
+    return getattr(least_of(item), figure, None)
 
 
 def _cells(summary: Summary) -> Cells:
@@ -340,13 +345,8 @@ def _places(items: Sequence[ScreenedItem]) -> str:
     """The items of one cause: the first in full, the outages and the points of all."""
     if len(items) == 1:
         return where(items[0])
-    outages, points = (
-        list(dict.fromkeys(names))
-        for names in (
-            [item.outage.name for item in items],
-            [item.point.name for item in items],
-        )
-    )
+    outages = list(dict.fromkeys(item.outage.name for item in items))
+    points = list(dict.fromkeys(item.point.name for item in items))
     at = f" at {few(points, _FEW)}" if len(points) > 1 else ""
     return f"{len(items)} items ({few(outages, _NAMED)}{at}), first {where(items[0])}"
 
@@ -430,7 +430,8 @@ def _page(summary: Summary) -> str:
     """One file that needs no other: what is worst, when, with which outage, and where a damping controller helps."""
     plan, figures = summary.result.plan, Figures()
     content = [("Outages", overview(summary, 20).html())] if len(plan.outages) > 1 else []
-    if (beyond := limits_table(summary, 20)) is not None:
+    beyond = limits_table(summary, 20)
+    if beyond is not None:
         content.append(("Ratings and voltage bands", beyond.html()))
     content += [("Modes", modes_table(summary, 20, whole=True).html())]
     content += [("Damping and how long", _durations(summary, figures))]

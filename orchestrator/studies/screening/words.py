@@ -34,6 +34,12 @@ class OutageRow:
         return self.worst is not None and self.worst.record.stable is False
 
 
+def _rank(item: ScreenedItem) -> tuple[bool, float]:
+    """Return a key that puts unstable items first, and then those with the least damping."""
+    least = least_of(item)
+    return item.record.stable is not False, least.damping if least else np.inf
+
+
 def by_outage(summary: Summary) -> list[OutageRow]:
     groups: dict[str, list[ScreenedItem]] = {}
     for item in summary.result.items:
@@ -41,14 +47,7 @@ def by_outage(summary: Summary) -> list[OutageRow]:
     rows = []
     for name, items in groups.items():
         known = [item for item in items if item.record.status is Status.COMPUTED]
-        worst = min(
-            known,
-            key=lambda item: (
-                item.record.stable is not False,
-                one.damping if (one := least_of(item)) else np.inf,
-            ),
-            default=None,
-        )
+        worst = min(known, key=_rank, default=None)
         least = None if worst is None else least_of(worst)
         unjudged = tuple(item for item in items if item.record.status is not Status.COMPUTED)
         rows.append(OutageRow(name, worst, least, unjudged, len(items)))
@@ -171,7 +170,8 @@ def verdict_of(summary: Summary) -> VerdictSentence:
         text = f"nothing grows at any of {total} points and outages{_but_slowly(summary)}{tail}"
         return VerdictSentence(True, "stable", text)
     left = summary.result.plan.number_of_items - total
-    missing = [text] if (text := not_judged(summary)) else []
+    text = not_judged(summary)
+    missing = [text] if text else []
     missing += [f"{left} not computed yet"] if left else []
     uncounted = computed - summary.counted
     if uncounted:

@@ -75,15 +75,13 @@ def parameters_in(
     real = {name: found for name, found in everything.items() if found[1].type == "Real"}
     for pattern in patterns:
         _check_fits(pattern, everything, real)
-    chosen = {
-        name: (component, info)
-        for name, (component, info) in real.items()
-        if (
-            any(fnmatch.fnmatchcase(name, p) for p in patterns)
-            if patterns
-            else fixed or info.variability == "tunable"
-        )
-    }
+
+    def is_chosen(name: str, info: VariableInfo) -> bool:
+        if patterns:
+            return any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)
+        return fixed or info.variability == "tunable"
+
+    chosen = {name: found for name, found in real.items() if is_chosen(name, found[1])}
     return [
         _parameter(component, info, value_of(component, info.name))
         for component, info in chosen.values()

@@ -163,7 +163,8 @@ class AmbientModes:
         from tempfile import TemporaryDirectory  # noqa: PLC0415 - only here
 
         with TemporaryDirectory() as folder:
-            self.save_picture(picture := Path(folder) / "ambient.png")
+            picture = Path(folder) / "ambient.png"
+            self.save_picture(picture)
             data = b64encode(picture.read_bytes()).decode()
         rows = [
             [

@@ -129,7 +129,8 @@ def _check(times: Numbers, values: Numbers, line_frequency: float) -> None:
         raise AnalysisError(
             "no mode can be identified in a signal of fewer than 2 samples; give an earlier start"
         )
-    if (missing := ~np.isfinite(values)).any():
+    missing = ~np.isfinite(values)
+    if missing.any():
         begin, end = _longest(~missing)
         stretch = f"from {times[begin]:.6g} to {times[end]:.6g} s"
         remedy = f"the longest stretch without a gap is {stretch}; choose it by the "

@@ -163,10 +163,8 @@ def plan_sweep(case: Case, request: SweepRequest) -> SweepPlan:
     )
     refuse_doubles(axes, prepared)
     ends = [plan.values(tuple(end % len(axis.values) for axis in axes)) for end in (0, -1)]
-    idle = [
-        _check_end(plan, varied)
-        for varied in (ends if any(axis.key == ALPHA for axis in axes) else ends[:1])
-    ]
+    shares = any(axis.key == ALPHA for axis in axes)
+    idle = [_check_end(plan, varied) for varied in (ends if shares else ends[:1])]
     return replace(plan, idle=tuple(idle[0]))
 
 

@@ -135,13 +135,11 @@ class Recorder:
                     f"cannot record {name!r}: there is no such variable; `gfor fmu info` lists them"
                 )
             by_component.setdefault(component, []).append((column, variable))
-        self._batches = [
-            (
-                RealBatch(run.components[component], [v for _, v in entries]),
-                np.array([c for c, _ in entries]),
-            )
-            for component, entries in by_component.items()
-        ]
+        self._batches = []
+        for component, entries in by_component.items():
+            columns, variables = zip(*entries, strict=True)
+            batch = RealBatch(run.components[component], list(variables))
+            self._batches.append((batch, np.array(columns)))
         self._allocate((stop_index - run.index) // self.every + 2)
         self._first = self._filled = self._handed = 0
         self._last_index, self._failed = -1, False

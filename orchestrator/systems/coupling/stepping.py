@@ -232,6 +232,7 @@ class Stepper(CoupledComponents):
             spent = [seconds for seconds, of_bank in zip(spent, banks, strict=True) if not of_bank]
         threads = self._loop.threads
         adaptive = None if self._adaptive is None else replace(self._adaptive.counts)
+        reasons = {name: c.one_thread for name, c in self.components.items() if c.one_thread}
         return StepStatistics(
             steps if adaptive is None else adaptive.accepted,
             seconds,
@@ -241,8 +242,6 @@ class Stepper(CoupledComponents):
             ),
             simulated=self.clock.time(steps),
             threads=threads,
-            one_thread={
-                name: reason for name, c in self.components.items() if (reason := c.one_thread)
-            },
+            one_thread=reasons,
             adaptive=adaptive,
         )

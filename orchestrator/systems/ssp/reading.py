@@ -215,7 +215,8 @@ def _values(
         place = f"value of {'.'.join((*owner, variable))}"
         try:
             values[variable] = _converted(value, fmu.variables[variable].unit, fmu)
-            if value.unit and (says := contradiction(value.unit, value.base)):
+            says = contradiction(value.unit, value.base) if value.unit else ""
+            if says:
                 topic = QuestionTopic("a unit and its base", ".".join((*owner, variable)))
                 questions.append(Problem(place, says, topic=topic))
         except InputError as error:

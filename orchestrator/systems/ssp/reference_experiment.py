@@ -119,7 +119,8 @@ def parameter_set(
     listed = SubElement(root, tag("ssv:Parameters"))
     for variable, value in values.items():
         entry = SubElement(listed, tag("ssv:Parameter"), name=variable)
-        match type_ := description.variables[variable].type:
+        type_ = description.variables[variable].type
+        match type_:
             case "Boolean":
                 text = str(value).lower()
             case "Integer":

@@ -65,12 +65,12 @@ def profiles_of(path: Path) -> dict[str, bytes]:
             f"{path}: it holds no .xml files; give a zip or a folder with the profiles EQ, SSH, TP and SV"
         )
     heads = [content[:_HEAD].decode("utf-8", errors="replace") for content in found.values()]
-    missing = [
-        profile
-        for profile, word in _NEEDED.items()
-        if not any(word in head or f"/{profile}/" in head for head in heads)
-        and not any(f"_{profile}" in name.upper() for name in found)
-    ]
+
+    def is_there(profile: str, word: str) -> bool:
+        in_heads = any(word in head or f"/{profile}/" in head for head in heads)
+        return in_heads or any(f"_{profile}" in name.upper() for name in found)
+
+    missing = [profile for profile, word in _NEEDED.items() if not is_there(profile, word)]
     if missing:
         raise InputError(
             f"{path}: the {'profiles' if len(missing) > 1 else 'profile'} {', '.join(missing)} "

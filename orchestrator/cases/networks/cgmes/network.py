@@ -252,14 +252,10 @@ class _Reading:
         for row in nodes.itertuples():
             of_bus.setdefault(row.bus_id, []).append(row.name or row.Index)
         found = {}
-        for candidates in (
-            {
-                bus: of_bus[bus][0] if len(of_bus.get(bus, ())) == 1 else buses.name[bus]
-                for bus in buses.index
-            },
-            dict(buses.name),
-            {bus: bus for bus in buses.index},
-        ):
+        names = dict(buses.name)
+        only = {bus: own[0] for bus, own in of_bus.items() if len(own) == 1}
+        by_node = {bus: only.get(bus, names[bus]) for bus in buses.index}
+        for candidates in (by_node, names, dict(zip(buses.index, buses.index, strict=True))):
             found = {
                 bus: re.sub(r"\W+", "_", str(name)).strip("_") for bus, name in candidates.items()
             }

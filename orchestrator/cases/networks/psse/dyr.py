@@ -94,7 +94,8 @@ def machine_models(
         else:
             parts[key][known.kind] = known.part
             try:
-                values[key] |= (own := values_of_record(record, known))
+                own = values_of_record(record, known)
+                values[key] |= own
                 lines[key] |= dict.fromkeys(own, record.line)
             except InputError as error:
                 problems.append(str(error))

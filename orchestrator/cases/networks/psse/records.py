@@ -297,7 +297,8 @@ def _without_names(section: str, fields: list[str]) -> list[str]:
 
 def _following(path: Path, number: int, line: str, name: str, order: list[str]) -> str:
     """The section that begins: the one that the line names, or else the next in the revision's order."""
-    ended = section_of(found[1]) if (found := _END.search(line)) else ""
+    found = _END.search(line)
+    ended = section_of(found[1]) if found else ""
     if name == "substation" and not _BEGIN.search(line):
         return name  # each substation has sections of its own
     shunts = ended.endswith("shunt") and name.endswith("shunt")  # either may be called just so

@@ -218,7 +218,8 @@ class _Trial:
             for number, other in enumerate(self._bench.effects(FrequencySwing(size))):
                 usual = self._usual[number]
                 alike, name = likeness(usual, other), self._bench.names[number]
-                if fault := self._out_of_proportion(name, usual, other):
+                fault = self._out_of_proportion(name, usual, other)
+                if fault:
                     return self._unless_tired(fault)
                 if alike < _ALIKE and (usual.shown or times == _LARGE):
                     says = (

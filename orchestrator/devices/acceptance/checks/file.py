@@ -99,15 +99,15 @@ def _wrong_port_units(described: FmuDescription, *, bound: bool) -> list[str]:
     variables = described.variables
     if not set(_PORT_UNITS) <= set(variables):
         return []
-    return [
-        f"{name} is declared in {variables[name].unit!r}, no unit of a {'voltage' if name[0] == 'v' else 'current'}"
-        for name, allowed in _PORT_UNITS.items()
-        if variables[name].unit not in (*_PLAIN, *allowed)
-    ] + [
-        f"{name} is declared in {variables[name].unit!r}; without a binding it must be pu"
-        for name, allowed in _PORT_UNITS.items()
-        if variables[name].unit in allowed[1:] and not bound
-    ]
+    foreign, to_bind = [], []
+    for name, allowed in _PORT_UNITS.items():
+        unit = variables[name].unit
+        quantity = "voltage" if name[0] == "v" else "current"
+        if unit not in (*_PLAIN, *allowed):
+            foreign.append(f"{name} is declared in {unit!r}, no unit of a {quantity}")
+        if unit in allowed[1:] and not bound:
+            to_bind.append(f"{name} is declared in {unit!r}; without a binding it must be pu")
+    return foreign + to_bind
 
 
 @check("declared_starts", "Does every input and parameter start, within its own bounds?")

@@ -249,7 +249,8 @@ def _powers(
     """Powers asked for, found, the voltages at which it starts; why it was not tried with imported power."""
     asked, found, voltages, left_out = [], [], [], ""
     for point in (*_points(subject), *IMPORTING):
-        if point in IMPORTING and (reason := cannot_import(subject, point)):
+        reason = cannot_import(subject, point) if point in IMPORTING else ""
+        if reason:
             left_out = left_out or reason
             continue
         try:

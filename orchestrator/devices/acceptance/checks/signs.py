@@ -84,7 +84,8 @@ def rated_frequency(subject: Subject) -> CheckResult:
         still, shown = np.zeros((1, len(running.rest))), subject.outputs.index("omega")
         rest, settled = at_rest(lambda: running.hold(still, steps, subject.step_size)[:, shown])
     seen = omega_seen(rest)
-    if settled and (found := of_frequency(rest, _rated(subject))):
+    found = of_frequency(rest, _rated(subject)) if settled else None
+    if found:
         return failed("rated_frequency", found.fault, found.evidence, **found.figures)
     if abs(rest - 1) > SLIGHT:
         return remarked("rated_frequency", seen, "let it settle, or ask what omega is", omega=rest)
@@ -204,7 +205,8 @@ def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
             "its power is no number after small changes, and fmi2DoStep returned OK",
         )
     wrong, unknown = _wrong(point, voltage, frequency), ""
-    if not wrong and (misfit := _wrong_omega(frequency, _rated(subject))):
+    misfit = None if wrong else _wrong_omega(frequency, _rated(subject))
+    if misfit:
         wrong = misfit.fault, misfit.evidence
         figures |= misfit.figures
     if not wrong:

@@ -248,9 +248,9 @@ def step_invariance(subject: Subject) -> CheckResult:
     )
     converges = first < 0.75 * second
     breaks = second > _LARGE or second > max(1e-3, _BEYOND * first)
-    if first > _LARGE and (
-        elsewhere := switches_elsewhere(subject.watched, [((fine, h), (double, 2 * h))])
-    ):
+    pairs = [((fine, h), (double, 2 * h))]
+    elsewhere = switches_elsewhere(subject.watched, pairs) if first > _LARGE else None
+    if elsewhere:
         subject.memory["switching"] = True
         return _switching("step_invariance", elsewhere, seen, **figures)
     if first > _LARGE or (first > 1e-3 and not converges):

@@ -79,8 +79,9 @@ def _datasets(folder: Path, names: Sequence[str], file: str) -> Iterator[tuple[s
             dataset = _load(path)
             manifest = read_manifest(path.parent)
             said = (manifest.scenario if manifest else "") or name
-            found = dataset.attrs.get("scenario", said)
-            if found != name or (found := said) != name:
+            recorded = dataset.attrs.get("scenario", said)
+            found = said if recorded == name else recorded
+            if found != name:
                 raise InputError(
                     f"{path}: it is the recording of scenario {found!r}, and lies in the folder of {name!r}: the "
                     "folders were renamed or swapped; give each its own name again, or run the study again"

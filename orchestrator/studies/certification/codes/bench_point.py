@@ -71,6 +71,16 @@ def write_row(
         connections += [
             {"from": f"{name}.i_{part}", "to": f"{BENCH}.{prefix}i_{part}"} for part in ("re", "im")
         ]
+    events = [
+        {
+            "type": "parameter_change",
+            "time": f"{c.time!r} s",
+            "component": BENCH,
+            "parameter": c.parameter,
+            "value": c.value,
+        }
+        for c in programme.changes
+    ]
     table = {
         "name": row,
         "title": title,
@@ -84,16 +94,7 @@ def write_row(
         },
         "components": components,
         "connections": connections,
-        "events": [
-            {
-                "type": "parameter_change",
-                "time": f"{c.time!r} s",
-                "component": BENCH,
-                "parameter": c.parameter,
-                "value": c.value,
-            }
-            for c in programme.changes
-        ],
+        "events": events,
     }
     path = folder / case_name(row)
     write_text(path, tomli_w.dumps(table))

@@ -38,19 +38,20 @@ def save_needs(plan: ChangePlan, needs: Sequence[CriterionNeeds], folder: Path) 
 
 
 def needs_json(plan: ChangePlan, needs: Sequence[CriterionNeeds]) -> dict[str, Any]:
+    failed = [
+        {
+            "row": n.row,
+            **asdict(n.criterion),
+            "sensitivities": [_row_json(s) for s in n.sensitivities],
+            "confirmed": None if n.confirmed is None else _confirmed_json(n.confirmed),
+        }
+        for n in needs
+    ]
     return {
         "format": FORMAT,
         "code": plan.certificate.code.key,
         "change": plan.change,
-        "failed": [
-            {
-                "row": n.row,
-                **asdict(n.criterion),
-                "sensitivities": [_row_json(s) for s in n.sensitivities],
-                "confirmed": None if n.confirmed is None else _confirmed_json(n.confirmed),
-            }
-            for n in needs
-        ],
+        "failed": failed,
         "left_out": dict(plan.left_out),
     }
 

@@ -100,7 +100,8 @@ def faults(folder: Path, content: dict[str, Any], data: xr.Dataset) -> list[str]
 
     Row files of another code may lie in the folder, from an earlier certificate; those of the record's files may not.
     """
-    codes = [*tables().values(), code := _table(content)]
+    code = _table(content)
+    codes = [*tables().values(), code]
     recorded, table = [row["row"] for row in content["rows"]], [row.name for row in code.rows]
     own = {*content["files"], *(case_name(row.name) for code in codes for row in code.rows)}
     files = [
@@ -109,17 +110,15 @@ def faults(folder: Path, content: dict[str, Any], data: xr.Dataset) -> list[str]
         if name.startswith("row_")
     ]
     kept = [str(name).removeprefix("time_") for name in data.coords]
-    compared = (
-        (
-            "rows of the code's table that the record has not",
-            [name for name in table if name not in recorded],
-        ),
-        ("files of rows that the record has not", [name for name in files if name not in recorded]),
-        (
-            f"rows of {RESPONSES} that the record has not",
-            [name for name in kept if name not in recorded],
-        ),
-    )
+    of_record = {
+        "rows of the code's table that the record has not": table,
+        "files of rows that the record has not": files,
+        f"rows of {RESPONSES} that the record has not": kept,
+    }
+    compared = [
+        (what, [name for name in names if name not in recorded])
+        for what, names in of_record.items()
+    ]
     strangers = sorted(path.name for path in folder.glob("row_*.toml") if path.name not in own)
     faults = [f"{what}: {', '.join(names)}" for what, names in compared if names]
     faults += [

@@ -204,13 +204,14 @@ def _confirmed(
     again = next((c for c in result.criteria if c.criterion == need.criterion.criterion), None)
     reason = "" if again else "; ".join(c.text for c in result.criteria)
     reason = str(result.failure) if result.failure else reason
+    failing = tuple(c.criterion for c in result.criteria if not c.accepted)
     return ConfirmedChange(
         sensitivity.parameter,
         change,
         straight_line=_expected(sensitivity, change),
         margin=again.margin if again else None,
         met=again.accepted if again else None,
-        failing=tuple(c.criterion for c in result.criteria if not c.accepted),
+        failing=failing,
         reason=reason,
     )
 

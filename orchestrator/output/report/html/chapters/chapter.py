@@ -85,15 +85,10 @@ def kinds_of(records: Sequence[Content]) -> list[str]:
 def modes_map(name: str, groups: Mapping[str, Sequence[Content]]) -> str:
     """The eigenvalues of each group, without those that are over at once, where there are any."""
     shades = {label: colour(k) for k, label in enumerate(groups)}
-    marks = [
-        Mark(
-            z["real"],
-            (hz := abs(z["imag"]) / (2 * pi)),
-            shades[label],
-            f"{label}: {hz:.3f} Hz, {z['real']:.3f} 1/s",
-        )
-        for label, found in groups.items()
-        for z in found
-        if z["real"] > _FASTEST
-    ]
+    marks = []
+    for label, found in groups.items():
+        for z in (z for z in found if z["real"] > _FASTEST):
+            hz = abs(z["imag"]) / (2 * pi)
+            tip = f"{label}: {hz:.3f} Hz, {z['real']:.3f} 1/s"
+            marks.append(Mark(z["real"], hz, shades[label], tip))
     return legend(shades.items()) + complex_plane(name, marks) if marks else ""

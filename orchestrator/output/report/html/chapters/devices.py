@@ -108,6 +108,18 @@ def of_strengths(file: Path, c: Content) -> Chapter:
     )
 
 
+def _retuned(parameter: Content) -> list[str]:
+    """Return the row of a parameter that could be retuned."""
+    needed, confirmed = parameter["needed"], parameter["confirmed"]
+    return [
+        escape(parameter["name"]),
+        f"{parameter['now']:.4g}",
+        "" if needed is None else f"{needed:.4g}",
+        "" if confirmed is None else f"{confirmed['verdict']}, {confirmed['distance']:.4f}",
+        escape(parameter["remark"]),
+    ]
+
+
 def of_nyquist(file: Path, c: Content) -> Chapter:
     rows = [
         [name, f"{m['value']:.4g}", f"{m['frequency_hz']:.4g}"]
@@ -117,18 +129,7 @@ def of_nyquist(file: Path, c: Content) -> Chapter:
     content = table("Margins", ["Margin", "Value", "at [Hz]"], rows)
     found = c.get("retune")
     if found:
-        made = [
-            [
-                escape(x["name"]),
-                f"{x['now']:.4g}",
-                "" if x["needed"] is None else f"{x['needed']:.4g}",
-                ""
-                if (said := x["confirmed"]) is None
-                else f"{said['verdict']}, {said['distance']:.4f}",
-                escape(x["remark"]),
-            ]
-            for x in found["parameters"]
-        ]
+        made = [_retuned(x) for x in found["parameters"]]
         wanted = f"What to retune for a distance of {found['distance_wanted']:g} from −1"
         content += table(wanted, ["Parameter", "Now", "Needed", "Confirmed", "Remark"], made)
     for picture in (

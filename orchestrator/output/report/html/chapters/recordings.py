@@ -80,6 +80,7 @@ def of_sources(file: Path, records: Any) -> Chapter:
         [record, at, x["kind"], x["source"] or "not named", x["reason"], x["advice"]]
         for at, x, record in found
     ]
+    cells = [[escape(cell) for cell in row] for row in rows]
     return Chapter(
         file,
         "Where does the oscillation come from?",
@@ -90,7 +91,7 @@ def of_sources(file: Path, records: Any) -> Chapter:
         content=table(
             "Oscillations",
             ["Record", "Oscillation", "Kind", "Source", "Why", "Next"],
-            [[escape(cell) for cell in row] for row in rows],
+            cells,
             left=6,
         ),
     )

@@ -85,7 +85,8 @@ def of_design(file: Path, c: Content) -> Chapter:
     thin = c.get("thin_margin_damping_ratio")
     if thin:
         answer += f"; no margin: {100 * thin:.2f} % with 20 % more gain"
-    if c["met"] and (spoilt := c.get("larger_gain_spoils")):
+    spoilt = c.get("larger_gain_spoils")
+    if c["met"] and spoilt:
         answer += f"; no margin: with 20 % more gain {spoilt}"
     sure = f"closed loop of the coupled FMUs: {c['verdict']}"
     modes = {word: [c[f"{which}_mode"]] for word, which in _DESIGNED.items()}
