@@ -8,7 +8,7 @@ import numpy as np
 from orchestrator.core.arrays import Numbers
 from orchestrator.devices.binding.misfits import NO_LIMIT
 from orchestrator.simulation.watch.limits import ABOVE, LASTS, told_of
-from orchestrator.studies.certification.codes.bench_point import PLANT
+from orchestrator.studies.certification.codes.bench_point import CAPACITANCE, PLANT
 from orchestrator.studies.certification.codes.measured import MeasuredRow, over_a_period
 from orchestrator.studies.certification.codes.row import Band, Bounded, Judge, RowFinding
 
@@ -72,6 +72,12 @@ def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
+_RESONATES = (
+    f"the voltage reaches {{v:.3g}} pu: the converter feeds a resonance of the source with the bench's capacitance of "
+    f"{CAPACITANCE:g} pu, where it is not passive (`gfor fmu nyquist --scr 10` tells where)"
+)
+
+
 def holds_together() -> Judge:
     """Neither a loss of synchronism, nor growth, nor a lasting oscillation, as `gfor run` watches for them, nor a trip.
 
@@ -80,6 +86,8 @@ def holds_together() -> Judge:
     def judge(row: MeasuredRow) -> RowFinding:
         faults = row.faults
         text = "; ".join(faults or ["nothing was found", *row.undecided])
+        if faults and row.resonance is not None:
+            text = f"{_RESONATES.format(v=row.resonance)}; {text}"
         return RowFinding(
             "stable",
             "no loss of synchronism, growth, lasting oscillation or trip",

@@ -40,6 +40,10 @@ LATEST = 0.05  # how long that end is [s]
 HALF_TURN = np.pi
 FED_IN = 0.05  # active power before the first event from which on a trip can be told [pu]
 
+RESONANCE = 3.0
+"""Voltage at the connection point [pu] that no row's source and current together give: 1.3 pu of the source, and the
+most current, 1.3 pu, in the reactance of SCR 1.25, 0.8 pu."""
+
 _IN_WORDS = {
     "loss_of_synchronism": "it slips",
     "growth": "it grows",
@@ -118,6 +122,14 @@ class MeasuredRow:
         gone = self.tripped
         slips = [] if self.turned is None or watched else [_turned(self.turned)]
         return odd + watched + slips + ([] if gone is None else [_trip_text(gone)])
+
+    @property
+    def resonance(self) -> float | None:
+        """The highest voltage [pu], where it is beyond `RESONANCE`; None where it is not, or without a source."""
+        if self.source_angle is None or "v" not in self.signals:
+            return None
+        highest = float(np.max(self.signals["v"]))
+        return highest if RESONANCE < highest < np.inf else None
 
     @property
     def undecided(self) -> list[str]:

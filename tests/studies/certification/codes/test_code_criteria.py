@@ -1,5 +1,7 @@
 """The criteria of the codes on responses whose answers are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -190,6 +192,21 @@ def test_loss_of_synchronism_is_not_accepted_whatever_the_power_does():
     assert not c.holds_together()(response(0.5, findings=(finding,))).accepted
     assert c.holds_together()(response(0.5)).accepted
     assert not c.holds_together()(response(np.where(TIMES > 2, np.nan, 0.5))).accepted
+
+
+def test_a_voltage_beyond_all_sources_is_told_as_a_resonance_of_what_does_not_hold():
+    """Before what follows from it; what holds together, or has no such voltage, has no such words."""
+    finding = {"kind": "run_away", "message": "the speed runs away", "time": 1.04}
+    high = np.where(TIMES > 1.03, 26.4, 1.0)
+    told = [
+        c.holds_together()(replace(response(0.5, v=v, findings=found), source_angle=0 * TIMES)).text
+        for v, found in ((high, (finding,)), (1.4, (finding,)), (high, ()))
+    ]
+    assert told[0].startswith("the voltage reaches 26.4 pu: the converter feeds a resonance")
+    assert told[0].endswith("; the speed runs away")
+    assert told[1:] == ["the speed runs away", "nothing was found"]
+    alone = c.holds_together()(response(0.5, v=high, findings=(finding,)))
+    assert alone.text == "the speed runs away"  # a current without a source raises it as well
 
 
 def test_a_mean_over_a_period_takes_away_what_swings_with_it():
