@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from orchestrator.core.arrays import Complex, Numbers
+from orchestrator.devices.fmi.port import BoundDescription
 from orchestrator.studies.validation.device import OperatingStart, Played, PlayedDevice
 from orchestrator.studies.validation.figures import (
     SIGNALS,
@@ -329,10 +330,24 @@ def _of_response(comparison: EventComparison) -> list[Question]:
             "q_measured": event.start.power.imag,
         }
         found.append(Question(QuestionKind.START, figures))
+    found += _assumed_bases(comparison.device)
     found += _slow_samples(comparison)
     found += _without_noise(comparison)
     found += _setpoint(comparison)
     return found
+
+
+def _assumed_bases(device: PlayedDevice) -> list[Question]:
+    """What stands for a rating or a rated frequency that the device does not have."""
+    if isinstance(device.description, BoundDescription):
+        return []
+    values = {"S_n": f"{device.rating:g} MVA", "f_n": f"{device.rated_hz:g} Hz"}
+    missing = [name for name in values if name not in device.description.variables]
+    if not missing:
+        return []
+    assumed = " and ".join(values[name] for name in missing)
+    figures = {"missing": " and no ".join(missing), "assumed": assumed}
+    return [Question(QuestionKind.BASES_ASSUMED, figures)]
 
 
 def _alone(steps: Numbers, width: int) -> bool:

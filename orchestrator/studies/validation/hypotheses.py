@@ -38,6 +38,8 @@ _AFTER = 3.0  # part after its begin, the same [s]
 _LEAVES = 0.25  # part of the error that another scale may leave: parameters change a size as well
 _MOST_FACTOR = 2000
 _NEAR_PREFIX = 0.1  # part by which a factor may miss one of ten and be it
+_CURRENTS = ("ia", "ib", "ic")
+_RATED_HZ = (50.0, 60.0)  # of grids
 _RADIAN = 180 / math.pi  # [deg]
 _OFF_ELSEWHERE = 0.06  # part of the movement, as above, of a voltage that is measured elsewhere
 _TRIED_REACTANCE = 0.12  # of a usual transformer [pu of the rating]
@@ -59,6 +61,7 @@ class Reading:
     of_unit: str = ""  # of the angle, where only one in that unit may be meant so
     leaves: float = _EXPLAINS  # part of the error that it may leave, to be named
     swaps: bool = False  # its two channels change their places
+    turns: int = 0  # its three channels do, each by so many places
 
     def fits(self, recording: Recording) -> bool:
         """Return whether a recording may be meant so: it has the channels, in the unit."""
@@ -73,6 +76,12 @@ class Reading:
         if self.swaps:
             first, second = self.roles
             return [channels[second].taken_for(first), channels[first].taken_for(second)]
+        if self.turns:
+            others = self.roles[self.turns :] + self.roles[: self.turns]
+            return [
+                replace(channels[other], role=role).as_text()
+                for role, other in zip(self.roles, others, strict=True)
+            ]
         return [channels[role].changed(factor=round(self.factor, 6)) for role in self.roles]
 
     def scales(self) -> tuple[float, float]:
@@ -96,6 +105,12 @@ def _swapped(recording: Recording) -> Recording:
     return replace(recording, power=np.asarray(power))
 
 
+def _power_turned(thirds: int) -> Callable[[Recording], Recording]:
+    """A change of the power's angle by thirds of a turn, as of currents that are of another phase."""
+    way = np.exp(2j * np.pi / 3 * thirds)
+    return lambda recording: replace(recording, power=np.asarray(recording.power * way))
+
+
 def _angle(factor: float) -> Callable[[Recording], Recording]:
     def changed(recording: Recording) -> Recording:
         angle = np.unwrap(np.angle(recording.voltage))
@@ -113,6 +128,24 @@ READINGS = (
     Reading("P is of one phase", ("p",), 3, _power(3, 1), "", _LEAVES),
     Reading("Q is of one phase", ("q",), 3, _power(1, 3), "", _LEAVES),
     Reading("P and Q are in each other's place", ("p", "q"), 1, _swapped, "", _LEAVES, swaps=True),
+    Reading(
+        "the currents are each of the next phase",
+        _CURRENTS,
+        1,
+        _power_turned(-1),
+        "",
+        _LEAVES,
+        turns=2,
+    ),
+    Reading(
+        "the currents are each of the phase before",
+        _CURRENTS,
+        1,
+        _power_turned(1),
+        "",
+        _LEAVES,
+        turns=1,
+    ),
     Reading("the angle is in radians", ("angle",), _RADIAN, _angle(_RADIAN), of_unit="deg"),
     Reading("the angle is in degrees", ("angle",), 1 / _RADIAN, _angle(1 / _RADIAN), of_unit="rad"),
     Reading("the angle has the other sign", ("angle",), -1, _angle(-1)),
@@ -133,6 +166,7 @@ def question_readings(comparison: EventComparison, bases: PortBases) -> list[Que
     explained = [*lost_jump(comparison), *_clock(comparison, whole)]
     if whole > max(_LEAST_OFF, _OFF_ELSEWHERE * math.hypot(*moved)):
         explained += _meter_elsewhere(comparison, bases, whole)
+        explained += _rated_otherwise(comparison, whole)
     return [min(explained, key=lambda one: one[0])[1]] if explained else []
 
 
@@ -250,6 +284,27 @@ def _meter_elsewhere(
     if left <= _LEAVES * error:
         figures = {"reactance": reactance, "error": error, "left": left}
         yield left / error, Question(QuestionKind.METER_ELSEWHERE, figures)
+
+
+def _rated_otherwise(comparison: EventComparison, error: float) -> Iterator[tuple[float, Question]]:
+    """The other usual rated frequency, if it explains most of the error; phasors have none by themselves."""
+    event, device = comparison.event, comparison.device
+    others = [one for one in _RATED_HZ if abs(one - device.rated_hz) > 1]
+    if "f_n" not in device.description.variables or len(others) != 1:
+        return
+    near, (hertz,) = cut_event(event, _AFTER, _BEFORE), others
+    other = device.with_values({"f_n": hertz})
+    here = math.hypot(*rms_error(comparison.near_power(near), near))
+    try:
+        power = other.play(near.recording, near.start).power
+        if math.hypot(*rms_error(power, near)) > _LEAVES * here:
+            return
+        left = math.hypot(*rms_error(other.play(event.recording, event.start).power, event))
+    except CosimError:
+        return
+    if left <= _LEAVES * error:
+        figures = {"seen": hertz, "rated": device.rated_hz, "error": error, "left": left}
+        yield left / error, Question(QuestionKind.RATED_FREQUENCY, figures)
 
 
 def _clock(comparison: EventComparison, error: float) -> Iterator[tuple[float, Question]]:

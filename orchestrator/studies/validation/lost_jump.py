@@ -28,7 +28,8 @@ _BEFORE = 0.5  # part before it, the same [s]
 _LEAST = 0.003  # rms error in that part [pu] below which nothing is tried
 _OFF = 0.06  # part of the movement there that the error is at least
 _EXPLAINS = 0.4  # part of the error that a sharper angle may leave, to be named
-_PROMISES = 0.7  # part of the error that a straight line may leave, for a run to say what is left
+_SMALL = 0.03  # change of the angle [rad] that gives the part of the lost one: a shock says nothing of it
+_PROMISES = 0.8  # part of the error that a straight line may leave, for a run to say what is left
 _ABRUPT = 0.005  # time [s] within which an angle jumps, and over which its derivative is taken
 _TIMES = 2.0  # times the recorded angle's fastest change, from which on the sharper one has a jump of its own
 _SHORTEST = 0.01  # smoothing over less [s] is none that matters
@@ -68,8 +69,11 @@ def _lost_by_mean(length: float, ahead: float) -> Callable[[Recording], Numbers]
 
 SMOOTHINGS = (
     Smoothing(0.1, _lost_by_lag(0.1)),
-    *(Smoothing(length, _lost_by_mean(length, 0.0)) for length in (0.05, 0.1, 0.2)),
-    *(Smoothing(length, _lost_by_mean(length, 0.5)) for length in (0.05, 0.1, 0.2)),
+    *(Smoothing(length, _lost_by_mean(length, 0.0)) for length in (0.04, 0.05, 0.1, 0.2)),
+    *(
+        Smoothing(length, _lost_by_mean(length, 0.5))
+        for length in (0.04, 0.06, 0.08, 0.1, 0.2, 0.3)
+    ),
 )
 
 
@@ -111,14 +115,15 @@ def _tried(
     little."""
     recording = near.recording
     lost = smoothing.lost(recording)
+    part = min(1.0, _SMALL / max(float(np.abs(lost).max()), _SMALL))
     try:
-        moves = device.play(_turned(recording, lost), near.start).power - base
+        moves = (device.play(_turned(recording, part * lost), near.start).power - base) / part
         off = recording.power - base
-        part = recording.good
-        size = float(np.sum(np.abs(moves[part]) ** 2))
-        scale = float(np.real(np.vdot(moves[part], off[part]))) / size if size > 0 else 0.0
-        promised = _rms((off - scale * moves)[part])
-        if promised > _PROMISES * _rms(off[part]) or scale * smoothing.length < _SHORTEST:
+        good = recording.good
+        size = float(np.sum(np.abs(moves[good]) ** 2))
+        scale = float(np.real(np.vdot(moves[good], off[good]))) / size if size > 0 else 0.0
+        promised = _rms((off - scale * moves)[good])
+        if promised > _PROMISES * _rms(off[good]) or scale * smoothing.length < _SHORTEST:
             return
         power = device.play(_turned(recording, scale * lost), near.start).power
     except CosimError:

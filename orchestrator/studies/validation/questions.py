@@ -16,6 +16,9 @@ class QuestionKind(StrEnum):
     ANGLE_HELD = "angle held"
     ANGLE_AND_FREQUENCY = "angle and frequency differ"
     FREQUENCY_ALONE = "frequency alone"
+    PHASE_ORDER = "phase order"
+    TIME_UNIT = "time unit"
+    BASES_ASSUMED = "bases assumed"
     NO_STEADY_STATE = "no steady state before"
     NO_EVENT = "no event"
     SLOW_SAMPLES = "slow samples"
@@ -37,6 +40,7 @@ class QuestionKind(StrEnum):
 
 
 FIGURES_HOLD = {
+    QuestionKind.BASES_ASSUMED,
     QuestionKind.MISSING,
     QuestionKind.FILLED,
     QuestionKind.SLOW_SAMPLES,

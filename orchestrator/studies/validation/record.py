@@ -25,8 +25,15 @@ _FEWEST = 20  # samples of a recording that can be compared with anything
 _LONGEST_GAP = 0.25  # gap [s] that a straight line bridges in the voltage that drives the device
 _TURN = 2 * np.pi
 _NEAR_A_TURN = 0.2  # part of a turn by which a jump of the angle may miss a whole one
+_AS_BESIDE = 3.0  # times the largest change beside it, by which an angle moves while it wraps
+_BESIDE_WRAP = 4  # changes before and after it that are looked at
 _MOVES = 1e-6
 """Part of its range from which on an angle moves: more than rounding makes of an angle at rest."""
+_PERIODS_OF_ORDER = 5  # of which the order of the phases is taken
+_OTHER_ORDER = (
+    3.0  # times the positive sequence, from which on a negative one is the order of the phases
+)
+_MEASURED = 2e-6  # scatter of a voltage [pu] that no simulation has and each instrument
 _SPIKE = 3.0  # jump to one sample and back [pu] that no plant makes
 _HELD = (
     0.2  # part of the samples whose angle is that of the sample before, from which on it is held
@@ -235,6 +242,8 @@ class _Reading:
             if np.ptp(value) == 0:
                 figures = {"role": role, "column": column, "count": len(value)}
                 self.ask(QuestionKind.STUCK, value=float(self.dataset[column][known][0]), **figures)
+            if role == "v" and _scatters(value):
+                self._ask_of_still_angle()
             before, after = value[1:-1] - value[:-2], value[1:-1] - value[2:]
             alone = np.where(before * after > 0, np.minimum(np.abs(before), np.abs(after)), 0.0)
             most = int(alone.argmax())
@@ -242,11 +251,23 @@ class _Reading:
                 at = float(times[most + 1])
                 self.ask(QuestionKind.SPIKE, column=column, jump=float(alone[most]), at=at)
 
+    def _ask_of_still_angle(self) -> None:
+        """Ask about an angle that never moves beside a magnitude that an instrument measured."""
+        if "angle" not in self.channels:
+            return
+        column = self.channels["angle"].column
+        values = np.asarray(self.dataset[column].values, dtype=float)
+        known = values[np.isfinite(values)]
+        if len(known) and np.ptp(known) == 0:
+            figures = {"role": "angle", "column": column, "count": len(known)}
+            self.ask(QuestionKind.STUCK, value=float(known[0]), **figures)
+
     def voltage(self) -> Complex:
         """[pu], in a frame that rotates with the rated frequency."""
         if self.instantaneous:
             phases = [self._volts(f"v{x}", math.sqrt(2 / 3)) for x in "abc"]
             turn = np.exp(-1j * _TURN * self.bases.rated_hz * self.times)
+            self._ask_of_order("v", phases)
             return np.asarray(2 / 3 * (_PHASORS @ np.array(phases)) * turn)
         return np.asarray(self._volts("v", 1.0) * np.exp(1j * self._angle()))
 
@@ -259,6 +280,7 @@ class _Reading:
             phases = [self._amperes(f"i{x}", math.sqrt(2)) for x in "abc"]
             turn = np.exp(-1j * _TURN * self.bases.rated_hz * self.times)
             current = 2 / 3 * (_PHASORS @ np.array(phases)) * turn
+            self._ask_of_order("i", phases)
             found = self.voltage() * current.conj()
         elif {"i", "i_angle"} <= self.channels.keys():
             current = self._amperes("i", 1.0) * np.exp(1j * self._values("i_angle")[0])
@@ -268,6 +290,21 @@ class _Reading:
                 f"{self.label}: currents of phases need voltages of phases beside them, va, vb and vc; or give p and q"
             )
         return np.asarray(found)
+
+    def _ask_of_order(self, what: str, phases: Sequence[Numbers]) -> None:
+        """Ask about three phases that follow each other as a, c, b."""
+        first = self.times - self.times[0] <= _PERIODS_OF_ORDER / self.bases.rated_hz
+        turn = np.exp(-1j * _TURN * self.bases.rated_hz * self.times)
+        sizes = [
+            abs(np.nanmean((way @ np.array(phases) * turn)[first]))
+            for way in (_PHASORS, _PHASORS.conj())
+        ]
+        if sizes[1] > _OTHER_ORDER * sizes[0]:
+            b, c = f"{what}b", f"{what}c"
+            remedy = [
+                replace(self.channels[one], role=other).as_text() for one, other in ((c, b), (b, c))
+            ]
+            self.ask(QuestionKind.PHASE_ORDER, what=what, remedy=remedy)
 
     def _values(self, role: str) -> tuple[Numbers, str]:
         channel = self.channels[role]
@@ -345,11 +382,11 @@ class _Reading:
         largest = float(np.abs(steps).max(initial=0.0))
         degrees = unit_of(channel, self.dataset) == "deg"
         other = "rad" if degrees else "deg"
-        within = abs(largest / _TURN - 1) if degrees else abs(largest / 360 - 1)
+        wraps = _wraps(steps, _TURN if degrees else 360.0)
         if degrees and float(np.nanmax(np.abs(raw), initial=0.0)) > 1.01 * _TURN:
-            within = 1.0  # radians that wrap stay within a turn
+            wraps = False  # radians that wrap stay within a turn
         beyond = not degrees and float(np.nanmax(np.abs(raw[:5]), initial=0.0)) > 1.01 * _TURN
-        if within < _NEAR_A_TURN or beyond:
+        if wraps or beyond:
             self.ask(
                 QuestionKind.ANGLE_UNIT,
                 jump=largest,
@@ -401,6 +438,27 @@ _IN_PER_UNIT: Mapping[str, Callable[[_Reading, str], Numbers]] = {
     "p": _Reading._watts,
     "q": _Reading._watts,
 }
+
+
+def _scatters(values: Numbers) -> bool:
+    """Return whether a magnitude [pu] scatters from sample to sample in its first part, as a measured one does."""
+    first = values[: max(_FEWEST, len(values) // 10)]
+    return float(np.diff(first, 2).std()) > _MEASURED
+
+
+def _wraps(steps: Numbers, turn: float) -> bool:
+    """Return whether the largest change of an angle is a wrap: without the turn it changes as it does beside it.
+
+    A jump of the phase does not, be it as large as a turn of another unit by chance."""
+    if not len(steps):
+        return False
+    at = int(np.abs(steps).argmax())
+    rest = abs(abs(float(steps[at])) - turn)
+    beside = np.delete(
+        np.abs(steps[max(0, at - _BESIDE_WRAP) : at + _BESIDE_WRAP + 1]), min(at, _BESIDE_WRAP)
+    )
+    moves = _AS_BESIDE * float(beside.max(initial=0.0)) + 1e-3 * turn
+    return rest < min(moves, _NEAR_A_TURN * turn)
 
 
 def _evened(reading: _Reading, voltage: Complex, power: Complex) -> Recording:

@@ -36,6 +36,11 @@ def _rating(x: Figures) -> str:
 
 
 def _rated_frequency(x: Figures) -> str:
+    if "left" in x:
+        return (
+            f"is the rated frequency {x['seen']:g} Hz? The device has {x['rated']:g} Hz; with the other one the error "
+            f"falls from {x['error']:.3g} to {x['left']:.3g} pu (rms). If it is so, give --set f_n={x['seen']:g}"
+        )
     return (
         f"before the event the frequency is {x['seen']:.4g} Hz, and the device's is {x['rated']:g} Hz: give its rated "
         "frequency, as in --set f_n=60, or the channel's unit"
@@ -67,6 +72,31 @@ def _frequency_alone(x: Figures) -> str:
     return (
         "there is no angle, and the voltage's is the integral of the frequency, which recorders filter for 0.1 s and "
         "longer: steps of the angle are missing. Give the angle where it was recorded"
+    )
+
+
+def _phase_order(x: Figures) -> str:
+    what = "voltages" if x["what"] == "v" else "currents"
+    given = " ".join(f"--channel '{one}'" for one in x["remedy"])
+    return f"the phases of the {what} follow each other as a, c, b: are two of them exchanged? If so, give {given}"
+
+
+def _time_unit(x: Figures) -> str:
+    return (
+        f"the times look like {x['unit']}: a sample every {x['interval']:.3g} s, {x['length']:.4g} s in all"
+        + (
+            f"; read so, the error falls from {x['error']:.3g} to {x['left']:.3g} pu (rms)"
+            if "left" in x
+            else ""
+        )
+        + f". If they are, give --channel '{x['remedy']}'"
+    )
+
+
+def _bases_assumed(x: Figures) -> str:
+    return (
+        f"the device has no {x['missing']}: {x['assumed']} stands for it, and per unit is of that. Another one goes "
+        "into the [rating] of a binding: --binding vendor.toml"
     )
 
 
@@ -215,6 +245,9 @@ _SENTENCES: Mapping[QuestionKind, Callable[[Figures], str]] = {
     QuestionKind.ANGLE_HELD: _angle_held,
     QuestionKind.ANGLE_AND_FREQUENCY: _angle_and_frequency,
     QuestionKind.FREQUENCY_ALONE: _frequency_alone,
+    QuestionKind.PHASE_ORDER: _phase_order,
+    QuestionKind.TIME_UNIT: _time_unit,
+    QuestionKind.BASES_ASSUMED: _bases_assumed,
     QuestionKind.NO_STEADY_STATE: _no_steady_state,
     QuestionKind.NO_EVENT: _no_event,
     QuestionKind.SLOW_SAMPLES: _slow_samples,
