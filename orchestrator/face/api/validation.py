@@ -22,7 +22,7 @@ from orchestrator.studies.validation.device import PlayedDevice
 from orchestrator.studies.validation.limits import read_limits
 from orchestrator.studies.validation.record import PortBases
 from orchestrator.studies.validation.study import GivenRecording, ValidationRequest, validate_device
-from orchestrator.studies.validation.transformer import read_impedance
+from orchestrator.studies.validation.transformer import read_transformer
 from orchestrator.studies.validation.view import Validation
 from orchestrator.systems.coupling.step_awareness import STEP_PARAMETER
 
@@ -77,7 +77,8 @@ def validate(
     voltage
         Rated voltage between lines [kV], where the recording is in kV or V.
     transformer
-        Between meter and port, such as ``"X 0.12"`` or ``"R 0.005 X 0.12"`` [pu of the rating].
+        Between meter and port, such as ``"X 0.12"`` or ``"R 0.005 X 0.12"`` [pu of the rating]; ``"X 0.12 of V"`` if
+        the voltage alone is measured beyond it, ``"X 0.12 of PQ"`` if P and Q alone are.
     events
         Begin and end of the event [s], one for all recordings or one for each; found where none is given.
     average
@@ -133,7 +134,7 @@ def validate(
     if voltage is not None:
         kilovolt = number_in(voltage, "kV", "voltage", "a voltage in kV, such as 230")
     mean = None if average is None else moment(average, "average")
-    bases = PortBases(found.rating, found.rated_hz, kilovolt, read_impedance(transformer), mean)
+    bases = PortBases(found.rating, found.rated_hz, kilovolt, read_transformer(transformer), mean)
     given = _all_given(_as_list(recordings), hold_back, start, stop)
     request = ValidationRequest(
         found,

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 ROLES = {
+    "time": "time of the samples",
     "v": "magnitude of the voltage",
     "angle": "angle of the voltage",
     "f": "frequency of the voltage",
@@ -34,6 +35,7 @@ ROLES = {
 """What a recording may hold, by the name of its channel."""
 
 _NAMES = {
+    "time": (),
     "v": ("v", "vm", "u", "um", "vmag", "voltage", "v_mag", "v1", "u1", "vpos", "v_pos"),
     "angle": ("angle", "va", "ua", "theta", "phi", "ang", "v_angle", "v_ang", "vang", "delta"),
     "f": ("f", "freq", "frequency", "hz"),
@@ -50,6 +52,7 @@ _NAMES = {
 }
 
 _BASES = {
+    "time": ("s",),
     "v": ("kV", "pu"),
     "angle": ("rad",),
     "f": ("Hz", "pu"),
@@ -149,7 +152,8 @@ def channels_in(
     Raises an `InputError` if the voltage or the power is missing, or several columns may be one of them; it names what
     could be meant."""
     columns = [str(name) for name in dataset.data_vars]
-    found = {channel.role: channel for channel in (read_channel(text, columns) for text in given)}
+    given_by = [read_channel(text, [*columns, "time"]) for text in given]
+    found = {channel.role: channel for channel in given_by}
     several = {}
     for role in ROLES:
         likely = [c for c in columns if role not in found and _fits(role, c, dataset, place)]

@@ -25,6 +25,7 @@ from orchestrator.studies.validation.filled import Mask, runs_of
 from orchestrator.studies.validation.parameters import NEVER
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import PortBases, Recording, questions_of_level
+from orchestrator.studies.validation.setpoint import ask_of_setpoint
 from orchestrator.studies.validation.windows import Windows, find_windows
 
 _SHORTEST_BEFORE = 0.1  # a window before the event [s] that shows a steady state
@@ -37,17 +38,12 @@ _STARTS_ELSEWHERE = 0.02  # power at rest [pu] by which a device misses what was
 _NO_NOISE = 2e-6  # scatter of P and Q before the event [pu] that no instrument has
 _TOO_GOOD = 1e-4  # median error [pu] beside a recording without noise, as the model's own
 _MOVED = 2e-3  # rms movement [pu] that is an event
-_OFFSET = 0.015  # error that stays [pu]
-_BACK = 0.005  # deviation of the voltage [pu] that is none of an event
 _SLOWER_THAN = 0.015  # interval between samples [s] of which is said what it cannot show
 _SUCH = 3  # times of a device that are named, which the samples do not show
 _SHORT_GAP = 0.02  # [s]: over a period voltages are means, and a gap hides little
 _IN_GAP = 0.3  # part of the largest change of the voltage, from which on a gap hides an event
-_SETPOINT_WITHIN = 0.1  # time [s] within which a setpoint moves P or Q by most of its step
-_ABRUPT = 6.0  # times the usual change over that time
 _FEWEST_BEFORE = 30  # samples before an event that a part of the recording keeps
 _OF_SAMPLES = ("voltage", "power", "good", "driven")
-_BESIDE = 0.4  # part of the step by which the signal moves just before or after, as a swing does
 
 
 @dataclass(frozen=True)
@@ -333,12 +329,12 @@ def _of_response(comparison: EventComparison) -> list[Question]:
     found += _assumed_bases(comparison.device)
     found += _slow_samples(comparison)
     found += _without_noise(comparison)
-    found += _setpoint(comparison)
+    found += ask_of_setpoint(event.recording, event.windows, played.power)
     return found
 
 
 def _assumed_bases(device: PlayedDevice) -> list[Question]:
-    """What stands for a rating or a rated frequency that the device does not have."""
+    """Ask about what stands for a rating or a rated frequency that the device does not have."""
     if isinstance(device.description, BoundDescription):
         return []
     values = {"S_n": f"{device.rating:g} MVA", "f_n": f"{device.rated_hz:g} Hz"}
@@ -348,43 +344,3 @@ def _assumed_bases(device: PlayedDevice) -> list[Question]:
     assumed = " and ".join(values[name] for name in missing)
     figures = {"missing": " and no ".join(missing), "assumed": assumed}
     return [Question(QuestionKind.BASES_ASSUMED, figures)]
-
-
-def _alone(steps: Numbers, width: int) -> bool:
-    """Return whether the largest change stands alone: a swing changes as fast before or after."""
-    at = int(steps.argmax())
-    low, high = 3 * width // 2, 4 * width
-    beside = [steps[max(0, at - high) : max(0, at - low)], steps[at + low : at + high]]
-    return float(np.concatenate(beside).max(initial=0.0)) < _BESIDE * float(steps[at])
-
-
-def _setpoint(comparison: EventComparison) -> list[Question]:
-    """P or Q that leaves the model's at once and for good while the voltage does nothing.
-
-    An error that shrinks is the end of a transient, in which the model was off."""
-    event = comparison.event
-    recording = event.recording
-    width = max(1, round(_SETPOINT_WITHIN / recording.interval))
-    error = comparison.played.power - recording.power
-    times = recording.times
-    first = int(np.searchsorted(times, event.windows.end + _SETPOINT_WITHIN))
-    found = []
-    for name, values in (("p", error.real), ("q", error.imag)):
-        means = np.convolve(values, np.ones(width) / width, mode="valid")
-        steps = np.abs(means[width:] - means[:-width])[first:]
-        if len(steps) < 4 * width:
-            continue
-        at = first + int(steps.argmax())
-        before, after = values[max(0, at - 2 * width) : at], values[at + 2 * width :]
-        if not len(after):
-            continue
-        offset = float(after.mean() - before.mean())
-        leaves = abs(after.mean()) > abs(before.mean())
-        abrupt = float(steps.max()) > _ABRUPT * float(np.median(steps)) + _OFFSET
-        abrupt = abrupt and leaves and _alone(steps, width)
-        around = recording.voltage[at : at + 2 * width]
-        if abrupt and abs(offset) > _OFFSET and np.ptp(np.abs(around)) < _BACK:
-            moment = recording.begin + float(times[at + width])
-            figures = {"signal": name, "offset": -offset, "at": moment}
-            found.append(Question(QuestionKind.SETPOINT, figures))
-    return found[:1]

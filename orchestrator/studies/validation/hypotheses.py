@@ -25,6 +25,7 @@ from orchestrator.studies.validation.event import (
 from orchestrator.studies.validation.lost_jump import lost_jump
 from orchestrator.studies.validation.questions import Question, QuestionKind
 from orchestrator.studies.validation.record import PortBases, Recording, at_port
+from orchestrator.studies.validation.transformer import AT_PORT, Between, Beyond
 
 _OFF = (
     0.25  # part of the movement by which a response is off, from which on other readings are tried
@@ -36,6 +37,9 @@ _AS_GOOD = 1.15  # times the least error left, up to which the reading that come
 _BEFORE = 1.0  # part of a recording before the event with which readings are tried [s]
 _AFTER = 3.0  # part after its begin, the same [s]
 _LEAVES = 0.25  # part of the error that another scale may leave: parameters change a size as well
+_LEAVES_ALONE = (
+    0.12  # the same of a meter that stands alone beyond a transformer: wrong reactances are like it
+)
 _MOST_FACTOR = 2000
 _NEAR_PREFIX = 0.1  # part by which a factor may miss one of ten and be it
 _CURRENTS = ("ia", "ib", "ic")
@@ -44,6 +48,10 @@ _RADIAN = 180 / math.pi  # [deg]
 _OFF_ELSEWHERE = 0.06  # part of the movement, as above, of a voltage that is measured elsewhere
 _TRIED_REACTANCE = 0.12  # of a usual transformer [pu of the rating]
 _REACTANCES = 0.04, 0.25  # of which transformers are [pu of the rating]
+_PROMISES = 0.5  # part of the error that a straight line may leave, for a run to say what is left
+_UNITS_OF_TIME = {"min": 60.0, "ms": 1e-3, "us": 1e-6, "h": 3600.0, "d": 86400.0}
+_INTERVALS = 1e-4, 0.2  # between samples of a recording that shows an event [s]
+_LENGTHS = 0.5, 1200.0  # of such a recording [s]
 _LEAST_CLOCK = 0.004  # delay [s] that is named, and at least
 _SAMPLES_CLOCK = 0.6  # so many samples
 _ALIKE = 0.25  # part by which the delays of P and Q may differ and be one clock's
@@ -160,6 +168,8 @@ def question_readings(comparison: EventComparison, bases: PortBases) -> list[Que
     excess = [max(e * e - (_NOISY * n) ** 2, 0) ** 0.5 for e, n in zip(error, scatter, strict=True)]
     off = [one > max(_LEAST_OFF, _OFF * way) for one, way in zip(excess, moved, strict=True)]
     named = _likeliest(comparison, bases, math.hypot(*error)) if any(off) else []
+    if any(off) and not named:
+        named = list(_time_unit(comparison, bases, math.hypot(*error)))
     if named:
         return named
     whole = math.hypot(*error)
@@ -256,34 +266,68 @@ def _error_left(
 def _meter_elsewhere(
     comparison: EventComparison, bases: PortBases, error: float
 ) -> Iterator[tuple[float, Question]]:
-    """A transformer between meter and port that explains most of the error, and the part that is left."""
-    if bases.impedance:
+    """A transformer between meters and port that explains most of the error, and the part that is left."""
+    if bases.between.impedance:
         return
+    for beyond in Beyond:
+        yield from _meters_beyond(comparison, bases, error, beyond)
+
+
+def _meters_beyond(
+    comparison: EventComparison, bases: PortBases, error: float, beyond: Beyond
+) -> Iterator[tuple[float, Question]]:
     near, device = cut_event(comparison.event, _AFTER, _BEFORE), comparison.device
-    part = near.recording.good & (near.recording.times > near.windows.begin)
 
     def misses(event: RecordedEvent, reactance: float) -> Complex:
-        moved = at_port(event.recording, 1j * reactance)
+        moved = at_port(event.recording, Between(1j * reactance, beyond))
         changed = prepare_event(moved, bases, event.windows)
         played = device.play(changed.recording, changed.start)
-        return np.asarray(played.power - changed.recording.power)
+        part = event.recording.good & (event.recording.times > event.windows.begin)
+        return np.asarray((played.power - changed.recording.power)[part])
 
+    part = near.recording.good & (near.recording.times > near.windows.begin)
     here: Complex = (comparison.near_power(near) - near.recording.power)[part]
     try:
-        way = misses(near, _TRIED_REACTANCE)[part] - here
+        way = misses(near, _TRIED_REACTANCE) - here
         size = float(np.sum(np.abs(way) ** 2))
         times = -float(np.real(np.vdot(way, here))) / size if size > 0 else 0.0
         reactance = times * _TRIED_REACTANCE
-        if not _REACTANCES[0] <= abs(reactance) <= _REACTANCES[1]:
+        rest = float(np.sum(np.abs(here + times * way) ** 2) / np.sum(np.abs(here) ** 2))
+        likely = _REACTANCES[0] <= abs(reactance) <= _REACTANCES[1] and rest < _PROMISES**2
+        if not likely:
             return
-        whole = comparison.event
-        part = whole.recording.good & (whole.recording.times > whole.windows.begin)
-        left = float(np.sqrt(np.mean(np.abs(misses(whole, reactance)[part]) ** 2)))
+        left = float(np.sqrt(np.mean(np.abs(misses(comparison.event, reactance)) ** 2)))
     except CosimError:
         return
-    if left <= _LEAVES * error:
-        figures = {"reactance": reactance, "error": error, "left": left}
+    if left <= (_LEAVES if beyond is Beyond.ALL else _LEAVES_ALONE) * error:
+        figures = {"reactance": reactance, "error": error, "left": left, "of": str(beyond)}
         yield left / error, Question(QuestionKind.METER_ELSEWHERE, figures)
+
+
+def _time_unit(comparison: EventComparison, bases: PortBases, error: float) -> Iterator[Question]:
+    """Another unit of the times that explains most of the error."""
+    whole = comparison.event.recording
+    if "time" in whole.channels:
+        return
+    for unit, seconds in _UNITS_OF_TIME.items():
+        interval, length = seconds * whole.interval, seconds * whole.length
+        if not (
+            _INTERVALS[0] <= interval <= _INTERVALS[1] and _LENGTHS[0] <= length <= _LENGTHS[1]
+        ):
+            continue
+        timed = replace(whole, interval=interval, begin=seconds * whole.begin)
+        try:
+            event = prepare_event(at_port(timed, AT_PORT), bases)
+            near = cut_event(event, _AFTER, _BEFORE)
+            power = comparison.device.play(near.recording, near.start).power
+        except CosimError:
+            continue
+        left = math.hypot(*rms_error(power, near))
+        if left <= _LEAVES * error:
+            figures = {"unit": unit, "interval": whole.interval, "length": whole.length}
+            figures |= {"error": error, "left": left, "remedy": f"time=time in {unit}"}
+            yield Question(QuestionKind.TIME_UNIT, figures)
+            return
 
 
 def _rated_otherwise(comparison: EventComparison, error: float) -> Iterator[tuple[float, Question]]:

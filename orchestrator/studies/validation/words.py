@@ -83,7 +83,7 @@ def _phase_order(x: Figures) -> str:
 
 def _time_unit(x: Figures) -> str:
     return (
-        f"the times look like {x['unit']}: a sample every {x['interval']:.3g} s, {x['length']:.4g} s in all"
+        f"the times look like {_TIMES[x['unit']]}: a sample every {x['interval']:.3g} s, {x['length']:.4g} s in all"
         + (
             f"; read so, the error falls from {x['error']:.3g} to {x['left']:.3g} pu (rms)"
             if "left" in x
@@ -91,6 +91,15 @@ def _time_unit(x: Figures) -> str:
         )
         + f". If they are, give --channel '{x['remedy']}'"
     )
+
+
+_TIMES = {
+    "us": "microseconds",
+    "ms": "milliseconds",
+    "min": "minutes",
+    "h": "hours",
+    "d": "days, as spreadsheets have them",
+}
 
 
 def _bases_assumed(x: Figures) -> str:
@@ -194,17 +203,26 @@ def _clocks(x: Figures) -> str:
 
 def _meter_elsewhere(x: Figures) -> str:
     side = "the grid's side" if x["reactance"] > 0 else "the device's side"
+    meters = {"": "the meter", "V": "the meter of the voltage alone", "PQ": "that of P and Q alone"}
+    given = f"X {x['reactance']:.3g}" + (f" of {x['of']}" if x["of"] else "")
     return (
-        f"is the meter at {side} of a transformer that the model does not hold? With a reactance of "
+        f"is {meters[x['of']]} at {side} of a transformer that the model does not hold? With a reactance of "
         f"{abs(x['reactance']):.3g} pu between meter and port the error falls from {x['error']:.3g} to {x['left']:.3g} "
-        f"pu (rms). If it is so, give its own, such as --transformer 'X {x['reactance']:.3g}'; if not, a reactance "
+        f"pu (rms). If it is so, give its own, such as --transformer '{given}'; if not, a reactance "
         "of the model is wrong"
     )
 
 
 def _setpoint(x: Figures) -> str:
+    name = x["signal"].upper()
+    if "until" in x:
+        return (
+            f"from {x['at']:.4g} to {x['until']:.4g} s {name} leaves the model's along a straight line, by "
+            f"{x['offset']:+.3g} pu, which the voltage does not explain: did a setpoint ramp? No parameter explains "
+            "it; give the part before, with --stop"
+        )
     return (
-        f"at {x['at']:.4g} s {x['signal'].upper()} leaves the model's by {x['offset']:+.3g} pu and stays, and the "
+        f"at {x['at']:.4g} s {name} leaves the model's by {x['offset']:+.3g} pu and stays, and the "
         "voltage does nothing then: did a setpoint change? No parameter explains it; give the part before, with --stop"
     )
 

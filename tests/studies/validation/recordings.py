@@ -53,3 +53,15 @@ def written(frame, folder, name="rec.csv"):
     path = folder / name
     frame.to_csv(path, index=False, float_format="%.9g")
     return path
+
+
+def waves(frame, kilovolt=230.0):
+    """Three instantaneous voltages [kV] and currents [kA] at 50 Hz, as a fault recorder has them, by name."""
+    v = frame.v_pu * np.exp(1j * np.deg2rad(frame.angle_deg))
+    i = np.conj((frame.p_mw + 1j * frame.q_mvar) / (np.sqrt(3) * kilovolt * v))
+    found = {}
+    for k, phase in enumerate("abc"):
+        turn = np.exp(2j * np.pi * (50 * frame.time - k / 3))
+        found[f"v{phase}"] = np.real(kilovolt * np.sqrt(2 / 3) * v * turn)
+        found[f"i{phase}"] = np.real(np.sqrt(2) * i * turn)
+    return found

@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 import orchestrator as gfor_in_python
 from orchestrator.studies.validation.limits import EXAMPLE
-from tests.studies.validation.recordings import run, table, with_noise
+from tests.studies.validation.recordings import run, table, waves, with_noise
 
 ON = {"pod_p.enabled": True}
 
@@ -16,8 +16,9 @@ def good():
     return with_noise(table(run()))
 
 
-def asked(frame, **more):
-    found = gfor_in_python.validate("gfor", frame.set_index("time"), values=ON, **more).as_json()
+def asked(frame, values=None, **more):
+    given = ON | (values or {})
+    found = gfor_in_python.validate("gfor", frame.set_index("time"), values=given, **more).as_json()
     return found["events"][0]["questions"]
 
 
@@ -71,6 +72,28 @@ def beyond_transformer(frame, reactance=0.12):
     return frame.assign(
         v_pu=np.abs(seen), angle_deg=angle, p_mw=np.real(power), q_mvar=np.imag(power)
     )
+
+
+def of_angle_behind_a_lag(frame, seconds=0.02):
+    part = 1e-3 / seconds
+    first = frame.angle_deg[0]
+    behind = lfilter([part], [1, part - 1], frame.angle_deg - first) + first
+    return frame.assign(angle_deg=behind)
+
+
+def alone_beyond(frame, *columns):
+    """The same, where some columns alone are measured beyond the transformer."""
+    return frame.assign(**{name: beyond_transformer(frame)[name] for name in columns})
+
+
+def of_ramp(frame, low=2.0, high=3.5):
+    return frame.assign(p_mw=frame.p_mw + 100 * np.clip((frame.time - low) / (high - low), 0, 1))
+
+
+def in_waves(frame):
+    units = {"v": "kv", "i": "ka"}
+    named = {f"{name}_{units[name[0]]}": values for name, values in waves(frame).items()}
+    return frame[["time"]].assign(**named)
 
 
 def of_pmu(frame, every=20, mean=40):
@@ -135,6 +158,18 @@ PLANTED = {
     ),
     "the event begins outside of steady state": (moving_before, "no steady state before"),
     "nothing happens": (lambda f: f[f.time < 0.95], "no event"),
+    "the angle is behind a lag of 20 ms": (of_angle_behind_a_lag, "angle lacks a jump"),
+    "the angle was not recorded": (lambda f: f.assign(angle_deg=3.0), "channel does not move"),
+    "the voltage alone is measured beyond a transformer": (
+        lambda f: alone_beyond(f, "v_pu", "angle_deg"),
+        "meter elsewhere",
+    ),
+    "P and Q alone are measured beyond a transformer": (
+        lambda f: alone_beyond(f, "p_mw", "q_mvar"),
+        "meter elsewhere",
+    ),
+    "the times are in minutes": (lambda f: f.assign(time=f.time / 60), "time unit"),
+    "a setpoint ramps": (of_ramp, "setpoint"),
     "setpoint": (lambda f: f.assign(p_mw=f.p_mw + 100 * (f.time > 2)), "setpoint"),
 }
 
@@ -263,3 +298,49 @@ def test_a_control_that_is_faster_than_the_samples_is_not_fitted(good):
     found = gfor_in_python.validate("gfor", frame, values=ON, fit="voltage_control.tau").fitted()
     assert found.why_not.item() == "too fast"
     assert found.value.item() == found.start.item()
+
+
+def test_a_model_of_another_rated_frequency_is_asked_about(good):
+    (question,) = asked(good, values={"f_n": 60.0})
+    assert question["kind"] == "rated frequency"
+    assert "--set f_n=50" in question["text"]
+
+
+@pytest.mark.parametrize("order", ["bca", "cab", "acb"])
+def test_currents_of_other_phases_are_asked_about_and_read_as_the_remedy_says(good, order):
+    recorded = in_waves(good[good.time < 3.0])
+    assert asked(recorded, voltage=230) == []
+    moved = {f"i{x}_ka": recorded[f"i{y}_ka"] for x, y in zip("abc", order, strict=True)}
+    first, *_ = [one for one in asked(recorded.assign(**moved), voltage=230) if one["keeps_open"]]
+    assert first["kind"] == ("phase order" if order == "acb" else "read otherwise")
+    given = first["figures"]["remedy"]
+    assert asked(recorded.assign(**moved), voltage=230, channels=given) == []
+
+
+@pytest.mark.parametrize(
+    ("columns", "given"),
+    [(("v_pu", "angle_deg"), "X 0.12 of V"), (("p_mw", "q_mvar"), "X 0.12 of PQ")],
+)
+def test_a_transformer_before_one_meter_is_counted_where_it_is_given(good, columns, given):
+    assert asked(alone_beyond(good, *columns), transformer=given) == []
+
+
+def test_times_in_minutes_are_read_as_the_remedy_says(good):
+    in_minutes = good.assign(time=good.time / 60)
+    (question,) = [one for one in asked(in_minutes) if one["kind"] == "time unit"]
+    assert asked(in_minutes, channels=[question["figures"]["remedy"]]) == []
+
+
+@pytest.mark.parametrize("wrong", [{"droop.R_f": 0.02}, {"transformer.X_t": 0.25}, {"pod_p.K": 50}])
+def test_an_honest_recording_beside_a_wrong_model_is_not_accused(good, wrong):
+    assert asked(good, values=wrong) == []
+
+
+def test_a_jump_of_the_phase_by_six_degrees_is_no_wrap_of_radians(good):
+    jumped = good.assign(angle_deg=good.angle_deg - good.angle_deg[0] + 6.2 * (good.time > 1))
+    assert "angle unit" not in [one["kind"] for one in asked(jumped)]
+
+
+def test_an_angle_that_an_ideal_source_holds_is_not_asked_about():
+    still = table(run()).assign(angle_deg=0.0)
+    assert "channel does not move" not in [one["kind"] for one in asked(still)]

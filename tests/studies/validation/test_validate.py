@@ -2,7 +2,6 @@
 
 import json
 
-import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
@@ -10,7 +9,7 @@ import xarray as xr
 import orchestrator as gfor_in_python
 from orchestrator.output.results.comtrade.writing import write_comtrade
 from orchestrator.studies.validation.limits import EXAMPLE
-from tests.studies.validation.recordings import run, table, with_noise, written
+from tests.studies.validation.recordings import run, table, waves, with_noise, written
 
 ON = {"pod_p.enabled": True}
 
@@ -89,17 +88,12 @@ def test_a_machine_is_driven_by_its_own_voltage(gfor, tmp_path):
 
 
 def in_comtrade(frame, path):
-    """Three instantaneous voltages [kV] and currents [kA] at 230 kV and 50 Hz, as a fault recorder has them."""
-    v = frame.v_pu * np.exp(1j * np.deg2rad(frame.angle_deg))
-    i = np.conj((frame.p_mw + 1j * frame.q_mvar) / (np.sqrt(3) * 230 * v))
-    turn = np.exp(2j * np.pi * 50 * frame.time)
-    waves = {}
-    for k, phase in enumerate("abc"):
-        later = turn * np.exp(-2j * np.pi / 3 * k)
-        waves[f"v{phase}"] = ("time", np.real(230 * np.sqrt(2 / 3) * v * later), {"units": "kV"})
-        waves[f"i{phase}"] = ("time", np.real(np.sqrt(2) * i * later), {"units": "kA"})
-    dataset = xr.Dataset(waves, coords={"time": frame.time.to_numpy()})
-    return write_comtrade(dataset, list(waves), path)[0]
+    units = {"v": "kV", "i": "kA"}
+    signals = {
+        name: ("time", values, {"units": units[name[0]]}) for name, values in waves(frame).items()
+    }
+    dataset = xr.Dataset(signals, coords={"time": frame.time.to_numpy()})
+    return write_comtrade(dataset, list(signals), path)[0]
 
 
 def test_an_excel_file_gives_the_same_figures(recording, tmp_path):
