@@ -346,7 +346,7 @@ def _rated_otherwise(comparison: EventComparison, error: float) -> Iterator[tupl
         left = math.hypot(*rms_error(other.play(event.recording, event.start).power, event))
     except CosimError:
         return
-    if left <= _LEAVES * error:
+    if left <= _LEAVES_ALONE * error:
         figures = {"seen": hertz, "rated": device.rated_hz, "error": error, "left": left}
         yield left / error, Question(QuestionKind.RATED_FREQUENCY, figures)
 

@@ -39,7 +39,8 @@ def _rated_frequency(x: Figures) -> str:
     if "left" in x:
         return (
             f"is the rated frequency {x['seen']:g} Hz? The device has {x['rated']:g} Hz; with the other one the error "
-            f"falls from {x['error']:.3g} to {x['left']:.3g} pu (rms). If it is so, give --set f_n={x['seen']:g}"
+            f"falls from {x['error']:.3g} to {x['left']:.3g} pu (rms). If it is so, give --set f_n={x['seen']:g}; "
+            "if not, a droop of the model is wrong"
         )
     return (
         f"before the event the frequency is {x['seen']:.4g} Hz, and the device's is {x['rated']:g} Hz: give its rated "
