@@ -32,7 +32,7 @@ from orchestrator.output.results.lock import held
 from orchestrator.output.signatures.signing import check_key
 from orchestrator.simulation.watch.finding import MISFIT
 from orchestrator.studies.certification.acceptance import read_checks, run_checks
-from orchestrator.studies.certification.certificate import Certificate, DampingTest
+from orchestrator.studies.certification.certificate import Certificate, DampingCertificate
 from orchestrator.studies.certification.codes import frequency_domain
 from orchestrator.studies.certification.codes.nts631 import NTS631
 from orchestrator.studies.certification.codes.row import checked, in_words, like
@@ -67,11 +67,11 @@ def show(found: Certificate, files: Sequence[Path], folder: Path, console: Conso
         found.verdict, "green" if found.passed and not found.refused else "red"
     )
     said = found.sentence()
-    if found.damping is None and found.departures:
+    if found.is_by_rows and found.departures:
         said += f" Not as the code has it: {', '.join(found.departures)}."
     console.print(f"[bold {colour}]{escape(said)}[/]", soft_wrap=True)
-    if found.damping is not None:
-        _show_damping_test(found, found.damping, console)
+    if isinstance(found, DampingCertificate):
+        _show_damping_test(found, console)
     else:
         console.print(_verdicts(found), "")
         print_parts(console, map(escape, _remarks(found)))
@@ -139,10 +139,10 @@ def _criteria(found: Certificate) -> PlainTable:
     return table
 
 
-def _show_damping_test(found: Certificate, test: DampingTest, console: Console) -> None:
+def _show_damping_test(found: DampingCertificate, console: Console) -> None:
     print_parts(console, map(escape, _misfits(p.findings for p in found.results.values())))
     table = make_table(
-        f"Damping test, {test.signal} watched",
+        f"Damping test, {found.signal} watched",
         "X_L [pu]",
         "least damped [Hz]",
         "ξ [%]",
@@ -217,7 +217,7 @@ def run_one(options: argparse.Namespace, device: Device) -> int:
     if not options.json:
         show(found, files, folder, console)
     beside: dict[str, Any] = {}
-    if options.sensitivities and found.damping is None:
+    if options.sensitivities and found.is_by_rows:
         beside = {"sensitivities": find_needs(options, found, folder, console)}
     if options.json:
         content = json.loads((folder / JSON).read_text(encoding="utf-8"))

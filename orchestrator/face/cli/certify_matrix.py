@@ -124,7 +124,7 @@ def _tested(
             cell.take(found)
             if not (options.json or several):
                 show(found, files, own, console)
-            if options.sensitivities and found.damping is None:
+            if options.sensitivities and found.is_by_rows:
                 _take_needs(options, found, cell, own, console)
         if not options.no_check and key not in (GB, FREQUENCY):
             options.check = own / KEPT

@@ -16,7 +16,7 @@ from orchestrator.output.report.html.folder import SUMMARY
 from orchestrator.output.results.readers import has_reader
 from orchestrator.output.results.recording import TRAJECTORY
 from orchestrator.studies.certification.case_file import CASE
-from orchestrator.studies.certification.certificate import Certificate
+from orchestrator.studies.certification.certificate import Certificate, DampingCertificate
 from orchestrator.studies.certification.codes.bench_point import case_name
 from orchestrator.studies.certification.codes.record import pictures_of
 from orchestrator.studies.certification.files import JSON, RESPONSES, read_record
@@ -76,7 +76,18 @@ def _rows(certificate: Certificate) -> Iterator[tuple[str, str, dict[str, Any]]]
     """Yield of each row its name, its case file, and its cell."""
     for verdict in certificate.verdicts:
         pictures: list[tuple[str, list[ChartCurve], str]] = []
-        if certificate.damping is None:
+        if isinstance(certificate, DampingCertificate):
+            name, bench, said = f"X_L = {verdict.X_L:g} pu", CASE, list(verdict.faults)
+            said += [
+                f"{m.criterion}: {m.text} (margin {margin_text(m.margin)})"
+                for m in verdict.margins()
+            ]
+            if verdict.time is not None:
+                event_time = certificate.event_time
+                pictures = [
+                    (*response_curves(certificate, verdict, event_time), verdict.time.swings.reason)
+                ]
+        else:
             name, bench, said = verdict.row.name, case_name(verdict.row.name), [verdict.row.title]
             said += [
                 f"{f.criterion}: {verdict.word(f)}, {f.text} (margin {margin_text(f.margin)})"
@@ -84,17 +95,6 @@ def _rows(certificate: Certificate) -> Iterator[tuple[str, str, dict[str, Any]]]
             ]
             drawn = pictures_of(verdict, certificate.results[name], certificate.f_n)
             pictures = [(label, curves, caption) for _, label, curves, caption in drawn]
-        else:
-            name, bench, said = f"X_L = {verdict.X_L:g} pu", CASE, list(verdict.faults)
-            said += [
-                f"{m.criterion}: {m.text} (margin {margin_text(m.margin)})"
-                for m in verdict.margins()
-            ]
-            if verdict.time is not None:
-                event_time = certificate.damping.event_time
-                pictures = [
-                    (*response_curves(certificate, verdict, event_time), verdict.time.swings.reason)
-                ]
         said += [f"not judged: {verdict.unknown}"] if verdict.unknown else []
         yield (
             name,

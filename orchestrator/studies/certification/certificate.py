@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, ClassVar
 
 from orchestrator.cases.form.schema import Value
 from orchestrator.core.errors import CaseError, Problem
@@ -36,9 +36,23 @@ from orchestrator.studies.certification.verdict import (
     verdict_of,
 )
 
+_FLOW = ("Q_0", "theta_0")
+"""Values of the converter that the power flow of the damping test's case gives."""
+
+_STUDY = ("S_n", "P_0", "v_0")
+"""Values of the converter that the damping test's case sets."""
+
 
 @dataclass
 class Certificate:
+    """A certificate by the rows of a code on the test bench; `DampingCertificate` is the other kind.
+
+    ``part``: what a part of the test is called; ``is_by_rows``: whether `gfor certify --sensitivities` can tell what
+    its rows need."""
+
+    part: ClassVar[str] = "row"
+    is_by_rows: ClassVar[bool] = True
+
     request: CertificationRequest
     description: FmuDescription
     code: GridCode[Any]
@@ -49,8 +63,6 @@ class Certificate:
     case: Path  # the case file of the damping test, or of the first row
     # every value of the system with the converter at the first row, by ``component.variable``
     values: Mapping[str, float | bool] = field(default_factory=dict, kw_only=True)
-    # what the damping test has beside
-    damping: DampingTest | None = field(default=None, kw_only=True)
     stored: int = field(default=0, kw_only=True)  # number of rows that an earlier start had kept
     details: Details = field(default_factory=Details, kw_only=True)
     # of a record that is read again: names of the FMU and the binding as they were given, and where it was computed
@@ -104,33 +116,57 @@ class Certificate:
 
     def sentence(self) -> str:
         """The verdict, with what failed or was not tested."""
-        said = rows_in_words(self) if self.damping is None else self.damping.in_words(self)
+        said = self.test_in_words()
         if self.acceptance is not None and self.refused:
             said += f" Acceptance tests failed: {', '.join(self.acceptance.faults)}; do not rely on the FMU as it is."
         return said
 
+    @property
+    def heading(self) -> str:
+        """Return the name of the test in the title of the page."""
+        return self.code.key.upper()
 
-def rows_in_words(c: Certificate) -> str:
-    judged = [v for v in c.verdicts if v.judged]
-    bad = [v for v in judged if not v.accepted]
-    subject, title = f"The converter {c.description.model_name!r}", c.code.title
-    rows = f"{len(judged) - len(bad)} of {len(judged)} judged rows are accepted."
-    if bad:
-        names = "; ".join(f"{v.name}: {', '.join(f.criterion for f in v.failed)}" for v in bad)
-        return f"{subject} {FAILS} {title}: {rows} Not accepted: {names}."
-    if c.verdict == INCOMPLETE:
-        # as issued ones say, also of one part
-        untested = f"{len(c.missing)} parts of {title} were not tested."
-        return f"The test is {INCOMPLETE}: {untested} {subject}: {rows}"
-    return f"{subject} {PASSES} {title}: {rows}"
+    @property
+    def part_of_test(self) -> str:
+        """How much of the test was judged, for the title; "" if that is all."""
+        return ""
+
+    @property
+    def settings(self) -> Mapping[str, Value]:
+        """Values of the converter that the test itself switches."""
+        return {}
+
+    def origin_of(self, name: str) -> str:
+        """Return what gave a value of the converter."""
+        if name in self.request.values:
+            return "--set"
+        return f"the bench, in row {self.verdicts[0].name}"
+
+    def test_in_words(self) -> str:
+        """Return the sentence on the test alone, without the acceptance tests."""
+        judged = [v for v in self.verdicts if v.judged]
+        bad = [v for v in judged if not v.accepted]
+        subject, title = f"The converter {self.description.model_name!r}", self.code.title
+        rows = f"{len(judged) - len(bad)} of {len(judged)} judged rows are accepted."
+        if bad:
+            names = "; ".join(f"{v.name}: {', '.join(f.criterion for f in v.failed)}" for v in bad)
+            return f"{subject} {FAILS} {title}: {rows} Not accepted: {names}."
+        if self.verdict == INCOMPLETE:
+            # as issued ones say, also of one part
+            untested = f"{len(self.missing)} parts of {title} were not tested."
+            return f"The test is {INCOMPLETE}: {untested} {subject}: {rows}"
+        return f"{subject} {PASSES} {title}: {rows}"
 
 
-@dataclass(frozen=True)
-class DampingTest:
-    """Test that NTS 631 has beside the rows of other codes: rows are line reactances, of a case of its own."""
+@dataclass
+class DampingCertificate(Certificate):
+    """A certificate by NTS 631's damping test, whose parts are line reactances of a case of its own."""
 
-    controllers: DampingControllers
-    event_time: float
+    part: ClassVar[str] = "point"
+    is_by_rows: ClassVar[bool] = False
+
+    controllers: DampingControllers = field(kw_only=True)
+    event_time: float = field(kw_only=True)  # [s]
 
     @property
     def pod(self) -> str:
@@ -140,23 +176,42 @@ class DampingTest:
     def signal(self) -> str:
         return watched(self.pod)
 
-    def in_words(self, c: Certificate) -> str:
-        subject = f"The converter {c.description.model_name!r} {self.controllers.in_words()}"
-        reasons = incomplete_because(missing_of(c), c.departures)
-        if c.verdict == PASSES:
+    @property
+    def heading(self) -> str:
+        return "Damping test"
+
+    @property
+    def part_of_test(self) -> str:
+        left, rows = missing_of(self), len(self.code.rows)
+        return f" ({rows - len(left)} of {rows})" if left else ""
+
+    @property
+    def settings(self) -> Mapping[str, Value]:
+        return self.controllers.settings
+
+    def origin_of(self, name: str) -> str:
+        if name in self.request.values:
+            return "--set"
+        if name in self.settings:
+            return "--pod"
+        if name in _FLOW:
+            return f"the power flow at X_L = {self.request.reactances[0]:g} pu"
+        return "the study" if name in _STUDY else "the step size of the study"
+
+    def test_in_words(self) -> str:
+        subject = f"The converter {self.description.model_name!r} {self.controllers.in_words()}"
+        reasons = incomplete_because(missing_of(self), self.departures)
+        if self.verdict == PASSES:
             return f"{subject} passes the damping test at all {len(REACTANCES)} line reactances, by both criteria."
-        if c.verdict == FAILS:
-            failed = [v for v in c.verdicts if v.judged and not v.accepted]
+        judged = [v for v in self.verdicts if v.judged]
+        if self.verdict == FAILS:
+            failed = [v for v in judged if not v.accepted]
             places, first = ", ".join(f"{v.X_L:g}" for v in failed), failed[0]
             text = f"{subject} fails the damping test at X_L = {places} pu. At {first.X_L:g} pu: "
             text += f"{'; '.join(first.faults)}."
             return f"{text} The test is incomplete as well: {reasons}." if reasons else text
-        where = (
-            "is accepted where it was judged"
-            if any(v.judged for v in c.verdicts)
-            else "was judged nowhere"
-        )
-        unknown = [v for v in c.verdicts if not v.judged]
+        where = "is accepted where it was judged" if judged else "was judged nowhere"
+        unknown = [v for v in self.verdicts if not v.judged]
         text = f"The damping test is incomplete: {reasons}. {subject} {where}"
         return f"{text}; at {unknown[0].X_L:g} pu, {unknown[0].unknown}." if unknown else f"{text}."
 

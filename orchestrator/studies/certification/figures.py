@@ -16,16 +16,17 @@ from orchestrator.devices.fmi.values import Scalar
 from orchestrator.linear.spectra.modes import damping_ratio
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.studies.certification.case_file import CASE, WITH, WITHOUT
-from orchestrator.studies.certification.certificate import Certificate, DampingTest, missing_of
+from orchestrator.studies.certification.certificate import (
+    Certificate,
+    DampingCertificate,
+    missing_of,
+)
 from orchestrator.studies.certification.criteria import ModeVerdict
 from orchestrator.studies.certification.form import NORM
 from orchestrator.studies.certification.judgement import PointVerdict, TimeVerdict
 from orchestrator.studies.certification.point import COMPUTED, CONVERTER
 from orchestrator.studies.certification.request import REACTANCES
 from orchestrator.studies.certification.swings import RecordedSwing, SwingTest
-
-_FLOW = ("Q_0", "theta_0")
-_STUDY = ("S_n", "P_0", "v_0")
 
 
 @dataclass(frozen=True)
@@ -76,24 +77,12 @@ def _values(c: Certificate, description: FmuDescription) -> Iterator[tuple[str, 
                 yield (
                     m.variable,
                     scale * m.factor * value + m.offset,
-                    f"{_by(c, name)}, {name} of the binding",
+                    f"{c.origin_of(name)}, {name} of the binding",
                 )
     for name, passed in given.items():
         target = bound.inner_names.get(name) if bound else name
         if target is not None and not (bound and name in START):
-            yield target, passed, _by(c, name)
-
-
-def _by(c: Certificate, name: str) -> str:
-    if name in c.request.values:
-        return "--set"
-    if c.damping is None:
-        return f"the bench, in row {c.verdicts[0].name}"
-    if name in c.damping.controllers.settings:
-        return "--pod"
-    if name in _FLOW:
-        return f"the power flow at X_L = {c.request.reactances[0]:g} pu"
-    return "the study" if name in _STUDY else "the step size of the study"
+            yield target, passed, c.origin_of(name)
 
 
 def linearised_of(c: Certificate) -> dict[str, str]:
@@ -110,7 +99,7 @@ def fit_errors_of(c: Certificate) -> dict[str, float]:
     return found
 
 
-def damping_json(c: Certificate, test: DampingTest) -> dict[str, Any]:
+def damping_json(c: DampingCertificate) -> dict[str, Any]:
     missing = missing_of(c)
     return {
         "format": NORM,
@@ -133,13 +122,13 @@ def damping_json(c: Certificate, test: DampingTest) -> dict[str, Any]:
         "values": dict(c.request.values),
         "study_values": dict(c.request.study_values),
         "black_box": c.request.black_box,
-        "pod": test.pod,
-        "pod_source": test.controllers.source,
-        "pod_values": dict(test.controllers.settings),
+        "pod": c.pod,
+        "pod_source": c.controllers.source,
+        "pod_values": dict(c.controllers.settings),
         "parameters": [asdict(row) for row in parameter_rows(c)],
         "acceptance": None if c.acceptance is None else dict(c.acceptance.report),
-        "signal": test.signal,
-        "event_time": test.event_time,
+        "signal": c.signal,
+        "event_time": c.event_time,
         "linearised": linearised_of(c),
         "fit_errors": fit_errors_of(c),
         "environment": dict(c.computed_on),
@@ -246,7 +235,7 @@ def _swing_json(s: RecordedSwing) -> dict[str, Any]:
     }
 
 
-def damping_responses(c: Certificate, test: DampingTest) -> xr.Dataset:
+def damping_responses(c: DampingCertificate) -> xr.Dataset:
     """Recorded signals over scenario, X_L and time; NaN where a run ended early."""
     whole = max(c.results.values(), key=lambda p: len(p.times))
     names = dict.fromkeys(name for point in c.results.values() for name in point.signals)
@@ -259,7 +248,7 @@ def damping_responses(c: Certificate, test: DampingTest) -> xr.Dataset:
                 signal = c.results[scenario, X_L].signals.get(name, np.empty(0))
                 values[i, k, : len(signal)] = signal
         unit = next(p.units[name] for p in c.results.values() if name in p.units)
-        kept = values if name == test.signal else values.astype(np.float32)
+        kept = values if name == c.signal else values.astype(np.float32)
         data[name] = (("scenario", "X_L", "time"), kept, {"units": unit})
     coordinates = {
         "scenario": scenarios,

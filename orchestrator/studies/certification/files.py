@@ -7,6 +7,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import xarray as xr
+
 from orchestrator.core.errors import InputError
 from orchestrator.core.foreign_files import read_text
 from orchestrator.core.safe_files import file_hash, write_text
@@ -16,7 +18,7 @@ from orchestrator.output.results.storage import save_netcdf
 from orchestrator.output.signatures.beside import Beside
 from orchestrator.studies.certification.acceptance import KEPT
 from orchestrator.studies.certification.case_file import BINDING, CASE, FMU
-from orchestrator.studies.certification.certificate import Certificate
+from orchestrator.studies.certification.certificate import Certificate, DampingCertificate
 from orchestrator.studies.certification.codes.bench_point import case_name
 from orchestrator.studies.certification.codes.nts631 import NTS631
 from orchestrator.studies.certification.codes.record import code_json, code_responses
@@ -33,13 +35,17 @@ PDF = "certificate.pdf"
 
 
 def figures_of(c: Certificate) -> dict[str, Any]:
-    return code_json(c) if c.damping is None else damping_json(c, c.damping)
+    """Return the verdict, what it rests on, and the data that a verification needs."""
+    return damping_json(c) if isinstance(c, DampingCertificate) else code_json(c)
+
+
+def _responses_of(c: Certificate) -> xr.Dataset:
+    return damping_responses(c) if isinstance(c, DampingCertificate) else code_responses(c)
 
 
 def save(c: Certificate, folder: Path, *, pdf: bool = False) -> list[Path]:
     html, target, made = folder / HTML, folder / JSON, datetime.now(UTC).replace(microsecond=0)
-    responses = code_responses(c) if c.damping is None else damping_responses(c, c.damping)
-    save_netcdf(responses, folder / RESPONSES)
+    save_netcdf(_responses_of(c), folder / RESPONSES)
     content = {"made": made.isoformat(), **figures_of(c)}
     names = [FMU, *([BINDING] if c.request.binding else []), *case_files(content), RESPONSES]
     hashes = {

@@ -17,7 +17,7 @@ from orchestrator.devices.fmi.description import FmuDescription
 from orchestrator.linear.spectra.mode_tracking import ModeSet
 from orchestrator.linear.spectra.modes import damping_ratio
 from orchestrator.studies.certification.case_file import BASE, CASE, WITH, WITHOUT
-from orchestrator.studies.certification.certificate import Certificate, DampingTest
+from orchestrator.studies.certification.certificate import Certificate, DampingCertificate
 from orchestrator.studies.certification.codes.nts631 import NTS
 from orchestrator.studies.certification.compared import (
     TOLERANCE,
@@ -61,7 +61,7 @@ def rebuilt(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Cer
         verdicts.append(_verdict(point, having, lacking, controllers.pod, event))
     if any("pod" in point for point in content["points"]):  # until 0.3 they were not switched off
         verdicts = with_pod(verdicts, points, controllers, event)
-    return Certificate(
+    return DampingCertificate(
         request,
         description,
         code=NTS,
@@ -69,7 +69,8 @@ def rebuilt(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Cer
         verdicts=verdicts,
         results=points,
         case=folder / CASE,
-        damping=DampingTest(controllers, event),
+        controllers=controllers,
+        event_time=event,
     )
 
 

@@ -1,6 +1,7 @@
 """The report on a damping test as one HTML page, with every figure that a person needs to check it by hand."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import datetime
 from html import escape
 
@@ -10,14 +11,14 @@ from orchestrator.devices.fmi.port import BoundDescription
 from orchestrator.devices.fmi.values import Scalar, as_text
 from orchestrator.output.report.html.elements import Figures, document, listed, table
 from orchestrator.studies.certification.case_file import BINDING, FMU, WITH
-from orchestrator.studies.certification.certificate import Certificate, missing_of
+from orchestrator.studies.certification.certificate import Certificate, DampingCertificate
 from orchestrator.studies.certification.codes.record import row_chapters
 from orchestrator.studies.certification.figures import commands, parameter_rows
 from orchestrator.studies.certification.point import FREQUENCY
 from orchestrator.studies.certification.report_criteria import (
     damping_chapters,
+    damping_facts,
     damping_findings,
-    told_of_damping,
 )
 from orchestrator.studies.certification.texts import TEXTS
 from orchestrator.studies.certification.verdict import FAILS, INCOMPLETE, PASSES
@@ -25,6 +26,36 @@ from orchestrator.studies.certification.verdict import FAILS, INCOMPLETE, PASSES
 _LINE = '<span class="blank"></span>'  # A line to be filled in by hand
 
 Hashes = Mapping[str, str | None]
+
+
+@dataclass(frozen=True)
+class PageParts:
+    """Parts of a page that only one kind of test has."""
+
+    chapters: Sequence[tuple[str, str]]
+    commands: Mapping[str, str]  # which compute the first part of the test again
+    findings: Sequence[str] = ()  # lines of the summary at the top
+    facts: Mapping[str, str] = field(default_factory=dict)  # lines of the table of the converter
+    steadiness: str = ""
+    study: str = ""  # of the case in which the converter was tested
+    watched: str = "by_power"  # the signal that is judged in time, as the texts have it
+
+
+def _parts_of(c: Certificate) -> PageParts:
+    if not isinstance(c, DampingCertificate):
+        again = {"response": f"gfor run {c.case.name} --out again"}
+        return PageParts(row_chapters(c, Figures()), again)
+    X_L = c.verdicts[0].X_L
+    residual = max(p.residual for p in c.results.values())
+    return PageParts(
+        chapters=damping_chapters(c, Figures()),
+        commands=commands(X_L, WITH, identified=c.results[WITH, X_L].identified is not None),
+        findings=list(damping_findings(c)),
+        facts=damping_facts(c),
+        steadiness=f"Steady states hold to {residual:.1e} pu in one communication step. ",
+        study=TEXTS["study"],
+        watched="by_frequency" if c.signal == FREQUENCY else "by_power",
+    )
 
 
 def details(c: Certificate) -> str:
@@ -35,10 +66,9 @@ def details(c: Certificate) -> str:
     return table("Filled in from the file of --details, or by hand", ["", ""], rows, left=2)
 
 
-def converter(c: Certificate, hashes: Hashes) -> str:
+def converter(c: Certificate, said: PageParts, hashes: Hashes) -> str:
     origin = read_origin(c.description.path)
-    switched = {} if c.damping is None else c.damping.controllers.settings
-    values = {**c.request.values, **switched, **c.request.study_values}
+    values = {**c.request.values, **c.settings, **c.request.study_values}
     given = {
         "FMU": c.fmu_name,
         "Model": c.description.model_name,
@@ -56,7 +86,7 @@ def converter(c: Certificate, hashes: Hashes) -> str:
         "Voltage": _voltage(c),
         "Binding": c.binding_name or "none: the port is ours",
         "Values set": ", ".join(f"{k} = {as_text(v)}" for k, v in values.items()) or "none",
-        **({} if c.damping is None else told_of_damping(c, c.damping)),
+        **said.facts,
     }
     rows = [
         [escape(name), escape(str(value)) or '<span class="soft">not said</span>']
@@ -138,7 +168,7 @@ def acceptance(c: Certificate) -> str:
     return f'<p class="{style}">{escape(said)}</p>{listed}'
 
 
-def provenance(c: Certificate, hashes: Hashes) -> str:
+def provenance(c: Certificate, said: PageParts, hashes: Hashes) -> str:
     machine = table(
         "Computed on", ["", ""], [[escape(k), escape(v)] for k, v in c.computed_on.items()], left=2
     )
@@ -149,17 +179,12 @@ def provenance(c: Certificate, hashes: Hashes) -> str:
         left=2,
     )
     first = c.verdicts[0]
-    again, worst = {"response": f"gfor run {c.case.name} --out again"}, ""
-    if c.damping is not None:
-        again = commands(
-            first.X_L, WITH, identified=c.results[WITH, first.X_L].identified is not None
-        )
-        residual = max(p.residual for p in c.results.values())
-        worst = f"Steady states hold to {residual:.1e} pu in one communication step. "
-    named = "".join(f"<li>{name}: <code>{escape(text)}</code></li>" for name, text in again.items())
+    named = "".join(
+        f"<li>{name}: <code>{escape(text)}</code></li>" for name, text in said.commands.items()
+    )
     text = escape(c.case.read_text(encoding="utf-8"))
     return (
-        f"{machine}{files}<p>{worst}Any {'row' if c.damping is None else 'point'} can be computed again in the folder "
+        f"{machine}{files}<p>{said.steadiness}Any {c.part} can be computed again in the folder "
         f"of this page; the case file holds every value that was set. For {escape(first.name)}:</p>"
         f"<ul>{named}</ul>{TEXTS['integrity']}"
         f"<details data-print><summary>Case file</summary><pre>{text}</pre></details>"
@@ -167,14 +192,12 @@ def provenance(c: Certificate, hashes: Hashes) -> str:
 
 
 def page(c: Certificate, hashes: Hashes, made: datetime) -> str:
-    figures, test = Figures(), c.damping
-    own = row_chapters(c, figures) if test is None else damping_chapters(c, test, figures)
-    watched = "by_frequency" if test and test.signal == FREQUENCY else "by_power"
-    readings = [text.replace("{watched}", TEXTS[watched]) for text in c.code.readings]
+    said = _parts_of(c)
+    readings = [text.replace("{watched}", TEXTS[said.watched]) for text in c.code.readings]
     content = [
         ("For whom and by whom", details(c)),
-        ("What was tested", converter(c, hashes) + (TEXTS["study"] if test else "")),
-        *own,
+        ("What was tested", converter(c, said, hashes) + said.study),
+        *said.chapters,
         ("Acceptance tests of the FMU", acceptance(c)),
         ("Parameters of the FMU", parameters(c)),
         ("Binding", binding(c, hashes)),
@@ -182,26 +205,22 @@ def page(c: Certificate, hashes: Hashes, made: datetime) -> str:
             "How the code was read",
             f"{listed(readings)}<p>{escape(c.code.source)}, {escape(c.code.date)}.</p>",
         ),
-        ("Provenance", provenance(c, hashes)),
+        ("Provenance", provenance(c, said, hashes)),
     ]
-    return document(title(c), c.code.title, _findings(c), content, made)
+    return document(title(c), c.code.title, _findings(c, said.findings), content, made)
 
 
 _TITLES = {PASSES: "passed", FAILS: "failed", INCOMPLETE: "incomplete"}
 
 
 def title(c: Certificate) -> str:
-    word = _TITLES[c.verdict]
-    left = missing_of(c) if c.damping is not None else []
-    if left:
-        word += f" ({len(c.code.rows) - len(left)} of {len(c.code.rows)})"
+    word = _TITLES[c.verdict] + c.part_of_test
     if c.refused:
         word += ", acceptance tests failed"
-    kind = c.code.key.upper() if c.damping is None else "Damping test"
-    return f"{kind} of {c.description.model_name!r}: {word}"
+    return f"{c.heading} of {c.description.model_name!r}: {word}"
 
 
-def _findings(c: Certificate) -> str:
+def _findings(c: Certificate, own: Sequence[str]) -> str:
     good = c.passed and not c.refused
     items = [f'<b class="{"good" if good else "bad"}">{escape(c.sentence())}</b>']
     checked = "not run"
@@ -213,7 +232,7 @@ def _findings(c: Certificate) -> str:
             *items,
         ]
     items.append(f"Acceptance tests of the FMU (gfor fmu check): {checked}")
-    items += [] if c.damping is None else damping_findings(c, c.damping)
+    items += own
     warnings = dict.fromkeys(
         text for result in c.results.values() for text in getattr(result, "warnings", ())
     )

@@ -24,7 +24,7 @@ from orchestrator.output.report.html.elements import (
 )
 from orchestrator.output.report.linearised import exceptions_in_words
 from orchestrator.studies.certification.case_file import WITH, WITHOUT
-from orchestrator.studies.certification.certificate import Certificate, DampingTest
+from orchestrator.studies.certification.certificate import Certificate, DampingCertificate
 from orchestrator.studies.certification.criteria import PAIRED, is_judged, is_near
 from orchestrator.studies.certification.figures import fit_errors_of, linearised_of
 from orchestrator.studies.certification.judgement import LOWERED, PointVerdict, TimeVerdict
@@ -38,7 +38,7 @@ _SHOWN = 30.0
 PODS = {"none": "none", "p": "POD-P", "q": "POD-Q", "pq": "POD-P and POD-Q"}
 
 
-def damping_chapters(c: Certificate, test: DampingTest, figures: Figures) -> list[tuple[str, str]]:
+def damping_chapters(c: DampingCertificate, figures: Figures) -> list[tuple[str, str]]:
     return [
         ("Result at every line reactance", _overview(c)),
         ("Dampings that the converter lowers", _lowered(c)),
@@ -46,28 +46,28 @@ def damping_chapters(c: Certificate, test: DampingTest, figures: Figures) -> lis
         ("Eigenvalue criterion", eigenvalues(c, figures)),
         (
             "Time-domain criterion",
-            "".join(part for v in c.verdicts for part in _response(c, v, test, figures)),
+            "".join(part for v in c.verdicts for part in _response(c, v, figures)),
         ),
         ("What the damping controllers change", pod_section(c.verdicts)),
     ]
 
 
-def damping_findings(c: Certificate, test: DampingTest) -> Iterator[str]:
+def damping_findings(c: DampingCertificate) -> Iterator[str]:
     yield f"Eigenvalue criterion: {_where([v for v in c.verdicts if v.judged and not v.eigenvalues_accepted])}"
     bad = [v for v in c.verdicts if v.judged and (v.time is None or not v.time.accepted)]
-    yield f"Time-domain criterion on {signal_name(test.signal)}: {_where(bad)}"
+    yield f"Time-domain criterion on {signal_name(c.signal)}: {_where(bad)}"
     yield escape(converter_model(c.results[WITH, v.X_L] for v in c.verdicts))
-    yield f"Damping controllers: {PODS[test.pod]} ({escape(test.controllers.source)})"
+    yield f"Damping controllers: {PODS[c.pod]} ({escape(c.controllers.source)})"
     yield from _least_and_growth(c)
     yield from _remark(c)
 
 
-def told_of_damping(c: Certificate, test: DampingTest) -> dict[str, str]:
+def damping_facts(c: DampingCertificate) -> dict[str, str]:
     """Lines of the table of the converter."""
     linearised = linearised_of(c)
     return {
-        "Damping controllers": f"{PODS[test.pod]}: {test.controllers.source}",
-        "Watched in time": signal_name(test.signal),
+        "Damping controllers": f"{PODS[c.pod]}: {c.controllers.source}",
+        "Watched in time": signal_name(c.signal),
         "In the modes": converter_model(c.results[WITH, v.X_L] for v in c.verdicts),
         "Linear models": exceptions_in_words(linearised, fit_errors_of(c))
         or ("all by perturbing the running FMUs" if linearised else "not recorded"),
@@ -186,14 +186,12 @@ def _base_modes(c: Certificate, v: PointVerdict) -> str:
     return table(caption, [*_MODE, "Who takes part"], rows) + note
 
 
-def _response(
-    c: Certificate, v: PointVerdict, test: DampingTest, figures: Figures
-) -> Iterator[str]:
+def _response(c: DampingCertificate, v: PointVerdict, figures: Figures) -> Iterator[str]:
     yield f"<h3>X_L = {v.X_L:g} pu</h3>"
     if v.time is None:
         yield f'<p class="bad">{escape("; ".join(v.faults) or v.unknown)}</p>'
         return
-    label, curves = response_curves(c, v, test.event_time)
+    label, curves = response_curves(c, v, c.event_time)
     picture, link = figures.add(
         line_chart(f"Response at X_L = {v.X_L:g} pu", "Time [s]", label, curves),
         f"Response to +2 % of SG2's voltage reference at X_L = {v.X_L:g} pu. Dashed: without the converter. "

@@ -8,7 +8,7 @@ from orchestrator.cases.scenario.prepare import PreparedScenario
 from orchestrator.core.errors import InputError
 from orchestrator.devices.binding.binding import bound_fmu
 from orchestrator.studies.certification.case_file import BASE, WITH, WITHOUT, write_case
-from orchestrator.studies.certification.certificate import Certificate, DampingTest, refusing
+from orchestrator.studies.certification.certificate import Certificate, DampingCertificate, refusing
 from orchestrator.studies.certification.codes.known import tables
 from orchestrator.studies.certification.codes.nts631 import NTS
 from orchestrator.studies.certification.damping_controllers import (
@@ -62,7 +62,7 @@ def certify(
     ]
     verdicts = with_pod(verdicts, points, controllers, event)
     description = having.system.components[CONVERTER].description
-    return Certificate(
+    return DampingCertificate(
         request,
         description,
         code=NTS,
@@ -71,7 +71,8 @@ def certify(
         results=points,
         case=having.case.path,
         values=having.values,
-        damping=DampingTest(controllers, event),
+        controllers=controllers,
+        event_time=event,
         stored=work.stored,
     )
 

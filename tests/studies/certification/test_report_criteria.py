@@ -43,8 +43,13 @@ def test_the_findings_name_where_each_criterion_is_not_accepted(monkeypatch):
         SimpleNamespace(X_L=X, judged=judged, time=time, eigenvalues_accepted=X < 0.3)
         for X, (judged, time) in times.items()
     ]
-    c = SimpleNamespace(verdicts=verdicts, results={("with", X): None for X in times})
-    test = SimpleNamespace(pod="none", signal="sg1.p", controllers=SimpleNamespace(source=""))
-    text = "\n".join(report_criteria.damping_findings(c, test))
+    c = SimpleNamespace(
+        verdicts=verdicts,
+        results={("with", X): None for X in times},
+        pod="none",
+        signal="sg1.p",
+        controllers=SimpleNamespace(source=""),
+    )
+    text = "\n".join(report_criteria.damping_findings(c))
     assert "Eigenvalue criterion: not accepted at X_L = 0.3 pu" in text
     assert "not accepted at X_L = 0.2, 0.3 pu" in text
