@@ -11,7 +11,7 @@ from orchestrator.cases.scenario.short_circuit import CONVENTION, BusStrength, w
 from orchestrator.face.cli.arguments import add_json_argument, add_kept_argument, add_options
 from orchestrator.face.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.face.cli.terminal import keep_json, make_console, print_json
-from orchestrator.output.report.tables import make_table
+from orchestrator.output.report.strength_table import strength_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,21 +46,7 @@ def run(options: argparse.Namespace) -> int:
         alike.setdefault(json.dumps(with_titles), []).append(scenario.title)
     console = make_console(names=names)
     for rows, titles in alike.items():
-        told = json.loads(rows)
-        columns = ["Bus", "S_sc [MVA]", "SCR", "of [MVA]", "X/R", "Converters"]
-        columns += ["Area"] * any("area" in x for x in told)
-        table = make_table(", ".join(titles), *columns)
-        for x in told:
-            numbers = (
-                (x["s_sc_mva"], ".0f"),
-                (x["scr"], ".2f"),
-                (x["rating_mva"], ".5g"),
-                (x["x_r"], ".1f"),
-            )
-            figures = ["–" if value is None else f"{value:{form}}" for value, form in numbers]
-            row = [x["bus"], *figures, ", ".join(x["converters"]), x.get("area", "")]
-            table.add_row(*row[: len(columns)])
-        console.print(table, "")
+        console.print(strength_table(", ".join(titles), json.loads(rows)), "")
     console.print(escape(f"Convention: {convention}."), soft_wrap=True, highlight=False)
     return 0
 

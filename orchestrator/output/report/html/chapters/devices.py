@@ -9,6 +9,7 @@ from pathlib import Path
 from orchestrator.core.errors import counted
 from orchestrator.output.report.html.chapters.chapter import Chapter, Content
 from orchestrator.output.report.html.elements import table
+from orchestrator.output.report.strength_table import strength_table
 from orchestrator.output.report.tables import short
 
 _LONGEST = 300
@@ -83,17 +84,15 @@ def _unjudged(checks: Sequence[Content]) -> list[str]:
 
 
 def of_strengths(file: Path, c: Content) -> Chapter:
-    said, rows = dict[str, list[str]](), []
+    said = dict[str, list[str]]()
+    content = ""
     for scenario in c["scenarios"]:
         weakest, *_ = buses = sorted(scenario["buses"], key=lambda b: b["s_sc_mva"])
-        ratios = {b["bus"]: "–" if b["scr"] is None else f"{b['scr']:.2f}" for b in buses}
-        text = "".join(f", SCR {scr} at {bus}" for bus, scr in ratios.items() if scr != "–")
+        ratios = {b["bus"]: b["scr"] for b in buses if b["scr"] is not None}
+        text = "".join(f", SCR {scr:.2f} at {bus}" for bus, scr in ratios.items())
         text = f"weakest is {weakest['bus']} with {weakest['s_sc_mva']:.0f} MVA{text}"
         said.setdefault(short(text, _LONGEST), []).append(scenario["name"])
-        rows += [
-            [escape(scenario["name"]), escape(b["bus"]), f"{b['s_sc_mva']:.0f}", ratios[b["bus"]]]
-            for b in buses
-        ]
+        content += strength_table(f"Short-circuit power: {scenario['name']}", buses).html()
     answer = "; ".join(f"{', '.join(names)}: {text}" for text, names in said.items())
     return Chapter(
         file,
@@ -102,9 +101,7 @@ def of_strengths(file: Path, c: Content) -> Chapter:
         good=None,
         sure=c["convention"],
         not_judged=(),
-        content=table(
-            "Short-circuit power", ["Scenario", "Bus", "S_sc [MVA]", "SCR"], rows, left=2
-        ),
+        content=content,
     )
 
 
