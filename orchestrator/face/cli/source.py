@@ -22,7 +22,8 @@ from orchestrator.face.cli.terminal import (
     saying_warnings,
 )
 from orchestrator.face.cli.verdict import add_details_argument
-from orchestrator.studies.oscillations.view import Sources, opinions_table, sources_table
+from orchestrator.studies.oscillations.tables import opinions_table
+from orchestrator.studies.oscillations.view import Sources, sources_table
 
 _SHOWN = 5
 

@@ -7,11 +7,12 @@ import numpy as np
 
 from orchestrator.core.errors import counted
 from orchestrator.output.report.html.charts import ChartCurve, legend, line_chart
-from orchestrator.output.report.html.elements import Figures, colour, document, table
+from orchestrator.output.report.html.elements import Figures, colour, document
 from orchestrator.output.report.html.network_map import network_map
 from orchestrator.studies.oscillations.detection import envelope, signals_of, spectra
 from orchestrator.studies.oscillations.location import works
 from orchestrator.studies.oscillations.measurements import Measurements
+from orchestrator.studies.oscillations.tables import opinions_table
 from orchestrator.studies.oscillations.verdict import Located
 
 _LEAST_FLOW = 0.02  # part of the largest energy flow below which a branch has no arrow
@@ -39,24 +40,7 @@ def source_page(measured: Measurements, found: list[Located]) -> str:
 def _chapter(
     measured: Measurements, one: Located, found: list[Located], figures: Figures
 ) -> Iterator[str]:
-    rows = [
-        [
-            escape(cell)
-            for cell in (
-                o.method,
-                "yes" if o.applies else "no",
-                o.place or "–",
-                ", ".join(f"{name} {share:.0%}" for name, share in o.ranking[:5]),
-            )
-        ]
-        for o in one.opinions
-    ]
-    yield table(
-        "What each method says",
-        ["Method", "Applies", "Names", "Places, the largest part first"],
-        rows,
-        left=4,
-    )
+    yield opinions_table("What each method says", one).html()
     yield _map(measured, one, [x.found.frequency for x in found if x is not one], figures)
     signals = signals_of(measured)
     curves = []

@@ -164,12 +164,3 @@ def _rows(one: Sources) -> Iterator[Sequence[str]]:
         )
     if not len(one):
         yield one.label, "–", "no oscillation", "–", "–", ""
-
-
-def opinions_table(head: str, one: Located) -> PlainTable:
-    columns = ("Method", "Applies", "Names", "Places, the largest part first")
-    rows = []
-    for o in one.opinions:
-        ranked = ", ".join(f"{name} {100 * share:.0f} %" for name, share in o.ranking[:_SHOWN])
-        rows.append((o.method, "yes" if o.applies else "no", o.place or "–", ranked))
-    return make_table(head, *columns, left=4, rows=rows)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
-
-from rich.table import Table
 
 from orchestrator.core.errors import few
 from orchestrator.core.late import pd
@@ -18,7 +16,8 @@ from orchestrator.linear.spectra.modes import damping_percent
 from orchestrator.output.report.html.elements import Figures, damping, document, table
 from orchestrator.output.report.html.network_map import network_map
 from orchestrator.output.report.notebook import page
-from orchestrator.output.report.tables import make_table, share_text
+from orchestrator.output.report.table import ShownTable
+from orchestrator.output.report.tables import share_text
 from orchestrator.output.results.lock import held
 from orchestrator.output.results.mode_json import eigenvalue_json
 from orchestrator.output.results.staging import new_run_id, staged
@@ -396,14 +395,15 @@ def rows(result: SiteResult) -> list[dict[str, Any]]:
     ]
 
 
-def ranking_table(result: SiteResult) -> Table:
+def ranking_table(result: SiteResult) -> ShownTable:
+    """The best buses."""
+    return _table_of(result, f"{unit(result, '100')}; best first", result.ranking[:_SHOWN])
+
+
+def _table_of(result: SiteResult, title: str, buses: Sequence[str]) -> ShownTable:
     modes = [f"{seen.label}, {seen.mode.damping_percent:.2f} %" for seen in result.intact.modes]
-    rows = [
-        [bus, *_cells(result, bus), *_confirmed_cells(result, bus)]
-        for bus in result.ranking[:_SHOWN]
-    ]
-    columns = ("Bus", *modes, *_confirmed_headings(result))
-    return make_table(f"{unit(result, '100')}; best first", *columns, rows=rows)
+    rows = [[bus, *_cells(result, bus), *_confirmed_cells(result, bus)] for bus in buses]
+    return ShownTable(title, ["Bus", *modes, *_confirmed_headings(result)], rows)
 
 
 def _confirmed_headings(result: SiteResult) -> list[str]:
@@ -442,13 +442,8 @@ def _page(result: SiteResult) -> str:
     lines = "".join(f"<li>{escape(text)}</li>" for text in (*sureness(result), *remarks(result)))
     findings = f'<div class="findings"><p class="{shade}">{escape(answer(result))}</p><ul>{lines}</ul></div>'
     content = [("Map", "".join(_map(result, seen, figures) for seen in result.intact.modes[:3]))]
-    modes = [f"{seen.label}, {seen.mode.damping_percent:.2f} %" for seen in result.intact.modes]
-    cells = [
-        [escape(bus), *_cells(result, bus), *_confirmed_cells(result, bus)]
-        for bus in result.ranking
-    ]
-    headings = ["Bus", *modes, *_confirmed_headings(result)]
-    content.append(("All buses", table(unit(result, "100"), headings, cells)))
+    all_buses = _table_of(result, unit(result, "100"), result.ranking)
+    content.append(("All buses", all_buses.html()))
     outages = [at for at in result.worst_first if at.name != result.intact.name]
     if outages:
         best = []

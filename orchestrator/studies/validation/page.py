@@ -12,11 +12,15 @@ from orchestrator.studies.validation.event import EventComparison
 from orchestrator.studies.validation.figures import SIGNALS
 from orchestrator.studies.validation.limits import LimitVerdict
 from orchestrator.studies.validation.study import ValidationResult
+from orchestrator.studies.validation.tables import (
+    beside_table,
+    confirmation_table,
+    criteria_table,
+    explanation_table,
+)
 from orchestrator.studies.validation.words import (
-    EXPLANATION_COLUMNS,
     difference_sentence,
     error_sentence,
-    explanation_cells,
     explanation_sentence,
     fit_sentence,
     sentence,
@@ -132,38 +136,15 @@ def _errors(one: EventComparison) -> str:
 
 
 def _beside(result: ValidationResult) -> str:
-    first, second = result.comparisons[0].device.name, result.others[0].device.name
-    rows = [
-        [
-            escape(one.recording),
-            one.window,
-            one.signal.upper(),
-            *(f"{x:.4f}" for x in (one.first, one.second, one.apart, one.largest)),
-        ]
-        for one in result.apart
-    ]
-    columns = ["Recording", "Window", "", escape(first), escape(second), "Apart", "Most apart"]
     places = [one for one in result.apart if one.more_than_from_record]
     said = f"<p>{escape(difference_sentence(places))}</p>" if places else ""
-    title = "Rms from the recording, and from each other [pu of the rating]"
-    return said + table(title, columns, rows, left=3)
+    return said + beside_table(result).html()
 
 
 def _limits(result: ValidationResult) -> str:
     limits = result.request.limits
-    rows = [
-        [
-            escape(one.place),
-            escape(one.name),
-            "–" if one.value is None else f"{one.value:.4g} {one.unit}",
-            f"{one.limit:g} {one.unit}",
-            str(one.verdict),
-        ]
-        for one in result.criteria
-    ]
-    source = limits.source if limits else ""
-    columns = ["Recording", "Figure", "Value", "Limit", "Verdict"]
-    return table(f"Limits: {source}", columns, rows, left=2)
+    title = f"Limits: {limits.source if limits else ''}"
+    return criteria_table(title, result.criteria, by_device=True).html()
 
 
 def _fit(result: ValidationResult) -> str:
@@ -182,25 +163,14 @@ def _fit(result: ValidationResult) -> str:
     ]
     columns = ["Parameter", "In the model", "Fitted", "95 %", "Can the recordings tell it?"]
     kept = [one.recording for one in result.confirmations if not one.fitted]
-    checks = [
-        [
-            escape(one.recording),
-            "fitted" if one.fitted else "kept back",
-            f"{one.before:.4g}",
-            f"{one.after:.4g}",
-        ]
-        for one in result.confirmations
-    ]
-    errors = ["Recording", "", "In the model", "Fitted"]
     said = f"<p>{escape(fit_sentence(fit, kept))}</p>"
-    title = "Rms error of P and Q [pu of the rating]"
-    return table("Fitted parameters", columns, rows) + said + table(title, errors, checks, left=2)
+    checks = confirmation_table(result.confirmations).html()
+    return table("Fitted parameters", columns, rows) + said + checks
 
 
 def _explained(result: ValidationResult) -> str:
-    rows = [list(map(escape, explanation_cells(one))) for one in result.explanations]
     said = f"<p>{escape(explanation_sentence(result.explanations))}</p>"
-    return said + table("Each cause by itself", list(EXPLANATION_COLUMNS), rows)
+    return said + explanation_table(result.explanations).html()
 
 
 def _not_judged(result: ValidationResult) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -16,20 +15,24 @@ from orchestrator.core.late import pd
 from orchestrator.core.safe_files import made_folder
 from orchestrator.output.report.notebook import page
 from orchestrator.output.report.pdf import print_pdf
+from orchestrator.output.report.table import ShownTable
 from orchestrator.output.report.tables import PlainTable, VerdictSentence, make_table
 from orchestrator.output.results.staging import new_run_id, staged
 from orchestrator.output.results.storage import save_json, save_table
-from orchestrator.studies.validation.causes import Explanation
 from orchestrator.studies.validation.event import EventComparison
 from orchestrator.studies.validation.fit import Fit
 from orchestrator.studies.validation.limits import Criterion, LimitVerdict
 from orchestrator.studies.validation.questions import Question
-from orchestrator.studies.validation.study import FitCheck, ValidationResult
+from orchestrator.studies.validation.study import ValidationResult
+from orchestrator.studies.validation.tables import (
+    beside_table,
+    confirmation_table,
+    criteria_table,
+    explanation_table,
+)
 from orchestrator.studies.validation.words import (
-    EXPLANATION_COLUMNS,
     difference_sentence,
     error_sentence,
-    explanation_cells,
     explanation_sentence,
     fit_sentence,
     sentence,
@@ -229,15 +232,15 @@ def parts(found: Validation) -> Iterator[RenderableType]:
     for one in result.comparisons:
         yield _windows_table(one)
     if result.others:
-        yield _beside_table(result)
+        yield beside_table(result)
     if result.criteria:
-        yield _criteria_table(result.criteria)
+        yield _worst_criteria(result.criteria)
     if result.explanations:
         yield escape(explanation_sentence(result.explanations))
-        yield _explanation_table(result.explanations)
+        yield explanation_table(result.explanations[:_SHOWN])
     if result.fit is not None:
         yield _fit_table(result.fit)
-        yield _confirmation_table(result.confirmations)
+        yield confirmation_table(result.confirmations)
         yield escape(
             fit_sentence(result.fit, [c.recording for c in result.confirmations if not c.fitted])
         )
@@ -248,22 +251,6 @@ def _differences(result: ValidationResult) -> Iterator[str]:
     places = [one for one in result.apart if one.more_than_from_record]
     if places:
         yield escape(difference_sentence(places))
-
-
-def _beside_table(result: ValidationResult) -> PlainTable:
-    first, second = result.comparisons[0].device.name, result.others[0].device.name
-    rows = [
-        (
-            one.recording,
-            one.window,
-            one.signal.upper(),
-            *(f"{x:.4f}" for x in (one.first, one.second, one.apart, one.largest)),
-        )
-        for one in result.apart
-    ]
-    columns = ("Recording", "Window", "", first, second, "apart", "most apart")
-    title = "Two models of one plant: rms from the recording, and from each other [pu]"
-    return make_table(title, *columns, rows=rows, left=3)
 
 
 def _answer(found: Validation) -> str:
@@ -327,11 +314,6 @@ def _windows_table(one: EventComparison) -> PlainTable:
     return make_table(title, *columns, rows=rows)
 
 
-def _explanation_table(explanations: Sequence[Explanation]) -> PlainTable:
-    rows = [explanation_cells(one) for one in explanations[:_SHOWN]]
-    return make_table("One cause that would explain the error", *EXPLANATION_COLUMNS, rows=rows)
-
-
 def _fit_table(fit: Fit) -> PlainTable:
     rows = []
     for one in fit.parameters:
@@ -353,34 +335,11 @@ def _fit_table(fit: Fit) -> PlainTable:
     return table
 
 
-def _confirmation_table(confirmations: Sequence[FitCheck]) -> PlainTable:
-    rows = [
-        (
-            one.recording,
-            "fitted" if one.fitted else "kept back",
-            f"{one.before:.4g}",
-            f"{one.after:.4g}",
-        )
-        for one in confirmations
-    ]
-    columns = ("Recording", "", "rms error now [pu]", "fitted [pu]")
-    return make_table("The error with the fitted values", *columns, rows=rows, left=2)
-
-
-def _criteria_table(criteria: list[Criterion] | Any) -> PlainTable:
-    named = attrgetter("place" if len({one.device for one in criteria}) > 1 else "recording")
+def _worst_criteria(criteria: Sequence[Criterion]) -> ShownTable:
+    """The criteria that are missed most, above those that are open and met."""
     order = {LimitVerdict.NOT_MET: 0, LimitVerdict.OPEN: 1, LimitVerdict.MET: 2}
     worst = sorted(criteria, key=lambda one: (order[one.verdict], -(one.value or 0) / one.limit))
-    rows = [
-        (
-            named(one),
-            one.name,
-            "–" if one.value is None else f"{one.value:.4g} {one.unit}",
-            f"{one.limit:g} {one.unit}",
-            str(one.verdict),
-        )
-        for one in worst[:_SHOWN]
-    ]
     met = sum(one.verdict is LimitVerdict.MET for one in criteria)
+    several = len({one.device for one in criteria}) > 1
     title = f"Limits: {met} of {len(criteria)} met"
-    return make_table(title, "Recording", "Figure", "Value", "Limit", "Verdict", rows=rows, left=2)
+    return criteria_table(title, worst[:_SHOWN], by_device=several)

@@ -13,7 +13,7 @@ from orchestrator.studies.pod_design.closed_loop import PodSetting
 from orchestrator.studies.pod_design.lead_lag import NO_COMPENSATION
 from orchestrator.studies.siting import study
 from orchestrator.studies.siting.candidates import question_about, unit_terminals
-from orchestrator.studies.siting.confirmation import Confirmation, SearchEnd, _tuned
+from orchestrator.studies.siting.confirmation import Confirmation, SearchEnd, tuned_setting
 from orchestrator.studies.siting.study import SiteRequest, find_sites
 from orchestrator.studies.siting.view import (
     Siting,
@@ -95,13 +95,10 @@ def test_the_headline_ranks_as_the_confirmation_does(five, monkeypatch):
 def test_what_the_device_brings_without_its_pod_stands_in_a_column(five, monkeypatch):
     found = planted(monkeypatch, five, bus_11=(4.61, 8.13, True), bus_12=(4.0, 9.30, True))
     table = ranking_table(found)
-    headings = [str(column.header) for column in table.columns]
+    headings = table.headings
     alone = next(k for k, text in enumerate(headings) if "with the device alone [%]" in text)
     assert headings[alone + 2 : alone + 4] == ["least damped then [%]", "at [Hz]"]
-    cells = {
-        str(row[0]): [str(cell) for cell in row[alone : alone + 3]]
-        for row in zip(*(column.cells for column in table.columns), strict=True)
-    }
+    cells = {row[0]: row[alone : alone + 3] for row in table.rows}
     assert cells == {"bus_12": ["4.00", "9.30", "7.50"], "bus_11": ["4.61", "8.13", "7.50"]}
     (one,) = [x for x in as_json(found)["confirmed"] if x["bus"] == "bus_11"]
     assert one["damping_percent_of_device_alone"] == pytest.approx(4.61)
@@ -206,7 +203,9 @@ class Loop:
     ],
 )
 def test_gain_rises_until_damping_does_no_longer_or_its_bound_is_reached(other, most, gain, ended):
-    setting, search = _tuned(Loop(other), None, complex(-1.0), complex(0.0, Loop.SWING), most)
+    setting, search = tuned_setting(
+        Loop(other), None, complex(-1.0), complex(0.0, Loop.SWING), most
+    )
     assert setting.gain == gain
     assert search == ended
 

@@ -218,7 +218,7 @@ def test_the_page_holds_the_fit_and_what_explains_the_error(recording, tmp_path)
     page = found.html()
     assert "Fitted parameters" in page
     assert "The likeliest cause is pod_p.K" in page
-    assert "Rms error of P and Q" in page
+    assert "The error with the fitted values" in page
 
 
 def test_a_page_is_printed_only_where_a_folder_is_given(gfor, recording):
