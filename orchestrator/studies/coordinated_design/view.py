@@ -188,14 +188,16 @@ def _mode(mode: PlacedMode | None) -> dict[str, Any] | None:
 
 def _ranked(one: RankedConverter) -> dict[str, Any]:
     setting = one.setting
+    # without stages that are designed there are no time constants: the device's own may be others
+    times = None if setting is None or not one.stages else setting.filters
     return {
         "component": one.place.component,
         "controller": one.place.controller,
         "worst_damping_ratio": one.worst,
         "worst_damping_ratio_of_all_modes": one.least,
         "K": None if setting is None else setting.gain,
-        "T_S1": None if setting is None else setting.filters.T_S1,
-        "T_S2": None if setting is None else setting.filters.T_S2,
+        "T_S1": None if times is None else times.T_S1,
+        "T_S2": None if times is None else times.T_S2,
         "shift_rad_s_per_pu": one.shift,
     }
 
