@@ -2,7 +2,7 @@
 
 import cmath
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -106,12 +106,11 @@ class Mode(OfEigenvalue):
 
     def by_group(self, group_of: Callable[[str], str | None]) -> dict[str, float]:
         """Participation of groups of states, largest first; states whose group is None are left out."""
-        sums: dict[str, float] = {}
-        for state, factor in self.participation:
-            group = group_of(state)
-            if group is not None:
-                sums[group] = sums.get(group, 0.0) + factor
-        return ReadOnlyTable(sorted(sums.items(), key=lambda entry: -entry[1]))
+        return _sum_by_group(self.participation, group_of)
+
+    def by_group_of_components(self, groups: Mapping[str, str]) -> dict[str, float]:
+        """Participation of groups of components, largest first; components without a group are left out."""
+        return _sum_by_group(self.by_component.items(), groups.get) if groups else {}
 
     def swing(self, states: Iterable[str], least: float = 0.1) -> tuple[list[str], list[str]]:
         """Two groups of some states, such as all speeds, that swing against each other.
@@ -150,6 +149,18 @@ class Mode(OfEigenvalue):
 _ALIKE_DEG = 45.0
 """Two states swing together, or against each other, if their angle is within this of 0 or of 180 degrees: then the
 greater part of each motion is along that of the other one."""
+
+
+def _sum_by_group(
+    factors: Iterable[tuple[str, float]], group_of: Callable[[str], str | None]
+) -> dict[str, float]:
+    """Return the sum of each group, largest first; what has no group is left out."""
+    sums: dict[str, float] = {}
+    for name, factor in factors:
+        group = group_of(name)
+        if group is not None:
+            sums[group] = sums.get(group, 0.0) + factor
+    return ReadOnlyTable(sorted(sums.items(), key=lambda entry: -entry[1]))
 
 
 @dataclass(frozen=True)

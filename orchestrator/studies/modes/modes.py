@@ -107,7 +107,7 @@ class ModesResult:
 
     def by_area(self, mode: spectra.Mode) -> dict[str, float]:
         """Participation of every area, largest first; components without an area are left out."""
-        return mode.by_group(lambda state: self.areas.get(state.partition(".")[0]))
+        return mode.by_group_of_components(self.areas)
 
     def swings_apart(self) -> tuple[list[spectra.Mode], list[spectra.Mode]]:
         """Return the modes in which machines swing or that have a name, and the others."""
