@@ -38,6 +38,7 @@ from orchestrator.cases.networks.psse.device_notes import device_notes
 from orchestrator.cases.networks.psse.raw import read_raw
 from orchestrator.cases.networks.psse.raw_network import FileLoad, Machine, RawNetwork, bus_of_unit
 from orchestrator.cases.networks.psse.solution import half_digit, stated_voltages
+from orchestrator.cases.networks.psse.static_vars import Modelled
 from orchestrator.cases.networks.psse.studied_parts import (
     StudiedPart,
     choose_part,
@@ -115,14 +116,16 @@ class NetworkData:
     counted_controls: str = ""  # how many could move, in words
 
 
-def network_data(table: NetworkTable, directory: Path, slack: str | None = None) -> NetworkData:
+def network_data(
+    table: NetworkTable, directory: Path, slack: str | None = None, modelled: Modelled = ()
+) -> NetworkData:
     """Buses, lines, loads and shunts of a network table, its files and its source included.
 
-    ``slack``: the unit or bus that the case names as the reference.
+    ``slack``: the unit or bus that the case names as the reference. ``modelled``: see `read_raw`.
 
     Raises an `InputError` if a file is missing, lacks a column, holds something that is not a number, or a source holds
     something that the grid model does not have."""
-    found = _source(table, directory, slack)
+    found = _source(table, directory, slack, modelled)
     source = found.network
     lines = [
         Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B, t.tap, t.shift, t.X_C)
@@ -201,10 +204,10 @@ def bus_name(label: str) -> str:
     return f"bus_{label}" if label[:1].isdigit() else label
 
 
-def _source(table: NetworkTable, directory: Path, slack: str | None) -> _Source:
+def _source(table: NetworkTable, directory: Path, slack: str | None, modelled: Modelled) -> _Source:
     imported = ImportedNetwork()
     if table.raw is not None:
-        return _from_raw(directory / table.raw, table, slack)
+        return _from_raw(directory / table.raw, table, slack, modelled)
     if table.keep_load_parts:
         raise InputError(
             "keep_load_parts is for networks of PSS/E; remove the key, or give the file as 'raw'"
@@ -244,15 +247,17 @@ class _Asked:
     version: tuple[int, int]  # time of its last change [ns], and size [bytes]
     slack: str | None
     text: str  # the case's table as JSON, by which it is told from others
+    modelled: Modelled
     table: NetworkTable = field(compare=False)
 
 
-def _from_raw(path: Path, table: NetworkTable, slack: str | None) -> _Source:
+def _from_raw(path: Path, table: NetworkTable, slack: str | None, modelled: Modelled) -> _Source:
     """A network of PSS/E, which every scenario of a case asks for."""
     path = seen_from_here(path)
     state = path.stat() if path.is_file() else None
     version = (state.st_mtime_ns, state.st_size) if state else (0, 0)
-    return _read_from_raw(_Asked(path, version, slack, table.model_dump_json(), table))
+    text = table.model_dump_json()
+    return _read_from_raw(_Asked(path, version, slack, text, frozenset(modelled), table))
 
 
 @lru_cache(maxsize=2)
@@ -264,6 +269,7 @@ def _read_from_raw(asked: _Asked) -> _Source:
         table.leave_out,
         keep_load_parts=table.keep_load_parts,
         slack=asked.slack,
+        modelled=asked.modelled,
     )
     if not raw.machines:
         raise InputError(

@@ -6,6 +6,7 @@ from dataclasses import replace
 from fmus.grid.network import Network, Port
 from fmus.toolchain.catalogue import model_names, needs_arguments, network_of
 from orchestrator.cases.draft import Draft
+from orchestrator.cases.form.csv_rows import seen_from_here
 from orchestrator.cases.form.names import close_names
 from orchestrator.cases.form.schema import (
     BusFaultTable,
@@ -16,7 +17,10 @@ from orchestrator.cases.form.schema import (
 )
 from orchestrator.cases.networks.data import network_data
 from orchestrator.cases.networks.element_names import ElementNames, names_without_units
+from orchestrator.cases.networks.psse.dyr_records import read_dyr
+from orchestrator.cases.networks.psse.static_vars import RECORDS, Modelled
 from orchestrator.core.errors import InputError
+from orchestrator.core.foreign_files import read_bytes
 
 Tables = Mapping[str, ComponentTable]
 
@@ -40,13 +44,27 @@ def read_network(draft: Draft) -> None:
     source = given[0] if given else None
     try:
         flow = draft.given.case.power_flow
-        draft.data = network_data(table, draft.given.directory, flow.slack if flow else None)
+        slack = flow.slack if flow else None
+        draft.data = network_data(table, draft.given.directory, slack, _static_vars(draft))
         _name_in_events(draft, names_without_units(draft.data))
         draft.found.questions += draft.data.changes
         draft.found.records += draft.data.records
     except InputError as error:
         where = draft.given.place("network", source) if source else draft.given.place("network")
         draft.note_network(where, str(error))
+
+
+def _static_vars(draft: Draft) -> Modelled:
+    """Return bus and identifier of the records of static var compensators; a file that has none is not read here."""
+    units, network = draft.given.case.units, draft.given.case.network
+    if units is None or units.dyr is None or network is None or network.raw is None:
+        return ()
+    path = seen_from_here(draft.given.directory / units.dyr)
+    if not path.is_file() or not any(name.encode() in read_bytes(path) for name in RECORDS):
+        return ()
+    left = {name.upper() for name in units.dyr_leave_out}
+    wanted = {*RECORDS} - left
+    return frozenset((x.bus, x.machine) for x in read_dyr(path) if x.name in wanted)
 
 
 def _name_in_events(draft: Draft, names: ElementNames) -> None:

@@ -25,6 +25,7 @@ from orchestrator.cases.networks.psse.raw_tables import (
     RawTables,
 )
 from orchestrator.cases.networks.psse.records import leave_out
+from orchestrator.cases.networks.psse.static_vars import Modelled, units_of_devices
 from orchestrator.cases.networks.source_changes import Changes
 from orchestrator.cases.networks.sources import SourceTables
 
@@ -35,13 +36,16 @@ def read_raw(
     *,
     keep_load_parts: bool = False,
     slack: str | None = None,
+    modelled: Modelled = (),
 ) -> RawNetwork:
     """Read a file.
 
     ``slack``: the unit or bus that a case names as the reference: nothing then stands at the file's own one where no
-    machine is in service."""
+    machine is in service. ``modelled``: bus and identifier of records of static var compensators, which may be of FACTS
+    devices."""
     raw = read_file(path)
-    return _network(RawTables(raw, Changes(raw.place), keep_load_parts), leaving_out, slack)
+    net = RawTables(raw, Changes(raw.place), keep_load_parts)
+    return _network(net, leaving_out, slack, modelled)
 
 
 def _read_devices(net: RawTables, leaving_out: Sequence[str]) -> None:
@@ -56,7 +60,9 @@ def _read_devices(net: RawTables, leaving_out: Sequence[str]) -> None:
             net.add_branch(start, end, z, 1)
 
 
-def _network(net: RawTables, leaving_out: Sequence[str], slack: str | None = None) -> RawNetwork:
+def _network(
+    net: RawTables, leaving_out: Sequence[str], slack: str | None, modelled: Modelled
+) -> RawNetwork:
     for line, section in net.raw.guessed.items():
         text = f"does not say which data begin, as other lines do: taken as {section} data, which are next in order"
         net.changes.note(line, text)
@@ -73,6 +79,7 @@ def _network(net: RawTables, leaving_out: Sequence[str], slack: str | None = Non
     read_transformers(net)
     _read_devices(net, leaving_out)
     machines = read_machines(net)
+    machines = (*machines, *units_of_devices(net, machines, modelled))
     machines = (*machines, *infinite_buses(net, machines, slack))
     leave_out_bare_buses(net, machines)
     gen = np.zeros((len(machines), GENERATOR_COLUMNS))
